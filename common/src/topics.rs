@@ -125,6 +125,8 @@ topics! {
     TICK_LIMIT "tick_limit": TickLimitSample, SUPERVISOR, on_change(RESTATE);
     /// The stages' processes, as the supervisor sees them.
     ROSTER "roster": RosterHeader RosterEntry, SUPERVISOR, on_change(RESTATE), limits: ROSTERS;
+    /// How old the samples of a mirror on another machine are. The bus of the robot itself has no such sample.
+    MIRROR "mirror": MirrorSample, SUPERVISOR, on_change(RESTATE);
     /// A stage's process ended: cause, ages, the end of its log, what follows.
     DEATHS "deaths": DeathSample, SUPERVISOR, Rate::WhenItHappens;
     /// The robot should make progress and does not: how, and what is tried.

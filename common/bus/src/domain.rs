@@ -165,6 +165,16 @@ impl Domain {
         self.directory.join("run-directory")
     }
 
+    /// A link whose text names where the robot runs, if this domain is a mirror of a robot of another machine.
+    pub fn mirror_link(&self) -> PathBuf {
+        self.directory.join("mirror")
+    }
+
+    /// Where the robot runs that this domain mirrors; none if the robot itself has the domain, or nobody.
+    pub fn mirrors(&self) -> Option<String> {
+        Some(fs::read_link(self.mirror_link()).ok()?.display().to_string())
+    }
+
     /// The socket of the link that an operator's stop needs no middleware for.
     pub fn stop_socket(&self) -> PathBuf {
         self.directory.join("stop")
@@ -240,16 +250,18 @@ fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
     found.cloned().unwrap_or_default()
 }
 
-/// The process that holds `lock`, the supervisor's. The system's list of locks names it; where the list misses it, the number in the
-/// file does.
+/// The process that holds `lock`, the supervisor's, which wrote its number in the file. The system's list of locks may miss it, or name
+/// the holder of a file with the same number on another file system, and a container has other numbers for processes.
 fn holder_of(mut lock: &File) -> io::Result<u32> {
-    if let Some(&listed) = holders(lock)?.first() {
-        return Ok(listed);
-    }
+    let listed = holders(lock)?;
     let mut named = String::new();
     lock.read_to_string(&mut named)?;
-    let unknown = |_| io::Error::other("nobody says which process holds the supervisor's lock");
-    named.trim().parse().map_err(unknown)
+    match named.trim().parse() {
+        Ok(named) if listed.is_empty() || listed.contains(&named) => Ok(named),
+        _ => listed.first().copied().ok_or_else(|| {
+            io::Error::other("nobody says which process holds the supervisor's lock")
+        }),
+    }
 }
 
 #[cfg(test)]

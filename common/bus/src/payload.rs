@@ -75,8 +75,9 @@ pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H
         return Some((header, Vec::new()));
     }
     let count = u32::decode(&mut from)? as usize;
-    // The message may state any length, but each element takes at least a byte.
-    let count = (count <= from.left()).then_some(count)?;
+    // The message may state any length, but an element takes a byte or more, and at least half of its size in memory.
+    let least = size_of::<E>().div_ceil(2);
+    let count = (count <= from.left() / least).then_some(count)?;
     let mut slice = vec![E::default(); count];
     E::decode_all(&mut slice, &mut from)?;
     Some((header, slice))

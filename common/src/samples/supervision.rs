@@ -435,6 +435,20 @@ impl RequestSample {
     }
 }
 
+payloads! {
+    /// How old what a mirror shows is.
+    "firsthand.Mirror" MirrorSample {
+        /// The newest sample was published on the robot's machine so long ago at most, nanoseconds.
+        age_ns: u64,
+    }
+}
+
+impl MirrorSample {
+    pub const fn age_s(&self) -> f64 {
+        self.age_ns as f64 * 1e-9
+    }
+}
+
 wire_enum! {
     /// A fault that can be injected into a running stage; [`crate::faults::TABLE`] says where and how.
     #[derive(Serialize, Deserialize)]

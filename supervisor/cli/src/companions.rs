@@ -36,7 +36,7 @@ const fn laboratory(name: &'static str, about: &'static str) -> Companion {
 pub const LABORATORY: &str = "firsthand-lab";
 
 /// THE table: the package, completions, help and the manual page know them from here.
-pub static TABLE: [Companion; 8] = [
+pub static TABLE: [Companion; 9] = [
     viewer(
         "top",
         "firsthand-top",
@@ -49,6 +49,7 @@ pub static TABLE: [Companion; 8] = [
     ),
     viewer("ros2", "firsthand-ros2", "Show a robot in ROS 2, to RViz and to other nodes"),
     viewer("foxglove", "firsthand-foxglove", "Serve a robot to Foxglove or Lichtblick, live"),
+    viewer("remote", "firsthand-remote", "Show a robot of another machine on this one, read-only"),
     laboratory("evaluate", "Run missions on many worlds and count successes by the ground truth"),
     laboratory(
         "experiments",

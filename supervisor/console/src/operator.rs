@@ -38,6 +38,7 @@ pub fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
 /// where it still names a process that has ended, the successor is waited for.
 pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result {
     let domain = Domain::of(robot.clone());
+    operator::refuse_mirror(&domain)?;
     // A frozen supervisor publishes nothing.
     if stage == "supervisor" {
         let holder = domain.supervisor();

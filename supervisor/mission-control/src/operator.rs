@@ -95,6 +95,7 @@ const LINK_ANSWERS: Duration = Duration::from_millis(200);
 pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let asked_ns = monotonic_ns();
     let domain = Domain::of(robot.clone());
+    refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
     let link = stop_socket::Operator::connect(&domain)
         .map_err(|error| OperatorError::System("open a socket to the link", error))?
@@ -218,6 +219,7 @@ fn stopped_for_good(link: &LinkSample) -> bool {
 
 pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
     let domain = Domain::of(robot.clone());
+    refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
     // The link's own stop ends with this alone. Where no link runs, the next one need not know of it.
     let _ = match stop_socket::Operator::connect(&domain) {
@@ -313,9 +315,24 @@ fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
     OperatorError::refused(code(answer), message)
 }
 
+/// Refuse an order to a mirror: the robot is on another machine, which lets none in.
+///
+/// # Errors
+/// Where `domain` is a mirror; the order is given on the robot's machine.
+pub fn refuse_mirror(domain: &Domain) -> Result<(), OperatorError> {
+    let Some(at) = domain.mirrors() else { return Ok(()) };
+    let message = format!(
+        "this is a mirror of robot {} at {at}, and orders are not let in; give them on its machine",
+        domain.robot
+    );
+    Err(OperatorError::refused("mirror", message))
+}
+
 /// Send a request to the supervisor, and wait until the roster has its answer.
 fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
-    let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
+    let domain = Domain::of(robot.clone());
+    refuse_mirror(&domain)?;
+    let bus = roster::join(&domain, "operator")?;
     // The roster is opened first, so that the answer is not missed.
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;

@@ -107,7 +107,7 @@ impl DomainLock {
         self.bus.as_ref().map(|(_, bus)| Rc::clone(bus))
     }
 
-    /// Link `at` in the domain's directory to the directory of the run.
+    /// Link `at` in the domain's directory to `run`: the directory of the run, or the place of the robot that is mirrored.
     pub fn link_to_run(&mut self, run: &Path, at: PathBuf) -> Result<(), DomainError> {
         symlink(run, &at).map_err(failed("make", &at))?;
         self.links.push((at, run.to_path_buf()));
@@ -265,7 +265,8 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
 }
 
 fn remove_run(domain: &Domain) -> Result<(), DomainError> {
-    let files = [domain.run_link(), domain.run_directory(), domain.stop_socket()];
+    let files =
+        [domain.run_link(), domain.run_directory(), domain.stop_socket(), domain.mirror_link()];
     files.iter().try_for_each(|file| remove_file(file))
 }
 

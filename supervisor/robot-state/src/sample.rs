@@ -5,9 +5,9 @@ use common::{
     clock::MissionTime,
     samples::{
         CommandSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader,
-        FollowingSample, GridHeader, GuidanceSample, LinkSample, PoseSample, PowerSample,
-        RangeReading, RangesHeader, RequestSample, RosterEntry, RosterHeader, ScanHeader,
-        StallSample, TargetSample, WheelSample,
+        FollowingSample, GridHeader, GuidanceSample, LinkSample, MirrorSample, PoseSample,
+        PowerSample, RangeReading, RangesHeader, RequestSample, RosterEntry, RosterHeader,
+        ScanHeader, StallSample, TargetSample, WheelSample,
     },
     topics::{self, AnyTopic, OPERATOR, Spec},
 };
@@ -54,6 +54,7 @@ samples! {
     Power(PowerSample): POWER by one,
     Grid(GridHeader, Vec<u8>): GRID by slice,
     Field(FieldHeader, Vec<FieldCell>): FIELD by slice,
+    Mirror(MirrorSample): MIRROR by one,
     Roster(RosterHeader, Vec<RosterEntry>): ROSTER by slice,
     Death(DeathSample): DEATHS by one,
     Directive(DirectiveSample): DIRECTIVE by one,

@@ -7,8 +7,8 @@ use common::{
     mission::Mission,
     samples::{
         CommandSample, DeathSample, FieldCell, FieldHeader, FollowState, FollowingSample,
-        GridHeader, GuidanceSample, GuidanceStatus, HoldReason, LinkSample, PoseSample,
-        PowerSample, RosterEntry, RosterHeader, TargetPoint, TargetSample, name_str,
+        GridHeader, GuidanceSample, GuidanceStatus, HoldReason, LinkSample, MirrorSample,
+        PoseSample, PowerSample, RosterEntry, RosterHeader, TargetPoint, TargetSample, name_str,
     },
 };
 use glam::DVec2;
@@ -23,6 +23,9 @@ use crate::{
 const MOST_POINTS: usize = 2000;
 /// The least distance between two points of the way, metres.
 const POINT_EVERY_M: f64 = 0.05;
+
+/// From this age on, what a mirror shows does not count as what the robot does. A robot's state comes several times a second.
+const OLD_S: f64 = 1.0;
 
 /// What a robot is doing. Samples that have not come yet are none, lists are empty. Lengths are metres in the mission frame.
 #[derive(Clone, Debug, Default)]
@@ -47,6 +50,8 @@ pub struct RobotState {
     pub command: Option<CommandSample>,
     pub link: Option<LinkSample>,
     pub power: Option<PowerSample>,
+    /// The age of what is shown, if a mirror shows a robot of another machine.
+    pub mirror: Option<MirrorSample>,
     /// The newest death of each stage that died.
     pub deaths: BTreeMap<String, DeathSample>,
     /// The number of stalls that were seen.
@@ -70,6 +75,7 @@ impl RobotState {
             Sample::Target(target) => self.target = Some(*target),
             Sample::Following(following) => self.following = Some(*following),
             Sample::Power(power) => self.power = Some(*power),
+            Sample::Mirror(mirror) => self.mirror = Some(*mirror),
             Sample::Link(link) => self.link = Some(*link),
             Sample::Stall(_) => self.stalls += 1,
             Sample::Death(death) => {
@@ -136,8 +142,27 @@ impl RobotState {
         self.target().into_iter().flat_map(|sent| [&sent.target].into_iter().chain(sent.ahead()))
     }
 
-    /// What the robot does, in a sentence, and how important that is.
+    /// What the robot does, in a sentence, and how important that is. A mirror says how old that is.
     pub fn doing(&self) -> (Kind, String) {
+        let (kind, text) = self.does();
+        match self.age_in_words() {
+            None => (kind, text),
+            Some((is_old, age)) => {
+                (if is_old { Kind::Bad } else { kind }, format!("{text} ({age})"))
+            }
+        }
+    }
+
+    /// The age of what a mirror shows, and whether it is too old; none on the robot's machine.
+    pub fn age_in_words(&self) -> Option<(bool, String)> {
+        let age_s = self.mirror?.age_s();
+        let is_old = age_s >= OLD_S;
+        let how = if is_old { "NOT HEARD for" } else { "as of" };
+        let ago = if is_old { "" } else { " ago" };
+        Some((is_old, format!("another machine, {how} {age_s:.1} s{ago}")))
+    }
+
+    fn does(&self) -> (Kind, String) {
         let supervisor = self.supervisor.unwrap_or_default();
         let status = self.guidance.unwrap_or_default().status;
         let (kind, text) = match (&self.link, HoldReason::from_byte(supervisor.reason)) {
@@ -266,6 +291,19 @@ mod tests {
         assert_eq!((state.way_to_go(), state.targets().count()), (None, 0), "it has no target");
         state.link = Some(LinkSample { connected: 0, losses: 1, ..LinkSample::default() });
         assert_eq!(state.doing(), (Kind::Bad, "the robot does not answer".to_owned()));
+    }
+
+    #[test]
+    fn a_mirror_that_is_not_heard_says_so_with_the_age() {
+        let mut state = RobotState::default();
+        let mut doing = |age_ns| {
+            state.apply(&Sample::Mirror(MirrorSample { age_ns, ..MirrorSample::default() }));
+            state.doing()
+        };
+        let told = "the robot starts (another machine, as of 0.2 s ago)".to_owned();
+        assert_eq!(doing(200_000_000), (Kind::Warn, told));
+        let told = "the robot starts (another machine, NOT HEARD for 7.0 s)".to_owned();
+        assert_eq!(doing(7_000_000_000), (Kind::Bad, told));
     }
 
     #[test]

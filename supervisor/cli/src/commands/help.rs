@@ -39,6 +39,7 @@ static GUIDE: &[Page] = guide! {
     "your-robot",
     "operate",
     "attach",
+    "another-machine",
     "nav2-planner",
     "recordings",
     "break-it",

@@ -54,6 +54,8 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
+    /// Where the robot runs, if a mirror answers for it.
+    mirror: Option<MirrorStatus>,
     /// The target; none if the robot waits for one, or none is published.
     target: Option<TargetStatus>,
     /// Where the robot believes it is; none if it is not published.
@@ -65,6 +67,13 @@ struct Status<'a> {
     /// The power; none if the robot does not report it.
     power: Option<PowerStatus>,
     stages: Vec<StageStatus<'a>>,
+}
+
+#[derive(Serialize)]
+struct MirrorStatus {
+    of: String,
+    /// The age of what is shown, at most.
+    age_s: f64,
 }
 
 #[derive(Serialize)]
@@ -162,11 +171,12 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 /// The topics of a status. The supervisor publishes the target before its roster.
-static WANTED: [&dyn AnyTopic; 6] = [
+static WANTED: [&dyn AnyTopic; 7] = [
     &topics::ROSTER,
     &topics::LINK,
     &topics::POWER,
     &topics::FOLLOWING,
+    &topics::MIRROR,
     &topics::TARGET,
     &topics::POSE,
 ];
@@ -247,12 +257,20 @@ fn status<'a>(
     waited: Duration,
 ) -> Option<Status<'a>> {
     let header = robot.supervisor.filter(|_| is_complete(robot, waited))?;
+    let mirrors = Domain::of(arguments.robot.clone()).mirrors();
+    // A status without its age would look like that of a robot of this machine.
+    if mirrors.is_some() && robot.mirror.is_none() {
+        return None;
+    }
     Some(Status {
         robot: &arguments.robot,
         supervisor_pid: header.supervisor_pid,
         order: order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)),
         tick: header.stamp.tick,
         mission_time_s: header.stamp.time().seconds(),
+        mirror: robot
+            .mirror
+            .map(|mirror| MirrorStatus { of: mirrors.unwrap_or_default(), age_s: mirror.age_s() }),
         target: robot.target().map(|&TargetSample { number, last, target, .. }| TargetStatus {
             number,
             last,
@@ -335,6 +353,9 @@ impl fmt::Display for Status<'_> {
             "robot {}: supervisor {}, {}, {:.1} s into the mission",
             self.robot, self.supervisor_pid, self.order, self.mission_time_s
         )?;
+        if let Some(MirrorStatus { of, age_s }) = &self.mirror {
+            writeln!(f, "a mirror of the robot at {of}; this is {age_s:.1} s old, or less")?;
+        }
         if let Some(TargetStatus { number, last, x_m, y_m, to_go_m }) = &self.target {
             write!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;
             writeln!(f, "{}", to_go_m.map_or(String::new(), |m| format!(", {m:.2} m to go")))?;

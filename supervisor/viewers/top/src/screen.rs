@@ -92,7 +92,10 @@ fn heading(view: &View) -> Line<'static> {
     } else {
         waiting::ENDED.to_owned()
     };
-    Line::from(vec![Span::styled(robot, TITLE), Span::raw(kind), Span::raw(state)])
+    let (is_old, age) = view.state.age_in_words().unwrap_or_default();
+    let age = if age.is_empty() { age } else { format!("; {age}") };
+    let age = Span::styled(age, if is_old { BAD } else { Style::new() });
+    Line::from(vec![Span::styled(robot, TITLE), Span::raw(kind), Span::raw(state), age])
 }
 
 fn keys_line() -> Line<'static> {

@@ -147,6 +147,7 @@ fn understood(words: &[String]) -> Result<Option<commands::Command>, clap::Error
         Some("top") => by::<firsthand_top::Arguments>(&words[1..]),
         Some("page") => by::<firsthand_page::Arguments>(&words[1..]),
         Some("ros2") => by::<firsthand_ros2::Arguments>(&words[1..]),
+        Some("remote") => by::<firsthand_remote::Arguments>(&words[1..]),
         Some("foxglove") => by::<firsthand_foxglove::Arguments>(&words[1..]),
         Some(name) if companions::find(name.as_ref()).is_some() => {
             by::<firsthand_lab::Arguments>(words)

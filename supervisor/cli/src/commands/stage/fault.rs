@@ -12,7 +12,7 @@ use common::{
     waiter::Waiter,
 };
 
-use mission_control::operator::{PATIENCE, find, new_id};
+use mission_control::operator::{PATIENCE, find, new_id, refuse_mirror};
 
 use console::{
     failure::{Refused, Result},
@@ -53,7 +53,9 @@ pub fn main(arguments: &Arguments) -> Result {
         return Err(Refused::new("unknown-fault", message).into());
     };
     let robot = &arguments.robot;
-    let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
+    let domain = Domain::of(robot.clone());
+    refuse_mirror(&domain)?;
+    let bus = roster::join(&domain, "operator")?;
     let simulated = find(&mut Roster::open(&bus)?, robot, |header, _| Some(header.simulated == 1))?;
     if !simulated && !arguments.break_a_real_robot {
         return Err(real_robot(robot).into());

@@ -1,0 +1,7 @@
+//! The executable `firsthand-remote`; see the library.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    firsthand_remote::main()
+}

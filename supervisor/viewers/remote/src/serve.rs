@@ -1,0 +1,195 @@
+//! From a robot's bus to a session, as a consumer that no stage waits for.
+
+use std::{
+    fs,
+    hash::{BuildHasher as _, RandomState},
+    path::PathBuf,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+use common::{
+    bus::{AnyReader, Bus, BusError, Reader},
+    clock::monotonic_ns,
+    domain::{Domain, RobotName},
+    follower::{Event, Follower},
+    run,
+    samples::{HoldReason, Order, RosterEntry, RosterHeader},
+    topics::{self, AnyTopic, EVERY_STAGE, Logged, OPERATOR},
+};
+use console::{
+    failure::{Refused, Result},
+    stream::{LOOK_EVERY, Stream},
+    words::order,
+};
+use zenoh::{Session, Wait, pubsub::Publisher};
+
+use crate::{
+    session::{self, Certificates, failed},
+    wire::{Hello, Sent},
+};
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Arguments {
+    /// Name of the robot.
+    #[arg(long, default_value = "x80")]
+    robot: RobotName,
+    /// Where others connect: tls/ADDRESS:PORT, or tcp/ADDRESS:PORT on a network that you trust.
+    #[arg(long, required = true)]
+    listen: Vec<String>,
+    #[command(flatten)]
+    own: Certificates,
+    /// The authority of the certificates of those who may read, a PEM file.
+    #[arg(long)]
+    clients: Option<PathBuf>,
+    /// The common name in the certificate of one who may read; without it, all whom the authority knows.
+    #[arg(long, value_name = "NAME", requires = "clients")]
+    allow: Vec<String>,
+    /// A topic to serve, for example `field`; without it, all but the largest and those that operators write.
+    #[arg(long, value_name = "TOPIC")]
+    topic: Vec<String>,
+}
+
+/// What is answered to whoever asks.
+#[derive(Default)]
+struct Told {
+    hello: Hello,
+    /// The run file.
+    run: String,
+}
+
+/// One writer on the robot writes each of them. What operators write is not served, because the mirror must not look like one who asks.
+pub(crate) fn may_serve(topic: &dyn AnyTopic) -> bool {
+    let spec = topic.spec();
+    ![OPERATOR, EVERY_STAGE].contains(&spec.writer) && spec.name != topics::MIRROR.spec().name
+}
+
+fn topics(named: &[String]) -> Result<Vec<&'static dyn AnyTopic>> {
+    let all = topics::TABLE.iter().copied().filter(|topic| may_serve(*topic));
+    if named.is_empty() {
+        let large = |topic: &dyn AnyTopic| {
+            topic.spec().logged == Logged::WithFields
+                || topic.spec().name == topics::WIRE.spec().name
+        };
+        return Ok(all.filter(|topic| !large(*topic)).collect());
+    }
+    let find = |name: &String| {
+        let found = all.clone().find(|topic| topic.spec().name == name);
+        found.ok_or_else(|| {
+            Refused::new("unknown-topic", format!("topic {name:?} is not served")).into()
+        })
+    };
+    named.iter().map(find).collect()
+}
+
+struct Readers {
+    topics: Vec<Box<dyn AnyReader>>,
+    roster: Reader<RosterHeader, RosterEntry>,
+}
+
+pub(crate) fn serve(arguments: &Arguments) -> Result {
+    let topics = topics(&arguments.topic)?;
+    // The threads of the session get the lower priority of this one.
+    let mut stream = Stream::open()?;
+    let Arguments { listen, own, clients, allow, robot, .. } = arguments;
+    let session = session::listen(listen, own, clients.as_deref(), allow)?;
+    let told = Arc::new(Mutex::new(Told::default()));
+    lock(&told).hello.robot = robot.to_string();
+    let _hello = answer(&session, robot, "hello", &told, |told| {
+        let hello = Hello { clock_ns: monotonic_ns(), ..told.hello.clone() };
+        serde_json::to_vec(&hello).unwrap_or_default()
+    })?;
+    let _run = answer(&session, robot, "run", &told, |told| told.run.clone().into_bytes())?;
+    let publishers = topics.iter().map(|topic| {
+        let key = format!("firsthand/{robot}/topic/{}", topic.spec().name);
+        session.declare_publisher(key).wait().map_err(failed)
+    });
+    let publishers = publishers.collect::<Result<Vec<_>>>()?;
+    let domain = Domain::of(robot.clone());
+    let open = |bus: &Bus| {
+        let readers = topics.iter().map(|topic| topic.recorder_reader(bus));
+        let readers = readers.collect::<Result<_, BusError>>()?;
+        Ok(Readers { topics: readers, roster: bus.reader(&topics::ROSTER)? })
+    };
+    let mut follower = Follower::new(domain.clone(), "remote", &topics::LINK, open)
+        .also_on([&topics::ROSTER as _]);
+    stream.write("serving\n")?;
+    let mut message = Vec::new();
+    while !stream.has_ended() {
+        match follower.wait(LOOK_EVERY)? {
+            Event::Connected | Event::Disconnected => {
+                let mut told = lock(&told);
+                (told.hello.id, told.run) = (0, String::new());
+            }
+            Event::Nothing => {}
+            Event::Samples(readers) => {
+                let id = tell(&mut lock(&told), &domain, &mut readers.roster)?;
+                for (reader, publisher) in readers.topics.iter_mut().zip(&publishers) {
+                    put(id, reader.as_mut(), publisher, &mut message)?;
+                }
+            }
+        }
+    }
+    // Closing it would wait for a link that may be cut.
+    std::mem::forget(session);
+    Ok(())
+}
+
+/// Bring `told` up to date. Returns the number of the run.
+fn tell(
+    told: &mut Told,
+    domain: &Domain,
+    roster: &mut Reader<RosterHeader, RosterEntry>,
+) -> Result<u64> {
+    while let Some(entries) = roster.next_slice()? {
+        let header = entries.header();
+        told.hello.order =
+            order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)).to_owned();
+        told.hello.mission_time_s = header.stamp.time().seconds();
+    }
+    // The run file comes after the bus.
+    if told.hello.id == 0
+        && let Ok(text) = fs::read_to_string(domain.run_directory().join(run::FILE_NAME))
+    {
+        told.run = text;
+        told.hello.id = RandomState::new().hash_one(std::process::id()) | 1;
+    }
+    Ok(told.hello.id)
+}
+
+fn put(
+    id: u64,
+    reader: &mut dyn AnyReader,
+    publisher: &Publisher<'_>,
+    message: &mut Vec<u8>,
+) -> Result {
+    while reader.next_message(message)?.is_some() {
+        let sent = Sent { id, sent_ns: monotonic_ns() };
+        // What a slow link cannot take is dropped, and nothing waits for it.
+        publisher.put(message.as_slice()).attachment(sent.encoded()).wait().map_err(failed)?;
+    }
+    Ok(())
+}
+
+type Answering = zenoh::query::Queryable<()>;
+
+/// Answer whoever asks for `what` of `robot`.
+fn answer(
+    session: &Session,
+    robot: &RobotName,
+    what: &str,
+    told: &Arc<Mutex<Told>>,
+    bytes: impl Fn(&Told) -> Vec<u8> + Send + Sync + 'static,
+) -> Result<Answering> {
+    let key = format!("firsthand/{robot}/{what}");
+    let (told, own) = (Arc::clone(told), key.clone());
+    let queryable = session.declare_queryable(key).callback(move |query| {
+        let bytes = bytes(&lock(&told));
+        // Whoever asked may have gone.
+        let _ = query.reply(own.as_str(), bytes).wait();
+    });
+    queryable.wait().map_err(failed)
+}
+
+fn lock(told: &Mutex<Told>) -> MutexGuard<'_, Told> {
+    told.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,139 @@
+//! Sessions of zenoh, with certificates. Whoever connects may read and nothing else: what another session puts is not taken.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use common::grid::MAX_CELLS;
+use console::{
+    failure::{Failure, Refused, Result},
+    output::write_stderr,
+};
+use serde_json::{Value, json};
+use zenoh::{Session, Wait};
+
+const PORT: u16 = 7447;
+/// A link over which nothing came for so long is lost, and made again.
+const LEASE_MS: u64 = 2000;
+/// The longest message: a map of the most cells.
+const LONGEST: usize = (MAX_CELLS as usize).pow(2) + (1 << 16);
+
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct Certificates {
+    /// This side's certificate, a PEM file.
+    #[arg(long, requires = "key")]
+    cert: Option<PathBuf>,
+    /// The private key of the certificate.
+    #[arg(long, requires = "cert")]
+    key: Option<PathBuf>,
+}
+
+/// Listen at `endpoints`. With `clients` only those may read whose certificate is of that authority, and of them those in `names`, if
+/// there are any.
+pub(crate) fn listen(
+    endpoints: &[String],
+    own: &Certificates,
+    clients: Option<&Path>,
+    names: &[String],
+) -> Result<Session> {
+    let endpoints: Vec<_> = endpoints.iter().map(|at| endpoint(at, own.cert.is_some())).collect();
+    let secured = endpoints.iter().all(|at| at.starts_with("tls/"));
+    if !secured && clients.is_some() {
+        let message =
+            "over tcp nobody has a certificate; with --clients each --listen is tls/ADDRESS:PORT";
+        return Err(Refused::new("no-tls", message).into());
+    }
+    if !secured {
+        write_stderr(
+            "firsthand: over tcp whoever reaches the port reads the robot; tls with --clients says who may\n",
+        );
+    }
+    let mut reader = json!({ "id": "readers" });
+    if !names.is_empty() {
+        reader["cert_common_names"] = json!(names);
+    }
+    let rule = |id, flow, messages: &[&str]| json!({ "id": id, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": ["firsthand/**"] });
+    open(&json!({
+        "mode": "peer",
+        "listen": { "endpoints": endpoints, "exit_on_failure": true, "timeout_ms": 0 },
+        "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        "access_control": {
+            "enabled": true,
+            "default_permission": "deny",
+            "rules": [
+                rule("ask", "ingress", &["declare_subscriber", "query"]),
+                rule("tell", "egress", &["put", "reply", "declare_queryable"]),
+            ],
+            "subjects": [reader],
+            "policies": [{ "rules": ["ask", "tell"], "subjects": ["readers"] }],
+        },
+        "transport": transport(&json!({
+            "root_ca_certificate": clients,
+            "enable_mtls": clients.is_some(),
+            "listen_certificate": own.cert,
+            "listen_private_key": own.key,
+            "close_link_on_expiration": true,
+        })),
+    }))
+}
+
+#[derive(Clone, Debug, Default, Args)]
+pub(crate) struct Connecting {
+    /// The authority of the robot's certificate, a PEM file. Without it the connection is over tcp, and nothing says whose robot it is.
+    #[arg(long)]
+    ca: Option<PathBuf>,
+    #[command(flatten)]
+    own: Certificates,
+}
+
+impl Connecting {
+    pub(crate) fn endpoint(&self, at: &str) -> String {
+        endpoint(at, self.ca.is_some())
+    }
+
+    /// Connect to `at`, and again whenever the link is lost.
+    pub(crate) fn connect(&self, at: &str) -> Result<Session> {
+        let Self { ca, own } = self;
+        open(&json!({
+            "mode": "peer",
+            "connect": { "endpoints": [self.endpoint(at)], "exit_on_failure": false, "timeout_ms": -1,
+                "retry": { "period_init_ms": 500, "period_max_ms": 2000, "period_increase_factor": 2 } },
+            "listen": { "endpoints": [] },
+            "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+            "transport": transport(&json!({
+                "root_ca_certificate": ca,
+                "enable_mtls": own.cert.is_some(),
+                "connect_certificate": own.cert,
+                "connect_private_key": own.key,
+            })),
+        }))
+    }
+}
+
+fn transport(tls: &Value) -> Value {
+    json!({
+        "unicast": { "max_sessions": 64, "compression": { "enabled": true } },
+        "link": { "tx": { "lease": LEASE_MS }, "rx": { "max_message_size": LONGEST }, "tls": tls },
+        "shared_memory": { "enabled": false },
+    })
+}
+
+fn open(config: &Value) -> Result<Session> {
+    let config = zenoh::Config::from_json5(&config.to_string()).map_err(failed)?;
+    zenoh::open(config).wait().map_err(failed)
+}
+
+/// An error of zenoh, as one of ours.
+pub(crate) fn failed(error: zenoh::Error) -> Failure {
+    error
+}
+
+/// `at` as zenoh writes it: `tls/HOST:PORT` or `tcp/HOST:PORT`, of which the first and the last part may be left out.
+pub(crate) fn endpoint(at: &str, secured: bool) -> String {
+    let (protocol, address) =
+        at.split_once('/').unwrap_or((if secured { "tls" } else { "tcp" }, at));
+    let has_port = address.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());
+    match has_port {
+        true => format!("{protocol}/{address}"),
+        false => format!("{protocol}/{address}:{PORT}"),
+    }
+}
