@@ -5,17 +5,18 @@ cells. The centre of the cell (row, column) is at x = column, y = row.
 """
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-Cell = tuple[int, int]
+_Cell = tuple[int, int]
 """(row, column), both from 0."""
 
 class SolveError(ValueError):
     """A map is invalid, or a solve has no field: the message says why and what to do."""
 
+@final
 class Verification:
     """What the check of every cell found; without it no field is handed out."""
 
@@ -28,17 +29,23 @@ class Verification:
     reachable: int
     """Cells from which the target can be reached, its own included."""
 
+@final
 class Field:
     """A verified field. u is 1 at the target, 0 on blocked cells and outside the map, and the mean of its neighbours elsewhere."""
 
-    shape: tuple[int, int]
-    """(rows, columns)."""
-    target: Cell
-    u: NDArray[np.float64]
-    """u of each cell, a new array; 0 also where it is below 1e-308."""
-    log10_u: NDArray[np.float64]
-    """log10 of u of each cell over its full range, a new array; -inf where u is 0."""
-    verification: Verification
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+    @property
+    def target(self) -> _Cell: ...
+    @property
+    def u(self) -> NDArray[np.float64]:
+        """u of each cell, a new array; 0 also where it is below 1e-308."""
+    @property
+    def log10_u(self) -> NDArray[np.float64]:
+        """log10 of u of each cell over its full range, a new array; -inf where u is 0."""
+    @property
+    def verification(self) -> Verification: ...
 
     def guidance(
         self, x: float, y: float
@@ -48,12 +55,12 @@ class Field:
         """The direction of `guidance`; None in the target's cell and where no path leads."""
     def directions(self) -> NDArray[np.float64]:
         """The direction at the centre of each cell: an array (rows, columns, 2) of (x, y); (0, 0) where there is none."""
-    def path(self, start: Cell) -> NDArray[np.float64]:
+    def path(self, start: _Cell) -> NDArray[np.float64]:
         """Positions (x, y) from the centre of a cell to that of the target: an array (steps, 2).
 
         Raises SolveError if no path leads there.
         """
-    def update(self, changes: Mapping[Cell, bool]) -> None:
+    def update(self, changes: Mapping[_Cell, bool]) -> None:
         """Block or free cells and solve again, starting from this field: {(row, column): is it free}.
 
         Raises SolveError; the field then stays as it was.
@@ -61,7 +68,7 @@ class Field:
 
 def solve(
     free: NDArray[np.bool_],
-    target: Cell,
+    target: _Cell,
     screening: float | None = None,
     *,
     threads: int = 1,

@@ -1,7 +1,14 @@
 """Tests of the wheel: python -m unittest discover -s services/planner/harmonic/python/tests"""
 
+import contextlib
+import io
+import os
+import re
+import subprocess
+import tempfile
 import threading
 import unittest
+from pathlib import Path
 
 import numpy as np
 from harmonic_field import SolveError, solve
@@ -86,6 +93,27 @@ class Fields(unittest.TestCase):
         for other in [free.astype(np.int8), free[0], free.tolist()]:
             with self.assertRaisesRegex(TypeError, "NumPy array of bool with two dimensions"):
                 solve(other, (2, 17))
+
+    def test_the_example_of_the_readme_says_what_its_comment_says(self):
+        readme = (Path(__file__).parents[2] / "README.md").read_text()
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            exec(re.search("```python\n(.*?)```", readme, re.DOTALL)[1], {})
+        self.assertTrue(said.getvalue().startswith("(0.9"), said.getvalue())
+        self.assertTrue(said.getvalue().endswith("[17.  5.]\n"), said.getvalue())
+
+    @unittest.skipUnless("FIRSTHAND" in os.environ, "FIRSTHAND names no executable to compare with")
+    def test_u_is_that_of_firsthand_field(self):
+        free = np.pad(hall(), 1)
+        with tempfile.TemporaryDirectory() as work:
+            rows = "\n".join("".join("@."[cell] for cell in row) for row in free.astype(int))
+            Path(work, "hall.map").write_text(f"type octile\nheight {len(free)}\nwidth {len(free[0])}\nmap\n{rows}\n")
+            command = [os.environ["FIRSTHAND"], "field", "hall.map", "--target-cell", "18,3", "--out", "hall.npy"]
+            subprocess.run(command, cwd=work, check=True, capture_output=True)
+            values = np.load(f"{work}/hall.npy")
+        field = solve(free, (3, 18))
+        np.testing.assert_array_equal(field.u, np.ldexp(values["mantissa"], values["exponent"]))
+        np.testing.assert_allclose(field.directions()[2, 3], [values["ex"][2, 3], values["ey"][2, 3]], atol=1e-6)
 
     def test_u_has_its_full_range_and_other_threads_run_while_it_is_solved(self):
         free = np.ones((801, 2001), bool)
