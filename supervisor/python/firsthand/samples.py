@@ -20,10 +20,10 @@ def dtype_of(kind: Any) -> np.dtype[Any]:
         length: int = kind._length_
         if kind._type_ is ctypes.c_char:
             return np.dtype(f"S{length}")
-        array: np.dtype[Any] = np.dtype((dtype_of(kind._type_), (length,)))
-        return array
+        return np.dtype((dtype_of(kind._type_), (length,)))
     if not issubclass(kind, ctypes.Structure):
-        return np.dtype(kind)
+        number: np.dtype[Any] = np.dtype(kind)
+        return number
     names = [field[0] for field in kind._fields_]
     formats, offsets = [dtype_of(field[1]) for field in kind._fields_], [getattr(kind, name).offset for name in names]
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": ctypes.sizeof(kind)})

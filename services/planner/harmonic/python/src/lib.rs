@@ -80,16 +80,16 @@ impl Field {
         (row, col)
     }
 
-    fn guidance(&self, x: f64, y: f64) -> (&'static str, Option<[f64; 2]>) {
+    fn guidance(&self, x: f64, y: f64) -> (&'static str, Option<(f64, f64)>) {
         match self.solved.guidance(x, y) {
-            Guidance::Along(direction) => ("along", Some(direction)),
+            Guidance::Along(direction) => ("along", Some(direction.into())),
             Guidance::AtTarget => ("at_target", None),
-            Guidance::WayOut(direction) => ("way_out", Some(direction)),
+            Guidance::WayOut(direction) => ("way_out", Some(direction.into())),
             Guidance::Unreachable => ("unreachable", None),
         }
     }
 
-    fn direction(&self, x: f64, y: f64) -> Option<[f64; 2]> {
+    fn direction(&self, x: f64, y: f64) -> Option<(f64, f64)> {
         self.guidance(x, y).1
     }
 
