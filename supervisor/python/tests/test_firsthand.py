@@ -1,12 +1,17 @@
 """Tests of the wheel on a simulated robot, which the executable that FIRSTHAND names drives: python -m unittest discover -s tests"""
 
+import contextlib
+import io
+import itertools
 import os
+import re
 import signal
 import subprocess
 import tempfile
 import threading
 import unittest
 from pathlib import Path
+from unittest import mock
 
 import firsthand
 import numpy as np
@@ -14,6 +19,19 @@ from firsthand import topics
 from firsthand.samples import dtype_of
 
 ROBOT = "ci-wheels"
+
+
+def lines_of(page):
+    """The first lines of Python on a page of the guide."""
+    text = (Path(__file__).parents[2] / "guide" / page).read_text()
+    return re.search("```python\n(.*?)```", text, re.DOTALL)[1]
+
+
+def said_by(lines):
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        exec(lines, {})
+    return said.getvalue()
 
 
 def setUpModule():
@@ -80,6 +98,12 @@ class Live(unittest.TestCase):
             held.extend(grids)
         self.assertEqual(len(held), 2)
 
+    def test_the_lines_of_the_guide_show_a_robot(self):
+        poses = itertools.islice(firsthand.follow(ROBOT, "pose"), 3)
+        with mock.patch("firsthand.follow", return_value=poses):
+            said = said_by(lines_of("attach.md").replace("x80", ROBOT))
+        self.assertRegex(said, r"^<robot ci-wheels at .*>\n(\d+ -?[\d.e-]+ -?[\d.e-]+\n){3}$")
+
     def test_the_state_of_a_robot_is_told_and_without_one_those_that_run(self):
         state = firsthand.robot_state(ROBOT)
         self.assertEqual(list(state.stages), ["link", "dead-reckoning", "mapper", "planner", "controller"])
@@ -126,6 +150,10 @@ class Recorded(unittest.TestCase):
         np.testing.assert_allclose(pose["t_s"], pose["stamp"]["stamp_ns"] / 1e9)
         self.assertEqual(self.recording.run["robot"], ROBOT)
         self.assertTrue(self.recording.is_complete)
+
+    def test_the_lines_of_the_guide_show_a_recording(self):
+        said = said_by(lines_of("recordings.md").replace("recording.mcap", str(directory / "recording.mcap")))
+        self.assertRegex(said, r"^Recording\(target: ")
 
     def test_parts_of_a_grid_make_the_map_that_was_followed(self):
         again = firsthand.Map()

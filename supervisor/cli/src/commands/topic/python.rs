@@ -190,6 +190,25 @@ mod tests {
     }
 
     #[test]
+    fn every_enum_that_the_comment_of_a_byte_names_is_in_the_python_module() {
+        fn check(kind: &Kind, module: &str) {
+            let Kind::Struct(structure) = kind else { return };
+            for field in &structure.fields {
+                check(&field.kind, module);
+                let named = field.doc.split("A [`").nth(1).and_then(|rest| rest.split('`').next());
+                if let (Some(name), Kind::Number("u8")) = (named, &field.kind) {
+                    assert!(module.contains(&format!("class {name}(enum.IntEnum):")), "{name}");
+                }
+            }
+        }
+        let module = module();
+        for topic in topics::TABLE {
+            check(&topic.layout().0, &module);
+        }
+        assert!(module.contains("GuidanceStatus.\n"), "comments lose the marks of links");
+    }
+
+    #[test]
     fn a_struct_in_python_prints_its_fields_and_those_of_its_structs() {
         let module = module() + "\nprint(repr(TOPICS['pose'][0](x_m=1.5)))";
         if let Ok(output) = std::process::Command::new("python3").args(["-c", &module]).output() {
