@@ -95,7 +95,7 @@ class Live(unittest.TestCase):
         self.assertFalse(np.shares_memory(copy.elements, grid.elements))
         held = [grid]
         with self.assertRaisesRegex(BufferError, "two arrays of grid are held"):
-            held.extend(grids)
+            held.extend(itertools.islice(grids, 50))
         self.assertEqual(len(held), 2)
 
     def test_the_lines_of_the_guide_show_a_robot(self):
@@ -156,9 +156,14 @@ class Recorded(unittest.TestCase):
         self.assertRegex(said, r"^Recording\(target: ")
 
     def test_parts_of_a_grid_make_the_map_that_was_followed(self):
-        again = firsthand.Map()
+        again, compared = firsthand.Map(), 0
         for grid in self.recording["grid"]:
+            # A keyframe for who comes late is the map that its parts have made.
+            if grid.header.part.keyframe and again.version == grid.header.part.version:
+                np.testing.assert_array_equal(again.cells, grid.elements)
+                compared += 1
             again.apply(grid)
+        self.assertGreater(compared, 0)
         self.assertEqual(again.version, whole.version)
         np.testing.assert_array_equal(again.cells, whole.cells)
 
