@@ -1,6 +1,7 @@
 """Tests of the wheel on a simulated robot, which the executable that FIRSTHAND names drives: python -m unittest discover -s tests"""
 
 import contextlib
+import ctypes
 import io
 import itertools
 import os
@@ -133,6 +134,15 @@ class Live(unittest.TestCase):
     def test_a_topic_that_does_not_exist_is_refused_with_the_one_that_is_meant(self):
         with self.assertRaisesRegex(ValueError, "did you mean 'pose'"):
             firsthand.follow(ROBOT, "poses")
+
+
+    def test_a_robot_of_another_version_is_told(self):
+        class Pose(topics.Struct):
+            _fields_ = [*topics.Pose._fields_, ("more", ctypes.c_double)]
+            type_name = topics.Pose.type_name
+
+        with mock.patch.dict(topics.TOPICS, pose=(Pose, None)), self.assertRaisesRegex(TypeError, "another version of firsthand"):
+            next(firsthand.follow(ROBOT, "pose"))
 
 
 class Recorded(unittest.TestCase):

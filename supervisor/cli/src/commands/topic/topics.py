@@ -163,29 +163,30 @@ class Follower:
         iox2 = self.iox2
         try:
             # Under this lock, which ends with the file, nobody removes the bus until the readers are open.
-            joining = open(f"{self.directory}/joining.lock")
-            fcntl.flock(joining, fcntl.LOCK_SH)
-            if self._instance() != instance:
+            with open(f"{self.directory}/joining.lock") as joining:
+                fcntl.flock(joining, fcntl.LOCK_SH)
+                if self._instance() != instance:
+                    return None
+                config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{instance}"))
+                builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
+                node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+                subscribers = {}
+                for topic, (payload, element) in self.topics.items():
+                    service = node.service_builder(iox2.ServiceName.new(topic))
+                    if element is None:
+                        service = service.publish_subscribe(payload)
+                    else:
+                        service = service.publish_subscribe(iox2.Slice[element]).user_header(payload)
+                    subscribers[topic] = (service.open().subscriber_builder().create(), element is not None)
+                # The link ends a tick; until then the stages need the processor.
+                link = node.service_builder(iox2.ServiceName.new("link"))
+                listener = link.event().open().listener_builder().create()
+                return node, listener, subscribers
+        except Exception as error:
+            if self._instance() != instance or not self._supervised():
                 return None
-            config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{instance}"))
-            builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
-            node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
-            subscribers = {}
-            for topic, (payload, element) in self.topics.items():
-                service = node.service_builder(iox2.ServiceName.new(topic))
-                if element is None:
-                    service = service.publish_subscribe(payload)
-                else:
-                    service = service.publish_subscribe(iox2.Slice[element]).user_header(payload)
-                subscribers[topic] = (service.open().subscriber_builder().create(), element is not None)
-            # The link ends a tick; until then the stages need the processor.
-            link = node.service_builder(iox2.ServiceName.new("link"))
-            listener = link.event().open().listener_builder().create()
-            joining.close()
-            return node, listener, subscribers
-        except Exception:
-            if self._instance() == instance and self._supervised():
-                raise
-            return None
+            if "IncompatibleTypes" in str(error):
+                raise TypeError(f"robot {self.robot!r} is driven by another version of firsthand: take the Python of that one") from error
+            raise
 
 
