@@ -14,13 +14,13 @@ pub use bus::{Stamp, Stamped};
 macro_rules! structs {
     (@) => { $crate::bus::Layout::zero() };
     (@ $default:expr) => { $default };
-    ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[$doc:meta])* $field:ident: $kind:ty $(= $default:expr)?,)* })*) => {$(
+    ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[doc = $doc:literal])* $field:ident: $kind:ty $(= $default:expr)?,)* })*) => {$(
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, $crate::bus::ZeroCopySend)]
         #[type_name($type_name)]
         #[repr(C)]
         pub struct $name {
-            $($(#[$doc])* pub $field: $kind,)*
+            $($(#[doc = $doc])* pub $field: $kind,)*
         }
 
         impl Default for $name {
@@ -29,7 +29,7 @@ macro_rules! structs {
             }
         }
 
-        $crate::bus::layouts! { $name { $($field)* } }
+        $crate::bus::layouts! { $name { $($field [$($doc)*])* } }
     )*};
 }
 
@@ -67,6 +67,9 @@ macro_rules! wire_enum {
         #[repr(u8)]
         pub enum $name { $($(#[$doc])* $variant = $byte),* }
         impl $name {
+            /// The names of all values, and their bytes.
+            pub const VALUES: &[(&str, u8)] = &[$((stringify!($variant), $byte)),*];
+
             /// An unknown byte is read as the safe value.
             pub const fn from_byte(byte: u8) -> Self {
                 match byte {

@@ -79,6 +79,8 @@ pub struct Field {
     /// Bytes from the start of the struct.
     pub offset: usize,
     pub kind: Kind,
+    /// Its comment, lines joined; empty for none.
+    pub doc: &'static str,
 }
 
 impl Structure {
@@ -185,7 +187,7 @@ impl<T: Layout, const N: usize> Layout for [T; N] {
 /// Implements [`Layout`] for payloads from the names of their fields. If a field is missing in the list, the code does not compile.
 #[macro_export]
 macro_rules! layouts {
-    ($($payload:ident { $($field:ident)* })*) => {$(
+    ($($payload:ident { $($field:ident $([$($doc:literal)*])?)* })*) => {$(
         impl $crate::Layout for $payload {
             fn zero() -> Self {
                 Self { $($field: $crate::Layout::zero()),* }
@@ -197,6 +199,7 @@ macro_rules! layouts {
                     name: stringify!($field),
                     offset: std::mem::offset_of!(Self, $field),
                     kind: $crate::kind_of(|payload: &Self| &payload.$field),
+                    doc: concat!($($($doc),*)?),
                 }),*])
             }
 

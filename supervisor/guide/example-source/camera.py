@@ -19,5 +19,5 @@ for event, pose in camera:
             due = pose.stamp.stamp_ns + 1_000_000_000
             x, y = (random.gauss(seen[-1][axis], 0.05) for axis in "xy")
             fix = Fix(capture_ns=pose.stamp.stamp_ns, x_m=x, y_m=y, heading_rad=math.nan)
-            fix.source[:6], fix.covariance[0], fix.covariance[3] = b"camera", 0.0025, 0.0025
+            fix.source, fix.covariance[0], fix.covariance[3] = b"camera", 0.0025, 0.0025
             camera.publish("fix", fix)

@@ -84,7 +84,7 @@
 //! - Values: [`Cell`] and [`Change`] (`cell.rs`), [`Scaled`], [`Screening`], [`SolveError`], [`Cancellation`], [`Domain`];
 //!   `real.rs` the two precisions, `simd.rs` vector instructions chosen at run time.
 //! - Storage: u of a map (`store.rs`).
-//! - The field: `verification.rs`, [`Field`], [`Guidance`].
+//! - The field: `verification.rs`, [`Field`], [`Guidance`], `path.rs`.
 //! - Engines: `multigrid/`, `multigrid_bands.rs`, `multifrontal/`.
 //! - [`Solver`] (`solver/`): the choice of a method, the solve.
 //!
@@ -102,6 +102,7 @@ mod method;
 mod multifrontal;
 mod multigrid;
 mod multigrid_bands;
+mod path;
 mod policy;
 mod real;
 mod scaled;

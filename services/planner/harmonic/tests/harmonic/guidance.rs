@@ -51,6 +51,30 @@ fn following_the_guidance_from_anywhere_arrives_without_entering_a_blocked_cell(
 }
 
 #[test]
+fn the_path_from_every_cell_ends_at_the_target_and_touches_no_blocked_cell() {
+    for (seed, kind) in KINDS.into_iter().enumerate() {
+        let (domain, field) = generated(kind, seed as u64);
+        let target = [domain.target().col as f64, domain.target().row as f64];
+        for index in 0..domain.blocked().len() {
+            let start = Cell::new(index % domain.width(), index / domain.width());
+            let path = field.path(start);
+            assert_eq!(path.is_some(), field.is_reachable(start), "{kind:?} {start:?}");
+            let path = path.unwrap_or(vec![target]);
+            assert_eq!(path.last(), Some(&target), "{kind:?} {start:?}");
+            for pair in path.windows(2) {
+                for part in 0..8 {
+                    let at = [0, 1].map(|i| {
+                        (pair[0][i] + f64::from(part) / 8.0 * (pair[1][i] - pair[0][i])).round()
+                    });
+                    let cell = Cell::new(at[0] as usize, at[1] as usize);
+                    assert!(!domain.is_blocked(cell), "{kind:?} {pair:?} from {start:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn guidance_never_points_into_a_wall_it_touches() {
     for (seed, kind) in KINDS.into_iter().enumerate() {
         let (domain, field) = generated(kind, 7 + seed as u64);

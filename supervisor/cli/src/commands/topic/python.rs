@@ -4,12 +4,46 @@ use std::{collections::BTreeSet, fmt::Write as _};
 
 use common::{
     bus::{Kind, Structure},
+    grid::CellState,
+    samples::*,
     topics,
 };
+
+/// The enums that are bytes of structs, whose comments name them.
+macro_rules! enums {
+    ($($name:ident)*) => {
+        const ENUMS: &[(&str, &[(&str, u8)])] = &[$((stringify!($name), $name::VALUES)),*];
+    };
+}
+
+enums! {
+    Action BeaconRefusal Cause CommandState DeathCause Direction FaultAnswer FaultKind FixRefusal FollowState GuidanceStatus HealthState
+    HoldReason NextStep Order RangeStatus RecoveryStep RequestAnswer RequestKind Rest StageState StallCause
+}
+
+/// The bytes of `grid`, which are no field.
+const CELL_STATES: &[(&str, u8)] = &[
+    ("Free", CellState::Free as u8),
+    ("Sensed", CellState::Sensed as u8),
+    ("Known", CellState::Known as u8),
+    ("Perimeter", CellState::Perimeter as u8),
+    ("Scanned", CellState::Scanned as u8),
+    ("Margin", CellState::Margin as u8),
+];
 
 /// Structs whose layouts are checked when the module is loaded, and a follower.
 pub fn module() -> String {
     let mut module = include_str!("topics.py").to_owned();
+    // Writing to a String cannot fail.
+    for (name, values) in ENUMS.iter().chain(&[("CellState", CELL_STATES)]) {
+        let _ = writeln!(module, "class {name}(enum.IntEnum):");
+        for (value, byte) in *values {
+            // `None` is a keyword of Python.
+            let value = if *value == "None" { "Nothing" } else { value };
+            let _ = writeln!(module, "    {value} = {byte}");
+        }
+        module.push_str("\n\n");
+    }
     let (mut known, mut table) = (BTreeSet::new(), String::new());
     for topic in topics::TABLE {
         let (payload, element) = topic.layout();
@@ -17,7 +51,6 @@ pub fn module() -> String {
             declare(kind, &mut known, &mut module);
         }
         let element = element.map_or("None".to_owned(), |element| python(&element));
-        // Writing to a String cannot fail.
         let _ =
             writeln!(table, "    \"{}\": ({}, {element}),", topic.spec().name, python(&payload));
     }
@@ -42,7 +75,16 @@ fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String)
         declare(&field.kind, known, module);
     }
     let class = class(structure);
-    let _ = writeln!(module, "class {class}(Struct):\n    _fields_ = [");
+    let _ = writeln!(module, "class {class}(Struct):");
+    let commented = || structure.fields.iter().filter(|field| !field.doc.is_empty());
+    if commented().count() > 0 {
+        module.push_str("    \"\"\"\n");
+        for field in commented() {
+            let _ = writeln!(module, "    {}:{}", field.name, plain(field.doc));
+        }
+        module.push_str("    \"\"\"\n\n");
+    }
+    module.push_str("    _fields_ = [\n");
     for field in &structure.fields {
         let _ = writeln!(module, "        (\"{}\", {}),", field.name, python(&field.kind));
     }
@@ -59,6 +101,16 @@ fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String)
     module.push_str("\n\n");
 }
 
+/// A comment without the marks of its links.
+fn plain(doc: &str) -> String {
+    let mut parts = doc.split("](");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text += part.split_once(')').map_or(part, |(_, rest)| rest);
+    }
+    text.replace(['[', ']', '`'], "").replace("super::", "").replace("crate::", "")
+}
+
 /// The class lacks the name of the project.
 fn class(structure: &Structure) -> &'static str {
     let name = structure.name;
@@ -73,6 +125,10 @@ fn python(kind: &Kind) -> String {
             let (sign, bits) = integer.split_at(1);
             let unsigned = if sign == "u" { "u" } else { "" };
             format!("ctypes.c_{unsigned}int{bits}")
+        }
+        // Arrays of bytes are texts.
+        Kind::Array(element, length) if **element == Kind::Number("u8") => {
+            format!("ctypes.c_char * {length}")
         }
         Kind::Array(element, length) => format!("{} * {length}", python(element)),
         Kind::Struct(structure) => class(structure).to_owned(),
@@ -131,6 +187,25 @@ mod tests {
             let error = String::from_utf8_lossy(&output.stderr);
             assert!(output.status.success(), "{error}");
         }
+    }
+
+    #[test]
+    fn every_enum_that_the_comment_of_a_byte_names_is_in_the_python_module() {
+        fn check(kind: &Kind, module: &str) {
+            let Kind::Struct(structure) = kind else { return };
+            for field in &structure.fields {
+                check(&field.kind, module);
+                let named = field.doc.split("A [`").nth(1).and_then(|rest| rest.split('`').next());
+                if let (Some(name), Kind::Number("u8")) = (named, &field.kind) {
+                    assert!(module.contains(&format!("class {name}(enum.IntEnum):")), "{name}");
+                }
+            }
+        }
+        let module = module();
+        for topic in topics::TABLE {
+            check(&topic.layout().0, &module);
+        }
+        assert!(module.contains("GuidanceStatus.\n"), "comments lose the marks of links");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 # `firsthand topic list --python` prints it. Print it again when firsthand is replaced.
 
 import ctypes
+import enum
 import fcntl
 import os
 import time
@@ -15,12 +16,25 @@ class Struct(ctypes.Structure):
         listed = ((name, list(it) if isinstance(it, ctypes.Array) else it) for name, it in values)
         return f"{type(self).__name__}({', '.join(f'{name}={it!r}' for name, it in listed)})"
 
+    def copy(self):
+        return type(self).from_buffer_copy(self)
+
+def places():
+    """The directories in which robots of this user may be, the first to be taken if there is none yet."""
+    user = os.geteuid()
+    home = os.path.expanduser("~/.firsthand")
+    places = [f"/tmp/firsthand-{user}", "/run/firsthand", f"/run/user/{user}/firsthand", home]
+    # Another user may have made a directory of such a name.
+    own = [place for place in places if os.path.isdir(place) and os.lstat(place).st_uid == user]
+    return own or places
+
 
 class Follower:
     """Follows a robot from run to run.
 
     `for event, sample in Follower("x80", ["pose", "grid"])` yields the events "here", "gone" and "nothing" (for a second), or the
-    name of a topic with one sample: its struct, or its header and an array. A sample is valid until the next event.
+    name of a topic with one sample: its struct, or its header and an array. Structs and headers are copies. An array lies in memory
+    shared with the robot, where a reader holds two at most: let go of one, or copy it, before the next but one comes.
     """
 
     def __init__(self, robot="x80", topics=("pose",), name="python"):
@@ -93,9 +107,9 @@ class Follower:
                 try:
                     sample = subscriber.receive()
                 except Exception as error:
-                    # The writer may have just ended.
                     if "Borrow" in str(error):
-                        raise
+                        raise BufferError(f"two arrays of {topic} are held already: keep copies of them") from error
+                    # The writer may have just ended.
                     break
                 if sample is None:
                     break
@@ -104,21 +118,21 @@ class Follower:
                     element = self.topics[topic][1]
                     count = slice.len() // ctypes.sizeof(element)
                     elements = (element * count).from_address(slice.as_ptr())
-                    yield topic, (sample.user_header().contents, elements)
+                    # The memory is the writer's again when the array is gone.
+                    elements.sample = sample
+                    it = sample.user_header().contents.copy(), elements
+                    del slice, elements
                 else:
-                    yield topic, sample.payload().contents
+                    it = sample.payload().contents.copy()
                 del sample
+                yield topic, it
+                del it
 
     @property
     def directory(self):
         """The robot's directory: where it is, or else in the first place that is this user's."""
-        user = os.geteuid()
-        home = os.path.expanduser("~/.firsthand")
-        places = [f"/tmp/firsthand-{user}", "/run/firsthand", f"/run/user/{user}/firsthand", home]
-        # Another user may have made a directory of such a name.
-        own = [place for place in places if os.path.isdir(place) and os.lstat(place).st_uid == user]
-        own.sort(key=lambda place: not os.path.exists(f"{place}/{self.robot}"))
-        return f"{(own or places)[0]}/{self.robot}"
+        own = sorted(places(), key=lambda place: not os.path.exists(f"{place}/{self.robot}"))
+        return f"{own[0]}/{self.robot}"
 
     def _instance(self):
         try:
@@ -149,29 +163,30 @@ class Follower:
         iox2 = self.iox2
         try:
             # Under this lock, which ends with the file, nobody removes the bus until the readers are open.
-            joining = open(f"{self.directory}/joining.lock")
-            fcntl.flock(joining, fcntl.LOCK_SH)
-            if self._instance() != instance:
+            with open(f"{self.directory}/joining.lock") as joining:
+                fcntl.flock(joining, fcntl.LOCK_SH)
+                if self._instance() != instance:
+                    return None
+                config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{instance}"))
+                builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
+                node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+                subscribers = {}
+                for topic, (payload, element) in self.topics.items():
+                    service = node.service_builder(iox2.ServiceName.new(topic))
+                    if element is None:
+                        service = service.publish_subscribe(payload)
+                    else:
+                        service = service.publish_subscribe(iox2.Slice[element]).user_header(payload)
+                    subscribers[topic] = (service.open().subscriber_builder().create(), element is not None)
+                # The link ends a tick; until then the stages need the processor.
+                link = node.service_builder(iox2.ServiceName.new("link"))
+                listener = link.event().open().listener_builder().create()
+                return node, listener, subscribers
+        except Exception as error:
+            if self._instance() != instance or not self._supervised():
                 return None
-            config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{instance}"))
-            builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
-            node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
-            subscribers = {}
-            for topic, (payload, element) in self.topics.items():
-                service = node.service_builder(iox2.ServiceName.new(topic))
-                if element is None:
-                    service = service.publish_subscribe(payload)
-                else:
-                    service = service.publish_subscribe(iox2.Slice[element]).user_header(payload)
-                subscribers[topic] = (service.open().subscriber_builder().create(), element is not None)
-            # The link ends a tick; until then the stages need the processor.
-            link = node.service_builder(iox2.ServiceName.new("link"))
-            listener = link.event().open().listener_builder().create()
-            joining.close()
-            return node, listener, subscribers
-        except Exception:
-            if self._instance() == instance and self._supervised():
-                raise
-            return None
+            if "IncompatibleTypes" in str(error):
+                raise TypeError(f"robot {self.robot!r} is driven by another version of firsthand: take the Python of that one") from error
+            raise
 
 
