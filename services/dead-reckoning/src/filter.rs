@@ -94,7 +94,24 @@ impl TryFrom<&FixSample> for Fix {
     }
 }
 
+fn parts(noise: &SMatrix<f64, 3, 3>) -> [f64; 6] {
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|at: (usize, usize)| noise[at])
+}
+
 impl Fix {
+    /// A fix in `frame`, in the frame of the estimate.
+    fn laid(&self, frame: Pose2) -> Self {
+        let turned = DVec2::from_angle(frame.heading);
+        let DVec2 { x: cos, y: sin } = turned;
+        let turn = SMatrix::<f64, 3, 3>::from([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]);
+        Self {
+            position: frame.position + turned.rotate(self.position),
+            heading: self.heading.map(|heading| heading + frame.heading),
+            covariance: parts(&(turn * self.noise() * turn.transpose())),
+            ..*self
+        }
+    }
+
     fn noise(&self) -> SMatrix<f64, 3, 3> {
         let [xx, xy, xt, yy, yt, tt] = self.covariance;
         SMatrix::from([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
@@ -152,33 +169,17 @@ impl Anchor {
         [0, 1, 2].map(|part| (shared[part] - self.shared[part]).max(0.0))
     }
 
-    /// `fix` as it is used: one of the matcher in the estimate's frame, and as unsure as it is beside the drift.
-    fn laid(&self, fix: &Fix) -> Fix {
-        let shared = fix.shares();
-        if shared == [0.0; 3] || self.variances.is_none() {
-            return *fix;
-        }
+    /// `fix` as unsure as it is beside what all the matcher's fixes share, but for the drift. Deviations shrink and correlations stay, so
+    /// that the matrix stays positive.
+    fn apart(&self, fix: &Fix) -> Fix {
+        let (shared, stated) = (fix.shares(), fix.noise());
         let drift = self.drift(shared);
         let least = [LEAST_VARIANCE, LEAST_VARIANCE, LEAST_HEADING_VARIANCE];
-        let stated = fix.noise();
-        // Deviations shrink and correlations stay, so the matrix stays positive.
-        let shrunk = SVector::from([0, 1, 2].map(|part| {
+        let shrunk = SMatrix::from_diagonal(&SVector::from([0, 1, 2].map(|part| {
             let all = stated[(part, part)];
             ((all - shared[part] + drift[part]).max(least[part]) / all).sqrt()
-        }));
-        let turned = DVec2::from_angle(self.frame.heading);
-        let DVec2 { x: cos, y: sin } = turned;
-        let turn = SMatrix::<f64, 3, 3>::from([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]);
-        let laid = turn * SMatrix::from_diagonal(&shrunk);
-        let own = laid * stated * laid.transpose();
-        let covariance =
-            [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|at: (usize, usize)| own[at]);
-        Fix {
-            position: self.frame.position + turned.rotate(fix.position),
-            heading: fix.heading.map(|heading| heading + self.frame.heading),
-            covariance,
-            ..*fix
-        }
+        })));
+        Fix { covariance: parts(&(shrunk * stated * shrunk)), ..*fix }
     }
 
     /// The variances below which `fix` does not make the estimate, which it corrected at `pose` by `error` and left with `variances`.
@@ -254,15 +255,17 @@ impl Filter {
 
     /// Use a fix measured at `there`. Returns whether it agrees.
     fn take(&mut self, fix: &Fix, there: Pose2) -> bool {
-        let laid = self.anchor.laid(fix);
-        let mut taken = self.updated(&laid, there);
-        if taken.is_none() && laid != *fix {
-            // The matcher began anew at the estimate.
-            taken = self.updated(fix, there);
-            if taken.is_some() {
-                self.anchor = Anchor::default();
+        let mut laid = *fix;
+        if self.anchor.variances.is_some() && fix.shares() != [0.0; 3] {
+            let apart = self.anchor.apart(fix);
+            let fits = |frame| self.updated(&apart.laid(frame), there).is_some();
+            // The matcher may have begun anew at the estimate.
+            if !fits(self.anchor.frame) && fits(Pose2::default()) {
+                self.anchor.frame = Pose2::default();
             }
+            laid = fix.laid(self.anchor.frame);
         }
+        let taken = self.updated(&laid, there);
         if let Some((error, mut covariance)) = taken {
             let variances = [0, 1, 2].map(|part| covariance[(part, part)]);
             let floor = self.anchor.floor(fix, self.pose, &error, variances);
