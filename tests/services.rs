@@ -1,6 +1,7 @@
 //! Tests of runs under a service manager, which the tests replace.
 
 use std::{
+    fs,
     os::unix::{fs::MetadataExt, net::UnixDatagram},
     path::Path,
     process::{Command, Stdio},
@@ -400,6 +401,29 @@ fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_
     assert_reached(exit.code(), &summary[0]);
     assert_eq!(summary[0]["resumes"], 1, "{summary:?}");
     assert_nothing_left("cut");
+}
+
+#[test]
+fn a_service_begins_anew_after_a_run_of_another_version_and_says_so() {
+    let robot = "updated";
+    let (runs, service) = service(robot, &["--set", "resume='automatic'"]);
+    kill_while_it_drives(robot, &mut service());
+    for entry in fs::read_dir(runs.path().join("open-room-001")).unwrap().flatten() {
+        let mut bytes = fs::read(entry.path()).unwrap();
+        for at in 0..bytes.len().saturating_sub(4) {
+            if bytes[at..].starts_with(b"FHC") {
+                bytes[at + 3] = b'1';
+            }
+        }
+        fs::write(entry.path(), bytes).unwrap();
+    }
+    let again = service().output().unwrap();
+    let said = String::from_utf8_lossy(&again.stderr);
+    assert!(said.contains("the last run ends here") && said.contains("version 1, not"), "{said}");
+    let (exit, summary) = support::json_of(&again);
+    assert_reached(exit.code(), &summary[0]);
+    assert_eq!(summary[0]["resumes"], 0, "{summary:?}");
+    assert_nothing_left(robot);
 }
 
 #[test]

@@ -16,6 +16,12 @@ class Struct(ctypes.Structure):
         return f"{type(self).__name__}({', '.join(f'{name}={it!r}' for name, it in listed)})"
 
 
+def series(version):
+    """A version without what may differ between two that understand each other."""
+    major, minor = (version.split(".") + [""])[:2]
+    return major, minor if major == "0" else ""
+
+
 class Follower:
     """Follows a robot from run to run.
 
@@ -153,6 +159,13 @@ class Follower:
             fcntl.flock(joining, fcntl.LOCK_SH)
             if self._instance() != instance:
                 return None
+            with open(f"{self.directory}/{instance}") as lines:
+                made_by = lines.readline().removeprefix("# firsthand ").strip()
+            if series(made_by) != series(VERSION):
+                raise RuntimeError(
+                    f"robot {self.robot} runs firsthand {made_by}, and this module is of {VERSION}: "
+                    "print it again with that version, `firsthand topic list --python`"
+                )
             config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{instance}"))
             builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
             node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
