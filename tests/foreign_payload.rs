@@ -30,7 +30,7 @@ fn a_consumer_built_against_another_payload_is_refused_with_the_reason() {
 #[test]
 fn a_robot_of_another_version_is_named_and_can_be_stopped() {
     let robot = "foreign-vers";
-    let mut run = Run::under_way(robot, "obstacle-course", &["--pace", "1"], 0.3);
+    let run = Run::under_way(robot, "obstacle-course", &["--pace", "1"], 0.3);
     let file = bus_instance(robot).config();
     let config = fs::read_to_string(&file).unwrap();
     fs::write(&file, config.replacen(VERSION, "99.0.0", 1)).unwrap();

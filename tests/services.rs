@@ -141,7 +141,7 @@ fn a_frozen_supervisor_does_not_feed_the_watchdog() {
 #[test]
 fn in_a_journal_a_stages_death_has_its_priority() {
     let directory = support::directory_of("journal");
-    let journal = std::fs::File::create(directory.path().join("journal")).unwrap();
+    let journal = fs::File::create(directory.path().join("journal")).unwrap();
     let found = journal.metadata().unwrap();
     let mut run = mission("journal", &directory)
         .env("JOURNAL_STREAM", format!("{}:{}", found.dev(), found.ino()))
@@ -152,7 +152,7 @@ fn in_a_journal_a_stages_death_has_its_priority() {
     let mapper = find(&status, "mapper")["pid"].as_u64().unwrap();
     signal_process(mapper as u32, Signal::KILL);
     support::wait_for_status("journal", |status| find(status, "mapper")["generation"] == 2);
-    let journal = || std::fs::read_to_string(directory.path().join("journal")).unwrap();
+    let journal = || fs::read_to_string(directory.path().join("journal")).unwrap();
     support::wait_until("the title is shown", || {
         journal().lines().any(|line| !line.starts_with('<'))
     });
@@ -207,7 +207,7 @@ impl Units {
 fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i32> {
     let mut last = None;
     loop {
-        let mut append = std::fs::File::options();
+        let mut append = fs::File::options();
         let log = append.create(true).append(true).open(log).unwrap();
         let mut command = firsthand(&["stage", stage, "--robot", robot]);
         let code = command.stderr(log).status().unwrap().code();
@@ -228,7 +228,7 @@ impl Drop for Units {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for stage in support::STAGES.iter().filter(|_| thread::panicking()) {
-            let log = std::fs::read_to_string(self.directory.path().join(stage));
+            let log = fs::read_to_string(self.directory.path().join(stage));
             eprintln!("{stage}: {}", log.unwrap_or_default());
         }
     }

@@ -202,7 +202,7 @@ fn a_topic_is_not_opened_by_a_program_for_which_the_same_bytes_are_other_fields(
 
 #[test]
 fn a_bus_of_another_version_is_not_joined_and_its_version_is_named() {
-    with_bus("version", |bus| {
+    with_bus("version", |_| {
         let domain = &Domain::of(format!("version-{}", std::process::id()).parse().unwrap());
         fs::write(domain.joining_lock_file(), "").unwrap();
         let file = BusInstance::current(domain).unwrap().config();
