@@ -1,7 +1,10 @@
 //! A consumer built against other payload types is refused with the reason, and does no harm.
 
-use crate::support::{self, Run, in_own_process};
+use std::fs;
+
+use crate::support::{self, Run, bus_instance, in_own_process, output, printed, refused};
 use common::{
+    VERSION,
     bus::{Bus, BusError, Topic},
     samples::WheelSample,
     topics,
@@ -22,4 +25,22 @@ fn a_consumer_built_against_another_payload_is_refused_with_the_reason() {
         let (_, summary) = run.finish();
         assert_eq!(summary["restarts"]["dead-reckoning"], 0, "{summary}");
     });
+}
+
+#[test]
+fn a_robot_of_another_version_is_named_and_can_be_stopped() {
+    let robot = "foreign-vers";
+    let run = Run::under_way(robot, "obstacle-course", &["--pace", "1"], 0.3);
+    let file = bus_instance(robot).config();
+    let config = fs::read_to_string(&file).unwrap();
+    fs::write(&file, config.replacen(VERSION, "99.0.0", 1)).unwrap();
+    for command in [&["status"][..], &["goto", "1", "1"], &["stage", "kill", "planner"]] {
+        let command = [command, &["--robot", robot]].concat();
+        refused(&command, "other-version", &["99.0.0", VERSION]);
+    }
+    assert!(printed(&["status", "--all"]).contains("it runs another version"));
+    let stopped = output(&["stop", "--robot", robot]);
+    assert!(stopped.status.success(), "{stopped:?}");
+    fs::write(&file, config).unwrap();
+    run.stop();
 }

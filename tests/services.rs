@@ -1,6 +1,7 @@
 //! Tests of runs under a service manager, which the tests replace.
 
 use std::{
+    fs,
     os::unix::{fs::MetadataExt, net::UnixDatagram},
     path::Path,
     process::{Command, Stdio},
@@ -140,7 +141,7 @@ fn a_frozen_supervisor_does_not_feed_the_watchdog() {
 #[test]
 fn in_a_journal_a_stages_death_has_its_priority() {
     let directory = support::directory_of("journal");
-    let journal = std::fs::File::create(directory.path().join("journal")).unwrap();
+    let journal = fs::File::create(directory.path().join("journal")).unwrap();
     let found = journal.metadata().unwrap();
     let mut run = mission("journal", &directory)
         .env("JOURNAL_STREAM", format!("{}:{}", found.dev(), found.ino()))
@@ -151,7 +152,7 @@ fn in_a_journal_a_stages_death_has_its_priority() {
     let mapper = find(&status, "mapper")["pid"].as_u64().unwrap();
     signal_process(mapper as u32, Signal::KILL);
     support::wait_for_status("journal", |status| find(status, "mapper")["generation"] == 2);
-    let journal = || std::fs::read_to_string(directory.path().join("journal")).unwrap();
+    let journal = || fs::read_to_string(directory.path().join("journal")).unwrap();
     support::wait_until("the title is shown", || {
         journal().lines().any(|line| !line.starts_with('<'))
     });
@@ -206,7 +207,7 @@ impl Units {
 fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i32> {
     let mut last = None;
     loop {
-        let mut append = std::fs::File::options();
+        let mut append = fs::File::options();
         let log = append.create(true).append(true).open(log).unwrap();
         let mut command = firsthand(&["stage", stage, "--robot", robot]);
         let code = command.stderr(log).status().unwrap().code();
@@ -227,7 +228,7 @@ impl Drop for Units {
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for stage in support::STAGES.iter().filter(|_| thread::panicking()) {
-            let log = std::fs::read_to_string(self.directory.path().join(stage));
+            let log = fs::read_to_string(self.directory.path().join(stage));
             eprintln!("{stage}: {}", log.unwrap_or_default());
         }
     }
@@ -400,6 +401,29 @@ fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_
     assert_reached(exit.code(), &summary[0]);
     assert_eq!(summary[0]["resumes"], 1, "{summary:?}");
     assert_nothing_left("cut");
+}
+
+#[test]
+fn a_service_begins_anew_after_a_run_of_another_version_and_says_so() {
+    let robot = "updated";
+    let (runs, service) = service(robot, &["--set", "resume='automatic'"]);
+    kill_while_it_drives(robot, &mut service());
+    for entry in fs::read_dir(runs.path().join("open-room-001")).unwrap().flatten() {
+        let mut bytes = fs::read(entry.path()).unwrap();
+        for at in 0..bytes.len().saturating_sub(4) {
+            if bytes[at..].starts_with(b"FHC") {
+                bytes[at + 3] = b'1';
+            }
+        }
+        fs::write(entry.path(), bytes).unwrap();
+    }
+    let again = service().output().unwrap();
+    let said = String::from_utf8_lossy(&again.stderr);
+    assert!(said.contains("the last run ends here") && said.contains("version 1, not"), "{said}");
+    let (exit, summary) = support::json_of(&again);
+    assert_reached(exit.code(), &summary[0]);
+    assert_eq!(summary[0]["resumes"], 0, "{summary:?}");
+    assert_nothing_left(robot);
 }
 
 #[test]

@@ -42,7 +42,11 @@ fn members() -> Vec<(String, PathBuf)> {
     let packages = metadata["packages"].as_array().unwrap().iter();
     let member = |package: &serde_json::Value| {
         let manifest = Path::new(package["manifest_path"].as_str().unwrap());
-        (package["name"].as_str().unwrap().to_owned(), manifest.parent().unwrap().to_owned())
+        // Others depend on it by the name of its library, which is another where the package can be published.
+        let mut targets = package["targets"].as_array().unwrap().iter();
+        let library = targets.find(|target| target["kind"][0] == "lib").map(|it| &it["name"]);
+        let name = library.unwrap_or(&package["name"]).as_str().unwrap().replace('_', "-");
+        (name, manifest.parent().unwrap().to_owned())
     };
     packages.map(member).collect()
 }
@@ -76,7 +80,7 @@ fn no_stage_knows_another_nor_the_supervisor() {
 #[test]
 fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
     let names = linked(&["--package", "mission-control"]);
-    assert!(names.contains("common"), "{names:?}");
+    assert!(names.contains("firsthand-common"), "{names:?}");
     for tool in ["png", "mcap", "csv", "rand_pcg", "picture", "x80-sim", "clap"] {
         assert!(!names.contains(tool), "{tool}");
     }

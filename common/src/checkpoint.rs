@@ -32,7 +32,7 @@ pub enum CheckpointError {
     )]
     TooLarge { file: PathBuf, capacity: usize, length: usize },
     #[error(
-        "checkpoint {file} was written by another version of this program ({problem}); go on with that version, or start a new run"
+        "checkpoint {file} was written by another version of this program ({problem}); go on with that version, which `run.toml` beside it names, or start a new run"
     )]
     Foreign { file: PathBuf, problem: String },
     #[error("cannot encode checkpoint {file}: {source}; this is a fault in the stage")]
@@ -41,8 +41,8 @@ pub enum CheckpointError {
 
 /// "firsthand checkpoint", before the version.
 const MAGIC: [u8; 3] = *b"FHC";
-/// Raise it when the encoding of any process's state changes.
-const VERSION: u8 = b'3';
+/// Raise it when the encoding of any process's state changes, or of an entry of its journal.
+pub const VERSION: u8 = b'3';
 /// magic u32, sequence u64, length u32, crc32 u32.
 const HEADER: usize = 20;
 
@@ -160,8 +160,7 @@ fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<(u64, T)>, String>
         return Ok(None);
     };
     if version != VERSION {
-        let [found, known] = [version, VERSION].map(|version| version.escape_ascii().to_string());
-        return Err(format!("its state has version {found}, not {known}"));
+        return Err(other_version(version));
     }
     let Some((sequence, body)) = whole(bytes) else {
         return Ok(None);
@@ -170,6 +169,11 @@ fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<(u64, T)>, String>
         Ok(state) => Ok(Some((sequence, state))),
         Err(error) => Err(format!("its state cannot be decoded: {error}")),
     }
+}
+
+pub(crate) fn other_version(found: u8) -> String {
+    let [found, known] = [found, VERSION].map(|version| version.escape_ascii().to_string());
+    format!("its state has version {found}, not {known}")
 }
 
 fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {

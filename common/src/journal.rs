@@ -3,7 +3,7 @@
 //! The state is the fold of its entries. To append one is a small write however large the state is; a new process folds those after the
 //! snapshot into it.
 //!
-//! An entry is `number | length | crc32 | body`, little-endian. A kill during an append leaves a torn tail, which is cut off. A kill
+//! An entry is `number | length | version | crc32 | body`, little-endian. A whole one of another version is refused, as a [`Checkpoint`] is. A kill during an append leaves a torn tail, which is cut off. A kill
 //! between a snapshot and the emptying of the journal leaves entries that the snapshot holds, as their numbers show.
 //!
 //! Room is reserved at opening, for a full disk. An end mark empties the journal, because shortening it would give the room away.
@@ -17,7 +17,8 @@ use std::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::checkpoint::{
-    Checkpoint, CheckpointError, checksum, encode_after, failed, open_reserved,
+    Checkpoint, CheckpointError, VERSION, checksum, encode_after, failed, open_reserved,
+    other_version,
 };
 
 /// The fewest and the most entries after which a snapshot is due.
@@ -25,7 +26,7 @@ const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
 /// Bytes of the state for each further entry before a snapshot: to write them takes about as long as to fold an entry, as a new process
 /// must before it is ready.
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
-/// number u64, length u32, crc32 u32.
+/// number u64, length u24, version u8, crc32 u32.
 const HEADER: usize = 16;
 /// It follows the last entry. No header is all zeros, for the checksum of zeros is not 0.
 const END: [u8; HEADER] = [0; HEADER];
@@ -80,18 +81,21 @@ impl Journal {
         Ok((journal, Restored { state, entries }))
     }
 
-    /// Cuts off what follows the last whole entry.
+    /// Cuts off what follows the last whole entry. Fails when a whole one is of another version.
     fn read<E: DeserializeOwned>(&mut self) -> Result<Vec<E>, CheckpointError> {
         let bytes = std::fs::read(&self.path).map_err(failed("read", &self.path))?;
         let mut entries = Vec::new();
         let mut rest = &bytes[..];
-        while let Some((number, body, after)) = entry(rest) {
+        let foreign = |problem| CheckpointError::Foreign { file: self.path.clone(), problem };
+        while let Some((number, version, body, after)) = entry(rest) {
+            if version != VERSION {
+                return Err(foreign(other_version(version)));
+            }
             // The snapshot holds lower numbers. After a gap nothing can be folded.
             if number == self.number {
-                let Ok(entry) = postcard::from_bytes(body) else {
-                    break;
-                };
-                entries.push(entry);
+                let entry = postcard::from_bytes(body);
+                let undecoded = |error| foreign(format!("an entry cannot be decoded: {error}"));
+                entries.push(entry.map_err(undecoded)?);
                 self.number += 1;
             } else if number > self.number {
                 break;
@@ -117,7 +121,8 @@ impl Journal {
         let length = bytes.len() - HEADER;
         bytes.extend_from_slice(&END);
         bytes[..8].copy_from_slice(&self.number.to_le_bytes());
-        bytes[8..12].copy_from_slice(&(length as u32).to_le_bytes());
+        bytes[8..11].copy_from_slice(&(length as u32).to_le_bytes()[..3]);
+        bytes[11] = VERSION;
         let end = HEADER + length;
         let crc = checksum(&bytes[..end], 12);
         bytes[12..16].copy_from_slice(&crc.to_le_bytes());
@@ -146,16 +151,17 @@ fn snapshot_after(capacity: usize) -> u64 {
     (capacity as u64 / BYTES_FOR_AN_ENTRY).clamp(soonest, latest)
 }
 
-/// The number and body of the first entry, and the bytes after it. None when it is not whole.
-fn entry(bytes: &[u8]) -> Option<(u64, &[u8], &[u8])> {
+/// Number, version and body of the first entry, and the bytes after it. None when it is not whole.
+fn entry(bytes: &[u8]) -> Option<(u64, u8, &[u8], &[u8])> {
     let number = u64::from_le_bytes(bytes.get(..8)?.try_into().ok()?);
-    let length = u32::from_le_bytes(bytes.get(8..12)?.try_into().ok()?) as usize;
+    let &[low, middle, high, version] = bytes.get(8..12)? else { return None };
+    let length = u32::from_le_bytes([low, middle, high, 0]) as usize;
     let crc = u32::from_le_bytes(bytes.get(12..16)?.try_into().ok()?);
     if length > LONGEST {
         return None;
     }
     let (whole, after) = bytes.split_at_checked(HEADER + length)?;
-    (checksum(whole, 12) == crc).then(|| (number, &whole[HEADER..], after))
+    (checksum(whole, 12) == crc).then(|| (number, version, &whole[HEADER..], after))
 }
 
 #[cfg(test)]
@@ -229,6 +235,29 @@ mod tests {
             std::fs::write(&file, &changed).unwrap();
             assert_eq!(folded(&path), 100, "bit {}", bit - 8 * last);
         }
+    }
+
+    #[test]
+    fn a_whole_entry_of_another_version_or_type_is_refused_and_not_cut_off() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("map.checkpoint");
+        open(&path).0.append(&100_u64).unwrap();
+        let refused = Journal::open::<Sum, [String; 3]>(&path, 64, 4_592).unwrap_err().to_string();
+        assert!(
+            refused.contains("map.journal") && refused.contains("cannot be decoded"),
+            "{refused}"
+        );
+        let mut bytes = std::fs::read(path.with_extension("journal")).unwrap();
+        bytes[11] = b'1';
+        let end = bytes.len() - END.len();
+        let crc = checksum(&bytes[..end], 12).to_le_bytes();
+        bytes[12..16].copy_from_slice(&crc);
+        std::fs::write(path.with_extension("journal"), bytes).unwrap();
+        let refused = Journal::open::<Sum, u64>(&path, 64, 4_592).unwrap_err().to_string();
+        assert!(
+            refused.contains("map.journal") && refused.contains("version 1, not 3"),
+            "{refused}"
+        );
     }
 
     #[test]

@@ -62,7 +62,7 @@ pub mod target;
 pub mod topics;
 pub mod wiring;
 
-pub use bus::{self, bus_instance, claim, clock, domain, lock_holders, poll, waiter};
+pub use bus::{self, VERSION, bus_instance, claim, clock, domain, lock_holders, poll, waiter};
 pub use json_protocol as json_wire;
 pub use mission::{self, address, geometry, kinematics, sonar};
 pub use x80_protocol as wire;

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::{
+    VERSION,
     address::Address,
     clock::MissionClock,
     domain::RobotName,
@@ -33,7 +34,14 @@ pub enum RunError {
     File { action: &'static str, file: PathBuf, source: io::Error },
     #[error("{file} is not a run file: {problem}; start the stage through `firsthand run`")]
     Content { file: PathBuf, problem: String },
+    #[error(
+        "firsthand {by} wrote {file}, which this firsthand {VERSION} cannot read ({problem}); go on with that version, or start a new run"
+    )]
+    OtherVersion { file: PathBuf, by: String, problem: String },
 }
+
+/// The key of a run file that has the version of the supervisor.
+const WRITTEN_BY: &str = "firsthand";
 
 impl Run {
     pub fn save(&self, directory: &Path) -> Result<(), RunError> {
@@ -42,10 +50,11 @@ impl Run {
             file: file.clone(),
             problem: error.to_string(),
         })?;
+        let text = format!("{WRITTEN_BY} = {VERSION:?}\n{text}");
         replace(&file, &text).map_err(|source| RunError::File { action: "write", file, source })
     }
 
-    /// Fails when the file cannot be read or is no run file.
+    /// Fails when the file cannot be read, is no run file, or is that of another version with other keys.
     pub fn load(directory: &Path) -> Result<Self, RunError> {
         let file = directory.join(FILE_NAME);
         let text = fs::read_to_string(&file).map_err(|source| RunError::File {
@@ -53,8 +62,22 @@ impl Run {
             file: file.clone(),
             source,
         })?;
-        toml::from_str(&text)
-            .map_err(|error| RunError::Content { file, problem: error.message().to_owned() })
+        Self::parse(&text, &file)
+    }
+
+    /// The run in the `text` of a run file; `file` is where an error says that it is.
+    pub fn parse(text: &str, file: &Path) -> Result<Self, RunError> {
+        toml::from_str(text).map_err(|error| {
+            let (file, problem) = (file.to_owned(), error.message().to_owned());
+            let by = toml::from_str(text).ok().and_then(|run: toml::Table| {
+                let by = run.get(WRITTEN_BY)?.as_str()?;
+                (by != VERSION).then(|| by.to_owned())
+            });
+            match by {
+                Some(by) => RunError::OtherVersion { file, by, problem },
+                None => RunError::Content { file, problem },
+            }
+        })
     }
 }
 
@@ -83,6 +106,32 @@ pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_run_file_of_another_version_is_read_or_refused_by_its_version() {
+        let directory = tempfile::tempdir().unwrap();
+        let run = Run {
+            robot: "x80".parse().unwrap(),
+            address: Address::Ros2(Some(7)),
+            clock: MissionClock::Ticks { period_ns: 1 },
+            mission: Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap(),
+        };
+        run.save(directory.path()).unwrap();
+        assert_eq!(Run::load(directory.path()).unwrap(), run);
+        let file = directory.path().join(FILE_NAME);
+        let text = fs::read_to_string(&file).unwrap();
+        let later = text.replacen(VERSION, "99.0.0", 1);
+        fs::write(&file, &later).unwrap();
+        assert_eq!(Run::load(directory.path()).unwrap(), run);
+        fs::write(&file, later.replace("[mission]", "[mission]\nspeeed = 3")).unwrap();
+        let refused = Run::load(directory.path()).unwrap_err();
+        assert!(matches!(refused, RunError::OtherVersion { .. }), "{refused}");
+        let said = refused.to_string();
+        assert!(said.contains("99.0.0") && said.contains("speeed"), "{said}");
+        fs::write(&file, text.replace("[mission]", "[mission]\nspeeed = 3")).unwrap();
+        let refused = Run::load(directory.path()).unwrap_err();
+        assert!(matches!(refused, RunError::Content { .. }), "{refused}");
+    }
 
     #[test]
     fn generations_are_counted_on_by_the_next_supervisor() {

@@ -17,6 +17,10 @@ use crate::domain::{Domain, SHARED_MEMORY};
 const CONFIG: [&str; 2] = ["iceoryx2-", ".toml"];
 /// The length of an instance's name. Paths of sockets contain the name twice, and Linux limits their length.
 const LENGTH: usize = 4;
+/// The version of firsthand that this program is of.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// A configuration begins with it and the version of the supervisor that made the bus.
+const MADE_BY: &str = "# firsthand ";
 const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -69,6 +73,19 @@ impl BusInstance {
         self.domain.directory().join(self.config_name())
     }
 
+    /// The middleware's `settings` as the text of a configuration.
+    pub(crate) fn config_text(settings: &str) -> String {
+        format!("{MADE_BY}{VERSION}\n{settings}")
+    }
+
+    /// The version that made the bus if this program must not join it.
+    pub(crate) fn made_by_another(&self) -> io::Result<Option<String>> {
+        let config = fs::read_to_string(self.config())?;
+        let made_by = config.lines().next().and_then(|line| line.strip_prefix(MADE_BY));
+        let made_by = made_by.unwrap_or("of before 0.1.0");
+        Ok((series(made_by) != series(VERSION)).then(|| made_by.to_owned()))
+    }
+
     /// The names of all files of this instance in [`SHARED_MEMORY`] start with this prefix.
     pub fn shared_memory_prefix(&self) -> String {
         format!("{}{}_", self.domain.shared_memory_prefix(), self.name)
@@ -81,10 +98,26 @@ impl BusInstance {
     }
 }
 
+/// A version without what may differ between two that understand each other, which before 1.0 is its last number.
+fn series(version: &str) -> (Option<&str>, Option<&str>) {
+    let mut numbers = version.split('.');
+    let major = numbers.next();
+    (major, numbers.next().filter(|_| major == Some("0")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::os::unix::fs::DirBuilderExt as _;
+
+    #[test]
+    fn versions_meet_that_differ_in_the_last_number_and_from_1_0_in_the_last_two() {
+        assert_eq!(series("0.1.0"), series("0.1.12"));
+        assert_eq!(series("1.2.0"), series("1.3.4"));
+        assert_ne!(series("0.1.0"), series("0.2.0"));
+        assert_ne!(series("1.2.0"), series("2.2.0"));
+        assert_ne!(series("0.1.0"), series("1.1.0"));
+    }
 
     #[test]
     fn the_bus_that_is_there_is_the_one_made_last() {

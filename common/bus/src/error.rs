@@ -9,7 +9,7 @@ use iceoryx2::{
 use thiserror::Error;
 
 use super::spec::Spec;
-use crate::domain::SHARED_MEMORY;
+use crate::{bus_instance::VERSION, domain::SHARED_MEMORY};
 
 pub(crate) type Result<T = (), E = BusError> = std::result::Result<T, E>;
 
@@ -19,6 +19,10 @@ pub enum BusError {
         "robot {robot:?} is not running here ({detail}); start it with `firsthand run`, or name another with --robot"
     )]
     NotRunning { robot: String, detail: String },
+    #[error(
+        "robot {robot} runs firsthand {runs}, and this is {VERSION}: use the commands of that version; `firsthand stop` works all the same"
+    )]
+    OtherVersion { robot: String, runs: String },
     #[error(
         "topic {topic:?} carries another payload than this program was built for; build it against the firsthand that runs (`firsthand --version`)"
     )]
@@ -71,9 +75,10 @@ pub(super) fn taking(spec: &Spec) -> impl FnOnce(ReceiveError) -> BusError {
 pub(super) fn opening(topic: &'static str) -> impl FnOnce(PublishSubscribeOpenError) -> BusError {
     use PublishSubscribeOpenError as E;
     move |error| match error {
-        E::IncompatibleTypes | E::VersionMismatch | E::ServiceInCorruptedState => {
-            BusError::Incompatible { topic }
-        }
+        E::IncompatibleTypes
+        | E::IncompatibleAttributes
+        | E::VersionMismatch
+        | E::ServiceInCorruptedState => BusError::Incompatible { topic },
         other => refused("open", topic)(other),
     }
 }

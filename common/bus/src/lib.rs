@@ -61,6 +61,7 @@ mod write;
 pub use self::{
     any::{AnyReader, AnySample, AnyTopic, AnyWriter},
     authors::{Admitted, Author, Ignored, Names, Writers},
+    bus_instance::VERSION,
     close_on_exec::close_all_on_exec,
     error::BusError,
     layout::{Field, Kind, Layout, Structure, Value, kind_of},

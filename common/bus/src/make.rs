@@ -104,7 +104,8 @@ impl Bus {
         config.defaults.publish_subscribe.subscriber_expired_connection_buffer = Limits::WRITERS;
         let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
         let file = instance.config();
-        std::fs::write(&file, text).map_err(|error| failed(format!("{}: {error}", file.display())))
+        std::fs::write(&file, BusInstance::config_text(&text))
+            .map_err(|error| failed(format!("{}: {error}", file.display())))
     }
 
     /// Join the bus of a robot under a name that `iox2 node list` shows, and read the newest generation, whoever wrote it. It fails if
@@ -134,6 +135,10 @@ impl Bus {
         let join = no_join(&instance.domain);
         let refused = |error: &dyn Debug| join(format!("{error:?}"));
         ownership::check(&instance).map_err(|error| join(error.to_string()))?;
+        let other = instance.made_by_another().map_err(|error| join(error.to_string()))?;
+        if let Some(runs) = other {
+            return Err(BusError::OtherVersion { robot: instance.domain.robot.to_string(), runs });
+        }
         let file = instance.config();
         let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
             .map_err(|error| join(format!("{error:?} in {file:?}")))?;

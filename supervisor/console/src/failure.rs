@@ -7,7 +7,7 @@ use std::{error::Error, path::Path, process::ExitCode};
 
 use common::{
     address::AddressError, bus::BusError, checkpoint::CheckpointError, domain::SHARED_MEMORY,
-    mission::MissionError, start::StageError,
+    mission::MissionError, run::RunError, start::StageError,
 };
 use mission_control::{SupervisorError, operator::OperatorError, recovery::ResumeError};
 use processes::{DomainError, planner_executable::PlannerExecutableError};
@@ -90,6 +90,11 @@ pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
         ResumeError {
             ResumeError::Ended { .. } => Some("ended"),
             ResumeError::Checkpoint(error) => code(error),
+            ResumeError::Run(error) => code(error),
+            _ => None,
+        }
+        RunError {
+            RunError::OtherVersion { .. } => Some("other-version"),
             _ => None,
         }
         OperatorError {
@@ -106,6 +111,7 @@ pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
         }
         BusError {
             BusError::NotRunning { .. } => Some("not-running"),
+            BusError::OtherVersion { .. } => Some("other-version"),
             BusError::Incompatible { .. } => Some("other-payload"),
             BusError::NoPlace { .. } => Some("no-place"),
             _ => None,
@@ -114,6 +120,8 @@ pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
             RecordingError::NoRecording(_) => Some("no-recording"),
             RecordingError::Several { .. } => Some("several-recordings"),
             RecordingError::Foreign { .. } => Some("not-a-recording"),
+            RecordingError::Schema { .. } | RecordingError::Message { .. } => Some("other-version"),
+            RecordingError::Run(error) => code(error),
             _ => None,
         }
         LookupError {

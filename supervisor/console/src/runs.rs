@@ -270,6 +270,18 @@ mod tests {
         assert_eq!(ended, [true, true, false]);
     }
 
+    #[test]
+    fn a_target_of_another_version_is_read_by_the_keys_that_it_has() {
+        let run = tempfile::tempdir().unwrap();
+        let lines = r#"{"number":1,"x_m":1,"y_m":2,"outcome":"reached","at_s":3.5,"new":[]}
+            {"number":2,"x_mm":1000}
+            {"number":3,"x_m":1,"y_m":2,"outcome":"of another kind","at_s":null}
+            "#;
+        fs::write(run.path().join(records::TARGETS), lines).unwrap();
+        let numbers: Vec<_> = targets(run.path()).iter().map(|target| target.number).collect();
+        assert_eq!(numbers, [1, 3]);
+    }
+
     /// The directory of a run of `robot` that has begun.
     fn begun(runs: &Path, robot: &str, name: &str) -> PathBuf {
         let directory = runs.join(name);

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use common::{bus::BusError, file::FileError};
+use common::{bus::BusError, file::FileError, run::RunError};
 use thiserror::Error;
 
 pub(crate) type Result<T = (), E = RecordingError> = std::result::Result<T, E>;
@@ -25,6 +25,12 @@ pub enum RecordingError {
         "{file} contains a message on {topic:?} that this version cannot read; use the version that wrote it"
     )]
     Message { file: PathBuf, topic: String },
+    #[error(
+        "{file} contains samples {schema:?} with other fields than those of this version; use the version that wrote it, which its record `run` names"
+    )]
+    Schema { file: PathBuf, schema: String },
+    #[error(transparent)]
+    Run(#[from] RunError),
     #[error(transparent)]
     Bus(#[from] BusError),
 }

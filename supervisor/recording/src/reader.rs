@@ -12,7 +12,7 @@ use std::{
 use common::{
     bus::{Layout, Payload, Stamped, Topic, decode_sample, decode_slice},
     file::FileError,
-    run::Run,
+    run::{Run, RunError},
 };
 use mcap::{
     McapError,
@@ -24,6 +24,7 @@ use crate::{
     error::{RecordingError, Result},
     file::{LOST, RUN},
     places::parts,
+    schema,
 };
 
 /// Most bytes of a record or chunk. The recorder's are shorter.
@@ -137,8 +138,10 @@ impl Recording {
         };
         let mut about = |key| about.remove(key).unwrap_or_default();
         let run_text: String = about("run_toml");
-        let run = toml::from_str(&run_text)
-            .map_err(|error| foreign(format!("its run is unknown: {}", error.message())))?;
+        let run = Run::parse(&run_text, path).map_err(|error| match error {
+            RunError::Content { problem, .. } => foreign(format!("its run is unknown: {problem}")),
+            other => other.into(),
+        })?;
         let after = bounds.map_or(0, |(from, to)| to - from);
         Ok(Self {
             path: path.to_path_buf(),
@@ -324,6 +327,11 @@ impl Records {
                 }
                 LinearReadEvent::Record { data, opcode } => {
                     match mcap::parse_record(opcode, data).map_err(cut)? {
+                        // Its samples would be decoded into wrong fields.
+                        Record::Schema { header, data } if schema::differs(&header.name, &data) => {
+                            let (file, schema) = (self.path.clone(), header.name);
+                            return Err(Stop::Error(RecordingError::Schema { file, schema }));
+                        }
                         Record::Channel(channel) => {
                             self.channels.insert(channel.id, channel.topic.into());
                         }
@@ -339,5 +347,40 @@ impl Records {
             }
         }
         Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::BufWriter;
+
+    use common::topics;
+    use mcap::{Writer, records::Metadata};
+
+    use super::*;
+
+    /// Why a recording with a schema of this text and a run file of this text is refused.
+    fn refused(schema_text: &str, run_text: &str) -> RecordingError {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("recording.mcap");
+        let mut writer = Writer::new(BufWriter::new(File::create(&path).unwrap())).unwrap();
+        let pose = schema::of(&topics::POSE);
+        let id = writer.add_schema(&pose.name, "ros2msg", schema_text.as_bytes()).unwrap();
+        writer.add_channel(id, "pose", "cdr", &BTreeMap::new()).unwrap();
+        let metadata = BTreeMap::from([("run_toml".to_owned(), run_text.to_owned())]);
+        writer.write_metadata(&Metadata { name: RUN.to_owned(), metadata }).unwrap();
+        writer.finish().unwrap();
+        Recording::open(&path).unwrap_err()
+    }
+
+    #[test]
+    fn a_recording_of_another_version_is_refused_by_what_it_cannot_be_read_for() {
+        let own = schema::of(&topics::POSE).text;
+        let other = refused(&own.replacen("float64 x_m", "float32 x_m", 1), "");
+        assert!(matches!(other, RecordingError::Schema { .. }), "{other}");
+        // A topic that only says more about itself is read, up to a run file with other keys.
+        let other = refused(&format!("# More.\n{own}"), "firsthand = '99.0.0'\nrobots = 2");
+        assert!(matches!(other, RecordingError::Run(RunError::OtherVersion { .. })), "{other}");
+        assert!(other.to_string().contains("99.0.0"), "{other}");
     }
 }

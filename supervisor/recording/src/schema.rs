@@ -1,8 +1,10 @@
 //! The schema of a topic, made from its layout: the text of a ROS 2 message, and the texts of the messages in it.
 
+use std::{collections::BTreeMap, sync::LazyLock};
+
 use common::{
     bus::{Kind, Structure},
-    topics::AnyTopic,
+    topics::{self, AnyTopic},
 };
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,6 +13,22 @@ pub struct Schema {
     pub name: String,
     /// The fields of the message, then the messages that it contains.
     pub text: String,
+}
+
+/// The texts of all schemas by their names, without comments.
+static OWN: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| {
+    let schemas = topics::TABLE.iter().map(|topic| of(*topic));
+    schemas.map(|Schema { name, text }| (name, uncommented(&text))).collect()
+});
+
+/// Whether a recorded schema has the name of one of this program's and other fields.
+pub(crate) fn differs(name: &str, text: &[u8]) -> bool {
+    let own = OWN.get(name);
+    own.is_some_and(|own| uncommented(&String::from_utf8_lossy(text)) != *own)
+}
+
+fn uncommented(text: &str) -> String {
+    text.lines().filter(|line| !line.starts_with('#')).flat_map(|line| [line, "\n"]).collect()
 }
 
 const RULE: &str =

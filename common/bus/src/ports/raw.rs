@@ -22,9 +22,13 @@ use std::{
 use iceoryx2::{
     node::Node,
     port::{listener, notifier, publisher, subscriber},
-    prelude::{AllocationStrategy, CallbackProgression, FileDescriptorBased, ServiceName, ipc},
+    prelude::{
+        AllocationStrategy, AttributeSpecifier, AttributeVerifier, CallbackProgression,
+        FileDescriptorBased, ServiceName, ipc,
+    },
     sample,
     service::{
+        attribute::{AttributeKey, AttributeValue},
         builder::publish_subscribe::Builder,
         marker::{CustomHeaderMarker, CustomPayloadMarker},
         port_factory::{PortFactory as _, event, publish_subscribe::PortFactory},
@@ -121,6 +125,8 @@ pub struct Carried {
     header: Type,
     element: Type,
     elements: TypeVariant,
+    /// Differs where fields have other names, kinds or places in as many bytes.
+    layout: u32,
 }
 
 impl Carried {
@@ -129,8 +135,19 @@ impl Carried {
             true => (Type::of::<H>(), Type::of::<E>(), TypeVariant::Dynamic),
             false => (Type::of::<E>(), Type::of::<H>(), TypeVariant::FixedSize),
         };
-        Self { header, element, elements }
+        Self { header, element, elements, layout: fnv_1a(&format!("{:?}", (H::kind(), E::kind()))) }
     }
+
+    fn layout(&self, spec: &Spec) -> Result<(AttributeKey, AttributeValue)> {
+        let refused = || refused("describe the layout of", spec.name);
+        let key = "layout".try_into().map_err(refused())?;
+        let value = format!("{:08x}", self.layout);
+        Ok((key, value.as_str().try_into().map_err(refused())?))
+    }
+}
+
+fn fnv_1a(text: &str) -> u32 {
+    text.bytes().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }
 
 fn samples(
@@ -166,7 +183,11 @@ fn service_name(spec: &Spec) -> Result<ServiceName> {
 
 /// Create the services of a topic. They exist as long as the result is held.
 pub(crate) fn create(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Box<dyn Any>> {
-    let samples = samples(node, spec, carried)?.create().map_err(refused("create", spec.name))?;
+    let (key, layout) = carried.layout(spec)?;
+    let layout = AttributeSpecifier::new().define(&key, &layout);
+    let layout = layout.map_err(refused("describe the layout of", spec.name))?;
+    let samples = samples(node, spec, carried)?.create_with_attributes(&layout);
+    let samples = samples.map_err(refused("create", spec.name))?;
     let event = node
         .service_builder(&service_name(spec)?)
         .event()
@@ -206,7 +227,11 @@ pub(crate) fn opened_by(node: &BusNode, spec: &Spec, carried: &Carried) -> Resul
 
 impl RawService {
     pub(super) fn open(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Self> {
-        let service = samples(node, spec, carried)?.open().map_err(opening(spec.name))?;
+        let (key, layout) = carried.layout(spec)?;
+        let layout = AttributeVerifier::new().require(&key, &layout);
+        let layout = layout.map_err(refused("describe the layout of", spec.name))?;
+        let service = samples(node, spec, carried)?.open_with_attributes(&layout);
+        let service = service.map_err(opening(spec.name))?;
         let there = service.static_config().message_type_details();
         let fits = carried.header.is_that_of(&there.user_header)
             && carried.element.is_that_of(&there.payload)

@@ -14,7 +14,7 @@ use iceoryx2::prelude::{ServiceName, ZeroCopySend};
 use super::*;
 use crate::{
     AnyTopic, Bus, BusError, Logged, Rate, Stamp, Stamped, Topic,
-    bus_instance::BusInstance,
+    bus_instance::{BusInstance, VERSION},
     clock::MissionTime,
     domain::{Domain, SHARED_MEMORY},
     layouts,
@@ -178,6 +178,51 @@ fn a_topic_is_not_opened_as_another_payload_or_another_shape() {
         ] {
             assert!(matches!(error, BusError::Incompatible { .. }), "{error}");
         }
+    });
+}
+
+#[test]
+fn a_topic_is_not_opened_by_a_program_for_which_the_same_bytes_are_other_fields() {
+    #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+    #[type_name("firsthand.TestCell")]
+    #[repr(C)]
+    struct Swapped {
+        third: f32,
+        second: u32,
+        first: f32,
+    }
+    layouts! { Swapped { third second first } }
+    with_bus("swapped", |bus| {
+        let swapped = Topic::<Test, Swapped>::new(SLICES.spec());
+        let error = bus.reader(&swapped).unwrap_err();
+        assert!(matches!(error, BusError::Incompatible { topic: "slices" }), "{error}");
+        bus.reader(&SLICES).unwrap();
+    });
+}
+
+#[test]
+fn a_bus_of_another_version_is_not_joined_and_its_version_is_named() {
+    with_bus("version", |_| {
+        let domain = &Domain::of(format!("version-{}", std::process::id()).parse().unwrap());
+        fs::write(domain.joining_lock_file(), "").unwrap();
+        let file = BusInstance::current(domain).unwrap().config();
+        let config = fs::read_to_string(&file).unwrap();
+        let made_by = |version: &str| {
+            fs::write(&file, config.replacen(VERSION, version, 1)).unwrap();
+            Bus::join(domain, "late").map(drop)
+        };
+        let (series, _) = VERSION.rsplit_once('.').unwrap();
+        made_by(&format!("{series}.77")).unwrap();
+        for other in ["99.0.0", "of a later kind"] {
+            let error = made_by(other).unwrap_err();
+            assert!(matches!(error, BusError::OtherVersion { .. }), "{error}");
+            let said = error.to_string();
+            assert!(said.contains(other) && said.contains(VERSION), "{said}");
+        }
+        fs::write(&file, config.split_once('\n').unwrap().1).unwrap();
+        let error = Bus::join(domain, "late").unwrap_err();
+        assert!(matches!(error, BusError::OtherVersion { .. }), "{error}");
+        made_by(VERSION).unwrap();
     });
 }
 

@@ -1,6 +1,7 @@
 //! Tables as Markdown, as the guide shows them.
 
 pub mod stored;
+pub mod versions;
 
 use clap::{Args, Subcommand};
 use common::{
@@ -30,6 +31,8 @@ enum Table {
     Results,
     /// Print what is promised, and the tests of it.
     Capabilities,
+    /// Print what becomes of files and robots of another version.
+    Versions,
 }
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -37,6 +40,7 @@ pub fn main(arguments: &Arguments) -> Result {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
         Table::Results => stored::results(),
+        Table::Versions => versions::versions(),
         Table::Capabilities => stored::markdown("capabilities", None).unwrap_or_default(),
     })?)
 }
@@ -49,6 +53,7 @@ pub fn shown(name: &str, section: Option<&str>) -> Option<String> {
         "stages" => Some(stages()),
         "failsafe" => Some(failsafe()),
         "faults" => Some(faults()),
+        "versions" => Some(versions::versions()),
         "ros2" => Some(firsthand_ros2::topics()),
         stored => stored::markdown(stored, section),
     }

@@ -59,6 +59,7 @@ fn listed(robot: Robot) -> Listed {
     let (state, mission_time_s, simulated) = match roster {
         None => ("its supervisor was killed", None, None),
         Some(Ok(Some(roster))) => roster,
+        Some(Err(BusError::OtherVersion { .. })) => ("it runs another version", None, None),
         // The supervisor is frozen, or its bus is not complete yet.
         Some(_) => ("no answer", None, None),
     };

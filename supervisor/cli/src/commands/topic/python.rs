@@ -3,6 +3,7 @@
 use std::{collections::BTreeSet, fmt::Write as _};
 
 use common::{
+    VERSION,
     bus::{Kind, Structure},
     grid::CellState,
     samples::*,
@@ -56,7 +57,7 @@ pub fn module() -> String {
     }
     let _ = write!(
         module,
-        "# What each sample is: a struct; or a header, and what a slice is made of.\nTOPICS = {{\n{table}}}\n"
+        "# What each sample is: a struct; or a header, and what a slice is made of.\nTOPICS = {{\n{table}}}\nVERSION = {VERSION:?}\n"
     );
     module
 }
@@ -206,6 +207,18 @@ mod tests {
             check(&topic.layout().0, &module);
         }
         assert!(module.contains("GuidanceStatus.\n"), "comments lose the marks of links");
+    }
+
+    #[test]
+    fn the_module_has_the_version_that_it_joins_robots_of() {
+        let module = module();
+        assert!(module.contains(&format!("\nVERSION = {VERSION:?}\n")));
+        let module = module
+            + "\nassert series('0.1.0') == series('0.1.7') != series('0.2.0')"
+            + "\nassert series('1.2.0') == series('1.3.0') != series('2.2.0') != series('')";
+        if let Ok(output) = std::process::Command::new("python3").args(["-c", &module]).output() {
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        }
     }
 
     #[test]

@@ -29,6 +29,12 @@ def places():
     return own or places
 
 
+def series(version):
+    """A version without what may differ between two that understand each other."""
+    major, minor = (version.split(".") + [""])[:2]
+    return major, minor if major == "0" else ""
+
+
 class Follower:
     """Follows a robot from run to run.
 
@@ -167,6 +173,12 @@ class Follower:
                 fcntl.flock(joining, fcntl.LOCK_SH)
                 if self._instance() != instance:
                     return None
+                with open(f"{self.directory}/{instance}") as lines:
+                    made_by = lines.readline().removeprefix("# firsthand ").strip()
+                if series(made_by) != series(VERSION):
+                    raise TypeError(
+                        f"robot {self.robot!r} runs firsthand {made_by}, and this module is of {VERSION}: take the Python of that version"
+                    )
                 config = iox2.config.from_file(iox2.FilePath.new(f"{self.directory}/{instance}"))
                 builder = iox2.NodeBuilder.new().config(config).name(iox2.NodeName.new(self.name))
                 node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)

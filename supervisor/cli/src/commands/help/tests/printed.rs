@@ -7,7 +7,7 @@ use std::{
 };
 
 use super::{documents, root};
-use crate::commands::table::{self, stored};
+use crate::commands::table::{self, stored, versions};
 
 /// Test functions of the whole tree.
 fn test_functions() -> BTreeSet<String> {
@@ -63,6 +63,14 @@ fn every_capability_has_a_verdict_and_every_contract_tests_that_exist() {
     let flaws: Vec<_> = rows.iter().filter_map(|row| flaw(row, &functions)).collect();
     assert!(flaws.is_empty(), "{flaws:#?}");
     assert!(rows.len() > 90, "only {} rows were found", rows.len());
+}
+
+#[test]
+fn every_row_of_the_table_of_versions_has_tests_that_exist() {
+    let functions = test_functions();
+    for test in versions::tests() {
+        assert!(functions.contains(test), "there is no test {test}");
+    }
 }
 
 #[test]
