@@ -70,14 +70,8 @@ impl RecordingFile {
         let mut unfinished = path.as_os_str().to_owned();
         unfinished.push(".new");
         let file = File::create(&unfinished).map_err(named)?;
-        let options = WriteOptions::new()
-            .profile("")
-            .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Zstd))
-            .compression_threads(0)
-            .chunk_size(Some(CHUNK_BYTES))
-            // A chunk is written in one piece when it is complete, and never changed.
-            .disable_seeking(true);
+        // A chunk is written in one piece when it is complete, and never changed.
+        let options = options().profile("").disable_seeking(true);
         let writer = options.create(BufWriter::new(file)).map_err(failed(path))?;
         let mut recording = Self {
             writer,
@@ -214,7 +208,16 @@ impl RecordingFile {
     }
 }
 
-fn failed(path: &Path) -> impl FnOnce(mcap::McapError) -> RecordingError + use<> {
+/// The options of every file.
+pub(crate) fn options() -> WriteOptions {
+    WriteOptions::new()
+        .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
+        .compression(Some(Compression::Zstd))
+        .compression_threads(0)
+        .chunk_size(Some(CHUNK_BYTES))
+}
+
+pub(crate) fn failed(path: &Path) -> impl FnOnce(mcap::McapError) -> RecordingError + use<> {
     let file = path.to_path_buf();
     move |error| {
         let problem = match error {
