@@ -15,7 +15,8 @@ use crate::{definitions::definition, endpoints::published, shown::Shown, topics:
 
 /// Make a bag of rosbag2 from a recording: for `ros2 bag play`, PlotJuggler and other readers of bags.
 ///
-/// It has the topics that are published of a robot that runs. Their stamps and the times of the bag are mission time.
+/// It has the topics that are published of a robot that runs, `path` and `field` only from a recording with `--fields`. Their stamps and
+/// the times of the bag are mission time.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct Arguments {
     /// A recorded run's directory, or one recording.
