@@ -72,7 +72,7 @@ pub mod viewers;
 
 pub(crate) use self::error::Result;
 pub use self::{
-    bag::{Bag, BagTopic},
+    bag::Bag,
     error::RecordingError,
     file::now_ns,
     places::{files, next_place, parts},

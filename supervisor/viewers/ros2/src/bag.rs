@@ -1,17 +1,14 @@
 //! `firsthand ros2 bag`: a bag of rosbag2 from a recording, with the messages that the bridge publishes.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, path::PathBuf};
 
 use clap::Args;
 use common::topics;
 use console::failure::Failure;
-use recording::{Bag, BagTopic, Recording, RecordingError};
+use recording::{Bag, Recording, RecordingError};
 use robot_state::{Sample, TOPICS};
 
-use crate::{definitions::definition, endpoints::published, shown::Shown, topics::Id};
+use crate::{definitions::define, endpoints::published, shown::Shown};
 
 /// Make a bag of rosbag2 from a recording: for `ros2 bag play`, PlotJuggler and other readers of bags.
 ///
@@ -25,35 +22,27 @@ pub(crate) struct Arguments {
     out: PathBuf,
 }
 
-/// A bag with the channels of its topics.
-struct Writer {
-    bag: Bag,
-    channels: BTreeMap<Id, u16>,
-    /// Whether all messages so far could be written.
-    written: Result<(), RecordingError>,
-}
-
-impl Writer {
-    /// What takes the messages of this time.
-    fn at(&mut self, at_ns: u64) -> impl FnMut(Id, Vec<u8>) {
-        move |id, payload| {
-            if let (Ok(()), Some(channel)) = (&self.written, self.channels.get(&id)) {
-                self.written = self.bag.message(*channel, at_ns, &payload);
-            }
-        }
-    }
-}
-
-/// Make a bag with topics below `namespace`. Returns what is in it, in words.
+/// Make a bag with topics below `namespace`. Returns what is in it and what is not, in words.
 pub(crate) fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { recording, out } = arguments;
-    let recordings = recording::files(recording)?;
+    let files = recording::files(recording)?;
     let recordings: Vec<_> =
-        recordings.iter().map(|file| Recording::open(file)).collect::<Result<_, _>>()?;
-    let (mut shown, mut writer) = begin(namespace, &recordings[0], out)?;
+        files.iter().map(|file| Recording::open(file)).collect::<Result<_, _>>()?;
+    let run = &recordings[0].run;
+    let mut shown = Shown::new(run.robot.to_string(), run.mission.clone());
+    let mut bag = Bag::create(out)?;
+    let mut names = BTreeMap::new();
+    for (row, id, name) in published(namespace, shown.sensor_topics()) {
+        let mut definition = String::new();
+        define(&row.message.join("/"), &mut definition);
+        let kind = row.message.join("/msg/");
+        bag.add([&name, &kind, &definition], row.is_latched)?;
+        names.insert(id, name);
+    }
+    let mut messages = Vec::new();
     if let Some(first) = recordings[0].samples(&topics::POSE)?.next().transpose()? {
         let at_ns = first.sample.stamp.stamp_ns;
-        shown.mounting(at_ns, &mut writer.at(at_ns));
+        shown.mounting(at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
     }
     let wanted: Vec<_> = TOPICS.iter().map(|topic| topic.spec().name).collect();
     for recording in &recordings {
@@ -64,43 +53,23 @@ pub(crate) fn make(namespace: &str, arguments: &Arguments) -> Result<String, Fai
                 return Err(RecordingError::Message { file, topic }.into());
             };
             let at_ns = sample.time().0;
-            shown.sample(&sample, at_ns, &mut writer.at(at_ns));
+            shown.sample(&sample, at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
             // Before the first pose mission time is not known.
             if let Some(pose) = shown.state.pose {
-                let now_ns = pose.stamp.stamp_ns;
-                shown.tick(now_ns, &mut writer.at(now_ns));
+                let at_ns = pose.stamp.stamp_ns;
+                shown.tick(at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
             }
-            std::mem::replace(&mut writer.written, Ok(()))?;
+            for (at_ns, id, payload) in messages.drain(..) {
+                if let Some(name) = names.get(&id) {
+                    bag.message(name, at_ns, &payload)?;
+                }
+            }
         }
     }
-    let topics = writer.channels.len();
-    let (messages, span_s) = writer.bag.finish()?;
-    let gaps = recordings.iter().flat_map(Recording::gaps).map(|gap| gap + "\n");
-    let out = out.display();
-    Ok(gaps.collect::<String>()
-        + &format!("{out}: {messages} messages on {topics} topics, {span_s:.1} s\n"))
-}
-
-fn begin(
-    namespace: &str,
-    recording: &Recording,
-    out: &Path,
-) -> Result<(Shown, Writer), RecordingError> {
-    let run = &recording.run;
-    let shown = Shown::new(run.robot.to_string(), run.mission.clone());
-    let mut bag = Bag::create(out)?;
-    let mut channels = BTreeMap::new();
-    for (row, id, name) in published(namespace, shown.sensor_topics()) {
-        let [package, message] = row.message;
-        let channel = bag.add(BagTopic {
-            name,
-            type_name: format!("{package}/msg/{message}"),
-            definition: definition(row.message),
-            is_latched: row.is_latched,
-        })?;
-        channels.insert(id, channel);
-    }
-    Ok((shown, Writer { bag, channels, written: Ok(()) }))
+    let mut told: String =
+        recordings.iter().flat_map(Recording::gaps).map(|gap| gap + "\n").collect();
+    told += &format!("{}: {} messages\n", out.display(), bag.finish()?);
+    Ok(told)
 }
 
 #[cfg(test)]
@@ -124,11 +93,21 @@ mod tests {
         for (recording, parts) in [(recording, 1), (run, 2)] {
             let arguments = Arguments { recording, out: folder.path().join(parts.to_string()) };
             make("a", &arguments).unwrap();
-            let metadata = fs::read_to_string(arguments.out.join("metadata.yaml")).unwrap();
-            let row = |topic: &str| metadata.lines().find(|line| line.contains(topic)).unwrap();
-            let count = format!("message_count: {}}}", parts * poses);
-            assert!(row("name: /a/tf,").contains(&count), "{metadata}");
-            assert!(row("name: /a/tf_static,").contains("durability: 1"), "{metadata}");
+            let metadata = fs::read(arguments.out.join("metadata.yaml")).unwrap();
+            let metadata: serde_json::Value = serde_json::from_slice(&metadata).unwrap();
+            let topics = &metadata["rosbag2_bagfile_information"]["topics_with_message_count"];
+            let row = |index: usize| (&topics[index], &topics[index]["topic_metadata"]);
+            let (tf, about) = row(0);
+            assert_eq!(
+                (&about["name"], &tf["message_count"]),
+                (&"/a/tf".into(), &(parts * poses).into())
+            );
+            let (fixed, about) = row(1);
+            assert_eq!(
+                (&about["name"], &fixed["message_count"]),
+                (&"/a/tf_static".into(), &1.into())
+            );
+            assert!(about["offered_qos_profiles"].to_string().contains("durability: 1"));
             assert!(make("a", &arguments).unwrap_err().to_string().contains("exists"));
         }
     }

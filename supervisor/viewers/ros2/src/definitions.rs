@@ -5,25 +5,18 @@ const ALL: &str = include_str!("definitions.msg");
 const RULE: &str =
     "================================================================================\n";
 
-/// The fields of a message, then the messages that it contains.
-pub(crate) fn definition([package, message]: [&str; 2]) -> String {
-    let mut names = vec![format!("{package}/{message}")];
-    let (mut whole, mut at) = (String::new(), 0);
-    while let Some(name) = names.get(at).cloned() {
-        if at > 0 {
-            whole += &format!("{RULE}MSG: {name}\n");
-        }
-        at += 1;
-        let own = |text: &'static str| text.strip_prefix(&name)?.strip_prefix('\n');
-        let text = ALL.split("MSG: ").find_map(own).unwrap_or_default();
-        whole += text;
-        for kind in text.lines().filter_map(|line| line.split([' ', '[']).next()) {
-            if kind.contains('/') && !names.iter().any(|name| name == kind) {
-                names.push(kind.to_owned());
-            }
+/// Add to `text` the fields of the message `name`, then the messages in it that are not there yet.
+pub(crate) fn define(name: &str, text: &mut String) {
+    let own = |part: &'static str| part.strip_prefix(name)?.strip_prefix('\n');
+    let fields = ALL.split("MSG: ").find_map(own).unwrap_or_default();
+    *text += fields;
+    for kind in fields.lines().filter_map(|line| line.split([' ', '[']).next()) {
+        let head = format!("{RULE}MSG: {kind}\n");
+        if kind.contains('/') && !text.contains(&head) {
+            *text += &head;
+            define(kind, text);
         }
     }
-    whole
 }
 
 #[cfg(test)]
@@ -34,7 +27,8 @@ mod tests {
     #[test]
     fn every_message_that_is_written_has_the_definitions_of_all_that_is_in_it() {
         for row in TABLE.iter().filter(|row| row.accepted_by.is_none()) {
-            let whole = definition(row.message);
+            let mut whole = String::new();
+            define(&row.message.join("/"), &mut whole);
             for part in whole.split(RULE) {
                 let fields = part.lines().filter(|line| !line.starts_with("MSG: "));
                 assert!(fields.clone().count() > 0, "{whole}");
