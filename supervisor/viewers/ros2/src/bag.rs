@@ -39,11 +39,11 @@ pub(crate) fn make(namespace: &str, arguments: &Arguments) -> Result<String, Fai
         bag.add([&name, &kind, &definition], row.is_latched)?;
         names.insert(id, name);
     }
+    // A bag begins with the first pose, so that readers know where the sensors are before any message of them.
+    let first = recordings[0].samples(&topics::POSE)?.next().transpose()?;
+    let began_ns = first.map_or(0, |first| first.sample.stamp.stamp_ns);
     let mut messages = Vec::new();
-    if let Some(first) = recordings[0].samples(&topics::POSE)?.next().transpose()? {
-        let at_ns = first.sample.stamp.stamp_ns;
-        shown.mounting(at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
-    }
+    shown.mounting(began_ns, &mut |id, payload| messages.push((began_ns, id, payload)));
     let wanted: Vec<_> = TOPICS.iter().map(|topic| topic.spec().name).collect();
     for recording in &recordings {
         for message in recording.messages(&wanted)? {
@@ -60,7 +60,7 @@ pub(crate) fn make(namespace: &str, arguments: &Arguments) -> Result<String, Fai
                 shown.tick(at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
             }
             for (at_ns, id, payload) in messages.drain(..) {
-                if let Some(name) = names.get(&id) {
+                if let Some(name) = names.get(&id).filter(|_| at_ns >= began_ns) {
                     bag.message(name, at_ns, &payload)?;
                 }
             }
