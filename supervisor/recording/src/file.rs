@@ -16,7 +16,7 @@ use common::{
     topics::{AnyTopic, EVERY_STAGE, OPERATOR, Spec},
 };
 use mcap::{
-    Compression, WriteOptions, Writer,
+    Compression, Summary, WriteOptions, Writer,
     records::{MessageHeader, Metadata},
 };
 
@@ -37,9 +37,7 @@ pub(crate) const LOST: &str = "recorder";
 const LOST_SCHEMA: &[u8] = br#"{"title": "firsthand.Recorder", "type": "object", "properties": {"lost": {"type": "object"}}}"#;
 
 pub(crate) struct RecordingFile {
-    writer: Writer<BufWriter<File>>,
-    path: PathBuf,
-    channels: HashMap<String, u16>,
+    output: Output,
     /// The start of the mission, nanoseconds since 1970.
     began_ns: u64,
     clock: Option<MissionClock>,
@@ -69,20 +67,10 @@ impl RecordingFile {
         }
         let mut unfinished = path.as_os_str().to_owned();
         unfinished.push(".new");
-        let file = File::create(&unfinished).map_err(named)?;
-        let options = WriteOptions::new()
-            .profile("")
-            .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Zstd))
-            .compression_threads(0)
-            .chunk_size(Some(CHUNK_BYTES))
-            // A chunk is written in one piece when it is complete, and never changed.
-            .disable_seeking(true);
-        let writer = options.create(BufWriter::new(file)).map_err(failed(path))?;
+        let mut output = Output::create(unfinished.as_ref(), "")?;
+        output.path = path.to_path_buf();
         let mut recording = Self {
-            writer,
-            path: path.to_path_buf(),
-            channels: HashMap::new(),
+            output,
             began_ns: now_ns(),
             clock: run.map(|run| run.clock),
             newest: MissionTime::default(),
@@ -96,15 +84,23 @@ impl RecordingFile {
                 ("writer".to_owned(), spec.writer.to_owned()),
                 ("meaning".to_owned(), spec.meaning.trim().to_owned()),
             ]);
-            recording.add(spec.name, &name, "ros2msg", text.as_bytes(), "cdr", &about)?;
+            recording.output.add(spec.name, &name, "ros2msg", text.as_bytes(), "cdr", &about)?;
         }
         let none = BTreeMap::new();
         for Channel { topic, schema, descriptors } in viewers::channels(run.map(|run| &run.mission))
         {
-            recording.add(&topic, schema, "protobuf", descriptors, "protobuf", &none)?;
+            recording.output.add(&topic, schema, "protobuf", descriptors, "protobuf", &none)?;
         }
-        recording.add(LOST, "firsthand.Recorder", "jsonschema", LOST_SCHEMA, "json", &none)?;
-        recording.metadata(about)?;
+        recording.output.add(
+            LOST,
+            "firsthand.Recorder",
+            "jsonschema",
+            LOST_SCHEMA,
+            "json",
+            &none,
+        )?;
+        recording.output.metadata(RUN, about)?;
+        recording.flush()?;
         fs::rename(&unfinished, path).map_err(named)?;
         Ok(recording)
     }
@@ -128,7 +124,75 @@ impl RecordingFile {
         self.began_ns.saturating_add(self.mission_time().0)
     }
 
-    fn add(
+    /// Add `message`, a sample of a topic. Returns its log time.
+    pub(crate) fn sample(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> Result<u64> {
+        let mut times = [self.now_ns(); 2];
+        // An operator knows no mission time, and a heartbeat has that of the tick before it.
+        if ![OPERATOR, EVERY_STAGE].contains(&spec.writer) {
+            self.newest = self.newest.max(stamp.time());
+            times[1] = self.began_ns.saturating_add(stamp.stamp_ns);
+            if !matches!(self.clock, Some(MissionClock::Wall { .. })) {
+                times[0] = times[1];
+            }
+        }
+        self.output.write(spec.name, stamp.sequence, times, message)?;
+        Ok(times[0])
+    }
+
+    /// Add a message that is no sample.
+    pub(crate) fn message(&mut self, topic: &str, log_ns: u64, message: &[u8]) -> Result {
+        self.output.write(topic, 0, [log_ns; 2], message)
+    }
+
+    /// Add the numbers of samples that were lost so far.
+    pub(crate) fn lost(&mut self, lost: &BTreeMap<&str, u64>) -> Result {
+        let json = serde_json::json!({"lost": lost}).to_string();
+        self.message(LOST, self.now_ns(), json.as_bytes())
+    }
+
+    /// Write the current chunk, if the last one was written [`CHUNK_EVERY`] ago.
+    pub(crate) fn flush_if_due(&mut self) -> Result {
+        if self.chunk_began.elapsed() >= CHUNK_EVERY {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result {
+        self.chunk_began = Instant::now();
+        let Output { writer, path, .. } = &mut self.output;
+        writer.flush().map_err(failed(path))
+    }
+
+    /// Write the rest, and the summary that readers use as an index.
+    pub(crate) fn finish(self) -> Result {
+        self.output.finish().map(drop)
+    }
+}
+
+/// An MCAP file that is written.
+pub(crate) struct Output {
+    writer: Writer<BufWriter<File>>,
+    path: PathBuf,
+    channels: HashMap<String, u16>,
+}
+
+impl Output {
+    pub(crate) fn create(path: &Path, profile: &str) -> Result<Self> {
+        let file = File::create(path).map_err(FileError::of("make", path))?;
+        let options = WriteOptions::new()
+            .profile(profile)
+            .library(concat!("firsthand ", env!("CARGO_PKG_VERSION")))
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
+            // A chunk is written in one piece when it is complete, and never changed.
+            .disable_seeking(true);
+        let writer = options.create(BufWriter::new(file)).map_err(failed(path))?;
+        Ok(Self { writer, path: path.to_path_buf(), channels: HashMap::new() })
+    }
+
+    pub(crate) fn add(
         &mut self,
         topic: &str,
         schema: &str,
@@ -145,33 +209,7 @@ impl RecordingFile {
         Ok(())
     }
 
-    /// Add `message`, a sample of a topic. Returns its log time.
-    pub(crate) fn sample(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> Result<u64> {
-        let mut times = [self.now_ns(); 2];
-        // An operator knows no mission time, and a heartbeat has that of the tick before it.
-        if ![OPERATOR, EVERY_STAGE].contains(&spec.writer) {
-            self.newest = self.newest.max(stamp.time());
-            times[1] = self.began_ns.saturating_add(stamp.stamp_ns);
-            if !matches!(self.clock, Some(MissionClock::Wall { .. })) {
-                times[0] = times[1];
-            }
-        }
-        self.write(spec.name, stamp.sequence, times, message)?;
-        Ok(times[0])
-    }
-
-    /// Add a message that is no sample.
-    pub(crate) fn message(&mut self, topic: &str, log_ns: u64, message: &[u8]) -> Result {
-        self.write(topic, 0, [log_ns; 2], message)
-    }
-
-    /// Add the numbers of samples that were lost so far.
-    pub(crate) fn lost(&mut self, lost: &BTreeMap<&str, u64>) -> Result {
-        let json = serde_json::json!({"lost": lost}).to_string();
-        self.message(LOST, self.now_ns(), json.as_bytes())
-    }
-
-    fn write(
+    pub(crate) fn write(
         &mut self,
         topic: &str,
         sequence: u32,
@@ -187,30 +225,13 @@ impl RecordingFile {
         written.map_err(failed(&self.path))
     }
 
-    fn metadata(&mut self, metadata: BTreeMap<String, String>) -> Result {
-        let name = RUN.to_owned();
-        let record = Metadata { name, metadata };
-        let written = self.writer.write_metadata(&record);
-        written.map_err(failed(&self.path))?;
-        self.flush()
+    pub(crate) fn metadata(&mut self, name: &str, metadata: BTreeMap<String, String>) -> Result {
+        let record = Metadata { name: name.to_owned(), metadata };
+        self.writer.write_metadata(&record).map_err(failed(&self.path))
     }
 
-    /// Write the current chunk, if the last one was written [`CHUNK_EVERY`] ago.
-    pub(crate) fn flush_if_due(&mut self) -> Result {
-        if self.chunk_began.elapsed() >= CHUNK_EVERY {
-            self.flush()?;
-        }
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result {
-        self.chunk_began = Instant::now();
-        self.writer.flush().map_err(failed(&self.path))
-    }
-
-    /// Write the rest, and the summary that readers use as an index.
-    pub(crate) fn finish(mut self) -> Result {
-        self.writer.finish().map(drop).map_err(failed(&self.path))
+    pub(crate) fn finish(mut self) -> Result<Summary> {
+        self.writer.finish().map_err(failed(&self.path))
     }
 }
 

@@ -44,6 +44,7 @@
 //! | module | holds |
 //! |---|---|
 //! | [`schema`] | the schema of a topic, made from its layout |
+//! | `bag` | writing a bag of rosbag2 |
 //! | `budget` | the disk budget of a recorder's files |
 //! | `file` | writing the file |
 //! | `log_files` | lines that the processes of a run append to their logs |
@@ -55,6 +56,7 @@
 //! | [`viewers`], `protobuf` | messages for viewers, and their encoding |
 //! | `error` | errors |
 
+mod bag;
 mod budget;
 mod error;
 mod file;
@@ -70,9 +72,10 @@ pub mod viewers;
 
 pub(crate) use self::error::Result;
 pub use self::{
+    bag::Bag,
     error::RecordingError,
     file::now_ns,
-    places::{next_place, parts},
+    places::{files, next_place, parts},
     reader::{End, Message, Recording, Sample, SliceSample},
     recorder::{Options, record},
     viewers::log_line,

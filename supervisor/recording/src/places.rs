@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::{RecordingError, Result};
+
 /// The name of recording `number`: `F.mcap`, `F-2.mcap`, ...
 pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     if number <= 1 {
@@ -28,6 +30,21 @@ pub fn next_place(run: &Path) -> PathBuf {
 /// The recordings in a run's directory, in order. A recorder with a disk budget removes the oldest.
 pub fn parts(run: &Path) -> Vec<PathBuf> {
     places(run).filter(|file| file.is_file()).collect()
+}
+
+/// The recordings of `run`, in order and never none: those in a run's directory, or one file.
+///
+/// # Errors
+/// When the directory has none.
+pub fn files(run: &Path) -> Result<Vec<PathBuf>> {
+    if !run.is_dir() {
+        return Ok(vec![run.to_path_buf()]);
+    }
+    let files = parts(run);
+    if files.is_empty() {
+        return Err(RecordingError::NoRecording(run.to_path_buf()));
+    }
+    Ok(files)
 }
 
 #[cfg(test)]

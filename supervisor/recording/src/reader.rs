@@ -159,6 +159,23 @@ impl Recording {
         })
     }
 
+    /// What is not in the recording, in sentences.
+    pub fn gaps(&self) -> Vec<String> {
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        let mut gaps = Vec::new();
+        if let End::Cut { after, problem } = &self.end {
+            let after_s = after.as_secs_f64();
+            gaps.push(format!(
+                "{name} is cut off after {after_s:.1} s: {problem}. What came later is missing."
+            ));
+        }
+        let lost: u64 = self.lost.values().sum();
+        if lost > 0 {
+            gaps.push(format!("The recorder of {name} lost {lost} samples."));
+        }
+        gaps
+    }
+
     /// The messages of the topics that `wanted` names, or of all without names, in the order of the file. They end where the
     /// file is cut.
     pub fn messages(&self, wanted: &[&str]) -> Result<Messages> {

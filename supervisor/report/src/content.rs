@@ -12,7 +12,7 @@ use common::{
     samples::RangeReading,
 };
 use page::{Collector, Recorded};
-use recording::{End, Message, Recording};
+use recording::{Message, Recording};
 use robot_state::{Kind, Sample, TOPICS};
 use serde_json::{Map, Value, json};
 
@@ -92,18 +92,7 @@ impl Content {
     }
 
     fn part(&mut self, recording: &Recording) -> Result<(), ReportError> {
-        let name = recording.path.file_name().unwrap_or_default();
-        let name = name.to_string_lossy();
-        if let End::Cut { after, problem } = &recording.end {
-            self.remarks.push(format!(
-                "{name} is cut off after {:.1} s: {problem}. What came later is not in this report.",
-                after.as_secs_f64()
-            ));
-        }
-        let lost: u64 = recording.lost.values().sum();
-        if lost > 0 {
-            self.remarks.push(format!("The recorder of {name} lost {lost} samples."));
-        }
+        self.remarks.extend(recording.gaps());
         let topics = TOPICS.iter().map(|topic| topic.spec().name);
         let wanted: Vec<_> = topics.chain([LOG]).collect();
         for message in recording.messages(&wanted)? {

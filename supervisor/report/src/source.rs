@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use common::{file, run::Run};
-use recording::{Recording, RecordingError};
+use recording::Recording;
 use serde_json::{Map, Value};
 
 use crate::error::ReportError;
@@ -20,14 +20,7 @@ pub(crate) struct Source {
 impl Source {
     /// The recordings of `run`: a run's directory, or one recording.
     pub(crate) fn find(run: &Path) -> Result<Self, ReportError> {
-        if !run.is_dir() {
-            return Ok(Self { files: vec![run.to_path_buf()], is_run: false });
-        }
-        let files = recording::parts(run);
-        if files.is_empty() {
-            return Err(RecordingError::NoRecording(run.to_path_buf()).into());
-        }
-        Ok(Self { files, is_run: true })
+        Ok(Self { files: recording::files(run)?, is_run: run.is_dir() })
     }
 
     /// The default directory of the report.

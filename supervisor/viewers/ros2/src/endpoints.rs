@@ -71,6 +71,20 @@ fn write_to(node: &mut Node<Id>, id: Id, row: &Spec, sensor: &str) -> io::Result
     node.write_to(id, [&name, row.type_name], quality)
 }
 
+/// The topics that are published of a robot with these of its sensors: row, content and name below `namespace`.
+pub(crate) fn published<'a>(
+    namespace: &str,
+    sensors: impl Iterator<Item = (Id, &'a str)>,
+) -> impl Iterator<Item = (&'static Spec, Id, String)> {
+    let is_sensor = |id| matches!(id, Id::Range(_) | Id::Scan(_));
+    let others = TABLE.iter().filter(move |row| row.accepted_by.is_none() && !is_sensor(row.id));
+    let topics = others.map(|row| (row.id, "")).chain(sensors);
+    topics.filter_map(move |(id, sensor)| {
+        let row = spec(id)?;
+        Some((row, id, topic_name(namespace, row, sensor)))
+    })
+}
+
 /// The name of the topic of `row` below `namespace`, from the root.
 pub(crate) fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
     let name = row.name.replace("SENSOR", &ros_name(sensor));

@@ -11,6 +11,8 @@
 //! | `goals` | the goals of any action, pure |
 //! | `action` | the server of the action `navigate_to_pose`, pure |
 //! | `messages` | the messages that are written |
+//! | `bag` | a bag of rosbag2 from a recording |
+//! | `definitions` | the definitions of the messages that are written |
 //! | `bridge` | the bridge itself |
 //! | `endpoints` | its readers and writers |
 //! | `node` | readers, writers and servers of actions as a node that `ros2 node list` shows |
@@ -20,7 +22,9 @@
 
 mod action;
 mod asked;
+mod bag;
 mod bridge;
+mod definitions;
 mod drift;
 mod endpoints;
 mod frames;
@@ -93,6 +97,7 @@ const RVIZ: &str = include_str!("../firsthand.rviz");
 #[derive(Debug, Subcommand)]
 enum Command {
     Planner(planner::Arguments),
+    Bag(bag::Arguments),
 }
 
 /// A namespace of ROS: names of letters, digits and `_` between slashes.
@@ -133,6 +138,11 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     if arguments.rviz {
         print_text(RVIZ)?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if let Some(Command::Bag(options)) = &arguments.command {
+        let_stages_go_first();
+        print_text(&bag::make(&arguments.namespace, options)?)?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut signals = Signals::that_end()?;

@@ -7,10 +7,7 @@ use common::{
 };
 use ros2::topic::Topic;
 
-use crate::{
-    endpoints::topic_name,
-    topics::{Id, TABLE, spec},
-};
+use crate::{endpoints::published, topics::Id};
 
 /// Those topics of a bridge in `domain` and `namespace` that the link of `run` reads, with the topics of these sensors.
 pub(crate) fn overlap<'a>(
@@ -23,10 +20,7 @@ pub(crate) fn overlap<'a>(
         _ => false,
     };
     let read: Vec<_> = read(&run.mission).filter(|_| reads).collect();
-    let is_sensor = |id| matches!(id, Id::Range(_) | Id::Scan(_));
-    let written = TABLE.iter().filter(|row| row.accepted_by.is_none() && !is_sensor(row.id));
-    let topics = written.map(|row| (row.id, "")).chain(sensors);
-    let named = topics.filter_map(|(id, name)| Some((id, topic_name(namespace, spec(id)?, name))));
+    let named = published(namespace, sensors).map(|(_, id, name)| (id, name));
     named.filter(|(_, name)| read.contains(name)).collect()
 }
 

@@ -1,0 +1,114 @@
+//! `firsthand ros2 bag`: a bag of rosbag2 from a recording, with the messages that the bridge publishes.
+
+use std::{collections::BTreeMap, path::PathBuf};
+
+use clap::Args;
+use common::topics;
+use console::failure::Failure;
+use recording::{Bag, Recording, RecordingError};
+use robot_state::{Sample, TOPICS};
+
+use crate::{definitions::define, endpoints::published, shown::Shown};
+
+/// Make a bag of rosbag2 from a recording: for `ros2 bag play`, PlotJuggler and other readers of bags.
+///
+/// It has the topics that are published of a robot that runs, `path` and `field` only from a recording with `--fields`. Their stamps and
+/// the times of the bag are mission time.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Arguments {
+    /// A recorded run's directory, or one recording.
+    recording: PathBuf,
+    /// The folder of the bag, which must not exist yet.
+    out: PathBuf,
+}
+
+/// Make a bag with topics below `namespace`. Returns what is in it and what is not, in words.
+pub(crate) fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
+    let Arguments { recording, out } = arguments;
+    let files = recording::files(recording)?;
+    let recordings: Vec<_> =
+        files.iter().map(|file| Recording::open(file)).collect::<Result<_, _>>()?;
+    let run = &recordings[0].run;
+    let mut shown = Shown::new(run.robot.to_string(), run.mission.clone());
+    let mut bag = Bag::create(out)?;
+    let mut names = BTreeMap::new();
+    for (row, id, name) in published(namespace, shown.sensor_topics()) {
+        let mut definition = String::new();
+        define(&row.message.join("/"), &mut definition);
+        let kind = row.message.join("/msg/");
+        bag.add([&name, &kind, &definition], row.is_latched)?;
+        names.insert(id, name);
+    }
+    // A bag begins with the first pose, so that readers know where the sensors are before any message of them.
+    let first = recordings[0].samples(&topics::POSE)?.next().transpose()?;
+    let began_ns = first.map_or(0, |first| first.sample.stamp.stamp_ns);
+    let mut messages = Vec::new();
+    shown.mounting(began_ns, &mut |id, payload| messages.push((began_ns, id, payload)));
+    let wanted: Vec<_> = TOPICS.iter().map(|topic| topic.spec().name).collect();
+    for recording in &recordings {
+        for message in recording.messages(&wanted)? {
+            let message = message?;
+            let Some(sample) = Sample::decoded(&message.topic, &message.data) else {
+                let (file, topic) = (recording.path.clone(), message.topic.to_string());
+                return Err(RecordingError::Message { file, topic }.into());
+            };
+            let at_ns = sample.time().0;
+            shown.sample(&sample, at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
+            // Before the first pose mission time is not known.
+            if let Some(pose) = shown.state.pose {
+                let at_ns = pose.stamp.stamp_ns;
+                shown.tick(at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
+            }
+            for (at_ns, id, payload) in messages.drain(..) {
+                if let Some(name) = names.get(&id).filter(|_| at_ns >= began_ns) {
+                    bag.message(name, at_ns, &payload)?;
+                }
+            }
+        }
+    }
+    let mut told: String =
+        recordings.iter().flat_map(Recording::gaps).map(|gap| gap + "\n").collect();
+    told += &format!("{}: {} messages\n", out.display(), bag.finish()?);
+    Ok(told)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_bag_has_a_transform_for_each_recorded_pose_and_replaces_no_other() {
+        let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/golden");
+        let recording = PathBuf::from(golden).join("stall-and-kill.mcap");
+        let poses = Recording::open(&recording).unwrap().counts["pose"];
+        let folder = tempfile::tempdir().unwrap();
+        // A run's directory with two recordings.
+        let run = folder.path().join("run");
+        fs::create_dir(&run).unwrap();
+        for part in ["recording.mcap", "recording-2.mcap"] {
+            fs::copy(&recording, run.join(part)).unwrap();
+        }
+        for (recording, parts) in [(recording, 1), (run, 2)] {
+            let arguments = Arguments { recording, out: folder.path().join(parts.to_string()) };
+            make("a", &arguments).unwrap();
+            let metadata = fs::read(arguments.out.join("metadata.yaml")).unwrap();
+            let metadata: serde_json::Value = serde_json::from_slice(&metadata).unwrap();
+            let topics = &metadata["rosbag2_bagfile_information"]["topics_with_message_count"];
+            let row = |index: usize| (&topics[index], &topics[index]["topic_metadata"]);
+            let (tf, about) = row(0);
+            assert_eq!(
+                (&about["name"], &tf["message_count"]),
+                (&"/a/tf".into(), &(parts * poses).into())
+            );
+            let (fixed, about) = row(1);
+            assert_eq!(
+                (&about["name"], &fixed["message_count"]),
+                (&"/a/tf_static".into(), &1.into())
+            );
+            assert!(about["offered_qos_profiles"].to_string().contains("durability: 1"));
+            assert!(make("a", &arguments).unwrap_err().to_string().contains("exists"));
+        }
+    }
+}
