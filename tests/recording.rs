@@ -176,6 +176,24 @@ fn killed_recorder(run: &Run, file: PathBuf, growths: usize) -> PathBuf {
 }
 
 #[test]
+fn a_recorder_that_waits_for_a_robot_records_its_run_so_that_it_can_be_read() {
+    let out = tempfile::tempdir().unwrap();
+    let file = out.path().join("waited.mcap");
+    let mut recorder = firsthand(&["record", "--robot", "rec-waits", "--out"])
+        .arg(&file)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (code, summary, _) = Run::start("rec-waits", "open-room", &["--pace", "4"]).finish_in();
+    assert_eq!(code, Some(0), "{summary}");
+    let mut said = BufReader::new(recorder.stdout.take().unwrap()).lines().map(Result::unwrap);
+    said.find(|line| line.contains("complete")).unwrap();
+    signal_process(recorder.id(), Signal::INT);
+    recorder.wait().unwrap();
+    assert_eq!(Recording::open(&file).unwrap().run.mission.name, "open-room");
+}
+
+#[test]
 fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was() {
     let run = Run::under_way("rec-shot", "obstacle-course", &["--pace", "4"], 1.0);
     // A robot that stands does not arrive before its recorders are killed, however busy the machine is.

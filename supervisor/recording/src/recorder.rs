@@ -112,6 +112,7 @@ pub fn record(
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;
+    let mut joins = false;
     let earlier = options.run.as_deref().map(places::parts).unwrap_or_default();
     let mut budget = options.budget.map(|bytes| Budget::new(bytes, earlier));
     loop {
@@ -122,7 +123,10 @@ pub fn record(
             Event::Disconnected => Some(false),
             Event::Samples(_) | Event::Nothing => None,
         };
-        if news == Some(true) {
+        joins = news.unwrap_or(joins);
+        // A bus is there before its run.
+        if joins && let Some(run) = find_run(options) {
+            joins = false;
             let holder = options.domain.supervisor().ok().flatten();
             // Another supervisor resumes the run, and starts a recorder of its own.
             if options.run.is_some() && supervisor.is_some() && supervisor != holder {
@@ -132,9 +136,8 @@ pub fn record(
                 return Ok(());
             }
             supervisor = holder;
-            let run = find_run(options);
             // Samples of a bus that was recreated within the run go into the same file.
-            if let Some(ended) = current.take_if(|current| !current.is_of(run.as_deref())) {
+            if let Some(ended) = current.take_if(|current| !current.is_of(&run)) {
                 let file = ended.finish(tell)?;
                 if let Some(budget) = &mut budget {
                     budget.complete(file);
@@ -206,13 +209,13 @@ fn find_run(options: &Options) -> Option<PathBuf> {
 struct CurrentRun {
     path: PathBuf,
     began: Instant,
-    directory: Option<PathBuf>,
+    directory: PathBuf,
     run: Option<Run>,
     about: BTreeMap<String, String>,
     file: RecordingFile,
     drawn: Drawn,
     losses: Losses,
-    logs: Option<LogFiles>,
+    logs: LogFiles,
     logs_taken: Instant,
     message: Vec<u8>,
 }
@@ -222,10 +225,9 @@ impl CurrentRun {
         options: &Options,
         topics: &[&'static dyn AnyTopic],
         path: &Path,
-        directory: Option<PathBuf>,
+        directory: PathBuf,
     ) -> Result<Self> {
-        let run_file = directory.as_ref().map(|run| run.join(run::FILE_NAME));
-        let text = run_file.and_then(|file| file::text(&file, LONGEST_RUN_FILE));
+        let text = file::text(&directory.join(run::FILE_NAME), LONGEST_RUN_FILE);
         let run: Option<Run> = text.as_ref().and_then(|text| toml::from_str(text).ok());
         let mut about = BTreeMap::from([
             ("robot", options.domain.robot.to_string()),
@@ -242,8 +244,7 @@ impl CurrentRun {
         let about: BTreeMap<_, _> = about.map(|(key, value)| (key.to_owned(), value)).collect();
         let file = RecordingFile::create(path, topics, run.as_ref(), about.clone())?;
         let whole = options.run.is_some();
-        let logs = directory.as_ref();
-        let logs = logs.map(|directory| LogFiles::follow(directory, whole));
+        let logs = LogFiles::follow(&directory, whole);
         Ok(Self {
             path: path.to_path_buf(),
             began: Instant::now(),
@@ -269,8 +270,8 @@ impl CurrentRun {
         Ok(std::mem::replace(&mut self.path, path.to_path_buf()))
     }
 
-    fn is_of(&self, run: Option<&Path>) -> bool {
-        self.directory.as_deref() == run
+    fn is_of(&self, run: &Path) -> bool {
+        self.directory == run
     }
 
     fn take(&mut self, readers: &mut Readers) -> Result {
@@ -302,9 +303,7 @@ impl CurrentRun {
             return Ok(());
         }
         self.logs_taken = Instant::now();
-        let (file, Some(logs)) = (&mut self.file, &mut self.logs) else {
-            return Ok(());
-        };
+        let (file, logs) = (&mut self.file, &mut self.logs);
         let mut written = Ok(());
         let now_ns = file.now_ns();
         logs.take(&mut |process, line| {
