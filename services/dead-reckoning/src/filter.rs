@@ -28,10 +28,8 @@ const MOST_TICKS: usize = 64;
 const MOST_FIXES: usize = 64;
 /// Squared Mahalanobis distance beyond which a fix is refused: one good one in a thousand, for 2 and 3 degrees of freedom.
 pub(crate) const GATES: [f64; 2] = [13.8, 16.3];
-/// The least stated variance, m^2: 5 mm.
-const LEAST_VARIANCE: f64 = 25e-6;
-/// The least variance of the heading, rad^2: a tenth of a degree.
-const LEAST_HEADING_VARIANCE: f64 = 3e-6;
+/// The least stated variances of x, y and the heading, m^2 and rad^2: 5 mm and a tenth of a degree.
+const LEAST_VARIANCES: [f64; 3] = [25e-6, 25e-6, 3e-6];
 /// A fix of the scan matcher that is less sure by its scan than this, metres and radians, may lean on the pose by the wheels: the matcher
 /// holds its match at that pose with these deviations, and states the match alone several times as unsure as it is.
 const LEANS: [f64; 2] = [0.1, 0.05];
@@ -84,7 +82,7 @@ impl TryFrom<&FixSample> for Fix {
             shared: if heading.is_some() { shared } else { [shared[0], 0.0] },
         };
         // Positive: less than the least eigenvalue can be taken from the diagonal.
-        let least = SVector::from([LEAST_VARIANCE, LEAST_VARIANCE, LEAST_HEADING_VARIANCE]);
+        let least = SVector::from(LEAST_VARIANCES);
         let spare = fix.noise() - SMatrix::from_diagonal(&(least * (1.0 - 1e-9)));
         let positive = match heading {
             Some(_) => spare.cholesky().is_some(),
@@ -174,10 +172,9 @@ impl Anchor {
     fn apart(&self, fix: &Fix) -> Fix {
         let (shared, stated) = (fix.shares(), fix.noise());
         let drift = self.drift(shared);
-        let least = [LEAST_VARIANCE, LEAST_VARIANCE, LEAST_HEADING_VARIANCE];
         let shrunk = SMatrix::from_diagonal(&SVector::from([0, 1, 2].map(|part| {
             let all = stated[(part, part)];
-            ((all - shared[part] + drift[part]).max(least[part]) / all).sqrt()
+            ((all - shared[part] + drift[part]).max(LEAST_VARIANCES[part]) / all).sqrt()
         })));
         Fix { covariance: parts(&(shrunk * stated * shrunk)), ..*fix }
     }

@@ -75,7 +75,9 @@ export class Store {
     if (message.state) this.states.push(message.state);
     if (message.state || message.rows) this.heard = performance.now();
     if (!this.isBounded) return;
-    if (this.events.length > MOST_EVENTS) this.events.splice(0, this.events.length - MOST_EVENTS);
+    for (const list of [this.events, this.results]) {
+      if (list.length > MOST_EVENTS) list.splice(0, list.length - MOST_EVENTS);
+    }
     if (this.states.length > MOST_STATES) this.states.splice(0, MOST_STATES / 10);
   }
 

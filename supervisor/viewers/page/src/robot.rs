@@ -16,9 +16,9 @@ use common::{
     samples::{Cause, TargetPoint, TargetSample},
     topics,
 };
+use console::runs::Results;
 use glam::DVec2;
 use planner::step::Planner;
-use processes::records;
 use recording::log_files::{LogFiles, Tail};
 
 use page::{Collector, about, blob};
@@ -35,6 +35,8 @@ const LOGS_EVERY: Duration = Duration::from_millis(500);
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// Most bytes of the ground truth that are read at once; the bytes behind them are skipped.
 const TRUTH_AT_ONCE: u64 = 1 << 16;
+/// The most bytes of the results of a run that goes on when it is first shown.
+const LARGEST_RESULTS: u64 = 1 << 20;
 /// The most cells of a map for which a field is computed to a target that is only looked at.
 const PREVIEW_MOST_CELLS: usize = 512 * 512;
 
@@ -46,7 +48,7 @@ struct Reading {
     logs_read: Instant,
     /// What a simulated robot writes about itself.
     truth: (PathBuf, Tail),
-    results: (PathBuf, Tail),
+    results: Results,
     packed: Option<Instant>,
 }
 
@@ -61,7 +63,7 @@ impl Reading {
             logs: LogFiles::follow(&directory, true),
             logs_read: Instant::now(),
             truth: (directory.join(GROUND_TRUTH), Tail::default()),
-            results: (directory.join(records::TARGETS), Tail::default()),
+            results: Results::of(&directory, LARGEST_RESULTS),
             packed: None,
         })
     }
@@ -69,11 +71,11 @@ impl Reading {
     /// Give browsers the new data.
     fn publish(&mut self, shared: &Shared) {
         let Self { collector, processes, logs, logs_read, results, packed, .. } = self;
-        let mut ended = String::new();
+        let mut ended = Vec::new();
         if logs_read.elapsed() >= LOGS_EVERY {
             *logs_read = Instant::now();
             logs.take(&mut |process, line| collector.state.log(process, line));
-            ended = results.1.lines(&results.0);
+            ended = results.take();
         }
         let usage = processes.look(&collector.processes(), Instant::now());
         collector.used(usage);
@@ -98,8 +100,8 @@ impl Reading {
         for event in events {
             shown.event(&serde_json::json!(event));
         }
-        for target in ended.lines().filter_map(|line| serde_json::from_str(line).ok()) {
-            shown.result(&page::result(&target));
+        for target in ended {
+            shown.result(&page::result(&serde_json::json!(target)));
         }
         if let Some(state) = state {
             shown.state.set(state.to_string().into());
