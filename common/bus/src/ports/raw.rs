@@ -135,7 +135,8 @@ impl Carried {
             true => (Type::of::<H>(), Type::of::<E>(), TypeVariant::Dynamic),
             false => (Type::of::<E>(), Type::of::<H>(), TypeVariant::FixedSize),
         };
-        Self { header, element, elements, layout: fnv_1a(&format!("{:?}", (H::kind(), E::kind()))) }
+        let layout = crc32fast::hash(format!("{:?}", (H::kind(), E::kind())).as_bytes());
+        Self { header, element, elements, layout }
     }
 
     fn layout(&self, spec: &Spec) -> Result<(AttributeKey, AttributeValue)> {
@@ -144,10 +145,6 @@ impl Carried {
         let value = format!("{:08x}", self.layout);
         Ok((key, value.as_str().try_into().map_err(refused())?))
     }
-}
-
-fn fnv_1a(text: &str) -> u32 {
-    text.bytes().fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
 }
 
 fn samples(

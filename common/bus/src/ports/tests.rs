@@ -17,6 +17,7 @@ use crate::{
     bus_instance::{BusInstance, VERSION},
     clock::MissionTime,
     domain::{Domain, SHARED_MEMORY},
+    layout::{Kind, Layout as _},
     layouts,
     spec::Limits,
     waiter::Waiter,
@@ -192,6 +193,10 @@ fn a_topic_is_not_opened_by_a_program_for_which_the_same_bytes_are_other_fields(
         first: f32,
     }
     layouts! { Swapped { third second first } }
+    let Kind::Struct(mut swapped) = Swapped::kind() else { panic!("it is a struct") };
+    let text = format!("{swapped:?}");
+    swapped.fields[0].doc = "A comment changes no layout.";
+    assert_eq!(format!("{swapped:?}"), text);
     with_bus("swapped", |bus| {
         let swapped = Topic::<Test, Swapped>::new(SLICES.spec());
         let error = bus.reader(&swapped).unwrap_err();
