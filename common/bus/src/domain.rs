@@ -94,21 +94,31 @@ impl Domain {
 
     /// The process that holds the supervisor's lock, or claims the robot while the lock is missing; none if there is neither.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
-        let lock = match File::open(self.lock_file()) {
-            // A cleaner of temporary files may have removed it.
-            Err(error) if error.kind() == NotFound => return claim::holder(self),
-            opened => opened?,
-        };
-        match lock.try_lock_shared() {
-            Ok(()) => Ok(None),
-            Err(TryLockError::WouldBlock) => holder_of(&lock).map(Some),
-            Err(TryLockError::Error(error)) => Err(error),
+        match self.supervision()? {
+            Supervision::Locked(lock) => holder_of(&lock).map(Some),
+            Supervision::Claimed(process) => Ok(Some(process)),
+            Supervision::None => Ok(None),
         }
     }
 
-    /// Whether the robot has a supervisor; true if that cannot be found out.
+    /// Whether the robot has a supervisor; true if that cannot be found out. Who it is takes longer to find.
     pub fn is_supervised(&self) -> bool {
-        !matches!(self.supervisor(), Ok(None))
+        !matches!(self.supervision(), Ok(Supervision::None))
+    }
+
+    fn supervision(&self) -> io::Result<Supervision> {
+        let lock = match File::open(self.lock_file()) {
+            // A cleaner of temporary files may have removed it.
+            Err(error) if error.kind() == NotFound => {
+                return Ok(claim::holder(self)?.map_or(Supervision::None, Supervision::Claimed));
+            }
+            opened => opened?,
+        };
+        match lock.try_lock_shared() {
+            Ok(()) => Ok(Supervision::None),
+            Err(TryLockError::WouldBlock) => Ok(Supervision::Locked(lock)),
+            Err(TryLockError::Error(error)) => Err(error),
+        }
     }
 
     /// The name of the claim on the robot. Two containers may have the network in common, and with it such names, so the name has the set
@@ -196,6 +206,13 @@ impl Domain {
     pub fn shared_memory_prefix(&self) -> String {
         format!("fh{}_{}_", self.owner, self.robot)
     }
+}
+
+/// How it shows that a robot has a supervisor.
+enum Supervision {
+    Locked(File),
+    Claimed(u32),
+    None,
 }
 
 /// The environment variable that sets a suite of tests apart, so that two of them may run at once: `t` and four of a-z and 0-9, which
