@@ -103,7 +103,7 @@ pub struct Link {
     /// its answer.
     stood: Option<MissionTime>,
     stop_sent_ns: Option<u64>,
-    /// Motor frames still to come in lockstep: one for each command and ping since the order.
+    /// Motor frames still to come in lockstep: one for each command and ping.
     due: u32,
     tally: Tally,
     refused_ns: Option<u64>,
@@ -309,12 +309,12 @@ impl Link {
     }
 
     fn begin_tick(&mut self, motion: Motion, now_ns: u64, effects: &mut Vec<Effect>) {
+        // The last of several due answers shows the robot's present state.
+        self.due = self.due.saturating_sub(1);
         if !self.ordered_to_drive() && !self.stands_by() {
             return;
         }
         if self.in_ticks() {
-            // The last of several due answers shows the robot's present state.
-            self.due = self.due.saturating_sub(1);
             if self.open.is_some() || self.due > 0 {
                 return;
             }
@@ -423,7 +423,7 @@ impl Link {
             self.observe(Observation::Resumed, now_ns);
         }
         self.observe(Observation::Directive(order, reason), now_ns);
-        if drives && self.in_ticks() {
+        if drives && self.in_ticks() && self.due == 0 {
             // A robot that waits for commands answers a ping with its state, which starts tick 0.
             self.ping(now_ns, effects);
         }

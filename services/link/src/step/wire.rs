@@ -20,8 +20,9 @@ impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.failsafe.monitors.presence.wire(open);
         self.base.reset();
-        // Stops sent to a closed wire are lost.
+        // What was sent to a closed wire is lost.
         self.stop_sent_ns = None;
+        self.due = 0;
         if !open {
             self.lose(now_ns, effects);
         }
@@ -117,16 +118,12 @@ impl Link {
             effects.push(Effect::Send(self.base.greeting()));
             // The robot may still drive by a command of an earlier link.
             self.stop_sent_ns = None;
-            if self.in_ticks() {
-                // These frames answer the greeting, and their number depends on the robot's start. Ticks begin with those that answer
-                // the order.
-                if motion.is_some() {
-                    self.due = self.due.saturating_sub(1);
-                }
+            if self.in_ticks() && self.base.is_polled() {
+                // Its answer to a ping has no motion, and it was not polled yet.
+                self.due = 0;
                 if self.ordered_to_drive() {
                     self.ping(now_ns, effects);
                 }
-                return;
             }
         }
         if counts == Some(Counts::Implausible) {
@@ -212,9 +209,7 @@ impl Link {
     pub(super) fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.pinged_ns = Some(now_ns);
         self.failsafe.monitors.presence.pinged(now_ns);
-        if self.ordered_to_drive() {
-            self.due += 1;
-        }
+        self.due += 1;
         effects.push(Effect::Send(self.base.ping()));
         self.poll_in_ticks(effects);
     }

@@ -16,19 +16,6 @@ fn in_lockstep_no_command_is_sent_again() {
 }
 
 #[test]
-fn in_lockstep_a_second_answer_to_a_ping_is_no_tick() {
-    let mut link = in_ticks();
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
-    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
-    // The robot is slow, so it is pinged again. Then both answers come.
-    link.at(Event::Order(Order::Hold, HoldReason::Operator), MS);
-    link.at(Event::Order(Order::Drive, HoldReason::None), 2 * MS);
-    assert!(ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 3 * MS)).is_empty());
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 4 * MS);
-    assert_eq!(ticks(&effects).len(), 1);
-}
-
-#[test]
 fn in_lockstep_the_order_asks_for_tick_0_and_each_command_for_the_next() {
     let mut link = in_ticks();
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
@@ -48,9 +35,31 @@ fn in_lockstep_a_robot_found_after_the_order_still_starts() {
     let mut link = in_ticks();
     link.at(Event::Order(Order::Drive, HoldReason::None), 0);
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 1);
-    assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 2);
     assert_eq!(ticks(&effects)[0].0, 0);
+}
+
+#[test]
+fn in_lockstep_a_late_answer_to_a_ping_is_none_to_a_command() {
+    let mut link = in_ticks();
+    let pings = |effects: &[Effect]| {
+        let ping = Command::System(SystemSignal::Ping);
+        sent(effects).iter().filter(|sent| **sent == ping).count()
+    };
+    // The robot is slow, so it is pinged again before it is found, and answers each ping once.
+    let mut owed = pings(&link.at(Event::Quiet, 0));
+    owed += pings(&link.at(Event::Quiet, 200 * MS));
+    assert_eq!(owed, 2);
+    owed += pings(&link.at(Event::Datagram(&datagram(255, 0, 0)), 201 * MS));
+    owed += pings(&link.at(Event::Order(Order::Drive, HoldReason::None), 202 * MS));
+    let began = ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 203 * MS));
+    link.at(Event::Command(command(0, 0, 1.0, 1.0)), 204 * MS);
+    let late =
+        (2..owed).flat_map(|_| ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 205 * MS)));
+    let late: Vec<_> = late.collect();
+    let answered = ticks(&link.at(Event::Datagram(&datagram(120, 9, 9)), 206 * MS));
+    let numbers: [Vec<u64>; 3] =
+        [began, late, answered].map(|ticks| ticks.iter().map(|tick| tick.0).collect());
+    assert_eq!(numbers, [vec![0], vec![], vec![1]]);
 }
 
 #[test]
