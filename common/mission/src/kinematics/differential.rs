@@ -6,7 +6,7 @@ use super::pose::Twist;
 pub struct DifferentialDrive {
     radius: f64,
     track: f64,
-    rim_limit: f64,
+    top_wheel_speed: f64,
 }
 
 /// rad/s.
@@ -21,13 +21,12 @@ pub struct WheelSpeeds {
 impl DifferentialDrive {
     /// The `radius` r and the `track` W in metres, the top speed in rad/s; all positive.
     pub fn new(radius: f64, track: f64, top_wheel_speed: f64) -> Self {
-        Self { radius, track, rim_limit: top_wheel_speed }
+        Self { radius, track, top_wheel_speed }
     }
 
     /// (2). The map is linear, so wheel angles give (arc, turn).
-    pub fn twist(&self, wheels: WheelSpeeds) -> Twist {
+    pub fn twist(&self, WheelSpeeds { right, left }: WheelSpeeds) -> Twist {
         let (half, over) = (self.radius / 2.0, self.radius / self.track);
-        let WheelSpeeds { right, left } = wheels;
         Twist { v: half * right + half * left, omega: over * right - over * left }
     }
 
@@ -37,7 +36,8 @@ impl DifferentialDrive {
             (1.0 / self.radius * twist.v, self.track / (2.0 * self.radius) * twist.omega);
         let (right, left) = (rim + turn, rim - turn);
         let fastest = right.abs().max(left.abs());
-        let scale = if fastest > self.rim_limit { self.rim_limit / fastest } else { 1.0 };
+        let scale =
+            if fastest > self.top_wheel_speed { self.top_wheel_speed / fastest } else { 1.0 };
         WheelSpeeds { right: right * scale, left: left * scale }
     }
 }

@@ -28,8 +28,10 @@ impl Pose2 {
         // sin(h)/h, the chord over its arc, stable through h = 0.
         let half = turn / 2.0;
         let chord = if half.abs() < 1e-6 { 1.0 - half * half / 6.0 } else { half.sin() / half };
-        let step = DVec2::from_angle(self.heading + half) * (arc * chord);
-        Self { position: self.position + step, heading: self.heading + turn }
+        Self {
+            position: self.position + DVec2::from_angle(self.heading + half) * (arc * chord),
+            heading: self.heading + turn,
+        }
     }
 
     /// One forward Euler step of (21) along the heading before the turn.
