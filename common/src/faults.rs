@@ -90,24 +90,24 @@ pub fn admit(
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Asked {
-    pub(crate) id: u64,
-    pub(crate) fault: Result<FaultKind, FaultAnswer>,
+pub struct Asked {
+    pub id: u64,
+    pub fault: Result<FaultKind, FaultAnswer>,
 }
 
 #[derive(Debug)]
-pub(crate) struct Requests {
+pub struct Requests {
     requests: Reader<FaultSample>,
     stage: &'static str,
     simulated: bool,
 }
 
 impl Requests {
-    pub(crate) fn open(bus: &Bus, stage: &'static str, simulated: bool) -> Result<Self, BusError> {
+    pub fn open(bus: &Bus, stage: &'static str, simulated: bool) -> Result<Self, BusError> {
         Ok(Self { requests: bus.reader(&topics::FAULTS)?, stage, simulated })
     }
 
-    pub(crate) fn take(&mut self) -> Result<Option<Asked>, BusError> {
+    pub fn take(&mut self) -> Result<Option<Asked>, BusError> {
         while let Some(request) = self.requests.next_sample()? {
             if name_str(&request.stage) == self.stage {
                 return Ok(Some(Asked {

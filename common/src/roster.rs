@@ -58,6 +58,7 @@ impl Roster {
 
     /// Wait until the supervisor names this process, then let its readers on `bus` admit the processes that rosters name. A roster that
     /// names this process comes before all that it publishes; readers in other processes know it by then.
+    #[cfg(feature = "stage")]
     pub(crate) fn admit_named(mut self, bus: &Bus) -> Result<(), BusError> {
         let Some(writers) = bus.writers() else {
             return Ok(());

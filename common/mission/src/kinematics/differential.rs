@@ -1,14 +1,12 @@
 //! The differential drive, (2), and its inverse, (17).
 
-use nalgebra::{Matrix2, Vector2};
-
 use super::pose::Twist;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DifferentialDrive {
-    g: Matrix2<f64>,
-    inverse: Matrix2<f64>,
-    rim_limit: f64,
+    radius: f64,
+    track: f64,
+    top_wheel_speed: f64,
 }
 
 /// rad/s.
@@ -23,31 +21,24 @@ pub struct WheelSpeeds {
 impl DifferentialDrive {
     /// The `radius` r and the `track` W in metres, the top speed in rad/s; all positive.
     pub fn new(radius: f64, track: f64, top_wheel_speed: f64) -> Self {
-        let (half, over) = (radius / 2.0, radius / track);
-        Self {
-            g: Matrix2::new(half, half, over, -over),
-            inverse: Matrix2::new(
-                1.0 / radius,
-                track / (2.0 * radius),
-                1.0 / radius,
-                -track / (2.0 * radius),
-            ),
-            rim_limit: top_wheel_speed,
-        }
+        Self { radius, track, top_wheel_speed }
     }
 
     /// (2). The map is linear, so wheel angles give (arc, turn).
-    pub fn twist(&self, wheels: WheelSpeeds) -> Twist {
-        let body = self.g * Vector2::new(wheels.right, wheels.left);
-        Twist { v: body.x, omega: body.y }
+    pub fn twist(&self, WheelSpeeds { right, left }: WheelSpeeds) -> Twist {
+        let (half, over) = (self.radius / 2.0, self.radius / self.track);
+        Twist { v: half * right + half * left, omega: over * right - over * left }
     }
 
     /// (17); both are scaled by one factor when a wheel would exceed its limit, so that the curvature stays.
     pub fn wheels(&self, twist: Twist) -> WheelSpeeds {
-        let wheels = self.inverse * Vector2::new(twist.v, twist.omega);
-        let fastest = wheels.amax();
-        let scale = if fastest > self.rim_limit { self.rim_limit / fastest } else { 1.0 };
-        WheelSpeeds { right: wheels.x * scale, left: wheels.y * scale }
+        let (rim, turn) =
+            (1.0 / self.radius * twist.v, self.track / (2.0 * self.radius) * twist.omega);
+        let (right, left) = (rim + turn, rim - turn);
+        let fastest = right.abs().max(left.abs());
+        let scale =
+            if fastest > self.top_wheel_speed { self.top_wheel_speed / fastest } else { 1.0 };
+        WheelSpeeds { right: right * scale, left: left * scale }
     }
 }
 

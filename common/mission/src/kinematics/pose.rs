@@ -1,5 +1,4 @@
 use glam::DVec2;
-use nalgebra::{Rotation2, Vector2};
 use serde::{Deserialize, Serialize};
 
 /// The robot's centre in the mission frame.
@@ -29,14 +28,15 @@ impl Pose2 {
         // sin(h)/h, the chord over its arc, stable through h = 0.
         let half = turn / 2.0;
         let chord = if half.abs() < 1e-6 { 1.0 - half * half / 6.0 } else { half.sin() / half };
-        let step = Rotation2::new(self.heading + half) * Vector2::new(arc * chord, 0.0);
-        Self { position: self.position + DVec2::new(step.x, step.y), heading: self.heading + turn }
+        Self {
+            position: self.position + DVec2::from_angle(self.heading + half) * (arc * chord),
+            heading: self.heading + turn,
+        }
     }
 
     /// One forward Euler step of (21) along the heading before the turn.
     pub fn along_euler(&self, arc: f64, turn: f64) -> Self {
-        let step = Rotation2::new(self.heading) * Vector2::new(arc, 0.0);
-        Self { position: self.position + DVec2::new(step.x, step.y), heading: self.heading + turn }
+        Self { position: self.position + self.axis() * arc, heading: self.heading + turn }
     }
 }
 

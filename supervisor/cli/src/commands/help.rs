@@ -40,6 +40,7 @@ static GUIDE: &[Page] = guide! {
     "operate",
     "attach",
     "another-machine",
+    "small-machine",
     "nav2-planner",
     "recordings",
     "break-it",
