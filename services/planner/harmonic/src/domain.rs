@@ -52,10 +52,7 @@ impl Domain {
     /// [`SolveError::ScreeningLength`].
     pub fn with_screening(mut self, screening: &Screening) -> Result<Self, SolveError> {
         if let Screening::Uniform { length, cell } = screening {
-            let cells = length / cell;
-            if cells.is_nan() || cells < MIN_SCREENING_CELLS {
-                return Err(SolveError::ScreeningLength { cells });
-            }
+            check_length(length / cell)?;
         }
         self.screening = screening.coefficient();
         Ok(self)
@@ -73,10 +70,7 @@ impl Domain {
             return Err(SolveError::WrongLength { found: costs.len(), expected });
         }
         let length = 0.5 / self.screening.sqrt();
-        let too_short = |&&cost: &&f32| !(length / f64::from(cost) >= MIN_SCREENING_CELLS);
-        if let Some(&cost) = costs.iter().find(too_short) {
-            return Err(SolveError::ScreeningLength { cells: length / f64::from(cost) });
-        }
+        costs.iter().try_for_each(|&cost| check_length(length / f64::from(cost)))?;
         self.costs = costs;
         Ok(self)
     }
@@ -178,4 +172,11 @@ impl Domain {
         }
         Ok(self.index(cell))
     }
+}
+
+fn check_length(cells: f64) -> Result<(), SolveError> {
+    if cells.is_nan() || cells < MIN_SCREENING_CELLS {
+        return Err(SolveError::ScreeningLength { cells });
+    }
+    Ok(())
 }
