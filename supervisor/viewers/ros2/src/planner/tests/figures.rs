@@ -7,7 +7,7 @@ use std::{
     cmp::Reverse,
     collections::{BTreeMap, BinaryHeap},
     io::{BufReader, Read as _, Write as _},
-    process::{ChildStdin, ChildStdout, Command, Stdio},
+    process::{Child, ChildStdout, Command, Stdio},
     sync::Arc,
     time::Duration,
 };
@@ -269,7 +269,7 @@ fn inflated(distances: &[f64]) -> Vec<u8> {
 
 /// Nav2's planners in a process of their own.
 struct Nav2 {
-    to: ChildStdin,
+    child: Child,
     from: BufReader<ChildStdout>,
 }
 
@@ -278,19 +278,18 @@ impl Nav2 {
         let path = std::env::var_os("NAV2_PLANNERS")?;
         let started = Command::new(path).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
         let mut child = started.unwrap();
-        Some(Self {
-            to: child.stdin.take().unwrap(),
-            from: BufReader::new(child.stdout.take().unwrap()),
-        })
+        let from = BufReader::new(child.stdout.take().unwrap());
+        Some(Self { child, from })
     }
 
     /// Ways and milliseconds of NavFn, Theta* and Smac 2D.
     fn plan(&mut self, grid: &Grid, costs: &[u8], ends: [usize; 2]) -> [(Vec<DVec2>, f64); 3] {
         let [from, to] = ends.map(|cell| [cell % grid.width, cell / grid.width]);
+        let input = self.child.stdin.as_mut().unwrap();
         for number in [grid.width, grid.height, from[0], from[1], to[0], to[1]] {
-            self.to.write_all(&(number as u32).to_ne_bytes()).unwrap();
+            input.write_all(&(number as u32).to_ne_bytes()).unwrap();
         }
-        self.to.write_all(costs).unwrap();
+        input.write_all(costs).unwrap();
         [(); 3].map(|()| {
             let took = u64::from_ne_bytes(self.take());
             let count = u32::from_ne_bytes(self.take());
@@ -336,6 +335,14 @@ fn maps() -> Vec<Grid> {
         }
     }
     grids
+}
+
+impl Drop for Nav2 {
+    fn drop(&mut self) {
+        // It ends with its input.
+        drop(self.child.stdin.take());
+        self.child.wait().unwrap();
+    }
 }
 
 /// What this thread has taken of a processor: other work beside it does not count.
