@@ -18,6 +18,8 @@
 //! laplacian u = u / L^2, in which u falls by a further factor of e in the screening length L; [`Screening`] states L, and
 //! k = (h / (2 L))^2 on cells of side h. A short screening length makes the field prefer short ways over wide ones.
 //!
+//! k may differ from cell to cell ([`Domain::with_costs`]): the field leads round cells that cost more.
+//!
 //! u is the probability that a random walk from the cell meets the target before it meets a blocked cell. The walk steps to each
 //! neighbour with equal chance, and ends at every step with chance k / (1 + k). The normalised gradient of u is the guidance.
 //!

@@ -90,7 +90,7 @@ fn factor(
             spent.push(update);
         }
         for (at, &place) in cells[..own].iter().enumerate() {
-            matrix.add(at, at, 4.0 * (1.0 + domain.screening_coefficient()));
+            matrix.add(at, at, 4.0 * (1.0 + domain.screening_of(pass.cell(place))));
             for neighbour in pass.neighbours(place) {
                 // Cells that a child eliminated before have no slot here; pairs within the front are met twice.
                 let other = slot.get(neighbour as usize).copied().unwrap_or(NOWHERE);

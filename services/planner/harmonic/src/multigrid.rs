@@ -131,13 +131,14 @@ impl<R: Real> Multigrid<R> {
         self.is_steep = false;
         let finest = &mut self.finest;
         let width = domain.width();
-        let inverse = R::of(0.25 / (1.0 + domain.screening_coefficient()));
+        let mut weights = vec![R::default(); width];
         self.simd.run(
             #[inline(always)]
             || {
                 for row in rows.clone() {
                     let blocked = &domain.blocked()[row * width..(row + 1) * width];
-                    finest.set_row(row, blocked, inverse);
+                    domain.weights_of_row(row, &mut weights);
+                    finest.set_row(row, blocked, &weights);
                 }
             },
         );

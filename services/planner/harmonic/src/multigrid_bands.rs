@@ -230,8 +230,8 @@ impl<'a> Bands<'a> {
         inverse.resize(here.width * here.height, 0.0);
         values.clear();
         values.resize(here.width * here.height, BLOCKED as f32);
-        let k = self.domain.screening_coefficient();
         for &at in &unknowns.places {
+            let k = self.domain.screening_of(self.index(at));
             inverse[here.index(at)] = (0.25 / (1.0 + k)) as f32;
         }
         let inflow = |from| self.u(from).relative_to(top - f32::TOP) as f32;

@@ -126,6 +126,7 @@ pub(super) struct Prepared<R> {
     width: usize,
     blocked: Vec<bool>,
     screening: f64,
+    costs: Vec<f32>,
 }
 
 impl Solver {
@@ -305,8 +306,9 @@ where
         let changed = if same_size
             && self.levels.is_some()
             && self.screening == domain.screening_coefficient()
+            && self.costs.len() == domain.costs().len()
         {
-            changed_rows(&self.blocked, domain)
+            self.changed_rows(domain)
         } else {
             Some(0..domain.height())
         };
@@ -321,20 +323,22 @@ where
             self.blocked.clear();
             self.blocked.extend_from_slice(domain.blocked());
             self.screening = domain.screening_coefficient();
+            self.costs.clear();
+            self.costs.extend_from_slice(domain.costs());
         }
         levels
     }
-}
 
-/// The rows between the first and the last in which the map differs from `before`.
-fn changed_rows(before: &[bool], domain: &Domain) -> Option<Range<usize>> {
-    let width = domain.width();
-    let mut differ = before
-        .chunks_exact(width)
-        .zip(domain.blocked().chunks_exact(width))
-        .enumerate()
-        .filter(|(_, (before, now))| before != now)
-        .map(|(row, _)| row);
-    let first = differ.next()?;
-    Some(first..differ.next_back().unwrap_or(first) + 1)
+    /// The rows between the first and the last in which the map differs from that of before.
+    fn changed_rows(&self, domain: &Domain) -> Option<Range<usize>> {
+        let width = domain.width();
+        let differs = |row: &usize| {
+            let cells = row * width..(row + 1) * width;
+            self.blocked[cells.clone()] != domain.blocked()[cells.clone()]
+                || self.costs.get(cells.clone()) != domain.costs().get(cells)
+        };
+        let mut rows = (0..domain.height()).filter(differs);
+        let first = rows.next()?;
+        Some(first..rows.next_back().unwrap_or(first) + 1)
+    }
 }

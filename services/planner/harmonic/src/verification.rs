@@ -120,9 +120,9 @@ fn check_extended(
 
 /// Sets the weights of a row of `domain`; no equation holds at the target.
 fn weights_of<R: Real>(domain: &Domain) -> impl Fn(usize, &mut [R]) {
-    let (target, weight) = (domain.target(), R::of(0.25 / (1.0 + domain.screening_coefficient())));
+    let target = domain.target();
     move |row, weights| {
-        weights.fill(weight);
+        domain.weights_of_row(row, weights);
         if row == target.row {
             weights[target.col] = R::default();
         }

@@ -102,8 +102,8 @@ pub(crate) struct Arguments {
     /// Do not lead through cells of which nothing is known.
     #[arg(long)]
     avoid_unknown: bool,
-    /// The field's screening length, metres: a longer one prefers wide ways, a shorter one short ways.
-    #[arg(long, value_name = "METRES", default_value = "0.5", value_parser = amount)]
+    /// The field's screening length a metre from obstacles, metres: a shorter one keeps farther from them, on longer ways, and takes longer.
+    #[arg(long, value_name = "METRES", default_value = "2", value_parser = amount)]
     screening: f64,
     /// The most time for a path, seconds.
     #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = amount)]

@@ -27,8 +27,9 @@ pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &Store) -> Stor
         for place in places.clone().rev().chain(places) {
             let around = pass.neighbours(place).into_iter().filter(|&it| it != ABSENT);
             let sum = Scaled::sum(around.map(|place| u[pass.cell(place)]));
-            let mean = 0.25 * sum.mantissa / (1.0 + domain.screening_coefficient());
-            let (new, own) = (Scaled::new(mean, sum.exponent), &mut u[pass.cell(place)]);
+            let cell = pass.cell(place);
+            let mean = 0.25 * sum.mantissa / (1.0 + domain.screening_of(cell));
+            let (new, own) = (Scaled::new(mean, sum.exponent), &mut u[cell]);
             change = change.max((own.relative_to(new.exponent) / new.mantissa - 1.0).abs());
             *own = new;
         }

@@ -62,16 +62,16 @@ impl<R: Real> Finest<R> {
         self.scratch.reset(&grid);
     }
 
-    /// Sets one row of cells; `inverse` is 1 / diagonal of a free one.
+    /// Sets one row of cells; `inverse` is 1 / diagonal of each where it is free.
     #[inline(always)]
-    pub(super) fn set_row(&mut self, row: usize, blocked: &[bool], inverse: R) {
+    pub(super) fn set_row(&mut self, row: usize, blocked: &[bool], inverse: &[R]) {
         let Grid { width, columns, .. } = self.grid;
         let (plane, start) = self.grid.locate(0, row);
         let (first, second) = self.inverse.split_at_mut(plane + 1);
         let even = &mut first[plane][start..][..columns];
         let odd = &mut second[0][start..][..columns];
         let value = |col: usize| {
-            if blocked[col] { R::default() } else { inverse }
+            if blocked[col] { R::default() } else { inverse[col] }
         };
         for x in 0..width / 2 {
             even[x] = value(2 * x);

@@ -140,7 +140,7 @@ pub(super) fn beyond_single(
 /// cosh(1 / L) = 1 + 2 k.
 fn decades_per_cell(domain: &Domain, width: f64) -> f64 {
     let confined = std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;
-    let screened = (1.0 + 2.0 * domain.screening_coefficient()).acosh() / std::f64::consts::LN_10;
+    let screened = (1.0 + 2.0 * domain.mean_screening()).acosh() / std::f64::consts::LN_10;
     confined.hypot(screened)
 }
 

@@ -109,6 +109,33 @@ fn invalid_domains_are_refused_with_the_reason() {
 }
 
 #[test]
+fn costs_are_refused_that_are_too_few_or_no_amounts() {
+    let domain = Domain::new(2, 2, vec![false; 4], Cell::new(0, 0)).expect("a valid map");
+    let domain = domain.with_screening(&Screening::cells(9.0)).expect("a valid screening");
+    let refused = |costs: Vec<f32>| domain.clone().with_costs(costs).unwrap_err();
+    assert!(matches!(refused(vec![1.0; 3]), SolveError::WrongLength { .. }));
+    for wrong in [-1.0, f32::NAN, f32::INFINITY, 1e9] {
+        assert!(matches!(refused(vec![1.0, wrong, 1.0, 1.0]), SolveError::ScreeningLength { .. }));
+    }
+}
+
+#[test]
+fn a_field_leads_round_cells_that_cost_more_than_the_way_round() {
+    // A band of dear cells across a hall, with a gap at one side.
+    let (n, target) = (80, Cell::new(40, 10));
+    let dear = |i: usize| (36..44).contains(&(i / n)) && i % n < 55;
+    for (cost, through_gap) in [(1.0, false), (8.0, true)] {
+        let domain = Domain::new(n, n, vec![false; n * n], target).expect("a valid map");
+        let domain = domain.with_screening(&Screening::cells(6.0)).expect("a valid screening");
+        let costs = (0..n * n).map(|i| if dear(i) { cost } else { 1.0 }).collect();
+        let field = solve(&domain.with_costs(costs).expect("valid costs"));
+        let path = field.path(Cell::new(40, 70)).expect("a path");
+        let across = path.iter().find(|at| at[1] < 40.0).expect("the band is crossed");
+        assert_eq!(across[0] > 54.0, through_gap, "{across:?}");
+    }
+}
+
+#[test]
 fn a_cancelled_solve_says_so() {
     let cancellation = Cancellation::new();
     cancellation.clone().cancel();

@@ -4,7 +4,7 @@ use crate::support::{Kind, Map, Reference, follow};
 use harmonic::{Cancellation, Cell, Change, Domain, Field, Guidance, Screening, Settings, Solver};
 use proptest::prelude::*;
 
-/// Any grid of up to 48 x 48 cells, any free target, any screening.
+/// Any grid of up to 48 x 48 cells, any free target, any screening, with costs or without.
 fn any_domain() -> impl Strategy<Value = Domain> {
     // Lengths for screening coefficients of 0, of 0 .. 0.1 and of 0 .. 2.
     let screened = |most: f64| (0.0..most).prop_map(|k| Screening::cells(0.5 / k.sqrt()));
@@ -17,7 +17,12 @@ fn any_domain() -> impl Strategy<Value = Domain> {
                 (0..width * height).map(|_| random.unit() < density).collect();
             blocked[target.row * width + target.col] = false;
             let domain = Domain::new(width, height, blocked, target).expect("a valid map");
-            domain.with_screening(&screening).expect("a valid screening")
+            let domain = domain.with_screening(&screening).expect("a valid screening");
+            if seed % 2 == 0 {
+                return domain;
+            }
+            let costs = (0..width * height).map(|_| 5.0 * random.unit() as f32).collect();
+            domain.with_costs(costs).expect("valid costs")
         },
     )
 }
@@ -119,7 +124,13 @@ fn a_set_up_that_was_patched_gives_the_same_field_bit_for_bit() {
     for step in 0..12 {
         map.fill(40 + 9 * step..43 + 9 * step, 60..64, step % 3 != 0);
         map.aim((30 + 5 * step, 100));
-        let domain = map.domain().expect("a valid map");
+        let mut domain = map.domain().expect("a valid map");
+        if step >= 4 {
+            let mut costs = vec![1.0; 200 * 170];
+            costs[step * 2000..][..2400].fill(3.0);
+            domain = domain.with_screening(&Screening::cells(30.0)).expect("a valid screening");
+            domain = domain.with_costs(costs).expect("valid costs");
+        }
         let patched = solver.solve(&domain, &Cancellation::new()).expect("a field");
         let fresh = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
         assert_eq!(patched.verification(), fresh.verification());

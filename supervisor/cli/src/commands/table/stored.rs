@@ -24,6 +24,7 @@ static FILES: &[(&str, &str)] = stored! {
     "tick" in "results/tick.csv",
     "tick-at-7-hz" in "results/tick_at_7_hz.csv",
     "field" in "results/field.csv",
+    "nav2-planners" in "results/nav2_planners.csv",
 };
 
 /// Rows of some sections (`a,b`) or of all; none where there is no such file or section.

@@ -12,6 +12,8 @@ use super::costmap::{Body, Costmap};
 const MOST_CELLS: usize = 1 << 24;
 /// A path follows the field in such steps, in cells: at a wall the field leads away from it or along it.
 const STEP: f64 = 0.25;
+/// No cell has a shorter screening length, in cells: u falls to a third or so from cell to cell.
+const SHORTEST: f64 = 0.5;
 /// A path has no more poses but for its goals: DDS does not divide an answer of over 64 kB here.
 const MOST_POSES: usize = 500;
 const MOST_GOALS: usize = 100;
@@ -41,6 +43,7 @@ pub(super) struct Planner {
     solver: Solver,
     map: Option<Arc<Costmap>>,
     blocked: Vec<bool>,
+    costs: Vec<f32>,
     /// Fields with what they are of, that of the newest path last.
     fields: VecDeque<(Domain, Field)>,
 }
@@ -48,7 +51,15 @@ pub(super) struct Planner {
 impl Planner {
     pub(super) fn new(body: Body, screening_m: f64) -> Self {
         let (solver, fields) = (Solver::default(), VecDeque::new());
-        Self { body, screening_m, solver, map: None, blocked: Vec::new(), fields }
+        Self {
+            body,
+            screening_m,
+            solver,
+            map: None,
+            blocked: Vec::new(),
+            costs: Vec::new(),
+            fields,
+        }
     }
 
     /// Poses about a cell apart, farther on a long way, in the frame of `map`, from `start` by way of all `goals`, each of which has its own heading.
@@ -67,7 +78,8 @@ impl Planner {
         }
         let before = self.map.replace(Arc::clone(map));
         if before.is_none_or(|before| !Arc::ptr_eq(&before, map)) {
-            self.blocked = map.blocked(&self.body);
+            let most = self.screening_m / map.resolution_m / SHORTEST;
+            (self.blocked, self.costs) = map.blocked_and_costs(&self.body, most as f32);
         }
         let (mut path, mut ends) = (Vec::new(), Vec::new());
         let mut from = start.translation;
@@ -135,7 +147,8 @@ impl Planner {
         cancellation: &Cancellation,
     ) -> Result<&Field, SolveError> {
         let domain = Domain::new(map.width, map.height, self.blocked.clone(), goal)?
-            .with_screening(&Screening::cells(self.screening_m / map.resolution_m))?;
+            .with_screening(&Screening::cells(self.screening_m / map.resolution_m))?
+            .with_costs(self.costs.clone())?;
         let known = self.fields.iter().position(|(_, field)| field.target() == goal);
         let field = match known.and_then(|at| self.fields.remove(at)) {
             Some((of, field)) if of == domain => field,

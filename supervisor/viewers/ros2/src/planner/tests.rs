@@ -25,7 +25,7 @@ use crate::frames::Frames;
 const BODY: Body = Body { radius_m: 0.22, occupied: 99, enters_unknown: true };
 
 fn planner() -> Planner {
-    Planner::new(BODY, 0.5)
+    Planner::new(BODY, 2.0)
 }
 
 fn at(x: f64, y: f64) -> DAffine2 {
@@ -157,6 +157,27 @@ fn a_robot_that_touches_what_is_inflated_is_led_out_and_not_through_a_wall() {
 }
 
 #[test]
+fn a_path_leads_round_a_zone_that_costs_more() {
+    // A wall with two doors, of which the lower one is nearer.
+    let mut grid = Grid::new(200, 100);
+    grid.fill([100, 0], [2, 100], true);
+    grid.fill([100, 20], [2, 16], false);
+    grid.fill([100, 65], [2, 16], false);
+    let ends = (at(1.0, 1.9), [at(9.0, 1.9)]);
+    let crosses = |path: &[Pose]| path.iter().find(|pose| pose[0] >= 5.0).unwrap()[1];
+    let mut zone = map(&grid);
+    let direct = crosses(&plan(&mut planner(), &zone, ends.0, &ends.1).unwrap());
+    let window = update([70, 0], [60, 50], 90);
+    Arc::make_mut(&mut zone).update(&window).unwrap();
+    // The update has covered the wall beside the lower door.
+    for rows in [[0, 20], [36, 14]] {
+        Arc::make_mut(&mut zone).update(&update([100, rows[0]], [2, rows[1]], 100)).unwrap();
+    }
+    let around = crosses(&plan(&mut planner(), &zone, ends.0, &ends.1).unwrap());
+    assert!(direct < 2.0 && around > 3.0, "{direct} {around}");
+}
+
+#[test]
 fn a_change_of_the_map_changes_the_field_of_a_goal_as_a_new_solve_would() {
     let mut changing = planner();
     let mut grid = rooms();
@@ -188,7 +209,7 @@ fn cells_are_blocked_whose_centres_are_within_the_radius_of_an_occupied_one_and_
     map.update(&update([0, 0], [1, 1], 255)).unwrap();
     map.update(&update([29, 19], [1, 1], 98)).unwrap();
     for (radius_m, enters_unknown) in [(0.0, true), (0.21, true), (0.11, false), (9.0, true)] {
-        let blocked = map.blocked(&Body { radius_m, enters_unknown, ..BODY });
+        let blocked = map.blocked_and_costs(&Body { radius_m, enters_unknown, ..BODY }, 1.0).0;
         for (index, &is_blocked) in blocked.iter().enumerate() {
             let (col, row) = ((index % 30) as f64, (index / 30) as f64);
             let near = |c: f64, r: f64| (col - c).hypot(row - r) * RESOLUTION_M <= radius_m + 1e-9;
@@ -222,7 +243,7 @@ fn a_map_or_update_that_is_cut_or_false_is_refused_whole() {
     for ([col, row], size) in [([2, 0], [2, 1]), ([0, 1], [1, 2]), ([u32::MAX, 0], [1, 1])] {
         assert!(map.update(&update([col, row], size, 100)).is_err());
     }
-    assert!(map.blocked(&BODY).iter().all(|blocked| !blocked));
+    assert!(map.blocked_and_costs(&BODY, 1.0).0.iter().all(|blocked| !blocked));
 }
 
 /// A message of transforms: parent, frame, pose.

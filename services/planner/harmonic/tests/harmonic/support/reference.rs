@@ -23,7 +23,7 @@ impl Reference {
         let mut diagonal = vec![1.0; cells];
         let mut right = vec![Scaled::ZERO; cells];
         for i in (0..cells).filter(|&i| free(i) && i != target) {
-            diagonal[i] = 4.0 * (1.0 + domain.screening_coefficient());
+            diagonal[i] = 4.0 * (1.0 + domain.screening_of(i));
             let [_, east, _, south] = neighbours(domain, i);
             for next in [east, south].into_iter().flatten().filter(|&n| free(n) && n != target) {
                 coupling[i * width + (next - i - 1)] += 1.0;
@@ -118,7 +118,7 @@ impl Reference {
                 if self.u[i].is_zero() || i == target {
                     continue;
                 }
-                let weight = 0.25 / (1.0 + self.domain.screening_coefficient());
+                let weight = 0.25 / (1.0 + self.domain.screening_of(i));
                 let mean = scale(sum(&self.around(i)), weight);
                 if pass == 1 {
                     let ratio = mean.relative_to(self.u[i].exponent) / self.u[i].mantissa;

@@ -1,8 +1,16 @@
-//! The figures of the guide's page: paths on random maps, held against shortest ones and against those of a wavefront with NavFn's costs.
+//! The figures of the guide's page: paths on random maps, held against NavFn's.
 //!
-//! `MAPS=200 cargo test -p firsthand-ros2 paths_on_random_maps -- --nocapture` prints them. MAPS may be a folder of maps of map_server.
+//! `.ci/nav2-planners` prints them, with Nav2's own code in the program that NAV2_PLANNERS names. Without it a wavefront with NavFn's costs
+//! stands for NavFn. MAPS may be a folder of maps of map_server; BOUND=1 searches the clearest ways there are, SCREENING is the option.
 
-use std::{cmp::Reverse, collections::BinaryHeap, sync::Arc, time::Instant};
+use std::{
+    cmp::Reverse,
+    collections::{BTreeMap, BinaryHeap},
+    io::{BufReader, Read as _, Write as _},
+    process::{Child, ChildStdout, Command, Stdio},
+    sync::Arc,
+    time::Duration,
+};
 
 use glam::{DAffine2, DVec2};
 use harmonic::Cancellation;
@@ -93,6 +101,12 @@ impl Grid {
     }
 
     pub(super) fn message(&self) -> Vec<u8> {
+        let values: Vec<_> = self.occupied.iter().map(|&it| 100 * u8::from(it)).collect();
+        self.message_of(&values)
+    }
+
+    /// A map of this size with these values.
+    fn message_of(&self, values: &[u8]) -> Vec<u8> {
         let mut writer = Writer::default();
         writer
             .header(0, "map")
@@ -100,11 +114,7 @@ impl Grid {
             .f32(RESOLUTION_M as f32)
             .u32(self.width as u32)
             .u32(self.height as u32);
-        writer.pose([0.0; 3]).length(self.occupied.len());
-        writer.raw(
-            &self.occupied.iter().map(|&occupied| 100 * u8::from(occupied)).collect::<Vec<_>>(),
-        );
-        writer.take()
+        writer.pose([0.0; 3]).length(values.len()).raw(values).take()
     }
 
     /// Costs of the cheapest way from `sources` to every cell, in cells; `cost` is that of a cell.
@@ -203,17 +213,97 @@ fn length(way: &[DVec2]) -> f64 {
     way.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
 }
 
-/// Mean and least distance of a way in cells from what is occupied.
-fn clearance(grid: &Grid, distances: &[f64], way: &[DVec2]) -> [f64; 2] {
-    let at =
-        |at: &DVec2| distances[at.y.round() as usize * grid.width + at.x.round() as usize].min(1e3);
-    let all: Vec<_> = way.iter().map(at).collect();
-    [all.iter().sum::<f64>() / all.len() as f64, all.iter().copied().fold(f64::INFINITY, f64::min)]
+/// Length of a way, and its mean and least distance from what is occupied at places a quarter of a cell apart, all in cells.
+fn judge(grid: &Grid, distances: &[f64], way: &[DVec2]) -> [f64; 3] {
+    let (mut sum, mut count, mut least, mut next) = (0.0, 0.0, f64::INFINITY, 0.0);
+    for pair in way.windows(2) {
+        let long = pair[0].distance(pair[1]);
+        while next <= long {
+            let at = if long > 0.0 { pair[0].lerp(pair[1], next / long) } else { pair[0] };
+            let clear = distances[at.y.round() as usize * grid.width + at.x.round() as usize];
+            (sum, count, least) = (sum + clear.min(1e3), count + 1.0, clear.min(least));
+            next += 0.25;
+        }
+        next -= long;
+    }
+    [length(way), sum / count, least]
 }
 
-fn median(numbers: &mut [f64]) -> [f64; 4] {
+/// The value below which these shares of the numbers are: 5 %, the median, 95 %, and the largest.
+fn shares(numbers: &[f64]) -> [f64; 4] {
+    let mut numbers = numbers.to_vec();
     numbers.sort_by(f64::total_cmp);
     [0.05, 0.5, 0.95, 1.0].map(|share| numbers[((numbers.len() - 1) as f64 * share) as usize])
+}
+
+/// Distances of all cells from the nearest occupied one, in cells.
+fn distances(grid: &Grid) -> Vec<f64> {
+    let sources = (0..grid.occupied.len()).filter(|&cell| grid.occupied[cell]);
+    let mut nearest: Vec<Option<usize>> = vec![None; grid.occupied.len()];
+    let place = |cell: usize| DVec2::new((cell % grid.width) as f64, (cell / grid.width) as f64);
+    let mut waiting = BinaryHeap::new();
+    sources.for_each(|cell| waiting.push((Reverse(0_u64), cell, cell)));
+    while let Some((_, cell, source)) = waiting.pop() {
+        if nearest[cell].is_none() {
+            nearest[cell] = Some(source);
+            for next in grid.beside(cell).into_iter().flatten() {
+                let by = place(next).distance_squared(place(source)) as u64;
+                waiting.push((Reverse(by), next, source));
+            }
+        }
+    }
+    let each = nearest.iter().enumerate();
+    each.map(|(cell, near)| near.map_or(1e3, |near| place(cell).distance(place(near)))).collect()
+}
+
+/// The costs of Nav2's inflation layer, `computeCost`.
+fn inflated(distances: &[f64]) -> Vec<u8> {
+    let cost = |&cells: &f64| match cells * RESOLUTION_M {
+        _ if cells == 0.0 => 254,
+        far if far <= RADIUS_M => 253,
+        _ if cells > (INFLATION_M / RESOLUTION_M).floor() => 0,
+        far => (252.0 * (-SCALING * (far - RADIUS_M)).exp()) as u8,
+    };
+    distances.iter().map(cost).collect()
+}
+
+/// Nav2's planners in a process of their own.
+struct Nav2 {
+    child: Child,
+    from: BufReader<ChildStdout>,
+}
+
+impl Nav2 {
+    fn start() -> Option<Self> {
+        let path = std::env::var_os("NAV2_PLANNERS")?;
+        let started = Command::new(path).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+        let mut child = started.unwrap();
+        let from = BufReader::new(child.stdout.take().unwrap());
+        Some(Self { child, from })
+    }
+
+    /// Ways and milliseconds of NavFn, Theta* and Smac 2D.
+    fn plan(&mut self, grid: &Grid, costs: &[u8], ends: [usize; 2]) -> [(Vec<DVec2>, f64); 3] {
+        let [from, to] = ends.map(|cell| [cell % grid.width, cell / grid.width]);
+        let input = self.child.stdin.as_mut().unwrap();
+        for number in [grid.width, grid.height, from[0], from[1], to[0], to[1]] {
+            input.write_all(&(number as u32).to_ne_bytes()).unwrap();
+        }
+        input.write_all(costs).unwrap();
+        [(); 3].map(|()| {
+            let took = u64::from_ne_bytes(self.take());
+            let count = u32::from_ne_bytes(self.take());
+            let mut number = || f64::from(f32::from_ne_bytes(self.take()));
+            let way = (0..count).map(|_| DVec2::new(number(), number())).collect();
+            (way, took as f64 * 1e-6)
+        })
+    }
+
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let mut bytes = [0; N];
+        self.from.read_exact(&mut bytes).unwrap();
+        bytes
+    }
 }
 
 fn maps() -> Vec<Grid> {
@@ -247,112 +337,221 @@ fn maps() -> Vec<Grid> {
     grids
 }
 
+impl Drop for Nav2 {
+    fn drop(&mut self) {
+        // It ends with its input.
+        drop(self.child.stdin.take());
+        self.child.wait().unwrap();
+    }
+}
+
+/// What this thread has taken of a processor: other work beside it does not count.
+struct Processor(Duration);
+
+impl Processor {
+    fn now() -> Self {
+        let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        Self(Duration::new(now.tv_sec as u64, now.tv_nsec as u32))
+    }
+
+    /// Milliseconds since then.
+    fn elapsed(&self) -> f64 {
+        (Self::now().0 - self.0).as_secs_f64() * 1e3
+    }
+}
+
+fn named(name: &str) -> Option<f64> {
+    std::env::var(name).ok().map(|text| text.parse().unwrap())
+}
+
+/// A planner's ways, each held against the reference's: length, mean and least clearance, processor time.
+#[derive(Default)]
+struct Judged {
+    ratios: [Vec<f64>; 4],
+    /// Pairs of places between which no way was found though there is one, and the reverse.
+    false_no: usize,
+    false_yes: usize,
+}
+
+impl Judged {
+    fn add(&mut self, found: [f64; 3], reference: [f64; 3], times: [f64; 2]) {
+        for part in 0..3 {
+            self.ratios[part].push(found[part] / reference[part]);
+        }
+        self.ratios[3].push(times[0] / times[1]);
+    }
+}
+
+/// The clearest way of any here that is at most 1.15 times as long as the reference: those of wavefronts with costs that fall with the
+/// distance from obstacles in several ways.
+fn clearest(
+    grid: &Grid,
+    distances: &[f64],
+    blocked: &[bool],
+    ends: [usize; 2],
+    most: f64,
+) -> [f64; 3] {
+    let free = distances.iter().zip(blocked).filter(|it| !it.1);
+    let widest = free.map(|it| *it.0).fold(0.0, f64::max);
+    let ramp = |cells: f64, weight: f64, reach_m: f64| {
+        let past = (cells * RESOLUTION_M - RADIUS_M).max(0.0);
+        1.0 + weight * (1.0 - past / reach_m).max(0.0)
+    };
+    let judged = (0..10).map(|kind| {
+        let cost = |cell: usize| match (blocked[cell], distances[cell]) {
+            (true, _) => f64::INFINITY,
+            (_, cells) => match kind {
+                0 => ramp(cells, 10.0, 0.5),
+                1 => ramp(cells, 10.0, 1.0),
+                2 => ramp(cells, 10.0, 2.0),
+                3 => ramp(cells, 50.0, 1.0),
+                4 => 1.01 * widest - cells,
+                5 => 1.2 * widest - cells,
+                6 => cells.recip(),
+                7 => cells.powf(-1.5),
+                8 => cells.powi(-2),
+                _ => cells.powi(-3),
+            },
+        };
+        judge(grid, distances, &grid.descend(&grid.front(&[ends[1]], cost), ends[0]))
+    });
+    let short = judged.filter(|judged| judged[0] <= most);
+    short.fold([0.0; 3], |best, judged| if judged[1] > best[1] { judged } else { best })
+}
+
 #[test]
 fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_clear() {
-    let screening: f64 = std::env::var("SCREENING").map_or(0.5, |text| text.parse().unwrap());
-    let body = Body { radius_m: RADIUS_M, occupied: 99, enters_unknown: true };
-    let (mut lengths, mut to_navfn, mut clears, mut leasts, mut times, mut again) =
-        (vec![], vec![], vec![], vec![], vec![], vec![]);
-    let (mut navfn_lengths, mut navfn_times) = (vec![], vec![]);
-    let (mut bare, mut bare_least) = (vec![], vec![]);
-    let (mut false_no, mut none) = (0, 0);
+    let screening = named("SCREENING").unwrap_or(2.0);
+    let alone = Body { radius_m: RADIUS_M, occupied: 99, enters_unknown: true };
+    let inflated_map = Body { radius_m: 0.0, ..alone };
+    let mut nav2 = Nav2::start();
+    let mut table = BTreeMap::<&str, Judged>::new();
+    let (mut pairs, mut none) = (0, 0);
     for (seed, grid) in (0_u64..).zip(maps()) {
         let map = Arc::new(Costmap::read(&grid.message()).unwrap());
-        let blocked = map.blocked(&body);
-        let free: Vec<usize> = (0..blocked.len()).filter(|&cell| !blocked[cell]).collect();
+        let (blocked, _) = map.blocked_and_costs(&alone, 1.0);
+        // NavFn takes the outermost cells of a map for blocked.
+        let inside = |cell: &usize| grid.beside(*cell).iter().all(Option::is_some);
+        let free = (0..blocked.len()).filter(|&cell| !blocked[cell]);
+        let free: Vec<usize> = free.filter(inside).collect();
         let mut random = Random(seed + 1);
-        let cells = [free[random.below(free.len())], free[random.below(free.len())]];
+        let mut any = || free[random.below(free.len())];
+        let cells = [any(), any()];
         let place =
             |cell: usize| DVec2::new((cell % grid.width) as f64, (cell / grid.width) as f64);
         let [from, to] =
             cells.map(|cell| DAffine2::from_translation(map.place.transform_point2(place(cell))));
         let plain = grid.front(&[cells[1]], |cell| if blocked[cell] { f64::INFINITY } else { 1.0 });
-        let mut planner = Planner::new(body, screening);
-        let began = Instant::now();
-        let planned = planner.plan(&map, from, &[to], &Cancellation::default());
-        let took = began.elapsed().as_secs_f64() * 1e3;
         let exists = plain[cells[0]].is_finite();
-        let path = match planned {
-            Ok(path) => path,
-            Err(failure) => {
-                assert_eq!(failure.0, Reason::NoPath, "{seed}: {}", failure.1);
-                false_no += usize::from(exists);
-                none += 1;
-                continue;
-            }
-        };
-        assert!(exists, "{seed}");
-        times.push(took);
-        let began = Instant::now();
-        planner.plan(&map, from, &[to], &Cancellation::default()).unwrap();
-        again.push(began.elapsed().as_secs_f64() * 1e3);
-        let way: Vec<DVec2> = path
-            .iter()
-            .map(|&[x, y, _]| map.place.inverse().transform_point2(DVec2::new(x, y)))
-            .collect();
-        for at in &way {
-            let cell = map.cell_at(*at).unwrap();
-            assert!(!blocked[cell.row * grid.width + cell.col], "{seed}: {at}");
+        (pairs, none) = (pairs + 1, none + usize::from(!exists));
+        let distances = distances(&grid);
+        let costs = inflated(&distances);
+        let mut ways = vec![("shortest", vec![], 0.0)];
+        if exists {
+            ways[0].1 = grid.descend(&plain, cells[0]);
         }
-        let sources: Vec<usize> = (0..blocked.len()).filter(|&cell| grid.occupied[cell]).collect();
-        let distances = grid.front(&sources, |_| 1.0);
-        let began = Instant::now();
-        let cost = |cell: usize| {
-            let past = distances[cell] * RESOLUTION_M - RADIUS_M;
-            let cost =
-                if past + RADIUS_M > INFLATION_M { 0.0 } else { 252.0 * (-SCALING * past).exp() };
-            if blocked[cell] { f64::INFINITY } else { (50.0 + 0.8 * cost) / 50.0 }
+        match &mut nav2 {
+            Some(nav2) => {
+                let names = ["NavFn", "Theta*", "Smac 2D"];
+                let found = names.into_iter().zip(nav2.plan(&grid, &costs, cells));
+                ways.extend(found.map(|(name, (way, took))| (name, way, took)));
+            }
+            None => {
+                let began = Processor::now();
+                let cost = |cell: usize| match costs[cell] {
+                    253.. => f64::INFINITY,
+                    cost => (50.0 + 0.8 * f64::from(cost)) / 50.0,
+                };
+                let front = grid.front(&[cells[1]], cost);
+                let way = if exists { grid.descend(&front, cells[0]) } else { vec![] };
+                ways.push(("NavFn", way, began.elapsed()));
+            }
+        }
+        // As a costmap is published.
+        let published = |&cost: &u8| match cost {
+            254 => 100,
+            253 => 99,
+            0 => 0,
+            cost => 1 + (97 * (u32::from(cost) - 1) / 251) as u8,
         };
-        let navfn = grid.descend(&grid.front(&[cells[1]], cost), cells[0]);
-        navfn_times.push(began.elapsed().as_secs_f64() * 1e3);
-        if plain[cells[0]] < 20.0 {
+        let values: Vec<u8> = costs.iter().map(published).collect();
+        let mut changed = grid.clone();
+        let away = |cell: &usize| cells.iter().all(|&end| place(end).distance(place(*cell)) > 12.0);
+        let block = std::iter::repeat_with(any).find(away).unwrap();
+        changed.fill([block % grid.width, block / grid.width], [3, 3], true);
+        let changed_costs: Vec<u8> =
+            inflated(&self::distances(&changed)).iter().map(published).collect();
+        for (names, body, messages) in [
+            (
+                ["ours", "ours, map changed", "ours, same map"],
+                alone,
+                [grid.message(), changed.message()],
+            ),
+            (
+                ["ours on costmap", "ours on costmap, map changed", "ours on costmap, same map"],
+                inflated_map,
+                [grid.message_of(&values), changed.message_of(&changed_costs)],
+            ),
+        ] {
+            let maps = messages.map(|message| Arc::new(Costmap::read(&message).unwrap()));
+            let mut planner = Planner::new(body, screening);
+            for (name, map) in names.into_iter().zip([&maps[0], &maps[1], &maps[1]]) {
+                let began = Processor::now();
+                let planned = planner.plan(map, from, &[to], &Cancellation::default());
+                let took = began.elapsed();
+                let (blocked, _) = map.blocked_and_costs(&body, 1.0);
+                let path = planned.unwrap_or_else(|failure| {
+                    assert_eq!(failure.0, Reason::NoPath, "{seed}: {}", failure.1);
+                    vec![]
+                });
+                let place = |&[x, y, _]: &[f64; 3]| DVec2::new(x, y);
+                let way: Vec<DVec2> = path
+                    .iter()
+                    .map(|pose| map.place.inverse().transform_point2(place(pose)))
+                    .collect();
+                for at in &way {
+                    let cell = map.cell_at(*at).unwrap();
+                    assert!(!blocked[cell.row * grid.width + cell.col], "{seed}: {name} {at}");
+                }
+                ways.push((name, way, took));
+            }
+        }
+        for (name, way, _) in ways.iter().filter(|it| !it.0.contains("map")) {
+            let judged = table.entry(name).or_default();
+            judged.false_no += usize::from(exists && way.is_empty());
+            judged.false_yes += usize::from(!exists && !way.is_empty());
+        }
+        let navfn = &ways[1];
+        if plain[cells[0]] < 20.0 || !exists || navfn.1.is_empty() {
             continue;
         }
-        lengths.push(length(&way) / plain[cells[0]]);
-        navfn_lengths.push(length(&navfn) / plain[cells[0]]);
-        to_navfn.push(length(&way) / length(&navfn));
-        let shortest = grid.descend(&plain, cells[0]);
-        bare.push(
-            clearance(&grid, &distances, &way)[0] / clearance(&grid, &distances, &shortest)[0],
-        );
-        bare_least.push(
-            clearance(&grid, &distances, &way)[1] / clearance(&grid, &distances, &shortest)[1],
-        );
-        let ([mean, least], [of_mean, of_least]) =
-            (clearance(&grid, &distances, &way), clearance(&grid, &distances, &navfn));
-        clears.push(mean / of_mean);
-        leasts.push(least / of_least);
+        let reference = judge(&grid, &distances, &navfn.1);
+        if named("BOUND").is_some() {
+            let best = clearest(&grid, &distances, &blocked, cells, 1.15 * reference[0]);
+            table.entry("clearest").or_default().add(best, reference, [0.0, 1.0]);
+        }
+        for (name, way, took) in ways.iter().filter(|it| !it.1.is_empty()) {
+            let judged = table.entry(name).or_default();
+            judged.add(judge(&grid, &distances, way), reference, [*took, navfn.2]);
+        }
     }
     println!(
-        "{} paths, {none} without a way, {false_no} of them falsely; 5 %, median, 95 % and most:",
-        times.len()
+        "{pairs} pairs of places, {none} without a way; over NavFn's, median (5 %, 95 %, most):"
     );
-    println!(
-        "length over the shortest {:.3?}, NavFn's {:.3?}, over NavFn's {:.3?}",
-        median(&mut lengths),
-        median(&mut navfn_lengths),
-        median(&mut to_navfn)
-    );
-    println!(
-        "mean clearance over NavFn's {:.2?}, least {:.2?}",
-        median(&mut clears),
-        median(&mut leasts)
-    );
-    println!(
-        "mean clearance over that of a wavefront without costs {:.2?}, least {:.2?}",
-        median(&mut bare),
-        median(&mut bare_least)
-    );
-    println!(
-        "ms: {:.2?}, the same goal again {:.2?}, the wavefront {:.2?}",
-        median(&mut times),
-        median(&mut again),
-        median(&mut navfn_times)
-    );
-    assert_eq!(false_no, 0);
-    assert!(
-        median(&mut lengths)[1] < 1.1
-            && median(&mut lengths)[2] < 1.25
-            && median(&mut bare)[1] > 1.1
-    );
+    println!("planner,n,falsely none,length,mean clearance,least clearance,time");
+    for (name, Judged { ratios, false_no, false_yes }) in &table {
+        assert_eq!(*false_yes, 0, "{name}");
+        print!("{name},{},{false_no}", ratios[0].len());
+        for ratios in ratios {
+            let [low, median, high, most] = shares(ratios);
+            print!(",\"{median:.2} ({low:.2}, {high:.2}, {most:.2})\"");
+        }
+        println!();
+    }
+    for name in ["ours", "ours on costmap"] {
+        let Judged { ratios, false_no, .. } = &table[name];
+        assert_eq!(*false_no, 0);
+        let [length, mean, ..] = ratios.each_ref().map(|ratios| shares(ratios)[1]);
+        assert!(length < 1.1 && mean > 0.98, "{name}: {length} {mean}");
+    }
 }
