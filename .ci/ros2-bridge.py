@@ -219,8 +219,8 @@ def main(firsthand):
     def bridge(*words):
         return start("ros2", "--robot", ROBOT, *words)
 
-    def mission(name, *words):
-        slow = ["--pace", "1", "--json", "--robot", ROBOT, "--out", f"{work}/{name}", "--set", "controller.speed_m_s=0.3"]
+    def mission(name, *words, speed=0.3):
+        slow = ["--pace", "1", "--json", "--robot", ROBOT, "--out", f"{work}/{name}", "--set", f"controller.speed_m_s={speed}"]
         return start("run", "open-room", *slow, *words, says=subprocess.DEVNULL)
 
     def is_at(heard, x, y):
@@ -268,7 +268,8 @@ def main(firsthand):
 
         # The requests are a goal, a place and a stop.
         bridged = bridge("--accept", "goals,pose,hand,stop")
-        run = mission("asked", "--timeout", "600")
+        # It is still on its way when a busy machine asks for the next thing.
+        run = mission("asked", "--timeout", "600", speed=0.15)
         heard.until("range, battery", lambda: heard.messages.get("range/front") and heard.messages.get("battery_state"))
         heard.until("movement", lambda: heard.newest("odom").twist.twist.linear.x > 0.1)
         goal.pose.position.x, goal.pose.position.y = 2.5, 0.8
