@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 loaded = importlib.util.spec_from_file_location("bridge", os.path.join(os.path.dirname(__file__), "ros2-bridge.py"))
 bridge = importlib.util.module_from_spec(loaded)
@@ -26,6 +27,7 @@ from cyclonedds.idl.types import array, int8, int64, sequence, uint8, uint16, ui
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid, Path
 
 SIDE, CELL, RADIUS = 1000, 0.05, 0.22
@@ -123,6 +125,35 @@ class Client:
 
 def at(x, y, heading=0.0, frame="map"):
     return Pose(Header(frame_id=frame), Plane(x=x, y=y, k=math.sin(heading / 2), w=math.cos(heading / 2)))
+
+
+def commander(is_free):
+    """Nav2's client asks, by the planner's names."""
+    # It turns only while it asks, so it says where the robot is.
+    navigator = bridge.BasicNavigator(namespace="firsthand")
+
+    def stamped(x, y):
+        pose = PoseStamped()
+        pose.header.frame_id, pose.pose.position.x, pose.pose.position.y, pose.pose.orientation.w = "map", x, y, 1.0
+        return pose
+
+    def check(path, *places):
+        poses = [pose.pose.position for pose in path.poses]
+        assert all(is_free(at.x, at.y) for at in poses)
+        for x, y in places:
+            assert min(math.hypot(at.x - x, at.y - y) for at in poses) < 1e-6, (x, y)
+        return len(poses)
+
+    start, goal = stamped(-10.0, -2.0), stamped(10.0, 0.0)
+    count = check(navigator.getPath(start, goal, use_start=True), (-10.0, -2.0), (10.0, 0.0))
+    assert navigator.getTaskError() == (0, "")
+    check(navigator.getPathThroughPoses(start, [stamped(-5.0, 5.0), goal], use_start=True), (-5.0, 5.0), (10.0, 0.0))
+    assert navigator.getPath(start, stamped(-19.8, -19.8), use_start=True) is None
+    code, text = navigator.getTaskError()
+    assert code == 206 and "(-19.80, -19.80) is occupied" in text, (code, text)
+    assert navigator.getPathThroughPoses(start, [stamped(30.0, 0.0)], use_start=True) is None
+    assert navigator.getTaskError()[0] == 304
+    print(f"nav2_simple_commander has a path of {count} poses, one by way of another goal, and the codes of two that have none")
 
 
 def main(firsthand):
@@ -226,6 +257,10 @@ def main(firsthand):
             assert (result.status, result.error_code) == (6, code), (code, result.error_code, result.error_msg)
             print(f"{code}: {result.error_msg}")
         assert through.plan(turn, Goals(Header(), []))[1].error_code == 309
+        heard = SimpleNamespace(node=node, until=until)
+        bridge.check_parameters(heard, "firsthand_planner", {"robot_radius": RADIUS, "map": "map", "occupied": 99}, "radius")
+        if bridge.BasicNavigator is not None:
+            commander(is_free)
 
         # The door is shut but for a part by an update.
         fill(500, 720, 4, 20, 100)

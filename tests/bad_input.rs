@@ -29,6 +29,14 @@ fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike
     assert_nothing_left("bad");
 }
 
+#[cfg(not(feature = "ros2"))]
+#[test]
+fn a_robot_of_ros_2_is_refused_without_the_feature_that_speaks_it() {
+    let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-ros2-robot/robot.toml");
+    assert_refused(&output(&["run", robot, "--robot", "bad"]), "mission", &["--features ros2"]);
+    assert_nothing_left("bad");
+}
+
 #[test]
 fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
     let cases: [(&[&str], _, &[&str]); 20] = [

@@ -166,4 +166,4 @@ macro_rules! numbers {
     };
 }
 
-numbers! { u8 u16 u32 i32 f32 f64 }
+numbers! { u8 u16 u32 i32 i64 f32 f64 }

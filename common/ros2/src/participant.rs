@@ -32,6 +32,8 @@ use crate::{cdr::ENCAPSULATION, topic::Topic};
 
 /// A longer message is cut, and its decoder refuses what it needs beyond: a map of 8192 x 8192 cells has 67 MB.
 const LONGEST: usize = 1 << 27;
+/// A longer reply does not fit into a datagram.
+const LONGEST_REPLY: usize = 65_000;
 /// Messages skipped at a time because they cannot be decoded.
 const MOST_BROKEN: usize = 16;
 
@@ -261,11 +263,12 @@ impl Writer {
         self.0.write(payload, None).is_ok()
     }
 
+    /// Returns whether the library took it; it cannot send a reply in fragments.
     pub fn reply(&self, to: &Request, payload: &[u8]) -> bool {
         let options = WriteOptionsBuilder::new().related_sample_identity(to.identity).build();
         let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
         let payload = [encapsulation, &to.header, rest].concat();
-        self.0.write_with_options(payload, options).is_ok()
+        payload.len() <= LONGEST_REPLY && self.0.write_with_options(payload, options).is_ok()
     }
 
     pub fn gid(&self) -> Gid {

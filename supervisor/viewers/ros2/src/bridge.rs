@@ -31,6 +31,7 @@ use crate::{
     node::{Call, Node},
     orders::{Done, Order, Orders, Why},
     overlap::overlap,
+    parameters::Parameter,
     shown::{BASE, ODOM, Shown},
     topics::{Accept, Frames, Id},
 };
@@ -68,6 +69,7 @@ pub(crate) struct Options {
     pub(crate) frames: Frames,
     /// Stamps are mission time, which is published.
     pub(crate) clock: bool,
+    pub(crate) parameters: Vec<Parameter>,
 }
 
 /// The bridge cannot be opened.
@@ -296,6 +298,7 @@ impl Bridge {
 
     /// Take the messages that nodes have sent.
     fn hear(&mut self) {
+        self.node.answer();
         for (id, message) in self.node.heard() {
             if let Err(why) = self.hear_topic(id, &message) {
                 self.tell(&format!("a message is refused: {why}"));

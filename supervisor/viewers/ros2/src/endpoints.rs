@@ -15,8 +15,8 @@ const TRANSFORMS: Quality = Quality { is_reliable: false, is_latched: false, dep
 
 /// Join the domain by the interface of `options`, with topics below the namespace there.
 pub(crate) fn open(options: &Options) -> io::Result<Node<Id>> {
-    let Options { domain, interface, namespace, accepted, .. } = options;
-    let mut node = Node::join(*domain, *interface, namespace, "firsthand")?;
+    let Options { domain, interface, namespace, accepted, parameters, .. } = options;
+    let mut node = Node::join((*domain, *interface, namespace), "firsthand", parameters.clone())?;
     if options.frames == Frames::Map {
         node.read_from(Id::Tf, ["tf", "tf2_msgs::msg::dds_::TFMessage_"], TRANSFORMS)?;
     }

@@ -17,6 +17,7 @@
 //! | `endpoints` | its readers and writers |
 //! | `node` | readers, writers and servers of actions as a node that `ros2 node list` shows |
 //! | `planner` | Nav2's planner server, which is no bridge |
+//! | `parameters` | the options as parameters, for `ros2 param`, pure |
 //! | `overlap` | whether it would publish what the robot's own link reads |
 //! | `orders` | what was asked is done, without holding up the bridge |
 
@@ -33,6 +34,7 @@ mod messages;
 mod node;
 mod orders;
 mod overlap;
+mod parameters;
 mod planner;
 mod shown;
 #[cfg(test)]
@@ -41,7 +43,7 @@ mod topics;
 
 use std::{net::Ipv4Addr, process::ExitCode};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use common::{address::domain_of_environment, domain::RobotName, signals::Signals};
 
 use console::{
@@ -147,9 +149,12 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
     }
     let mut signals = Signals::that_end()?;
     let domain = arguments.domain.map_or_else(domain_of_environment, Ok)?;
+    let mut command = Arguments::command();
+    let matches = command.get_matches_mut();
+    let parameters = parameters::of_options(&command, &matches);
     if let Some(Command::Planner(options)) = &arguments.command {
         let network = (domain, arguments.interface, arguments.namespace.as_str());
-        planner::serve(network, options, &mut || signals.came())?;
+        planner::serve(network, (options, parameters), &mut || signals.came())?;
         return Ok(ExitCode::SUCCESS);
     }
     let_stages_go_first();
@@ -161,6 +166,7 @@ fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
         accepted: arguments.accept.clone(),
         frames: arguments.frames,
         clock: arguments.clock,
+        parameters,
     };
     serve(&options, &mut || signals.came())?;
     Ok(ExitCode::SUCCESS)

@@ -1,4 +1,4 @@
-//! A node in DDS: readers and writers of topics, servers of actions, and what `ros2 node list` shows of them.
+//! A node in DDS: readers and writers of topics, servers of actions, its parameters, and what `ros2 node list` shows of them.
 
 use std::{collections::BTreeMap, io, net::Ipv4Addr};
 
@@ -7,6 +7,8 @@ use ros2::{
     participant::{Gid, Message, Participant, Quality, Reader, Request, Writer},
     topic::Topic,
 };
+
+use crate::parameters::{self, Parameter, SERVICES, Service};
 
 /// The most messages of a topic that wait for a slow reader, or for the node.
 const DEPTH: u16 = 10;
@@ -46,6 +48,8 @@ pub(crate) struct Node<Id> {
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
     actions: Vec<Action>,
+    parameters: Vec<Parameter>,
+    of_parameters: Vec<(Service, Reader, Writer)>,
     /// The list of the participant's readers and writers, for other nodes.
     entities: Writer,
     pub(crate) participant: Participant,
@@ -54,10 +58,9 @@ pub(crate) struct Node<Id> {
 impl<Id: Copy + Ord> Node<Id> {
     /// Join `domain` by the interface `only`, with topics below `namespace`.
     pub(crate) fn join(
-        domain: u16,
-        only: Option<Ipv4Addr>,
-        namespace: &str,
+        (domain, only, namespace): (u16, Option<Ipv4Addr>, &str),
         name: &'static str,
+        parameters: Vec<Parameter>,
     ) -> io::Result<Self> {
         let participant = Participant::join(domain, only)?;
         let namespace = namespace.trim_matches('/');
@@ -65,15 +68,24 @@ impl<Id: Copy + Ord> Node<Id> {
             "ros_discovery_info",
             "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_",
         );
-        Ok(Self {
+        let mut node = Self {
             name,
             namespace: if namespace.is_empty() { String::new() } else { format!("/{namespace}") },
             writers: BTreeMap::new(),
             readers: Vec::new(),
             actions: Vec::new(),
+            parameters,
+            of_parameters: Vec::new(),
             entities: participant.writer(&entities, LATCHED)?,
             participant,
-        })
+        };
+        for (service, part, kind) in SERVICES {
+            let name = node.full_name(&format!("{name}/{part}"));
+            let kind = format!("rcl_interfaces::srv::dds_::{kind}");
+            let (requests, replies) = node.service(&name, &kind)?;
+            node.of_parameters.push((service, requests, replies));
+        }
+        Ok(node)
     }
 
     /// The name from the root of one that is below the namespace unless it begins with a slash.
@@ -110,6 +122,13 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
+    /// The reader of requests, and the writer of replies.
+    fn service(&self, name: &str, kind: &str) -> io::Result<(Reader, Writer)> {
+        let [requests, replies] = Topic::service(name, kind);
+        let requests = self.participant.reader(&requests, SURE)?;
+        Ok((requests, self.participant.writer(&replies, SURE)?))
+    }
+
     /// Serve an action of Nav2, `kind`, as `name`.
     pub(crate) fn serve(&mut self, name: &str, kind: &str) -> io::Result<()> {
         let name = |part| format!("{}/_action/{part}", self.full_name(name));
@@ -120,9 +139,8 @@ impl<Id: Copy + Ord> Node<Id> {
             (Call::CancelGoal, "cancel_goal", "action_msgs::srv::dds_::CancelGoal".to_owned()),
             (Call::GetResult, "get_result", kind("GetResult")),
         ] {
-            let [requests, replies] = Topic::service(&name(part), &kind);
-            let requests = self.participant.reader(&requests, SURE)?;
-            services.push((call, requests, self.participant.writer(&replies, SURE)?));
+            let (requests, replies) = self.service(&name(part), &kind)?;
+            services.push((call, requests, replies));
         }
         let writer = |part, kind: &str, quality| {
             self.participant.writer(&Topic::new(&name(part), kind), quality)
@@ -135,10 +153,15 @@ impl<Id: Copy + Ord> Node<Id> {
 
     /// Tell other nodes which readers and writers are the node's.
     pub(crate) fn announce(&self) {
-        let services = || self.actions.iter().flat_map(|action| &action.services);
+        let services = || {
+            let actions = self.actions.iter().flat_map(|action| &action.services);
+            let actions = actions.map(|(_, requests, replies)| (requests, replies));
+            actions
+                .chain(self.of_parameters.iter().map(|(_, requests, replies)| (requests, replies)))
+        };
         let readers = self.readers.iter().map(|(_, reader)| reader);
-        let readers = readers.chain(services().map(|(_, requests, _)| requests)).map(Reader::gid);
-        let writers = self.writers.values().chain(services().map(|(.., replies)| replies));
+        let readers = readers.chain(services().map(|(requests, _)| requests)).map(Reader::gid);
+        let writers = self.writers.values().chain(services().map(|(_, replies)| replies));
         let topics = self.actions.iter().flat_map(|action| [&action.feedback, &action.status]);
         let writers = writers.chain(topics).map(Writer::gid);
         let gid = |writer: &mut cdr::Writer, gid: Gid| {
@@ -167,6 +190,21 @@ impl<Id: Copy + Ord> Node<Id> {
     pub(crate) fn publish_status(&self, action: usize, payload: Vec<u8>) {
         if let Some(action) = self.actions.get(action) {
             action.status.write(payload);
+        }
+    }
+
+    /// Answer those who ask for parameters.
+    pub(crate) fn answer(&self) {
+        for (service, requests, replies) in &self.of_parameters {
+            for Message { payload, request, .. } in requests.messages().take(AT_A_TIME) {
+                let payload = request.without_header(&payload);
+                match parameters::reply(&self.parameters, *service, &payload) {
+                    Ok(reply) => {
+                        replies.reply(&request, &reply);
+                    }
+                    Err(why) => tracing::warn!("a request for parameters is refused: {why}"),
+                }
+            }
         }
     }
 

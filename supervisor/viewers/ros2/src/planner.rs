@@ -47,6 +47,7 @@ use crate::{
     goals::{Goals, Status, Uuid},
     messages::{self, Header},
     node::{Call, LATCHED, Node, SURE},
+    parameters::Parameter,
     shown::arrows,
 };
 
@@ -155,13 +156,13 @@ struct Plan {
 
 /// Serve until `ended` returns true.
 pub(crate) fn serve(
-    (domain, interface, namespace): (u16, Option<Ipv4Addr>, &str),
-    options: &Arguments,
+    network: (u16, Option<Ipv4Addr>, &str),
+    (options, parameters): (&Arguments, Vec<Parameter>),
     ended: &mut dyn FnMut() -> bool,
 ) -> Result<(), BridgeError> {
     let open = || {
-        let node = open(domain, interface, namespace, options);
-        let node = node.map_err(|source| BridgeError::Join { domain, source })?;
+        let node = open(network, options, parameters.clone());
+        let node = node.map_err(|source| BridgeError::Join { domain: network.0, source })?;
         Server::new(options, node).map_err(BridgeError::System)
     };
     let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
@@ -178,12 +179,11 @@ pub(crate) fn serve(
 }
 
 fn open(
-    domain: u16,
-    interface: Option<Ipv4Addr>,
-    namespace: &str,
+    network: (u16, Option<Ipv4Addr>, &str),
     options: &Arguments,
+    parameters: Vec<Parameter>,
 ) -> io::Result<Node<Id>> {
-    let mut node = Node::join(domain, interface, namespace, "firsthand_planner")?;
+    let mut node = Node::join(network, "firsthand_planner", parameters)?;
     let Arguments { map, tf, .. } = options;
     let [updates, stay] = [format!("{map}_updates"), format!("{tf}_static")];
     let frames = "tf2_msgs::msg::dds_::TFMessage_";
@@ -233,6 +233,7 @@ impl<'a> Server<'a> {
     /// Do all that is to be done now.
     fn turn(&mut self) {
         self.node.participant.unring();
+        self.node.answer();
         for (id, message) in self.node.heard() {
             if let Err(why) = self.hear(id, &message.payload) {
                 tracing::warn!("a message of {id:?} is refused: {why}");
