@@ -231,7 +231,7 @@ def main(firsthand):
             poses = [pose.pose for pose in result.poses]
             assert all(is_free(pose.x, pose.y) for pose in poses)
             steps = [math.hypot(b.x - a.x, b.y - a.y) for a, b in zip(poses, poses[1:])]
-            assert max(steps) < 2.5 * CELL, max(steps)
+            assert max(steps) < 3 * CELL, max(steps)
             for x, y in places:
                 assert min(math.hypot(pose.x - x, pose.y - y) for pose in poses) < 1e-6, (x, y)
             return sum(steps)

@@ -13,6 +13,7 @@ use rustix::{
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
     termios::{Winsize, tcsetwinsize},
 };
+use serde_json::Value;
 
 use crate::support::{PATIENCE, Run, find, firsthand_under, refused, signal_process};
 
@@ -140,10 +141,13 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     // The planner is the fourth stage.
     screen.press("\x1b[B\x1b[B\x1b[Bk");
     screen.wait_for("kill planner: done");
-    run.wait_until("it is replaced", |status| {
-        let planner = find(status, "planner");
-        planner["generation"].as_u64() >= Some(2) && planner["state"] == "running"
-    });
+    let is_generation = |generation| {
+        move |status: &Value| {
+            let planner = find(status, "planner");
+            planner["generation"].as_u64() >= Some(generation) && planner["state"] == "running"
+        }
+    };
+    run.wait_until("it is replaced", is_generation(2));
     let deaths = run.records("deaths.jsonl");
     let killed = deaths.iter().any(|death| {
         let by_signal = death["cause"]["signalled"]["signal"] == 9 && death["hung"] == false;
@@ -153,6 +157,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     screen.wait_for("signal 9");
     screen.press("r");
     screen.wait_for("restart planner: done");
+    run.wait_until("it has a process again", is_generation(3));
     screen.press("f");
     screen.wait_for("freeze planner: done");
     screen.press("c");

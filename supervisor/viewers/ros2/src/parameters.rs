@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(value(&planner, "namespace"), text("a"));
         assert_eq!(value(&planner, "footprint"), text("[[1, 1], [-1, 1], [0, -1]]"));
         assert_eq!(value(&planner, "occupied"), Some(Value::Integer(99)));
-        assert_eq!(value(&planner, "screening"), Some(Value::Double(0.5)));
+        assert_eq!(value(&planner, "screening"), Some(Value::Double(2.0)));
         assert_eq!(value(&planner, "avoid_unknown"), Some(Value::Bool(false)));
         assert_eq!(value(&planner, "accept"), None);
         assert!(planner.iter().all(|parameter| !parameter.meaning.is_empty()));
