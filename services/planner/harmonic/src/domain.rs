@@ -60,7 +60,7 @@ impl Domain {
 
     /// Makes some cells dearer than others: the screening length of a cell is that of the map divided by its cost. In the limit
     /// of short screening lengths the field leads along the way of the least sum of costs; without screening costs change nothing.
-    /// Row-major, from 0 on.
+    /// Row-major, from 0 on; they are checked against the screening that the map has by then.
     ///
     /// # Errors
     /// [`SolveError::WrongLength`], and [`SolveError::ScreeningLength`] for a cost that is not a number or makes a length too short.
