@@ -1,11 +1,7 @@
 //! THE table of faults that can be injected into a running stage, to see whether the others go on. `firsthand stage fault`, its help and
 //! the guide read it. A stage's shell refuses a fault of a real robot unless the request says that it means one.
 
-use crate::{
-    bus::{Bus, BusError, Reader},
-    samples::{FaultAnswer, FaultKind, FaultSample, name_str},
-    topics,
-};
+use crate::samples::{FaultAnswer, FaultKind, FaultSample};
 
 #[derive(Debug)]
 pub struct Fault {
@@ -86,37 +82,6 @@ pub fn admit(
         Ok(kind)
     } else {
         Err(FaultAnswer::Refused)
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub struct Asked {
-    pub id: u64,
-    pub fault: Result<FaultKind, FaultAnswer>,
-}
-
-#[derive(Debug)]
-pub struct Requests {
-    requests: Reader<FaultSample>,
-    stage: &'static str,
-    simulated: bool,
-}
-
-impl Requests {
-    pub fn open(bus: &Bus, stage: &'static str, simulated: bool) -> Result<Self, BusError> {
-        Ok(Self { requests: bus.reader(&topics::FAULTS)?, stage, simulated })
-    }
-
-    pub fn take(&mut self) -> Result<Option<Asked>, BusError> {
-        while let Some(request) = self.requests.next_sample()? {
-            if name_str(&request.stage) == self.stage {
-                return Ok(Some(Asked {
-                    id: request.id,
-                    fault: admit(&request, self.stage, self.simulated),
-                }));
-            }
-        }
-        Ok(None)
     }
 }
 

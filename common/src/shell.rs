@@ -3,6 +3,8 @@
 //!
 //! A [`Process`] declares its topics, which the shell opens for it.
 
+mod fault_requests;
+
 use std::{
     env, fmt,
     io::{self, Write as _},
@@ -14,12 +16,12 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
+use self::fault_requests::{Asked, Requests};
 use crate::{
     bus::{Bus, Stamp, Writer, Writers},
     checkpoint::Checkpoint,
     clock::{MissionClock, MissionTime},
     external,
-    faults::{Asked, Requests},
     journal::{Journal, Restored},
     outputs::Saved,
     poll,

@@ -104,9 +104,9 @@ impl Costmap {
         body.is_occupied(self.cells[cell.row * self.width + cell.col])
     }
 
-    /// The cells with centres no farther than the body's radius from that of an occupied one; and what each cell costs beside one that is
-    /// free and a metre from obstacles: more by the inverse square of its own distance from them, which ends to count at [`REACH_M`], and
-    /// by its value up to [`DEAREST`] times as much, `most` at most.
+    /// The cells with centres no farther than the body's radius from that of an occupied one, and the cost of each cell. A free cell a metre
+    /// from obstacles costs 1. The cost goes with the inverse square of the distance from obstacles, up to [`REACH_M`]; the cell's own value
+    /// makes it up to [`DEAREST`] times as great. No cost is greater than `most`.
     pub(super) fn blocked_and_costs(&self, body: &Body, most: f32) -> (Vec<bool>, Vec<f32>) {
         let cells = |metres: f64| (metres / self.resolution_m).clamp(0.0, MAX_SIDE as f64);
         let (radius, reach) = (cells(body.radius_m), cells(REACH_M).min(MOST_REACH));
@@ -125,8 +125,8 @@ impl Costmap {
             .unzip()
     }
 
-    /// The squares of the distances of cells, in cells, from the nearest whose value is a source; of those out of reach the square of one
-    /// more than it. Numbers are of the kind whose minimum takes every processor one instruction.
+    /// The square of each cell's distance, in cells, from the nearest whose value is a source; out of reach that of `reach` and one more.
+    /// The squares are `f32`, because every processor has the minimum of several of these in one instruction.
     fn squares(&self, reach: usize, is_source: impl Fn(u8) -> bool) -> Vec<f32> {
         let beyond = reach as u16 + 1;
         let square = |cells: u16| f32::from(cells).powi(2);
