@@ -1,6 +1,7 @@
 //! Tests that a consumer that comes late gets everything, and that its leaving changes nothing.
 
 use std::{
+    io::{BufRead as _, BufReader},
     process::{Child, Stdio},
     sync::{
         Arc, Mutex,
@@ -9,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::support::{self, Run, STAGES, assert_nothing_left, in_own_process, operate};
+use crate::support::{self, Run, STAGES, assert_nothing_left, firsthand, in_own_process, operate};
 use common::{
     bus::{Bus, BusError},
     follower::{Event, Follower},
@@ -171,6 +172,15 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
             assert!(began.elapsed() < support::PATIENCE, "{} held", held.len());
         };
         assert!(matches!(refused, BusError::HoldsTooMany { .. }), "{refused}");
+        let mut shown = Staying(
+            firsthand(&["status", "--follow", "--robot", "greedy"])
+                .stdout(Stdio::piped())
+                .spawn()
+                .unwrap(),
+        );
+        let mut first = String::new();
+        let mut said = BufReader::new(shown.0.stdout.take().unwrap());
+        said.read_line(&mut first).unwrap();
         let mut readers = Vec::new();
         let refused = loop {
             match bus.reader(&topics::POSE) {
@@ -179,6 +189,9 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
             }
         };
         assert!(matches!(refused, BusError::NoPlace { .. }), "{refused}");
+        drop(shown);
+        readers
+            .push(bus.reader(&topics::POSE).expect("the place of a killed process is waited for"));
         // Whoever asks for the status needs a place, too.
         readers.pop();
         // A stage that needs a place gets one.
@@ -235,7 +248,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
         let mut staying = Vec::new();
         for consumer in 0..10 {
             let topic = ["grid", "field"][consumer % 2];
-            let mut echo = support::firsthand(&["topic", "echo", topic, "--robot", robot]);
+            let mut echo = firsthand(&["topic", "echo", topic, "--robot", robot]);
             echo.stdout(Stdio::null()).stderr(Stdio::null());
             staying.push(Staying(echo.spawn().unwrap()));
         }

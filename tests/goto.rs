@@ -202,6 +202,7 @@ fn each_of_fifty_commands_in_a_row_finds_a_place_on_the_bus() {
 
 /// No target, and a place with a wall all around it.
 const STAYS: &str = "
+timeout_s = 1000.0
 perimeter.width_m = 8.0
 robot.odometry = { diameter_ratio_sd = 0.0, track_scale_sd = 0.0 }
 simulation.realism = 'laboratory'
@@ -230,7 +231,10 @@ fn a_run_that_stays_waits_before_between_and_after_its_targets_and_none_ends_it(
     operate("goto-stay", &["goto", "0.5", "-1.0"]);
     run.wait_until("it drives again", |status| status["order"] == "driving");
     run.wait_until("it waits at last", waits);
-    assert_eq!(run.records("targets.jsonl").len(), 4, "each has its record while the run goes on");
+    // A record waits for the ground truth of its tick.
+    support::wait_until("each has its record while the run goes on", || {
+        run.records("targets.jsonl").len() == 4
+    });
     run.signal(Signal::INT);
     let (code, summary, directory) = run.finish_in();
     assert_eq!(outcomes(&summary), ["reached", "reached", "unreachable", "reached"], "{summary}");
@@ -281,7 +285,11 @@ fn a_standing_robot_is_told_where_it_is_goes_on_from_there_and_replays_to_the_bi
     // It stands there, and is believed one metre farther.
     operate(robot, &["place", "-1", "0.5", "90", "--sigma", "0.1"]);
     run.wait_until("it believes so", |status| is_at(status, -1.0, 0.5));
-    let stalls = run.records("stalls.jsonl");
+    let mut stalls = Vec::new();
+    support::wait_until("the recovery is recorded", || {
+        stalls = run.records("stalls.jsonl");
+        !stalls.is_empty()
+    });
     assert_eq!(stalls.len(), 1, "{stalls:?}");
     assert_eq!(
         (&stalls[0]["cause"], &stalls[0]["recovery"]),

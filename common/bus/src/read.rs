@@ -3,6 +3,8 @@
 use std::{
     cell::Cell,
     os::fd::{AsFd, BorrowedFd},
+    thread,
+    time::{Duration, Instant},
 };
 
 use super::{
@@ -15,8 +17,12 @@ use super::{
     topic::Topic,
 };
 
+/// On a busy machine the supervisor needs more than one round.
+const PLACES_FREED_WITHIN: Duration = Duration::from_secs(4);
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
 impl Bus {
-    /// Read `topic`. It fails if the topic is missing, carries another payload, or has no place left.
+    /// Read `topic`. It fails if the topic is missing, carries another payload, or has no place left, for which a consumer waits a little.
     pub fn reader<H: Stamped, E: Payload>(&self, topic: &Topic<H, E>) -> Result<Reader<H, E>> {
         self.reader_that_keeps(topic, topic.spec.limits.buffer)
     }
@@ -27,13 +33,27 @@ impl Bus {
         topic: &Topic<H, E>,
         buffer: usize,
     ) -> Result<Reader<H, E>> {
-        let _held = self.hold()?;
-        let service = Service::open(&self.node, topic.spec)?;
-        self.leave_places(topic.spec, topic.spec.limits.readers, service.readers().len())?;
-        Ok(Reader {
-            subscriber: service.subscriber(buffer)?,
-            admitted: Admitted::of(topic.spec, self.writers.as_ref()),
-        })
+        let subscriber = self.once_freed(|| {
+            let service = Service::open(&self.node, topic.spec)?;
+            self.leave_places(topic.spec, topic.spec.limits.readers, service.readers().len())?;
+            service.subscriber(buffer)
+        })?;
+        Ok(Reader { subscriber, admitted: Admitted::of(topic.spec, self.writers.as_ref()) })
+    }
+
+    /// Open an endpoint. A consumer waits for the places of killed processes, which the supervisor frees about once a second.
+    fn once_freed<T>(&self, open: impl Fn() -> Result<T>) -> Result<T> {
+        let began = Instant::now();
+        loop {
+            let held = self.hold()?;
+            match open() {
+                Err(BusError::NoPlace { .. })
+                    if !self.is_stage && began.elapsed() < PLACES_FREED_WITHIN => {}
+                opened => return opened,
+            }
+            drop(held);
+            thread::park_timeout(LOOK_EVERY);
+        }
     }
 
     /// Refuse a consumer the last places, which the stages may need.
@@ -98,9 +118,8 @@ pub struct Wakeup {
 
 impl Wakeup {
     pub(super) fn open(bus: &Bus, spec: &'static Spec) -> Result<Self> {
-        let _held = bus.hold()?;
         let admit = |taken| bus.leave_places(spec, Limits::LISTENERS, taken);
-        let listener = Listener::open(&bus.node, spec, admit)?;
+        let listener = bus.once_freed(|| Listener::open(&bus.node, spec, admit))?;
         Ok(Self { listener, had_events: Cell::new(false) })
     }
 

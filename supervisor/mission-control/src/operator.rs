@@ -31,8 +31,9 @@ use link::stop_guard;
 use processes::{executable, process};
 use thiserror::Error;
 
-/// The patience with a roster, which comes five times a second.
-pub const PATIENCE: Duration = Duration::from_secs(2);
+/// The patience with a supervisor, whose roster comes five times a second. Beside ten busy
+/// processes a core a supervisor took more than 2 s to answer.
+pub const PATIENCE: Duration = Duration::from_secs(4);
 /// A request that a run refuses because it starts is made again after this.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
@@ -82,7 +83,7 @@ const fn code(answer: RequestAnswer) -> &'static str {
 pub type Untold = Option<String>;
 
 /// The time for a process to start and to tell the supervisor.
-const TOLD_WITHIN: Duration = Duration::from_secs(4);
+const TOLD_WITHIN: Duration = PATIENCE.saturating_add(Duration::from_secs(2));
 
 /// The patience with a stop: the link changes its method after a second.
 const REST_PATIENCE: Duration = Duration::from_secs(5);

@@ -112,7 +112,7 @@ pub fn record(
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;
-    let mut joins = false;
+    let (mut joins, mut left) = (false, false);
     let earlier = options.run.as_deref().map(places::parts).unwrap_or_default();
     let mut budget = options.budget.map(|bytes| Budget::new(bytes, earlier));
     loop {
@@ -124,6 +124,7 @@ pub fn record(
             Event::Samples(_) | Event::Nothing => None,
         };
         joins = news.unwrap_or(joins);
+        left = news.map_or(left, |joined| !joined);
         // A bus is there before its run.
         if joins && let Some(run) = find_run(options) {
             joins = false;
@@ -179,7 +180,9 @@ pub fn record(
         if wish == Wish::CatchUp {
             tell(Happened::CaughtUp);
         }
-        let run_over = news == Some(false) && !options.domain.is_supervised();
+        // A supervisor removes its bus some time before it ends.
+        let run_over = left && !options.domain.is_supervised();
+        left &= !run_over;
         if (stopped || run_over)
             && let Some(ended) = current.take()
         {
@@ -356,4 +359,70 @@ fn machine() -> String {
         system.trim(),
         std::env::consts::ARCH
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        sync::atomic::{AtomicUsize, Ordering},
+        thread,
+    };
+
+    use processes::domain::DomainLock;
+
+    use super::*;
+
+    const PATIENCE: Duration = Duration::from_secs(30);
+
+    #[test]
+    fn a_recording_ends_though_its_supervisor_ends_long_after_it_removed_the_bus() {
+        let domain = Domain::of("rec-late".parse().unwrap());
+        let mut lock = DomainLock::acquire(domain.clone(), 1).unwrap();
+        let out = tempfile::tempdir().unwrap();
+        lock.link_to_run(out.path(), domain.run_directory()).unwrap();
+        let options = Options {
+            domain: domain.clone(),
+            out: out.path().join("late.mcap"),
+            topics: None,
+            fields: false,
+            run: None,
+            budget: None,
+        };
+        let [rounds, attached, complete] = [const { AtomicUsize::new(0) }; 3];
+        let until = |is_so: &dyn Fn() -> bool| {
+            let began = Instant::now();
+            while !is_so() && began.elapsed() < PATIENCE {
+                thread::yield_now();
+            }
+            is_so()
+        };
+        thread::scope(|scope| {
+            let recorder = scope.spawn(|| {
+                let began = Instant::now();
+                let mut wish = || {
+                    rounds.fetch_add(1, Ordering::Relaxed);
+                    // A recorder that is stopped completes its file too, so it is stopped after the test has failed.
+                    let failed = began.elapsed() > PATIENCE * 4;
+                    let over = failed || complete.load(Ordering::Relaxed) > 0;
+                    if over { Wish::Stop } else { Wish::Record }
+                };
+                record(&options, &mut wish, &mut |happened| {
+                    match happened {
+                        Happened::Attached(_) => attached.fetch_add(1, Ordering::Relaxed),
+                        Happened::Complete(..) => complete.fetch_add(1, Ordering::Relaxed),
+                        Happened::CaughtUp => 0,
+                    };
+                })
+            });
+            assert!(until(&|| attached.load(Ordering::Relaxed) > 0));
+            fs::remove_file(domain.middleware_config()).unwrap();
+            // By then the recorder knows that the bus is gone.
+            let known = rounds.load(Ordering::Relaxed) + 5;
+            assert!(until(&|| rounds.load(Ordering::Relaxed) >= known));
+            assert_eq!(complete.load(Ordering::Relaxed), 0, "the supervisor has not ended");
+            drop(lock);
+            assert!(until(&|| complete.load(Ordering::Relaxed) > 0), "the recording goes on");
+            recorder.join().unwrap().unwrap();
+        });
+    }
 }
