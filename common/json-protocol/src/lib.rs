@@ -133,8 +133,19 @@ impl Lines {
                 complete.extend(Some(line).filter(|line| !line.trim_ascii().is_empty()));
             }
         }
-        if self.held.trim_ascii_end().ends_with(b"}") && parse::<IgnoredAny>(&self.held).is_ok() {
-            complete.push(std::mem::take(&mut self.held));
+        if self.held.trim_ascii_end().ends_with(b"}") {
+            let is_object = |line| serde_json::from_slice::<IgnoredAny>(line).map(drop);
+            let last = bytes.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
+            match is_object(&self.held) {
+                Ok(()) => complete.push(std::mem::take(&mut self.held)),
+                // What came before begins no object that `last` could go on with.
+                Err(error) if !error.is_eof() && is_object(last).is_ok() => {
+                    self.held.truncate(self.held.len() - last.len());
+                    self.reset();
+                    complete.push(last.to_vec());
+                }
+                Err(_) => {}
+            }
         }
         complete
     }
@@ -189,6 +200,18 @@ mod tests {
             "a long line is divided over datagrams"
         );
         assert_eq!(lines.push(rest), [whole]);
+    }
+
+    #[test]
+    fn a_damaged_datagram_without_a_newline_makes_a_robot_deaf_for_one_more_at_most() {
+        let whole = br#"{"ranges":{"front":1.2},"heard":1}"#;
+        for (damaged, heard) in [("noise", 3), ("noise}", 3), (r#"{"wheels":[1,"#, 2)] {
+            let mut lines = Lines::default();
+            assert!(lines.push(damaged.as_bytes()).is_empty(), "{damaged}");
+            let came: Vec<_> = (0..3).flat_map(|_| lines.push(whole)).collect();
+            assert_eq!(came, vec![whole.to_vec(); heard], "{damaged}");
+            assert_eq!(lines.dropped() as usize, damaged.len() + (3 - heard) * whole.len());
+        }
     }
 
     #[test]
