@@ -5,6 +5,8 @@ use std::{
     io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
     process::Stdio,
+    thread,
+    time::Duration,
 };
 
 use common::{
@@ -20,9 +22,9 @@ use recording::{
 use rustix::process::Signal;
 
 use crate::support::{
-    self, PATIENCE, Run, STAGES, assert_nothing_left, assert_refused, firsthand, golden, golden_of,
-    json_of, operate, output, processes, refused, replayed, replayed_in, signal_process,
-    wait_until,
+    self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_refused, firsthand,
+    golden, golden_of, json_of, operate, output, processes, refused, replayed, replayed_in,
+    signal_process, wait_until,
 };
 
 fn open(directory: &Path) -> Recording {
@@ -129,7 +131,8 @@ fn the_log_time_of_a_run_in_lockstep_is_mission_time() {
 
 #[test]
 fn on_a_wall_clock_a_tick_is_answered_again_when_its_map_is_solved() {
-    let run = Run::start("rec-again", "obstacle-course", &["--pace", "2", "--set", "timeout_s=12"]);
+    let run = Run::under_way("rec-again", "obstacle-course", &["--pace", "2"], 12.0);
+    run.signal(Signal::TERM);
     let (_, summary, directory) = run.finish_in();
     let recording = open(directory.path());
     let guidance = recording.samples(&topics::GUIDANCE).unwrap();
@@ -147,9 +150,7 @@ fn a_run_in_lockstep_waits_for_its_recorder_and_is_recorded_from_its_first_sampl
     let run = Run::start("rec-late", "open-room", &["--timeout", "8"]);
     let file = run.directory().join("recording.mcap");
     wait_until("the recorder has begun its file", || file.exists());
-    let line = run.directory().to_str().unwrap().to_owned();
-    let recorder = processes(&line).into_iter().find(|(_, line)| line.contains(" record "));
-    let (recorder, _) = recorder.unwrap();
+    let recorder = recorder_of(&run);
     signal_process(recorder, Signal::STOP);
     support::wait_for_status("rec-late", |status| status["order"] == "driving");
     signal_process(recorder, Signal::CONT);
@@ -157,6 +158,25 @@ fn a_run_in_lockstep_waits_for_its_recorder_and_is_recorded_from_its_first_sampl
     let recording = open(directory.path());
     assert!(recording.lost.is_empty(), "{:?}", recording.lost);
     assert_eq!(replayed(&recording).equal(), 5);
+}
+
+fn recorder_of(run: &Run) -> u32 {
+    let mut processes = processes(run.directory().to_str().unwrap()).into_iter();
+    processes.find(|(_, line)| line.contains(" record ")).unwrap().0
+}
+
+#[test]
+fn a_run_that_is_ended_waits_for_its_recorder_and_is_not_taken_for_one_that_hangs() {
+    let run = Run::under_way("rec-held", "open-room", &["--pace", "1"], 0.5);
+    let recorder = recorder_of(&run);
+    signal_process(recorder, Signal::STOP);
+    run.signal(Signal::TERM);
+    // The duration is what is tested: it is longer than a loop that hangs may stand still.
+    thread::sleep(Duration::from_secs(4));
+    signal_process(recorder, Signal::CONT);
+    let (code, summary, directory) = run.finish_in();
+    assert_ended(code, &summary, 0, "aborted");
+    assert_eq!(open(directory.path()).end, End::Complete);
 }
 
 /// Kill a recorder of `robot` whose file has grown `growths` times. Returns its file.
