@@ -131,8 +131,7 @@ fn the_log_time_of_a_run_in_lockstep_is_mission_time() {
 
 #[test]
 fn on_a_wall_clock_a_tick_is_answered_again_when_its_map_is_solved() {
-    let run = Run::under_way("rec-again", "obstacle-course", &["--pace", "2"], 12.0);
-    run.signal(Signal::TERM);
+    let run = Run::at_own_speed("rec-again", "obstacle-course", &["--pace", "2"]);
     let (_, summary, directory) = run.finish_in();
     let recording = open(directory.path());
     let guidance = recording.samples(&topics::GUIDANCE).unwrap();
