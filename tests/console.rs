@@ -9,7 +9,7 @@ use std::{
     process::{Child, ChildStderr, ChildStdout, Command, Stdio},
 };
 
-use common::{bus::Kind, topics};
+use common::{bus::Kind, poll, topics};
 use rustix::process::Signal;
 use serde_json::Value;
 
@@ -36,6 +36,8 @@ impl Reading {
 
     fn line(&mut self) -> String {
         let mut line = String::new();
+        let is_there = !self.lines.buffer().is_empty();
+        assert!(is_there || poll::is_readable(self.lines.get_ref(), PATIENCE).unwrap(), "no line");
         self.lines.read_line(&mut line).unwrap();
         line
     }

@@ -157,8 +157,8 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
 #[test]
 fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_notices() {
     in_own_process(|| {
-        // Slow enough not to arrive before its stages run again.
-        let slowly = ["--pace", "2", "--set", "controller.speed_m_s=0.1"];
+        // Slow enough not to arrive before its stages run again, on a busy machine either.
+        let slowly = ["--pace", "2", "--set", "controller.speed_m_s=0.02"];
         let mut run = Run::under_way("greedy", "open-room", &slowly, 0.5);
         let bus = Bus::join(&support::domain("greedy"), "greedy").unwrap();
         let mut grids = bus.reader(&topics::GRID).unwrap();
@@ -198,6 +198,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
         for stage in ["mapper", "planner"] {
             run.kill_and_await_successor(stage, rustix::process::Signal::KILL);
         }
+        run.signal(rustix::process::Signal::TERM);
         let (code, summary) = run.finish();
         assert_eq!(code, Some(0), "{summary}");
         for stage in ["mapper", "planner"] {
@@ -243,8 +244,8 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
  {
     in_own_process(|| {
         let robot = "visited-c6";
-        let mut run =
-            Run::under_way(robot, "obstacle-course", &["--pace", "2", "--timeout", "30"], 0.5);
+        let slowly = ["--pace", "2", "--set", "controller.speed_m_s=0.05"];
+        let mut run = Run::under_way(robot, "obstacle-course", &slowly, 0.5);
         let mut staying = Vec::new();
         for consumer in 0..10 {
             let topic = ["grid", "field"][consumer % 2];
@@ -269,12 +270,11 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
         });
         assert!(joined > 10, "{joined}");
         drop(staying);
-        let (_, summary) = run.finish();
+        let summary = run.stop();
         for stage in STAGES {
             let killed = u64::from(stage == "planner");
             assert_eq!(summary["restarts"][stage], killed, "{summary}");
         }
-        assert_nothing_left(robot);
     });
 }
 

@@ -11,7 +11,7 @@ use std::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{Run, STAGES, assert_reached, replayed_in};
+use crate::support::{Run, assert_reached, replayed_in};
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
@@ -86,9 +86,7 @@ fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
     let robot = PythonRobot::start();
     let mut run = robot.run("json-kills");
     run.wait_until_under_way(0.3);
-    for stage in STAGES {
-        run.kill_and_await_successor(stage, Signal::KILL);
-    }
+    run.kill_each(Signal::KILL);
     let (code, summary) = run.finish();
     assert_reached(code, &summary);
     assert_at_its_target_untouched(&robot.end());

@@ -96,7 +96,7 @@ impl Row {
             }
             Phase::Driving => {
                 run.wait_until_under_way(1.0);
-                self.hit_each(&mut run);
+                self.signals.iter().for_each(|&signal| run.kill_each(signal));
                 let (summary, directory) = run.arrives_in();
                 self.assert_restarts(&summary);
                 assert_pose_was_not_lost(&summary);
@@ -106,7 +106,7 @@ impl Row {
                 run.wait_until_under_way(1.0);
                 operate(robot, &["stop"]);
                 run.wait_until("it stands", waits);
-                self.hit_each(&mut run);
+                self.signals.iter().for_each(|&signal| run.kill_each(signal));
                 let status = run.wait_until("every stage runs", all_run);
                 assert!(waits(&status), "{status}");
                 operate(robot, &["resume"]);
@@ -125,14 +125,6 @@ impl Row {
                 let (code, summary) = run.finish();
                 assert_ended(code, &summary, 0, "aborted");
                 assert_nothing_left(robot);
-            }
-        }
-    }
-
-    fn hit_each(&self, run: &mut Run) {
-        for &signal in self.signals {
-            for stage in STAGES {
-                run.kill_and_await_successor(stage, signal);
             }
         }
     }

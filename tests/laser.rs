@@ -24,9 +24,7 @@ fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_b
     for topic in ["scan", "scan_fix"] {
         printed(&["topic", "echo", topic, "--robot", "laser-kills", "-n", "1"]);
     }
-    for stage in STAGES {
-        run.kill_and_await_successor(stage, Signal::KILL);
-    }
+    run.kill_each(Signal::KILL);
     let (_, directory) = run.arrives_in();
     let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
     assert!(recording.counts["scan"] > 100, "{:?}", recording.counts);

@@ -5,6 +5,8 @@ use std::{
     io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
     process::Stdio,
+    thread,
+    time::Duration,
 };
 
 use common::{
@@ -20,9 +22,9 @@ use recording::{
 use rustix::process::Signal;
 
 use crate::support::{
-    self, PATIENCE, Run, STAGES, assert_nothing_left, assert_refused, firsthand, golden, golden_of,
-    json_of, operate, output, processes, refused, replayed, replayed_in, signal_process,
-    wait_until,
+    self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_refused, firsthand,
+    golden, golden_of, json_of, operate, output, processes, refused, replayed, replayed_in,
+    signal_process, wait_until,
 };
 
 fn open(directory: &Path) -> Recording {
@@ -64,7 +66,8 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
 
 #[test]
 fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_has_ended() {
-    let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.02", "--set", "timeout_s=600"];
+    // A busy machine takes minutes for these commands, and the robot must not be there by then.
+    let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.006"];
     let mut run = Run::start("rec-orders", "open-room", &slow);
     run.wait_until_driving();
     let mut asked = Vec::new();
@@ -72,12 +75,16 @@ fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_
         let words: [(&[&str], _); 4] = [
             (&["stop"], RequestKind::Stop),
             (&["resume"], RequestKind::Resume),
-            (&["goto", "1", "0"], RequestKind::Goto),
+            (&["goto", "3", "0"], RequestKind::Goto),
             (&["stage", "restart", "planner"], RequestKind::Restart),
         ];
         for (words, kind) in words {
-            operate("rec-orders", words);
-            asked.push((kind, RequestAnswer::Taken));
+            let said = output(&[words, &["--robot", "rec-orders"]].concat());
+            assert!(said.status.success(), "{said:?}");
+            // A stop of which its supervisor was not told says so, and holds.
+            if said.stderr.is_empty() {
+                asked.push((kind, RequestAnswer::Taken));
+            }
         }
     }
     refused(&["goto", "99", "0", "--robot", "rec-orders"], "target-outside", &[]);
@@ -91,7 +98,9 @@ fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_
         .iter()
         .map(|order| (RequestKind::from_byte(order.kind), RequestAnswer::from_byte(order.answer)))
         .collect();
-    assert_eq!(answered, asked);
+    // On a busy machine an order is made again until it is taken, and a supervisor takes one for which nobody waits any more.
+    let mut rest = answered.iter();
+    assert!(asked.iter().all(|order| rest.any(|it| it == order)), "{answered:?}");
     let times = orders.windows(2).map(|pair| pair[1].stamp.stamp_ns - pair[0].stamp.stamp_ns);
     assert!(times.min() > Some(0), "each has its mission time");
     assert_eq!(recording.lost.get("orders"), None);
@@ -122,7 +131,7 @@ fn the_log_time_of_a_run_in_lockstep_is_mission_time() {
 
 #[test]
 fn on_a_wall_clock_a_tick_is_answered_again_when_its_map_is_solved() {
-    let run = Run::start("rec-again", "obstacle-course", &["--pace", "2", "--set", "timeout_s=12"]);
+    let run = Run::at_own_speed("rec-again", "obstacle-course", &["--pace", "2"]);
     let (_, summary, directory) = run.finish_in();
     let recording = open(directory.path());
     let guidance = recording.samples(&topics::GUIDANCE).unwrap();
@@ -140,9 +149,7 @@ fn a_run_in_lockstep_waits_for_its_recorder_and_is_recorded_from_its_first_sampl
     let run = Run::start("rec-late", "open-room", &["--timeout", "8"]);
     let file = run.directory().join("recording.mcap");
     wait_until("the recorder has begun its file", || file.exists());
-    let line = run.directory().to_str().unwrap().to_owned();
-    let recorder = processes(&line).into_iter().find(|(_, line)| line.contains(" record "));
-    let (recorder, _) = recorder.unwrap();
+    let recorder = recorder_of(&run);
     signal_process(recorder, Signal::STOP);
     support::wait_for_status("rec-late", |status| status["order"] == "driving");
     signal_process(recorder, Signal::CONT);
@@ -150,6 +157,25 @@ fn a_run_in_lockstep_waits_for_its_recorder_and_is_recorded_from_its_first_sampl
     let recording = open(directory.path());
     assert!(recording.lost.is_empty(), "{:?}", recording.lost);
     assert_eq!(replayed(&recording).equal(), 5);
+}
+
+fn recorder_of(run: &Run) -> u32 {
+    let mut processes = processes(run.directory().to_str().unwrap()).into_iter();
+    processes.find(|(_, line)| line.contains(" record ")).unwrap().0
+}
+
+#[test]
+fn a_run_that_is_ended_waits_for_its_recorder_and_is_not_taken_for_one_that_hangs() {
+    let run = Run::under_way("rec-held", "open-room", &["--pace", "1"], 0.5);
+    let recorder = recorder_of(&run);
+    signal_process(recorder, Signal::STOP);
+    run.signal(Signal::TERM);
+    // The duration is what is tested: it is longer than a loop that hangs may stand still.
+    thread::sleep(Duration::from_secs(4));
+    signal_process(recorder, Signal::CONT);
+    let (code, summary, directory) = run.finish_in();
+    assert_ended(code, &summary, 0, "aborted");
+    assert_eq!(open(directory.path()).end, End::Complete);
 }
 
 /// Kill a recorder of `robot` whose file has grown `growths` times. Returns its file.

@@ -29,7 +29,9 @@ fn next_pose(bus: &Bus) -> PoseSample {
 #[test]
 fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_without_harm() {
     in_own_process(|| {
-        let mut run = Run::start(ROBOT, "open-room", &["--pace", "4"]);
+        // The robot is slow enough not to arrive while a busy machine starts its stages again.
+        let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02"];
+        let mut run = Run::start(ROBOT, "open-room", &slow);
         let status = run.wait_until_under_way(1.0);
         let domain = support::domain(ROBOT);
         let old = Bus::join(&domain, "logger").unwrap();
@@ -68,6 +70,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
             assert_eq!(generation(&after, stage), generation(&before, stage) + more, "{stage}");
         }
         drop(new);
+        run.signal(Signal::TERM);
         let (code, summary) = run.finish();
         assert_eq!(code, Some(0), "{summary}");
         assert_nothing_left(ROBOT);

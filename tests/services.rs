@@ -192,12 +192,15 @@ impl Units {
         Self { keepers: support::STAGES.map(keep).into(), over, directory }
     }
 
-    /// Wait until all stages have ended by themselves, each in order.
+    /// Wait until all stages have ended by themselves, each in order. On a busy machine the supervisor may kill one that has stopped, and
+    /// whose process has not ended yet.
     fn assert_all_leave(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for (stage, keeper) in std::mem::take(&mut self.keepers) {
             let code = keeper.join().unwrap();
-            assert_eq!(code, Some(0), "{stage}: see {:?}", self.directory);
+            let log = fs::read_to_string(self.directory.path().join(stage)).unwrap();
+            let stopped = log.contains("common::shell: stopped");
+            assert!(stopped && code.is_none_or(|code| code == 0), "{stage}: {code:?}");
         }
     }
 }
@@ -251,9 +254,7 @@ fn watching_with(robot: &'static str, arguments: &[&str]) -> (Run, Units) {
 fn external_stages_drive_and_survive_kills_under_a_supervisor_that_only_watches() {
     let (mut run, mut units) = watching("units");
     run.wait_until_under_way(2.0);
-    for stage in support::STAGES {
-        run.kill_and_await_successor(stage, Signal::KILL);
-    }
+    run.kill_each(Signal::KILL);
     let (code, summary) = run.finish();
     assert_reached(code, &summary);
     for stage in support::STAGES {
@@ -266,8 +267,8 @@ fn external_stages_drive_and_survive_kills_under_a_supervisor_that_only_watches(
 #[test]
 fn a_frozen_external_stage_is_ended_by_the_supervisor_that_only_watches() {
     let (mut run, mut units) = watching("unit-hang");
-    run.wait_until_under_way(1.0);
-    run.kill_and_await_successor("mapper", Signal::STOP);
+    let status = run.wait_until_under_way(1.0);
+    run.kill_and_await("mapper", Signal::STOP, &status);
     run.signal(Signal::TERM);
     assert_eq!(run.finish().0, Some(0));
     units.assert_all_leave();
@@ -277,8 +278,8 @@ fn a_frozen_external_stage_is_ended_by_the_supervisor_that_only_watches() {
 #[test]
 fn external_stages_that_systemd_stops_before_their_supervisor_are_no_deaths() {
     let (mut run, mut units) = watching("unit-order");
-    run.wait_until_under_way(1.0);
-    let status = run.kill_and_await_successor("planner", Signal::KILL);
+    let status = run.wait_until_under_way(1.0);
+    let status = run.kill_and_await("planner", Signal::KILL, &status);
     // A unit that systemd stops is not started again.
     units.over.store(true, Ordering::Relaxed);
     for stage in support::STAGES.iter().rev() {

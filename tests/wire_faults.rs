@@ -8,7 +8,7 @@ use std::{
 };
 
 use crate::support::{
-    Run, assert_ended, assert_nothing_left, operate, refused,
+    Run, assert_ended, assert_nothing_left, logged, operate, refused, wait_until,
     wire::{Proxy, Robot},
 };
 use common::wire::{
@@ -248,12 +248,12 @@ fn a_robot_whose_counts_jump_in_motion_stands_and_its_arrival_is_unsure() {
     let body = Robot::start("open-room", "udp", "127.0.0.1:0");
     let faults = FaultInjector::before(&body, Fault::None);
     let sure = ["--set", "sure_within_m=0.5", "--set", &faults.proxy.as_robot()];
-    let mut run = Run::at_own_speed("fi-jump", "open-room", &sure);
-    run.wait_until_under_way(0.5);
+    let run = Run::at_own_speed("fi-jump", "open-room", &sure);
+    wait_until("it moves", || faults.moved_for() > Duration::from_millis(500));
     faults.set(Fault::Elsewhere);
-    run.wait_until("it stands", cause_is("odometry implausible"));
-    run.wait_until("it goes on", |status| status["link"]["cause"].is_null());
-    let (code, summary) = run.finish();
+    let (code, summary, directory) = run.finish_in();
+    let stood = ["cause=\"odometry implausible\""];
+    assert!(logged(&directory.path().join("run"), "link", &stood) > 0, "{summary}");
     assert_ended(code, &summary, 11, "reached_unsure");
     let within_m = summary["pose_within_m"].as_f64().unwrap();
     assert!(within_m > 0.5, "{summary}");

@@ -18,7 +18,7 @@ use tempfile::TempDir;
 use super::{
     commands::firsthand,
     robot::{
-        all_run, assert_nothing_left, directory_of, find, follow_status, generation, pid,
+        STAGES, all_run, assert_nothing_left, directory_of, follow_status, generation, pid,
         signal_process, status_of,
     },
 };
@@ -33,7 +33,8 @@ pub struct Run {
 
 impl Run {
     /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments. Unless an argument says otherwise, wheels that nobody
-    /// calibrated do not make its arrival unsure, and the robot is slow, so that a test can act while it drives.
+    /// calibrated do not make its arrival unsure, mission time does not run out while a busy machine starts processes, and the robot is
+    /// slow, so that a test can act while it drives.
     pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
         let slow = ["--set", "controller.speed_m_s=0.2"];
         Self::at_own_speed(robot, mission, &[&slow[..], arguments].concat())
@@ -45,7 +46,7 @@ impl Run {
         let out = directory.path().join("run");
         let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
             .arg(&out)
-            .args(["--set", "sure_within_m=9"])
+            .args(["--set", "sure_within_m=9", "--set", "timeout_s=900"])
             .args(arguments)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -100,10 +101,10 @@ impl Run {
         })
     }
 
-    /// Wait until the robot has been under way for `seconds` of mission time.
+    /// Wait until the robot has been under way for `seconds` of mission time, and every stage runs.
     pub fn wait_until_under_way(&mut self, seconds: f64) -> Value {
         self.wait_until("the robot is under way", |status| {
-            status["mission_time_s"].as_f64().unwrap() >= seconds
+            status["mission_time_s"].as_f64().unwrap() >= seconds && all_run(status)
         })
     }
 
@@ -131,20 +132,28 @@ impl Run {
         signal_process(self.pid(), signal);
     }
 
-    /// Kill a stage, or freeze it (`Signal::STOP`), and wait until its successor runs. Returns the status then.
+    /// Kill a stage, or freeze it (`Signal::STOP`), and wait until its successor and all others run. Returns the status then.
     pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) -> Value {
-        let status =
-            self.wait_until("the stage runs", |status| find(status, stage)["state"] == "running");
+        let status = self.wait_until_all_run();
         self.kill_and_await(stage, signal, &status)
     }
 
-    /// [`Self::kill_and_await_successor`] for a stage that runs in `status`, without asking for a new status.
+    /// [`Self::kill_and_await_successor`] for a stage that runs in `status`. The robot drives on while a new status is asked for, which
+    /// takes seconds on a busy machine.
     pub fn kill_and_await(&mut self, stage: &str, signal: Signal, status: &Value) -> Value {
         signal_process(pid(status, stage), signal);
         let before = generation(status, stage);
         self.wait_until("its successor runs", |status| {
-            generation(status, stage) > before && find(status, stage)["state"] == "running"
+            generation(status, stage) > before && all_run(status)
         })
+    }
+
+    /// Kill or freeze each stage, as soon as the successor of the one before runs.
+    pub fn kill_each(&mut self, signal: Signal) {
+        let mut status = self.wait_until_all_run();
+        for stage in STAGES {
+            status = self.kill_and_await(stage, signal, &status);
+        }
     }
 
     /// Wait for the end. Returns the exit code, and the JSON of the last line.

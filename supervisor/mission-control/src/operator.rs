@@ -31,9 +31,8 @@ use link::stop_guard;
 use processes::{executable, process};
 use thiserror::Error;
 
-/// The patience with a supervisor, whose roster comes five times a second. Beside ten busy
-/// processes a core a supervisor took more than 2 s to answer.
-pub const PATIENCE: Duration = Duration::from_secs(4);
+/// The patience with a supervisor, whose roster comes five times a second. Beside 25 busy processes a core one took more than 4 s to answer.
+pub const PATIENCE: Duration = Duration::from_secs(10);
 /// A request that a run refuses because it starts is made again after this.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 

@@ -112,7 +112,7 @@ pub fn run<'a>(
     let lock = lock.insert(DomainLock::acquire(domain, options.mission.grid_frame().area())?);
     let mut supervisor =
         Supervisor::start(options, lock, (turns.clone(), &signals), consumer, listener)
-            .inspect_err(|_| turns.end())?;
+            .inspect_err(|_| turns.rest(true))?;
     let ending = loop {
         match supervisor.drive(&mut signals, lock, consumer, show) {
             Ok(Some(ending)) => break Ok(ending),
@@ -123,8 +123,12 @@ pub fn run<'a>(
     // The robot is stopped first after an error, too, and then the stages in order.
     let given_up = Some(Cause::OdometryGivenUp.name());
     let trusts_encoders = ending.as_ref().map_or(true, |ending| ending.cause != given_up);
-    let stopped = supervisor.end_mission(trusts_encoders, &mut || consumer.catch_up(&signals));
-    turns.end();
+    let stopped = supervisor.end_mission(trusts_encoders, &mut || {
+        turns.rest(true);
+        consumer.catch_up(&signals);
+        turns.rest(false);
+    });
+    turns.rest(true);
     let ending = ending?;
     let wheels = stopped?;
     supervisor.end_following(TargetOutcome::Followed);

@@ -18,7 +18,7 @@ use common::{
     mission::Mission,
     poll, run,
 };
-use processes::process::Process;
+use processes::{policy::STOP_GRACE, process::Process};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use thiserror::Error;
 
@@ -26,7 +26,6 @@ use crate::long_record;
 
 /// Beside 30 busy processes a core it takes seconds.
 const STARTUP: Duration = Duration::from_secs(30);
-const STOP_GRACE: Duration = Duration::from_millis(300);
 /// The greatest length of a line of ground truth, which has under 300 bytes; a longer one is an error.
 const LONGEST_LINE: usize = 64 * 1024;
 

@@ -27,11 +27,10 @@ use rustix::{
     thread::gettid,
 };
 
-use crate::domain;
+use crate::{domain, policy::STOP_GRACE};
 
 /// The time without an iteration after which the loop hangs; a healthy one turns five times a second.
 const STUCK: Duration = Duration::from_secs(2);
-const GRACE: Duration = Duration::from_millis(300);
 /// The exit code of a run that ends like this, which is that of any run that failed.
 const FAILED: u8 = 1;
 
@@ -39,11 +38,11 @@ const HANGS: &str = "the supervisor hangs, perhaps in a file of the bus that was
 
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// The number of turns of the supervisor's loop, and whether it has ended.
+/// The number of turns of the supervisor's loop, and whether it need not turn now.
 #[derive(Clone, Default)]
 pub struct Turns {
     count: Arc<AtomicU64>,
-    ended: Arc<AtomicBool>,
+    rests: Arc<AtomicBool>,
 }
 
 impl Turns {
@@ -51,30 +50,29 @@ impl Turns {
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Note that the stages have ended in order. The rest may take longer.
-    pub fn end(&self) {
-        self.ended.store(true, Ordering::Relaxed);
+    /// Note whether the loop need not turn: it waits for something that has a time limit, or the stages have ended in order.
+    pub fn rest(&self, rests: bool) {
+        self.rests.store(rests, Ordering::Relaxed);
     }
 
-    /// Wait until the loop of `thread` has not turned for [`STUCK`]. Returns false when it has ended.
-    fn are_stuck(&self, thread: Pid) -> bool {
+    /// Wait until the loop of `thread` has not turned for [`STUCK`].
+    fn await_stuck(&self, thread: Pid) {
         let (mut seen, mut stuck, mut waited) = (0, Duration::ZERO, processor_awaited(thread));
-        while !self.ended.load(Ordering::Relaxed) {
+        loop {
             let now = self.count.load(Ordering::Relaxed);
-            if now != seen {
+            if now != seen || self.rests.load(Ordering::Relaxed) {
                 (seen, stuck, waited) = (now, Duration::ZERO, processor_awaited(thread));
             }
             // A loop that waits for a processor does not hang.
             let waits = processor_awaited(thread).saturating_sub(waited);
             if stuck.saturating_sub(waits) >= STUCK {
-                return true;
+                return;
             }
             let began = Instant::now();
             thread::park_timeout(LOOK_EVERY);
             // A machine on which this thread has to wait delays the loop, too.
             stuck += began.elapsed().min(2 * LOOK_EVERY);
         }
-        false
     }
 }
 
@@ -94,13 +92,11 @@ pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
                 return;
             }
         }
-        if !turns.are_stuck(watched) {
-            return;
-        }
+        turns.await_stuck(watched);
         tracing::error!("{HANGS}");
         let _ = writeln!(std::io::stderr(), "firsthand: {HANGS}");
         end_children(Signal::TERM);
-        thread::park_timeout(GRACE);
+        thread::park_timeout(STOP_GRACE);
         end_children(Signal::KILL);
         domain::remove_all(&domain);
         exit_at_once(FAILED);

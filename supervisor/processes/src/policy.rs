@@ -35,7 +35,7 @@ pub const HOLD_WINDOW: Duration = Duration::from_secs(10);
 const BLOCKED_STARTS: u32 = 2;
 const ABORT_GRACE: Duration = Duration::from_millis(100);
 /// Time for a terminated stage to stop in order. The link sends three datagrams in it.
-const STOP_GRACE: Duration = Duration::from_millis(300);
+pub const STOP_GRACE: Duration = Duration::from_millis(300);
 
 /// Time since the supervisor started.
 pub type Now = Duration;

@@ -18,13 +18,10 @@ use crate::{
     death::Death,
     observed_time::ObservedTime,
     output_watchdog::OutputWatchdog,
-    policy::{Action, Event, Now, Phase},
+    policy::{Action, Event, Now, Phase, STOP_GRACE},
     stage_process::{StageProcess, StageProcessError},
     stages::start_order,
 };
-
-/// Time for a stage to stop in order when its supervisor fails.
-const STOP_GRACE: Duration = Duration::from_millis(300);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starter {

@@ -18,6 +18,7 @@ use common::{
     topics::{self, AnyTopic},
     waiter::Waiter,
 };
+use mission_control::operator::PATIENCE;
 use robot_state::{Feed, RobotState};
 use serde::Serialize;
 
@@ -154,8 +155,6 @@ struct StageStatus<'a> {
     output_age_s: Option<f64>,
 }
 
-/// The roster is published five times a second.
-const PATIENCE: Duration = Duration::from_secs(2);
 /// The link publishes ten times a second, and a robot reports its batteries several times a second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 

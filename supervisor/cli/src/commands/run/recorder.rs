@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use common::{clock::Pace, file::append, poll, signals::Signals};
+use common::{file::append, poll, signals::Signals};
 use mission_control::{Consumer, Options};
 use processes::process::{Process, firsthand};
 
@@ -22,11 +22,13 @@ struct Patience {
     ended: Duration,
 }
 
-/// Waiting for the recorder takes milliseconds, and seconds beside 30 busy processes a core. A robot and the service manager wait for a run
-/// on a wall clock, nobody for one in lockstep. A calibration is nothing without its recording.
+/// Waiting for the recorder takes milliseconds, and seconds beside 30 busy processes a core. A real robot waits for its run, nobody for a
+/// simulated one. A calibration is nothing without its recording.
 const fn patience(options: &Options) -> Patience {
-    let [attached, caught_up, ended] = match (options.pace, &options.mission.planner.calibration) {
-        (Pace::Rate(_), None) => [2_000, 500, 5_000],
+    let mission = &options.mission;
+    let [attached, caught_up, ended] = match (&mission.robot.address, &mission.planner.calibration)
+    {
+        (Some(_), None) => [2_000, 500, 5_000],
         _ => [20_000, 20_000, 60_000],
     };
     Patience {

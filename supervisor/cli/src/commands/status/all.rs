@@ -1,6 +1,6 @@
 //! `firsthand status --all`: the robots of this machine.
 
-use std::{path::PathBuf, time::Duration};
+use std::path::PathBuf;
 
 use common::{
     bus::BusError,
@@ -17,9 +17,7 @@ use console::{
     table::Table,
     words,
 };
-
-/// A roster is published five times a second.
-const PATIENCE: Duration = Duration::from_secs(1);
+use mission_control::operator::PATIENCE;
 
 #[derive(Serialize)]
 struct Listed {
