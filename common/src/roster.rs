@@ -12,6 +12,10 @@ use crate::{
 
 /// The supervisor answers the first heartbeat of a process with a roster. On a loaded machine that takes a while.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// What a stage publishes before it is named is lost to the others, a first whole map too. Beside 20 busy processes a core it took the
+/// supervisor more than a second.
+#[cfg(feature = "stage")]
+const NAMED_WITHIN: Duration = Duration::from_secs(10);
 
 #[derive(Debug)]
 pub struct Roster {
@@ -64,7 +68,7 @@ impl Roster {
             return Ok(());
         };
         let own = std::process::id();
-        let first = self.find(PATIENCE, |_, entries| {
+        let first = self.find(NAMED_WITHIN, |_, entries| {
             let names_own = entries.iter().any(|entry| entry.pid == own);
             names_own.then(|| named(entries).collect::<Vec<_>>())
         })?;
