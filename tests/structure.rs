@@ -26,10 +26,13 @@ fn linked(arguments: &[&str]) -> BTreeSet<String> {
     tree.lines().filter_map(|line| Some(line.split_once(' ')?.0.to_owned())).collect()
 }
 
+fn manifest(folder: &Path) -> toml::Table {
+    fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap()
+}
+
 /// The names under `[dependencies]` of the manifest in `folder`.
 fn dependencies(folder: &Path) -> Vec<String> {
-    let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
-    let manifest: toml::Table = text.parse().unwrap();
+    let manifest = manifest(folder);
     let named = manifest.get("dependencies").and_then(toml::Value::as_table);
     named.into_iter().flat_map(toml::Table::keys).cloned().collect()
 }
@@ -92,5 +95,29 @@ fn the_robots_executable_contains_no_viewer_and_no_laboratory() {
     assert!(names.contains("planner") && names.contains("x80-sim"), "{names:?}");
     for tool in ["tokio", "axum", "ratatui", "foxglove", "rustdds", "firsthand-lab"] {
         assert!(!names.contains(tool), "{tool}");
+    }
+}
+
+/// The files below `folder`.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let paths = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    paths.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
+}
+
+#[test]
+fn a_library_whose_tests_are_off_has_none_neither_in_its_documentation() {
+    for (_, folder) in members() {
+        let manifest = manifest(&folder);
+        let is_off = |key| manifest.get("lib").and_then(|lib| lib.get(key)) == Some(&false.into());
+        for file in files(&folder.join("src")) {
+            let text = fs::read(&file).unwrap();
+            let text = String::from_utf8_lossy(&text);
+            assert!(!is_off("test") || !text.contains("#[test]"), "{}", file.display());
+            // Code stands between two of these lines, of which the first names another language.
+            let fences = text.lines().filter(|line| line.trim_start().starts_with("//"));
+            let mut opening = fences.filter(|line| line.contains("```")).step_by(2);
+            let all_are_text = opening.all(|line| line.ends_with("text"));
+            assert!(!is_off("doctest") || all_are_text, "{}", file.display());
+        }
     }
 }
