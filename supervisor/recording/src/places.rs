@@ -22,12 +22,12 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
 fn taken(run: &Path) -> BTreeMap<u32, PathBuf> {
     let first = run.join("recording.mcap");
     let paths = fs::read_dir(run).into_iter().flatten().flatten().map(|entry| entry.path());
-    let with_number = |path: PathBuf| {
-        let name = path.file_stem()?.to_str()?.strip_prefix("recording")?;
-        let number = name.strip_prefix('-').map_or(Ok(1), str::parse).ok()?;
+    let with_numbers = paths.filter_map(|path| {
+        let name = path.file_stem()?.to_str()?.rsplit_once('-');
+        let number = name.map_or(Ok(1), |(_, number)| number.parse()).ok()?;
         (path == numbered(&first, number)).then_some((number, path))
-    };
-    paths.filter_map(with_number).collect()
+    });
+    with_numbers.collect()
 }
 
 /// The next free file name for a recording in a run's directory.
@@ -65,8 +65,8 @@ mod tests {
         let run = tempfile::tempdir().unwrap();
         let file = |name: &str| run.path().join(name);
         assert_eq!(next_place(run.path()), file("recording.mcap"));
-        for name in ["10.mcap", "2.mcap", "011.mcap", "1.mcap", "+12.mcap", "13.txt"] {
-            fs::write(file(&format!("recording-{name}")), "").unwrap();
+        for number in ["10", "2", "011", "1", "+12"] {
+            fs::write(file(&format!("recording-{number}.mcap")), "").unwrap();
         }
         assert_eq!(parts(run.path()), ["recording-2.mcap", "recording-10.mcap"].map(file));
         assert_eq!(next_place(run.path()), file("recording-11.mcap"));
