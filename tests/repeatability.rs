@@ -187,8 +187,8 @@ fn a_mission_whose_robot_stalls_gives_the_same_summary_to_the_bit() {
 
 #[test]
 fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
-    // At this speed the mission has thousands of ticks, which take seconds. That is time enough to stop it.
-    let slow = ["--set", "controller.speed_m_s=0.008", "--timeout", "20000"];
+    // At this speed the mission has thousands of ticks, which take a second or two. That is time enough to stop it.
+    let slow = ["--set", "controller.speed_m_s=0.02", "--timeout", "8000"];
     let (_, undisturbed) = support::run("tick-calm", "open-room", &slow);
     let mut run = Run::start("tick-held", "open-room", &slow);
     run.wait_until("the robot drives", |status| status["order"] == "driving");
@@ -201,7 +201,7 @@ fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
 
 #[test]
 fn a_robot_with_a_laser_goes_the_same_way_though_a_slow_stage_makes_the_link_repeat_ticks() {
-    let robot = ["--set", "robot.model='kobuki'", "--set", "controller.speed_m_s=0.01"];
+    let robot = ["--set", "robot.model='kobuki'", "--set", "controller.speed_m_s=0.03"];
     let slow = [&robot[..], &["--timeout", "8000"]].concat();
     in_own_process(|| {
         let (_, undisturbed) = support::run("laser-calm", "open-room", &slow);

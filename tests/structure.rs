@@ -26,10 +26,13 @@ fn linked(arguments: &[&str]) -> BTreeSet<String> {
     tree.lines().filter_map(|line| Some(line.split_once(' ')?.0.to_owned())).collect()
 }
 
+fn manifest(folder: &Path) -> toml::Table {
+    fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap()
+}
+
 /// The names under `[dependencies]` of the manifest in `folder`.
 fn dependencies(folder: &Path) -> Vec<String> {
-    let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
-    let manifest: toml::Table = text.parse().unwrap();
+    let manifest = manifest(folder);
     let named = manifest.get("dependencies").and_then(toml::Value::as_table);
     named.into_iter().flat_map(toml::Table::keys).cloned().collect()
 }
@@ -92,5 +95,17 @@ fn the_robots_executable_contains_no_viewer_and_no_laboratory() {
     assert!(names.contains("planner") && names.contains("x80-sim"), "{names:?}");
     for tool in ["tokio", "axum", "ratatui", "foxglove", "rustdds", "firsthand-lab"] {
         assert!(!names.contains(tool), "{tool}");
+    }
+}
+
+#[test]
+fn a_library_whose_documentation_is_not_tested_has_no_code_there() {
+    for (_, folder) in members() {
+        if manifest(&folder).get("lib").is_some_and(|lib| lib.get("doctest").is_some()) {
+            let fences = ["-rhE", "^ *//[/!] ```"];
+            let found = Command::new("grep").args(fences).arg(folder.join("src")).output().unwrap();
+            let found = String::from_utf8(found.stdout).unwrap();
+            assert!(found.lines().step_by(2).all(|line| line.ends_with("text")), "{folder:?}");
+        }
     }
 }

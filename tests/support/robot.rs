@@ -35,6 +35,8 @@ pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
     let began = Instant::now();
     while !is_so() {
         assert!(began.elapsed() < PATIENCE, "waited too long until {what}");
+        // The processes that are waited for need the processor.
+        thread::sleep(Duration::from_millis(5));
     }
 }
 

@@ -1,6 +1,10 @@
 //! The names of recordings.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use crate::{RecordingError, Result};
 
@@ -13,23 +17,28 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     out.with_file_name(format!("{stem}-{number}.mcap"))
 }
 
-const MOST_PARTS: u32 = 10_000;
-
-/// The possible files of a run's recordings, in order: a resumed run begins another, and so does a file that reached its size.
-fn places(run: &Path) -> impl DoubleEndedIterator<Item = PathBuf> + use<> {
+/// What stands in a run's directory under the names of recordings, by number: a resumed run begins another, and so does a file that
+/// reached its size.
+fn taken(run: &Path) -> BTreeMap<u32, PathBuf> {
     let first = run.join("recording.mcap");
-    (1..=MOST_PARTS).map(move |number| numbered(&first, number))
+    let paths = fs::read_dir(run).into_iter().flatten().flatten().map(|entry| entry.path());
+    let with_numbers = paths.filter_map(|path| {
+        let name = path.file_stem()?.to_str()?.rsplit_once('-');
+        let number = name.map_or(Ok(1), |(_, number)| number.parse()).ok()?;
+        (path == numbered(&first, number)).then_some((number, path))
+    });
+    with_numbers.collect()
 }
 
 /// The next free file name for a recording in a run's directory.
 pub fn next_place(run: &Path) -> PathBuf {
-    let free = places(run).rev().take_while(|file| !file.exists()).last();
-    free.unwrap_or_else(|| numbered(&run.join("recording.mcap"), MOST_PARTS + 1))
+    let last = taken(run).into_keys().next_back().unwrap_or(0);
+    numbered(&run.join("recording.mcap"), last.saturating_add(1))
 }
 
 /// The recordings in a run's directory, in order. A recorder with a disk budget removes the oldest.
 pub fn parts(run: &Path) -> Vec<PathBuf> {
-    places(run).filter(|file| file.is_file()).collect()
+    taken(run).into_values().filter(|file| file.is_file()).collect()
 }
 
 /// The recordings of `run`, in order and never none: those in a run's directory, or one file.
@@ -52,9 +61,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_of_the_next_run_has_the_next_number() {
-        let out = Path::new("/tmp/a.mcap");
-        assert_eq!(numbered(out, 1), Path::new("/tmp/a.mcap"));
-        assert_eq!(numbered(out, 2), Path::new("/tmp/a-2.mcap"));
+    fn the_next_recording_has_the_number_after_the_last_and_other_names_do_not_count() {
+        let run = tempfile::tempdir().unwrap();
+        let file = |name: &str| run.path().join(name);
+        assert_eq!(next_place(run.path()), file("recording.mcap"));
+        for number in ["10", "2", "011", "1", "+12"] {
+            fs::write(file(&format!("recording-{number}.mcap")), "").unwrap();
+        }
+        assert_eq!(parts(run.path()), ["recording-2.mcap", "recording-10.mcap"].map(file));
+        assert_eq!(next_place(run.path()), file("recording-11.mcap"));
     }
 }

@@ -1,15 +1,6 @@
 //! Tests with hosts that other people wrote, as the protocol notes describe them. They share no code with the wire
 //! module, so that a mistake in it does not meet the same mistake here.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "what tests share may stop at the first broken promise too"
-)]
-
-mod support;
-
 use std::{
     collections::VecDeque,
     fs::{File, OpenOptions},
@@ -19,8 +10,9 @@ use std::{
 };
 
 use common::clock::Pace;
-use support::{PATIENCE, Sim};
 use x80_sim::Transport;
+
+use crate::support::{self, PATIENCE, Sim};
 
 /// The CRC bit by bit, as the vendor's documents have it.
 fn checksum(bytes: &[u8]) -> u8 {

@@ -1,20 +1,12 @@
 //! Tests of a whole simulated robot behind a bad radio.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "what tests share may stop at the first broken promise too"
-)]
-
-mod support;
-
 use common::{
     clock::Pace,
     ground_truth::GroundTruthTick,
     wire::{Addressing, Command, Decoder, Report},
 };
-use support::{Sim, receive};
+
+use crate::support::{Sim, receive};
 
 fn forward(counts: i16) -> Vec<u8> {
     let mut bytes = Vec::new();

@@ -1,15 +1,5 @@
 //! Tests of two simulated robots in one world.
 
-#![allow(
-    dead_code,
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "what tests share may stop at the first broken promise too"
-)]
-
-mod support;
-
 use std::{
     net::UdpSocket,
     path::Path,
@@ -21,8 +11,9 @@ use common::{
     ground_truth::GroundTruthTick,
     wire::{Addressing, Command},
 };
-use support::{Sim, receive};
 use x80_sim::Transport;
+
+use crate::support::{Sim, receive};
 
 const DIAMETER_M: f64 = 0.38;
 

@@ -1,13 +1,5 @@
 //! A simulated robot in a thread, and a host that talks to it.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "what tests share may stop at the first broken promise too"
-)]
-#![allow(dead_code, reason = "each test file uses its own part")]
-
 use std::{
     io::{BufRead, BufReader},
     net::{SocketAddr, UdpSocket},

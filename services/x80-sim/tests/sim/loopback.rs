@@ -1,22 +1,14 @@
 //! Tests of the process shell on a real loopback socket, at both paces.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "what tests share may stop at the first broken promise too"
-)]
-
-mod support;
-
 use std::net::{SocketAddr, UdpSocket};
 
 use common::{
     clock::Pace,
     wire::{Addressing, Command, Decoder, Report, SystemSignal},
 };
-use support::{Sim, mission, receive};
 use x80_sim::{SimError, SimOptions, Transport, run};
+
+use crate::support::{self, Sim, mission, receive};
 
 fn encoded(command: Command) -> Vec<u8> {
     let mut bytes = Vec::new();
