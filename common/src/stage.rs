@@ -85,7 +85,6 @@ pub trait Stage: Sized + 'static {
     }
 }
 
-/// A state that was saved by a stage of another mission.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("the saved state is of another mission; the stage starts without it")]
 pub struct ForeignState;
@@ -115,7 +114,6 @@ impl<S: Stage> Runner<S> {
         self.out.open_late(context)
     }
 
-    /// Note `entry` for a replay, and let the stage take it.
     pub fn take_entry(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome> {
         self.out.note(&entry)?;
         self.stage.take_entry(entry, &mut self.out)

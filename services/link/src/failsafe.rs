@@ -38,7 +38,6 @@ use self::monitor::{Clears, Moment, Monitor, Observation};
 
 macro_rules! monitors {
     ($($name:ident: $monitor:ty,)*) => {
-        /// The monitors of one robot.
         #[derive(Clone, Debug)]
         pub(crate) struct Monitors {
             $(pub(crate) $name: $monitor,)*
@@ -78,7 +77,6 @@ pub struct Rule {
     /// The condition in words, for the documentation.
     pub when: &'static str,
     pub action: Action,
-    /// The clearing condition.
     pub clears: Clears,
     /// The longest time from the fault until the link tells the robot to stand, or its last command is over, seconds; from the operator's
     /// stop if the robot does not follow that. None where nothing bounds it, or an operator or another commander acts.
@@ -304,7 +302,6 @@ pub const TABLE: &[Rule] = {
     ]
 };
 
-/// An action and its cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
     pub action: Action,
@@ -337,7 +334,6 @@ pub fn rule(cause: Cause) -> Option<&'static Rule> {
     TABLE.iter().find(|rule| rule.cause == cause)
 }
 
-/// The monitors of one robot, and the causes that apply.
 #[derive(Clone, Debug)]
 pub(crate) struct Failsafe {
     pub(crate) monitors: Monitors,

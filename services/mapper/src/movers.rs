@@ -113,7 +113,6 @@ pub(crate) struct Movers {
     /// Oldest first: times, the robot by odometry, beams.
     scans: VecDeque<(f64, Pose2, Vec<f32>)>,
     tracks: Vec<Track>,
-    /// The time at which a mover was seen last.
     seen_s: Option<f64>,
     placed: Vec<Mover>,
 }
@@ -202,7 +201,6 @@ impl Movers {
         }
     }
 
-    /// Foresee where the movers are at the time of `pose`.
     pub(crate) fn place(&mut self, pose: &PoseSample) {
         let [x, y, turn] = pose.map_from_odom;
         let (at_s, turned) = (pose.stamp.time().seconds(), DVec2::from_angle(turn));
@@ -253,7 +251,6 @@ impl Track {
         track
     }
 
-    /// The middle, foreseen.
     fn at(&self, at_s: f64) -> DVec2 {
         self.middle + (at_s - self.seen_s) * self.velocity
     }

@@ -62,7 +62,6 @@ impl Rows {
         self.rows.iter().flatten().filter(|row| row.cone.is_some()).count()
     }
 
-    /// The rows of lasers.
     pub(crate) fn lasers(&self) -> Vec<usize> {
         (0..self.rows.len()).filter(|row| self.laser(*row).is_some()).collect()
     }
@@ -223,7 +222,6 @@ impl Fan<'_> {
     }
 }
 
-/// A touch of the body, in the mission's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch {
     /// The body's centre, metres.

@@ -63,7 +63,6 @@ impl<T: Default> OfTick<T> {
     }
 }
 
-/// The mapper process.
 pub struct Shell {
     inputs: Inputs,
     runner: Runner<Mapper>,

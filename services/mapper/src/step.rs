@@ -244,7 +244,6 @@ impl Mapper {
         Ok(())
     }
 
-    /// Take `input` at mission time `now`.
     pub fn step(&mut self, input: Input, now: MissionTime) -> Change {
         self.fix = None;
         match input {
@@ -473,7 +472,6 @@ impl Mapper {
         changed
     }
 
-    /// Returns the changed window.
     fn redraw(&mut self, window: Window) -> Window {
         let Self { frame, target, evidential, belief, .. } = self;
         let Sensed::Evidence(map) = &belief.sensed else {

@@ -96,7 +96,6 @@ enum Near {
     Sides,
 }
 
-/// A way so far.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     /// Its first and its newest leg.
@@ -106,7 +105,6 @@ struct Way {
     rests: bool,
     now: Moving,
     steps: u32,
-    /// When the robot moved last.
     moved_s: f64,
     /// The least that the robot was near to a hazard since the start: it goes no nearer.
     near: Near,

@@ -95,7 +95,6 @@ impl FieldPublisher {
         })
     }
 
-    /// Whether the policy of a field that `changed` is due at mission time `now`.
     pub(crate) fn is_due(&self, changed: bool, now: MissionTime) -> bool {
         let age = self.change_published.map(|then| now.since(then));
         changed

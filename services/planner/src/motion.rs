@@ -142,7 +142,6 @@ impl MotionModel {
         Moving { pose: now.pose.along_arc(twist.v * for_s, twist.omega * for_s), twist }
     }
 
-    /// The controller's command.
     fn command(&self, axis: DVec2, (status, to, limit): Advice) -> Twist {
         let (cosine, sine) = (axis.dot(to), axis.perp_dot(to));
         let angle = sine.atan2(cosine).abs();

@@ -38,7 +38,6 @@ pub struct Entry<'a> {
 #[derive(Debug, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 pub(crate) enum Taken<'a> {
-    /// A sample of `grid`.
     Grid(#[serde(with = "inputs::slice")] (GridHeader, Cow<'a, [u8]>)),
     /// The pose of the tick; its guidance is published.
     Pose {

@@ -212,7 +212,6 @@ impl Planner {
         Ok(Work::Solved)
     }
 
-    /// The version before the change is `before`.
     fn follow(&mut self, window: Window, before: u64) -> Result<Work, SolveError> {
         let Some(mut live) = self.live.take() else {
             return self.solve_first();

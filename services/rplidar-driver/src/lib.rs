@@ -36,7 +36,6 @@ struct Turn {
 }
 
 impl Rplidar {
-    /// The `product` in `row` of the mission's table.
     pub fn new(row: usize, sensor: Sensor, product: Product) -> Self {
         Self {
             row,

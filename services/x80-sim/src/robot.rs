@@ -85,7 +85,6 @@ pub struct Robot {
     lasers: Vec<Laser>,
     rplidar: Option<Rplidar>,
     touches: Vec<TouchRow>,
-    /// What each has felt since the last tick.
     felt: Vec<bool>,
     /// As `felt` at the last tick.
     told: Vec<bool>,
@@ -205,7 +204,6 @@ impl Robot {
         ordered || self.rims() != Wheels::default()
     }
 
-    /// The other robot of its world, from now on.
     pub fn meet(&mut self, other: Option<Other>) {
         self.world.set_other(other);
     }
@@ -352,7 +350,6 @@ impl Robot {
         self.rplidar.as_ref().is_some_and(Rplidar::is_scanning)
     }
 
-    /// The answers of the laser with a wire of its own.
     pub fn on_laser(&mut self, bytes: &[u8]) -> Vec<u8> {
         let now = self.time;
         self.rplidar.as_mut().map_or_else(Vec::new, |rplidar| rplidar.answer(bytes, now))

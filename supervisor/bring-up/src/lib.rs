@@ -41,7 +41,6 @@ pub struct Finding {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// As stated.
     Right,
     /// Not as stated.
     Wrong,

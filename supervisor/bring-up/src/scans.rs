@@ -61,7 +61,6 @@ const SIZES_TOLD: SizesTold = SizesTold { sizes: 0.04, ratio: 0.03 };
 
 type Unknowns = SVector<f64, UNKNOWNS>;
 
-/// The body's motion against the wheels'.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Hypothesis {
     /// It turns against the wheels, as it seems to the laser.
@@ -76,7 +75,6 @@ pub(crate) struct Placed {
     hypothesis: Hypothesis,
     unknowns: Unknowns,
     share: f64,
-    /// The row of the laser.
     row: usize,
     /// Where the beams ended, metres.
     pub(crate) points: Vec<DVec2>,
@@ -190,7 +188,6 @@ impl<'a> Problem<'a> {
         poses
     }
 
-    /// The laser on the robot.
     fn laser(&self, unknowns: &Unknowns) -> DVec2 {
         DVec2::new(self.header.x_m + unknowns[X], self.header.y_m + unknowns[Y])
     }

@@ -118,7 +118,6 @@ impl Wheels {
         self.follows() == Matrix2::identity()
     }
 
-    /// The body's motion by what the wheels counted, put right.
     pub(crate) fn motion(&self, trace: &Trace, track_m: f64) -> Motion {
         let wheels = self.follows().transpose();
         let motion = |(at, counted): &(f64, [f64; 2])| {

@@ -218,7 +218,6 @@ pub fn spread(points: &[[f64; 2]]) -> [f64; 3] {
     })
 }
 
-/// The keys of a mission for `estimate`, with the lag of `stated`.
 #[must_use]
 pub fn keys(estimate: &Estimate, stated: Response) -> String {
     let Measured { value, sd } = estimate.delay_s;

@@ -45,7 +45,6 @@ const HEADING_SD_RAD: f64 = 0.13;
 /// on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s.
 const SLOW_RAD: f64 = 0.08;
 pub(crate) const FAST_RAD: f64 = 0.5;
-/// A turn with this rest is over.
 const TURNED_RAD: f64 = 0.04;
 pub(crate) const SPEED_M_S: f64 = 0.35;
 const NEAR_M_S: f64 = 0.12;
@@ -57,7 +56,6 @@ pub struct Wall {
     plan: CalibrationPlan,
     ways: Ways,
     wheels: Wheels,
-    /// The ways when the robot faced the wall.
     visit: Ways,
     /// The wall was faced by a measured normal: at first it is where the robot started.
     is_measured: bool,

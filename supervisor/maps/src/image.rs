@@ -51,7 +51,6 @@ pub(super) struct Free {
     pub pixels: Vec<bool>,
 }
 
-/// Each pixel is a cell.
 pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
     let Free { cols, pixels } = pixels(file, lightness)?;
     Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))

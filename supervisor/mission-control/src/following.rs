@@ -198,7 +198,6 @@ impl Following {
     }
 }
 
-/// The map around a beacon.
 struct Around<'a> {
     frame: GridFrame,
     cells: &'a [u8],

@@ -27,7 +27,6 @@ const MOST_CONTACTS: usize = 64;
 /// The newest output of the stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Published {
-    /// The tick of the newest command.
     pub tick: Option<u64>,
     pub commands: u64,
     /// The generation of the planner's newest heartbeat, and the tick of the newest grid that it has used.

@@ -290,7 +290,6 @@ pub fn change_zones(
     ask_with(robot, kind, points, [0.0; 2])
 }
 
-/// Send the robot to where its mission starts.
 pub fn send_back(robot: &RobotName) -> Result<(), OperatorError> {
     let start = Run::load(&Domain::of(robot.clone()).run_directory())
         .map_or(DVec2::ZERO, |run| run.mission.start.at);

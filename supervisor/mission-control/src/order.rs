@@ -43,7 +43,6 @@ impl Decision {
     }
 }
 
-/// The first reason that applies decides.
 pub(crate) const fn decide(snapshot: &Snapshot) -> Decision {
     let can_start = snapshot.all_running && snapshot.robot_answers && snapshot.field_known;
     let ready = snapshot.was_ready || can_start;

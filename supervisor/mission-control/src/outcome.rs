@@ -36,7 +36,6 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The exit code of a run that ends so.
     pub const fn exit_code(self) -> u8 {
         match self {
             Self::Reached | Self::Waited => 0,

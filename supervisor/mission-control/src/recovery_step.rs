@@ -103,7 +103,6 @@ impl RecoverySteps {
     }
 }
 
-/// Whether the stages have answered the recovery step of `stall`.
 fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
     let commanded = now.commands > before.commands;
     match stall.recovery() {

@@ -31,7 +31,6 @@ pub enum TargetOutcome {
     Unreachable,
     /// The robot was not there in time.
     TimedOut,
-    /// The run ended on the way to the target.
     Missed,
     /// The run ended before the robot was sent to it.
     NotTried,
@@ -75,7 +74,6 @@ struct Stored {
 pub struct TargetList {
     number: u64,
     current: TargetPoint,
-    /// The first tick in which the current target holds.
     since_tick: u64,
     /// Mission time at which the target became the current one, seconds.
     began_s: f64,
@@ -85,14 +83,12 @@ pub struct TargetList {
     recorded: usize,
     /// The current target has its result, and the robot waits for the next one.
     waits: bool,
-    /// The current target is a hand's, and has no result.
     by_hand: bool,
     /// The current target moves with a beacon; one result tells of all its places.
     follows: bool,
 }
 
 impl TargetList {
-    /// The targets that `mission` begins with.
     pub(crate) fn of(mission: &Mission) -> Self {
         let mut points = mission.waypoints().into_iter().map(TargetPoint::from);
         let waits =
@@ -147,7 +143,6 @@ impl TargetList {
         (self.waits, self.by_hand, self.follows) = (true, false, true);
     }
 
-    /// The target moves to `place` with the beacon.
     pub(crate) fn move_to(&mut self, place: DVec2, since_tick: u64) {
         self.number += 1;
         (self.current, self.since_tick) = (TargetPoint::at(place), since_tick);
@@ -258,7 +253,6 @@ impl TargetList {
         self.waits = true;
     }
 
-    /// The current target ended by `arrival`, or with `outcome` at `now_s`.
     fn end_current(
         &mut self,
         outcome: TargetOutcome,

@@ -33,7 +33,6 @@ pub enum Shown {
     Preview = 3,
 }
 
-/// The map of `cells` at mission time `time_s`.
 pub fn map(frame: GridFrame, cells: &[u8], time_s: f64) -> Vec<u8> {
     let header = Header {
         shown: Shown::Map,

@@ -73,7 +73,6 @@ impl Range {
         if part.is_finite() { part.clamp(0.0, 1.0) } else { f64::NAN }
     }
 
-    /// The parts at which round numbers stand, and these numbers.
     fn ticks(&self) -> impl Iterator<Item = (f64, String)> + use<'_> {
         let part = |value: f64| (value - self.low) / (self.high - self.low);
         let ticks = ticks(self.low, self.high, self.step);

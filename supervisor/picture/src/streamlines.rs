@@ -53,7 +53,6 @@ pub(super) fn layer(lattice: &Lattice, cells: &[FieldCell], style: &Style) -> St
     }
 }
 
-/// The arrowheads are as at the `usual` spacing.
 fn drawn(lattice: &Lattice, cells: &[FieldCell], usual: f64, spacing: f64) -> (Path, Path) {
     let (mut lines, mut arrowheads) = (Path::default(), Path::default());
     for line in evenly_spaced(lattice, cells, spacing) {

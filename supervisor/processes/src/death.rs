@@ -26,7 +26,6 @@ pub struct Death {
     pub cause: ExitCause,
     /// Whether the supervisor ended the process because it hung or was never ready.
     pub hung: bool,
-    /// Age of its last beat when the supervisor noticed.
     pub noticed_after_s: Option<f64>,
     /// Age of its last beat; none if the process never beat.
     pub beat_age_s: Option<f64>,

@@ -50,7 +50,6 @@ pub enum Event {
     BeatReady,
     /// The process beats, but does not answer its inputs.
     OutputStale,
-    /// The process is reaped.
     Exited,
     /// The process is reaped, and its exit code says that the bus refused it.
     Refused,
@@ -85,7 +84,6 @@ pub enum Phase {
     Starting {
         since: Now,
     },
-    /// A process that beats.
     Running {
         since: Now,
         beat: Now,
@@ -109,7 +107,6 @@ pub enum Phase {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stability {
     NeverReady,
-    /// The generation was ready for less than [`STABLE_AFTER`].
     Brief,
     /// The generation was ready for [`STABLE_AFTER`].
     Stable,
@@ -168,7 +165,6 @@ impl Policy {
         }
     }
 
-    /// The action that `event` calls for.
     pub fn step(&mut self, event: Event, now: Now) -> Option<Action> {
         let due = self.deadline().is_some_and(|deadline| now >= deadline);
         match (self.phase, event) {

@@ -202,7 +202,6 @@ impl StageProcesses {
         self.position(stage).is_some_and(|index| self.stages[index].is_running())
     }
 
-    /// Give `event` to the stage's policy, and carry out its action.
     fn apply(&mut self, index: usize, event: Event, now: Now, first_tick: u64) {
         let Some(action) = self.stages[index].policy.step(event, now) else {
             return;

@@ -30,7 +30,6 @@ pub struct Stage {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Deadlines {
-    /// The longest time from its start to its first beat as ready.
     pub startup: Duration,
     /// The longest time from beat to beat. Beats come every 150 ms, or with a tick.
     pub heartbeat: Duration,
@@ -39,7 +38,6 @@ pub struct Deadlines {
 }
 
 impl Stage {
-    /// A stage with the usual deadlines, whose process is `P`.
     const fn new<P: Process>(replay: Begin, while_down: &'static str) -> Self {
         Self {
             name: P::WIRING.stage,

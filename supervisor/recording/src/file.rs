@@ -41,7 +41,6 @@ pub(crate) struct RecordingFile {
     /// The start of the mission, nanoseconds since 1970.
     began_ns: u64,
     clock: Option<MissionClock>,
-    /// The newest mission time of a sample.
     newest: MissionTime,
     chunk_began: Instant,
 }
@@ -111,7 +110,6 @@ impl RecordingFile {
         self
     }
 
-    /// Mission time: that of the clock, or of the newest sample in lockstep.
     fn mission_time(&self) -> MissionTime {
         match self.clock {
             Some(clock @ MissionClock::Wall { .. }) => clock.at(0, monotonic_ns()),
@@ -170,7 +168,6 @@ impl RecordingFile {
     }
 }
 
-/// An MCAP file that is written.
 pub(crate) struct Output {
     writer: Writer<BufWriter<File>>,
     path: PathBuf,

@@ -15,7 +15,6 @@ const STAMP: std::ops::Range<usize> = 4..28;
 struct Last {
     sequence: u32,
     crc32: u32,
-    /// The number of the bus.
     bus: u32,
 }
 

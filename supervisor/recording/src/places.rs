@@ -21,7 +21,6 @@ fn places(run: &Path) -> impl DoubleEndedIterator<Item = PathBuf> + use<> {
     (1..=MOST_PARTS).map(move |number| numbered(&first, number))
 }
 
-/// The next free file name for a recording in a run's directory.
 pub fn next_place(run: &Path) -> PathBuf {
     let free = places(run).rev().take_while(|file| !file.exists()).last();
     free.unwrap_or_else(|| numbered(&run.join("recording.mcap"), MOST_PARTS + 1))

@@ -35,18 +35,15 @@ pub enum End {
     Complete,
     /// The recorder was killed, or the disk was full: the file ends after the last whole chunk.
     Cut {
-        /// The time from the first message to the last.
         after: Duration,
         /// The problem behind the last message.
         problem: String,
     },
 }
 
-/// A recording of one run, or of a part of one.
 #[derive(Clone, Debug)]
 pub struct Recording {
     pub path: PathBuf,
-    /// The text of the stages' run file.
     pub run_text: String,
     /// The run file: mission, clock, robot.
     pub run: Run,
@@ -55,7 +52,6 @@ pub struct Recording {
     /// When the recorder was attached; empty in a recording of an earlier version.
     pub began: String,
     pub end: End,
-    /// Numbers of messages by topic.
     pub counts: BTreeMap<String, u64>,
     /// Numbers of samples by topic that the recorder lost.
     pub lost: BTreeMap<String, u64>,
@@ -72,7 +68,6 @@ pub struct Message {
     pub data: Vec<u8>,
 }
 
-/// A sample of a topic of structs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<P> {
     /// Mission time, as nanoseconds since 1970.
@@ -80,7 +75,6 @@ pub struct Sample<P> {
     pub sample: P,
 }
 
-/// A sample of a topic of slices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SliceSample<H, T> {
     /// Mission time, as nanoseconds since 1970.
@@ -185,7 +179,6 @@ impl Recording {
         })
     }
 
-    /// The samples of `topic`, in the order of the file.
     pub fn samples<P: Payload + Stamped + Layout>(
         &self,
         topic: &'static Topic<P>,
@@ -225,7 +218,6 @@ impl Recording {
     }
 }
 
-/// A message of the recorder itself.
 fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
     #[derive(serde::Deserialize)]
     struct Recorder {
@@ -288,7 +280,6 @@ enum Stop {
     Error(RecordingError),
 }
 
-/// The records of a file, one after another.
 struct Records {
     path: PathBuf,
     file: BufReader<File>,

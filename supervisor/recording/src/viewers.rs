@@ -24,7 +24,6 @@ const MOVERS: &str = "foxglove/movers";
 /// The channel of log lines.
 pub const LOG: &str = "log";
 
-/// The mission's frame.
 const MAP: &str = "map";
 /// The frame of the robot: its centre, x ahead. Each sensor has a frame of its name.
 const BASE: &str = "base_link";
@@ -35,7 +34,6 @@ const MOST_A_SIDE: usize = 1024;
 /// The bytes of a drawn cell and their names. `state` is a [`CellState`]; viewers use the other four as its colour by default.
 const CELL: [&str; 5] = ["state", "red", "green", "blue", "alpha"];
 
-/// The topics that are drawn.
 static DRAWN: [&dyn AnyTopic; 5] =
     [&topics::POSE, &topics::RANGES, &topics::SCAN, &topics::GRID, &topics::TARGET];
 
@@ -62,7 +60,6 @@ macro_rules! channel {
     };
 }
 
-/// The channels for the drawings of `mission`.
 pub fn channels(mission: Option<&Mission>) -> Vec<Channel> {
     let fixed = [
         channel!(TRANSFORMS, "FrameTransforms"),
@@ -341,7 +338,6 @@ pub fn log(process: &str, line: &str, now_ns: u64, sink: Sink<'_>) {
     sink(LOG, log.bytes());
 }
 
-/// The numbers of these fields of a `Log`.
 const LOG_MESSAGE: u64 = 3;
 const LOG_NAME: u64 = 4;
 
@@ -378,7 +374,6 @@ fn time(ns: u64) -> Message {
     Message::default().integer(1, ns / 1_000_000_000).integer(2, ns % 1_000_000_000)
 }
 
-/// The beginning of most messages: the time and the frame.
 fn framed(time: &Message, frame: &str) -> Message {
     Message::default().part(1, time).text(2, frame)
 }

@@ -73,7 +73,6 @@ impl Beliefs {
         }
     }
 
-    /// The fields of the maps, as messages of the page.
     pub(crate) fn fields(&self, mission: &Mission) -> impl Iterator<Item = Vec<u8>> {
         self.held.iter().filter_map(|belief| belief.field(mission))
     }

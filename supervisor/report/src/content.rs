@@ -31,7 +31,6 @@ const LARGEST_TRUTH: u64 = 1 << 28;
 const MAP_EVERY_S: f64 = 0.5;
 /// Most rows, states and events of a page. The page shows the beginning of a longer run; metrics count all.
 const MOST: usize = 60_000;
-/// Most maps of a page.
 const MOST_MAPS: usize = 2400;
 
 #[derive(Default)]
@@ -240,7 +239,6 @@ impl Content {
     }
 }
 
-/// The ground truth of a simulated robot's run in `directory`.
 fn truth(directory: &Path) -> Option<Lines<BufReader<Take<File>>>> {
     let file = File::open(directory.join(GROUND_TRUTH)).ok()?;
     Some(BufReader::new(file.take(LARGEST_TRUTH)).lines())

@@ -16,7 +16,6 @@ use crate::{
 
 /// Most letters of a text.
 const LONGEST: usize = 300;
-/// Most events that wait to be taken.
 const MOST_WAITING: usize = 20_000;
 
 /// A line of the list.
@@ -37,7 +36,6 @@ impl Event {
     }
 }
 
-/// The importance of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {

@@ -19,7 +19,6 @@ use crate::{
     words::{failsafe_in_words, guidance_in_words},
 };
 
-/// The longest way, in points.
 const MOST_POINTS: usize = 2000;
 /// The least distance between two points of the way, metres.
 const POINT_EVERY_M: f64 = 0.05;
@@ -30,7 +29,6 @@ const OLD_S: f64 = 1.0;
 /// What a robot is doing. Samples that have not come yet are none, lists are empty. Lengths are metres in the mission frame.
 #[derive(Clone, Debug, Default)]
 pub struct RobotState {
-    /// The supervisor with its order.
     pub supervisor: Option<RosterHeader>,
     pub stages: Vec<RosterEntry>,
     pub pose: Option<PoseSample>,
@@ -60,7 +58,6 @@ pub struct RobotState {
 }
 
 impl RobotState {
-    /// A robot before its first sample, which drives `mission`.
     pub fn of_mission(mission: &Mission) -> Self {
         Self { target: Some(TargetSample::first(mission)), ..Self::default() }
     }
@@ -122,7 +119,6 @@ impl RobotState {
         self.way.push(position);
     }
 
-    /// Take a line of the log of `process`.
     pub fn log(&mut self, process: &str, line: &str) {
         self.events.log(process, line);
     }
@@ -226,7 +222,6 @@ impl RobotState {
     }
 }
 
-/// Drop every second item, from the second one on.
 pub fn drop_every_second<T>(items: &mut Vec<T>) {
     let mut nth = 0;
     items.retain(|_| {

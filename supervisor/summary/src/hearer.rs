@@ -97,7 +97,6 @@ impl Hearer {
         &self.trails.0
     }
 
-    /// Full solves of all generations of the planner, up to the sample `last`.
     pub(crate) fn solves_until(&self, last: Option<&GuidanceSample>) -> u64 {
         let (newest, its) =
             last.map_or((u32::MAX, None), |last| (last.stamp.generation, Some(last.full_solves)));

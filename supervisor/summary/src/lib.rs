@@ -68,7 +68,6 @@ pub struct Summary {
     /// Two standard deviations of that pose's position along the worst axis: an arrival is sure within `sure_within_m` of the mission.
     #[serde(default)]
     pub pose_within_m: Option<f64>,
-    /// Distance from the robot's end to the target, by the ground truth.
     pub true_distance_m: Option<f64>,
     /// The time at which the robot had moved 0.1 m, by the ground truth.
     pub departed_s: Option<f64>,

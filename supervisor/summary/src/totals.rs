@@ -35,7 +35,6 @@ impl<T: Copy + Default> Totals<T> {
         self.newest.push_back((tick, add(totals)));
     }
 
-    /// The totals of all ticks up to `tick`.
     pub(crate) fn at(&self, tick: u64) -> T {
         let until = self.newest.iter().rev().find(|(of, _)| *of <= tick);
         until.map_or(T::default(), |&(_, totals)| totals)

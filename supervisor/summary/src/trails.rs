@@ -18,7 +18,6 @@ const MOST_WAYS: usize = 256;
 pub struct Trail {
     /// Mission times, seconds, and places, metres; never empty.
     pub places: Vec<(f64, DVec2)>,
-    /// The newest.
     pub radius_m: f64,
     /// Time, place and velocity.
     newest: (f64, DVec2, DVec2),

@@ -51,7 +51,6 @@ pub fn socket() -> io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// A socket that is connected to the robot at `robot`.
 pub fn to_robot(robot: SocketAddr) -> io::Result<UdpSocket> {
     let socket = socket()?;
     socket.connect(robot)?;

@@ -57,7 +57,6 @@ pub struct Judged {
     pub text: String,
 }
 
-/// A result for people, or as a line of JSON.
 fn text(result: &(impl Display + Serialize), json: bool) -> Result<String> {
     Ok(if json { serde_json::to_string(result)? + "\n" } else { result.to_string() })
 }

@@ -11,7 +11,6 @@ impl Random {
         Self(Pcg64::new(seed.into(), stream))
     }
 
-    /// The numbers of world `number` of the kind `kind` under `seed`.
     pub fn of_world(seed: u64, kind: u64, number: u64) -> Self {
         Self::new(seed, u128::from(kind) << 64 | u128::from(number))
     }

@@ -178,7 +178,6 @@ struct Program {
     pose: Pose2,
     /// The newest angles of the wheels.
     wheels: Option<WheelSpeeds>,
-    /// When they were taken.
     taken_ns: Option<u64>,
 }
 
@@ -202,7 +201,6 @@ impl Program {
         Ok(Order::Drive { wheels: [left, right], twist: [v, omega], for_s: WATCHDOG_S })
     }
 
-    /// Go on to where the wheels turned.
     fn take_wheels(&mut self, report: &Report) {
         if let Some(now) = report.wheels.map(both) {
             let before = self.wheels.replace(now).unwrap_or(now);

@@ -75,7 +75,6 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(print_text(&format!("published {fixes} fixes and {turns} turns\n"))?)
 }
 
-/// The writers of fixes and of turns.
 type Writers = (Writer<FixSample>, Writer<TurnSample>);
 
 struct Source<'a> {

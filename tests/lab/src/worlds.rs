@@ -24,7 +24,6 @@ use crate::{
 
 /// Failed draws in a row after which a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
-/// Start and target were given for worlds that have their own.
 const NO_MAP: &str =
     "--start and --target are for ROS maps; give one to --worlds, or leave them out";
 

@@ -18,7 +18,6 @@ use glam::DVec2;
 
 use super::deafness::Missing;
 
-/// Places on an echo's arc.
 const PLACES: usize = 9;
 /// The share of a sonar's reach up to which its echoes are sure to come again.
 const SURE: f64 = 0.7;

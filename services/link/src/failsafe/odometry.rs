@@ -254,7 +254,6 @@ impl Odometry {
         self.reached.each_ref().map(ModelledSpeed::speed)
     }
 
-    /// Respond to commands by `response` from now on.
     fn adopt(&mut self, response: Response) {
         self.response = response;
         let change = self.most_change();

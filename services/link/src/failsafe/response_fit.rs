@@ -73,7 +73,6 @@ pub(super) struct Suspected {
     pub(super) from_s: f64,
 }
 
-/// Responses that explain a motion alike.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Alike {
     /// The one that stops last from top speed.

@@ -14,7 +14,6 @@ use super::monitor::{Condition, Moment, Monitor, Observation};
 struct Times {
     /// The answered tick's.
     command: MissionTime,
-    /// The oldest pose's.
     pose: MissionTime,
     guidance: MissionTime,
 }

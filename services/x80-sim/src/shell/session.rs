@@ -430,7 +430,6 @@ impl Session {
         }
     }
 
-    /// The bytes that the radio has let through.
     fn deliver(&mut self, bytes: &[u8]) {
         if let Some(peer) = self.peer.filter(|_| !bytes.is_empty()) {
             self.way.send(peer, bytes);

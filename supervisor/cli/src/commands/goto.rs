@@ -96,7 +96,6 @@ fn await_result(
     }
 }
 
-/// Of pairs of numbers.
 pub fn points(places: &[f64]) -> Result<Vec<TargetPoint>, Refused> {
     let (places, rest) = places.as_chunks::<2>();
     if !rest.is_empty() {

@@ -7,7 +7,6 @@ use serde::Serialize;
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     pub stages: BTreeMap<&'static str, StageReport>,
-    /// The first difference by tick.
     pub difference: Option<Difference>,
     /// The time at which the recording was cut off, seconds after its first message; none if it is complete.
     pub cut_after_s: Option<f64>,
@@ -43,7 +42,6 @@ pub struct Difference {
 }
 
 impl Report {
-    /// Generations of all stages that are equal to the bit.
     pub fn equal(&self) -> u64 {
         self.stages.values().map(|stage| stage.equal).sum()
     }

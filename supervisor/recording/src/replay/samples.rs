@@ -34,7 +34,6 @@ pub struct First {
     pub values: [String; 2],
 }
 
-/// The stamp that a message begins with.
 pub(crate) fn stamp_of(message: &[u8]) -> Stamp {
     let stamp = Decoder::new(message).and_then(|mut from| Stamp::decode(&mut from));
     stamp.unwrap_or_default()

@@ -43,7 +43,6 @@ pub struct Arguments {
 
 const LAYOUT: &str = include_str!("../layout.json");
 
-/// Run the executable.
 pub fn main() -> ExitCode {
     // A client could fill the log with its own errors.
     executable::run("error,firsthand_foxglove=warn,foxglove=off", serve, |error| {

@@ -48,7 +48,6 @@ pub(crate) struct LiveError {
     source: io::Error,
 }
 
-/// A server for viewers.
 #[derive(Debug)]
 pub(crate) struct Live {
     context: Arc<Context>,
@@ -63,7 +62,6 @@ fn served() -> impl Iterator<Item = &'static dyn AnyTopic> {
     all.filter(|topic| matches!(topic.spec().logged, Logged::Yes))
 }
 
-/// The channels of one run.
 struct Serving {
     channels: HashMap<String, Arc<RawChannel>>,
     drawn: Drawn,

@@ -10,7 +10,6 @@ use std::{
     net::SocketAddr,
 };
 
-/// The rights of a browser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Role {
     /// The browser may watch and stop the robot.
@@ -90,7 +89,6 @@ impl Access {
         self.hosts.iter().map(String::as_str).find(|known| *known == host)
     }
 
-    /// Whether `origin` is that of the page at `host`.
     pub(crate) fn is_own_origin(&self, origin: &str, host: &str) -> bool {
         origin.strip_prefix(self.scheme).and_then(|rest| rest.strip_prefix("://")) == Some(host)
     }

@@ -61,7 +61,6 @@ pub struct Arguments {
     behind_proxy: Option<String>,
 }
 
-/// Run the executable.
 pub fn main() -> ExitCode {
     executable::run("error", serve, |error| match error.downcast_ref()? {
         PageError::NotLoopback(_) => Some("not-loopback"),

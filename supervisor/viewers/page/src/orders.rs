@@ -4,19 +4,16 @@ use serde::Deserialize;
 
 use crate::access::Role;
 
-/// Most targets in one order.
 const MOST_TARGETS: usize = 16;
 
 /// Carries out orders, and waits until each is confirmed. The result is the confirmation, or the reason why it was not
 /// carried out.
 pub(crate) trait Operator: Send + Sync + 'static {
-    /// Let the robot stand.
     fn stop(&self) -> Result<String, String>;
     /// Let a stopped robot go on.
     fn resume(&self) -> Result<String, String>;
     /// Start a new generation of a stage.
     fn restart(&self, stage: &str) -> Result<String, String>;
-    /// Kill the process of a stage.
     fn kill(&self, stage: &str) -> Result<String, String>;
     /// Go to these places, one after the other; metres in the mission frame.
     fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String>;

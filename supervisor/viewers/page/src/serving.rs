@@ -50,7 +50,6 @@ pub(crate) enum PageError {
     System(#[from] io::Error),
 }
 
-/// A page that is served.
 #[derive(Debug)]
 pub(crate) struct Page {
     /// The address on which the page listens.

@@ -23,7 +23,6 @@ use crate::{
     shared::Cursor,
 };
 
-/// The time for a browser to show its token.
 const TOKEN_WITHIN: Duration = Duration::from_secs(3);
 /// The interval at which new data are sent.
 const SEND_EVERY: Duration = Duration::from_millis(100);
@@ -33,7 +32,6 @@ const ALIVE_EVERY: Duration = Duration::from_millis(300);
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 /// The time within which a robot that may go on does so.
 const GOES_WITHIN: Duration = Duration::from_secs(3);
-/// Most messages of a browser in a second.
 const MOST_A_SECOND: u32 = 50;
 /// Most orders that are performed at a time, stops not counted, and most stops.
 const MOST_ORDERS: usize = 1;

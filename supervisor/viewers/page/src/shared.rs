@@ -37,10 +37,8 @@ impl<T: Clone> Newest<T> {
     }
 }
 
-/// The newest items of a series, each with its number.
 #[derive(Debug, Default)]
 pub(crate) struct Ring {
-    /// The number of the first item.
     first: u64,
     items: VecDeque<Arc<str>>,
 }
@@ -63,10 +61,8 @@ impl Ring {
     }
 }
 
-/// The robot's run as browsers are shown it.
 #[derive(Debug, Default)]
 pub(crate) struct Shown {
-    /// The number of the run.
     run: u64,
     about: Option<Arc<str>>,
     pub(crate) connected: bool,
@@ -106,7 +102,6 @@ impl Shown {
         self.events.push(event, MOST_EVENTS);
     }
 
-    /// The result of a target, as an event.
     pub(crate) fn result(&mut self, result: &Value) {
         self.results.push(result, MOST_EVENTS);
     }

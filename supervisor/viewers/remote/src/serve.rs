@@ -53,7 +53,6 @@ pub(crate) struct Arguments {
 #[derive(Default)]
 struct Told {
     hello: Hello,
-    /// The run file.
     run: String,
 }
 
@@ -172,7 +171,6 @@ fn put(
 
 type Answering = zenoh::query::Queryable<()>;
 
-/// Answer whoever asks for `what` of `robot`.
 fn answer(
     session: &Session,
     robot: &RobotName,

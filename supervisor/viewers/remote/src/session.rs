@@ -122,7 +122,6 @@ fn open(config: &Value) -> Result<Session> {
     zenoh::open(config).wait().map_err(failed)
 }
 
-/// An error of zenoh, as one of ours.
 pub(crate) fn failed(error: zenoh::Error) -> Failure {
     error
 }

@@ -2,10 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The longest answer that is looked at.
 const LONGEST_HELLO: usize = 4096;
 
-/// The answer of a machine that serves a robot.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Hello {
     /// Another for each run and each serving process; 0 while the robot does not run.

@@ -18,7 +18,6 @@ use crate::{
     shown::MAP,
 };
 
-/// The target of a goal.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Aim {
     point: TargetPoint,
@@ -61,7 +60,6 @@ impl<T: ToString> From<T> for Refusal {
     }
 }
 
-/// The server's goals.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Server {
     pub(crate) goals: Goals<Aim>,
@@ -170,7 +168,6 @@ impl Server {
         self.goals.aborted().for_each(|goal| goal.known.number = None);
     }
 
-    /// The requests for the results of goals that are over.
     pub(crate) fn answerable(&mut self) -> Vec<(Request, Uuid)> {
         self.goals.aborted().for_each(|goal| goal.known.awaited += 1);
         self.goals.answerable(|status, aim| {

@@ -54,15 +54,12 @@ const RUN_ENDED: &str = "the run ended before the robot arrived";
 /// The least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
-/// The options of the bridge.
 #[derive(Clone, Debug)]
 pub(crate) struct Options {
     pub(crate) robot: RobotName,
-    /// The domain of DDS.
     pub(crate) domain: u16,
     /// The address of the network interface; all of them without it.
     pub(crate) interface: Option<Ipv4Addr>,
-    /// The namespace of the topics.
     pub(crate) namespace: String,
     /// The requests of others that are permitted.
     pub(crate) accepted: Vec<Accept>,
@@ -87,7 +84,6 @@ pub(crate) enum BridgeError {
     System(io::Error),
 }
 
-/// The state of the bridge.
 struct Bridge {
     options: Options,
     node: Node<Id>,
@@ -98,7 +94,6 @@ struct Bridge {
     server: Server,
     /// The directory of the run, with the results of its targets.
     run: Option<(PathBuf, Results)>,
-    /// The goals as they are stored for a bridge that comes after this one.
     stored: String,
     goals_file: PathBuf,
     /// Clients do not know the writers of this bridge before.
@@ -260,7 +255,6 @@ impl Bridge {
         (self.shown, self.stands_for_cancel) = (None, None);
     }
 
-    /// Take all samples that were published on the robot's bus.
     fn take_samples(&mut self, feed: &mut Feed) -> Result<(), BusError> {
         let Self { node, shown, server, stands_for_cancel, options, transforms, .. } = self;
         let Some(shown) = shown else {
@@ -381,7 +375,6 @@ impl Bridge {
         self.server.refuse(id, why, now_ns);
     }
 
-    /// Take an order with its result.
     fn done(&mut self, (order, result): Done) {
         if let Err(why) = &result {
             self.tell(&format!("what was asked is not done: {}", why.text));

@@ -13,7 +13,6 @@ use crate::{
 /// Transforms come from many nodes, of either reliability.
 const TRANSFORMS: Quality = Quality { is_reliable: false, is_latched: false, depth: 100 };
 
-/// Join the domain by the interface of `options`, with topics below the namespace there.
 pub(crate) fn open(options: &Options) -> io::Result<Node<Id>> {
     let Options { domain, interface, namespace, accepted, parameters, .. } = options;
     let mut node = Node::join((*domain, *interface, namespace), "firsthand", parameters.clone())?;
@@ -45,7 +44,6 @@ pub(crate) const fn is_of_robot(id: Id) -> bool {
     matches!(id, Id::Odom | Id::Battery | Id::Range(_) | Id::Scan(_))
 }
 
-/// Open the topics of a robot, and close those of the robot before.
 pub(crate) fn open_robot<'a>(
     node: &mut Node<Id>,
     topics: impl Iterator<Item = (Id, &'a str)>,
@@ -85,7 +83,6 @@ pub(crate) fn published<'a>(
     })
 }
 
-/// The name of the topic of `row` below `namespace`, from the root.
 pub(crate) fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
     let name = row.name.replace("SENSOR", &ros_name(sensor));
     let name = name.trim_end_matches('/');

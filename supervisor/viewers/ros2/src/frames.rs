@@ -8,7 +8,6 @@ use ros2::cdr::Reader;
 /// The most frames that are known, and that a message has.
 const MOST_FRAMES: usize = 1024;
 
-/// The place of a frame in its parent.
 #[derive(Debug)]
 struct Place {
     parent: String,
@@ -17,7 +16,6 @@ struct Place {
     heard: Option<Instant>,
 }
 
-/// Frames by their names.
 #[derive(Debug, Default)]
 pub(crate) struct Frames(BTreeMap<String, Place>);
 

@@ -15,7 +15,6 @@ pub(crate) type Uuid = [u8; 16];
 
 /// The most goals that are remembered; older ones are forgotten.
 const MOST_GOALS: usize = 16;
-/// The most clients that wait for results.
 const MOST_RESULTS: usize = 32;
 
 /// A `action_msgs/GoalStatus`.
@@ -53,13 +52,11 @@ pub(crate) struct Goal<T> {
     pub(crate) known: T,
 }
 
-/// A server's goals.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Goals<T> {
     goals: VecDeque<Goal<T>>,
     /// Whether the states have changed since they were last published.
     is_changed: bool,
-    /// Clients that wait for the result of a goal.
     waiting: Vec<(Request, Uuid)>,
 }
 
@@ -75,7 +72,6 @@ impl<T> Goals<T> {
         self.add(id, Status::Executing, known, now_ns);
     }
 
-    /// Add a goal in this state.
     pub(crate) fn add(&mut self, id: Uuid, status: Status, known: T, now_ns: u64) {
         if self.goals.len() == MOST_GOALS {
             self.goals.pop_front();
@@ -132,7 +128,6 @@ impl<T> Goals<T> {
         Ok((reply, !canceled.is_empty()))
     }
 
-    /// Take a request for the result of a goal.
     pub(crate) fn wait(&mut self, request: &Request, payload: &[u8]) -> Result<(), String> {
         let id = uuid(&mut Reader::new(payload)?)?;
         if self.waiting.len() == MOST_RESULTS {
@@ -167,7 +162,6 @@ impl<T> Goals<T> {
         over
     }
 
-    /// The states of all goals, if they have changed.
     pub(crate) fn take_status(&mut self) -> Option<Vec<u8>> {
         let status = |writer: &mut Writer, goal: &Goal<T>| {
             writer.raw(&goal.id).time(goal.at_ns).u8(goal.status as u8);
@@ -177,7 +171,6 @@ impl<T> Goals<T> {
     }
 }
 
-/// The id of a goal.
 pub(crate) fn uuid(reader: &mut Reader<'_>) -> Result<Uuid, String> {
     let bytes = reader.raw(16)?;
     bytes.try_into().map_err(|_| "an id of other than 16 bytes".to_owned())

@@ -114,7 +114,6 @@ fn namespace(text: &str) -> Result<String, String> {
     }
 }
 
-/// Run the executable.
 pub fn main() -> ExitCode {
     // Refused requests of other nodes are logged.
     executable::run("warn,rustdds=off", show, |_| None)

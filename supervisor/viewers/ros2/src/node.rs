@@ -31,7 +31,6 @@ pub(crate) enum Call {
     GetResult,
 }
 
-/// The server of an action.
 #[derive(Debug)]
 struct Action {
     services: Vec<(Call, Reader, Writer)>,
@@ -56,7 +55,6 @@ pub(crate) struct Node<Id> {
 }
 
 impl<Id: Copy + Ord> Node<Id> {
-    /// Join `domain` by the interface `only`, with topics below `namespace`.
     pub(crate) fn join(
         (domain, only, namespace): (u16, Option<Ipv4Addr>, &str),
         name: &'static str,
@@ -122,14 +120,12 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
-    /// The reader of requests, and the writer of replies.
     fn service(&self, name: &str, kind: &str) -> io::Result<(Reader, Writer)> {
         let [requests, replies] = Topic::service(name, kind);
         let requests = self.participant.reader(&requests, SURE)?;
         Ok((requests, self.participant.writer(&replies, SURE)?))
     }
 
-    /// Serve an action of Nav2, `kind`, as `name`.
     pub(crate) fn serve(&mut self, name: &str, kind: &str) -> io::Result<()> {
         let name = |part| format!("{}/_action/{part}", self.full_name(name));
         let kind = |part| format!("nav2_msgs::action::dds_::{kind}_{part}");
@@ -193,7 +189,6 @@ impl<Id: Copy + Ord> Node<Id> {
         }
     }
 
-    /// Answer those who ask for parameters.
     pub(crate) fn answer(&self) {
         for (service, requests, replies) in &self.of_parameters {
             for Message { payload, request, .. } in requests.messages().take(AT_A_TIME) {
@@ -216,7 +211,6 @@ impl<Id: Copy + Ord> Node<Id> {
         heard.collect()
     }
 
-    /// The calls of clients of actions.
     pub(crate) fn called(&self) -> Vec<(usize, Call, Message)> {
         let actions = self.actions.iter().enumerate();
         let called = actions.flat_map(|(action, it)| {
@@ -227,7 +221,6 @@ impl<Id: Copy + Ord> Node<Id> {
         called.collect()
     }
 
-    /// Answer a call.
     pub(crate) fn reply(&self, action: usize, call: Call, to: &Request, payload: &[u8]) {
         let services = self.actions.get(action).map(|action| &action.services);
         if let Some((.., replies)) = services.into_iter().flatten().find(|(of, ..)| *of == call) {

@@ -18,10 +18,8 @@ use ros2::participant::Request;
 
 use crate::action::{Refusal, Sent, code};
 
-/// The most orders that wait.
 const MOST_WAITING: usize = 16;
 
-/// An order to the robot.
 #[derive(Clone, Debug)]
 pub(crate) enum Order {
     /// Go to a target. If `resumes`, the robot stands for a goal that was canceled, and is resumed first.
@@ -41,7 +39,6 @@ pub(crate) enum Order {
     Hand(DVec2, Instant),
 }
 
-/// The sender of a target.
 #[derive(Clone, Debug)]
 pub(crate) enum Why {
     Topic,
@@ -66,7 +63,6 @@ pub(crate) struct Orders {
 }
 
 impl Orders {
-    /// Orders for `robot`.
     pub(crate) fn new(robot: &RobotName) -> io::Result<Self> {
         let (refused, done) = channel();
         let worker = |name: &str, most| {

@@ -24,7 +24,6 @@ pub(crate) fn overlap<'a>(
     named.filter(|(_, name)| read.contains(name)).collect()
 }
 
-/// The names of the topics that a link reads as its robot's.
 fn read(mission: &Mission) -> impl Iterator<Item = String> {
     let topics = &mission.robot.ros2;
     let lasers = mission.lasers_of_base();

@@ -47,7 +47,6 @@ pub(crate) struct Parameter {
     meaning: String,
 }
 
-/// The options of `command`, or of its subcommand that was asked for, which have a value.
 pub(crate) fn of_options(mut command: &Command, mut matches: &ArgMatches) -> Vec<Parameter> {
     if let Some((name, of_it)) = matches.subcommand()
         && let Some(subcommand) = command.find_subcommand(name)

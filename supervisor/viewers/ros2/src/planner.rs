@@ -53,7 +53,6 @@ use crate::{
 
 /// The interval at which the end of this process, or that of the time for a path, is noticed.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// The most goals that wait.
 const MOST_WAITING: usize = 16;
 /// `/tf_static` keeps the messages of all its publishers; messages of `/tf` are many.
 const DEPTH: u16 = 256;
@@ -211,7 +210,6 @@ struct Server<'a> {
     node: Node<Id>,
     frames: Frames,
     map: Option<Arc<Costmap>>,
-    /// The goals of each action.
     goals: [Goals<Plan>; 2],
     jobs: SyncSender<Job>,
     done: Receiver<Done>,

@@ -36,7 +36,6 @@ const POSE_EVERY: usize = 4;
 /// Takes a message: its topic and its payload.
 pub(crate) type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
 
-/// A robot as the messages show it.
 #[derive(Debug)]
 pub(crate) struct Shown {
     robot: String,
@@ -76,7 +75,6 @@ impl Shown {
         &self.mission
     }
 
-    /// The topics of the sensors that the mission uses.
     pub(crate) fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
         let used = self.sensors.iter().enumerate().filter(|(_, sensor)| sensor.used);
         let is_scan = |(_, sensor): &(usize, &Sensor)| sensor.kind == SensorKind::Scan;
@@ -87,7 +85,6 @@ impl Shown {
         })
     }
 
-    /// The mounting of the sensors.
     pub(crate) fn mounting(&self, now_ns: u64, sink: Sink<'_>) {
         let used = self.sensors.iter().filter(|sensor| sensor.used);
         let mounts = used
@@ -95,7 +92,6 @@ impl Shown {
         sink(Id::TfStatic, messages::transforms(now_ns, &mounts.collect::<Vec<_>>()));
     }
 
-    /// The newest pose.
     pub(crate) fn newest_pose(&self) -> PoseSample {
         self.state.pose.unwrap_or_default()
     }
@@ -205,7 +201,6 @@ impl Shown {
         }
     }
 
-    /// Publish the whole map if it has changed and is due.
     fn map(&mut self, now_ns: u64, sink: Sink<'_>) {
         let version = self.state.map.version();
         let is_due = self.map.is_none_or(|(published, at_ns)| {
@@ -403,7 +398,6 @@ fn mover((id, mover): (i32, &Mover)) -> [Marker; 3] {
     [disc("movers", mover.radius_m.into(), 0.6), disc("doubt", mover.reach_m(), 0.2), way]
 }
 
-/// The direction of each cell that has one.
 fn directions(frame: GridFrame, cells: &[FieldCell]) -> Marker {
     arrows([frame.cells as usize; 2], frame.resolution_m, |col, row| {
         let cell = Cell { col: col as u32, row: row as u32 };

@@ -56,11 +56,8 @@ pub(crate) enum Frames {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spec {
     pub(crate) id: Id,
-    /// The name, relative to the bridge's namespace.
     pub(crate) name: &'static str,
-    /// The package and the name of its type.
     pub(crate) message: [&'static str; 2],
-    /// The name of its type in DDS.
     pub(crate) type_name: &'static str,
     /// Whether a reader that joins later gets the newest message.
     pub(crate) is_latched: bool,
@@ -125,7 +122,6 @@ table! {
         "true: the robot stands; false: it goes on";
 }
 
-/// The row of `id`.
 pub(crate) fn spec(id: Id) -> Option<&'static Spec> {
     let id = match id {
         Id::Range(_) => Id::Range(0),

@@ -24,7 +24,6 @@ pub(super) struct ScreenFeed {
     counted: Instant,
 }
 
-/// The first topic that a stage writes.
 struct Output {
     stage: &'static str,
     reader: Box<dyn AnyReader>,

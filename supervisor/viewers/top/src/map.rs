@@ -61,7 +61,6 @@ impl Square {
     }
 }
 
-/// The styles of hazards, for a legend.
 pub(super) fn legend() -> [(Style, &'static str); 4] {
     let style = |square: Square| Style::new().fg(square.hazard().unwrap_or_default());
     [
@@ -75,7 +74,6 @@ pub(super) fn legend() -> [(Style, &'static str); 4] {
 /// The squares of the screen on the map.
 struct Scale {
     frame: GridFrame,
-    /// Squares along each side.
     side: usize,
     /// Cells along each side of a square.
     step: f64,

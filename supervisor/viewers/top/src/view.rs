@@ -53,13 +53,11 @@ impl View {
         stage.map(|entry| name_str(&entry.stage))
     }
 
-    /// Choose the stage that is `down` rows below the chosen one.
     pub(super) fn choose(&mut self, down: isize) {
         let last = self.state.stages.len().saturating_sub(1);
         self.chosen = self.chosen.saturating_add_signed(down).min(last);
     }
 
-    /// The processes of the stages, and the supervisor's.
     pub(super) fn processes(&self) -> Vec<u32> {
         let supervisor = self.state.supervisor.map_or(0, |header| header.supervisor_pid);
         self.state.stages.iter().map(|entry| entry.pid).chain([supervisor]).collect()

@@ -59,7 +59,6 @@ impl Map<'_> {
         self.free_neighbour(cell, [cols, rows])
     }
 
-    /// The cell so many columns and rows from `cell`, if it is free.
     pub fn free_neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
         let col = cell.col.checked_add_signed(cols)?;
         let row = cell.row.checked_add_signed(rows)?;

@@ -38,7 +38,6 @@ pub struct Bug {
     enclosed: bool,
 }
 
-/// A hazard that the robot circumvents.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Following {
     /// The place where the robot met the hazard, metres.
@@ -139,7 +138,6 @@ impl Following {
         true
     }
 
-    /// The boundary from here on, up to [`MOST_CELLS`] cells.
     fn ahead<'a>(&self, map: &'a Map<'_>) -> impl Iterator<Item = Place> + 'a {
         // A boundary of steps is up to sqrt(2) times as long as it is wide, and folds.
         let cells = (2.0 * AHEAD_M / map.frame.resolution_m).ceil() as usize;

@@ -72,7 +72,6 @@ impl<P: Planner> Baseline<P> {
         self.along(way, sample)
     }
 
-    /// The guidance that sends the robot of `sample` along `way`.
     fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
         let belief = &self.belief.header;
         let pose = sample.pose();

@@ -54,7 +54,6 @@ pub struct Attack {
     pose: Option<PoseSample>,
 }
 
-/// A signal that was sent.
 struct Sent {
     row: Row,
     at: Instant,
@@ -348,7 +347,6 @@ impl Attack {
     }
 }
 
-/// Whether the signal reached a process.
 pub fn send(pid: u32, signal: Signal) -> bool {
     Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, signal).is_ok())
 }

@@ -17,7 +17,6 @@ use summary::Summary;
 
 use crate::{random::Random, robot::firsthand};
 
-/// Changes of the targets of one mission.
 const MOST_CHANGES: usize = 6;
 /// Wall-clock time from one change to the next, seconds.
 const PAUSE_S: [f64; 2] = [0.8, 3.0];

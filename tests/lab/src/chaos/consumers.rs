@@ -157,7 +157,6 @@ impl Running {
     }
 }
 
-/// The name of the recorder among the consumers.
 const RECORD: &str = "record";
 
 /// A program that reads from the bus: a subcommand of `firsthand`, or a user's command without a shell.

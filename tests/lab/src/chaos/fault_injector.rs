@@ -27,14 +27,12 @@ const NEAR_M: [f64; 2] = [0.005, 0.05];
 const RANDOM_COUNTS_S: f64 = 1000.0;
 /// The greatest of random readings, metres.
 const RANDOM_M: f64 = 2.5;
-/// The value for no reading.
 const NO_READING: f64 = -1.0;
 /// The frozen range of a sensor that has measured nothing yet, metres.
 const FROZEN_M: f64 = 1.5;
 /// Messages that are stored: as many as come in [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
-/// Bytes for the host, and their time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Late {
     /// Time on the clock of the incoming bytes.
@@ -54,7 +52,6 @@ pub struct FaultInjector {
     /// How great the fault of this mission is, from 0 to 1.
     size: f64,
     words: Words,
-    /// The last message with wheels before the fault.
     base: Option<Said>,
     /// The newest readings before the fault that are distances.
     newest: Report,
@@ -134,7 +131,6 @@ impl FaultInjector {
         least + self.size * (greatest - least)
     }
 
-    /// The newest of the messages `of_kind` that are `age` old.
     fn old(&self, now: Duration, age: Duration, of_kind: impl Fn(&Said) -> bool) -> Option<&Said> {
         let old = self.kept.iter().rfind(|(at, said)| *at + age <= now && of_kind(said));
         old.map(|(_, said)| said)
@@ -179,7 +175,6 @@ impl FaultInjector {
         }
     }
 
-    /// The bytes into which the fault changes the message `said`.
     fn changed(&mut self, mut said: Said, now: Duration) -> Vec<u8> {
         use RobotFault as F;
         match self.fault {
@@ -234,7 +229,6 @@ impl FaultInjector {
         speeds.is_some_and(|speeds| speeds != [0.0; 2])
     }
 
-    /// Change the readings of `said`.
     fn misread(&mut self, said: &mut Said) {
         use RobotFault as F;
         let near_m = self.drawn(NEAR_M);

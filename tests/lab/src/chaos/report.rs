@@ -94,7 +94,6 @@ impl<'a> Series<'a> {
         })
     }
 
-    /// Keep a signal whose measurement is complete.
     pub fn keep(&mut self, row: Row) -> Result {
         self.report.add(&row);
         self.signals.add(row)
@@ -164,7 +163,6 @@ pub struct Row {
     pub mission: u64,
     /// Mission time of the newest wheel sample that was read before the signal, seconds.
     pub time_s: Option<f64>,
-    /// The stage, `supervisor`, `everything`, or the consumer's name.
     pub stage: String,
     pub kind: Kind,
     /// The generation; for a consumer the number of its starts in that mission. None for the supervisor, for everything and for the
@@ -185,7 +183,6 @@ pub fn ms_since(at: Instant) -> f64 {
     (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
-/// The file in `directory`, without rows.
 pub fn create(directory: &Path) -> Result<Table<Row>> {
     let path = directory.join(FILE_NAME);
     fs::create_dir_all(directory).or_cannot_file("make the directory of", &path)?;

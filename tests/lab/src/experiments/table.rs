@@ -19,7 +19,6 @@ pub const METHODS: [(&str, &[&str]); 2] = [
 ];
 const PAPER: &str = "paper";
 
-/// An experiment of section V.B of the paper.
 #[derive(Debug, Deserialize)]
 pub struct Experiment {
     /// The number in the paper, and the variant.
@@ -27,7 +26,6 @@ pub struct Experiment {
     pub title: String,
     pub reported: String,
     pub reported_time_s: Option<f64>,
-    /// The shipped mission, and the experiment's change of it.
     mission: String,
     change: Option<String>,
     /// Whether only the paper's method can do it: the default method has no constant speed.
@@ -39,7 +37,6 @@ pub struct Experiment {
 #[derive(Debug, Deserialize)]
 pub struct Claim {
     pub experiment: String,
-    /// The claim as a condition.
     pub claim: String,
     pub figure: String,
     /// The experiment whose figure divides this one.

@@ -13,7 +13,6 @@ use serde::{Serialize, de::DeserializeOwned};
 use super::row::{Latency, Row};
 use crate::error::{OrCannot as _, Refused, Result};
 
-/// The file of the command that gives the rows.
 const PLAN_FILE: &str = "plan.txt";
 
 /// The command of this process, which gives the rows, without what does not change them.
@@ -91,7 +90,6 @@ pub struct Table<R> {
 }
 
 impl<R: Serialize + DeserializeOwned> Table<R> {
-    /// The table in `file`: with its rows, or empty.
     pub fn open(file: PathBuf) -> Result<Self> {
         let mut rows = Vec::new();
         if file.exists() {

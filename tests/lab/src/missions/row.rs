@@ -20,7 +20,6 @@ pub enum Outcome {
     Success,
     Collision,
     Timeout,
-    /// The robot reported its arrival in a wrong place.
     WrongPlace,
     /// The robot gave up although a path to the target exists.
     Unreachable,
@@ -46,7 +45,6 @@ pub struct Row {
     /// Distance driven by the ground truth.
     pub path_m: f64,
     pub straight_m: f64,
-    /// Length of the body's shortest path.
     pub shortest_m: f64,
     /// K of the paper: path divided by straight distance.
     pub k: f64,

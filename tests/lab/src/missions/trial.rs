@@ -155,7 +155,6 @@ fn moved(shapes: &Shapes, by: DVec2) -> Shapes {
     shapes
 }
 
-/// The places of all `shapes`.
 pub fn points(shapes: &mut Shapes) -> impl Iterator<Item = &mut DVec2> {
     let Shapes { drums, boxes, walls } = shapes;
     let drums = drums.iter_mut().map(|drum| &mut drum.at);

@@ -144,7 +144,6 @@ impl Log {
     }
 }
 
-/// The time that begins a line, and what follows it.
 fn split_time(line: &str) -> Option<(&str, &str)> {
     let (time, text) = line.split_at_checked(TIME)?;
     let is_time = time.ends_with('Z') && time.as_bytes()[10] == b'T' && text.starts_with(' ');

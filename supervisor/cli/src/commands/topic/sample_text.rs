@@ -89,7 +89,6 @@ fn on_one_line(value: &Value, most: usize) -> String {
     }
 }
 
-/// A value in the data model of JSON.
 struct Json<'a>(&'a Value);
 
 impl Serialize for Json<'_> {

@@ -12,13 +12,11 @@ use crate::{
     messages::{Header, write_path},
 };
 
-/// The most goals of one call.
 const MOST_GOALS: usize = 256;
 
 /// A pose in the frame of this name; in that of the map without one.
 pub(super) type Placed = (String, DAffine2);
 
-/// What a client asks for.
 #[derive(Debug)]
 pub(super) struct Asked {
     pub(super) id: Uuid,
@@ -60,7 +58,6 @@ fn placed(reader: &mut Reader<'_>) -> Result<Placed, Malformed> {
 /// The end of a goal.
 #[derive(Debug, Default)]
 pub(super) struct Outcome {
-    /// The frame of the path.
     pub(super) frame: String,
     pub(super) at_ns: u64,
     pub(super) took_ns: u64,
