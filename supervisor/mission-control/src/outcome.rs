@@ -24,6 +24,8 @@ pub enum Outcome {
     ReachedUnsure,
     /// The robot stalled, and no recovery step was left.
     Unreachable,
+    /// Of a target it is called `timed_out`.
+    #[serde(alias = "timed_out")]
     Timeout,
     Collision,
     /// The robot stood and waited for its first target when the run was ended.
@@ -65,7 +67,7 @@ impl Outcome {
 }
 
 /// What the encoders say at the end.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub(crate) enum Wheels {
     AtRest,
     /// Nothing, and why.
@@ -73,7 +75,7 @@ pub(crate) enum Wheels {
     Turning,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Ending {
     pub outcome: Outcome,
     pub reason: String,

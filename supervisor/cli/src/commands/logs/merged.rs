@@ -12,7 +12,6 @@ const LONGEST_LINE: u64 = 64 << 10;
 /// A time like 2026-11-21T06:04:22.729158Z.
 const TIME: usize = 27;
 
-#[derive(Debug)]
 pub struct Logs {
     directory: PathBuf,
     /// `None` reads all.
@@ -20,7 +19,6 @@ pub struct Logs {
     logs: Vec<Log>,
 }
 
-#[derive(Debug)]
 struct Log {
     process: String,
     file: BufReader<File>,
