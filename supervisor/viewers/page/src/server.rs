@@ -27,11 +27,10 @@ const REQUEST_WITHIN: Duration = Duration::from_secs(3);
 const ANSWERED_WITHIN: Duration = Duration::from_secs(10);
 const MOST_HEADER_BYTES: usize = 16 << 10;
 const MOST_MESSAGE_BYTES: usize = 4 << 10;
-/// The path of the websocket.
 const LIVE: &str = "/live";
 
 /// Serve connections until the result is dropped.
-pub(crate) async fn serve(context: Arc<Context>, listener: TcpListener) {
+pub async fn serve(context: Arc<Context>, listener: TcpListener) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
         tracing::error!("the system refuses to watch the socket of the page");
         return;

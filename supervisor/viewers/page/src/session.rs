@@ -44,7 +44,6 @@ const WRONG_TOKEN: u16 = 4401;
 const REPLACED: u16 = 4409;
 const TOO_MUCH: u16 = 4429;
 
-/// The first message of a browser.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Hello {
@@ -54,7 +53,7 @@ struct Hello {
 type Sender = SplitSink<WebSocket, Message>;
 
 /// `stranger` is the place of a client that has shown no token.
-pub(crate) async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>) {
+pub async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>) {
     let first = tokio::select! {
         first = timeout(TOKEN_WITHIN, socket.recv()) => first.ok().flatten(),
         () = lost(&stranger) => None,
@@ -112,7 +111,6 @@ pub(crate) async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Co
     }
 }
 
-/// The messages to the task that sends.
 enum Told {
     Answer(String),
     Close(u16),

@@ -54,24 +54,24 @@ const RUN_ENDED: &str = "the run ended before the robot arrived";
 /// The least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
-#[derive(Clone, Debug)]
-pub(crate) struct Options {
-    pub(crate) robot: RobotName,
-    pub(crate) domain: u16,
+#[derive(Clone)]
+pub struct Options {
+    pub robot: RobotName,
+    pub domain: u16,
     /// The address of the network interface; all of them without it.
-    pub(crate) interface: Option<Ipv4Addr>,
-    pub(crate) namespace: String,
+    pub interface: Option<Ipv4Addr>,
+    pub namespace: String,
     /// The requests of others that are permitted.
-    pub(crate) accepted: Vec<Accept>,
-    pub(crate) frames: Frames,
+    pub accepted: Vec<Accept>,
+    pub frames: Frames,
     /// Stamps are mission time, which is published.
-    pub(crate) clock: bool,
-    pub(crate) parameters: Vec<Parameter>,
+    pub clock: bool,
+    pub parameters: Vec<Parameter>,
 }
 
 /// The bridge cannot be opened.
 #[derive(Debug, Error)]
-pub(crate) enum BridgeError {
+pub enum BridgeError {
     #[error(
         "cannot join domain {domain} of ROS 2: {source}; is the address of --interface one of this machine?"
     )]
@@ -87,7 +87,6 @@ pub(crate) enum BridgeError {
 struct Bridge {
     options: Options,
     node: Node<Id>,
-    /// The transforms of other nodes.
     transforms: Transforms,
     orders: Orders,
     shown: Option<Shown>,
@@ -106,7 +105,7 @@ struct Bridge {
 }
 
 /// Bridge a robot, from run to run, until `ended` returns true.
-pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
+pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
     let (robot, domain) = (&options.robot, options.domain);
     let join = || endpoints::open(options).map_err(|source| BridgeError::Join { domain, source });
     let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
@@ -166,7 +165,7 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
 }
 
 /// The time, nanoseconds since 1970.
-pub(crate) fn now_ns() -> u64 {
+pub fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
@@ -282,7 +281,6 @@ impl Bridge {
         })
     }
 
-    /// The time for stamps.
     fn now_ns(&self) -> u64 {
         match &self.shown {
             Some(shown) if self.options.clock => (shown.state.now_s() * 1e9) as u64,
@@ -290,7 +288,6 @@ impl Bridge {
         }
     }
 
-    /// Take the messages that nodes have sent.
     fn hear(&mut self) {
         self.node.answer();
         for (id, message) in self.node.heard() {
@@ -415,7 +412,6 @@ impl Bridge {
         }
     }
 
-    /// Publish the samples that are due.
     fn publish(&mut self) {
         let now_ns = self.now_ns();
         self.read_results();

@@ -10,7 +10,7 @@ use ros2::topic::Topic;
 use crate::{endpoints::published, topics::Id};
 
 /// Those topics of a bridge in `domain` and `namespace` that the link of `run` reads, with the topics of these sensors.
-pub(crate) fn overlap<'a>(
+pub fn overlap<'a>(
     (domain, namespace): (u16, &str),
     run: &Run,
     sensors: impl Iterator<Item = (Id, &'a str)>,
