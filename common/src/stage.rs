@@ -49,7 +49,6 @@ use crate::{
 
 /// What a stage computes. A process and a replay run the same one.
 pub trait Stage: Sized + 'static {
-    /// The state that a generation starts from.
     type Start: Serialize + DeserializeOwned;
     /// What the stage takes at once: a sample of a topic, or an enum where it takes more than one kind. It may borrow from shared
     /// memory for the length of the call. A recording holds it in this encoding.
@@ -204,7 +203,6 @@ pub struct Answer<P> {
     pub sample: P,
     /// Whether the state is saved before the sample is published. Otherwise no tick waits for the file.
     pub saves_first: bool,
-    /// A warning for the log of the process.
     pub warning: Option<Cow<'static, str>>,
 }
 

@@ -459,7 +459,7 @@ impl History {
 }
 
 /// It has the pose at the fix's time if the fix contradicts it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub(crate) struct Refused {
     pub(crate) why: FixRefusal,
     pub(crate) there: Option<Pose2>,

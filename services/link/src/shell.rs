@@ -57,7 +57,6 @@ readers! {
     }
 }
 
-/// The link process.
 pub struct Shell {
     transport: Transport,
     wires: Vec<Transport>,

@@ -71,10 +71,9 @@ const MIDDLE_M: f64 = 0.03;
 /// So much of a radius that was seen is left in the next scan, which may see a part of it.
 const RADIUS_LEFT: f64 = 0.98;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Thing {
     at_s: f64,
-    /// The laser's place.
     origin: DVec2,
     /// Its first and last end, if they are its own: nothing before it hides the rest.
     own: [Option<DVec2>; 2],
@@ -90,7 +89,6 @@ struct Thing {
 /// A thing that is followed, as what goes straight on, by a filter of Kalman's; accelerations are its noise.
 #[derive(Clone, Copy, Debug)]
 struct Track {
-    /// The first place and its doubt, and when.
     first: (DVec2, f64),
     since_s: f64,
     seen_s: f64,

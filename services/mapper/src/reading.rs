@@ -158,7 +158,6 @@ fn safety_distance(reading: &RangeReading) -> Option<f64> {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading {
     /// The sensor's place, metres in the mission frame.
     pub(crate) origin: DVec2,
@@ -169,7 +168,6 @@ pub(crate) struct Reading {
     pub(crate) sonar: SonarModel,
 }
 
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
     /// The ranger's place, metres in the mission frame.
     pub(crate) origin: DVec2,
@@ -178,7 +176,7 @@ pub(crate) struct Ray {
     pub(crate) seen: Seen,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Fan<'a> {
     /// The laser's place, metres in the mission frame.
     pub(crate) origin: DVec2,
@@ -222,7 +220,6 @@ impl Fan<'_> {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch {
     /// The body's centre, metres.
     pub(crate) robot: DVec2,

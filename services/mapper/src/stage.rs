@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::step::{Belief, Change, Input, Mapper};
 
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Start {
     belief: Option<Belief>,
     /// Oldest first, after the snapshot.

@@ -17,7 +17,6 @@ use thread_priority::{
 };
 
 /// Dropping this cancels the running job, if it can be, and waits for it.
-#[derive(Debug)]
 pub(crate) struct Background<Job, Done> {
     jobs: Option<Sender<Job>>,
     results: Receiver<Done>,

@@ -78,7 +78,7 @@ pub(crate) struct Evasion {
 }
 
 /// A mover.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Disc {
     at: DVec2,
     velocity: DVec2,
@@ -89,14 +89,14 @@ struct Disc {
 }
 
 /// The body is free at any heading, may touch a hazard with its corners, or touches it with its sides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Near {
     Free,
     Corners,
     Sides,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Way {
     /// Its first and its newest leg.
     first: Advice,
@@ -112,7 +112,6 @@ struct Way {
     meets_s: f64,
     hazard_s: f64,
     danger: f64,
-    /// The way along the field.
     gain_m: f64,
 }
 
@@ -235,7 +234,6 @@ fn best(mut ways: Vec<Way>, score: impl Fn(&Way) -> f64) -> Vec<Way> {
     kept
 }
 
-/// What moves, around a robot that starts somewhere.
 struct Scene<'a> {
     evasion: &'a Evasion,
     view: &'a View<'a>,

@@ -25,7 +25,7 @@ const MOST_DOUBTED_S: f64 = 1.0;
 /// A turn that takes a smaller share of what the wheels gain is no matter.
 const LEAST_SHARE: f64 = 0.1;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Moving {
     pub(crate) pose: Pose2,
     pub(crate) twist: Twist,

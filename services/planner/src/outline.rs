@@ -48,7 +48,7 @@ const GOAL_WITHIN_M: f64 = 2.0;
 const MOST_POSES: usize = 5_000;
 
 /// What the body does about the field's direction.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Passage {
     /// It follows it, no faster than this, m/s.
     Follow(f64),
@@ -104,7 +104,7 @@ impl Planned {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Reached {
     pose: Pose2,
     /// The pose before, and the step from there.

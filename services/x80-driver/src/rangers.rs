@@ -6,7 +6,7 @@ use common::{
     wire::{CustomSensors, Echo, INFRARED_LIVE_AD, StandardSensors, infrared_m},
 };
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Rangers {
     table: Vec<Sensor>,
     /// The first infrared ranger comes in the standard frame, the other six in the custom one.

@@ -41,7 +41,6 @@ const COMES_TO_REST_S: f64 = 3.0;
 pub enum Heard {
     /// It is not addressed to a robot.
     Foreign,
-    /// Nothing is answered to it.
     Ack,
     Ping,
     Motion,
@@ -355,7 +354,6 @@ impl Robot {
         self.rplidar.as_mut().map_or_else(Vec::new, |rplidar| rplidar.answer(bytes, now))
     }
 
-    /// What that laser measured since the last call.
     pub fn laser_measured(&mut self) -> Vec<u8> {
         let (now, pose) = (self.time, self.body.pose());
         let rplidar = self.rplidar.as_mut();
@@ -543,7 +541,6 @@ impl Robot {
         }
     }
 
-    /// Resets the least clearance.
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Twist { v, omega } = self.twist();

@@ -27,13 +27,11 @@ use glam::DVec2;
 use scans::Placed;
 pub use trace::Trace;
 
-/// A verdict about one part of the robot.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct Finding {
     /// The part, as a user calls it: "wheels", "laser".
     pub part: String,
     pub verdict: Verdict,
-    /// One sentence.
     pub text: String,
     /// Keys of the mission, and the values that were found.
     pub keys: Vec<(String, String)>,

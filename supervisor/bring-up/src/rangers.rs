@@ -346,7 +346,6 @@ impl Turn {
     }
 }
 
-/// What the sonars say of the body's motion.
 pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves {
     let table = mission.sensor_table();
     let turn = Turn::best(|scale| {

@@ -20,7 +20,7 @@ pub enum Told {
 }
 
 /// Times are mission time, seconds.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Trace {
     /// Way of the left and the right rim since the beginning by the counts, metres, with nominal wheels.
     pub rolled: Vec<(f64, [f64; 2])>,

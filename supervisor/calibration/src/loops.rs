@@ -104,7 +104,7 @@ fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
     (mean, (square - mean * mean).max(0.0).sqrt())
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Estimate {
     /// (rho - 1) / (rho + 1) and tau.
     values: Vector2<f64>,
@@ -148,7 +148,6 @@ pub enum Refusal {
     Singular,
 }
 
-/// Equations that are linear in e and tau.
 pub(crate) struct Rows {
     design: DMatrix<f64>,
     values: DVector<f64>,

@@ -55,7 +55,7 @@ pub struct Measured {
 }
 
 /// What the turns say.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Estimate {
     /// With the lag that was stated, seconds.
     pub delay_s: Measured,
@@ -115,7 +115,6 @@ fn measured(values: impl Iterator<Item = f64>) -> Measured {
     Measured { value, sd: 1.48 * distance / count.sqrt() }
 }
 
-#[derive(Clone, Copy, Debug)]
 struct Fit {
     delay_s: f64,
     acceleration: f64,
@@ -160,7 +159,7 @@ impl Fit {
 }
 
 /// A base, as the simulated one is: a delay, and a lag that is limited in acceleration.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Model {
     delay_s: f64,
     lag_s: f64,

@@ -80,8 +80,7 @@ const WITH_GYRO: [Leg; 13] = [
     STILL,
 ];
 
-/// The procedure in the planner's place.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Script {
     procedure: Procedure,
     side_m: f64,

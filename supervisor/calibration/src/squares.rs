@@ -35,7 +35,7 @@ pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
 }
 
 /// Nominal ways of both wheels in each tick, metres, and the end by tape, in the frame of its start.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct Driven {
     pub ways: Vec<[f64; 2]>,
     pub end: DVec2,

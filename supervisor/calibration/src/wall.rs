@@ -51,7 +51,7 @@ const NEAR_M_S: f64 = 0.12;
 /// The deviation of the track that is good enough, over that of the ratio.
 const TRACK_OVER_RATIO: f64 = 3.0;
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Wall {
     plan: CalibrationPlan,
     ways: Ways,

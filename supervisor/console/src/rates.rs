@@ -36,7 +36,7 @@ struct Counts {
     late: bool,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct Report {
     pub topic: &'static str,
     pub rate_hz: f64,

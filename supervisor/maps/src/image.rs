@@ -17,7 +17,6 @@ use crate::{
 /// 16 bits a channel, four channels, with room for the words of a Netpbm in ASCII.
 const LONGEST: u64 = (MAX_SIDE as u64).pow(2) * 8 + (1 << 20);
 
-/// The trinary mode of the ROS map_server.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lightness {
     /// Dark means free.

@@ -81,7 +81,6 @@ impl Following {
         self.is_lost
     }
 
-    /// Where the beacon was heard at last.
     pub(crate) fn place(&self) -> DVec2 {
         self.heard.map_or(DVec2::ZERO, |(_, place)| place)
     }

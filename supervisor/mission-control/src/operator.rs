@@ -305,7 +305,6 @@ pub fn place(
     ask_with(robot, RequestKind::Place, &[point], deviations)
 }
 
-/// A request that is made now.
 fn request(kind: RequestKind) -> RequestSample {
     RequestSample { kind: kind.into(), asked_ns: monotonic_ns(), ..RequestSample::default() }
 }

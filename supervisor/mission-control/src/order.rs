@@ -2,7 +2,6 @@
 
 use common::samples::{HoldReason, Order};
 
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Snapshot {
     /// Whether the robot was once ready to drive on this bus.
     pub was_ready: bool,

@@ -98,7 +98,7 @@ pub(crate) fn log(stall: &StallSample) {
     );
 }
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct StallWatch {
     moved_m: f64,
     turned_rad: f64,
@@ -272,7 +272,6 @@ impl StallWatch {
         is_elsewhere.then(|| self.recover(StallCause::Relocated, pose))
     }
 
-    /// Decide the next recovery step against `cause`.
     fn recover(&mut self, cause: StallCause, pose: &PoseSample) -> StallSample {
         let relocated = cause == StallCause::Relocated;
         let recovery = if self.may_replan(cause, pose.pose().position) {

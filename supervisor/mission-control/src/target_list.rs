@@ -38,8 +38,7 @@ pub enum TargetOutcome {
     Followed,
 }
 
-/// How the robot followed a beacon.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Followed {
     pub way_m: f64,
     pub time_s: f64,
@@ -47,7 +46,7 @@ pub struct Followed {
     pub lost: u64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct TargetResult {
     pub number: u64,
     pub x_m: f64,
@@ -63,14 +62,14 @@ pub struct TargetResult {
     pub followed: Option<Followed>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Stored {
     result: TargetResult,
     /// The tick of the arrival; none if the robot did not arrive.
     tick: Option<u64>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TargetList {
     number: u64,
     current: TargetPoint,
@@ -204,7 +203,6 @@ impl TargetList {
         sample
     }
 
-    /// Append `points`; false if there are too many.
     pub(crate) fn append(&mut self, points: &[TargetPoint]) -> bool {
         let fits = self.ahead.len() + points.len() < MOST_TARGETS;
         if fits {

@@ -19,14 +19,12 @@ use common::{grid::GridFrame, samples::FieldCell};
 use flate2::{Compression, write::DeflateEncoder};
 use glam::DVec2;
 
-/// Steps of a turn.
 const STEPS: f32 = 254.0;
 const NONE: u8 = 255;
 /// The most cells a side of a field; from a larger one every second, third, ... cell is sent.
 const MOST_A_SIDE: usize = 256;
 
-/// The content of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Shown {
     Map = 1,
     Field = 2,

@@ -66,14 +66,12 @@ struct Tick {
     link: Option<(u64, f64)>,
 }
 
-/// The content of the newest samples.
 #[derive(Debug, Default)]
 pub struct Collector {
     mission: Mission,
     ticks: BTreeMap<u64, Tick>,
     pose_tick: u64,
     newest: Tick,
-    /// The newest samples, and the events in them.
     pub state: RobotState,
     usage: Vec<Usage>,
     /// The ground truth from the tick of the newest row on, as far as it was read.

@@ -33,7 +33,6 @@ impl Recorded {
         self.add(0, message.to_string().as_bytes());
     }
 
-    /// Add a map or a field.
     pub fn blob(&mut self, message: &[u8]) {
         self.add(1, message);
     }

@@ -5,7 +5,7 @@ use glam::DVec2;
 
 use super::page::{PLOT_SIDE, View, metres};
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Lattice {
     pub(super) cols: usize,
     pub(super) rows: usize,

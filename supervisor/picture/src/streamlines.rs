@@ -9,7 +9,6 @@ use super::{
     page::{Path, ink},
 };
 
-#[derive(Debug)]
 pub(super) struct Style {
     /// Bytes of the lines: an irregular field is drawn sparser, not larger.
     pub(super) budget: usize,
@@ -143,7 +142,6 @@ struct Tracer<'a> {
     spacing: f64,
     /// Square bins of one spacing.
     drawn: Vec<Vec<DVec2>>,
-    /// Bins along a row and along a column.
     bins: [usize; 2],
 }
 

@@ -18,7 +18,7 @@ use crate::process::ExitCause;
 
 const LOG_TAIL_BYTES: u64 = 400;
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct Death {
     pub stage: &'static str,
     pub pid: u32,
@@ -36,7 +36,7 @@ pub struct Death {
     pub log_tail: String,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Next {
     StartNow,

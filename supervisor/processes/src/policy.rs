@@ -37,13 +37,11 @@ const ABORT_GRACE: Duration = Duration::from_millis(100);
 /// Time for a terminated stage to stop in order. The link sends three datagrams in it.
 const STOP_GRACE: Duration = Duration::from_millis(300);
 
-/// Time since the supervisor started.
 pub type Now = Duration;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     Start,
-    /// The process could not be started.
     StartFailed,
     /// The process beat, but is not ready yet.
     BeatStarting,
@@ -80,7 +78,6 @@ pub enum Phase {
     },
     /// There is no process; the stage died too often, and only an operator starts it again.
     Held,
-    /// A process that has not beaten as ready.
     Starting {
         since: Now,
     },

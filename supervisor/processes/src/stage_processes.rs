@@ -39,7 +39,6 @@ pub struct StageProcesses {
     directory: PathBuf,
     clock: ObservedTime,
     starter: Starter,
-    /// Whether stages that end stay down.
     ending: bool,
     start_blocked: bool,
 }
@@ -251,7 +250,6 @@ impl StageProcesses {
         self.names(|stage| external && !stage.is_running())
     }
 
-    /// The stages that only an operator starts again.
     pub fn held(&self) -> Vec<&'static str> {
         self.names(|stage| stage.phase() == Phase::Held)
     }

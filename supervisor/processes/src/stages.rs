@@ -23,7 +23,6 @@ pub struct Stage {
     /// The time added to each deadline for a million cells of the map.
     pub per_million_cells: Duration,
     pub while_down: &'static str,
-    /// The main function of its process.
     pub run: fn(&Start) -> Result<(), StageError>,
     pub replay: Begin,
 }
@@ -50,7 +49,6 @@ impl Stage {
         }
     }
 
-    /// A stage that answers one topic with another.
     const fn answering<A: Answering>(while_down: &'static str) -> Self {
         Self::new::<Answers<A>>(replay::<A>, while_down)
     }

@@ -32,7 +32,6 @@ const CHUNK_BYTES: u64 = 1 << 19;
 const CHUNK_EVERY: Duration = Duration::from_secs(1);
 /// The name of the metadata record about the run.
 pub(crate) const RUN: &str = "run";
-/// The channel of the recorder's own losses.
 pub(crate) const LOST: &str = "recorder";
 const LOST_SCHEMA: &[u8] = br#"{"title": "firsthand.Recorder", "type": "object", "properties": {"lost": {"type": "object"}}}"#;
 
@@ -137,7 +136,6 @@ impl RecordingFile {
         Ok(times[0])
     }
 
-    /// Add a message that is no sample.
     pub(crate) fn message(&mut self, topic: &str, log_ns: u64, message: &[u8]) -> Result {
         self.output.write(topic, 0, [log_ns; 2], message)
     }

@@ -18,7 +18,7 @@ struct Last {
     bus: u32,
 }
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Losses {
     /// The recorder was there before all writers, so their first samples are missing if they do not come.
     whole: bool,
@@ -68,7 +68,6 @@ impl Losses {
         std::mem::take(&mut self.changed).then_some(&self.counts)
     }
 
-    /// Losses by topic.
     pub(crate) const fn counts(&self) -> &BTreeMap<&'static str, u64> {
         &self.counts
     }

@@ -30,18 +30,17 @@ use crate::{
 /// Most bytes of a record or chunk. The recorder's are shorter.
 const LONGEST_RECORD: usize = 1 << 28;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub enum End {
     Complete,
     /// The recorder was killed, or the disk was full: the file ends after the last whole chunk.
     Cut {
         after: Duration,
-        /// The problem behind the last message.
         problem: String,
     },
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Recording {
     pub path: PathBuf,
     pub run_text: String,
@@ -57,25 +56,24 @@ pub struct Recording {
     pub lost: BTreeMap<String, u64>,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Message {
     pub topic: Arc<str>,
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     /// The sample's number, counted by its writer.
     pub sequence: u32,
-    /// The message in the topic's encoding.
     pub data: Vec<u8>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct Sample<P> {
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     pub sample: P,
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct SliceSample<H, T> {
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,

@@ -21,7 +21,6 @@ const ODOMETRY: &str = "foxglove/odometry";
 const GRID: &str = "foxglove/grid";
 const SCENE: &str = "foxglove/scene";
 const MOVERS: &str = "foxglove/movers";
-/// The channel of log lines.
 pub const LOG: &str = "log";
 
 const MAP: &str = "map";
@@ -38,7 +37,7 @@ static DRAWN: [&dyn AnyTopic; 5] =
     [&topics::POSE, &topics::RANGES, &topics::SCAN, &topics::GRID, &topics::TARGET];
 
 /// A channel for viewers, whose messages are in the encoding `protobuf`, and the schema too.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Channel {
     pub topic: String,
     /// The name of its schema, such as `foxglove.Grid`.
@@ -47,7 +46,6 @@ pub struct Channel {
     pub descriptors: &'static [u8],
 }
 
-/// Takes a message: topic and content.
 pub type Sink<'a> = &'a mut dyn FnMut(&str, &[u8]);
 
 macro_rules! channel {
@@ -79,7 +77,6 @@ fn scan_topic(sensor: &Sensor) -> String {
     format!("foxglove/scan/{}", sensor.name)
 }
 
-/// The drawings of a run for viewers.
 pub struct Drawn {
     mission: Option<Mission>,
     sensors: Vec<Sensor>,
@@ -90,7 +87,6 @@ pub struct Drawn {
 }
 
 impl Drawn {
-    /// A run before its first sample.
     pub fn new(mission: Option<Mission>) -> Self {
         Self {
             sensors: mission.as_ref().map(Mission::sensor_table).unwrap_or_default(),

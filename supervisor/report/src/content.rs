@@ -23,7 +23,6 @@ use crate::{
     source::{self, Source},
 };
 
-/// The lines of logs, which are no topic.
 const LOG: &str = "log";
 /// Most bytes of the ground truth: an hour at 10 Hz takes 10 MB.
 const LARGEST_TRUTH: u64 = 1 << 28;
@@ -38,7 +37,6 @@ pub(crate) struct Content {
     pub(crate) mission: Mission,
     /// Names and values: robot, build, machine and others.
     about: Vec<(&'static str, String)>,
-    /// Gaps of the recordings.
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
     /// The row of the front sonar; none for a robot without sonars.

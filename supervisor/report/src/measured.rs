@@ -50,7 +50,6 @@ impl Measured {
         }
     }
 
-    /// Take a reading of the front sonar.
     pub(crate) fn range(&mut self, range: &RangeReading, mission: &Mission) {
         self.ranges += 1;
         match range.status() {

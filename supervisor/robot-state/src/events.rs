@@ -18,7 +18,6 @@ use crate::{
 const LONGEST: usize = 300;
 const MOST_WAITING: usize = 20_000;
 
-/// A line of the list.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Event {
     /// Mission time, seconds.
@@ -51,7 +50,6 @@ pub enum Kind {
 
 const FAILSAFE: &str = "failsafe";
 
-/// Finds the events in samples, in their order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Events {
     waiting: VecDeque<Event>,
@@ -137,7 +135,6 @@ impl Events {
         }
     }
 
-    /// The importance of the state of `link`.
     pub(crate) fn kind(&self, link: &LinkSample) -> Kind {
         match link.cause() {
             Cause::NotOrdered => Kind::Note,

@@ -50,9 +50,7 @@ pub struct RobotState {
     pub power: Option<PowerSample>,
     /// The age of what is shown, if a mirror shows a robot of another machine.
     pub mirror: Option<MirrorSample>,
-    /// The newest death of each stage that died.
     pub deaths: BTreeMap<String, DeathSample>,
-    /// The number of stalls that were seen.
     pub stalls: u64,
     events: Events,
 }
@@ -133,7 +131,6 @@ impl RobotState {
         self.events.now_s
     }
 
-    /// The current target and those after it.
     pub fn targets(&self) -> impl Iterator<Item = &TargetPoint> {
         self.target().into_iter().flat_map(|sent| [&sent.target].into_iter().chain(sent.ahead()))
     }

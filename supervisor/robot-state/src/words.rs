@@ -27,7 +27,6 @@ pub const fn guidance_in_words(status: u8) -> &'static str {
     }
 }
 
-/// How a stage's process ended.
 pub fn death_in_words(death: &DeathSample) -> String {
     let code = death.code;
     match DeathCause::from_byte(death.cause) {

@@ -28,7 +28,7 @@ pub struct Hearer {
 }
 
 /// How often each cause of the failsafe took a robot that had gone to standing or to half speed.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Interruptions {
     has_gone: bool,
     newest: Option<(Action, Cause)>,
@@ -92,7 +92,6 @@ impl Hearer {
         self.looks.add(stamp.tick, |totals| totals.with(guidance));
     }
 
-    /// The ways of what moved, the oldest first.
     pub fn trails(&self) -> &[Trail] {
         &self.trails.0
     }
@@ -104,7 +103,6 @@ impl Hearer {
         before + its.or(self.solves.get(&newest).copied()).unwrap_or_default()
     }
 
-    /// Tick latencies of every generation of the link.
     pub(crate) fn latency(&self) -> Histogram {
         let mut all = Histogram::default();
         for link in self.links.values() {

@@ -41,7 +41,7 @@ impl From<&Histogram> for Quantiles {
 
 /// The last line of `run --json`. Distances are in metres. An unknown value is none (null), such as the ground truth of a real
 /// robot.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Summary {
     pub outcome: Outcome,
     pub reason: String,
@@ -175,7 +175,6 @@ impl Summary {
         }
     }
 
-    /// Lines below the picture.
     pub fn captions(&self) -> Vec<String> {
         let metres = |value: Option<f64>| {
             value.map_or("unknown".to_owned(), |value| format!("{value:.3} m"))

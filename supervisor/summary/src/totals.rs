@@ -8,7 +8,7 @@ use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatu
 /// The number of ticks whose totals are stored: that of the arrival must still be there when its command is read.
 const MOST: usize = 1024;
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct Totals<T> {
     newest: VecDeque<(u64, T)>,
 }
@@ -42,7 +42,7 @@ impl<T: Copy + Default> Totals<T> {
 }
 
 /// The extremes of both wheels' commanded speeds, rad/s.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct WheelTotals {
     extremes: Option<[f64; 2]>,
 }
@@ -64,8 +64,7 @@ impl WheelTotals {
     }
 }
 
-/// The robot's stops to look around.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct LookTotals {
     pub looks: u64,
     pub ticks: u64,

@@ -11,7 +11,6 @@ use std::{
 };
 
 /// A thread that works turn by turn until this is dropped.
-#[derive(Debug)]
 pub struct Turns {
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,

@@ -49,7 +49,6 @@ use report::Series;
 const NOT_CLEAN: u8 = 8;
 
 /// What a chaos tried, what went wrong, the worst case in words, and the whole result as text.
-#[derive(Debug)]
 pub struct Judged {
     pub tried: u64,
     pub lost: u64,

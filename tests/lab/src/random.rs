@@ -3,7 +3,6 @@
 use glam::DVec2;
 use rand_pcg::{Pcg64, rand_core::Rng as _};
 
-#[derive(Clone, Debug)]
 pub struct Random(Pcg64);
 
 impl Random {

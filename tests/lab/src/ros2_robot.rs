@@ -77,7 +77,6 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(())
 }
 
-#[derive(Debug)]
 pub struct Ros2Robot {
     /// What a mission of the robot states beside its other keys.
     pub keys: Vec<String>,
@@ -176,7 +175,6 @@ struct Program {
     drive: DifferentialDrive,
     turns: f64,
     pose: Pose2,
-    /// The newest angles of the wheels.
     wheels: Option<WheelSpeeds>,
     taken_ns: Option<u64>,
 }

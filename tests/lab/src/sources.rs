@@ -81,13 +81,11 @@ struct Source<'a> {
     arguments: &'a Arguments,
     chance: Random,
     file: Option<BufReader<File>>,
-    /// The beginning of an incomplete line.
     line: String,
     truth: Vec<GroundTruthTick>,
     poses: Vec<PoseSample>,
     next_fix_s: f64,
     turned: Option<(f64, f64)>,
-    /// Published ones.
     fixes: u64,
     turns: u64,
 }

@@ -87,7 +87,7 @@ impl Found {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Asked {
     /// Number of worlds; without it a hundred that are drawn, all files, and ten on each map without tests.
     pub count: Option<usize>,
@@ -114,7 +114,6 @@ pub fn find(worlds: &Worlds, asked: Asked) -> Result<Found> {
     Ok(found)
 }
 
-/// Draw worlds until enough of them are solvable.
 fn draw(&Kind { stream, name, draw, rules }: &Kind, asked: Asked) -> Result<Found> {
     let (count, seed) = (asked.count.unwrap_or(100), asked.seed);
     let mut found = Found::default();

@@ -70,8 +70,7 @@ impl Echo {
     }
 }
 
-/// A sonar where it is when it measures.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Listener {
     from: Pose2,
     half_rad: f64,

@@ -16,7 +16,6 @@ pub struct Moment {
     pub machine_ns: u64,
 }
 
-/// Something that happened on the link.
 #[derive(Clone, Copy, Debug)]
 pub enum Observation<'a> {
     Pace(Pace),
@@ -24,14 +23,12 @@ pub enum Observation<'a> {
     Directive(Order, HoldReason),
     /// An operator resumed the robot, so faults count as repaired.
     Resumed,
-    /// The controller published a newer command.
     Command(&'a CommandSample),
     /// A command with these speeds was sent to the wheels, counts/s, forward positive.
     Commanded([i16; 2]),
     Sent,
     /// The robot owes so many acknowledgements for what was sent.
     Owed(usize),
-    /// The robot acknowledged something.
     Acknowledged,
     /// The motor currents of the wheels in the motor frame that follows, AD counts.
     Currents([u16; 2]),
@@ -48,14 +45,12 @@ pub enum Observation<'a> {
     Responds(Response),
     /// A sender other than the link told the robot something.
     Commander(Commander),
-    /// Two nodes publish odometry, which this text names.
     TwoPublishers(&'a str),
     /// The robot answers again or for the first time, and was asked for its streams.
     Found {
         /// Whether it had answered before.
         again: bool,
     },
-    /// The robot does not answer.
     Lost,
 }
 
@@ -88,7 +83,7 @@ impl From<bool> for Condition {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Clears {
     WithCondition,
     After(Duration),

@@ -12,7 +12,6 @@ use super::monitor::{Condition, Moment, Monitor, Observation};
 
 #[derive(Clone, Copy, Debug)]
 struct Times {
-    /// The answered tick's.
     command: MissionTime,
     pose: MissionTime,
     guidance: MissionTime,

@@ -43,7 +43,6 @@ enum Leg {
 
 pub(super) struct Session {
     robot: Robot,
-    /// Time waits for commands.
     lock_step: bool,
     way: Way,
     radio: Option<Radio<Leg>>,

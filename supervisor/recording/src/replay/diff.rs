@@ -10,7 +10,7 @@ use crate::{
     replay::samples::{COMPARED, First, difference, is_keyframe, tick_of},
 };
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Parting {
     /// Lines of the run file that differ: mission, seed, clock. Address and name of the robot are left out.
     pub run: Vec<String>,

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Report {
     pub stages: BTreeMap<&'static str, StageReport>,
     pub difference: Option<Difference>,
@@ -12,7 +12,7 @@ pub struct Report {
     pub cut_after_s: Option<f64>,
 }
 
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct StageReport {
     /// Generations whose outputs are equal to the bit.
     pub equal: u64,
@@ -27,7 +27,7 @@ pub struct StageReport {
     pub unrecorded: u64,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, PartialEq, Serialize)]
 pub struct Difference {
     pub stage: &'static str,
     pub generation: u32,
@@ -46,7 +46,6 @@ impl Report {
         self.stages.values().map(|stage| stage.equal).sum()
     }
 
-    /// Generations of all stages that were not replayed.
     pub fn not_replayed(&self) -> usize {
         let stages = self.stages.values();
         stages.map(|stage| stage.not_replayed.len()).sum()

@@ -9,7 +9,7 @@ use glam::DVec2;
 /// Step along a line of sight, as a share of a cell.
 const SIGHT_STEP: f64 = 0.1;
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub struct Belief {
     grid: Replica<u8>,
     pub header: GridHeader,

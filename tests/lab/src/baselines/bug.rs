@@ -77,7 +77,6 @@ impl Planner for Bug {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
 struct Straight<'a> {
     map: &'a Map<'a>,
     line_from: DVec2,

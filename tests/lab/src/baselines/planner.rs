@@ -20,7 +20,7 @@ pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
     fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way;
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub enum Way {
     Unknown,
     To(DVec2),
@@ -36,7 +36,6 @@ impl Way {
     }
 }
 
-#[derive(Debug)]
 pub struct Baseline<P> {
     /// The target of the robot; none before the supervisor has published one.
     target: Option<TargetSample>,

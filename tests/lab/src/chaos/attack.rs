@@ -42,7 +42,6 @@ pub struct Attack {
     time: Option<MissionTime>,
     pub consumers: Consumers,
     entries: Vec<RosterEntry>,
-    /// The time when they were read.
     entries_read: Option<Instant>,
     supervisor: u32,
     /// Whether the supervisor was hit. Later samples of it and its stages are no sign of its successor.

@@ -27,7 +27,7 @@ const CLEARANCE_M: f64 = 0.45;
 /// The greatest distance by the ground truth of a robot from a target that it reached, metres.
 const REACHED_WITHIN_M: f64 = 0.5;
 
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct Changes {
     /// Requests: taken (the supervisor confirmed them), refused, unanswered (the supervisor was hit). Targets: reached, replaced.
     #[serde(flatten)]

@@ -33,7 +33,7 @@ const FROZEN_M: f64 = 1.5;
 /// Messages that are stored: as many as come in [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Late {
     /// Time on the clock of the incoming bytes.
     pub at: Duration,
@@ -41,7 +41,6 @@ pub struct Late {
 }
 
 /// Passes bytes unchanged until its fault begins.
-#[derive(Debug)]
 pub struct FaultInjector {
     fault: RobotFault,
     faulty: bool,
@@ -163,7 +162,6 @@ impl FaultInjector {
         out
     }
 
-    /// Note a message that came before the fault.
     fn note(&mut self, said: Said) {
         let Report { ranges, scan, scans, .. } = &said.report;
         let distances = ranges.iter().filter(|(_, range)| range.is_some_and(|range| range >= 0.0));

@@ -28,7 +28,7 @@ struct Counts {
     not_replayed: u64,
 }
 
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct Replays {
     #[serde(flatten)]
     whole: Counts,

@@ -22,8 +22,7 @@ const FILE_NAME: &str = "signals.csv";
 /// The name for supervisor and stages together.
 pub const EVERYTHING: &str = "everything";
 
-/// The result of all missions under attack.
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct Report {
     pub missions: u64,
     pub reached: u64,
@@ -50,7 +49,7 @@ pub struct Report {
     pub took_s: f64,
 }
 
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct ConsumerCounts {
     pub killed: u32,
     pub frozen: u32,
@@ -62,8 +61,7 @@ pub struct ConsumerCounts {
     pub last_end: Option<String>,
 }
 
-/// Times from the signal to the successor.
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct Recovery {
     /// The time to the first ready beat, after kills: a death is noticed at once.
     #[serde(serialize_with = "quantiles")]
@@ -114,7 +112,6 @@ impl Report {
         self.kills.values().flat_map(BTreeMap::values).sum()
     }
 
-    /// Count a signal whose measurement is complete.
     fn add(&mut self, row: &Row) {
         let Row { stage, kind, ready_ms, first_output_ms, .. } = row;
         *match self.consumers.get_mut(stage) {

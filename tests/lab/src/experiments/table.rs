@@ -34,7 +34,7 @@ pub struct Experiment {
 
 /// A claim of the paper about the median of a figure, or about the share that `arrived`. "About half" is 0.4 to 0.6, "about 0.7"
 /// is 0.6 to 0.8; a deviation is minor up to a fifth of the path.
-#[derive(Debug, Deserialize)]
+#[derive(Deserialize)]
 pub struct Claim {
     pub experiment: String,
     pub claim: String,

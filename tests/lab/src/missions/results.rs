@@ -30,7 +30,6 @@ pub fn command() -> Result<String> {
     shlex::try_join(words.iter().map(String::as_str)).or_cannot("write the command")
 }
 
-#[derive(Debug)]
 pub struct Results {
     pub directory: PathBuf,
     pub rows: Table<Row>,

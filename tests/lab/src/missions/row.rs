@@ -35,14 +35,12 @@ pub const OUTCOMES: [&str; 6] =
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub world: String,
-    /// Seed of the simulation's noise.
     pub seed: u64,
     pub setting: String,
     pub planner: String,
     pub outcome: Outcome,
     pub reason: String,
     pub time_s: f64,
-    /// Distance driven by the ground truth.
     pub path_m: f64,
     pub straight_m: f64,
     pub shortest_m: f64,
@@ -183,7 +181,7 @@ impl Record for Row {
 }
 
 /// The latencies of one mission's ticks and solves, microseconds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub struct Latency {
     pub world: String,
     pub seed: u64,

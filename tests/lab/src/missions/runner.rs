@@ -31,7 +31,6 @@ const PAGE: &str = "report/report.html";
 /// Time between lines of progress that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-#[derive(Clone, Debug)]
 pub struct Plan {
     pub trials: Vec<Trial>,
     pub settings: Vec<Setting>,
@@ -47,7 +46,7 @@ pub struct Plan {
     pub calibrates: bool,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub enum NoiseSeeds {
     /// Every world has the same seeds: this seed and the following ones.
     Counted(u64),
@@ -195,7 +194,6 @@ struct Robot<'a> {
     trial: &'a Trial,
     seed: u64,
     name: &'a str,
-    /// The other robot in its world.
     other: Option<&'a str>,
     directory: PathBuf,
     calibrated: Option<String>,

@@ -106,7 +106,6 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result 
     Ok(())
 }
 
-/// Forwards all new samples.
 type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
 
 fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward> {

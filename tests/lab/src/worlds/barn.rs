@@ -102,7 +102,6 @@ fn scene(drums: Vec<Drum>) -> Scene {
     }
 }
 
-/// The rules of the challenge.
 pub const RULES: Rules = Rules {
     success_within_m: 1.0,
     clock_after_departure: true,

@@ -19,8 +19,6 @@ const MOTOR_BYTES: usize = 33;
 /// The angle of a count of an X80, radians.
 pub const COUNT_RAD: f64 = TAU / 1200.0;
 
-/// Converts bytes to the messages of one protocol.
-#[derive(Debug)]
 pub enum Words {
     X80 {
         robot: Decoder,
@@ -88,7 +86,7 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], mut of: impl FnMut(&Frame<'_>)
 }
 
 /// A message of the robot, in the words of JSON whatever it speaks.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Said {
     /// Of an X80 the wheels are its channels, and the ranges those of its sonars, by their numbers.
     pub report: json_wire::Report,
@@ -203,7 +201,6 @@ impl Said {
     }
 }
 
-#[derive(Clone, Debug)]
 pub enum Effect {
     /// The wheels turn; these bytes in place of the order make them stand.
     Moves {
@@ -211,7 +208,6 @@ pub enum Effect {
     },
     /// The wheels stand by a speed of 0.
     Stands,
-    /// The wheels stand by other means.
     Disables,
     Other,
 }
