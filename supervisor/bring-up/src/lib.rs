@@ -47,7 +47,6 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -74,7 +73,6 @@ impl Finding {
         Self::new(part, Verdict::Unknown, text)
     }
 
-    #[must_use]
     pub(crate) fn with_key(mut self, key: impl Into<String>, value: impl Into<String>) -> Self {
         self.keys.push((key.into(), value.into()));
         self
@@ -83,7 +81,6 @@ impl Finding {
 
 /// What the trace says of the robot of `mission`, and where the beams of a laser, or without one the echoes of rangers, ended: metres from
 /// the robot's first place, x ahead. With `lifted` wheels nothing is said of what the body does.
-#[must_use]
 pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Vec<DVec2>) {
     let mut found = vec![wheels::rate(mission, trace)];
     if !trace.begins_at_rest() {

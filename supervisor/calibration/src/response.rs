@@ -209,7 +209,6 @@ impl Model {
 }
 
 /// Sums of the squares of the first values from their mean, of the products of both, and of the squares of the second.
-#[must_use]
 pub fn spread(points: &[[f64; 2]]) -> [f64; 3] {
     let mean = [0, 1].map(|of| points.iter().map(|it| it[of]).sum::<f64>() / points.len() as f64);
     [(0, 0), (0, 1), (1, 1)].map(|(one, other)| {
@@ -217,7 +216,6 @@ pub fn spread(points: &[[f64; 2]]) -> [f64; 3] {
     })
 }
 
-#[must_use]
 pub fn keys(estimate: &Estimate, stated: Response) -> String {
     let Measured { value, sd } = estimate.delay_s;
     let acceleration = match estimate.acceleration_m_s2 {

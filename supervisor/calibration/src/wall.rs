@@ -134,7 +134,6 @@ pub(crate) fn direction_aside(left: f64, most: f64) -> f64 {
 }
 
 impl Wall {
-    #[must_use]
     pub fn new(plan: CalibrationPlan) -> Self {
         Self {
             plan,
@@ -159,22 +158,18 @@ impl Wall {
         }
     }
 
-    #[must_use]
     pub fn loops(&self) -> &[Loop] {
         &self.loops
     }
 
-    #[must_use]
     pub fn normal_sd(&self) -> f64 {
         normal_sd(&self.differences)
     }
 
-    #[must_use]
     pub fn metres(&self) -> f64 {
         self.ways.rolled_m / 2.0
     }
 
-    #[must_use]
     pub const fn state(&self) -> State {
         match self.phase {
             Phase::Finished => State::Finished,

@@ -8,15 +8,9 @@ use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatu
 /// The number of ticks whose totals are stored: that of the arrival must still be there when its command is read.
 const MOST: usize = 1024;
 
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(crate) struct Totals<T> {
     newest: VecDeque<(u64, T)>,
-}
-
-impl<T> Default for Totals<T> {
-    fn default() -> Self {
-        Self { newest: VecDeque::new() }
-    }
 }
 
 impl<T: Copy + Default> Totals<T> {
