@@ -129,7 +129,6 @@ pub(crate) fn failed(
     move |source| CheckpointError::File { action, file, source }
 }
 
-/// Append `state`, of at most `capacity` bytes, to `header`.
 pub(crate) fn encode_after<T: Serialize>(
     header: Vec<u8>,
     state: &T,

@@ -160,12 +160,10 @@ pub struct Heard {
 /// A sender, other than the link, of commands to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commander {
-    /// Its number in the network.
     pub number: [u8; 16],
     pub moves: bool,
 }
 
-/// A scan of the laser in `row`, its beams as [`beam`] gives them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LaserScan {
     pub row: usize,

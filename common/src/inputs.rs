@@ -19,7 +19,6 @@ use crate::{
     topics,
 };
 
-/// A piece has at most so many bytes.
 const PIECE: usize = 16_384;
 /// Keyframes of a large map need longer pieces: one byte for so many cells.
 const CELLS_FOR_A_BYTE: usize = 8;

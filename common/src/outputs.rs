@@ -170,7 +170,6 @@ impl Outputs {
         matches!(&self.saved, Saved::Journal(journal) if journal.is_long())
     }
 
-    /// Save a snapshot of `state` if one is due.
     pub fn shorten_journal(&mut self, state: &impl Serialize) -> Result {
         match &mut self.saved {
             Saved::Journal(journal) if journal.is_long() => Ok(journal.snapshot(state)?),

@@ -4,7 +4,6 @@ use std::{fs, time::Duration};
 
 use rustix::param::clock_ticks_per_second;
 
-/// A field of the status of process `process`, a number or `self`.
 pub fn field(process: &str, field: &str) -> Option<String> {
     let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let mut lines = status.lines().filter_map(|line| line.split_once(':'));

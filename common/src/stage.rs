@@ -49,7 +49,6 @@ use crate::{
 
 /// What a stage computes. A process and a replay run the same one.
 pub trait Stage: Sized + 'static {
-    /// The state that a generation starts from.
     type Start: Serialize + DeserializeOwned;
     /// What the stage takes at once: a sample of a topic, or an enum where it takes more than one kind. It may borrow from shared
     /// memory for the length of the call. A recording holds it in this encoding.
@@ -85,7 +84,6 @@ pub trait Stage: Sized + 'static {
     }
 }
 
-/// A state that was saved by a stage of another mission.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("the saved state is of another mission; the stage starts without it")]
 pub struct ForeignState;
@@ -115,7 +113,6 @@ impl<S: Stage> Runner<S> {
         self.out.open_late(context)
     }
 
-    /// Note `entry` for a replay, and let the stage take it.
     pub fn take_entry(&mut self, entry: S::Entry<'_>) -> Result<S::Outcome> {
         self.out.note(&entry)?;
         self.stage.take_entry(entry, &mut self.out)
@@ -206,7 +203,6 @@ pub struct Answer<P> {
     pub sample: P,
     /// Whether the state is saved before the sample is published. Otherwise no tick waits for the file.
     pub saves_first: bool,
-    /// A warning for the log of the process.
     pub warning: Option<Cow<'static, str>>,
 }
 

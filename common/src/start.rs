@@ -111,7 +111,6 @@ pub fn become_child(process_name: &str, supervisor: u32) -> Result {
     }
 }
 
-/// Take a name that `ps` and `pkill` show.
 pub(crate) fn name_process(name: &str) -> Result {
     // A name with a zero byte cannot come from the table.
     if let Ok(name) = std::ffi::CString::new(name) {

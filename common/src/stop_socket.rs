@@ -24,7 +24,6 @@ use crate::{clock::monotonic_ns, domain::Domain, poll};
 /// A request of an operator to the link. Recordings hold the number of the variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request {
-    /// The stop is over.
     Resume,
     /// The robot stands until an operator resumes.
     Stop,

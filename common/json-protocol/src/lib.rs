@@ -61,7 +61,6 @@ pub struct Report {
     pub battery_v: Option<f64>,
 }
 
-/// As `scan`, `scan_age_s` and `scan_time_s` of a [`Report`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scan {

@@ -32,7 +32,6 @@ pub enum Model {
     #[serde(rename = "turtlebot3-waffle")]
     TurtleBot3Waffle,
     /// Clearpath's TurtleBot 4, a Create 3 with a laser that is turned to its left. Source of the laser's place: `turtlebot4_description`.
-    #[serde(rename = "turtlebot4")]
     TurtleBot4,
     /// iRobot's Create 3. Source: the control parameters of `create3_sim`, and its documentation of
     /// `safety_override`: by default it drives no faster than 0.306 m/s and hardly backwards. It has no laser of its
@@ -41,7 +40,6 @@ pub enum Model {
     /// Yujin's Kobuki. Source: its user guide; its accelerations are those of its ROS velocity smoother.
     Kobuki,
     /// A Kobuki with a depth camera beside the laser, as a TurtleBot 2 has one.
-    #[serde(rename = "turtlebot2")]
     TurtleBot2,
     /// A small car on the X80's boards. Nominal, no product: the size of a model car of about 1:14.
     Car,

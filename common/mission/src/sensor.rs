@@ -319,18 +319,15 @@ impl Sensor {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Sensors {
     /// The cone whose bearing is the least.
-    #[serde(rename = "front")]
     Front,
     #[serde(rename = "front+infrared")]
     FrontInfrared,
     /// The front sonar and the cones within 60 degrees of it.
-    #[serde(rename = "three-front")]
     ThreeFront,
-    #[serde(rename = "laser")]
     Laser,
-    #[serde(rename = "all")]
     All,
 }
 

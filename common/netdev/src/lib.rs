@@ -16,7 +16,6 @@ use nix::{
 /// The most bytes of a packet of IP.
 const LARGEST: u32 = 65_535;
 
-/// An address of an interface.
 #[derive(Clone, Copy, Debug)]
 pub struct Net<A> {
     addr: A,

@@ -8,7 +8,7 @@ const LONGEST_TEXT: usize = 256;
 /// The bytes before the message name its encoding.
 pub(crate) const ENCAPSULATION: usize = 4;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[derive(Debug, PartialEq, Eq, Error)]
 pub enum Malformed {
     #[error("encoding {0:#06x} instead of plain CDR; set the robot's middleware to XCDR1")]
     Encoding(u16),

@@ -9,7 +9,6 @@ pub const COVARIANCE: usize = 36;
 #[derive(Clone, Copy, Debug)]
 pub struct Header<'a>(pub u64, pub &'a str);
 
-/// The beginning of a message with this header.
 pub fn begin(Header(ns, frame): Header<'_>) -> Writer {
     let mut writer = Writer::default();
     writer.header(ns, frame);

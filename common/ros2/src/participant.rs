@@ -151,7 +151,6 @@ impl Participant {
         Ok(())
     }
 
-    /// Fails if DDS refuses the reader.
     pub fn reader(&self, topic: &Topic, quality: Quality) -> io::Result<Reader> {
         let policies = quality.policies();
         let subscriber = self.inner.create_subscriber(&policies).map_err(io::Error::other)?;
@@ -163,7 +162,6 @@ impl Participant {
         Ok(Reader { inner: reader, bell: self.bell.clone() })
     }
 
-    /// Fails if DDS refuses the writer.
     pub fn writer(&self, topic: &Topic, quality: Quality) -> io::Result<Writer> {
         let policies = quality.policies();
         let publisher = self.inner.create_publisher(&policies).map_err(io::Error::other)?;
@@ -213,7 +211,7 @@ impl Request {
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Message {
     pub payload: Payload,
     pub from: Gid,

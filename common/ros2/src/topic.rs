@@ -1,6 +1,6 @@
 //! A topic as DDS knows it.
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Topic {
     /// The name in ROS, from the root.
     pub name: String,

@@ -152,7 +152,6 @@ impl Answer {
     }
 }
 
-/// One measurement of a standard scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node {
     /// A turn begins with it.

@@ -43,7 +43,6 @@ impl Part {
         }
     }
 
-    /// The whole map in `frame`: a keyframe.
     pub const fn whole(frame: GridFrame, version: u64) -> Self {
         Self { keyframe: 1, ..Self::of(frame, frame.whole(), version) }
     }

@@ -195,7 +195,6 @@ enum Inside {
     Nothing,
     /// A sound frame begins at this offset.
     Frame(usize),
-    /// The frame is incomplete.
     Unknown,
 }
 

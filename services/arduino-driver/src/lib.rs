@@ -41,7 +41,7 @@ const GYRO_RAD: f64 = 1e-4;
 /// A greater multiple of a wheel's top speed is no speed.
 const IMPLAUSIBLE: f64 = 1.5;
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 enum Waits {
     No,
     /// The rest of the round that was asked for at poll `since`, of which these ranges came, centimetres.
@@ -55,7 +55,7 @@ enum Waits {
     },
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Arduino {
     body: Body,
     pid_rate_hz: f64,

@@ -24,7 +24,7 @@ const MOST_OFF_TARGET_M: f64 = 0.5;
 const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
 /// (14), with the heading in place of the measured velocity, which has no direction at rest, where every mission starts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Alignment {
     /// eta_d: cosine of the angle to the guidance.
     pub cosine: f64,
@@ -38,7 +38,7 @@ impl Alignment {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum SpeedLaw {
     /// (16): the robot drives while it turns.
     Paper,
@@ -57,7 +57,7 @@ enum Arrival {
     Arrived,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Controller {
     drive: Drive,
     tolerance: f64,

@@ -29,7 +29,7 @@ const BIAS_RAD_S: f64 = 0.002;
 /// Growth of the bias's deviation, rad/s per square root of a second.
 const BIAS_WALK: f64 = 2e-5;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct ErrorModel {
     /// Variance, m^2 per metre rolled.
     slip: f64,

@@ -36,7 +36,6 @@ impl Doubt {
         self.rolled_m = 0.0;
     }
 
-    /// An operator set the pose.
     pub(crate) const fn place(&mut self) {
         (self.rolled_m, self.relocated) = (0.0, [0.0; 2]);
     }

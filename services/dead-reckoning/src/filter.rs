@@ -97,7 +97,6 @@ fn parts(noise: &SMatrix<f64, 3, 3>) -> [f64; 6] {
 }
 
 impl Fix {
-    /// A fix in `frame`, in the frame of the estimate.
     fn laid(&self, frame: Pose2) -> Self {
         let turned = DVec2::from_angle(frame.heading);
         let DVec2 { x: cos, y: sin } = turned;
@@ -460,7 +459,7 @@ impl History {
 }
 
 /// It has the pose at the fix's time if the fix contradicts it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub(crate) struct Refused {
     pub(crate) why: FixRefusal,
     pub(crate) there: Option<Pose2>,

@@ -16,7 +16,7 @@ const MOST_TURNS: usize = 128;
 const MOST_COUNTS: usize = 128;
 
 /// The samples of sources outside that came since the tick before.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Sources {
     pub fixes: Vec<FixSample>,
     pub turns: Vec<TurnSample>,

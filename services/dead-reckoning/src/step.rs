@@ -95,7 +95,7 @@ struct Last {
     omega: f64,
 }
 
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default)]
 pub struct Reckoned {
     pub pose: PoseSample,
     /// The counts jumped farther than wheels turn, or the robot restarted them: the pose stays, and its covariance grows by how far the
@@ -103,7 +103,6 @@ pub struct Reckoned {
     pub rejected: bool,
     /// Fixes that agree contradicted the pose, which became theirs.
     pub relocated: bool,
-    /// An operator set the pose.
     pub placed: bool,
     /// Unless the fix before was refused for the same reason.
     pub refused: Option<FixRefusal>,
@@ -114,7 +113,7 @@ pub struct Reckoned {
 }
 
 /// (20) and (21).
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct DeadReckoning {
     drive: Drive,
     body: Body,
@@ -462,7 +461,7 @@ impl DeadReckoning {
     }
 }
 
-#[derive(Clone, Copy, PartialEq)]
+#[derive(PartialEq)]
 enum Taken {
     Used,
     Refused(FixRefusal),

@@ -22,7 +22,7 @@ const MOST_CLOCK_S: f64 = 4e9;
 /// Orders that count as answered by one report.
 const MOST_ANSWERED: usize = 64;
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Json {
     body: Body,
     rate_hz: f64,

@@ -12,7 +12,6 @@ use x80_driver::X80;
 
 use crate::transport::{BAUD, Line};
 
-/// A sensor with a wire of its own.
 #[derive(Debug)]
 pub struct SensorWire {
     /// None for that of the simulated robot, which hears the sensor's requests too.

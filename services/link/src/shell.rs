@@ -57,10 +57,8 @@ readers! {
     }
 }
 
-/// The link process.
 pub struct Shell {
     transport: Transport,
-    /// Of the sensors with wires of their own.
     wires: Vec<Transport>,
     inputs: Inputs,
     writers: Option<Writers>,

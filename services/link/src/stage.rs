@@ -23,7 +23,6 @@ use crate::step::{Effect, Entry, Event, Link, State};
 #[derive(Debug)]
 pub struct LinkStage {
     pub(crate) link: Link,
-    /// The header of each laser's scans, and their beams.
     lasers: Vec<(ScanHeader, usize)>,
     infrared: Option<InfraredSample>,
     power: Option<PowerSample>,
@@ -173,7 +172,6 @@ impl Stage for LinkStage {
         Ok(left)
     }
 
-    /// The bytes of the wire.
     fn publish_rest(&mut self, out: &mut Outputs) -> Result<(), StageError> {
         let now = out.at;
         for (at, header, bytes) in self.wire.drain(..) {

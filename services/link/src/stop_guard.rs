@@ -41,7 +41,6 @@ const SILENT: Duration = Duration::from_secs(10);
 /// A robot that says that it moves, in spite of all stops, for longer may have wrong encoders.
 const TOLD_IN_VAIN: Duration = Duration::from_secs(60);
 
-#[derive(Debug)]
 pub(crate) struct StopGuard {
     pipe: io::PipeWriter,
 }

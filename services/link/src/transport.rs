@@ -40,7 +40,6 @@ impl From<TransportError> for StageError {
 
 /// Bits a second of a serial line, if its device does not say otherwise.
 pub const BAUD: u32 = 115_200;
-/// The settings of a serial line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Line {
     /// Bits a second.

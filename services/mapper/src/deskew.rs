@@ -108,7 +108,6 @@ impl Poses {
 }
 
 /// A scan whose beams were measured at once, with the robot then.
-#[derive(Clone, Debug)]
 pub(crate) struct Placed {
     pub(crate) row: usize,
     pub(crate) robot: PoseSample,

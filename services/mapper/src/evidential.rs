@@ -43,7 +43,6 @@ pub(crate) struct Evidential {
     under: Vec<Option<u32>>,
     map_within: f64,
     sonars: usize,
-    /// Their rows.
     lasers: Vec<usize>,
     beside_laser: bool,
 }

@@ -10,7 +10,7 @@ const WALL_M: f64 = 0.5;
 /// No step to a neighbouring cell crosses the wall.
 const WALL_CELLS: f64 = 1.5;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub(crate) enum Area {
     Disc(DVec2),
     /// Its distance from this point is [`WALL_M`].

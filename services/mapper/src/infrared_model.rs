@@ -24,7 +24,7 @@ const FORMULA_M: f64 = 0.02;
 /// beside it. Nominal.
 pub(crate) const SCANNED_ASIDE_M: f64 = 0.04;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(crate) struct Seen {
     /// Metres from the ranger; at most 0.72.
     pub(crate) clear_m: f64,

@@ -46,7 +46,7 @@ const ENDED: u8 = 1;
 const PASSED: u8 = 2;
 const PASSED_FAR: u8 = 4;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Beam {
     /// Unit vector.
     along: DVec2,

@@ -71,10 +71,9 @@ const MIDDLE_M: f64 = 0.03;
 /// So much of a radius that was seen is left in the next scan, which may see a part of it.
 const RADIUS_LEFT: f64 = 0.98;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Thing {
     at_s: f64,
-    /// The laser's place.
     origin: DVec2,
     /// Its first and last end, if they are its own: nothing before it hides the rest.
     own: [Option<DVec2>; 2],
@@ -90,7 +89,6 @@ struct Thing {
 /// A thing that is followed, as what goes straight on, by a filter of Kalman's; accelerations are its noise.
 #[derive(Clone, Copy, Debug)]
 struct Track {
-    /// The first place and its doubt, and when.
     first: (DVec2, f64),
     since_s: f64,
     seen_s: f64,
@@ -113,7 +111,6 @@ pub(crate) struct Movers {
     /// Oldest first: times, the robot by odometry, beams.
     scans: VecDeque<(f64, Pose2, Vec<f32>)>,
     tracks: Vec<Track>,
-    /// The time at which a mover was seen last.
     seen_s: Option<f64>,
     placed: Vec<Mover>,
 }
@@ -202,7 +199,6 @@ impl Movers {
         }
     }
 
-    /// Foresee where the movers are at the time of `pose`.
     pub(crate) fn place(&mut self, pose: &PoseSample) {
         let [x, y, turn] = pose.map_from_odom;
         let (at_s, turned) = (pose.stamp.time().seconds(), DVec2::from_angle(turn));
@@ -253,7 +249,6 @@ impl Track {
         track
     }
 
-    /// The middle, foreseen.
     fn at(&self, at_s: f64) -> DVec2 {
         self.middle + (at_s - self.seen_s) * self.velocity
     }

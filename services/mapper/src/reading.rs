@@ -62,7 +62,6 @@ impl Rows {
         self.rows.iter().flatten().filter(|row| row.cone.is_some()).count()
     }
 
-    /// The rows of lasers.
     pub(crate) fn lasers(&self) -> Vec<usize> {
         (0..self.rows.len()).filter(|row| self.laser(*row).is_some()).collect()
     }
@@ -159,7 +158,6 @@ fn safety_distance(reading: &RangeReading) -> Option<f64> {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Reading {
     /// The sensor's place, metres in the mission frame.
     pub(crate) origin: DVec2,
@@ -170,7 +168,6 @@ pub(crate) struct Reading {
     pub(crate) sonar: SonarModel,
 }
 
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {
     /// The ranger's place, metres in the mission frame.
     pub(crate) origin: DVec2,
@@ -179,7 +176,7 @@ pub(crate) struct Ray {
     pub(crate) seen: Seen,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Fan<'a> {
     /// The laser's place, metres in the mission frame.
     pub(crate) origin: DVec2,
@@ -223,8 +220,6 @@ impl Fan<'_> {
     }
 }
 
-/// A touch of the body, in the mission's frame.
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch {
     /// The body's centre, metres.
     pub(crate) robot: DVec2,

@@ -143,9 +143,7 @@ struct Line {
 
 #[derive(Clone, Debug)]
 pub(crate) struct ScanMatcher {
-    /// Of the laser.
     row: usize,
-    /// Published matches are so far apart.
     every_ticks: u64,
     /// Matches that share their errors.
     shared: f64,

@@ -63,7 +63,6 @@ impl<T: Default> OfTick<T> {
     }
 }
 
-/// The mapper process.
 pub struct Shell {
     inputs: Inputs,
     runner: Runner<Mapper>,
@@ -72,7 +71,6 @@ pub struct Shell {
     scans: Vec<(u64, Scan)>,
     contact: OfTick<Option<ContactSample>>,
     last_keyframe: Option<MissionTime>,
-    /// The number of the newest zones.
     zones: u64,
 }
 

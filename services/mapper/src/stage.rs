@@ -13,8 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::step::{Belief, Change, Input, Mapper};
 
-/// A generation starts from it.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Start {
     belief: Option<Belief>,
     /// Oldest first, after the snapshot.
@@ -24,7 +23,6 @@ pub struct Start {
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry {
-    /// The changed window is published.
     Step(Input, Progress),
     /// The whole map is published although nothing changed.
     Again(Progress),

@@ -28,7 +28,7 @@ use crate::{
 
 /// The belief follows from its inputs alone, so the journal holds them.
 #[allow(clippy::large_enum_variant, reason = "one is held at a time")]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Input {
     Tick(Tick),
     Reset {
@@ -56,14 +56,13 @@ pub struct Tick {
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scan {
-    /// The laser's, in the mission's table.
     pub row: usize,
     /// Metres.
     pub beams: Vec<f32>,
     pub sweep: Sweep,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub enum Change {
     /// Nothing changed, and no stage waits for an answer.
     None,
@@ -221,7 +220,6 @@ impl Mapper {
         mapper
     }
 
-    /// What the next process must know.
     pub const fn state(&self) -> &Belief {
         &self.belief
     }
@@ -244,7 +242,6 @@ impl Mapper {
         Ok(())
     }
 
-    /// Take `input` at mission time `now`.
     pub fn step(&mut self, input: Input, now: MissionTime) -> Change {
         self.fix = None;
         match input {
@@ -473,7 +470,6 @@ impl Mapper {
         changed
     }
 
-    /// Returns the changed window.
     fn redraw(&mut self, window: Window) -> Window {
         let Self { frame, target, evidential, belief, .. } = self;
         let Sensed::Evidence(map) = &belief.sensed else {

@@ -28,7 +28,7 @@ const AHEAD_M: f64 = 0.6;
 /// The robot heads for a point of the planned way so many radii of its body ahead.
 const AIM_RADII: f64 = 2.4;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub(crate) enum Advice {
     /// No faster than this, m/s, and in this direction, a unit vector.
     Go(f64, DVec2),

@@ -35,7 +35,7 @@ pub(crate) struct Arcs {
     response: Response,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Followed {
     curvature: f64,
     /// The length until a hazard.

@@ -17,12 +17,10 @@ use thread_priority::{
 };
 
 /// Dropping this cancels the running job, if it can be, and waits for it.
-#[derive(Debug)]
 pub(crate) struct Background<Job, Done> {
     jobs: Option<Sender<Job>>,
     results: Receiver<Done>,
     done: UnixStream,
-    /// Jobs whose end is unread in `done`.
     unread: u64,
     /// Read ends whose results were not taken; negative if results were taken whose ends are unread.
     ended: i64,

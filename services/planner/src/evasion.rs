@@ -78,7 +78,7 @@ pub(crate) struct Evasion {
 }
 
 /// A mover.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Disc {
     at: DVec2,
     velocity: DVec2,
@@ -89,15 +89,14 @@ struct Disc {
 }
 
 /// The body is free at any heading, may touch a hazard with its corners, or touches it with its sides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Near {
     Free,
     Corners,
     Sides,
 }
 
-/// A way so far.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Way {
     /// Its first and its newest leg.
     first: Advice,
@@ -106,7 +105,6 @@ struct Way {
     rests: bool,
     now: Moving,
     steps: u32,
-    /// When the robot moved last.
     moved_s: f64,
     /// The least that the robot was near to a hazard since the start: it goes no nearer.
     near: Near,
@@ -114,7 +112,6 @@ struct Way {
     meets_s: f64,
     hazard_s: f64,
     danger: f64,
-    /// The way along the field.
     gain_m: f64,
 }
 
@@ -237,7 +234,6 @@ fn best(mut ways: Vec<Way>, score: impl Fn(&Way) -> f64) -> Vec<Way> {
     kept
 }
 
-/// What moves, around a robot that starts somewhere.
 struct Scene<'a> {
     evasion: &'a Evasion,
     view: &'a View<'a>,

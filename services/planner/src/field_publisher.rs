@@ -18,7 +18,6 @@ use harmonic::Cancellation;
 
 use crate::{background::Background, step::Snapshot};
 
-#[derive(Debug)]
 pub(crate) struct Policy {
     pub(crate) header: FieldHeader,
     pub(crate) frame: GridFrame,
@@ -32,7 +31,6 @@ impl Policy {
     }
 }
 
-#[derive(Debug)]
 struct Computed {
     policy: Policy,
     at: Progress,
@@ -70,7 +68,6 @@ impl Worker {
 }
 
 /// Decides what to publish of which policy: the changed window, or the whole when that is due or there is a new reader.
-#[derive(Debug)]
 pub(crate) struct FieldPublisher {
     thread: Background<(Snapshot, Progress), Computed>,
     busy: bool,
@@ -95,7 +92,6 @@ impl FieldPublisher {
         })
     }
 
-    /// Whether the policy of a field that `changed` is due at mission time `now`.
     pub(crate) fn is_due(&self, changed: bool, now: MissionTime) -> bool {
         let age = self.change_published.map(|then| now.since(then));
         changed

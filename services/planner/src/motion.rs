@@ -25,7 +25,7 @@ const MOST_DOUBTED_S: f64 = 1.0;
 /// A turn that takes a smaller share of what the wheels gain is no matter.
 const LEAST_SHARE: f64 = 0.1;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Moving {
     pub(crate) pose: Pose2,
     pub(crate) twist: Twist,
@@ -142,7 +142,6 @@ impl MotionModel {
         Moving { pose: now.pose.along_arc(twist.v * for_s, twist.omega * for_s), twist }
     }
 
-    /// The controller's command.
     fn command(&self, axis: DVec2, (status, to, limit): Advice) -> Twist {
         let (cosine, sine) = (axis.dot(to), axis.perp_dot(to));
         let angle = sine.atan2(cosine).abs();

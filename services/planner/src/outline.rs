@@ -27,7 +27,6 @@ const SQUEEZED_M: f64 = 0.03;
 /// The turn of a step, radians, and the length of one, metres.
 const TURN_RAD: f64 = PI / 16.0;
 const WAY_M: f64 = 0.1;
-/// Way and turn of the steps of the search.
 const STEPS: [[f64; 2]; 6] = [
     [WAY_M, 0.0],
     [WAY_M, TURN_RAD],
@@ -46,11 +45,10 @@ const MOST_OFF_M: f64 = 0.1;
 const NEAR_M: f64 = 0.15;
 /// The goal of a search is on the field's way within this length, metres.
 const GOAL_WITHIN_M: f64 = 2.0;
-/// Most poses that a search follows.
 const MOST_POSES: usize = 5_000;
 
 /// What the body does about the field's direction.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Passage {
     /// It follows it, no faster than this, m/s.
     Follow(f64),
@@ -78,7 +76,6 @@ pub(crate) struct Outline {
     plan: Vec<Planned>,
 }
 
-/// The end of a step.
 #[derive(Clone, Copy, Debug)]
 struct Planned {
     pose: Pose2,
@@ -86,7 +83,6 @@ struct Planned {
 }
 
 impl Planned {
-    /// A robot at `pose` has made the step.
     fn is_over(&self, pose: &Pose2) -> bool {
         let [way, turn] = self.step;
         let left_m = (self.pose.position - pose.position).dot(self.pose.axis());
@@ -108,8 +104,7 @@ impl Planned {
     }
 }
 
-/// A pose of a search.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Reached {
     pose: Pose2,
     /// The pose before, and the step from there.

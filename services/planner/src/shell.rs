@@ -37,7 +37,6 @@ readers! {
     }
 }
 
-/// The planner process.
 pub struct Shell {
     inputs: Inputs,
     /// Without a target no grid counts as followed.

@@ -26,7 +26,6 @@ use crate::{
     step::{Job, Planner, Snapshot, Solved, Work},
 };
 
-/// An action of the planner, and its tick.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Entry<'a> {
     #[serde(borrow)]
@@ -38,7 +37,6 @@ pub struct Entry<'a> {
 #[derive(Debug, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 pub(crate) enum Taken<'a> {
-    /// A sample of `grid`.
     Grid(#[serde(with = "inputs::slice")] (GridHeader, Cow<'a, [u8]>)),
     /// The pose of the tick; its guidance is published.
     Pose {
@@ -53,7 +51,6 @@ pub(crate) enum Taken<'a> {
     Fault(FaultKind, DVec2),
     /// This part of the newest policy is published.
     Field(#[serde(with = "inputs::sample")] Part),
-    /// A policy of the field is due.
     Policy,
     Target(#[serde(with = "inputs::sample")] TargetSample),
     Response(FoundResponse),
@@ -67,7 +64,6 @@ pub struct PlannerStage {
     /// Not begun, oldest first.
     pub(crate) jobs: VecDeque<Job>,
     pub(crate) solved: Option<Solved>,
-    /// A policy of this field is due.
     pub(crate) snapshot: Option<Snapshot>,
     pub(crate) policy: Option<Policy>,
     pub(crate) full_solve_ns: u64,

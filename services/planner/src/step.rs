@@ -79,7 +79,6 @@ pub struct Planner {
     belief: GridHeader,
     /// None before the first keyframe.
     live: Option<Live>,
-    /// An injected fault: no direction anywhere.
     on_a_saddle: bool,
     jobs: u64,
     full_solves: u64,
@@ -144,7 +143,6 @@ impl Planner {
         self.lead.is_some()
     }
 
-    /// The base was commanded, and acts later.
     pub fn take_command(&mut self, command: &CommandSample) -> Work {
         let CommandSample { v_m_s: v, omega_rad_s: omega, pose_ns, state, .. } = *command;
         let drives = CommandState::from_byte(state) == CommandState::Driving;
@@ -212,7 +210,6 @@ impl Planner {
         Ok(Work::Solved)
     }
 
-    /// The version before the change is `before`.
     fn follow(&mut self, window: Window, before: u64) -> Result<Work, SolveError> {
         let Some(mut live) = self.live.take() else {
             return self.solve_first();

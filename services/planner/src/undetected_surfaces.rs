@@ -43,7 +43,7 @@ const SECTORS: usize = 32;
 /// The most sectors between a surface's normal and a beam that it answers.
 const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as usize + 1;
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct UndetectedSurfaces {
     beams: BySector,
     rays: Vec<Beam>,
@@ -56,7 +56,7 @@ pub(crate) struct UndetectedSurfaces {
     answers: [f64; 2],
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Beam {
     origin: DVec2,
     axis: DVec2,
@@ -76,7 +76,7 @@ impl From<&ClearBeam> for Beam {
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 struct BySector {
     /// In each sector, those that may have an echo come last.
     beams: Vec<Beam>,
@@ -110,7 +110,7 @@ impl BySector {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Tally {
     silences: usize,
     echoes: usize,

@@ -9,7 +9,7 @@ pub(crate) const STEP_M: f64 = 0.05;
 /// Step of the search for unscanned cells on a fine grid, metres.
 const GRAIN_M: f64 = 0.025;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
     pub(crate) frame: GridFrame,
     /// One [`CellState`] byte a cell, row-major.

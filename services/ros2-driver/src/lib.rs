@@ -244,7 +244,6 @@ impl Ros2 {
 /// Stamps of plausible scans, from the newest odometry's on.
 const STAMPS_NS: std::ops::RangeInclusive<i64> = -LONGEST_SWEEP_NS..=AHEAD_NS;
 
-/// The times of the row's beams from the first one of `scan` on.
 fn sweep_of(scan: &Scan, sensor: &Sensor) -> Sweep {
     let ((first, step), (its_first, its_step)) = (scan.fan, sensor.fan());
     let along = if scan.is_reversed { -1.0 } else { 1.0 };

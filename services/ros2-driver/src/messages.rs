@@ -24,7 +24,7 @@ pub fn is_repeated(newest_ns: i64, stamp_ns: i64) -> bool {
     (newest_ns - SET_ANEW_NS..=newest_ns).contains(&stamp_ns)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Odometry {
     /// The robot's clock gives it.
     pub stamp_ns: i64,
@@ -60,7 +60,7 @@ impl Odometry {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Imu {
     pub stamp_ns: i64,
     pub turn: ImuTurn,

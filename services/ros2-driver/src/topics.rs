@@ -6,10 +6,8 @@ use ros2::topic::Topic;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     Odometry,
-    /// The laser in this row of the mission.
     Scan(usize),
     Battery,
-    /// The sensor in this row of the mission.
     Range(usize),
     Imu,
     /// The bumper or cliff sensor in this row of the mission.

@@ -13,13 +13,12 @@ use rplidar_protocol::{Answer, Decoder, Node, Request, Said};
 const PAUSE: [u8; 64] = [0; 64];
 const HEALTH_ERROR: u8 = 2;
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Rplidar {
     row: usize,
     sensor: Sensor,
     decoder: Decoder,
     sample_ns: i64,
-    /// Measurements so far.
     count: i64,
     /// None until a turn begins, and after a loss until the next one does.
     turn: Option<Turn>,
@@ -36,7 +35,6 @@ struct Turn {
 }
 
 impl Rplidar {
-    /// The `product` in `row` of the mission's table.
     pub fn new(row: usize, sensor: Sensor, product: Product) -> Self {
         Self {
             row,

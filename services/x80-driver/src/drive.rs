@@ -18,7 +18,7 @@ const FASTEST: i16 = 32_766;
 /// A wheel does not turn at this pulse width.
 const PWM_STANDS: i16 = 16_384;
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Drive {
     robot: RobotConfig,
 }

@@ -24,7 +24,7 @@ use self::{
     telemetry::Telemetry,
 };
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct X80 {
     drive: Drive,
     decoder: Decoder,

@@ -6,7 +6,7 @@ use common::{
     wire::{CustomSensors, Echo, INFRARED_LIVE_AD, StandardSensors, infrared_m},
 };
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Rangers {
     table: Vec<Sensor>,
     /// The first infrared ranger comes in the standard frame, the other six in the custom one.
@@ -36,7 +36,6 @@ impl Rangers {
         Some((sample, self.readings(SensorKind::Ray, &raw_ad.map(seen))))
     }
 
-    /// Those of the rows of a kind, by their channels.
     fn readings(&self, kind: SensorKind, channels: &[RangeReading]) -> Vec<RangeReading> {
         let rows = (0..).zip(&self.table).filter(|(_, row)| row.kind == kind);
         let read = |(sensor, row): (u8, &Sensor)| {

@@ -9,7 +9,7 @@ use common::{
 };
 
 /// Values of earlier frames for the next sample.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Telemetry {
     currents: [u16; 6],
 }

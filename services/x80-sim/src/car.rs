@@ -100,7 +100,6 @@ impl Car {
         }
     }
 
-    /// The steering turns as its motor asks, up to the stop.
     fn steer(&self, motor: &mut Motor, now: f64, dt: f64, noise: &mut Noise) {
         let limit = self.steering.counts(self.steering.limit_rad);
         let asked = motor.step(now, dt, noise);

@@ -60,7 +60,6 @@ pub(crate) struct Drivetrain {
 }
 
 impl Drivetrain {
-    /// The wheels are `diameter` times the nominal one.
     pub(crate) fn new(mission: &Mission, diameter: Wheels<f64>) -> Self {
         let [left, right] = OnChannel::left_and_right(&mission.robot);
         Self {

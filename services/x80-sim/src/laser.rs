@@ -67,7 +67,6 @@ impl Laser {
         Self { sensor, height_m, timing, poses: VecDeque::new(), noise, scan: Vec::new() }
     }
 
-    /// Measure for this tick, if the laser does.
     pub(crate) fn measure(&mut self, world: &World, pose: Pose2, (tick, time): (u64, f64)) {
         self.scan = match tick.is_multiple_of(self.sensor.every_ticks) {
             true => self.scan(world, pose, time),

@@ -41,7 +41,6 @@ const COMES_TO_REST_S: f64 = 3.0;
 pub enum Heard {
     /// It is not addressed to a robot.
     Foreign,
-    /// Nothing is answered to it.
     Ack,
     Ping,
     Motion,
@@ -85,7 +84,6 @@ pub struct Robot {
     lasers: Vec<Laser>,
     rplidar: Option<Rplidar>,
     touches: Vec<TouchRow>,
-    /// What each has felt since the last tick.
     felt: Vec<bool>,
     /// As `felt` at the last tick.
     told: Vec<bool>,
@@ -205,7 +203,6 @@ impl Robot {
         ordered || self.rims() != Wheels::default()
     }
 
-    /// The other robot of its world, from now on.
     pub fn meet(&mut self, other: Option<Other>) {
         self.world.set_other(other);
     }
@@ -352,13 +349,11 @@ impl Robot {
         self.rplidar.as_ref().is_some_and(Rplidar::is_scanning)
     }
 
-    /// The answers of the laser with a wire of its own.
     pub fn on_laser(&mut self, bytes: &[u8]) -> Vec<u8> {
         let now = self.time;
         self.rplidar.as_mut().map_or_else(Vec::new, |rplidar| rplidar.answer(bytes, now))
     }
 
-    /// What that laser measured since the last call.
     pub fn laser_measured(&mut self) -> Vec<u8> {
         let (now, pose) = (self.time, self.body.pose());
         let rplidar = self.rplidar.as_mut();
@@ -546,7 +541,6 @@ impl Robot {
         }
     }
 
-    /// Resets the least clearance.
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Twist { v, omega } = self.twist();

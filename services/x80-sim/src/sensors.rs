@@ -25,7 +25,6 @@ const CURRENT: (f64, f64) = (20.0, 0.2);
 /// Further current of a stalled motor, AD counts; nominal. It draws several times the current of a rolling one.
 pub(crate) const STALL_CURRENT: f64 = 1500.0;
 
-/// The sensors of the multimedia board.
 #[derive(Clone, Debug)]
 pub struct Ranging {
     front: usize,

@@ -6,7 +6,6 @@ use nalgebra::{Matrix2, Vector2};
 use crate::Finding;
 
 /// The body's motion over that of its wheels.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Moves {
     /// It turns, or drives, the other way; none if nothing shows it.
     pub(crate) turns_back: Option<bool>,
@@ -56,7 +55,6 @@ pub(crate) fn words(parts: Matrix2<f64>, part: &str) -> String {
 }
 
 impl Moves {
-    /// All motors that what was seen allows.
     fn possible(&self) -> Vec<Matrix2<f64>> {
         let either = |known: Option<bool>| known.map_or(vec![false, true], |it| vec![it]);
         let drives = either(self.drives_back);
@@ -64,7 +62,6 @@ impl Moves {
         either(self.turns_back).into_iter().flat_map(with).collect()
     }
 
-    /// The motors, if what was seen tells them.
     pub(crate) fn motors(&self) -> Option<Matrix2<f64>> {
         let possible = self.possible();
         possible.first().copied().filter(|_| possible.len() == 1)

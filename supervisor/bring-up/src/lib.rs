@@ -27,13 +27,11 @@ use glam::DVec2;
 use scans::Placed;
 pub use trace::Trace;
 
-/// A verdict about one part of the robot.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct Finding {
     /// The part, as a user calls it: "wheels", "laser".
     pub part: String,
     pub verdict: Verdict,
-    /// One sentence.
     pub text: String,
     /// Keys of the mission, and the values that were found.
     pub keys: Vec<(String, String)>,
@@ -41,7 +39,6 @@ pub struct Finding {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// As stated.
     Right,
     /// Not as stated.
     Wrong,
@@ -50,7 +47,6 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
             Self::Right => "right",
@@ -77,7 +73,6 @@ impl Finding {
         Self::new(part, Verdict::Unknown, text)
     }
 
-    #[must_use]
     pub(crate) fn with_key(mut self, key: impl Into<String>, value: impl Into<String>) -> Self {
         self.keys.push((key.into(), value.into()));
         self
@@ -86,7 +81,6 @@ impl Finding {
 
 /// What the trace says of the robot of `mission`, and where the beams of a laser, or without one the echoes of rangers, ended: metres from
 /// the robot's first place, x ahead. With `lifted` wheels nothing is said of what the body does.
-#[must_use]
 pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Vec<DVec2>) {
     let mut found = vec![wheels::rate(mission, trace)];
     if !trace.begins_at_rest() {

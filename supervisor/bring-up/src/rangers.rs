@@ -28,7 +28,6 @@ const DIFFERENT_M: f64 = 0.5;
 /// A bearing is told if it explains this share of the stated one's differences, and the least difference of the stated one, metres.
 const EXPLAINS: f64 = 0.55;
 const LEAST_DIFFERENCE_M: f64 = 0.12;
-/// Samples that a bearing needs.
 const LEAST_SAMPLES: usize = 30;
 /// A bearing less beside the stated one is not told, bins.
 const BESIDE_BINS: usize = 3;
@@ -54,7 +53,6 @@ fn mean(values: &[f64], least: usize) -> Option<f64> {
     (values.len() >= least).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The readings of a row with their times.
 fn readings(trace: &Trace, row: usize) -> impl Iterator<Item = (f64, &RangeReading)> {
     let of = move |it: &&RangeReading| usize::from(it.sensor) == row;
     trace.ranges.iter().filter_map(move |(at, all)| Some((*at, all.iter().find(of)?)))
@@ -141,7 +139,6 @@ fn laser_lives(trace: &Trace, row: usize, sensor: &Sensor) -> Finding {
     }
 }
 
-/// The gyro against the wheels' turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gyro {
     /// Its turns over those by the wheels.
@@ -286,7 +283,6 @@ pub(crate) fn findings(
     found
 }
 
-/// The turn by the wheels.
 fn turned(motion: &Motion, at_s: f64) -> f64 {
     between(motion, at_s).map_or(0.0, |[angle, _]| angle)
 }
@@ -350,7 +346,6 @@ impl Turn {
     }
 }
 
-/// What the sonars say of the body's motion.
 pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves {
     let table = mission.sensor_table();
     let turn = Turn::best(|scale| {

@@ -45,7 +45,6 @@ const FEW_BEAMS: usize = 30;
 const BEAMS: usize = 90;
 /// A point so near the reference is placed, metres.
 const PLACED_M: f64 = 0.08;
-/// The least share of placed points.
 const LEAST_PLACED: f64 = 0.6;
 /// The share at which no other solution is looked for, and how much of it a logarithm of turn or way over the wheels' takes: a turn the
 /// other way round that is longer ends at the same heading.
@@ -61,8 +60,7 @@ const SIZES_TOLD: SizesTold = SizesTold { sizes: 0.04, ratio: 0.03 };
 
 type Unknowns = SVector<f64, UNKNOWNS>;
 
-/// The body's motion against the wheels'.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 struct Hypothesis {
     /// It turns against the wheels, as it seems to the laser.
     turns_back: bool,
@@ -71,12 +69,10 @@ struct Hypothesis {
 }
 
 /// The scans in one frame, in which the robot stood at the origin first.
-#[derive(Clone, Debug)]
 pub(crate) struct Placed {
     hypothesis: Hypothesis,
     unknowns: Unknowns,
     share: f64,
-    /// The row of the laser.
     row: usize,
     /// Where the beams ended, metres.
     pub(crate) points: Vec<DVec2>,
@@ -84,7 +80,6 @@ pub(crate) struct Placed {
 }
 
 impl Placed {
-    /// Whether the scans agree on a motion.
     pub(crate) fn is_sure(&self) -> bool {
         self.share >= LEAST_PLACED
     }
@@ -190,7 +185,6 @@ impl<'a> Problem<'a> {
         poses
     }
 
-    /// The laser on the robot.
     fn laser(&self, unknowns: &Unknowns) -> DVec2 {
         DVec2::new(self.header.x_m + unknowns[X], self.header.y_m + unknowns[Y])
     }

@@ -20,7 +20,7 @@ pub enum Told {
 }
 
 /// Times are mission time, seconds.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Trace {
     /// Way of the left and the right rim since the beginning by the counts, metres, with nominal wheels.
     pub rolled: Vec<(f64, [f64; 2])>,
@@ -44,12 +44,10 @@ pub struct Leg {
 }
 
 impl Leg {
-    #[must_use]
     pub fn seconds(&self) -> f64 {
         self.until_s - self.from_s
     }
 
-    #[must_use]
     pub fn contains(&self, at_s: f64) -> bool {
         (self.from_s..self.until_s).contains(&at_s)
     }
@@ -140,7 +138,6 @@ impl Trace {
     }
 
     /// The legs in their order. The first begins with the trace, because no command comes before the robot moves.
-    #[must_use]
     pub fn legs(&self) -> Vec<Leg> {
         let begins = self.rolled.first().map_or(0.0, |(at, _)| *at);
         let ends = self.rolled.last().map_or(0.0, |(at, _)| *at);
@@ -158,7 +155,6 @@ impl Trace {
     }
 
     /// A recording that lacks the beginning begins in a turn.
-    #[must_use]
     pub fn begins_at_rest(&self) -> bool {
         let until = self.rest_until_s();
         let (first, last) = (self.rolled.first(), self.rolled.iter().rfind(|it| it.0 < until));
@@ -167,7 +163,6 @@ impl Trace {
     }
 
     /// The time until which the robot has not been told to move.
-    #[must_use]
     pub fn rest_until_s(&self) -> f64 {
         self.legs().first().map_or(0.0, |rest| rest.until_s)
     }

@@ -19,7 +19,6 @@ const ALIKE: f64 = 0.1;
 /// Rates of motor frames differ from the stated one by this share at most.
 const RATE_SHARE: f64 = 0.2;
 
-/// The rate of the motor frames.
 pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
     let stated = mission.robot.rate_hz;
     let (Some(first), Some(last)) = (trace.rolled.first(), trace.rolled.last()) else {
@@ -34,7 +33,7 @@ pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
 }
 
 /// By how much each wheel counts what each was told.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) struct Wheels {
     /// Rows are the wheels that count, columns the wheels that were told; left and right.
     counted: Matrix2<f64>,
@@ -118,7 +117,6 @@ impl Wheels {
         self.follows() == Matrix2::identity()
     }
 
-    /// The body's motion by what the wheels counted, put right.
     pub(crate) fn motion(&self, trace: &Trace, track_m: f64) -> Motion {
         let wheels = self.follows().transpose();
         let motion = |(at, counted): &(f64, [f64; 2])| {

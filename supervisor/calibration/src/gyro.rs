@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use crate::loops::{Estimate, Refusal, Rows};
 
 /// Between two rests.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Motion {
     /// Nominal ways, forward less backward.
     pub left_m: f64,
@@ -28,7 +28,6 @@ const LEAST_RAD: f64 = 3.0;
 const LEAST_REST_S: f64 = 2.0;
 
 /// What a gyro says at rest: times, seconds, and turns, radians, of increments.
-#[derive(Clone, Copy, Debug)]
 struct Rest {
     seconds: f64,
     bias_rad_s: f64,

@@ -56,7 +56,6 @@ pub struct Loop {
 }
 
 /// Radians, from the differences between the two ways of each sweep.
-#[must_use]
 pub fn normal_sd(differences: &[f64]) -> f64 {
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n.max(1.0);
@@ -78,7 +77,6 @@ impl Wheels {
     pub const NOMINAL: Self = Self { e: 0.0, track: 1.0 };
 
     /// The turn for these nominal ways, radians.
-    #[must_use]
     pub fn turned(self, left_m: f64, right_m: f64, track_m: f64) -> f64 {
         (right_m - left_m + self.e * (right_m + left_m)) / (track_m * self.track)
     }
@@ -104,7 +102,7 @@ fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
     (mean, (square - mean * mean).max(0.0).sqrt())
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Estimate {
     /// (rho - 1) / (rho + 1) and tau.
     values: Vector2<f64>,
@@ -148,7 +146,6 @@ pub enum Refusal {
     Singular,
 }
 
-/// Equations that are linear in e and tau.
 pub(crate) struct Rows {
     design: DMatrix<f64>,
     values: DVector<f64>,
@@ -241,28 +238,23 @@ impl Estimate {
     }
 
     /// rho: right over left.
-    #[must_use]
     pub fn ratio(&self) -> f64 {
         (1.0 + self.values.x) / (1.0 - self.values.x)
     }
 
-    #[must_use]
     pub fn ratio_sd(&self) -> f64 {
         2.0 * self.covariance[(0, 0)].max(0.0).sqrt() / (1.0 - self.values.x).powi(2)
     }
 
     /// tau: on the ground over nominal.
-    #[must_use]
     pub fn track(&self) -> f64 {
         self.values.y
     }
 
-    #[must_use]
     pub fn track_sd(&self) -> f64 {
         self.covariance[(1, 1)].max(0.0).sqrt()
     }
 
-    #[must_use]
     pub fn wheels(&self) -> Wheels {
         Wheels { e: self.values.x, track: self.values.y }
     }
@@ -285,7 +277,6 @@ impl Estimate {
     }
 
     /// Values for `[robot.odometry]`, without provenance. The loops do not tell the distance, which stays as it was.
-    #[must_use]
     pub fn odometry(&self, before: &Odometry) -> Odometry {
         Odometry {
             diameter_ratio: self.ratio(),

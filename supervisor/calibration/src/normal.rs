@@ -18,7 +18,7 @@ const UNEQUAL_RAD: f64 = 0.12;
 pub(crate) struct Leg(Vec<(f64, f64)>);
 
 /// Headings at which the wall begins and ends to answer, radians.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 struct Arc {
     first: f64,
     last: f64,
@@ -60,7 +60,7 @@ impl Leg {
 }
 
 /// The mean of the turns to both sides.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub(crate) struct Normal {
     pub(crate) heading: f64,
     /// Middle of the first turn's arc less that of the second. The age of the ranges makes this the same in each
@@ -70,7 +70,7 @@ pub(crate) struct Normal {
     pub(crate) range_m: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) enum NoNormal {
     /// A leg lacks an end of the arc that answers.
     Narrow,

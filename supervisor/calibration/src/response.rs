@@ -55,7 +55,7 @@ pub struct Measured {
 }
 
 /// What the turns say.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Estimate {
     /// With the lag that was stated, seconds.
     pub delay_s: Measured,
@@ -115,7 +115,6 @@ fn measured(values: impl Iterator<Item = f64>) -> Measured {
     Measured { value, sd: 1.48 * distance / count.sqrt() }
 }
 
-#[derive(Clone, Copy, Debug)]
 struct Fit {
     delay_s: f64,
     acceleration: f64,
@@ -160,7 +159,7 @@ impl Fit {
 }
 
 /// A base, as the simulated one is: a delay, and a lag that is limited in acceleration.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Model {
     delay_s: f64,
     lag_s: f64,
@@ -210,7 +209,6 @@ impl Model {
 }
 
 /// Sums of the squares of the first values from their mean, of the products of both, and of the squares of the second.
-#[must_use]
 pub fn spread(points: &[[f64; 2]]) -> [f64; 3] {
     let mean = [0, 1].map(|of| points.iter().map(|it| it[of]).sum::<f64>() / points.len() as f64);
     [(0, 0), (0, 1), (1, 1)].map(|(one, other)| {
@@ -218,8 +216,6 @@ pub fn spread(points: &[[f64; 2]]) -> [f64; 3] {
     })
 }
 
-/// The keys of a mission for `estimate`, with the lag of `stated`.
-#[must_use]
 pub fn keys(estimate: &Estimate, stated: Response) -> String {
     let Measured { value, sd } = estimate.delay_s;
     let acceleration = match estimate.acceleration_m_s2 {

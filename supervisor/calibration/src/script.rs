@@ -80,8 +80,7 @@ const WITH_GYRO: [Leg; 13] = [
     STILL,
 ];
 
-/// The procedure in the planner's place.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Script {
     procedure: Procedure,
     side_m: f64,
@@ -95,7 +94,6 @@ pub struct Script {
 
 impl Script {
     /// Every procedure but that before a wall; squares have this side, and the ways for a gyro this length.
-    #[must_use]
     pub fn new(procedure: Procedure, side_m: f64, rate_hz: f64) -> Self {
         let (from, ways) = (Ways::default(), Ways::default());
         Self { procedure, side_m, rate_hz, leg: 0, ticks: 0, from, ways }
@@ -118,7 +116,6 @@ impl Script {
         }
     }
 
-    #[must_use]
     pub fn state(&self) -> State {
         if self.leg().is_none() { State::Finished } else { State::Running }
     }

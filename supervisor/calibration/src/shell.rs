@@ -30,7 +30,7 @@ const SCAN_HOLDS_S: f64 = 0.5;
 /// Encoded: two legs of 200 readings, and 64 loops.
 pub(crate) const STATE_BYTES: usize = 16 << 10;
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub enum Drive {
     Wall(Box<Wall>),
     Script(Script),
@@ -73,7 +73,7 @@ readers! {
 }
 
 /// What a laser sees ahead of a robot whose way it watches.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct FreeByScan {
     half_width_m: f64,
     /// When it saw that, and the free way before the body, metres.

@@ -23,7 +23,6 @@ const NUDGE: f64 = 1e-4;
 /// Half of them are to the left.
 pub const FEWEST_SQUARES: usize = 6;
 
-#[must_use]
 pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
     let mut ways = Ways::default();
     let step = |counts: &[u16; 2]| {
@@ -35,7 +34,7 @@ pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
 }
 
 /// Nominal ways of both wheels in each tick, metres, and the end by tape, in the frame of its start.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct Driven {
     pub ways: Vec<[f64; 2]>,
     pub end: DVec2,

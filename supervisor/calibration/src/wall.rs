@@ -45,19 +45,17 @@ const HEADING_SD_RAD: f64 = 0.13;
 /// on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s.
 const SLOW_RAD: f64 = 0.08;
 pub(crate) const FAST_RAD: f64 = 0.5;
-/// A turn with this rest is over.
 const TURNED_RAD: f64 = 0.04;
 pub(crate) const SPEED_M_S: f64 = 0.35;
 const NEAR_M_S: f64 = 0.12;
 /// The deviation of the track that is good enough, over that of the ratio.
 const TRACK_OVER_RATIO: f64 = 3.0;
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Wall {
     plan: CalibrationPlan,
     ways: Ways,
     wheels: Wheels,
-    /// The ways when the robot faced the wall.
     visit: Ways,
     /// The wall was faced by a measured normal: at first it is where the robot started.
     is_measured: bool,
@@ -136,7 +134,6 @@ pub(crate) fn direction_aside(left: f64, most: f64) -> f64 {
 }
 
 impl Wall {
-    #[must_use]
     pub fn new(plan: CalibrationPlan) -> Self {
         Self {
             plan,
@@ -161,22 +158,18 @@ impl Wall {
         }
     }
 
-    #[must_use]
     pub fn loops(&self) -> &[Loop] {
         &self.loops
     }
 
-    #[must_use]
     pub fn normal_sd(&self) -> f64 {
         normal_sd(&self.differences)
     }
 
-    #[must_use]
     pub fn metres(&self) -> f64 {
         self.ways.rolled_m / 2.0
     }
 
-    #[must_use]
     pub const fn state(&self) -> State {
         match self.phase {
             Phase::Finished => State::Finished,

@@ -3,7 +3,7 @@
 use common::{mission::Body, wire::counts_between};
 use serde::{Deserialize, Serialize};
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Ways {
     counts: Option<[u16; 2]>,
     pub(crate) left_m: f64,

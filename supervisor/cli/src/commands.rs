@@ -56,7 +56,6 @@ macro_rules! commands {
             $($($name($module::Arguments),)*)*
         }
 
-        /// Headings, and the subcommands below each.
         const GROUPS: &[(&str, &[&str])] =
             &[$(($heading, &[$(stringify!($name),)* $($companion,)*])),*];
 

@@ -36,7 +36,7 @@ struct Counts {
     late: bool,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct Report {
     pub topic: &'static str,
     pub rate_hz: f64,
@@ -46,7 +46,6 @@ pub struct Report {
     pub age_s: Option<f64>,
     /// Overwritten before this reader took them.
     pub lost: u64,
-    /// Ticks from the first sample to the last.
     pub ticks: u64,
     /// Ticks without a sample; none if the table does not promise one in each tick.
     pub missing_ticks: Option<u64>,

@@ -11,7 +11,7 @@ pub const SUPERVISOR_LOG: &str = "supervisor.log";
 /// The user's number follows it in the name of each user's directory.
 const USER_DIRECTORY: &str = "firsthand-";
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Robot {
     pub name: RobotName,
     /// Its process; none if the supervisor was killed.

@@ -24,7 +24,7 @@ const LARGEST_TARGETS: u64 = 4 << 20;
 /// A summary takes 2 kB; a larger file is not read.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RunDirectory {
     pub began: SystemTime,
     pub directory: PathBuf,
@@ -41,7 +41,6 @@ pub enum Outcome {
     Ended(Ended),
 }
 
-/// What the summary of a run says.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Ended {
     /// A word such as `reached`.
@@ -84,7 +83,6 @@ impl Results {
         Self { file, tail }
     }
 
-    /// The results since the last call.
     pub fn take(&mut self) -> Vec<Target> {
         let mut targets = Vec::new();
         loop {

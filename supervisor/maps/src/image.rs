@@ -17,7 +17,6 @@ use crate::{
 /// 16 bits a channel, four channels, with room for the words of a Netpbm in ASCII.
 const LONGEST: u64 = (MAX_SIDE as u64).pow(2) * 8 + (1 << 20);
 
-/// The trinary mode of the ROS map_server.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lightness {
     /// Dark means free.
@@ -51,7 +50,6 @@ pub(super) struct Free {
     pub pixels: Vec<bool>,
 }
 
-/// Each pixel is a cell.
 pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
     let Free { cols, pixels } = pixels(file, lightness)?;
     Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))

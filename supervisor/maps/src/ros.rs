@@ -112,7 +112,6 @@ pub(super) struct Saved {
     pub corner_m: [f64; 2],
 }
 
-/// Writes the YAML `file` and an image of the same name beside it.
 pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
     let unwritable =
         |cause| MapError::of(file, format!("{cause}; give the name of a map to write"));

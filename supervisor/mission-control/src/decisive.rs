@@ -15,7 +15,6 @@ pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTic
     truth.get(truth.partition_point(|tick| tick.contacts == 0))
 }
 
-#[derive(Debug, PartialEq)]
 pub(crate) struct Decided {
     pub ending: Ending,
     /// The last complete tick; none if no tick decided. That of a contact, a timeout or a stall may be incomplete.
@@ -24,7 +23,7 @@ pub(crate) struct Decided {
     pub truth_ticks: usize,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Timeout {
     pub deadline: Deadline,
     /// Whether time is that of the simulated robot's own clock, which also counts ticks that nobody received, in lockstep.

@@ -14,7 +14,7 @@ use common::{
 };
 
 /// What the loop knows of the beacon beside the [`Following`] that is saved.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Beacon {
     /// The newest sample before a following waits for it, and in lockstep each until all stages have answered the tick of its capture.
     waiting: Option<BeaconSample>,
@@ -123,7 +123,6 @@ impl Supervisor<'_> {
         !begins && captured <= next && record.published.tick < Some(captured)
     }
 
-    /// Returns whether the robot is sent elsewhere.
     fn follow_to(&mut self, beacon: &BeaconSample) -> bool {
         let now = self.beacon_time();
         let mission = &self.options.mission;

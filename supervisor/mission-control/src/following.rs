@@ -81,7 +81,6 @@ impl Following {
         self.is_lost
     }
 
-    /// Where the beacon was heard at last.
     pub(crate) fn place(&self) -> DVec2 {
         self.heard.map_or(DVec2::ZERO, |(_, place)| place)
     }
@@ -198,7 +197,6 @@ impl Following {
     }
 }
 
-/// The map around a beacon.
 struct Around<'a> {
     frame: GridFrame,
     cells: &'a [u8],

@@ -19,7 +19,6 @@ const NO_PROGRESS: Duration = Duration::from_secs(15);
 /// The time within which a robot that was told to stand rests: by then the link has used each method of the protocol twice.
 pub(crate) const RESTS_WITHIN: Duration = Duration::from_secs(5);
 
-#[derive(Clone, Debug)]
 pub(crate) struct Snapshot<'a> {
     pub arrival: Option<Arrival>,
     pub link: Option<&'a LinkSample>,
@@ -33,7 +32,6 @@ pub(crate) struct Snapshot<'a> {
     pub in_ticks: bool,
     /// The time when the newest tick was first seen or the order last changed, whichever is later.
     pub progress: Now,
-    /// Whether a tick has begun.
     pub has_ticked: bool,
     pub reason: HoldReason,
     pub held: Vec<&'static str>,
@@ -60,7 +58,7 @@ pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
 }
 
 /// The deadline of a target. Time in which an operator stopped the robot does not count.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct Deadline {
     /// Mission time at which the robot was sent to the target, seconds.
     pub began_s: f64,
@@ -163,7 +161,7 @@ impl Snapshot<'_> {
     }
 }
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct StopClock {
     /// Time of the last call, if the robot was stopped then.
     stopped_at: Option<MissionTime>,
@@ -177,7 +175,6 @@ impl StopClock {
     }
 }
 
-#[derive(Debug)]
 pub(crate) struct TickProgress {
     tick: Option<u64>,
     since: Now,

@@ -6,7 +6,6 @@ use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 /// half, of which none is thinned out.
 const MOST_TICKS: usize = 4096;
 
-/// A tick of a record.
 pub(crate) trait Recorded: Copy {
     /// This tick in place of itself and the `next` one; none if both are needed.
     fn with(self, next: Self) -> Option<Self>;

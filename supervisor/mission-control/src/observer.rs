@@ -24,15 +24,12 @@ const MOST_GUIDANCE: usize = 1024;
 /// The most contacts that are recorded: more than come between two checks for stalls.
 const MOST_CONTACTS: usize = 64;
 
-/// The newest output of the stages.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Published {
-    /// The tick of the newest command.
     pub tick: Option<u64>,
     pub commands: u64,
     /// The generation of the planner's newest heartbeat, and the tick of the newest grid that it has used.
     pub planner: (u32, u64),
-    /// The epoch of the newest guidance.
     pub epoch: u64,
     pub grid_epoch: u64,
     /// Whether the grid changed when that epoch began. The planner does not answer a grid that did not change.
@@ -64,7 +61,6 @@ pub(crate) struct Observer {
     pub record: Record,
 }
 
-/// The data read so far.
 #[derive(Default)]
 pub struct Record {
     /// The pose of every tick; in a long run older ticks are thinned out.

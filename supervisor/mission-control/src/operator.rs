@@ -289,7 +289,6 @@ pub fn change_zones(
     ask_with(robot, kind, points, [0.0; 2])
 }
 
-/// Send the robot to where its mission starts.
 pub fn send_back(robot: &RobotName) -> Result<(), OperatorError> {
     let start = Run::load(&Domain::of(robot.clone()).run_directory())
         .map_or(DVec2::ZERO, |run| run.mission.start.at);
@@ -305,7 +304,6 @@ pub fn place(
     ask_with(robot, RequestKind::Place, &[point], deviations)
 }
 
-/// A request that is made now.
 fn request(kind: RequestKind) -> RequestSample {
     RequestSample { kind: kind.into(), asked_ns: monotonic_ns(), ..RequestSample::default() }
 }

@@ -2,7 +2,6 @@
 
 use common::samples::{HoldReason, Order};
 
-#[derive(Clone, Copy, Debug)]
 pub(crate) struct Snapshot {
     /// Whether the robot was once ready to drive on this bus.
     pub was_ready: bool,
@@ -43,7 +42,6 @@ impl Decision {
     }
 }
 
-/// The first reason that applies decides.
 pub(crate) const fn decide(snapshot: &Snapshot) -> Decision {
     let can_start = snapshot.all_running && snapshot.robot_answers && snapshot.field_known;
     let ready = snapshot.was_ready || can_start;

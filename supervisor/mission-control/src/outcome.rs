@@ -24,6 +24,8 @@ pub enum Outcome {
     ReachedUnsure,
     /// The robot stalled, and no recovery step was left.
     Unreachable,
+    /// Of a target it is called `timed_out`.
+    #[serde(alias = "timed_out")]
     Timeout,
     Collision,
     /// The robot stood and waited for its first target when the run was ended.
@@ -36,7 +38,6 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// The exit code of a run that ends so.
     pub const fn exit_code(self) -> u8 {
         match self {
             Self::Reached | Self::Waited => 0,
@@ -66,7 +67,7 @@ impl Outcome {
 }
 
 /// What the encoders say at the end.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub(crate) enum Wheels {
     AtRest,
     /// Nothing, and why.
@@ -74,7 +75,7 @@ pub(crate) enum Wheels {
     Turning,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Ending {
     pub outcome: Outcome,
     pub reason: String,

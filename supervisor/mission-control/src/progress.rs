@@ -8,7 +8,6 @@ use crate::observer::Record;
 
 pub struct Progress<'a> {
     pub record: &'a Record,
-    /// Stages that run, and all stages.
     pub running: (usize, usize),
     pub driving: bool,
     /// The distance from the start to the target, metres.

@@ -25,7 +25,7 @@ const CAPACITY: usize = 18 << 10;
 pub const SUMMARY: &str = "summary.json";
 const SIMULATOR: &str = "x80-sim";
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct SupervisorState {
     pub operator_stop: bool,
     /// Mission time of operators' stops on the way to the current target, seconds.
@@ -65,9 +65,8 @@ pub fn last_place(directory: &Path, mission: &Mission) -> Option<(PlaceSample, f
     Some((place, saved.elapsed().unwrap_or_default().as_secs_f64()))
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct RecoveredRun {
-    /// The run file, whose clock goes on.
     pub run: Run,
     /// The first tick that did not happen yet.
     pub first_tick: u64,

@@ -17,7 +17,7 @@ const AHEAD: u64 = 4;
 /// planner may take to start.
 const ANSWERED: Duration = Duration::from_secs(3);
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Next {
     /// No recovery step is under way, so further ticks are to be checked.
     Check,
@@ -26,7 +26,7 @@ pub(crate) enum Next {
 }
 
 /// A recovery step, from the stall until it was answered.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Step {
     stall: StallSample,
     /// The time when the step was carried out, and the samples that were published by then.
@@ -34,7 +34,6 @@ struct Step {
 }
 
 /// The recovery step under way, and in lockstep the limit of the link.
-#[derive(Debug)]
 pub(crate) struct RecoverySteps {
     limit: Option<TickLimitSample>,
     step: Option<Step>,
@@ -103,7 +102,6 @@ impl RecoverySteps {
     }
 }
 
-/// Whether the stages have answered the recovery step of `stall`.
 fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
     let commanded = now.commands > before.commands;
     match stall.recovery() {

@@ -26,7 +26,6 @@ pub struct Finished {
     /// Seconds of the robot's clock from the first motion order, or in a resumed run on a wall clock from its start, to the end.
     pub duration_s: f64,
     pub record: Record,
-    /// The ground truth of a simulated robot until that tick.
     pub truth: Vec<GroundTruthTick>,
     pub drove: bool,
     pub restarts: BTreeMap<&'static str, u32>,

@@ -9,7 +9,6 @@ use common::{
 
 use crate::{observer::Record, recovery::RecoveredRun};
 
-/// The clock of a run, from the start of this supervisor on.
 pub(crate) struct RunClock {
     pub clock: MissionClock,
     /// The first tick that no earlier supervisor has seen.

@@ -53,9 +53,7 @@ const WANDERS_LEAST_M: f64 = 12.0;
 /// The side of a square, metres. A laser's map is to be trusted, and the way through a building may be long: each square in which a
 /// robot with a laser has not been lets it drive [`WANDERS`] times that farther.
 const SQUARE_M: f64 = 1.0;
-/// The most squares that are remembered.
 const MOST_SQUARES: usize = 10_000;
-/// Replans before the map is reset.
 const MOST_REPLANS: u32 = 2;
 /// Resets of the map before the target is unreachable.
 const MOST_RESETS: u64 = 3;
@@ -100,7 +98,7 @@ pub(crate) fn log(stall: &StallSample) {
     );
 }
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct StallWatch {
     moved_m: f64,
     turned_rad: f64,
@@ -119,7 +117,6 @@ pub(crate) struct StallWatch {
     wanders_at: Option<f64>,
     /// The squares in which a robot with a laser was on the way to its target; none without a laser.
     been: Option<HashSet<IVec2>>,
-    /// Replans at this place, since the last reset.
     replans_here: u32,
     replans: u32,
     /// The place where the wheels were held, and the replans there since the last reset.
@@ -131,7 +128,6 @@ pub(crate) struct StallWatch {
     /// The resets before its present target, without those of relocations.
     resets_before: u64,
     target: Option<u64>,
-    /// The relocations of the newest pose that was checked.
     relocations: u64,
     tick: Option<u64>,
     stalls: Vec<StallSample>,
@@ -276,7 +272,6 @@ impl StallWatch {
         is_elsewhere.then(|| self.recover(StallCause::Relocated, pose))
     }
 
-    /// Decide the next recovery step against `cause`.
     fn recover(&mut self, cause: StallCause, pose: &PoseSample) -> StallSample {
         let relocated = cause == StallCause::Relocated;
         let recovery = if self.may_replan(cause, pose.pose().position) {

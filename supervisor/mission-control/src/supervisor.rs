@@ -54,7 +54,6 @@ pub struct Options {
     /// Directory of logs, checkpoints and results; it must exist.
     pub directory: PathBuf,
     pub starter: Starter,
-    /// The run to resume; without one a new run begins.
     pub recovered: Option<RecoveredRun>,
     /// The robot stands until an operator says resume.
     pub stands: bool,
@@ -91,7 +90,6 @@ impl Robot {
         Ok(Self { simulator, address })
     }
 
-    /// The ground truth of a simulated robot.
     pub(crate) fn truth(&self) -> &[GroundTruthTick] {
         self.simulator.as_ref().map_or(&[], Simulator::truth)
     }
@@ -388,7 +386,6 @@ impl<'a> Supervisor<'a> {
         self.clock.first_tick(self.bus.observer.record.newest_tick())
     }
 
-    /// The tick and the time of the supervisor's own samples.
     pub(crate) fn published_as_of(&self) -> (u64, MissionTime) {
         // An external stage takes its first tick from this sample, so the tick must be a new one.
         let tick = self.first_tick().saturating_sub(1);

@@ -31,7 +31,6 @@ pub enum TargetOutcome {
     Unreachable,
     /// The robot was not there in time.
     TimedOut,
-    /// The run ended on the way to the target.
     Missed,
     /// The run ended before the robot was sent to it.
     NotTried,
@@ -39,8 +38,7 @@ pub enum TargetOutcome {
     Followed,
 }
 
-/// How the robot followed a beacon.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Followed {
     pub way_m: f64,
     pub time_s: f64,
@@ -48,7 +46,7 @@ pub struct Followed {
     pub lost: u64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct TargetResult {
     pub number: u64,
     pub x_m: f64,
@@ -64,18 +62,17 @@ pub struct TargetResult {
     pub followed: Option<Followed>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Stored {
     result: TargetResult,
     /// The tick of the arrival; none if the robot did not arrive.
     tick: Option<u64>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TargetList {
     number: u64,
     current: TargetPoint,
-    /// The first tick in which the current target holds.
     since_tick: u64,
     /// Mission time at which the target became the current one, seconds.
     began_s: f64,
@@ -85,14 +82,12 @@ pub struct TargetList {
     recorded: usize,
     /// The current target has its result, and the robot waits for the next one.
     waits: bool,
-    /// The current target is a hand's, and has no result.
     by_hand: bool,
     /// The current target moves with a beacon; one result tells of all its places.
     follows: bool,
 }
 
 impl TargetList {
-    /// The targets that `mission` begins with.
     pub(crate) fn of(mission: &Mission) -> Self {
         let mut points = mission.waypoints().into_iter().map(TargetPoint::from);
         let waits =
@@ -147,7 +142,6 @@ impl TargetList {
         (self.waits, self.by_hand, self.follows) = (true, false, true);
     }
 
-    /// The target moves to `place` with the beacon.
     pub(crate) fn move_to(&mut self, place: DVec2, since_tick: u64) {
         self.number += 1;
         (self.current, self.since_tick) = (TargetPoint::at(place), since_tick);
@@ -209,7 +203,6 @@ impl TargetList {
         sample
     }
 
-    /// Append `points`; false if there are too many.
     pub(crate) fn append(&mut self, points: &[TargetPoint]) -> bool {
         let fits = self.ahead.len() + points.len() < MOST_TARGETS;
         if fits {
@@ -258,7 +251,6 @@ impl TargetList {
         self.waits = true;
     }
 
-    /// The current target ended by `arrival`, or with `outcome` at `now_s`.
     fn end_current(
         &mut self,
         outcome: TargetOutcome,

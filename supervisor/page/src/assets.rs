@@ -10,7 +10,6 @@ const TEXT: &str = "text/plain; charset=utf-8";
 
 macro_rules! web {
     ($($path:literal $file:literal $kind:ident,)*) => {
-        /// All files of the page.
         pub const ALL: &[Asset] =
             &[$(($path, $kind, include_str!(concat!("../web/", $file)))),*];
     };

@@ -19,21 +19,18 @@ use common::{grid::GridFrame, samples::FieldCell};
 use flate2::{Compression, write::DeflateEncoder};
 use glam::DVec2;
 
-/// Steps of a turn.
 const STEPS: f32 = 254.0;
 const NONE: u8 = 255;
 /// The most cells a side of a field; from a larger one every second, third, ... cell is sent.
 const MOST_A_SIDE: usize = 256;
 
-/// The content of a message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Shown {
     Map = 1,
     Field = 2,
     Preview = 3,
 }
 
-/// The map of `cells` at mission time `time_s`.
 pub fn map(frame: GridFrame, cells: &[u8], time_s: f64) -> Vec<u8> {
     let header = Header {
         shown: Shown::Map,

@@ -66,17 +66,12 @@ struct Tick {
     link: Option<(u64, f64)>,
 }
 
-/// The content of the newest samples.
 #[derive(Debug, Default)]
 pub struct Collector {
     mission: Mission,
-    /// Ticks whose samples come in, by their numbers.
     ticks: BTreeMap<u64, Tick>,
-    /// The tick of the newest pose.
     pose_tick: u64,
-    /// The samples of the newest row.
     newest: Tick,
-    /// The newest samples, and the events in them.
     pub state: RobotState,
     usage: Vec<Usage>,
     /// The ground truth from the tick of the newest row on, as far as it was read.
@@ -222,7 +217,6 @@ impl Collector {
         self.truths.len() < MOST_TRUTHS
     }
 
-    /// The processes of the stages, and the supervisor's.
     pub fn processes(&self) -> Vec<u32> {
         let stages = self.state.stages.iter().map(|entry| entry.pid);
         stages.chain([self.roster().supervisor_pid]).collect()

@@ -33,7 +33,6 @@ impl Recorded {
         self.add(0, message.to_string().as_bytes());
     }
 
-    /// Add a map or a field.
     pub fn blob(&mut self, message: &[u8]) {
         self.add(1, message);
     }
@@ -83,7 +82,6 @@ fn script(kind: &str, file: &str) -> String {
     format!("<script {kind}src=\"/{file}\"></script>")
 }
 
-/// The text of a file of the page.
 fn asset(file: &str) -> &'static str {
     let found = assets::ALL.iter().find(|(path, ..)| path.strip_prefix('/') == Some(file));
     found.map_or("", |(_, _, text)| text)
@@ -113,7 +111,6 @@ fn bundle() -> String {
     bundle
 }
 
-/// The names and the module of a line that imports.
 fn import(line: &str) -> Option<(&str, &str)> {
     let (names, from) = line.strip_prefix("import ")?.split_once(" from \"./")?;
     Some((names, from.strip_suffix(".js\";")?))

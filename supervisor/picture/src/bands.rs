@@ -9,7 +9,6 @@ use super::{
     page::{Path, round_up},
 };
 
-#[derive(Debug)]
 pub(super) struct Style {
     /// Bytes of this layer: an irregular field is drawn coarser, not larger.
     pub(super) budget: usize,
@@ -40,7 +39,7 @@ pub(super) const MISSION: Style = Style {
 const BELOW: f64 = 0.02;
 
 /// The levels are -step, -2 step, ..., -count step of log2 u.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Levels {
     pub(super) step: f64,
     pub(super) count: u32,

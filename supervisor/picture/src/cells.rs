@@ -97,7 +97,6 @@ impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
         path
     }
 
-    /// Draw runs of these columns, from their first row to `end_row`.
     fn draw(&self, path: &mut Path, runs: BTreeMap<(usize, usize), usize>, end_row: usize) {
         // The last block of a row or column may be cut short by the map's edge.
         let edge = |block: usize, cells: usize| (block * self.side).min(cells) as f64 - 0.5;

@@ -21,13 +21,13 @@ const SYMBOL: f64 = 38.0;
 const APART: f64 = 24.0;
 const MIDDLE: &str = " text-anchor=\"middle\"";
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Mark {
     Discs,
     Crosses,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Series {
     pub name: &'static str,
     pub mark: Mark,
@@ -35,18 +35,16 @@ pub struct Series {
     pub points: Vec<[f64; 2]>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Chart {
     pub title: &'static str,
     /// A sentence for people who cannot see it.
     pub description: &'static str,
-    /// Quantity and unit along x and y.
     pub axes: [&'static str; 2],
     /// Later series are drawn above the first ones.
     pub series: Vec<Series>,
 }
 
-/// The range of an axis, between round numbers.
 struct Range {
     low: f64,
     high: f64,
@@ -73,7 +71,6 @@ impl Range {
         if part.is_finite() { part.clamp(0.0, 1.0) } else { f64::NAN }
     }
 
-    /// The parts at which round numbers stand, and these numbers.
     fn ticks(&self) -> impl Iterator<Item = (f64, String)> + use<'_> {
         let part = |value: f64| (value - self.low) / (self.high - self.low);
         let ticks = ticks(self.low, self.high, self.step);

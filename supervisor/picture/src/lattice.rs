@@ -5,7 +5,7 @@ use glam::DVec2;
 
 use super::page::{PLOT_SIDE, View, metres};
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Lattice {
     pub(super) cols: usize,
     pub(super) rows: usize,
@@ -17,7 +17,6 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// Cells of the mission frame, with y up.
     pub(super) fn of_mission(frame: &GridFrame, view: &View) -> Self {
         let side = frame.cells as usize;
         let step = view.px(frame.resolution_m);

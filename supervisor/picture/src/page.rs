@@ -35,7 +35,6 @@ pub(super) mod ink {
     pub(crate) const FAILURE: &str = "#c0271c";
 }
 
-#[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     /// Least x and y, metres.
     pub(super) low: DVec2,
@@ -59,7 +58,6 @@ impl View {
         DVec2::new(PLOT_LEFT + from_low.x, PLOT_TOP + PLOT_SIDE - from_low.y)
     }
 
-    /// A length on the sheet.
     pub(super) fn px(&self, metres: f64) -> f64 {
         metres * PLOT_SIDE / self.side_m
     }
@@ -140,7 +138,7 @@ impl Display for Px {
 }
 
 /// The `d` of an SVG path, in sheet coordinates.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(super) struct Path {
     data: String,
     pen: Option<DVec2>,

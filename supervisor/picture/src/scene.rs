@@ -15,21 +15,20 @@ pub struct Scene<'a> {
     pub truth: &'a [Pose2],
     /// Metres; empty for those of the mission.
     pub targets: &'a [DVec2],
-    /// The ways of things that moved.
     pub trails: &'a [Trail<'a>],
     pub facts: Facts<'a>,
     /// Each is cut where the page ends.
     pub captions: &'a [String],
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Trail<'a> {
     /// Mission times in order, seconds, and places, metres.
     pub places: &'a [(f64, DVec2)],
     pub radius_m: f64,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Facts<'a> {
     /// A word: reached, unreachable, timeout, ...
     pub outcome: &'a str,

@@ -9,7 +9,6 @@ use super::{
     page::{Path, ink},
 };
 
-#[derive(Debug)]
 pub(super) struct Style {
     /// Bytes of the lines: an irregular field is drawn sparser, not larger.
     pub(super) budget: usize,
@@ -53,7 +52,6 @@ pub(super) fn layer(lattice: &Lattice, cells: &[FieldCell], style: &Style) -> St
     }
 }
 
-/// The arrowheads are as at the `usual` spacing.
 fn drawn(lattice: &Lattice, cells: &[FieldCell], usual: f64, spacing: f64) -> (Path, Path) {
     let (mut lines, mut arrowheads) = (Path::default(), Path::default());
     for line in evenly_spaced(lattice, cells, spacing) {
@@ -144,7 +142,6 @@ struct Tracer<'a> {
     spacing: f64,
     /// Square bins of one spacing.
     drawn: Vec<Vec<DVec2>>,
-    /// Bins along a row and along a column.
     bins: [usize; 2],
 }
 

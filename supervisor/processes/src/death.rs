@@ -18,7 +18,7 @@ use crate::process::ExitCause;
 
 const LOG_TAIL_BYTES: u64 = 400;
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct Death {
     pub stage: &'static str,
     pub pid: u32,
@@ -26,7 +26,6 @@ pub struct Death {
     pub cause: ExitCause,
     /// Whether the supervisor ended the process because it hung or was never ready.
     pub hung: bool,
-    /// Age of its last beat when the supervisor noticed.
     pub noticed_after_s: Option<f64>,
     /// Age of its last beat; none if the process never beat.
     pub beat_age_s: Option<f64>,
@@ -37,7 +36,7 @@ pub struct Death {
     pub log_tail: String,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Next {
     StartNow,

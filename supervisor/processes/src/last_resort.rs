@@ -83,7 +83,6 @@ fn processor_awaited(thread: Pid) -> Duration {
     Duration::from_nanos(waited.unwrap_or_default())
 }
 
-/// Watch the `turns` of the loop of this thread, the supervisor of `domain`, from the first of `signals` on.
 pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
     let watched = gettid();
     thread::spawn(move || {

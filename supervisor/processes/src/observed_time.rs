@@ -9,7 +9,6 @@ use crate::policy::Now;
 /// hundredth of this.
 const TOLERANCE: Duration = Duration::from_millis(20);
 
-#[derive(Debug)]
 pub(crate) struct ObservedTime {
     observed: Now,
     until: Instant,

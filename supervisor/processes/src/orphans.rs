@@ -60,7 +60,6 @@ pub(crate) fn wait_for_consumers(domain: &Domain) -> Result<File, DomainError> {
     Ok(lock)
 }
 
-/// Whether `file` was locked within `patience`.
 pub(crate) fn locked_within(file: &File, patience: Duration) -> io::Result<bool> {
     let began = Instant::now();
     loop {

@@ -37,20 +37,17 @@ const ABORT_GRACE: Duration = Duration::from_millis(100);
 /// Time for a terminated stage to stop in order. The link sends three datagrams in it.
 pub const STOP_GRACE: Duration = Duration::from_millis(300);
 
-/// Time since the supervisor started.
 pub type Now = Duration;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     Start,
-    /// The process could not be started.
     StartFailed,
     /// The process beat, but is not ready yet.
     BeatStarting,
     BeatReady,
     /// The process beats, but does not answer its inputs.
     OutputStale,
-    /// The process is reaped.
     Exited,
     /// The process is reaped, and its exit code says that the bus refused it.
     Refused,
@@ -81,11 +78,9 @@ pub enum Phase {
     },
     /// There is no process; the stage died too often, and only an operator starts it again.
     Held,
-    /// A process that has not beaten as ready.
     Starting {
         since: Now,
     },
-    /// A process that beats.
     Running {
         since: Now,
         beat: Now,
@@ -109,7 +104,6 @@ pub enum Phase {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stability {
     NeverReady,
-    /// The generation was ready for less than [`STABLE_AFTER`].
     Brief,
     /// The generation was ready for [`STABLE_AFTER`].
     Stable,
@@ -168,7 +162,6 @@ impl Policy {
         }
     }
 
-    /// The action that `event` calls for.
     pub fn step(&mut self, event: Event, now: Now) -> Option<Action> {
         let due = self.deadline().is_some_and(|deadline| now >= deadline);
         match (self.phase, event) {

@@ -71,7 +71,7 @@ pub struct Process {
     pidfd: OwnedFd,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExitCause {
     Exited(i32),

@@ -118,7 +118,6 @@ impl StageProcess {
         state == HealthState::Starting || !was_running && event == Event::BeatReady
     }
 
-    /// Start the next generation, which logs to the run `directory` and answers ticks from `first_tick` on.
     pub(crate) fn start(&mut self, directory: &Path, first_tick: u64, now: Now) {
         let stage = self.stage.name;
         (self.started, self.hung) = (now, None);
@@ -204,7 +203,6 @@ impl StageProcess {
         death
     }
 
-    /// Add the policy's decision to the record of a death.
     pub(crate) fn record_next(&self, death: &mut Death, now: Now) {
         death.deaths_in_window = self.policy.recent_deaths() as u32;
         death.next = match self.phase() {

@@ -36,7 +36,6 @@ pub struct StageProcesses {
     directory: PathBuf,
     clock: ObservedTime,
     starter: Starter,
-    /// Whether stages that end stay down.
     ending: bool,
     start_blocked: bool,
 }
@@ -199,7 +198,6 @@ impl StageProcesses {
         self.position(stage).is_some_and(|index| self.stages[index].is_running())
     }
 
-    /// Give `event` to the stage's policy, and carry out its action.
     fn apply(&mut self, index: usize, event: Event, now: Now, first_tick: u64) {
         let Some(action) = self.stages[index].policy.step(event, now) else {
             return;
@@ -249,7 +247,6 @@ impl StageProcesses {
         self.names(|stage| external && !stage.is_running())
     }
 
-    /// The stages that only an operator starts again.
     pub fn held(&self) -> Vec<&'static str> {
         self.names(|stage| stage.phase() == Phase::Held)
     }

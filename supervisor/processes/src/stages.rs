@@ -23,14 +23,12 @@ pub struct Stage {
     /// The time added to each deadline for a million cells of the map.
     pub per_million_cells: Duration,
     pub while_down: &'static str,
-    /// The main function of its process.
     pub run: fn(&Start) -> Result<(), StageError>,
     pub replay: Begin,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Deadlines {
-    /// The longest time from its start to its first beat as ready.
     pub startup: Duration,
     /// The longest time from beat to beat. Beats come every 150 ms, or with a tick.
     pub heartbeat: Duration,
@@ -39,7 +37,6 @@ pub struct Deadlines {
 }
 
 impl Stage {
-    /// A stage with the usual deadlines, whose process is `P`.
     const fn new<P: Process>(replay: Begin, while_down: &'static str) -> Self {
         Self {
             name: P::WIRING.stage,
@@ -52,7 +49,6 @@ impl Stage {
         }
     }
 
-    /// A stage that answers one topic with another.
     const fn answering<A: Answering>(while_down: &'static str) -> Self {
         Self::new::<Answers<A>>(replay::<A>, while_down)
     }

@@ -19,7 +19,6 @@ const LATCHED: &str = "[{history: 1, depth: 1, reliability: 1, durability: 1, de
      lifespan: {sec: 9223372036, nsec: 854775807}, liveliness: 1, \
      liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}, avoid_ros_namespace_conventions: false}]";
 
-/// A bag that is written.
 pub struct Bag {
     output: Output,
     folder: PathBuf,

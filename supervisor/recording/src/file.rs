@@ -32,7 +32,6 @@ const CHUNK_BYTES: u64 = 1 << 19;
 const CHUNK_EVERY: Duration = Duration::from_secs(1);
 /// The name of the metadata record about the run.
 pub(crate) const RUN: &str = "run";
-/// The channel of the recorder's own losses.
 pub(crate) const LOST: &str = "recorder";
 const LOST_SCHEMA: &[u8] = br#"{"title": "firsthand.Recorder", "type": "object", "properties": {"lost": {"type": "object"}}}"#;
 
@@ -41,7 +40,6 @@ pub(crate) struct RecordingFile {
     /// The start of the mission, nanoseconds since 1970.
     began_ns: u64,
     clock: Option<MissionClock>,
-    /// The newest mission time of a sample.
     newest: MissionTime,
     chunk_began: Instant,
 }
@@ -111,7 +109,6 @@ impl RecordingFile {
         self
     }
 
-    /// Mission time: that of the clock, or of the newest sample in lockstep.
     fn mission_time(&self) -> MissionTime {
         match self.clock {
             Some(clock @ MissionClock::Wall { .. }) => clock.at(0, monotonic_ns()),
@@ -139,7 +136,6 @@ impl RecordingFile {
         Ok(times[0])
     }
 
-    /// Add a message that is no sample.
     pub(crate) fn message(&mut self, topic: &str, log_ns: u64, message: &[u8]) -> Result {
         self.output.write(topic, 0, [log_ns; 2], message)
     }
@@ -170,7 +166,6 @@ impl RecordingFile {
     }
 }
 
-/// An MCAP file that is written.
 pub(crate) struct Output {
     writer: Writer<BufWriter<File>>,
     path: PathBuf,

@@ -14,7 +14,6 @@ const AT_ONCE: usize = 1 << 16;
 #[derive(Debug, Default)]
 pub struct Tail {
     read: u64,
-    /// The incomplete last line.
     partial: Vec<u8>,
 }
 

@@ -15,11 +15,10 @@ const STAMP: std::ops::Range<usize> = 4..28;
 struct Last {
     sequence: u32,
     crc32: u32,
-    /// The number of the bus.
     bus: u32,
 }
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Losses {
     /// The recorder was there before all writers, so their first samples are missing if they do not come.
     whole: bool,
@@ -69,7 +68,6 @@ impl Losses {
         std::mem::take(&mut self.changed).then_some(&self.counts)
     }
 
-    /// Losses by topic.
     pub(crate) const fn counts(&self) -> &BTreeMap<&'static str, u64> {
         &self.counts
     }

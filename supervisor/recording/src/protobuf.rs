@@ -1,13 +1,12 @@
 //! The encoding of Protobuf, as far as messages for viewers need it: <https://protobuf.dev/programming-guides/encoding/>.
 
-/// Kinds of fields on the wire.
 const VARINT: u64 = 0;
 const FIXED_64: u64 = 1;
 const BYTES: u64 = 2;
 const FIXED_32: u64 = 5;
 
 /// A message that is written field by field. A number that is zero is left out, as the encoding has it.
-#[derive(Clone, Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Message(Vec<u8>);
 
 impl Message {
@@ -57,7 +56,6 @@ impl Message {
         if packed.is_empty() { self } else { self.data(field, &packed) }
     }
 
-    /// Add bytes or a text.
     pub(crate) fn data(mut self, field: u64, data: &[u8]) -> Self {
         self.tag(field, BYTES);
         self.varint(data.len() as u64);

@@ -30,23 +30,19 @@ use crate::{
 /// Most bytes of a record or chunk. The recorder's are shorter.
 const LONGEST_RECORD: usize = 1 << 28;
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub enum End {
     Complete,
     /// The recorder was killed, or the disk was full: the file ends after the last whole chunk.
     Cut {
-        /// The time from the first message to the last.
         after: Duration,
-        /// The problem behind the last message.
         problem: String,
     },
 }
 
-/// A recording of one run, or of a part of one.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Recording {
     pub path: PathBuf,
-    /// The text of the stages' run file.
     pub run_text: String,
     /// The run file: mission, clock, robot.
     pub run: Run,
@@ -55,33 +51,29 @@ pub struct Recording {
     /// When the recorder was attached; empty in a recording of an earlier version.
     pub began: String,
     pub end: End,
-    /// Numbers of messages by topic.
     pub counts: BTreeMap<String, u64>,
     /// Numbers of samples by topic that the recorder lost.
     pub lost: BTreeMap<String, u64>,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Message {
     pub topic: Arc<str>,
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     /// The sample's number, counted by its writer.
     pub sequence: u32,
-    /// The message in the topic's encoding.
     pub data: Vec<u8>,
 }
 
-/// A sample of a topic of structs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct Sample<P> {
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     pub sample: P,
 }
 
-/// A sample of a topic of slices.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub struct SliceSample<H, T> {
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
@@ -185,7 +177,6 @@ impl Recording {
         })
     }
 
-    /// The samples of `topic`, in the order of the file.
     pub fn samples<P: Payload + Stamped + Layout>(
         &self,
         topic: &'static Topic<P>,
@@ -225,7 +216,6 @@ impl Recording {
     }
 }
 
-/// A message of the recorder itself.
 fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
     #[derive(serde::Deserialize)]
     struct Recorder {
@@ -288,7 +278,6 @@ enum Stop {
     Error(RecordingError),
 }
 
-/// The records of a file, one after another.
 struct Records {
     path: PathBuf,
     file: BufReader<File>,

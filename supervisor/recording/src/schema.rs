@@ -7,7 +7,7 @@ use common::{
     topics::{self, AnyTopic},
 };
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Schema {
     /// The name, for example `firsthand/msg/Pose`.
     pub name: String,

@@ -21,10 +21,8 @@ const ODOMETRY: &str = "foxglove/odometry";
 const GRID: &str = "foxglove/grid";
 const SCENE: &str = "foxglove/scene";
 const MOVERS: &str = "foxglove/movers";
-/// The channel of log lines.
 pub const LOG: &str = "log";
 
-/// The mission's frame.
 const MAP: &str = "map";
 /// The frame of the robot: its centre, x ahead. Each sensor has a frame of its name.
 const BASE: &str = "base_link";
@@ -35,12 +33,11 @@ const MOST_A_SIDE: usize = 1024;
 /// The bytes of a drawn cell and their names. `state` is a [`CellState`]; viewers use the other four as its colour by default.
 const CELL: [&str; 5] = ["state", "red", "green", "blue", "alpha"];
 
-/// The topics that are drawn.
 static DRAWN: [&dyn AnyTopic; 5] =
     [&topics::POSE, &topics::RANGES, &topics::SCAN, &topics::GRID, &topics::TARGET];
 
 /// A channel for viewers, whose messages are in the encoding `protobuf`, and the schema too.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Channel {
     pub topic: String,
     /// The name of its schema, such as `foxglove.Grid`.
@@ -49,7 +46,6 @@ pub struct Channel {
     pub descriptors: &'static [u8],
 }
 
-/// Takes a message: topic and content.
 pub type Sink<'a> = &'a mut dyn FnMut(&str, &[u8]);
 
 macro_rules! channel {
@@ -62,7 +58,6 @@ macro_rules! channel {
     };
 }
 
-/// The channels for the drawings of `mission`.
 pub fn channels(mission: Option<&Mission>) -> Vec<Channel> {
     let fixed = [
         channel!(TRANSFORMS, "FrameTransforms"),
@@ -82,7 +77,6 @@ fn scan_topic(sensor: &Sensor) -> String {
     format!("foxglove/scan/{}", sensor.name)
 }
 
-/// The drawings of a run for viewers.
 pub struct Drawn {
     mission: Option<Mission>,
     sensors: Vec<Sensor>,
@@ -93,7 +87,6 @@ pub struct Drawn {
 }
 
 impl Drawn {
-    /// A run before its first sample.
     pub fn new(mission: Option<Mission>) -> Self {
         Self {
             sensors: mission.as_ref().map(Mission::sensor_table).unwrap_or_default(),
@@ -341,7 +334,6 @@ pub fn log(process: &str, line: &str, now_ns: u64, sink: Sink<'_>) {
     sink(LOG, log.bytes());
 }
 
-/// The numbers of these fields of a `Log`.
 const LOG_MESSAGE: u64 = 3;
 const LOG_NAME: u64 = 4;
 
@@ -378,7 +370,6 @@ fn time(ns: u64) -> Message {
     Message::default().integer(1, ns / 1_000_000_000).integer(2, ns % 1_000_000_000)
 }
 
-/// The beginning of most messages: the time and the frame.
 fn framed(time: &Message, frame: &str) -> Message {
     Message::default().part(1, time).text(2, frame)
 }

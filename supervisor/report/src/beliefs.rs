@@ -16,7 +16,7 @@ const FIRST_APART_S: f64 = 2.0;
 /// The most cells of a map whose field is computed here.
 const LARGEST: usize = 1024 * 1024;
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 struct Belief {
     time_s: f64,
     header: GridHeader,
@@ -40,8 +40,6 @@ impl Belief {
     }
 }
 
-/// Maps at about equal intervals.
-#[derive(Clone, Debug)]
 pub(crate) struct Beliefs {
     held: Vec<Belief>,
     apart_s: f64,
@@ -66,14 +64,12 @@ impl Beliefs {
         self.end(time_s, target, header, cells);
     }
 
-    /// Take the last map `cells`, at `time_s`.
     pub(crate) fn end(&mut self, time_s: f64, target: DVec2, header: &GridHeader, cells: &[u8]) {
         if cells.len() <= LARGEST {
             self.held.push(Belief { time_s, header: *header, cells: cells.to_vec(), target });
         }
     }
 
-    /// The fields of the maps, as messages of the page.
     pub(crate) fn fields(&self, mission: &Mission) -> impl Iterator<Item = Vec<u8>> {
         self.held.iter().filter_map(|belief| belief.field(mission))
     }

@@ -23,7 +23,6 @@ use crate::{
     source::{self, Source},
 };
 
-/// The lines of logs, which are no topic.
 const LOG: &str = "log";
 /// Most bytes of the ground truth: an hour at 10 Hz takes 10 MB.
 const LARGEST_TRUTH: u64 = 1 << 28;
@@ -31,7 +30,6 @@ const LARGEST_TRUTH: u64 = 1 << 28;
 const MAP_EVERY_S: f64 = 0.5;
 /// Most rows, states and events of a page. The page shows the beginning of a longer run; metrics count all.
 const MOST: usize = 60_000;
-/// Most maps of a page.
 const MOST_MAPS: usize = 2400;
 
 #[derive(Default)]
@@ -39,7 +37,6 @@ pub(crate) struct Content {
     pub(crate) mission: Mission,
     /// Names and values: robot, build, machine and others.
     about: Vec<(&'static str, String)>,
-    /// Gaps of the recordings.
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
     /// The row of the front sonar; none for a robot without sonars.
@@ -240,7 +237,6 @@ impl Content {
     }
 }
 
-/// The ground truth of a simulated robot's run in `directory`.
 fn truth(directory: &Path) -> Option<Lines<BufReader<Take<File>>>> {
     let file = File::open(directory.join(GROUND_TRUTH)).ok()?;
     Some(BufReader::new(file.take(LARGEST_TRUTH)).lines())

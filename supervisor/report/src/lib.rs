@@ -39,7 +39,6 @@ use common::file::FileError;
 
 use self::{content::Content, source::Source};
 
-/// The page's name in the directory of a report.
 pub const PAGE: &str = "report.html";
 
 /// Write the report of `run`, a run's directory or a recording, into `out`: by default `report` in the run's directory, or

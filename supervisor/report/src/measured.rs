@@ -50,7 +50,6 @@ impl Measured {
         }
     }
 
-    /// Take a reading of the front sonar.
     pub(crate) fn range(&mut self, range: &RangeReading, mission: &Mission) {
         self.ranges += 1;
         match range.status() {
@@ -87,7 +86,6 @@ impl Measured {
         }
     }
 
-    /// Latencies of all generations of the link.
     pub(crate) fn latency(&self) -> Histogram {
         let mut latency = self.latency.clone();
         if let Some(last) = &self.link {
@@ -96,7 +94,6 @@ impl Measured {
         latency
     }
 
-    /// Full solves of all generations of the planner.
     pub(crate) fn solves(&self) -> u64 {
         let last = self.planner.map_or(0, |last| last.full_solves);
         self.solves.saturating_add(last)

@@ -87,7 +87,6 @@ impl Grid {
         Some(grid)
     }
 
-    /// Block every cell whose centre is nearer to `piece` than `radius`.
     fn block(&mut self, piece: &Piece<'_>, radius: f64) {
         let (least, greatest) = piece.bounds();
         let from = self.cell(least - radius).max(IVec2::ZERO);

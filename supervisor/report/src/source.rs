@@ -18,12 +18,10 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// The recordings of `run`: a run's directory, or one recording.
     pub(crate) fn find(run: &Path) -> Result<Self, ReportError> {
         Ok(Self { files: recording::files(run)?, is_run: run.is_dir() })
     }
 
-    /// The default directory of the report.
     pub(crate) fn default_out(&self) -> PathBuf {
         let file = &self.files[0];
         if self.is_run {
@@ -35,7 +33,6 @@ impl Source {
     }
 }
 
-/// The summary of the run of `recording`, if its file is beside the recording.
 pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
     let file = run_directory(recording)?.join("summary.json");
     serde_json::from_str(&file::text(&file, LARGEST_SUMMARY)?).ok()

@@ -16,10 +16,8 @@ use crate::{
 
 /// Most letters of a text.
 const LONGEST: usize = 300;
-/// Most events that wait to be taken.
 const MOST_WAITING: usize = 20_000;
 
-/// A line of the list.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Event {
     /// Mission time, seconds.
@@ -37,7 +35,6 @@ impl Event {
     }
 }
 
-/// The importance of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
@@ -53,7 +50,6 @@ pub enum Kind {
 
 const FAILSAFE: &str = "failsafe";
 
-/// Finds the events in samples, in their order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Events {
     waiting: VecDeque<Event>,
@@ -139,7 +135,6 @@ impl Events {
         }
     }
 
-    /// The importance of the state of `link`.
     pub(crate) fn kind(&self, link: &LinkSample) -> Kind {
         match link.cause() {
             Cause::NotOrdered => Kind::Note,

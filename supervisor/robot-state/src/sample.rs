@@ -71,7 +71,6 @@ struct OneTopic {
     generation: u32,
 }
 
-/// The readers of a robot's bus.
 pub struct Feed {
     readers: Vec<OneTopic>,
     message: Vec<u8>,

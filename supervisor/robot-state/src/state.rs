@@ -19,7 +19,6 @@ use crate::{
     words::{failsafe_in_words, guidance_in_words},
 };
 
-/// The longest way, in points.
 const MOST_POINTS: usize = 2000;
 /// The least distance between two points of the way, metres.
 const POINT_EVERY_M: f64 = 0.05;
@@ -30,7 +29,6 @@ const OLD_S: f64 = 1.0;
 /// What a robot is doing. Samples that have not come yet are none, lists are empty. Lengths are metres in the mission frame.
 #[derive(Clone, Debug, Default)]
 pub struct RobotState {
-    /// The supervisor with its order.
     pub supervisor: Option<RosterHeader>,
     pub stages: Vec<RosterEntry>,
     pub pose: Option<PoseSample>,
@@ -52,15 +50,12 @@ pub struct RobotState {
     pub power: Option<PowerSample>,
     /// The age of what is shown, if a mirror shows a robot of another machine.
     pub mirror: Option<MirrorSample>,
-    /// The newest death of each stage that died.
     pub deaths: BTreeMap<String, DeathSample>,
-    /// The number of stalls that were seen.
     pub stalls: u64,
     events: Events,
 }
 
 impl RobotState {
-    /// A robot before its first sample, which drives `mission`.
     pub fn of_mission(mission: &Mission) -> Self {
         Self { target: Some(TargetSample::first(mission)), ..Self::default() }
     }
@@ -122,7 +117,6 @@ impl RobotState {
         self.way.push(position);
     }
 
-    /// Take a line of the log of `process`.
     pub fn log(&mut self, process: &str, line: &str) {
         self.events.log(process, line);
     }
@@ -137,7 +131,6 @@ impl RobotState {
         self.events.now_s
     }
 
-    /// The current target and those after it.
     pub fn targets(&self) -> impl Iterator<Item = &TargetPoint> {
         self.target().into_iter().flat_map(|sent| [&sent.target].into_iter().chain(sent.ahead()))
     }
@@ -226,7 +219,6 @@ impl RobotState {
     }
 }
 
-/// Drop every second item, from the second one on.
 pub fn drop_every_second<T>(items: &mut Vec<T>) {
     let mut nth = 0;
     items.retain(|_| {

@@ -16,7 +16,6 @@ pub fn words(variant: impl Debug) -> String {
     words
 }
 
-/// The status of the planner, a [`GuidanceStatus`].
 pub const fn guidance_in_words(status: u8) -> &'static str {
     match GuidanceStatus::from_byte(status) {
         GuidanceStatus::Waiting => "waits for the way",
@@ -28,7 +27,6 @@ pub const fn guidance_in_words(status: u8) -> &'static str {
     }
 }
 
-/// How a stage's process ended.
 pub fn death_in_words(death: &DeathSample) -> String {
     let code = death.code;
     match DeathCause::from_byte(death.cause) {
@@ -39,7 +37,6 @@ pub fn death_in_words(death: &DeathSample) -> String {
     }
 }
 
-/// What the link's failsafe does with the robot, and why.
 pub fn failsafe_in_words(link: &LinkSample) -> String {
     match (link.action(), link.cause()) {
         (action, Cause::None) => format!("the robot {}", action.effect()),

@@ -28,7 +28,7 @@ pub struct Hearer {
 }
 
 /// How often each cause of the failsafe took a robot that had gone to standing or to half speed.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Interruptions {
     has_gone: bool,
     newest: Option<(Action, Cause)>,
@@ -92,12 +92,10 @@ impl Hearer {
         self.looks.add(stamp.tick, |totals| totals.with(guidance));
     }
 
-    /// The ways of what moved, the oldest first.
     pub fn trails(&self) -> &[Trail] {
         &self.trails.0
     }
 
-    /// Full solves of all generations of the planner, up to the sample `last`.
     pub(crate) fn solves_until(&self, last: Option<&GuidanceSample>) -> u64 {
         let (newest, its) =
             last.map_or((u32::MAX, None), |last| (last.stamp.generation, Some(last.full_solves)));
@@ -105,7 +103,6 @@ impl Hearer {
         before + its.or(self.solves.get(&newest).copied()).unwrap_or_default()
     }
 
-    /// Tick latencies of every generation of the link.
     pub(crate) fn latency(&self) -> Histogram {
         let mut all = Histogram::default();
         for link in self.links.values() {

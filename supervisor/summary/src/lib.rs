@@ -41,7 +41,7 @@ impl From<&Histogram> for Quantiles {
 
 /// The last line of `run --json`. Distances are in metres. An unknown value is none (null), such as the ground truth of a real
 /// robot.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Summary {
     pub outcome: Outcome,
     pub reason: String,
@@ -68,7 +68,6 @@ pub struct Summary {
     /// Two standard deviations of that pose's position along the worst axis: an arrival is sure within `sure_within_m` of the mission.
     #[serde(default)]
     pub pose_within_m: Option<f64>,
-    /// Distance from the robot's end to the target, by the ground truth.
     pub true_distance_m: Option<f64>,
     /// The time at which the robot had moved 0.1 m, by the ground truth.
     pub departed_s: Option<f64>,
@@ -176,7 +175,6 @@ impl Summary {
         }
     }
 
-    /// Lines below the picture.
     pub fn captions(&self) -> Vec<String> {
         let metres = |value: Option<f64>| {
             value.map_or("unknown".to_owned(), |value| format!("{value:.3} m"))

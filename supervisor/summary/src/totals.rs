@@ -8,15 +8,9 @@ use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatu
 /// The number of ticks whose totals are stored: that of the arrival must still be there when its command is read.
 const MOST: usize = 1024;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Default)]
 pub(crate) struct Totals<T> {
     newest: VecDeque<(u64, T)>,
-}
-
-impl<T> Default for Totals<T> {
-    fn default() -> Self {
-        Self { newest: VecDeque::new() }
-    }
 }
 
 impl<T: Copy + Default> Totals<T> {
@@ -35,7 +29,6 @@ impl<T: Copy + Default> Totals<T> {
         self.newest.push_back((tick, add(totals)));
     }
 
-    /// The totals of all ticks up to `tick`.
     pub(crate) fn at(&self, tick: u64) -> T {
         let until = self.newest.iter().rev().find(|(of, _)| *of <= tick);
         until.map_or(T::default(), |&(_, totals)| totals)
@@ -43,7 +36,7 @@ impl<T: Copy + Default> Totals<T> {
 }
 
 /// The extremes of both wheels' commanded speeds, rad/s.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct WheelTotals {
     extremes: Option<[f64; 2]>,
 }
@@ -65,8 +58,7 @@ impl WheelTotals {
     }
 }
 
-/// The robot's stops to look around.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct LookTotals {
     pub looks: u64,
     pub ticks: u64,

@@ -13,14 +13,11 @@ const APART_S: f64 = 0.2;
 const MOST_PLACES: usize = 600;
 const MOST_WAYS: usize = 256;
 
-/// The way of something that moved.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Trail {
     /// Mission times, seconds, and places, metres; never empty.
     pub places: Vec<(f64, DVec2)>,
-    /// The newest.
     pub radius_m: f64,
-    /// Time, place and velocity.
     newest: (f64, DVec2, DVec2),
     apart_s: f64,
 }
@@ -54,7 +51,7 @@ impl Trail {
     }
 }
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Trails(pub(crate) Vec<Trail>);
 
 impl Trails {

@@ -11,7 +11,6 @@ use std::{
 };
 
 /// A thread that works turn by turn until this is dropped.
-#[derive(Debug)]
 pub struct Turns {
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -51,7 +50,6 @@ pub fn socket() -> io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// A socket that is connected to the robot at `robot`.
 pub fn to_robot(robot: SocketAddr) -> io::Result<UdpSocket> {
     let socket = socket()?;
     socket.connect(robot)?;

@@ -48,7 +48,7 @@ pub struct Arguments {
 
 /// A fault of the table `faults.csv`: the parts of which one must be found wrong, and the keys that the robot has instead of the
 /// stated ones, in which VALUE is a number from one of two ranges.
-#[derive(Debug, Deserialize)]
+#[derive(Deserialize)]
 struct Fault {
     robot: String,
     name: String,

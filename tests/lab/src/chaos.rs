@@ -49,7 +49,6 @@ use report::Series;
 const NOT_CLEAN: u8 = 8;
 
 /// What a chaos tried, what went wrong, the worst case in words, and the whole result as text.
-#[derive(Debug)]
 pub struct Judged {
     pub tried: u64,
     pub lost: u64,
@@ -57,7 +56,6 @@ pub struct Judged {
     pub text: String,
 }
 
-/// A result for people, or as a line of JSON.
 fn text(result: &(impl Display + Serialize), json: bool) -> Result<String> {
     Ok(if json { serde_json::to_string(result)? + "\n" } else { result.to_string() })
 }

@@ -4,7 +4,6 @@ use std::{fmt::Display, path::Path};
 
 pub use console::failure::{Failure, Refused, Result};
 
-/// Says which action failed, and with which file.
 pub trait OrCannot<T>: Sized {
     fn or_cannot(self, action: &str) -> Result<T>;
 

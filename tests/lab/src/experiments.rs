@@ -52,7 +52,6 @@ pub struct Arguments {
 }
 
 const LABORATORY: &str = "laboratory";
-/// The first noise seed, whose missions are drawn.
 const FIRST_SEED: u64 = 1;
 /// The radio's outage except with laboratory realism. The paper's link fades; the paper gives no number.
 const OUTAGE: &str = "simulation.radio.outage_share=0.2";

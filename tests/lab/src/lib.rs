@@ -20,7 +20,7 @@
 //! | `ros2_robot` | a simulated robot as one of ROS 2 |
 //! | `error` | why a bench ended early |
 
-// No other crate uses these modules: `pub` says that another module does, and what none uses is reported all the same.
+// No other crate uses these modules: `pub` means another module; what none uses is reported.
 #![allow(unreachable_pub)]
 
 mod background;
@@ -86,7 +86,6 @@ fn print(report: &impl Serialize, json: bool) -> error::Result {
     Ok(console::output::print_text(&format!("{text}\n"))?)
 }
 
-/// The main function of the executable.
 pub fn main() -> ExitCode {
     console::executable::run("error,rustdds=off", execute, |_| None)
 }

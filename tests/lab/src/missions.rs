@@ -22,7 +22,7 @@ pub mod trial;
 pub const HARMONIC: &str = "harmonic";
 
 /// Mission keys that are compared on the same worlds.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Setting {
     pub name: String,
     /// The planner: [`HARMONIC`], or the executable in its place.

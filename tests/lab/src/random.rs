@@ -3,7 +3,6 @@
 use glam::DVec2;
 use rand_pcg::{Pcg64, rand_core::Rng as _};
 
-#[derive(Clone, Debug)]
 pub struct Random(Pcg64);
 
 impl Random {
@@ -11,7 +10,6 @@ impl Random {
         Self(Pcg64::new(seed.into(), stream))
     }
 
-    /// The numbers of world `number` of the kind `kind` under `seed`.
     pub fn of_world(seed: u64, kind: u64, number: u64) -> Self {
         Self::new(seed, u128::from(kind) << 64 | u128::from(number))
     }

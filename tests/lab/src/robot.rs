@@ -57,7 +57,6 @@ pub fn simulated(directory: &Path, mission: &Mission, pace: Pace) -> Result<Simu
     Ok(Simulator::start(firsthand(&[]), None, directory, mission, pace, None)?)
 }
 
-/// A run in a process that ends with this one.
 pub struct Run {
     pub process: Process,
     directory: PathBuf,

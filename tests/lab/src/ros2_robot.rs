@@ -77,7 +77,6 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(())
 }
 
-#[derive(Debug)]
 pub struct Ros2Robot {
     /// What a mission of the robot states beside its other keys.
     pub keys: Vec<String>,
@@ -176,9 +175,7 @@ struct Program {
     drive: DifferentialDrive,
     turns: f64,
     pose: Pose2,
-    /// The newest angles of the wheels.
     wheels: Option<WheelSpeeds>,
-    /// When they were taken.
     taken_ns: Option<u64>,
 }
 
@@ -202,7 +199,6 @@ impl Program {
         Ok(Order::Drive { wheels: [left, right], twist: [v, omega], for_s: WATCHDOG_S })
     }
 
-    /// Go on to where the wheels turned.
     fn take_wheels(&mut self, report: &Report) {
         if let Some(now) = report.wheels.map(both) {
             let before = self.wheels.replace(now).unwrap_or(now);

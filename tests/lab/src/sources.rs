@@ -75,20 +75,17 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(print_text(&format!("published {fixes} fixes and {turns} turns\n"))?)
 }
 
-/// The writers of fixes and of turns.
 type Writers = (Writer<FixSample>, Writer<TurnSample>);
 
 struct Source<'a> {
     arguments: &'a Arguments,
     chance: Random,
     file: Option<BufReader<File>>,
-    /// The beginning of an incomplete line.
     line: String,
     truth: Vec<GroundTruthTick>,
     poses: Vec<PoseSample>,
     next_fix_s: f64,
     turned: Option<(f64, f64)>,
-    /// Published ones.
     fixes: u64,
     turns: u64,
 }

@@ -105,7 +105,7 @@ fn measure(
 }
 
 /// Ticks a second; none if they follow each other at once. Their cost depends on it: caches are warm or cold, cores awake or asleep.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 struct Regime(Option<f64>);
 
 /// Trips of a round that follow each other without a pause.
@@ -171,7 +171,7 @@ impl Times {
     }
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Serialize)]
 struct Report {
     regime: String,
     /// Ratio of the medians, tick to bare hops.
@@ -180,7 +180,6 @@ struct Report {
     /// Resources of all processes of the last mission and its simulated robot; none for a mission of a second or two.
     #[serde(flatten)]
     used: Option<Used>,
-    /// The bare hops, and the tick.
     times: [Times; 2],
 }
 

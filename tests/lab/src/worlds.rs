@@ -24,7 +24,6 @@ use crate::{
 
 /// Failed draws in a row after which a kind of world is taken for unsolvable.
 const MOST_FAILURES: u64 = 10_000;
-/// Start and target were given for worlds that have their own.
 const NO_MAP: &str =
     "--start and --target are for ROS maps; give one to --worlds, or leave them out";
 
@@ -88,7 +87,7 @@ impl Found {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Asked {
     /// Number of worlds; without it a hundred that are drawn, all files, and ten on each map without tests.
     pub count: Option<usize>,
@@ -115,7 +114,6 @@ pub fn find(worlds: &Worlds, asked: Asked) -> Result<Found> {
     Ok(found)
 }
 
-/// Draw worlds until enough of them are solvable.
 fn draw(&Kind { stream, name, draw, rules }: &Kind, asked: Asked) -> Result<Found> {
     let (count, seed) = (asked.count.unwrap_or(100), asked.seed);
     let mut found = Found::default();

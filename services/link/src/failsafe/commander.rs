@@ -52,7 +52,6 @@ impl Window {
     }
 }
 
-/// Others' commands, without a pause.
 #[derive(Clone, Copy, Debug)]
 struct Told {
     newest: Commander,
@@ -61,7 +60,7 @@ struct Told {
     newest_ns: u64,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct OtherCommander {
     topic: String,
     told: Option<Told>,
@@ -135,19 +134,12 @@ impl Monitor for OtherCommander {
     fn new(mission: &Mission) -> Self {
         Self {
             topic: mission.robot.ros2.cmd_vel.clone(),
-            told: None,
-            in_ticks: false,
-            owed: VecDeque::new(),
-            window: Window::default(),
-            most: 0,
-            shared: 0,
             stated: match mission.robot.protocol() {
                 Protocol::X80 => WINDOW.as_secs_f64() * mission.robot.rate_hz,
                 _ => 0.0,
             },
             half_period: Duration::from_secs_f64(0.5 / mission.robot.rate_hz),
-            shows: None,
-            is_told: false,
+            ..Self::default()
         }
     }
 

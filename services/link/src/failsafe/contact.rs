@@ -30,7 +30,7 @@ const AT_ONE_WHEEL: (f64, f64) = (PI / 4.0, PI / 6.0);
 /// A command below this share of the rims' relative speed is a turn on the spot.
 const LEAST_AHEAD_SHARE: f64 = 0.5;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Contacts {
     limit_ad: u16,
     currents: [u16; 2],
@@ -43,13 +43,7 @@ pub(super) struct Contacts {
 
 impl Contacts {
     pub(super) fn new(mission: &Mission) -> Self {
-        Self {
-            limit_ad: mission.robot.held_current_ad,
-            currents: [0; 2],
-            high_and_rolls_s: [0.0; 2],
-            held: None,
-            new: None,
-        }
+        Self { limit_ad: mission.robot.held_current_ad, ..Self::default() }
     }
 
     pub(super) const fn take_currents(&mut self, currents: [u16; 2]) {

@@ -28,7 +28,7 @@ enum State {
 }
 
 /// Times are the machine's, nanoseconds.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct LatencyMonitor {
     command_limit: Duration,
     limit_ns: u64,
@@ -78,15 +78,7 @@ impl LatencyMonitor {
 impl Monitor for LatencyMonitor {
     fn new(mission: &Mission) -> Self {
         let command_limit = Duration::from_secs_f64(mission.robot.command_limit_s);
-        let mut new = Self {
-            command_limit,
-            limit_ns: 0,
-            window_ns: 0,
-            again_ns: 0,
-            sent_ns: 0,
-            came_late: false,
-            state: State::Timely,
-        };
+        let mut new = Self { command_limit, ..Self::default() };
         new.set_pace(Pace::Rate(1.0));
         new
     }

@@ -18,7 +18,6 @@ use glam::DVec2;
 
 use super::deafness::Missing;
 
-/// Places on an echo's arc.
 const PLACES: usize = 9;
 /// The share of a sonar's reach up to which its echoes are sure to come again.
 const SURE: f64 = 0.7;
@@ -71,8 +70,7 @@ impl Echo {
     }
 }
 
-/// A sonar where it is when it measures.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Listener {
     from: Pose2,
     half_rad: f64,

@@ -9,7 +9,6 @@ use common::{
     samples::{Cause, CommandSample, HoldReason, Order, RangeReading},
 };
 
-/// The two clocks at one moment.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moment {
     pub time: MissionTime,
@@ -17,26 +16,19 @@ pub struct Moment {
     pub machine_ns: u64,
 }
 
-/// Something that happened on the link.
 #[derive(Clone, Copy, Debug)]
 pub enum Observation<'a> {
-    /// Mission time passes at this pace from now on.
     Pace(Pace),
-    /// Time has passed.
     Time,
-    /// The supervisor published a directive.
     Directive(Order, HoldReason),
     /// An operator resumed the robot, so faults count as repaired.
     Resumed,
-    /// The controller published a newer command.
     Command(&'a CommandSample),
     /// A command with these speeds was sent to the wheels, counts/s, forward positive.
     Commanded([i16; 2]),
-    /// Something was sent to the robot.
     Sent,
     /// The robot owes so many acknowledgements for what was sent.
     Owed(usize),
-    /// The robot acknowledged something.
     Acknowledged,
     /// The motor currents of the wheels in the motor frame that follows, AD counts.
     Currents([u16; 2]),
@@ -44,7 +36,6 @@ pub enum Observation<'a> {
     Motor(WheelCounts, Counts),
     /// The voltages of the batteries of the boards, the motors and the servos came; 0 for a battery that is not fitted.
     Batteries([f64; 3]),
-    /// Readings of ranging sensors came.
     Readings(&'a [RangeReading]),
     /// A scan came that says it was measured at this mission time, seconds, in the middle of its beams.
     Scan(&'a LaserScan, f64),
@@ -54,14 +45,12 @@ pub enum Observation<'a> {
     Responds(Response),
     /// A sender other than the link told the robot something.
     Commander(Commander),
-    /// Two nodes publish odometry, which this text names.
     TwoPublishers(&'a str),
     /// The robot answers again or for the first time, and was asked for its streams.
     Found {
         /// Whether it had answered before.
         again: bool,
     },
-    /// The robot does not answer.
     Lost,
 }
 
@@ -81,10 +70,8 @@ pub enum Counts {
     Implausible,
 }
 
-/// Whether the condition of a cause holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
-    /// The condition holds.
     Holds,
     /// The condition has not held for so long; `Duration::MAX` if that is not measured.
     OverFor(Duration),
@@ -96,12 +83,9 @@ impl From<bool> for Condition {
     }
 }
 
-/// The clearing condition of a cause.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Clears {
-    /// The cause clears when its condition is over.
     WithCondition,
-    /// The cause clears when its condition has been over for so long.
     After(Duration),
     /// The cause clears when an operator resumes the robot after a stop; if a time is given, also when its condition has been over for
     /// so long.
@@ -150,7 +134,6 @@ pub trait Monitor {
     where
         Self: Sized;
 
-    /// Note an observation.
     fn observe(&mut self, what: &Observation<'_>, now: Moment);
 
     /// Whether the condition of `cause` holds, which must be one of its causes.

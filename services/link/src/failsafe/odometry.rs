@@ -66,7 +66,6 @@ const MOST_RECOVERIES: u32 = 2;
 /// A response that was searched for is new if the way to stop is longer by the second factor or shorter by the first: what is new makes
 /// planner and controller forget the commands that the base has not answered yet.
 const UNCHANGED: std::ops::Range<f64> = 0.67..1.2;
-/// Time between looks for a delay.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
@@ -102,7 +101,7 @@ impl Suspicion {
 }
 
 /// When counts are evidence about a command in one direction, by the base's response, seconds.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 struct Settles {
     settled_s: f64,
     /// A wheel has changed direction by then; that of an X80 at 7 Hz has 0.6 of its speed.
@@ -115,7 +114,6 @@ impl From<Response> for Settles {
     }
 }
 
-/// Where the response is from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Known {
     Unknown,
@@ -215,7 +213,6 @@ pub struct Odometry {
     ordered_to_drive: bool,
     /// A bring-up looks for wheels that do not turn as commanded: its robot goes on, slowly and for a minute.
     is_bring_up: bool,
-    /// In words, and when both published last.
     two_publishers: Option<(String, MissionTime)>,
 }
 
@@ -254,7 +251,6 @@ impl Odometry {
         self.reached.each_ref().map(ModelledSpeed::speed)
     }
 
-    /// Respond to commands by `response` from now on.
     fn adopt(&mut self, response: Response) {
         self.response = response;
         let change = self.most_change();

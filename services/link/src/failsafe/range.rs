@@ -159,7 +159,6 @@ impl Row {
         }
     }
 
-    /// Doubted, and sure.
     fn is_implausible(&self) -> [bool; 2] {
         let [equal, near] = &self.past.staying;
         [(1.0, 0), (SURE, 1)].map(|(least, it)| {

@@ -66,15 +66,14 @@ const CHANNELS: usize = 3;
 const TURN: usize = 2;
 
 /// What a response must explain to end a suspicion, and not only what a wheel rolled before it died.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Suspected {
     pub(super) channel: usize,
     /// What raised the suspicion happened from then on.
     pub(super) from_s: f64,
 }
 
-/// Responses that explain a motion alike.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Alike {
     /// The one that stops last from top speed.
     pub(super) slowest: Response,
@@ -345,7 +344,7 @@ impl ResponseFit {
 
 /// Sums over the intervals of a channel: of the modelled way, of the squares of the modelled and the counted way, and of their product,
 /// counts.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Default)]
 struct Motion {
     way: f64,
     model: f64,

@@ -17,7 +17,6 @@ const MOST_APART_S: f64 = 1.0;
 /// Poses are kept for the longest delay and the time between two scans, whatever comes no more than this number.
 const POSES_S: f64 = 3.5;
 const MOST_KEPT: usize = 2048;
-/// Beams that are compared, and the least number of them.
 const BEAMS: usize = 180;
 const LEAST_BEAMS: f64 = 20.0;
 /// A greater difference, metres, is that of another surface.

@@ -12,9 +12,7 @@ use super::monitor::{Condition, Moment, Monitor, Observation};
 
 #[derive(Clone, Copy, Debug)]
 struct Times {
-    /// The answered tick's.
     command: MissionTime,
-    /// The oldest pose's.
     pose: MissionTime,
     guidance: MissionTime,
 }

@@ -5,8 +5,7 @@ use common::{ground_truth::GroundTruthTick, mission::Mission, samples::Cause};
 
 use super::{TABLE, rule};
 
-/// The most of each, from a fault.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Stop {
     /// Until the link knows of it: it tells the robot to stand, or its last command is over.
     pub known_s: f64,

@@ -47,7 +47,6 @@ pub struct StopMonitor {
     driven: f64,
     told_to_stand: Option<MissionTime>,
     frame: Option<(WheelCounts, MissionTime)>,
-    /// Whether the newest two frames show motion.
     moves: bool,
     moving: Duration,
     resting: Duration,

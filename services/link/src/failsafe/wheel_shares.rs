@@ -36,7 +36,6 @@ const SETTLED: f64 = 0.05;
 const LEAST_CHANGE: f64 = 1e-8;
 const MOST_CORNER: f64 = 0.05;
 
-/// Sums over ticks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     way_m: f64,
@@ -200,7 +199,6 @@ impl WheelShares {
         [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().all(|(kind, wheel)| steady(kind, wheel))
     }
 
-    /// Respond to commands by `response` from now on.
     pub(crate) fn adopt(&mut self, response: Response) {
         let change = response.acceleration_m_s2 / self.metres_per_count;
         let wheel = ModelledSpeed::new(response.dead_time_s(), change);

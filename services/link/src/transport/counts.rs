@@ -1,6 +1,6 @@
 //! The counts of a transport.
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
     /// Dropped, because they came from another address than the robot's.
     pub foreign_datagrams: u64,

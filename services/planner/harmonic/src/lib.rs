@@ -1,4 +1,4 @@
-//! Harmonic potential fields on grid maps: they give a direction at any position from free and blocked cells and a target.
+#![doc = include_str!("../README.md")]
 //!
 //! # The problem
 //! A robot on a map of cells wants a direction wherever it stands, such that following it ends at the target and never
@@ -54,25 +54,6 @@
 //! Cells are named by column and row from 0; arrays are row-major. Positions are continuous in units of a cell, with the
 //! centres at the integers: the cell (c, r) covers c - 0.5 ..= c + 0.5. Directions are unit vectors (along growing columns,
 //! along growing rows). Angles are radians. Screening lengths are in cells, or in any unit the side of a cell is given in.
-//!
-//! # Example
-//! ```
-//! use harmonic::{Cancellation, Cell, Change, Domain, Guidance, Screening, Solver};
-//!
-//! // 20 x 10 free cells with the target near the right end; u falls by a further factor of e every 8 cells.
-//! let mut domain = Domain::new(20, 10, vec![false; 200], Cell::new(17, 5))?
-//!     .with_screening(&Screening::cells(8.0))?;
-//! let mut solver = Solver::default();
-//! let mut field = solver.solve(&domain, &Cancellation::new())?;
-//! assert!(field.verification().worst_residual < 2e-5);
-//! assert!(matches!(field.guidance(3.2, 5.0), Guidance::Along([x, _]) if x > 0.9));
-//!
-//! // An obstacle appears; the map is solved again.
-//! domain.apply(&[Change { cell: Cell::new(10, 5), blocked: true }])?;
-//! field = solver.solve_near(&domain, &field, &Cancellation::new())?;
-//! assert!(field.is_blocked(Cell::new(10, 5)));
-//! # Ok::<(), harmonic::SolveError>(())
-//! ```
 //!
 //! # Errors
 //! [`SolveError`] tells apart what is wrong with a map ([`MapEmpty`](SolveError::MapEmpty),
@@ -132,8 +113,3 @@ pub use crate::{
 };
 #[cfg(feature = "testing")]
 pub use testing::solve_exactly;
-
-/// The example of the README runs as a test.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -78,7 +78,7 @@ const SWEEPS: usize = 3;
 const COARSEST_SIDE: usize = 5;
 
 /// The levels of one map, in one precision.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Multigrid<R> {
     finest: Finest<R>,
     coarse: Vec<Coarse<R>>,
@@ -95,15 +95,7 @@ pub(crate) struct Multigrid<R> {
 impl<R: Real> Multigrid<R> {
     /// Levels for maps of this size, with no equations yet.
     pub(crate) fn new(width: usize, height: usize) -> Self {
-        let mut levels = Self {
-            finest: Finest::default(),
-            coarse: Vec::new(),
-            coarsest: Coarsest::default(),
-            products: Vec::new(),
-            corrects: false,
-            is_steep: false,
-            simd: Simd::default(),
-        };
+        let mut levels = Self::default();
         levels.reshape(width, height);
         levels
     }

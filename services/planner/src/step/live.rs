@@ -84,7 +84,6 @@ impl Live {
         self.state == State::Current
     }
 
-    /// The version before the change is `before`.
     pub(super) fn map_changed(&mut self, before: u64) {
         match &mut self.state {
             State::Current => {
@@ -210,7 +209,6 @@ impl Live {
         refused.contains(&true)
     }
 
-    /// The field leads to a cell beside the target, and the robot is there.
     fn is_beside(&self, target: DVec2, robot: DVec2) -> bool {
         let Cell { col, row } = self.field.target();
         let aim = grid::Cell { col: col as u32, row: row as u32 };
@@ -218,7 +216,6 @@ impl Live {
         !own && self.frame.centre_of(aim).distance(robot) <= AT_CELL_M
     }
 
-    /// Cells whose hazard differs between `cells` and the map.
     pub(super) fn changes_in(&self, window: Window, cells: &[u8]) -> Vec<Change> {
         let changed = window.cells().filter_map(|cell| {
             let blocked = is_hazard(cells[self.frame.index(cell)]) || self.is_refused(cell);

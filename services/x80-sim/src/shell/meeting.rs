@@ -40,11 +40,10 @@ const SAME_S: f64 = 1e-6;
 const FRESH_S: f64 = 0.5;
 /// A larger datagram is no place.
 const LONGEST: usize = 4096;
-/// The most datagrams taken at once.
 const MOST_AT_ONCE: usize = 64;
 
 /// Metres and seconds of the mission frame, which both missions share.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Place {
     time_s: f64,
@@ -138,16 +137,11 @@ impl Meeting {
             waits,
             goes_on_after_contact: mission.simulation.goes_on_after_contact,
             own: Place {
-                time_s: 0.0,
-                at: DVec2::ZERO,
-                heading: 0.0,
-                v: 0.0,
-                omega: 0.0,
                 radius_m: body.radius_m,
                 footprint: body.footprint.map_or_else(Vec::new, |it| it.corners().to_vec()),
                 bottom_m: heights.ground_clearance_m,
                 top_m: heights.body_top_m,
-                ended: false,
+                ..Place::default()
             },
             is_told: false,
             newest: None,

@@ -43,7 +43,6 @@ enum Leg {
 
 pub(super) struct Session {
     robot: Robot,
-    /// Time waits for commands.
     lock_step: bool,
     way: Way,
     radio: Option<Radio<Leg>>,
@@ -430,7 +429,6 @@ impl Session {
         }
     }
 
-    /// The bytes that the radio has let through.
     fn deliver(&mut self, bytes: &[u8]) {
         if let Some(peer) = self.peer.filter(|_| !bytes.is_empty()) {
             self.way.send(peer, bytes);

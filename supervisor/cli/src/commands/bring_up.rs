@@ -125,7 +125,6 @@ pub fn main(arguments: &Arguments) -> Result {
     }
 }
 
-/// Writes a mission for a robot that nobody described yet.
 fn write_new(protocol: Protocol, address: &str, out: &Path) -> Result {
     let text = written::new_robot(protocol, address);
     missions::parsed(&text, "bring-up", &[])?;
@@ -155,7 +154,6 @@ fn as_json(finding: &Finding) -> serde_json::Value {
     json!({ "part": part, "verdict": verdict.word(), "text": text, "keys": keys })
 }
 
-/// What was seen, by the motion that was found.
 fn drawn(seen: &[DVec2]) -> String {
     Chart {
         title: "What the robot saw, placed by the motion that was found",

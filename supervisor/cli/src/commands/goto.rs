@@ -80,14 +80,9 @@ fn await_result(
         let is_its = |it: &Target| (it.x_m, it.y_m) == (target.x_m, target.y_m);
         if let Some(result) = results.take().into_iter().find(is_its) {
             print_text(&format!("{}\n", result.outcome.replace('_', " ")))?;
-            return Ok(match result.outcome.as_str() {
-                "reached" => Outcome::Reached.exit_code().into(),
-                "unreachable" => Outcome::Unreachable.exit_code().into(),
-                "timed_out" => Outcome::Timeout.exit_code().into(),
-                "wrong_place" => Outcome::WrongPlace.exit_code().into(),
-                "reached_unsure" => Outcome::ReachedUnsure.exit_code().into(),
-                _ => ExitCode::FAILURE,
-            });
+            // A target's outcome is called as a run's; others, such as `replaced`, are none.
+            let outcome = serde_json::from_value::<Outcome>(result.outcome.into());
+            return Ok(outcome.map_or(ExitCode::FAILURE, |outcome| outcome.exit_code().into()));
         }
         if !goes_on {
             return Err(format!("the run of robot {robot} ended without a result").into());
@@ -96,7 +91,6 @@ fn await_result(
     }
 }
 
-/// Of pairs of numbers.
 pub fn points(places: &[f64]) -> Result<Vec<TargetPoint>, Refused> {
     let (places, rest) = places.as_chunks::<2>();
     if !rest.is_empty() {

@@ -62,7 +62,6 @@ fn newest(arguments: &Arguments) -> Option<PathBuf> {
     })
 }
 
-/// `directory` must have the requested log.
 fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs> {
     let stage = arguments.stage.as_deref();
     let unreadable = |error| format!("cannot read logs in {}: {error}", directory.display());

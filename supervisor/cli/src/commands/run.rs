@@ -375,7 +375,6 @@ fn print_removed(directory: &Path) -> Result<(), String> {
     print_text(&text).map_err(|error| format!("cannot print what is removed: {error}"))
 }
 
-/// The first line of the progress.
 fn title(options: &Options) -> String {
     let mission = &options.mission;
     // A real robot does not wait.

@@ -98,7 +98,6 @@ struct FollowingStatus {
     refused: u64,
     /// The reason of the newest refusal; none without one.
     refusal: Option<&'static str>,
-    /// The result so far.
     result: String,
 }
 
@@ -114,7 +113,6 @@ struct PoseStatus {
 #[derive(Serialize)]
 struct LinkStatus {
     connected: bool,
-    /// Whether the link stops the robot.
     stopped: bool,
     /// The effect of the failsafe: the robot goes, stands or the like.
     robot: &'static str,

@@ -1,7 +1,6 @@
 //! Tables as Markdown, as the guide shows them.
 
 pub mod stored;
-pub mod versions;
 
 use clap::{Args, Subcommand};
 use common::{
@@ -40,23 +39,9 @@ pub fn main(arguments: &Arguments) -> Result {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
         Table::Results => stored::results(),
-        Table::Versions => versions::versions(),
         Table::Capabilities => stored::markdown("capabilities", None).unwrap_or_default(),
+        Table::Versions => stored::markdown("versions", None).unwrap_or_default(),
     })?)
-}
-
-/// A page of the guide shows it behind `<!-- table NAME SECTION -->`; none of an unknown name.
-#[cfg(test)]
-pub fn shown(name: &str, section: Option<&str>) -> Option<String> {
-    match name {
-        "topics" => Some(topics()),
-        "stages" => Some(stages()),
-        "failsafe" => Some(failsafe()),
-        "faults" => Some(faults()),
-        "versions" => Some(versions::versions()),
-        "ros2" => Some(firsthand_ros2::topics()),
-        stored => stored::markdown(stored, section),
-    }
 }
 
 pub fn topics() -> String {
@@ -127,7 +112,7 @@ pub fn stages() -> String {
     rows + &item(&format!("every stage also reads {reads} and writes {writes}"))
 }
 
-fn failsafe() -> String {
+pub fn failsafe() -> String {
     let row = |rule: &failsafe::Rule| {
         let until = match rule.clears {
             Clears::WithCondition => String::new(),
@@ -139,7 +124,7 @@ fn failsafe() -> String {
     failsafe::TABLE.iter().map(row).collect()
 }
 
-fn faults() -> String {
+pub fn faults() -> String {
     let row = |fault: &faults::Fault| {
         let stage = fault.stage.unwrap_or("any stage");
         item(&format!("`{}` ({stage}): {}; until: {}", fault.name, fault.meaning, fault.ends))

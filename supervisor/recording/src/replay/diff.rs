@@ -10,18 +10,16 @@ use crate::{
     replay::samples::{COMPARED, First, difference, is_keyframe, tick_of},
 };
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Parting {
     /// Lines of the run file that differ: mission, seed, clock. Address and name of the robot are left out.
     pub run: Vec<String>,
-    /// The builds, if they differ.
     pub builds: Option<[String; 2]>,
     pub first: Option<First>,
     /// Ticks that both recordings have.
     pub ticks: u64,
 }
 
-/// Find the first difference of `first` and `second`.
 pub fn diff(first: &Recording, second: &Recording) -> Result<Parting> {
     let mut parting =
         Parting { run: run_differences(&first.run_text, &second.run_text), ..Parting::default() };
@@ -55,7 +53,6 @@ fn run_differences(first: &str, second: &str) -> Vec<String> {
     lines
 }
 
-/// The last sample of each tick on one topic.
 struct Ticks<I> {
     messages: I,
     /// A sample of the next tick that was read already.

@@ -22,7 +22,6 @@ use crate::{
 
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The stages, by their names; all without names.
     pub stages: Vec<String>,
     /// The mission time from which on outputs are compared. Earlier ticks are computed, too, because the state follows
     /// from them.

@@ -39,10 +39,8 @@ pub(crate) struct Setting<'a> {
     pub(crate) cut: bool,
 }
 
-/// The body of an entry.
 type Body = Rc<Vec<u8>>;
 
-/// A computed output, and the inputs before it.
 struct Computed {
     sequence: u32,
     message: Vec<u8>,

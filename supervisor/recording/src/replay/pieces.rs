@@ -3,7 +3,7 @@
 use common::inputs::LONGEST_ENTRY;
 use thiserror::Error;
 
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(crate) struct Pieces {
     next: u32,
     bytes: Vec<u8>,
@@ -12,7 +12,7 @@ pub(crate) struct Pieces {
 }
 
 /// Pieces that do not follow each other, or hold no valid entries.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[derive(Debug, PartialEq, Eq, Error)]
 pub(crate) enum Broken {
     #[error(
         "its first {0} pieces of `inputs` are not recorded; was the recorder attached when it started?"
@@ -41,7 +41,6 @@ impl Pieces {
         Ok(())
     }
 
-    /// The body of the next complete entry.
     pub(crate) fn entry(&mut self) -> Result<Option<Vec<u8>>, Broken> {
         let rest = &self.bytes[self.given..];
         let Some((length, rest)) = rest.split_first_chunk() else {

@@ -4,16 +4,15 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct Report {
     pub stages: BTreeMap<&'static str, StageReport>,
-    /// The first difference by tick.
     pub difference: Option<Difference>,
     /// The time at which the recording was cut off, seconds after its first message; none if it is complete.
     pub cut_after_s: Option<f64>,
 }
 
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub struct StageReport {
     /// Generations whose outputs are equal to the bit.
     pub equal: u64,
@@ -28,7 +27,7 @@ pub struct StageReport {
     pub unrecorded: u64,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, PartialEq, Serialize)]
 pub struct Difference {
     pub stage: &'static str,
     pub generation: u32,
@@ -43,12 +42,10 @@ pub struct Difference {
 }
 
 impl Report {
-    /// Generations of all stages that are equal to the bit.
     pub fn equal(&self) -> u64 {
         self.stages.values().map(|stage| stage.equal).sum()
     }
 
-    /// Generations of all stages that were not replayed.
     pub fn not_replayed(&self) -> usize {
         let stages = self.stages.values();
         stages.map(|stage| stage.not_replayed.len()).sum()

@@ -21,8 +21,7 @@ pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
 /// The fields that a process measures of itself, or that count its restarts, which differ in every run.
 const OWN: [&str; 4] = ["stamp.generation", "stamp.sequence", "full_solve_ns", "full_solves"];
 
-/// The first difference of two recordings.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Debug, PartialEq, Serialize)]
 pub struct First {
     pub tick: u64,
     pub time_s: f64,
@@ -34,7 +33,6 @@ pub struct First {
     pub values: [String; 2],
 }
 
-/// The stamp that a message begins with.
 pub(crate) fn stamp_of(message: &[u8]) -> Stamp {
     let stamp = Decoder::new(message).and_then(|mut from| Stamp::decode(&mut from));
     stamp.unwrap_or_default()

@@ -13,14 +13,14 @@ use std::{
 };
 
 /// The origin of Foxglove's own page. Programs that are no browsers mostly say none.
-pub(crate) const FOXGLOVE: &str = "https://app.foxglove.dev";
+pub const FOXGLOVE: &str = "https://app.foxglove.dev";
 /// Most clients at a time; more are closed at once.
 const MOST_CLIENTS: usize = 32;
 const SAID_WITHIN: Duration = Duration::from_secs(3);
 const MOST_REQUEST_BYTES: usize = 4 << 10;
 
 /// One of this machine's 16 million addresses.
-pub(crate) fn hidden_address() -> io::Result<Ipv4Addr> {
+pub fn hidden_address() -> io::Result<Ipv4Addr> {
     let mut bytes = [0; 3];
     File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     let [one, two, three] = bytes;
@@ -29,7 +29,7 @@ pub(crate) fn hidden_address() -> io::Result<Ipv4Addr> {
 }
 
 /// Pass on the clients of `listener` to `server`, apart from web pages of other than these origins, until this process ends.
-pub(crate) fn open(listener: TcpListener, server: SocketAddr, origins: Vec<String>) {
+pub fn open(listener: TcpListener, server: SocketAddr, origins: Vec<String>) {
     let origins = Arc::new(origins);
     thread::spawn(move || {
         for client in listener.incoming() {

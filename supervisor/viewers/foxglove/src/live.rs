@@ -43,14 +43,13 @@ const MOST_WAITING: usize = 512;
 /// A server that cannot be started.
 #[derive(Debug, Error)]
 #[error("cannot listen on {address}: {source}; choose another port with --listen")]
-pub(crate) struct LiveError {
+pub struct LiveError {
     address: SocketAddr,
     source: io::Error,
 }
 
-/// A server for viewers.
 #[derive(Debug)]
-pub(crate) struct Live {
+pub struct Live {
     context: Arc<Context>,
     server: WebSocketServerHandle,
 }
@@ -63,7 +62,6 @@ fn served() -> impl Iterator<Item = &'static dyn AnyTopic> {
     all.filter(|topic| matches!(topic.spec().logged, Logged::Yes))
 }
 
-/// The channels of one run.
 struct Serving {
     channels: HashMap<String, Arc<RawChannel>>,
     drawn: Drawn,
@@ -74,7 +72,7 @@ struct Serving {
 impl Live {
     /// Listen from now on, for web pages of these origins and for other programs. Returns the address, too, whose port the system may
     /// choose.
-    pub(crate) fn open(
+    pub fn open(
         robot: &RobotName,
         address: SocketAddr,
         origins: &[String],
@@ -96,7 +94,7 @@ impl Live {
     }
 
     /// Serve the robot of `domain`, from run to run, until `ended` returns true.
-    pub(crate) fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
+    pub fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
         let open = |bus: &Bus| -> Result<Readers, BusError> {
             served().map(|topic| Ok((topic.spec().name, topic.recorder_reader(bus)?))).collect()
         };

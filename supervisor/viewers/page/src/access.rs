@@ -10,9 +10,8 @@ use std::{
     net::SocketAddr,
 };
 
-/// The rights of a browser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Role {
+pub enum Role {
     /// The browser may watch and stop the robot.
     Watch,
     /// The browser may do everything.
@@ -20,8 +19,7 @@ pub(crate) enum Role {
 }
 
 /// A secret that gives rights to its owner.
-#[derive(Clone)]
-pub(crate) struct Token(String);
+pub struct Token(String);
 
 impl Token {
     fn new() -> io::Result<Self> {
@@ -38,7 +36,7 @@ impl Token {
     }
 
     #[cfg(test)]
-    pub(crate) fn reveal(&self) -> &str {
+    pub fn reveal(&self) -> &str {
         &self.0
     }
 }
@@ -50,15 +48,14 @@ impl fmt::Debug for Token {
     }
 }
 
-/// The rules of one page.
 #[derive(Debug)]
-pub(crate) struct Access {
+pub struct Access {
     /// `http` or `https`.
     scheme: &'static str,
     /// The hosts that a request may name.
     hosts: Vec<String>,
-    pub(crate) watch: Token,
-    pub(crate) drive: Token,
+    pub watch: Token,
+    pub drive: Token,
 }
 
 impl Access {
@@ -66,7 +63,7 @@ impl Access {
     ///
     /// # Errors
     /// When the system gives no random bytes for tokens.
-    pub(crate) fn new(address: SocketAddr, proxy: Option<&str>) -> io::Result<Self> {
+    pub fn new(address: SocketAddr, proxy: Option<&str>) -> io::Result<Self> {
         let hosts = match (proxy, address.port()) {
             (Some(name), _) => vec![name.to_owned()],
             // Browsers leave the usual port out.
@@ -78,7 +75,7 @@ impl Access {
     }
 
     /// The addresses of the page with their tokens, in lines, for the operator alone.
-    pub(crate) fn addresses(&self) -> String {
+    pub fn addresses(&self) -> String {
         let host = self.hosts.first().map(String::as_str).unwrap_or_default();
         let line =
             |role, Token(token): &Token| format!("{role} {}://{host}/#{token}\n", self.scheme);
@@ -86,23 +83,22 @@ impl Access {
     }
 
     /// The name of `host` as the rules have it; none if the page does not answer to it.
-    pub(crate) fn host(&self, host: &str) -> Option<&str> {
+    pub fn host(&self, host: &str) -> Option<&str> {
         self.hosts.iter().map(String::as_str).find(|known| *known == host)
     }
 
-    /// Whether `origin` is that of the page at `host`.
-    pub(crate) fn is_own_origin(&self, origin: &str, host: &str) -> bool {
+    pub fn is_own_origin(&self, origin: &str, host: &str) -> bool {
         origin.strip_prefix(self.scheme).and_then(|rest| rest.strip_prefix("://")) == Some(host)
     }
 
     /// The addresses at which a page at `host` may open its websocket.
-    pub(crate) fn websocket(&self, host: &str) -> String {
+    pub fn websocket(&self, host: &str) -> String {
         let scheme = if self.scheme == "https" { "wss" } else { "ws" };
         format!("{scheme}://{host}")
     }
 
     /// The rights of a browser that shows `token`; none if it has no rights at all.
-    pub(crate) fn role(&self, token: &str) -> Option<Role> {
+    pub fn role(&self, token: &str) -> Option<Role> {
         if self.drive.is(token) {
             Some(Role::Drive)
         } else {
@@ -115,7 +111,7 @@ impl Access {
 ///
 /// # Errors
 /// When `text` is something else.
-pub(crate) fn host_name(text: &str) -> Result<String, String> {
+pub fn host_name(text: &str) -> Result<String, String> {
     let is_letter = |letter: char| letter.is_ascii_alphanumeric() || "-.:[]".contains(letter);
     if !text.is_empty() && text.chars().all(is_letter) {
         Ok(text.to_ascii_lowercase())

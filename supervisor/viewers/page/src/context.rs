@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use crate::{access::Access, orders::Operator, places::Places, shared::Shared};
 
-pub(crate) struct Context {
-    pub(crate) access: Arc<Access>,
-    pub(crate) shared: Arc<Shared>,
-    pub(crate) operator: Arc<dyn Operator>,
+pub struct Context {
+    pub access: Arc<Access>,
+    pub shared: Arc<Shared>,
+    pub operator: Arc<dyn Operator>,
     /// Places of browsers that may watch, and of those that may drive.
-    pub(crate) watching: Places,
-    pub(crate) driving: Places,
+    pub watching: Places,
+    pub driving: Places,
 }

@@ -17,6 +17,9 @@
 //! | `orders` | what an operator may ask for |
 //! | `operator` | how that is done |
 
+// No other crate uses these modules: `pub` means another module; what none uses is reported.
+#![allow(unreachable_pub)]
+
 mod access;
 mod context;
 mod operator;
@@ -61,7 +64,6 @@ pub struct Arguments {
     behind_proxy: Option<String>,
 }
 
-/// Run the executable.
 pub fn main() -> ExitCode {
     executable::run("error", serve, |error| match error.downcast_ref()? {
         PageError::NotLoopback(_) => Some("not-loopback"),

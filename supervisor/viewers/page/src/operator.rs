@@ -7,8 +7,8 @@ use rustix::process::Signal;
 
 use crate::orders::Operator;
 
-pub(crate) struct RobotOperator {
-    pub(crate) robot: RobotName,
+pub struct RobotOperator {
+    pub robot: RobotName,
 }
 
 /// The confirmation, or the reason why the request was not carried out.

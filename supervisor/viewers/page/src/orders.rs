@@ -4,19 +4,15 @@ use serde::Deserialize;
 
 use crate::access::Role;
 
-/// Most targets in one order.
 const MOST_TARGETS: usize = 16;
 
 /// Carries out orders, and waits until each is confirmed. The result is the confirmation, or the reason why it was not
 /// carried out.
-pub(crate) trait Operator: Send + Sync + 'static {
-    /// Let the robot stand.
+pub trait Operator: Send + Sync + 'static {
     fn stop(&self) -> Result<String, String>;
     /// Let a stopped robot go on.
     fn resume(&self) -> Result<String, String>;
-    /// Start a new generation of a stage.
     fn restart(&self, stage: &str) -> Result<String, String>;
-    /// Kill the process of a stage.
     fn kill(&self, stage: &str) -> Result<String, String>;
     /// Go to these places, one after the other; metres in the mission frame.
     fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String>;
@@ -27,17 +23,17 @@ pub(crate) trait Operator: Send + Sync + 'static {
 }
 
 /// A message of a browser that has shown its token.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub(crate) struct Asked {
+#[derive(Clone, Deserialize)]
+pub struct Asked {
     /// The number of the message, which the answer has, too.
-    pub(crate) id: u64,
+    pub id: u64,
     #[serde(flatten)]
-    pub(crate) order: Order,
+    pub order: Order,
 }
 
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "order", rename_all = "snake_case")]
-pub(crate) enum Order {
+pub enum Order {
     Stop,
     Resume,
     Restart {
@@ -63,7 +59,7 @@ pub(crate) enum Order {
 
 impl Order {
     /// The reason why a browser of `role` may not give this order to a robot that is `simulated` or not.
-    pub(crate) fn refusal(&self, role: Role, simulated: bool) -> Option<&'static str> {
+    pub fn refusal(&self, role: Role, simulated: bool) -> Option<&'static str> {
         match self {
             Self::Stop => None,
             _ if role < Role::Drive => {
@@ -79,8 +75,7 @@ impl Order {
         }
     }
 
-    /// Have `operator` carry out the order.
-    pub(crate) fn perform(&self, operator: &dyn Operator) -> Result<String, String> {
+    pub fn perform(&self, operator: &dyn Operator) -> Result<String, String> {
         match self {
             Self::Stop => operator.stop(),
             Self::Resume => operator.resume(),

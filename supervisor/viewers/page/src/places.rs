@@ -9,21 +9,20 @@ use std::{
 use tokio::sync::Semaphore;
 
 /// A place of a client, until it is dropped. It closes when another client gets it.
-pub(crate) type Place = Arc<Semaphore>;
+pub type Place = Arc<Semaphore>;
 
-#[derive(Debug)]
-pub(crate) struct Places {
+pub struct Places {
     most: usize,
     /// The oldest is the first.
     taken: Mutex<VecDeque<Weak<Semaphore>>>,
 }
 
 impl Places {
-    pub(crate) fn new(most: usize) -> Self {
+    pub fn new(most: usize) -> Self {
         Self { most, taken: Mutex::default() }
     }
 
-    pub(crate) fn take(&self) -> Place {
+    pub fn take(&self) -> Place {
         let place = Arc::new(Semaphore::new(0));
         let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         taken.retain(|place| place.strong_count() > 0);
@@ -38,6 +37,6 @@ impl Places {
 }
 
 /// Wait until another client gets `place`.
-pub(crate) async fn lost(place: &Place) {
+pub async fn lost(place: &Place) {
     let _ = place.acquire().await;
 }

@@ -40,7 +40,6 @@ const LARGEST_RESULTS: u64 = 1 << 20;
 /// The most cells of a map for which a field is computed to a target that is only looked at.
 const PREVIEW_MOST_CELLS: usize = 512 * 512;
 
-/// The data of one run.
 struct Reading {
     collector: Collector,
     processes: Processes,
@@ -68,7 +67,6 @@ impl Reading {
         })
     }
 
-    /// Give browsers the new data.
     fn publish(&mut self, shared: &Shared) {
         let Self { collector, processes, logs, logs_read, results, packed, .. } = self;
         let mut ended = Vec::new();
@@ -139,7 +137,7 @@ fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
 }
 
 /// Show the robot of `domain` in `shared`, from run to run, until `ended` returns true.
-pub(crate) fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool) {
+pub fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool) {
     let open = |bus: &Bus| Feed::open(bus, TOPICS);
     let mut follower = Follower::new(domain.clone(), "page", &topics::LINK, open)
         .also_on([&topics::ROSTER as _, &topics::DEATHS as _]);

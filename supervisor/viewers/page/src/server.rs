@@ -22,19 +22,15 @@ use crate::{
 
 /// Most connections at a time whose clients have shown no token.
 const MOST_STRANGERS: usize = 64;
-/// The time for the request of a connection.
 const REQUEST_WITHIN: Duration = Duration::from_secs(3);
 /// The time within which a connection that does not become a websocket ends.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(10);
-/// Most bytes of a request and its headers.
 const MOST_HEADER_BYTES: usize = 16 << 10;
-/// Most bytes of a websocket's message.
 const MOST_MESSAGE_BYTES: usize = 4 << 10;
-/// The path of the websocket.
 const LIVE: &str = "/live";
 
 /// Serve connections until the result is dropped.
-pub(crate) async fn serve(context: Arc<Context>, listener: TcpListener) {
+pub async fn serve(context: Arc<Context>, listener: TcpListener) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
         tracing::error!("the system refuses to watch the socket of the page");
         return;
@@ -57,7 +53,6 @@ pub(crate) async fn serve(context: Arc<Context>, listener: TcpListener) {
     }
 }
 
-/// Answer one request, or begin a session.
 async fn connection(context: &Arc<Context>, stream: TcpStream, place: &Place) -> io::Result<()> {
     let service = service_fn(|request: hyper::Request<Incoming>| {
         let (context, place) = (context.clone(), place.clone());

@@ -26,18 +26,17 @@ use crate::{
 /// Most browsers at a time that may watch, and that may drive.
 const MOST_SESSIONS: usize = 16;
 
-/// The options of a page.
-#[derive(Clone, Debug)]
-pub(crate) struct Options {
-    pub(crate) robot: RobotName,
-    pub(crate) listen: SocketAddr,
+#[derive(Clone)]
+pub struct Options {
+    pub robot: RobotName,
+    pub listen: SocketAddr,
     /// The name by which browsers know the proxy before the page; none without a proxy.
-    pub(crate) proxy: Option<String>,
+    pub proxy: Option<String>,
 }
 
 /// A page that cannot be served.
 #[derive(Debug, Error)]
-pub(crate) enum PageError {
+pub enum PageError {
     #[error(
         "{0} is no loopback address, and the page does not encrypt; listen on 127.0.0.1 and use a tunnel, or a proxy with --behind-proxy"
     )]
@@ -50,17 +49,15 @@ pub(crate) enum PageError {
     System(#[from] io::Error),
 }
 
-/// A page that is served.
 #[derive(Debug)]
-pub(crate) struct Page {
-    /// The address on which the page listens.
+pub struct Page {
     #[cfg_attr(not(test), allow(dead_code, reason = "tests connect to it"))]
-    pub(crate) address: SocketAddr,
-    pub(crate) access: Arc<Access>,
+    pub address: SocketAddr,
+    pub access: Arc<Access>,
     /// The file with the addresses, which is removed with the page.
-    pub(crate) kept: PathBuf,
+    pub kept: PathBuf,
     domain: Domain,
-    pub(crate) shared: Arc<Shared>,
+    pub shared: Arc<Shared>,
     server: Option<(tokio::sync::oneshot::Sender<()>, thread::JoinHandle<()>)>,
 }
 
@@ -69,7 +66,7 @@ impl Page {
     ///
     /// # Errors
     /// When the address is not one of this machine alone, or is taken.
-    pub(crate) fn open(options: &Options, operator: Arc<dyn Operator>) -> Result<Self, PageError> {
+    pub fn open(options: &Options, operator: Arc<dyn Operator>) -> Result<Self, PageError> {
         if !options.listen.ip().is_loopback() {
             return Err(PageError::NotLoopback(options.listen));
         }
@@ -107,7 +104,7 @@ impl Page {
     }
 
     /// Show the robot, from run to run, until `ended` returns true.
-    pub(crate) fn show(&self, ended: &mut dyn FnMut() -> bool) {
+    pub fn show(&self, ended: &mut dyn FnMut() -> bool) {
         robot::follow(&self.domain, &self.shared, ended);
     }
 }

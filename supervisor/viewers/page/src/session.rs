@@ -23,7 +23,6 @@ use crate::{
     shared::Cursor,
 };
 
-/// The time for a browser to show its token.
 const TOKEN_WITHIN: Duration = Duration::from_secs(3);
 /// The interval at which new data are sent.
 const SEND_EVERY: Duration = Duration::from_millis(100);
@@ -33,7 +32,6 @@ const ALIVE_EVERY: Duration = Duration::from_millis(300);
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 /// The time within which a robot that may go on does so.
 const GOES_WITHIN: Duration = Duration::from_secs(3);
-/// Most messages of a browser in a second.
 const MOST_A_SECOND: u32 = 50;
 /// Most orders that are performed at a time, stops not counted, and most stops.
 const MOST_ORDERS: usize = 1;
@@ -46,7 +44,6 @@ const WRONG_TOKEN: u16 = 4401;
 const REPLACED: u16 = 4409;
 const TOO_MUCH: u16 = 4429;
 
-/// The first message of a browser.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Hello {
@@ -56,7 +53,7 @@ struct Hello {
 type Sender = SplitSink<WebSocket, Message>;
 
 /// `stranger` is the place of a client that has shown no token.
-pub(crate) async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>) {
+pub async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>) {
     let first = tokio::select! {
         first = timeout(TOKEN_WITHIN, socket.recv()) => first.ok().flatten(),
         () = lost(&stranger) => None,
@@ -114,7 +111,6 @@ pub(crate) async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Co
     }
 }
 
-/// The messages to the task that sends.
 enum Told {
     Answer(String),
     Close(u16),

@@ -20,13 +20,13 @@ const AT_ONCE: usize = 500;
 
 /// A value and its number, which grows with each new one.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Newest<T> {
+pub struct Newest<T> {
     number: u64,
     value: Option<T>,
 }
 
 impl<T: Clone> Newest<T> {
-    pub(crate) fn set(&mut self, value: T) {
+    pub fn set(&mut self, value: T) {
         (self.number, self.value) = (self.number + 1, Some(value));
     }
 
@@ -37,10 +37,8 @@ impl<T: Clone> Newest<T> {
     }
 }
 
-/// The newest items of a series, each with its number.
 #[derive(Debug, Default)]
-pub(crate) struct Ring {
-    /// The number of the first item.
+pub struct Ring {
     first: u64,
     items: VecDeque<Arc<str>>,
 }
@@ -63,32 +61,30 @@ impl Ring {
     }
 }
 
-/// The robot's run as browsers are shown it.
 #[derive(Debug, Default)]
-pub(crate) struct Shown {
-    /// The number of the run.
+pub struct Shown {
     run: u64,
     about: Option<Arc<str>>,
-    pub(crate) connected: bool,
-    pub(crate) simulated: bool,
+    pub connected: bool,
+    pub simulated: bool,
     /// Whether the link stops the robot for an operator, and the link's action in words.
-    pub(crate) link: (bool, String),
+    pub link: (bool, String),
     rows: Ring,
     events: Ring,
     results: Ring,
-    pub(crate) state: Newest<Arc<str>>,
-    pub(crate) map: Newest<Bytes>,
-    pub(crate) field: Newest<Bytes>,
-    pub(crate) preview: Newest<Bytes>,
+    pub state: Newest<Arc<str>>,
+    pub map: Newest<Bytes>,
+    pub field: Newest<Bytes>,
+    pub preview: Newest<Bytes>,
     /// The target whose field is wanted; a new one replaces it.
-    pub(crate) wanted: Option<[f64; 2]>,
+    pub wanted: Option<[f64; 2]>,
     /// The reason why the robot cannot be shown; empty if it can.
-    pub(crate) problem: String,
+    pub problem: String,
 }
 
 impl Shown {
     /// Note that a run began, and drop the data of the last one.
-    pub(crate) fn begin(&mut self, about: &Value, simulated: bool) {
+    pub fn begin(&mut self, about: &Value, simulated: bool) {
         *self = Self {
             run: self.run + 1,
             about: Some(about.to_string().into()),
@@ -98,33 +94,31 @@ impl Shown {
         };
     }
 
-    pub(crate) fn row(&mut self, row: &Value) {
+    pub fn row(&mut self, row: &Value) {
         self.rows.push(row, MOST_ROWS);
     }
 
-    pub(crate) fn event(&mut self, event: &Value) {
+    pub fn event(&mut self, event: &Value) {
         self.events.push(event, MOST_EVENTS);
     }
 
-    /// The result of a target, as an event.
-    pub(crate) fn result(&mut self, result: &Value) {
+    pub fn result(&mut self, result: &Value) {
         self.results.push(result, MOST_EVENTS);
     }
 }
 
 #[derive(Debug, Default)]
-pub(crate) struct Shared {
+pub struct Shared {
     shown: Mutex<Shown>,
     watching: AtomicUsize,
 }
 
 impl Shared {
-    pub(crate) fn lock(&self) -> MutexGuard<'_, Shown> {
+    pub fn lock(&self) -> MutexGuard<'_, Shown> {
         self.shown.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether a browser watches.
-    pub(crate) fn is_watched(&self) -> bool {
+    pub fn is_watched(&self) -> bool {
         self.watching.load(Ordering::Relaxed) > 0
     }
 }
@@ -145,28 +139,25 @@ struct Sent {
 }
 
 /// One browser that watches.
-#[derive(Debug)]
-pub(crate) struct Cursor {
+pub struct Cursor {
     shared: Arc<Shared>,
     sent: Sent,
 }
 
-/// The new data for a browser.
 #[derive(Debug, Default)]
-pub(crate) struct News {
+pub struct News {
     /// JSON; empty if nothing in it is new.
-    pub(crate) text: String,
-    pub(crate) blobs: Vec<Bytes>,
+    pub text: String,
+    pub blobs: Vec<Bytes>,
 }
 
 impl Cursor {
-    pub(crate) fn new(shared: &Arc<Shared>) -> Self {
+    pub fn new(shared: &Arc<Shared>) -> Self {
         shared.watching.fetch_add(1, Ordering::Relaxed);
         Self { shared: shared.clone(), sent: Sent::default() }
     }
 
-    /// The new data since the last time.
-    pub(crate) fn news(&mut self) -> News {
+    pub fn news(&mut self) -> News {
         let sent = &mut self.sent;
         let shown = self.shared.lock();
         let mut parts = Vec::new();

@@ -19,7 +19,7 @@ use crate::{
 };
 
 #[derive(Debug, clap::Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Machines: HOST, HOST:PORT, tls/HOST:PORT or tcp/HOST:PORT.
     #[arg(required = true)]
     hosts: Vec<String>,
@@ -43,7 +43,7 @@ const PATIENCE: Duration = Duration::from_secs(3);
 const OTHERS: Duration = Duration::from_millis(300);
 const AGAIN_AFTER: Duration = Duration::from_millis(50);
 
-pub(crate) fn list(arguments: &Arguments) -> Result {
+pub fn list(arguments: &Arguments) -> Result {
     let (mut listed, mut silent) = (Vec::new(), Vec::new());
     for host in &arguments.hosts {
         let at = arguments.connecting.endpoint(host);

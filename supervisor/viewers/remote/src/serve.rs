@@ -29,7 +29,7 @@ use crate::{
 };
 
 #[derive(Debug, clap::Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
@@ -49,16 +49,14 @@ pub(crate) struct Arguments {
     topic: Vec<String>,
 }
 
-/// What is answered to whoever asks.
 #[derive(Default)]
 struct Told {
     hello: Hello,
-    /// The run file.
     run: String,
 }
 
 /// One writer on the robot writes each of them. What operators write is not served, because the mirror must not look like one who asks.
-pub(crate) fn may_serve(topic: &dyn AnyTopic) -> bool {
+pub fn may_serve(topic: &dyn AnyTopic) -> bool {
     let spec = topic.spec();
     ![OPERATOR, EVERY_STAGE].contains(&spec.writer) && spec.name != topics::MIRROR.spec().name
 }
@@ -86,7 +84,7 @@ struct Readers {
     roster: Reader<RosterHeader, RosterEntry>,
 }
 
-pub(crate) fn serve(arguments: &Arguments) -> Result {
+pub fn serve(arguments: &Arguments) -> Result {
     let topics = topics(&arguments.topic)?;
     // The threads of the session get the lower priority of this one.
     let mut stream = Stream::open()?;
@@ -172,7 +170,6 @@ fn put(
 
 type Answering = zenoh::query::Queryable<()>;
 
-/// Answer whoever asks for `what` of `robot`.
 fn answer(
     session: &Session,
     robot: &RobotName,

@@ -17,8 +17,8 @@ const LEASE_MS: u64 = 2000;
 /// The longest message: a map of the most cells.
 const LONGEST: usize = (MAX_CELLS as usize).pow(2) + (1 << 16);
 
-#[derive(Clone, Debug, Default, Args)]
-pub(crate) struct Certificates {
+#[derive(Debug, Args)]
+pub struct Certificates {
     /// This side's certificate, a PEM file.
     #[arg(long, requires = "key")]
     cert: Option<PathBuf>,
@@ -29,7 +29,7 @@ pub(crate) struct Certificates {
 
 /// Listen at `endpoints`. With `clients` only those may read whose certificate is of that authority, and of them those in `names`, if
 /// there are any.
-pub(crate) fn listen(
+pub fn listen(
     endpoints: &[String],
     own: &Certificates,
     clients: Option<&Path>,
@@ -76,8 +76,8 @@ pub(crate) fn listen(
     }))
 }
 
-#[derive(Clone, Debug, Default, Args)]
-pub(crate) struct Connecting {
+#[derive(Debug, Args)]
+pub struct Connecting {
     /// The authority of the robot's certificate, a PEM file. Without it the connection is over tcp, and nothing says whose robot it is.
     #[arg(long)]
     ca: Option<PathBuf>,
@@ -86,12 +86,12 @@ pub(crate) struct Connecting {
 }
 
 impl Connecting {
-    pub(crate) fn endpoint(&self, at: &str) -> String {
+    pub fn endpoint(&self, at: &str) -> String {
         endpoint(at, self.ca.is_some())
     }
 
     /// Connect to `at`, and again whenever the link is lost.
-    pub(crate) fn connect(&self, at: &str) -> Result<Session> {
+    pub fn connect(&self, at: &str) -> Result<Session> {
         let Self { ca, own } = self;
         open(&json!({
             "mode": "peer",
@@ -122,13 +122,12 @@ fn open(config: &Value) -> Result<Session> {
     zenoh::open(config).wait().map_err(failed)
 }
 
-/// An error of zenoh, as one of ours.
-pub(crate) fn failed(error: zenoh::Error) -> Failure {
+pub fn failed(error: zenoh::Error) -> Failure {
     error
 }
 
 /// `at` as zenoh writes it: `tls/HOST:PORT` or `tcp/HOST:PORT`, of which the first and the last part may be left out.
-pub(crate) fn endpoint(at: &str, secured: bool) -> String {
+pub fn endpoint(at: &str, secured: bool) -> String {
     let (protocol, address) =
         at.split_once('/').unwrap_or((if secured { "tls" } else { "tcp" }, at));
     let has_port = address.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok());

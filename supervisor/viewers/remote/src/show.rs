@@ -36,7 +36,7 @@ use crate::{
 };
 
 #[derive(Debug, clap::Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// The robot's machine: HOST, HOST:PORT, tls/HOST:PORT or tcp/HOST:PORT.
     host: String,
     /// Name of the robot there.
@@ -58,10 +58,9 @@ const SILENT: Duration = Duration::from_millis(400);
 /// Samples that wait for this process; more are dropped.
 const WAITING: usize = 256;
 
-/// The most entries of a roster.
 const LONGEST_ROSTER: usize = 64;
 
-pub(crate) fn show(arguments: &Arguments) -> Result {
+pub fn show(arguments: &Arguments) -> Result {
     let mut stream = Stream::open()?;
     let Arguments { host, robot, named, connecting } = arguments;
     let session = connecting.connect(host)?;
@@ -179,14 +178,14 @@ fn payload(reply: &Reply) -> Option<Vec<u8>> {
 }
 
 /// The run in `text`, if its mission is a sane one: the size of the mirror's memory is in it.
-pub(crate) fn checked(text: &str) -> Option<Run> {
+pub fn checked(text: &str) -> Option<Run> {
     let run: Run = toml::from_str(text).ok()?;
     Mission::parse(&toml::to_string(&run.mission).ok()?, Path::new("the run file")).ok()?;
     Some(run)
 }
 
 /// A bus with the samples of another machine's robot. The fields are dropped in this order: the lock, which removes the bus, last.
-pub(crate) struct Mirror {
+pub struct Mirror {
     id: u64,
     writers: BTreeMap<&'static str, Box<dyn AnyWriter>>,
     ages: Writer<MirrorSample>,
@@ -213,7 +212,7 @@ impl Drop for RunDirectory {
 impl Mirror {
     /// # Errors
     /// If a robot of that name runs here, or shared memory is full.
-    pub(crate) fn open(domain: &Domain, mut run: Run, id: u64, place: &str) -> Result<Self> {
+    pub fn open(domain: &Domain, mut run: Run, id: u64, place: &str) -> Result<Self> {
         let cells = run.mission.grid_frame().area();
         run.robot = domain.robot.clone();
         // No robot's name has a point.
@@ -242,7 +241,7 @@ impl Mirror {
     }
 
     /// Publish a sample of the robot. What is no sample of a topic that is served is counted and left out.
-    pub(crate) fn take(&mut self, topic: &str, sent: Sent, message: &[u8]) -> Result {
+    pub fn take(&mut self, topic: &str, sent: Sent, message: &[u8]) -> Result {
         let stamp = decode_sample::<Stamp>(message).filter(|_| sent.id == self.id);
         let mut served = topics::TABLE.iter().copied().filter(|topic| may_serve(*topic));
         let known = served.find(|known| known.spec().name == topic);
@@ -295,7 +294,7 @@ impl Mirror {
     }
 
     /// Say how old what is shown is, and show the newest samples again while none come.
-    pub(crate) fn tell(&mut self, clock: &Clock) -> Result {
+    pub fn tell(&mut self, clock: &Clock) -> Result {
         let Some((sent, stamp)) = self.heard else { return Ok(()) };
         if self.told.is_some_and(|told| told.elapsed() < RESTATE) {
             return Ok(());

@@ -2,46 +2,41 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The longest answer that is looked at.
 const LONGEST_HELLO: usize = 4096;
 
-/// The answer of a machine that serves a robot.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Hello {
+pub struct Hello {
     /// Another for each run and each serving process; 0 while the robot does not run.
-    pub(crate) id: u64,
+    pub id: u64,
     /// The monotonic clock of the machine at the time of the answer.
-    pub(crate) clock_ns: u64,
-    pub(crate) robot: String,
-    /// The supervisor's order, in words.
-    pub(crate) order: String,
-    pub(crate) mission_time_s: f64,
+    pub clock_ns: u64,
+    pub robot: String,
+    pub order: String,
+    pub mission_time_s: f64,
 }
 
 impl Hello {
     /// None if `bytes` are no such answer.
-    pub(crate) fn decoded(bytes: &[u8]) -> Option<Self> {
+    pub fn decoded(bytes: &[u8]) -> Option<Self> {
         let bytes = bytes.get(..LONGEST_HELLO).map_or(Some(bytes), |_| None)?;
         serde_json::from_slice(bytes).ok()
     }
 }
 
-/// What goes with each sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Sent {
-    /// The run; see [`Hello`].
-    pub(crate) id: u64,
+#[derive(Clone, Copy, Debug)]
+pub struct Sent {
+    pub id: u64,
     /// The monotonic clock of the robot's machine when the sample was read there.
-    pub(crate) sent_ns: u64,
+    pub sent_ns: u64,
 }
 
 impl Sent {
-    pub(crate) fn encoded(self) -> Vec<u8> {
+    pub fn encoded(self) -> Vec<u8> {
         [self.id.to_le_bytes(), self.sent_ns.to_le_bytes()].concat()
     }
 
     /// None if `bytes` are something else.
-    pub(crate) fn decoded(bytes: &[u8]) -> Option<Self> {
+    pub fn decoded(bytes: &[u8]) -> Option<Self> {
         let (id, sent_ns) = bytes.split_first_chunk()?;
         let sent_ns = u64::from_le_bytes(sent_ns.try_into().ok()?);
         Some(Self { id: u64::from_le_bytes(*id), sent_ns })
@@ -53,8 +48,8 @@ const DRIFT: i64 = 10_000;
 
 /// The other machine's clock, by questions and answers. The answer was given after the question was asked, so every time of that machine
 /// was here no earlier than this says, and an age is never told too low, however slow the link is one way.
-#[derive(Debug, Default)]
-pub(crate) struct Clock {
+#[derive(Default)]
+pub struct Clock {
     id: u64,
     /// Our clock less theirs at least, and when that was known.
     known: Option<(i64, u64)>,
@@ -62,7 +57,7 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// Note that a question of `asked_ns`, by our clock, was answered with `hello`. In another run it may be another machine.
-    pub(crate) fn on_answer(&mut self, asked_ns: u64, hello: &Hello) {
+    pub fn on_answer(&mut self, asked_ns: u64, hello: &Hello) {
         if hello.id != self.id {
             *self = Self { id: hello.id, known: None };
         }
@@ -74,7 +69,7 @@ impl Clock {
     }
 
     /// The age at most, at `now_ns` by our clock, of what was sent at `sent_ns` by theirs; none before the first answer.
-    pub(crate) fn age_ns(&self, now_ns: u64, sent_ns: u64) -> Option<u64> {
+    pub fn age_ns(&self, now_ns: u64, sent_ns: u64) -> Option<u64> {
         let (least, _) = self.known?;
         let here_ns = i128::from(sent_ns) + i128::from(least);
         u64::try_from((i128::from(now_ns) - here_ns).max(0)).ok()

@@ -18,9 +18,8 @@ use crate::{
     shown::MAP,
 };
 
-/// The target of a goal.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Aim {
+#[derive(Default, Serialize, Deserialize)]
+pub struct Aim {
     point: TargetPoint,
     /// The number of the goal's target, once the supervisor has published it.
     number: Option<u64>,
@@ -28,7 +27,6 @@ pub(crate) struct Aim {
     waits: bool,
     /// The number of the newest target that is older than the goal.
     after: u64,
-    /// Why the goal was not reached.
     why: Refusal,
     /// How often the result of its target was awaited in vain.
     #[serde(skip)]
@@ -40,19 +38,19 @@ const MOST_AWAITED: u32 = 20;
 
 /// Why a goal is not reached: an error code of Nav2, and its words.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Refusal {
-    pub(crate) code: u16,
-    pub(crate) text: String,
+pub struct Refusal {
+    pub code: u16,
+    pub text: String,
 }
 
 /// The codes of Nav2: those of `NavigateToPose`, and those of its planner, which `NavigateToPose` passes on.
-pub(crate) mod code {
-    pub(crate) const UNKNOWN: u16 = 9000;
-    pub(crate) const TF_ERROR: u16 = 9002;
-    pub(crate) const TIMEOUT: u16 = 9003;
-    pub(crate) const GOAL_OUTSIDE_MAP: u16 = 204;
-    pub(crate) const GOAL_OCCUPIED: u16 = 206;
-    pub(crate) const NO_VALID_PATH: u16 = 208;
+pub mod code {
+    pub const UNKNOWN: u16 = 9000;
+    pub const TF_ERROR: u16 = 9002;
+    pub const TIMEOUT: u16 = 9003;
+    pub const GOAL_OUTSIDE_MAP: u16 = 204;
+    pub const GOAL_OCCUPIED: u16 = 206;
+    pub const NO_VALID_PATH: u16 = 208;
 }
 
 impl<T: ToString> From<T> for Refusal {
@@ -61,53 +59,48 @@ impl<T: ToString> From<T> for Refusal {
     }
 }
 
-/// The server's goals.
-#[derive(Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Server {
-    pub(crate) goals: Goals<Aim>,
+#[derive(Default, Serialize, Deserialize)]
+pub struct Server {
+    pub goals: Goals<Aim>,
     /// The number of the newest target, which the target of a goal that is sent now follows; another run counts from 1.
     #[serde(skip)]
-    pub(crate) newest_target: u64,
+    pub newest_target: u64,
 }
 
-/// A goal that a client sends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Sent {
-    pub(crate) id: Uuid,
-    pub(crate) point: TargetPoint,
+#[derive(Clone, Copy, Debug)]
+pub struct Sent {
+    pub id: Uuid,
+    pub point: TargetPoint,
 }
 
 impl Server {
     /// The id of the goal that a client sends, and where to go or why not there. The error says why the payload is none.
-    pub(crate) fn read_goal(
-        payload: &[u8],
-    ) -> Result<(Uuid, Result<TargetPoint, Refusal>), String> {
+    pub fn read_goal(payload: &[u8]) -> Result<(Uuid, Result<TargetPoint, Refusal>), String> {
         let mut reader = Reader::new(payload)?;
         Ok((uuid(&mut reader)?, goal_of(&mut reader)))
     }
 
     /// Take a goal that the supervisor accepted; its target comes after the one with the number `after`.
-    pub(crate) fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
+    pub fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
         self.abort("a newer goal took its place");
         let aim = Aim { point: sent.point, after, ..Aim::default() };
         self.goals.accept(sent.id, aim, now_ns);
     }
 
     /// Take a goal that has ended before it began; another one goes on.
-    pub(crate) fn refuse(&mut self, id: Uuid, why: &Refusal, now_ns: u64) {
+    pub fn refuse(&mut self, id: Uuid, why: &Refusal, now_ns: u64) {
         let aim = Aim { why: why.clone(), ..Aim::default() };
         self.goals.add(id, Status::Aborted, aim, now_ns);
     }
 
-    /// End the goal that is not over.
-    pub(crate) fn abort(&mut self, why: &str) {
+    pub fn abort(&mut self, why: &str) {
         if let Some(goal) = self.goals.current() {
             goal.known.why = why.into();
         }
         self.goals.end(Status::Aborted);
     }
 
-    pub(crate) fn target(&mut self, target: &TargetSample) {
+    pub fn target(&mut self, target: &TargetSample) {
         self.newest_target = target.number;
         let Some(goal) = self.goals.current() else {
             return;
@@ -124,7 +117,7 @@ impl Server {
         }
     }
 
-    pub(crate) fn command(&mut self, command: &CommandSample) {
+    pub fn command(&mut self, command: &CommandSample) {
         let has_arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
         let goal = self.goals.current();
         let goal = goal.filter(|goal| goal.known.number == Some(command.target_number));
@@ -134,7 +127,7 @@ impl Server {
     }
 
     /// A run that stays gives up a target, and then waits for the next one.
-    pub(crate) fn directive(&mut self, directive: &DirectiveSample) {
+    pub fn directive(&mut self, directive: &DirectiveSample) {
         let waits = HoldReason::from_byte(directive.reason) == HoldReason::Waiting;
         if let Some(goal) = self.goals.current().filter(|goal| goal.known.number.is_some())
             && std::mem::replace(&mut goal.known.waits, waits)
@@ -145,7 +138,7 @@ impl Server {
     }
 
     /// Take the recorded result of a target: it says why a goal was given up, or how it ended while nobody looked.
-    pub(crate) fn recorded(&mut self, number: u64, outcome: &str) {
+    pub fn recorded(&mut self, number: u64, outcome: &str) {
         let is_of = |aim: &Aim| aim.number == Some(number);
         if self.goals.current().is_some_and(|goal| is_of(&goal.known)) {
             self.abort("the robot was sent elsewhere, or the run ended");
@@ -166,12 +159,11 @@ impl Server {
     }
 
     /// No further results of the targets of earlier goals come.
-    pub(crate) fn forget_targets(&mut self) {
+    pub fn forget_targets(&mut self) {
         self.goals.aborted().for_each(|goal| goal.known.number = None);
     }
 
-    /// The requests for the results of goals that are over.
-    pub(crate) fn answerable(&mut self) -> Vec<(Request, Uuid)> {
+    pub fn answerable(&mut self) -> Vec<(Request, Uuid)> {
         self.goals.aborted().for_each(|goal| goal.known.awaited += 1);
         self.goals.answerable(|status, aim| {
             status != Status::Aborted as u8
@@ -180,19 +172,14 @@ impl Server {
     }
 
     /// The result of a goal; none while it is not over.
-    pub(crate) fn result(&self, id: Uuid) -> Option<Vec<u8>> {
+    pub fn result(&self, id: Uuid) -> Option<Vec<u8>> {
         let (status, aim) = self.goals.over(id)?;
         let Refusal { code, text } = aim.map(|aim| aim.why.clone()).unwrap_or_default();
         Some(Writer::default().u8(status).u16(code).text(&text).take())
     }
 
     /// The progress of the robot with its goal; none without a goal.
-    pub(crate) fn feedback(
-        &mut self,
-        pose: &PoseSample,
-        recoveries: u64,
-        now_ns: u64,
-    ) -> Option<Vec<u8>> {
+    pub fn feedback(&mut self, pose: &PoseSample, recoveries: u64, now_ns: u64) -> Option<Vec<u8>> {
         let goal = self.goals.current()?;
         let at = pose.pose();
         let left_m = at.position.distance(goal.known.point.position());

@@ -14,12 +14,12 @@ use crate::{
 const LEAST_SIGMA: f64 = 0.05;
 
 /// The target of a `geometry_msgs/PoseStamped`.
-pub(crate) fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
+pub fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
     goal_of(&mut Reader::new(payload)?).map_err(|why| why.text)
 }
 
 /// The target of a `geometry_msgs/PoseStamped` that is a part of a message, in the mission's frame.
-pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, Refusal> {
+pub fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, Refusal> {
     let (_stamp_ns, frame) = reader.header()?;
     if !(frame.is_empty() || frame.trim_start_matches('/') == MAP) {
         let text = format!("a pose in the frame {frame:?}; give it in {MAP:?}");
@@ -34,7 +34,7 @@ pub(crate) fn goal_of(reader: &mut Reader<'_>) -> Result<TargetPoint, Refusal> {
 }
 
 /// The place of a `geometry_msgs/PoseWithCovarianceStamped`, and its deviations, metres and radians.
-pub(crate) fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
+pub fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
     let mut reader = Reader::new(payload)?;
     let place = goal_of(&mut reader).map_err(|why| why.text)?;
     let all: [f64; 36] = reader.f64s()?;
@@ -43,7 +43,7 @@ pub(crate) fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
 }
 
 /// Where a hand pushes by a `geometry_msgs/Twist`: ahead and to the left, in shares of the mission's speeds.
-pub(crate) fn stick(payload: &[u8], mission: &Mission) -> Result<DVec2, String> {
+pub fn stick(payload: &[u8], mission: &Mission) -> Result<DVec2, String> {
     let [ahead, _, _, _, _, left]: [f64; 6] = Reader::new(payload)?.f64s()?;
     let stick = DVec2::new(ahead / mission.speed_m_s(), left / mission.turn_rad_s());
     match stick.is_finite() {
@@ -52,7 +52,6 @@ pub(crate) fn stick(payload: &[u8], mission: &Mission) -> Result<DVec2, String> 
     }
 }
 
-/// The value of a `std_msgs/Bool`.
-pub(crate) fn flag(payload: &[u8]) -> Result<bool, String> {
+pub fn flag(payload: &[u8]) -> Result<bool, String> {
     Ok(Reader::new(payload)?.u8()? != 0)
 }

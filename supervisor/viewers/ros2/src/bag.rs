@@ -15,7 +15,7 @@ use crate::{definitions::define, endpoints::published, shown::Shown};
 /// It has the topics that are published of a robot that runs, `path` and `field` only from a recording with `--fields`. Their stamps and
 /// the times of the bag are mission time.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// A recorded run's directory, or one recording.
     recording: PathBuf,
     /// The folder of the bag, which must not exist yet.
@@ -23,7 +23,7 @@ pub(crate) struct Arguments {
 }
 
 /// Make a bag with topics below `namespace`. Returns what is in it and what is not, in words.
-pub(crate) fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
+pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { recording, out } = arguments;
     let files = recording::files(recording)?;
     let recordings: Vec<_> =

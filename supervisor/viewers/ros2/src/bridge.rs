@@ -54,27 +54,24 @@ const RUN_ENDED: &str = "the run ended before the robot arrived";
 /// The least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
-/// The options of the bridge.
-#[derive(Clone, Debug)]
-pub(crate) struct Options {
-    pub(crate) robot: RobotName,
-    /// The domain of DDS.
-    pub(crate) domain: u16,
+#[derive(Clone)]
+pub struct Options {
+    pub robot: RobotName,
+    pub domain: u16,
     /// The address of the network interface; all of them without it.
-    pub(crate) interface: Option<Ipv4Addr>,
-    /// The namespace of the topics.
-    pub(crate) namespace: String,
+    pub interface: Option<Ipv4Addr>,
+    pub namespace: String,
     /// The requests of others that are permitted.
-    pub(crate) accepted: Vec<Accept>,
-    pub(crate) frames: Frames,
+    pub accepted: Vec<Accept>,
+    pub frames: Frames,
     /// Stamps are mission time, which is published.
-    pub(crate) clock: bool,
-    pub(crate) parameters: Vec<Parameter>,
+    pub clock: bool,
+    pub parameters: Vec<Parameter>,
 }
 
 /// The bridge cannot be opened.
 #[derive(Debug, Error)]
-pub(crate) enum BridgeError {
+pub enum BridgeError {
     #[error(
         "cannot join domain {domain} of ROS 2: {source}; is the address of --interface one of this machine?"
     )]
@@ -87,18 +84,15 @@ pub(crate) enum BridgeError {
     System(io::Error),
 }
 
-/// The state of the bridge.
 struct Bridge {
     options: Options,
     node: Node<Id>,
-    /// The transforms of other nodes.
     transforms: Transforms,
     orders: Orders,
     shown: Option<Shown>,
     server: Server,
     /// The directory of the run, with the results of its targets.
     run: Option<(PathBuf, Results)>,
-    /// The goals as they are stored for a bridge that comes after this one.
     stored: String,
     goals_file: PathBuf,
     /// Clients do not know the writers of this bridge before.
@@ -111,7 +105,7 @@ struct Bridge {
 }
 
 /// Bridge a robot, from run to run, until `ended` returns true.
-pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
+pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
     let (robot, domain) = (&options.robot, options.domain);
     let join = || endpoints::open(options).map_err(|source| BridgeError::Join { domain, source });
     let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
@@ -171,7 +165,7 @@ pub(crate) fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Resul
 }
 
 /// The time, nanoseconds since 1970.
-pub(crate) fn now_ns() -> u64 {
+pub fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
@@ -260,7 +254,6 @@ impl Bridge {
         (self.shown, self.stands_for_cancel) = (None, None);
     }
 
-    /// Take all samples that were published on the robot's bus.
     fn take_samples(&mut self, feed: &mut Feed) -> Result<(), BusError> {
         let Self { node, shown, server, stands_for_cancel, options, transforms, .. } = self;
         let Some(shown) = shown else {
@@ -288,7 +281,6 @@ impl Bridge {
         })
     }
 
-    /// The time for stamps.
     fn now_ns(&self) -> u64 {
         match &self.shown {
             Some(shown) if self.options.clock => (shown.state.now_s() * 1e9) as u64,
@@ -296,7 +288,6 @@ impl Bridge {
         }
     }
 
-    /// Take the messages that nodes have sent.
     fn hear(&mut self) {
         self.node.answer();
         for (id, message) in self.node.heard() {
@@ -381,7 +372,6 @@ impl Bridge {
         self.server.refuse(id, why, now_ns);
     }
 
-    /// Take an order with its result.
     fn done(&mut self, (order, result): Done) {
         if let Err(why) = &result {
             self.tell(&format!("what was asked is not done: {}", why.text));
@@ -422,7 +412,6 @@ impl Bridge {
         }
     }
 
-    /// Publish the samples that are due.
     fn publish(&mut self) {
         let now_ns = self.now_ns();
         self.read_results();

@@ -6,7 +6,7 @@ const RULE: &str =
     "================================================================================\n";
 
 /// Add to `text` the fields of the message `name`, then the messages in it that are not there yet.
-pub(crate) fn define(name: &str, text: &mut String) {
+pub fn define(name: &str, text: &mut String) {
     let own = |part: &'static str| part.strip_prefix(name)?.strip_prefix('\n');
     let fields = ALL.split("MSG: ").find_map(own).unwrap_or_default();
     *text += fields;

@@ -15,24 +15,17 @@ type Covariance = [f64; 36];
 /// The errors of x, y and heading in the frame of odometry since the bridge knows the run. The systematic ones are per share of error of
 /// the wheels' ratio, the track and the mean diameter, as in the covariance of dead reckoning.
 #[derive(Debug)]
-pub(crate) struct Drift {
+pub struct Drift {
     slipped: DMat3,
     systematic: [DVec3; 3],
-    /// The tick's time of the newest sample.
     at_s: Option<f64>,
 }
 
 impl Drift {
-    pub(crate) const NONE: Self =
-        Self { slipped: DMat3::ZERO, systematic: [DVec3::ZERO; 3], at_s: None };
+    pub const NONE: Self = Self { slipped: DMat3::ZERO, systematic: [DVec3::ZERO; 3], at_s: None };
 
     /// The covariances of the pose in odometry and of the speeds, for stamps that go `pace` times slower than mission time.
-    pub(crate) fn after(
-        &mut self,
-        sample: &PoseSample,
-        mission: &Mission,
-        pace: f64,
-    ) -> [Covariance; 2] {
+    pub fn after(&mut self, sample: &PoseSample, mission: &Mission, pace: f64) -> [Covariance; 2] {
         let (model, body) = (&mission.robot.odometry, mission.body());
         let period_s = 1.0 / mission.robot.rate_hz;
         let now_s = sample.stamp.time().seconds();

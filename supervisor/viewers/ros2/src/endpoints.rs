@@ -13,8 +13,7 @@ use crate::{
 /// Transforms come from many nodes, of either reliability.
 const TRANSFORMS: Quality = Quality { is_reliable: false, is_latched: false, depth: 100 };
 
-/// Join the domain by the interface of `options`, with topics below the namespace there.
-pub(crate) fn open(options: &Options) -> io::Result<Node<Id>> {
+pub fn open(options: &Options) -> io::Result<Node<Id>> {
     let Options { domain, interface, namespace, accepted, parameters, .. } = options;
     let mut node = Node::join((*domain, *interface, namespace), "firsthand", parameters.clone())?;
     if options.frames == Frames::Map {
@@ -41,12 +40,11 @@ pub(crate) fn open(options: &Options) -> io::Result<Node<Id>> {
 }
 
 /// Whether the topic is opened for each robot: a robot that speaks ROS 2 may publish it itself.
-pub(crate) const fn is_of_robot(id: Id) -> bool {
+pub const fn is_of_robot(id: Id) -> bool {
     matches!(id, Id::Odom | Id::Battery | Id::Range(_) | Id::Scan(_))
 }
 
-/// Open the topics of a robot, and close those of the robot before.
-pub(crate) fn open_robot<'a>(
+pub fn open_robot<'a>(
     node: &mut Node<Id>,
     topics: impl Iterator<Item = (Id, &'a str)>,
 ) -> io::Result<()> {
@@ -72,7 +70,7 @@ fn write_to(node: &mut Node<Id>, id: Id, row: &Spec, sensor: &str) -> io::Result
 }
 
 /// The topics that are published of a robot with these of its sensors: row, content and name below `namespace`.
-pub(crate) fn published<'a>(
+pub fn published<'a>(
     namespace: &str,
     sensors: impl Iterator<Item = (Id, &'a str)>,
 ) -> impl Iterator<Item = (&'static Spec, Id, String)> {
@@ -85,8 +83,7 @@ pub(crate) fn published<'a>(
     })
 }
 
-/// The name of the topic of `row` below `namespace`, from the root.
-pub(crate) fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
+pub fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
     let name = row.name.replace("SENSOR", &ros_name(sensor));
     let name = name.trim_end_matches('/');
     match namespace.trim_matches('/') {

@@ -8,7 +8,6 @@ use ros2::cdr::Reader;
 /// The most frames that are known, and that a message has.
 const MOST_FRAMES: usize = 1024;
 
-/// The place of a frame in its parent.
 #[derive(Debug)]
 struct Place {
     parent: String,
@@ -17,13 +16,12 @@ struct Place {
     heard: Option<Instant>,
 }
 
-/// Frames by their names.
-#[derive(Debug, Default)]
-pub(crate) struct Frames(BTreeMap<String, Place>);
+#[derive(Default)]
+pub struct Frames(BTreeMap<String, Place>);
 
 impl Frames {
     /// Take a `tf2_msgs/TFMessage` that was `heard` then, or is of frames that stay. The error says why it is refused.
-    pub(crate) fn take(&mut self, payload: &[u8], heard: Option<Instant>) -> Result<(), String> {
+    pub fn take(&mut self, payload: &[u8], heard: Option<Instant>) -> Result<(), String> {
         let mut reader = Reader::new(payload)?;
         for _ in 0..reader.length(MOST_FRAMES)? {
             let (_stamp_ns, parent) = reader.header()?;
@@ -40,7 +38,7 @@ impl Frames {
     }
 
     /// The pose of `frame` in `root`, from transforms that are not older than `since`. The error says what is missing.
-    pub(crate) fn find(
+    pub fn find(
         &self,
         frame: &str,
         root: &str,

@@ -11,16 +11,15 @@ use ros2::{
 use serde::{Deserialize, Serialize};
 
 /// The id that a client gave its goal.
-pub(crate) type Uuid = [u8; 16];
+pub type Uuid = [u8; 16];
 
 /// The most goals that are remembered; older ones are forgotten.
 const MOST_GOALS: usize = 16;
-/// The most clients that wait for results.
 const MOST_RESULTS: usize = 32;
 
 /// A `action_msgs/GoalStatus`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) enum Status {
+pub enum Status {
     Executing = 2,
     Canceling = 3,
     Succeeded = 4,
@@ -29,14 +28,11 @@ pub(crate) enum Status {
 }
 
 impl Status {
-    /// Whether the status is final.
-    pub(crate) const fn is_final(self) -> bool {
+    pub const fn is_final(self) -> bool {
         matches!(self, Self::Succeeded | Self::Canceled | Self::Aborted)
     }
 }
 
-/// The answer to a request to cancel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cancel {
     Taken = 0,
     Unknown = 2,
@@ -44,39 +40,36 @@ enum Cancel {
 }
 
 /// A goal that was accepted, with what its action knows of it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Goal<T> {
-    pub(crate) id: Uuid,
+#[derive(Serialize, Deserialize)]
+pub struct Goal<T> {
+    pub id: Uuid,
     /// The time when the goal was accepted, nanoseconds since 1970.
-    pub(crate) at_ns: u64,
-    pub(crate) status: Status,
-    pub(crate) known: T,
+    pub at_ns: u64,
+    pub status: Status,
+    pub known: T,
 }
 
-/// A server's goals.
-#[derive(Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Goals<T> {
+#[derive(Default, Serialize, Deserialize)]
+pub struct Goals<T> {
     goals: VecDeque<Goal<T>>,
     /// Whether the states have changed since they were last published.
     is_changed: bool,
-    /// Clients that wait for the result of a goal.
     waiting: Vec<(Request, Uuid)>,
 }
 
 impl<T> Goals<T> {
     /// The reply to a goal, at `now_ns` since 1970.
-    pub(crate) fn reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
+    pub fn reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
         Writer::default().u8(is_accepted.into()).time(now_ns).take()
     }
 
     /// Take a goal; it ends the one before.
-    pub(crate) fn accept(&mut self, id: Uuid, known: T, now_ns: u64) {
+    pub fn accept(&mut self, id: Uuid, known: T, now_ns: u64) {
         self.end(Status::Aborted);
         self.add(id, Status::Executing, known, now_ns);
     }
 
-    /// Add a goal in this state.
-    pub(crate) fn add(&mut self, id: Uuid, status: Status, known: T, now_ns: u64) {
+    pub fn add(&mut self, id: Uuid, status: Status, known: T, now_ns: u64) {
         if self.goals.len() == MOST_GOALS {
             self.goals.pop_front();
         }
@@ -84,25 +77,24 @@ impl<T> Goals<T> {
         self.is_changed = true;
     }
 
-    pub(crate) fn are_any(&self) -> bool {
+    pub fn are_any(&self) -> bool {
         !self.goals.is_empty()
     }
 
     /// Let the goal that is not over end with `status`.
-    pub(crate) fn end(&mut self, status: Status) {
+    pub fn end(&mut self, status: Status) {
         for goal in self.goals.iter_mut().filter(|goal| !goal.status.is_final()) {
             goal.status = status;
             self.is_changed = true;
         }
     }
 
-    /// The goal that is not over.
-    pub(crate) fn current(&mut self) -> Option<&mut Goal<T>> {
+    pub fn current(&mut self) -> Option<&mut Goal<T>> {
         self.goals.iter_mut().rev().find(|goal| !goal.status.is_final())
     }
 
     /// Take a request to cancel. Returns the reply, and whether a goal is canceled.
-    pub(crate) fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
+    pub fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
         let mut reader = Reader::new(payload)?;
         let (id, until_ns) = (uuid(&mut reader)?, reader.time()?);
         let is_any = id == Uuid::default();
@@ -132,8 +124,7 @@ impl<T> Goals<T> {
         Ok((reply, !canceled.is_empty()))
     }
 
-    /// Take a request for the result of a goal.
-    pub(crate) fn wait(&mut self, request: &Request, payload: &[u8]) -> Result<(), String> {
+    pub fn wait(&mut self, request: &Request, payload: &[u8]) -> Result<(), String> {
         let id = uuid(&mut Reader::new(payload)?)?;
         if self.waiting.len() == MOST_RESULTS {
             self.waiting.remove(0);
@@ -143,7 +134,7 @@ impl<T> Goals<T> {
     }
 
     /// The state of a goal with what is known of it; none while it is not over. An unknown goal has the state 0.
-    pub(crate) fn over(&self, id: Uuid) -> Option<(u8, Option<&T>)> {
+    pub fn over(&self, id: Uuid) -> Option<(u8, Option<&T>)> {
         match self.goals.iter().find(|goal| goal.id == id) {
             Some(goal) if !goal.status.is_final() => None,
             Some(goal) => Some((goal.status as u8, Some(&goal.known))),
@@ -151,12 +142,12 @@ impl<T> Goals<T> {
         }
     }
 
-    pub(crate) fn aborted(&mut self) -> impl Iterator<Item = &mut Goal<T>> {
+    pub fn aborted(&mut self) -> impl Iterator<Item = &mut Goal<T>> {
         self.goals.iter_mut().filter(|goal| goal.status == Status::Aborted)
     }
 
     /// The requests whose goals are over and whose results `are_known`; the others still wait.
-    pub(crate) fn answerable(
+    pub fn answerable(
         &mut self,
         are_known: impl Fn(u8, Option<&T>) -> bool,
     ) -> Vec<(Request, Uuid)> {
@@ -167,8 +158,7 @@ impl<T> Goals<T> {
         over
     }
 
-    /// The states of all goals, if they have changed.
-    pub(crate) fn take_status(&mut self) -> Option<Vec<u8>> {
+    pub fn take_status(&mut self) -> Option<Vec<u8>> {
         let status = |writer: &mut Writer, goal: &Goal<T>| {
             writer.raw(&goal.id).time(goal.at_ns).u8(goal.status as u8);
         };
@@ -177,8 +167,7 @@ impl<T> Goals<T> {
     }
 }
 
-/// The id of a goal.
-pub(crate) fn uuid(reader: &mut Reader<'_>) -> Result<Uuid, String> {
+pub fn uuid(reader: &mut Reader<'_>) -> Result<Uuid, String> {
     let bytes = reader.raw(16)?;
     bytes.try_into().map_err(|_| "an id of other than 16 bytes".to_owned())
 }

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-pub(crate) use ros2::messages::{Header, battery, odometry, scan};
+pub use ros2::messages::{Header, battery, odometry, scan};
 use ros2::{
     cdr::Writer,
     messages::{COVARIANCE, begin},
@@ -11,7 +11,7 @@ use ros2::{
 };
 
 /// A `tf2_msgs/TFMessage` of frames and the frames in them.
-pub(crate) fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
+pub fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
     let mut writer = Writer::default();
     let transform = |writer: &mut Writer, &(parent, child, pose): &(&str, &str, Pose)| {
         writer.header(ns, parent).text(child).pose(pose);
@@ -20,12 +20,12 @@ pub(crate) fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> 
 }
 
 /// A `geometry_msgs/PoseWithCovarianceStamped`.
-pub(crate) fn pose(header: Header<'_>, pose: Pose, covariance: &[f64; COVARIANCE]) -> Vec<u8> {
+pub fn pose(header: Header<'_>, pose: Pose, covariance: &[f64; COVARIANCE]) -> Vec<u8> {
     begin(header).pose(pose).f64s(covariance).take()
 }
 
 /// A `nav_msgs/OccupancyGrid` of square cells; `corner` is the corner of the first cell, and its rows go along x.
-pub(crate) fn map(
+pub fn map(
     header: Header<'_>,
     resolution: f64,
     [width, height]: [u32; 2],
@@ -39,7 +39,7 @@ pub(crate) fn map(
 }
 
 /// A `map_msgs/OccupancyGridUpdate` of a window whose first cell is this one.
-pub(crate) fn map_update(
+pub fn map_update(
     header: Header<'_>,
     [col, row]: [u32; 2],
     [width, height]: [u32; 2],
@@ -50,51 +50,48 @@ pub(crate) fn map_update(
 }
 
 /// A `nav_msgs/Path`.
-pub(crate) fn path(header: Header<'_>, poses: &[Pose]) -> Vec<u8> {
+pub fn path(header: Header<'_>, poses: &[Pose]) -> Vec<u8> {
     let mut writer = Writer::default();
     write_path(&mut writer, header, poses);
     writer.take()
 }
 
-/// A `nav_msgs/Path` as a part of a message.
-pub(crate) fn write_path(writer: &mut Writer, Header(ns, frame): Header<'_>, poses: &[Pose]) {
+pub fn write_path(writer: &mut Writer, Header(ns, frame): Header<'_>, poses: &[Pose]) {
     let stamped = |writer: &mut Writer, pose: &Pose| pose_stamped(writer, Header(ns, frame), *pose);
     writer.header(ns, frame).list(poses, stamped);
 }
 
 /// A `geometry_msgs/PoseStamped` as a part of a message.
-pub(crate) fn pose_stamped(writer: &mut Writer, Header(ns, frame): Header<'_>, pose: Pose) {
+pub fn pose_stamped(writer: &mut Writer, Header(ns, frame): Header<'_>, pose: Pose) {
     writer.header(ns, frame).pose(pose);
 }
 
-/// The shapes of markers that are used.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) enum Shape {
+#[derive(Clone, Copy, Default)]
+pub enum Shape {
     #[default]
     Cylinder = 3,
-    /// Lines, each between two points.
     Lines = 5,
 }
 
 /// A `visualization_msgs/Marker`.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Marker {
-    pub(crate) namespace: &'static str,
-    pub(crate) id: i32,
-    pub(crate) shape: Shape,
-    pub(crate) pose: Pose,
+#[derive(Clone, Default)]
+pub struct Marker {
+    pub namespace: &'static str,
+    pub id: i32,
+    pub shape: Shape,
+    pub pose: Pose,
     /// The size along x, y and z; lines have their width in the first.
-    pub(crate) scale: [f64; 3],
+    pub scale: [f64; 3],
     /// The colour: red, green, blue, alpha.
-    pub(crate) color: [f32; 4],
-    pub(crate) points: Vec<[f64; 2]>,
+    pub color: [f32; 4],
+    pub points: Vec<[f64; 2]>,
 }
 
 /// The action that removes all markers that were sent before.
 const DELETE_ALL: i32 = 3;
 
 /// A `visualization_msgs/MarkerArray` that replaces the one before.
-pub(crate) fn markers(header: Header<'_>, markers: &[Marker]) -> Vec<u8> {
+pub fn markers(header: Header<'_>, markers: &[Marker]) -> Vec<u8> {
     let mut writer = Writer::default();
     writer.length(markers.len() + 1);
     marker(&mut writer, header, &Marker::default(), DELETE_ALL);
@@ -122,7 +119,7 @@ fn marker(writer: &mut Writer, Header(ns, frame): Header<'_>, marker: &Marker, a
 }
 
 /// A range as REP 117 has it: nearer than `least` and farther than `most` are infinite, and no measurement is not a number.
-pub(crate) fn within([least, most]: [f64; 2], range: f64) -> f64 {
+pub fn within([least, most]: [f64; 2], range: f64) -> f64 {
     if range < least {
         f64::NEG_INFINITY
     } else if range > most {
@@ -133,7 +130,7 @@ pub(crate) fn within([least, most]: [f64; 2], range: f64) -> f64 {
 }
 
 /// A `sensor_msgs/Range` of a sonar, or of an infrared ranger.
-pub(crate) fn range(
+pub fn range(
     header: Header<'_>,
     is_sonar: bool,
     field_of_view: f64,
@@ -150,13 +147,13 @@ pub(crate) fn range(
 }
 
 /// A `rcl_interfaces/Log` of a part of the robot, with its severity.
-pub(crate) fn log(ns: u64, severity: u8, name: &str, text: &str) -> Vec<u8> {
+pub fn log(ns: u64, severity: u8, name: &str, text: &str) -> Vec<u8> {
     Writer::default().time(ns).u8(severity).text(name).text(text).text("").text("").u32(0).take()
 }
 
 /// The severity of a `diagnostic_msgs/DiagnosticStatus`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Level {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Level {
     #[default]
     Ok = 0,
     Warn = 1,
@@ -164,16 +161,16 @@ pub(crate) enum Level {
 }
 
 /// A `diagnostic_msgs/DiagnosticStatus`.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Status {
-    pub(crate) level: Level,
-    pub(crate) name: String,
-    pub(crate) message: String,
-    pub(crate) values: Vec<(&'static str, String)>,
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Status {
+    pub level: Level,
+    pub name: String,
+    pub message: String,
+    pub values: Vec<(&'static str, String)>,
 }
 
 /// A `diagnostic_msgs/DiagnosticArray` of this robot.
-pub(crate) fn diagnostics(header: Header<'_>, robot: &str, statuses: &[Status]) -> Vec<u8> {
+pub fn diagnostics(header: Header<'_>, robot: &str, statuses: &[Status]) -> Vec<u8> {
     let status = |writer: &mut Writer, status: &Status| {
         writer.u8(status.level as u8).text(&status.name).text(&status.message).text(robot);
         writer.list(&status.values, |writer, (key, value)| {

@@ -16,22 +16,20 @@ const DEPTH: u16 = 10;
 const AT_A_TIME: usize = 16;
 
 /// The quality that sends lost messages again, for messages that all count.
-pub(crate) const SURE: Quality = Quality { is_reliable: true, is_latched: false, depth: DEPTH };
+pub const SURE: Quality = Quality { is_reliable: true, is_latched: false, depth: DEPTH };
 /// The quality that stores the newest message for readers that join later.
-pub(crate) const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, depth: 1 };
+pub const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, depth: 1 };
 
 /// The quality of messages of which only the newest counts, from senders of either reliability.
-pub(crate) const NEWEST: Quality = Quality { is_reliable: false, is_latched: false, depth: 1 };
+pub const NEWEST: Quality = Quality { is_reliable: false, is_latched: false, depth: 1 };
 
-/// The services of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Call {
+pub enum Call {
     SendGoal,
     CancelGoal,
     GetResult,
 }
 
-/// The server of an action.
 #[derive(Debug)]
 struct Action {
     services: Vec<(Call, Reader, Writer)>,
@@ -40,11 +38,10 @@ struct Action {
 }
 
 /// Topics are told apart by `Id`, actions by the order in which they were opened.
-#[derive(Debug)]
-pub(crate) struct Node<Id> {
+pub struct Node<Id> {
     name: &'static str,
     /// Empty, or with a slash before it.
-    pub(crate) namespace: String,
+    pub namespace: String,
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
     actions: Vec<Action>,
@@ -52,12 +49,11 @@ pub(crate) struct Node<Id> {
     of_parameters: Vec<(Service, Reader, Writer)>,
     /// The list of the participant's readers and writers, for other nodes.
     entities: Writer,
-    pub(crate) participant: Participant,
+    pub participant: Participant,
 }
 
 impl<Id: Copy + Ord> Node<Id> {
-    /// Join `domain` by the interface `only`, with topics below `namespace`.
-    pub(crate) fn join(
+    pub fn join(
         (domain, only, namespace): (u16, Option<Ipv4Addr>, &str),
         name: &'static str,
         parameters: Vec<Parameter>,
@@ -89,12 +85,11 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 
     /// The name from the root of one that is below the namespace unless it begins with a slash.
-    pub(crate) fn full_name(&self, name: &str) -> String {
+    pub fn full_name(&self, name: &str) -> String {
         if name.starts_with('/') { name.to_owned() } else { format!("{}/{name}", self.namespace) }
     }
 
-    /// Write to a topic of a type.
-    pub(crate) fn write_to(
+    pub fn write_to(
         &mut self,
         id: Id,
         [name, kind]: [&str; 2],
@@ -106,12 +101,11 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 
     /// Close the writers of other ids.
-    pub(crate) fn retain_writers(&mut self, keep: impl Fn(Id) -> bool) {
+    pub fn retain_writers(&mut self, keep: impl Fn(Id) -> bool) {
         self.writers.retain(|id, _| keep(*id));
     }
 
-    /// Read from a topic of a type.
-    pub(crate) fn read_from(
+    pub fn read_from(
         &mut self,
         id: Id,
         [name, kind]: [&str; 2],
@@ -122,15 +116,13 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
-    /// The reader of requests, and the writer of replies.
     fn service(&self, name: &str, kind: &str) -> io::Result<(Reader, Writer)> {
         let [requests, replies] = Topic::service(name, kind);
         let requests = self.participant.reader(&requests, SURE)?;
         Ok((requests, self.participant.writer(&replies, SURE)?))
     }
 
-    /// Serve an action of Nav2, `kind`, as `name`.
-    pub(crate) fn serve(&mut self, name: &str, kind: &str) -> io::Result<()> {
+    pub fn serve(&mut self, name: &str, kind: &str) -> io::Result<()> {
         let name = |part| format!("{}/_action/{part}", self.full_name(name));
         let kind = |part| format!("nav2_msgs::action::dds_::{kind}_{part}");
         let mut services = Vec::new();
@@ -152,7 +144,7 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 
     /// Tell other nodes which readers and writers are the node's.
-    pub(crate) fn announce(&self) {
+    pub fn announce(&self) {
         let services = || {
             let actions = self.actions.iter().flat_map(|action| &action.services);
             let actions = actions.map(|(_, requests, replies)| (requests, replies));
@@ -175,26 +167,25 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 
     /// Send a message. If the library does not accept it now, it is lost, and a newer one follows.
-    pub(crate) fn publish(&self, id: Id, payload: Vec<u8>) {
+    pub fn publish(&self, id: Id, payload: Vec<u8>) {
         if let Some(writer) = self.writers.get(&id) {
             writer.write(payload);
         }
     }
 
-    pub(crate) fn publish_feedback(&self, action: usize, payload: Vec<u8>) {
+    pub fn publish_feedback(&self, action: usize, payload: Vec<u8>) {
         if let Some(action) = self.actions.get(action) {
             action.feedback.write(payload);
         }
     }
 
-    pub(crate) fn publish_status(&self, action: usize, payload: Vec<u8>) {
+    pub fn publish_status(&self, action: usize, payload: Vec<u8>) {
         if let Some(action) = self.actions.get(action) {
             action.status.write(payload);
         }
     }
 
-    /// Answer those who ask for parameters.
-    pub(crate) fn answer(&self) {
+    pub fn answer(&self) {
         for (service, requests, replies) in &self.of_parameters {
             for Message { payload, request, .. } in requests.messages().take(AT_A_TIME) {
                 let payload = request.without_header(&payload);
@@ -208,16 +199,14 @@ impl<Id: Copy + Ord> Node<Id> {
         }
     }
 
-    /// The messages that have come on the topics.
-    pub(crate) fn heard(&self) -> Vec<(Id, Message)> {
+    pub fn heard(&self) -> Vec<(Id, Message)> {
         let heard = self.readers.iter().flat_map(|(id, reader)| {
             reader.messages().take(AT_A_TIME).map(|message| (*id, message))
         });
         heard.collect()
     }
 
-    /// The calls of clients of actions.
-    pub(crate) fn called(&self) -> Vec<(usize, Call, Message)> {
+    pub fn called(&self) -> Vec<(usize, Call, Message)> {
         let actions = self.actions.iter().enumerate();
         let called = actions.flat_map(|(action, it)| {
             it.services.iter().flat_map(move |(call, requests, _)| {
@@ -227,8 +216,7 @@ impl<Id: Copy + Ord> Node<Id> {
         called.collect()
     }
 
-    /// Answer a call.
-    pub(crate) fn reply(&self, action: usize, call: Call, to: &Request, payload: &[u8]) {
+    pub fn reply(&self, action: usize, call: Call, to: &Request, payload: &[u8]) {
         let services = self.actions.get(action).map(|action| &action.services);
         if let Some((.., replies)) = services.into_iter().flatten().find(|(of, ..)| *of == call) {
             replies.reply(to, payload);

@@ -18,12 +18,10 @@ use ros2::participant::Request;
 
 use crate::action::{Refusal, Sent, code};
 
-/// The most orders that wait.
 const MOST_WAITING: usize = 16;
 
-/// An order to the robot.
 #[derive(Clone, Debug)]
-pub(crate) enum Order {
+pub enum Order {
     /// Go to a target. If `resumes`, the robot stands for a goal that was canceled, and is resumed first.
     Go {
         to: TargetPoint,
@@ -41,9 +39,8 @@ pub(crate) enum Order {
     Hand(DVec2, Instant),
 }
 
-/// The sender of a target.
 #[derive(Clone, Debug)]
-pub(crate) enum Why {
+pub enum Why {
     Topic,
     /// A client of the action. The goal's target comes after the one with the number `after`.
     Action {
@@ -54,10 +51,9 @@ pub(crate) enum Why {
 }
 
 /// An order, and the reason if it was not carried out.
-pub(crate) type Done = (Order, Result<(), Refusal>);
+pub type Done = (Order, Result<(), Refusal>);
 
-/// Threads that carry out orders in turn.
-pub(crate) struct Orders {
+pub struct Orders {
     targets: SyncSender<Order>,
     stops: SyncSender<Order>,
     hands: SyncSender<Order>,
@@ -66,8 +62,7 @@ pub(crate) struct Orders {
 }
 
 impl Orders {
-    /// Orders for `robot`.
-    pub(crate) fn new(robot: &RobotName) -> io::Result<Self> {
+    pub fn new(robot: &RobotName) -> io::Result<Self> {
         let (refused, done) = channel();
         let worker = |name: &str, most| {
             let (orders, waiting) = sync_channel::<Order>(most);
@@ -86,8 +81,7 @@ impl Orders {
         Ok(Self { targets: targets?, stops: stops?, hands: worker("hands", 1)?, done, refused })
     }
 
-    /// Have `order` carried out.
-    pub(crate) fn give(&self, order: Order) {
+    pub fn give(&self, order: Order) {
         let worker = match order {
             Order::Go { .. } | Order::Place(..) => &self.targets,
             Order::Stand { .. } | Order::Resume => &self.stops,
@@ -102,7 +96,7 @@ impl Orders {
     }
 
     /// An order that was carried out, or was not.
-    pub(crate) fn done(&self) -> Option<Done> {
+    pub fn done(&self) -> Option<Done> {
         self.done.try_recv().ok()
     }
 }

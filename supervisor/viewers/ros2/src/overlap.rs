@@ -10,7 +10,7 @@ use ros2::topic::Topic;
 use crate::{endpoints::published, topics::Id};
 
 /// Those topics of a bridge in `domain` and `namespace` that the link of `run` reads, with the topics of these sensors.
-pub(crate) fn overlap<'a>(
+pub fn overlap<'a>(
     (domain, namespace): (u16, &str),
     run: &Run,
     sensors: impl Iterator<Item = (Id, &'a str)>,
@@ -24,7 +24,6 @@ pub(crate) fn overlap<'a>(
     named.filter(|(_, name)| read.contains(name)).collect()
 }
 
-/// The names of the topics that a link reads as its robot's.
 fn read(mission: &Mission) -> impl Iterator<Item = String> {
     let topics = &mission.robot.ros2;
     let lasers = mission.lasers_of_base();

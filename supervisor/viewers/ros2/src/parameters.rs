@@ -10,9 +10,8 @@ const OTHERS: [&str; 4] = ["help", "version", "topics", "rviz"];
 /// The most names, or elements of a value, in a request.
 const MOST: usize = 256;
 
-/// The services of a node for its parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Service {
+#[derive(Clone, Copy)]
+pub enum Service {
     List,
     Describe,
     Get,
@@ -21,8 +20,7 @@ pub(crate) enum Service {
     SetAtomically,
 }
 
-/// Their names and types.
-pub(crate) const SERVICES: [(Service, &str, &str); 6] = [
+pub const SERVICES: [(Service, &str, &str); 6] = [
     (Service::List, "list_parameters", "ListParameters"),
     (Service::Describe, "describe_parameters", "DescribeParameters"),
     (Service::Get, "get_parameters", "GetParameters"),
@@ -32,7 +30,7 @@ pub(crate) const SERVICES: [(Service, &str, &str); 6] = [
 ];
 
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Value {
+pub enum Value {
     Bool(bool),
     Integer(i64),
     Double(f64),
@@ -40,15 +38,14 @@ pub(crate) enum Value {
     Texts(Vec<String>),
 }
 
-#[derive(Clone, Debug)]
-pub(crate) struct Parameter {
+#[derive(Clone)]
+pub struct Parameter {
     name: String,
     value: Value,
     meaning: String,
 }
 
-/// The options of `command`, or of its subcommand that was asked for, which have a value.
-pub(crate) fn of_options(mut command: &Command, mut matches: &ArgMatches) -> Vec<Parameter> {
+pub fn of_options(mut command: &Command, mut matches: &ArgMatches) -> Vec<Parameter> {
     if let Some((name, of_it)) = matches.subcommand()
         && let Some(subcommand) = command.find_subcommand(name)
     {
@@ -89,7 +86,7 @@ fn value(option: &Arg, matches: &ArgMatches) -> Option<Value> {
 }
 
 /// The reply to a request. The error says why the payload is none.
-pub(crate) fn reply(
+pub fn reply(
     parameters: &[Parameter],
     service: Service,
     payload: &[u8],

@@ -53,7 +53,6 @@ use crate::{
 
 /// The interval at which the end of this process, or that of the time for a path, is noticed.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// The most goals that wait.
 const MOST_WAITING: usize = 16;
 /// `/tf_static` keeps the messages of all its publishers; messages of `/tf` are many.
 const DEPTH: u16 = 256;
@@ -78,7 +77,7 @@ enum Id {
 ///
 /// Names without a slash at their beginning are below the namespace.
 #[derive(Clone, Debug, Args)]
-pub(crate) struct Arguments {
+pub struct Arguments {
     /// The topic of the map, which is a costmap of Nav2 or the map itself; its updates are on that with `_updates`.
     #[arg(long, value_name = "TOPIC", default_value = "global_costmap/costmap")]
     map: String,
@@ -133,7 +132,6 @@ fn inscribed(text: &str) -> Result<f64, String> {
     Ok(sides.map(distance).fold(f64::INFINITY, f64::min))
 }
 
-/// A path to be planned.
 struct Job {
     action: usize,
     id: Uuid,
@@ -146,16 +144,14 @@ struct Job {
 /// A job's action, its goal and outcome, and the field as a message.
 type Done = (usize, Uuid, Outcome, Option<Vec<u8>>);
 
-/// A goal that was accepted.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Plan {
     began: Option<Instant>,
     cancellation: Cancellation,
     outcome: Outcome,
 }
 
-/// Serve until `ended` returns true.
-pub(crate) fn serve(
+pub fn serve(
     network: (u16, Option<Ipv4Addr>, &str),
     (options, parameters): (&Arguments, Vec<Parameter>),
     ended: &mut dyn FnMut() -> bool,
@@ -211,7 +207,6 @@ struct Server<'a> {
     node: Node<Id>,
     frames: Frames,
     map: Option<Arc<Costmap>>,
-    /// The goals of each action.
     goals: [Goals<Plan>; 2],
     jobs: SyncSender<Job>,
     done: Receiver<Done>,
@@ -230,7 +225,6 @@ impl<'a> Server<'a> {
         Ok(Self { options, node, frames: Frames::default(), map: None, goals, jobs, done })
     }
 
-    /// Do all that is to be done now.
     fn turn(&mut self) {
         self.node.participant.unring();
         self.node.answer();

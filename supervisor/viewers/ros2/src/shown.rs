@@ -20,9 +20,9 @@ use crate::{
 };
 
 /// The mission's frame, that of odometry, and the robot's, whose x is ahead.
-pub(crate) const MAP: &str = "map";
-pub(crate) const ODOM: &str = "odom";
-pub(crate) const BASE: &str = "base_link";
+pub const MAP: &str = "map";
+pub const ODOM: &str = "odom";
+pub const BASE: &str = "base_link";
 
 /// Wall-clock time between whole maps, and between diagnostics that have not changed, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
@@ -34,30 +34,28 @@ const STEPS_A_CELL: usize = 8;
 const POSE_EVERY: usize = 4;
 
 /// Takes a message: its topic and its payload.
-pub(crate) type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
+pub type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
 
-/// A robot as the messages show it.
 #[derive(Debug)]
-pub(crate) struct Shown {
+pub struct Shown {
     robot: String,
     mission: Mission,
     sensors: Vec<Sensor>,
-    /// The newest samples.
-    pub(crate) state: RobotState,
+    pub state: RobotState,
     /// The version of the last whole map that was published, and its time.
     map: Option<(u64, u64)>,
     has_movers: bool,
     diagnosed: Option<(Vec<Status>, u64)>,
     drift: Drift,
     /// Mission time over the time of stamps.
-    pub(crate) pace: f64,
+    pub pace: f64,
     /// The frame `odom` by another node, which has the robot in it; none of these before it is heard.
-    pub(crate) others_odom: Option<Option<DAffine2>>,
+    pub others_odom: Option<Option<DAffine2>>,
 }
 
 impl Shown {
     /// A robot before any sample of it has been read.
-    pub(crate) fn new(robot: String, mission: Mission) -> Self {
+    pub fn new(robot: String, mission: Mission) -> Self {
         Self {
             robot,
             sensors: mission.sensor_table(),
@@ -72,12 +70,11 @@ impl Shown {
         }
     }
 
-    pub(crate) const fn mission(&self) -> &Mission {
+    pub const fn mission(&self) -> &Mission {
         &self.mission
     }
 
-    /// The topics of the sensors that the mission uses.
-    pub(crate) fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
+    pub fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
         let used = self.sensors.iter().enumerate().filter(|(_, sensor)| sensor.used);
         let is_scan = |(_, sensor): &(usize, &Sensor)| sensor.kind == SensorKind::Scan;
         let is_alone = used.clone().filter(is_scan).count() == 1;
@@ -87,21 +84,19 @@ impl Shown {
         })
     }
 
-    /// The mounting of the sensors.
-    pub(crate) fn mounting(&self, now_ns: u64, sink: Sink<'_>) {
+    pub fn mounting(&self, now_ns: u64, sink: Sink<'_>) {
         let used = self.sensors.iter().filter(|sensor| sensor.used);
         let mounts = used
             .map(|sensor| (BASE, sensor.name.as_str(), plane(sensor.mount.on(Pose2::default()))));
         sink(Id::TfStatic, messages::transforms(now_ns, &mounts.collect::<Vec<_>>()));
     }
 
-    /// The newest pose.
-    pub(crate) fn newest_pose(&self) -> PoseSample {
+    pub fn newest_pose(&self) -> PoseSample {
         self.state.pose.unwrap_or_default()
     }
 
     /// Take a sample, and publish what is shown of it at once.
-    pub(crate) fn sample(&mut self, sample: &Sample, now_ns: u64, sink: Sink<'_>) {
+    pub fn sample(&mut self, sample: &Sample, now_ns: u64, sink: Sink<'_>) {
         if !self.state.apply(sample) {
             return;
         }
@@ -205,7 +200,6 @@ impl Shown {
         }
     }
 
-    /// Publish the whole map if it has changed and is due.
     fn map(&mut self, now_ns: u64, sink: Sink<'_>) {
         let version = self.state.map.version();
         let is_due = self.map.is_none_or(|(published, at_ns)| {
@@ -251,7 +245,7 @@ impl Shown {
     }
 
     /// Publish the messages that depend on time: the map, what happened, and diagnostics if they have changed or are due.
-    pub(crate) fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
+    pub fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
         self.map(now_ns, sink);
         for event in self.state.take_events() {
             let severity = match event.kind {
@@ -403,7 +397,6 @@ fn mover((id, mover): (i32, &Mover)) -> [Marker; 3] {
     [disc("movers", mover.radius_m.into(), 0.6), disc("doubt", mover.reach_m(), 0.2), way]
 }
 
-/// The direction of each cell that has one.
 fn directions(frame: GridFrame, cells: &[FieldCell]) -> Marker {
     arrows([frame.cells as usize; 2], frame.resolution_m, |col, row| {
         let cell = Cell { col: col as u32, row: row as u32 };
@@ -414,7 +407,7 @@ fn directions(frame: GridFrame, cells: &[FieldCell]) -> Marker {
 }
 
 /// A line at each cell, or at one among several, from the first of what `of` says of its column and row along the second.
-pub(crate) fn arrows(
+pub fn arrows(
     [columns, rows]: [usize; 2],
     cell_m: f64,
     of: impl Fn(usize, usize) -> Option<[DVec2; 2]>,

@@ -3,9 +3,8 @@
 
 use clap::ValueEnum;
 
-/// The content of a topic.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) enum Id {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Id {
     Tf,
     TfStatic,
     Pose,
@@ -30,8 +29,8 @@ pub(crate) enum Id {
 }
 
 /// The requests of others, each of which the user must permit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
-pub(crate) enum Accept {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Accept {
     /// Send the robot to targets: `goal_pose` and the action `navigate_to_pose`.
     Goals,
     /// Say where it is: `initialpose`.
@@ -44,7 +43,7 @@ pub(crate) enum Accept {
 
 /// The transforms that are published.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Frames {
+pub enum Frames {
     /// `map` to `odom` to `base_link`.
     #[default]
     All,
@@ -52,27 +51,21 @@ pub(crate) enum Frames {
     Map,
 }
 
-/// A row of the table.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Spec {
-    pub(crate) id: Id,
-    /// The name, relative to the bridge's namespace.
-    pub(crate) name: &'static str,
-    /// The package and the name of its type.
-    pub(crate) message: [&'static str; 2],
-    /// The name of its type in DDS.
-    pub(crate) type_name: &'static str,
+pub struct Spec {
+    pub id: Id,
+    pub name: &'static str,
+    pub message: [&'static str; 2],
+    pub type_name: &'static str,
     /// Whether a reader that joins later gets the newest message.
-    pub(crate) is_latched: bool,
+    pub is_latched: bool,
     /// The permission for it; none for a topic that the bridge publishes.
-    pub(crate) accepted_by: Option<Accept>,
-    pub(crate) meaning: &'static str,
+    pub accepted_by: Option<Accept>,
+    pub meaning: &'static str,
 }
 
 macro_rules! table {
     ($($id:expr => $name:literal, $package:ident / $message:ident, $latched:literal, $accept:expr, $meaning:literal;)*) => {
-        /// Every topic.
-        pub(crate) const TABLE: &[Spec] = &[$(Spec {
+        pub const TABLE: &[Spec] = &[$(Spec {
             id: $id,
             name: $name,
             message: [stringify!($package), stringify!($message)],
@@ -125,8 +118,7 @@ table! {
         "true: the robot stands; false: it goes on";
 }
 
-/// The row of `id`.
-pub(crate) fn spec(id: Id) -> Option<&'static Spec> {
+pub fn spec(id: Id) -> Option<&'static Spec> {
     let id = match id {
         Id::Range(_) => Id::Range(0),
         Id::Scan(_) => Id::Scan(0),

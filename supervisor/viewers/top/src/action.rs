@@ -12,7 +12,7 @@ use rustix::process::Signal;
 use console::operator;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Action {
+pub enum Action {
     Kill,
     Freeze,
     Thaw,
@@ -47,7 +47,7 @@ impl Action {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Key {
+pub enum Key {
     Up,
     Down,
     Act(Action),
@@ -55,7 +55,7 @@ pub(super) enum Key {
 }
 
 /// The keys: the text for each in the last line of the screen, its effect, and its meaning.
-pub(super) const KEYS: [(&str, &str, Key); 8] = [
+pub const KEYS: [(&str, &str, Key); 8] = [
     ("↑↓", "choose", Key::Down),
     ("k", "kill", Key::Act(Action::Kill)),
     ("f", "freeze", Key::Act(Action::Freeze)),
@@ -67,7 +67,7 @@ pub(super) const KEYS: [(&str, &str, Key); 8] = [
 ];
 
 /// Take the keys out of `typed`, the bytes of a terminal in raw mode. The beginning of an incomplete key stays there.
-pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
+pub fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
     let mut keys = Vec::new();
     let mut rest = &typed[..];
     loop {
@@ -103,7 +103,6 @@ pub(super) fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
 const ESCAPE: u8 = 0x1b;
 /// Ctrl-C, which a terminal in raw mode sends as a byte.
 const CONTROL_C: u8 = 0x03;
-/// The most bytes that a key sends.
 const LONGEST_SEQUENCE: usize = 32;
 
 /// The meaning of a letter; none if it has none.
@@ -113,18 +112,18 @@ fn meaning(letter: u8) -> Option<Key> {
 }
 
 /// Performs one action at a time in a thread, because a stop takes until the robot rests.
-pub(super) struct Operator {
+pub struct Operator {
     robot: RobotName,
     under_way: Option<(JoinHandle<()>, Receiver<String>)>,
 }
 
 impl Operator {
-    pub(super) fn new(robot: &RobotName) -> Self {
+    pub fn new(robot: &RobotName) -> Self {
         Self { robot: robot.clone(), under_way: None }
     }
 
     /// Begin `action`. Returns the text to show meanwhile.
-    pub(super) fn ask(&mut self, action: Action, stage: Option<&str>) -> String {
+    pub fn ask(&mut self, action: Action, stage: Option<&str>) -> String {
         if self.under_way.is_some() {
             return "the last action goes on".to_owned();
         }
@@ -149,7 +148,7 @@ impl Operator {
     }
 
     /// The result of the action. The next call gives none.
-    pub(super) fn answer(&mut self) -> Option<String> {
+    pub fn answer(&mut self) -> Option<String> {
         let (_, receiver) = self.under_way.as_ref()?;
         let message = match receiver.try_recv() {
             Ok(message) => message,

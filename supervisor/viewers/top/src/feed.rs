@@ -14,17 +14,15 @@ use robot_state::{Feed, Sample, TOPICS};
 
 use super::view::View;
 
-/// The time over which rates are counted.
 const COUNT_FOR: Duration = Duration::from_secs(1);
 
-pub(super) struct ScreenFeed {
+pub struct ScreenFeed {
     feed: Feed,
     outputs: Vec<Output>,
     processes: Processes,
     counted: Instant,
 }
 
-/// The first topic that a stage writes.
 struct Output {
     stage: &'static str,
     reader: Box<dyn AnyReader>,
@@ -33,7 +31,7 @@ struct Output {
 }
 
 impl ScreenFeed {
-    pub(super) fn open(bus: &Bus) -> Result<Self, BusError> {
+    pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let now = Instant::now();
         let first_outputs = stages::TABLE.iter().filter_map(|stage| {
             let first = stage.wiring.outputs.first()?.spec().name;
@@ -56,8 +54,7 @@ impl ScreenFeed {
         })
     }
 
-    /// Bring `view` up to date.
-    pub(super) fn update(&mut self, view: &mut View) -> Result<(), BusError> {
+    pub fn update(&mut self, view: &mut View) -> Result<(), BusError> {
         let mut has_roster = false;
         self.feed.read(&mut |sample| {
             has_roster |= matches!(sample, Sample::Roster(..));

@@ -7,6 +7,9 @@
 //! | `screen`, `map` | draw it |
 //! | `action` | what the keys do |
 
+// No other crate uses these modules: `pub` means another module; what none uses is reported.
+#![allow(unreachable_pub)]
+
 mod action;
 mod feed;
 mod map;
@@ -66,7 +69,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// The interval at which the screen is drawn again.
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
-/// The main function of the executable.
 pub fn main() -> ExitCode {
     executable::run("error", show_on_terminal, |_| None)
 }

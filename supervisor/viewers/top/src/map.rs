@@ -15,67 +15,54 @@ use robot_state::RobotState;
 /// Directions from east on, counter-clockwise, 45 degrees each.
 const FIELD: [char; 8] = ['→', '↗', '↑', '↖', '←', '↙', '↓', '↘'];
 const ROBOT: [char; 8] = ['▶', '◥', '▲', '◤', '◀', '◣', '▼', '◢'];
-pub(super) const TARGET: char = 'X';
-pub(super) const WAY: char = '·';
+pub const TARGET: char = 'X';
+pub const WAY: char = '·';
 /// The intervals at which the field is drawn, letters to the right and down.
 const FIELD_EVERY: (usize, usize) = (4, 2);
 
 const SCANNED: Color = Color::Indexed(236);
-pub(super) const FIELD_STYLE: Style = Style::new().fg(Color::Indexed(67));
-pub(super) const WAY_STYLE: Style = Style::new().fg(Color::Magenta);
-pub(super) const TARGET_STYLE: Style = Style::new().fg(Color::Green).add_modifier(Modifier::BOLD);
-pub(super) const ROBOT_STYLE: Style = Style::new().fg(Color::White).add_modifier(Modifier::BOLD);
+pub const FIELD_STYLE: Style = Style::new().fg(Color::Indexed(67));
+pub const WAY_STYLE: Style = Style::new().fg(Color::Magenta);
+pub const TARGET_STYLE: Style = Style::new().fg(Color::Green).add_modifier(Modifier::BOLD);
+pub const ROBOT_STYLE: Style = Style::new().fg(Color::White).add_modifier(Modifier::BOLD);
 
-/// The most important cell of a square.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Square {
-    Free,
-    Scanned,
-    Margin,
-    Perimeter,
-    Known,
-    Sensed,
+/// A square shows the last of its cells' states in this order.
+const BY_IMPORTANCE: [CellState; 6] = [
+    CellState::Free,
+    CellState::Scanned,
+    CellState::Margin,
+    CellState::Perimeter,
+    CellState::Known,
+    CellState::Sensed,
+];
+
+fn importance(state: &CellState) -> Option<usize> {
+    BY_IMPORTANCE.iter().position(|other| other == state)
 }
 
-impl Square {
-    const fn of(cell: u8) -> Self {
-        match CellState::from_byte(cell) {
-            CellState::Free => Self::Free,
-            CellState::Scanned => Self::Scanned,
-            CellState::Margin => Self::Margin,
-            CellState::Perimeter => Self::Perimeter,
-            CellState::Known => Self::Known,
-            CellState::Sensed => Self::Sensed,
-        }
-    }
-
-    /// The colour of a hazard; none for another square.
-    const fn hazard(self) -> Option<Color> {
-        match self {
-            Self::Free | Self::Scanned => None,
-            Self::Margin => Some(Color::Indexed(94)),
-            Self::Perimeter => Some(Color::DarkGray),
-            Self::Known => Some(Color::Blue),
-            Self::Sensed => Some(Color::Indexed(208)),
-        }
+/// The colour of a hazard; none for another square.
+const fn hazard(state: CellState) -> Option<Color> {
+    match state {
+        CellState::Free | CellState::Scanned => None,
+        CellState::Margin => Some(Color::Indexed(94)),
+        CellState::Perimeter => Some(Color::DarkGray),
+        CellState::Known => Some(Color::Blue),
+        CellState::Sensed => Some(Color::Indexed(208)),
     }
 }
 
-/// The styles of hazards, for a legend.
-pub(super) fn legend() -> [(Style, &'static str); 4] {
-    let style = |square: Square| Style::new().fg(square.hazard().unwrap_or_default());
+pub fn legend() -> [(Style, &'static str); 4] {
+    let style = |state| Style::new().fg(hazard(state).unwrap_or_default());
     [
-        (style(Square::Sensed), "sensed"),
-        (style(Square::Margin), "margin"),
-        (style(Square::Known), "known"),
-        (style(Square::Perimeter), "perimeter"),
+        (style(CellState::Sensed), "sensed"),
+        (style(CellState::Margin), "margin"),
+        (style(CellState::Known), "known"),
+        (style(CellState::Perimeter), "perimeter"),
     ]
 }
 
-/// The squares of the screen on the map.
 struct Scale {
     frame: GridFrame,
-    /// Squares along each side.
     side: usize,
     /// Cells along each side of a square.
     step: f64,
@@ -99,7 +86,7 @@ impl Scale {
 }
 
 /// The map of a robot in at most `width` by `height` letters; none before the first grid.
-pub(super) fn lines(state: &RobotState, width: u16, height: u16) -> Option<Vec<Line<'static>>> {
+pub fn lines(state: &RobotState, width: u16, height: u16) -> Option<Vec<Line<'static>>> {
     let frame = state.map.frame()?;
     let side = usize::from(width).min(2 * usize::from(height)) & !1;
     if side == 0 {
@@ -132,7 +119,7 @@ pub(super) fn lines(state: &RobotState, width: u16, height: u16) -> Option<Vec<L
 }
 
 /// The letter of a robot with `heading`, radians.
-pub(super) fn robot(heading: f64) -> char {
+pub fn robot(heading: f64) -> char {
     ROBOT[octant(heading)]
 }
 
@@ -148,21 +135,27 @@ fn letter(state: &RobotState, scale: &Scale, col: usize, line: usize) -> (char, 
         let rows = scale.cells(scale.side - 1 - row);
         let cols = scale.cells(col);
         let of_rows = rows.flat_map(|row| &cells[row * side + cols.start..row * side + cols.end]);
-        of_rows.map(|&cell| Square::of(cell)).max().unwrap_or(Square::Free)
+        of_rows
+            .map(|&cell| CellState::from_byte(cell))
+            .max_by_key(importance)
+            .unwrap_or(CellState::Free)
     };
     let (above, below) = (square(2 * line), square(2 * line + 1));
     let ground = |square| match square {
-        Square::Scanned => SCANNED,
+        CellState::Scanned => SCANNED,
         _ => Color::Reset,
     };
-    match (above.hazard(), below.hazard()) {
+    match (hazard(above), hazard(below)) {
         (Some(one), Some(other)) if one == other => ('█', Style::new().fg(one)),
         (Some(one), Some(other)) => ('▀', Style::new().fg(one).bg(other)),
         (Some(one), None) => ('▀', Style::new().fg(one).bg(ground(below))),
         (None, Some(other)) => ('▄', Style::new().fg(other).bg(ground(above))),
         (None, None) => {
             let arrow = field(state, scale, col, line);
-            (arrow.unwrap_or(' '), FIELD_STYLE.bg(ground(above.max(below))))
+            (
+                arrow.unwrap_or(' '),
+                FIELD_STYLE.bg(ground(if above == CellState::Free { below } else { above })),
+            )
         }
     }
 }

@@ -18,7 +18,6 @@ use console::{
 };
 use robot_state::{RobotState, guidance_in_words};
 
-/// Columns of the table of stages.
 const TABLE_WIDTH: u16 = 80;
 /// The width from which on the map is beside the table instead of below it.
 const WIDE: u16 = TABLE_WIDTH + 50;
@@ -27,7 +26,7 @@ const TITLE: Style = Style::new().add_modifier(Modifier::BOLD);
 const DIM: Style = Style::new().fg(Color::DarkGray);
 const BAD: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 
-pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
+pub fn draw(view: &View, frame: &mut Frame<'_>) {
     let [title, body, message, keys] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Min(0),
@@ -119,20 +118,18 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
         let state = if view.connected { "running" } else { "ended" };
         let usage = usage(view, view.state.stages.len());
         let blank = String::new;
-        rows.push(Cells {
-            texts: [
-                "supervisor".to_owned(),
-                state.to_owned(),
-                pid,
-                blank(),
-                blank(),
-                blank(),
-                blank(),
-                cpu(usage),
-                memory(usage),
-            ],
-            style: Style::new(),
-        });
+        let texts = [
+            "supervisor".to_owned(),
+            state.to_owned(),
+            pid,
+            blank(),
+            blank(),
+            blank(),
+            blank(),
+            cpu(usage),
+            memory(usage),
+        ];
+        rows.push((texts, Style::new()));
     }
     let widths: [u16; 9] = [14, 11, 7, 3, 8, 7, 7, 5, 8];
     let heads = ["stage", "state", "pid", "gen", "restarts", "rate", "beat", "CPU", "memory"];
@@ -147,7 +144,7 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
         })
     };
     let heads = Row::new(cells(heads.map(str::to_owned))).style(DIM);
-    let rows = rows.into_iter().map(|row| Row::new(cells(row.texts)).style(row.style));
+    let rows = rows.into_iter().map(|(texts, style)| Row::new(cells(texts)).style(style));
     let table = Table::new(rows, widths)
         .header(heads)
         .column_spacing(1)
@@ -158,37 +155,31 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
     frame.render_stateful_widget(table, area, &mut state);
 }
 
-struct Cells {
-    texts: [String; 9],
-    style: Style,
-}
-
 /// The usage of a process: of the stage in this row, or behind them of the supervisor.
 fn usage(view: &View, at: usize) -> Usage {
     view.usage.get(at).copied().unwrap_or_default()
 }
 
-fn stage_row(view: &View, at: usize, entry: &RosterEntry) -> Cells {
+fn stage_row(view: &View, at: usize, entry: &RosterEntry) -> ([String; 9], Style) {
     let state = StageState::from_byte(entry.state);
     let runs = view.connected && entry.pid != 0;
-    Cells {
-        texts: [
-            name_str(&entry.stage).to_owned(),
-            words::state(state).to_owned(),
-            if runs { entry.pid.to_string() } else { "-".to_owned() },
-            entry.generation.to_string(),
-            entry.restarts.to_string(),
-            view.rates_hz.get(at).copied().flatten().map_or("-".to_owned(), rate),
-            age(words::seconds(entry.beat_age_ns)),
-            cpu(usage(view, at)),
-            memory(usage(view, at)),
-        ],
-        style: match state {
-            StageState::Running => Style::new(),
-            StageState::Held => BAD,
-            _ => Style::new().fg(Color::Yellow),
-        },
-    }
+    let texts = [
+        name_str(&entry.stage).to_owned(),
+        words::state(state).to_owned(),
+        if runs { entry.pid.to_string() } else { "-".to_owned() },
+        entry.generation.to_string(),
+        entry.restarts.to_string(),
+        view.rates_hz.get(at).copied().flatten().map_or("-".to_owned(), rate),
+        age(words::seconds(entry.beat_age_ns)),
+        cpu(usage(view, at)),
+        memory(usage(view, at)),
+    ];
+    let style = match state {
+        StageState::Running => Style::new(),
+        StageState::Held => BAD,
+        _ => Style::new().fg(Color::Yellow),
+    };
+    (texts, style)
 }
 
 fn rate(hz: f64) -> String {
@@ -293,7 +284,6 @@ fn time(microseconds: f64) -> String {
     }
 }
 
-/// The meaning of the letters of the map.
 fn legend() -> Vec<Line<'static>> {
     let mut letters = Vec::new();
     let mut of = |letter: char, style: Style, what: &'static str| {

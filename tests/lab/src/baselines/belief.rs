@@ -9,7 +9,7 @@ use glam::DVec2;
 /// Step along a line of sight, as a share of a cell.
 const SIGHT_STEP: f64 = 0.1;
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub struct Belief {
     grid: Replica<u8>,
     pub header: GridHeader,
@@ -59,7 +59,6 @@ impl Map<'_> {
         self.free_neighbour(cell, [cols, rows])
     }
 
-    /// The cell so many columns and rows from `cell`, if it is free.
     pub fn free_neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
         let col = cell.col.checked_add_signed(cols)?;
         let row = cell.row.checked_add_signed(rows)?;

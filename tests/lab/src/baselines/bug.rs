@@ -38,7 +38,6 @@ pub struct Bug {
     enclosed: bool,
 }
 
-/// A hazard that the robot circumvents.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Following {
     /// The place where the robot met the hazard, metres.
@@ -78,7 +77,6 @@ impl Planner for Bug {
     }
 }
 
-#[derive(Clone, Copy, Debug)]
 struct Straight<'a> {
     map: &'a Map<'a>,
     line_from: DVec2,
@@ -139,7 +137,6 @@ impl Following {
         true
     }
 
-    /// The boundary from here on, up to [`MOST_CELLS`] cells.
     fn ahead<'a>(&self, map: &'a Map<'_>) -> impl Iterator<Item = Place> + 'a {
         // A boundary of steps is up to sqrt(2) times as long as it is wide, and folds.
         let cells = (2.0 * AHEAD_M / map.frame.resolution_m).ceil() as usize;

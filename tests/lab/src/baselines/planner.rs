@@ -20,7 +20,7 @@ pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
     fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way;
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy)]
 pub enum Way {
     Unknown,
     To(DVec2),
@@ -36,7 +36,6 @@ impl Way {
     }
 }
 
-#[derive(Debug)]
 pub struct Baseline<P> {
     /// The target of the robot; none before the supervisor has published one.
     target: Option<TargetSample>,
@@ -72,7 +71,6 @@ impl<P: Planner> Baseline<P> {
         self.along(way, sample)
     }
 
-    /// The guidance that sends the robot of `sample` along `way`.
     fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
         let belief = &self.belief.header;
         let pose = sample.pose();

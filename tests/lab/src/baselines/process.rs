@@ -24,7 +24,6 @@ use super::{
 };
 use crate::error::{Refused, Result};
 
-/// The planners to compare with.
 pub const BASELINES: &[&str] = &["wavefront", "bug"];
 
 /// Be a planner to compare with: wavefront or bug.

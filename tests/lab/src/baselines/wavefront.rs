@@ -15,7 +15,7 @@ use crate::baselines::{
 const AIM_M: f64 = 0.6;
 
 /// The planner of shortest paths. It plans from the map alone.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Wavefront;
 
 impl Planner for Wavefront {

@@ -152,7 +152,6 @@ fn input(seed: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// Try so many inputs.
 pub(super) fn judge(inputs: u64, seed: u64) -> Result<Judged> {
     let directory = tempfile::tempdir().or_cannot("make a temporary directory")?;
     let mut targets = targets(directory.path())?;

@@ -42,7 +42,6 @@ pub struct Attack {
     time: Option<MissionTime>,
     pub consumers: Consumers,
     entries: Vec<RosterEntry>,
-    /// The time when they were read.
     entries_read: Option<Instant>,
     supervisor: u32,
     /// Whether the supervisor was hit. Later samples of it and its stages are no sign of its successor.
@@ -54,7 +53,6 @@ pub struct Attack {
     pose: Option<PoseSample>,
 }
 
-/// A signal that was sent.
 struct Sent {
     row: Row,
     at: Instant,
@@ -348,7 +346,6 @@ impl Attack {
     }
 }
 
-/// Whether the signal reached a process.
 pub fn send(pid: u32, signal: Signal) -> bool {
     Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, signal).is_ok())
 }

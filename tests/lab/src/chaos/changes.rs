@@ -17,7 +17,6 @@ use summary::Summary;
 
 use crate::{random::Random, robot::firsthand};
 
-/// Changes of the targets of one mission.
 const MOST_CHANGES: usize = 6;
 /// Wall-clock time from one change to the next, seconds.
 const PAUSE_S: [f64; 2] = [0.8, 3.0];
@@ -28,7 +27,7 @@ const CLEARANCE_M: f64 = 0.45;
 /// The greatest distance by the ground truth of a robot from a target that it reached, metres.
 const REACHED_WITHIN_M: f64 = 0.5;
 
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct Changes {
     /// Requests: taken (the supervisor confirmed them), refused, unanswered (the supervisor was hit). Targets: reached, replaced.
     #[serde(flatten)]

@@ -157,11 +157,10 @@ impl Running {
     }
 }
 
-/// The name of the recorder among the consumers.
 const RECORD: &str = "record";
 
 /// A program that reads from the bus: a subcommand of `firsthand`, or a user's command without a shell.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Consumer {
     name: String,
     program: PathBuf,
@@ -196,7 +195,6 @@ impl FromStr for Consumer {
 }
 
 impl Consumer {
-    /// The subcommands of `firsthand` for `robot`.
     pub fn own(robot: &RobotName) -> Result<[Self; 3], Refused> {
         let program = robot::path()?;
         let own = |(name, words): (&str, &str)| Self {

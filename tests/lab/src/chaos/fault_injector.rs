@@ -27,15 +27,13 @@ const NEAR_M: [f64; 2] = [0.005, 0.05];
 const RANDOM_COUNTS_S: f64 = 1000.0;
 /// The greatest of random readings, metres.
 const RANDOM_M: f64 = 2.5;
-/// The value for no reading.
 const NO_READING: f64 = -1.0;
 /// The frozen range of a sensor that has measured nothing yet, metres.
 const FROZEN_M: f64 = 1.5;
 /// Messages that are stored: as many as come in [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
-/// Bytes for the host, and their time.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug)]
 pub struct Late {
     /// Time on the clock of the incoming bytes.
     pub at: Duration,
@@ -43,7 +41,6 @@ pub struct Late {
 }
 
 /// Passes bytes unchanged until its fault begins.
-#[derive(Debug)]
 pub struct FaultInjector {
     fault: RobotFault,
     faulty: bool,
@@ -54,7 +51,6 @@ pub struct FaultInjector {
     /// How great the fault of this mission is, from 0 to 1.
     size: f64,
     words: Words,
-    /// The last message with wheels before the fault.
     base: Option<Said>,
     /// The newest readings before the fault that are distances.
     newest: Report,
@@ -134,7 +130,6 @@ impl FaultInjector {
         least + self.size * (greatest - least)
     }
 
-    /// The newest of the messages `of_kind` that are `age` old.
     fn old(&self, now: Duration, age: Duration, of_kind: impl Fn(&Said) -> bool) -> Option<&Said> {
         let old = self.kept.iter().rfind(|(at, said)| *at + age <= now && of_kind(said));
         old.map(|(_, said)| said)
@@ -167,7 +162,6 @@ impl FaultInjector {
         out
     }
 
-    /// Note a message that came before the fault.
     fn note(&mut self, said: Said) {
         let Report { ranges, scan, scans, .. } = &said.report;
         let distances = ranges.iter().filter(|(_, range)| range.is_some_and(|range| range >= 0.0));
@@ -179,7 +173,6 @@ impl FaultInjector {
         }
     }
 
-    /// The bytes into which the fault changes the message `said`.
     fn changed(&mut self, mut said: Said, now: Duration) -> Vec<u8> {
         use RobotFault as F;
         match self.fault {
@@ -234,7 +227,6 @@ impl FaultInjector {
         speeds.is_some_and(|speeds| speeds != [0.0; 2])
     }
 
-    /// Change the readings of `said`.
     fn misread(&mut self, said: &mut Said) {
         use RobotFault as F;
         let near_m = self.drawn(NEAR_M);

@@ -38,7 +38,6 @@ pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     found
 }
 
-/// The processes with files in `directory`, and their command lines.
 fn lines(directory: &str) -> impl Iterator<Item = String> {
     let its = command_lines().filter(move |(_, line)| line.contains(directory));
     its.map(|(process, line)| format!("process {process}: {}", line.trim_end()))

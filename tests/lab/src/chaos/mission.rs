@@ -125,7 +125,6 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     Ok(())
 }
 
-/// The records of the deaths of the run in `directory`.
 fn deaths(directory: &Path) -> Vec<Value> {
     let text = fs::read_to_string(directory.join(DEATHS)).unwrap_or_default();
     let lines = text.lines().map(serde_json::from_str);
@@ -145,7 +144,6 @@ fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
     body.metres_per_count() * (f64::from(kills) + target / body.track_m) + slip_m
 }
 
-/// Start the robot of a mission with its files in `files`.
 pub fn robot(options: &Options, seed: u64, files: &Path, ignores_time: bool) -> Result<Simulator> {
     let mut mission = Mission { seed, ..options.loaded.clone() };
     mission.simulation.ignores_time |= ignores_time;

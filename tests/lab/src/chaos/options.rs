@@ -124,7 +124,6 @@ impl Options {
         Ok(Self { asked, loaded, directory })
     }
 
-    /// Of the robot's link.
     pub fn protocol(&self) -> Protocol {
         if self.asked.ros2 { Protocol::Ros2 } else { self.loaded.robot.protocol() }
     }
@@ -133,7 +132,6 @@ impl Options {
         self.asked.replay || self.asked.include_consumers
     }
 
-    /// The consumers to hit.
     pub fn consumers(&self) -> Result<Vec<Consumer>> {
         let mut consumers = self.asked.consumer.clone();
         if self.asked.include_consumers {

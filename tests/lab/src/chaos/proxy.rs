@@ -31,7 +31,6 @@ struct Shared {
     last_moving_ns: AtomicU64,
 }
 
-#[derive(Debug)]
 pub struct Proxy {
     pub address: SocketAddr,
     began: Instant,

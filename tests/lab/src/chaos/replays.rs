@@ -19,7 +19,6 @@ struct Counts {
     /// Generations whose outputs are equal to the bit, and those that ended before their first step.
     equal: u64,
     without_step: u64,
-    /// Compared samples.
     compared: u64,
     /// Recordings that end before their recorder did.
     cut: u64,
@@ -29,7 +28,7 @@ struct Counts {
     not_replayed: u64,
 }
 
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct Replays {
     #[serde(flatten)]
     whole: Counts,

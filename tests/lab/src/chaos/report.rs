@@ -22,8 +22,7 @@ const FILE_NAME: &str = "signals.csv";
 /// The name for supervisor and stages together.
 pub const EVERYTHING: &str = "everything";
 
-/// The result of all missions under attack.
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct Report {
     pub missions: u64,
     pub reached: u64,
@@ -50,7 +49,7 @@ pub struct Report {
     pub took_s: f64,
 }
 
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct ConsumerCounts {
     pub killed: u32,
     pub frozen: u32,
@@ -62,8 +61,7 @@ pub struct ConsumerCounts {
     pub last_end: Option<String>,
 }
 
-/// Times from the signal to the successor.
-#[derive(Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct Recovery {
     /// The time to the first ready beat, after kills: a death is noticed at once.
     #[serde(serialize_with = "quantiles")]
@@ -94,7 +92,6 @@ impl<'a> Series<'a> {
         })
     }
 
-    /// Keep a signal whose measurement is complete.
     pub fn keep(&mut self, row: Row) -> Result {
         self.report.add(&row);
         self.signals.add(row)
@@ -115,7 +112,6 @@ impl Report {
         self.kills.values().flat_map(BTreeMap::values).sum()
     }
 
-    /// Count a signal whose measurement is complete.
     fn add(&mut self, row: &Row) {
         let Row { stage, kind, ready_ms, first_output_ms, .. } = row;
         *match self.consumers.get_mut(stage) {
@@ -164,7 +160,6 @@ pub struct Row {
     pub mission: u64,
     /// Mission time of the newest wheel sample that was read before the signal, seconds.
     pub time_s: Option<f64>,
-    /// The stage, `supervisor`, `everything`, or the consumer's name.
     pub stage: String,
     pub kind: Kind,
     /// The generation; for a consumer the number of its starts in that mission. None for the supervisor, for everything and for the
@@ -185,7 +180,6 @@ pub fn ms_since(at: Instant) -> f64 {
     (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
 
-/// The file in `directory`, without rows.
 pub fn create(directory: &Path) -> Result<Table<Row>> {
     let path = directory.join(FILE_NAME);
     fs::create_dir_all(directory).or_cannot_file("make the directory of", &path)?;

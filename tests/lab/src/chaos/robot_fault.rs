@@ -13,7 +13,7 @@ use super::fault_injector::LATE;
 /// that believes in stuck ranges goes slowly, and slow frames leave pauses.
 const SHOWS_AFTER_S: f64 = 2.0;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Promise {
     /// The robot is at rest as soon as its base can be, stays so, and touches nothing.

@@ -46,7 +46,6 @@ const DEPARTS_WITHIN: Duration = Duration::from_secs(60);
 const END_GRACE: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Run missions of each fault that is asked for and that a robot of this protocol can have.
 pub fn run(options: &Options) -> Result<StopTimeTable> {
     let asked = &options.asked;
     let protocol = options.protocol();
@@ -212,7 +211,6 @@ fn directory(options: &Options, fault: RobotFault, seed: u64) -> PathBuf {
     options.directory.join(format!("{}-{seed}", fault.row().name))
 }
 
-/// Kill the processes that `fault` names, of the mission with its files in `directory`.
 fn kill(fault: RobotFault, supervisor: &Process, directory: &Path) {
     let run = directory.join("run");
     let run = run.to_string_lossy();

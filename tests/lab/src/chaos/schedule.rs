@@ -56,7 +56,6 @@ const FREEZE_ALL_SHARE: f64 = 0.5;
 /// long.
 const FREEZE_S: Range<f64> = 0.3..1.5;
 
-#[derive(Debug)]
 pub struct Schedule(Random);
 
 impl Schedule {

@@ -14,7 +14,7 @@ use crate::error::Result;
 /// The least time from the last tick in which a wheel turned to the end of a mission that ends at rest, seconds.
 const AT_REST_BEFORE_S: f64 = 0.15;
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Debug, Serialize)]
 pub struct Entry {
     pub fault: RobotFault,
     pub seed: u64,
@@ -50,7 +50,7 @@ impl Entry {
     }
 }
 
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Default, Serialize)]
 pub struct StopTimeTable {
     pub entries: Vec<Entry>,
 }

@@ -15,7 +15,6 @@ use crate::{
     },
 };
 
-/// The figures of missions that arrived.
 const FIGURES: [&str; 7] = [
     "time_s",
     "path_m",
@@ -60,7 +59,6 @@ pub fn report(experiments: &[Experiment], rows: &[Row]) -> Result<Vec<Value>> {
     Ok(experiments.iter().map(object).collect())
 }
 
-/// The missions of an experiment by one method.
 fn findings(rows: &[&Row]) -> Value {
     let [arrived, touched, wrong_place] =
         [Outcome::Success, Outcome::Collision, Outcome::WrongPlace].map(|it| count(rows, it));

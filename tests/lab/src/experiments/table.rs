@@ -19,7 +19,6 @@ pub const METHODS: [(&str, &[&str]); 2] = [
 ];
 const PAPER: &str = "paper";
 
-/// An experiment of section V.B of the paper.
 #[derive(Debug, Deserialize)]
 pub struct Experiment {
     /// The number in the paper, and the variant.
@@ -27,7 +26,6 @@ pub struct Experiment {
     pub title: String,
     pub reported: String,
     pub reported_time_s: Option<f64>,
-    /// The shipped mission, and the experiment's change of it.
     mission: String,
     change: Option<String>,
     /// Whether only the paper's method can do it: the default method has no constant speed.
@@ -36,10 +34,9 @@ pub struct Experiment {
 
 /// A claim of the paper about the median of a figure, or about the share that `arrived`. "About half" is 0.4 to 0.6, "about 0.7"
 /// is 0.6 to 0.8; a deviation is minor up to a fifth of the path.
-#[derive(Debug, Deserialize)]
+#[derive(Deserialize)]
 pub struct Claim {
     pub experiment: String,
-    /// The claim as a condition.
     pub claim: String,
     pub figure: String,
     /// The experiment whose figure divides this one.

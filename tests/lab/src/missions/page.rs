@@ -51,7 +51,6 @@ impl Page {
         self.0 += &format!("<figure><figcaption>{caption}</figcaption>{image}{page}</figure>\n");
     }
 
-    /// Write the page into `directory`. Returns its path.
     pub fn save(self, directory: &Path) -> Result<PathBuf> {
         let file = directory.join(PAGE_FILE);
         std::fs::write(&file, self.0 + "</body></html>\n").or_cannot_file("write", &file)?;

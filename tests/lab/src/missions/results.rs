@@ -13,7 +13,6 @@ use serde::{Serialize, de::DeserializeOwned};
 use super::row::{Latency, Row};
 use crate::error::{OrCannot as _, Refused, Result};
 
-/// The file of the command that gives the rows.
 const PLAN_FILE: &str = "plan.txt";
 
 /// The command of this process, which gives the rows, without what does not change them.
@@ -31,7 +30,6 @@ pub fn command() -> Result<String> {
     shlex::try_join(words.iter().map(String::as_str)).or_cannot("write the command")
 }
 
-#[derive(Debug)]
 pub struct Results {
     pub directory: PathBuf,
     pub rows: Table<Row>,
@@ -91,7 +89,6 @@ pub struct Table<R> {
 }
 
 impl<R: Serialize + DeserializeOwned> Table<R> {
-    /// The table in `file`: with its rows, or empty.
     pub fn open(file: PathBuf) -> Result<Self> {
         let mut rows = Vec::new();
         if file.exists() {

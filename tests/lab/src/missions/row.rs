@@ -20,7 +20,6 @@ pub enum Outcome {
     Success,
     Collision,
     Timeout,
-    /// The robot reported its arrival in a wrong place.
     WrongPlace,
     /// The robot gave up although a path to the target exists.
     Unreachable,
@@ -36,17 +35,14 @@ pub const OUTCOMES: [&str; 6] =
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub world: String,
-    /// Seed of the simulation's noise.
     pub seed: u64,
     pub setting: String,
     pub planner: String,
     pub outcome: Outcome,
     pub reason: String,
     pub time_s: f64,
-    /// Distance driven by the ground truth.
     pub path_m: f64,
     pub straight_m: f64,
-    /// Length of the body's shortest path.
     pub shortest_m: f64,
     /// K of the paper: path divided by straight distance.
     pub k: f64,
@@ -185,7 +181,7 @@ impl Record for Row {
 }
 
 /// The latencies of one mission's ticks and solves, microseconds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Serialize, Deserialize)]
 pub struct Latency {
     pub world: String,
     pub seed: u64,

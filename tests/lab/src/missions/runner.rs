@@ -26,13 +26,11 @@ use crate::{
     robot::{self, Run},
 };
 
-/// A run's picture and its page, in its directory.
 const PICTURE: &str = "picture.svg";
 const PAGE: &str = "report/report.html";
 /// Time between lines of progress that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-#[derive(Clone, Debug)]
 pub struct Plan {
     pub trials: Vec<Trial>,
     pub settings: Vec<Setting>,
@@ -48,7 +46,7 @@ pub struct Plan {
     pub calibrates: bool,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub enum NoiseSeeds {
     /// Every world has the same seeds: this seed and the following ones.
     Counted(u64),
@@ -57,7 +55,6 @@ pub enum NoiseSeeds {
 }
 
 impl NoiseSeeds {
-    /// The noise seed of mission `repeat` of `repeats` on world `number`.
     fn seed(self, number: u64, repeats: u64, repeat: u64) -> u64 {
         match self {
             Self::Counted(first) => first.wrapping_add(repeat),
@@ -150,12 +147,10 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     kept
 }
 
-/// The noise seeds of the robots of a mission with noise `seed`.
 fn noises(seed: u64) -> impl Iterator<Item = u64> {
     (0..).map(move |robot| seed.wrapping_add(robot))
 }
 
-/// The mission file of `world` in the `directory` of all.
 fn world_file(directory: &Path, world: &str) -> PathBuf {
     directory.join("worlds").join(format!("{world}.toml"))
 }
@@ -190,7 +185,6 @@ struct Job<'a> {
     trial: &'a Trial,
     setting: &'a Setting,
     seed: u64,
-    /// The directory of all.
     directory: &'a Path,
 }
 
@@ -200,11 +194,8 @@ struct Robot<'a> {
     trial: &'a Trial,
     seed: u64,
     name: &'a str,
-    /// The other robot in its world.
     other: Option<&'a str>,
-    /// The directory of its run.
     directory: PathBuf,
-    /// The assignment of its calibration file, if it was calibrated.
     calibrated: Option<String>,
 }
 

@@ -26,7 +26,7 @@ pub fn swept_m(mission: &Mission) -> f64 {
 }
 
 /// The rules by which the ground truth judges a mission.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Rules {
     /// Distance from the target beyond which an arrival is in the wrong place, metres.
     pub success_within_m: f64,
@@ -50,7 +50,7 @@ impl Rules {
 }
 
 /// A world with a start and a target, in the frame of the world it comes from.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Scene {
     pub shapes: Shapes,
     /// The things that move in the world; the shortest path does not regard them.
@@ -67,14 +67,12 @@ pub struct Scene {
 
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// The world's name: its kind and number.
     pub world: String,
     /// The mission, its origin at the start of the robot.
     pub mission: Mission,
     /// Length of the body's shortest path, metres.
     pub shortest_m: f64,
     pub rules: Rules,
-    /// The other robot's trial, in the same frame.
     pub oncoming: Option<Box<Self>>,
 }
 
@@ -101,7 +99,6 @@ impl Trial {
         Some(Self { world, mission, shortest_m, rules: Rules::PLAIN, oncoming: None })
     }
 
-    /// The trial of each robot of the world.
     pub fn robots(&self) -> impl Iterator<Item = &Self> {
         std::iter::once(self).chain(self.oncoming.as_deref())
     }
@@ -155,7 +152,6 @@ fn moved(shapes: &Shapes, by: DVec2) -> Shapes {
     shapes
 }
 
-/// The places of all `shapes`.
 pub fn points(shapes: &mut Shapes) -> impl Iterator<Item = &mut DVec2> {
     let Shapes { drums, boxes, walls } = shapes;
     let drums = drums.iter_mut().map(|drum| &mut drum.at);

@@ -90,7 +90,6 @@ pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Resul
     Ok(latencies)
 }
 
-/// Run the forwarder that stands for the stage `place`.
 pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result {
     let mut terminated = Signals::catch(&[SIGTERM]).or_cannot("catch SIGTERM")?;
     become_child(place, supervisor)?;
@@ -107,7 +106,6 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result 
     Ok(())
 }
 
-/// Forwards all new samples.
 type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
 
 fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward> {

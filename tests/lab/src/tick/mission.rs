@@ -44,7 +44,6 @@ pub fn measure(
     Ok((times, processes.used()))
 }
 
-/// A consumer of `robot` until it is dropped.
 fn consumer(robot: &RobotName) -> Turns {
     let domain = Domain::of(robot.clone());
     Turns::start(move || {

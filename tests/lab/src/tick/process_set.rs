@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::{missions::statistics::rounded, robot::processes};
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Debug, PartialEq, Serialize)]
 pub struct Used {
     /// Voluntary context switches of all threads in a second: each wait ends with a wakeup.
     pub wakeups_per_s: f64,
@@ -21,7 +21,6 @@ pub struct Used {
     pub pss_mib: f64,
 }
 
-#[derive(Debug)]
 pub struct ProcessSet {
     root: u32,
     first: Option<Counts>,

@@ -35,14 +35,12 @@ struct Cylinder {
     radius_m: f64,
 }
 
-/// One row of the index, which has further columns.
 #[derive(Deserialize)]
 struct IndexRow {
     world: u32,
     optimal_time_s: f64,
 }
 
-/// A world's name, scene and rules.
 pub type World = (String, Scene, Rules);
 
 /// Every world of a table of cylinders, in the order of their numbers.
@@ -104,7 +102,6 @@ fn scene(drums: Vec<Drum>) -> Scene {
     }
 }
 
-/// The rules of the challenge.
 pub const RULES: Rules = Rules {
     success_within_m: 1.0,
     clock_after_departure: true,

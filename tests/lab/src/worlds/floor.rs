@@ -85,7 +85,6 @@ impl Floor {
         None
     }
 
-    /// The cell at a place, if it is on the map.
     fn cell(&self, at: DVec2) -> Option<usize> {
         let away = ((at - DVec2::from(self.map.corner_m)) / self.map.cell_m).floor();
         let size = DVec2::new(self.map.map.cols as f64, self.map.map.rows as f64);

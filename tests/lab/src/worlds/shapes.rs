@@ -32,7 +32,6 @@ pub fn drums(drums: impl Into<Vec<Drum>>) -> Shapes {
 }
 
 /// A closed room around a start at the origin and a target, and the middle and half extent of its floor.
-#[derive(Clone, Copy, Debug)]
 pub struct Room {
     pub target: DVec2,
     pub least: DVec2,
@@ -51,7 +50,6 @@ impl Room {
         }
     }
 
-    /// The wall around the room.
     pub fn closed(&self) -> Wall {
         let Self { least, greatest, .. } = *self;
         let corners = [DVec2::new(greatest.x, least.y), DVec2::new(least.x, greatest.y)];

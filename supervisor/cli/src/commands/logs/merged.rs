@@ -12,7 +12,6 @@ const LONGEST_LINE: u64 = 64 << 10;
 /// A time like 2026-11-21T06:04:22.729158Z.
 const TIME: usize = 27;
 
-#[derive(Debug)]
 pub struct Logs {
     directory: PathBuf,
     /// `None` reads all.
@@ -20,7 +19,6 @@ pub struct Logs {
     logs: Vec<Log>,
 }
 
-#[derive(Debug)]
 struct Log {
     process: String,
     file: BufReader<File>,
@@ -144,7 +142,6 @@ impl Log {
     }
 }
 
-/// The time that begins a line, and what follows it.
 fn split_time(line: &str) -> Option<(&str, &str)> {
     let (time, text) = line.split_at_checked(TIME)?;
     let is_time = time.ends_with('Z') && time.as_bytes()[10] == b'T' && text.starts_with(' ');

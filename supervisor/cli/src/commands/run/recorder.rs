@@ -14,7 +14,6 @@ use processes::process::{Process, firsthand};
 use crate::commands::record::DiskBudget;
 
 /// Longest times that a run waits for its recorder.
-#[derive(Clone, Copy)]
 struct Patience {
     /// One that attaches later misses the beginning.
     attached: Duration,

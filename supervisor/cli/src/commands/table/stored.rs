@@ -1,9 +1,10 @@
-//! Results and capabilities, stored as CSV files beside the guide.
+//! Results, capabilities and versions, stored as CSV files beside the guide.
 //!
 //! The first column of each file is the section of the page that shows a row.
 
 use std::fmt::Write as _;
 
+use common::checkpoint;
 use console::item::item;
 
 macro_rules! stored {
@@ -14,6 +15,7 @@ macro_rules! stored {
 
 static FILES: &[(&str, &str)] = stored! {
     "capabilities" in "capabilities.csv",
+    "versions" in "versions.csv",
     "figures" in "results/figures.csv",
     "worlds" in "results/worlds.csv",
     "paired" in "results/paired.csv",
@@ -45,13 +47,14 @@ pub fn markdown(name: &str, section: Option<&str>) -> Option<String> {
     }
     Some(match name {
         "capabilities" => rows.iter().map(|row| capability(row)).collect(),
+        "versions" => rows.iter().map(|row| version(row)).collect(),
         "figures" => rows.iter().map(|row| figure(row)).collect(),
         _ => table(header.iter().skip(1), &rows),
     })
 }
 
 pub fn results() -> String {
-    let of_results = FILES.iter().filter(|(name, _)| *name != "capabilities");
+    let of_results = FILES.iter().filter(|(name, _)| !["capabilities", "versions"].contains(name));
     let printed =
         of_results.filter_map(|(name, _)| Some(format!("{name}\n\n{}", markdown(name, None)?)));
     printed.collect::<Vec<_>>().join("\n")
@@ -62,15 +65,25 @@ fn capability(row: &[String]) -> String {
     let [text, verdict, tests] = row else {
         return String::new();
     };
-    let named = |tests: &str| {
-        tests.split(' ').map(|test| format!("`{test}`")).collect::<Vec<_>>().join(" ")
-    };
     let said = match (text.as_str(), tests.as_str()) {
         ("", test) => test.replace('_', " "),
         (text, "") => text.to_owned(),
         (text, tests) => format!("{text}: {}", named(tests)),
     };
     item(&format!("{verdict}: {said}"))
+}
+
+fn named(tests: &str) -> String {
+    tests.split(' ').map(|test| format!("`{test}`")).collect::<Vec<_>>().join(" ")
+}
+
+/// What a program does with a file or robot of another version than its own; `STATES` stands for the version of states.
+fn version(row: &[String]) -> String {
+    let [what, version, another, tests] = row else {
+        return String::new();
+    };
+    let version = version.replace("STATES", &checkpoint::VERSION.escape_ascii().to_string());
+    item(&format!("{what} ({version}): {another}: {}", named(tests)))
 }
 
 /// Below it stands the command that prints it.
@@ -95,17 +108,6 @@ fn table<'a>(header: impl Iterator<Item = &'a str>, rows: &[Vec<String>]) -> Str
     table
 }
 
-/// Text, verdict, names of tests.
-#[cfg(test)]
-pub fn capabilities() -> Vec<[String; 3]> {
-    let (_, text) = FILES[0];
-    let mut reader = csv::Reader::from_reader(text.as_bytes());
-    let rows = reader.deserialize::<(String, String, String, String)>();
-    rows.map(|row| row.map(|(_, text, verdict, tests)| [text, verdict, tests]))
-        .collect::<Result<_, _>>()
-        .unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,6 +119,5 @@ mod tests {
             let broken = records.filter(Result::is_err).count();
             assert_eq!(broken, 0, "{name}");
         }
-        assert!(!capabilities().is_empty());
     }
 }

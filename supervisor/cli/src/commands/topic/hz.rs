@@ -35,7 +35,6 @@ pub struct Arguments {
 
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-/// Readers, and the rates of what they read.
 struct Readers(Vec<(Box<dyn AnyReader>, TopicRates)>);
 
 impl Readers {

@@ -3,10 +3,7 @@
 use std::fmt::Write as _;
 
 use common::bus::Value;
-use serde::{
-    Serialize, Serializer,
-    ser::{SerializeMap as _, SerializeSeq as _},
-};
+use serde::{Serialize, Serializer};
 
 /// The name stands beside the fields of the header.
 const ELEMENTS: &str = "elements";
@@ -89,7 +86,6 @@ fn on_one_line(value: &Value, most: usize) -> String {
     }
 }
 
-/// A value in the data model of JSON.
 struct Json<'a>(&'a Value);
 
 impl Serialize for Json<'_> {
@@ -100,19 +96,9 @@ impl Serialize for Json<'_> {
             Value::Single(number) => to.serialize_f32(*number),
             Value::Double(number) => to.serialize_f64(*number),
             Value::Text(text) => to.serialize_str(text),
-            Value::Array(elements) => {
-                let mut array = to.serialize_seq(Some(elements.len()))?;
-                for element in elements {
-                    array.serialize_element(&Json(element))?;
-                }
-                array.end()
-            }
+            Value::Array(elements) => to.collect_seq(elements.iter().map(Json)),
             Value::Struct(fields) => {
-                let mut object = to.serialize_map(Some(fields.len()))?;
-                for (name, value) in fields {
-                    object.serialize_entry(name, &Json(value))?;
-                }
-                object.end()
+                to.collect_map(fields.iter().map(|(name, value)| (name, Json(value))))
             }
         }
     }

@@ -12,23 +12,20 @@ use crate::{
     messages::{Header, write_path},
 };
 
-/// The most goals of one call.
 const MOST_GOALS: usize = 256;
 
 /// A pose in the frame of this name; in that of the map without one.
-pub(super) type Placed = (String, DAffine2);
+pub type Placed = (String, DAffine2);
 
-/// What a client asks for.
-#[derive(Debug)]
-pub(super) struct Asked {
-    pub(super) id: Uuid,
-    pub(super) goals: Vec<Placed>,
+pub struct Asked {
+    pub id: Uuid,
+    pub goals: Vec<Placed>,
     /// None for the robot's own place.
-    pub(super) start: Option<Placed>,
+    pub start: Option<Placed>,
 }
 
 /// The goal of `ComputePathToPose`, or of `ComputePathThroughPoses`. The error says why the payload is none.
-pub(super) fn read(payload: &[u8], has_one: bool) -> Result<Asked, String> {
+pub fn read(payload: &[u8], has_one: bool) -> Result<Asked, String> {
     let mut reader = Reader::new(payload)?;
     let id = uuid(&mut reader)?;
     let ask = |mut reader: Reader<'_>, has_header: bool| {
@@ -57,19 +54,17 @@ fn placed(reader: &mut Reader<'_>) -> Result<Placed, Malformed> {
     Ok((frame.to_owned(), pose))
 }
 
-/// The end of a goal.
 #[derive(Debug, Default)]
-pub(super) struct Outcome {
-    /// The frame of the path.
-    pub(super) frame: String,
-    pub(super) at_ns: u64,
-    pub(super) took_ns: u64,
-    pub(super) path: Vec<Pose>,
-    pub(super) failure: Option<Failure>,
+pub struct Outcome {
+    pub frame: String,
+    pub at_ns: u64,
+    pub took_ns: u64,
+    pub path: Vec<Pose>,
+    pub failure: Option<Failure>,
 }
 
 /// The reply to a request for the result of a goal with this state; Nav2's error codes of the action begin at `codes`.
-pub(super) fn result(state: u8, outcome: &Outcome, codes: u16) -> Vec<u8> {
+pub fn result(state: u8, outcome: &Outcome, codes: u16) -> Vec<u8> {
     let mut writer = Writer::default();
     writer.u8(state);
     write_path(&mut writer, Header(outcome.at_ns, &outcome.frame), &outcome.path);

@@ -16,13 +16,13 @@ const DEAREST: f32 = 3.0;
 
 /// What may not be entered, whichever the map.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Body {
+pub struct Body {
     /// The robot's centre stays so far from what is occupied, metres.
-    pub(super) radius_m: f64,
+    pub radius_m: f64,
     /// Cells of this value or more, up to 100, are occupied.
-    pub(super) occupied: u8,
+    pub occupied: u8,
     /// Whether cells of which nothing is known are free.
-    pub(super) enters_unknown: bool,
+    pub enters_unknown: bool,
 }
 
 impl Body {
@@ -33,19 +33,19 @@ impl Body {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Costmap {
-    pub(super) frame: String,
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) resolution_m: f64,
+pub struct Costmap {
+    pub frame: String,
+    pub width: usize,
+    pub height: usize,
+    pub resolution_m: f64,
     /// From cells, whose centres are at the integers, to the map's frame.
-    pub(super) place: DAffine2,
+    pub place: DAffine2,
     cells: Vec<u8>,
 }
 
 impl Costmap {
     /// A `nav_msgs/OccupancyGrid`. Each error here says why the message is refused.
-    pub(super) fn read(payload: &[u8]) -> Result<Self, String> {
+    pub fn read(payload: &[u8]) -> Result<Self, String> {
         let mut reader = Reader::new(payload)?;
         let (_stamp_ns, frame) = reader.header()?;
         let _loaded_ns = reader.time()?;
@@ -74,7 +74,7 @@ impl Costmap {
     }
 
     /// Take a `map_msgs/OccupancyGridUpdate`, whole or not at all.
-    pub(super) fn update(&mut self, payload: &[u8]) -> Result<(), String> {
+    pub fn update(&mut self, payload: &[u8]) -> Result<(), String> {
         let mut reader = Reader::new(payload)?;
         let _header = reader.header()?;
         let [col, row, width, height] =
@@ -93,21 +93,21 @@ impl Costmap {
         Ok(())
     }
 
-    pub(super) fn cell_at(&self, at: DVec2) -> Option<Cell> {
+    pub fn cell_at(&self, at: DVec2) -> Option<Cell> {
         let [col, row] = at.round().to_array();
         let is_inside =
             (0.0..self.width as f64).contains(&col) && (0.0..self.height as f64).contains(&row);
         is_inside.then(|| Cell::new(col as usize, row as usize))
     }
 
-    pub(super) fn is_occupied(&self, cell: Cell, body: &Body) -> bool {
+    pub fn is_occupied(&self, cell: Cell, body: &Body) -> bool {
         body.is_occupied(self.cells[cell.row * self.width + cell.col])
     }
 
     /// The cells with centres no farther than the body's radius from that of an occupied one, and the cost of each cell. A free cell a metre
     /// from obstacles costs 1. The cost goes with the inverse square of the distance from obstacles, up to [`REACH_M`]; the cell's own value
     /// makes it up to [`DEAREST`] times as great. No cost is greater than `most`.
-    pub(super) fn blocked_and_costs(&self, body: &Body, most: f32) -> (Vec<bool>, Vec<f32>) {
+    pub fn blocked_and_costs(&self, body: &Body, most: f32) -> (Vec<bool>, Vec<f32>) {
         let cells = |metres: f64| (metres / self.resolution_m).clamp(0.0, MAX_SIDE as f64);
         let (radius, reach) = (cells(body.radius_m), cells(REACH_M).min(MOST_REACH));
         // In a costmap that is inflated 99 is a cell in which an obstacle touches the robot, and no obstacle itself.

@@ -20,7 +20,7 @@ const MOST_GOALS: usize = 100;
 
 /// Why there is no path: Nav2's error codes, less 200 for one goal and 300 for several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Reason {
+pub enum Reason {
     Unknown = 0,
     Tf = 2,
     StartOutside,
@@ -33,11 +33,10 @@ pub(super) enum Reason {
 }
 
 /// There is no path, for a reason with its words.
-pub(super) type Failure = (Reason, String);
+pub type Failure = (Reason, String);
 
-/// Plans on one map after the other.
 #[derive(Debug)]
-pub(super) struct Planner {
+pub struct Planner {
     body: Body,
     screening_m: f64,
     solver: Solver,
@@ -49,7 +48,7 @@ pub(super) struct Planner {
 }
 
 impl Planner {
-    pub(super) fn new(body: Body, screening_m: f64) -> Self {
+    pub fn new(body: Body, screening_m: f64) -> Self {
         let (solver, fields) = (Solver::default(), VecDeque::new());
         Self {
             body,
@@ -63,7 +62,7 @@ impl Planner {
     }
 
     /// Poses about a cell apart, farther on a long way, in the frame of `map`, from `start` by way of all `goals`, each of which has its own heading.
-    pub(super) fn plan(
+    pub fn plan(
         &mut self,
         map: &Arc<Costmap>,
         start: DAffine2,
@@ -100,8 +99,7 @@ impl Planner {
         Ok(kept.map(|(_, pose)| pose).collect())
     }
 
-    /// The field of the last path.
-    pub(super) fn newest_field(&self) -> Option<&Field> {
+    pub fn newest_field(&self) -> Option<&Field> {
         self.fields.back().map(|(_, field)| field)
     }
 

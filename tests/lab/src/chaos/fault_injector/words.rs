@@ -15,13 +15,10 @@ use common::{
 const HELD_AD: u16 = 1520;
 /// The longest echo of a sonar that heard something, metres.
 const LONGEST_ECHO_M: f64 = 2.54;
-/// Bytes of a motor frame's data.
 const MOTOR_BYTES: usize = 33;
 /// The angle of a count of an X80, radians.
 pub const COUNT_RAD: f64 = TAU / 1200.0;
 
-/// Converts bytes to the messages of one protocol.
-#[derive(Debug)]
 pub enum Words {
     X80 {
         robot: Decoder,
@@ -64,7 +61,6 @@ impl Words {
         }
     }
 
-    /// The orders in the bytes of the host, each with what it does.
     pub fn ordered(&mut self, bytes: &[u8]) -> Vec<(Vec<u8>, Effect)> {
         match self {
             Self::X80 { host, .. } => frames(host, bytes, |frame| {
@@ -90,11 +86,10 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], mut of: impl FnMut(&Frame<'_>)
 }
 
 /// A message of the robot, in the words of JSON whatever it speaks.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Said {
     /// Of an X80 the wheels are its channels, and the ranges those of its sonars, by their numbers.
     pub report: json_wire::Report,
-    /// The frame of an X80.
     frame: Option<(Addressing, Report)>,
 }
 
@@ -172,7 +167,6 @@ impl Said {
         if self.is_frame() { [0.08, 0.04] } else { [0.3, 0.2] }
     }
 
-    /// Whether the message has ranges, a scan, or the further readings of an X80.
     pub fn readings(&self) -> [bool; 3] {
         let json_wire::Report { ranges, scan, scans, .. } = &self.report;
         let has_further = matches!(self.frame, Some((_, Report::Custom(_))));
@@ -207,8 +201,6 @@ impl Said {
     }
 }
 
-/// What an order does.
-#[derive(Clone, Debug)]
 pub enum Effect {
     /// The wheels turn; these bytes in place of the order make them stand.
     Moves {
@@ -216,7 +208,6 @@ pub enum Effect {
     },
     /// The wheels stand by a speed of 0.
     Stands,
-    /// The wheels stand by other means.
     Disables,
     Other,
 }

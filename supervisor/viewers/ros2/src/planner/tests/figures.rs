@@ -21,13 +21,13 @@ use super::super::{
     planning::{Planner, Reason},
 };
 
-pub(super) const RESOLUTION_M: f64 = 0.05;
+pub const RESOLUTION_M: f64 = 0.05;
 const RADIUS_M: f64 = 0.22;
 /// Nav2's defaults, as its parameter file has them.
 const INFLATION_M: f64 = 0.7;
 const SCALING: f64 = 3.0;
 
-pub(super) struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
     fn below(&mut self, limit: usize) -> usize {
@@ -37,23 +37,18 @@ impl Random {
 }
 
 #[derive(Clone)]
-pub(super) struct Grid {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    pub(super) occupied: Vec<bool>,
+pub struct Grid {
+    pub width: usize,
+    pub height: usize,
+    pub occupied: Vec<bool>,
 }
 
 impl Grid {
-    pub(super) fn new(width: usize, height: usize) -> Self {
+    pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, occupied: vec![false; width * height] }
     }
 
-    pub(super) fn fill(
-        &mut self,
-        [left, bottom]: [usize; 2],
-        [width, height]: [usize; 2],
-        value: bool,
-    ) {
+    pub fn fill(&mut self, [left, bottom]: [usize; 2], [width, height]: [usize; 2], value: bool) {
         for row in bottom..(bottom + height).min(self.height) {
             for col in left..(left + width).min(self.width) {
                 self.occupied[row * self.width + col] = value;
@@ -100,7 +95,7 @@ impl Grid {
         grid
     }
 
-    pub(super) fn message(&self) -> Vec<u8> {
+    pub fn message(&self) -> Vec<u8> {
         let values: Vec<_> = self.occupied.iter().map(|&it| 100 * u8::from(it)).collect();
         self.message_of(&values)
     }
