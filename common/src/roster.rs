@@ -12,8 +12,7 @@ use crate::{
 
 /// The supervisor answers the first heartbeat of a process with a roster. On a loaded machine that takes a while.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// What a stage publishes before it is named is lost to the others, a first whole map too. Beside 20 busy processes a core it took the
-/// supervisor more than a second.
+/// What a stage publishes before it is named is lost, a first whole map too.
 #[cfg(feature = "stage")]
 const NAMED_WITHIN: Duration = Duration::from_secs(10);
 
