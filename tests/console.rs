@@ -224,7 +224,9 @@ fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says()
 #[test]
 fn list_shows_the_robots_that_run_and_where() {
     let [one, two] = ["con-list-1", "con-list-2"];
-    let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &["--pace", "1"]));
+    // They are still there when a frozen robot of another test has kept the list waiting.
+    let slowly = ["--pace", "1", "--set", "controller.speed_m_s=0.05"];
+    let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &slowly));
     runs.iter_mut().for_each(|run| drop(run.wait_until_under_way(0.5)));
     let listed = |robot: &str| {
         let lines = printed(&["status", "--all", "--json"]);

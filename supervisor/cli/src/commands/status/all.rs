@@ -1,6 +1,6 @@
 //! `firsthand status --all`: the robots of this machine.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, thread};
 
 use common::{
     bus::BusError,
@@ -30,7 +30,12 @@ struct Listed {
 }
 
 pub fn print(json: bool) -> Result {
-    let listed: Vec<_> = robots::own().into_iter().map(listed).collect();
+    // A frozen supervisor keeps nobody waiting for the others.
+    let listed: Vec<_> = thread::scope(|scope| {
+        let asked = robots::own().into_iter().map(|robot| scope.spawn(|| listed(robot)));
+        let asked: Vec<_> = asked.collect();
+        asked.into_iter().filter_map(|listed| listed.join().ok()).collect()
+    });
     if json {
         print_text(&json_lines(&listed)?)?;
         return Ok(());
