@@ -17,7 +17,7 @@ use super::{
     topic::Topic,
 };
 
-/// On a busy machine the supervisor needs more than one round.
+/// A busy supervisor needs several rounds.
 const PLACES_FREED_WITHIN: Duration = Duration::from_secs(4);
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 

@@ -31,7 +31,7 @@ use link::stop_guard;
 use processes::{executable, process};
 use thiserror::Error;
 
-/// The patience with a supervisor, whose roster comes five times a second. Beside 25 busy processes a core one took more than 4 s to answer.
+/// The patience with a supervisor, whose roster comes five times a second. Beside 25 busy processes a core one took more than 4 s.
 pub const PATIENCE: Duration = Duration::from_secs(10);
 /// A request that a run refuses because it starts is made again after this.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);

@@ -30,7 +30,7 @@ struct Listed {
 }
 
 pub fn print(json: bool) -> Result {
-    // A frozen supervisor keeps nobody waiting for the others.
+    // A frozen supervisor delays nobody else.
     let listed: Vec<_> = thread::scope(|scope| {
         let asked = robots::own().into_iter().map(|robot| scope.spawn(|| listed(robot)));
         let asked: Vec<_> = asked.collect();
