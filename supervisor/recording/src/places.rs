@@ -30,6 +30,7 @@ fn taken(run: &Path) -> BTreeMap<u32, PathBuf> {
     with_numbers.collect()
 }
 
+/// The next free one.
 pub fn next_place(run: &Path) -> PathBuf {
     let last = taken(run).into_keys().next_back().unwrap_or(0);
     numbered(&run.join("recording.mcap"), last.saturating_add(1))
