@@ -6,8 +6,8 @@
 //! field less its danger, so it steps aside early. It goes only where it could brake after the next tick and be at rest before it meets
 //! something, or where the whole way meets nothing: what runs into a robot at rest is not that robot's fault.
 //!
-//! A robot that was kept from its way for long stops evading: among people who give way it would stand and back off until its time runs
-//! out. It still goes only where it could rest in time.
+//! A robot that was kept from its way for long insists on it: among people who give way it would stand and back off until its time runs
+//! out. It still goes only where it could rest in time. It evades again for its next target, and once nothing moved near it for as long.
 
 use std::f64::consts::{PI, TAU};
 
@@ -54,7 +54,7 @@ const WATCHES_S: f64 = 0.5;
 const FADED_M_S: f64 = 0.05;
 /// What is farther away is no danger, metres.
 const FAR_M: f64 = 1.5;
-/// A robot that movers kept from its way for so long, seconds, less the time for which they did not, evades them no longer in this run.
+/// A robot insists on its way after movers kept it from there for so long, seconds, less the time for which they did not.
 const PATIENCE_S: f64 = 16.0;
 /// It goes on with these shares of the advised speed. A slow robot rests soon.
 const PATIENT_SPEEDS: [f64; 3] = [1.0, 0.5, 0.25];
@@ -75,6 +75,7 @@ pub(crate) struct Evasion {
     /// The newest answer's time, and how long movers kept the robot from its way, seconds.
     answered_s: f64,
     kept_s: f64,
+    insists: bool,
 }
 
 /// A mover.
@@ -130,7 +131,13 @@ impl Evasion {
             backs: mission.lasers().iter().any(|(_, laser)| looks_back(laser)),
             answered_s: 0.0,
             kept_s: 0.0,
+            insists: false,
         })
+    }
+
+    /// Starts over for another target.
+    pub(crate) fn forget_encounter(&mut self) {
+        (self.kept_s, self.insists) = (0.0, false);
     }
 
     /// The field's `advice` for a robot at `pose`, or another one because of `movers`.
@@ -147,18 +154,20 @@ impl Evasion {
         if at_s < WATCHES_S {
             return STAND;
         }
-        let safe = self.safe(view, movers, pose, advice);
-        if self.kept_s < PATIENCE_S {
-            // A limit that is no number is one that is kept, too.
-            let is_same = safe.2.total_cmp(&advice.2).is_eq();
-            let follows = (safe.0, safe.1) == (advice.0, advice.1) && is_same;
-            self.kept_s = (self.kept_s + if follows { -for_s } else { for_s }).max(0.0);
-        }
+        let scene = Scene::new(self, view, movers, pose.pose());
+        let safe = self.safe(&scene, pose, advice);
+        // A limit that is no number is one that is kept, too.
+        let is_same = safe.2.total_cmp(&advice.2).is_eq();
+        let follows = (safe.0, safe.1) == (advice.0, advice.1) && is_same;
+        // Whoever insists follows its way, so only an empty scene tells that the encounter is over.
+        let is_free = scene.discs.is_empty() || follows && !self.insists;
+        let change_s = if is_free { -for_s } else { for_s };
+        self.kept_s = (self.kept_s + change_s).clamp(0.0, PATIENCE_S);
+        self.insists = self.kept_s >= PATIENCE_S || self.insists && self.kept_s > 0.0;
         safe
     }
 
-    fn safe(&self, view: &View<'_>, movers: &[Mover], pose: &PoseSample, advice: Advice) -> Advice {
-        let scene = Scene::new(self, view, movers, pose.pose());
+    fn safe(&self, scene: &Scene<'_>, pose: &PoseSample, advice: Advice) -> Advice {
         let start = scene.start(pose);
         let acts_until_s = self.motion.dead_s() + self.motion.period_s;
         let is_safe = |to: Advice| scene.rests(scene.go(start, to, acts_until_s));
@@ -168,7 +177,7 @@ impl Evasion {
         }
         let (status, along, limit) = advice;
         let speed = self.motion.speed;
-        if self.kept_s >= PATIENCE_S {
+        if self.insists {
             let slower = PATIENT_SPEEDS.map(|share| (status, along, share * limit));
             return slower.into_iter().find(|to| is_safe(*to)).unwrap_or(STAND);
         }
@@ -188,7 +197,6 @@ impl Evasion {
                 let field = scene.field(way.now.pose.position);
                 let field = field.map(|to| (GuidanceStatus::Along, to, speed));
                 let legs = around(DIRECTIONS / 2, speed).chain(field).chain([STAND, way.last]);
-                let scene = &scene;
                 legs.map(move |to| scene.go(way, to, *until_s))
             });
             ways = next.collect();

@@ -177,6 +177,7 @@ impl Planner {
             return Ok(Work::None);
         }
         self.forget_ways();
+        self.evasion.iter_mut().for_each(Evasion::forget_encounter);
         let Some(mut live) = self.live.take() else {
             return self.solve_first();
         };

@@ -661,6 +661,29 @@ fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time
 }
 
 #[test]
+fn a_robot_that_insisted_evades_again_after_the_encounter_and_for_its_next_target() {
+    let comes = |hall: &mut Hall, second: u64, x_m: f64| {
+        let stamp = Stamp { stamp_ns: second * 1_000_000_000, ..Stamp::default() };
+        let pose = PoseSample { stamp, ..PoseSample::default() };
+        hall.guidance(&pose, DVec2::new(x_m, 0.1), DVec2::new(-1.2, 0.0)).ey.abs() > 0.3
+    };
+    let insisting = || {
+        let mut hall = Hall::new(6.0, "jackal");
+        (1..=17).for_each(|second| _ = comes(&mut hall, second, 4.5));
+        assert!(!comes(&mut hall, 18, 4.5), "it insists");
+        hall
+    };
+    let mut alone = insisting();
+    (19..=35).for_each(|second| _ = comes(&mut alone, second, 100.0));
+    assert!(comes(&mut alone, 36, 4.5), "nothing moved near it");
+    let mut sent = insisting();
+    let target = TargetPoint::at(DVec2::new(4.0, 0.2));
+    let target = TargetSample { number: 2, last: 2, target, ..Default::default() };
+    sent.planner.take_target(&target).unwrap();
+    assert!(comes(&mut sent, 19, 4.5), "it has another target");
+}
+
+#[test]
 fn what_goes_away_or_passes_far_off_changes_no_guidance() {
     for (at, velocity) in [([1.5, 0.0], [1.5, 0.0]), ([0.0, 3.0], [1.0, 0.0])] {
         let (guidance, speed) = guidance_beside(at.into(), velocity.into());
