@@ -1,4 +1,4 @@
-//! `cargo bench -p harmonic --features bench` prints the times of the solver and of other algorithms.
+//! `cargo bench -p firsthand-field --features bench` prints the times of the solver and of other algorithms.
 //!
 //! It does not use criterion, because the results are ratios, which hold only between times that are measured in turn in one run.
 //! Every time is the least of several runs. Arguments after `--` select the measurements:

@@ -1,4 +1,4 @@
-//! The crate `harmonic` for Python. `harmonic_field.pyi` documents it.
+//! The crate `firsthand-field` for Python. `harmonic_field.pyi` documents it.
 //!
 //! A cell is (row, column), as NumPy indexes it; a position or direction is (x, y), x along columns.
 
