@@ -77,6 +77,11 @@ impl<'a> Reader<'a> {
         Ok(bytes)
     }
 
+    /// Whether nothing but padding follows: RTPS pads a payload to a multiple of 4 bytes.
+    pub fn is_at_end(&self) -> bool {
+        self.bytes.len() < self.at + ENCAPSULATION
+    }
+
     /// Leaves out the zero byte that ends it, and what is not UTF-8. Fails if the bytes end early, or the text is too
     /// long.
     pub fn text(&mut self) -> Result<&'a str, Malformed> {
@@ -166,4 +171,4 @@ macro_rules! numbers {
     };
 }
 
-numbers! { u8 u16 u32 i32 i64 f32 f64 }
+numbers! { u8 u16 i16 u32 i32 i64 f32 f64 }

@@ -189,6 +189,8 @@ impl Server {
         // The time that remains is not estimated.
         writer.time(now_ns.saturating_sub(goal.at_ns)).time(0);
         writer.u16(u16::try_from(recoveries).unwrap_or(u16::MAX)).f32(left_m as f32);
+        // Nav2 1.5 appends the tracking errors of position and heading, which are not measured here.
+        writer.f32(0.0).f32(0.0);
         Some(writer.take())
     }
 }

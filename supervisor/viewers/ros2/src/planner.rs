@@ -15,7 +15,8 @@ mod planning;
 mod tests;
 
 use std::{
-    io,
+    collections::BTreeMap,
+    env, io,
     net::Ipv4Addr,
     sync::{
         Arc,
@@ -34,7 +35,10 @@ use common::{
 };
 use glam::{DAffine2, DVec2};
 use harmonic::{Cancellation, Cell};
-use ros2::participant::{Message, Quality};
+use ros2::{
+    cdr::Reader,
+    participant::{Gid, Message, Quality},
+};
 
 use self::{
     calls::{Asked, Outcome, Placed},
@@ -46,7 +50,7 @@ use crate::{
     frames::Frames,
     goals::{Goals, Status, Uuid},
     messages::{self, Header},
-    node::{Call, LATCHED, Node, SURE},
+    node::{Call, LATCHED, NEWEST, Node, SURE},
     parameters::Parameter,
     shown::arrows,
 };
@@ -54,6 +58,12 @@ use crate::{
 /// The interval at which the end of this process, or that of the time for a path, is noticed.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const MOST_WAITING: usize = 16;
+/// The most participants whose release of Nav2 is remembered.
+const MOST_CLIENTS: usize = 256;
+/// The releases of ROS whose Nav2 is older than 1.5.
+const BEFORE_1_5: [&str; 4] = ["humble", "iron", "jazzy", "kilted"];
+/// The bytes of a GID that are those of its participant.
+const PARTICIPANT: usize = 12;
 /// `/tf_static` keeps the messages of all its publishers; messages of `/tf` are many.
 const DEPTH: u16 = 256;
 
@@ -69,6 +79,7 @@ enum Id {
     Updates,
     Tf,
     TfStatic,
+    Clock,
     Plan,
     Field,
 }
@@ -111,6 +122,9 @@ pub struct Arguments {
     /// Transforms may be so old, seconds.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = amount)]
     transform_tolerance: f64,
+    /// Stamp paths with the time of `/clock`, as nodes with the parameter `use_sim_time` do.
+    #[arg(long)]
+    use_sim_time: bool,
 }
 
 /// A number that is not negative, of less than a day's seconds.
@@ -135,6 +149,7 @@ fn inscribed(text: &str) -> Result<f64, String> {
 struct Job {
     action: usize,
     id: Uuid,
+    at_ns: u64,
     map: Arc<Costmap>,
     start: DAffine2,
     goals: Vec<DAffine2>,
@@ -149,6 +164,8 @@ struct Plan {
     began: Option<Instant>,
     cancellation: Cancellation,
     outcome: Outcome,
+    /// Whether its client reads results of Nav2 1.5.
+    is_1_5: bool,
 }
 
 pub fn serve(
@@ -192,6 +209,9 @@ fn open(
     ] {
         node.read_from(id, [name, kind], quality)?;
     }
+    if options.use_sim_time {
+        node.read_from(Id::Clock, ["/clock", "rosgraph_msgs::msg::dds_::Clock_"], NEWEST)?;
+    }
     node.write_to(Id::Plan, ["plan", "nav_msgs::msg::dds_::Path_"], LATCHED)?;
     let field = ["plan_field", "visualization_msgs::msg::dds_::MarkerArray_"];
     node.write_to(Id::Field, field, LATCHED)?;
@@ -207,6 +227,10 @@ struct Server<'a> {
     node: Node<Id>,
     frames: Frames,
     map: Option<Arc<Costmap>>,
+    /// The newest time of `/clock`, nanoseconds.
+    clock_ns: u64,
+    /// Whether participants have Nav2 1.5, as their goals showed.
+    clients: BTreeMap<[u8; PARTICIPANT], bool>,
     goals: [Goals<Plan>; 2],
     jobs: SyncSender<Job>,
     done: Receiver<Done>,
@@ -222,7 +246,38 @@ impl<'a> Server<'a> {
         let planner = Planner::new(body, options.screening);
         let (jobs, done) = start_planning(planner, node.participant.bell())?;
         let goals = <[Goals<Plan>; 2]>::default();
-        Ok(Self { options, node, frames: Frames::default(), map: None, goals, jobs, done })
+        Ok(Self {
+            options,
+            node,
+            frames: Frames::default(),
+            map: None,
+            clock_ns: 0,
+            clients: BTreeMap::new(),
+            goals,
+            jobs,
+            done,
+        })
+    }
+
+    /// Returns the time of stamps, nanoseconds; 0 before the first message of a clock that is followed.
+    fn now_ns(&self) -> u64 {
+        if self.options.use_sim_time { self.clock_ns } else { now_ns() }
+    }
+
+    /// Returns whether a client has Nav2 1.5: by its goal, its earlier goals, or the release of ROS in this environment.
+    fn is_1_5(&mut self, from: Gid, asked: &Asked) -> bool {
+        let participant = *from.first_chunk().unwrap_or(&[0; PARTICIPANT]);
+        if let Some(is_1_5) = asked.is_1_5 {
+            if self.clients.len() >= MOST_CLIENTS {
+                self.clients.clear();
+            }
+            self.clients.insert(participant, is_1_5);
+        }
+        let by_environment = || {
+            let release = env::var("ROS_DISTRO").unwrap_or_default();
+            !BEFORE_1_5.contains(&release.as_str())
+        };
+        self.clients.get(&participant).copied().unwrap_or_else(by_environment)
     }
 
     fn turn(&mut self) {
@@ -260,7 +315,12 @@ impl<'a> Server<'a> {
                 if let Some((state, plan)) = goals.over(id) {
                     let unknown = Outcome::default();
                     let outcome = plan.map_or(&unknown, |plan| &plan.outcome);
-                    let result = calls::result(state, outcome, ACTIONS[action].2);
+                    let result = calls::result(
+                        state,
+                        outcome,
+                        ACTIONS[action].2,
+                        action == 1 && plan.is_some_and(|plan| plan.is_1_5),
+                    );
                     self.node.reply(action, Call::GetResult, &request, &result);
                 }
             }
@@ -277,6 +337,9 @@ impl<'a> Server<'a> {
             }
             Id::Tf => self.frames.take(payload, Some(Instant::now()))?,
             Id::TfStatic => self.frames.take(payload, None)?,
+            Id::Clock => {
+                self.clock_ns = Reader::new(payload)?.time()?.try_into().unwrap_or_default();
+            }
             Id::Plan | Id::Field => {}
         }
         Ok(())
@@ -288,9 +351,11 @@ impl<'a> Server<'a> {
         match call {
             Call::SendGoal => {
                 let asked = calls::read(&payload, action == 0);
-                let reply = Goals::<Plan>::reply(asked.is_ok(), now_ns());
+                let reply = Goals::<Plan>::reply(asked.is_ok(), self.now_ns());
                 self.node.reply(action, call, request, &reply);
-                self.begin(action, &asked?);
+                let asked = asked?;
+                let is_1_5 = self.is_1_5(message.from, &asked);
+                self.begin(action, &asked, is_1_5);
             }
             Call::CancelGoal => {
                 let (reply, is_canceled) = self.goals[action].cancel(&payload)?;
@@ -311,21 +376,23 @@ impl<'a> Server<'a> {
         }
     }
 
-    fn begin(&mut self, action: usize, asked: &Asked) {
+    fn begin(&mut self, action: usize, asked: &Asked, is_1_5: bool) {
         self.interrupt(action);
         let (id, cancellation) = (asked.id, Cancellation::default());
         let plan = Plan {
             began: Some(Instant::now()),
             cancellation: cancellation.clone(),
             outcome: Outcome::default(),
+            is_1_5,
         };
-        self.goals[action].accept(id, plan, now_ns());
+        let at_ns = self.now_ns();
+        self.goals[action].accept(id, plan, at_ns);
         let begun = self.job(action, asked, cancellation).and_then(|job| {
             let sent = self.jobs.try_send(job);
             sent.map_err(|_| (Reason::Timeout, "too many goals wait already".to_owned()))
         });
         if let Err(failure) = begun {
-            let outcome = Outcome { at_ns: now_ns(), failure: Some(failure), ..Outcome::default() };
+            let outcome = Outcome { at_ns, failure: Some(failure), ..Outcome::default() };
             self.end(action, id, outcome);
         }
     }
@@ -352,7 +419,8 @@ impl<'a> Server<'a> {
         };
         let start = asked.start.as_ref().map_or_else(|| find(&self.options.base), place)?;
         let goals = asked.goals.iter().map(place).collect::<Result<_, _>>()?;
-        Ok(Job { action, id: asked.id, map: Arc::clone(map), start, goals, cancellation })
+        let (id, at_ns) = (asked.id, self.now_ns());
+        Ok(Job { action, id, at_ns, map: Arc::clone(map), start, goals, cancellation })
     }
 
     /// Let a goal end with its outcome, unless it has ended already.
@@ -389,15 +457,14 @@ fn start_planning(
 }
 
 fn plan(planner: &mut Planner, job: &Job) -> Done {
-    let Job { action, id, map, start, goals, cancellation } = job;
+    let &Job { action, id, at_ns, ref map, start, ref goals, ref cancellation } = job;
     let began = Instant::now();
-    let planned = planner.plan(map, *start, goals, cancellation);
+    let planned = planner.plan(map, start, goals, cancellation);
     let took_ns = u64::try_from(began.elapsed().as_nanos()).unwrap_or(u64::MAX);
     let (path, failure) = match planned {
         Ok(path) => (path, None),
         Err(failure) => (Vec::new(), Some(failure)),
     };
-    let at_ns = now_ns();
     let outcome = Outcome { frame: map.frame.clone(), at_ns, took_ns, path, failure };
     let field = planner.newest_field().map(|field| {
         let drawn = arrows([map.width, map.height], map.resolution_m, |col, row| {
@@ -407,5 +474,5 @@ fn plan(planner: &mut Planner, job: &Job) -> Done {
         });
         messages::markers(Header(at_ns, &map.frame), &[drawn])
     });
-    (*action, *id, outcome, field)
+    (action, id, outcome, field)
 }

@@ -14,8 +14,12 @@ const MOST_CELLS: usize = 1 << 24;
 const STEP: f64 = 0.25;
 /// No cell has a shorter screening length, in cells: u falls to a third or so from cell to cell.
 const SHORTEST: f64 = 0.5;
-/// A path has no more poses but for its goals: DDS does not divide an answer of over 64 kB here.
-const MOST_POSES: usize = 500;
+/// A path has no more bytes: DDS does not divide an answer of over 64 kB here. Its header and the rest of the answer have the others.
+const MOST_BYTES: usize = 64_000;
+/// A pose without the name of its frame: stamp, length of the name, padding, position and orientation.
+const POSE_BYTES: usize = 76;
+/// A chord of a path is looked at in such steps, in cells.
+const LOOK: f64 = 0.0625;
 const MOST_GOALS: usize = 100;
 
 /// Why there is no path: Nav2's error codes, less 200 for one goal and 300 for several.
@@ -93,10 +97,52 @@ impl Planner {
             path.push([to.x, to.y, goal.matrix2.x_axis.to_angle()]);
             from = to;
         }
-        let every = path.len().div_ceil(MOST_POSES);
-        let kept = path.into_iter().enumerate();
-        let kept = kept.filter(|(at, _)| at % every == 0 || ends.binary_search(at).is_ok());
-        Ok(kept.map(|(_, pose)| pose).collect())
+        self.thinned(map, &path, &ends)
+    }
+
+    /// Returns as many poses as an answer carries, those at `ends` among them, whose chords enter no cell that is blocked.
+    ///
+    /// # Errors
+    /// When an answer carries too few for that.
+    fn thinned(&self, map: &Costmap, path: &[Pose], ends: &[usize]) -> Result<Vec<Pose>, Failure> {
+        let most = MOST_BYTES / (POSE_BYTES + map.frame.len());
+        let mut stride = path.len().div_ceil(most);
+        while stride <= path.len() {
+            let kept = self.strided(map, path, ends, stride);
+            if kept.len() <= most {
+                return Ok(kept);
+            }
+            stride += stride.div_ceil(4);
+        }
+        let text = format!("the path has more than {most} bends, which one answer cannot carry");
+        Err((Reason::Unknown, text))
+    }
+
+    /// Returns poses at most `stride` apart, nearer where the chord would enter a blocked cell.
+    fn strided(&self, map: &Costmap, path: &[Pose], ends: &[usize], stride: usize) -> Vec<Pose> {
+        let cells = map.place.inverse();
+        let place = |at: usize| cells.transform_point2(DVec2::new(path[at][0], path[at][1]));
+        let is_free = |from: DVec2, to: DVec2| {
+            let steps = (from.distance(to) / LOOK).ceil().max(1.0);
+            (0..=steps as usize).all(|step| {
+                let at = from.lerp(to, step as f64 / steps);
+                map.cell_at(at).is_some_and(|cell| !self.blocked[cell.row * map.width + cell.col])
+            })
+        };
+        let (mut kept, mut at) = (Vec::new(), 0);
+        for &end in ends {
+            while at < end {
+                kept.push(path[at]);
+                let mut ahead = stride.min(end - at);
+                while ahead > 1 && !is_free(place(at), place(at + ahead)) {
+                    ahead = ahead * 3 / 4;
+                }
+                at += ahead;
+            }
+            kept.push(path[end]);
+            at = end + 1;
+        }
+        kept
     }
 
     pub fn newest_field(&self) -> Option<&Field> {

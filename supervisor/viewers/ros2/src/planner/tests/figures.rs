@@ -95,6 +95,39 @@ impl Grid {
         grid
     }
 
+    /// A maze with one way between any two of its rooms, which are a metre wide, without the wall between them.
+    pub fn maze(seed: u64, side: usize) -> Self {
+        const ROOM: usize = 20;
+        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
+        let (mut grid, rooms) = (Self::new(side, side), side / ROOM);
+        grid.fill([0, 0], [side, side], true);
+        let (mut seen, mut trail) = (vec![false; rooms * rooms], vec![[0_usize, 0]]);
+        seen[0] = true;
+        grid.fill([2, 2], [ROOM - 4, ROOM - 4], false);
+        while let Some(&[col, row]) = trail.last() {
+            let beside = [
+                [col + 1, row],
+                [col, row + 1],
+                [col.wrapping_sub(1), row],
+                [col, row.wrapping_sub(1)],
+            ];
+            let fresh = |&[c, r]: &[usize; 2]| c < rooms && r < rooms && !seen[r * rooms + c];
+            let open: Vec<_> = beside.into_iter().filter(fresh).collect();
+            if open.is_empty() {
+                trail.pop();
+                continue;
+            }
+            let next = open[random.below(open.len())];
+            let corner = [col.min(next[0]) * ROOM + 2, row.min(next[1]) * ROOM + 2];
+            let size =
+                [col.abs_diff(next[0]), row.abs_diff(next[1])].map(|by| by * ROOM + ROOM - 4);
+            grid.fill(corner, size, false);
+            seen[next[1] * rooms + next[0]] = true;
+            trail.push(next);
+        }
+        grid
+    }
+
     pub fn message(&self) -> Vec<u8> {
         let values: Vec<_> = self.occupied.iter().map(|&it| 100 * u8::from(it)).collect();
         self.message_of(&values)
