@@ -1,7 +1,12 @@
 //! Tests that a robot stands whatever happens to the processes that drive it. The robots are processes of their own, and
 //! ignore the time limit of commands: without a stop they go on for ever.
 
-use std::{fs, path::PathBuf, time::Instant};
+use std::{
+    fs,
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering},
+    time::Instant,
+};
 
 use common::wire::{Command, Decoder, Motion};
 use rustix::process::Signal;
@@ -149,9 +154,14 @@ fn no_mission_ends_before_a_robot_rests_that_ignores_velocity_0_and_obeys_disabl
     assert_eq!(code, Some(if outcome == "reached" { 0 } else { 9 }), "{summary}");
 }
 
+/// Whether the robot of the next test gets no stop.
+static IS_DEAF: AtomicBool = AtomicBool::new(true);
+
 #[test]
-fn a_robot_that_obeys_no_stop_has_an_outcome_of_its_own_and_a_link_that_stays() {
-    let (_directory, mut robot, _proxy, mut run) = disobedient("sd-nothing", is_any_stop);
+fn a_robot_that_gets_no_stop_has_an_outcome_of_its_own_and_a_guard_that_stops_it_after_the_run() {
+    let name = "sd-nothing";
+    let (_directory, mut robot, _proxy, mut run) =
+        disobedient(name, |command| IS_DEAF.load(Ordering::Relaxed) && is_any_stop(command));
     let directory = run.directory();
     let began = Instant::now();
     while !fs::metadata(directory.join("summary.json")).is_ok_and(|file| file.len() > 2) {
@@ -167,6 +177,13 @@ fn a_robot_that_obeys_no_stop_has_an_outcome_of_its_own_and_a_link_that_stays() 
     let (code, summary) = run.finish();
     assert_eq!(summary["outcome"], "could_not_be_stopped", "{summary}");
     assert_eq!(code, Some(10), "{summary}");
+    let stop = ["stop", "--robot", name];
+    refused(&stop, "not-at-rest", &["it moves"]);
+    let status = output(&["status", "--robot", name]);
+    assert!(String::from_utf8_lossy(&status.stdout).contains("it moves"), "{status:?}");
+    IS_DEAF.store(false, Ordering::Relaxed);
+    robot.wait_until_at_rest();
+    wait_until("the guard leaves", || !domain(name).directory().exists());
 }
 
 fn stops_without_middleware(name: &str, damage: impl Fn(&Run)) {

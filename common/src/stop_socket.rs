@@ -1,5 +1,5 @@
-//! The operator's stop without middleware: the link's datagram socket in the robot's directory, which only its owner may enter. It works
-//! with a damaged bus, a full disk, or a supervisor that hangs.
+//! The operator's stop without middleware: the datagram socket of the link, or of its stop guard, in the robot's directory. Only the owner
+//! may enter that directory. The stop works with a damaged bus, a full disk, or a supervisor that hangs.
 //!
 //! A datagram is one byte: [`Request`] to the link, [`Answer`] from it.
 
@@ -9,7 +9,7 @@ use std::{
         fd::{AsFd, BorrowedFd},
         linux::net::SocketAddrExt as _,
         unix::{
-            fs::{DirBuilderExt as _, MetadataExt as _},
+            fs::{DirBuilderExt as _, MetadataExt as _, symlink},
             net::{SocketAddr, UnixDatagram},
         },
     },
@@ -19,7 +19,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{clock::monotonic_ns, domain::Domain, poll};
+use crate::{clock::monotonic_ns, domain::Domain, poll, samples::Rest};
 
 /// A request of an operator to the link. Recordings hold the number of the variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,16 +27,24 @@ pub enum Request {
     Resume,
     /// The robot stands until an operator resumes.
     Stop,
+    /// A person has seen the robot at rest, or it is off: the stop guard leaves. A link ignores this.
+    SignOff,
+    /// What the stop guard sees. A link ignores this.
+    Look,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
     Heard,
     AtRest,
+    /// What the stop guard sees: [`Rest`] and the seconds without a motor frame.
+    Sees(Rest, u8),
 }
 
 const STOP: u8 = b's';
 const RESUME: u8 = b'r';
+const SIGN_OFF: u8 = b'x';
+const LOOK: u8 = b'?';
 const HEARD: u8 = b'h';
 const AT_REST: u8 = b'a';
 
@@ -51,9 +59,8 @@ pub struct StopSocket {
 }
 
 impl StopSocket {
-    /// Bind the robot's socket in place of an earlier link's. Fails when the system refuses.
-    pub fn bind(domain: &Domain) -> io::Result<Self> {
-        let path = domain.stop_socket();
+    /// Binds `path` in place of an earlier process's socket. Fails when the system refuses.
+    pub fn bind(path: PathBuf) -> io::Result<Self> {
         remove(&path)?;
         Ok(Self { socket: bind(&path)?, path, asking: Vec::new() })
     }
@@ -72,10 +79,12 @@ impl StopSocket {
             let request = match (length, byte) {
                 (1, [STOP]) => Request::Stop,
                 (1, [RESUME]) => Request::Resume,
+                (1, [SIGN_OFF]) => Request::SignOff,
+                (1, [LOOK]) => Request::Look,
                 _ => continue,
             };
-            self.answer(&from, HEARD);
-            if request == Request::Stop && self.asking.len() < MOST_ASKING {
+            self.answer(&from, &[HEARD]);
+            if matches!(request, Request::Stop | Request::Look) && self.asking.len() < MOST_ASKING {
                 self.asking.push(from);
             }
             return Some(request);
@@ -84,13 +93,20 @@ impl StopSocket {
 
     pub fn tell_at_rest(&mut self) {
         for operator in std::mem::take(&mut self.asking) {
-            self.answer(&operator, AT_REST);
+            self.answer(&operator, &[AT_REST]);
         }
     }
 
-    fn answer(&self, operator: &SocketAddr, byte: u8) {
+    /// Answers everybody who asked: `silent_s` are the seconds without a motor frame.
+    pub fn tell(&self, rest: Rest, silent_s: u8) {
+        for operator in &self.asking {
+            self.answer(operator, &[rest as u8, silent_s]);
+        }
+    }
+
+    fn answer(&self, operator: &SocketAddr, bytes: &[u8]) {
         // An operator who has gone needs no answer.
-        let _ = self.socket.send_to_addr(&[byte], operator);
+        let _ = self.socket.send_to_addr(bytes, operator);
     }
 }
 
@@ -103,7 +119,7 @@ impl AsFd for StopSocket {
 /// Bind a socket at `path`, and make its directory, if that was removed.
 fn bind(path: &Path) -> io::Result<UnixDatagram> {
     if let Some(directory) = path.parent() {
-        fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
+        make_directory(directory)?;
     }
     let socket = UnixDatagram::bind(path)?;
     socket.set_nonblocking(true)?;
@@ -116,12 +132,12 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// None if no link runs. Fails when the system refuses a socket.
-    pub fn connect(domain: &Domain) -> io::Result<Option<Self>> {
+    /// Returns none if no process answers at `path`. Fails when the system refuses a socket.
+    pub fn connect(path: &Path) -> io::Result<Option<Self>> {
         // An abstract name leaves no file.
         let name = format!("firsthand-operator-{}-{}", std::process::id(), monotonic_ns());
         let socket = UnixDatagram::bind_addr(&SocketAddr::from_abstract_name(name)?)?;
-        match socket.connect(domain.stop_socket()) {
+        match socket.connect(path) {
             Ok(()) => Ok(Some(Self { socket })),
             Err(error) => match error.kind() {
                 io::ErrorKind::NotFound | io::ErrorKind::ConnectionRefused => Ok(None),
@@ -134,6 +150,8 @@ impl Operator {
         let byte = match request {
             Request::Stop => STOP,
             Request::Resume => RESUME,
+            Request::SignOff => SIGN_OFF,
+            Request::Look => LOOK,
         };
         self.socket.send(&[byte]).map(drop)
     }
@@ -146,32 +164,35 @@ impl Operator {
             if !poll::is_readable(&self.socket, left)? {
                 return Ok(None);
             }
-            let mut byte = [0];
-            let length = self.socket.recv(&mut byte)?;
-            match (length, byte) {
-                (1, [HEARD]) => return Ok(Some(Answer::Heard)),
-                (1, [AT_REST]) => return Ok(Some(Answer::AtRest)),
+            let mut bytes = [0; 2];
+            let length = self.socket.recv(&mut bytes)?;
+            match (length, bytes) {
+                (2, [rest, silent_s]) => {
+                    return Ok(Some(Answer::Sees(Rest::from_byte(rest), silent_s)));
+                }
+                (1, [HEARD, _]) => return Ok(Some(Answer::Heard)),
+                (1, [AT_REST, _]) => return Ok(Some(Answer::AtRest)),
                 _ => {}
             }
         }
     }
 }
 
-/// Inode and creation time of a link's socket tell it from its successor's; empty without a link.
+/// Inode and creation time of a socket, which differ from its successor's; empty without a socket.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity(pub String);
 
 impl Identity {
-    pub fn now(domain: &Domain) -> Self {
-        let found = fs::symlink_metadata(domain.stop_socket());
+    pub fn now(socket: &Path) -> Self {
+        let found = fs::symlink_metadata(socket);
         Self(found.map_or_else(
             |_| String::new(),
             |found| format!("{}-{}-{}", found.ino(), found.ctime(), found.ctime_nsec()),
         ))
     }
 
-    pub fn is_succeeded(&self, domain: &Domain) -> bool {
-        Self::now(domain) != *self && matches!(Operator::connect(domain), Ok(Some(_)))
+    pub fn is_succeeded(&self, socket: &Path) -> bool {
+        Self::now(socket) != *self && matches!(Operator::connect(socket), Ok(Some(_)))
     }
 }
 
@@ -198,6 +219,37 @@ impl StopMark {
     }
 }
 
+/// The mark of a robot that may move. The link sets it before the first motion command. Whoever sees the robot at rest, or signs it off,
+/// clears it. It outlives every process, so that the next link or guard knows.
+#[derive(Debug)]
+pub struct OwedStop(Domain);
+
+impl OwedStop {
+    pub const fn of(domain: Domain) -> Self {
+        Self(domain)
+    }
+
+    pub fn is_set(&self) -> bool {
+        self.0.owed_stop().symlink_metadata().is_ok()
+    }
+
+    /// Sets the mark for the robot of the run in `directory`, or clears it.
+    pub fn set(&self, owed: bool, directory: &Path) -> io::Result<()> {
+        if !owed {
+            return remove(&self.0.owed_stop());
+        }
+        if self.is_set() {
+            return Ok(());
+        }
+        make_directory(self.0.directory())?;
+        symlink(directory, self.0.owed_stop())
+    }
+}
+
+fn make_directory(directory: &Path) -> io::Result<()> {
+    fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)
+}
+
 fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -212,11 +264,11 @@ mod tests {
     #[test]
     fn a_link_whose_socket_and_directory_were_removed_is_reached_when_it_has_looked_again() {
         let domain = Domain::of(format!("stop-{}", std::process::id()).parse().unwrap());
-        let mut link = StopSocket::bind(&domain).unwrap();
+        let mut link = StopSocket::bind(domain.stop_socket()).unwrap();
         for _ in 0..2 {
             fs::remove_dir_all(domain.directory()).unwrap();
             assert_eq!(link.take(), None);
-            let operator = Operator::connect(&domain).unwrap().unwrap();
+            let operator = Operator::connect(&domain.stop_socket()).unwrap().unwrap();
             operator.send(Request::Stop).unwrap();
             assert_eq!(link.take(), Some(Request::Stop));
             assert_eq!(operator.answer(Duration::ZERO).unwrap(), Some(Answer::Heard));

@@ -207,6 +207,10 @@ impl Drop for Run {
             let _ = child.kill();
             let _ = child.wait();
         }
+        // A test that ends its robot leaves a stop guard, which orders the stop.
+        if super::domain(&self.robot).owed_stop().symlink_metadata().is_ok() {
+            let _ = firsthand(&["stop", "--sign-off", "--robot", &self.robot]).output();
+        }
     }
 }
 

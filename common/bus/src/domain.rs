@@ -190,6 +190,16 @@ impl Domain {
         self.directory.join("stop")
     }
 
+    /// The socket of the stop guard that orders the stop after its link ended.
+    pub fn guard_socket(&self) -> PathBuf {
+        self.directory.join("guard")
+    }
+
+    /// A link to the directory of the run whose robot may move.
+    pub fn owed_stop(&self) -> PathBuf {
+        self.directory.join("owed-stop")
+    }
+
     /// The socket at which the simulated robot hears where another in its world is.
     pub fn place_socket(&self) -> PathBuf {
         self.directory.join("place")

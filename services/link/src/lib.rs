@@ -17,3 +17,4 @@ pub mod step;
 pub mod stop_guard;
 pub mod transport;
 mod wheel_speeds;
+pub mod wire_owner;

@@ -1,7 +1,11 @@
 //! The link's process: it reads the wire, `command`, `directive` and `tick_limit`, and writes the wire, `ranges`, `wheels`, `link` and
 //! telemetry.
 
-use std::{io, time::Duration};
+use std::{
+    io,
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use common::{
     address::Address,
@@ -17,7 +21,7 @@ use common::{
     },
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
-    stop_socket::{Identity, Request, StopMark, StopSocket},
+    stop_socket::{Identity, OwedStop, Request, StopMark, StopSocket},
     topics::{
         BASE_RESPONSE, COMMAND, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER,
         RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
@@ -69,6 +73,10 @@ pub struct Shell {
     marked: bool,
     /// None in lockstep, where a robot waits for commands, and where it could not be started, as the log says.
     guard: Option<StopGuard>,
+    owed_mark: OwedStop,
+    owes_stop: bool,
+    directory: PathBuf,
+    identity: Identity,
     has_telemetry: bool,
     clock: MissionClock,
     latency: Histogram,
@@ -99,18 +107,14 @@ impl Process for Shell {
     fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         // The socket is there before the guard, which knows this link by it.
         let domain = Domain::of(context.run.robot.clone());
-        let stop_socket = StopSocket::bind(&domain)
+        let stop_socket = StopSocket::bind(domain.stop_socket())
             .inspect_err(without("operators' stops without middleware"))
             .ok();
-        let directory = &context.generation.directory;
+        let directory = &context.generation.directory.clone();
         let in_ticks = matches!(context.run.clock, MissionClock::Ticks { .. });
-        let guard = (!in_ticks)
-            .then(|| {
-                StopGuard::start(directory, &Identity::now(&domain))
-                    .inspect_err(without("stop guard"))
-                    .ok()
-            })
-            .flatten();
+        let identity = Identity::now(&domain.stop_socket());
+        let guard = (!in_ticks).then(|| start_guard(directory, &identity)).flatten();
+        let owed_mark = OwedStop::of(domain);
         let stop_mark = StopMark::of(directory);
         let mission = &context.run.mission;
         let transport = Transport::of_base(&context.run.address, mission)?;
@@ -140,6 +144,10 @@ impl Process for Shell {
             marked: stop_mark.is_set(),
             stop_mark,
             guard,
+            owes_stop: owed_mark.is_set(),
+            owed_mark,
+            directory: directory.clone(),
+            identity,
             has_telemetry: false,
             clock: context.run.clock,
             latency: Histogram::default(),
@@ -209,6 +217,7 @@ impl Process for Shell {
         self.take(Event::Quiet, monotonic_ns())?;
         self.answer_operators();
         if monotonic_ns() - self.stated_ns >= LINK.spec().restated_every().as_nanos() as u64 {
+            self.keep_guard();
             self.state()?;
         }
         self.runner.publish_rest()?;
@@ -248,15 +257,12 @@ impl Process for Shell {
         self.take(Event::End, monotonic_ns())?;
         self.runner.publish_rest()?;
         tracing::info!("stop sent to the robot");
-        let link = &self.runner.stage.link;
-        // A guard has only the encoders, too.
-        if (link.is_at_rest() || !link.was_heard() || link.distrusts_encoders())
-            && let Some(guard) = self.guard.take()
-        {
-            guard.release();
-        }
         Ok(())
     }
+}
+
+fn start_guard(directory: &Path, link: &Identity) -> Option<StopGuard> {
+    StopGuard::start(directory, link).inspect_err(without("stop guard")).ok()
 }
 
 fn without(what: &'static str) -> impl Fn(&io::Error) {
@@ -292,8 +298,10 @@ fn log_decision(before: Decision, now: Decision) {
 impl Shell {
     fn take_operators_requests(&mut self) -> Result<(), StageError> {
         while let Some(request) = self.stop_socket.as_mut().and_then(StopSocket::take) {
-            tracing::warn!(?request, "an operator asks the link itself");
-            self.take(Event::Operator(request), monotonic_ns())?;
+            if matches!(request, Request::Stop | Request::Resume) {
+                tracing::warn!(?request, "an operator asks the link itself");
+                self.take(Event::Operator(request), monotonic_ns())?;
+            }
         }
         Ok(())
     }
@@ -313,6 +321,32 @@ impl Shell {
             if let Err(error) = self.stop_mark.set(stopped) {
                 tracing::error!(%error, "cannot mark the operator's stop: a link that is started again will not know of it");
             }
+        }
+    }
+
+    /// Marks whether the stop is owed, before the command of motion is sent.
+    fn mark_owed_stop(&mut self) {
+        let owes = self.runner.stage.link.owes_stop(self.owes_stop);
+        if owes != self.owes_stop {
+            self.owes_stop = owes;
+            self.set_owed_mark();
+        }
+    }
+
+    fn set_owed_mark(&self) {
+        if let Err(error) = self.owed_mark.set(self.owes_stop, &self.directory) {
+            tracing::error!(%error, "cannot mark that the robot may move: no stop guard will order its stop");
+        }
+    }
+
+    /// Starts another guard if this one was killed, and makes a mark again that a cleaner of temporary files removed.
+    fn keep_guard(&mut self) {
+        if self.owes_stop {
+            self.set_owed_mark();
+        }
+        if self.guard.as_mut().is_some_and(StopGuard::has_ended) {
+            tracing::warn!("the stop guard ended; another is started");
+            self.guard = start_guard(&self.directory, &self.identity);
         }
     }
 
@@ -338,6 +372,7 @@ impl Shell {
     }
 
     fn carry_out(&mut self, effects: Vec<Effect>) -> Result<(), StageError> {
+        self.mark_owed_stop();
         for effect in effects {
             match effect {
                 Effect::Send(bytes) => self.transport.send(&bytes)?,

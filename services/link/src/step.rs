@@ -37,6 +37,7 @@ use crate::{
     sensors::Sensors,
     speed_trim::SpeedTrim,
     wheel_speeds::WheelSpeeds,
+    wire_owner::is_owed,
 };
 
 pub use event::{Effect, Entry, Event, State, Tally};
@@ -181,7 +182,7 @@ impl Link {
             Event::TickLimit { last_tick, target_number } => {
                 (self.last_tick, self.target_number) = (Some(last_tick), target_number);
             }
-            Event::Quiet => {}
+            Event::Quiet | Event::Operator(Request::SignOff | Request::Look) => {}
             Event::Remember(memory) => {
                 self.base.remember(&memory);
                 return effects;
@@ -253,13 +254,10 @@ impl Link {
         self.monitors().presence.losses()
     }
 
-    pub fn was_heard(&self) -> bool {
-        self.connected() || self.losses() > 0
-    }
-
-    pub fn distrusts_encoders(&self) -> bool {
-        let causes = [Cause::OdometryImplausible, Cause::OdometryGivenUp];
-        causes.into_iter().any(|cause| self.failsafe.applied(cause))
+    /// Returns whether the stop is owed, if it was so `before`.
+    pub fn owes_stop(&self, before: bool) -> bool {
+        let moves = self.monitors().stop.is_told_to_move();
+        !self.in_ticks() && is_owed(before, moves, self.is_at_rest())
     }
 
     /// None if the robot itself counts.

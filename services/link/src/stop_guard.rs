@@ -1,16 +1,16 @@
-//! The stop guard: a process that stops the robot when its link ended and nobody saw it rest.
+//! The stop guard: a process that orders the stop after its link ended, while the stop is owed ([`wire_owner`](crate::wire_owner)).
 //!
-//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link. A session of its own keeps it from
-//! signals to the link, the supervisor or their process groups. It speaks to the robot by the same [`Link`], and leaves when the robot
-//! rests or another link runs.
+//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link. The guard sleeps until then. It runs in
+//! a session of its own, so signals to the link, the supervisor or their process groups do not reach it. It speaks to the robot by the same
+//! [`Link`], and answers operators at a socket of its own.
 
 use std::{
-    io,
-    io::{Read as _, Write as _},
+    fs, io,
     net::UdpSocket,
     os::{fd::AsFd as _, unix::process::CommandExt as _},
-    path::Path,
-    process::{Command, Stdio},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    thread,
     time::Duration,
 };
 
@@ -19,117 +19,187 @@ use common::{
     bus::close_all_on_exec,
     clock::{MissionClock, Pace, monotonic_ns},
     domain::Domain,
+    file::append,
     poll,
     run::Run,
     samples::{HoldReason, Order, Rest},
     shell::StageError,
-    stop_socket::Identity,
+    stop_socket::{Identity, OwedStop, Request, StopSocket},
 };
 use rustix::process::setsid;
 
 use crate::{
     step::{Effect, Entry, Event, Link, State},
     transport::Transport,
+    wire_owner::{Found, Role},
 };
 
 /// Follows `firsthand stage` in the command line.
 pub const NAME: &str = "stop-guard";
 
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
-/// A robot whose encoders say nothing for longer is out of reach, or does not know.
-const SILENT: Duration = Duration::from_secs(10);
-/// A robot that says that it moves, in spite of all stops, for longer may have wrong encoders.
-const TOLD_IN_VAIN: Duration = Duration::from_secs(60);
+/// A frame or a request wakes the guard at once.
+const LOOKS_FOR_SILENT: Duration = Duration::from_millis(200);
+/// This machine may be out of descriptors or ports.
+const TRIES_AGAIN: Duration = Duration::from_secs(1);
 
 pub(crate) struct StopGuard {
-    pipe: io::PipeWriter,
+    process: Child,
+    _pipe: io::PipeWriter,
 }
 
 impl StopGuard {
     /// Fails when the process cannot be started.
     pub(crate) fn start(directory: &Path, link: &Identity) -> io::Result<Self> {
-        close_all_on_exec()?;
         let (ended, pipe) = io::pipe()?;
-        Command::new("/proc/self/exe")
-            .arg0("firsthand")
-            .args(["stage", NAME])
-            .arg(directory)
-            .arg(&link.0)
-            .stdin(ended)
-            .stdout(Stdio::null())
-            .spawn()?;
-        Ok(Self { pipe })
+        let process = spawn("/proc/self/exe".into(), directory, link, ended.into())?;
+        Ok(Self { process, _pipe: pipe })
     }
 
-    pub(crate) fn release(mut self) {
-        // A killed guard needs no release.
-        let _ = self.pipe.write_all(b"r");
+    pub(crate) fn has_ended(&mut self) -> bool {
+        !matches!(self.process.try_wait(), Ok(None))
     }
 }
 
-/// Be the guard of the link with this socket; standard input ends with the link. Fails when the run file or the wire cannot be used.
+/// Starts a guard whose link has ended when `ended` does. Fails when the process cannot be started.
+pub fn spawn(
+    program: PathBuf,
+    directory: &Path,
+    link: &Identity,
+    ended: Stdio,
+) -> io::Result<Child> {
+    close_all_on_exec()?;
+    Command::new(program)
+        .arg0("firsthand")
+        .args(["stage", NAME])
+        .arg(directory)
+        .arg(&link.0)
+        .stdin(ended)
+        .stdout(Stdio::null())
+        .stderr(append(&directory.join("link.log"))?)
+        .spawn()
+}
+
+/// Guards the robot of the link with this socket; standard input ends with the link. Fails when the run file cannot be used.
 pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     // The link's session may belong to a terminal, or end with the link.
     let _ = setsid();
+    // The directory may be gone when the link ends.
     let run = Run::load(directory)?;
+    let MissionClock::Wall { rate, .. } = run.clock else {
+        // In lockstep a robot waits for commands.
+        return Ok(());
+    };
     let domain = Domain::of(run.robot.clone());
-    let released = io::stdin().lock().read(&mut [0]).is_ok_and(|read| read > 0);
-    if released || link.is_succeeded(&domain) {
+    let mark = OwedStop::of(domain.clone());
+    let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
+    if !mark.is_set() || link.is_succeeded(&domain.stop_socket()) {
         return Ok(());
     }
-    tracing::warn!("the link ended, and nobody saw the robot at rest: it is told to stand");
-    let at_rest = stand(&run, || link.is_succeeded(&domain))?;
-    tracing::warn!(at_rest, "the stop guard leaves");
+    tracing::warn!("the link ended, and nobody saw the robot at rest: it is ordered to stop");
+    let socket = StopSocket::bind(domain.guard_socket())
+        .inspect_err(|error| tracing::error!(%error, "no operator reaches this stop guard"))
+        .ok();
+    let own = Identity::now(&domain.guard_socket());
+    let is_succeeded =
+        || link.is_succeeded(&domain.stop_socket()) || own.is_succeeded(&domain.guard_socket());
+    let mut guard = Guard { directory, run: &run, rate, mark, socket, heard_ns: monotonic_ns() };
+    while let Err(error) = guard.order_stop(&is_succeeded) {
+        tracing::error!(%error, "the stop guard tries again");
+        thread::park_timeout(TRIES_AGAIN);
+    }
+    if !is_succeeded() {
+        let _ = guard.mark.set(false, directory);
+        let _ = fs::remove_file(domain.guard_socket());
+        // It stays where a supervisor has files in it.
+        let _ = fs::remove_dir(domain.directory());
+    }
     Ok(())
 }
 
-/// Tell the robot to stand, by each method of the protocol in turn, until its encoders say that it rests. Returns false if they say
-/// nothing or it does not stop, or `leave` returns true. Fails when the wire cannot be used.
-pub fn stand(run: &Run, mut leave: impl FnMut() -> bool) -> Result<bool, StageError> {
-    let MissionClock::Wall { rate, .. } = run.clock else {
-        // In lockstep a robot waits for commands.
-        return Ok(true);
-    };
-    // A simulated robot ends with its supervisor.
-    let is_gone = || run.mission.robot.address.is_none() && !is_taken(&run.address);
-    let mut transport = Transport::of_base(&run.address, &run.mission)?;
-    let mut link = Link::new(&run.mission);
-    link.restore(State { pace: Pace::Rate(rate), next_tick: 0 });
-    let began_ns = monotonic_ns();
-    let mut heard_ns = began_ns;
-    loop {
-        let now_ns = monotonic_ns();
-        let mut effects = Vec::new();
-        let now = run.clock.at(0, now_ns);
-        let mut take =
-            |event: Event<'_>| effects.extend(link.step(Entry { event, machine_ns: now_ns, now }));
-        take(Event::Order(Order::Stop, HoldReason::Ending));
-        if let Some(open) = transport.maintain(now_ns)? {
-            take(Event::Wire(open));
-        }
-        while let Some(bytes) = transport.receive(now_ns)? {
-            take(Event::Datagram(bytes));
-        }
-        for effect in effects {
-            match effect {
-                Effect::Send(bytes) => transport.send(&bytes)?,
-                Effect::StopBy(method) => {
-                    tracing::warn!(by = method, "the robot does not stand; it is told again");
+struct Guard<'a> {
+    directory: &'a Path,
+    run: &'a Run,
+    rate: f64,
+    mark: OwedStop,
+    socket: Option<StopSocket>,
+    heard_ns: u64,
+}
+
+impl Guard<'_> {
+    /// Orders the stop, by each method of the protocol in turn, until the guard leaves. Fails when the wire cannot be used.
+    fn order_stop(&mut self, is_succeeded: &dyn Fn() -> bool) -> Result<(), StageError> {
+        let run = self.run;
+        let mut transport = Transport::of_base(&run.address, &run.mission)?;
+        let mut link = Link::new(&run.mission);
+        link.restore(State { pace: Pace::Rate(self.rate), next_tick: 0 });
+        loop {
+            let now_ns = monotonic_ns();
+            let mut effects = Vec::new();
+            let now = run.clock.at(0, now_ns);
+            let mut take = |event: Event<'_>| {
+                effects.extend(link.step(Entry { event, machine_ns: now_ns, now }));
+            };
+            take(Event::Order(Order::Stop, HoldReason::Ending));
+            if let Some(open) = transport.maintain(now_ns)? {
+                take(Event::Wire(open));
+            }
+            while let Some(bytes) = transport.receive(now_ns)? {
+                take(Event::Datagram(bytes));
+            }
+            for effect in effects {
+                match effect {
+                    Effect::Send(bytes) => transport.send(&bytes)?,
+                    Effect::Connected(true) => tracing::warn!("the robot answers the stop guard"),
+                    Effect::Connected(false) => tracing::warn!("the stop guard hears nothing"),
+                    _ => {}
                 }
-                _ => {}
+            }
+            let rest = link.rest();
+            if rest != Rest::Unknown {
+                self.heard_ns = now_ns;
+            }
+            let found = Found {
+                link_lives: false,
+                is_owed: rest != Rest::AtRest,
+                is_succeeded: is_succeeded(),
+                is_signed_off: self.answer(rest, now_ns),
+                is_robot_gone: run.mission.robot.address.is_none() && !is_taken(&run.address),
+            };
+            if found.role() != Role::Orders {
+                tracing::warn!(?found, "the stop guard leaves");
+                return Ok(());
+            }
+            // A cleaner of temporary files may remove it.
+            let _ = self.mark.set(true, self.directory);
+            let wires = [Some(transport.as_fd()), self.socket.as_ref().map(|it| it.as_fd())];
+            let wires: Vec<_> = wires.into_iter().flatten().collect();
+            let pause = if link.connected() { LOOKS_AGAIN } else { LOOKS_FOR_SILENT };
+            poll::readable(&wires, Some(pause)).map_err(|error| {
+                StageError::Other(format!("cannot wait for the robot: {error}"))
+            })?;
+        }
+    }
+
+    /// Answers operators. Returns whether one of them signs the robot off.
+    fn answer(&mut self, rest: Rest, now_ns: u64) -> bool {
+        let Some(socket) = &mut self.socket else {
+            return false;
+        };
+        while let Some(request) = socket.take() {
+            match request {
+                Request::SignOff => return true,
+                Request::Look => {
+                    let silent_s = now_ns.saturating_sub(self.heard_ns) / 1_000_000_000;
+                    socket.tell(rest, silent_s.min(u8::MAX.into()) as u8);
+                }
+                Request::Stop | Request::Resume => {}
             }
         }
-        match link.rest() {
-            Rest::AtRest => return Ok(true),
-            Rest::Moving => heard_ns = now_ns,
-            Rest::Unknown => {}
+        if rest == Rest::AtRest {
+            socket.tell_at_rest();
         }
-        let since = |then_ns: u64| Duration::from_nanos(now_ns.saturating_sub(then_ns));
-        if since(heard_ns) >= SILENT || is_gone() || since(began_ns) >= TOLD_IN_VAIN || leave() {
-            return Ok(false);
-        }
-        poll::readable(&[transport.as_fd()], Some(LOOKS_AGAIN))
-            .map_err(|error| StageError::Other(format!("cannot wait for the robot: {error}")))?;
+        false
     }
 }
 

@@ -2,11 +2,12 @@
 //! the request, or says why not.
 
 use std::{
-    env,
+    env, fs,
     io::{self, Read as _},
     os::unix::process::CommandExt as _,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::{Child, Stdio},
+    thread,
     time::{Duration, Instant},
 };
 
@@ -22,7 +23,7 @@ use common::{
         RosterEntry, RosterHeader, TargetPoint, name,
     },
     start::StageError,
-    stop_socket::{self, Answer, Request, StopMark},
+    stop_socket::{self, Answer, Identity, OwedStop, Request, StopMark},
     topics,
     waiter::Waiter,
 };
@@ -90,6 +91,9 @@ const REST_PATIENCE: Duration = Duration::from_secs(5);
 /// The patience with a link, which answers within milliseconds if it is scheduled.
 const LINK_ANSWERS: Duration = Duration::from_millis(200);
 
+/// Between looks for a stop guard that starts.
+const GUARD_STARTS: Duration = Duration::from_millis(20);
+
 /// Let the robot stand, and wait until it rests. The link is asked without the middleware; the supervisor is told too, so that the
 /// stop holds for its successors. Where no link answers, the robot itself is told.
 pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
@@ -97,13 +101,19 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let domain = Domain::of(robot.clone());
     refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
-    let link = stop_socket::Operator::connect(&domain)
+    let link = stop_socket::Operator::connect(&domain.stop_socket())
         .map_err(|error| OperatorError::System("open a socket to the link", error))?
         .filter(|link| {
             let answer = link.send(Request::Stop).and_then(|()| link.answer(LINK_ANSWERS));
             matches!(answer, Ok(Some(_)))
         });
     let run = Run::load(&domain.run_directory());
+    if link.is_none() && run.is_err() && owes_stop(robot) {
+        return match rests_by(&guard(&domain)?) {
+            true => Ok(None),
+            false => Err(not_at_rest(robot, &sees(robot).map_or("nobody knows".into(), |it| it.0))),
+        };
+    }
     if link.is_none() && run.is_err() {
         request_stop(robot, asked_ns)?;
         return await_rest(robot, stopped_for_good).map(|()| None);
@@ -112,7 +122,9 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let rests = match (link, run) {
         (Some(link), _) => rests_by(&link),
         // A link that answers nobody does not command the robot either.
-        (None, Ok(run)) => stop_guard::stand(&run, || false)?,
+        (None, Ok(_)) if owes_stop(robot) => rests_by(&guard(&domain)?),
+        // It was seen at rest, and nobody told it to move since.
+        (None, Ok(_)) => true,
         (None, Err(_)) => false,
     };
     let told = told(supervisor);
@@ -124,12 +136,76 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     }
 }
 
+/// Returns whether the robot may move although no link drives it: its stop is owed.
+pub fn owes_stop(robot: &RobotName) -> bool {
+    OwedStop::of(Domain::of(robot.clone())).is_set()
+}
+
+/// Connects to the robot's stop guard, and starts one if none answers.
+fn guard(domain: &Domain) -> Result<stop_socket::Operator, OperatorError> {
+    let connect = || stop_socket::Operator::connect(&domain.guard_socket());
+    let system = |error| OperatorError::System("reach the stop guard", error);
+    if let Some(guard) = connect().map_err(system)? {
+        guard.send(Request::Stop).map_err(system)?;
+        return Ok(guard);
+    }
+    let directory = fs::canonicalize(domain.owed_stop())
+        .map_err(|error| OperatorError::System("find the run of the robot that may move", error))?;
+    let link = Identity::now(&domain.stop_socket());
+    stop_guard::spawn(robot_executable(), &directory, &link, Stdio::null()).map_err(system)?;
+    let began = Instant::now();
+    loop {
+        match connect().map_err(system)? {
+            Some(guard) => {
+                guard.send(Request::Stop).map_err(system)?;
+                return Ok(guard);
+            }
+            None if began.elapsed() > PATIENCE => {
+                let message = "the stop guard does not start; see link.log of the run";
+                return Err(OperatorError::refused("no-answer", message));
+            }
+            None => thread::park_timeout(GUARD_STARTS),
+        }
+    }
+}
+
+/// Returns what the stop guard of a robot without a link sees, in words and as a number of seconds of silence; none without a guard.
+pub fn sees(robot: &RobotName) -> Option<(String, u8)> {
+    let guard = stop_socket::Operator::connect(&Domain::of(robot.clone()).guard_socket());
+    let guard = guard.ok().flatten()?;
+    guard.send(Request::Look).ok()?;
+    loop {
+        match guard.answer(PATIENCE).ok()?? {
+            Answer::Heard => {}
+            Answer::AtRest | Answer::Sees(Rest::AtRest, _) => return Some(("it rests".into(), 0)),
+            Answer::Sees(Rest::Moving, _) => return Some(("it moves".into(), 0)),
+            Answer::Sees(Rest::Unknown, silent_s) => {
+                return Some((format!("silent for {silent_s} s"), silent_s));
+            }
+        }
+    }
+}
+
+/// Ends the orders of the stop guard, after a person saw that the robot rests or is off. Fails while a link runs.
+pub fn sign_off(robot: &RobotName) -> Result<(), OperatorError> {
+    let domain = Domain::of(robot.clone());
+    let system = |error| OperatorError::System("sign the robot off", error);
+    if domain.is_supervised() {
+        let message = format!("robot {robot} has a run; end it first");
+        return Err(OperatorError::refused("running", message));
+    }
+    if let Some(guard) = stop_socket::Operator::connect(&domain.guard_socket()).map_err(system)? {
+        return guard.send(Request::SignOff).map_err(system);
+    }
+    OwedStop::of(domain).set(false, Path::new("")).map_err(system)
+}
+
 fn rests_by(link: &stop_socket::Operator) -> bool {
     let began = Instant::now();
     loop {
         match link.answer(REST_PATIENCE.saturating_sub(began.elapsed())) {
             Ok(Some(Answer::AtRest)) => return true,
-            Ok(Some(Answer::Heard)) => {}
+            Ok(Some(Answer::Heard | Answer::Sees(..))) => {}
             Ok(None) | Err(_) => return false,
         }
     }
@@ -204,11 +280,15 @@ fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result<
         Some(link) if link.rest() == Rest::Moving => format!("{}: it moves", link.cause().name()),
         Some(_) => "whether it rests is not known: no usable motor frames come".to_owned(),
     };
+    Err(not_at_rest(robot, &seen))
+}
+
+fn not_at_rest(robot: &RobotName, seen: &str) -> OperatorError {
     let message = format!(
         "robot {robot} is ordered to stand and was not seen at rest within {} s: {seen}; see `firsthand status`",
         REST_PATIENCE.as_secs()
     );
-    Err(OperatorError::refused("not-at-rest", message))
+    OperatorError::refused("not-at-rest", message)
 }
 
 /// Whether the link stops the robot for the operator, or ends the mission, and the robot rests.
@@ -222,7 +302,7 @@ pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
     refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
     // The link's own stop ends with this alone. Where no link runs, the next one need not know of it.
-    let _ = match stop_socket::Operator::connect(&domain) {
+    let _ = match stop_socket::Operator::connect(&domain.stop_socket()) {
         Ok(Some(link)) => link.send(Request::Resume),
         _ => StopMark::of(&domain.run_directory()).set(false),
     };

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use common::{domain::Domain, ground_truth::GroundTruthTick, samples::Cause, signals::Signals};
+use common::{domain::Domain, ground_truth::GroundTruthTick, signals::Signals};
 use processes::{
     domain::DomainLock,
     last_resort::{self, Turns},
@@ -120,9 +120,7 @@ pub fn run<'a>(
         }
     };
     // The robot is stopped first after an error, too, and then the stages in order.
-    let given_up = Some(Cause::OdometryGivenUp.name());
-    let trusts_encoders = ending.as_ref().map_or(true, |ending| ending.cause != given_up);
-    let stopped = supervisor.end_mission(trusts_encoders, &mut || {
+    let stopped = supervisor.end_mission(&mut || {
         turns.rest(true);
         consumer.catch_up(&signals);
         turns.rest(false);

@@ -24,21 +24,12 @@ const HEARD_WITHIN: Duration = Duration::from_secs(2);
 const NEW: Duration = Duration::from_secs(1);
 
 impl Supervisor<'_> {
-    /// Bring the robot to rest and stop the stages. The link comes last, and not while wheels turn. Without `trusts_encoders` nobody
-    /// knows whether they turn. `catch_up` waits for who reads along.
-    pub(crate) fn end_mission(
-        &mut self,
-        trusts_encoders: bool,
-        catch_up: &mut dyn FnMut(),
-    ) -> Result<Wheels> {
+    /// Brings the robot to rest and stops the stages. The link goes on while wheels turn; its stop guard takes over from a link that ends
+    /// before the robot was seen at rest. `catch_up` waits for consumers.
+    pub(crate) fn end_mission(&mut self, catch_up: &mut dyn FnMut()) -> Result<Wheels> {
         self.service.stopping();
         self.decision = Decision::ENDING;
-        let wheels = match self.come_to_rest()? {
-            Wheels::Turning if !trusts_encoders => {
-                Wheels::Unknown("its encoders cannot be right".to_owned())
-            }
-            wheels => wheels,
-        };
+        let wheels = self.come_to_rest()?;
         catch_up();
         if wheels == Wheels::Turning {
             self.stop_stages(1)?;

@@ -126,6 +126,11 @@ impl StopMonitor {
         }
     }
 
+    /// Whether the newest command is motion.
+    pub fn is_told_to_move(&self) -> bool {
+        self.told_to_stand.is_none() && self.driven > 0.0
+    }
+
     /// It grows on after the last method, when the first follows.
     pub const fn method(&self) -> usize {
         self.method

@@ -73,13 +73,21 @@ impl Link {
         } else if self.failsafe.applied(Cause::RobotDoesNotStop) {
             // The last method needs time to have an effect.
             return;
-        } else if self.connected() && passed(self.stop_sent_ns, now_ns, STOP_AGAIN) {
+        } else if self.is_stop_due(now_ns) {
             effects.push(Effect::Send(self.stop()));
         } else {
             return;
         }
         self.commanded([0, 0], now_ns);
         self.stop_sent_ns = Some(now_ns);
+    }
+
+    /// A robot that nobody hears may hear: it gets a stop with each ping.
+    fn is_stop_due(&self, now_ns: u64) -> bool {
+        match self.connected() {
+            true => passed(self.stop_sent_ns, now_ns, STOP_AGAIN),
+            false => self.pinged_ns == Some(now_ns) && self.stop_sent_ns != Some(now_ns),
+        }
     }
 
     fn commanded(&mut self, counts: [i16; 2], now_ns: u64) {

@@ -298,7 +298,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     }
     if let Some(robot) = still_moving {
         write_stderr(
-            "firsthand: THE ROBOT MOVES although it was told to stand by every method; its link goes on telling it; Ctrl-C leaves it\n",
+            "firsthand: THE ROBOT MOVES although it was told to stand by every method; its link goes on telling it; Ctrl-C leaves that to its stop guard\n",
         );
         let did = robot.watch()?;
         write_stderr(&format!("firsthand: the robot {did}\n"));
@@ -306,6 +306,12 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     // On a busy machine the recorder may need seconds for its last chunks.
     drop(recorder);
     drop(lock);
+    if mission_control::operator::owes_stop(&options.robot) {
+        let robot = &options.robot;
+        write_stderr(&format!(
+            "firsthand: THE ROBOT WAS NOT SEEN AT REST; its stop guard goes on ordering the stop: `firsthand status --robot {robot}` shows what it sees, `firsthand stop --sign-off --robot {robot}` ends it\n"
+        ));
+    }
     if may_be_removed {
         let _ = fs::remove_dir_all(directory);
         if !arguments.json {

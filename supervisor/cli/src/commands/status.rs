@@ -18,13 +18,13 @@ use common::{
     topics::{self, AnyTopic},
     waiter::Waiter,
 };
-use mission_control::operator::PATIENCE;
+use mission_control::operator::{self, PATIENCE};
 use robot_state::{Feed, RobotState};
 use serde::Serialize;
 
 use console::{
     failure::Result,
-    output::print,
+    output::{print, print_text},
     stream::{LOOK_EVERY, Stream},
     table::Table,
     waiting::Waiting,
@@ -187,7 +187,11 @@ fn is_complete(robot: &RobotState, waited: Duration) -> bool {
 }
 
 fn print_one(arguments: &Arguments) -> Result {
-    let bus = roster::join(&Domain::of(arguments.robot.clone()), "status")?;
+    let joined = roster::join(&Domain::of(arguments.robot.clone()), "status");
+    if joined.is_err() && operator::owes_stop(&arguments.robot) {
+        return print_guarded(arguments);
+    }
+    let bus = joined?;
     let mut feed = Feed::open(&bus, &WANTED)?;
     let mut waiter = Waiter::default();
     for topic in &WANTED[..3] {
@@ -211,6 +215,27 @@ fn print_one(arguments: &Arguments) -> Result {
         }
         waiter.wait(LINK_PATIENCE)?;
     }
+}
+
+/// Prints what the stop guard of a robot without a run sees.
+fn print_guarded(arguments: &Arguments) -> Result {
+    let robot = &arguments.robot;
+    let sees = operator::sees(robot);
+    if arguments.json {
+        let guard =
+            sees.map(|(sees, silent_s)| serde_json::json!({ "sees": sees, "silent_s": silent_s }));
+        print_text(&format!("{}\n", serde_json::json!({ "robot": robot, "stop_guard": guard })))?;
+        return Ok(());
+    }
+    print_text(&match sees {
+        Some((sees, _)) => format!(
+            "robot {robot}: no run; its stop guard orders the stop: {sees}; once you see it at rest, `firsthand stop --sign-off` ends that\n"
+        ),
+        None => format!(
+            "robot {robot}: no run, and NO STOP GUARD although it was not seen at rest: `firsthand stop` starts one\n"
+        ),
+    })?;
+    Ok(())
 }
 
 /// Print a status after each change, from run to run.
