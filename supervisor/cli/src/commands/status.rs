@@ -187,11 +187,12 @@ fn is_complete(robot: &RobotState, waited: Duration) -> bool {
 }
 
 fn print_one(arguments: &Arguments) -> Result {
-    let joined = roster::join(&Domain::of(arguments.robot.clone()), "status");
-    if joined.is_err() && operator::owes_stop(&arguments.robot) {
+    let domain = Domain::of(arguments.robot.clone());
+    // A killed supervisor leaves its bus.
+    if operator::owes_stop(&arguments.robot) && !domain.is_supervised() {
         return print_guarded(arguments);
     }
-    let bus = joined?;
+    let bus = roster::join(&domain, "status")?;
     let mut feed = Feed::open(&bus, &WANTED)?;
     let mut waiter = Waiter::default();
     for topic in &WANTED[..3] {
