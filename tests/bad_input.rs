@@ -8,8 +8,8 @@ use crate::support::{Run, assert_nothing_left, assert_refused, output, refused};
 fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike() {
     let cases = [
         ("target = [99, 0]", "1: target: ", "perimeter.width_m"),
-        ("target = [3, 0]\n[perimeter]\ncells = 3", "3: perimeter.cells: ", "10 to 4096"),
-        ("target = [3, 0]\n[perimeter]\ncells = 99999", "3: perimeter.cells: ", "10 to 4096"),
+        ("target = [3, 0]\n[perimeter]\ncells = 3", "3: perimeter.cells: ", "10 to 2048"),
+        ("target = [3, 0]\n[perimeter]\ncells = 99999", "3: perimeter.cells: ", "10 to 2048"),
         ("target = [3, nan]", "1: target: ", "finite"),
         ("target = [3, 0]\nspeed = 1", "2: ", "`speed`"),
         ("target = [3, 0]\n[[world.drum]]\nat = [0, 0.1]\nradius_m = 0.3", "2: world: ", "move it"),

@@ -3,6 +3,7 @@
 mod arduino;
 mod calibration;
 mod objection;
+mod reach;
 mod robot;
 mod ros2;
 mod sensor;
@@ -26,7 +27,7 @@ use super::{
 };
 use crate::{
     geometry::Zone,
-    grid::{MAX_CELLS, MIN_CELLS},
+    grid::MIN_CELLS,
 };
 
 /// A mission is a page or two; a file without end is no mission.
@@ -136,7 +137,13 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
         let text = format!("{asked} is more than the robot's sight allows: it drives at {sight:.2} m/s at most, from which it rests on ground that it has seen though its sensors fall silent");
         remark("controller.speed_m_s", text)
     });
-    [car, twice, blind].into_iter().flatten().collect()
+    let shut = mission.waypoints().into_iter().find(|to| reach::is_cut_off(mission, to.at)).map(|to| {
+        let (at, radius) = (to.at, mission.body().radius_m);
+        let key = if mission.targets.is_empty() { "target" } else { "targets" };
+        let text = format!("known shapes and zones leave a body of {radius} m radius no way to {at}; move the target, or what is around it");
+        remark(key, text)
+    });
+    [car, twice, blind, shut].into_iter().flatten().collect()
 }
 
 /// A list in the file that is longer than what was `read` of it: where it is, its key, and the problem.
@@ -230,16 +237,19 @@ impl Checker {
     }
 }
 
+/// The most cells along a side for which the stages answer within their deadlines.
+const MOST_DRIVEN_CELLS: u32 = 2048;
+
 fn perimeter(mission: &Mission) -> Result {
     let perimeter = &mission.perimeter;
     within("perimeter.width_m", perimeter.width_m, 0.5..=1000.0, "m")?;
     let frame = mission.grid_frame();
     let cells = frame.cells;
     refuse_if(
-        !(MIN_CELLS..=MAX_CELLS).contains(&cells),
+        !(MIN_CELLS..=MOST_DRIVEN_CELLS).contains(&cells),
         "perimeter.cells",
-        format!("a grid of {cells} x {cells} cells cannot be"),
-        format!("give {MIN_CELLS} to {MAX_CELLS}"),
+        format!("a grid of {cells} x {cells} cells is not solved in time"),
+        format!("give {MIN_CELLS} to {MOST_DRIVEN_CELLS}"),
     )?;
     point("perimeter.centre", perimeter.centre)?;
     let start = mission.start.at;
@@ -337,7 +347,7 @@ fn zones(mission: &Mission) -> Result {
     let zones = &mission.zones;
     let problem = format!("{} zones are too many", zones.len());
     refuse_if(zones.len() > MOST_ZONES, "zone", problem, format!("give {MOST_ZONES} at most"))?;
-    for Zone { points } in zones {
+    for zone @ Zone { points } in zones {
         let count = points.len();
         refuse_if(
             !(3..=MOST_CORNERS).contains(&count),
@@ -346,13 +356,25 @@ fn zones(mission: &Mission) -> Result {
             format!("give 3 to {MOST_CORNERS}"),
         )?;
         points.iter().try_for_each(|corner| point("zone", *corner))?;
+        let problem = "two edges of a zone cross";
+        refuse_if(zone.crosses_itself(), "zone", problem, "give its corners in order around it")?;
     }
     Ok(())
 }
 
+/// A body that reaches farther from its centre than so many tracks is given in another unit.
+const MOST_TRACKS: f64 = 5.0;
+
 /// A robot that starts inside a hazard has already collided.
 fn start_is_free(mission: &Mission) -> Result {
     let radius = mission.body().radius_m;
+    let track = mission.body().track_m;
+    refuse_if(
+        radius > MOST_TRACKS * track,
+        "robot.radius_m",
+        format!("a body of {radius} m radius on a track of {track} m"),
+        format!("give metres, at most {MOST_TRACKS} tracks"),
+    )?;
     let start = mission.start.at;
     for (key, shapes) in [("world", &mission.obstacles()), ("known", &mission.known)] {
         let clearance = shapes.clearance(start);

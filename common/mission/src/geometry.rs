@@ -140,6 +140,16 @@ impl Zone {
         }
         if is_inside { -nearest } else { nearest }
     }
+
+    /// Whether two of its edges cross.
+    pub fn crosses_itself(&self) -> bool {
+        let ends = self.points.iter().cycle().skip(1);
+        let edges: Vec<_> = self.points.iter().copied().zip(ends.copied()).collect();
+        let side = |(from, to): (DVec2, DVec2), at: DVec2| (to - from).perp_dot(at - from);
+        let splits = |line, (from, to)| side(line, from) * side(line, to) < 0.0;
+        let crosses = |one, other| splits(one, other) && splits(other, one);
+        edges.iter().any(|one| edges.iter().any(|other| crosses(*one, *other)))
+    }
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

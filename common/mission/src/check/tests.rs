@@ -57,6 +57,25 @@ fn a_start_is_a_place_with_or_without_a_heading_or_a_heading_at_the_origin() {
 }
 
 #[test]
+fn a_target_that_known_walls_shut_in_is_remarked_and_one_behind_a_gap_is_not() {
+    let remarks = |last: &str| {
+        let room = format!("points = [[2, -1], [4, -1], [4, 1], [2, 1], [2, {last}]]");
+        let text = format!("target = [3, 0]\n[[known.wall]]\n{room}");
+        Mission::parse(&text, Path::new("m.toml")).unwrap().remarks
+    };
+    assert!(remarks("-1")[0].starts_with("m.toml:1: target: "), "{:?}", remarks("-1"));
+    assert!(remarks("0.2").is_empty(), "{:?}", remarks("0.2"));
+}
+
+#[test]
+fn a_zone_whose_edges_cross_and_a_body_far_larger_than_its_wheels_are_refused() {
+    let zone = "target = [3, 0]\n[[zone]]\npoints = [[1, 1], [2, 2], [2, 1], [1, 2]]";
+    assert!(refusal(zone).contains("two edges of a zone cross; give its corners in order"));
+    let body = "target = [3, 0]\n[robot]\nmodel = 'jackal'\nradius_m = 5";
+    assert!(refusal(body).starts_with("m.toml:4: robot.radius_m: "), "{}", refusal(body));
+}
+
+#[test]
 fn a_zone_is_a_polygon_without_the_start_and_the_targets() {
     let zone = |points: &str| format!("target = [3, 0.5]\n[[zone]]\npoints = {points}");
     let mission = Mission::parse(&zone("[[1, 1], [2, 1], [2, 2]]"), Path::new("m.toml")).unwrap();
