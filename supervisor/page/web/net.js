@@ -16,6 +16,8 @@ function token() {
   return shown || history.state?.token || "";
 }
 
+const isStop = ({ order }) => order === "stop";
+
 export class Net {
   /// `on` has `message`, `blob`, `role` and `lost`.
   constructor(on) {
@@ -48,6 +50,7 @@ export class Net {
       if (message.role) {
         this.isOpen = true;
         this.on.role(message.role);
+        for (const [id, { order }] of this.asked) this.send(id, order);
       }
       if (message.answer) this.answered(message.answer);
       this.on.message(message);
@@ -69,22 +72,29 @@ export class Net {
   lose(why, isFinal = false) {
     this.socket = null;
     this.isOpen = false;
-    for (const answer of this.asked.values()) answer({ ok: false, text: "the server was lost; look at the state" });
-    this.asked.clear();
+    this.isRefused = isFinal;
+    for (const [id, { order }] of this.asked) {
+      if (isFinal || !isStop(order)) this.answered({ id, ok: false, text: "the server was lost; look at the state" });
+    }
     this.on.lost(why);
     if (!isFinal) this.again = setTimeout(() => this.connect(), AGAIN_AFTER_MS);
   }
 
   answered({ id, ok, text }) {
-    this.asked.get(id)?.({ ok, text });
+    this.asked.get(id)?.answer({ ok, text });
     this.asked.delete(id);
   }
 
-  /// Ask for an order. The answer says what was confirmed, or why it was not done.
+  /// Ask for an order. The answer says what was confirmed, or why it was not done. A stop is asked for again after each loss of the
+  /// server until it is answered.
   ask(order) {
-    if (!this.isOpen) return Promise.resolve({ ok: false, text: "there is no server to ask" });
+    if (!this.isOpen && (this.isRefused || !isStop(order))) return Promise.resolve({ ok: false, text: "there is no server to ask" });
     const id = this.next++;
+    if (this.isOpen) this.send(id, order);
+    return new Promise((answer) => this.asked.set(id, { order, answer }));
+  }
+
+  send(id, order) {
     this.socket.send(JSON.stringify({ id, ...order }));
-    return new Promise((answer) => this.asked.set(id, answer));
   }
 }

@@ -41,6 +41,8 @@ static STOPS: Semaphore = Semaphore::const_new(MOST_STOPS);
 
 /// Codes of websockets from 4000 are the application's.
 const WRONG_TOKEN: u16 = 4401;
+/// Nothing was heard in time, or the place went to another client. The browser connects again.
+const LATE: u16 = 4408;
 const REPLACED: u16 = 4409;
 const TOO_MUCH: u16 = 4429;
 
@@ -67,7 +69,7 @@ pub async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>)
     };
     let (sender, mut receiver) = socket.split();
     let Some(role) = role else {
-        close(sender, WRONG_TOKEN).await;
+        close(sender, if first.is_some() { WRONG_TOKEN } else { LATE }).await;
         return;
     };
     drop(stranger);
