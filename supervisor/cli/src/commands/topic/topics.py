@@ -143,7 +143,7 @@ class Follower:
     def _instance(self):
         try:
             return os.readlink(f"{self.directory}/iceoryx2.toml")
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
 
     def _supervised(self):
@@ -152,7 +152,7 @@ class Follower:
             with open(f"{self.directory}/lock") as lock:
                 fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
             return False
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):  # A page keeps a file beside the robots' directories.
             return False
         except BlockingIOError:
             return True
