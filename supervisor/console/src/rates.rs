@@ -68,7 +68,9 @@ impl TopicRates {
         counts.samples += 1;
         if last.generation == stamp.generation {
             let next = last.sequence.wrapping_add(1);
-            counts.lost += u64::from(stamp.sequence.wrapping_sub(next).min(i32::MAX as u32));
+            // A mirror repeats its newest sample.
+            let ahead = stamp.sequence.wrapping_sub(next).cast_signed();
+            counts.lost += u64::from(ahead.max(0).unsigned_abs());
         }
         let ticks = stamp.tick.saturating_sub(last.tick);
         counts.ticks += ticks;

@@ -114,6 +114,10 @@ pub fn main(arguments: &Arguments) -> Result {
         replace(file.as_ref(), text).map_err(FileError::of("write", file.as_ref()))?;
         write_stderr(&format!("firsthand: {} keys were written to {file}\n", keys.len()));
     }
+    if found.iter().all(|finding| finding.verdict == Verdict::Unknown) {
+        let message = "nothing was measured: the robot did not move, or its sensors said nothing; see the link's log in the run directory";
+        return Err(Refused::new("nothing-measured", message).into());
+    }
     let wrong = found.iter().filter(|finding| finding.verdict == Verdict::Wrong).count();
     match wrong {
         0 => Ok(()),

@@ -1,8 +1,8 @@
 use std::{
-    fs::File,
+    fs::{self, File},
     io::{self, Read as _},
     os::fd::AsFd as _,
-    path::PathBuf,
+    path::{Path, PathBuf},
     str::FromStr,
     time::Duration,
 };
@@ -10,6 +10,7 @@ use std::{
 use clap::Args;
 use common::{
     domain::{Domain, RobotName},
+    file::FileError,
     poll,
     signals::Signals,
     start::become_child,
@@ -84,6 +85,12 @@ fn topic(name: &str) -> Result<&'static dyn AnyTopic, String> {
     })
 }
 
+/// Makes and removes a file beside `out`: the recording itself begins with the robot's run, which may come late.
+fn refuse_unwritable(out: &Path) -> Result<(), FileError> {
+    let probe = out.with_extension(format!("{}.tmp", std::process::id()));
+    File::create_new(&probe).and_then(|_| fs::remove_file(&probe)).map_err(FileError::of("write", out))
+}
+
 pub fn main(arguments: &Arguments) -> Result {
     let mut signals = Signals::that_end()?;
     if let Some(supervisor) = arguments.supervisor {
@@ -99,6 +106,9 @@ pub fn main(arguments: &Arguments) -> Result {
         run: arguments.run_directory.clone(),
         budget: arguments.disk_budget.map(|DiskBudget(bytes)| bytes),
     };
+    if arguments.supervisor.is_none() {
+        refuse_unwritable(&arguments.out)?;
+    }
     let mut tell = |happened: Happened<'_>| {
         let printed = match happened {
             Happened::Attached(file) => {

@@ -75,8 +75,18 @@ pub fn show(arguments: &Arguments) -> Result {
     let place = connecting.endpoint(host);
     let mut asker = Asker::new(&session, robot);
     let mut mirror = None::<Mirror>;
+    // Until then nobody is told that nothing answers.
+    let mut silent_until = Some(Instant::now() + PATIENCE);
     while !stream.has_ended() {
-        if let Some(hello) = asker.look()?
+        let hello = asker.look()?;
+        if hello.is_some() {
+            silent_until = None;
+        } else if silent_until.take_if(|until| *until <= Instant::now()).is_some() {
+            write_stderr(&format!(
+                "firsthand: no robot {robot} answers at {host}; is its name right (--robot), does `firsthand remote serve` run there? It is asked again\n"
+            ));
+        }
+        if let Some(hello) = hello
             && mirror.as_ref().is_none_or(|mirror| mirror.id != hello.id)
         {
             // The last run's bus goes before the next one's comes.

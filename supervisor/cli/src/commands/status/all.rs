@@ -6,7 +6,8 @@ use common::{
     bus::BusError,
     domain::Domain,
     roster::{self, Roster},
-    samples::{HoldReason, Order},
+    samples::{HoldReason, MirrorSample, Order},
+    topics,
 };
 use serde::Serialize;
 
@@ -26,6 +27,8 @@ struct Listed {
     state: &'static str,
     mission_time_s: Option<f64>,
     simulated: Option<bool>,
+    /// The age of what a mirror shows of another machine, seconds.
+    age_s: Option<f64>,
     run: Option<PathBuf>,
 }
 
@@ -59,12 +62,12 @@ pub fn print(json: bool) -> Result {
 
 fn listed(robot: Robot) -> Listed {
     let roster = robot.supervisor.map(|_| roster(&robot));
-    let (state, mission_time_s, simulated) = match roster {
-        None => ("its supervisor was killed", None, None),
+    let (state, mission_time_s, simulated, age_s) = match roster {
+        None => ("its supervisor was killed", None, None, None),
         Some(Ok(Some(roster))) => roster,
-        Some(Err(BusError::OtherVersion { .. })) => ("it runs another version", None, None),
+        Some(Err(BusError::OtherVersion { .. })) => ("it runs another version", None, None, None),
         // The supervisor is frozen, or its bus is not complete yet.
-        Some(_) => ("no answer", None, None),
+        Some(_) => ("no answer", None, None, None),
     };
     Listed {
         robot: robot.name.to_string(),
@@ -72,20 +75,22 @@ fn listed(robot: Robot) -> Listed {
         state,
         mission_time_s,
         simulated,
+        age_s,
         run: robot.run,
     }
 }
 
-/// The supervisor's order, mission time, and whether the robot is simulated.
-type RosterFacts = (&'static str, Option<f64>, Option<bool>);
+/// The supervisor's order, mission time, whether the robot is simulated, and the age of what a mirror shows.
+type RosterFacts = (&'static str, Option<f64>, Option<bool>, Option<f64>);
 
 fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
     let bus = roster::join(&Domain::of(robot.name.clone()), "list")?;
+    let age_s = bus.reader(&topics::MIRROR)?.newest()?.as_ref().map(MirrorSample::age_s);
     Roster::open(&bus)?.find(PATIENCE, |header, _| {
         let order =
             words::order(Order::from_byte(header.order), HoldReason::from_byte(header.reason));
         let time_s = header.stamp.time().seconds();
-        Some((order, Some(time_s), Some(header.simulated == 1)))
+        Some((order, Some(time_s), Some(header.simulated == 1), age_s))
     })
 }
 
@@ -93,10 +98,11 @@ fn table(listed: &[Listed]) -> String {
     let mut table = Table::new(["robot", ">supervisor", "state", ">time", "kind", "run"]);
     let unknown = || "-".to_owned();
     for robot in listed {
-        let kind = match robot.simulated {
-            Some(true) => "simulated",
-            Some(false) => "real",
-            None => "-",
+        let kind = match (robot.age_s, robot.simulated) {
+            (Some(age_s), _) => format!("elsewhere, {age_s:.1} s ago"),
+            (None, Some(true)) => "simulated".to_owned(),
+            (None, Some(false)) => "real".to_owned(),
+            (None, None) => unknown(),
         };
         table.row([
             &robot.robot,
