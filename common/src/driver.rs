@@ -9,8 +9,8 @@ use std::{fmt, time::Duration};
 
 use crate::mission::Sensor;
 use crate::samples::{
-    CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample,
-    Sweep, WheelSample,
+    ComplaintSample, CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample,
+    Sweep, WheelSample, name, words,
 };
 
 /// The protocol of one device. A sensor needs no more than this.
@@ -110,13 +110,18 @@ impl Heard {
 
 impl WireTally {
     /// Count `piece`, a whole or broken message, and note in `heard` why it was refused. Returns whether it was `taken`.
-    pub fn count(&mut self, piece: &[u8], taken: Result<(), String>, heard: &mut Heard) -> bool {
+    pub fn count(
+        &mut self,
+        piece: &[u8],
+        taken: Result<(), impl Into<Refusal>>,
+        heard: &mut Heard,
+    ) -> bool {
         let is_taken = taken.is_ok();
         match taken {
             Ok(()) => self.messages += 1,
             Err(why) => {
                 self.bytes_dropped += piece.len() as u64;
-                heard.refused = Some(why);
+                heard.refused = Some(why.into());
             }
         }
         is_taken
@@ -125,6 +130,50 @@ impl WireTally {
     /// Adds bytes that were dropped before they could be a message.
     pub const fn with_dropped(self, bytes: u64) -> Self {
         Self { bytes_dropped: self.bytes_dropped + bytes, ..self }
+    }
+}
+
+/// Why a message is not used, for the user to mend.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Refusal {
+    /// The part of the message, as the message names it; empty for the whole.
+    pub input: String,
+    pub what: String,
+    /// Empty where `what` says it.
+    pub remedy: String,
+}
+
+impl From<String> for Refusal {
+    fn from(what: String) -> Self {
+        Self { what, ..Self::default() }
+    }
+}
+
+impl From<&str> for Refusal {
+    fn from(what: &str) -> Self {
+        what.to_owned().into()
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { input, what, remedy } = self;
+        let [colon, semicolon] = [(input, ": "), (remedy, "; ")]
+            .map(|(text, mark)| if text.is_empty() { "" } else { mark });
+        write!(f, "{input}{colon}{what}{semicolon}{remedy}")
+    }
+}
+
+impl ComplaintSample {
+    pub fn of(stage: &str, Refusal { input, what, remedy }: &Refusal) -> Self {
+        let (stage, input) = (name(stage), words(input));
+        Self { stage, input, what: words(what), remedy: words(remedy), ..Self::default() }
+    }
+
+    pub fn refusal(&self) -> Refusal {
+        let [input, what, remedy] =
+            [self.input, self.what, self.remedy].map(|words| words.text().into_owned());
+        Refusal { input, what, remedy }
     }
 }
 
@@ -154,7 +203,7 @@ pub struct Heard {
     /// Two nodes publish its odometry: their numbers, and the remedy.
     pub two_publishers: Option<String>,
     /// Why the newest refused message is none of the protocol.
-    pub refused: Option<String>,
+    pub refused: Option<Refusal>,
 }
 
 /// A sender, other than the link, of commands to the robot.

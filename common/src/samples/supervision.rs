@@ -201,6 +201,18 @@ impl Words {
 }
 
 payloads! {
+    /// What a stage cannot use, for the user to mend. The stage repeats it about once a second while it lasts.
+    "firsthand.Complaint" ComplaintSample {
+        stage: Name,
+        /// The part of the input, as the input names it; empty for the whole.
+        input: Words,
+        what: Words,
+        /// Empty where `what` says it.
+        remedy: Words,
+    }
+}
+
+payloads! {
     "firsthand.Death" DeathSample {
         stage: Name,
         pid: u32,

@@ -129,7 +129,8 @@ impl Arduino {
                     f64::from(count) * self.body.metres_per_count() / self.body.wheel_radius_m
                 });
                 let angle = gyro.map(|angle| f64::from(angle) * GYRO_RAD);
-                heard.refused = self.gyro.take(angle, wheels, &self.body, 1e9 / self.rate_hz);
+                let why = self.gyro.take(angle, wheels, &self.body, 1e9 / self.rate_hz);
+                heard.refused = why.map(Into::into);
                 heard.motion = Some(self.motion(counts, since));
             }
             (Answer::Invalid, _) => {
@@ -184,11 +185,11 @@ fn text(line: &[u8]) -> String {
 impl Driver for Arduino {
     fn hear(&mut self, bytes: &[u8]) -> Heard {
         let mut lines = self.lines.push(bytes);
-        let mut heard = Heard { refused: self.dropped.take(), ..Heard::default() };
+        let mut heard = Heard { refused: self.dropped.take().map(Into::into), ..Heard::default() };
         if lines.len() > MOST_AT_ONCE {
             let dropped = lines.drain(MOST_AT_ONCE..).map(|line| line.len()).sum::<usize>();
             self.tally.bytes_dropped += dropped as u64;
-            heard.refused = Some("more lines than were asked for".to_owned());
+            heard.refused = Some("more lines than were asked for".into());
             self.begin_anew();
         }
         for line in lines {

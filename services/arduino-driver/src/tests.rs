@@ -129,7 +129,7 @@ fn a_round_that_is_overdue_is_dropped_and_its_late_answers_are_no_answers_of_the
     assert_eq!(polled(&mut driver), "\rb\r");
     let late = heard(&mut driver, "22\r\n1 2\r\n");
     assert!(late.motion.is_none() && late.readings.is_empty(), "{late:?}");
-    assert!(late.refused.is_some_and(|why| why.contains("`p 5` is overdue")));
+    assert!(late.refused.is_some_and(|why| why.to_string().contains("`p 5` is overdue")));
     assert!(heard(&mut driver, "57600\r\n").anything);
     assert!(round(&mut driver, "1\r\n1\r\n1 2\r\n").motion.is_some());
 }

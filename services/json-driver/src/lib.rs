@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Base, Driver, Heard, LaserScan, Memory, Motion, StopMethod, Turn, WireTally, beam, gyro,
+        Base, Driver, Heard, LaserScan, Memory, Motion, Refusal, StopMethod, Turn, WireTally, beam, gyro,
         odometry::{Odometry, motion, twist, wheel_speeds},
         range_reading,
     },
@@ -56,10 +56,10 @@ impl Json {
     }
 
     /// A refused report has no effect; the error says why.
-    fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), String> {
+    fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), Refusal> {
         let readings = self.readings_of(&report.ranges)?;
         if report.clock_s.is_some_and(|clock| clock.abs() > MOST_CLOCK_S) {
-            return Err("a clock_s that no clock says: say seconds".to_owned());
+            return Err("a clock_s that no clock says: say seconds".into());
         }
         let stamp_ns = report.clock_s.map(|clock| (clock * 1e9).round() as i64);
         let mut scans = self.scans_of(report)?;
@@ -72,7 +72,7 @@ impl Json {
         });
         let touched = touched.collect::<Result<Vec<_>, String>>()?;
         let turned = match (report.wheels, report.odometry) {
-            (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".to_owned()),
+            (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".into()),
             (Some(turned), None) => Some(turned),
             (None, Some(odometry)) => {
                 let turned = self.odometry.turned(odometry, &self.body);
@@ -81,15 +81,15 @@ impl Json {
             (None, None) => None,
         };
         if turned.is_some() && report.speeds.is_none() {
-            return Err("wheels or odometry without speeds: say both".to_owned());
+            return Err("wheels or odometry without speeds: say both".into());
         }
         if report.gyro.is_some() && turned.is_none() {
-            return Err("gyro without wheels or odometry: say both".to_owned());
+            return Err("gyro without wheels or odometry: say both".into());
         }
         heard.readings.extend(readings);
         if let (Some(turned), Some(speeds)) = (turned, report.speeds) {
             let why = self.gyro.take(report.gyro, turned, &self.body, 1e9 / self.rate_hz);
-            heard.refused = why.or(heard.refused.take());
+            heard.refused = why.map(Refusal::from).or(heard.refused.take());
             let held = report.held.unwrap_or_default();
             let motion = motion(&self.body, turned, speeds, held);
             heard.motion = Some(Motion { stamp_ns, ..motion });
@@ -117,25 +117,30 @@ impl Json {
     fn readings_of(
         &self,
         ranges: &BTreeMap<String, Option<f64>>,
-    ) -> Result<Vec<RangeReading>, String> {
+    ) -> Result<Vec<RangeReading>, Refusal> {
         let reading = |(name, range): (&String, &Option<f64>)| {
             let row = self.table.iter().position(|sensor| sensor.name == *name);
             let row = row.ok_or_else(|| {
                 let names: Vec<_> = self.table.iter().map(|sensor| sensor.name.as_str()).collect();
-                format!("no sensor is called {name:?}; {} are", names.join(", "))
+                Refusal {
+                    input: format!("ranges.{name}"),
+                    what: format!("no sensor is called {name:?}"),
+                    remedy: format!("{} are; rename it there, or in robot.sensor", names.join(", ")),
+                }
             })?;
             Ok(range_reading(row, &self.table[row], *range))
         };
         ranges.iter().map(reading).collect()
     }
 
-    fn scans_of(&self, report: &Report) -> Result<Vec<LaserScan>, String> {
+    fn scans_of(&self, report: &Report) -> Result<Vec<LaserScan>, Refusal> {
         let only = report.scan.as_ref().map(|beams| {
             let [laser] = &self.lasers[..] else {
                 return Err(format!(
                     "a scan, and the mission has {} lasers: add a row of kind scan, or say scans by the names of rows",
                     self.lasers.len()
-                ));
+                )
+                .into());
             };
             scan_of(laser, beams, [report.scan_age_s, report.scan_time_s])
         });
@@ -152,10 +157,14 @@ fn scan_of(
     (row, sensor): &(usize, Sensor),
     beams: &[Option<f32>],
     [age_s, time_s]: [Option<f64>; 2],
-) -> Result<LaserScan, String> {
+) -> Result<LaserScan, Refusal> {
     if beams.len() != sensor.beams {
         let (came, name, want) = (beams.len(), &sensor.name, sensor.beams);
-        return Err(format!("a scan of {came} beams, and {name:?} has {want}"));
+        return Err(Refusal {
+            input: "scan".to_owned(),
+            what: format!("a scan of {came} beams, and {name:?} has {want}"),
+            remedy: format!("send {want}, or set beams = {came} in its row of robot.sensor"),
+        });
     }
     let nanoseconds = |word: &str, seconds: Option<f64>| {
         let ns = seconds.unwrap_or_default() * 1e9;
@@ -180,7 +189,8 @@ impl Driver for Json {
     fn hear(&mut self, bytes: &[u8]) -> Heard {
         let mut heard = Heard::default();
         for line in self.lines.push(bytes) {
-            let taken = parse(&line).and_then(|report| self.take(&report, &mut heard));
+            let report = parse(&line).map_err(|why: String| Refusal::from(why));
+            let taken = report.and_then(|report| self.take(&report, &mut heard));
             heard.anything |= self.tally.count(&line, taken, &mut heard);
         }
         heard
@@ -286,7 +296,7 @@ mod tests {
         ] {
             let heard = heard(&mut driver(), said);
             assert!(!heard.anything && heard.motion.is_none(), "{said}");
-            assert!(heard.refused.is_some_and(|refused| refused.contains(why)), "{said}");
+            assert!(heard.refused.is_some_and(|refused| refused.to_string().contains(why)), "{said}");
         }
     }
 
@@ -422,7 +432,7 @@ mod tests {
             (r#"{"scans":{"left":{"ranges":[1,2,3]}}}"#, "no laser is called \"left\""),
             (r#"{"scans":{"back":{"ranges":[1,2]}}}"#, "\"back\" has 3"),
         ] {
-            let refused = heard(&mut driver, said).refused.unwrap();
+            let refused = heard(&mut driver, said).refused.unwrap().to_string();
             assert!(refused.contains(why), "{refused}");
         }
     }
@@ -433,7 +443,7 @@ mod tests {
         let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
         let said = r#"{"touched":{"bumper-right":true,"cliff-left":false}}"#;
         assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
-        let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#).refused.unwrap();
+        let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#).refused.unwrap().to_string();
         assert!(refused.contains("no row of robot.touch is called \"nose\""), "{refused}");
     }
 

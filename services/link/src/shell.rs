@@ -16,14 +16,14 @@ use common::{
     latency::Histogram,
     readers,
     samples::{
-        Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
+        Action, Cause, CommandSample, ComplaintSample, DirectiveSample, HoldReason, LinkSample, Order,
         TickLimitSample,
     },
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
     stop_socket::{Identity, OwedStop, Request, StopMark, StopSocket},
     topics::{
-        BASE_RESPONSE, COMMAND, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER,
+        BASE_RESPONSE, COMMAND, COMPLAINTS, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER,
         RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
     },
     wiring::{Persists, Topics},
@@ -96,6 +96,7 @@ impl Process for Shell {
         &RANGES,
         &WHEELS,
         &LINK,
+        &COMPLAINTS,
         &INFRARED,
         &POWER,
         &SURROUNDINGS,
@@ -430,6 +431,7 @@ impl Shell {
                 Effect::FoundResponse(words) => tracing::warn!("{words}"),
                 Effect::Refused(why) => {
                     tracing::warn!("the robot says what is not in its protocol: {why}");
+                    self.runner.out.publish(&COMPLAINTS, ComplaintSample::of(Self::NAME, &why))?;
                 }
                 Effect::ClockRate(rate) => {
                     let pace = match self.clock {

@@ -176,7 +176,7 @@ impl Ros2 {
             heard.refused = Some(format!(
                 "odometry that jumps to ({x:.2}, {y:.2}) m and {:.0} degrees, which counts as no motion",
                 heading.to_degrees()
-            ));
+            ).into());
         }
         let turned = self.odometry.turned(odometry.pose, &self.body);
         let turned = turned.ok_or("a pose that no robot can have; say metres")?;
@@ -191,7 +191,7 @@ impl Ros2 {
             let [_, _, heading] = odometry.pose;
             let before = self.heading.replace(heading).unwrap_or(heading);
             if let Some(why) = self.gyro.odometry(stamp_ns, wrap_angle(heading - before)) {
-                heard.refused = Some(format!("the IMU: {why}"));
+                heard.refused = Some(format!("the IMU: {why}").into());
             }
             let [v, omega] = odometry.twist;
             let WheelSpeeds { right, left } = drive(&self.body).wheels(Twist { v, omega });
@@ -232,7 +232,7 @@ impl Ros2 {
             heard.refused = Some(format!(
                 "the stamp of a scan, {} s, which then counts as taken when odometry came; stamp both by one clock",
                 scan.stamp_ns as f64 / 1e9
-            ));
+            ).into());
         }
         let sweep = if is_stated { sweep } else { Sweep::default() };
         let stamp_ns = is_stated.then_some(scan.stamp_ns);

@@ -102,7 +102,7 @@ impl Driver for Rplidar {
                     heard.refused = Some(format!(
                         "the laser {:?} reports the error {code:#06x} of its health and does not scan: cut its power for a moment",
                         self.sensor.name
-                    ));
+                    ).into());
                 }
                 Said::Answer(Answer::SampleRate { standard_us: us @ 50..=2000, .. }) => {
                     self.sample_ns = i64::from(us) * 1000;

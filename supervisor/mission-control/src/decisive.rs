@@ -51,6 +51,7 @@ pub(crate) fn first(
     contact: Option<&GroundTruthTick>,
     timeout: Timeout,
     stall: Option<(u64, Ending)>,
+    tolerance_m: f64,
 ) -> Decided {
     let undecided = |ending| Decided { ending, last_tick: None, truth_ticks: truth.len() };
     if ending.outcome == Outcome::Aborted {
@@ -58,7 +59,8 @@ pub(crate) fn first(
     }
     let poses = &record.poses;
     let contact = contact.map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
-    let arrival = record.arrival.map(|command| (command.stamp.tick, reached(command.distance_m)));
+    let arrival = record.arrival;
+    let arrival = arrival.map(|it| (it.stamp.tick, reached(it.distance_m, tolerance_m)));
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
     // If two events have the same tick, the first of the list counts.
@@ -169,6 +171,7 @@ mod tests {
                 first_contact(&truth),
                 TIMEOUT,
                 (ticks == 18).then(|| (15, Ending::failed(Unreachable, ""))),
+                0.15,
             );
             let Decided { ending, last_tick, truth_ticks } = decided;
             assert_eq!((ending.outcome, last_tick, truth_ticks), want, "{what}");

@@ -33,6 +33,10 @@ pub(crate) struct Snapshot<'a> {
     /// The time when the newest tick was first seen or the order last changed, whichever is later.
     pub progress: Now,
     pub has_ticked: bool,
+    /// What a stage cannot use, with the remedy.
+    pub complaint: Option<String>,
+    /// The mission's `arrival_tolerance_m`.
+    pub tolerance_m: f64,
     pub reason: HoldReason,
     pub held: Vec<&'static str>,
     /// Stages that do not run although another should have started them.
@@ -47,8 +51,12 @@ pub(crate) struct Arrival {
     pub since: Now,
 }
 
-pub(crate) fn reached(distance_m: f64) -> Ending {
-    let reason = format!("{distance_m:.2} m from the target");
+/// A target in or beside a hazard counts as reached from as near as the robot gets.
+pub(crate) fn reached(distance_m: f64, tolerance_m: f64) -> Ending {
+    let mut reason = format!("{distance_m:.2} m from the target");
+    if distance_m > tolerance_m {
+        reason += &format!(", more than arrival_tolerance_m = {tolerance_m}: as near as it gets");
+    }
     Ending::asked_for(Outcome::Reached, reason)
 }
 
@@ -104,7 +112,7 @@ impl Snapshot<'_> {
         let Arrival { distance_m, since } = self.arrival?;
         let at_rest = self.link.is_some_and(|link| link.at_rest == 1);
         if self.in_ticks || at_rest {
-            return Some(reached(distance_m));
+            return Some(reached(distance_m, self.tolerance_m));
         }
         let arrived = format!("arrived {distance_m:.2} m from the target");
         (now.saturating_sub(since) >= RESTS_WITHIN).then(|| {
@@ -122,7 +130,13 @@ impl Snapshot<'_> {
 
     fn overran(&self) -> Option<Ending> {
         let late = self.time.seconds() >= self.deadline.at_s();
-        late.then(|| self.deadline.timed_out())
+        late.then(|| {
+            let mut ending = self.deadline.timed_out();
+            if let Some(complaint) = &self.complaint {
+                ending.reason += &format!("; {complaint}");
+            }
+            ending
+        })
     }
 
     fn stuck(&self, now: Now) -> Option<Ending> {
@@ -143,6 +157,8 @@ impl Snapshot<'_> {
         } else if !self.held.is_empty() {
             let (held, file) = (self.held.join(", "), records::DEATHS);
             format!("{held} died again and again and is held; see {file} in the run directory")
+        } else if let Some(complaint) = &self.complaint {
+            complaint.clone()
         } else if !self.has_ticked && !robot_answers {
             let address = self.address;
             match self.link.map_or(0, |link| link.other_port) {

@@ -1,6 +1,9 @@
 //! The supervisor's readers on the bus, and the record by which a run is judged.
 
-use std::{collections::VecDeque, time::Instant};
+use std::{
+    collections::VecDeque,
+    time::{Duration, Instant},
+};
 
 use common::{
     bus::{Bus, BusError, Reader, Writers},
@@ -8,7 +11,7 @@ use common::{
     mission::Mission,
     roster,
     samples::{
-        CommandSample, CommandState, ContactSample, FieldCell, FieldHeader, GridHeader,
+        CommandSample, CommandState, ComplaintSample, ContactSample, FieldCell, FieldHeader, GridHeader,
         GuidanceSample, HealthSample, LinkSample, PoseSample, Rest, name_str,
     },
     topics,
@@ -23,6 +26,9 @@ use crate::long_record;
 const MOST_GUIDANCE: usize = 1024;
 /// The most contacts that are recorded: more than come between two checks for stalls.
 const MOST_CONTACTS: usize = 64;
+
+/// A stage repeats what it complains of every second, and may get no processor for a while.
+const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Published {
@@ -51,6 +57,7 @@ pub type Listener = Box<dyn FnMut(Heard<'_>)>;
 pub(crate) struct Observer {
     health: Reader<HealthSample>,
     link: Reader<LinkSample>,
+    complaints: Reader<ComplaintSample>,
     pose: Reader<PoseSample>,
     contact: Reader<ContactSample>,
     grid: Reader<GridHeader, u8>,
@@ -75,6 +82,8 @@ pub struct Record {
     pub(crate) target_number: u64,
     pub arrival: Option<CommandSample>,
     pub link: Option<LinkSample>,
+    /// The newest, and when it was read.
+    complaint: Option<(ComplaintSample, Instant)>,
     /// The time when a sample of the link was last read in which the encoders say whether the robot rests.
     pub(crate) rest_read: Option<Instant>,
     pub grid: Replica<u8>,
@@ -91,6 +100,7 @@ impl Observer {
         Ok(Self {
             health: bus.reader(&topics::HEALTH)?,
             link: bus.reader(&topics::LINK)?,
+            complaints: bus.reader(&topics::COMPLAINTS)?,
             pose: bus.reader(&topics::POSE)?,
             contact: bus.reader(&topics::CONTACT)?,
             grid: bus.reader(&topics::GRID)?,
@@ -172,6 +182,9 @@ impl Observer {
                 record.rest_read = Some(Instant::now());
             }
         }
+        while let Some(complaint) = self.complaints.next_sample()? {
+            record.complaint = Some((complaint, Instant::now()));
+        }
         Ok(roster_changed)
     }
 }
@@ -185,6 +198,13 @@ fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
 }
 
 impl Record {
+    /// The complaint of a stage that still lasts, in words.
+    pub(crate) fn complaint(&self) -> Option<String> {
+        let (complaint, _) =
+            self.complaint.filter(|(_, read)| read.elapsed() < COMPLAINT_LASTS)?;
+        Some(format!("{}: {}", name_str(&complaint.stage), complaint.refusal()))
+    }
+
     /// Whether a place is in a believed hazard, or outside the map.
     pub(crate) fn is_hazard(&self, place: DVec2) -> bool {
         let frame = self.grid.frame();

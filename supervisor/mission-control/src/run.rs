@@ -144,6 +144,7 @@ pub fn run<'a>(
         decisive::first_contact(&truth).filter(|_| !goes_on),
         Timeout { deadline, by_robot: supervisor.clock.in_ticks() },
         end_by_stall,
+        options.mission.arrival_tolerance_m,
     );
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);

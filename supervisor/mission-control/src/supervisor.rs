@@ -354,7 +354,10 @@ impl<'a> Supervisor<'a> {
             deadline: self.deadline(),
             in_ticks: self.clock.in_ticks(),
             progress: self.tick_progress.update(record.newest_tick(), now),
-            has_ticked: record.newest_tick().is_some(),
+            // Other stages publish at tick 0 before the robot begins it.
+            has_ticked: record.pose.is_some(),
+            complaint: record.complaint(),
+            tolerance_m: self.options.mission.arrival_tolerance_m,
             reason: self.decision.reason,
             held: self.stages.held(),
             not_started: self.stages.not_started(),

@@ -176,8 +176,10 @@ impl TargetList {
     /// The ending of a run whose robot waits for its next target: the outcome of the newest one.
     pub(crate) fn outcome_while_waiting(&self) -> Option<Outcome> {
         let tried = |it: &&Stored| it.result.outcome != TargetOutcome::NotTried;
-        let newest = self.results.iter().rfind(tried).map(|it| it.result.outcome);
-        self.waits.then_some(match newest {
+        // A hand's target, which is the current one then, has no result.
+        let newest = self.results.iter().rfind(tried).map(|it| it.result);
+        let newest = newest.filter(|it| it.number == self.number).map(|it| it.outcome);
+        (self.waits || self.by_hand).then_some(match newest {
             Some(TargetOutcome::Unreachable) => Outcome::Unreachable,
             Some(TargetOutcome::TimedOut) => Outcome::Timeout,
             None | Some(TargetOutcome::Followed) => Outcome::Waited,

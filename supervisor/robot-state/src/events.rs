@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use common::samples::{
-    Cause, CommandSample, CommandState, DeathSample, DirectiveSample, FaultKind, FaultSample,
+    Cause, CommandSample, CommandState, ComplaintSample, DeathSample, DirectiveSample, FaultKind, FaultSample,
     FollowState, FollowingSample, HoldReason, LinkSample, Order, RequestAnswer, RequestKind,
     RequestSample, RosterEntry, StageState, StallSample, TargetSample, name_str,
 };
@@ -55,6 +55,8 @@ pub(crate) struct Events {
     waiting: VecDeque<Event>,
     failsafe: Option<(u8, u8)>,
     directive: Option<(u8, u8)>,
+    /// The newest complaint, of which only a change is an event.
+    complaint: String,
     /// The number of the current target, of the last of the list, and of the one that was reached.
     target: u64,
     last: u64,
@@ -65,6 +67,8 @@ pub(crate) struct Events {
     running: Vec<(String, u32)>,
     /// Mission time of the newest pose, seconds. A process that has just started knows no mission time.
     pub(crate) now_s: f64,
+    /// Mission time of the next event.
+    at_s: f64,
 }
 
 impl Events {
@@ -81,12 +85,21 @@ impl Events {
         if self.waiting.len() == MOST_WAITING {
             self.waiting.pop_front();
         }
-        self.waiting.push_back(Event { t: self.now_s, of: of.to_owned(), kind, text });
+        self.waiting.push_back(Event { t: self.at_s, of: of.to_owned(), kind, text });
     }
 
     pub(crate) fn sample(&mut self, sample: &Sample) {
+        if let Sample::Pose(pose) = sample {
+            self.now_s = self.now_s.max(pose.stamp.time().seconds());
+        }
+        self.at_s = match sample {
+            // What happens once is read late by a process that has just started.
+            Sample::Death(_) | Sample::Stall(_) | Sample::Order(_) | Sample::Fault(_) => {
+                sample.time().seconds()
+            }
+            _ => self.now_s,
+        };
         match sample {
-            Sample::Pose(pose) => self.now_s = self.now_s.max(pose.stamp.time().seconds()),
             Sample::Command(command) => self.command(command),
             Sample::Following(following) => self.following(following),
             Sample::Target(target) => self.target(target),
@@ -97,6 +110,7 @@ impl Events {
             Sample::Order(request) => self.request(request),
             Sample::Fault(fault) => self.fault(fault),
             Sample::Link(link) => self.link(link),
+            Sample::Complaint(complaint) => self.complaint(complaint),
             _ => {}
         }
     }
@@ -141,6 +155,14 @@ impl Events {
             Cause::MissionOver if self.last > 0 && self.arrived == self.last => Kind::Good,
             _ if link.stopped() => Kind::Bad,
             _ => Kind::Good,
+        }
+    }
+
+    fn complaint(&mut self, complaint: &ComplaintSample) {
+        let text = complaint.refusal().to_string();
+        if self.complaint != text {
+            self.complaint.clone_from(&text);
+            self.add(name_str(&complaint.stage), Kind::Warn, text);
         }
     }
 
@@ -209,6 +231,7 @@ impl Events {
     }
 
     pub(crate) fn log(&mut self, process: &str, line: &str) {
+        self.at_s = self.now_s;
         self.add(process, Kind::Log, line);
     }
 }
@@ -216,7 +239,10 @@ impl Events {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::samples::{DeathCause, RosterHeader, name};
+    use common::{
+        bus::Stamp,
+        samples::{DeathCause, PoseSample, RosterHeader, name},
+    };
 
     #[test]
     fn a_death_and_the_successor_that_runs_are_told_once_each() {
@@ -243,6 +269,17 @@ mod tests {
         let died = "generation 1 died (signal 9)";
         assert_eq!(told, ["generation 1 runs", died, "generation 2 runs"]);
         assert!(events.drain().is_empty());
+    }
+
+    #[test]
+    fn a_death_that_is_read_late_has_the_time_at_which_it_happened() {
+        let at = |stamp_ns| Stamp { stamp_ns, ..Stamp::default() };
+        let mut events = Events::default();
+        let stamp = at(60_000_000_000);
+        events.sample(&Sample::Pose(PoseSample { stamp, ..PoseSample::default() }));
+        let stamp = at(7_000_000_000);
+        events.sample(&Sample::Death(DeathSample { stamp, ..DeathSample::default() }));
+        assert_eq!(events.drain()[0].t, 7.0);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use common::{
     bus::{AnyReader, Bus, BusError, decode_sample, decode_slice},
     clock::MissionTime,
     samples::{
-        CommandSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader,
+        CommandSample, ComplaintSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader,
         FollowingSample, GridHeader, GuidanceSample, LinkSample, MirrorSample, PoseSample,
         PowerSample, RangeReading, RangesHeader, RequestSample, RosterEntry, RosterHeader,
         ScanHeader, StallSample, TargetSample, WheelSample,
@@ -61,6 +61,7 @@ samples! {
     Stall(StallSample): STALLS by one,
     Order(RequestSample): ORDERS by one,
     Fault(FaultSample): FAULTS by one,
+    Complaint(ComplaintSample): COMPLAINTS by one,
     Link(LinkSample): LINK by one,
 }
 

@@ -6,7 +6,7 @@ use common::{
     grid::{Applied, Replica},
     mission::Mission,
     samples::{
-        CommandSample, DeathSample, FieldCell, FieldHeader, FollowState, FollowingSample,
+        CommandSample, ComplaintSample, DeathSample, FieldCell, FieldHeader, FollowState, FollowingSample,
         GridHeader, GuidanceSample, GuidanceStatus, HoldReason, LinkSample, MirrorSample,
         PoseSample, PowerSample, RosterEntry, RosterHeader, TargetPoint, TargetSample, name_str,
     },
@@ -47,6 +47,8 @@ pub struct RobotState {
     pub guidance: Option<GuidanceSample>,
     pub command: Option<CommandSample>,
     pub link: Option<LinkSample>,
+    /// The newest complaint of a stage. Its stage repeats it while it lasts.
+    pub complaint: Option<ComplaintSample>,
     pub power: Option<PowerSample>,
     /// The age of what is shown, if a mirror shows a robot of another machine.
     pub mirror: Option<MirrorSample>,
@@ -72,6 +74,7 @@ impl RobotState {
             Sample::Power(power) => self.power = Some(*power),
             Sample::Mirror(mirror) => self.mirror = Some(*mirror),
             Sample::Link(link) => self.link = Some(*link),
+            Sample::Complaint(complaint) => self.complaint = Some(*complaint),
             Sample::Stall(_) => self.stalls += 1,
             Sample::Death(death) => {
                 self.deaths.insert(name_str(&death.stage).to_owned(), *death);

@@ -2,7 +2,7 @@
 
 use common::{
     clock::{MissionTime, Pace},
-    driver::{LaserScan, Memory},
+    driver::{LaserScan, Memory, Refusal},
     inputs,
     samples::{
         BaseResponseSample, CommandSample, ContactSample, CountsSample, HoldReason, InfraredSample,
@@ -108,7 +108,7 @@ pub enum Effect {
     /// The base answers otherwise than stated, in these words.
     FoundResponse(String),
     /// A message is none of the protocol, for this reason.
-    Refused(String),
+    Refused(Refusal),
     /// The speed of the robot's clock over mission time's.
     ClockRate(f64),
     AskedForStreams,

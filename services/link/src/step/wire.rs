@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use common::{
     clock::MissionTime,
-    driver::{Heard, Motion, counts::WheelCounts},
+    driver::{Heard, Motion, Refusal, counts::WheelCounts},
     samples::{PowerSample, Sweep},
     wire::COUNT_CYCLE,
 };
@@ -54,14 +54,16 @@ impl Link {
         }
     }
 
-    fn take_refusal(&mut self, why: Option<String>, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn take_refusal(&mut self, why: Option<Refusal>, now_ns: u64, effects: &mut Vec<Effect>) {
         if let Some(why) = why
             && passed(self.refused_ns, now_ns, REFUSED_AGAIN)
         {
             self.refused_ns = Some(now_ns);
             // The reason may quote the device, which may send any text.
-            let why = why.escape_debug().take(LONGEST_REFUSAL).collect();
-            effects.push(Effect::Refused(why));
+            let clean = |letter: char| if letter.is_control() { '?' } else { letter };
+            let [input, what, remedy] = [why.input, why.what, why.remedy]
+                .map(|text| text.chars().take(LONGEST_REFUSAL).map(clean).collect());
+            effects.push(Effect::Refused(Refusal { input, what, remedy }));
         }
     }
 

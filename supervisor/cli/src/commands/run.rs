@@ -241,7 +241,26 @@ pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
         return Err(Refused::new("no-device", message).into());
     }
     planner_executable::resolve(&mut mission, OTHER_PLANNERS)?;
+    refuse_without_memory(&mission)?;
     Ok(mission)
+}
+
+/// Refuses a grid for which this machine has no memory free, where it says how much it has.
+fn refuse_without_memory(mission: &Mission) -> Result<(), Refused> {
+    /// All processes together for a cell, bytes: 1.84 GiB at 4096 x 4096.
+    const PER_CELL: u64 = 118;
+    let memory = fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let free = memory.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
+    let free = free.and_then(|rest| rest.trim().strip_suffix(" kB")?.parse::<u64>().ok());
+    let cells = mission.grid_frame().cells;
+    let most = free.map_or(u64::MAX, |kb| (kb * 1024 / PER_CELL).isqrt());
+    if u64::from(cells) <= most {
+        return Ok(());
+    }
+    let message = format!(
+        "perimeter.cells: {cells} x {cells} cells need more memory than this machine has free; give {most} or fewer"
+    );
+    Err(Refused::new("mission", message))
 }
 
 /// Refuses a robot of ROS 2 if this executable does not speak it.
@@ -330,7 +349,15 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             complain(show(run_report::report(&options)));
         }
     }
-    Ok(exit_code(&summary, &finished.ending))
+    let ending = &finished.ending;
+    if !ending.asked_for {
+        let (outcome, directory) = (summary.outcome.as_str(), directory.display());
+        write_stderr(&format!(
+            "firsthand: {outcome}: {}; the logs are in {directory}\n",
+            ending.reason
+        ));
+    }
+    Ok(exit_code(&summary, ending))
 }
 
 /// Begins the log in the run directory, reserves room for the summary, and reports the mission's remarks.
@@ -355,12 +382,12 @@ fn complain(reported: Result<(), String>) {
     }
 }
 
-/// This start created the directory, its robot never drove, and no stage died. Otherwise a robot that is switched off
-/// would fill the disk, start by start.
+/// This start created the directory, and the user ended the run before the robot drove or a stage died. A failed run keeps its logs.
 fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished) -> bool {
     let made_here = arguments.out.is_none() && options.recovered.is_none();
     let is_placed = finished.resets > 0;
     made_here
+        && finished.ending.asked_for
         && !finished.drove
         && !is_placed
         && finished.restarts.values().all(|&restarts| restarts == 0)

@@ -146,6 +146,7 @@ fn a_hands_target_has_no_result_and_ends_in_waiting_for_the_next_one() {
     hand(&mut list, 0.7);
     assert!(list.release() && list.waits());
     hand(&mut list, 0.8);
+    assert_eq!(list.outcome_while_waiting(), Some(Outcome::Waited));
     list.replace(&[at(2.0, 0.0)], (9, 8.0), None);
     assert!(list.has_target());
     list.settle(Outcome::Reached, 9.0, Some((arrival(9), true)));

@@ -102,7 +102,7 @@ impl Scene {
                     self.turns.extend(turn);
                 }
                 Effect::ClockRate(rate) => self.rates.push(rate),
-                Effect::Refused(why) => self.refused.push(why),
+                Effect::Refused(why) => self.refused.push(why.to_string()),
                 _ => {}
             }
         }

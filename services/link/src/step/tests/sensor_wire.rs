@@ -58,7 +58,7 @@ fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign
     };
     assert_eq!((scans[0].beams[0], scans[0].sweep.first_beam_ns), (2.0, -60_000_000));
     let refused = link.at(Event::Sensor(0, &[0]), 120 * MS);
-    assert!(refused.contains(&Effect::Refused("no scan".to_owned())));
+    assert!(refused.contains(&Effect::Refused("no scan".into())));
     // It falls silent.
     let again = (3..30).flat_map(|tick| link.at(Event::Datagram(wheels), 50 * tick * MS));
     assert!(again.filter(|effect| matches!(effect, Effect::SendSensor(..))).count() > 0);
