@@ -16,6 +16,13 @@ pub fn kibibytes(process: &str, field: &str) -> Option<u64> {
     self::field(process, field)?.strip_suffix(" kB")?.trim().parse().ok()
 }
 
+/// The time for which a thread ran, and the time for which it was ready to run and others ran. `task` is its path below `/proc`.
+pub fn scheduled(task: &str) -> Option<[Duration; 2]> {
+    let counts = fs::read_to_string(format!("/proc/{task}/schedstat")).ok()?;
+    let mut times = counts.split(' ').map_while(|time| time.parse().ok().map(Duration::from_nanos));
+    Some([times.next()?, times.next()?])
+}
+
 pub fn processor_time(process: u32) -> Option<Duration> {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     // The name in parentheses may have any letters; numbers follow.

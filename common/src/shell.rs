@@ -40,6 +40,9 @@ pub use crate::start::{Result, StageError};
 
 /// On a wall clock, a pause of this length without input means that the tick is over: a tick takes a tenth of that.
 const TICK_OVER: Duration = Duration::from_millis(5);
+/// The longest time for which idle work waits for such a pause. A stage that gets too little processor time has none, and its journal
+/// would grow until each restore took longer than the one before.
+const IDLE_WITHIN: Duration = Duration::from_secs(1);
 
 pub struct Context {
     pub generation: Generation,
@@ -140,7 +143,7 @@ pub trait Process: Sized {
 
     /// Do what nobody waits for: publish a whole map again, save a snapshot. A stage that goes on computing can
     /// keep the processor from the one it has just woken, so on a wall clock this is called in the pause after a
-    /// tick, where [`Process::has_idle_work`] says so; in lockstep, where ticks follow each other at once,
+    /// tick, or after a second without one, where [`Process::has_idle_work`] says so; in lockstep, where ticks follow each other at once,
     /// after each turn.
     fn idle(&mut self) -> Result {
         Ok(())
@@ -246,7 +249,7 @@ fn work(
     process.after_ready(context)?;
     let simulated = context.run.mission.robot.address.is_none();
     let mut faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
-    let mut busy = true;
+    let (mut busy, mut idled) = (true, Instant::now());
     // The process whose samples were ignored last.
     let mut foreign = 0;
     while !stop.came() {
@@ -257,8 +260,12 @@ fn work(
             .fold(heartbeat.time_to_beat(), Duration::min);
         let came = context.waiter.wait(patience)?;
         progress = process.turn()?;
-        if ticks_follow_at_once || busy && !came {
+        let overdue = process.has_idle_work() && idled.elapsed() >= IDLE_WITHIN;
+        if ticks_follow_at_once || busy && !came || overdue {
             process.idle()?;
+        }
+        if !process.has_idle_work() {
+            idled = Instant::now();
         }
         busy = came;
         if heartbeat.beat_if_due(progress)? {

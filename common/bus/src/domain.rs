@@ -17,7 +17,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{claim, lock_holders::holders};
+use crate::claim;
 
 /// The name of a robot, and of its domain: 1 to 16 of a-z, 0-9 and `-`.
 ///
@@ -92,16 +92,20 @@ impl Domain {
         self.directory.join("lock")
     }
 
-    /// The process that holds the supervisor's lock, or claims the robot while the lock is missing; none if there is neither.
+    /// The process that claims the robot, or wrote its number in the supervisor's lock and holds it; none if there is neither.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
         match self.supervision()? {
-            Supervision::Locked(lock) => holder_of(&lock).map(Some),
+            Supervision::Locked(lock) => match claim::holder(self)? {
+                // Another user has the name of the claim.
+                None => named_in(&lock).map(Some),
+                claimed => Ok(claimed),
+            },
             Supervision::Claimed(process) => Ok(Some(process)),
             Supervision::None => Ok(None),
         }
     }
 
-    /// Whether the robot has a supervisor; true if that cannot be found out. Who it is takes longer to find.
+    /// Whether the robot has a supervisor; true if that cannot be found out.
     pub fn is_supervised(&self) -> bool {
         !matches!(self.supervision(), Ok(Supervision::None))
     }
@@ -277,18 +281,12 @@ fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
     found.cloned().unwrap_or_default()
 }
 
-/// The process that holds `lock`, the supervisor's, which wrote its number in the file. The system's list of locks may miss it, or name
-/// the holder of a file with the same number on another file system, and a container has other numbers for processes.
-fn holder_of(mut lock: &File) -> io::Result<u32> {
-    let listed = holders(lock)?;
+/// The process that wrote its number in `lock`.
+fn named_in(mut lock: &File) -> io::Result<u32> {
     let mut named = String::new();
     lock.read_to_string(&mut named)?;
-    match named.trim().parse() {
-        Ok(named) if listed.is_empty() || listed.contains(&named) => Ok(named),
-        _ => listed.first().copied().ok_or_else(|| {
-            io::Error::other("nobody says which process holds the supervisor's lock")
-        }),
-    }
+    let unnamed = || io::Error::other("nobody says which process holds the supervisor's lock");
+    named.trim().parse().map_err(|_| unnamed())
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ use std::{
 use common::{
     domain::Domain,
     poll,
+    process_status::scheduled,
     signals::{Signals, exit_at_once},
 };
 use rustix::{
@@ -78,9 +79,7 @@ impl Turns {
 
 /// The time for which `thread` was ready to run and other processes ran; zero where the kernel does not count it.
 fn processor_awaited(thread: Pid) -> Duration {
-    let counts = fs::read_to_string(format!("/proc/self/task/{thread}/schedstat"));
-    let waited = counts.ok().and_then(|counts| counts.split(' ').nth(1)?.parse().ok());
-    Duration::from_nanos(waited.unwrap_or_default())
+    scheduled(&format!("self/task/{thread}")).map_or(Duration::ZERO, |[_, awaited]| awaited)
 }
 
 pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {

@@ -11,6 +11,7 @@
 //! | [`stages`] | THE table of stages: inputs, outputs, deadlines |
 //! | [`policy`] | what to do with one stage, pure |
 //! | `output_watchdog` | whether each stage answers what it reads, pure |
+//! | [`activity`] | whether a process hangs, is blocked or only waits for a processor |
 //! | `observed_time` | time that the supervisor was there to see: what deadlines count |
 //! | [`process`] | a process that is watched, signalled, reaped |
 //! | `stage_process`, [`stage_processes`] | one stage with its policy and process; all of them |
@@ -21,6 +22,7 @@
 //! | [`last_resort`] | the end of a run whose supervisor hangs |
 //! | [`executable`], [`planner_executable`] | a named executable, checked before anything starts; the one for the planner |
 
+pub mod activity;
 pub mod cleanup;
 pub mod death;
 mod descriptors;

@@ -69,8 +69,9 @@ impl OutputWatchdog {
         }
     }
 
-    /// The first stage, in the order of the pipeline, whose input is unanswered for too long.
-    pub(crate) fn stale(&mut self, now: Now) -> Option<&'static str> {
+    /// The first stage, in the order of the pipeline, whose input is unanswered for too long. Each stage has its own `now`, because time
+    /// in which it waited for a processor does not count.
+    pub(crate) fn stale(&mut self, now: impl Fn(&str) -> Now) -> Option<&'static str> {
         let published: Vec<_> = self.0.iter().map(|it| (it.stage.name, it.published)).collect();
         let published = |writer: &str| published.iter().find(|(name, _)| *name == writer)?.1;
         for output in &mut self.0 {
@@ -78,11 +79,12 @@ impl OutputWatchdog {
             if input.flatten() <= output.published.max(output.excused) {
                 output.unanswered_since = None;
             } else {
-                output.unanswered_since.get_or_insert(now);
+                output.unanswered_since.get_or_insert_with(|| now(output.stage.name));
             }
         }
         let stale = |output: &&StageOutput| {
-            let waited = output.unanswered_since.map(|since| now.saturating_sub(since));
+            let waited =
+                output.unanswered_since.map(|since| now(output.stage.name).saturating_sub(since));
             waited.is_some_and(|waited| waited >= output.patience)
         };
         self.0.iter().find(stale).map(|output| output.stage.name)
@@ -109,7 +111,7 @@ mod tests {
 
     /// The stage that is blamed when nothing further is published for a minute.
     fn blamed(watchdog: &mut OutputWatchdog) -> Option<&'static str> {
-        watchdog.stale(Duration::ZERO).or_else(|| watchdog.stale(MINUTE))
+        watchdog.stale(|_| Duration::ZERO).or_else(|| watchdog.stale(|_| MINUTE))
     }
 
     #[test]
@@ -146,15 +148,15 @@ mod tests {
             for reads in OutputWatchdog::new(0).find(stage.name).unwrap().reads.clone() {
                 watchdog.on_output(reads, 2);
             }
-            assert_eq!(watchdog.stale(MINUTE), None, "{}", stage.name);
+            assert_eq!(watchdog.stale(|_| MINUTE), None, "{}", stage.name);
             let early = MINUTE + stage.deadlines.answers - Duration::from_millis(1);
-            assert_ne!(watchdog.stale(early), Some(stage.name));
+            assert_ne!(watchdog.stale(|_| early), Some(stage.name));
             let all_others_answered = TABLE.iter().filter(|other| other.name != stage.name);
             for other in all_others_answered {
                 watchdog.on_output(other.name, 2);
             }
             let late = MINUTE + stage.deadlines.answers;
-            assert_eq!(watchdog.stale(late), Some(stage.name));
+            assert_eq!(watchdog.stale(|_| late), Some(stage.name));
         }
     }
 
@@ -167,7 +169,7 @@ mod tests {
                 watchdog.on_output(stage.name, tick + ahead);
             }
             let now = Duration::from_millis(900) * tick as u32;
-            assert_eq!(watchdog.stale(now), None);
+            assert_eq!(watchdog.stale(|_| now), None);
         }
     }
 
@@ -176,7 +178,7 @@ mod tests {
         let mut watchdog =
             published(&TABLE.iter().map(|stage| (stage.name, 6)).collect::<Vec<_>>());
         watchdog.on_output("link", 7);
-        watchdog.stale(Duration::ZERO);
+        watchdog.stale(|_| Duration::ZERO);
         watchdog.on_start("dead-reckoning");
         assert_eq!(blamed(&mut watchdog), None);
         watchdog.on_output("link", 8);
@@ -186,8 +188,8 @@ mod tests {
     #[test]
     fn time_before_the_robot_drove_is_cleared() {
         let mut watchdog = published(&[("link", 7)]);
-        watchdog.stale(Duration::ZERO);
+        watchdog.stale(|_| Duration::ZERO);
         watchdog.clear_unanswered();
-        assert_eq!(watchdog.stale(MINUTE), None);
+        assert_eq!(watchdog.stale(|_| MINUTE), None);
     }
 }

@@ -16,7 +16,7 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use crate::stages::Deadlines;
+use crate::{activity::Activity, stages::Deadlines};
 
 /// The time for which a generation must be ready to be stable; the count of deaths in a row then begins again.
 pub const STABLE_AFTER: Duration = Duration::from_millis(500);
@@ -55,7 +55,8 @@ pub enum Event {
     Replace,
     /// The stage should stop, without a successor.
     Stop,
-    Time,
+    /// Time passed. Without the process's activity, all of it counts.
+    Time(Option<Activity>),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,7 +150,7 @@ impl Policy {
         self.phase
     }
 
-    /// The time when [`Event::Time`] is next due; none if only other events matter.
+    /// The time from which [`Event::Time`] is due; none if only other events matter.
     pub fn deadline(&self) -> Option<Now> {
         match self.phase {
             Phase::Down | Phase::Held => None,
@@ -166,7 +167,7 @@ impl Policy {
         let due = self.deadline().is_some_and(|deadline| now >= deadline);
         match (self.phase, event) {
             (Phase::Down | Phase::BackingOff { .. }, Event::Start) => Some(self.start(now)),
-            (Phase::BackingOff { .. }, Event::Time) if due => Some(self.start(now)),
+            (Phase::BackingOff { .. }, Event::Time(_)) if due => Some(self.start(now)),
             (Phase::Held, Event::Start)
             | (Phase::BackingOff { .. } | Phase::Held, Event::Replace) => {
                 self.deaths = 0;
@@ -191,8 +192,14 @@ impl Policy {
                 None
             }
 
-            (Phase::Starting { .. }, Event::Time) if due => self.abort(Stability::NeverReady, now),
-            (Phase::Running { since, beat }, Event::Time) if due => {
+            (Phase::Starting { since }, Event::Time(activity))
+                if due && is_hung(activity, now - since, self.deadlines.startup) =>
+            {
+                self.abort(Stability::NeverReady, now)
+            }
+            (Phase::Running { since, beat }, Event::Time(activity))
+                if due && is_hung(activity, now - beat, self.deadlines.heartbeat) =>
+            {
                 self.abort(Stability::of(since, beat), now)
             }
             (Phase::Running { since, .. }, Event::OutputStale) => {
@@ -220,7 +227,7 @@ impl Policy {
             }
             (
                 Phase::Aborted { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill },
-                Event::Time,
+                Event::Time(_),
             ) if now >= kill => {
                 self.delay_kill(now);
                 Some(Action::Kill)
@@ -303,6 +310,10 @@ impl Policy {
         self.phase = Phase::BackingOff { until: now + backoff };
         None
     }
+}
+
+fn is_hung(activity: Option<Activity>, age: Duration, deadline: Duration) -> bool {
+    activity.is_none_or(|activity| activity.is_hung(age, deadline))
 }
 
 #[cfg(test)]

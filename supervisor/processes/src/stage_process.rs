@@ -17,6 +17,7 @@ use rustix::process::Signal;
 use thiserror::Error;
 
 use crate::{
+    activity::{Activity, Times},
     death::{Death, Next, log_tail},
     policy::{Event, Now, Phase, Policy},
     process::{self, ExitCause, Process},
@@ -40,6 +41,8 @@ pub(crate) struct StageProcess {
     generation: u32,
     started: Now,
     beat: Option<Now>,
+    /// The times of the process at its start or its last ready beat; none if the kernel does not count them.
+    times: Option<Times>,
     pub output: Option<Now>,
     log_start: u64,
     hung: Option<Now>,
@@ -60,6 +63,7 @@ impl StageProcess {
             generation: 0,
             started: Now::ZERO,
             beat: None,
+            times: None,
             output: None,
             log_start: 0,
             hung: None,
@@ -96,7 +100,7 @@ impl StageProcess {
         self.policy.step(Event::Start, now);
         self.process = Some(process);
         self.generation = health.stamp.generation;
-        self.started = now;
+        (self.started, self.times) = (now, Times::of(health.pid));
         true
     }
 
@@ -113,6 +117,9 @@ impl StageProcess {
             HealthState::Ready => Event::BeatReady,
             HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
         };
+        if event == Event::BeatReady {
+            self.times = Times::of(health.pid);
+        }
         self.policy.step(event, now);
         // A process that starts waits for a roster that names it.
         state == HealthState::Starting || !was_running && event == Event::BeatReady
@@ -120,7 +127,7 @@ impl StageProcess {
 
     pub(crate) fn start(&mut self, directory: &Path, first_tick: u64, now: Now) {
         let stage = self.stage.name;
-        (self.started, self.hung) = (now, None);
+        (self.started, self.hung, self.times) = (now, None, Some(Times::default()));
         self.log_start = self.log(directory).metadata().map_or(0, |log| log.len());
         let generation = run::next_generation(directory, stage).map_err(io::Error::other);
         let spawned = generation.and_then(|generation| {
@@ -165,6 +172,17 @@ impl StageProcess {
             tracing::debug!(stage = self.stage.name, ?signal, "signalled");
             process.signal(signal);
         }
+    }
+
+    /// The activity since the start or the last beat, if a deadline has passed by `now`.
+    pub(crate) fn overdue_activity(&self, now: Now) -> Option<Activity> {
+        self.policy.deadline().filter(|deadline| now >= *deadline)?;
+        self.times?.activity(self.pid())
+    }
+
+    /// The time `now` without that in which the process waited for a processor, as of its last beat.
+    pub(crate) fn unstarved(&self, now: Now) -> Now {
+        now.saturating_sub(self.times.unwrap_or_default().starved)
     }
 
     /// The cause of the end of the process, if it has ended. That of an external process that did not announce it comes an iteration

@@ -30,6 +30,9 @@ pub enum Starter {
     External,
 }
 
+/// The pause between looks at a stage that is late and may only be starved.
+const LOOK_AGAIN: Duration = Duration::from_millis(10);
+
 pub struct StageProcesses {
     stages: Vec<StageProcess>,
     watchdog: OutputWatchdog,
@@ -89,7 +92,8 @@ impl StageProcesses {
 
     pub fn time_to_deadline(&self) -> Option<Duration> {
         let deadline = self.stages.iter().filter_map(|stage| stage.policy.deadline()).min();
-        deadline.map(|deadline| deadline.saturating_sub(self.now()))
+        let left = deadline?.saturating_sub(self.now());
+        Some(if left.is_zero() { LOOK_AGAIN } else { left })
     }
 
     /// Take a heartbeat. Returns whether the roster changed by it.
@@ -121,7 +125,12 @@ impl StageProcesses {
             return;
         }
         let now = self.now();
-        if let Some(stage) = self.watchdog.stale(now) {
+        let stages = &self.stages;
+        let unstarved = |stage: &str| {
+            let stage = stages.iter().find(|it| it.stage.name == stage);
+            stage.map_or(now, |stage| stage.unstarved(now))
+        };
+        if let Some(stage) = self.watchdog.stale(unstarved) {
             tracing::warn!(stage, "the stage beats but does not answer its inputs");
             if let Some(index) = self.position(stage) {
                 self.apply(index, Event::OutputStale, now, first_tick);
@@ -157,7 +166,8 @@ impl StageProcesses {
                     deaths.push(death);
                 }
             }
-            self.apply(index, Event::Time, taken, first_tick);
+            let activity = self.stages[index].overdue_activity(taken);
+            self.apply(index, Event::Time(activity), taken, first_tick);
         }
         Ok(deaths)
     }

@@ -4,7 +4,7 @@
 mod model;
 
 use super::*;
-use crate::stages::TABLE;
+use crate::{activity::State, stages::TABLE};
 
 const fn ms(count: u64) -> Duration {
     Duration::from_millis(count)
@@ -35,8 +35,8 @@ fn deaths_in_a_row_wait_longer_and_longer_up_to_a_second() {
         assert_eq!(policy.step(Event::Exited, now), None);
         let until = policy.deadline().unwrap();
         waits.push((until - now).as_millis());
-        assert_eq!(policy.step(Event::Time, until - ms(1)), None);
-        assert_eq!(policy.step(Event::Time, until), Some(Action::Start));
+        assert_eq!(policy.step(Event::Time(None), until - ms(1)), None);
+        assert_eq!(policy.step(Event::Time(None), until), Some(Action::Start));
         now = until;
     }
     assert_eq!(waits, [2, 4, 8, 16, 32, 64, 128, 256, 512, 1000]);
@@ -51,7 +51,7 @@ fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
         }
         if let Phase::BackingOff { until } = policy.phase() {
             now = until;
-            assert_eq!(policy.step(Event::Time, now), Some(Action::Start));
+            assert_eq!(policy.step(Event::Time(None), now), Some(Action::Start));
         }
     }
     panic!("it is never held: {policy:?}");
@@ -64,7 +64,7 @@ fn a_stage_that_cannot_run_is_held_within_ten_seconds() {
     assert!(held < Duration::from_secs(10), "{held:?}");
     assert_eq!(policy.recent_deaths(), 12);
     let later = held + Duration::from_secs(3600);
-    assert_eq!(policy.step(Event::Time, later), None);
+    assert_eq!(policy.step(Event::Time(None), later), None);
     assert_eq!((policy.phase(), policy.deadline()), (Phase::Held, None));
 }
 
@@ -75,7 +75,7 @@ fn a_stage_that_never_becomes_ready_is_held_after_twelve_starts() {
     let mut starts = 1;
     for _ in 0..100 {
         let Some(now) = policy.deadline() else { break };
-        let mut action = policy.step(Event::Time, now);
+        let mut action = policy.step(Event::Time(None), now);
         if action == Some(Action::Abort) {
             action = policy.step(Event::Exited, now + ms(1));
         }
@@ -126,11 +126,40 @@ fn a_stable_generation_clears_the_deaths_before_it() {
 #[test]
 fn a_stage_that_stops_beating_is_aborted_then_killed() {
     let mut policy = running();
-    assert_eq!(policy.step(Event::Time, ms(759)), None);
-    assert_eq!(policy.step(Event::Time, ms(760)), Some(Action::Abort));
-    assert_eq!(policy.step(Event::Time, ms(859)), None);
-    assert_eq!(policy.step(Event::Time, ms(860)), Some(Action::Kill));
+    assert_eq!(policy.step(Event::Time(None), ms(759)), None);
+    assert_eq!(policy.step(Event::Time(None), ms(760)), Some(Action::Abort));
+    assert_eq!(policy.step(Event::Time(None), ms(859)), None);
+    assert_eq!(policy.step(Event::Time(None), ms(860)), Some(Action::Kill));
     assert_eq!(policy.step(Event::Exited, ms(861)), Some(Action::Start));
+}
+
+/// The time after its last beat at which a stage is aborted that spends each second like this; none if it never is.
+fn aborted_after(ran: f64, starved: f64, state: State) -> Option<u64> {
+    let mut policy = running();
+    (1..60_000).find(|&age| {
+        let (ran, starved) = (ms(age).mul_f64(ran), ms(age).mul_f64(starved));
+        let time = Event::Time(Some(Activity { ran, starved, state }));
+        policy.step(time, ms(10 + age)) == Some(Action::Abort)
+    })
+}
+
+#[test]
+fn a_starved_stage_is_not_aborted() {
+    assert_eq!(aborted_after(0.0, 0.0, State::Ready), None, "it waits since its beat");
+    assert_eq!(aborted_after(0.01, 0.99, State::Ready), None);
+    assert_eq!(aborted_after(0.01, 0.99, State::Asleep), None);
+}
+
+#[test]
+fn a_stage_that_spins_without_a_beat_is_aborted_after_its_deadline_of_processor_time() {
+    assert_eq!(aborted_after(1.0, 0.0, State::Ready), Some(750));
+    assert_eq!(aborted_after(0.25, 0.75, State::Ready), Some(3000));
+}
+
+#[test]
+fn a_blocked_stage_is_aborted_after_four_deadlines_and_a_stopped_one_after_one() {
+    assert_eq!(aborted_after(0.0, 0.0, State::Asleep), Some(3000));
+    assert_eq!(aborted_after(0.0, 0.5, State::Stopped), Some(750));
 }
 
 #[test]
@@ -146,8 +175,8 @@ fn a_stage_that_never_becomes_ready_is_aborted() {
     let mut policy = Policy::new(TABLE[0].deadlines);
     policy.step(Event::Start, ms(0));
     policy.step(Event::BeatStarting, ms(2999));
-    assert_eq!(policy.step(Event::Time, ms(2999)), None);
-    assert_eq!(policy.step(Event::Time, ms(3000)), Some(Action::Abort));
+    assert_eq!(policy.step(Event::Time(None), ms(2999)), None);
+    assert_eq!(policy.step(Event::Time(None), ms(3000)), Some(Action::Abort));
 }
 
 #[test]
@@ -162,7 +191,7 @@ fn a_bus_that_blocks_starts_is_recreated_once() {
                 now += ms(5);
             } else {
                 now += ms(3000);
-                assert_eq!(policy.step(Event::Time, now), Some(Action::Abort));
+                assert_eq!(policy.step(Event::Time(None), now), Some(Action::Abort));
             }
             let event = if refused { Event::Refused } else { Event::Exited };
             answers.push(policy.step(event, now));
@@ -182,7 +211,7 @@ fn a_generation_that_became_ready_clears_the_bus() {
         policy.step(Event::Exited, ms(second * 1000));
         // Two starts lie between two refusals.
         assert_ne!(policy.step(Event::Refused, ms(second * 1000 + 1)), Some(Action::RecreateBus));
-        policy.step(Event::Time, ms(second * 1000 + 51));
+        policy.step(Event::Time(None), ms(second * 1000 + 51));
         policy.step(Event::BeatReady, ms(second * 1000 + 60));
     }
 }
@@ -204,8 +233,8 @@ fn a_replaced_stage_is_told_to_stop_and_followed_and_has_not_died() {
 fn a_replaced_stage_that_stays_is_killed() {
     let mut policy = running();
     policy.step(Event::Replace, ms(50));
-    assert_eq!(policy.step(Event::Time, ms(349)), None);
-    assert_eq!(policy.step(Event::Time, ms(350)), Some(Action::Kill));
+    assert_eq!(policy.step(Event::Time(None), ms(349)), None);
+    assert_eq!(policy.step(Event::Time(None), ms(350)), Some(Action::Kill));
 }
 
 #[test]
@@ -220,9 +249,9 @@ fn a_stage_that_got_no_process_is_tried_again_but_not_at_once() {
 fn a_stopped_stage_is_not_followed_and_killed_if_it_stays() {
     let mut policy = running();
     assert_eq!(policy.step(Event::Stop, ms(50)), Some(Action::Terminate));
-    assert_eq!(policy.step(Event::Time, ms(349)), None);
-    assert_eq!(policy.step(Event::Time, ms(350)), Some(Action::Kill));
+    assert_eq!(policy.step(Event::Time(None), ms(349)), None);
+    assert_eq!(policy.step(Event::Time(None), ms(350)), Some(Action::Kill));
     assert_eq!(policy.step(Event::Exited, ms(351)), None);
     assert_eq!(policy.phase(), Phase::Down);
-    assert_eq!(policy.step(Event::Time, ms(9999)), None);
+    assert_eq!(policy.step(Event::Time(None), ms(9999)), None);
 }

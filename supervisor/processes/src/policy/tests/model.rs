@@ -45,7 +45,7 @@ const EVENTS: [Event; 10] = [
     Event::Refused,
     Event::Replace,
     Event::Stop,
-    Event::Time,
+    Event::Time(None),
 ];
 
 impl Model {
@@ -76,7 +76,7 @@ impl Model {
             | Event::OutputStale
             | Event::Exited
             | Event::Refused => self.generation.is_some(),
-            Event::Replace | Event::Stop | Event::Time => true,
+            Event::Replace | Event::Stop | Event::Time(_) => true,
         }
     }
 
@@ -106,7 +106,7 @@ impl Model {
                     self.deaths.clear();
                     true
                 }
-                Event::Time => self.wanted && !self.held && due,
+                Event::Time(_) => self.wanted && !self.held && due,
                 _ => false,
             };
             if event == Event::Stop {
@@ -121,11 +121,11 @@ impl Model {
                 self.blocked_starts = 0;
                 None
             }
-            Event::Time if due && generation.kill.is_some() => {
+            Event::Time(_) if due && generation.kill.is_some() => {
                 generation.kill = Some(now + ms(100));
                 Some(Action::Kill)
             }
-            Event::Time if due => self.abort(),
+            Event::Time(_) if due => self.abort(),
             Event::OutputStale if generation.kill.is_none() && generation.ready.is_some() => {
                 generation.sign = now;
                 self.abort()
@@ -306,7 +306,7 @@ fn two_million_steps_of_long_histories_keep_every_rule() {
                 pick = pick.saturating_sub(**weight);
                 found
             });
-            let event = *event.map_or(&Event::Time, |(event, _)| event);
+            let event = *event.map_or(&Event::Time(None), |(event, _)| event);
             if model.can(event) {
                 model.step(event);
                 actions += 1;

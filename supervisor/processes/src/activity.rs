@@ -1,0 +1,68 @@
+//! What a process does with its time, as the kernel counts it. Pure judgement: a starved process is not a hung one.
+//!
+//! The leading thread beats, so its time on a processor counts. Any thread may be starved, because the leading one may wait for it. The
+//! kernel adds a wait for a processor when it ends: until then, the state of the thread shows it.
+
+use std::{fs, time::Duration};
+
+use common::process_status::{field, scheduled};
+
+/// A process sleeps this many deadlines before it counts as blocked: a slow disk delays a healthy one by more than one.
+pub(crate) const BLOCKED_DEADLINES: u32 = 4;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    Ready,
+    /// Stopped by a signal or a debugger.
+    Stopped,
+    /// Waiting for an event, a lock or a disk.
+    Asleep,
+}
+
+/// The activity of a process since its start or its last beat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Activity {
+    pub ran: Duration,
+    /// The time for which it was ready to run and others ran.
+    pub starved: Duration,
+    pub state: State,
+}
+
+impl Activity {
+    /// Whether a process that owes a sign of life since `age` hangs: it is stopped, has run for the `deadline`, or sleeps.
+    pub(crate) fn is_hung(&self, age: Duration, deadline: Duration) -> bool {
+        let slept = age.saturating_sub(self.ran + self.starved);
+        let blocked = self.state == State::Asleep && slept >= deadline * BLOCKED_DEADLINES;
+        self.state == State::Stopped || self.ran >= deadline || blocked
+    }
+}
+
+/// The times of a process since its start.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Times {
+    ran: Duration,
+    pub starved: Duration,
+}
+
+impl Times {
+    /// The times of process `pid`; none if it has ended or the kernel does not count them.
+    pub(crate) fn of(pid: u32) -> Option<Self> {
+        let [ran, _] = scheduled(&pid.to_string())?;
+        let threads = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
+        let paths = threads.map(|it| format!("{pid}/task/{}", it.file_name().display()));
+        let starved = paths.filter_map(|path| Some(scheduled(&path)?[1])).sum();
+        Some(Self { ran, starved })
+    }
+
+    /// The activity of process `pid` since it had these times.
+    pub(crate) fn activity(self, pid: u32) -> Option<Activity> {
+        let now = Self::of(pid)?;
+        let state = match field(&pid.to_string(), "State")?.as_bytes().first()? {
+            b'R' => State::Ready,
+            b'T' | b't' => State::Stopped,
+            _ => State::Asleep,
+        };
+        let ran = now.ran.saturating_sub(self.ran);
+        Some(Activity { ran, starved: now.starved.saturating_sub(self.starved), state })
+    }
+}
