@@ -17,7 +17,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::claim;
+use crate::{claim, lock_holders::has_open};
 
 /// The name of a robot, and of its domain: 1 to 16 of a-z, 0-9 and `-`.
 ///
@@ -92,13 +92,13 @@ impl Domain {
         self.directory.join("lock")
     }
 
-    /// The process that claims the robot, or wrote its number in the supervisor's lock and holds it; none if there is neither.
+    /// The process that holds the supervisor's lock, or claims the robot; none if there is neither.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
         match self.supervision()? {
-            Supervision::Locked(lock) => match claim::holder(self)? {
-                // Another user has the name of the claim.
-                None => named_in(&lock).map(Some),
-                claimed => Ok(claimed),
+            // A frozen supervisor does not accept connections to its claim, so the lock's own text comes first.
+            Supervision::Locked(lock) => match named_in(&lock)?.filter(|pid| has_open(*pid, &lock)) {
+                None => claim::holder(self),
+                named => Ok(named),
             },
             Supervision::Claimed(process) => Ok(Some(process)),
             Supervision::None => Ok(None),
@@ -281,12 +281,11 @@ fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
     found.cloned().unwrap_or_default()
 }
 
-/// The process that wrote its number in `lock`.
-fn named_in(mut lock: &File) -> io::Result<u32> {
+/// The process that wrote its number in `lock`. A container may have another number for it.
+fn named_in(mut lock: &File) -> io::Result<Option<u32>> {
     let mut named = String::new();
     lock.read_to_string(&mut named)?;
-    let unnamed = || io::Error::other("nobody says which process holds the supervisor's lock");
-    named.trim().parse().map_err(|_| unnamed())
+    Ok(named.trim().parse().ok())
 }
 
 #[cfg(test)]

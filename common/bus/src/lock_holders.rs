@@ -22,6 +22,12 @@ pub fn holders(file: &File) -> io::Result<Vec<u32>> {
     Ok(pids.filter(|pid| descriptors(*pid, &file).is_ok_and(|mut all| all.any(locks))).collect())
 }
 
+/// Whether process `pid` has `file` open; false if it has ended or belongs to another user.
+pub(crate) fn has_open(pid: u32, file: &File) -> bool {
+    let opened = file.metadata().and_then(|file| Ok(descriptors(pid, &file)?.next().is_some()));
+    opened.unwrap_or(false)
+}
+
 /// The descriptors of `pid` that are open on `file`, as their entries in `/proc`.
 fn descriptors(pid: u32, file: &Metadata) -> io::Result<impl Iterator<Item = PathBuf>> {
     let opened = fs::read_dir(format!("/proc/{pid}/fd"))?.flatten().map(|entry| entry.path());
