@@ -96,7 +96,8 @@ impl Domain {
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
         match self.supervision()? {
             // A frozen supervisor does not accept connections to its claim, so the lock's own text comes first.
-            Supervision::Locked(lock) => match named_in(&lock)?.filter(|pid| has_open(*pid, &lock)) {
+            Supervision::Locked(lock) => match named_in(&lock)?.filter(|pid| has_open(*pid, &lock))
+            {
                 None => claim::holder(self),
                 named => Ok(named),
             },

@@ -30,7 +30,8 @@ pub struct Stage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Deadlines {
     pub startup: Duration,
-    /// The longest time from beat to beat. Beats come every 150 ms, or with a tick.
+    /// The longest time from beat to beat. Beats come every 150 ms, or with a tick. Time in which the stage waits for a processor does
+    /// not count, and a stage that sleeps has four times as long: see [`Activity`](crate::activity::Activity).
     pub heartbeat: Duration,
     /// The longest time from a tick on its inputs to its output of that tick, or of a later one.
     pub answers: Duration,
