@@ -322,6 +322,13 @@ def main(firsthand):
             heard.until("their states", lambda: of(heard.newest("navigate_to_pose/_action/status")) == [5, 6, 6])
             told = {(log.name, log.level[0] if isinstance(log.level, bytes) else log.level) for log in heard.messages["/rosout"]}
             assert told >= {("supervisor", 20), ("failsafe", 40)}, told
+            # The client of a goal that ends while the bridge is frozen has its result afterwards.
+            go(2.6, 0.6)
+            heard.until("its path", lambda: is_at(heard, 2.6, 0.6))
+            bridged.send_signal(signal.SIGSTOP)
+            subprocess.run([firsthand, "goto", "--robot", ROBOT, "3", "-0.5"], check=True, capture_output=True)
+            bridged.send_signal(signal.SIGCONT)
+            assert result()[0] == TaskResult.FAILED
             # The client of a goal that ends while there is no bridge has its result from the next one.
             go(3.0, 0.5)
             heard.until("its path", lambda: is_at(heard, 3.0, 0.5))

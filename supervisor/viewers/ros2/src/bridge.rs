@@ -44,8 +44,6 @@ const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// Transforms of other nodes that are older are of no use.
 const OLD_AFTER: Duration = Duration::from_secs(1);
-/// The time within which clients know the writers of a bridge that starts.
-const KNOWN_AFTER: Duration = Duration::from_secs(2);
 /// The file of the robot that has the goals of the action with the directory of their run.
 const GOALS: &str = "ros2-goals.json";
 /// The most bytes of results of targets that are read for goals of an earlier bridge.
@@ -95,8 +93,6 @@ struct Bridge {
     run: Option<(PathBuf, Results)>,
     stored: String,
     goals_file: PathBuf,
-    /// Clients do not know the writers of this bridge before.
-    answers_from: Instant,
     feedback_at: Instant,
     /// The number of stops that were asked for since the robot was ordered to stand for a canceled goal, that order included. None if the
     /// robot does not stand for one.
@@ -119,7 +115,6 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
         run: None,
         stored: String::new(),
         goals_file: PathBuf::new(),
-        answers_from: Instant::now() + KNOWN_AFTER,
         feedback_at: Instant::now(),
         stands_for_cancel: None,
         told_at: None,
@@ -419,7 +414,7 @@ impl Bridge {
         if let Some(status) = server.goals.take_status() {
             node.publish_status(0, status);
         }
-        if Instant::now() >= self.answers_from {
+        if node.is_known() {
             for (request, id) in server.answerable() {
                 let result = server.result(id).unwrap_or_default();
                 node.reply(0, Call::GetResult, &request, &result);

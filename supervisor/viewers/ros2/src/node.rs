@@ -1,6 +1,11 @@
 //! A node in DDS: readers and writers of topics, servers of actions, its parameters, and what `ros2 node list` shows of them.
 
-use std::{collections::BTreeMap, io, net::Ipv4Addr};
+use std::{
+    collections::BTreeMap,
+    io,
+    net::Ipv4Addr,
+    time::{Duration, Instant},
+};
 
 use ros2::{
     cdr,
@@ -12,6 +17,8 @@ use crate::parameters::{self, Parameter, SERVICES, Service};
 
 /// The most messages of a topic that wait for a slow reader, or for the node.
 const DEPTH: u16 = 10;
+/// The time within which clients discover the writers of a node that joins. A reply to a client that does not know its writer is lost.
+const KNOWN_AFTER: Duration = Duration::from_secs(2);
 /// The most messages of a topic that are taken at a time.
 const AT_A_TIME: usize = 16;
 
@@ -49,6 +56,7 @@ pub struct Node<Id> {
     of_parameters: Vec<(Service, Reader, Writer)>,
     /// The list of the participant's readers and writers, for other nodes.
     entities: Writer,
+    joined: Instant,
     pub participant: Participant,
 }
 
@@ -73,6 +81,7 @@ impl<Id: Copy + Ord> Node<Id> {
             parameters,
             of_parameters: Vec::new(),
             entities: participant.writer(&entities, LATCHED)?,
+            joined: Instant::now(),
             participant,
         };
         for (service, part, kind) in SERVICES {
@@ -82,6 +91,11 @@ impl<Id: Copy + Ord> Node<Id> {
             node.of_parameters.push((service, requests, replies));
         }
         Ok(node)
+    }
+
+    /// Whether clients that waited before the node joined have discovered its writers.
+    pub fn is_known(&self) -> bool {
+        self.joined.elapsed() >= KNOWN_AFTER
     }
 
     /// The name from the root of one that is below the namespace unless it begins with a slash.
