@@ -37,28 +37,45 @@ impl Frames {
         Ok(())
     }
 
-    /// The pose of `frame` in `root`, from transforms that are not older than `since`. The error says what is missing.
+    /// Returns the pose of `frame` in `root`, by way of the frame that both are below, from transforms that are not older than `since`.
+    /// The error says what is missing.
     pub fn find(
         &self,
         frame: &str,
         root: &str,
         since: Option<Instant>,
     ) -> Result<DAffine2, String> {
-        let (mut at, mut pose) = (name(frame), DAffine2::IDENTITY);
-        for _ in 0..=MOST_FRAMES {
-            if at == name(root) {
-                return Ok(pose);
+        let [(ends, of_frames), (also_ends, of_roots)] =
+            [frame, root].map(|it| self.climb(it, since));
+        let meet = of_frames.iter().find_map(|(common, pose)| {
+            let (_, of_root) = of_roots.iter().find(|(other, _)| other == common)?;
+            Some(of_root.inverse() * *pose)
+        });
+        meet.ok_or_else(|| {
+            format!("no transforms join {frame:?} and {root:?}: {ends}, {also_ends}")
+        })
+    }
+
+    /// Returns `frame` and those above it, with the pose of `frame` in each, and why there are no more.
+    fn climb<'a>(
+        &'a self,
+        frame: &'a str,
+        since: Option<Instant>,
+    ) -> (String, Vec<(&'a str, DAffine2)>) {
+        let mut passed = vec![(name(frame), DAffine2::IDENTITY)];
+        let mut last = passed[0];
+        while let Some(place) = self.0.get(last.0) {
+            let Place { parent, pose, heard } = place;
+            if heard.is_some_and(|heard| Some(heard) < since) {
+                return (format!("that from {:?} to {parent:?} is old", last.0), passed);
             }
-            let Some(place) = self.0.get(at) else {
-                return Err(format!("no transform from {at:?} towards {root:?} was published"));
-            };
-            if place.heard.is_some_and(|heard| Some(heard) < since) {
-                return Err(format!("the transform from {at:?} to {:?} is old", place.parent));
+            if passed.len() > MOST_FRAMES {
+                return (format!("those from {frame:?} lead in a circle"), passed);
             }
-            pose = place.pose * pose;
-            at = &place.parent;
+            last = (parent, *pose * last.1);
+            passed.push(last);
         }
-        Err(format!("the transforms from {frame:?} lead in a circle"))
+        (format!("none leads on from {:?}", last.0), passed)
     }
 }
 

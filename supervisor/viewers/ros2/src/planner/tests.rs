@@ -294,7 +294,7 @@ fn transforms(of: &[(&str, &str, Pose)]) -> Vec<u8> {
 }
 
 #[test]
-fn the_pose_of_the_robot_is_that_of_its_frame_by_way_of_odometry_unless_one_is_old_or_missing() {
+fn a_frame_is_found_in_another_by_way_of_the_one_above_both_unless_a_transform_is_old_or_missing() {
     let mut frames = Frames::default();
     let now = Instant::now();
     let find = |frames: &Frames, frame, since| frames.find(frame, "map", since);
@@ -308,6 +308,11 @@ fn the_pose_of_the_robot_is_that_of_its_frame_by_way_of_odometry_unless_one_is_o
     let later = now + Duration::from_secs(1);
     assert!(find(&frames, "base_link", Some(later)).unwrap_err().contains("old"));
     assert!(find(&frames, "odom", Some(later)).is_ok(), "it stays");
+    let down = frames.find("map", "odom", None).unwrap();
+    assert!(down.transform_point2(DVec2::new(1.0, 4.0)).distance(DVec2::new(2.0, 0.0)) < 1e-12);
+    frames.take(&transforms(&[("map", "mast", [1.0, 0.0, 0.0])]), None).unwrap();
+    let aside = frames.find("mast", "odom", None).unwrap();
+    assert!(aside.translation.distance(DVec2::new(-2.0, 0.0)) < 1e-12);
     frames.take(&transforms(&[("a", "b", [0.0; 3]), ("b", "a", [0.0; 3])]), None).unwrap();
     assert!(find(&frames, "a", None).unwrap_err().contains("circle"));
 }
