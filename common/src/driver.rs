@@ -9,8 +9,8 @@ use std::{fmt, time::Duration};
 
 use crate::mission::Sensor;
 use crate::samples::{
-    ComplaintSample, CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus, SurroundingsSample,
-    Sweep, WheelSample, name, words,
+    ComplaintSample, CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus,
+    SurroundingsSample, Sweep, WheelSample, name, words,
 };
 
 /// The protocol of one device. A sensor needs no more than this.

@@ -25,10 +25,7 @@ use super::{
     Hurry, MOST_CORNERS, MOST_TARGETS, MOST_ZONES, Method, Mission, Perimeter, Sensors, Waypoint,
     error::MissionError,
 };
-use crate::{
-    geometry::Zone,
-    grid::MIN_CELLS,
-};
+use crate::{geometry::Zone, grid::MIN_CELLS};
 
 /// A mission is a page or two; a file without end is no mission.
 const MAX_BYTES: u64 = 8 << 20;

@@ -7,7 +7,8 @@ use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Base, Driver, Heard, LaserScan, Memory, Motion, Refusal, StopMethod, Turn, WireTally, beam, gyro,
+        Base, Driver, Heard, LaserScan, Memory, Motion, Refusal, StopMethod, Turn, WireTally, beam,
+        gyro,
         odometry::{Odometry, motion, twist, wheel_speeds},
         range_reading,
     },
@@ -125,7 +126,10 @@ impl Json {
                 Refusal {
                     input: format!("ranges.{name}"),
                     what: format!("no sensor is called {name:?}"),
-                    remedy: format!("{} are; rename it there, or in robot.sensor", names.join(", ")),
+                    remedy: format!(
+                        "{} are; rename it there, or in robot.sensor",
+                        names.join(", ")
+                    ),
                 }
             })?;
             Ok(range_reading(row, &self.table[row], *range))
@@ -296,7 +300,10 @@ mod tests {
         ] {
             let heard = heard(&mut driver(), said);
             assert!(!heard.anything && heard.motion.is_none(), "{said}");
-            assert!(heard.refused.is_some_and(|refused| refused.to_string().contains(why)), "{said}");
+            assert!(
+                heard.refused.is_some_and(|refused| refused.to_string().contains(why)),
+                "{said}"
+            );
         }
     }
 
@@ -443,7 +450,8 @@ mod tests {
         let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
         let said = r#"{"touched":{"bumper-right":true,"cliff-left":false}}"#;
         assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
-        let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#).refused.unwrap().to_string();
+        let refused =
+            heard(&mut driver, r#"{"touched":{"nose":true}}"#).refused.unwrap().to_string();
         assert!(refused.contains("no row of robot.touch is called \"nose\""), "{refused}");
     }
 

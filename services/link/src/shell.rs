@@ -16,15 +16,15 @@ use common::{
     latency::Histogram,
     readers,
     samples::{
-        Action, Cause, CommandSample, ComplaintSample, DirectiveSample, HoldReason, LinkSample, Order,
-        TickLimitSample,
+        Action, Cause, CommandSample, ComplaintSample, DirectiveSample, HoldReason, LinkSample,
+        Order, TickLimitSample,
     },
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
     stop_socket::{Identity, OwedStop, Request, StopMark, StopSocket},
     topics::{
-        BASE_RESPONSE, COMMAND, COMPLAINTS, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER,
-        RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
+        BASE_RESPONSE, COMMAND, COMPLAINTS, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK,
+        POWER, RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
     },
     wiring::{Persists, Topics},
 };

@@ -109,7 +109,8 @@ fn a_message_that_ends_anywhere_is_refused_and_none_makes_the_driver_panic_or_al
         for length in 0..payload.len() {
             let heard = said(&mut driver, row, &payload[..length]);
             assert!(
-                length >= needed || heard.refused.is_some_and(|why| why.to_string().contains("ends early"))
+                length >= needed
+                    || heard.refused.is_some_and(|why| why.to_string().contains("ends early"))
             );
         }
         for at in 0..payload.len().min(80) {
@@ -267,7 +268,10 @@ fn a_scan_without_a_plausible_stamp_counts_as_taken_at_the_tick_and_the_log_says
 fn a_scan_whose_beams_go_back_in_time_or_take_longer_than_a_laser_does_is_refused() {
     for beam_s in [-0.0005, f32::NAN, f32::INFINITY, 0.1] {
         let heard = said(&mut driver(""), LASER, &scan_at(5000, beam_s, 0.0, 0.0174533));
-        assert!(heard.refused.is_some_and(|why| why.to_string().contains("time_increment")), "{beam_s}");
+        assert!(
+            heard.refused.is_some_and(|why| why.to_string().contains("time_increment")),
+            "{beam_s}"
+        );
     }
 }
 
@@ -455,7 +459,8 @@ fn jump(after_ms: u32, pose: [f64; 3]) -> (bool, [i32; 2]) {
     };
     let before = counts(&said(&mut driver, ODOM, &odometry_of(1000, [1.0, 0.5, 0.3])));
     let heard = said(&mut driver, ODOM, &odometry_of(1000 + after_ms, pose));
-    let refused = heard.refused.clone().is_some_and(|why| why.to_string().contains("odometry that jumps to"));
+    let refused =
+        heard.refused.clone().is_some_and(|why| why.to_string().contains("odometry that jumps to"));
     assert_eq!((heard.anything, refused), (true, heard.jumped), "{heard:?}");
     let after = counts(&heard);
     // The next pose continues from this one.

@@ -128,7 +128,9 @@ fn the_greeting_stops_asks_for_health_and_scans_and_an_error_of_health_is_named(
     let healthy = driver.hear(&Answer::Health { status: 0, code: 0 }.encode());
     assert_eq!(healthy.refused, None);
     let ill = driver.hear(&Answer::Health { status: 2, code: 0x8002 }.encode());
-    assert!(ill.refused.is_some_and(|why| why.to_string().contains("\"laser\"") && why.to_string().contains("0x8002")));
+    assert!(ill.refused.is_some_and(
+        |why| why.to_string().contains("\"laser\"") && why.to_string().contains("0x8002")
+    ));
 }
 
 #[test]

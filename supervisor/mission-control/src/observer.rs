@@ -11,8 +11,8 @@ use common::{
     mission::Mission,
     roster,
     samples::{
-        CommandSample, CommandState, ComplaintSample, ContactSample, FieldCell, FieldHeader, GridHeader,
-        GuidanceSample, HealthSample, LinkSample, PoseSample, Rest, name_str,
+        CommandSample, CommandState, ComplaintSample, ContactSample, FieldCell, FieldHeader,
+        GridHeader, GuidanceSample, HealthSample, LinkSample, PoseSample, Rest, name_str,
     },
     topics,
     waiter::Waiter,
@@ -200,8 +200,7 @@ fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
 impl Record {
     /// The complaint of a stage that still lasts, in words.
     pub(crate) fn complaint(&self) -> Option<String> {
-        let (complaint, _) =
-            self.complaint.filter(|(_, read)| read.elapsed() < COMPLAINT_LASTS)?;
+        let (complaint, _) = self.complaint.filter(|(_, read)| read.elapsed() < COMPLAINT_LASTS)?;
         Some(format!("{}: {}", name_str(&complaint.stage), complaint.refusal()))
     }
 

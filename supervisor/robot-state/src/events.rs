@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 
 use common::samples::{
-    Cause, CommandSample, CommandState, ComplaintSample, DeathSample, DirectiveSample, FaultKind, FaultSample,
-    FollowState, FollowingSample, HoldReason, LinkSample, Order, RequestAnswer, RequestKind,
-    RequestSample, RosterEntry, StageState, StallSample, TargetSample, name_str,
+    Cause, CommandSample, CommandState, ComplaintSample, DeathSample, DirectiveSample, FaultKind,
+    FaultSample, FollowState, FollowingSample, HoldReason, LinkSample, Order, RequestAnswer,
+    RequestKind, RequestSample, RosterEntry, StageState, StallSample, TargetSample, name_str,
 };
 use serde::Serialize;
 

@@ -4,10 +4,10 @@ use common::{
     bus::{AnyReader, Bus, BusError, decode_sample, decode_slice},
     clock::MissionTime,
     samples::{
-        CommandSample, ComplaintSample, DeathSample, DirectiveSample, FaultSample, FieldCell, FieldHeader,
-        FollowingSample, GridHeader, GuidanceSample, LinkSample, MirrorSample, PoseSample,
-        PowerSample, RangeReading, RangesHeader, RequestSample, RosterEntry, RosterHeader,
-        ScanHeader, StallSample, TargetSample, WheelSample,
+        CommandSample, ComplaintSample, DeathSample, DirectiveSample, FaultSample, FieldCell,
+        FieldHeader, FollowingSample, GridHeader, GuidanceSample, LinkSample, MirrorSample,
+        PoseSample, PowerSample, RangeReading, RangesHeader, RequestSample, RosterEntry,
+        RosterHeader, ScanHeader, StallSample, TargetSample, WheelSample,
     },
     topics::{self, AnyTopic, OPERATOR, Spec},
 };

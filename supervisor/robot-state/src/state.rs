@@ -6,9 +6,10 @@ use common::{
     grid::{Applied, Replica},
     mission::Mission,
     samples::{
-        CommandSample, ComplaintSample, DeathSample, FieldCell, FieldHeader, FollowState, FollowingSample,
-        GridHeader, GuidanceSample, GuidanceStatus, HoldReason, LinkSample, MirrorSample,
-        PoseSample, PowerSample, RosterEntry, RosterHeader, TargetPoint, TargetSample, name_str,
+        CommandSample, ComplaintSample, DeathSample, FieldCell, FieldHeader, FollowState,
+        FollowingSample, GridHeader, GuidanceSample, GuidanceStatus, HoldReason, LinkSample,
+        MirrorSample, PoseSample, PowerSample, RosterEntry, RosterHeader, TargetPoint,
+        TargetSample, name_str,
     },
 };
 use glam::DVec2;

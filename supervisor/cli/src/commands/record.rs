@@ -88,7 +88,9 @@ fn topic(name: &str) -> Result<&'static dyn AnyTopic, String> {
 /// Makes and removes a file beside `out`: the recording itself begins with the robot's run, which may come late.
 fn refuse_unwritable(out: &Path) -> Result<(), FileError> {
     let probe = out.with_extension(format!("{}.tmp", std::process::id()));
-    File::create_new(&probe).and_then(|_| fs::remove_file(&probe)).map_err(FileError::of("write", out))
+    File::create_new(&probe)
+        .and_then(|_| fs::remove_file(&probe))
+        .map_err(FileError::of("write", out))
 }
 
 pub fn main(arguments: &Arguments) -> Result {

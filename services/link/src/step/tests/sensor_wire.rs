@@ -12,7 +12,7 @@ impl Driver for Laser {
     fn hear(&mut self, bytes: &[u8]) -> Heard {
         let mut heard = Heard { anything: true, ..Heard::default() };
         match bytes {
-            [0] => heard.refused = Some("no scan".to_owned()),
+            [0] => heard.refused = Some("no scan".into()),
             bytes => heard.scans.extend(bytes.iter().map(|decimetres| LaserScan {
                 beams: vec![f32::from(*decimetres) / 10.0; 360],
                 ..LaserScan::default()
