@@ -22,7 +22,7 @@ fn told(said: &[Option<f64>]) -> (Vec<(u64, f64)>, Option<String>) {
         let rounded = |turn: f64| (turn * 1e6).round() / 1e6;
         turns.extend(driver.turn_for_tick().map(|it| (it.sequence, rounded(it.turn_rad))));
     }
-    (turns, refused)
+    (turns, refused.map(|why| why.to_string()))
 }
 
 #[test]
