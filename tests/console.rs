@@ -90,6 +90,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
             "base_response",
             "tick_limit",
             "contact",
+            "complaints",
             "scan",
             "scan_fix",
             "fix",

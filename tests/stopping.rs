@@ -173,6 +173,7 @@ fn a_robot_that_gets_no_stop_has_an_outcome_of_its_own_and_a_guard_that_stops_it
         find(status, "link")["state"] == "running"
     });
     assert_eq!(status["link"]["at_rest"], false, "{status}");
+    run.keeps_guard = true;
     run.signal(Signal::TERM);
     let (code, summary) = run.finish();
     assert_eq!(summary["outcome"], "could_not_be_stopped", "{summary}");

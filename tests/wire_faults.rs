@@ -344,7 +344,7 @@ fn with_one_dead_infrared_ranger_before_a_sonar_the_robot_says_so_and_arrives() 
     let mut run = Run::start("fi-ranger", "open-room", &quick);
     let status = run.wait_until("it is told", cause_is("infrared ranger silent"));
     assert_eq!(status["order"], "driving", "{status}");
-    assert!(run.link_logged(&["infrared-1"]));
+    wait_until("the log names it", || run.link_logged(&["infrared-1"]));
     run.arrives();
 }
 

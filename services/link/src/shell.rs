@@ -16,8 +16,8 @@ use common::{
     latency::Histogram,
     readers,
     samples::{
-        Action, Cause, CommandSample, ComplaintSample, DirectiveSample, HoldReason, LinkSample,
-        Order, TickLimitSample,
+        Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
+        TickLimitSample,
     },
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
@@ -431,7 +431,6 @@ impl Shell {
                 Effect::FoundResponse(words) => tracing::warn!("{words}"),
                 Effect::Refused(why) => {
                     tracing::warn!("the robot says what is not in its protocol: {why}");
-                    self.runner.out.publish(&COMPLAINTS, ComplaintSample::of(Self::NAME, &why))?;
                 }
                 Effect::ClockRate(rate) => {
                     let pace = match self.clock {

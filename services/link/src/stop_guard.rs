@@ -110,10 +110,13 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     }
     if !is_succeeded() {
         let _ = guard.mark.set(false, directory);
-        let _ = fs::remove_file(domain.guard_socket());
-        // It stays where a supervisor has files in it.
-        let _ = fs::remove_dir(domain.directory());
     }
+    // A newer guard has a socket of its own.
+    if Identity::now(&domain.guard_socket()) == own {
+        let _ = fs::remove_file(domain.guard_socket());
+    }
+    // The directory stays while another process has files in it.
+    let _ = fs::remove_dir(domain.directory());
     Ok(())
 }
 

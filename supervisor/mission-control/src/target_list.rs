@@ -177,8 +177,8 @@ impl TargetList {
     pub(crate) fn outcome_while_waiting(&self) -> Option<Outcome> {
         let tried = |it: &&Stored| it.result.outcome != TargetOutcome::NotTried;
         // A hand's target, which is the current one then, has no result.
-        let newest = self.results.iter().rfind(tried).map(|it| it.result);
-        let newest = newest.filter(|it| it.number == self.number).map(|it| it.outcome);
+        let newest = self.results.iter().rfind(tried).filter(|_| !self.by_hand);
+        let newest = newest.map(|it| it.result.outcome);
         (self.waits || self.by_hand).then_some(match newest {
             Some(TargetOutcome::Unreachable) => Outcome::Unreachable,
             Some(TargetOutcome::TimedOut) => Outcome::Timeout,

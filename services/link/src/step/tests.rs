@@ -132,7 +132,9 @@ fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
     let first = sent(&link.at(Event::Quiet, 0));
     assert_eq!((first.len(), &first[0]), (1 + STOPS as usize, &ping), "{first:?}");
     assert_eq!(sent(&link.at(Event::Quiet, 100 * MS)), []);
-    assert_eq!(sent(&link.at(Event::Quiet, 200 * MS)), [ping]);
+    let again = sent(&link.at(Event::Quiet, 200 * MS));
+    // A robot that is not heard may hear.
+    assert_eq!((again.len(), &again[0]), (2, &ping), "{again:?}");
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 201 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     let setup = sent(&effects);
