@@ -204,11 +204,6 @@ pub fn directory_of(robot: &str) -> TempDir {
 /// Assert that no process, no shared memory and no file of `robot` is left.
 #[track_caller]
 pub fn assert_nothing_left(robot: &str) {
-    let domain = domain(robot);
-    let shared = shared_memory(&domain.shared_memory_prefix());
-    assert!(shared.is_empty(), "left in shared memory: {shared:?}");
-    let directory = domain.directory();
-    assert!(!directory.exists(), "{} is left", directory.display());
     // A stop guard ends after its link, when its robot rests or is gone; a recorder whose supervisor was killed first writes its last
     // chunk.
     wait_until("no stop guard and no recorder is left", || {
@@ -216,6 +211,11 @@ pub fn assert_nothing_left(robot: &str) {
             |line: &String| line.contains("stop-guard") || line.contains("firsthand record");
         !processes_of(robot).iter().any(lasts)
     });
+    let domain = domain(robot);
+    let shared = shared_memory(&domain.shared_memory_prefix());
+    assert!(shared.is_empty(), "left in shared memory: {shared:?}");
+    let directory = domain.directory();
+    assert!(!directory.exists(), "{} is left", directory.display());
     assert_eq!(processes_of(robot), Vec::<String>::new());
 }
 

@@ -4,7 +4,7 @@ use std::{
     fs::{self, File, Metadata},
     io,
     os::unix::fs::MetadataExt as _,
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 use rustix::{
@@ -19,7 +19,9 @@ pub fn holders(file: &File) -> io::Result<Vec<u32>> {
     let processes = fs::read_dir("/proc")?.flatten();
     let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
     // A process of another user does not show its descriptors, and one that has ended has none.
-    Ok(pids.filter(|pid| descriptors(*pid, &file).is_ok_and(|mut all| all.any(locks))).collect())
+    Ok(pids
+        .filter(|pid| descriptors(*pid, &file).is_ok_and(|mut all| all.any(|it| locks(&it))))
+        .collect())
 }
 
 /// Whether process `pid` has `file` open; false if it has ended or belongs to another user.
@@ -37,7 +39,7 @@ fn descriptors(pid: u32, file: &Metadata) -> io::Result<impl Iterator<Item = Pat
 }
 
 /// Whether the descriptor holds a lock.
-fn locks(descriptor: PathBuf) -> bool {
+fn locks(descriptor: &Path) -> bool {
     let facts = fs::read_to_string(descriptor.to_string_lossy().replace("/fd/", "/fdinfo/"));
     facts.is_ok_and(|facts| facts.contains("FLOCK"))
 }

@@ -76,7 +76,7 @@ pub fn spawn(
         .arg(&link.0)
         .stdin(ended)
         .stdout(Stdio::null())
-        .stderr(append(&directory.join("link.log"))?)
+        .stderr(append(directory.join("link.log"))?)
         .spawn()
 }
 

@@ -197,7 +197,11 @@ pub fn sign_off(robot: &RobotName) -> Result<(), OperatorError> {
     if let Some(guard) = stop_socket::Operator::connect(&domain.guard_socket()).map_err(system)? {
         return guard.send(Request::SignOff).map_err(system);
     }
-    OwedStop::of(domain).set(false, Path::new("")).map_err(system)
+    OwedStop::of(domain.clone()).set(false, Path::new("")).map_err(system)?;
+    // A guard that was killed left them.
+    let _ = fs::remove_file(domain.guard_socket());
+    let _ = fs::remove_dir(domain.directory());
+    Ok(())
 }
 
 fn rests_by(link: &stop_socket::Operator) -> bool {

@@ -16,7 +16,7 @@ use common::{
     topics,
 };
 use console::{missions, output::write_stderr};
-use mission_control::{outcome::RIGHT_PLACE_M, simulator::Simulator};
+use mission_control::{operator::sign_off, outcome::RIGHT_PLACE_M, simulator::Simulator};
 use processes::process::Process;
 use rustix::process::Signal;
 
@@ -101,6 +101,8 @@ fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<
     // A frozen supervisor does not end in order.
     run.process.signal(Signal::CONT);
     run.process.end(END_GRACE);
+    // The robot ends here, so nobody will see it at rest.
+    sign_off(&asked.robot).or_cannot("sign the robot off")?;
     entry
 }
 
