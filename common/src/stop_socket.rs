@@ -56,13 +56,15 @@ pub struct StopSocket {
     path: PathBuf,
     socket: UnixDatagram,
     asking: Vec<SocketAddr>,
+    /// Operators who look at what a stop guard sees, and have no answer yet.
+    looking: Vec<SocketAddr>,
 }
 
 impl StopSocket {
     /// Binds `path` in place of an earlier process's socket. Fails when the system refuses.
     pub fn bind(path: PathBuf) -> io::Result<Self> {
         remove(&path)?;
-        Ok(Self { socket: bind(&path)?, path, asking: Vec::new() })
+        Ok(Self { socket: bind(&path)?, path, asking: Vec::new(), looking: Vec::new() })
     }
 
     pub fn take(&mut self) -> Option<Request> {
@@ -84,8 +86,13 @@ impl StopSocket {
                 _ => continue,
             };
             self.answer(&from, &[HEARD]);
-            if matches!(request, Request::Stop | Request::Look) && self.asking.len() < MOST_ASKING {
-                self.asking.push(from);
+            let waiting = match request {
+                Request::Stop => &mut self.asking,
+                Request::Look => &mut self.looking,
+                Request::Resume | Request::SignOff => return Some(request),
+            };
+            if waiting.len() < MOST_ASKING {
+                waiting.push(from);
             }
             return Some(request);
         }
@@ -97,10 +104,10 @@ impl StopSocket {
         }
     }
 
-    /// Answers everybody who asked: `silent_s` are the seconds without a motor frame.
-    pub fn tell(&self, rest: Rest, silent_s: u8) {
-        for operator in &self.asking {
-            self.answer(operator, &[rest as u8, silent_s]);
+    /// Answers everybody who looks: `silent_s` are the seconds without a motor frame.
+    pub fn tell(&mut self, rest: Rest, silent_s: u8) {
+        for operator in std::mem::take(&mut self.looking) {
+            self.answer(&operator, &[rest as u8, silent_s]);
         }
     }
 
@@ -274,5 +281,27 @@ mod tests {
             assert_eq!(operator.answer(Duration::ZERO).unwrap(), Some(Answer::Heard));
         }
         fs::remove_dir_all(domain.directory()).unwrap();
+    }
+
+    #[test]
+    fn operators_who_look_take_no_place_from_one_who_waits_for_rest() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("guard");
+        let mut guard = StopSocket::bind(path.clone()).unwrap();
+        let ask = |guard: &mut StopSocket, request| {
+            let operator = Operator::connect(&path).unwrap().unwrap();
+            operator.send(request).unwrap();
+            assert_eq!(guard.take(), Some(request));
+            assert_eq!(operator.answer(Duration::ZERO).unwrap(), Some(Answer::Heard));
+            operator
+        };
+        for _ in 0..=MOST_ASKING {
+            let looks = ask(&mut guard, Request::Look);
+            guard.tell(Rest::Moving, 1);
+            assert_eq!(looks.answer(Duration::ZERO).unwrap(), Some(Answer::Sees(Rest::Moving, 1)));
+        }
+        let stops = ask(&mut guard, Request::Stop);
+        guard.tell_at_rest();
+        assert_eq!(stops.answer(Duration::ZERO).unwrap(), Some(Answer::AtRest));
     }
 }
