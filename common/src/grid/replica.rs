@@ -61,7 +61,6 @@ impl<T: Copy + PartialEq> Replica<T> {
         let follows =
             if window.area() == 0 { version == held } else { held.checked_add(1) == Some(version) };
         if held_frame != frame || !follows {
-            self.state = None;
             return Applied::Missed;
         }
         for (offset, row) in cells.chunks_exact(window.width.max(1) as usize).enumerate() {

@@ -105,6 +105,7 @@ impl Process for Shell {
         }
         while let Some(pose) = self.inputs.pose.next_sample()? {
             let tick = pose.stamp.tick;
+            let is_repeated = self.runner.out.at.tick == tick;
             self.runner.out.at = Progress::of(&pose.stamp);
             let (mapper, inputs) = (&self.runner.stage, &mut self.inputs);
             let ranges = self.ranges.take(tick, || {
@@ -137,6 +138,10 @@ impl Process for Shell {
             let target = self.inputs.target.next(tick)?.map(|sample| sample.target.position());
             let target = target.filter(|target| *target != self.runner.stage.target());
             self.step(Input::Tick(Tick { pose, ranges, scans, contact, target }))?;
+            // Its repeats may have pushed the window of this tick out of the planner's queue.
+            if is_repeated {
+                self.publish_again()?;
+            }
         }
         if let Some(DirectiveSample { epoch, .. }) = self.inputs.directive.newest()?
             && self.step(Input::Reset { epoch })?
