@@ -187,15 +187,14 @@ impl Robot {
         }
     }
 
-    /// A robot that would never rest is halted.
-    pub fn come_to_rest(&mut self) {
+    /// Moves on without frames, because no host listens, and calls `on_tick` at each tick. A robot that would never rest is halted.
+    pub fn come_to_rest(&mut self, mut on_tick: impl FnMut(&mut Self)) {
         let latest = self.time + COMES_TO_REST_S;
         while self.time < latest && self.is_moving() {
-            self.advance_to((self.time + STEP_S).min(latest));
+            self.advance_to_next_tick();
+            on_tick(self);
         }
         self.motors.iter_mut().for_each(Motor::halt);
-        // No frames are sent on the way, because no host listens.
-        self.tick = self.tick.max((self.time * self.rate_hz) as u64);
     }
 
     fn is_moving(&self) -> bool {

@@ -18,7 +18,7 @@ use common::{
     mission::Mission,
     poll, run,
 };
-use processes::{policy::STOP_GRACE, process::Process};
+use processes::process::Process;
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use thiserror::Error;
 
@@ -26,6 +26,8 @@ use crate::long_record;
 
 /// Beside 30 busy processes a core it takes seconds.
 const STARTUP: Duration = Duration::from_secs(30);
+/// A simulator comes to rest and tells the other robot of its world each tick until then, which takes seconds on a busy machine.
+const REST: Duration = Duration::from_secs(5);
 /// The greatest length of a line of ground truth, which has under 300 bytes; a longer one is an error.
 const LONGEST_LINE: usize = 64 * 1024;
 
@@ -149,7 +151,7 @@ impl Simulator {
 
     /// End the simulator. The ground truth stays.
     pub fn stop(&mut self) -> Result<(), SimulatorError> {
-        self.process.end(STOP_GRACE);
+        self.process.end(REST);
         self.truth.take()
     }
 }

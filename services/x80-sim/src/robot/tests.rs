@@ -390,7 +390,7 @@ fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_it
     }
     let driving = first.ground_truth();
     assert!(driving.v > 0.2, "{driving:?}");
-    first.come_to_rest();
+    first.come_to_rest(|_| ());
     let saved = first.saved_state();
     let mission = mission("simulation.realism = 'measured'");
     let mut next = Robot::restored(&mission, &saved);

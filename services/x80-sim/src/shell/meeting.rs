@@ -5,6 +5,7 @@
 //! the velocity that it told.
 
 use std::{
+    collections::VecDeque,
     fs::{self, DirBuilder},
     io::ErrorKind,
     os::{
@@ -12,6 +13,7 @@ use std::{
         unix::{fs::DirBuilderExt as _, net::UnixDatagram},
     },
     path::PathBuf,
+    thread,
     time::{Duration, Instant},
 };
 
@@ -97,9 +99,9 @@ pub(super) struct Meeting {
     /// This robot's, with the size of its body.
     own: Place,
     is_told: bool,
-    /// The other's at this robot's time or before it, and the one after.
+    /// The other's at this robot's time or before it, and those after.
     newest: Option<Place>,
-    next: Option<Place>,
+    later: VecDeque<Place>,
     /// It was waited for in vain.
     is_missed: bool,
     refused: u64,
@@ -145,7 +147,7 @@ impl Meeting {
             },
             is_told: false,
             newest: None,
-            next: None,
+            later: VecDeque::new(),
             is_missed: false,
             refused: 0,
         })
@@ -177,32 +179,29 @@ impl Meeting {
 
     fn knows(&self, now_s: f64) -> bool {
         let has = |place: &Place| place.ended || place.time_s > now_s - SAME_S;
-        self.next.is_some() || self.newest.as_ref().is_some_and(has)
+        !self.later.is_empty() || self.newest.as_ref().is_some_and(has)
     }
 
-    /// Takes what came, up to the first place that is later than `now_s`.
+    /// Takes what came. A place of a time after `now_s` waits until then.
     fn take(&mut self, now_s: f64) {
-        for _ in 0..MOST_AT_ONCE {
-            if self.next.as_ref().is_some_and(|next| self.waits && next.time_s > now_s + SAME_S) {
-                return;
-            }
-            if let Some(next) = self.next.take() {
-                self.is_missed &= !next.ended && next.time_s < now_s - SAME_S;
-                self.newest = Some(next);
-            }
-            let mut bytes = [0; LONGEST];
-            let Ok(length) = self.socket.recv(&mut bytes) else {
-                return;
-            };
-            self.next = bytes.get(..length).and_then(Place::parse);
-            // On a wall clock the two missions began at different times.
-            if let Some(next) = self.next.as_mut().filter(|_| !self.waits) {
-                next.time_s = now_s;
-            }
-            if self.next.is_none() {
+        let mut bytes = [0; LONGEST];
+        while self.later.len() < MOST_AT_ONCE
+            && let Ok(length) = self.socket.recv(&mut bytes)
+        {
+            let Some(mut place) = bytes.get(..length).and_then(Place::parse) else {
                 self.refused += 1;
                 tracing::warn!(refused = self.refused, "a datagram is not the place of a robot");
+                continue;
+            };
+            // On a wall clock the two missions began at different times.
+            if !self.waits {
+                place.time_s = now_s;
             }
+            self.later.push_back(place);
+        }
+        while let Some(place) = self.later.pop_front_if(|it| it.time_s <= now_s + SAME_S) {
+            self.is_missed &= !place.ended && place.time_s < now_s - SAME_S;
+            self.newest = Some(place);
         }
     }
 
@@ -222,7 +221,20 @@ impl Meeting {
 
     fn send(&mut self) {
         let bytes = serde_json::to_vec(&self.own).unwrap_or_default();
-        self.is_told = self.socket.send_to(&bytes, &self.other).is_ok();
+        let began = Instant::now();
+        self.is_told = loop {
+            match self.socket.send_to(&bytes, &self.other) {
+                // In lockstep no place may be lost, and the other takes some with each of its ticks.
+                Err(error) if error.kind() == ErrorKind::WouldBlock && self.waits => {
+                    if self.is_missed || began.elapsed() > PATIENCE {
+                        self.is_missed = true;
+                        break false;
+                    }
+                    thread::sleep(AGAIN);
+                }
+                sent => break sent.is_ok(),
+            }
+        };
     }
 }
 

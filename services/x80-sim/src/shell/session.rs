@@ -155,10 +155,15 @@ impl Session {
 
     /// The process ends, and with it all commands: the robot comes to rest.
     pub(super) fn end(mut self) -> Result {
-        self.robot.come_to_rest();
-        if let Some(meeting) = &mut self.meeting {
-            meeting.tell(&self.robot.ground_truth(), true);
-        }
+        // The other robot sees the same way to rest, however many commands came after the mission was decided.
+        let Self { robot, meeting, .. } = &mut self;
+        let mut tell = |robot: &mut Robot, ended| {
+            if let Some(meeting) = meeting {
+                meeting.tell(&robot.ground_truth(), ended);
+            }
+        };
+        robot.come_to_rest(|robot| tell(robot, false));
+        tell(robot, true);
         self.save()
     }
 

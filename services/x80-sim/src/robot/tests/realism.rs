@@ -174,7 +174,7 @@ fn a_resumed_robot_has_the_wheels_and_the_silences_it_had() {
     let mut first = robot(text);
     let had = curvature(&mut first);
     assert!(had.abs() > 0.01, "{had}");
-    first.come_to_rest();
+    first.come_to_rest(|_| ());
     let saved = first.saved_state();
     let mut resumed = Robot::restored(&mission(text), &saved);
     assert!((curvature(&mut resumed) - had).abs() < 1e-3);
