@@ -12,7 +12,7 @@ mod table;
 use std::{num::NonZero, path::PathBuf};
 
 use clap::Args;
-use common::clock::Pace;
+use common::{clock::Pace, mission::Odometry};
 use console::output::write_stderr;
 
 use crate::{
@@ -56,6 +56,17 @@ const FIRST_SEED: u64 = 1;
 /// The radio's outage except with laboratory realism. The paper's link fades; the paper gives no number.
 const OUTAGE: &str = "simulation.radio.outage_share=0.2";
 
+/// Mission files of the paper state ideal wheels; nobody has measured those of another realism.
+fn uncalibrated() -> [String; 3] {
+    let Odometry { diameter_ratio_sd, track_scale_sd, distance_scale_sd, .. } = Odometry::default();
+    [
+        ("diameter_ratio", diameter_ratio_sd),
+        ("track_scale", track_scale_sd),
+        ("distance_scale", distance_scale_sd),
+    ]
+    .map(|(of, sd)| format!("robot.odometry.{of}_sd={sd}"))
+}
+
 pub fn main(arguments: &Arguments) -> Result {
     let Arguments { seeds, realism, .. } = arguments;
     let chosen = table::named(&arguments.only)?;
@@ -65,6 +76,7 @@ pub fn main(arguments: &Arguments) -> Result {
         let mut set: Vec<_> = own.iter().map(|&text| text.to_owned()).collect();
         if realism != LABORATORY {
             set.extend([format!("simulation.realism='{realism}'"), OUTAGE.to_owned()]);
+            set.extend(uncalibrated());
         }
         let its = chosen.iter().filter(|it| it.is_run_by(method));
         let plan = Plan {
