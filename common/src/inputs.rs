@@ -9,7 +9,9 @@
 //! An entry is published before the first sample that follows from it. When a process is killed, only entries from which
 //! nothing followed can be missing.
 
-use serde::Serialize;
+use std::cell::RefCell;
+
+use serde::{Serialize, Serializer};
 
 use crate::{
     bus::{BusError, Writer},
@@ -82,6 +84,22 @@ impl InputLog {
     }
 }
 
+thread_local! {
+    /// Kept from one sample to the next.
+    static ENCODED: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+}
+
+fn serialize_encoded<S: Serializer>(
+    encode: impl FnOnce(&mut Vec<u8>),
+    to: S,
+) -> Result<S::Ok, S::Error> {
+    ENCODED.with_borrow_mut(|bytes| {
+        bytes.clear();
+        encode(bytes);
+        to.serialize_bytes(bytes)
+    })
+}
+
 /// Samples as fields of an input: `#[serde(with = "inputs::sample")]`.
 pub mod sample {
     use serde::{Deserializer, Serializer, de::Error as _};
@@ -89,9 +107,7 @@ pub mod sample {
     use crate::bus::{Layout, decode_sample, encode_sample};
 
     pub fn serialize<P: Layout, S: Serializer>(sample: &P, to: S) -> Result<S::Ok, S::Error> {
-        let mut bytes = Vec::with_capacity(size_of::<P>() + 8);
-        encode_sample(sample, &mut bytes);
-        to.serialize_bytes(&bytes)
+        super::serialize_encoded(|bytes| encode_sample(sample, bytes), to)
     }
 
     pub fn deserialize<'de, P: Layout, D: Deserializer<'de>>(from: D) -> Result<P, D::Error> {
@@ -112,9 +128,7 @@ pub mod slice {
         (header, slice): &(H, Cow<'_, [T]>),
         to: S,
     ) -> Result<S::Ok, S::Error> {
-        let mut bytes = Vec::with_capacity(size_of::<H>() + size_of_val(&**slice) + 16);
-        encode_slice(header, slice, &mut bytes);
-        to.serialize_bytes(&bytes)
+        super::serialize_encoded(|bytes| encode_slice(header, slice, bytes), to)
     }
 
     pub fn deserialize<'de, H, T, D>(from: D) -> Result<(H, Cow<'static, [T]>), D::Error>

@@ -5,7 +5,7 @@
 //! normal within a right angle of the motion. For each point of the way and each normal a tangent surface is supposed, and a reading
 //! searched that would have detected it. An infrared ranger detects it where its ray meets it, at any angle.
 
-use std::f64::consts::TAU;
+use std::{cell::RefCell, f64::consts::TAU};
 
 use common::samples::{ClearBeam, GridHeader};
 use glam::DVec2;
@@ -47,6 +47,8 @@ const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as
 pub(crate) struct UndetectedSurfaces {
     beams: BySector,
     rays: Vec<Beam>,
+    /// Those of the last question, whose memory the next one uses.
+    near: RefCell<Vec<Beam>>,
     reach: f64,
     /// A ray excludes a supposed surface no farther from the body's centre, metres.
     met_within: f64,
@@ -143,6 +145,7 @@ impl UndetectedSurfaces {
         Self {
             beams: BySector::new(belief.clear_beams(), place, ahead_m + reach),
             rays: belief.clear_rays().iter().map(Beam::from).collect(),
+            near: RefCell::default(),
             reach,
             met_within: reach.hypot(MET_WITHIN_M) + ROUNDING_M,
             normals: std::array::from_fn(|index| {
@@ -156,16 +159,18 @@ impl UndetectedSurfaces {
     }
 
     /// Unit vectors towards surfaces that a body at `at`, going along the unit vector `along`, could touch and no reading excludes.
-    pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> {
+    pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> + use<> {
         let heading = along.to_angle();
-        let near = self.rays.iter().filter_map(|ray| self.near(ray, at));
-        let mut rays: Vec<_> = near.collect();
+        let mut rays = self.near.borrow_mut();
+        rays.clear();
+        rays.extend(self.rays.iter().filter_map(|ray| self.near(ray, at)));
         rays.sort_unstable_by_key(|ray| ray.may_echo);
-        self.normals.iter().filter_map(move |(normal, angle)| {
+        let undetected = self.normals.map(|(normal, angle)| {
             let normal = normal.rotate(along);
             let beams = self.beams.around(sector_of(heading + angle));
             (!self.is_excluded(at, normal, &beams, &rays)).then_some(normal)
-        })
+        });
+        undetected.into_iter().flatten()
     }
 
     /// The ray may meet a surface that touches a body at `at`, near the body and not too far behind its end.

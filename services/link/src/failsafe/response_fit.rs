@@ -321,6 +321,7 @@ impl ResponseFit {
         let first = intervals.next()?.0;
         for (wheel, speed) in wheels.iter_mut().enumerate() {
             speed.go_on(self.commands.front()?.0.min(first));
+            speed.reserve(self.commands.len());
             self.commands.iter().for_each(|(at, counts)| speed.command(*at, counts[wheel]));
             speed.go_on(first);
         }

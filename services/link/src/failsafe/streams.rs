@@ -75,13 +75,13 @@ impl Streams {
         if self.silence.is_over(since, now_ns) {
             return Motor::Silent;
         }
-        let mut sorted: Vec<_> = self.intervals.iter().copied().collect();
+        let mut sorted = [Duration::ZERO; INTERVALS];
+        sorted.iter_mut().zip(&self.intervals).for_each(|(slot, interval)| *slot = *interval);
         sorted.sort_unstable();
-        match sorted.get(SHORT_ONES) {
-            Some(&interval) if sorted.len() == INTERVALS && interval > self.limit => {
-                Motor::Slow(1.0 / interval.as_secs_f64())
-            }
-            _ => Motor::Regular,
+        let interval = sorted[SHORT_ONES];
+        match self.intervals.len() == INTERVALS && interval > self.limit {
+            true => Motor::Slow(1.0 / interval.as_secs_f64()),
+            false => Motor::Regular,
         }
     }
 

@@ -98,8 +98,10 @@ impl Link {
 
     /// None for velocity 0, which is the first method and follows the last.
     pub(super) fn other_stop(&self) -> Option<StopMethod> {
+        // Mostly nothing is to be encoded.
+        let method = Some(self.monitors().stop.method()).filter(|method| *method > 0)?;
         let mut others = self.base.other_stops();
-        let method = self.monitors().stop.method() % (others.len() + 1);
+        let method = method % (others.len() + 1);
         method.checked_sub(1).map(|other| others.swap_remove(other))
     }
 
