@@ -150,11 +150,6 @@ impl ModelledSpeed {
         Self { delay_s, most_change, pending, target: 0.0, speed: 0.0, at_s: f64::NEG_INFINITY }
     }
 
-    /// Keep room for so many commands more.
-    pub fn reserve(&mut self, commands: usize) {
-        self.pending.reserve(commands.min(MOST_PENDING));
-    }
-
     pub fn command(&mut self, at_s: f64, speed: f64) {
         if self.pending.len() == MOST_PENDING
             && let Some((_, oldest)) = self.pending.pop_front()

@@ -9,6 +9,8 @@ use common::{
     mission::{Mission, ModelledSpeed},
 };
 
+use crate::failsafe::modelled_wheels::{Axle, ModelledWheels};
+
 /// Agreeing commands until a wheel's speed is steady: its delay and lag take 0.15 s, a period at 7 Hz.
 const STEADY: usize = 3;
 /// Commands agree if the least is at least this share of the greatest.
@@ -23,8 +25,10 @@ const LEAST_SHARE: f64 = 0.7;
 
 #[derive(Clone, Debug)]
 pub(crate) struct SpeedTrim {
-    /// The speeds of the driving channels by the response: a car's second one steers.
-    wheels: Vec<ModelledSpeed>,
+    /// The channels by the response.
+    wheels: ModelledWheels,
+    /// A car's second channel steers.
+    driving: usize,
     /// Oldest first, counts/s.
     told: [[f64; 2]; STEADY],
     /// The newest tick's counts, and mission time, seconds.
@@ -35,12 +39,11 @@ pub(crate) struct SpeedTrim {
 
 impl SpeedTrim {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let body = mission.body();
+        let axle = Axle::from(&mission.body());
         let response = mission.trusted_response();
-        let change = response.acceleration_m_s2 / body.metres_per_count();
-        let wheel = ModelledSpeed::new(response.dead_time_s(), change);
         Self {
-            wheels: vec![wheel; if body.steering.is_some() { 1 } else { 2 }],
+            wheels: ModelledWheels::new(axle, response.dead_time_s(), &response),
+            driving: if axle.track_m.is_some() { 2 } else { 1 },
             told: [[0.0; 2]; STEADY],
             tick: None,
             longest_gap_s: 2.0 / mission.robot.rate_hz,
@@ -57,11 +60,8 @@ impl SpeedTrim {
     pub(crate) fn told(&mut self, counts: [i16; 2]) {
         self.told.rotate_left(1);
         self.told[STEADY - 1] = counts.map(f64::from);
-        let Some((_, now_s)) = self.tick else {
-            return;
-        };
-        for (wheel, counts) in self.wheels.iter_mut().zip(counts) {
-            wheel.command(now_s, counts.into());
+        if let Some((_, now_s)) = self.tick {
+            self.wheels.command(now_s, counts.map(f64::from));
         }
     }
 
@@ -74,14 +74,16 @@ impl SpeedTrim {
             return;
         }
         let turned = counts.since(before);
-        for (wheel, modelled) in self.wheels.iter_mut().enumerate() {
-            modelled.go_on(time_s);
+        self.wheels.go_on(time_s);
+        for (wheel, speed) in
+            self.wheels.each(ModelledSpeed::speed).into_iter().enumerate().take(self.driving)
+        {
             let told = self.told.map(|told| told[wheel]);
             let newest = told[STEADY - 1];
             let along = told.map(|counts_s| counts_s * newest.signum());
             let least = along.into_iter().fold(f64::INFINITY, f64::min);
             let greatest = along.into_iter().fold(0.0, f64::max);
-            let reached = modelled.speed() * newest.signum();
+            let reached = speed * newest.signum();
             if least.min(reached) < LEAST_COUNTS_S || least.min(reached) < AGREE * greatest {
                 continue;
             }

@@ -11,7 +11,9 @@
 //! [`SUSPECTED_AFTER`] the robot must stand: an X80 at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
 //!
 //! [`super::response_fit`] looks for a response that explains the motion, then and until the robot stands. If there is one, it replaces
-//! the stated one, and the link's log names it: a base that is heavier than stated is no fault.
+//! the stated one, and the link's log names it: a base that is heavier than stated is no fault. What is never explained ends as well once
+//! the wheels rest for [`CALM`], if they had turned as told for as long as raises a suspicion, and both counted when it was raised: they
+//! may do so again. So an encoder that died, or a wheel that never turned as told, is suspected for good.
 //!
 //! A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
 //! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
@@ -35,6 +37,7 @@ use common::{
 use super::{
     base_response::is_longer,
     contact::{Contacts, HELD_AFTER},
+    modelled_wheels::{Axle, ModelledWheels},
     monitor::{Condition, Counts, Moment, Monitor, Observation},
     response_fit::{ResponseFit, Suspected},
     wheel_shares::{WheelRatio, WheelShares},
@@ -59,7 +62,7 @@ pub(crate) const UNTOLD_AFTER: Duration = Duration::from_millis(1000);
 const JUDGED: Duration = Duration::from_millis(1500);
 pub(crate) const MOST_JUMPS: usize = 3;
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
-/// A suspicion about jumps ends without one for so long.
+/// A suspicion about jumps ends without one for so long, and one about wheels at rest.
 pub(crate) const CALM: Duration = Duration::from_secs(2);
 /// So often it ends by itself: a faulty robot's counts may jump only while it moves.
 const MOST_RECOVERIES: u32 = 2;
@@ -81,6 +84,16 @@ pub enum Suspicion {
 }
 
 impl Suspicion {
+    /// What it is about: the left wheel, the right one, or their difference.
+    const fn channel(self) -> Option<usize> {
+        match self {
+            Self::Left => Some(0),
+            Self::Right => Some(1),
+            Self::Turn | Self::Untold => Some(2),
+            Self::Jumps => None,
+        }
+    }
+
     pub const fn words(self) -> &'static str {
         match self {
             Self::Left => {
@@ -182,15 +195,14 @@ impl Evidence {
 
 #[derive(Clone, Debug)]
 pub struct Odometry {
-    counts_per_m: f64,
-    steers: bool,
+    axle: Axle,
     response: Response,
     /// Whether it looks for the response as it drives.
     searches: bool,
     known: Known,
     top_speed_m_s: f64,
     /// The commands, as far as the base's acceleration has reached them, counts/s.
-    reached: [ModelledSpeed; 2],
+    reached: ModelledWheels,
     fit: ResponseFit,
     shares: WheelShares,
     /// The response that explained a motion, until it is told.
@@ -204,6 +216,11 @@ pub struct Odometry {
     right: Evidence,
     turn: Evidence,
     untold_s: f64,
+    /// For how long each channel turned as told since a suspicion ended at rest.
+    followed_s: [f64; 3],
+    /// Whether the suspicion ends when the wheels rest.
+    ends_at_rest: bool,
+    moved: MissionTime,
     contacts: Contacts,
     jumps: VecDeque<MissionTime>,
     recoveries: u32,
@@ -231,7 +248,7 @@ impl Odometry {
         self.commanded = Some(now);
         let [left, right] = self.ask(counts.map(f64::from), now);
         self.left.ask(left, now);
-        if self.steers {
+        if self.axle.track_m.is_none() {
             return;
         }
         self.right.ask(right, now);
@@ -244,23 +261,15 @@ impl Odometry {
     /// The wheels are to turn at `counts`, counts/s. Returns what they have reached by the base's acceleration.
     fn ask(&mut self, counts: [f64; 2], now: MissionTime) -> [f64; 2] {
         self.fit.commanded(counts, now);
-        for (reached, counts) in self.reached.iter_mut().zip(counts) {
-            reached.command(now.seconds(), counts);
-            reached.go_on(now.seconds());
-        }
-        self.reached.each_ref().map(ModelledSpeed::speed)
+        self.reached.command(now.seconds(), counts);
+        self.reached.go_on(now.seconds());
+        self.reached.each(ModelledSpeed::speed)
     }
 
     fn adopt(&mut self, response: Response) {
         self.response = response;
-        let change = self.most_change();
-        self.reached = [(); 2].map(|()| ModelledSpeed::new(0.0, change));
+        self.reached = ModelledWheels::new(self.axle, 0.0, &response);
         self.shares.adopt(response);
-    }
-
-    /// Counts/s, in a second.
-    fn most_change(&self) -> f64 {
-        self.response.acceleration_m_s2 * self.counts_per_m
     }
 
     fn stops_within_m(&self, response: Response) -> f64 {
@@ -315,21 +324,26 @@ impl Odometry {
         let [left, right] = turned;
         let settles = Settles::from(self.response);
         let gap_s = gap.as_secs_f64();
-        let least = LEAST_M_S * self.counts_per_m;
+        let least = LEAST_M_S * self.axle.counts_per_m;
         let high = self.contacts.high();
         let wheels = [(&mut self.left, left), (&mut self.right, right)];
         for (wheel, (evidence, counts)) in wheels.into_iter().enumerate() {
-            if evidence.weigh((counts, gap_s), least, high[wheel], settles, now) && high[wheel] {
-                self.contacts.rolled(wheel, gap_s);
+            if evidence.weigh((counts, gap_s), least, high[wheel], settles, now) {
+                self.followed_s[wheel] += gap_s;
+                if high[wheel] {
+                    self.contacts.rolled(wheel, gap_s);
+                }
             }
         }
         if high == [false; 2] {
-            let least = LEAST_TURN_M_S * self.counts_per_m;
-            self.turn.weigh((right - left, gap_s), least, false, settles, now);
+            let least = LEAST_TURN_M_S * self.axle.counts_per_m;
+            if self.turn.weigh((right - left, gap_s), least, false, settles, now) {
+                self.followed_s[2] += gap_s;
+            }
             let from_s = now.seconds() - gap_s - settles.settled_s - self.limit.as_secs_f64();
             let speeds = turned.map(|counts| counts / gap_s);
-            let slows = (from_s, self.most_change());
-            let is_untold = self.fit.is_untold(speeds, slows, least, self.steers);
+            let slows = (from_s, self.axle.limits(&self.response));
+            let is_untold = self.fit.is_untold(speeds, slows, least);
             self.untold_s = (self.untold_s + if is_untold { gap_s } else { -gap_s }).max(0.0);
         }
         self.look_for_contact(now);
@@ -346,10 +360,25 @@ impl Odometry {
         let untold = (self.untold_s >= UNTOLD_AFTER.as_secs_f64()).then_some(Suspicion::Untold);
         if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion).or(untold)
             && !self.is_bring_up
+            && self.suspicion.is_none()
         {
-            self.suspicion.get_or_insert((suspicion, now));
+            self.suspicion = Some((suspicion, now));
+            let followed_s = suspicion.channel().map_or(0.0, |channel| self.followed_s[channel]);
+            self.ends_at_rest = followed_s >= SUSPECTED_AFTER.as_secs_f64()
+                && [&self.left, &self.right].iter().all(|wheel| wheel.still_s == 0.0);
         }
         self.look_for_explanation(now);
+        if turned.iter().any(|counts| counts.abs() > 1.0) {
+            self.moved = now;
+        }
+        if self.ends_at_rest
+            && let Some((_, since)) = self.suspicion
+            && now.since(self.moved.max(since)) >= CALM
+        {
+            self.suspicion = None;
+            self.followed_s = [0.0; 3];
+            self.clear_evidence();
+        }
         self.look_for_delay(now);
     }
 
@@ -359,7 +388,7 @@ impl Odometry {
             return;
         }
         self.looked = now;
-        let found = self.searched().or_else(|| self.fit.later(self.response, self.steers));
+        let found = self.searched().or_else(|| self.fit.later(self.response));
         if let Some(found) = found {
             if self.known == Known::Unknown {
                 self.known = Known::Found;
@@ -377,7 +406,7 @@ impl Odometry {
             return None;
         }
         let believed = (self.known == Known::Stated).then_some(self.response);
-        let found = self.fit.alike(believed, self.top_speed_m_s, self.steers)?;
+        let found = self.fit.alike(believed, self.top_speed_m_s)?;
         let now_m = self.stops_within_m(self.response);
         if believed.is_some() {
             let contradicts = is_longer(found.stops_within_m, now_m);
@@ -397,17 +426,14 @@ impl Odometry {
         let Some((suspicion, since)) = self.suspicion else {
             return;
         };
-        let channel = match suspicion {
-            Suspicion::Left => 0,
-            Suspicion::Right => 1,
-            Suspicion::Turn | Suspicion::Untold => 2,
-            Suspicion::Jumps => return,
+        let Some(channel) = suspicion.channel() else {
+            return;
         };
         if now.since(since) > JUDGED {
             return;
         }
         let suspected = Suspected { channel, from_s: since.seconds() - JUDGED.as_secs_f64() };
-        if let Some(found) = self.fit.explain(self.response, self.steers, suspected) {
+        if let Some(found) = self.fit.explain(self.response, suspected) {
             // A moment explains less than all that was seen, from which the search takes what is slow enough.
             let is_news = self.known == Known::Stated
                 || self.stops_within_m(found) > self.stops_within_m(self.response);
@@ -428,7 +454,7 @@ impl Odometry {
         if left.max(right) < HELD_AFTER.as_secs_f64() {
             return;
         }
-        let held = if self.steers { [true; 2] } else { [left > 0.0, right > 0.0] };
+        let held = if self.axle.track_m.is_none() { [true; 2] } else { [left > 0.0, right > 0.0] };
         let asked = [&self.left, &self.right].map(|evidence| evidence.asked[1]);
         if self.contacts.begin(held, asked, now) {
             (self.left.held_s, self.right.held_s) = (0.0, 0.0);
@@ -460,6 +486,7 @@ impl Odometry {
         self.contacts.reset();
         self.jumps.clear();
         self.recoveries = 0;
+        self.followed_s = [0.0; 3];
         self.suspicion = None;
     }
 
@@ -468,6 +495,7 @@ impl Odometry {
         self.right = Evidence::default();
         self.turn = Evidence::default();
         self.untold_s = 0.0;
+        self.ends_at_rest = false;
     }
 
     fn restart_evidence(&mut self, now: MissionTime) {
@@ -481,21 +509,19 @@ impl Odometry {
 impl Monitor for Odometry {
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
-        let counts_per_m = 1.0 / body.metres_per_count();
+        let axle = Axle::from(&body);
         let response = mission.trusted_response();
-        let change = response.acceleration_m_s2 * counts_per_m;
         let has_scans = mission.robot.protocol().has_scans();
         Self {
-            counts_per_m,
+            axle,
             response,
             searches: !mission.states_response() || has_scans && mission.brakes_by_response(),
             known: if mission.states_response() { Known::Stated } else { Known::Unknown },
             top_speed_m_s: body.top_speed_m_s,
-            reached: [(); 2].map(|()| ModelledSpeed::new(0.0, change)),
-            fit: ResponseFit::new(counts_per_m),
+            reached: ModelledWheels::new(axle, 0.0, &response),
+            fit: ResponseFit::new(axle),
             shares: WheelShares::new(mission),
             found: None,
-            steers: body.steering.is_some(),
             longest_gap: Duration::from_secs_f64(2.0 / mission.robot.rate_hz),
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             commanded: None,
@@ -504,6 +530,9 @@ impl Monitor for Odometry {
             right: Evidence::default(),
             turn: Evidence::default(),
             untold_s: 0.0,
+            followed_s: [0.0; 3],
+            ends_at_rest: false,
+            moved: MissionTime::default(),
             contacts: Contacts::new(mission),
             jumps: VecDeque::new(),
             recoveries: 0,

@@ -1,15 +1,15 @@
 //! Whether another response than the stated one explains what the wheels did.
 //!
 //! The newest commands and counts are compared with what wheels would have rolled that answer after any delay and with any acceleration of
-//! a grid. A response explains them if each wheel, and the difference of both, rolled as it says, apart from one factor. Dead, swapped and
-//! reversed wheels roll as no response says.
+//! a grid, and with what those of a base would that limits their mean and their difference apart. What tells of the one tells nothing of
+//! the other, so the difference is fitted by itself. A response explains the wheels if each, and the difference of both, rolled as it says,
+//! apart from one factor. Dead, swapped and reversed wheels roll as no response says.
 
 use std::collections::VecDeque;
 
-use common::{
-    clock::MissionTime,
-    mission::{ModelledSpeed, Response},
-};
+use common::{clock::MissionTime, mission::Response};
+
+use super::modelled_wheels::{Axle, Limits};
 
 /// Counts are kept for so long, seconds.
 const KEPT_S: f64 = 5.0;
@@ -24,6 +24,9 @@ pub(super) const DEAD_TIME_STEP_S: f64 = 0.05;
 const LEAST_ACCELERATION_M_S2: f64 = 0.15;
 pub(super) const ACCELERATION_RATIO: f64 = 1.25;
 const ACCELERATIONS: i32 = 16;
+/// What a turn that is limited apart gives a wheel, over that grid: the slowest is that of a narrow and heavy base, and none is that of two
+/// wheels, as it lies 4.5 steps of the grid lower.
+const TURN_SHARE: f64 = 0.366;
 /// The least square of the correlation of a wheel's way with that of the response.
 const EXPLAINED: f64 = 0.8;
 /// The factors that real wheels have.
@@ -88,24 +91,13 @@ fn is_far_better(unlike: f64, other: f64) -> bool {
     other > (unlike + LEAST_BETTER).max(BETTER * (unlike + NOISE))
 }
 
-/// Dead times, seconds, and accelerations, m/s^2.
-fn candidates() -> impl Iterator<Item = (f64, f64)> {
-    (0..DEAD_TIMES).flat_map(|step| {
-        let dead_time_s = f64::from(step) * DEAD_TIME_STEP_S;
-        let accelerations = (0..ACCELERATIONS)
-            .map(|power| LEAST_ACCELERATION_M_S2 * ACCELERATION_RATIO.powi(power))
-            .chain([f64::INFINITY]);
-        accelerations.map(move |acceleration| (dead_time_s, acceleration))
-    })
-}
-
 fn channels([left, right]: [f64; 2]) -> [f64; CHANNELS] {
     [left, right, right - left]
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct ResponseFit {
-    counts_per_m: f64,
+    axle: Axle,
     /// When they were given, and counts/s.
     commands: VecDeque<(f64, [f64; 2])>,
     /// The end of an interval, and the counts that the wheels turned in it; none where they are not known.
@@ -113,8 +105,8 @@ pub(super) struct ResponseFit {
 }
 
 impl ResponseFit {
-    pub(super) const fn new(counts_per_m: f64) -> Self {
-        Self { counts_per_m, commands: VecDeque::new(), turned: VecDeque::new() }
+    pub(super) const fn new(axle: Axle) -> Self {
+        Self { axle, commands: VecDeque::new(), turned: VecDeque::new() }
     }
 
     pub(super) fn commanded(&mut self, counts: [f64; 2], now: MissionTime) {
@@ -133,19 +125,19 @@ impl ResponseFit {
         keep(&mut self.turned, (now.seconds(), counts), KEPT_S);
     }
 
-    /// Whether a channel's speed is beyond every command since `from_s`, beyond what is left of an earlier one where wheels slow down by
-    /// `change` counts/s in a second, and beyond 0, by `least` and a share of the fastest; counts/s.
+    /// Whether a speed that is limited, or the difference of wheels that are, is beyond every command since `from_s`, beyond what is left
+    /// of an earlier one where it slows down by its limit, and beyond 0, by `least` and a share of the fastest; counts/s.
     pub(super) fn is_untold(
         &self,
         speeds: [f64; 2],
-        (from_s, change): (f64, f64),
+        (from_s, limits): (f64, Limits),
         least: f64,
-        steers: bool,
     ) -> bool {
         let told = |channel: usize, sign: f64| {
             let left = |(at, told): &(f64, [f64; 2])| {
-                let slowed = if *at < from_s { change * (from_s - at) } else { 0.0 };
-                sign * channels(*told)[channel] - slowed
+                let most = limits.most[channel % 2];
+                let slowed = if *at < from_s { most * (from_s - at) } else { 0.0 };
+                sign * channels(limits.axes(*told))[channel] - slowed
             };
             self.commands.iter().map(left).fold(0.0, f64::max)
         };
@@ -154,8 +146,14 @@ impl ResponseFit {
         let is_beyond = |(channel, speed): (usize, f64)| {
             speed.abs() > told(channel, speed.signum()) + least + UNTOLD_SHARE * fastest
         };
-        let judged = if steers { 1 } else { CHANNELS };
-        fastest > 0.0 && channels(speeds).into_iter().enumerate().take(judged).any(is_beyond)
+        let judged = if limits.are_apart { 2 } else { self.judged() };
+        fastest > 0.0
+            && channels(limits.axes(speeds)).into_iter().enumerate().take(judged).any(is_beyond)
+    }
+
+    /// The channels of the wheels that drive.
+    fn judged(&self) -> usize {
+        self.axle.track_m.map_or(1, |_| CHANNELS)
     }
 
     pub(super) fn reset(&mut self) {
@@ -165,24 +163,19 @@ impl ResponseFit {
 
     /// The response that explains the motion best, with the lag of `stated`, and also what is suspected; none if none does. Each wheel that
     /// does not drive is left out.
-    pub(super) fn explain(
-        &self,
-        stated: Response,
-        steers: bool,
-        suspected: Suspected,
-    ) -> Option<Response> {
-        let explained = candidates().filter_map(|(dead_time_s, acceleration_m_s2)| {
-            let explained = self.explained(dead_time_s, acceleration_m_s2, steers, suspected)?;
+    pub(super) fn explain(&self, stated: Response, suspected: Suspected) -> Option<Response> {
+        let explained = self.weighed(|dead_time_s, limits, ways| {
+            let explained = self.explained(limits, ways, suspected)?;
             let lag_s = stated.lag_s.min(dead_time_s);
-            let delay_s = dead_time_s - lag_s;
-            Some((explained, Response { delay_s, lag_s, acceleration_m_s2, ..stated }))
+            let found = self.axle.response(dead_time_s - lag_s, limits);
+            Some((explained, Response { lag_s, ..found }))
         });
-        let best = explained.max_by(|(one, _), (other, _)| one.total_cmp(other));
+        let best = explained.into_iter().max_by(|(one, _), (other, _)| one.total_cmp(other));
         best.filter(|(explained, _)| *explained >= EXPLAINED).map(|(_, response)| response)
     }
 
     /// `stated` as much later as is far more like the motion. Delays are then those of the base, of its network, or of both.
-    pub(super) fn later(&self, stated: Response, steers: bool) -> Option<Response> {
+    pub(super) fn later(&self, stated: Response) -> Option<Response> {
         let (last_s, _) = self.turned.back()?;
         // A network that begins to be late delivers nothing for a moment.
         let is_gap = |(_, turned): &&(f64, Option<[f64; 2]>)| turned.is_none();
@@ -194,18 +187,19 @@ impl ResponseFit {
         let scale = self.scale(intervals, last_s - from_s);
         let fit = |later_s: f64| {
             let dead_time_s = stated.dead_time_s() + later_s;
-            let [_, channels] = self.motions(dead_time_s, stated.acceleration_m_s2, *from_s)?;
-            let ((wheels, factor), turn) = (of_wheels(&channels, steers), &channels[TURN]);
+            let [_, channels] = self.motions_of(dead_time_s, &stated, *from_s);
+            let ((wheels, factor), turn) = (self.of_wheels(&channels), &channels[TURN]);
             let unlike = wheels.unlike(factor);
             let turns = turn.both * turn.both.abs() >= TURN_EXPLAINED * turn.model * turn.turned;
-            let explains = unlike <= LATER_UNEXPLAINED * wheels.turned && (steers || turns);
-            Some((scale * unlike, later_s, explains))
+            let explains =
+                unlike <= LATER_UNEXPLAINED * wheels.turned && (self.judged() == 1 || turns);
+            (scale * unlike, later_s, explains)
         };
         let later = (-LATER_STEPS..=LATER_STEPS)
             .map(|step| f64::from(step) * LATER_STEP_S)
             .chain([-stated.dead_time_s()])
             .filter(|later_s| stated.dead_time_s() + later_s >= 0.0)
-            .filter_map(fit);
+            .map(fit);
         let (later, prompt): (Vec<_>, Vec<_>) =
             later.partition(|(_, later_s, _)| *later_s >= LEAST_LATER_S);
         // Of a motion that repeats itself, a base that answers sooner than stated is as much like one that answers a whole round later.
@@ -218,44 +212,30 @@ impl ResponseFit {
 
     /// The responses that explain the wheels' motion about as well as the best one does. None if none explains it, or not far better
     /// than the response that is `believed`.
-    pub(super) fn alike(
-        &self,
-        believed: Option<Response>,
-        top_speed_m_s: f64,
-        steers: bool,
-    ) -> Option<Alike> {
+    pub(super) fn alike(&self, believed: Option<Response>, top_speed_m_s: f64) -> Option<Alike> {
         let ((first_s, _), (last_s, _)) = (self.turned.front()?, self.turned.back()?);
         let intervals = self.turned.iter().filter(|(_, turned)| turned.is_some()).count();
         let scale = self.scale(intervals, last_s - first_s);
         // What is not as this response says, all, and the factor.
-        let fit = |dead_time_s: f64, acceleration: f64| {
-            let [channels, _] = self.motions(dead_time_s, acceleration, *first_s)?;
-            let (wheels, factor) = of_wheels(&channels, steers);
-            Some((scale * wheels.unlike(factor), scale * wheels.turned, factor))
+        let fit = |[channels, _]: [[Motion; CHANNELS]; 2]| {
+            let (wheels, factor) = self.of_wheels(&channels);
+            (scale * wheels.unlike(factor), scale * wheels.turned, factor)
         };
-        let believed = match believed {
-            Some(it) => Some(fit(it.dead_time_s(), it.acceleration_m_s2)?.0),
-            None => None,
-        };
+        let of = |it: Response| fit(self.motions_of(it.dead_time_s(), &it, *first_s)).0;
+        let believed = believed.map(of);
         // Most robots answer as stated, and nothing is far better than that.
         if believed.is_some_and(|believed| !is_far_better(0.0, believed)) {
             return None;
         }
-        let fits = candidates().filter_map(|(dead_time_s, acceleration)| {
-            let (unlike, all, factor) = fit(dead_time_s, acceleration)?;
+        let fits = self.weighed(|dead_time_s, limits, ways| {
+            let (unlike, all, factor) = fit(self.motions(limits, ways, *first_s));
             // Wheels that reach less of a speed reach it sooner.
-            let acceleration_m_s2 = acceleration * factor;
-            let response = Response {
-                delay_s: dead_time_s,
-                lag_s: 0.0,
-                acceleration_m_s2,
-                turn_acceleration_rad_s2: f64::INFINITY,
-            };
+            let most = limits.most.map(|most| most * factor);
+            let response = self.axle.response(dead_time_s, Limits { most, ..limits });
             let stops_m = response.way_to_stop_m(top_speed_m_s, dead_time_s);
             let tells = all >= LEAST_MOTION && unlike <= LATER_UNEXPLAINED * all;
             tells.then_some((unlike, stops_m, response))
         });
-        let fits: Vec<_> = fits.collect();
         let (least, best_m, _) = *fits.iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
         if believed.is_some_and(|believed| !is_far_better(least, believed)) {
             return None;
@@ -272,18 +252,12 @@ impl ResponseFit {
 
     /// The least share of a channel's motion that the response explains; none if a channel moved by no factor of it, or
     /// otherwise in the time that raised the suspicion, or the suspected one was hardly to move.
-    fn explained(
-        &self,
-        dead_time_s: f64,
-        acceleration: f64,
-        steers: bool,
-        suspected: Suspected,
-    ) -> Option<f64> {
-        let [all, judged_all] = self.motions(dead_time_s, acceleration, suspected.from_s)?;
+    fn explained(&self, limits: Limits, ways: Ways<'_>, suspected: Suspected) -> Option<f64> {
+        let [all, judged_all] = self.motions(limits, ways, suspected.from_s);
         let mut least: Option<f64> = None;
         let motions = all.iter().zip(&judged_all).enumerate();
-        for (channel, (all, judged)) in motions.take(if steers { 1 } else { CHANNELS }) {
-            if all.way >= LEAST_M * self.counts_per_m {
+        for (channel, (all, judged)) in motions.take(self.judged()) {
+            if all.way >= LEAST_M * self.axle.counts_per_m {
                 let factor = all.both / all.model;
                 if !FACTORS.contains(&factor) || all.turned <= 0.0 || !judged.is_as_modelled(factor)
                 {
@@ -304,44 +278,138 @@ impl ResponseFit {
 
     /// Squares of counts in one of so many intervals to squares of m/s, times seconds.
     fn scale(&self, intervals: usize, in_s: f64) -> f64 {
-        intervals as f64 / in_s / self.counts_per_m.powi(2)
+        intervals as f64 / in_s / self.axle.counts_per_m.powi(2)
     }
 
-    /// The channels' motion with this response: all, and from then on.
-    fn motions(
+    /// What `weigh` makes of each response of the grid: of its dead time, its limits, and their ways. Of a turn that is limited apart the
+    /// grid has only the one that is most like the wheels. Those of wheels are last.
+    fn weighed<T>(&self, weigh: impl Fn(f64, Limits, Ways<'_>) -> Option<T>) -> Vec<T> {
+        let mut weighed = Vec::new();
+        let accelerations = (0..ACCELERATIONS)
+            .map(|power| LEAST_ACCELERATION_M_S2 * ACCELERATION_RATIO.powi(power))
+            .chain([f64::INFINITY]);
+        for are_apart in [true, false].into_iter().skip(usize::from(self.judged() == 1)) {
+            let share = if are_apart { TURN_SHARE } else { 1.0 };
+            let grid = accelerations.clone().map(|acceleration| {
+                let most = acceleration * self.axle.counts_per_m;
+                let limits = Limits { are_apart, most: [most, most * share] };
+                (limits, [0, 1].map(|axis| self.course(limits, axis)))
+            });
+            let grid: Vec<_> = grid.collect();
+            for step in 0..DEAD_TIMES {
+                let dead_time_s = f64::from(step) * DEAD_TIME_STEP_S;
+                let ways = |axis: usize| {
+                    grid.iter().map(move |(_, courses)| self.ways(&courses[axis], dead_time_s))
+                };
+                let others: Vec<_> = ways(1).collect();
+                let unlike = others.iter().map(|ways| self.unlike_turn(ways));
+                let best = unlike.enumerate().min_by(|one, other| one.1.total_cmp(&other.1));
+                let best = best.filter(|(_, unlike)| are_apart && !unlike.is_nan());
+                for (index, one) in ways(0).enumerate().filter(|_| best.is_some() || !are_apart) {
+                    let other = best.map_or(index, |(best, _)| best);
+                    let most = [grid[index].0.most[0], grid[other].0.most[1]];
+                    weighed.extend(weigh(
+                        dead_time_s,
+                        Limits { are_apart, most },
+                        [&one, &others[other]],
+                    ));
+                }
+            }
+        }
+        weighed
+    }
+
+    /// What is not half the wheels' difference; no number if none is modelled.
+    fn unlike_turn(&self, ways: &[f64]) -> f64 {
+        let mut turn = Motion::default();
+        for ((_, turned), modelled) in self.turned.iter().skip(1).zip(ways) {
+            if let Some([left, right]) = turned {
+                turn.add(*modelled, (right - left) / 2.0);
+            }
+        }
+        turn.unlike(turn.factor())
+    }
+
+    /// The course of an axis that answers at once.
+    fn course(&self, limits: Limits, axis: usize) -> Course {
+        let (mut way, mut speed) = (0.0, 0.0);
+        let mut course = Vec::new();
+        let ends = self.commands.iter().skip(1).map(|(at, _)| *at).chain([f64::INFINITY]);
+        for (&(at, told), end) in self.commands.iter().zip(ends).filter(|((at, _), end)| at < end) {
+            let target = limits.axes(told)[axis];
+            let rate = limits.most[axis].copysign(target - speed);
+            let reached = (at + (target - speed) / rate).min(end);
+            course.push([at, way, speed, if reached > at { rate } else { 0.0 }]);
+            let before = speed;
+            speed = if reached < end { target } else { speed + rate * (end - at) };
+            way += (before + speed) / 2.0 * (reached - at);
+            course.push([reached, way, speed, 0.0]);
+            way += speed * (end - reached);
+        }
+        course
+    }
+
+    /// What an axis of this course rolls in each interval but the first, counts, if it answers later.
+    fn ways(&self, course: &Course, dead_time_s: f64) -> Vec<f64> {
+        let mut pieces = course.iter().peekable();
+        let mut piece = &[0.0; 4];
+        // The oldest counts say only when the others begin.
+        let mut before = None;
+        let rolled = |(until, _): &(f64, _)| {
+            while let Some(next) = pieces.next_if(|[from, ..]| *from <= until - dead_time_s) {
+                piece = next;
+            }
+            let [from, way, speed, rate] = piece;
+            let for_s = until - dead_time_s - from;
+            let way = way + for_s * (speed + rate * for_s / 2.0);
+            before.replace(way).map(|before| way - before)
+        };
+        self.turned.iter().filter_map(rolled).collect()
+    }
+
+    fn motions_of(
         &self,
         dead_time_s: f64,
-        acceleration: f64,
+        response: &Response,
         from_s: f64,
-    ) -> Option<[[Motion; CHANNELS]; 2]> {
-        let change = acceleration * self.counts_per_m;
-        let mut wheels = [(); 2].map(|()| ModelledSpeed::new(dead_time_s, change));
-        // The oldest counts say only when the others begin.
-        let mut intervals = self.turned.iter();
-        let first = intervals.next()?.0;
-        for (wheel, speed) in wheels.iter_mut().enumerate() {
-            speed.go_on(self.commands.front()?.0.min(first));
-            speed.reserve(self.commands.len());
-            self.commands.iter().for_each(|(at, counts)| speed.command(*at, counts[wheel]));
-            speed.go_on(first);
-        }
+    ) -> [[Motion; CHANNELS]; 2] {
+        let limits = self.axle.limits(response);
+        let [one, other] = [0, 1].map(|axis| self.ways(&self.course(limits, axis), dead_time_s));
+        self.motions(limits, [&one, &other], from_s)
+    }
+
+    /// The channels' motion by these ways: all, and from then on.
+    fn motions(
+        &self,
+        limits: Limits,
+        [one, other]: Ways<'_>,
+        from_s: f64,
+    ) -> [[Motion; CHANNELS]; 2] {
         let mut all = [Motion::default(); CHANNELS];
         let mut judged_all = all;
-        for &(until, turned) in intervals {
-            let modelled = channels(wheels.each_mut().map(|wheel| wheel.go_on(until)));
-            let Some(turned) = turned else {
-                continue;
-            };
-            for (channel, turned) in channels(turned).into_iter().enumerate() {
+        for ((&(until, turned), one), other) in self.turned.iter().skip(1).zip(one).zip(other) {
+            let modelled = channels(limits.wheels([*one, *other]));
+            for (channel, turned) in turned.map(channels).into_iter().flatten().enumerate() {
                 all[channel].add(modelled[channel], turned);
                 if until >= from_s {
                     judged_all[channel].add(modelled[channel], turned);
                 }
             }
         }
-        Some([all, judged_all])
+        [all, judged_all]
+    }
+
+    /// The motion of all wheels that drive, and the factor by which it is that of the model.
+    fn of_wheels(&self, [left, right, _]: &[Motion; CHANNELS]) -> (Motion, f64) {
+        let wheels = if self.judged() == 1 { *left } else { left.with(right) };
+        (wheels, wheels.factor())
     }
 }
+
+/// Of a speed: from when on, the way until then, the speed then, and how much it grows in a second; seconds and counts.
+type Course = Vec<[f64; 4]>;
+/// What is limited rolls so far in each interval but the first.
+type Ways<'a> = [&'a [f64]; 2];
 
 /// Sums over the intervals of a channel: of the modelled way, of the squares of the modelled and the counted way, and of their product,
 /// counts.
@@ -379,16 +447,13 @@ impl Motion {
         self.turned - 2.0 * factor * self.both + factor * factor * self.model
     }
 
+    fn factor(&self) -> f64 {
+        (self.both / self.model).clamp(*FACTORS.start(), *FACTORS.end())
+    }
+
     fn is_as_modelled(&self, factor: f64) -> bool {
         self.unlike(factor) <= UNEXPLAINED * self.model.max(self.turned) + self.rounding
     }
-}
-
-/// The motion of all wheels that drive, and the factor by which it is that of the model.
-fn of_wheels([left, right, _]: &[Motion; CHANNELS], steers: bool) -> (Motion, f64) {
-    let wheels = if steers { *left } else { left.with(right) };
-    let factor = (wheels.both / wheels.model).clamp(*FACTORS.start(), *FACTORS.end());
-    (wheels, factor)
 }
 
 fn keep<T>(kept: &mut VecDeque<(f64, T)>, new: (f64, T), for_s: f64) {
@@ -401,15 +466,18 @@ fn keep<T>(kept: &mut VecDeque<(f64, T)>, new: (f64, T), for_s: f64) {
 
 #[cfg(test)]
 mod tests {
+    use common::mission::ModelledSpeed;
+
     use super::*;
 
     const PERIOD_S: f64 = 0.1;
+    const AXLE: Axle = Axle { counts_per_m: 1000.0, track_m: Some(0.3) };
 
     /// Drives a base with a track of 0.3 m as a controller does: on, to the left, on, to the right; its wheels turn by `model`, seen
     /// through `encoders`.
     fn explained(response: [f64; 2], encoders: impl Fn([f64; 2]) -> [f64; 2]) -> Option<Response> {
         let suspected = Suspected { channel: 0, from_s: 3.0 };
-        driven(response, 1.0, 45, encoders).explain(Response::X80, false, suspected)
+        driven(response, 1.0, 45, encoders).explain(Response::X80, suspected)
     }
 
     /// What is known after so many ticks of a base whose wheels reach `gain` of what they are told.
@@ -419,7 +487,7 @@ mod tests {
         ticks: u32,
         encoders: impl Fn([f64; 2]) -> [f64; 2],
     ) -> ResponseFit {
-        let mut fit = ResponseFit::new(1000.0);
+        let mut fit = ResponseFit::new(AXLE);
         let mut wheels = [(); 2].map(|()| ModelledSpeed::new(delay_s, acceleration * 1000.0));
         for tick in 0..ticks {
             let now = f64::from(tick) * PERIOD_S;
@@ -439,7 +507,7 @@ mod tests {
     }
 
     fn slowest(fit: &ResponseFit) -> Option<Response> {
-        fit.alike(None, 0.5, false).filter(|found| found.are_told_apart).map(|found| found.slowest)
+        fit.alike(None, 0.5).filter(|found| found.are_told_apart).map(|found| found.slowest)
     }
 
     #[test]
@@ -463,7 +531,7 @@ mod tests {
         let stated = Response { acceleration_m_s2: 1.0, ..Response::X80 };
         let contradicts = |base: [f64; 2]| {
             driven(base, 0.78, 45, |turned| turned)
-                .alike(Some(stated), 0.5, false)
+                .alike(Some(stated), 0.5)
                 .is_some_and(|found| found.stops_within_m > 0.4)
         };
         assert!(contradicts([0.4, 0.3]));
@@ -489,12 +557,15 @@ mod tests {
 
     #[test]
     fn wheels_that_still_slow_down_from_an_older_command_turn_as_told_and_faster_ones_do_not() {
-        let mut fit = ResponseFit::new(1000.0);
+        let mut fit = ResponseFit::new(AXLE);
         fit.commanded([500.0, 500.0], MissionTime::from_seconds(1.0));
         fit.commanded([0.0, 0.0], MissionTime::from_seconds(1.25));
         fit.commanded([100.0, 100.0], MissionTime::from_seconds(2.9));
         // At 3 s, a second after what the base has answered; it slows down by 0.3 m/s in a second.
-        let is_untold = |speed, change| fit.is_untold([speed; 2], (2.0, change), 100.0, false);
+        let is_untold = |speed, most| {
+            let limits = Limits { are_apart: false, most: [most; 2] };
+            fit.is_untold([speed; 2], (2.0, limits), 100.0)
+        };
         assert!(!is_untold(240.0, 300.0));
         assert!(is_untold(420.0, 300.0));
         assert!(is_untold(260.0, f64::INFINITY));
@@ -510,7 +581,7 @@ mod tests {
 
     /// How much later than stated a base is found that answers so much later, and whose encoders are seen so.
     fn later(late_s: f64, encoders: impl Fn([f64; 2]) -> [f64; 2]) -> Option<f64> {
-        let mut fit = ResponseFit::new(1000.0);
+        let mut fit = ResponseFit::new(AXLE);
         let dead_time_s = Response::X80.dead_time_s() + late_s;
         let mut wheels = [(); 2].map(|()| ModelledSpeed::new(dead_time_s, f64::INFINITY));
         for tick in 0..70 {
@@ -526,7 +597,7 @@ mod tests {
             fit.commanded(command, time);
             wheels.iter_mut().zip(command).for_each(|(wheel, speed)| wheel.command(now, speed));
         }
-        Some(fit.later(Response::X80, false)?.delay_s - Response::X80.delay_s)
+        Some(fit.later(Response::X80)?.delay_s - Response::X80.delay_s)
     }
 
     #[test]
@@ -546,7 +617,7 @@ mod tests {
 
     #[test]
     fn a_motion_that_repeats_itself_makes_no_prompt_base_a_whole_round_later() {
-        let mut fit = ResponseFit::new(1000.0);
+        let mut fit = ResponseFit::new(AXLE);
         let mut wheels = [(); 2].map(|()| ModelledSpeed::new(0.02, f64::INFINITY));
         for tick in 0..90 {
             let now = f64::from(tick) * PERIOD_S;
@@ -562,7 +633,7 @@ mod tests {
             };
             fit.commanded(command, time);
             wheels.iter_mut().zip(command).for_each(|(wheel, speed)| wheel.command(now, speed));
-            assert!(fit.later(Response::X80, false).is_none(), "after {now} s");
+            assert!(fit.later(Response::X80).is_none(), "after {now} s");
         }
     }
 }

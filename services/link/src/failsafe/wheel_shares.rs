@@ -12,8 +12,10 @@
 use common::{
     driver::counts::WheelCounts,
     least_squares::{Line, Two},
-    mission::{Body, Mission, ModelledSpeed, Response},
+    mission::{Mission, ModelledSpeed, Response},
 };
+
+use super::modelled_wheels::{Axle, ModelledWheels};
 
 /// So much of the sums is left after each further metre: 3 m are remembered.
 const LEFT_AFTER_A_METRE: f64 = 0.72;
@@ -99,10 +101,10 @@ impl WheelRatio {
 
 #[derive(Clone, Debug)]
 pub(crate) struct WheelShares {
-    metres_per_count: f64,
+    axle: Axle,
     top_speed_m_s: f64,
     /// None for a car, which has one driven wheel.
-    wheels: Option<[ModelledSpeed; 2]>,
+    wheels: Option<ModelledWheels>,
     sums: Sums,
     /// The modelled and counted ways of the newest ticks, oldest first.
     newest: [[[f64; 2]; 2]; STEADY],
@@ -112,28 +114,25 @@ pub(crate) struct WheelShares {
 
 impl WheelShares {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let (body, response) = (mission.body(), mission.trusted_response());
-        let Body { steering, top_speed_m_s, .. } = body;
-        let metres_per_count = body.metres_per_count();
-        let wheel = ModelledSpeed::new(
-            response.dead_time_s(),
-            response.acceleration_m_s2 / metres_per_count,
-        );
-        Self {
-            metres_per_count,
-            top_speed_m_s,
-            wheels: steering.is_none().then(|| [wheel.clone(), wheel]),
+        let body = mission.body();
+        let axle = Axle::from(&body);
+        let mut shares = Self {
+            axle,
+            top_speed_m_s: body.top_speed_m_s,
+            wheels: None,
             sums: Sums::default(),
             newest: [[[0.0; 2]; 2]; STEADY],
             frame: None,
             longest_gap_s: 2.0 / mission.robot.rate_hz,
-        }
+        };
+        shares.adopt(mission.trusted_response());
+        shares
     }
 
     /// `counts` were sent, counts/s.
     pub(crate) fn told(&mut self, counts: [i16; 2], now_s: f64) {
-        for (wheel, counts) in self.wheels.iter_mut().flatten().zip(counts) {
-            wheel.command(now_s, counts.into());
+        if let Some(wheels) = &mut self.wheels {
+            wheels.command(now_s, counts.map(f64::from));
         }
     }
 
@@ -147,16 +146,17 @@ impl WheelShares {
         let Some(wheels) = &mut self.wheels else {
             return;
         };
-        let told = wheels.each_mut().map(|wheel| wheel.go_on(now_s));
+        let told = wheels.go_on(now_s);
         if let Some((before, then_s)) = before
             && now_s - then_s <= self.longest_gap_s
         {
             let rolled = counts.since(before);
-            let metres = |counts: [f64; 2]| counts.map(|count| count * self.metres_per_count);
+            let metres = |counts: [f64; 2]| counts.map(|count| count / self.axle.counts_per_m);
             // Ways of wheels that gain or lose speed differ by when they do, which the model knows less well.
-            let settles =
-                |wheel: &ModelledSpeed| wheel.left().abs() <= SETTLED * wheel.speed().abs();
-            let told = if wheels.iter().all(settles) { told } else { [0.0; 2] };
+            let (left, speeds) =
+                (wheels.each(ModelledSpeed::left), wheels.each(ModelledSpeed::speed));
+            let settles = |wheel: usize| left[wheel].abs() <= SETTLED * speeds[wheel].abs();
+            let told = if settles(0) && settles(1) { told } else { [0.0; 2] };
             let now = [metres(told), metres(rolled)];
             self.newest.rotate_left(1);
             self.newest[STEADY - 1] = now;
@@ -173,18 +173,17 @@ impl WheelShares {
     /// before the model does. The ticks after it, which make good what that adds to the ratio, are unsteady and left out, and so the tick
     /// before must be, too.
     fn goes_on(&self, told: [f64; 2], change: f64, [then_s, now_s]: [f64; 2]) -> bool {
-        let Some([left, right]) = &self.wheels else {
+        let Some(wheels) = &self.wheels else {
             return false;
         };
         let mut before = [f64::NAN; 2];
-        left.pending().zip(right.pending()).all(|((acts_s, left), (_, right))| {
-            let speeds = [left, right];
+        wheels.pending().all(|(acts_s, speeds)| {
             // The link repeats its commands.
             if std::mem::replace(&mut before, speeds) == speeds {
                 return true;
             }
             let ticks = 1.0 + (acts_s - now_s) / (now_s - then_s);
-            let same_ways = left * told[0] > 0.0 && right * told[1] > 0.0;
+            let same_ways = speeds[0] * told[0] > 0.0 && speeds[1] * told[1] > 0.0;
             same_ways && (curve(speeds) - curve(told) - change * ticks).abs() <= MOST_CORNER
         })
     }
@@ -200,9 +199,8 @@ impl WheelShares {
     }
 
     pub(crate) fn adopt(&mut self, response: Response) {
-        let change = response.acceleration_m_s2 / self.metres_per_count;
-        let wheel = ModelledSpeed::new(response.dead_time_s(), change);
-        self.wheels = self.wheels.take().map(|_| [wheel.clone(), wheel]);
+        let wheels = || ModelledWheels::new(self.axle, response.dead_time_s(), &response);
+        self.wheels = self.axle.track_m.map(|_| wheels());
         self.sums = Sums::default();
     }
 
@@ -230,9 +228,9 @@ mod tests {
             shares.rolled(WheelCounts::Endless(rolled.map(f64::round)), now_s);
             let told = told(tick);
             shares.told(told, now_s);
-            for (wheel, rolls) in wheels.iter_mut().enumerate() {
-                rolls.command(now_s, told[wheel].into());
-                rolled[wheel] += rolls.go_on(now_s + PERIOD_S) * reached * counted[wheel];
+            wheels.command(now_s, told.map(f64::from));
+            for (wheel, way) in wheels.go_on(now_s + PERIOD_S).into_iter().enumerate() {
+                rolled[wheel] += way * reached * counted[wheel];
             }
         }
         shares.ratio()
@@ -325,10 +323,10 @@ mod tests {
                 _ => [700, 250],
             };
             shares.told(told, now_s);
-            for (wheel, rolls) in wheels.iter_mut().enumerate() {
-                // They gain speed as stated, and less of it.
-                rolls.command(now_s, 0.78 * f64::from(told[wheel]));
-                rolled[wheel] += rolls.go_on(now_s + PERIOD_S);
+            // They gain speed as stated, and less of it.
+            wheels.command(now_s, told.map(|counts| 0.78 * f64::from(counts)));
+            for (rolled, way) in rolled.iter_mut().zip(wheels.go_on(now_s + PERIOD_S)) {
+                *rolled += way;
             }
         }
         let WheelRatio { ratio, deviation } = shares.ratio();

@@ -1,0 +1,94 @@
+//! The wheels that a base turns as it is told. What limits them is each wheel's acceleration, or that of their mean and that of their
+//! difference: bases that take a speed and a turn rate limit them so, and their wheels differ from others as they turn.
+
+use common::mission::{Body, ModelledSpeed, Response};
+
+/// A turn that is as fast within this share as the wheels' accelerations allow is limited by them.
+const AS_WHEELS: f64 = 0.01;
+
+/// What makes counts of a body's motion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Axle {
+    pub(crate) counts_per_m: f64,
+    /// None for a car, whose second channel steers.
+    pub(crate) track_m: Option<f64>,
+}
+
+impl From<&Body> for Axle {
+    fn from(body: &Body) -> Self {
+        let track_m = body.steering.is_none().then_some(body.track_m);
+        Self { counts_per_m: 1.0 / body.metres_per_count(), track_m }
+    }
+}
+
+impl Axle {
+    pub(super) fn limits(self, response: &Response) -> Limits {
+        let most = response.acceleration_m_s2;
+        let turn = self.track_m.map(|track| response.turn_acceleration_rad_s2 * track / 2.0);
+        // Of two infinite ones the share is no number.
+        let apart = turn.filter(|turn| (turn / most - 1.0).abs() > AS_WHEELS);
+        let both = [most, apart.unwrap_or(most)];
+        Limits { are_apart: apart.is_some(), most: both.map(|most| most * self.counts_per_m) }
+    }
+
+    pub(super) fn response(self, dead_time_s: f64, limits: Limits) -> Response {
+        let [acceleration_m_s2, turn] = limits.most.map(|most| most / self.counts_per_m);
+        let turn_acceleration_rad_s2 =
+            self.track_m.map_or(f64::INFINITY, |track| 2.0 * turn / track);
+        Response { delay_s: dead_time_s, lag_s: 0.0, acceleration_m_s2, turn_acceleration_rad_s2 }
+    }
+}
+
+/// Accelerations of the left and the right wheel, or of half their sum and half their difference, counts/s in a second.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    pub(super) are_apart: bool,
+    pub(super) most: [f64; 2],
+}
+
+impl Limits {
+    /// What is limited of these wheels.
+    pub(super) fn axes(self, [left, right]: [f64; 2]) -> [f64; 2] {
+        if self.are_apart { [(left + right) / 2.0, (right - left) / 2.0] } else { [left, right] }
+    }
+
+    pub(super) fn wheels(self, [one, other]: [f64; 2]) -> [f64; 2] {
+        if self.are_apart { [one - other, one + other] } else { [one, other] }
+    }
+}
+
+/// Speeds and ways in counts.
+#[derive(Clone, Debug)]
+pub(crate) struct ModelledWheels {
+    limits: Limits,
+    axes: [ModelledSpeed; 2],
+}
+
+impl ModelledWheels {
+    pub(crate) fn new(axle: Axle, delay_s: f64, response: &Response) -> Self {
+        let limits = axle.limits(response);
+        Self { limits, axes: limits.most.map(|most| ModelledSpeed::new(delay_s, most)) }
+    }
+
+    pub(crate) fn command(&mut self, at_s: f64, counts: [f64; 2]) {
+        let [one, other] = self.limits.axes(counts);
+        self.axes[0].command(at_s, one);
+        self.axes[1].command(at_s, other);
+    }
+
+    /// See [`ModelledSpeed::go_on`].
+    pub(crate) fn go_on(&mut self, until_s: f64) -> [f64; 2] {
+        self.limits.wheels(self.axes.each_mut().map(|axis| axis.go_on(until_s)))
+    }
+
+    /// What `of` says of each axis, for the wheels.
+    pub(crate) fn each(&self, of: impl Fn(&ModelledSpeed) -> f64) -> [f64; 2] {
+        self.limits.wheels(self.axes.each_ref().map(of))
+    }
+
+    /// See [`ModelledSpeed::pending`].
+    pub(crate) fn pending(&self) -> impl Iterator<Item = (f64, [f64; 2])> {
+        let both = self.axes[0].pending().zip(self.axes[1].pending());
+        both.map(|((at_s, one), (_, other))| (at_s, self.limits.wheels([one, other])))
+    }
+}
