@@ -39,8 +39,9 @@ fn a_robot_of_ros_2_is_refused_without_the_feature_that_speaks_it() {
 
 #[test]
 fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
-    let cases: [(&[&str], _, &[&str]); 20] = [
+    let cases: [(&[&str], _, &[&str]); 21] = [
         (&["run", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
+        (&["record", "--robot", "bad", "--out", "/proc/x"], "", &["cannot write /proc/x"]),
         (&["check", "/no/such/file.toml"], "mission", &["/no/such/file.toml"]),
         (
             &["stage", "warp", "--run", "/tmp", "--supervisor", "1"],

@@ -25,7 +25,7 @@ use super::{
     Hurry, MOST_CORNERS, MOST_TARGETS, MOST_ZONES, Method, Mission, Perimeter, Sensors, Waypoint,
     error::MissionError,
 };
-use crate::{geometry::Zone, grid::MIN_CELLS};
+use crate::{BatteryLimits, Physics, geometry::Zone, grid::MIN_CELLS};
 
 /// A mission is a page or two; a file without end is no mission.
 const MAX_BYTES: u64 = 8 << 20;
@@ -140,7 +140,43 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
         let text = format!("known shapes and zones leave a body of {radius} m radius no way to {at}; move the target, or what is around it");
         remark(key, text)
     });
-    [car, twice, blind, shut].into_iter().flatten().collect()
+    let reversed = thresholds(mission).into_iter().filter(|(_, low, _, high)| low > high);
+    let reversed = reversed.map(|(key, low, other, high)| {
+        let text = format!(
+            "{low} is more than {other} = {high}, which is passed first; swap them, or change one"
+        );
+        remark(key, text)
+    });
+    [car, twice, blind, shut].into_iter().flatten().chain(reversed).collect()
+}
+
+/// Thresholds that are passed in an order: a key and its value, and the key and the value that are no less.
+fn thresholds(mission: &Mission) -> [(&'static str, f64, &'static str, f64); 4] {
+    let Physics { battery, heights, radio, .. } = mission.simulation.physics();
+    let BatteryLimits { board, motor, servo } = mission.robot.low_battery_v;
+    let (stops_m, slows_m) = (mission.arrival_tolerance_m, mission.controller.slow_radius_m);
+    let clearance_m = heights.ground_clearance_m;
+    [
+        ("arrival_tolerance_m", stops_m, "controller.slow_radius_m", slows_m),
+        (
+            "robot.low_battery_v",
+            board.max(motor).max(servo),
+            "simulation.battery.start_v",
+            battery.start_v,
+        ),
+        (
+            "simulation.heights.ground_clearance_m",
+            clearance_m,
+            "simulation.heights.body_top_m",
+            heights.body_top_m,
+        ),
+        (
+            "simulation.radio.outage_mean_s",
+            radio.outage_mean_s,
+            "simulation.radio.outage_max_s",
+            radio.outage_max_s,
+        ),
+    ]
 }
 
 /// A list in the file that is longer than what was `read` of it: where it is, its key, and the problem.

@@ -118,6 +118,15 @@ class Live(unittest.TestCase):
         self.assertIn(ROBOT, raised.exception.robots)
         self.assertRaises(firsthand.NotRunning, firsthand.fix, "nobody", 0, 0, sd_m=0.1)
 
+    def test_a_file_of_a_page_beside_the_robots_is_no_robot(self):
+        file = next(Path(place) for place in topics.places() if (Path(place) / ROBOT).is_dir()) / "nobody.page-8080"
+        file.touch()
+        self.addCleanup(file.unlink)
+        self.assertIn(ROBOT, firsthand.robots())
+        self.assertNotIn(file.name, firsthand.robots())
+        for name in ("nobody", file.name):
+            self.assertRaises(firsthand.NotRunning, firsthand.robot_state, name)
+
     def test_a_fix_is_used_and_a_turn_published(self):
         poses = firsthand.follow(ROBOT, "pose")
         pose = next(poses)

@@ -245,3 +245,36 @@ fn no_number_of_a_list_that_is_too_long_is_dropped_in_silence() {
         );
     }
 }
+
+#[test]
+fn thresholds_in_the_wrong_order_are_remarked_with_both_keys() {
+    let remarks = |text: &str| {
+        Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml")).unwrap().remarks
+    };
+    assert_eq!(remarks(""), Vec::<String>::new());
+    for (text, key, other) in [
+        (
+            "controller.slow_radius_m = 0.1",
+            "arrival_tolerance_m: 0.15",
+            "controller.slow_radius_m = 0.1",
+        ),
+        (
+            "robot.low_battery_v.motor = 8.5",
+            "m.toml:2: robot.low_battery_v: 8.5",
+            "simulation.battery.start_v = 7.8",
+        ),
+        (
+            "simulation.heights.body_top_m = 0.02",
+            "simulation.heights.ground_clearance_m",
+            "body_top_m = 0.02",
+        ),
+        (
+            "simulation.radio.outage_max_s = 0.2",
+            "simulation.radio.outage_mean_s: 0.5",
+            "outage_max_s = 0.2",
+        ),
+    ] {
+        let [remark] = &remarks(text)[..] else { panic!("{text}") };
+        assert!(remark.contains(key) && remark.contains(other), "{remark}");
+    }
+}

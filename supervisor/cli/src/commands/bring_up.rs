@@ -114,6 +114,10 @@ pub fn main(arguments: &Arguments) -> Result {
         replace(file.as_ref(), text).map_err(FileError::of("write", file.as_ref()))?;
         write_stderr(&format!("firsthand: {} keys were written to {file}\n", keys.len()));
     }
+    judged(&found)
+}
+
+fn judged(found: &[Finding]) -> Result {
     if found.iter().all(|finding| finding.verdict == Verdict::Unknown) {
         let message = "nothing was measured: the robot did not move, or its sensors said nothing; see the link's log in the run directory";
         return Err(Refused::new("nothing-measured", message).into());
@@ -170,4 +174,29 @@ fn drawn(seen: &[DVec2]) -> String {
         }],
     }
     .svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bring_up_that_measured_nothing_or_something_else_than_is_stated_fails() {
+        let code = |verdicts: &[Verdict]| {
+            let finding = |verdict: &Verdict| Finding {
+                part: String::new(),
+                verdict: *verdict,
+                text: String::new(),
+                keys: Vec::new(),
+            };
+            let found: Vec<_> = verdicts.iter().map(finding).collect();
+            judged(&found).err().map(|error| error.to_string())
+        };
+        use Verdict::{Right, Unknown, Wrong};
+        assert!(
+            code(&[Unknown, Unknown]).is_some_and(|said| said.contains("nothing was measured"))
+        );
+        assert!(code(&[Right, Wrong]).is_some_and(|said| said.contains("1 is not as")));
+        assert_eq!(code(&[Right, Unknown]), None);
+    }
 }

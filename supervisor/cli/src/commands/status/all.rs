@@ -115,3 +115,25 @@ fn table(listed: &[Listed]) -> String {
     }
     table.to_string()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mirror_is_listed_as_elsewhere_with_its_age_and_no_robot_of_here_is() {
+        let shown = |age_s| {
+            table(&[Listed {
+                robot: "x80".to_owned(),
+                supervisor_pid: Some(7),
+                state: "drive",
+                mission_time_s: Some(3.0),
+                simulated: Some(true),
+                age_s,
+                run: None,
+            }])
+        };
+        assert!(shown(Some(2.34)).contains("elsewhere, 2.3 s ago"));
+        assert!(shown(None).contains("simulated") && !shown(None).contains("elsewhere"));
+    }
+}
