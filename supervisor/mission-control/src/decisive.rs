@@ -6,7 +6,7 @@
 use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 
 use crate::{
-    judge::{Deadline, reached, touched},
+    judge::{Deadline, arrived, touched},
     observer::Record,
     outcome::{Ending, Outcome},
 };
@@ -60,7 +60,9 @@ pub(crate) fn first(
     let poses = &record.poses;
     let contact = contact.map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
     let arrival = record.arrival;
-    let arrival = arrival.map(|it| (it.stamp.tick, reached(it.distance_m, tolerance_m)));
+    let arrival =
+        arrival.map(|it| (it.stamp.tick, arrived(it.distance_m, record.beside(&it, tolerance_m))));
+    let arrived_in = arrival.as_ref().map(|(tick, _)| *tick);
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
     // If two events have the same tick, the first of the list counts.
@@ -70,7 +72,7 @@ pub(crate) fn first(
     };
     let last_tick = match ending.outcome {
         // The command of the arrival is the last command of the mission.
-        Outcome::Reached => tick,
+        Outcome::Reached | Outcome::Unreachable if arrived_in == Some(tick) => tick,
         _ => tick.saturating_sub(1),
     };
     let truth_ticks = match ending.outcome {

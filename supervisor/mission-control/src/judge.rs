@@ -8,6 +8,7 @@ use common::{
     domain::RobotName,
     samples::{Action, HoldReason, LinkSample},
 };
+use glam::DVec2;
 use link::failsafe;
 use processes::{policy::Now, records};
 
@@ -35,8 +36,6 @@ pub(crate) struct Snapshot<'a> {
     pub has_ticked: bool,
     /// What a stage cannot use, with the remedy.
     pub complaint: Option<String>,
-    /// The mission's `arrival_tolerance_m`.
-    pub tolerance_m: f64,
     pub reason: HoldReason,
     pub held: Vec<&'static str>,
     /// Stages that do not run although another should have started them.
@@ -48,16 +47,21 @@ pub(crate) struct Snapshot<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrival {
     pub distance_m: f64,
+    /// See [`crate::observer::Record::beside`].
+    pub beside: Option<DVec2>,
     pub since: Now,
 }
 
-/// A target in or beside a hazard counts as reached from as near as the robot gets.
-pub(crate) fn reached(distance_m: f64, tolerance_m: f64) -> Ending {
-    let mut reason = format!("{distance_m:.2} m from the target");
-    if distance_m > tolerance_m {
-        reason += &format!(", more than arrival_tolerance_m = {tolerance_m}: as near as it gets");
-    }
-    Ending::asked_for(Outcome::Reached, reason)
+/// A target in or beside a hazard is not reached from as near as the robot gets.
+pub(crate) fn arrived(distance_m: f64, beside: Option<DVec2>) -> Ending {
+    let reason = format!("{distance_m:.2} m from the target");
+    let Some(place) = beside else {
+        return Ending::asked_for(Outcome::Reached, reason);
+    };
+    let reason = format!(
+        "{reason}, at {place:.2}: as near as the robot gets beside a hazard, and more than arrival_tolerance_m"
+    );
+    Ending::failed(Outcome::Unreachable, reason)
 }
 
 pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
@@ -109,10 +113,10 @@ impl Snapshot<'_> {
 
     /// An arrival counts when the encoders say that the robot rests. In lockstep it does when no command follows.
     fn arrived(&self, now: Now) -> Option<Ending> {
-        let Arrival { distance_m, since } = self.arrival?;
+        let Arrival { distance_m, beside, since } = self.arrival?;
         let at_rest = self.link.is_some_and(|link| link.at_rest == 1);
         if self.in_ticks || at_rest {
-            return Some(reached(distance_m, self.tolerance_m));
+            return Some(arrived(distance_m, beside));
         }
         let arrived = format!("arrived {distance_m:.2} m from the target");
         (now.saturating_sub(since) >= RESTS_WITHIN).then(|| {

@@ -12,7 +12,8 @@ use common::{
     roster,
     samples::{
         CommandSample, CommandState, ComplaintSample, ContactSample, FieldCell, FieldHeader,
-        GridHeader, GuidanceSample, HealthSample, LinkSample, PoseSample, Rest, name_str,
+        GridHeader, GuidanceSample, GuidanceStatus, HealthSample, LinkSample, PoseSample, Rest,
+        name_str,
     },
     topics,
     waiter::Waiter,
@@ -20,7 +21,7 @@ use common::{
 use glam::DVec2;
 use processes::stage_processes::StageProcesses;
 
-use crate::long_record;
+use crate::{long_record, target_list::TargetOutcome};
 
 /// The most guidance samples that are kept: that of the arrival must still be there when its command is read.
 const MOST_GUIDANCE: usize = 1024;
@@ -73,7 +74,7 @@ pub struct Record {
     /// The pose of every tick; in a long run older ticks are thinned out.
     pub poses: Vec<PoseSample>,
     pub pose: Option<PoseSample>,
-    guidance: VecDeque<GuidanceSample>,
+    pub(crate) guidance: VecDeque<GuidanceSample>,
     pub command: Option<CommandSample>,
     pub(crate) published: Published,
     /// The newest ticks at which something held the wheels, oldest first.
@@ -212,11 +213,26 @@ impl Record {
             .is_none_or(|index| CellState::from_byte(self.grid.cells()[index]).is_hazard())
     }
 
-    /// The arrival at the current target, and whether the pose is sure enough for it.
-    pub(crate) fn sure_arrival(&self, mission: &Mission) -> Option<(CommandSample, bool)> {
+    /// The arrival at the current target, and what it is worth.
+    pub(crate) fn sure_arrival(&self, mission: &Mission) -> Option<(CommandSample, TargetOutcome)> {
         let command = self.arrival?;
         let pose = self.pose_at(command.stamp.tick);
-        Some((command, pose.is_none_or(|pose| pose.is_sure(mission))))
+        let outcome = if self.beside(&command, mission.arrival_tolerance_m).is_some() {
+            TargetOutcome::Unreachable
+        } else if pose.is_none_or(|pose| pose.is_sure(mission)) {
+            TargetOutcome::Reached
+        } else {
+            TargetOutcome::ReachedUnsure
+        };
+        Some((command, outcome))
+    }
+
+    /// Where the robot stands that arrived outside the tolerance, as near to a target in or beside a hazard as the planner says it gets.
+    pub(crate) fn beside(&self, arrival: &CommandSample, tolerance_m: f64) -> Option<DVec2> {
+        let guidance = self.guidance_at(arrival.stamp.tick)?;
+        let is_near = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
+        let pose = self.pose_at(arrival.stamp.tick)?;
+        (is_near && arrival.distance_m > tolerance_m).then(|| pose.pose().position)
     }
 
     pub fn guidance_at(&self, tick: u64) -> Option<&GuidanceSample> {

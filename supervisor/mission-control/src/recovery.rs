@@ -129,6 +129,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
+    use crate::target_list::TargetOutcome;
 
     #[test]
     fn the_persisted_targets_of_the_longest_run_fit_into_the_checkpoint() {
@@ -138,7 +139,7 @@ mod tests {
             [TargetPoint { x_m: 1.5, has_heading: 1, ..TargetPoint::default() }; MOST_TARGETS];
         for tick in 0..500 {
             let arrival = CommandSample { distance_m: 0.1, ..CommandSample::default() };
-            list.replace(&points, (tick, tick as f64), Some((arrival, true)));
+            list.replace(&points, (tick, tick as f64), Some((arrival, TargetOutcome::Reached)));
         }
         assert!(!list.append(&points[..1]), "the list is full");
         let directory = tempfile::tempdir().unwrap();

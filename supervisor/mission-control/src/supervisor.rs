@@ -336,6 +336,7 @@ impl<'a> Supervisor<'a> {
         let ends = self.targets.is_last() && !self.targets.follows();
         let arrival = record.arrival.filter(|_| ends).map(|command| Arrival {
             distance_m: newest_m.unwrap_or(command.distance_m),
+            beside: record.beside(&command, self.options.mission.arrival_tolerance_m),
             since: *self.arrived.get_or_insert(now),
         });
         let goes_on = self.options.mission.simulation.goes_on_after_contact;
@@ -357,7 +358,6 @@ impl<'a> Supervisor<'a> {
             // Other stages publish at tick 0 before the robot begins it.
             has_ticked: record.pose.is_some(),
             complaint: record.complaint(),
-            tolerance_m: self.options.mission.arrival_tolerance_m,
             reason: self.decision.reason,
             held: self.stages.held(),
             not_started: self.stages.not_started(),

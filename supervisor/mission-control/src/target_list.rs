@@ -137,7 +137,7 @@ impl TargetList {
     }
 
     /// Follow a beacon from now on. There is no target before the beacon is heard.
-    pub(crate) fn follow(&mut self, now_s: f64, arrival: Option<(CommandSample, bool)>) {
+    pub(crate) fn follow(&mut self, now_s: f64, arrival: Option<(CommandSample, TargetOutcome)>) {
         self.replace(&[], (0, now_s), arrival);
         (self.waits, self.by_hand, self.follows) = (true, false, true);
     }
@@ -218,7 +218,7 @@ impl TargetList {
         &mut self,
         points: &[TargetPoint],
         (since_tick, now_s): (u64, f64),
-        arrival: Option<(CommandSample, bool)>,
+        arrival: Option<(CommandSample, TargetOutcome)>,
     ) {
         if self.has_target() {
             self.end_current(TargetOutcome::Replaced, now_s, arrival);
@@ -238,7 +238,7 @@ impl TargetList {
         &mut self,
         outcome: Outcome,
         now_s: f64,
-        arrival: Option<(CommandSample, bool)>,
+        arrival: Option<(CommandSample, TargetOutcome)>,
     ) {
         if self.release() {
             return;
@@ -257,7 +257,7 @@ impl TargetList {
         &mut self,
         outcome: TargetOutcome,
         now_s: f64,
-        arrival: Option<(CommandSample, bool)>,
+        arrival: Option<(CommandSample, TargetOutcome)>,
     ) {
         if let Some(arrival) = arrival {
             return self.store_arrival(arrival);
@@ -273,8 +273,8 @@ impl TargetList {
         }
     }
 
-    /// Send the robot, whose `arrival` is a command and whether its pose was sure, to the next target, from `since_tick` on.
-    pub(crate) fn advance(&mut self, arrival: (CommandSample, bool), since_tick: u64) {
+    /// Send the robot, whose `arrival` is a command and what it is worth, to the next target, from `since_tick` on.
+    pub(crate) fn advance(&mut self, arrival: (CommandSample, TargetOutcome), since_tick: u64) {
         if self.ahead.is_empty() {
             return;
         }
@@ -297,8 +297,7 @@ impl TargetList {
         }
     }
 
-    fn store_arrival(&mut self, (command, is_sure): (CommandSample, bool)) {
-        let outcome = if is_sure { TargetOutcome::Reached } else { TargetOutcome::ReachedUnsure };
+    fn store_arrival(&mut self, (command, outcome): (CommandSample, TargetOutcome)) {
         let result = TargetResult {
             at_s: Some(command.stamp.time().seconds()),
             distance_m: Some(command.distance_m),
@@ -393,10 +392,12 @@ pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
     }
     let worse = [
         (TargetOutcome::WrongPlace, Outcome::WrongPlace, "was in the wrong place"),
+        (TargetOutcome::Unreachable, Outcome::Unreachable, "was beside a hazard, and too far off"),
         (TargetOutcome::ReachedUnsure, Outcome::ReachedUnsure, "was not sure"),
     ];
     let first = worse.into_iter().find_map(|(of_target, outcome, words)| {
-        let result = results.iter().find(|result| result.outcome == of_target)?;
+        let is_so = |it: &&TargetResult| it.outcome == of_target && it.distance_m.is_some();
+        let result = results.iter().find(is_so)?;
         let reason = format!("{}; the arrival at target {} {words}", ending.reason, result.number);
         Some(Ending::failed(outcome, reason))
     });

@@ -32,8 +32,9 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let moving = LinkSample { at_rest: 0, ..go };
     let resting = LinkSample { at_rest: 1, ..go };
     let arrival = |distance_m, seconds| {
-        Some(Arrival { distance_m, since: start + Duration::from_secs(seconds) })
+        Some(Arrival { distance_m, beside: None, since: start + Duration::from_secs(seconds) })
     };
+    let beside = arrival(0.36, 0).map(|it| Arrival { beside: Some(DVec2::new(2.64, 0.0)), ..it });
     // A simulated robot that drives; its last tick was made at the start.
     let driving = || Snapshot {
         arrival: None,
@@ -47,7 +48,6 @@ fn every_rule_of_the_judgement_decides_its_row() {
         progress: start,
         has_ticked: true,
         complaint: None,
-        tolerance_m: 0.15,
         reason: HoldReason::None,
         held: Vec::new(),
         not_started: Vec::new(),
@@ -102,8 +102,8 @@ fn every_rule_of_the_judgement_decides_its_row() {
         ("a timeout while a stage complains",
          Snapshot { deadline: deadline(10.0, 0.0), complaint: Some("link: no nose".to_owned()), ..driving() }, late,
          Some((Outcome::Timeout, "not there after 10 s; link: no nose"))),
-        ("an arrival beside the target", Snapshot { arrival: arrival(0.36, 0), ..driving() }, early,
-         Some((Outcome::Reached, "0.36 m from the target, more than arrival_tolerance_m = 0.15"))),
+        ("an arrival beside the target", Snapshot { arrival: beside, ..driving() }, early,
+         Some((Outcome::Unreachable, "0.36 m from the target, at [2.64, 0.00]: as near as the robot gets"))),
         ("an operator may wait", Snapshot { reason: HoldReason::Operator, ..driving() }, late, None),
         ("a held stage in ticks", held(), late, Some((Outcome::Aborted, "mapper died again and again"))),
         ("a held stage on the wall clock may wait", Snapshot { in_ticks: false, ..held() }, late, None),

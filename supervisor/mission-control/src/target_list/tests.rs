@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use common::samples::{PoseSample, Stamp};
+use common::samples::{GuidanceSample, GuidanceStatus, PoseSample, Stamp};
 use glam::DVec2;
 
 use super::*;
@@ -32,14 +32,14 @@ fn a_list_goes_on_from_target_to_target_and_says_what_became_of_each() {
     let TargetSample { number, last, since_tick, target, .. } = list.sample();
     assert_eq!((number, last, since_tick, target), (1, 3, 0, at(3.0, 0.0)));
     assert_eq!(list.sample().ahead(), [at(1.0, 1.0), at(2.0, 2.0)]);
-    list.advance((arrival(7), true), 8);
+    list.advance((arrival(7), Reached), 8);
     let TargetSample { number, last, since_tick, target, .. } = list.sample();
     assert_eq!((number, last, since_tick, target), (2, 3, 8, at(1.0, 1.0)));
     assert_eq!(list.began_s(), 7.0);
     list.replace(&[at(0.5, 0.0), at(0.0, 0.0)], (12, 11.0), None);
     let TargetSample { number, last, since_tick, target, .. } = list.sample();
     assert_eq!((number, last, since_tick, target), (4, 5, 12, at(0.5, 0.0)));
-    list.advance((arrival(20), false), 21);
+    list.advance((arrival(20), ReachedUnsure), 21);
     assert!(list.is_last());
     let reached = Ending::asked_for(Outcome::Reached, "");
     let results = list.results(&reached, Some(30), Some(&arrival(30)), None);
@@ -54,13 +54,38 @@ fn a_list_goes_on_from_target_to_target_and_says_what_became_of_each() {
 }
 
 #[test]
+fn an_arrival_beside_a_hazard_is_reached_within_the_tolerance_and_unreachable_beyond_it() {
+    let beside = |distance_m, status: GuidanceStatus| {
+        let mut record = Record::default();
+        let command = CommandSample { distance_m, ..arrival(7) };
+        record.arrival = Some(command);
+        record.poses.push(PoseSample { stamp: command.stamp, x_m: 2.6, ..PoseSample::default() });
+        let guidance = GuidanceSample {
+            stamp: command.stamp,
+            status: status.into(),
+            ..GuidanceSample::default()
+        };
+        record.guidance.push_back(guidance);
+        let mut list = TargetList::of(&mission(""));
+        assert!(list.append(&[at(0.0, 0.0)]));
+        list.advance(record.sure_arrival(&mission("")).unwrap(), 8);
+        let reached = Ending::asked_for(Outcome::Reached, "");
+        let results = list.results(&reached, Some(9), Some(&arrival(9)), None);
+        of_all(reached, &results).outcome
+    };
+    assert_eq!(beside(0.36, GuidanceStatus::AtTarget), Outcome::Unreachable);
+    assert_eq!(beside(0.14, GuidanceStatus::AtTarget), Outcome::Reached);
+    assert_eq!(beside(0.16, GuidanceStatus::Along), Outcome::Reached, "it turned to its heading");
+}
+
+#[test]
 fn an_arrival_that_the_ground_truth_contradicts_makes_the_whole_list_wrong() {
     let pose = PoseSample { stamp: arrival(7).stamp, left_counts: 7, ..PoseSample::default() };
     let truth = |x, tick| GroundTruthTick { tick, x, left_counts: 7, ..GroundTruthTick::default() };
     for (x, outcome) in [(2.6, Outcome::Reached), (2.4, Outcome::WrongPlace)] {
         let mut list = TargetList::of(&mission(""));
         assert!(list.append(&[at(0.0, 0.0)]));
-        list.advance((arrival(7), true), 8);
+        list.advance((arrival(7), TargetOutcome::Reached), 8);
         let mut record = Record::default();
         record.poses.push(pose);
         list.compare(&record, &[truth(x, 7)], 0.5);
@@ -123,7 +148,7 @@ fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
     list.settle(Outcome::Timeout, 9.0, None);
     assert_eq!(list.outcome_while_waiting(), Some(Outcome::Timeout));
     list.replace(&[at(0.5, 0.0)], (20, 20.0), None);
-    list.settle(Outcome::Reached, 30.0, Some((arrival(30), true)));
+    list.settle(Outcome::Reached, 30.0, Some((arrival(30), Reached)));
     assert_eq!(list.outcome_while_waiting(), Some(Outcome::Reached));
     let results = list.results(&Ending::asked_for(Outcome::Reached, ""), None, None, None);
     assert_eq!(outcomes(&results), [(1, TimedOut), (2, NotTried), (3, Reached)]);
@@ -141,7 +166,7 @@ fn a_hands_target_has_no_result_and_ends_in_waiting_for_the_next_one() {
     hand(&mut list, 0.6);
     assert_eq!((list.number(), list.waits(), list.has_target()), (3, false, false));
     // It is reached, or no way leads there.
-    list.settle(Outcome::Reached, 6.0, Some((arrival(6), true)));
+    list.settle(Outcome::Reached, 6.0, Some((arrival(6), Reached)));
     assert!(list.waits() && !list.release());
     hand(&mut list, 0.7);
     assert!(list.release() && list.waits());
@@ -149,7 +174,7 @@ fn a_hands_target_has_no_result_and_ends_in_waiting_for_the_next_one() {
     assert_eq!(list.outcome_while_waiting(), Some(Outcome::Waited));
     list.replace(&[at(2.0, 0.0)], (9, 8.0), None);
     assert!(list.has_target());
-    list.settle(Outcome::Reached, 9.0, Some((arrival(9), true)));
+    list.settle(Outcome::Reached, 9.0, Some((arrival(9), Reached)));
     let ending = Ending::asked_for(Outcome::Reached, "");
     let results = list.results(&ending, None, None, None);
     assert_eq!(outcomes(&results), [(1, Replaced), (6, Reached)]);
