@@ -23,6 +23,8 @@ pub struct Follower<Topics, Open> {
     open: Open,
     /// The robot is gone, and its last samples are given first.
     ending: bool,
+    /// When it was last looked whether the robot is gone.
+    looked: Instant,
     joined: Option<Joined<Topics>>,
     refused: Option<(BusInstance, Instant)>,
 }
@@ -63,6 +65,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
             wake_on: vec![wake_on],
             open,
             ending: false,
+            looked: Instant::now(),
             joined: None,
             refused: None,
         }
@@ -174,7 +177,12 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         Ok(Joined { topics: (self.open)(&bus)?, waiter, bus })
     }
 
-    fn on_disconnected(&self) -> bool {
+    /// A look opens the supervisor's lock file.
+    fn on_disconnected(&mut self) -> bool {
+        if self.looked.elapsed() < LOOK_EVERY {
+            return false;
+        }
+        self.looked = Instant::now();
         let replaced = |joined: &Joined<Topics>| joined.bus.is_replaced();
         // A killed supervisor leaves its bus behind.
         self.joined.as_ref().is_some_and(replaced) || !self.domain.is_supervised()
