@@ -35,7 +35,20 @@ struct Generation {
     kill: Option<Now>,
 }
 
-const EVENTS: [Event; 10] = [
+/// What a process did since its last sign of life.
+const SLEPT: Activity = Activity { ran: ms(0), starved: ms(0), state: State::Asleep };
+const RAN: Activity = Activity { ran: ms(3000), state: State::Ready, ..SLEPT };
+const STOPPED: Activity = Activity { state: State::Stopped, ..SLEPT };
+const STARVED: Activity = Activity { starved: Duration::MAX, state: State::Ready, ..SLEPT };
+const STARVED_THEN_WAITED: Activity = Activity { state: State::Asleep, ..STARVED };
+
+impl Generation {
+    const fn deadline(&self) -> Duration {
+        if self.ready.is_some() { ms(750) } else { ms(3000) }
+    }
+}
+
+const EVENTS: [Event; 15] = [
     Event::Start,
     Event::StartFailed,
     Event::BeatStarting,
@@ -46,6 +59,11 @@ const EVENTS: [Event; 10] = [
     Event::Replace,
     Event::Stop,
     Event::Time(None),
+    Event::Time(Some(RAN)),
+    Event::Time(Some(SLEPT)),
+    Event::Time(Some(STOPPED)),
+    Event::Time(Some(STARVED)),
+    Event::Time(Some(STARVED_THEN_WAITED)),
 ];
 
 impl Model {
@@ -83,10 +101,9 @@ impl Model {
     /// The time of the next deadline by the rules alone.
     fn due(&self) -> Option<Now> {
         match &self.generation {
-            Some(generation) => Some(generation.kill.unwrap_or_else(|| match generation.ready {
-                Some(_) => generation.sign + ms(750),
-                None => generation.sign + ms(3000),
-            })),
+            Some(generation) => {
+                Some(generation.kill.unwrap_or(generation.sign + generation.deadline()))
+            }
             None if self.wanted && !self.held => {
                 Some(self.deaths.last().copied().unwrap_or_default() + self.wait)
             }
@@ -94,10 +111,17 @@ impl Model {
         }
     }
 
+    /// The time at which a process that only sleeps is aborted, by the rules alone.
+    fn blocked(&self) -> Option<Now> {
+        let generation = self.generation.as_ref()?;
+        Some(generation.sign + generation.deadline() * 4)
+    }
+
     /// The action that the rules demand.
     fn expect(&mut self, event: Event) -> Option<Action> {
         let now = self.now;
         let due = self.due().is_some_and(|due| now >= due);
+        let blocked = self.blocked().is_some_and(|blocked| now >= blocked);
         let Some(generation) = &mut self.generation else {
             let starts = match event {
                 Event::Start if !self.held => true,
@@ -125,6 +149,8 @@ impl Model {
                 generation.kill = Some(now + ms(100));
                 Some(Action::Kill)
             }
+            Event::Time(Some(STARVED | STARVED_THEN_WAITED)) => None,
+            Event::Time(Some(SLEPT)) if !blocked => None,
             Event::Time(_) if due => self.abort(),
             Event::OutputStale if generation.kill.is_none() && generation.ready.is_some() => {
                 generation.sign = now;
@@ -217,8 +243,8 @@ impl Model {
     /// The moments at and around the due time, and one long after anything.
     fn moments(&self) -> Vec<Duration> {
         let mut pauses = vec![ms(0), ms(20), ms(11_000)];
-        if let Some(due) = self.due() {
-            let left = due.saturating_sub(self.now);
+        for then in [self.due(), self.blocked()].into_iter().flatten() {
+            let left = then.saturating_sub(self.now);
             pauses.extend([left.saturating_sub(ms(1)), left]);
         }
         pauses
