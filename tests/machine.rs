@@ -308,12 +308,19 @@ fn a_pipe_in_place_of_a_mission_is_refused_by_name_and_not_waited_for() {
 }
 
 #[test]
-fn fewer_descriptors_than_a_supervisor_needs_are_not_told_as_full_shared_memory() {
+fn fewer_descriptors_than_a_supervisor_needs_are_refused_and_as_many_as_it_says_suffice() {
     let directory = tempfile::tempdir().unwrap();
     let run = ["run", "open-room", "--robot", "mach-few", "--runs"];
-    let mut limited = firsthand_under(&["prlimit", "--nofile=64:64"], &run);
-    let output = limited.arg(directory.path()).output().unwrap();
+    let limited_to = |most: &str| {
+        let mut limited = firsthand_under(&["prlimit", &format!("--nofile={most}:{most}")], &run);
+        limited.arg(directory.path()).output().unwrap()
+    };
+    let output = limited_to("64");
     assert_refused(&output, "descriptors", &["64"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    let (_, needed) = said.split_once("needs ").unwrap();
+    let output = limited_to(needed.split_once(';').unwrap().0);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
 }
 
 #[test]

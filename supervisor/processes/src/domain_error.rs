@@ -8,6 +8,8 @@ use std::{
 use common::{bus::BusError, domain::SHARED_MEMORY};
 use thiserror::Error;
 
+use crate::descriptors::NEEDED;
+
 #[derive(Debug, Error)]
 pub enum DomainError {
     #[error(
@@ -22,7 +24,7 @@ pub enum DomainError {
     #[error("{SHARED_MEMORY} {problem}; {remedy}")]
     SharedMemory { problem: String, remedy: &'static str },
     #[error(
-        "a process may have {limit} descriptors here, and a supervisor needs 256; raise the limit (`ulimit -Hn`, systemd: LimitNOFILE=)"
+        "a process may have {limit} descriptors here, and a supervisor needs {NEEDED}; raise the limit (`ulimit -Hn`, systemd: LimitNOFILE=)"
     )]
     Descriptors { limit: u64 },
     #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
