@@ -85,15 +85,14 @@ impl BusEndpoints {
         })
     }
 
-    pub(crate) fn recreate(mut self, lock: &mut DomainLock) -> Result<Self> {
+    /// Replace the bus. After an error, these are the endpoints of the old one, on which nobody is left.
+    pub(crate) fn recreate(&mut self, lock: &mut DomainLock) -> Result {
+        lock.recreate_bus()?;
         let mut record = std::mem::take(&mut self.observer.record);
         // The next link opens the connection to the robot again.
         record.link = None;
-        let last_request = self.last_request;
-        // The old endpoints are closed before the new bus is made.
-        drop(self);
-        lock.recreate_bus()?;
-        Self::continued(lock, record, last_request)
+        *self = Self::continued(lock, record, self.last_request)?;
+        Ok(())
     }
 
     /// Whether the state was last published a `period` ago or earlier, or a consumer waits for the first roster.

@@ -13,7 +13,7 @@ use crate::{
     decisive::{self, Timeout},
     error::{Result, system},
     observer::{Listener, Record},
-    outcome::{Ending, Wheels, allowed_m},
+    outcome::{Ending, Outcome, Wheels, allowed_m},
     progress::Progress,
     supervisor::{Options, Supervisor},
     target_list::{self, TargetOutcome, TargetResult},
@@ -113,10 +113,14 @@ pub fn run<'a>(
         Supervisor::start(options, lock, (turns.clone(), &signals), consumer, listener)
             .inspect_err(|_| turns.rest(true))?;
     let ending = loop {
-        match supervisor.drive(&mut signals, lock, consumer, show) {
-            Ok(Some(ending)) => break Ok(ending),
-            Ok(None) => supervisor = supervisor.recreate_bus(lock)?,
-            Err(error) => break Err(error),
+        let driven = supervisor.drive(&mut signals, lock, consumer, show);
+        match driven.and_then(|ending| match ending {
+            None => supervisor.recreate_bus(lock).map(|()| None),
+            ending => Ok(ending),
+        }) {
+            Ok(None) => {}
+            Ok(Some(ending)) => break ending,
+            Err(error) => break Ending::failed(Outcome::Aborted, error.to_string()),
         }
     };
     // The robot is stopped first after an error, too, and then the stages in order.
@@ -126,8 +130,7 @@ pub fn run<'a>(
         turns.rest(false);
     });
     turns.rest(true);
-    let ending = ending?;
-    let wheels = stopped?;
+    let wheels = stopped.unwrap_or_else(|error| Wheels::Unknown(error.to_string()));
     supervisor.end_following(TargetOutcome::Followed);
     let end_by_stall = supervisor.end_by_stall();
     let deadline = supervisor.deadline();

@@ -50,18 +50,18 @@ impl Supervisor<'_> {
 
     /// Recreate the bus, files of which block the start of a stage, and restart all stages from their checkpoints. A consumer of the old
     /// bus asks [`Bus::is_replaced`](common::bus::Bus::is_replaced).
-    pub(crate) fn recreate_bus(mut self, lock: &mut DomainLock) -> Result<Self> {
+    pub(crate) fn recreate_bus(&mut self, lock: &mut DomainLock) -> Result {
         tracing::error!("the bus is recreated; consumers must join it again");
         self.decision = Decision::STARTING;
         self.stand()?;
         // A stage that dies meanwhile is not started again on the old bus.
         self.stages.start_no_more();
         self.stop_all()?;
-        let mut renewed = self.with_new_bus(lock)?;
-        renewed.publish_state()?;
-        renewed.stages.start_all(renewed.first_tick());
-        renewed.tick_progress = TickProgress::new(renewed.stages.now());
-        Ok(renewed)
+        self.bus.recreate(lock)?;
+        self.publish_state()?;
+        self.stages.start_all(self.first_tick());
+        self.tick_progress = TickProgress::new(self.stages.now());
+        Ok(())
     }
 
     /// Order the robot to stand, and wait a moment for the link to confirm it.

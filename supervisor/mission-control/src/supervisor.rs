@@ -212,12 +212,6 @@ impl<'a> Supervisor<'a> {
         Ok(supervisor)
     }
 
-    /// Recreate the bus. No stage may use the old one.
-    pub(crate) fn with_new_bus(self, lock: &mut DomainLock) -> Result<Self> {
-        let bus = self.bus.recreate(lock)?;
-        Ok(Self { bus, ..self })
-    }
-
     /// Iterate until the mission ends. Returns none if the bus must be recreated.
     pub(crate) fn drive(
         &mut self,

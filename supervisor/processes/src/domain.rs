@@ -78,7 +78,7 @@ impl DomainLock {
         Ok(acquired)
     }
 
-    /// Make the bus. It replaces an old one, whose endpoints must be closed before.
+    /// Make the bus. It replaces an old one, which nobody uses any more.
     pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
         self.clear()?;
         check_shared_memory(SHARED_MEMORY, SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64)?;
