@@ -5,11 +5,18 @@ use std::{
     io,
     os::{
         linux::net::SocketAddrExt as _,
-        unix::net::{SocketAddr, UnixListener, UnixStream},
+        unix::net::{SocketAddr, UnixListener},
     },
 };
 
-use rustix::{net::sockopt::socket_peercred, process::geteuid};
+use rustix::{
+    io::Errno,
+    net::{
+        AddressFamily, SocketAddrUnix, SocketFlags, SocketType, connect, socket_with,
+        sockopt::socket_peercred,
+    },
+    process::geteuid,
+};
 
 use crate::domain::Domain;
 
@@ -19,7 +26,8 @@ pub struct Claim(UnixListener);
 impl Claim {
     /// Fails with [`io::ErrorKind::AddrInUse`] while another process holds it.
     pub fn make(domain: &Domain) -> io::Result<Self> {
-        let listener = UnixListener::bind_addr(&name(domain)?)?;
+        let name = SocketAddr::from_abstract_name(domain.claim_name())?;
+        let listener = UnixListener::bind_addr(&name)?;
         listener.set_nonblocking(true)?;
         Ok(Self(listener))
     }
@@ -30,16 +38,16 @@ impl Claim {
     }
 }
 
-fn name(domain: &Domain) -> io::Result<SocketAddr> {
-    SocketAddr::from_abstract_name(domain.claim_name())
-}
-
 /// The process that claims the robot. Any user may take any abstract name, so it must be this user's or root's, as the kernel says.
+///
+/// Fails with [`io::ErrorKind::WouldBlock`] if the holder is frozen and more have asked than the kernel keeps.
 pub(crate) fn holder(domain: &Domain) -> io::Result<Option<u32>> {
-    let socket = match UnixStream::connect_addr(&name(domain)?) {
-        Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => return Ok(None),
+    let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
+    let socket = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;
+    match connect(&socket, &SocketAddrUnix::new_abstract_name(domain.claim_name().as_bytes())?) {
+        Err(Errno::CONNREFUSED) => return Ok(None),
         connected => connected?,
-    };
+    }
     let by = socket_peercred(&socket)?;
     let is_trusted = by.uid == geteuid() || by.uid.is_root();
     Ok(is_trusted.then(|| by.pid.as_raw_nonzero().get() as u32))
@@ -63,6 +71,8 @@ mod tests {
             }
             claim.forget_askers();
         }
+        let unanswered = (0..100_000).find_map(|_| domain.supervisor().err()).unwrap();
+        assert_eq!(unanswered.kind(), io::ErrorKind::WouldBlock);
         assert!(domain.is_supervised());
         drop(claim);
         assert!(!domain.is_supervised());
