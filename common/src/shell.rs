@@ -252,6 +252,7 @@ fn work(
     let (mut busy, mut idled) = (true, Instant::now());
     // The process whose samples were ignored last.
     let mut foreign = 0;
+    let mut lost = 0;
     while !stop.came() {
         let pause = (busy && process.has_idle_work()).then_some(TICK_OVER);
         let patience = [pause, process.looks_again_after()]
@@ -276,6 +277,10 @@ fn work(
                     pid = foreign,
                     "a process that the supervisor does not name writes samples; they are ignored; end it"
                 );
+            }
+            if context.bus.lost() > 2 * lost {
+                lost = context.bus.lost();
+                tracing::warn!(lost, "/dev/shm is full: samples are lost; remove what fills it");
             }
             while let Some(Asked { id, fault }) = faults.take()? {
                 let answer = inject(process, fault)?;

@@ -39,6 +39,10 @@ pub enum BusError {
         "this reader holds {most} samples of topic {topic:?}, as many as one may; drop one before the next is taken (nobody waits for it: the oldest that is not taken is lost)"
     )]
     HoldsTooMany { topic: &'static str, most: usize },
+    #[error(
+        "{SHARED_MEMORY} has no memory left for a sample of topic {topic:?}; remove what fills it, or end the reader that is stopped and holds samples"
+    )]
+    NoMemory { topic: &'static str },
     #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, `ulimit -n` reached, or the topic's last place taken?", shm = SHARED_MEMORY)]
     Refused { action: &'static str, topic: &'static str, detail: String },
     #[error("cannot join the bus of robot {robot:?}: {detail}; if it runs, is it this user's, and is {shm} writable and not full?", shm = SHARED_MEMORY)]

@@ -2,12 +2,14 @@
 
 use std::{
     any::Any,
+    cell::Cell,
     ffi::OsStr,
     fmt::Debug,
     fs::{DirBuilder, File},
     io,
     os::unix::{ffi::OsStrExt as _, fs::DirBuilderExt as _},
     path::{Path, PathBuf},
+    rc::Rc,
 };
 
 use iceoryx2::{
@@ -38,6 +40,7 @@ pub struct Bus {
     pub(super) writers: Option<Writers>,
     /// Whether the process is a stage or a supervisor, which may take the places that consumers leave free.
     pub(super) is_stage: bool,
+    pub(super) lost: Rc<Cell<u64>>,
     instance: BusInstance,
 }
 
@@ -153,12 +156,18 @@ impl Bus {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| refused(&error))?;
-        Ok(Self { node: node.into(), writers: None, is_stage: false, instance })
+        let (node, lost) = (node.into(), Rc::default());
+        Ok(Self { node, writers: None, is_stage: false, lost, instance })
     }
 
     /// The processes whose samples are read; none if nobody names them, and the newest generation is read.
     pub const fn writers(&self) -> Option<&Writers> {
         self.writers.as_ref()
+    }
+
+    /// The number of samples of this process that were lost because shared memory is full.
+    pub fn lost(&self) -> u64 {
+        self.lost.get()
     }
 
     /// Whether this bus is no longer used: another bus replaced it, in this run or the next one, or the run has ended. A consumer then

@@ -21,6 +21,7 @@ use super::{
     authors::Author,
     error::Result,
     payload::{Payload, Stamped, has_slice},
+    reserve::Places,
     spec::Spec,
 };
 
@@ -39,8 +40,10 @@ impl<H: Payload, E: Payload> Service<H, E> {
 
     pub(super) fn publisher(&self, longest: usize) -> Result<Publisher<H, E>> {
         let longest = if has_slice::<E>() { longest } else { 1 };
+        let raw = self.raw.publisher(self.spec, longest)?;
         Ok(Publisher {
-            raw: self.raw.publisher(self.spec, longest)?,
+            places: raw.places(self.spec.name, longest)?,
+            raw,
             topic: self.spec.name,
             carries: PhantomData,
         })
@@ -63,6 +66,7 @@ impl<H: Payload, E: Payload> Service<H, E> {
 #[derive(Debug)]
 pub(super) struct Publisher<H, E> {
     raw: RawPublisher,
+    places: Places,
     topic: &'static str,
     carries: PhantomData<fn() -> (H, E)>,
 }
@@ -74,7 +78,7 @@ impl<H: Payload, E: Payload> Publisher<H, E> {
 
     pub(super) fn send(&self, header: H, slice: &[E]) -> Result {
         let count = if has_slice::<E>() { slice.len() } else { 1 };
-        self.raw.send(self.topic, count, &mut |loan| {
+        self.raw.send(self.topic, &self.places, count, &mut |loan| {
             let place = match has_slice::<E>() {
                 true => loan.header.addr(),
                 false => loan.elements.as_mut_ptr().expose_provenance(),

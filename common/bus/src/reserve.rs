@@ -3,21 +3,28 @@
 //! defines the `ftruncate` that the middleware calls. It also reserves memory, or fails, and then the middleware refuses the port.
 //!
 //! Most segments have places for samples that frozen consumers hold, many times as many as are used. The middleware takes the place
-//! that was given back last, so only the first part of such a segment is used, and only that is reserved.
+//! that was given back last, so only the first part of such a segment is used, and only that is reserved at once. [`Places`] reserves
+//! the rest place by place.
 //!
-//! Why `unsafe` is allowed here: a function of that name replaces the one of the C library for the whole program. Here it has the same
-//! signature and meaning; it only fails earlier. The standard library and `rustix` do not call it. It borrows the descriptor that the
-//! caller owns until it returns, and sets `errno` as the C library does.
+//! Why `unsafe` is allowed here:
+//! - A function of that name replaces the one of the C library for the whole program. Here it has the same signature and meaning; it
+//!   only fails earlier. The standard library and `rustix` do not call it. It borrows the descriptor that the caller owns until it
+//!   returns, and sets `errno` as the C library does.
+//! - The advice that reserves places changes no byte of any memory.
 #![allow(unsafe_code)]
 
 use std::{
-    ffi::{c_int, c_long},
+    cell::Cell,
+    ffi::{c_int, c_long, c_void},
+    io,
     os::fd::BorrowedFd,
+    ptr,
 };
 
 use rustix::{
     fs::{FallocateFlags, fallocate, ftruncate as set_length},
     io::{Errno, Result, retry_on_intr},
+    param::page_size,
 };
 
 /// Segments up to this length are reserved as a whole.
@@ -25,8 +32,12 @@ const WHOLE: u64 = 512 << 10;
 /// The share of a longer segment that is reserved: eight maps of the field, more than are under way at once.
 const SHARE: u64 = 32;
 
+/// Advice of Linux 5.14 and later: give pages memory, as a write to each would.
+const MADV_POPULATE_WRITE: c_int = 23;
+
 unsafe extern "C" {
     fn __errno_location() -> *mut c_int;
+    fn madvise(address: *mut c_void, length: usize, advice: c_int) -> c_int;
 }
 
 /// `ftruncate` of POSIX, which also reserves memory.
@@ -57,6 +68,41 @@ fn lengthen(file: BorrowedFd<'_>, length: u64) -> Result<()> {
         // Such a file system does not reserve.
         Err(Errno::OPNOTSUPP) => Ok(()),
         reserved => reserved,
+    }
+}
+
+/// The places for samples in a publisher's segment, all of one length. One that was never used is taken only while all before it are in
+/// use. So the memory of the place behind a taken one is reserved before the sample is sent, and otherwise the taken place is given back.
+#[derive(Debug)]
+pub(crate) struct Places {
+    length: usize,
+    /// The address up to which the places have memory.
+    reserved: Cell<usize>,
+}
+
+impl Places {
+    /// The places of a segment, given the addresses of the first two.
+    pub(crate) const fn of_segment([first, second]: [usize; 2]) -> Self {
+        Self { length: second.abs_diff(first), reserved: Cell::new(first) }
+    }
+
+    /// Reserve memory up to the end of the place behind `taken`. Returns whether there is some.
+    pub(crate) fn reserve_behind(&self, taken: usize) -> bool {
+        let (start, end) = (self.reserved.get(), taken + 2 * self.length);
+        if end <= start {
+            return true;
+        }
+        let page = start - start % page_size();
+        let address = ptr::with_exposed_provenance_mut(page);
+        // SAFETY: the advice changes no byte.
+        let failed = unsafe { madvise(address, end - page, MADV_POPULATE_WRITE) } != 0;
+        let error = failed.then(|| Errno::from_io_error(&io::Error::last_os_error())).flatten();
+        let has_memory = !matches!(error, Some(Errno::FAULT | Errno::NOMEM));
+        // An older kernel does not know the advice.
+        if has_memory {
+            self.reserved.set(end);
+        }
+        has_memory
     }
 }
 

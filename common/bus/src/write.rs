@@ -1,10 +1,10 @@
 //! Writers, which stamp their samples and wake the readers.
 
-use std::collections::HashSet;
+use std::{cell::Cell, collections::HashSet, rc::Rc};
 
 use super::{
     clock::MissionTime,
-    error::Result,
+    error::{BusError, Result},
     make::Bus,
     payload::{Payload, Stamp, Stamped},
     ports::{Notifier, Publisher, Service},
@@ -34,6 +34,7 @@ impl Bus {
             notifier: Notifier::open(&self.node, topic.spec)?,
             generation,
             sequence: 0,
+            lost: Rc::clone(&self.lost),
         })
     }
 }
@@ -46,11 +47,12 @@ pub struct Writer<H, E = ()> {
     notifier: Notifier,
     generation: u32,
     sequence: u32,
+    lost: Rc<Cell<u64>>,
 }
 
 impl<H: Stamped> Writer<H> {
     /// Stamp `sample` with `tick` and the mission time `time`, publish it, and wake the readers. It fails if no memory is left for the
-    /// sample; the limits prevent that unless a reader holds more than it may.
+    /// sample: shared memory is full, and readers hold all that the topic has.
     pub fn publish(&mut self, tick: u64, time: MissionTime, sample: H) -> Result {
         self.publish_slice(tick, time, sample, &[])
     }
@@ -65,18 +67,27 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         header: H,
         slice: &[E],
     ) -> Result {
-        self.publish_quietly(tick, time, header, slice)?;
+        self.send(tick, time, header, slice)?;
         self.wake()
     }
 
-    /// [`Writer::publish_slice`] without waking the readers; [`Writer::wake`] does that.
+    /// [`Writer::publish_slice`] without waking the readers; [`Writer::wake`] does that. If no memory is left for the sample, it is lost,
+    /// as if its readers had not taken it in time: the sequence has a gap, and [`Bus::lost`] counts it.
     pub fn publish_quietly(
         &mut self,
         tick: u64,
         time: MissionTime,
-        mut header: H,
+        header: H,
         slice: &[E],
     ) -> Result {
+        match self.send(tick, time, header, slice) {
+            Err(BusError::NoMemory { .. }) => self.lost.set(self.lost.get() + 1),
+            sent => sent?,
+        }
+        Ok(())
+    }
+
+    fn send(&mut self, tick: u64, time: MissionTime, mut header: H, slice: &[E]) -> Result {
         let Self { generation, sequence, .. } = *self;
         *header.stamp_mut() = Stamp { tick, stamp_ns: time.0, generation, sequence };
         self.sequence = sequence.wrapping_add(1);

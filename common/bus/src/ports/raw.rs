@@ -41,6 +41,7 @@ use crate::{
     layout::type_name,
     leftovers::process_of,
     payload::{Payload, has_slice},
+    reserve::Places,
     spec::{Limits, Spec},
 };
 
@@ -271,16 +272,30 @@ pub(super) struct Loan<'a> {
 }
 
 impl RawPublisher {
+    /// The places of a new publisher for samples of `elements` elements.
+    pub(super) fn places(&self, topic: &'static str, elements: usize) -> Result<Places> {
+        // SAFETY: `elements` is 1 where samples have no slice.
+        let loan =
+            || unsafe { self.loan_custom_payload(elements) }.map_err(refused("write", topic));
+        let first = [loan()?, loan()?];
+        let first = first.each_ref().map(|sample| ptr::from_ref(sample.header()).addr());
+        Ok(Places::of_segment(first))
+    }
+
     /// Publish a sample of `elements` elements. `fill` writes the header and all elements, or returns false if they do not fit.
     pub(super) fn send(
         &self,
         topic: &'static str,
+        places: &Places,
         elements: usize,
         fill: &mut dyn FnMut(Loan<'_>) -> bool,
     ) -> Result {
         // SAFETY: `elements` is 1 where samples have no slice.
         let mut sample =
             unsafe { self.loan_custom_payload(elements) }.map_err(refused("publish on", topic))?;
+        if !places.reserve_behind(ptr::from_ref(sample.header()).expose_provenance()) {
+            return Err(BusError::NoMemory { topic });
+        }
         let header = ptr::from_mut(sample.user_header_mut());
         let elements = sample.payload_mut();
         if !fill(Loan { header, elements }) {

@@ -1,10 +1,14 @@
 //! Tests of the ports of bytes against the middleware's own typed API.
 
 use std::{
+    ffi::{c_int, c_long, c_void},
     fs,
     os::{
-        fd::AsFd as _,
-        unix::{fs::DirBuilderExt as _, net::UnixDatagram},
+        fd::{AsFd as _, AsRawFd as _},
+        unix::{
+            fs::{DirBuilderExt as _, MetadataExt as _},
+            net::UnixDatagram,
+        },
     },
     time::Duration,
 };
@@ -144,6 +148,36 @@ fn slices_of_any_length_up_to_the_longest_arrive_and_longer_ones_are_refused() {
         let refused = writer.publish_quietly(1, TIME, Test::default(), &long);
         assert!(matches!(refused, Err(BusError::Refused { topic: "bytes", .. })));
     });
+}
+
+unsafe extern "C" {
+    fn mmap(
+        address: *mut c_void,
+        length: usize,
+        protection: c_int,
+        flags: c_int,
+        descriptor: c_int,
+        offset: c_long,
+    ) -> *mut c_void;
+}
+
+/// A page behind the end of a file raises SIGBUS as one in a full file system does.
+#[test]
+fn a_place_is_used_only_if_the_one_behind_it_has_memory() {
+    const READ_WRITE: c_int = 3;
+    const SHARED: c_int = 1;
+    let page = rustix::param::page_size();
+    let file = tempfile::tempfile_in(SHARED_MEMORY).unwrap();
+    file.set_len(4 * page as u64).unwrap();
+    // SAFETY: nothing uses the memory but the kernel.
+    let start = unsafe { mmap(ptr::null_mut(), 8 * page, READ_WRITE, SHARED, file.as_raw_fd(), 0) };
+    let start = start.expose_provenance();
+    let places = Places::of_segment([start, start + page]);
+    let is_usable = |place: usize| places.reserve_behind(start + place * page);
+    assert_eq!([0, 1, 2, 3, 1].map(is_usable), [true, true, true, false, true]);
+    assert_eq!(file.metadata().unwrap().blocks() * 512, 4 * page as u64);
+    file.set_len(8 * page as u64).unwrap();
+    assert!(is_usable(3), "memory was freed");
 }
 
 #[test]
