@@ -1,4 +1,5 @@
-"""`firsthand ros2 planner` asked as Nav2 asks its planner server: paths, error codes, a map that changes, and the time to accept a goal.
+"""`firsthand ros2 planner` asked as Nav2 of each release asks its planner server: paths, stamps, error codes, a map that changes, and the time
+to accept a goal.
 
     python3 .ci/ros2-planner.py EXECUTABLE
 
@@ -23,12 +24,13 @@ loaded.loader.exec_module(bridge)
 import rclpy
 from bridge import Header, IdlStruct, LATCHED, OccupancyGridUpdate, Plane, TFMessage, Time, TransformStamped
 from cyclonedds.domain import DomainParticipant
-from cyclonedds.idl.types import array, int8, int64, sequence, uint8, uint16, uint32, uint64
+from cyclonedds.idl.types import array, int8, int16, int64, sequence, uint8, uint16, uint32, uint64
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import OccupancyGrid, Path
+from rosgraph_msgs.msg import Clock
 
 SIDE, CELL, RADIUS = 1000, 0.05, 0.22
 UUID = array[uint8, 16]
@@ -40,8 +42,8 @@ class Pose(IdlStruct, typename="geometry_msgs::msg::dds_::PoseStamped_"):
     pose: Plane = field(default_factory=Plane)
 
 
-def action(name, wanted):
-    """The types of an action: a goal, its reply, the request for the result, the result."""
+def action(name, wanted, is_1_5):
+    """The types of an action, of Nav2 from 1.5 on or before: a goal, its reply, the request for the result, the result."""
     of = lambda part: f"nav2_msgs::action::dds_::{name}_{part}_"
 
     @dataclass
@@ -51,6 +53,8 @@ def action(name, wanted):
         goal_id: UUID
         goals: wanted
         start: Pose = field(default_factory=Pose)
+        if is_1_5 and wanted is Pose:
+            viapoints: sequence[Pose] = field(default_factory=list)
         planner_id: str = "GridBased"
         use_start: bool = False
 
@@ -74,6 +78,8 @@ def action(name, wanted):
         status: int8
         header: Header
         poses: sequence[Pose]
+        if is_1_5 and wanted is not Pose:
+            last_reached_index: int16
         planning_time: Time
         error_code: uint16
         error_msg: str
@@ -87,10 +93,14 @@ class Goals(IdlStruct, typename="nav_msgs::msg::dds_::Goals_"):
     goals: sequence[Pose]
 
 
+# The type of several goals, and whether Nav2 is 1.5 or newer.
+RELEASES = {"jazzy": (sequence[Pose], False), "kilted": (Goals, False), "lyrical": (Goals, True), "main": (Goals, True)}
+
+
 class Client:
-    def __init__(self, participant, name, kind, goals):
-        self.Send, sent, self.Get, result = action(kind, goals)
-        topic = lambda way, part, of: Topic(participant, f"{way}/firsthand/{name}/_action/{part}", of)
+    def __init__(self, participant, name, kind, goals, is_1_5):
+        self.Send, sent, self.Get, result = action(kind, goals, is_1_5)
+        topic = lambda way, part, of: Topic(participant, f"{way}/{name}/_action/{part}", of)
         self.writers = [
             DataWriter(participant, topic("rq", f"{part}Request", of), bridge.cyclone_qos())
             for part, of in [("send_goal", self.Send), ("get_result", self.Get)]
@@ -99,15 +109,16 @@ class Client:
             DataReader(participant, topic("rr", f"{part}Reply", of), bridge.cyclone_qos())
             for part, of in [("send_goal", sent), ("get_result", result)]
         ]
-        self.number = 0
+        # All clients hear the replies to all.
+        self.client, self.number = int.from_bytes(os.urandom(7)), 0
 
     def call(self, which, request, turn):
         self.number += 1
-        self.writers[which].write(request(7, self.number))
+        self.writers[which].write(request(self.client, self.number))
         end = time.monotonic() + 60
         while time.monotonic() < end:
             for reply in self.readers[which].take(N=10):
-                if (reply.client, reply.number) == (7, self.number):
+                if (reply.client, reply.number) == (self.client, self.number):
                     return reply
             turn()
         raise AssertionError(f"call {which} was not answered")
@@ -121,6 +132,42 @@ class Client:
         accepted = time.monotonic() - begin
         assert sent.accepted
         return accepted, self.call(1, lambda client, number: self.Get(client, number, goal_id), turn)
+
+
+def clients(participant, release, namespace=""):
+    several, is_1_5 = RELEASES[release]
+    return [
+        Client(participant, f"{namespace}firsthand/compute_path_to_pose", "ComputePathToPose", Pose, is_1_5),
+        Client(participant, f"{namespace}firsthand/compute_path_through_poses", "ComputePathThroughPoses", several, is_1_5),
+    ]
+
+
+def ask_as_each_release(until, turn, now, namespace=""):
+    """Clients of each release have 20 paths each that begin at the robot and have stamps of the time `now`."""
+    for release, (several, is_1_5) in RELEASES.items():
+        # The planner tells clients apart by their participants.
+        to_pose, through = clients(DomainParticipant(int(os.environ["ROS_DOMAIN_ID"])), release, namespace)
+        until(f"the servers of {release}", lambda: all(w.get_matched_subscriptions() for c in [to_pose, through] for w in c.writers))
+
+        def first():
+            result = to_pose.plan(turn, at(-9.0, 5.0))[1]
+            return result.error_code == 0 and result.header.stamp.sec >= now() - 5
+
+        until(f"a path for {release}", first)
+        for n in range(20):
+            begin, goal = now(), at(-9.0 + 0.4 * n, 5.0)
+            if n % 2 == 0:
+                result = to_pose.plan(turn, goal)[1]
+            else:
+                goals = [at(-9.0, 4.0), goal]
+                result = through.plan(turn, goals if several is not Goals else Goals(Header(), goals))[1]
+                assert not is_1_5 or result.last_reached_index == -1, result.last_reached_index
+            assert (result.status, result.error_code, result.error_msg) == (4, 0, ""), (release, n, result.error_code, result.error_msg)
+            places = [(pose.pose.x, pose.pose.y) for pose in result.poses]
+            assert math.dist(places[0], (-10.0, -2.0)) < 1e-6 and math.dist(places[-1], (goal.pose.x, 5.0)) < 1e-6, (release, n, places)
+            stamps = {(stamp.sec, stamp.nanosec) for stamp in [result.header.stamp, *(pose.header.stamp for pose in result.poses)]}
+            assert len(stamps) == 1 and begin - 5 <= stamps.copy().pop()[0] <= now(), (release, n, begin, stamps)
+    print(f"clients of {', '.join(RELEASES)} have 20 paths each from the robot, the last with the stamp {stamps.pop()[0]} s")
 
 
 def at(x, y, heading=0.0, frame="map"):
@@ -164,6 +211,7 @@ def main(firsthand):
     frames = writer("rt/tf", TFMessage)
     updates = writer("rt/map_updates", OccupancyGridUpdate)
     maps = node.create_publisher(OccupancyGrid, "map", LATCHED)
+    clock = node.create_publisher(Clock, "/clock", 10)
     plans = []
     node.create_subscription(Path, "plan", plans.append, LATCHED)
     told = 0.0
@@ -192,12 +240,18 @@ def main(firsthand):
             told = time.monotonic()
             robot = [("map", "odom", Plane(x=-10.0)), ("odom", "base_link", Plane(y=-2.0))]
             frames.write(TFMessage([TransformStamped(Header(frame_id=parent), child, place) for parent, child, place in robot]))
+            message = Clock()
+            message.clock.sec = int(simulated())
+            clock.publish(message)
 
-    words = ["ros2", "planner", "--map", "map", "--robot-radius", str(RADIUS), "--max-planning-time", "60"]
+    # A clock of a simulation, seconds.
+    simulated = lambda: 1000 + time.monotonic() - started
+    started = time.monotonic()
+
+    words = ["ros2", "planner", "--map", "map", "--robot-radius", str(RADIUS), "--max-planning-time", "60", "--transform-tolerance", "60"]
     server = subprocess.Popen([firsthand, *words])
     try:
-        to_pose = Client(participant, "compute_path_to_pose", "ComputePathToPose", Pose)
-        through = Client(participant, "compute_path_through_poses", "ComputePathThroughPoses", Goals)
+        to_pose, through = clients(participant, "kilted")
 
         def until(what, condition):
             end = time.monotonic() + 60
@@ -244,6 +298,15 @@ def main(firsthand):
         # A goal may be in the robot's frame.
         check(to_pose.plan(turn, at(1.0, 0.0, frame="base_link"))[1], (-9.0, -2.0))
         check(through.plan(turn, Goals(Header(), [at(-5.0, 5.0), at(10.0, 0.0)]))[1], (-5.0, 5.0), (10.0, 0.0))
+
+        ask_as_each_release(until, turn, time.time)
+        words[words.index("map")] = "/map"
+        simulation = subprocess.Popen([firsthand, *words, "--namespace", "simulation", "--tf", "/tf", "--use-sim-time"])
+        try:
+            ask_as_each_release(until, turn, simulated, "simulation/")
+        finally:
+            simulation.terminate()
+            simulation.wait()
 
         for code, goal, start in [
             (202, at(1.0, 0.0, frame="nowhere"), None),

@@ -1,10 +1,12 @@
-//! CDR as the OMG's RTPS carries it: plain, version 1, either byte order. Each read checks its bounds, and no length
-//! from the wire is trusted.
+//! CDR as the OMG's RTPS carries it: plain, version 1, either byte order. A message names its fields once, and the same pass over them reads
+//! and writes. Each read checks its bounds, and no length from the wire is trusted.
 
 use thiserror::Error;
 
+use crate::msg::Release;
+
 /// Bytes; ROS uses texts for the names of frames.
-const LONGEST_TEXT: usize = 256;
+pub const LONGEST_TEXT: usize = 256;
 /// The bytes before the message name its encoding.
 pub(crate) const ENCAPSULATION: usize = 4;
 
@@ -15,7 +17,13 @@ pub enum Malformed {
     #[error("it ends early; is the topic of this type?")]
     Short,
     #[error("{0} elements in a list, and {1} are the most; is the topic of this type?")]
-    Long(u32, usize),
+    Long(usize, usize),
+    #[error("{0} for a flag, and 0 and 1 are all; is the topic of this type?")]
+    Bool(u8),
+    #[error("a text without its end; is the topic of this type?")]
+    Text,
+    #[error("a message in {0} layouts of releases of ROS; is the other node of another release?")]
+    Layouts(usize),
 }
 
 /// For those who only say why a message is refused.
@@ -25,150 +33,189 @@ impl From<Malformed> for String {
     }
 }
 
-#[derive(Clone, Debug)]
-pub struct Reader<'a> {
+/// A pass over the fields of a message in their order on the wire.
+pub trait Pass {
+    fn release(&self) -> Release;
+
+    /// Passes a number, the least significant of its bytes first.
+    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Malformed>;
+
+    /// Returns how many elements the list has that is `length` long before the pass, and may have `most`.
+    fn length(&mut self, length: usize, most: usize) -> Result<usize, Malformed>;
+}
+
+pub trait Cdr: Sized {
+    /// Passes its fields. Lists and texts have at most `most` elements.
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed>;
+
+    /// Reads a message in the newest layout that fits. What a later release appends is ignored.
+    fn decode(payload: &[u8]) -> Result<Self, Malformed>
+    where
+        Self: Default,
+    {
+        let read = |release| read(payload, release).map(|(message, _)| message);
+        let older = || Release::ALL.into_iter().find_map(|(_, release)| read(release).ok());
+        read(Release::Common).or_else(|error| older().ok_or(error))
+    }
+
+    /// Reads a message in the only layout in which `payload` has nothing else, with the releases that have it, the newest first.
+    fn decode_whole(payload: &[u8]) -> Result<(Vec<Release>, Self), Malformed>
+    where
+        Self: Clone + Default,
+    {
+        let whole = |(_, release)| {
+            let (message, is_whole) = read::<Self>(payload, release).ok()?;
+            is_whole.then_some((release, message))
+        };
+        let (releases, mut found): (_, Vec<_>) =
+            Release::ALL.into_iter().rev().filter_map(whole).unzip();
+        found.dedup_by_key(|message| message.clone().encode());
+        let [found] = found.try_into().map_err(|all: Vec<_>| Malformed::Layouts(all.len()))?;
+        Ok((releases, found))
+    }
+
+    fn encode(self) -> Vec<u8> {
+        self.encode_for(Release::Common)
+    }
+
+    fn encode_for(mut self, release: Release) -> Vec<u8> {
+        let mut writer = Writer { bytes: vec![0, 1, 0, 0], release };
+        // What is written is never malformed.
+        let _ = self.pass(&mut writer, usize::MAX);
+        writer.bytes
+    }
+}
+
+/// Returns the message, and whether nothing but padding follows: RTPS pads a payload to a multiple of 4 bytes.
+pub(crate) fn read<T: Cdr + Default>(
+    payload: &[u8],
+    release: Release,
+) -> Result<(T, bool), Malformed> {
+    let (header, bytes) = payload.split_at_checked(ENCAPSULATION).ok_or(Malformed::Short)?;
+    let is_big = match [header[0], header[1]] {
+        [0, order @ (0 | 1)] => order == 0,
+        other => return Err(Malformed::Encoding(u16::from_be_bytes(other))),
+    };
+    let mut reader = Reader { bytes, at: 0, is_big, release };
+    let mut message = T::default();
+    message.pass(&mut reader, usize::MAX)?;
+    Ok((message, bytes.len() < reader.at + ENCAPSULATION))
+}
+
+struct Reader<'a> {
     /// Alignment counts from its start.
     bytes: &'a [u8],
     at: usize,
     is_big: bool,
+    release: Release,
 }
 
-impl<'a> Reader<'a> {
-    /// `payload` begins with its encapsulation; fails if that names another encoding.
-    pub fn new(payload: &'a [u8]) -> Result<Self, Malformed> {
-        let (header, bytes) = payload.split_at_checked(ENCAPSULATION).ok_or(Malformed::Short)?;
-        match [header[0], header[1]] {
-            [0, order @ (0 | 1)] => Ok(Self { bytes, at: 0, is_big: order == 0 }),
-            other => Err(Malformed::Encoding(u16::from_be_bytes(other))),
-        }
+impl Pass for Reader<'_> {
+    fn release(&self) -> Release {
+        self.release
     }
 
-    /// Most significant first, after padding to a multiple of `N`.
-    fn primitive<const N: usize>(&mut self) -> Result<[u8; N], Malformed> {
+    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Malformed> {
         let start = self.at.next_multiple_of(N);
-        let bytes = self.bytes.get(start..).and_then(<[u8]>::first_chunk::<N>);
-        let mut bytes = *bytes.ok_or(Malformed::Short)?;
+        let found = self.bytes.get(start..).and_then(<[u8]>::first_chunk);
+        *bytes = *found.ok_or(Malformed::Short)?;
         self.at = start + N;
-        if !self.is_big {
+        if self.is_big {
             bytes.reverse();
         }
-        Ok(bytes)
+        Ok(())
     }
 
-    pub fn f64s<const N: usize>(&mut self) -> Result<[f64; N], Malformed> {
-        let mut numbers = [0.0; N];
-        for number in &mut numbers {
-            *number = self.f64()?;
+    fn length(&mut self, _: usize, most: usize) -> Result<usize, Malformed> {
+        let mut length = 0_u32;
+        length.pass(self, most)?;
+        match length as usize {
+            length if length > most => Err(Malformed::Long(length, most)),
+            // Each element has a byte or more.
+            length if length > self.bytes.len() - self.at => Err(Malformed::Short),
+            length => Ok(length),
         }
-        Ok(numbers)
-    }
-
-    /// Fails if the bytes end early, or the list has more than `most` numbers.
-    pub fn list(&mut self, most: usize) -> Result<Vec<f32>, Malformed> {
-        let length = self.length(most)?;
-        (0..length).map(|_| self.f32()).collect()
-    }
-
-    /// Fails if there are fewer bytes.
-    pub fn raw(&mut self, count: usize) -> Result<&'a [u8], Malformed> {
-        let bytes = self.bytes.get(self.at..).and_then(|rest| rest.get(..count));
-        let bytes = bytes.ok_or(Malformed::Short)?;
-        self.at += count;
-        Ok(bytes)
-    }
-
-    /// Whether nothing but padding follows: RTPS pads a payload to a multiple of 4 bytes.
-    pub fn is_at_end(&self) -> bool {
-        self.bytes.len() < self.at + ENCAPSULATION
-    }
-
-    /// Leaves out the zero byte that ends it, and what is not UTF-8. Fails if the bytes end early, or the text is too
-    /// long.
-    pub fn text(&mut self) -> Result<&'a str, Malformed> {
-        let length = self.length(LONGEST_TEXT)?;
-        let text = self.raw(length)?.split(|byte| *byte == 0).next().unwrap_or_default();
-        Ok(str::from_utf8(text).unwrap_or_default())
-    }
-
-    /// Fails if it is more than `most`.
-    pub fn length(&mut self, most: usize) -> Result<usize, Malformed> {
-        let length = self.u32()?;
-        usize::try_from(length)
-            .ok()
-            .filter(|length| *length <= most)
-            .ok_or(Malformed::Long(length, most))
     }
 }
 
 /// The least significant byte comes first.
-#[derive(Clone, Debug)]
-pub struct Writer(Vec<u8>);
-
-impl Default for Writer {
-    fn default() -> Self {
-        Self(vec![0, 1, 0, 0])
-    }
+struct Writer {
+    bytes: Vec<u8>,
+    release: Release,
 }
 
-impl Writer {
-    fn primitive<const N: usize>(&mut self, bytes: [u8; N]) -> &mut Self {
-        let end = (self.0.len() - ENCAPSULATION).next_multiple_of(N) + ENCAPSULATION;
-        self.0.resize(end, 0);
-        self.0.extend(bytes);
-        self
+impl Pass for Writer {
+    fn release(&self) -> Release {
+        self.release
     }
 
-    pub fn f64s(&mut self, numbers: &[f64]) -> &mut Self {
-        numbers.iter().fold(self, |writer, number| writer.f64(*number))
+    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Malformed> {
+        let end = (self.bytes.len() - ENCAPSULATION).next_multiple_of(N) + ENCAPSULATION;
+        self.bytes.resize(end, 0);
+        self.bytes.extend(*bytes);
+        Ok(())
     }
 
-    pub fn raw(&mut self, bytes: &[u8]) -> &mut Self {
-        self.0.extend(bytes);
-        self
-    }
-
-    /// A zero byte ends it.
-    pub fn text(&mut self, text: &str) -> &mut Self {
-        self.length(text.len() + 1).raw(text.as_bytes()).u8(0)
-    }
-
-    pub fn length(&mut self, elements: usize) -> &mut Self {
-        self.u32(u32::try_from(elements).unwrap_or(u32::MAX))
-    }
-
-    pub fn list<T>(
-        &mut self,
-        elements: impl IntoIterator<Item = T, IntoIter: ExactSizeIterator>,
-        mut write: impl FnMut(&mut Self, T),
-    ) -> &mut Self {
-        let elements = elements.into_iter();
-        self.length(elements.len());
-        for element in elements {
-            write(self, element);
-        }
-        self
-    }
-
-    /// Nothing more can be written to the message.
-    pub fn take(&mut self) -> Vec<u8> {
-        std::mem::take(&mut self.0)
+    fn length(&mut self, length: usize, most: usize) -> Result<usize, Malformed> {
+        u32::try_from(length).unwrap_or(u32::MAX).pass(self, most)?;
+        Ok(length)
     }
 }
 
 macro_rules! numbers {
-    ($($number:ident)*) => {
-        impl Reader<'_> {
-            $(pub fn $number(&mut self) -> Result<$number, Malformed> {
-                self.primitive().map($number::from_be_bytes)
-            })*
+    ($($number:ident)*) => {$(
+        impl Cdr for $number {
+            fn pass<P: Pass>(&mut self, pass: &mut P, _: usize) -> Result<(), Malformed> {
+                let mut bytes = self.to_le_bytes();
+                pass.number(&mut bytes)?;
+                *self = Self::from_le_bytes(bytes);
+                Ok(())
+            }
         }
-
-        impl Writer {
-            $(pub fn $number(&mut self, number: $number) -> &mut Self {
-                self.primitive(number.to_le_bytes())
-            })*
-        }
-    };
+    )*};
 }
 
-numbers! { u8 u16 i16 u32 i32 i64 f32 f64 }
+numbers! { u8 i8 u16 i16 u32 i32 u64 i64 f32 f64 }
+
+impl Cdr for bool {
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
+        let mut byte = u8::from(*self);
+        byte.pass(pass, most)?;
+        *self = byte == 1;
+        if byte > 1 { Err(Malformed::Bool(byte)) } else { Ok(()) }
+    }
+}
+
+/// A zero byte ends it on the wire, unless an implementation writes none for an empty text. What is not UTF-8 is replaced.
+impl Cdr for String {
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
+        let mut bytes = [self.as_bytes(), &[0]].concat();
+        bytes.pass(pass, most)?;
+        if bytes.pop().unwrap_or_default() != 0 {
+            return Err(Malformed::Text);
+        }
+        *self = Self::from_utf8_lossy(&bytes).into_owned();
+        Ok(())
+    }
+}
+
+impl<T: Cdr, const N: usize> Cdr for [T; N] {
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
+        self.iter_mut().try_for_each(|element| element.pass(pass, most))
+    }
+}
+
+/// It grows as its elements come.
+impl<T: Cdr + Default> Cdr for Vec<T> {
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
+        let length = pass.length(self.len(), most)?;
+        self.truncate(length);
+        for at in 0..length {
+            if at == self.len() {
+                self.push(T::default());
+            }
+            self[at].pass(pass, LONGEST_TEXT)?;
+        }
+        Ok(())
+    }
+}

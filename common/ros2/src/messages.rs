@@ -1,58 +1,77 @@
 //! Messages that a robot publishes. Lengths are metres, angles radians, times seconds unless a name says otherwise.
 
-use crate::{cdr::Writer, parts::Pose};
+use crate::{
+    cdr::Cdr as _,
+    msg::{
+        BatteryState, Header, LaserScan, Odometry, PoseWithCovariance, Twist, TwistWithCovariance,
+        Vector3,
+    },
+    parts::Pose,
+};
 
 /// The count of numbers in the covariance of a pose or a twist.
 pub const COVARIANCE: usize = 36;
 
-/// The time of a message, nanoseconds since 1970, and its frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Header<'a>(pub u64, pub &'a str);
-
-pub fn begin(Header(ns, frame): Header<'_>) -> Writer {
-    let mut writer = Writer::default();
-    writer.header(ns, frame);
-    writer
+/// A speed ahead and a turn rate.
+pub fn twist([v, omega]: [f64; 2]) -> Twist {
+    Twist {
+        linear: Vector3 { x: v, ..Vector3::default() },
+        angular: Vector3 { z: omega, ..Vector3::default() },
+    }
 }
 
-/// A `nav_msgs/Odometry`, with the covariances of the pose and of the speeds.
+/// With the covariances of the pose and of the speeds.
 pub fn odometry(
-    header: Header<'_>,
+    header: Header,
     child: &str,
-    (pose, of_pose): (Pose, &[f64; COVARIANCE]),
-    ([v, omega], of_speeds): ([f64; 2], &[f64; COVARIANCE]),
+    (pose, of_pose): (Pose, [f64; COVARIANCE]),
+    (speeds, of_speeds): ([f64; 2], [f64; COVARIANCE]),
 ) -> Vec<u8> {
-    let speeds = [v, 0.0, 0.0, 0.0, 0.0, omega];
-    begin(header).text(child).pose(pose).f64s(of_pose).f64s(&speeds).f64s(of_speeds).take()
+    let pose = PoseWithCovariance { pose: pose.into(), covariance: of_pose };
+    let twist = TwistWithCovariance { twist: twist(speeds), covariance: of_speeds };
+    Odometry { header, child_frame_id: child.to_owned(), pose, twist }.encode()
 }
 
-/// A `sensor_msgs/LaserScan`; `times_s` are those from beam to beam and from scan to scan.
+/// `times_s` are those from beam to beam and from scan to scan.
 pub fn scan(
-    header: Header<'_>,
+    header: Header,
     [first, step]: [f64; 2],
-    [least, most]: [f64; 2],
+    limits: [f64; 2],
     times_s: [f64; 2],
-    ranges: &[f32],
+    ranges: Vec<f32>,
 ) -> Vec<u8> {
     let last = first + step * ranges.len().saturating_sub(1) as f64;
-    let mut writer = begin(header);
-    for number in [first, last, step, times_s[0], times_s[1], least, most] {
-        writer.f32(number as f32);
+    let [angle_min, angle_max, angle_increment] = [first, last, step].map(|angle| angle as f32);
+    let [time_increment, scan_time] = times_s.map(|time| time as f32);
+    let [range_min, range_max] = limits.map(|limit| limit as f32);
+    LaserScan {
+        header,
+        angle_min,
+        angle_max,
+        angle_increment,
+        time_increment,
+        scan_time,
+        range_min,
+        range_max,
+        ranges,
+        ..LaserScan::default()
     }
-    let range = |writer: &mut Writer, range: &f32| {
-        writer.f32(*range);
-    };
-    // There are no intensities.
-    writer.list(ranges, range).length(0).take()
+    .encode()
 }
 
-/// A `sensor_msgs/BatteryState` that states the voltage only.
-pub fn battery(header: Header<'_>, volts: f64) -> Vec<u8> {
-    let mut writer = begin(header);
-    writer.f32(volts as f32);
-    for _temperature_current_charge_capacity_design_percentage in 0..6 {
-        writer.f32(f32::NAN);
+/// It states the voltage only.
+pub fn battery(header: Header, volts: f64) -> Vec<u8> {
+    BatteryState {
+        header,
+        voltage: volts as f32,
+        temperature: f32::NAN,
+        current: f32::NAN,
+        charge: f32::NAN,
+        capacity: f32::NAN,
+        design_capacity: f32::NAN,
+        percentage: f32::NAN,
+        present: true,
+        ..BatteryState::default()
     }
-    // Status, health and technology are unknown; the battery is present; there are no cells, place or number.
-    writer.u8(0).u8(0).u8(0).u8(1).length(0).length(0).text("").text("").take()
+    .encode()
 }

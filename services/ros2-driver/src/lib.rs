@@ -29,12 +29,16 @@ use common::{
     mission::{Body, Mission, Sensor, TouchRow},
     samples::{LONGEST_SWEEP_NS, Sweep},
 };
+use ros2::{
+    cdr::Cdr as _,
+    msg::{BatteryState, Bool},
+};
 
 use self::{
     gyro::Gyro,
     messages::{
-        Imu, NO_GROWTH, Odometry, Scan, is_repeated, read_bool, read_hazards, read_moves,
-        read_range, read_voltage, write_twist,
+        Imu, NO_GROWTH, Odometry, Scan, is_repeated, read_hazards, read_moves, read_range,
+        write_twist,
     },
     topics::{Content, Topics},
 };
@@ -115,14 +119,14 @@ impl Ros2 {
         match content {
             Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard),
             Content::Scan(row) => {
-                let mut scan = Scan::read(payload).map_err(|error| error.to_string())?;
+                let mut scan = Scan::read(payload)?;
                 if self.table.get(row).is_some_and(|sensor| sensor.is_upside_down) {
                     scan.turn_over();
                 }
                 self.take_scan(row, &scan, heard)
             }
             Content::Range(row) => {
-                let range = read_range(payload).map_err(|error| error.to_string())?;
+                let range = read_range(payload)?;
                 let sensor = self.table.get(row);
                 // Infinite is nothing in reach.
                 let range = Some(range).filter(|range| *range != f64::INFINITY);
@@ -130,7 +134,7 @@ impl Ros2 {
                 Ok(())
             }
             Content::Battery => {
-                let volts = read_voltage(payload).map_err(|error| error.to_string())?;
+                let volts = BatteryState::decode(payload)?.voltage;
                 if volts.is_finite() && volts >= 0.0 {
                     heard.take_battery(volts.into());
                 }
@@ -138,12 +142,11 @@ impl Ros2 {
             }
             Content::Imu => self.gyro.take(Imu::read(payload)?),
             Content::Touch(row) => {
-                let feels = read_bool(payload).map_err(|error| error.to_string())?;
-                heard.touched.push((row, feels));
+                heard.touched.push((row, Bool::decode(payload)?.data));
                 Ok(())
             }
             Content::Hazards => {
-                let frames = read_hazards(payload).map_err(|error| error.to_string())?;
+                let frames = read_hazards(payload)?;
                 let feels =
                     |row: &TouchRow| frames.iter().any(|frame| frame.replace('_', "-") == row.name);
                 heard.touched.extend(self.touches.iter().map(feels).enumerate());
@@ -152,7 +155,7 @@ impl Ros2 {
             Content::Command => {
                 let (&number, payload) =
                     payload.split_first_chunk().ok_or("a command without its writer")?;
-                let moves = read_moves(payload, self.stamped).map_err(|error| error.to_string())?;
+                let moves = read_moves(payload, self.stamped)?;
                 heard.commander = Some(Commander { number, moves });
                 Ok(())
             }

@@ -1,16 +1,12 @@
 //! Messages, as far as the driver needs them. Fields that a newer release of ROS appends are ignored.
 
-use common::mission::MOST_BEAMS;
 use ros2::{
-    cdr::{Malformed, Reader, Writer},
-    parts::heading,
+    cdr::{Cdr as _, Malformed},
+    messages::twist,
+    msg::{self, HazardDetection, HazardDetectionVector, LaserScan, Range, Twist, TwistStamped},
 };
 
-const COVARIANCE: usize = 36;
-const MOST_HAZARDS: usize = 64;
-
-/// A rotation's or a turn rate's; the first number is [`NOT_STATED`] if the quantity is not stated.
-const COVARIANCE_3: usize = 9;
+/// The first number of a covariance if its quantity is not stated.
 const NOT_STATED: f64 = -1.0;
 const FASTEST_TURN: f64 = 50.0;
 
@@ -37,26 +33,15 @@ pub struct Odometry {
 impl Odometry {
     /// The error says why there is none.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
-        let odometry = Self::decode(payload).map_err(|error| error.to_string())?;
-        if odometry.pose[2].is_nan() {
-            return Err("an orientation that is no rotation; fill pose.pose.orientation".to_owned());
-        }
-        if !odometry.twist.iter().all(|speed| speed.is_finite()) {
+        let msg::Odometry { header, pose, twist, .. } = msg::Odometry::decode(payload)?;
+        let heading = pose.pose.orientation.heading();
+        let heading =
+            heading.ok_or("an orientation that is no rotation; fill pose.pose.orientation")?;
+        let ([x, y], twist) = (pose.pose.at(), [twist.twist.linear.x, twist.twist.angular.z]);
+        if !twist.iter().all(|speed| speed.is_finite()) {
             return Err("a speed that is no number; fill twist.twist".to_owned());
         }
-        Ok(odometry)
-    }
-
-    /// A heading that is no rotation is no number.
-    fn decode(payload: &[u8]) -> Result<Self, Malformed> {
-        let mut reader = Reader::new(payload)?;
-        let (stamp_ns, _frame) = reader.header()?;
-        let _child_frame = reader.text()?;
-        let ([x, y], heading) = reader.pose()?;
-        reader.f64s::<COVARIANCE>()?;
-        let [ahead, _, _, _, _, turn] = reader.f64s()?;
-        let pose = [x, y, heading.unwrap_or(f64::NAN)];
-        Ok(Self { stamp_ns, pose, twist: [ahead, turn] })
+        Ok(Self { stamp_ns: header.stamp.ns(), pose: [x, y, heading], twist })
     }
 }
 
@@ -77,40 +62,26 @@ pub enum ImuTurn {
 impl Imu {
     /// The turn rate if it is stated, else the orientation. The error says why there is none.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
-        let (stamp_ns, heading, rate) = Self::decode(payload).map_err(|error| error.to_string())?;
-        let turn = match (rate, heading) {
-            (Some((rate, variance)), _) if rate.abs() <= FASTEST_TURN => {
+        let imu = msg::Imu::decode(payload)?;
+        let rate = imu.angular_velocity.z;
+        let turn = match (imu.angular_velocity_covariance, imu.orientation_covariance) {
+            ([NOT_STATED, ..], [NOT_STATED, ..]) => {
+                let why = "neither a turn rate nor an orientation is stated; publish one, or remove robot.ros2.imu";
+                return Err(why.to_owned());
+            }
+            ([NOT_STATED, ..], _) => {
+                let heading = imu.orientation.heading();
+                let why = "an orientation that is no rotation; fill orientation";
+                ImuTurn::Heading(heading.ok_or(why)?)
+            }
+            ([.., variance], _) if rate.abs() <= FASTEST_TURN => {
                 // A variance greater than that of any rate means that it is unknown.
                 let most = FASTEST_TURN * FASTEST_TURN;
                 ImuTurn::Rate(rate, Some(variance.min(most)).filter(|_| variance > 0.0))
             }
-            (Some((rate, _)), _) => {
-                return Err(format!("a turn rate of {rate}; fill angular_velocity in rad/s"));
-            }
-            (None, Some(heading)) if heading.is_nan() => {
-                return Err("an orientation that is no rotation; fill orientation".to_owned());
-            }
-            (None, Some(heading)) => ImuTurn::Heading(heading),
-            (None, None) => {
-                let why = "neither a turn rate nor an orientation is stated; publish one, or remove robot.ros2.imu";
-                return Err(why.to_owned());
-            }
+            _ => return Err(format!("a turn rate of {rate}; fill angular_velocity in rad/s")),
         };
-        Ok(Self { stamp_ns, turn })
-    }
-
-    /// Stamp, heading, and turn rate with its variance, as far as they are stated. A heading that is no rotation is
-    /// no number.
-    #[expect(clippy::type_complexity, reason = "it is taken apart at once")]
-    fn decode(payload: &[u8]) -> Result<(i64, Option<f64>, Option<(f64, f64)>), Malformed> {
-        let mut reader = Reader::new(payload)?;
-        let (stamp_ns, _frame) = reader.header()?;
-        let rotation = heading(reader.f64s()?).unwrap_or(f64::NAN);
-        let [first, ..] = reader.f64s::<COVARIANCE_3>()?;
-        let [_, _, rate] = reader.f64s()?;
-        let [rate_first, .., variance] = reader.f64s::<COVARIANCE_3>()?;
-        let heading = (first != NOT_STATED).then_some(rotation);
-        Ok((stamp_ns, heading, (rate_first != NOT_STATED).then_some((rate, variance))))
+        Ok(Self { stamp_ns: imu.header.stamp.ns(), turn })
     }
 }
 
@@ -133,14 +104,16 @@ pub struct Scan {
 impl Scan {
     /// Fails if `payload` is no `sensor_msgs/LaserScan`.
     pub fn read(payload: &[u8]) -> Result<Self, Malformed> {
-        let mut reader = Reader::new(payload)?;
-        let (stamp_ns, _frame) = reader.header()?;
-        let (first, _last, step) = (reader.f32()?, reader.f32()?, reader.f32()?);
-        let (beam_s, _scan_s) = (reader.f32()?, reader.f32()?);
-        let (least_m, most_m) = (reader.f32()?, reader.f32()?);
-        let ranges = reader.list(MOST_BEAMS)?;
-        let fan = (first.into(), step.into());
-        Ok(Self { stamp_ns, beam_s, fan, least_m, most_m, ranges, is_reversed: false })
+        let scan = LaserScan::decode(payload)?;
+        Ok(Self {
+            stamp_ns: scan.header.stamp.ns(),
+            beam_s: scan.time_increment,
+            fan: (scan.angle_min.into(), scan.angle_increment.into()),
+            least_m: scan.range_min,
+            most_m: scan.range_max,
+            ranges: scan.ranges,
+            is_reversed: false,
+        })
     }
 
     /// Its laser is mounted upside down: give the beams the order and the bearings that they have in the robot's frame.
@@ -154,11 +127,7 @@ impl Scan {
 
 /// Metres of a `sensor_msgs/Range`: infinite for nothing, no number for no reading. Fails if `payload` is none.
 pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
-    let mut reader = Reader::new(payload)?;
-    reader.header()?;
-    let _radiation = reader.u8()?;
-    let _field_of_view = reader.f32()?;
-    let (least_m, most_m, range) = (reader.f32()?, reader.f32()?, reader.f32()?);
+    let Range { min_range: least_m, max_range: most_m, range, .. } = Range::decode(payload)?;
     // A sensor with a single range says by an infinite one whether it is empty to there.
     Ok(match range {
         range if range == f32::NEG_INFINITY => 0.0,
@@ -169,51 +138,32 @@ pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
     })
 }
 
-/// Fails if `payload` is no `std_msgs/Bool`.
-pub fn read_bool(payload: &[u8]) -> Result<bool, Malformed> {
-    Ok(Reader::new(payload)?.u8()? != 0)
-}
-
 /// The frames of the bumpers and cliff sensors that feel something. Fails if `payload` is no
 /// `irobot_create_msgs/HazardDetectionVector`.
 pub fn read_hazards(payload: &[u8]) -> Result<Vec<String>, Malformed> {
-    const BUMP_AND_CLIFF: [u8; 2] = [1, 2];
-    let mut reader = Reader::new(payload)?;
-    reader.header()?;
-    let mut frames = Vec::new();
-    for _ in 0..reader.length(MOST_HAZARDS)? {
-        let (_, frame) = reader.header()?;
-        let frame = frame.to_owned();
-        if BUMP_AND_CLIFF.contains(&reader.u8()?) {
-            frames.push(frame);
-        }
-    }
-    Ok(frames)
-}
-
-/// No number if a `sensor_msgs/BatteryState` does not measure it. Fails if `payload` is none.
-pub fn read_voltage(payload: &[u8]) -> Result<f32, Malformed> {
-    let mut reader = Reader::new(payload)?;
-    reader.header()?;
-    reader.f32()
+    let felt = HazardDetectionVector::decode(payload)?
+        .detections
+        .into_iter()
+        .filter(|hazard| matches!(hazard.r#type, HazardDetection::BUMP | HazardDetection::CLIFF));
+    Ok(felt.map(|hazard| hazard.header.frame_id).collect())
 }
 
 /// The `geometry_msgs/Twist` or, if `stamped`, `TwistStamped` moves a robot. A speed that is no number counts as
 /// motion. Fails if `payload` is none.
 pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
-    let mut reader = Reader::new(payload)?;
-    if stamped {
-        reader.header()?;
-    }
-    Ok(reader.f64s::<6>()? != [0.0; 6])
+    let twist = match stamped {
+        true => TwistStamped::decode(payload)?.twist,
+        false => Twist::decode(payload)?,
+    };
+    Ok(twist != Twist::default())
 }
 
 /// The stamp is 0, which receivers take for their own time: the driver has no clock, and a stop must never be too
 /// old.
 pub fn write_twist(ahead: f64, turn: f64, stamped: bool) -> Vec<u8> {
-    let mut writer = Writer::default();
-    if stamped {
-        writer.header(0, "");
+    let twist = twist([ahead, turn]);
+    match stamped {
+        true => TwistStamped { twist, ..TwistStamped::default() }.encode(),
+        false => twist.encode(),
     }
-    writer.f64s(&[ahead, 0.0, 0.0, 0.0, 0.0, turn]).take()
 }

@@ -27,8 +27,9 @@ use console::{
     output::print_text,
 };
 use ros2::{
-    cdr,
-    messages::{COVARIANCE, Header, battery, odometry, scan},
+    cdr::{Cdr as _, Malformed},
+    messages::{COVARIANCE, battery, odometry, scan},
+    msg::{self, HazardDetection, HazardDetectionVector, Header},
     participant::{Participant, Quality, Reader, Writer},
 };
 use ros2_driver::topics::{Content, Topics};
@@ -48,8 +49,6 @@ const LOOK: Duration = Duration::from_millis(50);
 const SILENT: Duration = Duration::from_secs(1);
 const MOST_COMMANDS: usize = 16;
 const RELIABLE: Quality = Quality { is_reliable: true, is_latched: false, depth: 10 };
-/// The type of a bumper's and a cliff sensor's hazard.
-const HAZARDS: [u8; 2] = [1, 2];
 
 /// Simulate a robot that speaks ROS 2 in the world of a mission, until this ends. Prints the keys of its mission, as options of `firsthand
 /// run`.
@@ -193,8 +192,9 @@ impl Program {
     }
 
     /// What a `geometry_msgs/Twist` tells the wheels. Fails if `payload` is none.
-    fn order(&self, payload: &[u8]) -> Result<Order, cdr::Malformed> {
-        let [v, .., omega] = cdr::Reader::new(payload)?.f64s::<6>()?;
+    fn order(&self, payload: &[u8]) -> Result<Order, Malformed> {
+        let twist = msg::Twist::decode(payload)?;
+        let [v, omega] = [twist.linear.x, twist.angular.z];
         let WheelSpeeds { right, left } = self.drive.wheels(Twist { v, omega });
         Ok(Order::Drive { wheels: [left, right], twist: [v, omega], for_s: WATCHDOG_S })
     }
@@ -227,18 +227,20 @@ impl Program {
                 let Twist { v, omega } = self.drive.twist(both(report.speeds?));
                 let Pose2 { position, heading } = self.pose;
                 let pose = [position.x, position.y, heading];
-                let header = Header(now_ns, "odom");
+                let header = Header::at(now_ns, "odom");
                 report.wheels?;
                 let unknown = [0.0; COVARIANCE];
                 Some(odometry(
                     header,
                     "base_footprint",
-                    (pose, &unknown),
-                    ([v, self.turns * omega], &unknown),
+                    (pose, unknown),
+                    ([v, self.turns * omega], unknown),
                 ))
             }
             Content::Scan(row) => self.scan(row, report, now_ns),
-            Content::Battery => report.battery_v.map(|volts| battery(Header(now_ns, ""), volts)),
+            Content::Battery => {
+                report.battery_v.map(|volts| battery(Header::at(now_ns, ""), volts))
+            }
             Content::Hazards => {
                 (!report.touched.is_empty()).then(|| hazards(&report.touched, now_ns))
             }
@@ -264,9 +266,9 @@ impl Program {
         let beam_s = time_s.unwrap_or_default() / ranges.len() as f64;
         let period_s = sensor.every_ticks as f64 / self.stated.robot.rate_hz;
         let limits = [sensor.model.least_m(), sensor.reach_m];
-        let ranges: Vec<_> = ranges.iter().map(range).collect();
-        let header = Header(taken_ns, &sensor.name);
-        Some(scan(header, sensor.fan().into(), limits, [beam_s, period_s], &ranges))
+        let ranges = ranges.iter().map(range).collect();
+        let header = Header::at(taken_ns, &sensor.name);
+        Some(scan(header, sensor.fan().into(), limits, [beam_s, period_s], ranges))
     }
 }
 
@@ -276,13 +278,15 @@ const fn both([left, right]: [f64; 2]) -> WheelSpeeds {
 
 /// An `irobot_create_msgs/HazardDetectionVector` of what bumpers and cliff sensors feel, by the names of their rows.
 fn hazards(touched: &BTreeMap<String, bool>, now_ns: u64) -> Vec<u8> {
-    let feels = touched.iter().filter(|(_, feels)| **feels);
-    let feels: Vec<_> = feels.map(|(name, _)| name.replace('-', "_")).collect();
-    let mut message = cdr::Writer::default();
-    message.header(now_ns, "").list(feels, |message, frame| {
-        message.header(now_ns, &frame).u8(HAZARDS[usize::from(frame.starts_with("cliff"))]);
-    });
-    message.take()
+    let hazard = |(name, _): (&String, _)| HazardDetection {
+        header: Header::at(now_ns, &name.replace('-', "_")),
+        r#type: match name.starts_with("cliff") {
+            true => HazardDetection::CLIFF,
+            false => HazardDetection::BUMP,
+        },
+    };
+    let detections = touched.iter().filter(|(_, feels)| **feels).map(hazard).collect();
+    HazardDetectionVector { header: Header::at(now_ns, ""), detections }.encode()
 }
 
 #[cfg(test)]

@@ -6,16 +6,19 @@ use common::samples::{
     CommandSample, CommandState, DirectiveSample, HoldReason, PoseSample, TargetPoint, TargetSample,
 };
 use ros2::{
-    cdr::{Reader, Writer},
+    cdr::{Cdr, Malformed},
+    msg::{
+        ComputePathToPoseResult, Header, NavigateToPoseFeedback, NavigateToPoseFeedbackMessage,
+        NavigateToPoseGetResultResponse, NavigateToPoseResult, NavigateToPoseSendGoalRequest, UUID,
+    },
     participant::Request,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::{
     asked::goal_of,
-    goals::{Goals, Status, Uuid, uuid},
-    messages::{Header, pose_stamped},
-    shown::MAP,
+    goals::{Goals, Status, Uuid},
+    shown::{MAP, plane},
 };
 
 #[derive(Default, Serialize, Deserialize)]
@@ -36,26 +39,16 @@ pub struct Aim {
 /// The most times that the bridge looks for the result of a target, some 50 ms apart, before a goal is told without it.
 const MOST_AWAITED: u32 = 20;
 
-/// Why a goal is not reached: an error code of Nav2, and its words.
+/// Why a goal is not reached: an error code of `NavigateToPose`, or of its planner, which it passes on, and its words.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
     pub code: u16,
     pub text: String,
 }
 
-/// The codes of Nav2: those of `NavigateToPose`, and those of its planner, which `NavigateToPose` passes on.
-pub mod code {
-    pub const UNKNOWN: u16 = 9000;
-    pub const TF_ERROR: u16 = 9002;
-    pub const TIMEOUT: u16 = 9003;
-    pub const GOAL_OUTSIDE_MAP: u16 = 204;
-    pub const GOAL_OCCUPIED: u16 = 206;
-    pub const NO_VALID_PATH: u16 = 208;
-}
-
 impl<T: ToString> From<T> for Refusal {
     fn from(text: T) -> Self {
-        Self { code: code::UNKNOWN, text: text.to_string() }
+        Self { code: NavigateToPoseResult::UNKNOWN, text: text.to_string() }
     }
 }
 
@@ -75,9 +68,9 @@ pub struct Sent {
 
 impl Server {
     /// The id of the goal that a client sends, and where to go or why not there. The error says why the payload is none.
-    pub fn read_goal(payload: &[u8]) -> Result<(Uuid, Result<TargetPoint, Refusal>), String> {
-        let mut reader = Reader::new(payload)?;
-        Ok((uuid(&mut reader)?, goal_of(&mut reader)))
+    pub fn read_goal(payload: &[u8]) -> Result<(Uuid, Result<TargetPoint, Refusal>), Malformed> {
+        let NavigateToPoseSendGoalRequest { goal_id, goal } = Cdr::decode(payload)?;
+        Ok((goal_id.uuid, goal_of(&goal.pose.header, &goal.pose.pose)))
     }
 
     /// Take a goal that the supervisor accepted; its target comes after the one with the number `after`.
@@ -145,13 +138,17 @@ impl Server {
         }
         for goal in self.goals.aborted().filter(|goal| is_of(&goal.known)) {
             let (code, text) = match outcome {
-                "unreachable" => (code::NO_VALID_PATH, "the robot found no way to it"),
-                "timed_out" => (code::TIMEOUT, "the robot was not there in the mission's time"),
+                "unreachable" => {
+                    (ComputePathToPoseResult::NO_VALID_PATH, "the robot found no way to it")
+                }
+                "timed_out" => {
+                    (NavigateToPoseResult::TIMEOUT, "the robot was not there in the mission's time")
+                }
                 "reached" | "reached_unsure" | "wrong_place" => {
                     (goal.status, goal.known.why) = (Status::Succeeded, Refusal::default());
                     continue;
                 }
-                _ => (code::UNKNOWN, goal.known.why.text.as_str()),
+                _ => (NavigateToPoseResult::UNKNOWN, goal.known.why.text.as_str()),
             };
             goal.known.why = Refusal { code, text: text.to_owned() };
             goal.known.awaited = MOST_AWAITED;
@@ -166,7 +163,7 @@ impl Server {
     pub fn answerable(&mut self) -> Vec<(Request, Uuid)> {
         self.goals.aborted().for_each(|goal| goal.known.awaited += 1);
         self.goals.answerable(|status, aim| {
-            status != Status::Aborted as u8
+            status != Status::Aborted as i8
                 || aim.is_none_or(|aim| aim.number.is_none() || aim.awaited > MOST_AWAITED)
         })
     }
@@ -175,7 +172,8 @@ impl Server {
     pub fn result(&self, id: Uuid) -> Option<Vec<u8>> {
         let (status, aim) = self.goals.over(id)?;
         let Refusal { code, text } = aim.map(|aim| aim.why.clone()).unwrap_or_default();
-        Some(Writer::default().u8(status).u16(code).text(&text).take())
+        let result = NavigateToPoseResult { error_code: code, error_msg: text };
+        Some(NavigateToPoseGetResultResponse { status, result }.encode())
     }
 
     /// The progress of the robot with its goal; none without a goal.
@@ -183,14 +181,15 @@ impl Server {
         let goal = self.goals.current()?;
         let at = pose.pose();
         let left_m = at.position.distance(goal.known.point.position());
-        let mut writer = Writer::default();
-        writer.raw(&goal.id);
-        pose_stamped(&mut writer, Header(now_ns, MAP), [at.position.x, at.position.y, at.heading]);
-        // The time that remains is not estimated.
-        writer.time(now_ns.saturating_sub(goal.at_ns)).time(0);
-        writer.u16(u16::try_from(recoveries).unwrap_or(u16::MAX)).f32(left_m as f32);
-        // Nav2 1.5 appends the tracking errors of position and heading, which are not measured here.
-        writer.f32(0.0).f32(0.0);
-        Some(writer.take())
+        // The time that remains is not estimated, and the errors of tracking are not measured here.
+        let feedback = NavigateToPoseFeedback {
+            current_pose: Header::at(now_ns, MAP).with(plane(at)),
+            navigation_time: now_ns.saturating_sub(goal.at_ns).into(),
+            number_of_recoveries: i16::try_from(recoveries).unwrap_or(i16::MAX),
+            distance_remaining: left_m as f32,
+            ..NavigateToPoseFeedback::default()
+        };
+        let goal_id = UUID { uuid: goal.id };
+        Some(NavigateToPoseFeedbackMessage { goal_id, feedback }.encode())
     }
 }

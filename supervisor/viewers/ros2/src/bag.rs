@@ -8,7 +8,7 @@ use console::failure::Failure;
 use recording::{Bag, Recording, RecordingError};
 use robot_state::{Sample, TOPICS};
 
-use crate::{definitions::define, endpoints::published, shown::Shown};
+use crate::{endpoints::published, shown::Shown};
 
 /// Make a bag of rosbag2 from a recording: for `ros2 bag play`, PlotJuggler and other readers of bags.
 ///
@@ -33,10 +33,8 @@ pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
     let mut bag = Bag::create(out)?;
     let mut names = BTreeMap::new();
     for (row, id, name) in published(namespace, shown.sensor_topics()) {
-        let mut definition = String::new();
-        define(&row.message.join("/"), &mut definition);
         let kind = row.message.join("/msg/");
-        bag.add([&name, &kind, &definition], row.is_latched)?;
+        bag.add([&name, &kind, row.definition], row.is_latched)?;
         names.insert(id, name);
     }
     // A bag begins with the first pose, so that readers know where the sensors are before any message of them.

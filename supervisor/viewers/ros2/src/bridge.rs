@@ -19,7 +19,11 @@ use common::{
 };
 use console::runs::Results;
 use robot_state::{Feed, Sample, TOPICS, newest_run};
-use ros2::participant::{Message, Request};
+use ros2::{
+    cdr::Cdr as _,
+    msg::Bool,
+    participant::{Message, Request},
+};
 use thiserror::Error;
 
 use crate::{
@@ -311,10 +315,10 @@ impl Bridge {
                     self.orders.give(Order::Hand(stick, Instant::now()));
                 }
             }
-            Id::Stop if asked::flag(&message.payload)? => {
-                self.orders.give(Order::Stand { is_cancel: false });
-            }
-            Id::Stop => self.orders.give(Order::Resume),
+            Id::Stop => self.orders.give(match Bool::decode(&message.payload)?.data {
+                true => Order::Stand { is_cancel: false },
+                false => Order::Resume,
+            }),
             Id::Tf => self.transforms.take(&message.payload, Some(Instant::now()))?,
             _ => {}
         }

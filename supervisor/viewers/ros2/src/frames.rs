@@ -3,9 +3,12 @@
 use std::{collections::BTreeMap, time::Instant};
 
 use glam::DAffine2;
-use ros2::cdr::Reader;
+use ros2::{
+    cdr::Cdr as _,
+    msg::{TFMessage, TransformStamped},
+};
 
-/// The most frames that are known, and that a message has.
+/// The most frames that are known.
 const MOST_FRAMES: usize = 1024;
 
 #[derive(Debug)]
@@ -22,16 +25,16 @@ pub struct Frames(BTreeMap<String, Place>);
 impl Frames {
     /// Take a `tf2_msgs/TFMessage` that was `heard` then, or is of frames that stay. The error says why it is refused.
     pub fn take(&mut self, payload: &[u8], heard: Option<Instant>) -> Result<(), String> {
-        let mut reader = Reader::new(payload)?;
-        for _ in 0..reader.length(MOST_FRAMES)? {
-            let (_stamp_ns, parent) = reader.header()?;
-            let frame = reader.text()?;
-            let (at, heading) = reader.pose()?;
-            let pose = DAffine2::from_angle_translation(heading.unwrap_or(f64::NAN), at.into());
-            let is_known = self.0.contains_key(name(frame));
+        for TransformStamped { header, child_frame_id, transform } in
+            TFMessage::decode(payload)?.transforms
+        {
+            let at = [transform.translation.x, transform.translation.y];
+            let pose = placed(at, transform.rotation.heading().unwrap_or(f64::NAN));
+            let [parent, frame] = [&header.frame_id, &child_frame_id].map(|frame| name(frame));
+            let is_known = self.0.contains_key(frame);
             if pose.is_finite() && (is_known || self.0.len() < MOST_FRAMES) {
-                let parent = name(parent).to_owned();
-                self.0.insert(name(frame).to_owned(), Place { parent, pose, heard });
+                let parent = parent.to_owned();
+                self.0.insert(frame.to_owned(), Place { parent, pose, heard });
             }
         }
         Ok(())
@@ -77,6 +80,10 @@ impl Frames {
         }
         (format!("none leads on from {:?}", last.0), passed)
     }
+}
+
+pub fn placed(at: [f64; 2], heading: f64) -> DAffine2 {
+    DAffine2::from_angle_translation(heading, at.into())
 }
 
 /// Older nodes write a slash before the name.

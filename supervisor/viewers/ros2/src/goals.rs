@@ -5,7 +5,11 @@
 use std::collections::VecDeque;
 
 use ros2::{
-    cdr::{Reader, Writer},
+    cdr::{Cdr as _, Malformed},
+    msg::{
+        CancelGoalRequest, CancelGoalResponse, GoalInfo, GoalStatus, GoalStatusArray,
+        NavigateToPoseGetResultRequest, NavigateToPoseSendGoalResponse, UUID,
+    },
     participant::Request,
 };
 use serde::{Deserialize, Serialize};
@@ -33,12 +37,6 @@ impl Status {
     }
 }
 
-enum Cancel {
-    Taken = 0,
-    Unknown = 2,
-    Over = 3,
-}
-
 /// A goal that was accepted, with what its action knows of it.
 #[derive(Serialize, Deserialize)]
 pub struct Goal<T> {
@@ -47,6 +45,12 @@ pub struct Goal<T> {
     pub at_ns: u64,
     pub status: Status,
     pub known: T,
+}
+
+impl<T> Goal<T> {
+    fn info(&self) -> GoalInfo {
+        GoalInfo { goal_id: UUID { uuid: self.id }, stamp: self.at_ns.into() }
+    }
 }
 
 #[derive(Default, Serialize, Deserialize)]
@@ -60,7 +64,7 @@ pub struct Goals<T> {
 impl<T> Goals<T> {
     /// The reply to a goal, at `now_ns` since 1970.
     pub fn reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
-        Writer::default().u8(is_accepted.into()).time(now_ns).take()
+        NavigateToPoseSendGoalResponse { accepted: is_accepted, stamp: now_ns.into() }.encode()
     }
 
     /// Take a goal; it ends the one before.
@@ -94,38 +98,33 @@ impl<T> Goals<T> {
     }
 
     /// Take a request to cancel. Returns the reply, and whether a goal is canceled.
-    pub fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), String> {
-        let mut reader = Reader::new(payload)?;
-        let (id, until_ns) = (uuid(&mut reader)?, reader.time()?);
+    pub fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), Malformed> {
+        let GoalInfo { goal_id: UUID { uuid: id }, stamp } =
+            CancelGoalRequest::decode(payload)?.goal_info;
         let is_any = id == Uuid::default();
-        let until_ns = u64::try_from(until_ns).unwrap_or_default();
+        let until_ns = u64::try_from(stamp.ns()).unwrap_or_default();
         let is_asked = |goal: &Goal<T>| {
             goal.id == id || (is_any && until_ns == 0) || (until_ns > 0 && goal.at_ns <= until_ns)
         };
-        let mut canceled = Vec::new();
+        let mut goals_canceling = Vec::new();
         for goal in self.goals.iter_mut().filter(|goal| is_asked(goal)) {
             if goal.status == Status::Executing {
                 goal.status = Status::Canceling;
                 self.is_changed = true;
-                canceled.push((goal.id, goal.at_ns));
+                goals_canceling.push(goal.info());
             }
         }
-        let answer = match self.goals.iter().any(|goal| goal.id == id) {
-            _ if is_any || !canceled.is_empty() => Cancel::Taken,
-            true => Cancel::Over,
-            false => Cancel::Unknown,
+        let is_taken = !goals_canceling.is_empty();
+        let return_code = match self.goals.iter().any(|goal| goal.id == id) {
+            _ if is_any || is_taken => CancelGoalResponse::ERROR_NONE,
+            true => CancelGoalResponse::ERROR_GOAL_TERMINATED,
+            false => CancelGoalResponse::ERROR_UNKNOWN_GOAL_ID,
         };
-        let reply = Writer::default()
-            .u8(answer as u8)
-            .list(&canceled, |writer, (id, at_ns)| {
-                writer.raw(id).time(*at_ns);
-            })
-            .take();
-        Ok((reply, !canceled.is_empty()))
+        Ok((CancelGoalResponse { return_code, goals_canceling }.encode(), is_taken))
     }
 
-    pub fn wait(&mut self, request: &Request, payload: &[u8]) -> Result<(), String> {
-        let id = uuid(&mut Reader::new(payload)?)?;
+    pub fn wait(&mut self, request: &Request, payload: &[u8]) -> Result<(), Malformed> {
+        let id = NavigateToPoseGetResultRequest::decode(payload)?.goal_id.uuid;
         if self.waiting.len() == MOST_RESULTS {
             self.waiting.remove(0);
         }
@@ -134,10 +133,10 @@ impl<T> Goals<T> {
     }
 
     /// The state of a goal with what is known of it; none while it is not over. An unknown goal has the state 0.
-    pub fn over(&self, id: Uuid) -> Option<(u8, Option<&T>)> {
+    pub fn over(&self, id: Uuid) -> Option<(i8, Option<&T>)> {
         match self.goals.iter().find(|goal| goal.id == id) {
             Some(goal) if !goal.status.is_final() => None,
-            Some(goal) => Some((goal.status as u8, Some(&goal.known))),
+            Some(goal) => Some((goal.status as i8, Some(&goal.known))),
             None => Some((0, None)),
         }
     }
@@ -149,7 +148,7 @@ impl<T> Goals<T> {
     /// The requests whose goals are over and whose results `are_known`; the others still wait.
     pub fn answerable(
         &mut self,
-        are_known: impl Fn(u8, Option<&T>) -> bool,
+        are_known: impl Fn(i8, Option<&T>) -> bool,
     ) -> Vec<(Request, Uuid)> {
         let waiting = std::mem::take(&mut self.waiting);
         let is_over = |id| self.over(id).is_some_and(|(status, known)| are_known(status, known));
@@ -159,15 +158,10 @@ impl<T> Goals<T> {
     }
 
     pub fn take_status(&mut self) -> Option<Vec<u8>> {
-        let status = |writer: &mut Writer, goal: &Goal<T>| {
-            writer.raw(&goal.id).time(goal.at_ns).u8(goal.status as u8);
-        };
+        let status =
+            |goal: &Goal<T>| GoalStatus { goal_info: goal.info(), status: goal.status as i8 };
         let is_changed = std::mem::take(&mut self.is_changed);
-        is_changed.then(|| Writer::default().list(&self.goals, status).take())
+        let list = || GoalStatusArray { status_list: self.goals.iter().map(status).collect() };
+        is_changed.then(|| list().encode())
     }
-}
-
-pub fn uuid(reader: &mut Reader<'_>) -> Result<Uuid, String> {
-    let bytes = reader.raw(16)?;
-    bytes.try_into().map_err(|_| "an id of other than 16 bytes".to_owned())
 }

@@ -12,7 +12,6 @@
 //! | `action` | the server of the action `navigate_to_pose`, pure |
 //! | `messages` | the messages that are written |
 //! | `bag` | a bag of rosbag2 from a recording |
-//! | `definitions` | the definitions of the messages that are written |
 //! | `bridge` | the bridge itself |
 //! | `endpoints` | its readers and writers |
 //! | `node` | readers, writers and servers of actions as a node that `ros2 node list` shows |
@@ -28,7 +27,6 @@ mod action;
 mod asked;
 mod bag;
 mod bridge;
-mod definitions;
 mod drift;
 mod endpoints;
 mod frames;

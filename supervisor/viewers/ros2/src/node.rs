@@ -8,8 +8,9 @@ use std::{
 };
 
 use ros2::{
-    cdr,
-    participant::{Gid, Message, Participant, Quality, Reader, Request, Writer},
+    cdr::Cdr as _,
+    msg::{self, NodeEntitiesInfo, ParticipantEntitiesInfo},
+    participant::{Message, Participant, Quality, Reader, Request, Writer},
     topic::Topic,
 };
 
@@ -170,14 +171,17 @@ impl<Id: Copy + Ord> Node<Id> {
         let writers = self.writers.values().chain(services().map(|(_, replies)| replies));
         let topics = self.actions.iter().flat_map(|action| [&action.feedback, &action.status]);
         let writers = writers.chain(topics).map(Writer::gid);
-        let gid = |writer: &mut cdr::Writer, gid: Gid| {
-            writer.raw(&gid);
-        };
+        let gid = |data| msg::Gid { data };
         let namespace = if self.namespace.is_empty() { "/" } else { &self.namespace };
-        let mut entities = cdr::Writer::default();
-        entities.raw(&self.participant.gid()).length(1).text(namespace).text(self.name);
-        entities.list(readers.collect::<Vec<_>>(), gid).list(writers.collect::<Vec<_>>(), gid);
-        self.entities.write(entities.take());
+        let node = NodeEntitiesInfo {
+            node_namespace: namespace.to_owned(),
+            node_name: self.name.to_owned(),
+            reader_gid_seq: readers.map(gid).collect(),
+            writer_gid_seq: writers.map(gid).collect(),
+        };
+        let gid = gid(self.participant.gid());
+        let entities = ParticipantEntitiesInfo { gid, node_entities_info_seq: vec![node] };
+        self.entities.write(entities.encode());
     }
 
     /// Send a message. If the library does not accept it now, it is lost, and a newer one follows.

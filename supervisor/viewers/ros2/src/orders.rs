@@ -14,9 +14,12 @@ use common::{
 };
 use glam::DVec2;
 use mission_control::operator::{self, OperatorError};
-use ros2::participant::Request;
+use ros2::{
+    msg::{ComputePathToPoseResult, NavigateToPoseResult},
+    participant::Request,
+};
 
-use crate::action::{Refusal, Sent, code};
+use crate::action::{Refusal, Sent};
 
 const MOST_WAITING: usize = 16;
 
@@ -103,9 +106,13 @@ impl Orders {
 
 fn refusal(error: &OperatorError) -> Refusal {
     let code = match error {
-        OperatorError::Refused { code: "target-outside", .. } => code::GOAL_OUTSIDE_MAP,
-        OperatorError::Refused { code: "target-in-hazard", .. } => code::GOAL_OCCUPIED,
-        _ => code::UNKNOWN,
+        OperatorError::Refused { code: "target-outside", .. } => {
+            ComputePathToPoseResult::GOAL_OUTSIDE_MAP
+        }
+        OperatorError::Refused { code: "target-in-hazard", .. } => {
+            ComputePathToPoseResult::GOAL_OCCUPIED
+        }
+        _ => NavigateToPoseResult::UNKNOWN,
     };
     Refusal { code, text: error.to_string() }
 }

@@ -36,20 +36,23 @@ use common::{
 use glam::{DAffine2, DVec2};
 use harmonic::{Cancellation, Cell};
 use ros2::{
-    cdr::Reader,
+    cdr::Cdr as _,
+    msg::{
+        Clock, ComputePathThroughPosesResult, ComputePathToPoseResult, Header, PoseStamped, Release,
+    },
     participant::{Gid, Message, Quality},
 };
 
 use self::{
-    calls::{Asked, Outcome, Placed},
+    calls::{Asked, Outcome},
     costmap::{Body, Costmap},
     planning::{Failure, Planner, Reason},
 };
 use crate::{
     bridge::{BridgeError, now_ns},
-    frames::Frames,
+    frames::{Frames, placed},
     goals::{Goals, Status, Uuid},
-    messages::{self, Header},
+    messages,
     node::{Call, LATCHED, NEWEST, Node, SURE},
     parameters::Parameter,
     shown::arrows,
@@ -60,8 +63,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 const MOST_WAITING: usize = 16;
 /// The most participants whose release of Nav2 is remembered.
 const MOST_CLIENTS: usize = 256;
-/// The releases of ROS whose Nav2 is older than 1.5.
-const BEFORE_1_5: [&str; 4] = ["humble", "iron", "jazzy", "kilted"];
 /// The bytes of a GID that are those of its participant.
 const PARTICIPANT: usize = 12;
 /// `/tf_static` keeps the messages of all its publishers; messages of `/tf` are many.
@@ -69,8 +70,12 @@ const DEPTH: u16 = 256;
 
 /// The actions, their types, and where Nav2's error codes of them begin.
 const ACTIONS: [(&str, &str, u16); 2] = [
-    ("firsthand/compute_path_to_pose", "ComputePathToPose", 200),
-    ("firsthand/compute_path_through_poses", "ComputePathThroughPoses", 300),
+    ("firsthand/compute_path_to_pose", "ComputePathToPose", ComputePathToPoseResult::UNKNOWN),
+    (
+        "firsthand/compute_path_through_poses",
+        "ComputePathThroughPoses",
+        ComputePathThroughPosesResult::UNKNOWN,
+    ),
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -164,8 +169,8 @@ struct Plan {
     began: Option<Instant>,
     cancellation: Cancellation,
     outcome: Outcome,
-    /// Whether its client reads results of Nav2 1.5.
-    is_1_5: bool,
+    /// That of its client.
+    release: Release,
 }
 
 pub fn serve(
@@ -229,8 +234,8 @@ struct Server<'a> {
     map: Option<Arc<Costmap>>,
     /// The newest time of `/clock`, nanoseconds.
     clock_ns: u64,
-    /// Whether participants have Nav2 1.5, as their goals showed.
-    clients: BTreeMap<[u8; PARTICIPANT], bool>,
+    /// The releases that participants may be of, by their goals.
+    clients: BTreeMap<[u8; PARTICIPANT], Vec<Release>>,
     goals: [Goals<Plan>; 2],
     jobs: SyncSender<Job>,
     done: Receiver<Done>,
@@ -264,20 +269,20 @@ impl<'a> Server<'a> {
         if self.options.use_sim_time { self.clock_ns } else { now_ns() }
     }
 
-    /// Returns whether a client has Nav2 1.5: by its goal, its earlier goals, or the release of ROS in this environment.
-    fn is_1_5(&mut self, from: Gid, asked: &Asked) -> bool {
+    /// Returns the release of a client: by its goals, and by the release of ROS in this environment if that is one of those.
+    fn release(&mut self, from: Gid, asked: &[Release]) -> Release {
         let participant = *from.first_chunk().unwrap_or(&[0; PARTICIPANT]);
-        if let Some(is_1_5) = asked.is_1_5 {
-            if self.clients.len() >= MOST_CLIENTS {
-                self.clients.clear();
-            }
-            self.clients.insert(participant, is_1_5);
+        if self.clients.len() >= MOST_CLIENTS {
+            self.clients.clear();
         }
-        let by_environment = || {
-            let release = env::var("ROS_DISTRO").unwrap_or_default();
-            !BEFORE_1_5.contains(&release.as_str())
-        };
-        self.clients.get(&participant).copied().unwrap_or_else(by_environment)
+        let known = self.clients.entry(participant).or_insert_with(|| asked.to_vec());
+        known.retain(|release| asked.contains(release));
+        if known.is_empty() {
+            *known = asked.to_vec();
+        }
+        let here = env::var("ROS_DISTRO").unwrap_or_default();
+        let here = Release::ALL.iter().find(|(name, it)| *name == here && known.contains(it));
+        here.map(|(_, release)| *release).or(known.first().copied()).unwrap_or_default()
     }
 
     fn turn(&mut self) {
@@ -294,9 +299,9 @@ impl<'a> Server<'a> {
             }
         }
         while let Ok((action, id, outcome, field)) = self.done.try_recv() {
-            let header = Header(outcome.at_ns, &outcome.frame);
             if outcome.failure.is_none() {
-                self.node.publish(Id::Plan, messages::path(header, &outcome.path));
+                let header = Header::at(outcome.at_ns, &outcome.frame);
+                self.node.publish(Id::Plan, messages::path(header, &outcome.path).encode());
             }
             field.into_iter().for_each(|field| self.node.publish(Id::Field, field));
             self.end(action, id, outcome);
@@ -313,14 +318,9 @@ impl<'a> Server<'a> {
             }
             for (request, id) in goals.answerable(|_, _| true) {
                 if let Some((state, plan)) = goals.over(id) {
-                    let unknown = Outcome::default();
-                    let outcome = plan.map_or(&unknown, |plan| &plan.outcome);
-                    let result = calls::result(
-                        state,
-                        outcome,
-                        ACTIONS[action].2,
-                        action == 1 && plan.is_some_and(|plan| plan.is_1_5),
-                    );
+                    let unknown = Plan::default();
+                    let Plan { outcome, release, .. } = plan.unwrap_or(&unknown);
+                    let result = calls::result(state, outcome, ACTIONS[action].2, *release);
                     self.node.reply(action, Call::GetResult, &request, &result);
                 }
             }
@@ -338,7 +338,7 @@ impl<'a> Server<'a> {
             Id::Tf => self.frames.take(payload, Some(Instant::now()))?,
             Id::TfStatic => self.frames.take(payload, None)?,
             Id::Clock => {
-                self.clock_ns = Reader::new(payload)?.time()?.try_into().unwrap_or_default();
+                self.clock_ns = Clock::decode(payload)?.clock.ns().try_into().unwrap_or_default();
             }
             Id::Plan | Id::Field => {}
         }
@@ -354,8 +354,8 @@ impl<'a> Server<'a> {
                 let reply = Goals::<Plan>::reply(asked.is_ok(), self.now_ns());
                 self.node.reply(action, call, request, &reply);
                 let asked = asked?;
-                let is_1_5 = self.is_1_5(message.from, &asked);
-                self.begin(action, &asked, is_1_5);
+                let release = self.release(message.from, &asked.releases);
+                self.begin(action, &asked, release);
             }
             Call::CancelGoal => {
                 let (reply, is_canceled) = self.goals[action].cancel(&payload)?;
@@ -376,14 +376,14 @@ impl<'a> Server<'a> {
         }
     }
 
-    fn begin(&mut self, action: usize, asked: &Asked, is_1_5: bool) {
+    fn begin(&mut self, action: usize, asked: &Asked, release: Release) {
         self.interrupt(action);
         let (id, cancellation) = (asked.id, Cancellation::default());
         let plan = Plan {
             began: Some(Instant::now()),
             cancellation: cancellation.clone(),
             outcome: Outcome::default(),
-            is_1_5,
+            release,
         };
         let at_ns = self.now_ns();
         self.goals[action].accept(id, plan, at_ns);
@@ -413,9 +413,9 @@ impl<'a> Server<'a> {
         let find = |frame: &str| {
             self.frames.find(frame, &map.frame, since).map_err(|why| (Reason::Tf, why))
         };
-        let place = |(frame, pose): &Placed| match frame.as_str() {
-            "" => Ok(*pose),
-            frame => Ok(find(frame)? * *pose),
+        let place = |PoseStamped { header, pose }: &PoseStamped| {
+            let pose = placed(pose.at(), pose.orientation.heading().unwrap_or_default());
+            Ok(if header.frame_id.is_empty() { pose } else { find(&header.frame_id)? * pose })
         };
         let start = asked.start.as_ref().map_or_else(|| find(&self.options.base), place)?;
         let goals = asked.goals.iter().map(place).collect::<Result<_, _>>()?;
@@ -472,7 +472,7 @@ fn plan(planner: &mut Planner, job: &Job) -> Done {
             let at = map.place.transform_point2(DVec2::new(col as f64, row as f64));
             Some([at, map.place.transform_vector2(ahead.into()).normalize_or_zero()])
         });
-        messages::markers(Header(at_ns, &map.frame), &[drawn])
+        messages::markers(&Header::at(at_ns, &map.frame), vec![drawn])
     });
     (action, id, outcome, field)
 }

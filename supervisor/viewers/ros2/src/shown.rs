@@ -1,5 +1,7 @@
 //! The messages that show a robot: samples of its bus in, messages out. Pure.
 
+use std::f64::consts::TAU;
+
 use common::{
     grid::{Cell, CellState, GridFrame},
     kinematics::Pose2,
@@ -11,11 +13,19 @@ use common::{
 };
 use glam::{DAffine2, DVec2};
 use robot_state::{Kind, RobotState, Sample, death_in_words, failsafe_in_words};
-use ros2::{cdr::Writer, parts::Pose};
+use ros2::{
+    cdr::Cdr as _,
+    messages::{battery, odometry, scan},
+    msg::{
+        Clock, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Log, MapMetaData, Marker,
+        OccupancyGrid, OccupancyGridUpdate, PoseWithCovariance, PoseWithCovarianceStamped, Range,
+    },
+    parts::Pose,
+};
 
 use crate::{
     drift::Drift,
-    messages::{self, Header, Level, Marker, Shape, Status, within},
+    messages::{disc, lines, markers, path, transforms, within},
     topics::Id,
 };
 
@@ -45,7 +55,7 @@ pub struct Shown {
     /// The version of the last whole map that was published, and its time.
     map: Option<(u64, u64)>,
     has_movers: bool,
-    diagnosed: Option<(Vec<Status>, u64)>,
+    diagnosed: Option<(Vec<DiagnosticStatus>, u64)>,
     drift: Drift,
     /// Mission time over the time of stamps.
     pub pace: f64,
@@ -88,7 +98,7 @@ impl Shown {
         let used = self.sensors.iter().filter(|sensor| sensor.used);
         let mounts = used
             .map(|sensor| (BASE, sensor.name.as_str(), plane(sensor.mount.on(Pose2::default()))));
-        sink(Id::TfStatic, messages::transforms(now_ns, &mounts.collect::<Vec<_>>()));
+        sink(Id::TfStatic, transforms(now_ns, &mounts.collect::<Vec<_>>()));
     }
 
     pub fn newest_pose(&self) -> PoseSample {
@@ -107,7 +117,7 @@ impl Shown {
             Sample::Grid(header, cells) => self.grid(header, cells, now_ns, sink),
             Sample::Field(header, _) => self.field(header, now_ns, sink),
             Sample::Power(power) => {
-                sink(Id::Battery, messages::battery(Header(now_ns, BASE), power.motor_v));
+                sink(Id::Battery, battery(Header::at(now_ns, BASE), power.motor_v));
             }
             _ => {}
         }
@@ -120,21 +130,22 @@ impl Shown {
         match self.others_odom {
             None => {
                 let frames = [(MAP, ODOM, origin), (ODOM, BASE, odom)];
-                sink(Id::Tf, messages::transforms(now_ns, &frames));
+                sink(Id::Tf, transforms(now_ns, &frames));
             }
             Some(Some(robot)) => {
                 let origin = origin_of(robot, sample.pose());
-                sink(Id::Tf, messages::transforms(now_ns, &[(MAP, ODOM, origin)]));
+                sink(Id::Tf, transforms(now_ns, &[(MAP, ODOM, origin)]));
             }
             Some(None) => {}
         }
-        sink(Id::Pose, messages::pose(Header(now_ns, MAP), pose, &sample.covariance_6x6()));
+        let pose = PoseWithCovariance { pose: pose.into(), covariance: sample.covariance_6x6() };
+        let header = Header::at(now_ns, MAP);
+        sink(Id::Pose, PoseWithCovarianceStamped { header, pose }.encode());
         let [of_pose, of_speeds] = self.drift.after(sample, &self.mission, self.pace);
         let speeds = [sample.v_m_s, sample.omega_rad_s].map(|speed| speed * self.pace);
-        let header = Header(now_ns, ODOM);
-        let message = messages::odometry(header, BASE, (odom, &of_pose), (speeds, &of_speeds));
-        sink(Id::Odom, message);
-        sink(Id::Clock, Writer::default().time(sample.stamp.stamp_ns).take());
+        let header = Header::at(now_ns, ODOM);
+        sink(Id::Odom, odometry(header, BASE, (odom, of_pose), (speeds, of_speeds)));
+        sink(Id::Clock, Clock { clock: sample.stamp.stamp_ns.into() }.encode());
     }
 
     fn ranges(&self, readings: &[RangeReading], now_ns: u64, sink: Sink<'_>) {
@@ -151,11 +162,22 @@ impl Shown {
                 RangeStatus::Absent => continue,
             };
             if sensor.kind != SensorKind::Scan {
-                let is_sonar = sensor.kind == SensorKind::Cone;
-                let view = sensor.field_of_view_deg.to_radians();
                 let limits = [sensor.model.least_m(), sensor.reach_m];
-                let (header, range) = (Header(now_ns, &sensor.name), within(limits, range));
-                sink(Id::Range(row), messages::range(header, is_sonar, view, limits, range));
+                let [min_range, max_range] = limits.map(|limit| limit as f32);
+                let message = Range {
+                    header: Header::at(now_ns, &sensor.name),
+                    radiation_type: match sensor.kind {
+                        SensorKind::Cone => Range::ULTRASOUND,
+                        _ => Range::INFRARED,
+                    },
+                    field_of_view: sensor.field_of_view_deg.to_radians().min(TAU) as f32,
+                    min_range,
+                    max_range,
+                    range: within(limits, range) as f32,
+                    // The variance is not known.
+                    ..Range::default()
+                };
+                sink(Id::Range(row), message.encode());
             }
         }
     }
@@ -177,10 +199,9 @@ impl Shown {
             let at_ns = now_ns.saturating_add_signed((after_tick_ns as f64 / self.pace) as i64);
             let fan = [header.first_rad - sensor.mount.looks_rad(), header.step_rad];
             let limits = [sensor.model.least_m(), header.reach_m];
-            let header = Header(at_ns, &sensor.name);
-            let told: Vec<_> =
-                beams.iter().map(|range| within(limits, f64::from(*range)) as f32).collect();
-            sink(Id::Scan(row), messages::scan(header, fan, limits, [beam_s, period_s], &told));
+            let header = Header::at(at_ns, &sensor.name);
+            let told = beams.iter().map(|range| within(limits, f64::from(*range)) as f32).collect();
+            sink(Id::Scan(row), scan(header, fan, limits, [beam_s, period_s], told));
         }
     }
 
@@ -188,15 +209,20 @@ impl Shown {
         let window = header.part.window();
         let is_whole = header.part.frame().whole() == window;
         if self.map.is_some() && !is_whole && window.area() > 0 {
-            let occupied: Vec<u8> = cells.iter().copied().map(occupancy).collect();
-            let (first, size) = ([window.col, window.row], [window.width, window.height]);
-            let header = Header(now_ns, MAP);
-            sink(Id::MapUpdates, messages::map_update(header, first, size, &occupied));
+            let update = OccupancyGridUpdate {
+                header: Header::at(now_ns, MAP),
+                x: window.col as i32,
+                y: window.row as i32,
+                width: window.width,
+                height: window.height,
+                data: cells.iter().copied().map(occupancy).collect(),
+            };
+            sink(Id::MapUpdates, update.encode());
         }
         let movers: Vec<_> = (0..).zip(header.drawn_movers()).flat_map(mover).collect();
         // Without movers an empty array is published once more, which deletes the last ones.
         if std::mem::replace(&mut self.has_movers, !movers.is_empty()) || self.has_movers {
-            sink(Id::Movers, messages::markers(Header(now_ns, MAP), &movers));
+            sink(Id::Movers, markers(&Header::at(now_ns, MAP), movers));
         }
     }
 
@@ -209,13 +235,17 @@ impl Shown {
             && is_due
         {
             self.map = Some((version, now_ns));
-            let corner = frame.corner_of(Cell { col: 0, row: 0 }).to_array();
-            let occupied: Vec<u8> = self.state.map.cells().iter().copied().map(occupancy).collect();
-            let header = Header(now_ns, MAP);
-            sink(
-                Id::Map,
-                messages::map(header, frame.resolution_m, [frame.cells; 2], corner, &occupied),
-            );
+            let [x, y] = frame.corner_of(Cell { col: 0, row: 0 }).to_array();
+            let info = MapMetaData {
+                map_load_time: now_ns.into(),
+                resolution: frame.resolution_m as f32,
+                width: frame.cells,
+                height: frame.cells,
+                origin: [x, y, 0.0].into(),
+            };
+            let data = self.state.map.cells().iter().copied().map(occupancy).collect();
+            let header = Header::at(now_ns, MAP);
+            sink(Id::Map, OccupancyGrid { header, info, data }.encode());
         }
     }
 
@@ -224,22 +254,18 @@ impl Shown {
             return;
         };
         let to = DVec2::new(header.target_x_m, header.target_y_m);
-        let header = Header(now_ns, MAP);
+        let header = Header::at(now_ns, MAP);
         let (cells, from) = (self.state.field.cells(), self.newest_pose().pose().position);
-        sink(Id::Path, messages::path(header, &way(frame, cells, from, to)));
+        sink(Id::Path, path(header.clone(), &way(frame, cells, from, to)).encode());
         let drawn = [vec![directions(frame, cells)], self.targets()].concat();
-        sink(Id::Field, messages::markers(header, &drawn));
+        sink(Id::Field, markers(&header, drawn));
     }
 
     fn targets(&self) -> Vec<Marker> {
         let across = 2.0 * self.mission.arrival_tolerance_m;
-        let target = |(id, target): (i32, &TargetPoint)| Marker {
-            namespace: "targets",
-            id,
-            pose: [target.x_m, target.y_m, target.heading_rad],
-            scale: [across, across, 0.01],
-            color: [0.1, 0.7, 0.2, 0.6],
-            ..Marker::default()
+        let target = |(id, target): (i32, &TargetPoint)| {
+            let pose = [target.x_m, target.y_m, target.heading_rad];
+            disc(("targets", id), pose, across, [0.1, 0.7, 0.2, 0.6])
         };
         (0..).zip(self.state.targets()).map(target).collect()
     }
@@ -248,13 +274,14 @@ impl Shown {
     pub fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
         self.map(now_ns, sink);
         for event in self.state.take_events() {
-            let severity = match event.kind {
-                Kind::Bad => 40,
-                Kind::Warn => 30,
-                Kind::Good | Kind::Note => 20,
-                Kind::Log => 10,
+            let level = match event.kind {
+                Kind::Bad => Log::ERROR,
+                Kind::Warn => Log::WARN,
+                Kind::Good | Kind::Note => Log::INFO,
+                Kind::Log => Log::DEBUG,
             };
-            sink(Id::Rosout, messages::log(now_ns, severity, &event.of, &event.text));
+            let (stamp, name, msg) = (now_ns.into(), event.of, event.text);
+            sink(Id::Rosout, Log { stamp, level, name, msg, ..Log::default() }.encode());
         }
         let statuses = self.statuses();
         let is_due = self.diagnosed.as_ref().is_none_or(|(before, at_ns)| {
@@ -262,22 +289,20 @@ impl Shown {
             age_ns >= EVERY_NS || judged(before).ne(judged(&statuses))
         });
         if is_due {
-            sink(
-                Id::Diagnostics,
-                messages::diagnostics(Header(now_ns, ""), &self.robot, &statuses),
-            );
+            let (header, status) = (Header::at(now_ns, ""), statuses.clone());
+            sink(Id::Diagnostics, DiagnosticArray { header, status }.encode());
             self.diagnosed = Some((statuses, now_ns));
         }
     }
 
-    fn statuses(&self) -> Vec<Status> {
+    fn statuses(&self) -> Vec<DiagnosticStatus> {
         let link = self.state.link.unwrap_or_default();
         let level = match (link.action(), link.cause()) {
             (_, Cause::None | Cause::NotOrdered | Cause::MissionOver | Cause::OperatorStop) => {
-                Level::Ok
+                DiagnosticStatus::OK
             }
-            (Action::Go | Action::Slow, _) => Level::Warn,
-            (Action::Stop | Action::End, _) => Level::Error,
+            (Action::Go | Action::Slow, _) => DiagnosticStatus::WARN,
+            (Action::Stop | Action::End, _) => DiagnosticStatus::ERROR,
         };
         let message = failsafe_in_words(&link);
         let values = vec![
@@ -286,21 +311,37 @@ impl Shown {
             ("tick latency, us", (link.latency_ns / 1000).to_string()),
             ("robot lost, times", link.losses.to_string()),
         ];
-        let mut statuses =
-            vec![Status { level, name: "firsthand: failsafe".to_owned(), message, values }];
+        let mut statuses = vec![self.status(level, "failsafe", message, values)];
         statuses.extend(self.state.stages.iter().map(|entry| self.stage(entry)));
         if let Some(power) = &self.state.power {
-            let level = if power.is_low() { Level::Warn } else { Level::Ok };
+            let level = if power.is_low() { DiagnosticStatus::WARN } else { DiagnosticStatus::OK };
             let message = if power.is_low() { "low" } else { "not low" }.to_owned();
             let volts = |volts: f64| format!("{volts:.2}");
             let values =
                 vec![("board, V", volts(power.board_v)), ("motors, V", volts(power.motor_v))];
-            statuses.push(Status { level, name: "firsthand: battery".to_owned(), message, values });
+            statuses.push(self.status(level, "battery", message, values));
         }
         statuses
     }
 
-    fn stage(&self, entry: &RosterEntry) -> Status {
+    fn status(
+        &self,
+        level: u8,
+        name: &str,
+        message: String,
+        values: Vec<(&str, String)>,
+    ) -> DiagnosticStatus {
+        let value = |(key, value): (&str, String)| KeyValue { key: key.to_owned(), value };
+        DiagnosticStatus {
+            level,
+            name: format!("firsthand: {name}"),
+            message,
+            hardware_id: self.robot.clone(),
+            values: values.into_iter().map(value).collect(),
+        }
+    }
+
+    fn stage(&self, entry: &RosterEntry) -> DiagnosticStatus {
         let name = name_str(&entry.stage);
         let death = self
             .state
@@ -308,14 +349,14 @@ impl Shown {
             .get(name)
             .map(|death| format!("generation {}: {}", death.generation, death_in_words(death)));
         let (level, state) = match StageState::from_byte(entry.state) {
-            StageState::Running => (Level::Ok, "runs"),
-            StageState::Starting => (Level::Warn, "starts"),
-            StageState::Stopping => (Level::Warn, "stops"),
+            StageState::Running => (DiagnosticStatus::OK, "runs"),
+            StageState::Starting => (DiagnosticStatus::WARN, "starts"),
+            StageState::Stopping => (DiagnosticStatus::WARN, "stops"),
             StageState::BackingOff => {
-                (Level::Error, "died often, waits before it is started again")
+                (DiagnosticStatus::ERROR, "died often, waits before it is started again")
             }
-            StageState::Down => (Level::Error, "is down"),
-            StageState::Held => (Level::Error, "died far too often, is held"),
+            StageState::Down => (DiagnosticStatus::ERROR, "is down"),
+            StageState::Held => (DiagnosticStatus::ERROR, "died far too often, is held"),
         };
         let values = vec![
             ("generation", entry.generation.to_string()),
@@ -323,27 +364,27 @@ impl Shown {
             ("pid", entry.pid.to_string()),
             ("last death", death.unwrap_or_default()),
         ];
-        Status { level, name: format!("firsthand: {name}"), message: state.to_owned(), values }
+        self.status(level, name, state.to_owned(), values)
     }
 }
 
 /// The parts of diagnostics whose change publishes them at once.
-fn judged(statuses: &[Status]) -> impl Iterator<Item = (Level, &str)> {
+fn judged(statuses: &[DiagnosticStatus]) -> impl Iterator<Item = (u8, &str)> {
     statuses.iter().map(|status| (status.level, status.message.as_str()))
 }
 
-/// A cell's occupancy, as a byte: -1 is unknown, and 99 is a cell that the robot's centre must not enter, as in a costmap of
+/// A cell's occupancy: -1 is unknown, and 99 is a cell that the robot's centre must not enter, as in a costmap of
 /// Nav2.
-fn occupancy(cell: u8) -> u8 {
+fn occupancy(cell: u8) -> i8 {
     match CellState::from_byte(cell) {
-        CellState::Free => -1_i8 as u8,
+        CellState::Free => -1,
         CellState::Scanned => 0,
         CellState::Margin => 99,
         CellState::Sensed | CellState::Known | CellState::Perimeter => 100,
     }
 }
 
-const fn plane(Pose2 { position, heading }: Pose2) -> Pose {
+pub const fn plane(Pose2 { position, heading }: Pose2) -> Pose {
     [position.x, position.y, heading]
 }
 
@@ -377,23 +418,10 @@ fn way(frame: GridFrame, cells: &[FieldCell], from: DVec2, to: DVec2) -> Vec<Pos
 
 fn mover((id, mover): (i32, &Mover)) -> [Marker; 3] {
     let at = mover.place();
-    let disc = |namespace, radius_m: f64, alpha| Marker {
-        namespace,
-        id,
-        pose: [at.x, at.y, 0.0],
-        scale: [2.0 * radius_m, 2.0 * radius_m, 0.01],
-        color: [0.8, 0.1, 0.1, alpha],
-        ..Marker::default()
+    let disc = |namespace, radius_m: f64, alpha| {
+        disc((namespace, id), [at.x, at.y, 0.0], 2.0 * radius_m, [0.8, 0.1, 0.1, alpha])
     };
-    let way = Marker {
-        namespace: "in 1 s",
-        id,
-        shape: Shape::Lines,
-        scale: [0.05, 0.0, 0.0],
-        color: [0.8, 0.1, 0.1, 1.0],
-        points: vec![at.to_array(), (at + mover.velocity()).to_array()],
-        ..Marker::default()
-    };
+    let way = lines(("in 1 s", id), &[at, at + mover.velocity()], 0.05, [0.8, 0.1, 0.1, 1.0]);
     [disc("movers", mover.radius_m.into(), 0.6), disc("doubt", mover.reach_m(), 0.2), way]
 }
 
@@ -418,16 +446,9 @@ pub fn arrows(
     for row in (each / 2..rows).step_by(each) {
         for col in (each / 2..columns).step_by(each) {
             if let Some([at, ahead]) = of(col, row) {
-                points.extend([at.to_array(), (at + length * ahead).to_array()]);
+                points.extend([at, at + length * ahead]);
             }
         }
     }
-    Marker {
-        namespace: "field",
-        shape: Shape::Lines,
-        scale: [0.02, 0.0, 0.0],
-        color: [0.2, 0.4, 0.9, 0.8],
-        points,
-        ..Marker::default()
-    }
+    lines(("field", 0), &points, 0.02, [0.2, 0.4, 0.9, 0.8])
 }

@@ -16,14 +16,23 @@ use common::{
 };
 use glam::{DAffine2, DVec2};
 use robot_state::Sample;
-use ros2::cdr::{Reader, Writer};
+use ros2::{
+    cdr::Cdr,
+    messages::{COVARIANCE, battery, scan, twist},
+    msg::{
+        CancelGoalRequest, Clock, DiagnosticArray, DiagnosticStatus, GoalInfo, Header, KeyValue,
+        LaserScan, Log, MapMetaData, NavigateToPoseGetResultResponse, NavigateToPoseResult,
+        NavigateToPoseSendGoalRequest, OccupancyGrid, Odometry, Path as PathMessage, PoseStamped,
+        PoseWithCovariance, PoseWithCovarianceStamped, Range, TFMessage, Twist, UUID, Vector3,
+    },
+};
 
 use crate::{
     RVIZ,
-    action::{Sent, Server, code},
+    action::{Sent, Server},
     asked,
     goals::Status,
-    messages::{self, Header, Level, Marker, Shape},
+    messages::{self, disc, lines},
     shown::Shown,
     topics::{Id, TABLE},
 };
@@ -37,7 +46,7 @@ const MAP: &str = "000100000c0000000065cd1d040000006d6170000c0000000065cd1d00000
 const DIAGNOSTICS: &str = "000100000c0000000065cd1d0100000000000000010000000100000002000000610000000300000062630000040000007838300001000000020000006b000000020000007600";
 const MARKERS: &str = "00010000020000000c0000000065cd1d040000006d6170000100000000000000000000000300000003000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000f03f0000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000000100000000000000000000000000000001000000000000000100000000000000000000000000000001000000000000000100000000000000010000000000000000000000000000000c0000000065cd1d040000006d617000060000006669656c6400000007000000050000000000000000000000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f000000000000e03f000000000000000000000000000000000000803e0000003f0000403f0000803f00000000000000000000000002000000000000000000f03f0000000000000040000000000000000000000000000008400000000000001040000000000000000000000000010000000000000000000000000000000100000000000000010000000000000000000000000000000100000000000000010000000000000001000000000000000000000000";
 
-const AT: Header<'_> = Header(12_500_000_000, "map");
+const AT_NS: u64 = 12_500_000_000;
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
@@ -45,80 +54,95 @@ fn hex(bytes: &[u8]) -> String {
 
 #[test]
 fn what_is_written_is_what_rclpy_writes() {
-    let Header(ns, _) = AT;
-    assert_eq!(hex(&messages::path(AT, &[[1.0, 2.0, 0.0]])), PATH);
-    assert_eq!(hex(&messages::battery(Header(ns, "base_link"), 12.5)), BATTERY);
-    let ranges = [1.0, f32::INFINITY, 2.0];
-    let scan = messages::scan(Header(ns, "laser"), [-1.0, 1.0], [0.25, 8.0], [0.0, 0.125], &ranges);
-    assert_eq!(hex(&scan), SCAN);
-    assert_eq!(hex(&messages::range(Header(ns, "front"), false, 0.5, [0.25, 2.0], 1.5)), RANGE);
-    let map = messages::map(AT, 0.5, [2, 2], [-1.0, -2.0], &[255, 0, 99, 100]);
-    assert_eq!(hex(&map), MAP);
-    let status = messages::Status {
-        level: Level::Warn,
+    let header = |frame| Header::at(AT_NS, frame);
+    assert_eq!(hex(&messages::path(header("map"), &[[1.0, 2.0, 0.0]]).encode()), PATH);
+    assert_eq!(hex(&battery(header("base_link"), 12.5)), BATTERY);
+    let ranges = vec![1.0, f32::INFINITY, 2.0];
+    assert_eq!(hex(&scan(header("laser"), [-1.0, 1.0], [0.25, 8.0], [0.0, 0.125], ranges)), SCAN);
+    let range = Range {
+        header: header("front"),
+        radiation_type: Range::INFRARED,
+        field_of_view: 0.5,
+        min_range: 0.25,
+        max_range: 2.0,
+        range: 1.5,
+        variance: 0.0,
+    };
+    assert_eq!(hex(&range.encode()), RANGE);
+    let info = MapMetaData {
+        map_load_time: AT_NS.into(),
+        resolution: 0.5,
+        width: 2,
+        height: 2,
+        origin: [-1.0, -2.0, 0.0].into(),
+    };
+    let map = OccupancyGrid { header: header("map"), info, data: vec![-1, 0, 99, 100] };
+    assert_eq!(hex(&map.encode()), MAP);
+    let status = DiagnosticStatus {
+        level: DiagnosticStatus::WARN,
         name: "a".to_owned(),
         message: "bc".to_owned(),
-        values: vec![("k", "v".to_owned())],
+        hardware_id: "x80".to_owned(),
+        values: vec![KeyValue { key: "k".to_owned(), value: "v".to_owned() }],
     };
-    assert_eq!(hex(&messages::diagnostics(Header(ns, ""), "x80", &[status])), DIAGNOSTICS);
-    let lines = Marker {
-        namespace: "field",
-        id: 7,
-        shape: Shape::Lines,
-        pose: [1.0, 2.0, 0.0],
-        scale: [0.5, 0.0, 0.0],
-        color: [0.25, 0.5, 0.75, 1.0],
-        points: vec![[1.0, 2.0], [3.0, 4.0]],
-    };
-    assert_eq!(hex(&messages::markers(AT, &[lines])), MARKERS);
+    let diagnostics = DiagnosticArray { header: header(""), status: vec![status] };
+    assert_eq!(hex(&diagnostics.encode()), DIAGNOSTICS);
+    let points = [DVec2::new(1.0, 2.0), DVec2::new(3.0, 4.0)];
+    let mut drawn = lines(("field", 7), &points, 0.5, [0.25, 0.5, 0.75, 1.0]);
+    drawn.pose = [1.0, 2.0, 0.0].into();
+    assert_eq!(hex(&messages::markers(&header("map"), vec![drawn])), MARKERS);
 }
 
-/// A goal at (1, 2), in `frame`.
-fn goal(frame: &str) -> Vec<u8> {
-    Writer::default().header(0, frame).pose([1.0, 2.0, 0.5]).take()
+fn pose_in(frame: &str) -> PoseStamped {
+    Header::at(0, frame).with([1.0, 2.0, 0.5])
 }
 
 #[test]
 fn a_goal_is_taken_in_the_frame_of_the_map_only_and_never_in_part() {
-    let taken = asked::goal(&goal("map")).unwrap();
+    let goal = |pose: &PoseStamped| asked::goal(&pose.clone().encode());
+    let mut pose = pose_in("map");
+    let taken = goal(&pose).unwrap();
     assert_eq!((taken.x_m, taken.y_m, taken.has_heading), (1.0, 2.0, 1));
     assert!((taken.heading_rad - 0.5).abs() < 1e-12);
-    assert!(asked::goal(&goal("odom")).unwrap_err().contains("give it in \"map\""));
-    let whole = goal("map");
+    assert!(goal(&pose_in("odom")).unwrap_err().contains("give it in \"map\""));
+    let whole = pose.clone().encode();
     for end in 0..whole.len() {
         assert!(asked::goal(&whole[..end]).is_err(), "{end} bytes");
     }
-    let flat = Writer::default().header(0, "map").f64s(&[1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0]).take();
-    assert!(asked::goal(&flat).unwrap_err().contains("rotation"));
-    let nowhere = Writer::default().header(0, "map").pose([f64::NAN, 2.0, 0.0]).take();
-    assert!(asked::goal(&nowhere).unwrap_err().contains("metres"));
+    pose.pose.position.x = f64::NAN;
+    assert!(goal(&pose).unwrap_err().contains("metres"));
+    (pose.pose.orientation.z, pose.pose.orientation.w) = (0.0, 0.0);
+    assert!(goal(&pose).unwrap_err().contains("rotation"));
 }
 
-/// A call of the action that names the goal `id`, with `rest` behind that.
-fn call(id: u8, rest: &[u8]) -> Vec<u8> {
-    Writer::default().raw(&[id; 16]).raw(rest).take()
+/// The goal `id` to (1, 2) in `frame`.
+fn goal(id: u8, frame: &str) -> Vec<u8> {
+    let mut request = NavigateToPoseSendGoalRequest::default();
+    (request.goal_id.uuid, request.goal.pose) = ([id; 16], pose_in(frame));
+    request.encode()
 }
 
-/// The goal `id` to (1, 2).
+/// A request to cancel the goal `id`, of any time.
+fn cancel(id: u8) -> Vec<u8> {
+    let goal_info = GoalInfo { goal_id: UUID { uuid: [id; 16] }, stamp: 0.into() };
+    CancelGoalRequest { goal_info }.encode()
+}
+
 fn sent(id: u8) -> Sent {
-    let (id, point) = Server::read_goal(&call(id, &goal("map")[4..])).unwrap();
+    let (id, point) = Server::read_goal(&goal(id, "map")).unwrap();
     Sent { id, point: point.unwrap() }
 }
 
 /// The state of the goal `id`, its error code and the words of that.
-fn told(goals: &Server, id: u8) -> (u8, u16, String) {
+fn told(goals: &Server, id: u8) -> (i8, u16, String) {
     let result = goals.result([id; 16]).unwrap();
-    let mut reader = Reader::new(&result).unwrap();
-    let head = [reader.u8().unwrap(), reader.u8().unwrap()];
-    assert_eq!(head[1], 0, "it pads the code");
-    let code = u16::from_le_bytes(reader.raw(2).unwrap().try_into().unwrap());
-    (head[0], code, reader.text().unwrap().to_owned())
+    let NavigateToPoseGetResultResponse { status, result } = Cdr::decode(&result).unwrap();
+    (status, result.error_code, result.error_msg)
 }
 
 /// The state of the goal `id` by its result; none while it is not over.
-fn state(goals: &Server, id: u8) -> Option<u8> {
-    let result = goals.result([id; 16])?;
-    Some(Reader::new(&result).unwrap().u8().unwrap())
+fn state(goals: &Server, id: u8) -> Option<i8> {
+    goals.result([id; 16]).map(|_| told(goals, id).0)
 }
 
 /// A server with the goal 1, to (1, 2), which is the target with the number 5.
@@ -143,22 +167,23 @@ fn arrival(target_number: u64) -> CommandSample {
 fn a_place_is_taken_with_the_deviations_of_its_covariance() {
     let mut covariance = [0.0; 36];
     (covariance[0], covariance[7], covariance[35]) = (0.25, 0.25, 0.0685);
-    let message = Writer::default().header(0, "map").pose([1.0, 2.0, 0.5]).f64s(&covariance).take();
-    let (place, [sigma_m, sigma_rad]) = asked::place(&message).unwrap();
-    assert_eq!((place.x_m, place.y_m, sigma_m), (1.0, 2.0, 0.5));
-    assert!((place.heading_rad - 0.5).abs() < 1e-9 && (sigma_rad - 0.262).abs() < 1e-3);
-    let sure = Writer::default().header(0, "map").pose([1.0, 2.0, 0.5]).f64s(&[0.0; 36]).take();
-    assert_eq!(asked::place(&sure).unwrap().1, [0.05; 2]);
+    let place = |covariance| {
+        let PoseStamped { header, pose } = pose_in("map");
+        let pose = PoseWithCovariance { pose, covariance };
+        asked::place(&PoseWithCovarianceStamped { header, pose }.encode()).unwrap()
+    };
+    let (at, [sigma_m, sigma_rad]) = place(covariance);
+    assert_eq!((at.x_m, at.y_m, sigma_m), (1.0, 2.0, 0.5));
+    assert!((at.heading_rad - 0.5).abs() < 1e-9 && (sigma_rad - 0.262).abs() < 1e-3);
+    assert_eq!(place([0.0; COVARIANCE]).1, [0.05; 2]);
 }
 
 #[test]
 fn a_twist_is_a_stick_in_shares_of_the_missions_speeds_and_one_that_is_no_number_is_refused() {
     let text = "controller = { speed_m_s = 0.4, turn_rad_s = 1.6 }\nstay = true";
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-    let stick = |ahead, left| {
-        let twist = Writer::default().f64s(&[ahead, 9.0, 9.0, 9.0, 9.0, left]).take();
-        asked::stick(&twist, &mission).map(<[f64; 2]>::from)
-    };
+    let stick =
+        |ahead, left| asked::stick(&twist([ahead, left]).encode(), &mission).map(<[f64; 2]>::from);
     assert_eq!(stick(0.2, 0.8), Ok([0.5, 0.5]));
     assert_eq!(stick(-7.0, -1.6), Ok([-1.0, -1.0]));
     assert!(stick(f64::NAN, 0.0).unwrap_err().contains("m/s"));
@@ -171,7 +196,7 @@ fn a_goal_of_the_action_is_reached_with_its_own_target_only() {
     goals.command(&arrival(4));
     assert_eq!(state(&goals, 1), None);
     goals.command(&arrival(5));
-    assert_eq!(state(&goals, 1), Some(Status::Succeeded as u8));
+    assert_eq!(state(&goals, 1), Some(Status::Succeeded as i8));
     assert_eq!(state(&goals, 9), Some(0), "an unknown goal has an unknown state");
 }
 
@@ -179,22 +204,22 @@ fn a_goal_of_the_action_is_reached_with_its_own_target_only() {
 fn a_goal_of_the_action_ends_when_the_robot_is_sent_elsewhere() {
     let mut goals = with_a_goal();
     goals.target(&TargetSample { number: 6, ..TargetSample::default() });
-    assert_eq!(state(&goals, 1), Some(Status::Aborted as u8));
+    assert_eq!(state(&goals, 1), Some(Status::Aborted as i8));
     let mut goals = with_a_goal();
     goals.accept(sent(2), goals.newest_target, 8);
-    assert_eq!((state(&goals, 1), state(&goals, 2)), (Some(Status::Aborted as u8), None));
+    assert_eq!((state(&goals, 1), state(&goals, 2)), (Some(Status::Aborted as i8), None));
 }
 
 #[test]
 fn a_goal_that_is_refused_has_nav2s_error_code_and_words_and_the_one_before_goes_on() {
-    let (id, point) = Server::read_goal(&call(2, &goal("odom")[4..])).unwrap();
+    let (id, point) = Server::read_goal(&goal(2, "odom")).unwrap();
     let mut goals = with_a_goal();
     goals.refuse(id, &point.unwrap_err(), 8);
     let (status, code, text) = told(&goals, 2);
-    assert_eq!((status, code), (Status::Aborted as u8, code::TF_ERROR));
+    assert_eq!((status, code), (Status::Aborted as i8, NavigateToPoseResult::TF_ERROR));
     assert!(text.contains("give it in \"map\""), "{text}");
     goals.command(&arrival(5));
-    assert_eq!(told(&goals, 1), (Status::Succeeded as u8, 0, String::new()));
+    assert_eq!(told(&goals, 1), (Status::Succeeded as i8, 0, String::new()));
 }
 
 #[test]
@@ -214,7 +239,7 @@ fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target() {
         assert!(told(&goals, 1).2.contains("gave it up"), "the record is another target's");
         goals.recorded(5, outcome);
         let (is, was, text) = told(&goals, 1);
-        assert_eq!((is, was), (status as u8, code), "{outcome}");
+        assert_eq!((is, was), (status as i8, code), "{outcome}");
         assert!(text.contains(words), "{text}");
     }
     let mut goals = with_a_goal();
@@ -231,7 +256,7 @@ fn a_goal_of_an_earlier_bridge_has_the_result_of_its_target_that_came_meanwhile(
         let mut later: Server = serde_json::from_str(&stored).unwrap();
         assert_eq!(state(&later, 1), None, "it is not over");
         later.recorded(5, outcome);
-        assert_eq!(state(&later, 1), Some(status as u8), "{outcome}");
+        assert_eq!(state(&later, 1), Some(status as i8), "{outcome}");
     }
 }
 
@@ -243,12 +268,12 @@ fn a_goal_of_the_action_whose_target_is_given_up_ends_though_the_run_stays() {
     goals.directive(&waits);
     assert_eq!(state(&goals, 1), None, "its arrival may still be read");
     goals.directive(&waits);
-    assert_eq!(state(&goals, 1), Some(Status::Aborted as u8));
+    assert_eq!(state(&goals, 1), Some(Status::Aborted as i8));
     let mut goals = with_a_goal();
     goals.directive(&waits);
     goals.command(&arrival(5));
     goals.directive(&waits);
-    assert_eq!(state(&goals, 1), Some(Status::Succeeded as u8));
+    assert_eq!(state(&goals, 1), Some(Status::Succeeded as i8));
 }
 
 #[test]
@@ -269,25 +294,24 @@ fn goals_of_the_action_are_reached_one_after_the_other_in_a_run_that_stays() {
         }
         goals.command(&arrival(nth.into()));
         goals.directive(&waits);
-        assert_eq!(state(&goals, nth), Some(Status::Succeeded as u8), "goal {nth}");
+        assert_eq!(state(&goals, nth), Some(Status::Succeeded as i8), "goal {nth}");
     }
 }
 
 #[test]
 fn a_goal_that_is_canceled_stays_canceled_although_the_robot_arrives() {
-    let any_time = [0; 8];
     for id in [0, 1] {
         let mut goals = with_a_goal();
-        let (reply, stands) = goals.goals.cancel(&call(id, &any_time)).unwrap();
+        let (reply, stands) = goals.goals.cancel(&cancel(id)).unwrap();
         assert!(stands);
         assert_eq!(reply[4], 0, "it is taken");
         goals.command(&arrival(5));
         assert_eq!(state(&goals, 1), None, "the robot does not stand yet");
         goals.goals.end(Status::Canceled);
-        assert_eq!(state(&goals, 1), Some(Status::Canceled as u8));
+        assert_eq!(state(&goals, 1), Some(Status::Canceled as i8));
     }
     let mut goals = with_a_goal();
-    let (reply, stands) = goals.goals.cancel(&call(2, &any_time)).unwrap();
+    let (reply, stands) = goals.goals.cancel(&cancel(2)).unwrap();
     assert_eq!((reply[4], stands), (2, false), "it is unknown");
 }
 
@@ -314,22 +338,20 @@ fn odometry_and_its_origin_make_up_the_pose() {
     let sent = published(|sink| shown().sample(&Sample::Pose(pose), 0, sink));
     let ids: Vec<_> = sent.iter().map(|(id, _)| *id).collect();
     assert_eq!(ids, [Id::Tf, Id::Pose, Id::Odom, Id::Clock]);
-    let mut reader = Reader::new(&sent[2].1).unwrap();
-    reader.time().unwrap();
-    assert_eq!((reader.text().unwrap(), reader.text().unwrap()), ("odom", "base_link"));
-    let ([x, y], heading) = reader.pose().unwrap();
-    let back = DVec2::from_angle(0.25).rotate(DVec2::new(x, y)) + DVec2::new(0.5, -0.5);
+    let odometry = Odometry::decode(&sent[2].1).unwrap();
+    assert_eq!([&*odometry.header.frame_id, &odometry.child_frame_id], ["odom", "base_link"]);
+    let pose = odometry.pose.pose;
+    let back = DVec2::from_angle(0.25).rotate(pose.at().into()) + DVec2::new(0.5, -0.5);
     assert!(back.distance(DVec2::new(1.0, 2.0)) < 1e-12);
-    assert!((heading.unwrap() - 0.5).abs() < 1e-12);
+    assert!((pose.orientation.heading().unwrap() - 0.5).abs() < 1e-12);
 }
 
-/// The pose of the frame in the first transform of a message, and the names of parent and frame.
-fn first_transform(payload: &[u8]) -> ([String; 2], ([f64; 2], Option<f64>)) {
-    let mut reader = Reader::new(payload).unwrap();
-    assert_eq!(reader.u32().unwrap(), 1, "one transform");
-    let (_, parent) = reader.header().unwrap();
-    let names = [parent, reader.text().unwrap()].map(str::to_owned);
-    (names, reader.pose().unwrap())
+/// The names of parent and frame of the only transform of a message, and its place and turn.
+fn only_transform(payload: &[u8]) -> ([String; 2], ([f64; 2], f64)) {
+    let [transform] = TFMessage::decode(payload).unwrap().transforms.try_into().unwrap();
+    let Vector3 { x, y, .. } = transform.transform.translation;
+    let turned = transform.transform.rotation.heading().unwrap();
+    ([transform.header.frame_id, transform.child_frame_id], ([x, y], turned))
 }
 
 #[test]
@@ -345,21 +367,19 @@ fn where_another_node_has_the_robot_in_odom_the_map_alone_is_told_so_that_both_m
         let robot = DAffine2::from_angle_translation(-0.5, DVec2::new(7.0, -4.0));
         shown.others_odom = Some(Some(robot));
         let sent = published(|sink| shown.sample(&sample(x_m, heading), 0, sink));
-        let (names, (at, turned)) = first_transform(&sent[0].1);
+        let (names, (at, turned)) = only_transform(&sent[0].1);
         assert_eq!(names, ["map", "odom"]);
-        let both = DAffine2::from_angle_translation(turned.unwrap(), at.into()) * robot;
+        let both = DAffine2::from_angle_translation(turned, at.into()) * robot;
         assert!(both.translation.distance(DVec2::new(x_m, 2.0)) < 1e-12);
         assert!((both.matrix2.x_axis.to_angle() - heading).abs() < 1e-12);
     }
 }
 
-/// The pose covariance, the speeds and their covariance of an odometry.
-fn read_odometry(payload: &[u8]) -> ([f64; 36], [f64; 6], [f64; 36]) {
-    let mut reader = Reader::new(payload).unwrap();
-    reader.header().unwrap();
-    reader.text().unwrap();
-    reader.pose().unwrap();
-    (reader.f64s().unwrap(), reader.f64s().unwrap(), reader.f64s().unwrap())
+/// The pose covariance, the speed and the turn rate and their covariance of an odometry.
+fn read_odometry(payload: &[u8]) -> ([f64; 36], [f64; 2], [f64; 36]) {
+    let Odometry { pose, twist, .. } = Odometry::decode(payload).unwrap();
+    let Twist { linear, angular } = twist.twist;
+    (pose.covariance, [linear.x, angular.z], twist.covariance)
 }
 
 #[test]
@@ -374,7 +394,7 @@ fn the_covariance_of_odometry_grows_with_the_way_and_is_large_on_what_no_wheel_m
     let start = drive(0).0;
     assert_eq!((start[0], start[7], start[35]), (0.0, 0.0, 0.0));
     let (at_10_m, speeds, of_speeds) = (1..=1000).map(&mut drive).last().unwrap();
-    assert_eq!((speeds[0], speeds[5]), (0.1, 0.0));
+    assert_eq!((speeds[0], speeds[1]), (0.1, 0.0));
     // 1 % of the way by the mean diameter, and slip of 1 mm per root of a metre of two wheels.
     assert!((at_10_m[0].sqrt() - 0.1).abs() < 0.001, "{}", at_10_m[0].sqrt());
     // Half the ratio's deviation times the way squared, over the track, aside.
@@ -395,7 +415,7 @@ fn speeds_are_in_the_time_of_the_stamps_at_every_pace() {
     let pose = PoseSample { v_m_s: 0.1, omega_rad_s: -0.2, ..PoseSample::default() };
     let sent = published(|sink| shown.sample(&Sample::Pose(pose), 0, sink));
     let (_, speeds, fast) = read_odometry(&sent[2].1);
-    assert_eq!((speeds[0], speeds[5]), (0.4, -0.8));
+    assert_eq!((speeds[0], speeds[1]), (0.4, -0.8));
     shown.pace = 1.0;
     let sent = published(|sink| shown.sample(&Sample::Pose(pose), 0, sink));
     let slow = read_odometry(&sent[2].1).2;
@@ -439,10 +459,8 @@ fn a_scan_is_stamped_when_its_first_beam_was_measured_and_says_the_time_between_
         let header = ScanHeader::of(row, &laser).swept(sweep);
         let scan = Sample::Scan(header, vec![1.0; 360]);
         let sent = published(|sink| shown.sample(&scan, 1_000_000_000, sink));
-        let mut reader = Reader::new(&sent[0].1).unwrap();
-        let stamp = reader.header().unwrap().0;
-        let numbers: Vec<_> = (0..5).map(|_| reader.f32().unwrap()).collect();
-        (stamp, numbers[3])
+        let scan = LaserScan::decode(&sent[0].1).unwrap();
+        (scan.header.stamp.ns(), scan.time_increment)
     };
     assert_eq!(told(1.0, 0, 250_000), (910_000_000, 0.00025));
     assert_eq!(told(2.0, 0, 250_000), (955_000_000, 0.000_125));
@@ -456,14 +474,13 @@ fn what_happens_is_logged_with_its_severity_and_clocks_are_mission_time() {
     let mut pose = PoseSample::default();
     pose.stamp.stamp_ns = 2_500_000_000;
     let sent = published(|sink| shown.sample(&Sample::Pose(pose), 7, sink));
-    assert_eq!(sent[3], (Id::Clock, Writer::default().time(2_500_000_000).take()));
+    assert_eq!(sent[3], (Id::Clock, Clock { clock: 2_500_000_000.into() }.encode()));
     shown.sample(&Sample::Stall(StallSample::default()), 7, &mut |_, _| {});
     let sent = published(|sink| shown.tick(9, sink));
     let logs: Vec<_> = sent.iter().filter(|(id, _)| *id == Id::Rosout).collect();
-    let mut reader = Reader::new(&logs[0].1).unwrap();
-    assert_eq!((reader.time().unwrap(), reader.u8().unwrap()), (9, 40));
-    assert_eq!(reader.text().unwrap(), "stalls");
-    assert!(reader.text().unwrap().contains("no progress"));
+    let log = Log::decode(&logs[0].1).unwrap();
+    assert_eq!((log.stamp.ns(), log.level, &*log.name), (9, Log::ERROR, "stalls"));
+    assert!(log.msg.contains("no progress"));
     assert_eq!(logs.len(), 1);
 }
 
@@ -474,19 +491,14 @@ fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_fr
     let (row, laser) = mission.laser().unwrap();
     let mut shown = Shown::new("tb4".to_owned(), mission);
     let sent = published(|sink| shown.mounting(0, sink));
-    let mut reader = Reader::new(&sent[0].1).unwrap();
-    assert_eq!(reader.u32().unwrap(), 1);
-    reader.time().unwrap();
-    assert_eq!((reader.text().unwrap(), reader.text().unwrap()), ("base_link", "laser"));
-    let ([x, y], heading) = reader.pose().unwrap();
-    assert!((x, y) == (-0.04, 0.0) && (heading.unwrap() - FRAC_PI_2).abs() < 1e-12);
+    let (names, (at, turned)) = only_transform(&sent[0].1);
+    assert_eq!((names, at), (["base_link", "laser"].map(str::to_owned), [-0.04, 0.0]));
+    assert!((turned - FRAC_PI_2).abs() < 1e-12);
     // The first of 360 beams looks to the right of the robot, which is behind the laser.
     let header = ScanHeader::of(row, &laser);
     assert!((header.first_rad + FRAC_PI_2).abs() < 1e-12);
     let sent = published(|sink| shown.sample(&Sample::Scan(header, vec![1.0; 360]), 0, sink));
-    let mut reader = Reader::new(&sent[0].1).unwrap();
-    reader.header().unwrap();
-    assert!((reader.f32().unwrap() + PI as f32).abs() < 1e-6);
+    assert!((LaserScan::decode(&sent[0].1).unwrap().angle_min + PI as f32).abs() < 1e-6);
 }
 
 #[test]
@@ -552,17 +564,7 @@ fn a_path_leads_along_the_field_and_ends_where_there_is_no_direction() {
             FieldHeader { part: Part::whole(frame, 1), target_x_m, ..FieldHeader::default() };
         let field = Sample::Field(header, cells.to_vec());
         let sent = published(|sink| shown.sample(&field, 0, sink));
-        let mut reader = Reader::new(&sent[0].1).unwrap();
-        reader.time().unwrap();
-        reader.text().unwrap();
-        let count = reader.u32().unwrap();
-        let mut last = [0.0; 2];
-        for _ in 0..count {
-            reader.time().unwrap();
-            reader.text().unwrap();
-            last = reader.pose().unwrap().0;
-        }
-        last
+        PathMessage::decode(&sent[0].1).unwrap().poses.last().unwrap().pose.at()
     };
     let mut cells = vec![ahead; 400];
     assert!((path(&cells)[0] - 0.4).abs() < 0.06, "{:?}", path(&cells));
@@ -589,25 +591,16 @@ fn what_moves_is_markers_of_its_disc_doubt_and_way_and_they_are_deleted_when_it_
     let mover = Mover { x_m: 3.0, vy_m_s: 0.5, radius_m: 0.25, doubt_m: 0.1, ..Mover::default() };
     header.movers[..2].copy_from_slice(&[mover, Mover { x_m: f32::NAN, ..mover }]);
     header.mover_count = 2;
-    let disc = |namespace, width_m: f64, alpha| Marker {
-        namespace,
-        pose: [3.0, 0.0, 0.0],
-        scale: [width_m, width_m, 0.01],
-        color: [0.8, 0.1, 0.1, alpha],
-        ..Marker::default()
+    let disc = |namespace, across, alpha| {
+        disc((namespace, 0), [3.0, 0.0, 0.0], across, [0.8, 0.1, 0.1, alpha])
     };
-    let way = Marker {
-        namespace: "in 1 s",
-        shape: Shape::Lines,
-        scale: [0.05, 0.0, 0.0],
-        color: [0.8, 0.1, 0.1, 1.0],
-        points: vec![[3.0, 0.0], [3.0, 0.5]],
-        ..Marker::default()
-    };
+    let points = [DVec2::new(3.0, 0.0), DVec2::new(3.0, 0.5)];
+    let way = lines(("in 1 s", 0), &points, 0.05, [0.8, 0.1, 0.1, 1.0]);
     let reach_m = mover.reach_m();
     let wanted = [disc("movers", 0.5, 0.6), disc("doubt", 2.0 * reach_m, 0.2), way];
-    let markers =
-        |wanted: &[Marker]| vec![(Id::Movers, messages::markers(Header(0, "map"), wanted))];
+    let markers = |wanted: &[_]| {
+        vec![(Id::Movers, messages::markers(&Header::at(0, "map"), wanted.to_vec()))]
+    };
     assert_eq!(published_of(&header), markers(&wanted));
     header.mover_count = 0;
     assert_eq!(published_of(&header), markers(&[]));

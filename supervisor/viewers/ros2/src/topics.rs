@@ -56,6 +56,8 @@ pub struct Spec {
     pub name: &'static str,
     pub message: [&'static str; 2],
     pub type_name: &'static str,
+    /// Of the message, as recordings have it.
+    pub definition: &'static str,
     /// Whether a reader that joins later gets the newest message.
     pub is_latched: bool,
     /// The permission for it; none for a topic that the bridge publishes.
@@ -70,6 +72,7 @@ macro_rules! table {
             name: $name,
             message: [stringify!($package), stringify!($message)],
             type_name: concat!(stringify!($package), "::msg::dds_::", stringify!($message), "_"),
+            definition: ros2::msg::$message::DEFINITION,
             is_latched: $latched,
             accepted_by: $accept,
             meaning: $meaning,

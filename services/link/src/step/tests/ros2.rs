@@ -1,6 +1,12 @@
 //! Tests of the failsafe with a robot that speaks ROS 2.
 
-use ::ros2::cdr::Writer;
+use std::f64::consts::TAU;
+
+use ::ros2::{
+    cdr::Cdr as _,
+    messages::{self, COVARIANCE},
+    msg::{Header, Imu},
+};
 use ros2_driver::{
     messages::write_twist,
     topics::{Content, Topics},
@@ -109,39 +115,23 @@ impl Scene {
     }
 
     fn odometry(&self) -> Vec<u8> {
-        let [x, y, heading] = self.pose;
-        let mut writer = Writer::default();
-        let ms = (self.ms as f64 * self.clock) as u64;
-        writer.u32((ms / 1000) as u32).u32((ms % 1000 * MS) as u32);
-        writer.text("odom").text("base_footprint").f64s(&[x, y, 0.0, 0.0, 0.0]);
-        writer.f64s(&[(heading / 2.0).sin(), (heading / 2.0).cos()]).f64s(&[0.0; 36]);
-        writer.f64s(&[self.told[0], 0.0, 0.0, 0.0, 0.0, self.told[1]]).f64s(&[0.0; 36]).take()
+        let header = Header::at((self.ms as f64 * self.clock) as u64 * MS, "odom");
+        let none = [0.0; COVARIANCE];
+        messages::odometry(header, "base_footprint", (self.pose, none), (self.told, none))
     }
 
     fn scan(&self) -> Vec<u8> {
-        let step = std::f32::consts::TAU / 360.0;
-        let mut writer = Writer::default();
-        writer
-            .u32((self.ms / 1000) as u32)
-            .u32((self.ms % 1000 * MS) as u32)
-            .text("scan")
-            .f32(0.0)
-            .f32(std::f32::consts::TAU)
-            .f32(step);
-        writer.f32(0.0).f32(0.1).f32(0.12).f32(3.5).length(360);
         let noise = if self.sees { self.ms as f32 * 1e-6 } else { 0.0 };
         // Fewer beams than show whether they follow the motion, which they do not.
-        (0..360).for_each(|beam| {
-            writer.f32(if beam % 30 == 0 { 2.0 + noise } else { f32::INFINITY });
-        });
-        writer.length(0).take()
+        let range = |beam| if beam % 30 == 0 { 2.0 + noise } else { f32::INFINITY };
+        let (header, ranges) = (Header::at(self.ms * MS, "scan"), (0..360).map(range).collect());
+        messages::scan(header, [0.0, TAU / 360.0], [0.12, 3.5], [0.0, 0.1], ranges)
     }
 
     fn imu(&self) -> Vec<u8> {
-        let mut writer = Writer::default();
-        writer.u32((self.ms / 1000) as u32).u32((self.ms % 1000 * MS) as u32).text("imu");
-        writer.f64s(&[0.0, 0.0, 0.0, 1.0]).f64s(&[0.0; 9]);
-        writer.f64s(&[0.0, 0.0, self.told[1]]).f64s(&[0.0; 9]).f64s(&[0.0; 12]).take()
+        let mut imu = Imu { header: Header::at(self.ms * MS, "imu"), ..Imu::default() };
+        imu.angular_velocity.z = self.told[1];
+        imu.encode()
     }
 
     /// Let time pass: the robot says its odometry and its turn rate at 20 Hz and its scan at 10 Hz, and each tick is answered.

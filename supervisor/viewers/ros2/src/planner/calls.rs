@@ -1,101 +1,47 @@
 //! The calls of Nav2's two actions: a goal in, the result out. Pure.
 
-use glam::DAffine2;
 use ros2::{
-    cdr::{Malformed, Reader, Writer},
+    cdr::{Cdr, Malformed},
+    msg::{
+        ComputePathThroughPosesGetResultResponse, ComputePathThroughPosesResult,
+        ComputePathThroughPosesSendGoalRequest, ComputePathToPoseGetResultResponse,
+        ComputePathToPoseResult, ComputePathToPoseSendGoalRequest, Header, PoseStamped, Release,
+    },
     parts::Pose,
 };
 
 use super::planning::Failure;
-use crate::{
-    goals::{Uuid, uuid},
-    messages::{Header, write_path},
-};
-
-const MOST_GOALS: usize = 256;
-
-/// A pose in the frame of this name; in that of the map without one.
-pub type Placed = (String, DAffine2);
+use crate::{goals::Uuid, messages::path};
 
 pub struct Asked {
     pub id: Uuid,
     /// The viapoints of a single goal come before it.
-    pub goals: Vec<Placed>,
+    pub goals: Vec<PoseStamped>,
     /// None for the robot's own place.
-    pub start: Option<Placed>,
-    /// Whether the client is of Nav2 1.5 or later; none if the request does not say.
-    pub is_1_5: Option<bool>,
-}
-
-/// What the goal of an action has before the planner's name.
-#[derive(Clone, Copy)]
-enum Layout {
-    /// `ComputePathToPose`, up to Kilted.
-    One,
-    /// `ComputePathToPose` with viapoints, from Nav2 1.5 on.
-    OneByWay,
-    /// `ComputePathThroughPoses`, up to Jazzy.
-    Several,
-    /// `ComputePathThroughPoses` with `nav_msgs/Goals`, from Kilted on.
-    SeveralWithHeader,
+    pub start: Option<PoseStamped>,
+    /// Those whose clients ask so.
+    pub releases: Vec<Release>,
 }
 
 /// Reads the goal of `ComputePathToPose`, or of `ComputePathThroughPoses`, in the layout in which its bytes are a whole message.
 ///
 /// # Errors
 /// When no layout, or more than one, fits.
-pub fn read(payload: &[u8], has_one: bool) -> Result<Asked, String> {
-    let layouts = match has_one {
-        true => [Layout::OneByWay, Layout::One],
-        false => [Layout::SeveralWithHeader, Layout::Several],
+pub fn read(payload: &[u8], has_one: bool) -> Result<Asked, Malformed> {
+    let (releases, goal_id, goals, start, uses_start) = if has_one {
+        let (releases, asked) = ComputePathToPoseSendGoalRequest::decode_whole(payload)?;
+        let ComputePathToPoseSendGoalRequest { goal_id, goal: it } = asked;
+        let goals = it.viapoints.into_iter().chain([it.goal]).collect();
+        (releases, goal_id, goals, it.start, it.use_start)
+    } else {
+        let (releases, asked) = ComputePathThroughPosesSendGoalRequest::decode_whole(payload)?;
+        let ComputePathThroughPosesSendGoalRequest { goal_id, goal: it } = asked;
+        (releases, goal_id, it.goals.goals, it.start, it.use_start)
     };
-    let reader = Reader::new(payload)?;
-    match layouts.map(|layout| read_as(reader.clone(), layout)) {
-        [Ok(Some(asked)), Err(_) | Ok(None)] | [Err(_) | Ok(None), Ok(Some(asked))] => Ok(asked),
-        [Ok(Some(_)), Ok(Some(_))] => {
-            Err("a goal that two releases of Nav2 read differently".to_owned())
-        }
-        _ => Err("no goal of Nav2 from Jazzy to 1.5; is the client of another release?".to_owned()),
-    }
+    Ok(Asked { id: goal_id.uuid, goals, start: uses_start.then_some(start), releases })
 }
 
-/// Returns none if bytes are left over.
-fn read_as(mut reader: Reader<'_>, layout: Layout) -> Result<Option<Asked>, String> {
-    let id = uuid(&mut reader)?;
-    if matches!(layout, Layout::SeveralWithHeader) {
-        reader.header()?;
-    }
-    let is_one = matches!(layout, Layout::One | Layout::OneByWay);
-    let several = |reader: &mut Reader<'_>| {
-        let count = reader.length(MOST_GOALS)?;
-        (0..count).map(|_| placed(reader)).collect::<Result<Vec<_>, _>>()
-    };
-    let goal = is_one.then(|| placed(&mut reader)).transpose()?;
-    let mut goals = if is_one { Vec::new() } else { several(&mut reader)? };
-    let start = placed(&mut reader)?;
-    if matches!(layout, Layout::OneByWay) {
-        goals = several(&mut reader)?;
-    }
-    goals.extend(goal);
-    let _planner = reader.text()?;
-    let uses_start = reader.u8()?;
-    let is_1_5 = match layout {
-        Layout::OneByWay => Some(true),
-        Layout::One | Layout::Several => Some(false),
-        Layout::SeveralWithHeader => None,
-    };
-    let start = (uses_start == 1).then_some(start);
-    Ok((uses_start <= 1 && reader.is_at_end()).then_some(Asked { id, goals, start, is_1_5 }))
-}
-
-fn placed(reader: &mut Reader<'_>) -> Result<Placed, Malformed> {
-    let (_stamp_ns, frame) = reader.header()?;
-    let (at, heading) = reader.pose()?;
-    let pose = DAffine2::from_angle_translation(heading.unwrap_or_default(), at.into());
-    Ok((frame.to_owned(), pose))
-}
-
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Outcome {
     pub frame: String,
     pub at_ns: u64,
@@ -104,20 +50,26 @@ pub struct Outcome {
     pub failure: Option<Failure>,
 }
 
-/// The reply to a request for the result of a goal with this state; Nav2's error codes of the action begin at `codes`.
-/// With `has_index`, it has the index of the last goal that the path reaches, as `ComputePathThroughPoses` of Nav2 1.5.
-pub fn result(state: u8, outcome: &Outcome, codes: u16, has_index: bool) -> Vec<u8> {
-    const ALL_GOALS: i16 = -1;
-    let mut writer = Writer::default();
-    writer.u8(state);
-    write_path(&mut writer, Header(outcome.at_ns, &outcome.frame), &outcome.path);
-    if has_index {
-        writer.i16(ALL_GOALS);
+/// The reply to a client of `release` that waits for the result of a goal with this state; Nav2's error codes of the action begin at
+/// `codes`.
+pub fn result(status: i8, outcome: &Outcome, codes: u16, release: Release) -> Vec<u8> {
+    let path = path(Header::at(outcome.at_ns, &outcome.frame), &outcome.path);
+    let planning_time = outcome.took_ns.into();
+    let failure = outcome.failure.as_ref();
+    let (error_code, error_msg) =
+        failure.map(|(reason, text)| (codes + *reason as u16, text.clone())).unwrap_or_default();
+    if codes < ComputePathThroughPosesResult::UNKNOWN {
+        let result = ComputePathToPoseResult { path, planning_time, error_code, error_msg };
+        ComputePathToPoseGetResultResponse { status, result }.encode_for(release)
+    } else {
+        let last_reached_index = ComputePathThroughPosesResult::ALL_GOALS;
+        let result = ComputePathThroughPosesResult {
+            path,
+            last_reached_index,
+            planning_time,
+            error_code,
+            error_msg,
+        };
+        ComputePathThroughPosesGetResultResponse { status, result }.encode_for(release)
     }
-    writer.time(outcome.took_ns);
-    match &outcome.failure {
-        Some((reason, text)) => writer.u16(codes + *reason as u16).text(text),
-        None => writer.u16(0).text(""),
-    };
-    writer.take()
 }

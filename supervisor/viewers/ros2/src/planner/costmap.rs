@@ -2,10 +2,10 @@
 
 use glam::{DAffine2, DVec2};
 use harmonic::{Cell, MAX_SIDE};
-use ros2::cdr::Reader;
-
-/// A larger map is refused.
-const MOST_CELLS: usize = 1 << 26;
+use ros2::{
+    cdr::Cdr,
+    msg::{OccupancyGrid, OccupancyGridUpdate},
+};
 
 /// Obstacles farther away than this, in metres and in cells, make no difference.
 const REACH_M: f64 = 1.0;
@@ -26,9 +26,8 @@ pub struct Body {
 }
 
 impl Body {
-    fn is_occupied(&self, value: u8) -> bool {
-        (value as i8).is_negative() && !self.enters_unknown
-            || (self.occupied..=i8::MAX as u8).contains(&value)
+    fn is_occupied(&self, value: i8) -> bool {
+        if value < 0 { !self.enters_unknown } else { value as u8 >= self.occupied }
     }
 }
 
@@ -40,18 +39,16 @@ pub struct Costmap {
     pub resolution_m: f64,
     /// From cells, whose centres are at the integers, to the map's frame.
     pub place: DAffine2,
-    cells: Vec<u8>,
+    cells: Vec<i8>,
 }
 
 impl Costmap {
     /// A `nav_msgs/OccupancyGrid`. Each error here says why the message is refused.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
-        let mut reader = Reader::new(payload)?;
-        let (_stamp_ns, frame) = reader.header()?;
-        let _loaded_ns = reader.time()?;
-        let resolution_m = f64::from(reader.f32()?);
-        let [width, height] = [reader.u32()? as usize, reader.u32()? as usize];
-        let (origin, heading) = reader.pose()?;
+        let OccupancyGrid { header, info, data: cells } = OccupancyGrid::decode(payload)?;
+        let resolution_m = f64::from(info.resolution);
+        let [width, height] = [info.width, info.height].map(|side| side as usize);
+        let (origin, heading) = (info.origin.at(), info.origin.orientation.heading());
         let heading = heading.ok_or("an origin whose orientation is no rotation")?;
         let scale = DVec2::splat(resolution_m);
         let corner = DAffine2::from_scale_angle_translation(scale, heading, origin.into());
@@ -59,34 +56,30 @@ impl Costmap {
         if !(resolution_m > 0.0 && corner.is_finite() && fits(width) && fits(height)) {
             return Err(format!("{width} x {height} cells of {resolution_m} m at {origin:?}"));
         }
-        let count = reader.length(MOST_CELLS)?;
-        if count != width * height {
-            return Err(format!("{count} cells instead of {width} x {height}"));
+        if cells.len() != width * height {
+            return Err(format!("{} cells instead of {width} x {height}", cells.len()));
         }
         Ok(Self {
-            frame: frame.to_owned(),
+            frame: header.frame_id,
             width,
             height,
             resolution_m,
             place: corner * DAffine2::from_translation(DVec2::splat(0.5)),
-            cells: reader.raw(count)?.to_vec(),
+            cells,
         })
     }
 
     /// Take a `map_msgs/OccupancyGridUpdate`, whole or not at all.
     pub fn update(&mut self, payload: &[u8]) -> Result<(), String> {
-        let mut reader = Reader::new(payload)?;
-        let _header = reader.header()?;
-        let [col, row, width, height] =
-            [reader.u32()?, reader.u32()?, reader.u32()?, reader.u32()?].map(|x| x as usize);
+        let OccupancyGridUpdate { x, y, width, height, data, .. } = Cdr::decode(payload)?;
+        let [col, row, width, height] = [x as u32, y as u32, width, height].map(|it| it as usize);
         let is_inside = col + width <= self.width && row + height <= self.height;
-        if !is_inside || reader.length(MOST_CELLS)? != width * height {
+        if !is_inside || data.len() != width * height {
             return Err(format!(
                 "{width} x {height} cells at ({col}, {row}), which the map has not"
             ));
         }
-        let window = reader.raw(width * height)?;
-        for (from, row) in window.chunks_exact(width.max(1)).zip(row..) {
+        for (from, row) in data.chunks_exact(width.max(1)).zip(row..) {
             let at = row * self.width + col;
             self.cells[at..at + width].copy_from_slice(from);
         }
@@ -115,7 +108,7 @@ impl Costmap {
         let obstacle = |value| body.is_occupied(value) && !touches(value);
         let squares = self.squares(radius.max(reach) as usize, obstacle);
         let (radius, a_metre) = ((radius * radius) as f32, self.resolution_m.powi(-2) as f32);
-        let dear = |value: u8| 1.0 + (DEAREST - 1.0) / 98.0 * f32::from((value as i8).max(0));
+        let dear = |value: i8| 1.0 + (DEAREST - 1.0) / 98.0 * f32::from(value.max(0));
         let cells = squares.iter().zip(&self.cells);
         cells
             .map(|(&square, &value)| {
@@ -127,7 +120,7 @@ impl Costmap {
 
     /// The square of each cell's distance, in cells, from the nearest whose value is a source; out of reach that of `reach` and one more.
     /// The squares are `f32`, because every processor has the minimum of several of these in one instruction.
-    fn squares(&self, reach: usize, is_source: impl Fn(u8) -> bool) -> Vec<f32> {
+    fn squares(&self, reach: usize, is_source: impl Fn(i8) -> bool) -> Vec<f32> {
         let beyond = reach as u16 + 1;
         let square = |cells: u16| f32::from(cells).powi(2);
         // How far each cell is from a source in its row.

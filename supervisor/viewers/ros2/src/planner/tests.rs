@@ -1,7 +1,7 @@
 mod figures;
 
 use std::{
-    f64::consts::{FRAC_PI_2, PI},
+    f64::consts::FRAC_PI_2,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -9,7 +9,8 @@ use std::{
 use glam::{DAffine2, DVec2};
 use harmonic::Cancellation;
 use ros2::{
-    cdr::{Reader, Writer},
+    cdr::Cdr as _,
+    msg::{Header, OccupancyGrid, OccupancyGridUpdate, Release},
     parts::Pose,
 };
 
@@ -56,18 +57,10 @@ fn plan(
 }
 
 /// An update of a map: the value of a window.
-fn update([col, row]: [u32; 2], [width, height]: [u32; 2], value: u8) -> Vec<u8> {
-    let cells = vec![value; (width * height) as usize];
-    let mut writer = Writer::default();
-    writer
-        .header(0, "map")
-        .u32(col)
-        .u32(row)
-        .u32(width)
-        .u32(height)
-        .length(cells.len())
-        .raw(&cells)
-        .take()
+fn update([col, row]: [u32; 2], [width, height]: [u32; 2], value: i8) -> Vec<u8> {
+    let [x, y] = [col, row].map(|at| at as i32);
+    let data = vec![value; (width * height) as usize];
+    OccupancyGridUpdate { header: Header::at(0, "map"), x, y, width, height, data }.encode()
 }
 
 /// The points at every half cell of the path's chords that lie on blocked cells.
@@ -142,16 +135,10 @@ fn a_path_begins_at_the_start_ends_in_the_goals_pose_and_looks_ahead_a_cell_at_a
 #[test]
 fn a_map_that_is_turned_gives_the_path_that_is_turned() {
     let straight = plan(&mut planner(), &map(&rooms()), at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap();
-    let mut payload = rooms().message();
-    let end = payload.len() - 200 * 100 - 4;
-    payload.truncate(end - 32);
     let turn = DAffine2::from_angle_translation(FRAC_PI_2, DVec2::ZERO);
-    payload.extend(
-        [0.0, 0.0, (PI / 4.0).sin(), (PI / 4.0).cos()]
-            .iter()
-            .flat_map(|part: &f64| part.to_le_bytes()),
-    );
-    payload.extend(&rooms().message()[end..]);
+    let mut grid = OccupancyGrid::decode(&rooms().message()).unwrap();
+    grid.info.origin = [0.0, 0.0, FRAC_PI_2].into();
+    let payload = grid.encode();
     let turned = Arc::new(Costmap::read(&payload).unwrap());
     let path = plan(&mut planner(), &turned, turn * at(1.0, 4.0), &[turn * at(9.0, 1.0)]).unwrap();
     assert_eq!(path.len(), straight.len());
@@ -248,7 +235,7 @@ fn cells_are_blocked_whose_centres_are_within_the_radius_of_an_occupied_one_and_
     let mut grid = Grid::new(30, 20);
     grid.fill([12, 9], [1, 1], true);
     let mut map = Costmap::read(&grid.message()).unwrap();
-    map.update(&update([0, 0], [1, 1], 255)).unwrap();
+    map.update(&update([0, 0], [1, 1], -1)).unwrap();
     map.update(&update([29, 19], [1, 1], 98)).unwrap();
     for (radius_m, enters_unknown) in [(0.0, true), (0.21, true), (0.11, false), (9.0, true)] {
         let blocked = map.blocked_and_costs(&Body { radius_m, enters_unknown, ..BODY }, 1.0).0;
@@ -317,85 +304,99 @@ fn a_frame_is_found_in_another_by_way_of_the_one_above_both_unless_a_transform_i
     assert!(find(&frames, "a", None).unwrap_err().contains("circle"));
 }
 
-fn stamped(writer: &mut Writer, pose: Pose) {
-    writer.header(1_700_000_000_123_456_789, "map").pose(pose);
+fn bytes(hex: &str) -> Vec<u8> {
+    let digits = hex.as_bytes().chunks_exact(2);
+    digits.map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
+}
+
+/// Goals to (1, 2) with the start (7, 8), all but the first by way of (5, 6), as Cyclone DDS serialises the types of each release.
+const GOALS: [(bool, Release, &str); 4] = [
+    (
+        true,
+        Release::Kilted,
+        "00010000030303030303030303030303030303030c0000000065cd1d040000006d617000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0c0000000065cd1d040000006d6170000000000000001c4000000000000020400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0a0000004772696442617365640001",
+    ),
+    (
+        true,
+        Release::Common,
+        "00010000030303030303030303030303030303030c0000000065cd1d040000006d617000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0c0000000065cd1d040000006d6170000000000000001c4000000000000020400000000000000000000000000000000000000000000000000000000000000000000000000000f03f010000000c0000000065cd1d040000006d61700000000000000000000000144000000000000018400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0a0000004772696442617365640001",
+    ),
+    (
+        false,
+        Release::Jazzy,
+        "0001000003030303030303030303030303030303020000000c0000000065cd1d040000006d61700000000000000000000000144000000000000018400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0c0000000065cd1d040000006d617000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0c0000000065cd1d040000006d6170000000000000001c4000000000000020400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0a0000004772696442617365640001",
+    ),
+    (
+        false,
+        Release::Common,
+        "00010000030303030303030303030303030303030c0000000065cd1d040000006d617000020000000c0000000065cd1d040000006d61700000000000000000000000144000000000000018400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0c0000000065cd1d040000006d617000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0c0000000065cd1d040000006d6170000000000000001c4000000000000020400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0a0000004772696442617365640001",
+    ),
+];
+/// Results of a path from (1, 2), and of none: Nav2's first code, and the oldest and the newest release that have it.
+const RESULTS: [(u16, [Release; 2], [&str; 2]); 3] = [
+    (
+        200,
+        [Release::Humble, Release::Common],
+        [
+            "00010000040000000c0000000065cd1d040000006d617000010000000c0000000065cd1d040000006d617000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0000000005000000000000000100000000",
+            "000100000600000000000000000000000100000000000000000000000000000000000000d0000000070000006e6f2077617900",
+        ],
+    ),
+    (
+        300,
+        [Release::Humble, Release::Kilted],
+        [
+            "00010000040000000c0000000065cd1d040000006d617000010000000c0000000065cd1d040000006d617000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0000000005000000000000000100000000",
+            "00010000060000000000000000000000010000000000000000000000000000000000000035010000080000006e6f20676f616c00",
+        ],
+    ),
+    (
+        300,
+        [Release::Common, Release::Common],
+        [
+            "00010000040000000c0000000065cd1d040000006d617000010000000c0000000065cd1d040000006d617000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03fffff00000000000005000000000000000100000000",
+            "00010000060000000000000000000000010000000000000000000000ffff0000000000000000000035010000080000006e6f20676f616c00",
+        ],
+    ),
+];
+
+#[test]
+fn goals_are_those_of_the_release_in_which_their_bytes_are_whole() {
+    for (has_one, newest, goal) in GOALS {
+        let goal = bytes(goal);
+        for padding in 0..4 {
+            let asked = calls::read(&[&goal[..], &[0; 3][..padding]].concat(), has_one).unwrap();
+            let places: Vec<_> = asked.goals.iter().map(|goal| goal.pose.at()).collect();
+            assert!([&[5.0, 6.0], &[1.0, 2.0]].map(|it| *it).ends_with(&places), "{places:?}");
+            assert_eq!((asked.id, asked.releases[0]), ([3; 16], newest));
+            assert_eq!(asked.start.unwrap().pose.at(), [7.0, 8.0]);
+        }
+        for cut in 0..goal.len() {
+            assert!(calls::read(&goal[..cut], has_one).is_err(), "{newest:?}, {cut} bytes");
+        }
+        assert!(calls::read(&goal, !has_one).is_err());
+    }
 }
 
 #[test]
-fn goals_are_read_in_the_layout_of_each_release_of_nav2() {
-    let end = |mut writer: Writer, uses_start: u8| {
-        stamped(&mut writer, [7.0, 8.0, 0.0]);
-        writer.text("GridBased").u8(uses_start).take()
-    };
-    for (viapoints, planner) in [(0, "GridBased"), (0, ""), (1, ""), (3, "GridBased")] {
-        let mut by_way = Writer::default();
-        by_way.raw(&[3; 16]);
-        for x in [9.0, 7.0] {
-            stamped(&mut by_way, [x, 8.0, 0.0]);
-        }
-        by_way.length(viapoints);
-        (1..=viapoints).for_each(|n| stamped(&mut by_way, [n as f64, 0.0, 0.0]));
-        let padded = [by_way.text(planner).u8(1).take(), vec![0; 3]].concat();
-        for padding in 0..=3 {
-            let asked = calls::read(&padded[..padded.len() - padding], true).unwrap();
-            let xs: Vec<_> = asked.goals.iter().map(|(_, pose)| pose.translation.x).collect();
-            assert_eq!(xs, [&[1.0, 2.0, 3.0][..viapoints], &[9.0]].concat());
-            assert_eq!(asked.start.unwrap().1.translation, DVec2::new(7.0, 8.0));
-            assert_eq!(asked.is_1_5, Some(true));
-        }
-    }
-    let mut one = Writer::default();
-    one.raw(&[3; 16]);
-    stamped(&mut one, [1.0, 2.0, 0.5]);
-    let asked = calls::read(&end(one.clone(), 0), true).unwrap();
-    assert_eq!((asked.id, asked.goals.len(), asked.start.is_none()), ([3; 16], 1, true));
-    assert!(asked.goals[0].1.translation.distance(DVec2::new(1.0, 2.0)) < 1e-12);
-    let asked = calls::read(&end(one, 1), true).unwrap();
-    assert_eq!(asked.start.unwrap().1.translation, DVec2::new(7.0, 8.0));
-    for has_header in [true, false] {
-        let mut several = Writer::default();
-        several.raw(&[3; 16]);
-        if has_header {
-            several.header(0, "map");
-        }
-        several.length(3);
-        (1..=3).for_each(|n| stamped(&mut several, [n.into(), 0.0, 0.0]));
-        let payload = end(several, 0);
-        let asked = calls::read(&payload, false).unwrap();
-        let xs: Vec<_> = asked.goals.iter().map(|(_, pose)| pose.translation.x).collect();
-        assert_eq!(xs, [1.0, 2.0, 3.0], "{has_header}");
-        for cut in 0..payload.len() {
-            assert!(calls::read(&payload[..cut], false).is_err(), "{cut} bytes");
-        }
-    }
-}
-
-#[test]
-fn a_result_has_the_path_or_the_error_code_of_its_action_with_words() {
-    let outcome = Outcome {
+fn results_are_those_of_the_clients_release_with_the_error_code_of_their_action() {
+    let path = Outcome {
         frame: "map".to_owned(),
-        path: vec![[1.0, 2.0, 0.0]; 2],
+        at_ns: 12_500_000_000,
         took_ns: 5,
-        ..Outcome::default()
+        path: vec![[1.0, 2.0, 0.0]],
+        failure: None,
     };
-    let payload = calls::result(4, &outcome, 200, false);
-    let mut reader = Reader::new(&payload).unwrap();
-    assert_eq!(reader.u8().unwrap(), 4);
-    assert_eq!((reader.header().unwrap().1, reader.u32().unwrap()), ("map", 2));
-    for _ in 0..2 {
-        reader.header().unwrap();
-        assert_eq!(reader.pose().unwrap(), ([1.0, 2.0], Some(0.0)));
+    for (codes, releases, [found, none]) in RESULTS {
+        let failure = match codes {
+            200 => (Reason::NoPath, "no way"),
+            _ => (Reason::NoGoal, "no goal"),
+        };
+        let failure = Some((failure.0, failure.1.to_owned()));
+        let failed = Outcome { failure, ..Outcome::default() };
+        for release in releases {
+            assert_eq!(calls::result(4, &path, codes, release), bytes(found), "{release:?}");
+            assert_eq!(calls::result(6, &failed, codes, release), bytes(none), "{release:?}");
+        }
     }
-    assert_eq!((reader.time().unwrap(), reader.u16().unwrap(), reader.text().unwrap()), (5, 0, ""));
-    let failed = Outcome {
-        failure: Some((Reason::NoGoal, "no goal was given".to_owned())),
-        ..Outcome::default()
-    };
-    let payload = calls::result(6, &failed, 300, true);
-    let mut reader = Reader::new(&payload).unwrap();
-    reader.u8().unwrap();
-    reader.header().unwrap();
-    assert_eq!((reader.u32().unwrap(), reader.i16().unwrap()), (0, -1));
-    assert_eq!(reader.time().unwrap(), 0);
-    assert_eq!((reader.u16().unwrap(), reader.text().unwrap()), (309, "no goal was given"));
 }

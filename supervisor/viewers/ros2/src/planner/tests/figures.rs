@@ -14,7 +14,10 @@ use std::{
 
 use glam::{DAffine2, DVec2};
 use harmonic::Cancellation;
-use ros2::cdr::Writer;
+use ros2::{
+    cdr::Cdr as _,
+    msg::{Header, MapMetaData, OccupancyGrid},
+};
 
 use super::super::{
     costmap::{Body, Costmap},
@@ -129,20 +132,18 @@ impl Grid {
     }
 
     pub fn message(&self) -> Vec<u8> {
-        let values: Vec<_> = self.occupied.iter().map(|&it| 100 * u8::from(it)).collect();
-        self.message_of(&values)
+        self.message_of(self.occupied.iter().map(|&it| 100 * i8::from(it)).collect())
     }
 
     /// A map of this size with these values.
-    fn message_of(&self, values: &[u8]) -> Vec<u8> {
-        let mut writer = Writer::default();
-        writer
-            .header(0, "map")
-            .time(0)
-            .f32(RESOLUTION_M as f32)
-            .u32(self.width as u32)
-            .u32(self.height as u32);
-        writer.pose([0.0; 3]).length(values.len()).raw(values).take()
+    fn message_of(&self, data: Vec<i8>) -> Vec<u8> {
+        let info = MapMetaData {
+            resolution: RESOLUTION_M as f32,
+            width: self.width as u32,
+            height: self.height as u32,
+            ..MapMetaData::default()
+        };
+        OccupancyGrid { header: Header::at(0, "map"), info, data }.encode()
     }
 
     /// Costs of the cheapest way from `sources` to every cell, in cells; `cost` is that of a cell.
@@ -500,14 +501,14 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
             254 => 100,
             253 => 99,
             0 => 0,
-            cost => 1 + (97 * (u32::from(cost) - 1) / 251) as u8,
+            cost => 1 + (97 * (u32::from(cost) - 1) / 251) as i8,
         };
-        let values: Vec<u8> = costs.iter().map(published).collect();
+        let values: Vec<i8> = costs.iter().map(published).collect();
         let mut changed = grid.clone();
         let away = |cell: &usize| cells.iter().all(|&end| place(end).distance(place(*cell)) > 12.0);
         let block = std::iter::repeat_with(any).find(away).unwrap();
         changed.fill([block % grid.width, block / grid.width], [3, 3], true);
-        let changed_costs: Vec<u8> =
+        let changed_costs: Vec<i8> =
             inflated(&self::distances(&changed)).iter().map(published).collect();
         for (names, body, messages) in [
             (
@@ -518,7 +519,7 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
             (
                 ["ours on costmap", "ours on costmap, map changed", "ours on costmap, same map"],
                 inflated_map,
-                [grid.message_of(&values), changed.message_of(&changed_costs)],
+                [grid.message_of(values), changed.message_of(changed_costs)],
             ),
         ] {
             let maps = messages.map(|message| Arc::new(Costmap::read(&message).unwrap()));
