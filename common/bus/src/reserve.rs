@@ -125,9 +125,6 @@ mod tests {
             assert_eq!((found.len(), found.blocks() * 512), (length as u64, reserved));
         }
         assert_eq!(called_by_the_middleware(-1, 1), -1);
-        assert_eq!(
-            std::io::Error::last_os_error().raw_os_error(),
-            Some(Errno::BADF.raw_os_error())
-        );
+        assert_eq!(io::Error::last_os_error().raw_os_error(), Some(Errno::BADF.raw_os_error()));
     }
 }
