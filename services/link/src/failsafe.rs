@@ -132,7 +132,7 @@ rules! {
     FramesSlow, Stop, streams, WithCondition, Some(|mission| mission.robot.command_limit_s * (streams::INTERVALS - streams::SHORT_ONES) as f64),
         "they come less often than every `robot.command_limit_s`, which commands last for: let the robot send faster, or raise it";
     OdometryImplausible, Stop, odometry, OnResume { or_after: Some(odometry::CALM) }, Some(|mission| mission.trusted_response().dead_time_s() + odometry::STILL_AFTER.as_secs_f64()),
-        "0.55 s of motion that was commanded and due by `robot.response` with less than a quarter of it in the encoders, or 1 s of motion that was not commanded, and no other response explains what they say, until the robot restarts, or rests after wheels of which each had counted turned as told before, or 3 jumps within 2 s; `link.log` says which";
+        "0.55 s of motion that was commanded and due by `robot.response` with less than a quarter of it in the encoders, or 1 s of motion that was not commanded, and no other response explains what they say, until the robot restarts, or 3 jumps within 2 s; `link.log` says which";
     WheelsHeld, Stop, odometry, WithCondition, Some(|mission| mission.trusted_response().dead_time_s() + contact::HELD_AFTER.as_secs_f64()),
         "0.4 s of commanded motion with less than a quarter of it in the encoders, and a motor current of `robot.held_current_ad` or more; the robot stands for 0.5 s, `contact` says where it is touched, and the supervisor takes it for a stall";
     Felt, Stop, touch, WithCondition, None,

@@ -11,9 +11,7 @@
 //! [`SUSPECTED_AFTER`] the robot must stand: an X80 at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
 //!
 //! [`super::response_fit`] looks for a response that explains the motion, then and until the robot stands. If there is one, it replaces
-//! the stated one, and the link's log names it: a base that is heavier than stated is no fault. What is never explained ends as well once
-//! the wheels rest for [`CALM`], if they had turned as told for as long as raises a suspicion, and both counted when it was raised: they
-//! may do so again. So an encoder that died, or a wheel that never turned as told, is suspected for good.
+//! the stated one, and the link's log names it: a base that is heavier than stated is no fault.
 //!
 //! A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
 //! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
@@ -62,7 +60,7 @@ pub(crate) const UNTOLD_AFTER: Duration = Duration::from_millis(1000);
 const JUDGED: Duration = Duration::from_millis(1500);
 pub(crate) const MOST_JUMPS: usize = 3;
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
-/// A suspicion about jumps ends without one for so long, and one about wheels at rest.
+/// A suspicion about jumps ends without one for so long.
 pub(crate) const CALM: Duration = Duration::from_secs(2);
 /// So often it ends by itself: a faulty robot's counts may jump only while it moves.
 const MOST_RECOVERIES: u32 = 2;
@@ -216,11 +214,6 @@ pub struct Odometry {
     right: Evidence,
     turn: Evidence,
     untold_s: f64,
-    /// For how long each channel turned as told since a suspicion ended at rest.
-    followed_s: [f64; 3],
-    /// Whether the suspicion ends when the wheels rest.
-    ends_at_rest: bool,
-    moved: MissionTime,
     contacts: Contacts,
     jumps: VecDeque<MissionTime>,
     recoveries: u32,
@@ -328,18 +321,13 @@ impl Odometry {
         let high = self.contacts.high();
         let wheels = [(&mut self.left, left), (&mut self.right, right)];
         for (wheel, (evidence, counts)) in wheels.into_iter().enumerate() {
-            if evidence.weigh((counts, gap_s), least, high[wheel], settles, now) {
-                self.followed_s[wheel] += gap_s;
-                if high[wheel] {
-                    self.contacts.rolled(wheel, gap_s);
-                }
+            if evidence.weigh((counts, gap_s), least, high[wheel], settles, now) && high[wheel] {
+                self.contacts.rolled(wheel, gap_s);
             }
         }
         if high == [false; 2] {
             let least = LEAST_TURN_M_S * self.axle.counts_per_m;
-            if self.turn.weigh((right - left, gap_s), least, false, settles, now) {
-                self.followed_s[2] += gap_s;
-            }
+            self.turn.weigh((right - left, gap_s), least, false, settles, now);
             let from_s = now.seconds() - gap_s - settles.settled_s - self.limit.as_secs_f64();
             let speeds = turned.map(|counts| counts / gap_s);
             let slows = (from_s, self.axle.limits(&self.response));
@@ -363,22 +351,8 @@ impl Odometry {
             && self.suspicion.is_none()
         {
             self.suspicion = Some((suspicion, now));
-            let followed_s = suspicion.channel().map_or(0.0, |channel| self.followed_s[channel]);
-            self.ends_at_rest = followed_s >= SUSPECTED_AFTER.as_secs_f64()
-                && [&self.left, &self.right].iter().all(|wheel| wheel.still_s == 0.0);
         }
         self.look_for_explanation(now);
-        if turned.iter().any(|counts| counts.abs() > 1.0) {
-            self.moved = now;
-        }
-        if self.ends_at_rest
-            && let Some((_, since)) = self.suspicion
-            && now.since(self.moved.max(since)) >= CALM
-        {
-            self.suspicion = None;
-            self.followed_s = [0.0; 3];
-            self.clear_evidence();
-        }
         self.look_for_delay(now);
     }
 
@@ -486,7 +460,6 @@ impl Odometry {
         self.contacts.reset();
         self.jumps.clear();
         self.recoveries = 0;
-        self.followed_s = [0.0; 3];
         self.suspicion = None;
     }
 
@@ -495,7 +468,6 @@ impl Odometry {
         self.right = Evidence::default();
         self.turn = Evidence::default();
         self.untold_s = 0.0;
-        self.ends_at_rest = false;
     }
 
     fn restart_evidence(&mut self, now: MissionTime) {
@@ -530,9 +502,6 @@ impl Monitor for Odometry {
             right: Evidence::default(),
             turn: Evidence::default(),
             untold_s: 0.0,
-            followed_s: [0.0; 3],
-            ends_at_rest: false,
-            moved: MissionTime::default(),
             contacts: Contacts::new(mission),
             jumps: VecDeque::new(),
             recoveries: 0,

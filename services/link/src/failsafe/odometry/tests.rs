@@ -230,40 +230,6 @@ fn a_robot_that_is_suspected_is_given_up_after_10_s_or_plausible_again_when_an_o
     assert!(suspicion(&odometry).is_none() && !given_up(&odometry, 11.0));
 }
 
-/// Drive a robot for 5 s and then again and again until it is suspected, whose left wheel turns by `share` of its way from then on;
-/// it stands while it is suspected. Returns how often it was, and whether it is at last.
-fn slipping(share: f64, until_s: f64) -> (usize, bool) {
-    let mut odometry = odometry();
-    let mut wheels = Wheels::default();
-    let (mut lost, mut before, mut times) = (0.0, 0.0, 0);
-    for tick in 0..210 {
-        let time = f64::from(tick) * PERIOD;
-        wheels.roll_to(time);
-        if (5.0..until_s).contains(&time) {
-            lost += (1.0 - share) * (wheels.rolled[0] - before);
-        }
-        before = wheels.rolled[0];
-        let left = (wheels.rolled[0] - lost).rem_euclid(f64::from(COUNTS)) as u16;
-        let now = MissionTime::from_seconds(time);
-        let was_suspected = suspicion(&odometry).is_some();
-        odometry.plausible([left, wheels.counts()[1]], now);
-        let is_suspected = suspicion(&odometry).is_some();
-        times += usize::from(is_suspected && !was_suspected);
-        let tells = if is_suspected { [0; 2] } else { [TURN, TURN / 2] };
-        odometry.commanded(tells, now);
-        wheels.tell(tells);
-    }
-    (times, suspicion(&odometry).is_some())
-}
-
-#[test]
-fn wheels_that_had_followed_are_plausible_again_when_they_rest_and_a_dead_encoder_is_suspected_for_good()
- {
-    assert_eq!(slipping(0.1, 6.0), (1, false), "they slip once");
-    assert_eq!(slipping(0.1, 30.0), (2, true), "they slip for ever");
-    assert_eq!(slipping(0.0, 30.0), (1, true), "the encoder is dead");
-}
-
 #[test]
 fn three_jumps_within_two_seconds_are_suspected_until_two_seconds_without_twice_at_most() {
     let at = MissionTime::from_seconds;
