@@ -23,7 +23,7 @@ const OF_ACTIONS: [(&str, &str); 5] = [
 const RULE: &str =
     "================================================================================\n";
 
-/// Type, name, and what follows: `=` and the value of a constant, a space and a field's default, or nothing.
+/// Type, name and suffix: `=` and the value of a constant, a space and a field's default, or empty.
 type Line = [String; 3];
 /// The lines of messages by their names with the package, with the last release that has them, the newest first.
 type Messages = BTreeMap<String, Vec<(&'static str, Vec<Line>)>>;
@@ -39,7 +39,7 @@ fn add(messages: &mut Messages, release: &'static str, name: String, text: &str)
     messages.entry(name).or_default().push((release, lines));
 }
 
-/// A line that is none of the language makes no Rust.
+/// Splits a line. The compiler rejects the Rust that a malformed line becomes.
 fn parse(line: &str) -> Line {
     let line = line.replace(" = ", "=");
     let (kind, rest) = line.split_once(' ').unwrap_or((&line, ""));

@@ -26,7 +26,7 @@ pub enum Malformed {
     Layouts(usize),
 }
 
-/// For those who only say why a message is refused.
+/// For callers that report the reason as text.
 impl From<Malformed> for String {
     fn from(error: Malformed) -> Self {
         error.to_string()
@@ -86,7 +86,7 @@ pub trait Cdr: Sized {
     }
 }
 
-/// Returns the message, and whether nothing but padding follows: RTPS pads a payload to a multiple of 4 bytes.
+/// Decodes a message and reports whether it ends the payload. RTPS pads a payload to a multiple of 4 bytes.
 pub(crate) fn read<T: Cdr + Default>(
     payload: &[u8],
     release: Release,

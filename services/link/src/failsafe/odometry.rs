@@ -82,16 +82,6 @@ pub enum Suspicion {
 }
 
 impl Suspicion {
-    /// What it is about: the left wheel, the right one, or their difference.
-    const fn channel(self) -> Option<usize> {
-        match self {
-            Self::Left => Some(0),
-            Self::Right => Some(1),
-            Self::Turn | Self::Untold => Some(2),
-            Self::Jumps => None,
-        }
-    }
-
     pub const fn words(self) -> &'static str {
         match self {
             Self::Left => {
@@ -348,9 +338,8 @@ impl Odometry {
         let untold = (self.untold_s >= UNTOLD_AFTER.as_secs_f64()).then_some(Suspicion::Untold);
         if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion).or(untold)
             && !self.is_bring_up
-            && self.suspicion.is_none()
         {
-            self.suspicion = Some((suspicion, now));
+            self.suspicion.get_or_insert((suspicion, now));
         }
         self.look_for_explanation(now);
         self.look_for_delay(now);
@@ -400,8 +389,11 @@ impl Odometry {
         let Some((suspicion, since)) = self.suspicion else {
             return;
         };
-        let Some(channel) = suspicion.channel() else {
-            return;
+        let channel = match suspicion {
+            Suspicion::Left => 0,
+            Suspicion::Right => 1,
+            Suspicion::Turn | Suspicion::Untold => 2,
+            Suspicion::Jumps => return,
         };
         if now.since(since) > JUDGED {
             return;
