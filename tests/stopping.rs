@@ -276,3 +276,21 @@ fn an_operator_stops_a_robot_whose_bus_is_damaged() {
         }
     });
 }
+
+#[test]
+fn a_second_ctrl_c_ends_a_run_that_draws_its_picture() {
+    let mut run = Run::under_way("drawing", "open-room", &["--pace", "1"], 0.5);
+    // Writing into a pipe that nobody reads takes for ever.
+    let picture = run.directory().join("picture.svg");
+    assert!(std::process::Command::new("mkfifo").arg(&picture).status().unwrap().success());
+    run.signal(Signal::INT);
+    wait_until("the summary is written", || {
+        fs::read_to_string(run.directory().join("summary.json")).is_ok_and(|text| text.len() > 1)
+    });
+    wait_until("the run ends", || {
+        run.signal(Signal::INT);
+        !run.is_running()
+    });
+    let (code, summary) = run.finish();
+    assert_eq!((code, summary["outcome"].as_str()), (Some(0), Some("aborted")));
+}

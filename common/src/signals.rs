@@ -46,6 +46,14 @@ impl Signals {
     pub fn came(&mut self) -> bool {
         matches!(self.pipe.read(&mut [0; 16]), Ok(read) if read > 0)
     }
+
+    /// Wait until a signal comes. Fails when the system cannot wait.
+    pub fn wait(&mut self) -> io::Result<()> {
+        while !self.came() {
+            poll::readable(&[self.as_fd()], None)?;
+        }
+        Ok(())
+    }
 }
 
 /// The process that started this one may have had `signal` ignored.

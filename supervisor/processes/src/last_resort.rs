@@ -8,7 +8,6 @@
 use std::{
     fs,
     io::Write as _,
-    os::fd::AsFd as _,
     sync::{
         Arc,
         atomic::{AtomicBool, AtomicU64, Ordering},
@@ -19,7 +18,6 @@ use std::{
 
 use common::{
     domain::Domain,
-    poll,
     process_status::scheduled,
     signals::{Signals, exit_at_once},
 };
@@ -85,10 +83,8 @@ fn processor_awaited(thread: Pid) -> Duration {
 pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
     let watched = gettid();
     thread::spawn(move || {
-        while !signals.came() {
-            if poll::readable(&[signals.as_fd()], None).is_err() {
-                return;
-            }
+        if signals.wait().is_err() {
+            return;
         }
         turns.await_stuck(watched);
         tracing::error!("{HANGS}");

@@ -5,6 +5,7 @@ use std::{
     fs,
     path::{Path, PathBuf},
     process::ExitCode,
+    thread,
 };
 
 use clap::Args;
@@ -15,6 +16,7 @@ use common::{
     geometry::wrap_angle,
     mission::{Mission, Protocol, Resume, Start},
     samples::PlaceSample,
+    signals::{Signals, exit_at_once},
     start::become_child,
 };
 use glam::DVec2;
@@ -331,13 +333,31 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             "firsthand: THE ROBOT WAS NOT SEEN AT REST; its stop guard goes on ordering the stop: `firsthand status --robot {robot}` shows what it sees, `firsthand stop --sign-off --robot {robot}` ends it\n"
         ));
     }
+    let ending = &finished.ending;
+    let told = (!ending.asked_for).then(|| {
+        let (outcome, directory) = (summary.outcome.as_str(), directory.display());
+        format!("firsthand: {outcome}: {}; the logs are in {directory}\n", ending.reason)
+    });
+    let told = told.unwrap_or_default();
+    let code = exit_code(&summary, ending);
     if may_be_removed {
         let _ = fs::remove_dir_all(directory);
         if !arguments.json {
             complain(print_removed(directory));
         }
     } else {
-        // Picture and report come last and have no effect on the result.
+        // Picture and report come last and have no effect on the result, so a signal leaves them out.
+        let redraw = directory.display();
+        let last_words = format!(
+            "firsthand: picture and report are not drawn; `firsthand report {redraw}` draws the report\n{told}"
+        );
+        let mut signals = Signals::that_end()?;
+        thread::spawn(move || {
+            if signals.wait().is_ok() {
+                write_stderr(&last_words);
+                exit_at_once(code);
+            }
+        });
         let show = |written: run_report::Written| {
             let (name, file) = written?;
             let line = format!("{name}: {}\n", file.display());
@@ -349,15 +369,8 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             complain(show(run_report::report(&options)));
         }
     }
-    let ending = &finished.ending;
-    if !ending.asked_for {
-        let (outcome, directory) = (summary.outcome.as_str(), directory.display());
-        write_stderr(&format!(
-            "firsthand: {outcome}: {}; the logs are in {directory}\n",
-            ending.reason
-        ));
-    }
-    Ok(exit_code(&summary, ending))
+    write_stderr(&told);
+    Ok(code.into())
 }
 
 /// Begins the log in the run directory, reserves room for the summary, and reports the mission's remarks.
@@ -393,11 +406,9 @@ fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished)
         && finished.restarts.values().all(|&restarts| restarts == 0)
 }
 
-fn exit_code(summary: &Summary, ending: &Ending) -> ExitCode {
-    if ending.asked_for && summary.outcome == ending.outcome {
-        return ExitCode::SUCCESS;
-    }
-    summary.outcome.exit_code().into()
+fn exit_code(summary: &Summary, ending: &Ending) -> u8 {
+    let as_asked = ending.asked_for && summary.outcome == ending.outcome;
+    if as_asked { 0 } else { summary.outcome.exit_code() }
 }
 
 fn print_removed(directory: &Path) -> Result<(), String> {
