@@ -173,12 +173,13 @@ fn a_robot_that_gets_no_stop_has_an_outcome_of_its_own_and_a_guard_that_stops_it
         find(status, "link")["state"] == "running"
     });
     assert_eq!(status["link"]["at_rest"], false, "{status}");
+    let stop = ["stop", "--robot", name];
+    refused(&stop, "not-at-rest", &["it moves"]);
     run.keeps_guard = true;
     run.signal(Signal::TERM);
     let (code, summary) = run.finish();
     assert_eq!(summary["outcome"], "could_not_be_stopped", "{summary}");
     assert_eq!(code, Some(10), "{summary}");
-    let stop = ["stop", "--robot", name];
     refused(&stop, "not-at-rest", &["it moves"]);
     let status = output(&["status", "--robot", name]);
     assert!(String::from_utf8_lossy(&status.stdout).contains("it moves"), "{status:?}");

@@ -128,11 +128,12 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
         (None, Err(_)) => false,
     };
     let told = told(supervisor);
-    match told {
-        Err(why) if rests => Ok(Some(why.to_string())),
-        Err(why) => Err(why),
-        Ok(()) if rests => Ok(None),
-        Ok(()) => await_rest(robot, stopped_for_good).map(|()| None),
+    if rests {
+        return Ok(told.err().map(|why| why.to_string()));
+    }
+    match sees(robot) {
+        Some((seen, _)) => Err(not_at_rest(robot, &seen)),
+        None => told.and_then(|()| await_rest(robot, stopped_for_good)).map(|()| None),
     }
 }
 

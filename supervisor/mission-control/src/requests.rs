@@ -17,6 +17,7 @@ use processes::records;
 
 use crate::{
     error::Result,
+    order::Decision,
     outcome::{Ending, Outcome, allowed_m},
     supervisor::Supervisor,
     target_list::{self, TargetOutcome},
@@ -46,6 +47,10 @@ impl Supervisor<'_> {
 
     fn carry_out_request(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
         match RequestKind::from_byte(request.kind) {
+            // A run that ends takes stops alone.
+            kind if kind != RequestKind::Stop && self.decision == Decision::ENDING => {
+                return RequestAnswer::NotRunning;
+            }
             RequestKind::Nothing => return RequestAnswer::Unknown,
             RequestKind::Restart => {
                 let stage = name_str(&request.stage);
