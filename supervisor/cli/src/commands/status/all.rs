@@ -6,7 +6,7 @@ use common::{
     bus::BusError,
     domain::Domain,
     roster::{self, Roster},
-    samples::{HoldReason, MirrorSample, Order},
+    samples::{HoldReason, Order},
     topics,
 };
 use serde::Serialize;
@@ -84,9 +84,15 @@ fn listed(robot: Robot) -> Listed {
 type RosterFacts = (&'static str, Option<f64>, Option<bool>, Option<f64>);
 
 fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
-    let bus = roster::join(&Domain::of(robot.name.clone()), "list")?;
-    let age_s = bus.reader(&topics::MIRROR)?.newest()?.as_ref().map(MirrorSample::age_s);
+    let domain = Domain::of(robot.name.clone());
+    let bus = roster::join(&domain, "list")?;
+    let (is_mirror, mut ages, mut age_s) =
+        (domain.mirrors().is_some(), bus.reader(&topics::MIRROR)?, None);
     Roster::open(&bus)?.find(PATIENCE, |header, _| {
+        age_s = ages.newest().ok().flatten().map(|mirror| mirror.age_s()).or(age_s);
+        if is_mirror && age_s.is_none() {
+            return None;
+        }
         let order =
             words::order(Order::from_byte(header.order), HoldReason::from_byte(header.reason));
         let time_s = header.stamp.time().seconds();
