@@ -145,7 +145,8 @@ impl Snapshot<'_> {
 
     fn stuck(&self, now: Now) -> Option<Ending> {
         let may_wait = match self.reason {
-            HoldReason::None => self.may_be_away,
+            // A robot whose samples a stage cannot use is here.
+            HoldReason::None => self.may_be_away && self.complaint.is_none(),
             HoldReason::Operator | HoldReason::Waiting | HoldReason::Lost => true,
             // In wall-clock time the mission's timeout ends such a mission.
             HoldReason::StageHeld => !self.in_ticks,

@@ -31,12 +31,10 @@ impl fmt::Display for Progress<'_> {
             f,
             "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  hazards mapped {events:3} times  {running}/{all} stages alive"
         )?;
-        match link.action() {
-            Action::Go => Ok(()),
-            action => {
-                let cause = link.cause().name().to_uppercase();
-                write!(f, ", {cause}: the robot {}", action.effect())
-            }
+        if link.action() != Action::Go {
+            let (cause, effect) = (link.cause().name().to_uppercase(), link.action().effect());
+            write!(f, ", {cause}: the robot {effect}")?;
         }
+        record.complaint().map_or(Ok(()), |complaint| write!(f, "; {complaint}"))
     }
 }
