@@ -11,7 +11,7 @@ use std::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{Run, assert_reached, replayed_in};
+use crate::support::{Run, assert_ended, assert_no_restart, assert_reached, replayed_in};
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
@@ -90,6 +90,17 @@ fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
     let (code, summary) = run.finish();
     assert_reached(code, &summary);
     assert_at_its_target_untouched(&robot.end());
+}
+
+#[test]
+fn a_run_whose_robot_names_a_sensor_otherwise_ends_with_both_names_and_blames_no_stage() {
+    let robot = PythonRobot::start();
+    let nose = "robot.sensor=[{name='nose',kind='cone',bearing_deg=0}]";
+    let (code, summary) = robot.run_with("json-nose", &["--set", nose]).finish();
+    assert_ended(code, &summary, 6, "aborted");
+    let reason = summary["reason"].as_str().unwrap();
+    assert!(reason.contains("no sensor is called \"front\"; nose"), "{summary}");
+    assert_no_restart(&summary);
 }
 
 /// Whether the link of a run says that the base answers otherwise than stated.

@@ -176,10 +176,11 @@ impl Observer {
             }
         }
         while let Some(link) = self.link.next_sample()? {
-            stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
             listener(Heard::Link(&link));
             record.link = Some(link);
+            // Without motor frames the link begins no tick that another stage could answer.
             if link.rest() != Rest::Unknown {
+                stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
                 record.rest_read = Some(Instant::now());
             }
         }
