@@ -14,13 +14,12 @@
 //! | `page`, `lattice` | the page, and cells on it |
 //! | [`Scene`] | the data of a picture |
 //!
-//! `map` draws the field of a bare map, `chart` values against each other.
+//! `map` draws the field of a bare map, `points` what a robot saw.
 //!
 //! Every layer but the frame may be missing, and every input gives a valid file.
 
 mod bands;
 mod cells;
-mod chart;
 mod lattice;
 mod legend;
 mod map;
@@ -28,6 +27,7 @@ mod margin;
 mod motion;
 mod movers;
 mod page;
+mod points;
 mod scene;
 mod streamlines;
 #[cfg(test)]
@@ -40,9 +40,9 @@ use common::{
 };
 
 pub use self::{
-    chart::{Chart, Mark, Series},
     map::{FieldOnMap, map_svg},
     page::escape,
+    points::points_svg,
     scene::{Facts, Scene, Trail},
 };
 
@@ -110,7 +110,7 @@ pub fn svg(scene: &Scene<'_>) -> String {
         ink::NOWHERE
     );
     [
-        margin::open(scene),
+        margin::open(&scene.mission.name, &margin::facts(scene), scene.captions.len()),
         plot,
         margin::title(scene),
         margin::axes(&view),

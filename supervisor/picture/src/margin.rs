@@ -11,7 +11,7 @@ use super::{
 };
 
 /// The font of all text, which needs no font file; digits have one width if the font has such.
-pub(super) const FONT: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, \
+const FONT: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, \
      'DejaVu Sans', sans-serif";
 /// Characters of 12 px that surely fit across the sheet.
 const ACROSS: usize = 150;
@@ -21,16 +21,15 @@ const BELOW: f64 = 58.0;
 const LINE: f64 = 18.0;
 
 /// The start of the file: size, description, definitions.
-pub(super) fn open(scene: &Scene<'_>) -> String {
-    let lines = scene.captions.len().min(MOST_CAPTIONS) as f64;
+pub(super) fn open(name: &str, description: &str, captions: usize) -> String {
+    let lines = captions.min(MOST_CAPTIONS) as f64;
     let height = PLOT_TOP + PLOT_SIDE + BELOW + lines * LINE;
-    let name = escape(&scene.mission.name, ACROSS);
-    let facts = facts(scene);
+    let name = escape(name, ACROSS);
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" \
          width=\"{WIDTH}\" height=\"{height}\" role=\"img\" font-family=\"{FONT}\" \
          font-size=\"12.5\" fill=\"{}\">\n\
-         <title>{name}</title>\n<desc>{facts}</desc>\n\
+         <title>{name}</title>\n<desc>{description}</desc>\n\
          <defs><clipPath id=\"plot\"><rect x=\"{PLOT_LEFT}\" y=\"{PLOT_TOP}\" \
          width=\"{PLOT_SIDE}\" height=\"{PLOT_SIDE}\"/></clipPath>{}</defs>\n\
          <rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#fff\"/>\n",
@@ -53,7 +52,7 @@ pub(super) fn title(scene: &Scene<'_>) -> String {
     )
 }
 
-fn facts(scene: &Scene<'_>) -> String {
+pub(super) fn facts(scene: &Scene<'_>) -> String {
     let facts = &scene.facts;
     let number = |value: f64, digits: usize| {
         if value.is_finite() { format!("{value:.digits$}") } else { "?".to_owned() }

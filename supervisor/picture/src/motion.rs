@@ -4,7 +4,7 @@ use common::{geometry::principal_axes, kinematics::Pose2};
 use glam::DVec2;
 
 use super::{
-    page::{Path, Px, View, ink},
+    page::{Path, Px, View, ink, round_up},
     scene::Scene,
 };
 
@@ -14,8 +14,6 @@ const MOST_POSES: usize = 4000;
 const BODIES: f64 = 16.0;
 /// Within so many standard deviations 95 % of a normal distribution in a plane are: the root of -2 ln 0.05.
 const WITHIN_95: f64 = 2.4477;
-/// Bodies, whatever the times are.
-const MOST_BODIES: usize = 200;
 
 pub(super) struct Motion<'a> {
     scene: &'a Scene<'a>,
@@ -29,7 +27,7 @@ impl<'a> Motion<'a> {
         let duration = scene.facts.mission_time_s;
         let steps = motion.way().len().saturating_sub(1);
         if steps > 0 && duration.is_finite() && duration > 0.0 {
-            let seconds = whole_period(duration / BODIES);
+            let seconds = round_up(duration / BODIES);
             motion.every = Some((seconds, seconds / duration * steps as f64));
         }
         motion
@@ -56,14 +54,12 @@ impl<'a> Motion<'a> {
         self.every.map(|(seconds, _)| seconds)
     }
 
-    /// Every second one of the times at which the robot's body is drawn, at most so many, and the robot.
-    pub(super) fn instants(&self, most: usize) -> Vec<(f64, &'a Pose2)> {
-        let Some((seconds, stride)) = self.every else {
-            return Vec::new();
-        };
-        let way = self.way();
-        let pose = |nth: f64| Some((nth * seconds, way.get((nth * stride).round() as usize)?));
-        (1..=most).map_while(|nth| pose(2.0 * nth as f64)).collect()
+    /// The times at which the robot's body is drawn, about [`BODIES`], and the robot.
+    pub(super) fn instants(&self) -> impl Iterator<Item = (f64, &'a Pose2)> {
+        (0..).map(f64::from).map_while(|nth| {
+            let (seconds, stride) = self.every?;
+            Some((nth * seconds, self.way().get((nth * stride).round() as usize)?))
+        })
     }
 
     pub(super) fn layer(&self, view: &View) -> String {
@@ -89,16 +85,8 @@ impl<'a> Motion<'a> {
     }
 
     fn bodies(&self, view: &View, radius: f64) -> String {
-        let Some((_, stride)) = self.every else {
-            return String::new();
-        };
-        let way = self.way();
         let mut outlines = Path::default();
-        let poses = (0..MOST_BODIES)
-            .map(|nth| (nth as f64 * stride).round() as usize)
-            .map_while(|index| way.get(index))
-            .filter(|pose| is_shown(view, pose));
-        for pose in poses {
+        for (_, pose) in self.instants().filter(|(_, pose)| is_shown(view, pose)) {
             let at = view.place(pose.position);
             add_body(&mut outlines, at, radius, pose.heading);
             self.add_footprint(&mut outlines, view, pose);
@@ -108,12 +96,8 @@ impl<'a> Motion<'a> {
 
     /// The outline of a body that is no disc, inside the disc that covers it.
     fn add_footprint(&self, path: &mut Path, view: &View, pose: &Pose2) {
-        let footprint = self.scene.mission.body().footprint;
-        let corners = footprint.iter().flat_map(|it| it.corners_at(*pose));
-        let mut corners = corners.map(|corner| view.place(corner)).collect::<Vec<_>>();
-        corners.extend(corners.first().copied());
-        for (number, corner) in corners.into_iter().enumerate() {
-            if number == 0 { path.move_to(corner) } else { path.line_to(corner) }
+        if let Some(footprint) = self.scene.mission.body().footprint {
+            path.polygon(footprint.corners_at(*pose).map(|corner| view.place(corner)));
         }
     }
 
@@ -245,13 +229,4 @@ pub(super) fn start_mark(at: DVec2) -> String {
         Px(at.y - 4.5),
         ink::TRUTH
     )
-}
-
-/// A round period of at least `least` seconds.
-fn whole_period(least: f64) -> f64 {
-    const PERIODS: [f64; 12] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0];
-    PERIODS
-        .into_iter()
-        .find(|period| *period >= least)
-        .unwrap_or_else(|| super::page::round_up(least))
 }

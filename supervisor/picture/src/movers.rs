@@ -11,13 +11,12 @@ use super::{
 
 /// What was followed for less time, seconds, is left out.
 const LEAST_S: f64 = 1.0;
-/// The most discs of one way, and the most ways, the longest of a run.
-const MOST_DISCS: usize = 60;
+/// The most ways, the longest of a run.
 const MOST_WAYS: usize = 24;
 
 pub(super) struct Movers<'a> {
     trails: Vec<&'a Trail<'a>>,
-    /// Times of the discs, and the robot at each.
+    /// Times of the discs, every second one of those of the robot's body, and the robot at each.
     instants: Vec<(f64, &'a Pose2)>,
     body_m: f64,
 }
@@ -27,7 +26,8 @@ impl<'a> Movers<'a> {
         let mut trails: Vec<_> = scene.trails.iter().filter(|it| lasts_s(it) >= LEAST_S).collect();
         trails.sort_by(|one, other| lasts_s(other).total_cmp(&lasts_s(one)));
         trails.truncate(MOST_WAYS);
-        let instants = if trails.is_empty() { Vec::new() } else { motion.instants(MOST_DISCS) };
+        let instants =
+            motion.instants().skip(2).step_by(2).filter(|_| !trails.is_empty()).collect();
         Self { trails, instants, body_m: scene.mission.body().radius_m }
     }
 

@@ -53,6 +53,15 @@ impl View {
         Self { low: DVec2::splat(-0.5), side_m: 1.0 }
     }
 
+    /// The origin, all `points`, which are finite, and a rim.
+    pub(super) fn around(points: &[DVec2]) -> Self {
+        let (low, high) = points
+            .iter()
+            .fold((DVec2::ZERO, DVec2::ZERO), |(low, high), at| (low.min(*at), high.max(*at)));
+        let side_m = 1.1 * (high - low).max_element().max(1.0);
+        Self { low: (low + high - side_m) / 2.0, side_m }
+    }
+
     pub(super) fn place(&self, point: DVec2) -> DVec2 {
         let from_low = (point - self.low) * self.px(1.0);
         DVec2::new(PLOT_LEFT + from_low.x, PLOT_TOP + PLOT_SIDE - from_low.y)

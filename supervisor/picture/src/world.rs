@@ -84,8 +84,7 @@ impl Outline {
 }
 
 pub(super) fn layer(view: &View, world: &Shapes) -> String {
-    let outlines = Outline::ALL.into_iter().filter(|outline| outline.is_in(world));
-    outlines.map(|outline| outlined(view, world, outline)).collect()
+    Outline::ALL.map(|outline| outlined(view, world, outline)).concat()
 }
 
 fn outlined(view: &View, world: &Shapes, outline: Outline) -> String {

@@ -19,8 +19,7 @@ use console::{
     missions,
     output::{print_text, write_stderr},
 };
-use glam::DVec2;
-use picture::{Chart, Mark, Series};
+use picture::points_svg;
 use recording::Recording;
 use serde::{
     Deserialize as _,
@@ -66,6 +65,9 @@ fn protocol(word: &str) -> Result<Protocol, ValueError> {
 
 const SIMULATED: &str = "target = [1.5, 0]\nsimulation.realism = 'measured'\nsensors = 'all'\n[perimeter]\nwidth_m = 6.0\ncentre = [0.0, 0.0]\n[[world.wall]]\npoints = [[1.3, -1.6], [1.3, 1.2], [-0.4, 1.6], [-1.5, 0.4], [-1.2, -1.6], [1.3, -1.6]]\n";
 
+const TITLE: &str = "What the robot saw, placed by the motion that was found";
+const DESCRIPTION: &str = "Where beams and echoes ended, x ahead of the robot's first place, y to its left: one sharp outline if everything is as found.";
+
 pub fn main(arguments: &Arguments) -> Result {
     arguments.setting.log("bring-up.log")?;
     if let (Some(protocol), Some(address)) = (arguments.protocol, &arguments.address) {
@@ -91,7 +93,8 @@ pub fn main(arguments: &Arguments) -> Result {
     let trace = Trace::read(&named, &Recording::open(&directory.join("recording.mcap"))?)?;
     let (found, seen) = findings(&named, &trace, arguments.lifted);
     let picture = directory.join("bring-up.svg");
-    fs::write(&picture, drawn(&seen)).map_err(FileError::of("write", &picture))?;
+    fs::write(&picture, points_svg(TITLE, DESCRIPTION, &seen))
+        .map_err(FileError::of("write", &picture))?;
     if arguments.setting.json {
         let object = json!({
             "findings": found.iter().map(as_json).collect::<Vec<_>>(),
@@ -160,20 +163,6 @@ fn as_json(finding: &Finding) -> serde_json::Value {
     let keys: serde_json::Map<_, _> =
         keys.iter().map(|(key, value)| (key.clone(), json!(value))).collect();
     json!({ "part": part, "verdict": verdict.word(), "text": text, "keys": keys })
-}
-
-fn drawn(seen: &[DVec2]) -> String {
-    Chart {
-        title: "What the robot saw, placed by the motion that was found",
-        description: "Where beams and echoes ended: one sharp outline if everything is as found.",
-        axes: ["ahead of the robot's first place, m", "to its left, m"],
-        series: vec![Series {
-            name: "ends of beams, or of echoes",
-            mark: Mark::Crosses,
-            points: seen.iter().map(|it| [it.x, it.y]).collect(),
-        }],
-    }
-    .svg()
 }
 
 #[cfg(test)]
