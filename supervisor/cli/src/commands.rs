@@ -29,18 +29,13 @@ mod topic;
 mod zone;
 
 use std::{
-    error::Error,
     ffi::{OsStr, OsString},
     fmt::Write as _,
     process::{ExitCode, Termination as _},
 };
 
-use ::report::ReportError;
 use clap::{CommandFactory as _, Parser, Subcommand};
-use console::{
-    completion,
-    failure::{self, Result},
-};
+use console::{completion, failure::Result};
 
 use crate::companions;
 
@@ -150,20 +145,11 @@ pub fn command_line() -> clap::Command {
     Arguments::command().subcommands(companions::TABLE.iter().map(companions::Companion::command))
 }
 
-/// Only errors that no other executable has get a code here.
-pub fn error_code(error: &(dyn Error + 'static)) -> Option<&'static str> {
-    match error.downcast_ref()? {
-        ReportError::Recording(error) => failure::code(error),
-        _ => None,
-    }
-}
-
 pub fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
     let executable = OsString::from("firsthand");
     let words =
         std::iter::once(executable).chain(words.iter().map(|word| word.as_ref().to_owned()));
-    let arguments = Arguments::try_parse_from(words)?;
-    Ok(arguments.command.unwrap_or_else(|| Command::Run(run::Arguments::default())))
+    Arguments::try_parse_from(words)?.command.map_or_else(|| parse(&["run"]), Ok)
 }
 
 impl Command {

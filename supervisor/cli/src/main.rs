@@ -26,5 +26,5 @@ fn main() -> ExitCode {
         }
         command.execute()
     });
-    failure::report(executed, commands::error_code)
+    failure::report(executed)
 }

@@ -1,6 +1,6 @@
 //! The main function of a viewer, or of the laboratory.
 
-use std::{error::Error, process::ExitCode};
+use std::process::ExitCode;
 
 use clap::Parser;
 
@@ -10,15 +10,10 @@ use crate::{
     logging,
 };
 
-/// Answer a shell that asks for completions; or log to standard error from `log_level` on, and `execute`. `own_code`
-/// knows the codes of errors that only this executable has.
-pub fn run<A: Parser>(
-    log_level: &str,
-    execute: fn(&A) -> Result<ExitCode>,
-    own_code: fn(&(dyn Error + 'static)) -> Option<&'static str>,
-) -> ExitCode {
+/// Answer a shell that asks for completions; or log to standard error from `log_level` on, and `execute`.
+pub fn run<A: Parser>(log_level: &str, execute: fn(&A) -> Result<ExitCode>) -> ExitCode {
     completion::answer_shell(A::command, Vec::new);
     let arguments = A::parse();
     logging::to_stderr(log_level);
-    failure::report(execute(&arguments), own_code)
+    failure::report(execute(&arguments))
 }

@@ -35,16 +35,11 @@ impl Refused {
     }
 }
 
-/// Reports an error and its code on standard error: `own_code` knows codes of errors that only this executable has,
-/// [`code`] the others.
-pub fn report(
-    result: Result<ExitCode>,
-    own_code: fn(&(dyn Error + 'static)) -> Option<&'static str>,
-) -> ExitCode {
+/// Reports an error and its code on standard error.
+pub fn report(result: Result<ExitCode>) -> ExitCode {
     result.unwrap_or_else(|error| {
         let error = error.as_ref();
-        let code = own_code(error).or_else(|| code(error));
-        let code = code.map_or(String::new(), |code| format!(" [{code}]"));
+        let code = code(error).map_or(String::new(), |code| format!(" [{code}]"));
         let said = not_running(error).unwrap_or_else(|| error.to_string());
         write_stderr(&format!("firsthand: {said}{code}\n"));
         exit_code(error)

@@ -11,14 +11,15 @@ use common::{
     mission::{Mission, SensorKind},
     samples::RangeReading,
 };
+use mission_control::Heard;
 use page::{Collector, Recorded};
-use recording::{Message, Recording};
+use recording::{Message, Recording, RecordingError};
 use robot_state::{Kind, Sample, TOPICS};
 use serde_json::{Map, Value, json};
+use summary::Hearer;
 
 use crate::{
     beliefs::Beliefs,
-    error::ReportError,
     measured::Measured,
     source::{self, Source},
 };
@@ -42,6 +43,7 @@ pub(crate) struct Content {
     /// The row of the front sonar; none for a robot without sonars.
     front: Option<usize>,
     pub(crate) measured: Measured,
+    pub(crate) heard: Hearer,
     collector: Collector,
     beliefs: Beliefs,
     page: Recorded,
@@ -53,7 +55,7 @@ pub(crate) struct Content {
 }
 
 impl Content {
-    pub(crate) fn read(source: &Source) -> Result<Self, ReportError> {
+    pub(crate) fn read(source: &Source) -> Result<Self, RecordingError> {
         let first = Recording::open(&source.files[0])?;
         let mut content = Self::of(&first);
         for file in &source.files {
@@ -88,18 +90,17 @@ impl Content {
         }
     }
 
-    fn part(&mut self, recording: &Recording) -> Result<(), ReportError> {
+    fn part(&mut self, recording: &Recording) -> Result<(), RecordingError> {
         self.remarks.extend(recording.gaps());
         let topics = TOPICS.iter().map(|topic| topic.spec().name);
         let wanted: Vec<_> = topics.chain([LOG]).collect();
         for message in recording.messages(&wanted)? {
             let message = message?;
             if self.take(&message).is_none() {
-                return Err(recording::RecordingError::Message {
+                return Err(RecordingError::Message {
                     file: recording.path.to_path_buf(),
                     topic: message.topic.to_string(),
-                }
-                .into());
+                });
             }
         }
         Ok(())
@@ -131,10 +132,14 @@ impl Content {
                     self.measured.range(reading, &self.mission);
                 }
             }
-            Sample::Command(command) => self.measured.command(command),
-            Sample::Guidance(guidance) => self.measured.guidance(guidance),
+            Sample::Command(command) => self.heard.hear(&Heard::Command(command)),
+            Sample::Guidance(guidance) => {
+                let events = &mut self.measured.safety_events;
+                *events = guidance.safety_events.max(*events);
+                self.heard.hear(&Heard::Guidance(guidance));
+            }
             Sample::Link(link) => {
-                self.measured.link(link);
+                self.heard.hear(&Heard::Link(link));
                 self.add();
             }
             Sample::Grid(..) => self.add_map(),

@@ -3,7 +3,7 @@
 //! ```no_run
 //! let report = report::write("runs/obstacle-course-1".as_ref(), None)?;
 //! println!("{}", report.display());
-//! # Ok::<(), report::ReportError>(())
+//! # Ok::<(), recording::RecordingError>(())
 //! ```
 //!
 //! A recording is read once, and the page has a bounded number of rows, maps and fields; metrics count all.
@@ -16,11 +16,9 @@
 //! | `beliefs` | the map at a few moments, and the field of each |
 //! | `metrics` | the table of metrics, under their field names |
 //! | [`shortest_path`] | the shortest path of a body through known shapes |
-//! | `error` | errors |
 
 mod beliefs;
 mod content;
-mod error;
 mod measured;
 mod metrics;
 pub mod shortest_path;
@@ -33,9 +31,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-pub use error::ReportError;
-
 use common::file::FileError;
+use recording::RecordingError;
 
 use self::{content::Content, source::Source};
 
@@ -43,7 +40,7 @@ pub const PAGE: &str = "report.html";
 
 /// Write the report of `run`, a run's directory or a recording, into `out`: by default `report` in the run's directory, or
 /// `F-report` beside the recording `F.mcap`. Returns the path of the page.
-pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, ReportError> {
+pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, RecordingError> {
     let source = Source::find(run)?;
     let out = out.map_or_else(|| source.default_out(), Path::to_path_buf);
     let content = Content::read(&source)?;

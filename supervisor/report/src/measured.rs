@@ -1,9 +1,8 @@
 //! Metrics of all samples of the recording, not only of those that are drawn.
 
 use common::{
-    latency::Histogram,
     mission::Mission,
-    samples::{CommandSample, GuidanceSample, LinkSample, PoseSample, RangeReading, RangeStatus},
+    samples::{PoseSample, RangeReading, RangeStatus},
 };
 
 #[derive(Default)]
@@ -23,11 +22,6 @@ pub(crate) struct Measured {
     near: u64,
     /// Hits on the map.
     pub(crate) safety_events: u64,
-    wheels: Option<(f64, f64)>,
-    link: Option<LinkSample>,
-    latency: Histogram,
-    planner: Option<GuidanceSample>,
-    solves: u64,
 }
 
 impl Measured {
@@ -62,43 +56,6 @@ impl Measured {
         }
     }
 
-    pub(crate) fn command(&mut self, command: &CommandSample) {
-        let (left, right) = (command.left_rad_s, command.right_rad_s);
-        if left.is_finite() && right.is_finite() {
-            let (least, greatest) = self.wheels.unwrap_or((left, left));
-            self.wheels = Some((least.min(left).min(right), greatest.max(left).max(right)));
-        }
-    }
-
-    /// Take a sample of the link, each process of which counts from 0.
-    pub(crate) fn link(&mut self, link: &LinkSample) {
-        let last = self.link.replace(*link);
-        if let Some(last) = last.filter(|last| last.stamp.generation != link.stamp.generation) {
-            self.latency.add(&last.latency_histogram, last.latency_max_ns);
-        }
-    }
-
-    pub(crate) fn guidance(&mut self, guidance: &GuidanceSample) {
-        self.safety_events = self.safety_events.max(guidance.safety_events);
-        let last = self.planner.replace(*guidance);
-        if let Some(last) = last.filter(|last| last.stamp.generation != guidance.stamp.generation) {
-            self.solves = self.solves.saturating_add(last.full_solves);
-        }
-    }
-
-    pub(crate) fn latency(&self) -> Histogram {
-        let mut latency = self.latency.clone();
-        if let Some(last) = &self.link {
-            latency.add(&last.latency_histogram, last.latency_max_ns);
-        }
-        latency
-    }
-
-    pub(crate) fn solves(&self) -> u64 {
-        let last = self.planner.map_or(0, |last| last.full_solves);
-        self.solves.saturating_add(last)
-    }
-
     /// Mean of |dv/dt|, m/s^2.
     pub(crate) fn speed_change(&self) -> Option<f64> {
         share(self.speed_change, self.changes)
@@ -112,11 +69,6 @@ impl Measured {
     /// Share of the ticks with a reading below the range in which hits are mapped.
     pub(crate) fn near(&self) -> Option<f64> {
         share(self.near as f64, self.ranges)
-    }
-
-    /// The greatest commanded wheel speed less the least, rad/s.
-    pub(crate) fn wheel_range(&self) -> Option<f64> {
-        self.wheels.map(|(least, greatest)| greatest - least)
     }
 }
 

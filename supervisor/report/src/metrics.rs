@@ -35,7 +35,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
     let path = of("path_length_m", has_poses.then_some(measured.path_m));
     let straight = Some(content.mission.straight_m()).filter(|straight| *straight > 0.0);
     let ratio = path.zip(straight).map(|(path, straight)| path / straight);
-    let latency = measured.latency();
+    let latency = content.heard.latency();
     let quantile = |field: &str, share: f64| {
         let summed = content.summary.get("tick_latency_us");
         let summed = summed.and_then(|tick| tick.get(field)?.as_f64());
@@ -97,7 +97,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
         known("pose error expected", "pose_error_expected_m", pose.map(rms), 3, "m"),
         known("pose known within", "pose_within_m", pose.map(within), 3, "m"),
         known("collisions", "collisions", None, 0, ""),
-        known("full solves", "full_solves", count(measured.solves()), 0, ""),
+        known("full solves", "full_solves", count(content.heard.solves_until(None)), 0, ""),
         known("looks", "looks", None, 0, ""),
         row("tick latency, median", "tick_latency_us.p50", quantile("p50", 0.5), 2, "ms"),
         row("tick latency, 99 %", "tick_latency_us.p99", quantile("p99", 0.99), 2, "ms"),
@@ -115,7 +115,7 @@ fn wheel_range(content: &Content) -> Option<f64> {
         return None;
     }
     let summed = content.summed("wheel_range_rad_s");
-    summed.or_else(|| content.measured.wheel_range())
+    summed.or_else(|| content.heard.wheel_range_rad_s(u64::MAX))
 }
 
 fn restarts(content: &Content) -> Option<f64> {

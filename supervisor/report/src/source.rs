@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use common::{file, run::Run};
-use recording::Recording;
+use recording::{Recording, RecordingError};
 use serde_json::{Map, Value};
-
-use crate::error::ReportError;
 
 /// The greatest size of a summary, which takes 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
@@ -18,7 +16,7 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    pub(crate) fn find(run: &Path) -> Result<Self, ReportError> {
+    pub(crate) fn find(run: &Path) -> Result<Self, RecordingError> {
         Ok(Self { files: recording::files(run)?, is_run: run.is_dir() })
     }
 

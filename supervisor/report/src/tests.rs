@@ -4,8 +4,9 @@ use std::path::Path;
 
 use common::{
     latency::Histogram,
-    samples::{CommandSample, LinkSample, PoseSample, RangeReading, Stamp},
+    samples::{CommandSample, CommandState, LinkSample, PoseSample, RangeReading, Stamp},
 };
+use mission_control::Heard;
 use recording::Recording;
 
 use crate::{content::Content, html, source::Source};
@@ -81,6 +82,7 @@ fn a_recording_that_is_cut_off_gives_a_report_that_says_so() {
 fn metrics_count_every_generation_and_every_sample() {
     let mut content = golden();
     content.measured = crate::measured::Measured::default();
+    content.heard = summary::Hearer::default();
     let stamp = |tick: u64, generation| Stamp {
         tick,
         stamp_ns: tick * 1_000_000_000,
@@ -90,32 +92,34 @@ fn metrics_count_every_generation_and_every_sample() {
     let mut histogram = Histogram::default();
     histogram.record(1_000_000);
     for (tick, generation) in [(0, 1), (1, 1), (2, 2)] {
-        content.measured.link(&LinkSample {
+        content.heard.hear(&Heard::Link(&LinkSample {
             stamp: stamp(tick, generation),
             latency_histogram: *histogram.counts(),
             latency_max_ns: histogram.max_ns(),
             ..LinkSample::default()
-        });
+        }));
         let pose =
             PoseSample { stamp: stamp(tick, 1), v_m_s: tick as f64 * 0.5, ..PoseSample::default() };
         content.measured.pose(&pose, &content.mission);
         let range =
             RangeReading { range_m: 0.2, status: u8::from(tick == 0), ..RangeReading::default() };
         content.measured.range(&range, &content.mission);
-        content.measured.command(&CommandSample {
+        content.heard.hear(&Heard::Command(&CommandSample {
+            stamp: stamp(tick, 1),
             left_rad_s: -1.0,
             right_rad_s: tick as f64,
+            state: CommandState::Driving.into(),
             ..CommandSample::default()
-        });
+        }));
     }
     // This pose came a microsecond after the last one.
     let mut late = PoseSample { stamp: stamp(2, 1), v_m_s: 900.0, ..PoseSample::default() };
     late.stamp.stamp_ns += 1000;
     content.measured.pose(&late, &content.mission);
-    let counts: u32 = content.measured.latency().counts().iter().sum();
+    let counts: u32 = content.heard.latency().counts().iter().sum();
     assert_eq!(counts, 2);
     assert_eq!(content.measured.speed_change(), Some(0.5));
     assert_eq!(content.measured.near(), Some(1.0 / 3.0));
     assert_eq!(content.measured.unavailable(), Some(2.0 / 3.0));
-    assert_eq!(content.measured.wheel_range(), Some(3.0));
+    assert_eq!(content.heard.wheel_range_rad_s(u64::MAX), Some(3.0));
 }

@@ -65,7 +65,7 @@ impl Hearer {
         (hearer, Box::new(move |heard| told.borrow_mut().hear(&heard)))
     }
 
-    fn hear(&mut self, heard: &Heard<'_>) {
+    pub fn hear(&mut self, heard: &Heard<'_>) {
         match heard {
             Heard::Command(command) => {
                 self.wheels.add(command.stamp.tick, |totals| totals.with(command));
@@ -96,14 +96,20 @@ impl Hearer {
         &self.trails.0
     }
 
-    pub(crate) fn solves_until(&self, last: Option<&GuidanceSample>) -> u64 {
+    /// The full solves of all planners until its newest answer, or until the `last` one that counts.
+    pub fn solves_until(&self, last: Option<&GuidanceSample>) -> u64 {
         let (newest, its) =
             last.map_or((u32::MAX, None), |last| (last.stamp.generation, Some(last.full_solves)));
         let before: u64 = self.solves.range(..newest).map(|(_, count)| count).sum();
         before + its.or(self.solves.get(&newest).copied()).unwrap_or_default()
     }
 
-    pub(crate) fn latency(&self) -> Histogram {
+    /// The greatest commanded speed of either wheel less the least one, until `tick`, rad/s.
+    pub fn wheel_range_rad_s(&self, tick: u64) -> Option<f64> {
+        self.wheels.at(tick).range_rad_s()
+    }
+
+    pub fn latency(&self) -> Histogram {
         let mut all = Histogram::default();
         for link in self.links.values() {
             all.add(&link.latency_histogram, link.latency_max_ns);

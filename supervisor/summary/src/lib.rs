@@ -161,7 +161,7 @@ impl Summary {
             // A car has a steering angle in place of the second wheel.
             wheel_range_rad_s: last_tick
                 .filter(|_| mission.body().steering.is_none())
-                .and_then(|tick| heard.wheels.at(tick).range_rad_s()),
+                .and_then(|tick| heard.wheel_range_rad_s(tick)),
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: restarts.map(|(stage, times)| ((*stage).to_owned(), *times)).collect(),
             stops: heard.interruptions.stops.clone(),

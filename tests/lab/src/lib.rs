@@ -87,7 +87,7 @@ fn print(report: &impl Serialize, json: bool) -> error::Result {
 }
 
 pub fn main() -> ExitCode {
-    console::executable::run("error,rustdds=off", execute, |_| None)
+    console::executable::run("error,rustdds=off", execute)
 }
 
 fn execute(arguments: &Arguments) -> error::Result<ExitCode> {

@@ -15,7 +15,7 @@ mod tests;
 
 use std::{net::SocketAddr, process::ExitCode};
 
-use self::live::{Live, LiveError};
+use self::live::Live;
 use clap::Parser;
 use common::{
     domain::{Domain, RobotName},
@@ -48,9 +48,7 @@ const LAYOUT: &str = include_str!("../layout.json");
 
 pub fn main() -> ExitCode {
     // A client could fill the log with its own errors.
-    executable::run("error,firsthand_foxglove=warn,foxglove=off", serve, |error| {
-        error.is::<LiveError>().then_some("cannot-listen")
-    })
+    executable::run("error,firsthand_foxglove=warn,foxglove=off", serve)
 }
 
 fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {

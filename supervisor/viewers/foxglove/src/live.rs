@@ -19,6 +19,7 @@ use common::{
     mission::Mission,
     topics::{self, AnyTopic},
 };
+use console::failure::Refused;
 use foxglove::{
     ChannelBuilder, Context, RawChannel, Schema, WebSocketServer, WebSocketServerHandle,
 };
@@ -28,7 +29,6 @@ use recording::{
     viewers::{self, Channel, Drawn},
 };
 use robot_state::newest_run;
-use thiserror::Error;
 
 use crate::gate;
 
@@ -39,14 +39,6 @@ const LOGS_EVERY: Duration = Duration::from_millis(500);
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// The most messages that wait for a client: those of some ticks.
 const MOST_WAITING: usize = 512;
-
-/// A server that cannot be started.
-#[derive(Debug, Error)]
-#[error("cannot listen on {address}: {source}; choose another port with --listen")]
-pub struct LiveError {
-    address: SocketAddr,
-    source: io::Error,
-}
 
 #[derive(Debug)]
 pub struct Live {
@@ -76,8 +68,12 @@ impl Live {
         robot: &RobotName,
         address: SocketAddr,
         origins: &[String],
-    ) -> Result<(Self, SocketAddr), LiveError> {
-        let failed = |source| LiveError { address, source };
+    ) -> Result<(Self, SocketAddr), Refused> {
+        let failed = |problem: io::Error| {
+            let message =
+                format!("cannot listen on {address}: {problem}; choose another port with --listen");
+            Refused::new("cannot-listen", message)
+        };
         let listener = TcpListener::bind(address).map_err(failed)?;
         let listens = listener.local_addr().map_err(failed)?;
         let hidden = gate::hidden_address().map_err(failed)?;

@@ -7,7 +7,7 @@ use crate::{access::Access, orders::Operator, places::Places, shared::Shared};
 pub struct Context {
     pub access: Arc<Access>,
     pub shared: Arc<Shared>,
-    pub operator: Arc<dyn Operator>,
+    pub operator: Operator,
     /// Places of browsers that may watch, and of those that may drive.
     pub watching: Places,
     pub driving: Places,

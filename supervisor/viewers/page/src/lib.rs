@@ -42,8 +42,7 @@ use console::{executable, failure::Failure, output::print_text, stream::let_stag
 
 use self::{
     access::host_name,
-    operator::RobotOperator,
-    serving::{Options, Page, PageError},
+    serving::{Options, Page},
 };
 
 /// Show a robot in a browser: map, field, charts, stages, events; orders for whoever has the token to drive.
@@ -65,11 +64,7 @@ pub struct Arguments {
 }
 
 pub fn main() -> ExitCode {
-    executable::run("error", serve, |error| match error.downcast_ref()? {
-        PageError::NotLoopback(_) => Some("not-loopback"),
-        PageError::Listen { .. } => Some("cannot-listen"),
-        PageError::Keep(_) | PageError::System(_) => None,
-    })
+    executable::run("error", serve)
 }
 
 fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
@@ -77,7 +72,8 @@ fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut signals = Signals::that_end()?;
     let Arguments { robot, listen, behind_proxy } = arguments;
     let options = Options { robot: robot.clone(), listen: *listen, proxy: behind_proxy.clone() };
-    let page = Page::open(&options, Arc::new(RobotOperator { robot: robot.clone() }))?;
+    let driven = robot.clone();
+    let page = Page::open(&options, Arc::new(move |order| operator::perform(&driven, order)))?;
     print_text(&format!("{}kept in {}\n", page.access.addresses(), page.kept.display()))?;
     page.show(&mut || signals.came());
     Ok(ExitCode::SUCCESS)

@@ -1,4 +1,6 @@
-//! The orders that an operator may give in the browser, and their execution.
+//! The orders that an operator may give in the browser, and who may.
+
+use std::sync::Arc;
 
 use serde::Deserialize;
 
@@ -6,21 +8,8 @@ use crate::access::Role;
 
 const MOST_TARGETS: usize = 16;
 
-/// Carries out orders, and waits until each is confirmed. The result is the confirmation, or the reason why it was not
-/// carried out.
-pub trait Operator: Send + Sync + 'static {
-    fn stop(&self) -> Result<String, String>;
-    /// Let a stopped robot go on.
-    fn resume(&self) -> Result<String, String>;
-    fn restart(&self, stage: &str) -> Result<String, String>;
-    fn kill(&self, stage: &str) -> Result<String, String>;
-    /// Go to these places, one after the other; metres in the mission frame.
-    fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String>;
-    /// Go back to the place where the run began.
-    fn go_back(&self) -> Result<String, String>;
-    /// Push the stick, ahead and to the left, in shares of full speed. The robot stands soon unless this is asked again.
-    fn hand(&self, stick: [f64; 2]) -> Result<String, String>;
-}
+/// Carries out an order, and waits until it is confirmed. The result is the confirmation, or the reason why it was not carried out.
+pub type Operator = Arc<dyn Fn(&Order) -> Result<String, String> + Send + Sync>;
 
 /// A message of a browser that has shown its token.
 #[derive(Clone, Deserialize)]
@@ -72,19 +61,6 @@ impl Order {
                 Some("an order has 1 to 16 targets")
             }
             _ => None,
-        }
-    }
-
-    pub fn perform(&self, operator: &dyn Operator) -> Result<String, String> {
-        match self {
-            Self::Stop => operator.stop(),
-            Self::Resume => operator.resume(),
-            Self::Restart { stage } => operator.restart(stage),
-            Self::Kill { stage } => operator.kill(stage),
-            Self::GoTo { targets } => operator.go_to(targets),
-            Self::GoBack => operator.go_back(),
-            Self::Hand { ahead, left } => operator.hand([*ahead, *left]),
-            Self::Preview { .. } => Ok(String::new()),
         }
     }
 }

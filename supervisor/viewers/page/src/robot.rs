@@ -94,12 +94,12 @@ impl Reading {
             let says = format!("the link says: {}", failsafe_in_words(link));
             shown.link = (link.cause() == Cause::OperatorStop, says);
         }
-        rows.iter().for_each(|row| shown.row(row));
+        rows.iter().for_each(|row| shown.rows.push(row));
         for event in events {
-            shown.event(&serde_json::json!(event));
+            shown.events.push(&serde_json::json!(event));
         }
         for target in ended {
-            shown.result(&page::result(&serde_json::json!(target)));
+            shown.results.push(&page::result(&serde_json::json!(target)));
         }
         if let Some(state) = state {
             shown.state.set(state.to_string().into());

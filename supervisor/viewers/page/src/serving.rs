@@ -15,6 +15,7 @@ use common::{
     domain::{Domain, RobotName},
     file::FileError,
 };
+use console::failure::{Refused, Result};
 use processes::domain::make_own_directory;
 use thiserror::Error;
 
@@ -36,13 +37,7 @@ pub struct Options {
 
 /// A page that cannot be served.
 #[derive(Debug, Error)]
-pub enum PageError {
-    #[error(
-        "{0} is no loopback address, and the page does not encrypt; listen on 127.0.0.1 and use a tunnel, or a proxy with --behind-proxy"
-    )]
-    NotLoopback(SocketAddr),
-    #[error("cannot listen on {address}: {source}; choose another port with --listen")]
-    Listen { address: SocketAddr, source: io::Error },
+enum PageError {
     #[error("{0}; nobody could open the page without its addresses")]
     Keep(#[from] FileError),
     #[error("cannot start the page: {0}")]
@@ -66,12 +61,27 @@ impl Page {
     ///
     /// # Errors
     /// When the address is not one of this machine alone, or is taken.
-    pub fn open(options: &Options, operator: Arc<dyn Operator>) -> Result<Self, PageError> {
-        if !options.listen.ip().is_loopback() {
-            return Err(PageError::NotLoopback(options.listen));
+    pub fn open(options: &Options, operator: Operator) -> Result<Self> {
+        let address = options.listen;
+        if !address.ip().is_loopback() {
+            let message = format!(
+                "{address} is no loopback address, and the page does not encrypt; listen on 127.0.0.1 and use a tunnel, or a proxy with --behind-proxy"
+            );
+            return Err(Refused::new("not-loopback", message).into());
         }
-        let listener = TcpListener::bind(options.listen)
-            .map_err(|source| PageError::Listen { address: options.listen, source })?;
+        let listener = TcpListener::bind(address).map_err(|problem| {
+            let message =
+                format!("cannot listen on {address}: {problem}; choose another port with --listen");
+            Refused::new("cannot-listen", message)
+        })?;
+        Ok(Self::serve(options, listener, operator)?)
+    }
+
+    fn serve(
+        options: &Options,
+        listener: TcpListener,
+        operator: Operator,
+    ) -> Result<Self, PageError> {
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
         let access = Arc::new(Access::new(address, options.proxy.as_deref())?);

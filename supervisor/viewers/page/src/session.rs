@@ -187,7 +187,7 @@ async fn done(order: Order, context: &Arc<Context>) -> Result<String, String> {
     };
     let operator = context.operator.clone();
     let resumes = order == Order::Resume;
-    let done = spawn_blocking(move || order.perform(&*operator)).await;
+    let done = spawn_blocking(move || operator(&order)).await;
     drop(permit);
     let told = done.unwrap_or_else(|error| Err(format!("the order failed: {error}")))?;
     if resumes { resumed(context).await } else { Ok(told) }

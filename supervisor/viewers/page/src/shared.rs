@@ -12,9 +12,8 @@ use std::{
 use axum::body::Bytes;
 use serde_json::Value;
 
-/// Rows of ten minutes at 10 Hz.
-const MOST_ROWS: usize = 6000;
-const MOST_EVENTS: usize = 1000;
+/// The most items of a series: rows of ten minutes at 10 Hz.
+const MOST: usize = 6000;
 /// The most items of a series in one message.
 const AT_ONCE: usize = 500;
 
@@ -44,8 +43,8 @@ pub struct Ring {
 }
 
 impl Ring {
-    fn push(&mut self, item: &Value, most: usize) {
-        if self.items.len() == most {
+    pub fn push(&mut self, item: &Value) {
+        if self.items.len() == MOST {
             self.items.pop_front();
             self.first += 1;
         }
@@ -69,9 +68,9 @@ pub struct Shown {
     pub simulated: bool,
     /// Whether the link stops the robot for an operator, and the link's action in words.
     pub link: (bool, String),
-    rows: Ring,
-    events: Ring,
-    results: Ring,
+    pub rows: Ring,
+    pub events: Ring,
+    pub results: Ring,
     pub state: Newest<Arc<str>>,
     pub map: Newest<Bytes>,
     pub field: Newest<Bytes>,
@@ -92,18 +91,6 @@ impl Shown {
             simulated,
             ..Self::default()
         };
-    }
-
-    pub fn row(&mut self, row: &Value) {
-        self.rows.push(row, MOST_ROWS);
-    }
-
-    pub fn event(&mut self, event: &Value) {
-        self.events.push(event, MOST_EVENTS);
-    }
-
-    pub fn result(&mut self, result: &Value) {
-        self.results.push(result, MOST_EVENTS);
     }
 }
 
@@ -215,8 +202,8 @@ mod tests {
         shared.lock().begin(&json!({"robot": "x80"}), true);
         let mut cursor = Cursor::new(&shared);
         assert!(cursor.news().text.contains("\"robot\":\"x80\""));
-        for row in 0..MOST_ROWS + 100 {
-            shared.lock().row(&json!([row]));
+        for row in 0..MOST + 100 {
+            shared.lock().rows.push(&json!([row]));
             shared.lock().map.set(Bytes::from(row.to_string()));
         }
         let (mut rows, mut blobs) = (0, Vec::new());
@@ -232,20 +219,20 @@ mod tests {
             assert!(rows > 0 || some[0][0] == 100, "the oldest are dropped");
             rows += some.len();
         }
-        assert_eq!((rows, blobs), (MOST_ROWS, vec![Bytes::from((MOST_ROWS + 99).to_string())]));
+        assert_eq!((rows, blobs), (MOST, vec![Bytes::from((MOST + 99).to_string())]));
     }
 
     #[test]
     fn a_new_run_begins_the_page_anew_and_a_run_that_has_ended_is_told() {
         let shared = Arc::new(Shared::default());
         shared.lock().begin(&json!(1), true);
-        shared.lock().row(&json!([1.0]));
+        shared.lock().rows.push(&json!([1.0]));
         let mut cursor = Cursor::new(&shared);
         assert!(cursor.news().text.contains("rows"));
         shared.lock().connected = false;
         assert_eq!(cursor.news().text, r#"{"running":false,"problem":""}"#);
         shared.lock().begin(&json!(2), true);
-        shared.lock().row(&json!([2.0]));
+        shared.lock().rows.push(&json!([2.0]));
         let text = cursor.news().text;
         assert_eq!(text, r#"{"about":2,"running":true,"problem":"","rows":[[2.0]]}"#);
         assert!(shared.is_watched());

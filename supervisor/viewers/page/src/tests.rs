@@ -10,56 +10,37 @@ use std::{
     time::Duration,
 };
 
+use console::failure::code;
 use rustix::process::geteuid;
 use serde_json::{Value, json};
 
 use crate::{
-    orders::Operator,
-    serving::{Options, Page, PageError},
+    orders::{Operator, Order},
+    serving::{Options, Page},
 };
 
-/// An operator that notes what it is asked for.
-#[derive(Default)]
-struct Noted(Mutex<Vec<String>>);
+/// What an operator was asked for.
+type Noted = Arc<Mutex<Vec<Order>>>;
 
-impl Noted {
-    fn note(&self, order: &str) -> Result<String, String> {
-        self.0.lock().unwrap().push(order.to_owned());
+/// An operator that notes what it is asked for, and may not send the robot back.
+fn noting(noted: &Noted) -> Operator {
+    let noted = noted.clone();
+    Arc::new(move |order| {
+        if *order == Order::GoBack {
+            return Err("the robot is supervised by nobody".to_owned());
+        }
+        noted.lock().unwrap().push(order.clone());
         Ok("confirmed".to_owned())
-    }
-}
-
-impl Operator for Noted {
-    fn stop(&self) -> Result<String, String> {
-        self.note("stop")
-    }
-    fn resume(&self) -> Result<String, String> {
-        self.note("resume")
-    }
-    fn restart(&self, stage: &str) -> Result<String, String> {
-        self.note(&format!("restart {stage}"))
-    }
-    fn kill(&self, stage: &str) -> Result<String, String> {
-        self.note(&format!("kill {stage}"))
-    }
-    fn go_to(&self, targets: &[[f64; 2]]) -> Result<String, String> {
-        self.note(&format!("go to {targets:?}"))
-    }
-    fn hand(&self, stick: [f64; 2]) -> Result<String, String> {
-        self.note(&format!("hand {stick:?}"))
-    }
-    fn go_back(&self) -> Result<String, String> {
-        Err("the robot is supervised by nobody".to_owned())
-    }
+    })
 }
 
 fn options(listen: &str) -> Options {
     Options { robot: "page-test".parse().unwrap(), listen: listen.parse().unwrap(), proxy: None }
 }
 
-fn page() -> (Page, Arc<Noted>) {
-    let noted = Arc::new(Noted::default());
-    (Page::open(&options("127.0.0.1:0"), noted.clone()).unwrap(), noted)
+fn page() -> (Page, Noted) {
+    let noted = Noted::default();
+    (Page::open(&options("127.0.0.1:0"), noting(&noted)).unwrap(), noted)
 }
 
 /// The longest that a test waits for anything.
@@ -292,7 +273,7 @@ fn a_browser_that_shows_a_wrong_token_or_none_in_time_is_left() {
     hasty.say(&json!({"id": 1, "order": "stop"}).to_string());
     assert_eq!(hasty.await_close(), 4401, "an order is no token");
     assert_eq!(Browser::open(&page).await_close(), 4408, "a late token may be right");
-    assert!(noted.0.lock().unwrap().is_empty());
+    assert!(noted.lock().unwrap().is_empty());
 }
 
 #[test]
@@ -314,7 +295,7 @@ fn who_watches_may_stop_the_robot_and_nothing_else() {
         assert!(!done && why.contains("driving"), "{order}: {why}");
     }
     assert_eq!(browser.order(&json!({"order": "stop"})), (true, "confirmed".to_owned()));
-    assert_eq!(*noted.0.lock().unwrap(), ["stop"]);
+    assert_eq!(*noted.lock().unwrap(), [Order::Stop]);
 }
 
 #[test]
@@ -335,8 +316,12 @@ fn who_drives_is_told_what_was_confirmed_or_why_it_was_not_done() {
     assert!(browser.order(&json!({"order": "preview", "x": 1.5, "y": 0.0})).0);
     assert_eq!(page.shared.lock().wanted, Some([1.5, 0.0]));
     assert_eq!(
-        *noted.0.lock().unwrap(),
-        ["kill planner", "go to [[1.0, 2.0]]", "hand [1.0, -0.5]"]
+        *noted.lock().unwrap(),
+        [
+            Order::Kill { stage: "planner".to_owned() },
+            Order::GoTo { targets: vec![[1.0, 2.0]] },
+            Order::Hand { ahead: 1.0, left: -0.5 },
+        ]
     );
 }
 
@@ -352,7 +337,7 @@ fn a_long_message_and_a_flood_end_the_session() {
     }
     let code = browser.await_close();
     assert!([4429, 0].contains(&code), "{code}");
-    assert!(noted.0.lock().unwrap().is_empty());
+    assert!(noted.lock().unwrap().is_empty());
 }
 
 #[test]
@@ -424,19 +409,19 @@ fn a_request_without_an_end_is_not_waited_for() {
 
 #[test]
 fn a_page_that_cannot_be_served_says_why() {
-    let refused = |options: &Options| Page::open(options, Arc::new(Noted::default())).unwrap_err();
+    let refused = |options: &Options| Page::open(options, noting(&Noted::default())).unwrap_err();
     let far = refused(&options("0.0.0.0:0"));
-    assert!(matches!(far, PageError::NotLoopback(_)), "{far}");
+    assert_eq!(code(far.as_ref()), Some("not-loopback"), "{far}");
     let (first, _) = page();
     let taken = refused(&options(&first.address.to_string()));
-    assert!(matches!(taken, PageError::Listen { .. }), "{taken}");
+    assert_eq!(code(taken.as_ref()), Some("cannot-listen"), "{taken}");
 }
 
 #[test]
 fn behind_a_proxy_a_page_is_served_under_its_name_alone() {
     let proxy = Some("robot.example".to_owned());
     let options = Options { proxy, ..options("127.0.0.1:0") };
-    let page = Page::open(&options, Arc::new(Noted::default())).unwrap();
+    let page = Page::open(&options, noting(&Noted::default())).unwrap();
     let answer = ask(&page, &["GET / HTTP/1.1", "Host: robot.example"]);
     assert_eq!(status(&answer), "200");
     assert!(answer.contains("connect-src wss://robot.example;"), "{answer}");

@@ -51,7 +51,7 @@ enum What {
 }
 
 pub fn main() -> ExitCode {
-    executable::run("error", execute, |_| None)
+    executable::run("error", execute)
 }
 
 fn execute(arguments: &Arguments) -> Result<ExitCode> {

@@ -4,7 +4,7 @@ use std::{
     fs, io,
     net::Ipv4Addr,
     path::PathBuf,
-    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+    time::{Duration, Instant},
 };
 
 use common::{
@@ -18,6 +18,7 @@ use common::{
     topics,
 };
 use console::runs::Results;
+use recording::now_ns;
 use robot_state::{Feed, Sample, TOPICS, newest_run};
 use ros2::{
     cdr::Cdr as _,
@@ -161,12 +162,6 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
         }
     }
     Ok(())
-}
-
-/// The time, nanoseconds since 1970.
-pub fn now_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
 impl Bridge {

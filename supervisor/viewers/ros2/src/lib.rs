@@ -117,7 +117,7 @@ fn namespace(text: &str) -> Result<String, String> {
 
 pub fn main() -> ExitCode {
     // Refused requests of other nodes are logged.
-    executable::run("warn,rustdds=off", show, |_| None)
+    executable::run("warn,rustdds=off", show)
 }
 
 pub fn topics() -> String {

@@ -35,6 +35,7 @@ use common::{
 };
 use glam::{DAffine2, DVec2};
 use harmonic::{Cancellation, Cell};
+use recording::now_ns;
 use ros2::{
     cdr::Cdr as _,
     msg::{
@@ -49,7 +50,7 @@ use self::{
     planning::{Failure, Planner, Reason},
 };
 use crate::{
-    bridge::{BridgeError, now_ns},
+    bridge::BridgeError,
     frames::{Frames, placed},
     goals::{Goals, Status, Uuid},
     messages,

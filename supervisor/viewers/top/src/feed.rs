@@ -6,7 +6,6 @@ use common::{
     bus::{AnyReader, Bus, BusError},
     process_usage::Processes,
     samples::name_str,
-    topics,
 };
 use console::rates::TopicRates;
 use processes::stages;
@@ -33,11 +32,9 @@ struct Output {
 impl ScreenFeed {
     pub fn open(bus: &Bus) -> Result<Self, BusError> {
         let now = Instant::now();
-        let first_outputs = stages::TABLE.iter().filter_map(|stage| {
-            let first = stage.wiring.outputs.first()?.spec().name;
-            let mut all = topics::TABLE.iter();
-            Some((stage.name, all.find(|topic| topic.spec().name == first)?))
-        });
+        let first_outputs = stages::TABLE
+            .iter()
+            .filter_map(|stage| Some((stage.name, *stage.wiring.outputs.first()?)));
         let outputs = first_outputs.map(|(stage, topic)| {
             Ok(Output {
                 stage,

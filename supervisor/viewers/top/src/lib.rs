@@ -70,7 +70,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
 pub fn main() -> ExitCode {
-    executable::run("error", show_on_terminal, |_| None)
+    executable::run("error", show_on_terminal)
 }
 
 fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode, Failure> {
