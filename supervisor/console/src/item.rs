@@ -1,28 +1,34 @@
-//! A wrapped item of a Markdown list.
+//! Wrapped text, and items of a Markdown list.
 
 /// A line's columns, unless a code span alone is longer.
 const WIDTH: usize = 120;
 
 /// No line ends within a code span.
 pub fn item(text: &str) -> String {
-    let mut item = String::from("-");
-    let mut column = 1;
-    let mut rest = text;
-    while !rest.is_empty() {
-        let mut ends = rest.match_indices(' ').map(|(at, _)| at);
-        let outside_code = |at: &usize| rest[..*at].matches('`').count().is_multiple_of(2);
-        let word = &rest[..ends.find(outside_code).unwrap_or(rest.len())];
-        rest = rest[word.len()..].trim_start();
-        let width = word.chars().count();
-        if column + 1 + width > WIDTH {
-            item.push_str("\n ");
-            column = 1;
+    format!("- {}\n", wrapped(text, WIDTH - "- ".len(), true).join("\n  "))
+}
+
+/// The words of `text` in lines of at most `width` letters, and code spans as words if they stay whole. A longer word has a line of its own.
+pub fn wrapped(text: &str, width: usize, whole_code: bool) -> Vec<String> {
+    let mut in_code = false;
+    let words = text.split_inclusive(|letter| {
+        in_code ^= whole_code && letter == '`';
+        letter == ' ' && !in_code
+    });
+    let mut lines = vec![String::new()];
+    let mut column = 0;
+    for word in words {
+        let letters = word.trim_end().chars().count();
+        if column > 0 && column + letters > width {
+            lines.push(String::new());
+            column = 0;
         }
-        item.push(' ');
-        item.push_str(word);
-        column += 1 + width;
+        if let Some(line) = lines.last_mut() {
+            line.push_str(word);
+        }
+        column += word.chars().count();
     }
-    item + "\n"
+    lines.iter().map(|line| line.trim_end().to_owned()).collect()
 }
 
 #[cfg(test)]

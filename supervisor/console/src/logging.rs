@@ -49,15 +49,15 @@ pub fn to_stderr(default: &str) {
     start(vec![stderr_layer()], default);
 }
 
-/// Appends to `file`, and to the journal if there is one. Fails if the file cannot be opened.
-pub fn to_file(file: &Path, default: &str) -> io::Result<()> {
+/// Appends what is informational or more to `file`, and to the journal if there is one. Fails if the file cannot be opened.
+pub fn to_file(file: &Path) -> io::Result<()> {
     let log = Mutex::new(append(file)?);
     let mut layers: Vec<AnyLayer> =
         vec![fmt::layer().with_writer(log).log_internal_errors(false).with_ansi(false).boxed()];
     if to_journal() {
         layers.push(stderr_layer());
     }
-    start(layers, default);
+    start(layers, "info");
     Ok(())
 }
 

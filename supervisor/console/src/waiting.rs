@@ -1,6 +1,6 @@
 //! Messages about a robot that a command waits for, one each time.
 
-use common::domain::RobotName;
+use common::{domain::RobotName, follower::Event};
 
 use super::output::write_stderr;
 
@@ -11,18 +11,16 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    pub const fn on_connected(&mut self) {
-        (self.connected, self.reported) = (true, false);
-    }
-
-    pub fn on_disconnected(&mut self, robot: &RobotName) {
-        self.connected = false;
-        self.report(robot, ENDED);
-    }
-
-    pub fn on_nothing(&mut self, robot: &RobotName) {
-        if !self.connected {
-            self.report(robot, NOT_RUNNING);
+    /// Say where the robot is, if an `event` of its follower changes that.
+    pub fn tell<Topics>(&mut self, event: &Event<'_, Topics>, robot: &RobotName) {
+        match event {
+            Event::Connected => (self.connected, self.reported) = (true, false),
+            Event::Disconnected => {
+                self.connected = false;
+                self.report(robot, ENDED);
+            }
+            Event::Nothing if !self.connected => self.report(robot, NOT_RUNNING),
+            Event::Nothing | Event::Samples(_) => {}
         }
     }
 

@@ -144,10 +144,13 @@ pub fn owes_stop(robot: &RobotName) -> bool {
 
 /// Connects to the robot's stop guard, and starts one if none answers.
 fn guard(domain: &Domain) -> Result<stop_socket::Operator, OperatorError> {
-    let connect = || stop_socket::Operator::connect(&domain.guard_socket());
     let system = |error| OperatorError::System("reach the stop guard", error);
-    if let Some(guard) = connect().map_err(system)? {
-        guard.send(Request::Stop).map_err(system)?;
+    let told = || -> Result<_, OperatorError> {
+        let guard = stop_socket::Operator::connect(&domain.guard_socket()).map_err(system)?;
+        guard.iter().try_for_each(|guard| guard.send(Request::Stop)).map_err(system)?;
+        Ok(guard)
+    };
+    if let Some(guard) = told()? {
         return Ok(guard);
     }
     let directory = fs::canonicalize(domain.owed_stop())
@@ -156,11 +159,8 @@ fn guard(domain: &Domain) -> Result<stop_socket::Operator, OperatorError> {
     stop_guard::spawn(robot_executable(), &directory, &link, Stdio::null()).map_err(system)?;
     let began = Instant::now();
     loop {
-        match connect().map_err(system)? {
-            Some(guard) => {
-                guard.send(Request::Stop).map_err(system)?;
-                return Ok(guard);
-            }
+        match told()? {
+            Some(guard) => return Ok(guard),
             None if began.elapsed() > PATIENCE => {
                 let message = "the stop guard does not start; see link.log of the run";
                 return Err(OperatorError::refused("no-answer", message));
@@ -330,16 +330,14 @@ pub fn send_to(
     appends: bool,
 ) -> Result<(), OperatorError> {
     let kind = if appends { RequestKind::Append } else { RequestKind::Goto };
-    ask_with(robot, kind, points, [0.0; 2])
+    ask_with(robot, request(kind), points)
 }
 
 fn ask_with(
     robot: &RobotName,
-    kind: RequestKind,
+    mut request: RequestSample,
     points: &[TargetPoint],
-    deviations: [f64; 2],
 ) -> Result<(), OperatorError> {
-    let mut request = RequestSample { deviations, ..request(kind) };
     if points.len() > MOST_TARGETS {
         return Err(refused(robot, RequestAnswer::TooMany));
     }
@@ -350,17 +348,17 @@ fn ask_with(
 
 /// Drive by hand: towards `stick`, ahead and to the left of the robot, in shares of full speed, for 0.3 s after the last call.
 pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result<(), OperatorError> {
-    ask_with(robot, RequestKind::Hand, &[TargetPoint::at(stick)], [0.0; 2])
+    ask_with(robot, request(RequestKind::Hand), &[TargetPoint::at(stick)])
 }
 
 /// Follow the beacon at `distance_m`, 0 for the robot's own default.
 pub fn follow(robot: &RobotName, distance_m: f64) -> Result<(), OperatorError> {
-    ask_with(robot, RequestKind::Follow, &[], [distance_m, 0.0])
+    ask(robot, RequestSample { deviations: [distance_m, 0.0], ..request(RequestKind::Follow) })
 }
 
 /// Follow the beacon no longer. Returns when the robot rests.
 pub fn end_follow(robot: &RobotName) -> Result<(), OperatorError> {
-    ask_with(robot, RequestKind::EndFollow, &[], [0.0; 2])?;
+    ask(robot, request(RequestKind::EndFollow))?;
     await_rest(robot, |link| link.stopped() && link.at_rest == 1)
 }
 
@@ -371,7 +369,7 @@ pub fn change_zones(
     removes: bool,
 ) -> Result<(), OperatorError> {
     let kind = if removes { RequestKind::RemoveZone } else { RequestKind::AddZone };
-    ask_with(robot, kind, points, [0.0; 2])
+    ask_with(robot, request(kind), points)
 }
 
 pub fn send_back(robot: &RobotName) -> Result<(), OperatorError> {
@@ -386,7 +384,7 @@ pub fn place(
     point: TargetPoint,
     deviations: [f64; 2],
 ) -> Result<(), OperatorError> {
-    ask_with(robot, RequestKind::Place, &[point], deviations)
+    ask_with(robot, RequestSample { deviations, ..request(RequestKind::Place) }, &[point])
 }
 
 fn request(kind: RequestKind) -> RequestSample {

@@ -155,7 +155,7 @@ impl TargetList {
         place: DVec2,
         now_s: f64,
     ) {
-        let result = self.result_of(0, &TargetPoint::at(place), outcome);
+        let result = self.result_of(&TargetPoint::at(place), outcome);
         let (at_s, followed) = (Some(now_s), Some(followed));
         self.store(TargetResult { at_s, followed, ..result }, None);
         (self.waits, self.follows) = (true, false);
@@ -262,14 +262,14 @@ impl TargetList {
         if let Some(arrival) = arrival {
             return self.store_arrival(arrival);
         }
-        let result = self.result_of(0, &self.current, outcome);
+        let result = self.result_of(&self.current, outcome);
         self.store(TargetResult { at_s: Some(now_s), ..result }, None);
     }
 
     fn drop_ahead(&mut self, outcome: TargetOutcome) {
         for point in std::mem::take(&mut self.ahead) {
             self.number += 1;
-            self.store(self.result_of(0, &point, outcome), None);
+            self.store(self.result_of(&point, outcome), None);
         }
     }
 
@@ -284,9 +284,9 @@ impl TargetList {
         (self.since_tick, self.began_s) = (since_tick, arrival.0.stamp.time().seconds());
     }
 
-    fn result_of(&self, nth: u64, point: &TargetPoint, outcome: TargetOutcome) -> TargetResult {
+    fn result_of(&self, point: &TargetPoint, outcome: TargetOutcome) -> TargetResult {
         TargetResult {
-            number: self.number + nth,
+            number: self.number,
             x_m: point.x_m,
             y_m: point.y_m,
             outcome,
@@ -301,7 +301,7 @@ impl TargetList {
         let result = TargetResult {
             at_s: Some(command.stamp.time().seconds()),
             distance_m: Some(command.distance_m),
-            ..self.result_of(0, &self.current, outcome)
+            ..self.result_of(&self.current, outcome)
         };
         self.store(result, Some(command.stamp.tick));
     }
@@ -361,7 +361,7 @@ impl TargetList {
             Outcome::ReachedUnsure => TargetOutcome::ReachedUnsure,
             _ => TargetOutcome::Missed,
         };
-        let mut current = self.result_of(0, &self.current, outcome);
+        let mut current = self.result_of(&self.current, outcome);
         if let Some(arrival) = arrival.filter(|_| outcome != TargetOutcome::Missed) {
             current.at_s = Some(arrival.stamp.time().seconds());
             current.distance_m = Some(arrival.distance_m);
@@ -370,8 +370,11 @@ impl TargetList {
         if self.has_target() {
             results.push(current);
         }
-        let ahead = (1..).zip(&self.ahead);
-        results.extend(ahead.map(|(nth, it)| self.result_of(nth, it, TargetOutcome::NotTried)));
+        let ahead = (self.number + 1..).zip(&self.ahead);
+        results.extend(ahead.map(|(number, it)| TargetResult {
+            number,
+            ..self.result_of(it, TargetOutcome::NotTried)
+        }));
         for (nth, result) in results.iter_mut().enumerate().skip(over.unwrap_or(usize::MAX)) {
             let is_first = over == Some(nth);
             result.outcome = if is_first { TargetOutcome::Missed } else { TargetOutcome::NotTried };

@@ -96,7 +96,7 @@ pub fn main(arguments: &Arguments) -> Result {
         None if arguments.squares => by_squares(arguments, plan),
         None => by_wall(arguments, plan),
     }?;
-    found.write(&arguments.out, arguments.setting.json)
+    found.write(arguments)
 }
 
 impl Arguments {
@@ -151,9 +151,8 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
     }
     let (estimate, _) = loops::checked(wall.loops(), wall.normal_sd(), body.track_m)
         .map_err(|refusal| refused(&refusal.to_string()))?;
-    let robot = arguments.setting.robot.to_string();
     let metres = wall.metres();
-    Ok(Found { robot, method: "wall", before, estimate, metres, seconds })
+    Ok(Found { method: "wall", before, estimate, metres, seconds })
 }
 
 /// A square has noise of its own, and the wheels of all squares.
@@ -202,6 +201,5 @@ fn by_squares(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
     }
     let estimate =
         squares::checked(&driven, body.track_m).map_err(|refusal| refused(&refusal.to_string()))?;
-    let robot = arguments.setting.robot.to_string();
-    Ok(Found { robot, method: "squares", before, estimate, metres, seconds })
+    Ok(Found { method: "squares", before, estimate, metres, seconds })
 }

@@ -5,7 +5,7 @@ use std::{
 
 use clap::{Args, Command, error::ErrorKind};
 
-use console::{failure::Result, output::print_text};
+use console::{failure::Result, item, output::print_text};
 
 /// Print a page of the guide, or the options of a subcommand; without a name, list both.
 #[derive(Debug, Args)]
@@ -131,7 +131,7 @@ fn wrapped(markdown: &str, width: usize) -> String {
                 paragraph = paragraph + " " + more.trim_start();
             }
             let hang = if line.trim_start().starts_with("- ") { "  " } else { "" };
-            let rest = split(&paragraph, width.saturating_sub(hang.len()).max(1));
+            let rest = item::wrapped(&paragraph, width.saturating_sub(hang.len()).max(1), true);
             all.extend(
                 (0..)
                     .zip(rest)
@@ -148,24 +148,6 @@ fn goes_on(line: &str) -> bool {
     !line.is_empty()
         && !["#", "|", "- ", "```", "<", "!["].iter().any(|start| line.starts_with(start))
         && line.split_once(". ").is_none_or(|(number, _)| number.parse::<u32>().is_err())
-}
-
-/// The words of `text` in lines of at most `width` letters; a longer word has a line of its own.
-fn split(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    let mut column = 0;
-    for word in text.split_inclusive(' ') {
-        let letters = word.trim_end().chars().count();
-        if column > 0 && column + letters > width {
-            lines.push(String::new());
-            column = 0;
-        }
-        if let Some(line) = lines.last_mut() {
-            line.push_str(word);
-        }
-        column += word.chars().count();
-    }
-    lines.iter().map(|line| line.trim_end().to_owned()).collect()
 }
 
 /// No column becomes narrower, in letters.
@@ -196,7 +178,7 @@ fn drawn(rows: &[&str], width: usize) -> Vec<String> {
     };
     let mut drawn = Vec::new();
     for (nth, row) in rows.iter().enumerate() {
-        let cells = row.iter().zip(&widths).map(|(cell, &width)| split(cell, width));
+        let cells = row.iter().zip(&widths).map(|(cell, &width)| item::wrapped(cell, width, false));
         let cells: Vec<Vec<String>> = cells.collect();
         let height = cells.iter().map(Vec::len).max().unwrap_or_default();
         for at in 0..height {

@@ -6,7 +6,7 @@ use std::{
 };
 
 use clap::Args;
-use common::domain::RobotName;
+use common::{domain::RobotName, follower::Event};
 
 use self::merged::Logs;
 use console::{
@@ -95,13 +95,13 @@ fn follow(arguments: &Arguments, stream: &mut Stream) -> Result {
         }
         match goes_on {
             Some(directory) if followed.as_ref().is_none_or(|(last, _)| *last != directory) => {
-                waiting.on_connected();
+                waiting.tell(&Event::<()>::Connected, &arguments.robot);
                 let logs = Logs::of(&directory, arguments.stage.as_deref());
                 followed = Some((directory, logs));
             }
             Some(_) => thread::sleep(LOOK_EVERY),
             None => {
-                waiting.on_disconnected(&arguments.robot);
+                waiting.tell(&Event::<()>::Disconnected, &arguments.robot);
                 thread::sleep(LOOK_EVERY);
             }
         }

@@ -14,13 +14,13 @@ use common::{
     poll,
     signals::Signals,
     start::become_child,
-    topics::{self, AnyTopic},
 };
 use recording::{
     Options,
     recorder::{Happened, Wish},
 };
 
+use super::topic::readable;
 use console::{
     failure::Result,
     output::{print_text, write_stderr},
@@ -78,13 +78,6 @@ impl FromStr for DiskBudget {
     }
 }
 
-fn topic(name: &str) -> Result<&'static dyn AnyTopic, String> {
-    let found = topics::TABLE.iter().find(|topic| topic.spec().name == name);
-    found.copied().ok_or_else(|| {
-        format!("no topic is called {name:?}; `firsthand topic list` prints the table of topics")
-    })
-}
-
 /// Makes and removes a file beside `out`: the recording itself begins with the robot's run, which may come late.
 fn refuse_unwritable(out: &Path) -> Result<(), FileError> {
     let probe = out.with_extension(format!("{}.tmp", std::process::id()));
@@ -99,7 +92,7 @@ pub fn main(arguments: &Arguments) -> Result {
         become_child("recorder", supervisor)?;
     }
     let chosen = arguments.topics.as_ref();
-    let chosen = chosen.map(|names| names.iter().map(|name| topic(name)).collect());
+    let chosen = chosen.map(|names| names.iter().map(|name| readable(name)).collect::<Result<_>>());
     let options = Options {
         domain: Domain::of(arguments.robot.clone()),
         out: arguments.out.clone(),

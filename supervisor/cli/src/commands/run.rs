@@ -103,19 +103,6 @@ pub struct Arguments {
     parent: Option<u32>,
 }
 
-impl Default for Arguments {
-    fn default() -> Self {
-        use clap::Parser as _;
-        /// The attributes above have the defaults.
-        #[derive(clap::Parser)]
-        struct Alone {
-            #[command(flatten)]
-            arguments: Arguments,
-        }
-        Alone::parse_from(["firsthand"]).arguments
-    }
-}
-
 fn options(arguments: &Arguments) -> Result<Options> {
     if let Some(directory) = &arguments.resume {
         let found = fs::canonicalize(directory).map_err(|error| {
@@ -376,8 +363,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
 /// Begins the log in the run directory, reserves room for the summary, and reports the mission's remarks.
 fn prepare(options: &Options) -> Result<SummaryFile> {
     let log = options.directory.join(SUPERVISOR_LOG);
-    logging::to_file(&log, "info")
-        .map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
+    logging::to_file(&log).map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
     for remark in &options.mission.remarks {
         tracing::warn!("{remark}");
         write_stderr(&format!("firsthand: {remark}\n"));

@@ -59,9 +59,9 @@ struct Status<'a> {
     mirror: Option<MirrorStatus>,
     /// The target; none if the robot waits for one, or none is published.
     target: Option<TargetStatus>,
-    /// Where the robot believes it is; none if it is not published.
     /// How the robot follows a beacon; none if it does not.
     following: Option<FollowingStatus>,
+    /// Where the robot believes it is; none if it is not published.
     pose: Option<PoseStatus>,
     /// The link; none if no link publishes.
     link: Option<LinkStatus>,
@@ -248,13 +248,11 @@ fn follow(arguments: &Arguments) -> Result {
     let (mut robot, mut waiting) = (RobotState::default(), Waiting::default());
     let (mut began, mut shown) = (Instant::now(), None::<Instant>);
     while !stream.has_ended() {
-        match follower.wait(LOOK_EVERY)? {
-            Event::Connected => {
-                (robot, began) = (RobotState::default(), Instant::now());
-                waiting.on_connected();
-            }
-            Event::Disconnected => waiting.on_disconnected(&arguments.robot),
-            Event::Nothing => waiting.on_nothing(&arguments.robot),
+        let event = follower.wait(LOOK_EVERY)?;
+        waiting.tell(&event, &arguments.robot);
+        match event {
+            Event::Connected => (robot, began) = (RobotState::default(), Instant::now()),
+            Event::Disconnected | Event::Nothing => {}
             Event::Samples(feed) => {
                 feed.read(&mut |sample| {
                     robot.apply(&sample);

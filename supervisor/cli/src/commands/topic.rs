@@ -5,6 +5,8 @@ mod sample_text;
 
 use clap::{Args, Subcommand};
 
+pub use self::echo::readable;
+
 use super::table;
 use console::{failure::Result, output::print_text};
 

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec2;
 
-use super::shapes::{Room, drum, heading, wall, walls};
+use super::shapes::{Room, heading, wall};
 use crate::{missions::trial::Scene, random::Random};
 
 /// Widths of the doorway, metres: through a narrow one robots go one after the other.
@@ -18,18 +18,13 @@ const DOOR_FROM_ENDS_M: f64 = 1.5;
 pub fn draw(random: &mut Random) -> Scene {
     let room = Room::draw(random, 8.0, [1.6, 3.0]);
     let (target, half_width) = (room.target, room.greatest.y);
-    let mut shapes = walls([room.closed()]);
     let x = random.within(DOOR_FROM_ENDS_M, target.x - DOOR_FROM_ENDS_M);
     let half_gap = random.within(DOORS_M[0], DOORS_M[1]) / 2.0;
     let reach = half_width - half_gap - 0.1;
     let middle = random.within(-reach, reach);
+    let mut shapes = room.with_drums(random, DENSITY, KEPT_FREE_M);
     for ends in [[-half_width, middle - half_gap], [middle + half_gap, half_width]] {
         shapes.walls.push(wall(ends.map(|y| DVec2::new(x, y))));
-    }
-    for _ in 0..room.things(DENSITY) {
-        let (at, radius_m) = (room.place(random), random.within(0.12, 0.35));
-        let is_free = at.length().min(at.distance(target)) > radius_m + KEPT_FREE_M;
-        shapes.drums.extend(is_free.then(|| drum(at, radius_m)));
     }
     let [ahead, oncoming] = [0.0, PI].map(|usual| heading(random, 4, usual));
     Scene { shapes, heading: ahead, target, oncoming: Some(oncoming), ..Scene::default() }

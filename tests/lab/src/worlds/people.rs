@@ -3,7 +3,7 @@
 use common::mission::Person;
 use glam::DVec2;
 
-use super::shapes::{Room, drum, heading, walls};
+use super::shapes::{Room, heading};
 use crate::{missions::trial::Scene, random::Random};
 
 /// Fewest and most people, and the speeds that they want, m/s.
@@ -23,12 +23,7 @@ const BEGINS_M: f64 = 1.5;
 pub fn draw(random: &mut Random, number: usize) -> Scene {
     let room = Room::draw(random, 8.0, [2.0, 3.0]);
     let target = room.target;
-    let mut shapes = walls([room.closed()]);
-    for _ in 0..room.things(DENSITY) {
-        let (at, radius_m) = (room.place(random), random.within(0.12, 0.35));
-        let is_free = at.length().min(at.distance(target)) > radius_m + KEPT_FREE_M;
-        shapes.drums.extend(is_free.then(|| drum(at, radius_m)));
-    }
+    let shapes = room.with_drums(random, DENSITY, KEPT_FREE_M);
     let [least, most] = PEOPLE;
     let mut people: Vec<Person> = Vec::new();
     for _ in 0..least + number % (most + 1 - least) {

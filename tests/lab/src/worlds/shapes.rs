@@ -61,6 +61,17 @@ impl Room {
         ((self.greatest - self.least).element_product() * density).round() as usize
     }
 
+    /// Its wall, with drums on the floor, so many per square metre, and `free_m` around start and target.
+    pub fn with_drums(&self, random: &mut Random, density: f64, free_m: f64) -> Shapes {
+        let mut shapes = walls([self.closed()]);
+        for _ in 0..self.things(density) {
+            let (at, radius_m) = (self.place(random), random.within(0.12, 0.35));
+            let is_free = at.length().min(at.distance(self.target)) > radius_m + free_m;
+            shapes.drums.extend(is_free.then(|| drum(at, radius_m)));
+        }
+        shapes
+    }
+
     /// A place that is uniform over the floor.
     pub fn place(&self, random: &mut Random) -> DVec2 {
         random.point((self.least + self.greatest) / 2.0, (self.greatest - self.least) / 2.0)

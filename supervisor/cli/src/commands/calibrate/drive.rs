@@ -52,7 +52,7 @@ impl Setting {
     pub fn log(&self, name: &str) -> Result {
         fs::create_dir_all(&self.runs)
             .map_err(|error| format!("cannot make {}: {error}", self.runs.display()))?;
-        Ok(logging::to_file(&self.runs.join(name), "info")?)
+        Ok(logging::to_file(&self.runs.join(name))?)
     }
 
     /// The robot of `named`, and nothing else of it, in a procedure that alone ends the run. The controller drives it at `speed_m_s` or as

@@ -26,9 +26,8 @@ pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> R
     let (at_rest, motions) = motions(&mission, &trace).map_err(|why| refused(&why))?;
     let estimate = checked(&at_rest, &motions, scale_sd, mission.body().track_m)
         .map_err(|refusal| refused(&refusal.to_string()))?;
-    let robot = arguments.setting.robot.to_string();
     let metres = motions.iter().map(|it| it.rolled_m).sum::<f64>() / 2.0;
-    Ok(Found { robot, method: "gyro", before, estimate, metres, seconds })
+    Ok(Found { method: "gyro", before, estimate, metres, seconds })
 }
 
 /// Seconds and turns, radians.

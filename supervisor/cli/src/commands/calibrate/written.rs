@@ -1,7 +1,5 @@
 //! A calibration's file and lines.
 
-use std::path::Path;
-
 use calibration::loops::Estimate;
 use common::{
     file::{FileError, replace},
@@ -9,10 +7,10 @@ use common::{
 };
 use serde_json::json;
 
+use super::Arguments;
 use console::{failure::Result, logging::today, output::print_text};
 
 pub struct Found {
-    pub robot: String,
     pub method: &'static str,
     pub before: Odometry,
     pub estimate: Estimate,
@@ -22,12 +20,13 @@ pub struct Found {
 
 impl Found {
     /// Writes the calibration, and prints it. A kill leaves the old file or the new one.
-    pub fn write(&self, file: &Path, as_json: bool) -> Result {
+    pub fn write(&self, arguments: &Arguments) -> Result {
+        let (file, setting) = (&arguments.out, &arguments.setting);
         let it = &self.estimate;
         let mut odometry = it.odometry(&self.before);
         odometry.calibrated = Some(Provenance {
             date: today(),
-            robot: self.robot.clone(),
+            robot: setting.robot.to_string(),
             method: self.method.to_owned(),
             metres: self.metres,
             chi2_per_dof: it.chi2_per_dof,
@@ -35,7 +34,7 @@ impl Found {
         let mut object = serde_json::to_value(&odometry)?;
         let text = Calibration::new(odometry).to_text()?;
         replace(file, &text).map_err(FileError::of("write", file))?;
-        let said = if as_json {
+        let said = if setting.json {
             object["residuals"] = json!(it.residuals);
             object["seconds"] = json!(self.seconds);
             object["file"] = json!(file);

@@ -41,27 +41,23 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut waiting = Waiting::default();
     let mut left = arguments.number.unwrap_or(u64::MAX);
     while left > 0 && !stream.has_ended() {
-        match follower.wait(LOOK_EVERY)? {
-            Event::Connected => waiting.on_connected(),
-            Event::Disconnected => waiting.on_disconnected(&arguments.robot),
-            Event::Nothing => waiting.on_nothing(&arguments.robot),
-            Event::Samples(samples) => {
-                while left > 0
-                    && !stream.has_ended()
-                    && let Some(sample) = samples.next_sample()?
-                {
-                    let fields = sample_text::fields(sample.value(), sample.elements());
-                    // The writer may need the sample's place while a slow reader takes the text.
-                    drop(sample);
-                    let text = if arguments.json {
-                        sample_text::json(fields)? + "\n"
-                    } else {
-                        sample_text::text(&fields, arguments.whole) + "---\n"
-                    };
-                    stream.write(&text)?;
-                    left -= 1;
-                }
-            }
+        let event = follower.wait(LOOK_EVERY)?;
+        waiting.tell(&event, &arguments.robot);
+        let Event::Samples(samples) = event else { continue };
+        while left > 0
+            && !stream.has_ended()
+            && let Some(sample) = samples.next_sample()?
+        {
+            let fields = sample_text::fields(sample.value(), sample.elements());
+            // The writer may need the sample's place while a slow reader takes the text.
+            drop(sample);
+            let text = if arguments.json {
+                sample_text::json(fields)? + "\n"
+            } else {
+                sample_text::text(&fields, arguments.whole) + "---\n"
+            };
+            stream.write(&text)?;
+            left -= 1;
         }
     }
     Ok(())

@@ -80,16 +80,12 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut left = arguments.number.unwrap_or(u64::MAX);
     let mut due = None;
     while left > 0 && !stream.has_ended() {
-        match follower.wait(LOOK_EVERY)? {
-            Event::Connected => {
-                waiting.on_connected();
-                due = Some(Instant::now() + REPORT_EVERY);
-            }
-            Event::Disconnected => {
-                waiting.on_disconnected(&arguments.robot);
-                due = None;
-            }
-            Event::Nothing => waiting.on_nothing(&arguments.robot),
+        let event = follower.wait(LOOK_EVERY)?;
+        waiting.tell(&event, &arguments.robot);
+        match event {
+            Event::Connected => due = Some(Instant::now() + REPORT_EVERY),
+            Event::Disconnected => due = None,
+            Event::Nothing => {}
             Event::Samples(readers) => readers.take()?,
         }
         if due.is_some_and(|due| Instant::now() >= due)
