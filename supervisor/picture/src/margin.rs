@@ -24,7 +24,7 @@ const LINE: f64 = 18.0;
 pub(super) fn open(name: &str, description: &str, captions: usize) -> String {
     let lines = captions.min(MOST_CAPTIONS) as f64;
     let height = PLOT_TOP + PLOT_SIDE + BELOW + lines * LINE;
-    let name = escape(name, ACROSS);
+    let (name, description) = (escape(name, ACROSS), escape(description, usize::MAX));
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" \
          width=\"{WIDTH}\" height=\"{height}\" role=\"img\" font-family=\"{FONT}\" \

@@ -41,7 +41,7 @@ mod tests {
         let odd = [f64::NAN, f64::INFINITY, -1e300, 1e300, 0.0, -0.0, 1e-300];
         let odd: Vec<_> = odd.iter().flat_map(|&x| odd.map(|y| DVec2::new(x, y))).collect();
         for (points, marks) in [(odd, 9), (Vec::new(), 0), (vec![DVec2::new(1.0, 2.0)], 1)] {
-            let svg = points_svg("beams & echoes", "seen by a robot", &points);
+            let svg = points_svg("beams & echoes", "seen at < 10 m", &points);
             assert!(svg.contains(">x, metres<") && svg.contains(">beams &amp; echoes<"), "{svg}");
             assert_eq!(svg.matches("a1.7 1.7").count(), 2 * marks, "{svg}");
             roxmltree::Document::parse(&svg).unwrap();
