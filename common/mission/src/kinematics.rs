@@ -6,8 +6,8 @@ mod differential;
 mod drive;
 mod pose;
 
-pub use ackermann::{Ackermann, SteeredWheel};
-pub use differential::{DifferentialDrive, WheelSpeeds};
+pub use ackermann::Ackermann;
+pub use differential::DifferentialDrive;
 pub use drive::Drive;
 pub use pose::{Pose2, Twist};
 

@@ -3,7 +3,7 @@ use std::{collections::BTreeMap, path::PathBuf, sync::LazyLock};
 use crate::{
     arduino::ArduinoBoard,
     footprint::Footprint,
-    kinematics::{Ackermann, DifferentialDrive, Drive, Twist, WheelSpeeds},
+    kinematics::{Ackermann, DifferentialDrive, Drive, Twist},
     odometry::Odometry,
     response::{Response, ResponseKeys},
     ros2::Ros2Topics,
@@ -192,6 +192,11 @@ impl Body {
         }
     }
 
+    /// The drive of its two wheels without a speed limit.
+    pub fn unlimited(&self) -> DifferentialDrive {
+        DifferentialDrive::new(self.wheel_radius_m, self.track_m, f64::INFINITY)
+    }
+
     /// Of a wheel at top speed, rad/s.
     pub fn top_rad_s(&self) -> f64 {
         self.top_speed_m_s / self.wheel_radius_m
@@ -200,14 +205,13 @@ impl Body {
     /// The speeds of the left and right wheel, rad/s, that a tick reaches on the way from the `told` to the `wanted` ones: they grow no
     /// faster than the body's accelerations allow, and fall at once.
     pub fn reached(&self, told: [f64; 2], wanted: [f64; 2], rate_hz: f64) -> [f64; 2] {
-        let Self { wheel_radius_m, track_m, response, .. } = *self;
-        let acceleration = [response.acceleration_m_s2, response.turn_acceleration_rad_s2];
+        let Response { acceleration_m_s2, turn_acceleration_rad_s2, .. } = self.response;
+        let acceleration = [acceleration_m_s2, turn_acceleration_rad_s2];
         if acceleration == [f64::INFINITY; 2] {
             return wanted;
         }
-        let drive = DifferentialDrive::new(wheel_radius_m, track_m, f64::INFINITY);
-        let twist = |[left, right]: [f64; 2]| drive.twist(WheelSpeeds { right, left });
-        let (now, then) = (twist(wanted), twist(told));
+        let drive = self.unlimited();
+        let [now, then] = [wanted, told].map(|wheels| drive.twist(wheels));
         let grown = |now: f64, then: f64, acceleration: f64| {
             let most = (then * now.signum()).max(0.0) + acceleration / rate_hz;
             now.clamp(-most, most)
@@ -216,8 +220,7 @@ impl Body {
         // Slowing down so that the curve stays, which is free.
         let turned = if omega == now.omega { 1.0 } else { (omega / now.omega).abs() };
         let v = grown(now.v * turned, then.v, acceleration[0]);
-        let WheelSpeeds { right, left } = drive.wheels(Twist { v, omega });
-        [left, right]
+        drive.wheels(Twist { v, omega })
     }
 
     /// None for a robot with two driven wheels.

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{Memory, Motion, counts::WheelCounts};
 use crate::{
     geometry::wrap_angle,
-    kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
+    kinematics::{Pose2, Twist},
     mission::Body,
     samples::{CountsSample, WheelSample},
 };
@@ -56,7 +56,7 @@ impl Odometry {
         let [arc, turn, _] = self.way(now);
         self.last = Some(now);
         // (17) is linear, so the arc and the turn give the wheels' angles.
-        let WheelSpeeds { right, left } = drive(body).wheels(Twist { v: arc, omega: turn });
+        let [left, right] = body.unlimited().wheels(Twist { v: arc, omega: turn });
         self.turned = [self.turned[0] + left, self.turned[1] + right];
         Some(self.turned)
     }
@@ -106,11 +106,6 @@ fn is_start(pose: Pose2) -> bool {
     pose.position.length() <= NEAR_START && wrap_angle(pose.heading).abs() <= NEAR_START
 }
 
-/// The drive of wheels without a speed limit.
-pub fn drive(body: &Body) -> DifferentialDrive {
-    DifferentialDrive::new(body.wheel_radius_m, body.track_m, f64::INFINITY)
-}
-
 /// The motion of left and right wheels at these angles and speeds, radians and rad/s; `held` by something each or not.
 pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
     let counts = |angle: f64| (angle * body.counts_per_turn / TAU).round();
@@ -138,8 +133,7 @@ pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) 
 
 /// `counts` are wheel speeds, counts/s.
 pub fn twist(body: &Body, counts: [i16; 2]) -> Twist {
-    let [left, right] = wheel_speeds(body, counts);
-    drive(body).twist(WheelSpeeds { right, left })
+    body.unlimited().twist(wheel_speeds(body, counts))
 }
 
 /// Converts counts/s to rad/s.

@@ -6,7 +6,7 @@ use common::{
     clock::MissionTime,
     driver::counts::WheelCounts,
     found_response::if_there,
-    kinematics::{Drive, Pose2, SteeredWheel, Twist, WheelSpeeds},
+    kinematics::{Drive, Pose2, Twist},
     mission::{Body, Mission},
     samples::{CountsSample, FixRefusal, FixSample, PlaceSample, PoseSample, WheelSample},
     stage::{Answer, Answering, ForeignState},
@@ -395,14 +395,14 @@ impl DeadReckoning {
             Drive::Differential(drive) => {
                 let [left_scale, right_scale] = self.wheel_scales;
                 let right = right * per_count * right_scale;
-                drive.twist(WheelSpeeds { left: wheel * left_scale, right })
+                drive.twist([wheel * left_scale, right])
             }
             Drive::Ackermann(drive) => {
                 // The mean of the two angles stands for the steering on the way.
                 let middle = f64::from(counts_between(0, last.right)) + right / 2.0;
                 let angle = self.body.steering.map(|steering| steering.angle(middle));
                 let wheel = wheel * self.distance_scale;
-                drive.twist(SteeredWheel { wheel, steering: angle.unwrap_or_default() })
+                drive.twist([wheel, angle.unwrap_or_default()])
             }
         })
     }

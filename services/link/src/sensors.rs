@@ -6,8 +6,7 @@ use std::f64::consts::TAU;
 
 use common::{
     clock::MissionTime,
-    driver::{Heard, LaserScan, Motion, counts::WheelCounts, odometry::drive},
-    kinematics::WheelSpeeds,
+    driver::{Heard, LaserScan, Motion, counts::WheelCounts},
     mission::{Body, Mission, Sensor, SensorKind},
     samples::{LONGEST_SWEEP_NS, RangeReading, RangeStatus},
 };
@@ -174,8 +173,8 @@ impl Laser {
             (self.near, self.is_blind) = ((near, turned), false);
         } else if beams.iter().any(|beam| beam.is_infinite()) {
             let (near, turned_then) = self.near;
-            let [left, right] = [0, 1].map(|wheel| turned[wheel] - turned_then[wheel]);
-            let turn = drive(body).twist(WheelSpeeds { right, left }).omega;
+            let wheels = [0, 1].map(|wheel| turned[wheel] - turned_then[wheel]);
+            let turn = body.unlimited().twist(wheels).omega;
             // A turn removes things from a view that is no whole circle.
             let is_circle = self.sensor.field_of_view_deg >= 360.0;
             let lost = if is_circle { 0.0 } else { turn.abs() / self.sensor.fan().1 };

@@ -21,11 +21,11 @@ use std::{f64::consts::TAU, time::Duration};
 use common::{
     driver::{
         Base, Commander, Driver, Heard, LaserScan, Memory, Motion, Turn, WireTally, beam,
-        odometry::{self, drive, motion, twist},
+        odometry::{self, motion, twist},
         range_reading,
     },
     geometry::wrap_angle,
-    kinematics::{Twist, WheelSpeeds},
+    kinematics::Twist,
     mission::{Body, Mission, Sensor, TouchRow},
     samples::{LONGEST_SWEEP_NS, Sweep},
 };
@@ -197,8 +197,8 @@ impl Ros2 {
                 heard.refused = Some(format!("the IMU: {why}").into());
             }
             let [v, omega] = odometry.twist;
-            let WheelSpeeds { right, left } = drive(&self.body).wheels(Twist { v, omega });
-            let motion = motion(&self.body, turned, [left, right], [false; 2]);
+            let speeds = self.body.unlimited().wheels(Twist { v, omega });
+            let motion = motion(&self.body, turned, speeds, [false; 2]);
             heard.motion = Some(Motion { stamp_ns: Some(stamp_ns), ..motion });
         }
         Ok(())

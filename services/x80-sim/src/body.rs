@@ -1,24 +1,12 @@
 //! The body: a disc or a polygon that cannot go through things, on two driven wheels or on a car's.
 
 use common::{
-    kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
+    kinematics::{DifferentialDrive, Pose2, Twist},
     mission::{Footprint, Mission},
 };
 use glam::DVec2;
 
 use crate::world::{Surface, World};
-
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wheels<T> {
-    pub left: T,
-    pub right: T,
-}
-
-impl<T> Wheels<T> {
-    pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> Wheels<U> {
-        Wheels { left: change(self.left), right: change(self.right) }
-    }
-}
 
 /// From this distance on a body touches nothing any more.
 const RELEASE_M: f64 = 0.005;
@@ -100,16 +88,15 @@ impl Body {
         self.clearance
     }
 
-    /// Move as the wheels ask, metres of ground; the body slides along the thing it touches, or halts. Returns the
+    /// Move as the left and right wheels ask, metres of ground; the body slides along the thing it touches, or halts. Returns the
     /// ground that went by under either wheel.
-    pub fn roll(&mut self, asked: Wheels<f64>, world: &World) -> Wheels<f64> {
-        let turned = asked.map(|metres| metres / self.wheel_radius);
-        let step = self.drive.twist(WheelSpeeds { right: turned.right, left: turned.left });
+    pub fn roll(&mut self, asked: [f64; 2], world: &World) -> [f64; 2] {
+        let step = self.drive.twist(asked.map(|metres| metres / self.wheel_radius));
         let Some(arc) = self.go(step, world) else {
             return asked;
         };
         let half_turn = step.omega * self.track / 2.0;
-        Wheels { left: arc - half_turn, right: arc + half_turn }
+        [arc - half_turn, arc + half_turn]
     }
 
     /// Move by `step` (metres, radians) until something is in the way. Returns the distance it moved ahead, metres,
@@ -202,15 +189,11 @@ mod tests {
         (Body::new(&mission, &World::new(&mission), 1.0), World::new(&mission))
     }
 
-    fn both(metres: f64) -> Wheels<f64> {
-        Wheels { left: metres, right: metres }
-    }
-
     #[test]
     fn wheels_turn_the_body_by_the_track() {
         let (mut body, world) = at_start("robot.track_m = 0.25");
         let quarter = FRAC_PI_2 * 0.25 / 2.0;
-        body.roll(Wheels { left: -quarter, right: quarter }, &world);
+        body.roll([-quarter, quarter], &world);
         assert!((body.pose().heading - FRAC_PI_2).abs() < 1e-12);
         assert!(body.pose().position.length() < 1e-12);
     }
@@ -220,17 +203,17 @@ mod tests {
         let (mut body, world) = at_start("world.wall = [{ points = [[1, -2], [1, 2]] }]");
         let mut rolled = 0.0;
         for _ in 0..400 {
-            rolled += body.roll(both(0.005), &world).left;
+            rolled += body.roll([0.005; 2], &world)[0];
             assert!(body.clearance() >= 0.0, "it went into the wall");
         }
         assert!((body.pose().position.x - 0.81).abs() < 1e-6);
         assert!((rolled - 0.81).abs() < 1e-6, "the wheels went {rolled} m");
         assert_eq!(body.contacts(), 1);
         for _ in 0..40 {
-            body.roll(both(-0.005), &world);
+            body.roll([-0.005; 2], &world);
         }
         for _ in 0..80 {
-            body.roll(both(0.005), &world);
+            body.roll([0.005; 2], &world);
         }
         assert_eq!(body.contacts(), 2, "it came back");
     }
@@ -239,7 +222,7 @@ mod tests {
     fn an_oblique_wall_lets_the_body_slide_along_it() {
         let (mut body, world) = at_start("world.wall = [{ points = [[0.3, -1], [2.3, 1]] }]");
         for _ in 0..600 {
-            body.roll(both(0.005), &world);
+            body.roll([0.005; 2], &world);
             assert!(body.clearance() >= 0.0, "it went into the wall");
         }
         assert!(body.pose().position.y > 0.1, "it slid to {:?}", body.pose());
@@ -251,7 +234,7 @@ mod tests {
         let (mut body, world) =
             at_start("world.wall = [{ points = [[0.2, -1.5], [1.2, 0], [0.2, 1.5]] }]");
         for _ in 0..600 {
-            body.roll(both(0.005), &world);
+            body.roll([0.005; 2], &world);
             assert!(body.clearance() >= 0.0, "it went into the corner");
         }
         assert!(body.pose().position.x < 1.0);
@@ -264,7 +247,7 @@ mod tests {
         let walls = "world.wall = [{ points = [[0.5, 0.15], [3, 0.15]] }, { points = [[0.5, -0.15], [3, -0.15]] }]";
         let (mut body, world) = at_start(&format!("{LONG}{walls}"));
         for _ in 0..400 {
-            body.roll(both(0.005), &world);
+            body.roll([0.005; 2], &world);
         }
         assert!((body.pose().position.x - 2.0).abs() < 1e-9 && body.contacts() == 0);
         assert!((body.clearance() - 0.05).abs() < 1e-9, "{}", body.clearance());
@@ -280,7 +263,7 @@ mod tests {
             let position = DVec2::new(0.0, 0.2);
             body.put(Pose2 { position, heading: 0.0 }, 0, &world);
             for _ in 0..400 {
-                body.roll(Wheels { left: -0.001, right: 0.001 }, &world);
+                body.roll([-0.001, 0.001], &world);
                 assert!(body.clearance() >= 0.0, "it went into it: {shape}");
             }
             assert!(body.contacts() >= 1, "{shape}");

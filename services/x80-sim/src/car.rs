@@ -1,7 +1,7 @@
 //! A car between motor board and ground: one channel drives it, another steers.
 
 use common::{
-    kinematics::{Ackermann, SteeredWheel, Twist},
+    kinematics::{Ackermann, Twist},
     mission::{Mission, Steering, WheelPhysics},
 };
 
@@ -31,7 +31,7 @@ impl Car {
         let body = mission.body();
         let steering = body.steering?;
         let [driven, steered] = OnChannel::left_and_right(&mission.robot);
-        let wheel_radius_m = body.wheel_radius_m * errors.diameter.left;
+        let wheel_radius_m = body.wheel_radius_m * errors.diameter[0];
         Some(Self {
             drive: Ackermann::new(
                 wheel_radius_m,
@@ -63,10 +63,8 @@ impl Car {
 
     pub(crate) fn twist(&self, motors: &[Motor; 6]) -> Twist {
         let OnChannel { channel, sign } = self.driven;
-        self.drive.twist(SteeredWheel {
-            wheel: sign * motors[channel].speed() / self.counts_per_radian,
-            steering: self.angle(motors),
-        })
+        let wheel = sign * motors[channel].speed() / self.counts_per_radian;
+        self.drive.twist([wheel, self.angle(motors)])
     }
 
     /// Move `body` as the motors ask from mission time `now` for `dt` seconds, as far as `world` lets it.
@@ -85,10 +83,7 @@ impl Car {
         let rim = sign * asked / self.counts_per_radian * self.wheel_radius_m;
         let ground = slipped(rim, physics, noise);
         // (3) is linear in the wheel: its angle gives arc and turn as its speed gives v and omega.
-        let step = self.drive.twist(SteeredWheel {
-            wheel: ground / self.wheel_radius_m,
-            steering: self.angle(motors),
-        });
+        let step = self.drive.twist([ground / self.wheel_radius_m, self.angle(motors)]);
         let held_at = body.go(step, world);
         let grip = grip(held_at.is_some(), physics);
         let went = held_at.unwrap_or(ground) / self.wheel_radius_m * self.counts_per_radian * sign;

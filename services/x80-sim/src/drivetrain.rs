@@ -5,7 +5,7 @@ use common::{
     wire::{COUNT_CYCLE, Command, Encoder},
 };
 
-use crate::{body::Wheels, motor::Motor, noise::Noise};
+use crate::{motor::Motor, noise::Noise};
 
 /// Metres over the ground for a rim that rolls `metres` and slips.
 pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) -> f64 {
@@ -51,19 +51,19 @@ pub(crate) fn velocity(wheels: [OnChannel; 2], counts: [f64; 2], limit_ms: u16) 
     Command::velocity(channels, limit_ms)
 }
 
+/// Of two wheels, the left one first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drivetrain {
-    on: Wheels<OnChannel>,
+    on: [OnChannel; 2],
     /// The wheel has the nominal diameter.
     metres_per_count: f64,
-    diameter: Wheels<f64>,
+    diameter: [f64; 2],
 }
 
 impl Drivetrain {
-    pub(crate) fn new(mission: &Mission, diameter: Wheels<f64>) -> Self {
-        let [left, right] = OnChannel::left_and_right(&mission.robot);
+    pub(crate) fn new(mission: &Mission, diameter: [f64; 2]) -> Self {
         Self {
-            on: Wheels { left, right },
+            on: OnChannel::left_and_right(&mission.robot),
             metres_per_count: mission.body().metres_per_count(),
             diameter,
         }
@@ -76,15 +76,15 @@ impl Drivetrain {
         now: f64,
         dt: f64,
         noise: &mut Noise,
-    ) -> Wheels<f64> {
+    ) -> [f64; 2] {
         self.on.map(|OnChannel { channel, sign }| {
             sign * motors[channel].step(now, dt, noise) * self.metres_per_count
         })
     }
 
     /// The way of the real rims when nominal wheels would roll `metres`.
-    pub(crate) fn rims(&self, metres: Wheels<f64>) -> Wheels<f64> {
-        Wheels { left: metres.left * self.diameter.left, right: metres.right * self.diameter.right }
+    pub(crate) fn rims(&self, metres: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|wheel| metres[wheel] * self.diameter[wheel])
     }
 
     /// In `dt` seconds a wheel that is held by the share `grip` with the ground, which went by `went` metres, and by
@@ -92,34 +92,32 @@ impl Drivetrain {
     pub(crate) fn turn(
         &self,
         motors: &mut [Motor; 6],
-        asked: Wheels<f64>,
-        went: Wheels<f64>,
-        grip: Wheels<Option<f64>>,
+        asked: [f64; 2],
+        went: [f64; 2],
+        grip: [Option<f64>; 2],
         dt: f64,
     ) {
-        let mut turn = |on: OnChannel, asked: f64, went: f64, grip: Option<f64>| {
+        for (wheel, on) in self.on.into_iter().enumerate() {
             let counts = |metres: f64| on.sign * metres / self.metres_per_count;
-            let share = grip.unwrap_or(0.0);
+            let went = went[wheel] / self.diameter[wheel];
+            let share = grip[wheel].unwrap_or(0.0);
             let motor = &mut motors[on.channel];
-            motor.turn(counts(went * share + asked * (1.0 - share)));
-            if let Some(grip) = grip {
+            motor.turn(counts(went * share + asked[wheel] * (1.0 - share)));
+            if let Some(grip) = grip[wheel] {
                 motor.hold(counts(went) / dt, grip);
             }
-        };
-        let Wheels { left, right } = self.diameter;
-        turn(self.on.left, asked.left, went.left / left, grip.left);
-        turn(self.on.right, asked.right, went.right / right, grip.right);
+        }
     }
 
     /// m/s, forward positive.
-    pub(crate) fn rim_speeds(&self, motors: &[Motor; 6]) -> Wheels<f64> {
+    pub(crate) fn rim_speeds(&self, motors: &[Motor; 6]) -> [f64; 2] {
         self.rims(self.on.map(|OnChannel { channel, sign }| {
             sign * motors[channel].speed() * self.metres_per_count
         }))
     }
 
     /// Counts grow forward.
-    pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> Wheels<u16> {
+    pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> [u16; 2] {
         self.on.map(|OnChannel { channel, sign }| {
             let position = encoders[channel].position;
             if sign < 0.0 { (COUNT_CYCLE - position) % COUNT_CYCLE } else { position }

@@ -16,7 +16,7 @@ use glam::DVec2;
 
 use crate::{
     arduino_words::{ArduinoWords, Request},
-    body::{Body, Wheels},
+    body::Body,
     car::Car,
     drivetrain::{self, Drivetrain},
     gyro::Gyro,
@@ -199,7 +199,7 @@ impl Robot {
 
     fn is_moving(&self) -> bool {
         let ordered = self.motors.iter().any(|motor| motor.ends_at().is_some());
-        ordered || self.rims() != Wheels::default()
+        ordered || self.rims() != [0.0; 2]
     }
 
     pub fn meet(&mut self, other: Option<Other>) {
@@ -413,11 +413,10 @@ impl Robot {
             let mut ground =
                 drivetrain.rims(asked).map(|metres| drivetrain::slipped(metres, &wheels, noise));
             let blocked = self.blocked_wheels();
-            if blocked.left {
-                ground.left = 0.0;
-            }
-            if blocked.right {
-                ground.right = 0.0;
+            for (ground, blocked) in ground.iter_mut().zip(blocked) {
+                if blocked {
+                    *ground = 0.0;
+                }
             }
             let went = self.body.roll(ground, &self.world);
             let at_contact = drivetrain::grip(went != ground, &wheels);
@@ -426,31 +425,25 @@ impl Robot {
             drivetrain.turn(&mut self.motors, asked, went, grip, dt);
         }
         self.least_clearance = self.least_clearance.min(self.body.clearance());
-        let rims = self.rims();
-        if rims.left.abs().max(rims.right.abs()) > GroundTruthTick::AT_REST_M_S {
+        let [left, right] = self.rims();
+        if left.abs().max(right.abs()) > GroundTruthTick::AT_REST_M_S {
             self.stopping_time = self.stopping_time.max(now + dt - self.ordered_at);
         }
     }
 
     /// Something in the wheel or around it blocks it now.
-    fn blocked_wheels(&self) -> Wheels<bool> {
+    fn blocked_wheels(&self) -> [bool; 2] {
         let blocks = |wheel: &Block| {
             self.time >= wheel.from_s && wheel.until_s.is_none_or(|until| self.time < until)
         };
-        let mut now = Wheels::default();
-        for block in self.blocks.iter().filter(|block| blocks(block)) {
-            now.left |= block.wheels != BlockedWheels::Right;
-            now.right |= block.wheels != BlockedWheels::Left;
-        }
-        now
+        let now = || self.blocks.iter().filter(|block| blocks(block));
+        [BlockedWheels::Right, BlockedWheels::Left]
+            .map(|other| now().any(|block| block.wheels != other))
     }
 
-    fn rims(&self) -> Wheels<f64> {
+    fn rims(&self) -> [f64; 2] {
         match &self.car {
-            Some(car) => {
-                let driven = car.twist(&self.motors).v;
-                Wheels { left: driven, right: driven }
-            }
+            Some(car) => [car.twist(&self.motors).v; 2],
             None => self.drivetrain.rim_speeds(&self.motors),
         }
     }
@@ -459,7 +452,7 @@ impl Robot {
         if let Some(car) = &self.car {
             return car.twist(&self.motors);
         }
-        let Wheels { left, right } = self.rims();
+        let [left, right] = self.rims();
         Twist { v: (left + right) / 2.0, omega: (right - left) / self.body.track() }
     }
 
@@ -548,10 +541,7 @@ impl Robot {
             Some(arduino) => arduino
                 .counts(&self.motors)
                 .map(|counts| counts.rem_euclid(i32::from(COUNT_CYCLE)) as u16),
-            None => {
-                let counts = self.drivetrain.counts(&self.motor.encoders);
-                [counts.left, counts.right]
-            }
+            None => self.drivetrain.counts(&self.motor.encoders),
         };
         let clearance_m = self.least_clearance.min(GroundTruthTick::NOTHING_NEAR);
         self.least_clearance = self.body.clearance();

@@ -5,16 +5,13 @@
 
 use common::mission::Mission;
 
-use crate::{
-    body::Wheels,
-    noise::{Noise, Source},
-};
+use crate::noise::{Noise, Source};
 
 /// True values over nominal ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelErrors {
-    /// Their mean is 1.
-    pub diameter: Wheels<f64>,
+    /// Of the left and the right one; their mean is 1.
+    pub diameter: [f64; 2],
     pub track: f64,
     /// Share of the rolled way that slips away; below 0 it is won.
     pub slip_share: f64,
@@ -27,7 +24,7 @@ impl WheelErrors {
         let mut off = |spread: f64| spread * (2.0 * noise.uniform() - 1.0);
         let ratio = physics.diameter_ratio * (1.0 + off(physics.diameter_spread));
         Self {
-            diameter: Wheels { left: 2.0 / (1.0 + ratio), right: 2.0 * ratio / (1.0 + ratio) },
+            diameter: [2.0, 2.0 * ratio].map(|share| share / (1.0 + ratio)),
             track: physics.track_scale * (1.0 + off(physics.track_spread)),
             slip_share: physics.slip_share + off(physics.slip_share_spread),
         }
@@ -46,8 +43,7 @@ mod tests {
 
     #[test]
     fn wheels_in_the_laboratory_are_exactly_the_nominal_ones() {
-        let diameter = Wheels { left: 1.0, right: 1.0 };
-        let exact = WheelErrors { diameter, track: 1.0, slip_share: 0.0 };
+        let exact = WheelErrors { diameter: [1.0; 2], track: 1.0, slip_share: 0.0 };
         assert_eq!(errors("seed = 7\nsimulation.realism = 'laboratory'"), exact);
     }
 
@@ -56,7 +52,7 @@ mod tests {
         let robots = (1..=200)
             .map(|seed| errors(&format!("seed = {seed}\nsimulation.realism = 'measured'")));
         let robots: Vec<_> = robots.collect();
-        let ratio = |robot: &WheelErrors| robot.diameter.right / robot.diameter.left - 1.0;
+        let ratio = |robot: &WheelErrors| robot.diameter[1] / robot.diameter[0] - 1.0;
         let of = |value: &dyn Fn(&WheelErrors) -> f64| robots.iter().map(value).collect();
         let drawn: [(Vec<f64>, f64); 3] = [
             (of(&ratio), 0.008),

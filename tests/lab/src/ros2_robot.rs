@@ -16,9 +16,8 @@ use std::{
 use clap::Args;
 use common::{
     clock::{Pace, monotonic_ns},
-    driver::odometry::drive,
     json_wire::{Lines, Order, Report, Scan, line, parse},
-    kinematics::{DifferentialDrive, Pose2, Twist, WheelSpeeds},
+    kinematics::{DifferentialDrive, Pose2, Twist},
     mission::Mission,
     poll,
 };
@@ -174,16 +173,15 @@ struct Program {
     drive: DifferentialDrive,
     turns: f64,
     pose: Pose2,
-    wheels: Option<WheelSpeeds>,
+    wheels: Option<[f64; 2]>,
     taken_ns: Option<u64>,
 }
 
 impl Program {
     fn new(stated: &Mission, turns: f64) -> Self {
-        let drive = drive(&stated.body());
         Self {
             stated: stated.clone(),
-            drive,
+            drive: stated.body().unlimited(),
             turns,
             pose: Pose2::default(),
             wheels: None,
@@ -195,14 +193,14 @@ impl Program {
     fn order(&self, payload: &[u8]) -> Result<Order, Malformed> {
         let twist = msg::Twist::decode(payload)?;
         let [v, omega] = [twist.linear.x, twist.angular.z];
-        let WheelSpeeds { right, left } = self.drive.wheels(Twist { v, omega });
-        Ok(Order::Drive { wheels: [left, right], twist: [v, omega], for_s: WATCHDOG_S })
+        let wheels = self.drive.wheels(Twist { v, omega });
+        Ok(Order::Drive { wheels, twist: [v, omega], for_s: WATCHDOG_S })
     }
 
     fn take_wheels(&mut self, report: &Report) {
-        if let Some(now) = report.wheels.map(both) {
+        if let Some(now) = report.wheels {
             let before = self.wheels.replace(now).unwrap_or(now);
-            let turned = both([now.left - before.left, now.right - before.right]);
+            let turned = [0, 1].map(|wheel| now[wheel] - before[wheel]);
             let Twist { v: arc, omega: turn } = self.drive.twist(turned);
             self.pose = self.pose.along_arc(arc, self.turns * turn);
         }
@@ -224,7 +222,7 @@ impl Program {
     fn message(&self, content: Content, report: &Report, now_ns: u64) -> Option<Vec<u8>> {
         match content {
             Content::Odometry => {
-                let Twist { v, omega } = self.drive.twist(both(report.speeds?));
+                let Twist { v, omega } = self.drive.twist(report.speeds?);
                 let Pose2 { position, heading } = self.pose;
                 let pose = [position.x, position.y, heading];
                 let header = Header::at(now_ns, "odom");
@@ -270,10 +268,6 @@ impl Program {
         let header = Header::at(taken_ns, &sensor.name);
         Some(scan(header, sensor.fan().into(), limits, [beam_s, period_s], ranges))
     }
-}
-
-const fn both([left, right]: [f64; 2]) -> WheelSpeeds {
-    WheelSpeeds { right, left }
 }
 
 /// An `irobot_create_msgs/HazardDetectionVector` of what bumpers and cliff sensors feel, by the names of their rows.

@@ -12,14 +12,6 @@ pub struct Ackermann {
     creep: f64,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SteeredWheel {
-    /// omega_h, rad/s.
-    pub wheel: f64,
-    /// phi, radians, positive to the left.
-    pub steering: f64,
-}
-
 impl Ackermann {
     /// The radius r and the `wheelbase` L from the driven axle to the steered one in metres, the top speed in rad/s,
     /// the limit in radians, below pi/2. All positive. It creeps at `creep` m/s at most where a turn is asked for
@@ -39,15 +31,15 @@ impl Ackermann {
         self.wheelbase / self.steering_limit.tan()
     }
 
-    /// The map (3).
-    pub fn twist(&self, input: SteeredWheel) -> Twist {
-        let v = self.wheel_radius * input.wheel;
-        Twist { v, omega: input.steering.tan() / self.wheelbase * v }
+    /// The map (3) of omega_h, rad/s, and phi, radians, positive to the left.
+    pub fn twist(&self, [wheel, steering]: [f64; 2]) -> Twist {
+        let v = self.wheel_radius * wheel;
+        Twist { v, omega: steering.tan() / self.wheelbase * v }
     }
 
     /// (17): omega_h = v/r, phi = atan(L omega / v), clipped. A car cannot turn on the spot: it creeps forward where
     /// v would leave the turn impossible. A wheel at its limit keeps the steering, and so the curvature.
-    pub fn wheel(&self, twist: Twist) -> SteeredWheel {
+    pub fn wheel(&self, twist: Twist) -> [f64; 2] {
         let needed = twist.omega.abs() * self.least_turning_radius();
         let v = if twist.v.abs() < needed {
             let direction = if twist.v < 0.0 { -1.0 } else { 1.0 };
@@ -57,10 +49,10 @@ impl Ackermann {
         };
         let steering = if v == 0.0 { 0.0 } else { (self.wheelbase * twist.omega / v).atan() };
         let top = self.top_wheel_speed;
-        SteeredWheel {
-            wheel: (v / self.wheel_radius).clamp(-top, top),
-            steering: steering.clamp(-self.steering_limit, self.steering_limit),
-        }
+        [
+            (v / self.wheel_radius).clamp(-top, top),
+            steering.clamp(-self.steering_limit, self.steering_limit),
+        ]
     }
 }
 
@@ -90,13 +82,12 @@ mod tests {
     #[test]
     fn equation_3_by_hand_and_back() {
         // Wheels of 0.1 m, 0.5 m between the axles: at 45 degrees and 4 rad/s v = 0.4, omega = 0.4 / 0.5 = 0.8.
-        let input = SteeredWheel { wheel: 4.0, steering: FRAC_PI_4 };
-        let twist = car(1.0).twist(input);
+        let twist = car(1.0).twist([4.0, FRAC_PI_4]);
         close(twist.v, 0.4);
         close(twist.omega, 0.8);
-        let back = car(1.0).wheel(twist);
-        close(back.wheel, 4.0);
-        close(back.steering, FRAC_PI_4);
+        let [wheel, steering] = car(1.0).wheel(twist);
+        close(wheel, 4.0);
+        close(steering, FRAC_PI_4);
     }
 
     #[test]
@@ -107,10 +98,10 @@ mod tests {
 
     #[test]
     fn a_car_asked_to_turn_at_rest_creeps_forward_at_full_steering() {
-        let input = car(0.5).wheel(Twist { v: 0.0, omega: -1.0 });
-        close(input.wheel, 0.5);
-        close(input.steering, -0.5);
-        assert_eq!(car(0.5).wheel(Twist::default()), SteeredWheel::default());
+        let [wheel, steering] = car(0.5).wheel(Twist { v: 0.0, omega: -1.0 });
+        close(wheel, 0.5);
+        close(steering, -0.5);
+        assert_eq!(car(0.5).wheel(Twist::default()), [0.0; 2]);
     }
 
     #[test]
@@ -124,9 +115,9 @@ mod tests {
     #[test]
     fn what_the_inverse_asks_for_is_always_within_the_limits() {
         for twist in twists() {
-            let input = car(0.5).wheel(twist);
-            assert!(input.wheel.abs() <= 10.0, "{twist:?} gave {input:?}");
-            assert!(input.steering.abs() <= 0.5, "{twist:?} gave {input:?}");
+            let [wheel, steering] = car(0.5).wheel(twist);
+            assert!(wheel.abs() <= 10.0, "{twist:?} gave {wheel}");
+            assert!(steering.abs() <= 0.5, "{twist:?} gave {steering}");
         }
     }
 

@@ -9,36 +9,27 @@ pub struct DifferentialDrive {
     top_wheel_speed: f64,
 }
 
-/// rad/s.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct WheelSpeeds {
-    /// omega_R.
-    pub right: f64,
-    /// omega_L.
-    pub left: f64,
-}
-
 impl DifferentialDrive {
     /// The `radius` r and the `track` W in metres, the top speed in rad/s; all positive.
     pub fn new(radius: f64, track: f64, top_wheel_speed: f64) -> Self {
         Self { radius, track, top_wheel_speed }
     }
 
-    /// (2). The map is linear, so wheel angles give (arc, turn).
-    pub fn twist(&self, WheelSpeeds { right, left }: WheelSpeeds) -> Twist {
+    /// (2) of omega_L and omega_R, rad/s. The map is linear, so wheel angles give (arc, turn).
+    pub fn twist(&self, [left, right]: [f64; 2]) -> Twist {
         let (half, over) = (self.radius / 2.0, self.radius / self.track);
         Twist { v: half * right + half * left, omega: over * right - over * left }
     }
 
-    /// (17); both are scaled by one factor when a wheel would exceed its limit, so that the curvature stays.
-    pub fn wheels(&self, twist: Twist) -> WheelSpeeds {
+    /// (17): omega_L and omega_R, rad/s; both are scaled by one factor when a wheel would exceed its limit, so that the curvature stays.
+    pub fn wheels(&self, twist: Twist) -> [f64; 2] {
         let (rim, turn) =
             (1.0 / self.radius * twist.v, self.track / (2.0 * self.radius) * twist.omega);
         let (right, left) = (rim + turn, rim - turn);
         let fastest = right.abs().max(left.abs());
         let scale =
             if fastest > self.top_wheel_speed { self.top_wheel_speed / fastest } else { 1.0 };
-        WheelSpeeds { right: right * scale, left: left * scale }
+        [left * scale, right * scale]
     }
 }
 
@@ -54,7 +45,7 @@ mod tests {
     fn equation_2_by_hand() {
         // r = 0.1, W = 0.4: v = 0.05 (3 + 1) = 0.2, omega = 0.25 (3 - 1) = 0.5.
         let drive = DifferentialDrive::new(0.1, 0.4, 100.0);
-        let twist = drive.twist(WheelSpeeds { right: 3.0, left: 1.0 });
+        let twist = drive.twist([1.0, 3.0]);
         close(twist.v, 0.2);
         close(twist.omega, 0.5);
     }
@@ -62,17 +53,17 @@ mod tests {
     #[test]
     fn equation_17_inverts_equation_2() {
         let drive = DifferentialDrive::new(0.1, 0.4, 100.0);
-        let wheels = drive.wheels(Twist { v: 0.2, omega: 0.5 });
-        close(wheels.right, 3.0);
-        close(wheels.left, 1.0);
+        let [left, right] = drive.wheels(Twist { v: 0.2, omega: 0.5 });
+        close(right, 3.0);
+        close(left, 1.0);
     }
 
     #[test]
     fn saturation_keeps_the_curvature() {
         // Unlimited: (3, 1) rad/s; the limit 1.5 halves both.
         let drive = DifferentialDrive::new(0.1, 0.4, 1.5);
-        let wheels = drive.wheels(Twist { v: 0.2, omega: 0.5 });
-        close(wheels.right, 1.5);
-        close(wheels.left, 0.5);
+        let [left, right] = drive.wheels(Twist { v: 0.2, omega: 0.5 });
+        close(right, 1.5);
+        close(left, 0.5);
     }
 }

@@ -1,8 +1,4 @@
-use super::{
-    ackermann::{Ackermann, SteeredWheel},
-    differential::{DifferentialDrive, WheelSpeeds},
-    pose::Twist,
-};
+use super::{ackermann::Ackermann, differential::DifferentialDrive, pose::Twist};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drive {
@@ -15,14 +11,8 @@ impl Drive {
     /// steering angle, radians, positive to the left.
     pub fn inputs(&self, twist: Twist) -> [f64; 2] {
         match self {
-            Self::Differential(drive) => {
-                let WheelSpeeds { right, left } = drive.wheels(twist);
-                [left, right]
-            }
-            Self::Ackermann(drive) => {
-                let SteeredWheel { wheel, steering } = drive.wheel(twist);
-                [wheel, steering]
-            }
+            Self::Differential(drive) => drive.wheels(twist),
+            Self::Ackermann(drive) => drive.wheel(twist),
         }
     }
 }

@@ -40,7 +40,6 @@ mod tests {
     use std::path::Path;
 
     use common::{
-        kinematics::SteeredWheel,
         mission::Mission,
         samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus, TargetPoint},
         stage::Answering as _,
@@ -109,7 +108,7 @@ mod tests {
         let twist = |limit| {
             let command = command(&mission, GuidanceStatus::Along, 0.3, limit);
             assert!(drives(&command));
-            drive.twist(SteeredWheel { wheel: command.left_rad_s, steering: command.right_rad_s })
+            drive.twist([command.left_rad_s, command.right_rad_s])
         };
         let (free, limited) = (twist(f64::INFINITY), twist(0.1));
         assert!((limited.v - 0.1).abs() < 1e-12, "{limited:?}");

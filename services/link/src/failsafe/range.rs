@@ -15,8 +15,8 @@ use std::{f64::consts::TAU, ops::RangeInclusive, time::Duration};
 
 use common::{
     clock::MissionTime,
-    driver::{counts::WheelCounts, odometry::drive},
-    kinematics::{Pose2, SteeredWheel, WheelSpeeds},
+    driver::counts::WheelCounts,
+    kinematics::Pose2,
     mission::{Body, Mission, Sensor, SensorKind},
     samples::{Cause, RangeReading, RangeStatus},
 };
@@ -218,14 +218,14 @@ pub struct Range {
 impl Range {
     fn turn(&mut self, counts: WheelCounts, now: MissionTime) {
         if let Some(before) = self.counts.replace(counts) {
-            let [left, right] = counts.since(before).map(|it| it * TAU / self.body.counts_per_turn);
+            let wheels = counts.since(before).map(|it| it * TAU / self.body.counts_per_turn);
             let twist = match (self.body.ackermann(), self.body.steering) {
                 (Some(car), Some(steers)) => {
                     // Its second encoder is the steering's, 0 straight ahead.
                     let [_, angle] = counts.since([0; 2].into());
-                    car.twist(SteeredWheel { wheel: left, steering: steers.angle(angle) })
+                    car.twist([wheels[0], steers.angle(angle)])
                 }
-                _ => drive(&self.body).twist(WheelSpeeds { right, left }),
+                _ => self.body.unlimited().twist(wheels),
             };
             self.pose = self.pose.along_arc(twist.v, twist.omega);
             self.way_m += twist.v;

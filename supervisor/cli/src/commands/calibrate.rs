@@ -159,7 +159,7 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
 fn noise_of_its_own(mission: &mut Mission, number: u32) {
     let errors = x80_sim::wheel_errors::WheelErrors::of(mission);
     let wheels = &mut mission.simulation.wheels;
-    wheels.diameter_ratio = Some(errors.diameter.right / errors.diameter.left);
+    wheels.diameter_ratio = Some(errors.diameter[1] / errors.diameter[0]);
     wheels.track_scale = Some(errors.track);
     wheels.slip_share = Some(errors.slip_share);
     (wheels.diameter_spread, wheels.track_spread) = (Some(0.0), Some(0.0));
