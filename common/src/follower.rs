@@ -1,6 +1,9 @@
 //! A consumer that waits for a robot, follows it from run to run, and says when it is gone.
 
-use std::time::{Duration, Instant};
+use std::{
+    os::fd::BorrowedFd,
+    time::{Duration, Instant},
+};
 
 use crate::{
     bus::{Bus, BusError},
@@ -81,6 +84,15 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     /// # Errors
     /// When an existing bus cannot be used. Waiting again does not help until someone has repaired it.
     pub fn wait(&mut self, timeout: Duration) -> Result<Event<'_, Topics>, BusError> {
+        self.wait_also_for(&[], timeout)
+    }
+
+    /// [`Follower::wait`], which also ends with [`Event::Samples`] when one of `others` is readable while the robot is there.
+    pub fn wait_also_for(
+        &mut self,
+        others: &[BorrowedFd<'_>],
+        timeout: Duration,
+    ) -> Result<Event<'_, Topics>, BusError> {
         let began = Instant::now();
         while self.joined.is_none() {
             if self.look()? {
@@ -96,7 +108,8 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         loop {
             let left = timeout.saturating_sub(began.elapsed());
             if let Some(joined) = &self.joined {
-                came = joined.waiter.wait(left.min(LOOK_EVERY)).unwrap_or(false);
+                let waited = joined.waiter.wait_also_for(others, left.min(LOOK_EVERY));
+                came = waited.unwrap_or(false);
             }
             if came {
                 break;

@@ -11,6 +11,9 @@ use super::{
     topic::Topic,
 };
 
+/// An eighth of a recorder's smallest buffer for samples that wake nobody.
+const MOST_UNNOTICED: u32 = 128;
+
 impl Bus {
     /// Write `topic` as the `generation`-th process of its stage. It fails if the topic is missing, carries another payload, or has no
     /// place left.
@@ -71,8 +74,9 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         self.wake()
     }
 
-    /// [`Writer::publish_slice`] without waking the readers; [`Writer::wake`] does that. If no memory is left for the sample, it is lost,
-    /// as if its readers had not taken it in time: the sequence has a gap, and [`Bus::lost`] counts it.
+    /// [`Writer::publish_slice`] without waking the readers; [`Writer::wake`] does that. Each [`MOST_UNNOTICED`]th sample wakes them, so
+    /// none overruns the buffer of a recorder that sleeps. If no memory is left for the sample, it is lost, as if its readers had not
+    /// taken it in time: the sequence has a gap, and [`Bus::lost`] counts it.
     pub fn publish_quietly(
         &mut self,
         tick: u64,
@@ -84,7 +88,7 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
             Err(BusError::NoMemory { .. }) => self.lost.set(self.lost.get() + 1),
             sent => sent?,
         }
-        Ok(())
+        if self.sequence.is_multiple_of(MOST_UNNOTICED) { self.wake() } else { Ok(()) }
     }
 
     fn send(&mut self, tick: u64, time: MissionTime, mut header: H, slice: &[E]) -> Result {

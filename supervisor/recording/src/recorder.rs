@@ -8,6 +8,7 @@ use std::{
     collections::BTreeMap,
     fs::{self, File},
     io::{self, BufRead, BufReader},
+    os::fd::BorrowedFd,
     path::{Path, PathBuf},
     time::{Duration, Instant, SystemTime},
 };
@@ -34,8 +35,11 @@ use crate::{
     viewers::{self, Drawn},
 };
 
-/// Longest time between two reads of the bus.
-const POLL: Duration = Duration::from_millis(10);
+/// Longest time between two looks for a run, whose first samples a recorder misses that comes late.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+/// Longest time between two reads of the bus. Events wake the recorder before a buffer is full; scans are the exception, and theirs
+/// lasts for 0.4 s of a laser at 40 Hz and four times its pace.
+const READ_EVERY: Duration = Duration::from_millis(100);
 const LOGS_EVERY: Duration = Duration::from_millis(250);
 const LONGEST_RUN_FILE: u64 = 1 << 24;
 /// Niceness of a recorder of stages that answer a robot.
@@ -90,13 +94,29 @@ pub enum Wish {
     Stop,
 }
 
+/// The caller's wishes.
+pub trait Wishes {
+    fn next_wish(&mut self) -> Wish;
+
+    /// Readable when there may be another wish.
+    fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
+        Vec::new()
+    }
+}
+
+impl<F: FnMut() -> Wish> Wishes for F {
+    fn next_wish(&mut self) -> Wish {
+        self()
+    }
+}
+
 /// The readers of one bus.
 type Readers = Vec<(&'static dyn AnyTopic, Box<dyn AnyReader>)>;
 
 /// Record until the caller wishes it to stop, or a single run until its end.
 pub fn record(
     options: &Options,
-    wish: &mut dyn FnMut() -> Wish,
+    wishes: &mut dyn Wishes,
     tell: &mut dyn FnMut(Happened<'_>),
 ) -> Result {
     let chosen = options.topics();
@@ -105,10 +125,10 @@ pub fn record(
         chosen.iter().map(read).collect()
     };
     let domain = options.domain.clone();
-    // The recorder wakes at the end of a tick, at the start of a generation, which may be killed soon, and for what processes publish that
-    // end with it.
+    // The recorder wakes at the end of a tick, at the start of a generation, which may be killed soon, for what processes publish that
+    // end with it, and before the buffer of a topic overflows whose samples wake nobody.
     let mut follower = Follower::new(domain, "recorder", &topics::LINK, open)
-        .also_on([&topics::INPUTS as &'static dyn AnyTopic, &topics::FAULTS]);
+        .also_on([&topics::INPUTS as &'static dyn AnyTopic, &topics::WIRE, &topics::FAULTS]);
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;
@@ -116,9 +136,14 @@ pub fn record(
     let earlier = options.run.as_deref().map(places::parts).unwrap_or_default();
     let mut budget = options.budget.map(|bytes| Budget::new(bytes, earlier));
     loop {
-        let wish = wish();
+        let wish = wishes.next_wish();
         let stopped = wish == Wish::Stop;
-        let news = match follower.wait(if wish == Wish::Record { POLL } else { Duration::ZERO })? {
+        let patience = match wish {
+            Wish::Record if current.is_some() && !joins => READ_EVERY,
+            Wish::Record => LOOK_EVERY,
+            Wish::CatchUp | Wish::Stop => Duration::ZERO,
+        };
+        let news = match follower.wait_also_for(&wishes.descriptors(), patience)? {
             Event::Connected => Some(true),
             Event::Disconnected => Some(false),
             Event::Samples(_) | Event::Nothing => None,

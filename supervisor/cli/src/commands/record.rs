@@ -1,7 +1,7 @@
 use std::{
     fs::{self, File},
     io::{self, Read as _},
-    os::fd::AsFd as _,
+    os::fd::{AsFd, BorrowedFd},
     path::{Path, PathBuf},
     str::FromStr,
     time::Duration,
@@ -17,7 +17,7 @@ use common::{
 };
 use recording::{
     Options,
-    recorder::{Happened, Wish},
+    recorder::{Happened, Wish, Wishes},
 };
 
 use super::topic::readable;
@@ -86,8 +86,35 @@ fn refuse_unwritable(out: &Path) -> Result<(), FileError> {
         .map_err(FileError::of("write", out))
 }
 
+struct Asks {
+    signals: Signals,
+    /// The supervisor writes a byte for each wish, and may end before its recorder.
+    supervisor: Option<File>,
+}
+
+impl Wishes for Asks {
+    fn next_wish(&mut self) -> Wish {
+        if self.signals.came() {
+            return Wish::Stop;
+        }
+        let asks = self.supervisor.as_mut();
+        let asked = asks.filter(|asks| matches!(poll::is_readable(asks, Duration::ZERO), Ok(true)));
+        match asked.map(|asks| asks.read(&mut [0])) {
+            Some(Ok(1)) => return Wish::CatchUp,
+            Some(_) => self.supervisor = None,
+            None => {}
+        }
+        Wish::Record
+    }
+
+    fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
+        let supervisor = self.supervisor.as_ref().map(AsFd::as_fd);
+        supervisor.into_iter().chain([self.signals.as_fd()]).collect()
+    }
+}
+
 pub fn main(arguments: &Arguments) -> Result {
-    let mut signals = Signals::that_end()?;
+    let signals = Signals::that_end()?;
     if let Some(supervisor) = arguments.supervisor {
         become_child("recorder", supervisor)?;
     }
@@ -118,24 +145,9 @@ pub fn main(arguments: &Arguments) -> Result {
             write_stderr(&format!("firsthand: cannot say so: {error}\n"));
         }
     };
-    // The supervisor writes a byte for each wish, and may end before its recorder.
-    let mut asks = match arguments.supervisor {
+    let supervisor = match arguments.supervisor {
         Some(_) => Some(File::from(io::stdin().as_fd().try_clone_to_owned()?)),
         None => None,
     };
-    let mut wish = || {
-        if signals.came() {
-            return Wish::Stop;
-        }
-        let asked = asks
-            .as_mut()
-            .filter(|asks| matches!(poll::is_readable(asks, Duration::ZERO), Ok(true)));
-        match asked.map(|asks| asks.read(&mut [0])) {
-            Some(Ok(1)) => return Wish::CatchUp,
-            Some(_) => asks = None,
-            None => {}
-        }
-        Wish::Record
-    };
-    Ok(recording::record(&options, &mut wish, &mut tell)?)
+    Ok(recording::record(&options, &mut Asks { signals, supervisor }, &mut tell)?)
 }
