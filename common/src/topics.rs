@@ -17,11 +17,9 @@ pub use crate::bus::{
 
 /// How often the supervisor publishes its order and the roster again, for consumers that joined later.
 pub const RESTATE: Duration = Duration::from_millis(200);
-/// Heartbeats are farther apart than ticks at 7 Hz, so a stage that answers ticks beats with them and need not wake for a
-/// beat alone. Five of them fit in the tightest deadline of a heartbeat.
+/// Heartbeats, and the link's state, are farther apart than ticks at 7 Hz, so a stage that answers ticks publishes them with those and
+/// need not wake for them alone. Five of them fit in the tightest deadline of a heartbeat.
 const BEAT: Duration = Duration::from_millis(150);
-/// The link is published so often while no ticks come, so that `firsthand status` is up to date.
-const LINK_AGAIN: Duration = Duration::from_millis(100);
 
 /// The field is for displays and recorders; no stage waits for it. In mission time.
 const FIELD_RATE: Rate = Rate::OnChange {
@@ -112,7 +110,7 @@ topics! {
     /// Heartbeats, from inside the work loop.
     HEALTH "health": HealthSample, EVERY_STAGE, on_change(BEAT);
     /// The connection to the robot: its state, counts, tick latency.
-    LINK "link": LinkSample, "link", on_change(LINK_AGAIN);
+    LINK "link": LinkSample, "link", on_change(BEAT);
     /// What a stage cannot use and the remedy, about once a second while it lasts.
     COMPLAINTS "complaints": ComplaintSample, "link", Rate::WhenItHappens;
     /// The seven infrared rangers, metres.

@@ -17,17 +17,18 @@ pub fn readable(
     descriptors: &[BorrowedFd<'_>],
     timeout: Option<Duration>,
 ) -> io::Result<Vec<bool>> {
-    let mut polled: Vec<PollFd<'_>> = descriptors
-        .iter()
-        .map(|&descriptor| PollFd::from_borrowed_fd(descriptor, PollFlags::IN))
-        .collect();
-    wait(&mut polled, timeout)?;
-    Ok(polled.iter().map(|descriptor| !descriptor.revents().is_empty()).collect())
+    let mut all: Vec<_> = descriptors.iter().copied().map(polled).collect();
+    wait(&mut all, timeout)?;
+    Ok(all.iter().map(|descriptor| !descriptor.revents().is_empty()).collect())
+}
+
+pub(crate) fn polled(descriptor: BorrowedFd<'_>) -> PollFd<'_> {
+    PollFd::from_borrowed_fd(descriptor, PollFlags::IN)
 }
 
 /// Whether `descriptor` is readable, closed or broken within `timeout`.
 pub fn is_readable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool> {
-    Ok(readable(&[descriptor.as_fd()], Some(timeout))?.contains(&true))
+    wait(&mut [polled(descriptor.as_fd())], Some(timeout))
 }
 
 /// Whether `descriptor` is writable, closed or broken within `timeout`.
@@ -43,7 +44,7 @@ pub fn is_closed(descriptor: impl AsFd) -> io::Result<bool> {
 }
 
 /// Whether an event occurred within `timeout`; `poll` notes the events in `polled`.
-fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::Result<bool> {
+pub(crate) fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::Result<bool> {
     let began = Instant::now();
     loop {
         let left = timeout.map(|timeout| timeout.saturating_sub(began.elapsed()));

@@ -21,7 +21,6 @@ use super::{
     authors::Author,
     error::Result,
     payload::{Payload, Stamped, has_slice},
-    reserve::Places,
     spec::Spec,
 };
 
@@ -40,13 +39,7 @@ impl<H: Payload, E: Payload> Service<H, E> {
 
     pub(super) fn publisher(&self, longest: usize) -> Result<Publisher<H, E>> {
         let longest = if has_slice::<E>() { longest } else { 1 };
-        let raw = self.raw.publisher(self.spec, longest)?;
-        Ok(Publisher {
-            places: raw.places(self.spec.name, longest)?,
-            raw,
-            topic: self.spec.name,
-            carries: PhantomData,
-        })
+        Ok(Publisher { raw: self.raw.publisher(self.spec, longest)?, carries: PhantomData })
     }
 
     /// A subscriber with a buffer for the newest `buffer` samples that were not taken yet.
@@ -66,19 +59,17 @@ impl<H: Payload, E: Payload> Service<H, E> {
 #[derive(Debug)]
 pub(super) struct Publisher<H, E> {
     raw: RawPublisher,
-    places: Places,
-    topic: &'static str,
     carries: PhantomData<fn() -> (H, E)>,
 }
 
 impl<H: Payload, E: Payload> Publisher<H, E> {
     pub(super) const fn topic(&self) -> &'static str {
-        self.topic
+        self.raw.topic
     }
 
     pub(super) fn send(&self, header: H, slice: &[E]) -> Result {
         let count = if has_slice::<E>() { slice.len() } else { 1 };
-        self.raw.send(self.topic, &self.places, count, &mut |loan| {
+        self.raw.send(count, &mut |loan| {
             let place = match has_slice::<E>() {
                 true => loan.header.addr(),
                 false => loan.elements.as_mut_ptr().expose_provenance(),

@@ -7,7 +7,7 @@ use std::{
 
 use crate::{
     error::{BusError, Result},
-    poll,
+    poll::{self, polled},
     read::Wakeup,
 };
 
@@ -39,16 +39,19 @@ impl Waiter {
     pub fn wait_also_for(&self, others: &[BorrowedFd<'_>], timeout: Duration) -> Result<bool> {
         let wakeups = self.wakeups.iter().map(AsFd::as_fd);
         let own = self.descriptors.iter().map(AsFd::as_fd);
-        let all: Vec<BorrowedFd<'_>> = wakeups.chain(own).chain(others.iter().copied()).collect();
+        let all = wakeups.chain(own).chain(others.iter().copied());
+        let mut all: Vec<_> = all.map(polled).collect();
         let mut woken = false;
         for wakeup in &self.wakeups {
             woken |= wakeup.drain_what_came_meanwhile()?;
         }
         let timeout = if woken { Duration::ZERO } else { timeout };
-        let came = poll::readable(&all, Some(timeout)).map_err(BusError::Wait)?;
-        for (wakeup, _) in self.wakeups.iter().zip(&came).filter(|(_, came)| **came) {
-            wakeup.drain()?;
+        let came = poll::wait(&mut all, Some(timeout)).map_err(BusError::Wait)?;
+        for (wakeup, polled) in self.wakeups.iter().zip(&all) {
+            if !polled.revents().is_empty() {
+                wakeup.drain()?;
+            }
         }
-        Ok(woken || came.contains(&true))
+        Ok(woken || came)
     }
 }

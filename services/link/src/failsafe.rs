@@ -172,6 +172,11 @@ impl Decision {
         self.action >= Action::Stop
     }
 
+    fn of(applying: [Option<bool>; TABLE.len()]) -> Self {
+        let rules = TABLE.iter().zip(applying);
+        Self::worst(rules.filter_map(|(rule, applies)| applies?.then_some(rule)))
+    }
+
     /// The worst action of the rules `applying`, and the first cause with this action.
     fn worst<'a>(applying: impl IntoIterator<Item = &'a Rule>) -> Self {
         let mut worst = Self::GO;
@@ -212,17 +217,29 @@ impl Failsafe {
 
     /// Decide what to do now. In lockstep, and while the robot does not answer, the monitors that judge its frames are not asked.
     pub(crate) fn decide(&mut self, lockstep: bool, now: Moment) -> Decision {
+        let applying = self.applying(lockstep, now);
+        for (applied, applies) in self.applied.iter_mut().zip(applying) {
+            *applied = applies.unwrap_or(*applied);
+        }
+        Decision::of(applying)
+    }
+
+    /// The decision at a later time if nothing comes until then.
+    pub(crate) fn foresee(&self, lockstep: bool, then: Moment) -> Decision {
+        Decision::of(self.applying(lockstep, then))
+    }
+
+    /// Whether each row of [`TABLE`] applies; none where its monitor is not asked.
+    fn applying(&self, lockstep: bool, now: Moment) -> [Option<bool>; TABLE.len()] {
         let judges_frames = !lockstep && self.monitors.presence.connected();
-        let monitors = &self.monitors;
-        let rules = TABLE.iter().zip(&mut self.applied);
-        Decision::worst(rules.filter_map(|(rule, applied)| {
-            let monitor = (rule.monitor)(monitors);
-            if monitor.judges_frames() && !judges_frames {
-                return None;
-            }
-            *applied = rule.clears.applies(*applied, monitor.condition(rule.cause, now));
-            applied.then_some(rule)
-        }))
+        std::array::from_fn(|row| {
+            let rule = &TABLE[row];
+            let monitor = (rule.monitor)(&self.monitors);
+            let is_asked = judges_frames || !monitor.judges_frames();
+            let applies =
+                || rule.clears.applies(self.applied[row], monitor.condition(rule.cause, now));
+            is_asked.then(applies)
+        })
     }
 
     pub(crate) fn applied(&self, cause: Cause) -> bool {

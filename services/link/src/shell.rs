@@ -34,6 +34,7 @@ use crate::{
     failsafe::{
         Decision,
         battery::{BatteryChange, Charge},
+        monitor::Moment,
     },
     stage::LinkStage,
     step::{Effect, Entry, Event},
@@ -41,7 +42,7 @@ use crate::{
     transport::Transport,
 };
 
-/// Interval of the checks without input: a fifth of the shortest deadline.
+/// Interval of the checks without input, unless nothing is due sooner than the link is restated: a fifth of the shortest deadline.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
 /// A flood delays the heartbeat by no more than this, and a datagram; the rest waits for the next turn.
@@ -237,14 +238,23 @@ impl Process for Shell {
     /// Called without input, the link repeats commands, runs the failsafe and polls the robot.
     fn looks_again_after(&self) -> Option<Duration> {
         let link = &self.runner.stage.link;
-        let until_poll = match self.clock {
+        let at = |machine_ns| {
+            let time = self.clock.at(link.state().next_tick, machine_ns);
+            Moment { time, machine_ns }
+        };
+        let now = at(monotonic_ns());
+        let until_due = match self.clock {
             MissionClock::Wall { rate, .. } if rate > 0.0 => {
-                let now = self.clock.at(link.state().next_tick, monotonic_ns());
-                link.until_poll(now).map(|span| span.div_f64(rate))
+                link.until_due(now.time).map(|span| span.div_f64(rate))
             }
             _ => None,
         };
-        Some(until_poll.map_or(LOOKS_AGAIN, |until| until.min(LOOKS_AGAIN)))
+        let restated = at(self.stated_ns + LINK.spec().restated_every().as_nanos() as u64);
+        let looks = match link.is_calm_until(restated) {
+            true => Duration::from_nanos(restated.machine_ns.saturating_sub(now.machine_ns)),
+            false => LOOKS_AGAIN,
+        };
+        Some(until_due.map_or(looks, |until| until.min(looks)))
     }
 
     fn idle(&mut self) -> Result<(), StageError> {

@@ -127,8 +127,11 @@ pub fn record(
     let domain = options.domain.clone();
     // The recorder wakes at the end of a tick, at the start of a generation, which may be killed soon, for what processes publish that
     // end with it, and before the buffer of a topic overflows whose samples wake nobody.
-    let mut follower = Follower::new(domain, "recorder", &topics::LINK, open)
-        .also_on([&topics::INPUTS as &'static dyn AnyTopic, &topics::WIRE, &topics::FAULTS]);
+    let mut follower = Follower::new(domain, "recorder", &topics::LINK, open).also_on([
+        &topics::INPUTS as &'static dyn AnyTopic,
+        &topics::WIRE,
+        &topics::FAULTS,
+    ]);
     let mut current: Option<CurrentRun> = None;
     let mut files = 0;
     let mut supervisor = None;

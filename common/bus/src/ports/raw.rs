@@ -91,7 +91,7 @@ dropped_here! {
     /// Is readable when a sample was published on a topic.
     Listener(listener::Listener<ipc::Service>);
     RawService(PortFactory<ipc::Service, Bytes, CustomHeaderMarker>);
-    RawPublisher(publisher::Publisher<ipc::Service, Bytes, CustomHeaderMarker>);
+    PublisherPort(publisher::Publisher<ipc::Service, Bytes, CustomHeaderMarker>);
     RawSubscriber(subscriber::Subscriber<ipc::Service, Bytes, CustomHeaderMarker>);
     RawSample(sample::Sample<ipc::Service, Bytes, CustomHeaderMarker>);
 }
@@ -241,13 +241,19 @@ impl RawService {
     }
 
     pub(super) fn publisher(&self, spec: &Spec, longest: usize) -> Result<RawPublisher> {
-        let publisher = self
+        let port: PublisherPort = self
             .publisher_builder()
             .initial_max_slice_len(longest)
             .allocation_strategy(AllocationStrategy::Static)
             .create()
-            .map_err(refused("write", spec.name))?;
-        Ok(publisher.into())
+            .map_err(refused("write", spec.name))?
+            .into();
+        // SAFETY: `longest` is 1 where samples have no slice.
+        let loan =
+            || unsafe { port.loan_custom_payload(longest) }.map_err(refused("write", spec.name));
+        let first = [loan()?, loan()?];
+        let first = first.each_ref().map(|sample| ptr::from_ref(sample.header()).addr());
+        Ok(RawPublisher { places: Places::of_segment(first), port, topic: spec.name })
     }
 
     pub(super) fn subscriber(&self, spec: &Spec, buffer: usize) -> Result<RawSubscriber> {
@@ -271,29 +277,21 @@ pub(super) struct Loan<'a> {
     pub(super) elements: &'a mut [MaybeUninit<CustomPayloadMarker>],
 }
 
-impl RawPublisher {
-    /// The places of a new publisher for samples of `elements` elements.
-    pub(super) fn places(&self, topic: &'static str, elements: usize) -> Result<Places> {
-        // SAFETY: `elements` is 1 where samples have no slice.
-        let loan =
-            || unsafe { self.loan_custom_payload(elements) }.map_err(refused("write", topic));
-        let first = [loan()?, loan()?];
-        let first = first.each_ref().map(|sample| ptr::from_ref(sample.header()).addr());
-        Ok(Places::of_segment(first))
-    }
+#[derive(Debug)]
+pub(super) struct RawPublisher {
+    port: PublisherPort,
+    places: Places,
+    pub(super) topic: &'static str,
+}
 
+impl RawPublisher {
     /// Publish a sample of `elements` elements. `fill` writes the header and all elements, or returns false if they do not fit.
-    pub(super) fn send(
-        &self,
-        topic: &'static str,
-        places: &Places,
-        elements: usize,
-        fill: &mut dyn FnMut(Loan<'_>) -> bool,
-    ) -> Result {
+    pub(super) fn send(&self, elements: usize, fill: &mut dyn FnMut(Loan<'_>) -> bool) -> Result {
+        let topic = self.topic;
         // SAFETY: `elements` is 1 where samples have no slice.
-        let mut sample =
-            unsafe { self.loan_custom_payload(elements) }.map_err(refused("publish on", topic))?;
-        if !places.reserve_behind(ptr::from_ref(sample.header()).expose_provenance()) {
+        let sample = unsafe { self.port.loan_custom_payload(elements) };
+        let mut sample = sample.map_err(refused("publish on", topic))?;
+        if !self.places.reserve_behind(ptr::from_ref(sample.header()).expose_provenance()) {
             return Err(BusError::NoMemory { topic });
         }
         let header = ptr::from_mut(sample.user_header_mut());

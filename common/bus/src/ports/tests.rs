@@ -23,6 +23,7 @@ use crate::{
     domain::{Domain, SHARED_MEMORY},
     layout::{Kind, Layout as _},
     layouts,
+    reserve::Places,
     spec::Limits,
     waiter::Waiter,
 };

@@ -13,7 +13,6 @@ use std::{
         unix::{fs::DirBuilderExt as _, net::UnixDatagram},
     },
     path::PathBuf,
-    thread,
     time::{Duration, Instant},
 };
 
@@ -230,7 +229,14 @@ impl Meeting {
                         self.is_missed = true;
                         break false;
                     }
-                    thread::sleep(AGAIN);
+                    // Only a connected socket waits for the other's room, and it would hear nobody but the other of now.
+                    let has_room = UnixDatagram::unbound().and_then(|asks| {
+                        asks.connect(&self.other)?;
+                        poll::is_writable(asks, AGAIN)
+                    });
+                    if has_room.is_err() {
+                        break false;
+                    }
                 }
                 sent => break sent.is_ok(),
             }
