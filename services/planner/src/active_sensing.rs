@@ -138,7 +138,7 @@ impl ActiveSensing {
     ) -> bool {
         !view.is_hazard(at)
             && view.unscanned(at, self.ground_m).next().is_none()
-            && (self.has_laser || undetected.exclude_all(at, axis))
+            && (self.has_laser || undetected.normals(at, axis).next().is_none())
     }
 
     /// The direction to a point of the `way` ahead, with an open line to it. The field bends right before a hazard, so a robot that follows

@@ -160,34 +160,17 @@ impl UndetectedSurfaces {
 
     /// Unit vectors towards surfaces that a body at `at`, going along the unit vector `along`, could touch and no reading excludes.
     pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> + use<> {
-        let mut found = [None; NORMALS];
-        self.find(at, along, |normals| {
-            found.iter_mut().zip(normals).for_each(|(to, it)| *to = Some(it))
-        });
-        found.into_iter().flatten()
-    }
-
-    /// Whether readings exclude all surfaces that [`UndetectedSurfaces::normals`] looks for.
-    pub(crate) fn exclude_all(&self, at: DVec2, along: DVec2) -> bool {
-        self.find(at, along, |normals| normals.next().is_none())
-    }
-
-    fn find<T>(
-        &self,
-        at: DVec2,
-        along: DVec2,
-        take: impl FnOnce(&mut dyn Iterator<Item = DVec2>) -> T,
-    ) -> T {
         let heading = along.to_angle();
         let mut rays = self.near.borrow_mut();
         rays.clear();
         rays.extend(self.rays.iter().filter_map(|ray| self.near(ray, at)));
         rays.sort_unstable_by_key(|ray| ray.may_echo);
-        take(&mut self.normals.iter().filter_map(|&(normal, angle)| {
+        let undetected = self.normals.map(|(normal, angle)| {
             let normal = normal.rotate(along);
             let beams = self.beams.around(sector_of(heading + angle));
             (!self.is_excluded(at, normal, &beams, &rays)).then_some(normal)
-        }))
+        });
+        undetected.into_iter().flatten()
     }
 
     /// The ray may meet a surface that touches a body at `at`, near the body and not too far behind its end.
