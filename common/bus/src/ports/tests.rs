@@ -286,3 +286,16 @@ fn a_waiter_is_woken_again_after_a_publication_in_the_middle_of_a_drain() {
         }
     });
 }
+
+#[test]
+fn a_reader_that_sleeps_is_woken_before_samples_that_wake_nobody_overrun_a_recorders_buffer() {
+    with_bus("quiet", |bus| {
+        let mut writer = bus.writer(&STRUCTS, 1).unwrap();
+        let mut waiter = Waiter::default();
+        waiter.on(bus.wakeup(&STRUCTS).unwrap());
+        for _ in 0..Limits::SMALL.recorder_buffer / 4 {
+            writer.publish_quietly(1, TIME, Test::default(), &[]).unwrap();
+        }
+        assert!(waiter.wait(Duration::ZERO).unwrap());
+    });
+}
