@@ -3,6 +3,7 @@
 //! The library's threads ring the participant's descriptor; no call here waits.
 
 use std::{
+    collections::BTreeSet,
     convert::Infallible,
     env, fmt, io,
     net::Ipv4Addr,
@@ -12,8 +13,9 @@ use std::{
 };
 
 use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, Duration, QosPolicies, QosPolicyBuilder,
-    RTPSEntity as _, RepresentationIdentifier, TopicKind, WriteOptionsBuilder,
+    DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent as Status, Duration,
+    GUID, QosPolicies, QosPolicyBuilder, RTPSEntity as _, RepresentationIdentifier,
+    StatusEvented as _, TopicKind, WriteOptionsBuilder,
     bytes::Bytes,
     no_key::{
         DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter,
@@ -36,6 +38,8 @@ const LONGEST: usize = 1 << 27;
 const LONGEST_REPLY: usize = 65_000;
 /// Messages skipped at a time because they cannot be decoded.
 const MOST_BROKEN: usize = 16;
+/// Writers of a [`LateReader`]'s topic that are told apart; more keep it as it is.
+const MOST_WRITERS: usize = 256;
 
 type Payload = Vec<u8>;
 /// DDS knows a participant, a reader or a writer by it.
@@ -250,6 +254,61 @@ impl Reader {
 
     pub fn gid(&self) -> Gid {
         self.inner.guid().to_bytes()
+    }
+}
+
+/// A reader that no message of a node that publishes once may miss.
+///
+/// A node publishes as soon as it knows a reader. The library drops what comes from a writer that it does not know yet, and Fast DDS sends
+/// it again only after its heartbeat period of 3 s, when `ros2 topic pub --once` has ended. This reader opens when its writer is known, and
+/// closes after the last writer. It needs a participant of its own, which leaves with it: nodes that join later know the readers that a
+/// participant ever had. A node that publishes while another node's writer keeps the reader open may still be missed.
+#[derive(Debug)]
+pub struct LateReader {
+    participant: Participant,
+    topic: Topic,
+    quality: Quality,
+    writers: BTreeSet<GUID>,
+    reader: Option<Reader>,
+}
+
+impl LateReader {
+    /// Joins the domain as [`Participant::join`] does. Fails if DDS cannot start.
+    pub fn join(
+        domain: u16,
+        only: Option<Ipv4Addr>,
+        topic: Topic,
+        quality: Quality,
+    ) -> io::Result<Self> {
+        let participant = Participant::join(domain, only)?;
+        Ok(Self { participant, topic, quality, writers: BTreeSet::new(), reader: None })
+    }
+
+    /// The messages that have come, `most` at most. Opens and closes the reader. Fails if DDS cannot start.
+    pub fn take(&mut self, most: usize) -> io::Result<Vec<Message>> {
+        let listener = self.participant.inner.status_listener();
+        while let Some(status) = listener.try_recv_status() {
+            match status {
+                Status::WriterDetected { writer }
+                    if writer.topic_name == self.topic.dds_name()
+                        && self.writers.len() < MOST_WRITERS =>
+                {
+                    self.writers.insert(writer.guid);
+                }
+                Status::WriterLost { guid, .. } => {
+                    self.writers.remove(&guid);
+                }
+                _ => {}
+            }
+        }
+        if self.reader.is_none() && !self.writers.is_empty() {
+            self.reader = Some(self.participant.reader(&self.topic, self.quality)?);
+        }
+        let messages: Vec<_> = self.reader.iter().flat_map(Reader::messages).take(most).collect();
+        if messages.is_empty() && self.writers.is_empty() && self.reader.take().is_some() {
+            self.participant.rejoin()?;
+        }
+        Ok(messages)
     }
 }
 

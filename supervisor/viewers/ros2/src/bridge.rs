@@ -284,7 +284,11 @@ impl Bridge {
 
     fn hear(&mut self) {
         self.node.answer();
-        for (id, message) in self.node.heard() {
+        let heard = self.node.heard().unwrap_or_else(|error| {
+            self.tell(&format!("a topic cannot be read: {error}"));
+            Vec::new()
+        });
+        for (id, message) in heard {
             if let Err(why) = self.hear_topic(id, &message) {
                 self.tell(&format!("a message is refused: {why}"));
             }

@@ -23,6 +23,10 @@ pub fn open(options: &Options) -> io::Result<Node<Id>> {
         match row.accepted_by {
             None if is_of_robot(row.id) || (row.id == Id::Clock && !options.clock) => {}
             None => write_to(&mut node, row.id, row, "")?,
+            Some(Accept::Stop) if accepted.contains(&Accept::Stop) => {
+                let name = topic_name(namespace, row, "");
+                node.read_late(row.id, [&name, row.type_name], (*domain, *interface))?;
+            }
             Some(by) if accepted.contains(&by) => {
                 let name = topic_name(namespace, row, "");
                 // A hand's old pushes are not sent again.

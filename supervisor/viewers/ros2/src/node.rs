@@ -10,7 +10,7 @@ use std::{
 use ros2::{
     cdr::Cdr as _,
     msg::{self, NodeEntitiesInfo, ParticipantEntitiesInfo},
-    participant::{Message, Participant, Quality, Reader, Request, Writer},
+    participant::{LateReader, Message, Participant, Quality, Reader, Request, Writer},
     topic::Topic,
 };
 
@@ -52,6 +52,7 @@ pub struct Node<Id> {
     pub namespace: String,
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
+    late_readers: Vec<(Id, LateReader)>,
     actions: Vec<Action>,
     parameters: Vec<Parameter>,
     of_parameters: Vec<(Service, Reader, Writer)>,
@@ -78,6 +79,7 @@ impl<Id: Copy + Ord> Node<Id> {
             namespace: if namespace.is_empty() { String::new() } else { format!("/{namespace}") },
             writers: BTreeMap::new(),
             readers: Vec::new(),
+            late_readers: Vec::new(),
             actions: Vec::new(),
             parameters,
             of_parameters: Vec::new(),
@@ -128,6 +130,18 @@ impl<Id: Copy + Ord> Node<Id> {
     ) -> io::Result<()> {
         let topic = Topic::new(&self.full_name(name), kind);
         self.readers.push((id, self.participant.reader(&topic, quality)?));
+        Ok(())
+    }
+
+    /// Read a topic of which no message may be missed. `domain` and `only` are those that the node has joined.
+    pub fn read_late(
+        &mut self,
+        id: Id,
+        [name, kind]: [&str; 2],
+        (domain, only): (u16, Option<Ipv4Addr>),
+    ) -> io::Result<()> {
+        let topic = Topic::new(&self.full_name(name), kind);
+        self.late_readers.push((id, LateReader::join(domain, only, topic, SURE)?));
         Ok(())
     }
 
@@ -217,11 +231,16 @@ impl<Id: Copy + Ord> Node<Id> {
         }
     }
 
-    pub fn heard(&self) -> Vec<(Id, Message)> {
+    /// The messages that have come. Fails if the library cannot open a reader.
+    pub fn heard(&mut self) -> io::Result<Vec<(Id, Message)>> {
         let heard = self.readers.iter().flat_map(|(id, reader)| {
             reader.messages().take(AT_A_TIME).map(|message| (*id, message))
         });
-        heard.collect()
+        let mut heard: Vec<_> = heard.collect();
+        for (id, reader) in &mut self.late_readers {
+            heard.extend(reader.take(AT_A_TIME)?.into_iter().map(|message| (*id, message)));
+        }
+        Ok(heard)
     }
 
     pub fn called(&self) -> Vec<(usize, Call, Message)> {

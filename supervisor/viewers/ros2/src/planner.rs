@@ -289,7 +289,7 @@ impl<'a> Server<'a> {
     fn turn(&mut self) {
         self.node.participant.unring();
         self.node.answer();
-        for (id, message) in self.node.heard() {
+        for (id, message) in self.node.heard().unwrap_or_default() {
             if let Err(why) = self.hear(id, &message.payload) {
                 tracing::warn!("a message of {id:?} is refused: {why}");
             }
