@@ -10,7 +10,7 @@ use common::{
 
 use super::{
     monitor::{Condition, Moment, Monitor, Observation},
-    response_fit::search::{ACCELERATION_RATIO, DEAD_TIME_STEP_S},
+    response_fit::{ACCELERATION_RATIO, DEAD_TIME_STEP_S},
 };
 
 /// A way to stop that is longer by this share and by so many metres is not as stated: what was found is no more exact.

@@ -5,13 +5,10 @@
 //! the other, so the difference is fitted by itself. A response explains the wheels if each, and the difference of both, rolled as it says,
 //! apart from one factor. Dead, swapped and reversed wheels roll as no response says.
 
-pub(super) mod search;
-
 use std::collections::VecDeque;
 
 use common::{clock::MissionTime, mission::Response};
 
-use self::search::{Motion, Ways};
 use super::modelled_wheels::{Axle, Limits};
 
 /// Counts are kept for so long, seconds.
@@ -20,6 +17,16 @@ const KEPT_S: f64 = 5.0;
 const BEFORE_S: f64 = 2.0;
 /// Whatever is sent and received, no more is kept.
 const MOST_KEPT: usize = 512;
+const DEAD_TIMES: u32 = 21;
+pub(super) const DEAD_TIME_STEP_S: f64 = 0.05;
+/// Speeds grow by so much in a second: the slowest is that of a heavy base that a person pushes in vain, and the last but one is
+/// [`ACCELERATION_RATIO`] to the power of [`ACCELERATIONS`] times as much. The last is infinite.
+const LEAST_ACCELERATION_M_S2: f64 = 0.15;
+pub(super) const ACCELERATION_RATIO: f64 = 1.25;
+const ACCELERATIONS: i32 = 16;
+/// What a turn that is limited apart gives a wheel, over that grid: the slowest is that of a narrow and heavy base, and none is that of two
+/// wheels, as it lies 4.5 steps of the grid lower.
+const TURN_SHARE: f64 = 0.366;
 /// The least square of the correlation of a wheel's way with that of the response.
 const EXPLAINED: f64 = 0.8;
 /// The factors that real wheels have.
@@ -274,10 +281,178 @@ impl ResponseFit {
         intervals as f64 / in_s / self.axle.counts_per_m.powi(2)
     }
 
+    /// What `weigh` makes of each response of the grid: of its dead time, its limits, and their ways. Of a turn that is limited apart the
+    /// grid has only the one that is most like the wheels. Those of wheels are last.
+    fn weighed<T>(&self, weigh: impl Fn(f64, Limits, Ways<'_>) -> Option<T>) -> Vec<T> {
+        let mut weighed = Vec::new();
+        let accelerations = (0..ACCELERATIONS)
+            .map(|power| LEAST_ACCELERATION_M_S2 * ACCELERATION_RATIO.powi(power))
+            .chain([f64::INFINITY]);
+        for are_apart in [true, false].into_iter().skip(usize::from(self.judged() == 1)) {
+            let share = if are_apart { TURN_SHARE } else { 1.0 };
+            let grid = accelerations.clone().map(|acceleration| {
+                let most = acceleration * self.axle.counts_per_m;
+                let limits = Limits { are_apart, most: [most, most * share] };
+                (limits, [0, 1].map(|axis| self.course(limits, axis)))
+            });
+            let grid: Vec<_> = grid.collect();
+            for step in 0..DEAD_TIMES {
+                let dead_time_s = f64::from(step) * DEAD_TIME_STEP_S;
+                let ways = |axis: usize| {
+                    grid.iter().map(move |(_, courses)| self.ways(&courses[axis], dead_time_s))
+                };
+                let others: Vec<_> = ways(1).collect();
+                let unlike = others.iter().map(|ways| self.unlike_turn(ways));
+                let best = unlike.enumerate().min_by(|one, other| one.1.total_cmp(&other.1));
+                let best = best.filter(|(_, unlike)| are_apart && !unlike.is_nan());
+                for (index, one) in ways(0).enumerate().filter(|_| best.is_some() || !are_apart) {
+                    let other = best.map_or(index, |(best, _)| best);
+                    let most = [grid[index].0.most[0], grid[other].0.most[1]];
+                    weighed.extend(weigh(
+                        dead_time_s,
+                        Limits { are_apart, most },
+                        [&one, &others[other]],
+                    ));
+                }
+            }
+        }
+        weighed
+    }
+
+    /// What is not half the wheels' difference; no number if none is modelled.
+    fn unlike_turn(&self, ways: &[f64]) -> f64 {
+        let mut turn = Motion::default();
+        for ((_, turned), modelled) in self.turned.iter().skip(1).zip(ways) {
+            if let Some([left, right]) = turned {
+                turn.add(*modelled, (right - left) / 2.0);
+            }
+        }
+        turn.unlike(turn.factor())
+    }
+
+    /// The course of an axis that answers at once.
+    fn course(&self, limits: Limits, axis: usize) -> Course {
+        let (mut way, mut speed) = (0.0, 0.0);
+        let mut course = Vec::new();
+        let ends = self.commands.iter().skip(1).map(|(at, _)| *at).chain([f64::INFINITY]);
+        for (&(at, told), end) in self.commands.iter().zip(ends).filter(|((at, _), end)| at < end) {
+            let target = limits.axes(told)[axis];
+            let rate = limits.most[axis].copysign(target - speed);
+            let reached = (at + (target - speed) / rate).min(end);
+            course.push([at, way, speed, if reached > at { rate } else { 0.0 }]);
+            let before = speed;
+            speed = if reached < end { target } else { speed + rate * (end - at) };
+            way += (before + speed) / 2.0 * (reached - at);
+            course.push([reached, way, speed, 0.0]);
+            way += speed * (end - reached);
+        }
+        course
+    }
+
+    /// What an axis of this course rolls in each interval but the first, counts, if it answers later.
+    fn ways(&self, course: &Course, dead_time_s: f64) -> Vec<f64> {
+        let mut pieces = course.iter().peekable();
+        let mut piece = &[0.0; 4];
+        // The oldest counts say only when the others begin.
+        let mut before = None;
+        let rolled = |(until, _): &(f64, _)| {
+            while let Some(next) = pieces.next_if(|[from, ..]| *from <= until - dead_time_s) {
+                piece = next;
+            }
+            let [from, way, speed, rate] = piece;
+            let for_s = until - dead_time_s - from;
+            let way = way + for_s * (speed + rate * for_s / 2.0);
+            before.replace(way).map(|before| way - before)
+        };
+        self.turned.iter().filter_map(rolled).collect()
+    }
+
+    fn motions_of(
+        &self,
+        dead_time_s: f64,
+        response: &Response,
+        from_s: f64,
+    ) -> [[Motion; CHANNELS]; 2] {
+        let limits = self.axle.limits(response);
+        let [one, other] = [0, 1].map(|axis| self.ways(&self.course(limits, axis), dead_time_s));
+        self.motions(limits, [&one, &other], from_s)
+    }
+
+    /// The channels' motion by these ways: all, and from then on.
+    fn motions(
+        &self,
+        limits: Limits,
+        [one, other]: Ways<'_>,
+        from_s: f64,
+    ) -> [[Motion; CHANNELS]; 2] {
+        let mut all = [Motion::default(); CHANNELS];
+        let mut judged_all = all;
+        for ((&(until, turned), one), other) in self.turned.iter().skip(1).zip(one).zip(other) {
+            let modelled = channels(limits.wheels([*one, *other]));
+            for (channel, turned) in turned.map(channels).into_iter().flatten().enumerate() {
+                all[channel].add(modelled[channel], turned);
+                if until >= from_s {
+                    judged_all[channel].add(modelled[channel], turned);
+                }
+            }
+        }
+        [all, judged_all]
+    }
+
     /// The motion of all wheels that drive, and the factor by which it is that of the model.
     fn of_wheels(&self, [left, right, _]: &[Motion; CHANNELS]) -> (Motion, f64) {
         let wheels = if self.judged() == 1 { *left } else { left.with(right) };
         (wheels, wheels.factor())
+    }
+}
+
+/// Of a speed: from when on, the way until then, the speed then, and how much it grows in a second; seconds and counts.
+type Course = Vec<[f64; 4]>;
+/// What is limited rolls so far in each interval but the first.
+type Ways<'a> = [&'a [f64]; 2];
+
+/// Sums over the intervals of a channel: of the modelled way, of the squares of the modelled and the counted way, and of their product,
+/// counts.
+#[derive(Clone, Copy, Default)]
+struct Motion {
+    way: f64,
+    model: f64,
+    turned: f64,
+    both: f64,
+    /// Each interval begins and ends between two counts of each wheel.
+    rounding: f64,
+}
+
+impl Motion {
+    fn add(&mut self, model: f64, turned: f64) {
+        self.way += model.abs();
+        self.model += model * model;
+        self.turned += turned * turned;
+        self.both += model * turned;
+        self.rounding += 1.0;
+    }
+
+    fn with(&self, other: &Self) -> Self {
+        Self {
+            way: self.way + other.way,
+            model: self.model + other.model,
+            turned: self.turned + other.turned,
+            both: self.both + other.both,
+            rounding: self.rounding + other.rounding,
+        }
+    }
+
+    /// The sum of squares of what was counted less `factor` times what was modelled.
+    fn unlike(&self, factor: f64) -> f64 {
+        self.turned - 2.0 * factor * self.both + factor * factor * self.model
+    }
+
+    fn factor(&self) -> f64 {
+        (self.both / self.model).clamp(*FACTORS.start(), *FACTORS.end())
+    }
+
+    fn is_as_modelled(&self, factor: f64) -> bool {
+        self.unlike(factor) <= UNEXPLAINED * self.model.max(self.turned) + self.rounding
     }
 }
 
