@@ -95,7 +95,7 @@ fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
 #[test]
 fn a_run_whose_robot_names_a_sensor_otherwise_ends_with_both_names_and_blames_no_stage() {
     let robot = PythonRobot::start();
-    let nose = "robot.sensor=[{name='nose',kind='cone',bearing_deg=0}]";
+    let nose = "robot.sensor=[{name='nose',kind='cone',forward_m=0.2,bearing_deg=0}]";
     let (code, summary) = robot.run_with("json-nose", &["--set", nose]).finish();
     assert_ended(code, &summary, 6, "aborted");
     let reason = summary["reason"].as_str().unwrap();

@@ -3,7 +3,7 @@
 //! The library's threads ring the participant's descriptor; no call here waits.
 
 use std::{
-    collections::BTreeSet,
+    collections::BTreeMap,
     convert::Infallible,
     env, fmt, io,
     net::Ipv4Addr,
@@ -268,7 +268,8 @@ pub struct LateReader {
     participant: Participant,
     topic: Topic,
     quality: Quality,
-    writers: BTreeSet<GUID>,
+    /// The topic's writers, and whether each is lost: the library may say that it knows one after it said that it is lost.
+    writers: BTreeMap<GUID, bool>,
     reader: Option<Reader>,
 }
 
@@ -281,7 +282,7 @@ impl LateReader {
         quality: Quality,
     ) -> io::Result<Self> {
         let participant = Participant::join(domain, only)?;
-        Ok(Self { participant, topic, quality, writers: BTreeSet::new(), reader: None })
+        Ok(Self { participant, topic, quality, writers: BTreeMap::new(), reader: None })
     }
 
     /// The messages that have come, `most` at most. Opens and closes the reader. Fails if DDS cannot start.
@@ -293,19 +294,21 @@ impl LateReader {
                     if writer.topic_name == self.topic.dds_name()
                         && self.writers.len() < MOST_WRITERS =>
                 {
-                    self.writers.insert(writer.guid);
+                    self.writers.entry(writer.guid).or_default();
                 }
                 Status::WriterLost { guid, .. } => {
-                    self.writers.remove(&guid);
+                    self.writers.entry(guid).and_modify(|is_lost| *is_lost = true);
                 }
                 _ => {}
             }
         }
-        if self.reader.is_none() && !self.writers.is_empty() {
+        let is_written = self.writers.values().any(|is_lost| !is_lost);
+        if self.reader.is_none() && is_written {
             self.reader = Some(self.participant.reader(&self.topic, self.quality)?);
         }
         let messages: Vec<_> = self.reader.iter().flat_map(Reader::messages).take(most).collect();
-        if messages.is_empty() && self.writers.is_empty() && self.reader.take().is_some() {
+        if messages.is_empty() && !is_written && self.reader.take().is_some() {
+            self.writers.clear();
             self.participant.rejoin()?;
         }
         Ok(messages)

@@ -7,6 +7,8 @@ use common::mission::ModelledSpeed;
 use super::*;
 
 const PERIOD_S: f64 = 0.1;
+/// Missions of each base.
+const SEEDS: u64 = 6;
 const COUNTS_PER_M: f64 = 7162.0;
 const MISSION: &str = "target = [3, 0]
 [robot]
@@ -124,13 +126,13 @@ fn bases_apart() -> impl Iterator<Item = Base> {
 
 fn given_up(base: Base) -> usize {
     let is_so = |seed| drive(base, seed, f64::INFINITY).last().is_some_and(|(_, is_so)| *is_so);
-    (0..20).filter(|seed| is_so(*seed)).count()
+    (0..SEEDS).filter(|seed| is_so(*seed)).count()
 }
 
 #[test]
 fn no_base_that_limits_its_turn_apart_from_its_speed_is_given_up() {
     let counts: Vec<_> = bases_apart().map(given_up).collect();
-    assert_eq!(counts, [0; 8], "of 20 seeds");
+    assert_eq!(counts, [0; 8], "of {SEEDS} seeds");
 }
 
 #[test]
@@ -143,7 +145,7 @@ fn no_slow_or_late_base_is_given_up_though_nobody_stated_it() {
 #[test]
 fn an_encoder_that_dies_on_a_slow_base_is_suspected_for_good() {
     for base in bases() {
-        for seed in 0..20 {
+        for seed in 0..SEEDS {
             let last = drive(base, seed, 20.0).last().copied();
             let in_time = last.is_some_and(|(at, is_so)| is_so && at < 24.0);
             assert!(in_time, "{base:?} {seed}: {last:?}");
