@@ -6,7 +6,7 @@
 `robot.py 5600 0.6 0.3` is heavier and later: its wheels gain and lose 0.6 m/s in a second, 0.3 s after they were told.
 
 It simulates two wheels, a round body and three sonars in a small world. Yours replaces `Body` by what it is
-made of; `serve` stays as it is. The words are in the guide, "Your robot".
+made of; `serve` stays as it is. The words are in the guide, "Connect a JSON robot".
 """
 
 import collections
