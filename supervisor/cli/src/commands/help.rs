@@ -21,35 +21,59 @@ struct Page {
     text: &'static str,
 }
 
+/// Pages that answer the same kind of question, as <https://diataxis.fr> divides them.
+struct Part {
+    title: &'static str,
+    pages: &'static [Page],
+}
+
 macro_rules! guide {
-    ($($file:literal),* $(,)?) => {
-        &[$(Page {
-            file: $file,
-            text: include_str!(concat!("../../../guide/", $file, ".md")),
+    ($($title:literal: $($file:literal),* ;)*) => {
+        &[$(Part {
+            title: $title,
+            pages: &[$(Page {
+                file: $file,
+                text: include_str!(concat!("../../../guide/", $file, ".md")),
+            }),*],
         }),*]
     };
 }
 
-/// The order is that of reading. None has the name of a subcommand.
-static GUIDE: &[Page] = guide! {
-    "method",
-    "mission-file",
-    "simulation",
-    "what-moves",
-    "your-robot",
+/// The order is that of reading. No page has the name of a subcommand. `.ci/site` reads this table.
+static GUIDE: &[Part] = guide! {
+    "Tutorial":
+    "tutorial";
+    "How-to":
     "operate",
-    "attach",
+    "json-robot",
+    "ros2-robot",
+    "arduino-robot",
+    "calibration",
+    "service",
+    "viewers",
     "another-machine",
-    "small-machine",
-    "nav2-planner",
+    "attach",
     "recordings",
     "break-it",
     "evaluation",
-    "results",
-    "capabilities",
+    "nav2-planner",
+    "write-a-planner",
+    "add-a-stage";
+    "Reference":
+    "mission-file",
+    "simulation",
     "tables",
-    "CONTRIBUTING",
-    "add-a-stage",
+    "results",
+    "capabilities";
+    "Explanation":
+    "method",
+    "architecture",
+    "limits",
+    "what-moves",
+    "small-machine",
+    "testing",
+    "read-the-code",
+    "CONTRIBUTING";
 };
 
 impl Page {
@@ -62,20 +86,27 @@ impl Page {
     }
 }
 
+fn all_pages() -> impl Iterator<Item = &'static Page> {
+    GUIDE.iter().flat_map(|part| part.pages)
+}
+
 fn page(name: &str) -> Option<&'static Page> {
-    GUIDE.iter().find(|page| page.file.eq_ignore_ascii_case(name))
+    all_pages().find(|page| page.file.eq_ignore_ascii_case(name))
 }
 
 pub fn page_names() -> Vec<String> {
-    GUIDE.iter().map(Page::name).collect()
+    all_pages().map(Page::name).collect()
 }
 
-/// One a line, for the help of the whole command line.
+/// Lists the pages for the help of the whole command line, one a line.
 pub fn pages() -> String {
     let mut list = String::from("Guide (firsthand help PAGE):\n");
-    for page in GUIDE {
+    for Part { title, pages } in GUIDE {
         // Writing to a String cannot fail.
-        let _ = writeln!(list, "  {:<22} {}", page.name(), page.title());
+        let _ = writeln!(list, " {title}");
+        for page in *pages {
+            let _ = writeln!(list, "  {:<22} {}", page.name(), page.title());
+        }
     }
     list
 }
