@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn every_fault_has_its_row_in_the_guides_table_too() {
-        let guide = include_str!("../../../../supervisor/guide/break-it.md");
+        let guide = include_str!("../../../../supervisor/guide/tables.md");
         assert_eq!(TABLE.len(), RobotFault::value_variants().len());
         for fault in RobotFault::value_variants() {
             let Row { name, promise, cause, x80, json } = fault.row();
@@ -193,7 +193,7 @@ mod tests {
             let cause = cause.as_ref().map(|cause| format!(": {cause}")).unwrap_or_default();
             let promise = format!("{promise}{cause}");
             let line = format!("| `{name}` | {x80} | {json} | {promise} |\n");
-            assert!(guide.contains(&line), "missing in break-it.md: {line}");
+            assert!(guide.contains(&line), "missing in tables.md: {line}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Results, capabilities and versions, stored as CSV files beside the guide.
+//! Results, capabilities, versions and keys, stored as CSV files beside the guide.
 //!
 //! The first column of each file is the section of the page that shows a row.
 
@@ -16,6 +16,9 @@ macro_rules! stored {
 static FILES: &[(&str, &str)] = stored! {
     "capabilities" in "capabilities.csv",
     "versions" in "versions.csv",
+    "mission-keys" in "mission-keys.csv",
+    "simulation-keys" in "simulation-keys.csv",
+    "summary-keys" in "summary-keys.csv",
     "figures" in "results/figures.csv",
     "worlds" in "results/worlds.csv",
     "paired" in "results/paired.csv",
@@ -27,6 +30,8 @@ static FILES: &[(&str, &str)] = stored! {
     "tick-at-7-hz" in "results/tick_at_7_hz.csv",
     "field" in "results/field.csv",
     "nav2-planners" in "results/nav2_planners.csv",
+    "small-machine" in "results/small_machine.csv",
+    "small-machine-processes" in "results/small_machine_processes.csv",
 };
 
 /// Rows of some sections (`a,b`) or of all; none where there is no such file or section.
@@ -54,21 +59,21 @@ pub fn markdown(name: &str, section: Option<&str>) -> Option<String> {
 }
 
 pub fn results() -> String {
-    let of_results = FILES.iter().filter(|(name, _)| !["capabilities", "versions"].contains(name));
+    let is_result =
+        |name: &str| !["capabilities", "versions"].contains(&name) && !name.ends_with("-keys");
+    let of_results = FILES.iter().filter(|(name, _)| is_result(name));
     let printed =
         of_results.filter_map(|(name, _)| Some(format!("{name}\n\n{}", markdown(name, None)?)));
     printed.collect::<Vec<_>>().join("\n")
 }
 
-/// A capability without a text of its own is called by its test's name.
 fn capability(row: &[String]) -> String {
     let [text, verdict, tests] = row else {
         return String::new();
     };
-    let said = match (text.as_str(), tests.as_str()) {
-        ("", test) => test.replace('_', " "),
-        (text, "") => text.to_owned(),
-        (text, tests) => format!("{text}: {}", named(tests)),
+    let said = match tests.as_str() {
+        "" => text.to_owned(),
+        tests => format!("{text}: {}", named(tests)),
     };
     item(&format!("{verdict}: {said}"))
 }

@@ -6,6 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use console::missions;
+
 use super::{documents, root};
 use crate::commands::table;
 
@@ -70,6 +72,29 @@ fn every_capability_has_a_verdict_and_every_contract_tests_that_exist() {
     let flaws: Vec<_> = rows.iter().filter_map(|row| flaw(row, &functions)).collect();
     assert!(flaws.is_empty(), "{flaws:#?}");
     assert!(rows.len() > 90, "only {} rows were found", rows.len());
+}
+
+#[test]
+fn every_default_in_the_table_of_mission_keys_is_the_default() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("plain.toml");
+    fs::write(&file, "target = [4.0, 0.0]").unwrap();
+    let load = |set: &[String]| missions::load(file.to_str().unwrap(), set).unwrap();
+    let span = |text: &str| {
+        let inner = text.strip_prefix('`')?.strip_suffix('`')?;
+        (!inner.contains('`')).then(|| inner.to_owned())
+    };
+    let plain = load(&[]);
+    let mut checked = 0;
+    for row in rows("mission-keys") {
+        let of_a_row = ["sensor", "touch", "shapes"].contains(&&row[0]);
+        let (Some(key), Some(default)) = (span(&row[1]), span(&row[2])) else { continue };
+        if !of_a_row && !["name", "description"].contains(&key.as_str()) {
+            assert_eq!(load(&[format!("{key}={default}")]), plain, "{key}");
+            checked += 1;
+        }
+    }
+    assert!(checked > 50, "only {checked} defaults were found");
 }
 
 #[test]
