@@ -262,7 +262,8 @@ impl Reader {
 /// A node publishes as soon as it knows a reader. The library drops what comes from a writer that it does not know yet, and Fast DDS sends
 /// it again only after its heartbeat period of 3 s, when `ros2 topic pub --once` has ended. This reader opens when its writer is known, and
 /// closes after the last writer. It needs a participant of its own, which leaves with it: nodes that join later know the readers that a
-/// participant ever had. A node that publishes while another node's writer keeps the reader open may still be missed.
+/// participant ever had. A node may still be missed if it publishes while
+/// another node's writer keeps the reader open, or within a millisecond after it knows the reader.
 #[derive(Debug)]
 pub struct LateReader {
     participant: Participant,
@@ -298,6 +299,10 @@ impl LateReader {
                 }
                 Status::WriterLost { guid, .. } => {
                     self.writers.entry(guid).and_modify(|is_lost| *is_lost = true);
+                }
+                Status::ParticipantLost { id, .. } => {
+                    let its = self.writers.iter_mut().filter(|(writer, _)| writer.prefix == id);
+                    its.for_each(|(_, is_lost)| *is_lost = true);
                 }
                 _ => {}
             }

@@ -137,6 +137,14 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     }
 }
 
+/// Tells the robot's link to stop it, and waits for nothing. [`stand`] does the rest.
+pub fn stop_at_once(robot: &RobotName) {
+    let link = stop_socket::Operator::connect(&Domain::of(robot.clone()).stop_socket());
+    if let Ok(Some(link)) = link {
+        let _ = link.send(Request::Stop);
+    }
+}
+
 /// Returns whether the robot may move although no link drives it: its stop is owed.
 pub fn owes_stop(robot: &RobotName) -> bool {
     OwedStop::of(Domain::of(robot.clone())).is_set()

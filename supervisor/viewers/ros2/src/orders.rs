@@ -57,6 +57,7 @@ pub enum Why {
 pub type Done = (Order, Result<(), Refusal>);
 
 pub struct Orders {
+    robot: RobotName,
     targets: SyncSender<Order>,
     stops: SyncSender<Order>,
     hands: SyncSender<Order>,
@@ -81,10 +82,15 @@ impl Orders {
             Ok::<_, io::Error>(orders)
         };
         let [targets, stops] = ["targets", "stops"].map(|name| worker(name, MOST_WAITING));
-        Ok(Self { targets: targets?, stops: stops?, hands: worker("hands", 1)?, done, refused })
+        let (robot, hands) = (robot.clone(), worker("hands", 1)?);
+        Ok(Self { robot, targets: targets?, stops: stops?, hands, done, refused })
     }
 
     pub fn give(&self, order: Order) {
+        // The order may wait behind an earlier stop, until the robot rests.
+        if let Order::Stand { .. } = order {
+            operator::stop_at_once(&self.robot);
+        }
         let worker = match order {
             Order::Go { .. } | Order::Place(..) => &self.targets,
             Order::Stand { .. } | Order::Resume => &self.stops,

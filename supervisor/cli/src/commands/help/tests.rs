@@ -29,8 +29,7 @@ struct Document {
 }
 
 fn documents() -> Vec<Document> {
-    let pages =
-        all_pages().map(|page| PathBuf::from(format!("supervisor/guide/{}.md", page.file)));
+    let pages = all_pages().map(|page| PathBuf::from(format!("supervisor/guide/{}.md", page.file)));
     std::iter::once(PathBuf::from("README.md"))
         .chain(pages)
         .map(|path| Document { text: fs::read_to_string(root().join(&path)).unwrap(), path })
