@@ -38,7 +38,7 @@ const LONGEST: usize = 1 << 27;
 const LONGEST_REPLY: usize = 65_000;
 /// Messages skipped at a time because they cannot be decoded.
 const MOST_BROKEN: usize = 16;
-/// Writers of a [`LateReader`]'s topic that are told apart; more keep it as it is.
+/// Writers of a [`LateReader`]'s topic that are tracked; further ones do not open it.
 const MOST_WRITERS: usize = 256;
 
 type Payload = Vec<u8>;
@@ -166,6 +166,12 @@ impl Participant {
         Ok(Reader { inner: reader, bell: self.bell.clone() })
     }
 
+    /// Returns a [`LateReader`], which joins the same domain. Fails if DDS cannot start.
+    pub fn late_reader(&self, topic: Topic, quality: Quality) -> io::Result<LateReader> {
+        let participant = Self::join(self.inner.domain_id(), self.only)?;
+        Ok(LateReader { participant, topic, quality, writers: Writers::default(), reader: None })
+    }
+
     pub fn writer(&self, topic: &Topic, quality: Quality) -> io::Result<Writer> {
         let policies = quality.policies();
         let publisher = self.inner.create_publisher(&policies).map_err(io::Error::other)?;
@@ -257,63 +263,76 @@ impl Reader {
     }
 }
 
-/// A reader that no message of a node that publishes once may miss.
+/// The writers of one topic, and whether each is lost.
 ///
-/// A node publishes as soon as it knows a reader. The library drops what comes from a writer that it does not know yet, and Fast DDS sends
-/// it again only after its heartbeat period of 3 s, when `ros2 topic pub --once` has ended. This reader opens when its writer is known, and
-/// closes after the last writer. It needs a participant of its own, which leaves with it: nodes that join later know the readers that a
-/// participant ever had. A node may still be missed if it publishes while
-/// another node's writer keeps the reader open, or within a millisecond after it knows the reader.
+/// The library may report a writer again after it reported that it is lost, so lost writers stay until their places are needed.
+#[derive(Debug, Default)]
+struct Writers(BTreeMap<GUID, bool>);
+
+impl Writers {
+    fn on_detected(&mut self, writer: GUID) {
+        if self.0.contains_key(&writer) {
+            return;
+        }
+        if self.0.len() >= MOST_WRITERS {
+            self.0.retain(|_, is_lost| !*is_lost);
+        }
+        if self.0.len() < MOST_WRITERS {
+            self.0.insert(writer, false);
+        }
+    }
+
+    fn on_lost(&mut self, lost: impl Fn(GUID) -> bool) {
+        let writers = self.0.iter_mut().filter(|(writer, _)| lost(**writer));
+        writers.for_each(|(_, is_lost)| *is_lost = true);
+    }
+
+    fn has_one(&self) -> bool {
+        self.0.values().any(|is_lost| !is_lost)
+    }
+}
+
+/// A reader for messages that a node publishes once.
+///
+/// A node publishes when it knows a reader. The library drops messages of writers that it does not know yet. Fast DDS sends them again
+/// after its heartbeat period of 3 s, and `ros2 topic pub --once` ends before. This reader therefore opens when its writer is known.
+///
+/// Nodes that join later also see the closed readers of a participant. This reader therefore has a separate participant, and joins anew
+/// after its last writer.
+///
+/// It misses a message that is published while another writer keeps it open, or within a millisecond after the node knows the reader.
 #[derive(Debug)]
 pub struct LateReader {
     participant: Participant,
     topic: Topic,
     quality: Quality,
-    /// The topic's writers, and whether each is lost: the library may say that it knows one after it said that it is lost.
-    writers: BTreeMap<GUID, bool>,
+    writers: Writers,
     reader: Option<Reader>,
 }
 
 impl LateReader {
-    /// Joins the domain as [`Participant::join`] does. Fails if DDS cannot start.
-    pub fn join(
-        domain: u16,
-        only: Option<Ipv4Addr>,
-        topic: Topic,
-        quality: Quality,
-    ) -> io::Result<Self> {
-        let participant = Participant::join(domain, only)?;
-        Ok(Self { participant, topic, quality, writers: BTreeMap::new(), reader: None })
-    }
-
-    /// The messages that have come, `most` at most. Opens and closes the reader. Fails if DDS cannot start.
+    /// Opens or closes the reader, and returns at most `most` messages. Fails if DDS cannot start.
     pub fn take(&mut self, most: usize) -> io::Result<Vec<Message>> {
         let listener = self.participant.inner.status_listener();
         while let Some(status) = listener.try_recv_status() {
             match status {
-                Status::WriterDetected { writer }
-                    if writer.topic_name == self.topic.dds_name()
-                        && self.writers.len() < MOST_WRITERS =>
-                {
-                    self.writers.entry(writer.guid).or_default();
+                Status::WriterDetected { writer } if writer.topic_name == self.topic.dds_name() => {
+                    self.writers.on_detected(writer.guid);
                 }
-                Status::WriterLost { guid, .. } => {
-                    self.writers.entry(guid).and_modify(|is_lost| *is_lost = true);
-                }
+                Status::WriterLost { guid, .. } => self.writers.on_lost(|writer| writer == guid),
                 Status::ParticipantLost { id, .. } => {
-                    let its = self.writers.iter_mut().filter(|(writer, _)| writer.prefix == id);
-                    its.for_each(|(_, is_lost)| *is_lost = true);
+                    self.writers.on_lost(|writer| writer.prefix == id);
                 }
                 _ => {}
             }
         }
-        let is_written = self.writers.values().any(|is_lost| !is_lost);
+        let is_written = self.writers.has_one();
         if self.reader.is_none() && is_written {
             self.reader = Some(self.participant.reader(&self.topic, self.quality)?);
         }
         let messages: Vec<_> = self.reader.iter().flat_map(Reader::messages).take(most).collect();
         if messages.is_empty() && !is_written && self.reader.take().is_some() {
-            self.writers.clear();
+            self.writers = Writers::default();
             self.participant.rejoin()?;
         }
         Ok(messages)
@@ -373,3 +392,23 @@ macro_rules! debug_by_guid {
 }
 
 debug_by_guid! { Participant.inner Reader.inner Writer.0 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writers_that_came_and_went_take_no_later_writers_place() {
+        let guid = |number: usize| GUID::from_bytes((number as u128).to_be_bytes());
+        let mut writers = Writers::default();
+        for number in 0..MOST_WRITERS {
+            writers.on_detected(guid(number));
+            writers.on_lost(|writer| writer == guid(number));
+            // The library reports it again.
+            writers.on_detected(guid(number));
+        }
+        assert!(!writers.has_one());
+        writers.on_detected(guid(MOST_WRITERS));
+        assert!(writers.has_one());
+    }
+}

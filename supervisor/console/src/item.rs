@@ -8,7 +8,7 @@ pub fn item(text: &str) -> String {
     format!("- {}\n", wrapped(text, WIDTH - "- ".len(), true).join("\n  "))
 }
 
-/// The words of `text` in lines of at most `width` letters, and code spans as words if they stay whole. A longer word has a line of its own.
+/// Wraps `text` into lines of at most `width` letters. A longer word gets a separate line. With `whole_code`, a code span counts as one word.
 pub fn wrapped(text: &str, width: usize, whole_code: bool) -> Vec<String> {
     let mut in_code = false;
     let words = text.split_inclusive(|letter| {

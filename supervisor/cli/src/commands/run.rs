@@ -338,9 +338,9 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         let last_words = format!(
             "firsthand: picture and report are not drawn; `firsthand report {redraw}` draws the report\n{told}"
         );
-        let mut signals = Signals::that_end()?;
+        let signals = Signals::that_end();
         thread::spawn(move || {
-            if signals.wait().is_ok() {
+            if signals.and_then(|mut signals| signals.wait()).is_ok() {
                 write_stderr(&last_words);
                 exit_at_once(code);
             }

@@ -25,7 +25,7 @@ pub fn open(options: &Options) -> io::Result<Node<Id>> {
             None => write_to(&mut node, row.id, row, "")?,
             Some(Accept::Stop) if accepted.contains(&Accept::Stop) => {
                 let name = topic_name(namespace, row, "");
-                node.read_late(row.id, [&name, row.type_name], (*domain, *interface))?;
+                node.read_late(row.id, [&name, row.type_name])?;
             }
             Some(by) if accepted.contains(&by) => {
                 let name = topic_name(namespace, row, "");

@@ -133,15 +133,10 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
-    /// Read a topic of which no message may be missed. `domain` and `only` are those that the node has joined.
-    pub fn read_late(
-        &mut self,
-        id: Id,
-        [name, kind]: [&str; 2],
-        (domain, only): (u16, Option<Ipv4Addr>),
-    ) -> io::Result<()> {
+    /// Read a topic of which no message may be missed.
+    pub fn read_late(&mut self, id: Id, [name, kind]: [&str; 2]) -> io::Result<()> {
         let topic = Topic::new(&self.full_name(name), kind);
-        self.late_readers.push((id, LateReader::join(domain, only, topic, SURE)?));
+        self.late_readers.push((id, self.participant.late_reader(topic, SURE)?));
         Ok(())
     }
 
