@@ -10,6 +10,7 @@ use std::{
     time::Duration,
 };
 
+use nix::sys::signal::{SigSet, SigmaskHow};
 pub use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGTERM};
 
 use crate::{poll, process_status};
@@ -24,13 +25,21 @@ impl Signals {
     pub fn catch(signals: &[c_int]) -> io::Result<Self> {
         let (pipe, written_by_handler) = UnixStream::pair()?;
         pipe.set_nonblocking(true)?;
+        // A signal between its handler's installation and the registration of what the handler does would be lost: it waits instead.
+        let before = SigSet::all().thread_swap_mask(SigmaskHow::SIG_BLOCK)?;
+        let registered = Self::register(signals, &written_by_handler);
+        before.thread_set_mask()?;
+        registered.map(|()| Self { pipe })
+    }
+
+    fn register(signals: &[c_int], written_by_handler: &UnixStream) -> io::Result<()> {
         for &signal in signals {
             if signal == SIGHUP && is_ignored(SIGHUP) {
                 continue;
             }
             signal_hook::low_level::pipe::register(signal, written_by_handler.try_clone()?)?;
         }
-        Ok(Self { pipe })
+        Ok(())
     }
 
     /// Catch from now on what asks a process to end. Fails as [`Self::catch`].
