@@ -110,8 +110,9 @@ impl<F: FnMut() -> Wish> Wishes for F {
     }
 }
 
+type TopicReader = (&'static dyn AnyTopic, Box<dyn AnyReader>);
 /// The readers of one bus.
-type Readers = Vec<(&'static dyn AnyTopic, Box<dyn AnyReader>)>;
+type Readers = Vec<TopicReader>;
 
 /// Record until the caller wishes it to stop, or a single run until its end.
 pub fn record(
@@ -119,7 +120,9 @@ pub fn record(
     wishes: &mut dyn Wishes,
     tell: &mut dyn FnMut(Happened<'_>),
 ) -> Result {
-    let chosen = options.topics();
+    let mut chosen = options.topics();
+    // `CurrentRun::take` needs the inputs first.
+    chosen.sort_by_key(|topic| topic.spec().name != topics::INPUTS.spec().name);
     let open = |bus: &Bus| -> Result<Readers, BusError> {
         let read = |topic: &&'static dyn AnyTopic| Ok((*topic, topic.recorder_reader(bus)?));
         chosen.iter().map(read).collect()
@@ -305,26 +308,35 @@ impl CurrentRun {
         self.directory == run
     }
 
+    /// Takes all samples there are. A process that ends before a reader was connected to it takes its samples along, so the first reader,
+    /// that of the inputs, is connected again before each other one: outputs are recorded only after what they follow from.
     fn take(&mut self, readers: &mut Readers) -> Result {
-        let file = &mut self.file;
-        for (topic, reader) in readers {
-            let spec = topic.spec();
-            while let Some(stamp) = reader.next_message(&mut self.message)? {
-                if !self.losses.came(spec, &stamp, &self.message) {
-                    continue;
-                }
-                let log_ns = file.sample(spec, &stamp, &self.message)?;
-                let mut written = Ok(());
-                self.drawn.message(spec.name, &self.message, log_ns, &mut |topic, message| {
-                    if written.is_ok() {
-                        written = file.message(topic, log_ns, message);
-                    }
-                });
-                written?;
-            }
+        let Some((first, others)) = readers.split_first_mut() else { return Ok(()) };
+        for other in others {
+            self.take_from(first)?;
+            self.take_from(other)?;
         }
+        self.take_from(first)?;
         if let Some(lost) = self.losses.grown() {
-            file.lost(lost)?;
+            self.file.lost(lost)?;
+        }
+        Ok(())
+    }
+
+    fn take_from(&mut self, (topic, reader): &mut TopicReader) -> Result {
+        let (file, spec) = (&mut self.file, topic.spec());
+        while let Some(stamp) = reader.next_message(&mut self.message)? {
+            if !self.losses.came(spec, &stamp, &self.message) {
+                continue;
+            }
+            let log_ns = file.sample(spec, &stamp, &self.message)?;
+            let mut written = Ok(());
+            self.drawn.message(spec.name, &self.message, log_ns, &mut |topic, message| {
+                if written.is_ok() {
+                    written = file.message(topic, log_ns, message);
+                }
+            });
+            written?;
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use common::{
     bus::decode_slice,
     clock::MissionTime,
     run::Run,
-    samples::{DeathSample, HealthSample, HealthState, InputsHeader, name_str},
+    samples::{DeathSample, HealthSample, InputsHeader, name_str},
     topics,
 };
 use processes::stages::{self, Stage};
@@ -104,13 +104,7 @@ impl Generations {
             }
         } else if topic == topics::HEALTH.spec().name {
             let health: HealthSample = common::bus::decode_sample(&message.data).ok_or("health")?;
-            let ready = HealthState::from_byte(health.state) == HealthState::Ready;
-            let number = health.stamp.generation;
-            if let Some(generation) = self.of(name_str(&health.stage), number)
-                && ready
-            {
-                generation.worked();
-            }
+            self.of(name_str(&health.stage), health.stamp.generation);
         } else if topic == topics::DEATHS.spec().name {
             let death: DeathSample = common::bus::decode_sample(&message.data).ok_or("deaths")?;
             self.of(name_str(&death.stage), death.generation);

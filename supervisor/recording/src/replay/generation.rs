@@ -67,7 +67,7 @@ pub(crate) struct Generation {
     compared: u64,
     unrecorded: u64,
     pieces_came: bool,
-    /// Whether the generation beat as ready or published an output, so that it must have taken an input.
+    /// Whether the generation published an output, so that it must have taken an input.
     worked: bool,
 }
 
@@ -88,11 +88,6 @@ impl Generation {
             pieces_came: false,
             worked: false,
         }
-    }
-
-    /// Note that the generation must have taken an input.
-    pub(crate) const fn worked(&mut self) {
-        self.worked = true;
     }
 
     pub(crate) fn piece(&mut self, setting: &Setting<'_>, sequence: u32, piece: &[u8]) {
