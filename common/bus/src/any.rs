@@ -89,8 +89,7 @@ impl<H: Stamped, E: Payload> AnyTopic for Topic<H, E> {
     }
 
     fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>> {
-        let reader = bus.reader_that_keeps(self, self.spec.limits.recorder_buffer)?;
-        Ok(Box::new(reader.of_all_generations()))
+        Ok(Box::new(bus.recorder_reader(self)?.of_all_generations()))
     }
 
     fn any_writer(&self, bus: &Bus, generation: u32, longest: usize) -> Result<Box<dyn AnyWriter>> {

@@ -27,8 +27,16 @@ impl Bus {
         self.reader_that_keeps(topic, topic.spec.limits.buffer)
     }
 
-    /// [`Bus::reader`] with a buffer for the newest `buffer` samples that were not taken yet.
-    pub(super) fn reader_that_keeps<H: Stamped, E: Payload>(
+    /// [`Bus::reader`] with the buffer of a recorder, for a process that must have every sample although it may wait seconds for a
+    /// processor.
+    pub fn recorder_reader<H: Stamped, E: Payload>(
+        &self,
+        topic: &Topic<H, E>,
+    ) -> Result<Reader<H, E>> {
+        self.reader_that_keeps(topic, topic.spec.limits.recorder_buffer)
+    }
+
+    fn reader_that_keeps<H: Stamped, E: Payload>(
         &self,
         topic: &Topic<H, E>,
         buffer: usize,

@@ -98,16 +98,17 @@ impl Observer {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::LINK)?);
         waiter.on(bus.wakeup(&topics::FIELD)?);
+        // What judges an arrival is read whole, however long this process waits for a processor.
         Ok(Self {
             health: bus.reader(&topics::HEALTH)?,
             link: bus.reader(&topics::LINK)?,
             complaints: bus.reader(&topics::COMPLAINTS)?,
-            pose: bus.reader(&topics::POSE)?,
+            pose: bus.recorder_reader(&topics::POSE)?,
             contact: bus.reader(&topics::CONTACT)?,
             grid: bus.reader(&topics::GRID)?,
-            guidance: bus.reader(&topics::GUIDANCE)?,
+            guidance: bus.recorder_reader(&topics::GUIDANCE)?,
             field: bus.reader(&topics::FIELD)?,
-            command: bus.reader(&topics::COMMAND)?,
+            command: bus.recorder_reader(&topics::COMMAND)?,
             writers: bus.writers().cloned().unwrap_or_default(),
             record,
         })
