@@ -10,7 +10,7 @@ use std::{fmt, time::Duration};
 use crate::mission::Sensor;
 use crate::samples::{
     ComplaintSample, CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus,
-    SurroundingsSample, Sweep, WheelSample, name, words,
+    SurroundingsSample, Sweep, WheelSample, name, name_str, words,
 };
 
 /// The protocol of one device. A sensor needs no more than this.
@@ -174,6 +174,12 @@ impl ComplaintSample {
         let [input, what, remedy] =
             [self.input, self.what, self.remedy].map(|words| words.text().into_owned());
         Refusal { input, what, remedy }
+    }
+}
+
+impl fmt::Display for ComplaintSample {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", name_str(&self.stage), self.refusal())
     }
 }
 

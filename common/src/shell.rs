@@ -21,13 +21,14 @@ use crate::{
     bus::{Bus, Stamp, Writer, Writers},
     checkpoint::Checkpoint,
     clock::{MissionClock, MissionTime},
+    driver::Refusal,
     external,
     journal::{Journal, Restored},
     outputs::Saved,
     poll,
     roster::Roster,
     run::{self, Run},
-    samples::{FaultAnswer, FaultKind, HealthSample, HealthState, name},
+    samples::{ComplaintSample, FaultAnswer, FaultKind, HealthSample, HealthState, name, name_str},
     signals::{SIGTERM, Signals},
     stage_command,
     start::{self, Generation, Joined, Start, system},
@@ -155,6 +156,11 @@ pub trait Process: Sized {
         Ok(false)
     }
 
+    /// What the user must mend before the stage can work as it should. The shell publishes it again and again.
+    fn trouble(&mut self) -> Option<Refusal> {
+        None
+    }
+
     fn stop(&mut self) -> Result {
         Ok(())
     }
@@ -211,13 +217,19 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
         context.waiter.on(context.bus.wakeup(*topic)?);
     }
     let readers = P::Readers::open_readers(&context.bus)?;
-    let mut process = P::open(&mut context, readers)?;
-    tracing::info!(generation = number, "ready");
-    let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
-    // After an error, too, the stage is stopped in order: the link then stops the robot.
-    let stopped = process.stop();
-    tracing::info!("stopped");
-    worked.and(stopped)
+    let worked = P::open(&mut context, readers).and_then(|mut process| {
+        tracing::info!(generation = number, "ready");
+        let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
+        // After an error, too, the stage is stopped in order: the link then stops the robot.
+        let stopped = process.stop();
+        tracing::info!("stopped");
+        worked.and(stopped)
+    });
+    if let Err(error) = &worked {
+        // The stage's log has the error in any case.
+        let _ = heartbeat.complain(&error.to_string().into(), Progress::default());
+    }
+    worked
 }
 
 /// A stage is asked to stop by SIGTERM, or by the end of a supervisor that is not its parent.
@@ -270,17 +282,23 @@ fn work(
         }
         busy = came;
         if heartbeat.beat_if_due(progress)? {
+            if let Some(trouble) = process.trouble() {
+                heartbeat.complain(&trouble, progress)?;
+            }
             let ignored = context.bus.writers().map(Writers::ignored).unwrap_or_default();
             if ignored.process != foreign {
                 foreign = ignored.process;
-                tracing::warn!(
-                    pid = foreign,
-                    "a process that the supervisor does not name writes samples; they are ignored; end it"
-                );
+                let what = "samples are ignored of a process that the supervisor does not name";
+                let (input, remedy) = (format!("process {foreign}"), "end it".to_owned());
+                let trouble = Refusal { input, what: what.to_owned(), remedy };
+                tracing::warn!("{trouble}");
+                heartbeat.complain(&trouble, progress)?;
             }
             if context.bus.lost() > 2 * lost {
                 lost = context.bus.lost();
-                tracing::warn!(lost, "/dev/shm is full: samples are lost; remove what fills it");
+                let trouble = "/dev/shm is full and samples are lost; remove what fills it".into();
+                tracing::warn!(lost, "{trouble}");
+                heartbeat.complain(&trouble, progress)?;
             }
             while let Some(Asked { id, fault }) = faults.take()? {
                 let answer = inject(process, fault)?;
@@ -316,6 +334,8 @@ fn inject(
 struct Heartbeat {
     writer: Writer<HealthSample>,
     sample: HealthSample,
+    /// It is open before there is trouble: readers need time to connect, and a process that ends takes samples that nobody awaits along.
+    complaints: Writer<ComplaintSample>,
     /// The longest time from beat to beat, by the table of topics. The stage waits no longer for input either.
     period: Duration,
     last: Instant,
@@ -331,6 +351,7 @@ impl Heartbeat {
                 pid: std::process::id(),
                 ..HealthSample::default()
             },
+            complaints: bus.writer(&topics::COMPLAINTS, generation.number)?,
             period: topics::HEALTH.spec().restated_every(),
             last: Instant::now(),
             tick: 0,
@@ -348,6 +369,11 @@ impl Heartbeat {
         (self.last, self.tick) = (Instant::now(), progress.tick);
         self.writer.publish_quietly(progress.tick, progress.time, self.sample, &[])?;
         Ok(())
+    }
+
+    fn complain(&mut self, trouble: &Refusal, Progress { tick, time }: Progress) -> Result {
+        let complaint = ComplaintSample::of(name_str(&self.sample.stage), trouble);
+        Ok(self.complaints.publish_quietly(tick, time, complaint, &[])?)
     }
 
     fn time_to_beat(&self) -> Duration {

@@ -111,8 +111,8 @@ topics! {
     HEALTH "health": HealthSample, EVERY_STAGE, on_change(BEAT);
     /// The connection to the robot: its state, counts, tick latency.
     LINK "link": LinkSample, "link", on_change(BEAT);
-    /// What a stage cannot use and the remedy, about once a second while it lasts.
-    COMPLAINTS "complaints": ComplaintSample, "link", Rate::WhenItHappens;
+    /// Trouble of a stage, with the input and the remedy, again and again while it lasts.
+    COMPLAINTS "complaints": ComplaintSample, EVERY_STAGE, Rate::WhenItHappens;
     /// The seven infrared rangers, metres.
     INFRARED "infrared": InfraredSample, "link", Rate::EachFrame;
     /// Battery volts and whether they are low, motor currents, temperatures of the drivers.

@@ -3,15 +3,15 @@
 
 use crate::{
     bus::{AnyTopic, Bus, BusError},
-    topics::{FAULTS, HEALTH, INPUTS, ROSTER},
+    topics::{COMPLAINTS, FAULTS, HEALTH, INPUTS, ROSTER},
 };
 
 pub type Topics = &'static [&'static dyn AnyTopic];
 
 /// Every stage's process also reads the requests of faults, and the roster, which names the processes that it admits.
 pub static EVERY_STAGE_READS: Topics = &[&FAULTS, &ROSTER];
-/// Every stage's process also writes its heartbeats, and the inputs of its step.
-pub static EVERY_STAGE_WRITES: Topics = &[&HEALTH, &INPUTS];
+/// Every stage's process also writes its heartbeats, its trouble, and the inputs of its step.
+pub static EVERY_STAGE_WRITES: Topics = &[&HEALTH, &COMPLAINTS, &INPUTS];
 
 /// The topics that a stage reads, is woken by and writes, and the state that it persists.
 pub struct Wiring {

@@ -201,7 +201,7 @@ impl Words {
 }
 
 payloads! {
-    /// What a stage cannot use, for the user to mend. The stage repeats it about once a second while it lasts.
+    /// Trouble of a stage that the user can mend. The stage repeats it while it lasts.
     "firsthand.Complaint" ComplaintSample {
         stage: Name,
         /// The part of the input, as the input names it; empty for the whole.

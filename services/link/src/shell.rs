@@ -12,7 +12,7 @@ use common::{
     bus::{Reader, Writers},
     clock::{MissionClock, monotonic_ns},
     domain::Domain,
-    driver::Memory,
+    driver::{Memory, Refusal},
     latency::Histogram,
     readers,
     samples::{
@@ -23,8 +23,8 @@ use common::{
     stage::Runner,
     stop_socket::{Identity, OwedStop, Request, StopMark, StopSocket},
     topics::{
-        BASE_RESPONSE, COMMAND, COMPLAINTS, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK,
-        POWER, RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
+        BASE_RESPONSE, COMMAND, CONTACT, COUNTS, DIRECTIVE, IMU_TURN, INFRARED, LINK, POWER,
+        RANGES, SCAN, SURROUNDINGS, TICK_LIMIT, WHEELS, WIRE,
     },
     wiring::{Persists, Topics},
 };
@@ -42,6 +42,8 @@ use crate::{
     transport::Transport,
 };
 
+/// The step reports one refused message a second.
+const REFUSAL_LASTS_NS: u64 = 2_000_000_000;
 /// Interval of the checks without input, unless nothing is due sooner than the link is restated: a fifth of the shortest deadline.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
@@ -83,6 +85,8 @@ pub struct Shell {
     latency: Histogram,
     latency_ns: u64,
     stated_ns: u64,
+    /// Why the newest refused message was refused, and when.
+    refused: Option<(Refusal, u64)>,
 }
 
 impl Process for Shell {
@@ -97,7 +101,6 @@ impl Process for Shell {
         &RANGES,
         &WHEELS,
         &LINK,
-        &COMPLAINTS,
         &INFRARED,
         &POWER,
         &SURROUNDINGS,
@@ -155,6 +158,7 @@ impl Process for Shell {
             latency: Histogram::default(),
             latency_ns: 0,
             stated_ns: 0,
+            refused: None,
         };
         if let Some(memory) = memory {
             shell.take(Event::Remember(memory), monotonic_ns())?;
@@ -229,6 +233,16 @@ impl Process for Shell {
     fn after_ready(&mut self, context: &mut Context) -> Result<(), StageError> {
         self.has_telemetry = true;
         self.runner.open_late(context)
+    }
+
+    /// Why the robot is not heard or understood, or why the failsafe holds it.
+    fn trouble(&mut self) -> Option<Refusal> {
+        let (link, now_ns) = (&self.runner.stage.link, monotonic_ns());
+        let base = (!link.connected()).then(|| self.transport.trouble()).flatten();
+        self.refused.take_if(|(_, at_ns)| now_ns.saturating_sub(*at_ns) > REFUSAL_LASTS_NS);
+        base.or_else(|| self.wires.iter().find_map(Transport::trouble))
+            .or_else(|| self.refused.as_ref().map(|(why, _)| why.clone()))
+            .or_else(|| link.explain(link.decision().cause, now_ns).map(Refusal::from))
     }
 
     fn has_idle_work(&self) -> bool {
@@ -441,6 +455,7 @@ impl Shell {
                 Effect::FoundResponse(words) => tracing::warn!("{words}"),
                 Effect::Refused(why) => {
                     tracing::warn!("the robot says what is not in its protocol: {why}");
+                    self.refused = Some((why, monotonic_ns()));
                 }
                 Effect::ClockRate(rate) => {
                     let pace = match self.clock {

@@ -5,15 +5,15 @@ use common::{
     mission::{Mission, SensorKind},
     outputs::Outputs,
     samples::{
-        ComplaintSample, Direction, InfraredSample, PowerSample, RangesHeader, ScanHeader,
-        SurroundingsSample, WireHeader,
+        Direction, InfraredSample, PowerSample, RangesHeader, ScanHeader, SurroundingsSample,
+        WireHeader,
     },
     shell::{Context, Progress},
     stage::{ForeignState, Stage},
     start::StageError,
     topics::{
-        BASE_RESPONSE, COMPLAINTS, CONTACT, COUNTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN,
-        SURROUNDINGS, WHEELS, WIRE, WIRE_PIECE,
+        BASE_RESPONSE, CONTACT, COUNTS, IMU_TURN, INFRARED, POWER, RANGES, SCAN, SURROUNDINGS,
+        WHEELS, WIRE, WIRE_PIECE,
     },
 };
 
@@ -88,10 +88,6 @@ impl LinkStage {
                     out.publish(&COUNTS, counts)?;
                 }
                 out.publish(&WHEELS, wheels)?;
-            }
-            Effect::Refused(why) => {
-                out.publish(&COMPLAINTS, ComplaintSample::of("link", &why))?;
-                return Ok(Some(Effect::Refused(why)));
             }
             Effect::Infrared(sample) => self.infrared = Some(sample),
             Effect::Power(sample) => self.power = Some(sample),

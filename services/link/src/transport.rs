@@ -14,7 +14,7 @@ use std::{
     os::fd::{AsFd, BorrowedFd},
 };
 
-use common::{address::Address, mission::Mission, start::StageError};
+use common::{address::Address, driver::Refusal, mission::Mission, start::StageError};
 use thiserror::Error;
 
 pub use self::counts::{Attempts, Tally};
@@ -71,6 +71,11 @@ trait Wire: AsFd + fmt::Debug {
 
     /// None while the wire is open.
     fn attempts(&self, _now_ns: u64) -> Option<Attempts> {
+        None
+    }
+
+    /// Why the robot cannot be heard, and the remedy; none while it can.
+    fn trouble(&self) -> Option<(String, &'static str)> {
         None
     }
 }
@@ -155,6 +160,12 @@ impl Transport {
     /// None while the wire is open.
     pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
         self.wire.attempts(now_ns)
+    }
+
+    /// Why the robot cannot be heard; none while it can.
+    pub fn trouble(&self) -> Option<Refusal> {
+        let (what, remedy) = self.wire.trouble()?;
+        Some(Refusal { input: self.address.to_string(), what, remedy: remedy.to_owned() })
     }
 
     fn broken(&self, source: io::Error) -> TransportError {

@@ -143,10 +143,16 @@ impl Snapshot<'_> {
         })
     }
 
+    fn robot_answers(&self) -> bool {
+        self.link.is_some_and(|link| link.connected == 1)
+    }
+
     fn stuck(&self, now: Now) -> Option<Ending> {
         let may_wait = match self.reason {
-            // A robot whose samples a stage cannot use is here.
-            HoldReason::None => self.may_be_away && self.complaint.is_none(),
+            // A robot that answers and cannot be used is here.
+            HoldReason::None => {
+                self.may_be_away && !(self.robot_answers() && self.complaint.is_some())
+            }
             HoldReason::Operator | HoldReason::Waiting | HoldReason::Lost => true,
             // In wall-clock time the mission's timeout ends such a mission.
             HoldReason::StageHeld => !self.in_ticks,
@@ -155,23 +161,18 @@ impl Snapshot<'_> {
         if may_wait || now.saturating_sub(self.progress) < NO_PROGRESS {
             return None;
         }
-        let robot_answers = self.link.is_some_and(|link| link.connected == 1);
         let reason = if !self.not_started.is_empty() {
             let (robot, stages) = (self.robot, self.not_started.join(", "));
             format!("not running: {stages}; start each with `firsthand stage NAME --robot {robot}`")
         } else if !self.held.is_empty() {
             let (held, file) = (self.held.join(", "), records::DEATHS);
-            format!("{held} died again and again and is held; see {file} in the run directory")
+            let why = self.complaint.as_ref().map_or(String::new(), |why| format!(" ({why})"));
+            format!("{held} died again and again{why} and is held; see {file} in the run directory")
         } else if let Some(complaint) = &self.complaint {
             complaint.clone()
-        } else if !self.has_ticked && !robot_answers {
+        } else if !self.has_ticked && !self.robot_answers() {
             let address = self.address;
-            match self.link.map_or(0, |link| link.other_port) {
-                0 => format!("no robot answers at {address}; is it on, is robot.address right?"),
-                port => format!(
-                    "no robot answers at {address}, but its host does from port {port}; name that one in robot.address"
-                ),
-            }
+            format!("no robot answers at {address}: switch the robot on, or correct robot.address")
         } else if !self.has_ticked {
             "the robot answers and no tick begins: it may not send all that a tick needs, wheels and every sensor of its mission; see link.log"
                 .to_owned()

@@ -28,7 +28,7 @@ const MOST_GUIDANCE: usize = 1024;
 /// The most contacts that are recorded: more than come between two checks for stalls.
 const MOST_CONTACTS: usize = 64;
 
-/// A stage repeats what it complains of every second, and may get no processor for a while.
+/// A stage repeats its trouble several times a second, and may wait seconds for a processor.
 const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -202,9 +202,9 @@ fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
 
 impl Record {
     /// The complaint of a stage that still lasts, in words.
-    pub(crate) fn complaint(&self) -> Option<String> {
+    pub fn complaint(&self) -> Option<String> {
         let (complaint, _) = self.complaint.filter(|(_, read)| read.elapsed() < COMPLAINT_LASTS)?;
-        Some(format!("{}: {}", name_str(&complaint.stage), complaint.refusal()))
+        Some(complaint.to_string())
     }
 
     /// Whether a place is in a believed hazard, or outside the map.

@@ -21,7 +21,8 @@ impl fmt::Display for Progress<'_> {
         let link = record.link.unwrap_or_default();
         if !self.driving && link.cause() == Cause::NotOrdered {
             let what = if running == all { "waiting" } else { "starting" };
-            return write!(f, "{what}: {running}/{all} stages alive");
+            write!(f, "{what}: {running}/{all} stages alive")?;
+            return write_complaint(f, record);
         }
         let time = record.pose.map_or(0.0, |pose| pose.stamp.time().seconds());
         let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
@@ -35,6 +36,10 @@ impl fmt::Display for Progress<'_> {
             let (cause, effect) = (link.cause().name().to_uppercase(), link.action().effect());
             write!(f, ", {cause}: the robot {effect}")?;
         }
-        record.complaint().map_or(Ok(()), |complaint| write!(f, "; {complaint}"))
+        write_complaint(f, record)
     }
+}
+
+fn write_complaint(f: &mut fmt::Formatter<'_>, record: &Record) -> fmt::Result {
+    record.complaint().map_or(Ok(()), |complaint| write!(f, "; {complaint}"))
 }

@@ -1,6 +1,6 @@
 //! The state of a robot: its newest samples.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     grid::{Applied, Replica},
@@ -26,6 +26,8 @@ const POINT_EVERY_M: f64 = 0.05;
 
 /// From this age on, what a mirror shows does not count as what the robot does. A robot's state comes several times a second.
 const OLD_S: f64 = 1.0;
+/// A stage repeats its trouble several times a second, and may wait seconds for a processor.
+const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
 
 /// What a robot is doing. Samples that have not come yet are none, lists are empty. Lengths are metres in the mission frame.
 #[derive(Clone, Debug, Default)]
@@ -49,7 +51,7 @@ pub struct RobotState {
     pub command: Option<CommandSample>,
     pub link: Option<LinkSample>,
     /// The newest complaint of a stage. Its stage repeats it while it lasts.
-    pub complaint: Option<ComplaintSample>,
+    complaint: Option<ComplaintSample>,
     pub power: Option<PowerSample>,
     /// The age of what is shown, if a mirror shows a robot of another machine.
     pub mirror: Option<MirrorSample>,
@@ -141,7 +143,10 @@ impl RobotState {
 
     /// What the robot does, in a sentence, and how important that is. A mirror says how old that is.
     pub fn doing(&self) -> (Kind, String) {
-        let (kind, text) = self.does();
+        let (kind, mut text) = self.does();
+        if let Some(complaint) = self.complaint() {
+            text += &format!("; {complaint}");
+        }
         match self.age_in_words() {
             None => (kind, text),
             Some((is_old, age)) => {
@@ -157,6 +162,12 @@ impl RobotState {
         let how = if is_old { "NOT HEARD for" } else { "as of" };
         let ago = if is_old { "" } else { " ago" };
         Some((is_old, format!("another machine, {how} {age_s:.1} s{ago}")))
+    }
+
+    /// The trouble of a stage, while the stage repeats it.
+    pub fn complaint(&self) -> Option<&ComplaintSample> {
+        let now = self.link?.stamp.time();
+        self.complaint.as_ref().filter(|said| now.since(said.stamp.time()) < COMPLAINT_LASTS)
     }
 
     fn does(&self) -> (Kind, String) {
@@ -234,7 +245,10 @@ pub fn drop_every_second<T>(items: &mut Vec<T>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use common::grid::{GridFrame, Part, Window};
+    use common::{
+        driver::Refusal,
+        grid::{GridFrame, Part, Window},
+    };
 
     #[test]
     fn the_way_is_bounded_and_its_points_are_about_equally_far_apart() {
@@ -285,8 +299,15 @@ mod tests {
         state.link = Some(link(Action::Stop, Cause::NotOrdered));
         assert_eq!(state.doing().0, Kind::Warn);
         assert_eq!((state.way_to_go(), state.targets().count()), (None, 0), "it has no target");
-        state.link = Some(LinkSample { connected: 0, losses: 1, ..LinkSample::default() });
+        let mut link = LinkSample { connected: 0, losses: 1, ..LinkSample::default() };
+        state.link = Some(link);
         assert_eq!(state.doing(), (Kind::Bad, "the robot does not answer".to_owned()));
+        let trouble = Refusal { remedy: "open it".to_owned(), ..Refusal::from("the port is shut") };
+        state.apply(&Sample::Complaint(ComplaintSample::of("link", &trouble)));
+        assert!(state.doing().1.ends_with("; link: the port is shut; open it"));
+        link.stamp.stamp_ns = COMPLAINT_LASTS.as_nanos() as u64;
+        state.link = Some(link);
+        assert_eq!(state.complaint(), None, "the stage no longer repeats it");
     }
 
     #[test]

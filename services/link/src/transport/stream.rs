@@ -59,8 +59,8 @@ pub(super) struct Stream<D> {
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
-    /// It is not logged again.
-    logged: Option<Errno>,
+    /// Why the wire is down, which is not logged again.
+    down: Option<Errno>,
 }
 
 impl<D: Dial + 'static> Stream<D> {
@@ -72,7 +72,7 @@ impl<D: Dial + 'static> Stream<D> {
             tail: Vec::new(),
             backoff: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
             unsent: 0,
-            logged: None,
+            down: None,
         }))
     }
 }
@@ -93,6 +93,10 @@ impl<D: Dial> Wire for Stream<D> {
             State::Closed => self.backoff.wait_ns(now_ns),
         };
         Some(Attempts { made: self.backoff.attempts(), next_ns })
+    }
+
+    fn trouble(&self) -> Option<(String, &'static str)> {
+        self.down.map(|errno| (io::Error::from(errno).to_string(), remedy(errno)))
     }
 
     /// Continue or give up an attempt, or send the rest of a message.
@@ -146,7 +150,7 @@ impl<D: Dial> Wire for Stream<D> {
                 // Only received bytes reset the pauses: a peer that closes each connection at once must not be called ten times a
                 // second.
                 self.backoff.reset();
-                self.logged = None;
+                self.down = None;
                 return Ok(Some(length));
             }
             Err(Errno::AGAIN | Errno::INTR) => {}
@@ -233,7 +237,7 @@ impl<D: Dial> Stream<D> {
     fn log(&mut self, error: &io::Error) {
         // The end of a stream has no error number: EPIPE.
         let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
-        if self.logged.replace(errno) != Some(errno) {
+        if self.down.replace(errno) != Some(errno) {
             let remedy = remedy(errno);
             tracing::warn!(robot = %self.dial, %error, "the wire is down: {remedy}; it is tried for ever");
         }
@@ -242,11 +246,15 @@ impl<D: Dial> Stream<D> {
 
 const fn remedy(errno: Errno) -> &'static str {
     match errno {
-        Errno::NOENT | Errno::NODEV | Errno::NXIO | Errno::IO => "is the adapter plugged in",
-        Errno::ACCESS => "let this user's groups have the device, often `dialout`",
-        Errno::AGAIN => "another program holds the line: end it",
-        Errno::NOTTY => "robot.address names no serial line",
-        _ => "is the robot on, is robot.address right",
+        Errno::NOENT | Errno::NODEV | Errno::NXIO | Errno::IO => {
+            "plug the adapter in, or correct robot.address"
+        }
+        Errno::ACCESS => {
+            "add your user to the group of the device, often `dialout`, and log in again"
+        }
+        Errno::AGAIN => "end the other program that holds the line",
+        Errno::NOTTY => "name a serial line in robot.address",
+        _ => "switch the robot on, or correct robot.address",
     }
 }
 

@@ -73,10 +73,30 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     assert_eq!(transport.tally().foreign_datagrams, 1);
     // The sender may be the robot, if the mission has a wrong port.
     let port = other.local_addr().unwrap().port();
-    assert_eq!(transport.tally().other_port, port);
+    let trouble = transport.trouble().unwrap().to_string();
+    assert!(trouble.contains(&format!("answers from port {port}; name that port")), "{trouble}");
     robot.send_to(b"hello", link).unwrap();
     ready(&transport);
     assert_eq!(transport.receive(0).unwrap(), Some(&b"hello"[..]));
+}
+
+#[test]
+fn a_wire_that_cannot_be_opened_says_why_with_the_remedy_until_bytes_come() {
+    let (listener, address) = listener();
+    drop(listener);
+    let mut transport = open_at(&Address::Tcp(address)).unwrap();
+    while transport.trouble().is_none() {
+        transport.maintain(0).unwrap();
+    }
+    let trouble = transport.trouble().unwrap();
+    assert_eq!(trouble.input, format!("tcp://{address}"));
+    assert!(trouble.what.contains("refused") && trouble.remedy.contains("robot.address"));
+    let listener = TcpListener::bind(address).unwrap();
+    let later_ns = 60_000 * MS;
+    let mut robot = connected(&listener, &mut transport, later_ns);
+    robot.write_all(b"hello").unwrap();
+    expect(&mut transport, b"hello", later_ns);
+    assert_eq!(transport.trouble(), None);
 }
 
 fn listener() -> (TcpListener, SocketAddr) {

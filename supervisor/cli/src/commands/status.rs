@@ -8,6 +8,7 @@ use std::{
 use clap::Args;
 use common::{
     domain::{Domain, RobotName},
+    driver::Refusal,
     follower::{Event, Follower},
     geometry::wrap_angle,
     roster,
@@ -67,7 +68,19 @@ struct Status<'a> {
     link: Option<LinkStatus>,
     /// The power; none if the robot does not report it.
     power: Option<PowerStatus>,
+    /// The trouble of a stage; none if no stage has any.
+    complaint: Option<ComplaintStatus>,
     stages: Vec<StageStatus<'a>>,
+}
+
+#[derive(Serialize)]
+struct ComplaintStatus {
+    stage: String,
+    input: String,
+    what: String,
+    remedy: String,
+    #[serde(skip)]
+    text: String,
 }
 
 #[derive(Serialize)]
@@ -168,12 +181,13 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 /// The topics of a status. The supervisor publishes the target before its roster.
-static WANTED: [&dyn AnyTopic; 7] = [
+static WANTED: [&dyn AnyTopic; 8] = [
     &topics::ROSTER,
     &topics::LINK,
     &topics::POWER,
     &topics::FOLLOWING,
     &topics::MIRROR,
+    &topics::COMPLAINTS,
     &topics::TARGET,
     &topics::POSE,
 ];
@@ -319,6 +333,11 @@ fn status<'a>(
         }),
         link: robot.link.as_ref().map(link_status),
         power: robot.power.as_ref().map(power_status),
+        complaint: robot.complaint().map(|complaint| {
+            let Refusal { input, what, remedy } = complaint.refusal();
+            let stage = name_str(&complaint.stage).to_owned();
+            ComplaintStatus { stage, input, what, remedy, text: complaint.to_string() }
+        }),
         stages: robot.stages.iter().map(stage_status).collect(),
     })
 }
@@ -413,6 +432,9 @@ impl fmt::Display for Status<'_> {
         }
         if let Some(power) = &self.power {
             writeln!(f, "{power}")?;
+        }
+        if let Some(complaint) = &self.complaint {
+            writeln!(f, "{}", complaint.text)?;
         }
         let mut table = Table::new([
             "stage",

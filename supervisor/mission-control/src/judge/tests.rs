@@ -25,7 +25,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let go = link(Action::Go, Cause::None);
     let stop = link(Action::Stop, Cause::BatteryLow);
     let end = link(Action::End, Cause::BatteryEmpty);
-    let elsewhere = LinkSample { other_port: 4711, ..LinkSample::default() };
+    let away = LinkSample { connected: 0, ..go };
     let robot = "x80".parse().unwrap();
     let address = "udp://10.0.0.1:10001".parse::<Address<String>>().unwrap();
     let address = address.resolve().unwrap();
@@ -92,9 +92,8 @@ fn every_rule_of_the_judgement_decides_its_row() {
          Some((Outcome::Aborted, "link: no nose"))),
         ("a robot in a procedure may not be away", Snapshot { has_ticked: false, ..driving() }, late,
          Some((Outcome::Aborted, "no tick begins"))),
-        ("a robot that answers from another port",
-         Snapshot { may_be_away: true, link: Some(&elsewhere), ..starting() }, late,
-         Some((Outcome::Aborted, "its host does from port 4711"))),
+        ("a real robot may be away while its link says why it does not hear it",
+         Snapshot { may_be_away: true, link: Some(&away), complaint: Some("link: refused".to_owned()), ..driving() }, late, None),
         ("a real robot that is to start may not be away", Snapshot { may_be_away: true, link: None, ..starting() }, late,
          Some((Outcome::Aborted, "no robot answers at udp://10.0.0.1:10001"))),
         ("a robot that answers and does not start", starting(), late, Some((Outcome::Aborted, "every sensor of its mission"))),
@@ -109,6 +108,8 @@ fn every_rule_of_the_judgement_decides_its_row() {
          Some((Outcome::Unreachable, "0.36 m from the target, at [2.64, 0.00]: as near as the robot gets"))),
         ("an operator may wait", Snapshot { reason: HoldReason::Operator, ..driving() }, late, None),
         ("a held stage in ticks", held(), late, Some((Outcome::Aborted, "mapper died again and again"))),
+        ("a held stage that says why it died", Snapshot { complaint: Some("mapper: no disk".to_owned()), ..held() }, late,
+         Some((Outcome::Aborted, "mapper died again and again (mapper: no disk)"))),
         ("a held stage on the wall clock may wait", Snapshot { in_ticks: false, ..held() }, late, None),
         ("an external stage that is missing", Snapshot { not_started: vec!["planner"], held: vec!["mapper"], ..starting() },
          late, Some((Outcome::Aborted, "not running: planner; start each with `firsthand stage NAME --robot x80`"))),

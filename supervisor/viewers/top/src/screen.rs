@@ -245,6 +245,9 @@ fn numbers(state: &RobotState) -> Vec<Line<'static>> {
         line("robot", text, style);
         line("latency", latency(link), plain);
     }
+    if let Some(complaint) = state.complaint() {
+        line("trouble", complaint.to_string(), BAD);
+    }
     if let Some(power) = state.power {
         let (board, motor, servo) = (power.board_v, power.motor_v, power.servo_v);
         let style = if power.is_low() { BAD } else { plain };

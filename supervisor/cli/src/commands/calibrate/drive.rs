@@ -1,7 +1,4 @@
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::PathBuf};
 
 use clap::Args;
 use common::{
@@ -118,11 +115,7 @@ impl Setting {
             Box::new(|_| {}),
             &mut |progress| {
                 line.update(&title, || shown(progress), true);
-                let said = match progress.record.pose {
-                    Some(_) => None,
-                    None => complaint(&options.directory),
-                };
-                if let Some(said) = said {
+                if let Some(said) = progress.record.complaint() {
                     // Numbers in it may differ each time.
                     let words: String = said.chars().filter(|it| !it.is_numeric()).collect();
                     if !complained.contains(&words) {
@@ -169,13 +162,6 @@ pub struct Carried {
     pub counts: Vec<[u16; 2]>,
     /// The end of a simulated robot, metres.
     pub truth: Option<DVec2>,
-}
-
-/// What the link warned of last, for a robot that does not start.
-fn complaint(directory: &Path) -> Option<String> {
-    let log = fs::read_to_string(directory.join("link.log")).ok()?;
-    let (_, said) = log.lines().rev().find_map(|line| line.split_once(" WARN link::shell: "))?;
-    Some(said.to_owned())
 }
 
 fn shown(progress: &Progress<'_>) -> String {
