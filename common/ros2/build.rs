@@ -1,7 +1,8 @@
-//! Writes `msg.rs`: a Rust type for each message in the files of `interfaces`, one below a folder of its release and its package.
+//! Writes `msg.rs`: a Rust type for each message in `interfaces`, whose folders are a release and a
+//! package.
 //!
-//! A release without a file of an interface has that of the next one; `common` has those of Lyrical and later. One type serves all
-//! releases: its fields are those of all, and on the wire are those of a release.
+//! A release without a file of an interface uses the next one's; `common` has those of Lyrical and
+//! later. One type serves all releases: it has the fields of all, and encodes those of one.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,9 +11,9 @@ use std::{
     path::Path,
 };
 
-/// The oldest first.
+/// Releases, the oldest first.
 const RELEASES: [&str; 5] = ["Humble", "Iron", "Jazzy", "Kilted", "Common"];
-/// The messages that each action has beside its own three; `@` is its name.
+/// Messages of each action beside its own three; `@` is its name.
 const OF_ACTIONS: [(&str, &str); 5] = [
     ("SendGoalRequest", "unique_identifier_msgs/UUID goal_id\n@Goal goal"),
     ("SendGoalResponse", "bool accepted\nbuiltin_interfaces/Time stamp"),
@@ -25,7 +26,7 @@ const RULE: &str =
 
 /// Type, name and suffix: `=` and the value of a constant, a space and a field's default, or empty.
 type Line = [String; 3];
-/// The lines of messages by their names with the package, with the last release that has them, the newest first.
+/// Lines of messages by name with package. Each version has its last release; the newest is first.
 type Messages = BTreeMap<String, Vec<(&'static str, Vec<Line>)>>;
 
 fn add(messages: &mut Messages, release: &'static str, name: String, text: &str) {
@@ -39,7 +40,7 @@ fn add(messages: &mut Messages, release: &'static str, name: String, text: &str)
     messages.entry(name).or_default().push((release, lines));
 }
 
-/// Splits a line. The compiler rejects the Rust that a malformed line becomes.
+/// Splits a line. A malformed line becomes Rust that the compiler rejects.
 fn parse(line: &str) -> Line {
     let line = line.replace(" = ", "=");
     let (kind, rest) = line.split_once(' ').unwrap_or((&line, ""));
@@ -51,7 +52,8 @@ fn fields(lines: &[Line]) -> impl Iterator<Item = &Line> {
     lines.iter().filter(|[_, _, value]| !value.starts_with('='))
 }
 
-/// Adds the definition of a message as recordings have it: its lines, then those of messages in it that are not there yet.
+/// Adds the definition of a message in the form of recordings: its lines, then those of nested
+/// messages not yet included.
 fn define(messages: &Messages, name: &str, text: &mut String) {
     let lines = &messages[name][0].1;
     *text += &lines

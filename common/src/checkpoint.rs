@@ -1,11 +1,12 @@
-//! State that outlives a SIGKILL: a small file of two slots, written in turn.
+//! State that survives a SIGKILL: a small file of two slots, written in turn.
 //!
-//! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the older slot, so a kill leaves one whole,
-//! as the checksum shows. Nothing is synced: the kernel keeps what a killed process wrote, and a power cut takes the encoder counts too.
-//! Opening reserves room for both slots, so a full disk prevents no save.
+//! Each slot is `magic | sequence | length | crc32 | body`, little-endian. A save overwrites the
+//! older slot, so a kill leaves one whole, as the checksum shows. Saves are not synced: the kernel
+//! keeps a killed process's writes, and a power failure resets the encoder counts anyway. Opening
+//! reserves space for both slots, so saves succeed on a full disk.
 //!
-//! The magic ends with the version of the states. A state of another version, or a whole one that cannot be decoded, is refused: to
-//! start without it would lose it silently.
+//! The magic ends with the version of the states. A whole state of another version or type is
+//! refused rather than silently lost.
 
 use std::{
     fs::{File, OpenOptions},
@@ -41,7 +42,7 @@ pub enum CheckpointError {
 
 /// "firsthand checkpoint", before the version.
 const MAGIC: [u8; 3] = *b"FHC";
-/// Raise it when the encoding of any process's state changes, or of an entry of its journal.
+/// Format version. Raise it when the encoding of any process's state or journal entry changes.
 pub const VERSION: u8 = b'3';
 /// magic u32, sequence u64, length u32, crc32 u32.
 const HEADER: usize = 20;
@@ -56,10 +57,11 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// Open, or create, the checkpoint at `path` for encoded states of at most `capacity` bytes, and restore the newest whole one.
+    /// Opens or creates the checkpoint at `path`, for encoded states of at most `capacity` bytes,
+    /// and restores the newest.
     ///
     /// # Errors
-    /// When the file cannot be read or made, or holds a whole state of another version or type.
+    /// If the file cannot be read or created, or holds a whole state of another version or type.
     pub fn open<T: DeserializeOwned>(
         path: &Path,
         capacity: usize,
@@ -85,7 +87,7 @@ impl Checkpoint {
         slot * (HEADER + self.capacity) as u64
     }
 
-    /// None when the slot was never written, or is torn.
+    /// Returns `None` for an unwritten or torn slot.
     fn read_slot<T: DeserializeOwned>(
         &self,
         slot: u64,
@@ -98,7 +100,7 @@ impl Checkpoint {
             .map_err(|problem| CheckpointError::Foreign { file: self.path.clone(), problem })
     }
 
-    /// Save `state` in place of the older one. Fails when it cannot be encoded or written, or is too long.
+    /// Saves `state` over the older one. Fails if it is too long or cannot be encoded or written.
     pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), CheckpointError> {
         let sequence = self.sequence + 1;
         let mut bytes = std::mem::take(&mut self.buffer);
@@ -145,7 +147,7 @@ pub(crate) fn encode_after<T: Serialize>(
     Ok(bytes)
 }
 
-/// Covers all `bytes` but the four of the checksum, `at` this offset.
+/// Computes the checksum of all `bytes` except its own four, `at` this offset.
 pub(crate) fn checksum(bytes: &[u8], at: usize) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&bytes[..at]);
@@ -153,7 +155,7 @@ pub(crate) fn checksum(bytes: &[u8], at: usize) -> u32 {
     hasher.finalize()
 }
 
-/// None where the slot was never written, or is torn. An error says why a whole one is not of this program.
+/// Returns `None` for an unwritten or torn slot. An error says why a whole one is foreign.
 fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<Option<(u64, T)>, String> {
     let Some(&version) = bytes.strip_prefix(&MAGIC).and_then(<[u8]>::first) else {
         return Ok(None);
@@ -182,8 +184,8 @@ fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {
     (word(16)? == checksum(whole, 16)).then(|| (sequence, &whole[HEADER..]))
 }
 
-/// Open, or create, `path` with `length` bytes of the disk reserved; the file's own length stays. A file system that cannot reserve
-/// does not.
+/// Opens or creates `path` and reserves `length` bytes on disk, if the file system can; the file's
+/// length stays.
 pub(crate) fn open_reserved(path: &Path, length: u64) -> Result<File, CheckpointError> {
     let file = OpenOptions::new()
         .read(true)
@@ -282,7 +284,7 @@ mod tests {
         checkpoint.save(&vec![7_u32; 4]).unwrap();
         checkpoint.save(&vec![9_u32; 4]).unwrap();
         let whole = std::fs::read(&path).unwrap();
-        // The second save went into the first slot, which is as long as its state.
+        // The second save used the first slot, which is as long as its state.
         for bit in 8 * 4..8 * (HEADER + 5) {
             let mut changed = whole.clone();
             changed[bit / 8] ^= 1 << (bit % 8);

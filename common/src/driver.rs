@@ -1,5 +1,5 @@
-//! The interface between the link and the devices on its wires: one [`Base`], which drives, and any number of sensors with wires of their
-//! own. A driver knows neither wire nor clock: bytes come in, what they say goes out.
+//! Interface between the link and its devices: one [`Base`], which drives, and sensors with wires
+//! of their own. Drivers are independent of wire and clock: they map bytes to measurements.
 
 pub mod counts;
 pub mod gyro;
@@ -13,40 +13,41 @@ use crate::samples::{
     SurroundingsSample, Sweep, WheelSample, name, name_str, words,
 };
 
-/// The protocol of one device. A sensor needs no more than this.
+/// Protocol of one device; sufficient for a sensor.
 pub trait Driver: fmt::Debug {
-    /// The meaning of `bytes`, and of those before that they complete.
+    /// Decodes `bytes`, together with an earlier incomplete message.
     fn hear(&mut self, bytes: &[u8]) -> Heard;
 
-    /// Drop the beginning of a message, whose rest does not follow in the next connection.
+    /// Discards an incomplete message; a new connection starts without its rest.
     fn reset(&mut self);
 
     fn tally(&self) -> WireTally;
 
-    /// The bytes for a device that was found: settings, and the order to send what it measures. A sensor that fell silent gets them
+    /// Returns the settings and the order to stream for a new device. A silent sensor gets them
     /// again.
     fn greeting(&self) -> Vec<u8> {
         Vec::new()
     }
 }
 
-/// The driver of what moves the robot. All but [`Base::velocity`] depends on the robot.
+/// Driver of the robot's base. Methods other than [`Base::velocity`] depend on the robot.
 pub trait Base: Driver {
-    /// A command for the speeds of the two wheels, or of a car's wheel and steering, counts/s, forward positive; the robot itself stops
-    /// after `limit`.
+    /// Encodes a command for the two wheels, or a car's wheel and steering, counts/s, forward
+    /// positive. The robot stops by itself after `limit`.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
-    /// The turn since the tick before by the robot's own gyro, for a tick that begins now.
+    /// Returns the turn since the last tick by the robot's own gyro, for a tick that begins now.
     fn turn_for_tick(&mut self) -> Option<Turn> {
         None
     }
 
-    /// The request to send the sensors, for a robot that neither publishes them nor is polled.
+    /// Returns the request for sensor values, for a robot that neither publishes them nor is
+    /// polled.
     fn ask_for_sensors(&self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// The request to answer, for a robot that neither publishes nor is polled.
+    /// Returns a request for any answer, for a robot that neither publishes nor is polled.
     fn ping(&self) -> Vec<u8> {
         Vec::new()
     }
@@ -55,7 +56,8 @@ pub trait Base: Driver {
         Vec::new()
     }
 
-    /// How many acknowledgements, which [`Heard::acknowledged`] counts, the robot owes for these bytes to it.
+    /// Returns how many acknowledgements the robot owes for these bytes; [`Heard::acknowledged`]
+    /// counts them.
     fn owed(&self, _sent: &[u8]) -> usize {
         0
     }
@@ -64,27 +66,29 @@ pub trait Base: Driver {
         false
     }
 
-    /// The bytes that poll the robot now. The link calls this once a period of `robot.rate_hz`, a clock for the driver; in lockstep
-    /// after each command and ping.
+    /// Returns the bytes that poll the robot now. The link calls this once per period of
+    /// `robot.rate_hz`, the driver's clock; in lockstep after each command and ping.
     fn poll(&mut self) -> Vec<u8> {
         Vec::new()
     }
 
-    /// Continues the wheels' counts in the next driver; none if the robot counts.
+    /// Returns the state that continues the wheel counts in the next driver; `None` if the robot
+    /// counts.
     fn memory(&self) -> Option<Memory> {
         None
     }
 
     fn remember(&mut self, _memory: &Memory) {}
 
-    /// Methods that stop a robot which does not obey a velocity of 0, in the order of their use. After one the robot must be greeted
-    /// before it drives.
+    /// Returns ways to stop a robot that ignores a velocity of 0, in order of use. Greet the robot
+    /// afterwards, before it drives.
     fn other_stops(&self) -> Vec<StopMethod> {
         Vec::new()
     }
 }
 
-/// The state of a robot that says its pose: x, y and heading by its odometry, and the angles that its wheels have turned by then.
+/// State of a robot that reports its pose: x, y and heading of its odometry, and the matching wheel
+/// angles.
 pub type Memory = [f64; 5];
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,12 +100,12 @@ pub struct StopMethod {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WireTally {
     pub messages: u64,
-    /// Bytes that belong to no message, or were dropped unread.
+    /// Bytes outside any message, or dropped unread.
     pub bytes_dropped: u64,
 }
 
 impl Heard {
-    /// One battery feeds all of the robot.
+    /// Records the voltage of a single battery for the whole robot.
     pub fn take_battery(&mut self, volts: f64) {
         let (board_v, motor_v, servo_v) = (volts, volts, volts);
         self.power = Some(PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() });
@@ -109,7 +113,8 @@ impl Heard {
 }
 
 impl WireTally {
-    /// Count `piece`, a whole or broken message, and note in `heard` why it was refused. Returns whether it was `taken`.
+    /// Counts `piece`, a whole or broken message, and notes in `heard` why it was refused; returns
+    /// whether it was `taken`.
     pub fn count(
         &mut self,
         piece: &[u8],
@@ -127,19 +132,19 @@ impl WireTally {
         is_taken
     }
 
-    /// Adds bytes that were dropped before they could be a message.
+    /// Adds bytes dropped before decoding.
     pub const fn with_dropped(self, bytes: u64) -> Self {
         Self { bytes_dropped: self.bytes_dropped + bytes, ..self }
     }
 }
 
-/// Why a message is not used, for the user to mend.
+/// Reason why a message is unusable, for the user to correct.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Refusal {
-    /// The part of the message, as the message names it; empty for the whole.
+    /// Part of the message, by its own name; empty for the whole.
     pub input: String,
     pub what: String,
-    /// Empty where `what` says it.
+    /// Empty if `what` includes it.
     pub remedy: String,
 }
 
@@ -188,31 +193,31 @@ pub struct Heard {
     pub anything: bool,
     pub pinged: bool,
     pub acknowledged: usize,
-    /// A tick begins with it.
+    /// Motion; begins a tick.
     pub motion: Option<Motion>,
-    /// The rows of the sensors are those of the mission's table. Others are ignored.
+    /// Readings by row of the mission's sensor table; others are ignored.
     pub readings: Vec<RangeReading>,
     pub scans: Vec<LaserScan>,
-    /// Rows of [`crate::mission::Mission::touches`], and whether they feel something.
+    /// Rows of [`crate::mission::Mission::touches`] with their state.
     pub touched: Vec<(usize, bool)>,
-    /// The link says which batteries are low.
+    /// Voltages; the link sets the low flags.
     pub power: Option<PowerSample>,
     pub surroundings: Option<SurroundingsSample>,
     pub infrared: Option<InfraredSample>,
-    /// Whether its odometry jumped farther than the robot can move. The wheels' counts leave the jump out.
+    /// Whether its odometry jumped farther than the robot can move. The wheel counts omit the jump.
     pub jumped: bool,
-    /// Whether it counts orders from 0 again: it has restarted, and knows no settings.
+    /// Whether it counts orders from 0 again: it restarted and lost its settings.
     pub restarted: bool,
-    /// Its newest odometry by its own clock, if it says that.
+    /// Time of its newest odometry by its own clock, if stated.
     pub stamp_ns: Option<i64>,
     pub commander: Option<Commander>,
-    /// Two nodes publish its odometry: their numbers, and the remedy.
+    /// Numbers of two nodes that both publish its odometry, and the remedy.
     pub two_publishers: Option<String>,
-    /// Why the newest refused message is none of the protocol.
+    /// Reason why the newest refused message is invalid.
     pub refused: Option<Refusal>,
 }
 
-/// A sender, other than the link, of commands to the robot.
+/// Another sender of commands to the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Commander {
     pub number: [u8; 16],
@@ -224,13 +229,14 @@ pub struct LaserScan {
     pub row: usize,
     pub beams: Vec<f32>,
     pub sweep: Sweep,
-    /// When its first beam was measured by the clock of [`Motion::stamp_ns`]. Without it, `sweep` counts from the tick on.
+    /// Time of its first beam by the clock of [`Motion::stamp_ns`]. Without it, `sweep` is relative
+    /// to the tick.
     pub stamp_ns: Option<i64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
-    /// One more than the number of the turn at whose end this one begins; another number if one between is missing.
+    /// Successor of the number of the turn at whose end this one begins; other numbers mark a gap.
     pub sequence: u64,
     /// Radians counter-clockwise.
     pub turn_rad: f64,
@@ -240,21 +246,22 @@ pub struct Turn {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     pub wheels: WheelSample,
-    /// Of a robot that says angles or its odometry: the counts of `wheels` without their cycle.
+    /// Counts of `wheels` without wraparound, for a robot that reports angles or odometry.
     pub endless: Option<CountsSample>,
-    /// When it was measured, by the robot's clock.
+    /// Measurement time by the robot's clock.
     pub stamp_ns: Option<i64>,
     /// AD counts of the left and the right wheel.
     pub currents: [u16; 2],
 }
 
-/// The greatest range by which a sensor may say that nothing is in its reach. A greater one is of another unit, or garbage.
+/// Returns the greatest plausible range for nothing in reach; a greater one has another unit or is
+/// garbage.
 fn most_m(sensor: &Sensor) -> f64 {
     2.0 * sensor.reach_m.max(sensor.model.reach_m())
 }
 
-/// The reading of the sensor in `row` of the mission's table at a range, metres: none or one beyond reach is nothing; one that is negative,
-/// no number, or beyond twice the reach is no reading.
+/// Returns the reading of the sensor in `row` at a range, metres. Missing or beyond reach means
+/// nothing; negative, NaN or beyond twice the reach is invalid.
 pub fn range_reading(row: usize, sensor: &Sensor, range: Option<f64>) -> RangeReading {
     let (status, range_m) = match range {
         Some(range) if !(0.0..=most_m(sensor)).contains(&range) => (RangeStatus::Invalid, 0.0),
@@ -265,8 +272,8 @@ pub fn range_reading(row: usize, sensor: &Sensor, range: Option<f64>) -> RangeRe
     RangeReading { sensor: row as u8, range_m, raw, status: status.into() }
 }
 
-/// A beam as the topic `scan` has it: infinite for none or one beyond reach, no number for one too short to be a range or beyond twice
-/// the reach.
+/// Converts a beam for the topic `scan`: infinite if missing or beyond reach, NaN if below the
+/// least range or beyond twice the reach.
 pub fn beam(sensor: &Sensor, range: Option<f32>) -> f32 {
     let (least_m, reach_m) = (sensor.model.least_m() as f32, sensor.reach_m as f32);
     match range {

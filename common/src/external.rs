@@ -1,8 +1,8 @@
-//! External stages: processes that something other than the supervisor started (systemd, a person). Each finds the
-//! run, its place in it, and the supervisor.
+//! External stages: processes started by systemd or a person. Each finds the run, its place in it,
+//! and the supervisor.
 //!
-//! A supervisor that only watches links its run directory into the robot's domain, and publishes in the roster which
-//! stages have no process. A stage takes its place when the roster shows it free.
+//! A watching supervisor links its run directory into the robot's domain. A stage takes its place
+//! once the roster shows it free.
 
 use std::{
     fs::{self, File},
@@ -23,7 +23,8 @@ use crate::{
     start::{Generation, Joined, Result, StageError, enter, name_process, system},
 };
 
-/// The roster is published five times a second, and the place of a process that has ended is free in the next.
+/// Covers a few rosters, which come five times a second; the place of an ended process is free in
+/// the next.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 pub fn mission(robot: &RobotName) -> Result<Mission> {
@@ -31,7 +32,8 @@ pub fn mission(robot: &RobotName) -> Result<Mission> {
     Ok(Run::load(&directory)?.mission)
 }
 
-/// Count as a process of `domain` until the returned file is dropped. Returns the directory of the run, too.
+/// Counts as a process of `domain` until the returned file is dropped; also returns the run's
+/// directory.
 fn enter_run(domain: &Domain) -> Result<(PathBuf, File)> {
     let robot = &domain.robot;
     if !domain.directory().exists() {
@@ -98,8 +100,8 @@ fn gone() -> StageError {
     StageError::Other("the supervisor has ended".to_owned())
 }
 
-/// A descriptor that becomes readable when the supervisor ends. It published a moment ago, so no other process has its
-/// number yet.
+/// Returns a descriptor that becomes readable when the supervisor ends. It just published, so its
+/// number is still its own.
 fn watch(pid: u32) -> Result<OwnedFd> {
     let pid = i32::try_from(pid).ok().and_then(Pid::from_raw);
     pidfd_open(pid.ok_or_else(gone)?, PidfdFlags::empty()).map_err(|_| gone())

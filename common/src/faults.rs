@@ -1,5 +1,6 @@
-//! THE table of faults that can be injected into a running stage, to see whether the others go on. `firsthand stage fault`, its help and
-//! the guide read it. A stage's shell refuses a fault of a real robot unless the request says that it means one.
+//! Table of faults that can be injected into a running stage, to test the others.
+//! `firsthand stage fault`, its help and the guide read it. A stage's shell refuses faults of a
+//! real robot without confirmation.
 
 use crate::samples::{FaultAnswer, FaultKind, FaultSample};
 
@@ -7,7 +8,7 @@ use crate::samples::{FaultAnswer, FaultKind, FaultSample};
 pub struct Fault {
     pub kind: FaultKind,
     pub name: &'static str,
-    /// None: every stage has it.
+    /// `None` for a fault of every stage.
     pub stage: Option<&'static str>,
     pub meaning: &'static str,
     pub ends: &'static str,
@@ -66,10 +67,10 @@ pub fn of(stage: &str) -> impl Iterator<Item = &'static Fault> {
     TABLE.iter().filter(move |fault| fault.stage.is_none_or(|its| its == stage))
 }
 
-/// The fault to inject, or the answer that refuses it.
+/// Returns the fault to inject, or the answer that refuses it.
 ///
 /// # Errors
-/// When the robot is real and the request does not say so, or the stage has no such fault.
+/// If the stage has no such fault, or the robot is real and the request does not confirm that.
 pub fn admit(
     request: &FaultSample,
     stage: &str,

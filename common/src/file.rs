@@ -1,4 +1,4 @@
-//! The error of a file that cannot be used, the replacement of a file, what is written behind its end, and its text.
+//! File helpers: the error of an unusable file, replacement, appending, and bounded reading.
 
 use std::{
     fs,
@@ -26,7 +26,8 @@ impl FileError {
     }
 }
 
-/// A kill leaves the old content or the new one. Fails when the directory cannot be written.
+/// Replaces `file` so that a kill leaves the old or the new content. Fails if the directory cannot
+/// be written.
 pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     let mut new = file.as_os_str().to_owned();
     new.push(".new");
@@ -34,12 +35,12 @@ pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     fs::rename(&new, file)
 }
 
-/// The file, which is made if there is none, to write behind its end.
+/// Opens or creates the file for appending.
 pub fn append(file: impl AsRef<Path>) -> io::Result<fs::File> {
     fs::File::options().create(true).append(true).open(file)
 }
 
-/// The beginning of a text file, at most `most` bytes; none if it cannot be read.
+/// Returns the first `most` bytes of a text file; `None` if it cannot be read.
 pub fn text(file: &Path, most: u64) -> Option<String> {
     let mut text = String::new();
     fs::File::open(file).ok()?.take(most).read_to_string(&mut text).ok()?;

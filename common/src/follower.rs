@@ -1,4 +1,4 @@
-//! A consumer that waits for a robot, follows it from run to run, and says when it is gone.
+//! Consumer that waits for a robot, follows it from run to run, and reports its absence.
 
 use std::{
     os::fd::BorrowedFd,
@@ -15,18 +15,19 @@ use crate::{
 };
 
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// A bus that cannot be used is an error after this time; one that is being removed is gone by then.
+/// Time after which an unusable bus is an error; one that is being removed is gone by then.
 const REFUSED_FOR: Duration = Duration::from_secs(2);
 
-/// Follows one robot. `open` opens the readers, `Topics`, on each bus; they are dropped with it.
+/// Follower of one robot. `open` opens the readers, `Topics`, on each bus; they are dropped with
+/// it.
 pub struct Follower<Topics, Open> {
     domain: Domain,
     name: String,
     wake_on: Vec<&'static dyn AnyTopic>,
     open: Open,
-    /// The robot is gone, and its last samples are given first.
+    /// The robot is gone, and its last samples come first.
     ending: bool,
-    /// When it was last looked whether the robot is gone.
+    /// Time of the last check for the robot's absence.
     looked: Instant,
     joined: Option<Joined<Topics>>,
     refused: Option<(BusInstance, Instant)>,
@@ -42,15 +43,15 @@ struct Joined<Topics> {
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event<'a, Topics> {
     Connected,
-    /// Something may have been published: take all there is.
+    /// Samples may be available: take all.
     Samples(&'a mut Topics),
     Nothing,
     /// The run has ended, or its bus was replaced: the follower waits for the robot again.
     Disconnected,
 }
 
-/// The link's state ends the tick, and wakes consumers of its samples: they take no processor from stages that the tick has still to
-/// pass.
+/// Returns the topic whose wakeup announces `topic`. The link's state ends the tick, so consumers
+/// woken by it take no processor from stages in the tick.
 fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
     match topic.spec().rate {
         Rate::EachTick | Rate::EachFrame => &topics::LINK,
@@ -59,8 +60,8 @@ fn wakes_for(topic: &'static dyn AnyTopic) -> &'static dyn AnyTopic {
 }
 
 impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Open> {
-    /// Follow the robot of `domain` under a name that `iox2 node list` shows, and wake for samples on `wake_on`; for samples of each
-    /// tick, when the tick ends.
+    /// Follows the robot of `domain` under a name that `iox2 node list` shows. Wakes for samples on
+    /// `wake_on`, for those of each tick at its end.
     pub fn new(domain: Domain, name: &str, wake_on: &'static dyn AnyTopic, open: Open) -> Self {
         Self {
             domain,
@@ -79,15 +80,16 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         self
     }
 
-    /// Wait for an event, up to `timeout`.
+    /// Waits for an event, up to `timeout`.
     ///
     /// # Errors
-    /// When an existing bus cannot be used. Waiting again does not help until someone has repaired it.
+    /// If an existing bus is unusable; waiting again fails until it is repaired.
     pub fn wait(&mut self, timeout: Duration) -> Result<Event<'_, Topics>, BusError> {
         self.wait_also_for(&[], timeout)
     }
 
-    /// [`Follower::wait`], which also ends with [`Event::Samples`] when one of `others` is readable while the robot is there.
+    /// Waits like [`Follower::wait`], and returns [`Event::Samples`] when one of `others` is
+    /// readable while the robot is present.
     pub fn wait_also_for(
         &mut self,
         others: &[BorrowedFd<'_>],
@@ -137,8 +139,8 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         self.joined.as_mut().map(|joined| &mut joined.topics)
     }
 
-    /// Open the readers again: they get whole maps. Returns the earlier ones for their last samples; none while the robot is away. Fails
-    /// when the bus cannot be used.
+    /// Reopens the readers, which then get whole maps. Returns the earlier ones, with their last
+    /// samples; `None` while the robot is away. Fails if the bus is unusable.
     pub fn reopen(&mut self) -> Result<Option<Topics>, BusError> {
         let Some(joined) = &mut self.joined else {
             return Ok(None);
@@ -190,7 +192,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         Ok(Joined { topics: (self.open)(&bus)?, waiter, bus })
     }
 
-    /// A look opens the supervisor's lock file.
+    /// Checks at most once per interval: a check opens the supervisor's lock file.
     fn on_disconnected(&mut self) -> bool {
         if self.looked.elapsed() < LOOK_EVERY {
             return false;

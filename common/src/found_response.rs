@@ -1,4 +1,4 @@
-//! What the link found of the base's response, as planner and controller take it.
+//! Identified response of the base, as planner and controller take it.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -11,7 +11,7 @@ use crate::{
     topics::BASE_RESPONSE,
 };
 
-/// The newest that came, if any: dead time, seconds, and acceleration, m/s^2.
+/// Newest response, if any: dead time, seconds, and acceleration, m/s^2.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FoundResponse {
     /// Older recordings have none.
@@ -20,7 +20,8 @@ pub struct FoundResponse {
 }
 
 impl FoundResponse {
-    /// The mission by `newer`, if that differs; `stated` is the mission as it was given.
+    /// Returns the mission with the response in `newer`, if it differs; `stated` is the original
+    /// mission.
     pub fn changed(&mut self, newer: &Self, stated: &Mission) -> Option<Mission> {
         let [dead_time_s, acceleration] = newer.response.filter(|_| newer != self)?;
         *self = *newer;
@@ -50,7 +51,7 @@ impl Further for FoundResponse {
     }
 }
 
-/// The last part of an encoding, or the default where the encoding ends before it, as one of an earlier version does.
+/// Deserializes the last part of an encoding; the default if an earlier version ends before it.
 pub fn if_there<'a, T, D>(from: D) -> Result<T, D::Error>
 where
     T: Deserialize<'a> + Default,

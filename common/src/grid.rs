@@ -1,4 +1,5 @@
-//! The grid of cells over the perimeter: its frame, the [`Part`] of a map that a sample carries, and a follower's [`Replica`].
+//! Grid of cells over the perimeter: its frame, the [`Part`] of a map in a sample, and a follower's
+//! [`Replica`].
 
 mod part;
 mod replica;

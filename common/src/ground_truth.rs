@@ -1,27 +1,27 @@
-//! The ground truth of a simulated robot, one JSON object a line: a [`GroundTruthHeader`], then a [`GroundTruthTick`] each. No stage
-//! reads it.
+//! Ground truth of a simulated robot as JSON lines: a [`GroundTruthHeader`], then one
+//! [`GroundTruthTick`] each. Stages never read it.
 
 use serde::{Deserialize, Serialize};
 
 use crate::samples::PoseSample;
 
-/// The file in the run directory with the lines of ticks.
+/// File in the run directory with the lines of ticks.
 pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
     pub listening: String,
-    /// The wire of its laser, if that has one of its own.
+    /// Wire of a laser with a line of its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser: Option<String>,
 }
 
-/// Written when the tick's frames are made; tick 0 comes before any motion.
+/// State when the tick's frames are made; tick 0 precedes any motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthTick {
     pub tick: u64,
     pub time_s: f64,
-    /// The robot's centre in the mission frame, metres.
+    /// Robot's centre in the mission frame, metres.
     pub x: f64,
     pub y: f64,
     /// Radians counter-clockwise from x, not wrapped.
@@ -29,19 +29,20 @@ pub struct GroundTruthTick {
     pub v: f64,
     /// rad/s.
     pub omega: f64,
-    /// Least distance from the body's surface to anything since the tick before, metres; or [`GroundTruthTick::NOTHING_NEAR`].
+    /// Least distance from the body's surface to any obstacle since the last tick, metres; or
+    /// [`GroundTruthTick::NOTHING_NEAR`].
     pub clearance_m: f64,
     pub contacts: u64,
-    /// Encoder counts as this tick's frame shows them, growing forward, modulo 32768.
+    /// Encoder counts in this tick's frame, growing forward, modulo 32768.
     pub left_counts: u16,
     pub right_counts: u16,
-    /// The front ultrasonic byte of this tick's frame; 255 is nothing.
+    /// Front ultrasonic byte of this tick's frame; 255 means no echo.
     pub sonar_cm: u8,
-    /// The longest time that a wheel turned after the last motion command received, seconds; at rest is slower than
-    /// [`GroundTruthTick::AT_REST_M_S`].
+    /// Longest time that a wheel turned after the last received motion command, seconds. At rest
+    /// means below [`GroundTruthTick::AT_REST_M_S`].
     #[serde(default)]
     pub stopping_time_s: f64,
-    /// Missing where the radio is perfect.
+    /// Absent with a perfect radio.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radio: Option<GroundTruthRadio>,
 }
@@ -52,19 +53,19 @@ pub struct GroundTruthRadio {
     pub sent: u64,
     pub lost: u64,
     pub longest_outage_s: f64,
-    /// Ticks before this one whose frames were lost, in lockstep.
+    /// Earlier ticks whose frames were lost, in lockstep.
     #[serde(default)]
     pub missed_ticks: u64,
 }
 
 impl GroundTruthTick {
-    /// The speed of a wheel's rim, m/s.
+    /// Speed of a wheel's rim, m/s.
     pub const AT_REST_M_S: f64 = 0.01;
     /// Metres; JSON has no infinity.
     pub const NOTHING_NEAR: f64 = 1e9;
 
-    /// The tick's number if only ticks with received frames count, as poses do in lockstep. A tick whose frames were lost has the next
-    /// one's number.
+    /// Returns the number among ticks with received frames, which poses count in lockstep. A tick
+    /// with lost frames has the next one's number.
     pub const fn heard_tick(&self) -> u64 {
         match self.radio {
             Some(radio) => self.tick.saturating_sub(radio.missed_ticks),

@@ -1,13 +1,13 @@
-//! Topic `inputs`: the state that each generation of a stage started from, and the inputs of its step, in order. They are
-//! published before anything that follows from them. The same step with the same inputs gives the same outputs, so a replay
-//! in another process and another year can compute them again.
+//! Topic `inputs`: the initial state of each generation of a stage, and the inputs of its step, in
+//! order. The same step with the same inputs gives the same outputs, so a replay can recompute
+//! them.
 //!
-//! A generation's samples of topic `inputs` are pieces of one stream of bytes, in the order of their sequence. The stream is
-//! entries, each `length u32 | body`, little-endian. The first is the start of the process, each other one is the input of
-//! one call of the step. A body is the `postcard` encoding of the stage's [`Entry`](crate::stage::Stage::Entry).
+//! A generation's samples are pieces of one byte stream, ordered by sequence. Its entries are
+//! `length u32 | body`, little-endian: first the start of the process, then the input of each step.
+//! A body is the `postcard` encoding of the stage's [`Entry`](crate::stage::Stage::Entry).
 //!
-//! An entry is published before the first sample that follows from it. When a process is killed, only entries from which
-//! nothing followed can be missing.
+//! An entry is published before the first sample that depends on it. A kill can therefore lose only
+//! entries without effects.
 
 use std::cell::RefCell;
 
@@ -22,9 +22,9 @@ use crate::{
 };
 
 const PIECE: usize = 16_384;
-/// Keyframes of a large map need longer pieces: one byte for so many cells.
+/// Cells per byte of a piece; keyframes of a large map need longer pieces.
 const CELLS_FOR_A_BYTE: usize = 8;
-/// An entry has at most so many bytes: the whole belief of the largest map, and more.
+/// Most bytes of an entry: more than the whole belief of the largest map.
 pub const LONGEST_ENTRY: usize = 1 << 30;
 
 #[derive(Debug)]
@@ -36,7 +36,6 @@ pub(crate) struct InputLog {
 }
 
 impl InputLog {
-    /// Begin with the `start` of the process of `context`, which is published at once.
     pub(crate) fn begin(context: &Context, start: &impl Serialize) -> Result<Self> {
         let generation = &context.generation;
         let cells = context.run.mission.grid_frame().area();
@@ -49,7 +48,7 @@ impl InputLog {
         };
         log.append(start)?;
         log.publish(Progress::default())?;
-        // A recorder connects to the new writer now, before this process can be killed.
+        // The wakeup lets a recorder connect before this process can be killed.
         log.writer.wake()?;
         Ok(log)
     }
@@ -74,7 +73,7 @@ impl InputLog {
         Ok(())
     }
 
-    /// Publish the inputs that were noted, before something that follows from them.
+    /// Publishes the noted inputs, before any sample that depends on them.
     pub(crate) fn publish(&mut self, at: Progress) -> Result<(), BusError> {
         for piece in self.unpublished.chunks(self.piece) {
             self.writer.publish_quietly(at.tick, at.time, self.header, piece)?;
@@ -85,7 +84,7 @@ impl InputLog {
 }
 
 thread_local! {
-    /// Kept from one sample to the next.
+    /// Buffer reused for every sample.
     static ENCODED: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -100,7 +99,7 @@ fn serialize_encoded<S: Serializer>(
     })
 }
 
-/// Samples as fields of an input: `#[serde(with = "inputs::sample")]`.
+/// Serializes samples as fields of an input: `#[serde(with = "inputs::sample")]`.
 pub mod sample {
     use serde::{Deserializer, Serializer, de::Error as _};
 
@@ -116,7 +115,7 @@ pub mod sample {
     }
 }
 
-/// A header with a slice as a field of an input: `#[serde(with = "inputs::slice")]`.
+/// Serializes a header with a slice as a field of an input: `#[serde(with = "inputs::slice")]`.
 pub mod slice {
     use std::borrow::Cow;
 

@@ -1,12 +1,15 @@
-//! A large state that outlives a SIGKILL: a snapshot now and then, and the entries since.
+//! Large state that survives a SIGKILL: occasional snapshots, and the entries since.
 //!
-//! The state is the fold of its entries. To append one is a small write however large the state is; a new process folds those after the
-//! snapshot into it.
+//! The state is the fold of its entries. Appending one is a small write whatever the state's size;
+//! a new process folds those after the snapshot.
 //!
-//! An entry is `number | length | version | crc32 | body`, little-endian. A whole one of another version is refused, as a [`Checkpoint`] is. A kill during an append leaves a torn tail, which is cut off. A kill
-//! between a snapshot and the emptying of the journal leaves entries that the snapshot holds, as their numbers show.
+//! An entry is `number | length | version | crc32 | body`, little-endian. Like a [`Checkpoint`],
+//! the journal refuses a whole one of another version. A kill during an append leaves a torn tail,
+//! which is cut off. A kill between a snapshot and the emptying of the journal leaves entries that
+//! the snapshot includes, as their numbers show.
 //!
-//! Room is reserved at opening, for a full disk. An end mark empties the journal, because shortening it would give the room away.
+//! Opening reserves space in case the disk fills up. An end mark empties the journal, because
+//! truncation would release the space.
 
 use std::{
     fs::File,
@@ -21,16 +24,16 @@ use crate::checkpoint::{
     other_version,
 };
 
-/// The fewest and the most entries after which a snapshot is due.
+/// Least and greatest number of entries before a snapshot.
 const SNAPSHOT_AFTER: (u64, u64) = (8, 128);
-/// Bytes of the state for each further entry before a snapshot: to write them takes about as long as to fold an entry, as a new process
-/// must before it is ready.
+/// Bytes of state per additional entry before a snapshot. A new process folds an entry in about the
+/// time to write them.
 const BYTES_FOR_AN_ENTRY: u64 = 20_480;
 /// number u64, length u24, version u8, crc32 u32.
 const HEADER: usize = 16;
-/// It follows the last entry. No header is all zeros, for the checksum of zeros is not 0.
+/// End mark. No header is all zeros, because the checksum of zeros is not 0.
 const END: [u8; HEADER] = [0; HEADER];
-/// The mapper's entry with a scan of the most beams has half of this.
+/// Most bytes of an entry: twice the mapper's with a scan of the most beams.
 const LONGEST: usize = 131_072;
 const NUMBER: usize = 10;
 
@@ -41,7 +44,7 @@ pub struct Journal {
     path: PathBuf,
     end: u64,
     number: u64,
-    /// The first entry that the snapshot does not hold.
+    /// First entry after the snapshot.
     first: u64,
     snapshot_after: u64,
 }
@@ -59,9 +62,9 @@ struct Snapshot<S> {
 }
 
 impl Journal {
-    /// Open, or create, the snapshot at `path` for encoded states of at most `capacity` bytes, and the journal beside it, with
-    /// room for entries of `entry_bytes` until the next snapshot. Fails like
-    /// [`Checkpoint::open`].
+    /// Opens or creates the snapshot at `path`, for encoded states of at most `capacity` bytes, and
+    /// the journal beside it. It has space for entries of `entry_bytes` until the next snapshot.
+    /// Fails like [`Checkpoint::open`].
     pub fn open<S: DeserializeOwned, E: DeserializeOwned>(
         path: &Path,
         capacity: usize,
@@ -81,7 +84,7 @@ impl Journal {
         Ok((journal, Restored { state, entries }))
     }
 
-    /// Cuts off what follows the last whole entry. Fails when a whole one is of another version.
+    /// Cuts the file after the last whole entry. Fails on a whole one of another version.
     fn read<E: DeserializeOwned>(&mut self) -> Result<Vec<E>, CheckpointError> {
         let bytes = std::fs::read(&self.path).map_err(failed("read", &self.path))?;
         let mut entries = Vec::new();
@@ -91,7 +94,7 @@ impl Journal {
             if version != VERSION {
                 return Err(foreign(other_version(version)));
             }
-            // The snapshot holds lower numbers. After a gap nothing can be folded.
+            // The snapshot includes lower numbers. Entries after a gap cannot be folded.
             if number == self.number {
                 let entry = postcard::from_bytes(body);
                 let undecoded = |error| foreign(format!("an entry cannot be decoded: {error}"));
@@ -103,7 +106,7 @@ impl Journal {
             rest = after;
         }
         self.end = (bytes.len() - rest.len()) as u64;
-        // A whole tail is left alone: cutting it may wait for the disk.
+        // A whole tail stays, because cutting it may wait for the disk.
         if !rest.is_empty() && !rest.starts_with(&END) {
             self.cut()?;
         }
@@ -115,7 +118,7 @@ impl Journal {
         cut.map_err(failed("write", &self.path))
     }
 
-    /// Fails when the entry cannot be encoded or written, or is too long.
+    /// Fails if the entry is too long, or cannot be encoded or written.
     pub fn append<E: Serialize>(&mut self, entry: &E) -> Result<(), CheckpointError> {
         let mut bytes = encode_after(vec![0; HEADER], entry, LONGEST, &self.path)?;
         let length = bytes.len() - HEADER;
@@ -132,12 +135,13 @@ impl Journal {
         Ok(())
     }
 
-    /// Whether a snapshot is due. It takes the time of writing the whole state: do it when nobody waits.
+    /// Returns whether a snapshot is due. Take it when no process waits: it writes the whole state.
     pub const fn is_long(&self) -> bool {
         self.number - self.first >= self.snapshot_after
     }
 
-    /// Save `state`, into which every entry is folded, and empty the journal. Fails when either cannot be written.
+    /// Saves `state`, the fold of all entries, and empties the journal. Fails if either cannot be
+    /// written.
     pub fn snapshot<S: Serialize>(&mut self, state: &S) -> Result<(), CheckpointError> {
         self.snapshots.save(&Snapshot { next: self.number, state })?;
         self.first = self.number;
@@ -151,7 +155,8 @@ fn snapshot_after(capacity: usize) -> u64 {
     (capacity as u64 / BYTES_FOR_AN_ENTRY).clamp(soonest, latest)
 }
 
-/// Number, version and body of the first entry, and the bytes after it. None when it is not whole.
+/// Returns the first entry's number, version and body, and the bytes after it; `None` if
+/// incomplete.
 fn entry(bytes: &[u8]) -> Option<(u64, u8, &[u8], &[u8])> {
     let number = u64::from_le_bytes(bytes.get(..8)?.try_into().ok()?);
     let &[low, middle, high, version] = bytes.get(8..12)? else { return None };
@@ -174,7 +179,7 @@ mod tests {
         Journal::open(path, 64, 4_592).unwrap()
     }
 
-    /// The state as a new process restores it.
+    /// Returns the state as a new process restores it.
     fn folded(path: &Path) -> Sum {
         let restored = open(path).1;
         restored.state.unwrap_or_default() + restored.entries.iter().sum::<u64>()
@@ -212,7 +217,7 @@ mod tests {
             std::fs::write(&file, &whole[..cut]).unwrap();
             let mut sum = if cut >= whole.len() - HEADER { 300 } else { 100 };
             assert_eq!(folded(&path), sum, "cut at {cut}");
-            // The next process writes over the torn tail.
+            // The next process overwrites the torn tail.
             open(&path).0.append(&7_u64).unwrap();
             sum += 7;
             assert_eq!(folded(&path), sum, "cut at {cut}");

@@ -1,4 +1,5 @@
-//! A histogram of latencies that fits in a sample: eight buckets an octave from 1 microsecond, so a quantile is right within 9 percent.
+//! Latency histogram that fits in a sample: eight buckets per octave from 1 microsecond, so
+//! quantiles are accurate within 9 percent.
 
 /// 24 octaves, up to 16 s.
 pub const BUCKETS: usize = 192;
@@ -38,7 +39,7 @@ impl Histogram {
         self.counts.iter().map(|&count| u64::from(count)).sum()
     }
 
-    /// Add, for example, the counts of another generation of the writer.
+    /// Adds another histogram, for example of another generation.
     pub fn add(&mut self, counts: &[u32; BUCKETS], max_ns: u64) {
         for (own, other) in self.counts.iter_mut().zip(counts) {
             *own = own.saturating_add(*other);
@@ -46,7 +47,8 @@ impl Histogram {
         self.max_ns = self.max_ns.max(max_ns);
     }
 
-    /// The upper end of the bucket of the `share` quantile, never above the longest latency; none if nothing was counted.
+    /// Returns the upper end of the bucket of the `share` quantile, at most the longest latency;
+    /// `None` if empty.
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
         let total = self.total();
         if total == 0 {

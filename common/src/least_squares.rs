@@ -1,8 +1,8 @@
-//! Sums of a least-squares fit, which forget.
+//! Least-squares sums with exponential forgetting.
 
 use serde::{Deserialize, Serialize};
 
-/// Of y = factor x.
+/// Sums for y = factor x.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     pub xx: f64,
@@ -11,14 +11,14 @@ pub struct Line {
 }
 
 impl Line {
-    /// Add a pair; the share `left` of those before remains.
+    /// Adds a pair after scaling the previous sums by `left`.
     pub fn add(&mut self, left: f64, x: f64, y: f64) {
         for (sum, term) in [(&mut self.xx, x * x), (&mut self.xy, x * y), (&mut self.yy, y * y)] {
             *sum = *sum * left + term;
         }
     }
 
-    /// The factor, and its standard deviation if the pairs are so many.
+    /// Returns the factor and its standard deviation for this number of pairs.
     pub fn factor(&self, pairs: f64) -> (f64, f64) {
         let factor = self.xy / self.xx;
         let rest = (self.yy - factor * self.xy).max(0.0);
@@ -26,18 +26,19 @@ impl Line {
     }
 }
 
-/// Of y = a x + b z.
+/// Fit of y = a x + b z.
 #[derive(Clone, Copy, Debug)]
 pub struct Two {
-    /// Factors, each with its standard deviation.
+    /// Factor with its standard deviation.
     pub a: [f64; 2],
     pub b: [f64; 2],
-    /// The sum of squares that they leave.
+    /// Residual sum of squares.
     pub rest: f64,
 }
 
 impl Two {
-    /// From the sums of x, of z and of their products, if the pairs are so many. None where x and z are alike but for the share `alone`.
+    /// Fits from the sums of x, z and their products, for this number of pairs. `None` if x and z
+    /// are collinear up to the share `alone`.
     pub fn of(x: &Line, z: &Line, xz: f64, pairs: f64, alone: f64) -> Option<Self> {
         let determinant = x.xx * z.xx - xz * xz;
         (determinant > alone * x.xx * z.xx).then(|| {

@@ -1,36 +1,38 @@
-//! The code that firsthand's processes share: only what two of them must agree on.
+//! Shared code of firsthand's processes: only what two of them must agree on.
 //!
-//! Four crates lie below this one, and their modules are found under its name too: [`bus`] (writers, readers and wakeups; it alone
-//! names the middleware), [`mission`] (the mission file, geometry, kinematics) [`x80_protocol`] (here [`wire`]) and [`json_protocol`]
-//! (here [`json_wire`]).
+//! This crate re-exports four lower ones:
+//! - [`bus`]: writers, readers and wakeups; the only user of the middleware
+//! - [`mission`]: mission file, geometry, kinematics
+//! - [`x80_protocol`], here [`wire`]
+//! - [`json_protocol`], here [`json_wire`]
 //!
-//! Layout, lowest layer first: a module uses modules above it in this table only.
+//! Modules, lowest layer first; a module uses only modules above it in this table.
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`grid`] | cells and metres; parts and versions of a map |
 //! | [`latency`] | a histogram that fits in a sample |
 //! | [`least_squares`] | a fit of one factor to the newest pairs |
-//! | [`ground_truth`] | what a simulated robot writes about itself |
-//! | [`signals`] | signals as something to wait for |
-//! | [`checkpoint`], [`journal`] | state that outlives a SIGKILL: small, and large with few changes |
-//! | [`process_status`], [`process_usage`] | what the kernel says of a process; its processor and memory |
-//! | [`samples`] | the payloads of the topics |
-//! | [`topics`] | THE table of topics |
-//! | [`faults`] | THE table of what can be broken in a stage on purpose |
+//! | [`ground_truth`] | a simulated robot's record of itself |
+//! | [`signals`] | signals as a waitable descriptor |
+//! | [`checkpoint`], [`journal`] | state that survives a SIGKILL: small, and large with few changes |
+//! | [`process_status`], [`process_usage`] | kernel facts on a process; its processor and memory |
+//! | [`samples`] | payloads of the topics |
+//! | [`topics`] | table of topics |
+//! | [`faults`] | table of injectable faults |
 //! | [`follower`] | a consumer that follows a robot from run to run |
-//! | [`run`] | what the supervisor gives the stages of a run |
-//! | [`start`] | how a stage's process takes its place in a run |
-//! | [`external`] | how a stage that the supervisor did not start takes its place |
-//! | [`stage_command`] | the command line of a stage's process |
-//! | [`wiring`] | what a stage's process opens and persists, declared |
-//! | [`stop_socket`] | the operator's stop without middleware |
-//! | [`shell`] | the process shell every stage runs in |
-//! | [`target`] | the target, as a stage follows it |
-//! | [`driver`] | what the link needs of a robot's protocol |
-//! | [`inputs`], [`replay`] | the inputs of every step, published; their replay |
-//! | [`outputs`], [`stage`] | where a stage's outputs go; its runner: process and replay of every stage, once |
-//! | [`found_response`] | what the link found of the base's response, as stages take it |
+//! | [`run`] | the supervisor's input to the stages of a run |
+//! | [`start`] | joining a run as the supervisor's child |
+//! | [`external`] | joining a run otherwise |
+//! | [`stage_command`] | command line of a stage's process |
+//! | [`wiring`] | declared topics and persistence of a stage |
+//! | [`stop_socket`] | operator's stop without middleware |
+//! | [`shell`] | process shell of every stage |
+//! | [`target`] | current target, as a stage follows it |
+//! | [`driver`] | the link's interface to a robot's protocol |
+//! | [`inputs`], [`replay`] | published inputs of every step; their replay |
+//! | [`outputs`], [`stage`] | destinations of a stage's outputs; its runner for process and replay |
+//! | [`found_response`] | identified response of the base, as stages take it |
 
 pub mod checkpoint;
 pub mod driver;

@@ -1,4 +1,4 @@
-//! Where the outputs of a stage go: onto the bus and into files in its process, into a list in a replay.
+//! Destinations of a stage's outputs: the bus and files in its process, a list in a replay.
 
 use std::any::Any;
 
@@ -15,7 +15,7 @@ use crate::{
     topics::Rate,
 };
 
-/// The open file that a stage persists its state in, by [`Persists`](crate::wiring::Persists).
+/// Open file of a stage's persisted state, by [`Persists`](crate::wiring::Persists).
 #[derive(Debug, Default)]
 pub(crate) enum Saved {
     #[default]
@@ -27,10 +27,10 @@ pub(crate) enum Saved {
 
 #[derive(Default)]
 pub struct Outputs {
-    /// The tick and mission time of the next output.
+    /// Tick and mission time of the next output.
     pub at: Progress,
     writers: Vec<(&'static str, Box<dyn AnyWriter>)>,
-    /// None in a replay, and for a process whose inputs are not recorded.
+    /// `None` in a replay, and for a process whose inputs are not recorded.
     inputs: Option<InputLog>,
     saved: Saved,
     replayed: Option<Replayed>,
@@ -42,15 +42,14 @@ struct Replayed {
 }
 
 impl Outputs {
-    /// The outputs of a process whose inputs are not recorded, so that it cannot be replayed. It publishes no slices.
+    /// Opens outputs without recorded inputs, which cannot be replayed, and without slices.
     ///
     /// # Errors
-    /// When an output cannot be opened.
+    /// If an output cannot be opened.
     pub fn without_inputs(context: &mut Context) -> Result<Self> {
         Self::of_process(context, None, 0)
     }
 
-    /// The outputs of the process of `context`. A slice has at most `longest` elements.
     pub(crate) fn of_process(
         context: &mut Context,
         inputs: Option<InputLog>,
@@ -62,18 +61,19 @@ impl Outputs {
         Ok(out)
     }
 
-    /// The outputs of a replay. `has_field` says whether samples of `field` are compared.
+    /// Creates the outputs of a replay; `has_field` enables comparison of `field` samples.
     pub(crate) fn of_replay(has_field: bool) -> Self {
         let replayed = Some(Replayed { published: Vec::new(), has_field });
         Self { replayed, ..Self::default() }
     }
 
-    /// Whether samples of `field` are published: a replay saves the time where there are none to compare with.
+    /// Returns whether samples of `field` are published. A replay skips them if it has none to
+    /// compare.
     pub fn has_field(&self) -> bool {
         self.replayed.as_ref().is_none_or(|replayed| replayed.has_field)
     }
 
-    /// Open the topics that follow each frame of the robot.
+    /// Opens the topics that follow each robot frame.
     pub(crate) fn open_late(&mut self, context: &mut Context) -> Result {
         self.open(context, 0, true)
     }
@@ -105,7 +105,7 @@ impl Outputs {
         self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.note(input, self.at))
     }
 
-    /// Publish the inputs that were noted, before anything follows from them that is not a sample.
+    /// Publishes the noted inputs, before effects other than samples.
     pub fn publish_inputs(&mut self) -> Result<(), BusError> {
         self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.publish(self.at))
     }
@@ -127,7 +127,7 @@ impl Outputs {
         }
     }
 
-    /// Publish a header with a slice on a topic that wakes nobody.
+    /// Publishes a header with a slice on a topic without wakeups.
     pub fn publish_quietly<H: Stamped, E: Payload>(
         &mut self,
         topic: &'static Topic<H, E>,
@@ -143,7 +143,7 @@ impl Outputs {
         Ok(self.writer(topic)?.publish_quietly(tick, time, header, slice)?)
     }
 
-    /// Whether a reader of `topic` came since this was last asked: it needs a keyframe.
+    /// Returns whether `topic` has a new reader since the last call, which needs a keyframe.
     pub fn has_new_reader<H: Stamped, E: Payload>(
         &mut self,
         topic: &'static Topic<H, E>,
@@ -165,7 +165,7 @@ impl Outputs {
         }
     }
 
-    /// Whether a snapshot is due, with which the stage's journal begins anew.
+    /// Returns whether a snapshot, which empties the stage's journal, is due.
     pub const fn is_journal_long(&self) -> bool {
         matches!(&self.saved, Saved::Journal(journal) if journal.is_long())
     }

@@ -1,4 +1,4 @@
-//! Facts in `/proc/PID`; none if the process has ended.
+//! Facts in `/proc/PID`; `None` if the process has ended.
 
 use std::{fs, time::Duration};
 
@@ -11,12 +11,13 @@ pub fn field(process: &str, field: &str) -> Option<String> {
     Some(value.trim().to_owned())
 }
 
-/// A field in kibibytes, such as `VmRSS`.
+/// Returns a field in kibibytes, such as `VmRSS`.
 pub fn kibibytes(process: &str, field: &str) -> Option<u64> {
     self::field(process, field)?.strip_suffix(" kB")?.trim().parse().ok()
 }
 
-/// The time for which a thread ran, and the time for which it was ready to run and others ran. `task` is its path below `/proc`.
+/// Returns the times for which a thread ran and was runnable but waited. `task` is its path below
+/// `/proc`.
 pub fn scheduled(task: &str) -> Option<[Duration; 2]> {
     let counts = fs::read_to_string(format!("/proc/{task}/schedstat")).ok()?;
     let mut times = counts.split(' ').map_while(|time| time.parse().ok().map(Duration::from_nanos));
@@ -25,7 +26,7 @@ pub fn scheduled(task: &str) -> Option<[Duration; 2]> {
 
 pub fn processor_time(process: u32) -> Option<Duration> {
     let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The name in parentheses may have any letters; numbers follow.
+    // The name in parentheses may contain any characters; numbers follow.
     let (_, numbers) = stat.rsplit_once(") ")?;
     let mut times = numbers.split_ascii_whitespace().skip(11);
     let mut time = || times.next()?.parse::<u64>().ok();

@@ -1,4 +1,4 @@
-//! Processor and memory of a process, as the kernel counts them.
+//! Processor and memory use of a process, as the kernel counts them.
 
 use std::{
     collections::BTreeMap,
@@ -9,9 +9,9 @@ use crate::process_status::{kibibytes, processor_time};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Usage {
-    /// Share of one processor since the last look, 0 to 1; none at the first.
+    /// Share of one processor since the last look, 0 to 1; `None` at the first.
     pub cpu: Option<f64>,
-    /// Resident memory with shared memory; none if the process has ended.
+    /// Resident memory including shared memory; `None` if the process has ended.
     pub memory_bytes: Option<u64>,
 }
 
@@ -21,11 +21,11 @@ pub struct Processes {
     seen: BTreeMap<u32, (Instant, Duration, Usage)>,
 }
 
-/// The kernel counts hundredths of a second, so shares need a longer time.
+/// Least interval of a share, because the kernel counts hundredths of a second.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
 impl Processes {
-    /// The usage of each process at `now`. Shares are over a second at least.
+    /// Returns the usage of each process at `now`. Shares cover at least a second.
     pub fn look(&mut self, processes: &[u32], now: Instant) -> Vec<Usage> {
         self.seen.retain(|process, _| processes.contains(process));
         processes.iter().map(|&process| self.one(process, now)).collect()

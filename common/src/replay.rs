@@ -1,5 +1,5 @@
-//! The replay of one generation of a stage: the step gets the recorded inputs, and gives the samples that the generation must
-//! have published.
+//! Replay of one generation of a stage: recorded inputs reproduce the samples that it must have
+//! published.
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -10,11 +10,11 @@ use crate::{
     run::Run,
 };
 
-/// A sample that a generation published, or must have published.
+/// Sample that a generation published, or must have published.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     pub topic: &'static str,
-    /// The sample as a message of its own (see [`crate::bus::cdr`]), the stamp's generation and sequence 0.
+    /// Sample as a message (see [`crate::bus::cdr`]), with generation and sequence 0 in its stamp.
     pub message: Vec<u8>,
 }
 
@@ -42,19 +42,20 @@ pub enum ReplayError {
 }
 
 pub trait Replay {
-    /// Take the body of the next entry of its inputs. Gives what the process published because of it, in order.
+    /// Takes the body of the next input entry. Returns the resulting samples of the process, in
+    /// order.
     fn take(&mut self, entry: &[u8]) -> Result<Vec<Output>, ReplayError>;
 
-    /// The entry in words, for a reader who looks for the cause of a difference.
+    /// Describes the entry, to help find the cause of a difference.
     fn describe(&self, entry: &[u8]) -> Result<String, ReplayError>;
 }
 
 #[derive(Clone, Copy, Debug)]
 pub struct Beginning<'a> {
     pub run: &'a Run,
-    /// The body of the first entry of its inputs.
+    /// Body of the first input entry.
     pub start: &'a [u8],
-    /// Whether `field` samples are compared: they take longer than all else.
+    /// Whether `field` samples are compared, which takes longer than all else.
     pub fields: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The supervisor's roster, as another process reads it.
+//! Supervisor's roster, as another process reads it.
 
 use std::time::{Duration, Instant};
 
@@ -10,9 +10,9 @@ use crate::{
     waiter::Waiter,
 };
 
-/// The supervisor answers the first heartbeat of a process with a roster. On a loaded machine that takes a while.
+/// Wait for the roster that answers a process's first heartbeat; long enough for a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// What a stage publishes before it is named is lost, a first whole map too.
+/// Wait for a stage to be named. Earlier samples, such as the first whole map, are lost.
 #[cfg(feature = "stage")]
 const NAMED_WITHIN: Duration = Duration::from_secs(10);
 
@@ -30,8 +30,8 @@ pub fn named(entries: &[RosterEntry]) -> impl Iterator<Item = (String, Author)> 
     })
 }
 
-/// Join a robot's bus as a consumer, whose readers return only samples of the supervisor and of the processes that rosters name. Fails when
-/// the bus is not there or cannot be used.
+/// Joins a robot's bus as a consumer, which reads only samples of the supervisor and of processes
+/// in rosters. Fails if the bus is missing or unusable.
 pub fn join(domain: &Domain, name: &str) -> Result<Bus, BusError> {
     let bus = Bus::join_as_consumer(domain, name)?;
     if let Some(writers) = bus.writers() {
@@ -41,7 +41,7 @@ pub fn join(domain: &Domain, name: &str) -> Result<Bus, BusError> {
     Ok(bus)
 }
 
-/// The processes of all rosters since the last call.
+/// Returns the processes of all rosters since the last call.
 fn names(mut rosters: Reader<RosterHeader, RosterEntry>) -> Names {
     Box::new(move || {
         let mut all: Option<Vec<_>> = None;
@@ -59,8 +59,8 @@ impl Roster {
         Ok(Self { samples: bus.reader(&topics::ROSTER)?, waiter })
     }
 
-    /// Wait until the supervisor names this process, then let its readers on `bus` admit the processes that rosters name. A roster that
-    /// names this process comes before all that it publishes; readers in other processes know it by then.
+    /// Waits until a roster names this process, then admits the processes in rosters on `bus`. That
+    /// roster precedes all samples of this process, so readers elsewhere know it by then.
     #[cfg(feature = "stage")]
     pub(crate) fn admit_named(mut self, bus: &Bus) -> Result<(), BusError> {
         let Some(writers) = bus.writers() else {
@@ -79,7 +79,8 @@ impl Roster {
         Ok(())
     }
 
-    /// The first result of `find` in a roster; none after `patience`. Fails when the topic cannot be read.
+    /// Returns the first result of `find` in a roster; `None` after `patience`. Fails if the topic
+    /// cannot be read.
     pub fn find<T>(
         &mut self,
         patience: Duration,

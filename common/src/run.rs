@@ -1,4 +1,5 @@
-//! The run file, TOML in the run directory, tells the stages of a run what to do. Beside it is the count of each stage's generations.
+//! Run file: the supervisor's TOML input to the stages, in the run directory. Beside it are the
+//! stages' generation counts.
 
 use std::{
     fs,
@@ -40,7 +41,7 @@ pub enum RunError {
     OtherVersion { file: PathBuf, by: String, problem: String },
 }
 
-/// The key of a run file that has the version of the supervisor.
+/// Key of the supervisor's version in a run file.
 const WRITTEN_BY: &str = "firsthand";
 
 impl Run {
@@ -54,7 +55,7 @@ impl Run {
         replace(&file, &text).map_err(|source| RunError::File { action: "write", file, source })
     }
 
-    /// Fails when the file cannot be read, is no run file, or is that of another version with other keys.
+    /// Fails if the file is unreadable or invalid, or from another version with other keys.
     pub fn load(directory: &Path) -> Result<Self, RunError> {
         let file = directory.join(FILE_NAME);
         let text = fs::read_to_string(&file).map_err(|source| RunError::File {
@@ -65,7 +66,7 @@ impl Run {
         Self::parse(&text, &file)
     }
 
-    /// The run in the `text` of a run file; `file` is where an error says that it is.
+    /// Parses the `text` of a run file; errors name `file`.
     pub fn parse(text: &str, file: &Path) -> Result<Self, RunError> {
         toml::from_str(text).map_err(|error| {
             let (file, problem) = (file.to_owned(), error.message().to_owned());
@@ -81,9 +82,11 @@ impl Run {
     }
 }
 
-/// The number of a new generation of `stage`, from 1. It counts on in a resumed run, because readers drop samples of older generations.
-/// Each generation appends a line, which is atomic, and a slow disk delays it less than replacing a file. Fails when the file cannot be
-/// read or written.
+/// Returns the number of a new generation of `stage`, from 1. It continues in a resumed run,
+/// because readers drop older generations.
+///
+/// Each generation appends a line, which is atomic and faster on a slow disk than replacing a file.
+/// Fails if the file cannot be read or written.
 pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     let file = directory.join(format!("{stage}.generations"));
     let count = || {

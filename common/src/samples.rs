@@ -1,15 +1,17 @@
-//! The payloads of [`crate::topics`] in shared memory: `repr(C)`, no pointers, units in every name or doc. Size and `type_name`, for
-//! other languages, are checked at attach.
+//! Payloads of [`crate::topics`] in shared memory: `repr(C)`, without pointers, with units in each
+//! name or doc. Attaching checks size and `type_name`, for other languages.
 //!
-//! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform layout:
-//! all fields are plain numbers, and arrays of them, in `repr(C)` structs.
+//! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl`, which promises a
+//! self-contained type of uniform layout. All fields are plain numbers and arrays of them, in
+//! `repr(C)` structs.
 //!
-//! Another process may write any bit pattern: states are bytes, read through `from_byte`.
+//! Another process may write any bit pattern, so states are bytes, read through `from_byte`.
 #![allow(unsafe_code)]
 
 pub use bus::{Stamp, Stamped};
 
-/// Structs for shared memory: each has a name for other languages. A field without a default is 0.
+/// Declares structs for shared memory, each with a name for other languages. A field without a
+/// default is 0.
 #[macro_export]
 macro_rules! structs {
     (@) => { $crate::bus::Layout::zero() };
@@ -33,8 +35,8 @@ macro_rules! structs {
     )*};
 }
 
-/// Payloads of topics: [`structs`] that begin with a [`Stamp`], which need nothing else to be written, read, shown and recorded.
-/// `ZeroCopySend` must be in scope.
+/// Declares payloads of topics: [`structs`] that begin with a [`Stamp`]. The declaration suffices
+/// to write, read, show and record them. `ZeroCopySend` must be in scope.
 #[macro_export]
 macro_rules! payloads {
     ($($(#[$meta:meta])* $type_name:literal $name:ident { $($fields:tt)* })*) => {$(
@@ -51,7 +53,7 @@ macro_rules! payloads {
     )*};
 }
 
-/// An enum that is a byte on the bus. Each value may have a text.
+/// Declares an enum that is a byte on the bus, with an optional text for each value.
 macro_rules! wire_enum {
     ($(#[$meta:meta])* $name:ident, unknown = $unknown:ident, text = $text:ident { $($(#[$doc:meta])* $variant:ident = $byte:literal $words:literal),* $(,)? }) => {
         wire_enum! { $(#[$meta])* $name, unknown = $unknown { $($(#[$doc])* $variant = $byte),* } }
@@ -67,10 +69,10 @@ macro_rules! wire_enum {
         #[repr(u8)]
         pub enum $name { $($(#[$doc])* $variant = $byte),* }
         impl $name {
-            /// The names of all values, and their bytes.
+            /// Names of all values and their bytes.
             pub const VALUES: &[(&str, u8)] = &[$((stringify!($variant), $byte)),*];
 
-            /// An unknown byte is read as the safe value.
+            /// Decodes a byte; an unknown one gives the safe value.
             pub const fn from_byte(byte: u8) -> Self {
                 match byte {
                     $($byte => Self::$variant,)*

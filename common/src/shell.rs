@@ -1,7 +1,7 @@
-//! The process shell every stage runs in: take the place in the run, open the topics, wait, take a turn, publish
+//! Process shell of every stage: join the run, open the topics, wait, take a turn, publish
 //! heartbeats, stop on a signal.
 //!
-//! A [`Process`] declares its topics, which the shell opens for it.
+//! The shell opens the topics that a [`Process`] declares.
 
 mod fault_requests;
 
@@ -39,19 +39,19 @@ use crate::{
 
 pub use crate::start::{Result, StageError};
 
-/// On a wall clock, a pause of this length without input means that the tick is over: a tick takes a tenth of that.
+/// Pause without input that marks the end of a tick on a wall clock; a tick takes a tenth of it.
 const TICK_OVER: Duration = Duration::from_millis(5);
-/// The longest time for which idle work waits for such a pause. A stage that gets too little processor time has none, and its journal
-/// would grow until each restore took longer than the one before.
+/// Longest wait of idle work for such a pause. A stage starved of processor time has none, and its
+/// journal and restore time would grow without bound.
 const IDLE_WITHIN: Duration = Duration::from_secs(1);
 
 pub struct Context {
     pub generation: Generation,
     pub run: Run,
-    /// Wakes the process. Besides the topics of its wiring, a process can add descriptors.
+    /// Wakes the process. Besides its wired topics, a process can add descriptors.
     pub waiter: Waiter,
     pub(crate) bus: Bus,
-    /// Opened, and not handed to the process's outputs yet.
+    /// Open file until the process's outputs take it.
     pub(crate) saved: Saved,
     pub(crate) wiring: &'static Wiring,
 }
@@ -61,7 +61,7 @@ impl Context {
         self.bus.writers().cloned()
     }
 
-    /// Open the checkpoint, and give the state that the stage's last process saved.
+    /// Opens the checkpoint and returns the state of the stage's last process.
     pub fn saved_state<T: DeserializeOwned>(&mut self) -> Result<Option<T>> {
         let Persists::State(bytes) = self.wiring.persists else {
             return Ok(None);
@@ -71,7 +71,8 @@ impl Context {
         Ok(state)
     }
 
-    /// Open the journal of a state of at most `bytes`, and give what the stage's last process saved.
+    /// Opens the journal of a state of at most `bytes`, and returns what the stage's last process
+    /// saved.
     pub fn saved_journal<S: DeserializeOwned, E: DeserializeOwned>(
         &mut self,
         bytes: usize,
@@ -87,10 +88,10 @@ impl Context {
     }
 }
 
-/// The tick a stage is at. Its heartbeats carry it in their stamps.
+/// Current tick of a stage, which its heartbeats carry in their stamps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
-    /// The tick last worked on.
+    /// Last processed tick.
     pub tick: u64,
     pub time: MissionTime,
 }
@@ -101,7 +102,7 @@ impl Progress {
     }
 }
 
-/// A stage wired to its topics. An error ends the process, and the supervisor restarts the stage.
+/// Stage wired to its topics. An error ends the process, and the supervisor restarts the stage.
 pub trait Process: Sized {
     const NAME: &'static str;
     const WAKES: Topics;
@@ -118,16 +119,17 @@ pub trait Process: Sized {
         persists: Self::PERSISTS,
     };
 
-    /// Restore the checkpoint, and open the outputs and whatever else is not a reader.
+    /// Restores the checkpoint and opens everything except readers.
     ///
     /// # Errors
-    /// When one of them cannot be opened.
+    /// If one of them cannot be opened.
     fn open(context: &mut Context, readers: Self::Readers) -> Result<Self>;
 
-    /// Take what came, step, publish. Called whenever something may have come, and for each heartbeat.
+    /// Takes pending inputs, steps and publishes. Called when inputs may be pending, and for each
+    /// heartbeat.
     fn turn(&mut self) -> Result<Progress>;
 
-    /// Open what nobody waits for. Called once, after the first heartbeat that says ready.
+    /// Opens resources that no process waits for. Called once, after the first ready heartbeat.
     fn after_ready(&mut self, context: &mut Context) -> Result {
         let _ = context;
         Ok(())
@@ -137,20 +139,23 @@ pub trait Process: Sized {
         false
     }
 
-    /// After how long without input the stage has to look at the clock; none for one that only answers what comes.
+    /// Returns the time without input after which to check the clock; `None` for a stage that only
+    /// answers inputs.
     fn looks_again_after(&self) -> Option<Duration> {
         None
     }
 
-    /// Do what nobody waits for: publish a whole map again, save a snapshot. A stage that goes on computing can
-    /// keep the processor from the one it has just woken, so on a wall clock this is called in the pause after a
-    /// tick, or after a second without one, where [`Process::has_idle_work`] says so; in lockstep, where ticks follow each other at once,
-    /// after each turn.
+    /// Does work that no process waits for: publishes a whole map again, saves a snapshot.
+    ///
+    /// This could keep the processor from the stage that was just woken. On a wall clock it
+    /// therefore runs in the pause after a tick, or after a second without one, if
+    /// [`Process::has_idle_work`] says so. In lockstep, without pauses, it runs after each turn.
     fn idle(&mut self) -> Result {
         Ok(())
     }
 
-    /// Inject a fault. Returns false if the stage has no such fault, or nothing yet to inject it into.
+    /// Injects a fault. Returns false if the stage has no such fault, or nothing to inject it into
+    /// yet.
     fn inject(&mut self, fault: FaultKind) -> Result<bool> {
         let _ = fault;
         Ok(false)
@@ -166,8 +171,8 @@ pub trait Process: Sized {
     }
 }
 
-/// The `main` of an executable that has one stage: takes its place in the run that the command line says, and
-/// runs it until it is asked to stop. An error goes to standard error, which the supervisor saves as the stage's log.
+/// Implements `main` of an executable with one stage: joins the run on the command line and runs
+/// until asked to stop. The supervisor saves standard error as the stage's log.
 pub fn main<P: Process>() -> ExitCode {
     let stage = P::WIRING.stage;
     let start = match stage_command::start(stage, env::args_os().skip(1)) {
@@ -186,12 +191,12 @@ pub fn main<P: Process>() -> ExitCode {
     }
 }
 
-/// Write the error to standard error; where that is closed or its disk is full, the exit code has to say it.
+/// Writes the error to standard error. If that fails, the exit code still reports it.
 fn complain(error: &dyn fmt::Display) {
     let _ = writeln!(io::stderr(), "{error}");
 }
 
-/// The exit code for a wrong command line; `firsthand` has the same.
+/// Exit code for a wrong command line; `firsthand` has the same.
 const WRONG_USAGE: u8 = 2;
 
 pub fn run_stage<P: Process>(start: &Start) -> Result {
@@ -232,7 +237,7 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
     worked
 }
 
-/// A stage is asked to stop by SIGTERM, or by the end of a supervisor that is not its parent.
+/// Sources of a stop request: SIGTERM, or the end of a supervisor that is not the parent.
 struct StopRequest {
     terminated: Signals,
     supervisor: Option<OwnedFd>,
@@ -254,7 +259,7 @@ fn work(
     let ticks_follow_at_once = matches!(context.run.clock, MissionClock::Ticks { .. });
     let mut progress = process.turn()?;
     if ticks_follow_at_once {
-        // Idle work belongs to the tick before it, not to the next one.
+        // Idle work belongs to the previous tick.
         process.idle()?;
     }
     heartbeat.beat(HealthState::Ready, progress)?;
@@ -262,7 +267,7 @@ fn work(
     let simulated = context.run.mission.robot.address.is_none();
     let mut faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
     let (mut busy, mut idled) = (true, Instant::now());
-    // The process whose samples were ignored last.
+    // Process whose samples were ignored last.
     let mut foreign = 0;
     let mut lost = 0;
     while !stop.came() {
@@ -330,7 +335,7 @@ fn inject(
     })
 }
 
-/// Published from inside the work loop: a stage that hangs or spins stops beating.
+/// Heartbeat from inside the work loop, so a stage that hangs or spins falls silent.
 struct Heartbeat {
     writer: Writer<HealthSample>,
     sample: HealthSample,
@@ -380,10 +385,10 @@ impl Heartbeat {
         self.period.saturating_sub(self.last.elapsed())
     }
 
-    /// Beat if it is time. Returns whether it was.
+    /// Sends a due heartbeat and returns whether it did.
     ///
-    /// A stage that has answered a tick is awake anyway: it beats early, so that it need not wake for that alone, and
-    /// wakes nobody, for the supervisor is woken when the tick ends.
+    /// After a tick the stage is awake and beats early and quietly: this saves a wakeup, and the
+    /// end of the tick wakes the supervisor.
     fn beat_if_due(&mut self, progress: Progress) -> Result<bool> {
         self.sample.turns += 1;
         let age = self.last.elapsed();

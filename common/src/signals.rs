@@ -1,4 +1,4 @@
-//! Signals as a descriptor that becomes readable, so that none is missed between looking and waiting.
+//! Signals as a readable descriptor, so that none is lost between checking and waiting.
 
 use std::{
     ffi::c_int,
@@ -21,7 +21,8 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Catch `signals` from now on, except a SIGHUP that is ignored already, as under `nohup`. Fails when the system refuses a handler.
+    /// Catches `signals`, except an already ignored SIGHUP, as under `nohup`. Fails if the system
+    /// refuses a handler.
     pub fn catch(signals: &[c_int]) -> io::Result<Self> {
         let (pipe, written_by_handler) = UnixStream::pair()?;
         pipe.set_nonblocking(true)?;
@@ -42,12 +43,12 @@ impl Signals {
         Ok(())
     }
 
-    /// Catch from now on what asks a process to end. Fails as [`Self::catch`].
+    /// Catches the signals that ask a process to end. Fails as [`Self::catch`].
     pub fn that_end() -> io::Result<Self> {
         Self::catch(&[SIGINT, SIGTERM, SIGHUP])
     }
 
-    /// Whether a signal came that [`Self::came`] has not taken.
+    /// Returns whether a signal is waiting for [`Self::came`].
     pub fn pending(&self) -> bool {
         poll::is_readable(self, Duration::ZERO).unwrap_or(true)
     }
@@ -56,7 +57,7 @@ impl Signals {
         matches!(self.pipe.read(&mut [0; 16]), Ok(read) if read > 0)
     }
 
-    /// Wait until a signal comes. Fails when the system cannot wait.
+    /// Waits for a signal. Fails if the system cannot wait.
     pub fn wait(&mut self) -> io::Result<()> {
         while !self.came() {
             poll::readable(&[self.as_fd()], None)?;
@@ -65,7 +66,7 @@ impl Signals {
     }
 }
 
-/// The process that started this one may have had `signal` ignored.
+/// Returns whether the parent process had `signal` ignored.
 fn is_ignored(signal: c_int) -> bool {
     let mask = process_status::field("self", "SigIgn")
         .and_then(|mask| u64::from_str_radix(&mask, 16).ok());
@@ -78,7 +79,7 @@ impl AsFd for Signals {
     }
 }
 
-/// Whatever its other threads wait for.
+/// Exits without waiting for other threads.
 pub fn exit_at_once(code: u8) -> ! {
     signal_hook::low_level::exit(code.into())
 }

@@ -1,23 +1,24 @@
-//! A stage and its runner: what is common to the process and the replay of every stage, once.
+//! Stages and their runner, shared by each stage's process and replay.
 //!
-//! A [`Stage`] takes entries and gives outputs. Its process (a [`Process`]) reads topics and makes entries of what came; a replay
-//! reads the same entries from a recording. Both hand them to [`Stage::take_entry`], so a replay computes what the process published.
+//! A [`Stage`] maps entries to outputs. Its [`Process`] makes entries from topics; a replay reads
+//! them from a recording. Both call [`Stage::take_entry`], so a replay computes what the process
+//! published.
 //!
-//! A stage that answers each sample of one topic with a sample of another is [`Answering`], and nothing else. It may take what came
-//! on further topics with the sample.
+//! An [`Answering`] stage answers each sample of one topic, with samples of further topics if
+//! needed, by a sample of another.
 //!
-//! # What a stage may depend on
-//! A stage is pure: it has no shared memory, socket, file, thread or clock. A test, a fuzzer or a replay drives it as its process
-//! does, and it cannot tell which of them it is called by. It depends on three things, and nothing else:
+//! # Dependencies of a stage
+//! A stage is pure: it has no shared memory, socket, file, thread or clock. Tests, fuzzers and
+//! replays drive it like its process. Its only inputs are:
 //! - the mission, given once to [`Stage::new`];
 //! - the state given to [`Stage::begin`], which an earlier process of the stage may have saved;
-//! - its entries, in their order, each with the mission time it belongs to.
+//! - its entries, in their order, each with its mission time.
 //!
-//! So the same mission, state and entries give the same outputs to the bit, on any machine. Whatever else a stage
-//! needs is made an entry: a reading of the machine's clock (the link's), the result of a computation on another
-//! thread (the planner's background solve), a random seed (the mission's).
+//! The same inputs therefore give the same outputs to the bit, on any machine. Everything else
+//! becomes an entry: clock readings (of the link), results of other threads (the planner's
+//! background solve), a random seed (the mission's).
 //!
-//! # The stages
+//! # Stages
 //!
 //! | stage | entry | output | state |
 //! |---|---|---|---|
@@ -27,7 +28,7 @@
 //! | `planner` | grid part, pose, solved job, fault | guidance, job for the background solver | none: the next keyframe has all |
 //! | `controller` | guidance | command | none |
 //!
-//! # A stage of your own
+//! # Adding a stage
 //! The guide's page `add-a-stage.md` adds one, an odometer.
 
 use std::{borrow::Cow, fmt::Debug};
@@ -47,33 +48,34 @@ use crate::{
     wiring::{Persists, Readers, Topics},
 };
 
-/// What a stage computes. A process and a replay run the same one.
+/// Computation of a stage, shared by process and replay.
 pub trait Stage: Sized + 'static {
     type Start: Serialize + DeserializeOwned;
-    /// What the stage takes at once: a sample of a topic, or an enum where it takes more than one kind. It may borrow from shared
-    /// memory for the length of the call. A recording holds it in this encoding.
+    /// Input of one step: a sample, or an enum for several kinds. It may borrow from shared memory
+    /// during the call. Recordings use this encoding.
     type Entry<'a>: Serialize + Deserialize<'a> + Debug;
     type Outcome;
 
     fn new(mission: &Mission) -> Self;
 
-    /// Open the file that the stage persists its state in, and give the state that its process starts from.
+    /// Opens the file for the persisted state and returns the initial state.
     fn start(&self, context: &mut Context) -> Result<Self::Start>;
 
-    /// Go on from `start`. Called at most once, before the first entry.
+    /// Continues from `start`. Called at most once, before the first entry.
     ///
     /// # Errors
-    /// When the state cannot be of this mission. Then the stage stays as [`Stage::new`] created it.
+    /// If the state belongs to another mission. The stage then stays as [`Stage::new`] created it.
     fn begin(&mut self, start: Self::Start) -> Result<(), ForeignState>;
 
-    /// Compute, persist and publish what follows from `entry`. Sets [`Outputs::at`] if the entry says of which tick it is. An entry
-    /// that was taken before (a tick that is given again) must not count twice.
+    /// Computes, persists and publishes the effects of `entry`. Sets [`Outputs::at`] if the entry
+    /// states its tick. A repeated entry (a tick that is given again) must not count twice.
     ///
     /// # Errors
-    /// When an output cannot be published or the state cannot be saved.
+    /// If an output cannot be published or the state cannot be saved.
     fn take_entry(&mut self, entry: Self::Entry<'_>, out: &mut Outputs) -> Result<Self::Outcome>;
 
-    /// Publish outputs that no stage waits for. A process calls this in a pause, a replay after each entry.
+    /// Publishes outputs that no stage waits for. A process calls this in a pause, a replay after
+    /// each entry.
     fn publish_rest(&mut self, out: &mut Outputs) -> Result {
         let _ = out;
         Ok(())
@@ -88,15 +90,15 @@ pub trait Stage: Sized + 'static {
 #[error("the saved state is of another mission; the stage starts without it")]
 pub struct ForeignState;
 
-/// A stage that runs: in its process, or in a replay.
+/// Running stage, in its process or in a replay.
 pub struct Runner<S> {
     pub stage: S,
     pub out: Outputs,
 }
 
 impl<S: Stage> Runner<S> {
-    /// Open the topics that the stage writes, restore its state, and go on from there. A slice that it publishes has at most
-    /// `longest` elements.
+    /// Opens the stage's outputs and restores its state. A published slice has at most `longest`
+    /// elements.
     pub fn open(context: &mut Context, longest: impl FnOnce(&S) -> usize) -> Result<Self> {
         let mut stage = S::new(&context.run.mission);
         let start = stage.start(context)?;
@@ -108,7 +110,7 @@ impl<S: Stage> Runner<S> {
         Ok(Self { stage, out })
     }
 
-    /// Open the topics that follow each frame of the robot: to be called after the first heartbeat that says ready.
+    /// Opens the topics that follow each robot frame. Call it after the first ready heartbeat.
     pub fn open_late(&mut self, context: &mut Context) -> Result {
         self.out.open_late(context)
     }
@@ -125,7 +127,7 @@ impl<S: Stage> Runner<S> {
 
 pub fn replay<S: Stage>(beginning: Beginning<'_>) -> Result<Box<dyn Replay>, ReplayError> {
     let mut stage = S::new(&beginning.run.mission);
-    // A stage that persists nothing starts from an entry without bytes.
+    // A stage without persistence starts from an empty entry.
     if !beginning.start.is_empty() {
         // The process ignored a foreign state, too.
         let _ = stage.begin(entry(beginning.start)?);
@@ -145,30 +147,31 @@ impl<S: Stage> Replay for Runner<S> {
     }
 }
 
-/// A stage that answers each sample of one topic with a sample of another.
+/// Stage that answers each sample of one topic with a sample of another.
 pub trait Answering: Sized + 'static {
-    /// The state that must survive the process, because it cannot be recomputed from the topics that a new process reads; `()`
-    /// if there is none.
+    /// State that must survive the process, because its input topics cannot restore it; `()` for
+    /// none.
     type State: Serialize + DeserializeOwned + Clone + Debug;
     type In: Stamped;
     type Out: Stamped;
-    /// The samples of further topics that it takes with a sample of its input; `()` for none.
+    /// Samples of further topics that accompany an input sample; `()` for none.
     type Further: Further;
     const NAME: &'static str;
     const INPUT: &'static Topic<Self::In>;
     const OUTPUT: &'static Topic<Self::Out>;
     const PERSISTS: Persists = Persists::Nothing;
-    /// Whether the stage skips samples that are not the newest.
+    /// Whether the stage skips all but the newest sample.
     const NEWEST_ONLY: bool = false;
 
     fn new(mission: &Mission) -> Self;
 
     fn state(&self) -> &Self::State;
 
-    /// [`Stage::begin`] from the state that an earlier process of the same mission saved.
+    /// Applies [`Stage::begin`] to the state of an earlier process of the same mission.
     fn restore(&mut self, state: Self::State) -> Result<(), ForeignState>;
 
-    /// Whether `input` was answered before, as a tick that is given again. Then samples of further topics stay for the next one.
+    /// Returns whether `input` was answered before, as a repeated tick; samples of further topics
+    /// then wait for the next one.
     fn has_answered(&self, _input: &Self::In) -> bool {
         false
     }
@@ -181,12 +184,12 @@ pub trait Answering: Sized + 'static {
     ) -> Answer<Self::Out>;
 }
 
-/// The samples of further topics that came before a sample of an [`Answering`] stage's input. They wake nobody, and the entry
+/// Samples of further topics that arrived before an input sample. They wake no process; the entry
 /// contains them, so a replay takes them with the same sample.
 pub trait Further: Default + Serialize + DeserializeOwned + Debug + 'static {
     type Readers: Readers;
 
-    /// Take what came, and no more than a bounded number of samples.
+    /// Takes the pending samples, up to a limit.
     fn take_samples(readers: &mut Self::Readers) -> Result<Self, BusError>;
 }
 
@@ -201,7 +204,8 @@ impl Further for () {
 #[derive(Clone, Debug)]
 pub struct Answer<P> {
     pub sample: P,
-    /// Whether the state is saved before the sample is published. Otherwise no tick waits for the file.
+    /// Whether to save the state before publishing the sample. Otherwise no tick waits for the
+    /// file.
     pub saves_first: bool,
     pub warning: Option<Cow<'static, str>>,
 }
@@ -263,7 +267,8 @@ impl<A: Answering> Stage for A {
     }
 }
 
-/// The readers of an [`Answering`] stage: of its input, and of further topics, which are all feedback.
+/// Readers of an [`Answering`] stage: of its input, and of further topics, all of which are
+/// feedback.
 pub struct Questions<A: Answering>(Reader<A::In>, <A::Further as Further>::Readers);
 
 impl<A: Answering> Readers for Questions<A> {

@@ -1,4 +1,4 @@
-//! The command line of a stage's process: the supervisor writes it, and every executable of a stage reads it.
+//! Command line of a stage's process, written by the supervisor and read by every stage executable.
 //!
 //! | form | started by |
 //! |---|---|
@@ -26,8 +26,8 @@ pub struct StageCommandError {
     problem: String,
 }
 
-/// The arguments with which the supervisor, process `supervisor`, starts the process of `generation`. `called` is the name of
-/// its stage, or of the baseline in its place.
+/// Returns the arguments with which `supervisor` starts the process of `generation`. `called` names
+/// its stage, or the baseline in its place.
 pub fn arguments(called: &str, generation: &Generation, supervisor: u32) -> Vec<OsString> {
     let Generation { stage: _, directory, number, first_tick } = generation;
     vec![
@@ -44,8 +44,7 @@ pub fn arguments(called: &str, generation: &Generation, supervisor: u32) -> Vec<
     ]
 }
 
-/// The start of `stage` that `arguments` ask for, the words after the executable's name: for an executable that has
-/// this one stage.
+/// Parses the `arguments` after the name of an executable that has only `stage`.
 pub fn start(
     stage: &'static str,
     arguments: impl IntoIterator<Item = OsString>,

@@ -1,4 +1,4 @@
-//! How a stage's process takes its place in a run: as a child of the supervisor. `external` is the other way.
+//! Joining a run as a child of the supervisor. `external` is the alternative.
 
 use std::{fs::File, os::fd::OwnedFd, path::PathBuf};
 
@@ -11,14 +11,14 @@ use crate::{
     run::{Run, RunError},
 };
 
-/// One of a stage's processes in a run: each start of a stage is a generation.
+/// Process of a stage in a run; each start of a stage is a generation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Generation {
     pub stage: &'static str,
-    /// Where `run.toml` and the checkpoints lie.
+    /// Directory of `run.toml` and the checkpoints.
     pub directory: PathBuf,
     pub number: u32,
-    /// Ticks before this one are an earlier generation's.
+    /// First tick of this generation; earlier ones belong to its predecessors.
     pub first_tick: u64,
 }
 
@@ -26,10 +26,10 @@ pub struct Generation {
 pub enum Start {
     Child {
         generation: Generation,
-        /// The supervisor's process, its parent: when that ends, this one is to end.
+        /// Parent process, the supervisor; this process ends with it.
         supervisor: u32,
     },
-    /// Something else started it (systemd, a person), for a supervisor that only watches; it finds the rest itself.
+    /// Started by systemd or a person for a supervisor that only watches; it finds the rest itself.
     External { stage: &'static str, robot: RobotName },
 }
 
@@ -52,7 +52,7 @@ pub enum StageError {
     Run(#[from] RunError),
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// The stage publishes on a topic that is not among its outputs.
+    /// Publication on a topic outside the stage's outputs.
     #[error("topic {0} is not among the outputs of the stage; list it there")]
     NoOutput(&'static str),
     #[error("{0}")]
@@ -61,11 +61,11 @@ pub enum StageError {
     System { action: &'static str, source: std::io::Error },
 }
 
-/// The exit code of a stage that the bus refused: the supervisor then creates a new bus instance.
+/// Exit code of a stage that the bus refused: the supervisor then creates a new bus instance.
 pub const REFUSED: u8 = 8;
 
 impl StageError {
-    /// The exit code of a stage's process that ends with this error.
+    /// Returns the exit code of a stage's process that ends with this error.
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Bus(_) => REFUSED,
@@ -83,7 +83,7 @@ pub(crate) fn join_as_child(generation: &Generation, supervisor: u32) -> Result<
     Ok(Joined { generation: generation.clone(), run, bus, supervisor: None, stage_lock })
 }
 
-/// Count as a process of `domain`, until the result is dropped.
+/// Counts as a process of `domain` until the result is dropped.
 pub(crate) fn enter(domain: &Domain) -> Result<File> {
     domain.enter().map_err(system("enter the robot's directory"))
 }
@@ -92,10 +92,10 @@ pub(crate) fn system(action: &'static str) -> impl FnOnce(std::io::Error) -> Sta
     move |source| StageError::System { action, source }
 }
 
-/// Take a name that `ps` and `pkill` show, and get SIGTERM when `supervisor` ends.
+/// Sets the name for `ps` and `pkill`, and requests SIGTERM at the end of `supervisor`.
 ///
 /// # Errors
-/// When the supervisor has ended already, or the system is not Linux.
+/// If the supervisor has ended already, or the system is not Linux.
 pub fn become_child(process_name: &str, supervisor: u32) -> Result {
     name_process(process_name)?;
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
@@ -112,7 +112,7 @@ pub fn become_child(process_name: &str, supervisor: u32) -> Result {
 }
 
 pub(crate) fn name_process(name: &str) -> Result {
-    // A name with a zero byte cannot come from the table.
+    // The table has no name with a zero byte.
     if let Ok(name) = std::ffi::CString::new(name) {
         rustix::thread::set_name(&name)
             .map_err(|errno| system("name the process")(errno.into()))?;

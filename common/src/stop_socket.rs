@@ -1,5 +1,6 @@
-//! The operator's stop without middleware: the datagram socket of the link, or of its stop guard, in the robot's directory. Only the owner
-//! may enter that directory. The stop works with a damaged bus, a full disk, or a supervisor that hangs.
+//! Operator's stop without middleware: the datagram socket of the link, or of its stop guard, in
+//! the robot's directory, which only the owner may enter. The stop works with a damaged bus, a full
+//! disk, or a hung supervisor.
 //!
 //! A datagram is one byte: [`Request`] to the link, [`Answer`] from it.
 
@@ -21,15 +22,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::{clock::monotonic_ns, domain::Domain, poll, samples::Rest};
 
-/// A request of an operator to the link. Recordings hold the number of the variant.
+/// Operator's request to the link. Recordings hold the number of the variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request {
     Resume,
     /// The robot stands until an operator resumes.
     Stop,
-    /// A person has seen the robot at rest, or it is off: the stop guard leaves. A link ignores this.
+    /// Releases the stop guard: a person has seen the robot at rest, or it is off. A link ignores
+    /// this.
     SignOff,
-    /// What the stop guard sees. A link ignores this.
+    /// Asks for the stop guard's observations. A link ignores this.
     Look,
 }
 
@@ -37,7 +39,7 @@ pub enum Request {
 pub enum Answer {
     Heard,
     AtRest,
-    /// What the stop guard sees: [`Rest`] and the seconds without a motor frame.
+    /// Stop guard's observations: [`Rest`] and the seconds without a motor frame.
     Sees(Rest, u8),
 }
 
@@ -48,7 +50,7 @@ const LOOK: u8 = b'?';
 const HEARD: u8 = b'h';
 const AT_REST: u8 = b'a';
 
-/// The most operators that the link answers at once; it obeys others too.
+/// Most operators that the link answers at once; it obeys others too.
 const MOST_ASKING: usize = 16;
 
 #[derive(Debug)]
@@ -56,12 +58,12 @@ pub struct StopSocket {
     path: PathBuf,
     socket: UnixDatagram,
     asking: Vec<SocketAddr>,
-    /// Operators who look at what a stop guard sees, and have no answer yet.
+    /// Operators who wait for the stop guard's observations.
     looking: Vec<SocketAddr>,
 }
 
 impl StopSocket {
-    /// Binds `path` in place of an earlier process's socket. Fails when the system refuses.
+    /// Binds `path` in place of an earlier process's socket. Fails if the system refuses.
     pub fn bind(path: PathBuf) -> io::Result<Self> {
         remove(&path)?;
         Ok(Self { socket: bind(&path)?, path, asking: Vec::new(), looking: Vec::new() })
@@ -76,7 +78,7 @@ impl StopSocket {
             self.socket = again;
         }
         loop {
-            // Whatever is wrong with the socket, the robot drives on as ordered.
+            // The robot drives on despite any fault of the socket.
             let (length, from) = self.socket.recv_from(&mut byte).ok()?;
             let request = match (length, byte) {
                 (1, [STOP]) => Request::Stop,
@@ -104,7 +106,7 @@ impl StopSocket {
         }
     }
 
-    /// Answers everybody who looks: `silent_s` are the seconds without a motor frame.
+    /// Answers all waiting observers: `silent_s` are the seconds without a motor frame.
     pub fn tell(&mut self, rest: Rest, silent_s: u8) {
         for operator in std::mem::take(&mut self.looking) {
             self.answer(&operator, &[rest as u8, silent_s]);
@@ -112,7 +114,7 @@ impl StopSocket {
     }
 
     fn answer(&self, operator: &SocketAddr, bytes: &[u8]) {
-        // An operator who has gone needs no answer.
+        // A departed operator needs no answer.
         let _ = self.socket.send_to_addr(bytes, operator);
     }
 }
@@ -123,7 +125,7 @@ impl AsFd for StopSocket {
     }
 }
 
-/// Bind a socket at `path`, and make its directory, if that was removed.
+/// Binds a socket at `path` and recreates its directory if necessary.
 fn bind(path: &Path) -> io::Result<UnixDatagram> {
     if let Some(directory) = path.parent() {
         make_directory(directory)?;
@@ -139,7 +141,7 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// Returns none if no process answers at `path`. Fails when the system refuses a socket.
+    /// Returns `None` if no process answers at `path`. Fails if the system refuses a socket.
     pub fn connect(path: &Path) -> io::Result<Option<Self>> {
         // An abstract name leaves no file.
         let name = format!("firsthand-operator-{}-{}", std::process::id(), monotonic_ns());
@@ -163,7 +165,7 @@ impl Operator {
         self.socket.send(&[byte]).map(drop)
     }
 
-    /// Waits up to `patience`. Fails when the link is gone.
+    /// Waits up to `patience`. Fails if the link is gone.
     pub fn answer(&self, patience: Duration) -> io::Result<Option<Answer>> {
         let began = Instant::now();
         loop {
@@ -203,7 +205,7 @@ impl Identity {
     }
 }
 
-/// An operator's stop leaves this mark in a run's directory, so that a new link obeys it too.
+/// Mark of an operator's stop in a run's directory, for a new link.
 #[derive(Debug)]
 pub struct StopMark {
     path: PathBuf,
@@ -226,8 +228,9 @@ impl StopMark {
     }
 }
 
-/// The mark of a robot that may move. The link sets it before the first motion command. Whoever sees the robot at rest, or signs it off,
-/// clears it. It outlives every process, so that the next link or guard knows.
+/// Mark of a robot that may move. The link sets it before the first motion command. Whoever sees
+/// the robot at rest, or signs it off, clears it. It outlives every process, so the next link or
+/// guard knows.
 #[derive(Debug)]
 pub struct OwedStop(Domain);
 
@@ -240,7 +243,7 @@ impl OwedStop {
         self.0.owed_stop().symlink_metadata().is_ok()
     }
 
-    /// Sets the mark for the robot of the run in `directory`, or clears it.
+    /// Sets or clears the mark for the robot of the run in `directory`.
     pub fn set(&self, owed: bool, directory: &Path) -> io::Result<()> {
         if !owed {
             return remove(&self.0.owed_stop());

@@ -1,4 +1,4 @@
-//! The target, as a stage follows it on topic `target`.
+//! Current target, as a stage follows it on topic `target`.
 
 use crate::{bus::Reader, samples::TargetSample, start::Result};
 
@@ -16,16 +16,16 @@ impl From<Reader<TargetSample>> for TargetReader {
 }
 
 impl TargetReader {
-    /// The target that holds in `tick`, if it is not the one that was returned last.
+    /// Returns the target that holds in `tick`, if it differs from the last returned one.
     pub fn next(&mut self, tick: u64) -> Result<Option<TargetSample>> {
         self.newest = self.samples.newest()?.or(self.newest);
         Ok(self.newest.filter(|newest| takes(&mut self.taken, newest, tick)))
     }
 }
 
-/// `taken` is the number of the target that was taken last.
+/// Returns whether to take `newest`; `taken` is the number of the last taken target.
 fn takes(taken: &mut Option<u64>, newest: &TargetSample, tick: u64) -> bool {
-    // Any target is better than none: the stage may be a new generation.
+    // A new generation takes any target, because it has none.
     let is_due = |number| newest.number > number && tick >= newest.since_tick;
     let takes = taken.is_none_or(is_due);
     if takes {

@@ -1,8 +1,7 @@
-//! THE table of topics: what the processes publish for each other.
+//! Table of topics: all that the processes publish for each other.
 //!
-//! Services are created from it, the guide's list is printed from it (`firsthand topic list`), the stages' table is
-//! checked against it, and writers take from it how often they publish again. A topic is declared once, below, and
-//! named nowhere else.
+//! It defines the services, `firsthand topic list`, the check of the stages' table, and the
+//! writers' republishing intervals. Each topic is declared and named only here.
 
 use std::time::Duration;
 
@@ -15,36 +14,37 @@ pub use crate::bus::{
     AnyTopic, EVERY_STAGE, Limits, Logged, OPERATOR, Rate, SUPERVISOR, Spec, Topic,
 };
 
-/// How often the supervisor publishes its order and the roster again, for consumers that joined later.
+/// Republishing interval of the supervisor's order and roster, for consumers that joined later.
 pub const RESTATE: Duration = Duration::from_millis(200);
-/// Heartbeats, and the link's state, are farther apart than ticks at 7 Hz, so a stage that answers ticks publishes them with those and
-/// need not wake for them alone. Five of them fit in the tightest deadline of a heartbeat.
+/// Interval of heartbeats and the link's state. It exceeds a tick at 7 Hz, so a stage that answers
+/// ticks sends them without extra wakeups. Five fit in the tightest heartbeat deadline.
 const BEAT: Duration = Duration::from_millis(150);
 
-/// The field is for displays and recorders; no stage waits for it. In mission time.
+/// Rate of the field, in mission time. The field is for displays and recorders; no stage waits for
+/// it.
 const FIELD_RATE: Rate = Rate::OnChange {
     at_most_every: Duration::from_millis(250),
     again_after: Duration::from_secs(1),
 };
 
-/// A recorder that was not scheduled for long still learns of each generation from the rosters that wait for it.
+/// Limits that let a long unscheduled recorder learn each generation from buffered rosters.
 const ROSTERS: Limits = Limits { buffer: Limits::MAP.recorder_buffer, ..Limits::MAP };
 
-/// The memory for the most beams is that of 1,024 small scans: a recorder that is not scheduled for 1.6 s loses none of one laser at
-/// 40 Hz.
+/// Limits of scans; the largest take the memory of 1,024 small ones. With one laser at 40 Hz, a
+/// recorder that is not scheduled for 1.6 s loses none.
 const SCANS: Limits = Limits { buffer: 16, recorder_buffer: 64, ..Limits::slices(MOST_BEAMS) };
 
-/// The most bytes of a `wire` sample; longer data take several.
+/// Most bytes of a `wire` sample; longer data are split.
 pub const WIRE_PIECE: usize = 2048;
 const WIRE_PIECES: Limits = Limits { longest: WIRE_PIECE, ..Limits::DEEP };
 
-/// At every change at once, and again after `again_after`.
+/// Publishes at every change at once, and again after `again_after`.
 const fn on_change(again_after: Duration) -> Rate {
     Rate::OnChange { at_most_every: Duration::ZERO, again_after }
 }
 
-/// A row has its name, the header and the elements of its samples, its writer and its rate. A topic without `limits` has small samples, and
-/// all recordings contain one without `logged`.
+/// Declares topics: name, header and elements of samples, writer and rate. By default samples are
+/// small, and all recordings contain the topic.
 macro_rules! topics {
     (@ $written:expr, $default:expr) => { $written };
     (@ $default:expr) => { $default };
@@ -61,86 +61,91 @@ macro_rules! topics {
                 meaning: concat!($($meaning),+),
             });
         )*
-        /// Every topic, in the order of the pipeline.
+        /// All topics, in the order of the pipeline.
         pub static TABLE: &[&dyn AnyTopic] = &[$(&$id),*];
     };
 }
 
 topics! {
-    /// Where the robot is sent: the current target, and those after it.
+    /// Current target and those after it.
     TARGET "target": TargetSample, SUPERVISOR, on_change(RESTATE);
-    /// Where the thing is that the robot follows. Any consumer may publish it.
+    /// Position of the followed thing. Any consumer may publish it.
     BEACON "beacon": BeaconSample, OPERATOR, Rate::WhenItHappens;
-    /// How the robot follows the beacon, from the first request to do so on.
+    /// State of following the beacon, from the first request on.
     FOLLOWING "following": FollowingSample, SUPERVISOR, on_change(RESTATE);
-    /// The keep-out zones, if operators changed those of the mission.
+    /// Keep-out zones, once operators changed those of the mission.
     ZONES "zones": ZonesHeader ZoneCorner, SUPERVISOR, on_change(RESTATE), limits: Limits::slices(MOST_ZONES * MOST_CORNERS);
-    /// Readings of the sonars and infrared rangers, one for each row of the mission's sensors.
+    /// Readings of the sonars and infrared rangers, one per row of the mission's sensors.
     RANGES "ranges": RangesHeader RangeReading, "link", Rate::EachTick, limits: Limits::slices(MOST_SENSORS);
-    /// The beams of a laser, a sample for each laser that measured.
+    /// Beams of a laser, one sample per laser that measured.
     SCAN "scan": ScanHeader f32, "link", Rate::WhenItHappens, limits: SCANS;
     /// Encoder counts and wheel speeds.
     WHEELS "wheels": WheelSample, "link", Rate::EachTick;
-    /// The counts of `wheels` without their cycle, in each tick of a robot that says angles of its wheels or its odometry.
+    /// Counts of `wheels` without wraparound, in each tick of a robot that reports wheel angles or
+    /// odometry.
     COUNTS "counts": CountsSample, "link", Rate::WhenItHappens;
-    /// How the base was found to answer, in each tick, if it stops later than the mission states.
+    /// Identified response of the base, in each tick, if it stops later than the mission states.
     BASE_RESPONSE "base_response": BaseResponseSample, "link", Rate::WhenItHappens;
-    /// Wheels are held although they were told to turn, or a bumper or a cliff sensor feels something: where.
+    /// Location of a contact: wheels are blocked despite a command, or a bumper or cliff sensor is
+    /// active.
     CONTACT "contact": ContactSample, "link", Rate::WhenItHappens;
-    /// Where a source outside saw the robot: a camera, a satellite receiver. Any consumer may publish it.
+    /// Robot position from an external source: a camera, a satellite receiver. Any consumer may
+    /// publish it.
     FIX "fix": FixSample, OPERATOR, Rate::WhenItHappens;
-    /// Where the robot is by the scans of its laser.
+    /// Robot position from laser scans.
     SCAN_FIX "scan_fix": FixSample, "mapper", Rate::WhenItHappens;
-    /// Where an operator says that the standing robot is.
+    /// Pose of the standing robot, stated by an operator.
     PLACE "place": PlaceSample, SUPERVISOR, on_change(RESTATE);
-    /// How far a gyro turned. Any consumer may publish it, one at a time.
+    /// Turn measured by a gyro. Any consumer may publish it, one at a time.
     TURN "turn": TurnSample, OPERATOR, Rate::WhenItHappens;
-    /// How far the robot turned by its own gyro, in each tick.
+    /// Turn measured by the robot's own gyro, in each tick.
     IMU_TURN "imu_turn": TurnSample, "link", Rate::WhenItHappens;
-    /// Where the robot believes it is.
+    /// Estimated pose of the robot.
     POSE "pose": PoseSample, "dead-reckoning", Rate::EachTick;
-    /// The safety map: keyframes and changed windows.
+    /// Safety map: keyframes and changed windows.
     GRID "grid": GridHeader u8, "mapper", Rate::EachTick, limits: Limits::MAP;
-    /// The reference direction at the robot's pose.
+    /// Reference direction at the robot's pose.
     GUIDANCE "guidance": GuidanceSample, "planner", Rate::EachTick;
-    /// The whole-domain policy, for consumers.
+    /// Whole-domain policy, for consumers.
     FIELD "field": FieldHeader FieldCell, "planner", FIELD_RATE, limits: Limits::WHOLE_MAP, logged: WithFields;
     /// Wheel speeds for the robot.
     COMMAND "command": CommandSample, "controller", Rate::EachTick;
     /// Heartbeats, from inside the work loop.
     HEALTH "health": HealthSample, EVERY_STAGE, on_change(BEAT);
-    /// The connection to the robot: its state, counts, tick latency.
+    /// Connection to the robot: its state, counts, tick latency.
     LINK "link": LinkSample, "link", on_change(BEAT);
     /// Trouble of a stage, with the input and the remedy, again and again while it lasts.
     COMPLAINTS "complaints": ComplaintSample, EVERY_STAGE, Rate::WhenItHappens;
     /// The seven infrared rangers, metres.
     INFRARED "infrared": InfraredSample, "link", Rate::EachFrame;
-    /// Battery volts and whether they are low, motor currents, temperatures of the drivers.
+    /// Battery voltages and low flags, motor currents, driver temperatures.
     POWER "power": PowerSample, "link", Rate::EachFrame;
     /// Human sensors, tilt, temperature.
     SURROUNDINGS "surroundings": SurroundingsSample, "link", Rate::EachFrame;
-    /// The supervisor's order to all stages.
+    /// Supervisor's order to all stages.
     DIRECTIVE "directive": DirectiveSample, SUPERVISOR, on_change(RESTATE);
-    /// How far the robot may go in lockstep, and since which tick the newest recovery step holds.
+    /// Last permitted tick in lockstep, and the first tick of the newest recovery step.
     TICK_LIMIT "tick_limit": TickLimitSample, SUPERVISOR, on_change(RESTATE);
-    /// The stages' processes, as the supervisor sees them.
+    /// Processes of the stages, as the supervisor sees them.
     ROSTER "roster": RosterHeader RosterEntry, SUPERVISOR, on_change(RESTATE), limits: ROSTERS;
-    /// How old the samples of a mirror on another machine are. The bus of the robot itself has no such sample.
+    /// Age of the samples of a mirror on another machine. The robot's own bus has no such sample.
     MIRROR "mirror": MirrorSample, SUPERVISOR, on_change(RESTATE);
-    /// A stage's process ended: cause, ages, the end of its log, what follows.
+    /// End of a stage's process: cause, ages, the end of its log, the next step.
     DEATHS "deaths": DeathSample, SUPERVISOR, Rate::WhenItHappens;
-    /// The robot should make progress and does not: how, and what is tried.
+    /// Stall of the robot: kind and recovery.
     STALLS "stalls": StallSample, SUPERVISOR, Rate::WhenItHappens;
     /// Requests of an operator: restart, stop, resume, targets, the place, zones.
     REQUESTS "requests": RequestSample, OPERATOR, Rate::WhenItHappens, logged: No;
-    /// Each request with its answer. The process of an operator may end before others have read its request.
+    /// Requests with their answers. An operator's process may end before others have read its
+    /// request.
     ORDERS "orders": RequestSample, SUPERVISOR, Rate::WhenItHappens;
-    /// Requests of an operator to inject a fault into a stage; every stage reads it.
+    /// Requests of an operator to inject a fault into a stage; every stage reads them.
     FAULTS "faults": FaultSample, OPERATOR, Rate::WhenItHappens;
-    /// The bytes that the link received from the robot and sent to it. Wakes nobody: a reader waits for `link`.
+    /// Bytes that the link received from the robot and sent to it. It wakes no reader: wait for
+    /// `link`.
     WIRE "wire": WireHeader u8, "link", Rate::WhenItHappens, limits: WIRE_PIECES;
-    /// The inputs of every stage's step, and the checkpoint each generation started from, for a replay.
-    /// Wakes nobody: a reader waits for `link`.
+    /// Inputs of every stage's step, and the initial checkpoint of each generation, for a replay.
+    /// It wakes no reader: wait for `link`.
     INPUTS "inputs": InputsHeader u8, EVERY_STAGE, Rate::WhenItHappens, limits: Limits::DEEP;
 }
 

@@ -1,5 +1,6 @@
-//! The declaration of what a stage's process opens on the bus and what it persists. The table of stages refers to it, and the
-//! process opens what it declares: [`readers`](crate::readers) names a topic, its reader and the field that holds it in one line.
+//! Declaration of a stage's topics and persistence. The table of stages refers to it, and the
+//! process opens it: [`readers`](crate::readers) names a topic, its reader and its field in one
+//! line.
 
 use crate::{
     bus::{AnyTopic, Bus, BusError},
@@ -8,35 +9,39 @@ use crate::{
 
 pub type Topics = &'static [&'static dyn AnyTopic];
 
-/// Every stage's process also reads the requests of faults, and the roster, which names the processes that it admits.
+/// Additional inputs of every stage's process: fault requests, and the roster with the authorised
+/// processes.
 pub static EVERY_STAGE_READS: Topics = &[&FAULTS, &ROSTER];
 /// Every stage's process also writes its heartbeats, its trouble, and the inputs of its step.
 pub static EVERY_STAGE_WRITES: Topics = &[&HEALTH, &COMPLAINTS, &INPUTS];
 
-/// The topics that a stage reads, is woken by and writes, and the state that it persists.
+/// Topics and persisted state of a stage.
 pub struct Wiring {
-    /// The stage's name: of the process, of `firsthand stage NAME`, of the folder under `services/`.
+    /// Name of the stage: of the process, of `firsthand stage NAME`, of the folder under
+    /// `services/`.
     pub stage: &'static str,
-    /// Topics it reads, whose writers start before it.
+    /// Input topics whose writers start before it.
     pub inputs: Topics,
-    /// Topics it reads whose writers start after it: those that close the loop, and those that consumers write.
+    /// Input topics whose writers start after it: those that close the loop, and those that
+    /// consumers write.
     pub feedback: Topics,
-    /// Topics that start a turn of its work loop.
+    /// Topics that start an iteration of its work loop.
     pub wakes: Topics,
-    /// Topics that it alone writes. The last one that is published each tick answers the tick. Topics that follow each frame
-    /// of the robot are opened after the first heartbeat that says ready.
+    /// Topics that it alone writes. The last one published in each tick answers the tick. Topics
+    /// that follow each robot frame are opened after the first ready heartbeat.
     pub outputs: Topics,
     pub persists: Persists,
 }
 
-/// The state that a stage's next process goes on from, in the file `STAGE.checkpoint` of the run's directory.
+/// Persisted state for the stage's next process, in the file `STAGE.checkpoint` of the run's
+/// directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Persists {
-    /// Nothing is persisted: the next inputs bring everything.
+    /// None: the next inputs restore everything.
     Nothing,
-    /// The state, of at most so many bytes, is saved after each step.
+    /// State of at most this many bytes, saved after each step.
     State(usize),
-    /// The inputs since a snapshot are saved. The mission says how large a snapshot is.
+    /// Inputs since a snapshot. The mission determines a snapshot's size.
     Journal,
 }
 
@@ -54,7 +59,7 @@ impl Readers for () {
     }
 }
 
-/// A struct of readers, or of what is made from one, each with its topic.
+/// Declares a struct of readers, or of values made from one, each with its topic.
 #[macro_export]
 macro_rules! readers {
     ($(#[$meta:meta])* $vis:vis struct $name:ident {

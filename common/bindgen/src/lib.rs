@@ -1,2 +1,2 @@
-//! Nothing. iceoryx2 names bindgen among what it is built with, and its build script uses it on QNX only.
-//! Elsewhere the generator and its parsers would take a tenth of the robot's build.
+//! Empty replacement of bindgen. iceoryx2 lists it as a build dependency and uses it only on QNX;
+//! elsewhere it would take a tenth of the robot's build.

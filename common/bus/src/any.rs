@@ -1,4 +1,4 @@
-//! Topics of a table, and their readers and writers, without the types of their samples.
+//! Topics of a table, and their readers and writers, without their sample types.
 
 use std::any::Any;
 
@@ -16,23 +16,25 @@ use super::{
 };
 use crate::domain::Domain;
 
-/// A row of the table, without the types of its samples.
+/// Row of the table.
 pub trait AnyTopic: Sync {
     fn spec(&self) -> &'static Spec;
-    /// The name of its payload in all languages: of a struct, or of a header and a slice of elements.
+    /// Returns the payload's name in all languages.
     fn payload(&self) -> String;
-    /// The kind of a sample's header, and that of its elements where it has a slice.
+    /// Returns the kinds of the header and of the slice's elements.
     fn layout(&self) -> (Kind, Option<Kind>);
-    /// The values in a message of the topic, as those of an [`AnySample`]; none if it is no such message.
+    /// Decodes a message of the topic into the values of an [`AnySample`]; `None` for other
+    /// messages.
     fn decoded(&self, message: &[u8]) -> Option<(Value, Option<Vec<Value>>)>;
-    /// The types of its samples for the middleware. The result has no name outside this crate.
+    /// Returns the sample types for the middleware; the result is private to this crate.
     #[doc(hidden)]
     fn carried(&self) -> Carried;
     fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>>;
-    /// Opens a reader of the samples of all generations, with the buffer of a recorder.
+    /// Opens a reader of all generations with a recorder's buffer.
     fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>>;
     fn any_writer(&self, bus: &Bus, generation: u32, longest: usize) -> Result<Box<dyn AnyWriter>>;
-    /// The processes that have the topic open. It fails if the topic is missing or carries another payload.
+    /// Returns the processes that have the topic open. Fails for a missing topic or another
+    /// payload.
     fn opened_by(&self, bus: &Bus) -> Result<OpenedBy> {
         ports::opened_by(&bus.node, self.spec(), &self.carried())
     }
@@ -40,12 +42,11 @@ pub trait AnyTopic: Sync {
 
 pub trait AnyReader {
     fn next_sample(&mut self) -> Result<Option<Box<dyn AnySample>>>;
-    /// Puts the next sample as a message (see [`super::cdr`]) in place of what is in `message`. Returns its stamp; none when all samples
-    /// were taken.
+    /// Replaces `message` by the next sample (see [`super::cdr`]) and returns its stamp, if any.
     fn next_message(&mut self, message: &mut Vec<u8>) -> Result<Option<Stamp>>;
 }
 
-/// A sample of a topic. It stays in shared memory, and its writer cannot reuse that memory while the sample is held.
+/// Sample in shared memory, which its writer can reuse once it is dropped.
 pub trait AnySample {
     fn stamp(&self) -> &Stamp;
     fn author(&self) -> Author;
@@ -54,7 +55,8 @@ pub trait AnySample {
 }
 
 pub trait AnyWriter: Any {
-    /// Publish the sample in `message` with the stamp that it has, and wake the readers. Returns whether `message` is of this topic.
+    /// Publishes the sample in `message` with its own stamp and wakes the readers. Returns whether
+    /// `message` belongs to this topic.
     fn publish_message(&mut self, message: &[u8]) -> Result<bool>;
 }
 
@@ -138,13 +140,16 @@ impl<H: Stamped, E: Payload> AnyWriter for Writer<H, E> {
 }
 
 impl Bus {
-    /// Create the bus of a robot: its configuration, which consumers in other languages load too, and the services of all topics of
-    /// `table`. The new bus replaces an earlier one, and nobody can join it before all services exist. Only the supervisor calls this.
+    /// Creates a robot's bus: its configuration, which consumers in all languages load, and the
+    /// services of all topics in `table`.
+    ///
+    /// It replaces an earlier bus, and can be joined only once all services exist. Only the
+    /// supervisor calls this.
     pub fn make(domain: &Domain, name: &str, table: &[&dyn AnyTopic]) -> Result<(Self, Services)> {
         Self::make_services(domain, name, table.iter().map(|topic| (topic.spec(), topic.carried())))
     }
 
-    /// A wakeup that is readable once a sample was published on `topic`. It fails if the topic is missing or has no place left.
+    /// Opens a wakeup for publications on `topic`. Fails if the topic is missing or full.
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup> {
         Wakeup::open(self, topic.spec())
     }

@@ -1,4 +1,5 @@
-//! The processes whose samples a reader returns: those that the supervisor names as writers of a topic.
+//! Authorship of samples: a reader returns those of the processes that the supervisor names as a
+//! topic's writers.
 
 use std::{
     cell::RefCell,
@@ -19,31 +20,31 @@ pub struct Author {
     pub generation: u32,
 }
 
-/// Samples of processes that should not write.
+/// Dropped samples of unauthorised processes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ignored {
     pub samples: u64,
-    /// The process that wrote the last sample; 0 for none.
+    /// Author of the last one; 0 for none.
     pub process: u32,
 }
 
-/// Reads which processes the stages have; none if there is no newer list since the last call.
+/// Source of the stages' processes; `None` without a newer list since the last call.
 pub type Names = Box<dyn FnMut() -> Result<Option<Vec<(String, Author)>>>>;
 
-/// The number of processes of a stage that are remembered. A recorder still takes samples of those that ended.
+/// Remembered processes per stage. A recorder still takes samples of ended ones.
 const REMEMBERED: usize = 64;
 
-/// The processes that may write, for all readers of a process.
+/// Authorised processes, shared by all readers of a process.
 #[derive(Clone, Default)]
 pub struct Writers(Rc<RefCell<Named>>);
 
 #[derive(Default)]
 struct Named {
     supervisor: u32,
-    /// The processes of each stage, the newest last.
+    /// Processes of each stage, the newest last.
     stages: BTreeMap<String, VecDeque<Author>>,
     source: Option<Names>,
-    /// Until this time, or the first list of `source`, samples of stages wait for their readers.
+    /// Deadline for the first list of `source`; samples of stages wait until then.
     names_come_by: Option<Instant>,
     ignored: Ignored,
 }
@@ -70,23 +71,23 @@ impl fmt::Debug for Writers {
 }
 
 impl Writers {
-    /// Only the process `supervisor` may write, until stages are named.
+    /// Authorises only the process `supervisor`, until stages are named.
     pub fn of(supervisor: u32) -> Self {
         Self(Rc::new(RefCell::new(Named { supervisor, ..Named::default() })))
     }
 
-    /// Name the processes of stages. A stage that is not listed keeps the process that it had.
+    /// Names the processes of stages. An unlisted stage keeps its process.
     pub fn name(&self, stages: impl IntoIterator<Item = (String, Author)>) {
         self.0.borrow_mut().name(stages);
     }
 
-    /// Read the names from `source`, whenever a process writes that is not named.
+    /// Reads names from `source` whenever an unnamed process writes.
     pub fn read_from(&self, source: Names) {
         self.0.borrow_mut().source = Some(source);
     }
 
-    /// Let samples of stages wait until the source has a list. If it has none for `patience`, for example because the supervisor is
-    /// frozen, samples of the newest generation are returned until it has.
+    /// Holds samples of stages until the source has a list. Without one after `patience`, as with a
+    /// frozen supervisor, readers meanwhile return the newest generation.
     pub fn wait_for_names(&self, patience: Duration) {
         self.0.borrow_mut().names_come_by = Some(Instant::now() + patience);
     }
@@ -100,7 +101,7 @@ impl Writers {
     }
 
     fn read_names(&self) -> Result {
-        // The source is a reader of this bus, which asks for the supervisor's process.
+        // The source is a reader of this bus and itself asks for the supervisor's process.
         let Some(mut source) = self.0.borrow_mut().source.take() else {
             return Ok(());
         };
@@ -146,22 +147,22 @@ impl Writers {
     }
 }
 
-/// Whose samples a reader returns.
+/// Authors whose samples a reader returns.
 #[derive(Debug)]
 pub struct Admitted {
     authors: Authors,
-    /// Samples of older generations are returned, too, and of processes that the supervisor named earlier.
+    /// Also admits older generations and formerly named processes.
     all_generations: bool,
 }
 
 #[derive(Debug)]
 enum Authors {
-    /// All authors: several processes write the topic at a time.
+    /// All authors, for topics with several concurrent writers.
     All,
-    /// The newest generation, and the generation that was newest so far: nobody names authors.
+    /// Newest generation so far, where no process names authors.
     Newest(u32),
-    /// The supervisor's process, and its newest generation. It knows no [`Writers`]: a reader of the roster is their source, and a
-    /// circle of owners would keep its place on the bus for ever.
+    /// Supervisor's process and its newest generation. It holds no [`Writers`]: their source is a
+    /// reader of the roster, and the ownership cycle would keep its place on the bus forever.
     Supervisor(u32, u32),
     Named(OneStage),
 }
@@ -171,15 +172,15 @@ struct OneStage {
     writers: Writers,
     stage: &'static str,
     process: Option<Author>,
-    /// The earlier process, admitted until the first sample of `process` comes.
+    /// Earlier process, admitted until the first sample of `process`.
     before: Option<Author>,
-    /// The newest generation that the supervisor's process published on the topic, because it may play a recording, or that anybody
-    /// published before anybody was named.
+    /// Newest generation that the supervisor published on the topic, because it may play a
+    /// recording, or that any process published before the first name.
     newest: u32,
 }
 
 impl Admitted {
-    /// The authors of a topic for a process that knows the `writers`, or for one that does not.
+    /// Returns a topic's authors; `writers` is `None` for a process without names.
     pub fn of(spec: &Spec, writers: Option<&Writers>) -> Self {
         let authors = match writers {
             _ if !spec.has_one_writer() => Authors::All,
@@ -209,7 +210,8 @@ impl Admitted {
         }
     }
 
-    /// Whether a sample of `author` is returned. Samples of older generations are dropped, because their process has ended.
+    /// Returns whether to return a sample of `author`. The process of an older generation has
+    /// ended.
     pub fn admits(&mut self, author: Author) -> Result<bool> {
         let all = self.all_generations;
         match &mut self.authors {

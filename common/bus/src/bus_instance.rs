@@ -1,7 +1,7 @@
-//! The names of one bus instance. A recreated bus has its own files, so a process that leaves the old bus late cannot delete files
-//! of the new one.
+//! Names of one bus instance. A recreated bus has its own files, so late leavers of the old bus
+//! cannot delete new ones.
 //!
-//! The robot's directory holds the configuration of each instance, and a link to the configuration of the current one.
+//! The robot's directory holds each instance's configuration, and a link to the current one.
 
 use std::{
     fs,
@@ -13,13 +13,12 @@ use std::{
 
 use crate::domain::{Domain, SHARED_MEMORY};
 
-/// The file name of a configuration is the instance's name between these two.
+/// Affixes of a configuration's file name around the instance's name.
 const CONFIG: [&str; 2] = ["iceoryx2-", ".toml"];
-/// The length of an instance's name. Paths of sockets contain the name twice, and Linux limits their length.
+/// Length of an instance's name. Linux limits socket paths, which contain it twice.
 const LENGTH: usize = 4;
-/// The version of firsthand that this program is of.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// A configuration begins with it and the version of the supervisor that made the bus.
+/// Start of a configuration, before the supervisor's version.
 const MADE_BY: &str = "# firsthand ";
 const LETTERS: &[u8; 32] = b"abcdefghijkmnpqrstuvwxyz23456789";
 
@@ -30,7 +29,7 @@ pub struct BusInstance {
 }
 
 impl BusInstance {
-    /// A new instance. Its name is random, so nobody can create its files beforehand.
+    /// Creates an instance. Its random name keeps others from creating its files beforehand.
     pub fn new(domain: &Domain) -> Self {
         let mut random = RandomState::new().hash_one(std::process::id());
         let name = (0..LENGTH).map(|_| {
@@ -41,7 +40,7 @@ impl BusInstance {
         Self { domain: domain.clone(), name: name.collect() }
     }
 
-    /// The instance that processes join now; an error if the robot has no bus.
+    /// Returns the current instance; fails if the robot has no bus.
     pub fn current(domain: &Domain) -> io::Result<Self> {
         let link = domain.middleware_config();
         let config = fs::read_link(&link)?;
@@ -73,12 +72,11 @@ impl BusInstance {
         self.domain.directory().join(self.config_name())
     }
 
-    /// The middleware's `settings` as the text of a configuration.
     pub(crate) fn config_text(settings: &str) -> String {
         format!("{MADE_BY}{VERSION}\n{settings}")
     }
 
-    /// The version that made the bus if this program must not join it.
+    /// Returns the version that made the bus if it is incompatible with this program.
     pub(crate) fn made_by_another(&self) -> io::Result<Option<String>> {
         let config = fs::read_to_string(self.config())?;
         let made_by = config.lines().next().and_then(|line| line.strip_prefix(MADE_BY));
@@ -86,19 +84,20 @@ impl BusInstance {
         Ok((series(made_by) != series(VERSION)).then(|| made_by.to_owned()))
     }
 
-    /// The names of all files of this instance in [`SHARED_MEMORY`] start with this prefix.
+    /// Returns the prefix of this instance's files in [`SHARED_MEMORY`].
     pub fn shared_memory_prefix(&self) -> String {
         format!("{}{}_", self.domain.shared_memory_prefix(), self.name)
     }
 
-    /// The directory of the middleware's node and service files. It is in shared memory because the middleware syncs each file to
-    /// the disk, and a stage that starts creates twenty.
+    /// Returns the directory of the middleware's files. It is in shared memory because the
+    /// middleware syncs each file, and a starting stage creates twenty.
     pub fn root(&self) -> PathBuf {
         Path::new(SHARED_MEMORY).join(self.domain.shared_memory_prefix() + &self.name)
     }
 }
 
-/// A version without what may differ between two that understand each other, which before 1.0 is its last number.
+/// Returns the version without the numbers that compatible programs may differ in: the last before
+/// 1.0, all after the major from then on.
 fn series(version: &str) -> (Option<&str>, Option<&str>) {
     let mut numbers = version.split('.');
     let major = numbers.next();

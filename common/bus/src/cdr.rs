@@ -1,8 +1,10 @@
-//! The encoding of payloads outside shared memory: the little-endian CDR of ROS 2 (OMG DDS-XTYPES 1.3, XCDR version 1). Every reader
-//! of recordings can decode it. Numbers are aligned to their own size, counted from the first byte after the header. Structs and
-//! arrays have no bytes of their own. A slice begins with its length, a `u32`.
+//! Encoding of payloads outside shared memory: little-endian CDR of ROS 2 (OMG DDS-XTYPES 1.3, XCDR
+//! version 1), which every reader of recordings supports.
+//!
+//! Numbers are aligned to their size, counted from the first byte after the header. Structs and
+//! arrays add no bytes. A slice begins with its length, a `u32`.
 
-/// The header of every message: little-endian CDR, no options.
+/// Header of every message: little-endian CDR, no options.
 pub const HEADER: [u8; 4] = [0, 1, 0, 0];
 
 #[derive(Debug)]
@@ -31,7 +33,7 @@ impl<'a> Encoder<'a> {
     }
 }
 
-/// Reads numbers one after another; none where too few bytes are left.
+/// Sequential reader of numbers; returns `None` if too few bytes are left.
 #[derive(Clone, Debug)]
 pub struct Decoder<'a> {
     rest: &'a [u8],
@@ -39,7 +41,7 @@ pub struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// A decoder of `message`; none if the message has another encoding.
+    /// Returns `None` if `message` has another encoding.
     pub fn new(message: &'a [u8]) -> Option<Self> {
         let rest = message.strip_prefix(&HEADER)?;
         Some(Self { rest, length: rest.len() })

@@ -1,5 +1,5 @@
-//! A supervisor's claim on its robot: an abstract socket. The kernel keeps it as long as the process runs, and it is no file that
-//! a cleaner of temporary files could remove.
+//! Supervisor's claim on its robot: an abstract socket, kept by the kernel while the process runs,
+//! and safe from cleaners of temporary files.
 
 use std::{
     io,
@@ -32,15 +32,17 @@ impl Claim {
         Ok(Self(listener))
     }
 
-    /// Forget those who looked for the holder. The kernel has answered them, and keeps a limited number.
+    /// Drops the connections of processes that looked for the holder. The kernel has answered them,
+    /// and its queue is limited.
     pub fn forget_askers(&self) {
         while self.0.accept().is_ok() {}
     }
 }
 
-/// The process that claims the robot. Any user may take any abstract name, so it must be this user's or root's, as the kernel says.
+/// Returns the process that claims the robot. Any user may take any abstract name, so its owner
+/// must be this user or root.
 ///
-/// Fails with [`io::ErrorKind::WouldBlock`] if the holder is frozen and more have asked than the kernel keeps.
+/// Fails with [`io::ErrorKind::WouldBlock`] if the holder is frozen and the kernel's queue is full.
 pub(crate) fn holder(domain: &Domain) -> io::Result<Option<u32>> {
     let flags = SocketFlags::CLOEXEC | SocketFlags::NONBLOCK;
     let socket = socket_with(AddressFamily::UNIX, SocketType::STREAM, flags, None)?;

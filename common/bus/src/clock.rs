@@ -1,6 +1,6 @@
-//! Mission time, the pace it runs at, and the machine's own monotonic clock.
+//! Mission time, its pace, and the machine's monotonic clock.
 //!
-//! Samples carry mission time. Deadlines that detect processes which ended or hang use [`monotonic_ns`].
+//! Samples carry mission time. Deadlines that detect ended or hung processes use [`monotonic_ns`].
 
 use std::{fmt, str::FromStr, time::Duration};
 
@@ -8,7 +8,7 @@ use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Nanoseconds since the mission began.
+/// Nanoseconds since the start of the mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct MissionTime(pub u64);
 
@@ -17,12 +17,12 @@ impl MissionTime {
         self.0 as f64 * 1e-9
     }
 
-    /// The time `seconds` after the beginning; negative and NaN give the beginning.
+    /// Converts seconds; negative values and NaN give zero.
     pub fn from_seconds(seconds: f64) -> Self {
         Self((seconds.max(0.0) * 1e9) as u64)
     }
 
-    /// The time from `earlier` to this; zero if `earlier` is later.
+    /// Returns the time since `earlier`; zero if `earlier` is later.
     pub fn since(self, earlier: Self) -> Duration {
         Duration::from_nanos(self.0.saturating_sub(earlier.0))
     }
@@ -31,9 +31,9 @@ impl MissionTime {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Pace {
-    /// As fast as the machine can: each tick waits for the one before, and the run is repeatable.
+    /// As fast as possible: each tick waits for the one before, and the run is repeatable.
     Max,
-    /// Mission time is wall-clock time multiplied by this.
+    /// Mission time as a multiple of wall-clock time.
     Rate(f64),
 }
 
@@ -71,12 +71,12 @@ impl fmt::Display for Pace {
 pub enum MissionClock {
     /// Lockstep, a simulated robot at `--pace max`: tick k happens at k periods.
     Ticks { period_ns: u64 },
-    /// A real robot, or a simulated one at `--pace R`: the wall-clock time since the epoch, multiplied by a rate.
+    /// Real robot, or a simulated one at `--pace R`: wall-clock time since the epoch, multiplied by
+    /// a rate.
     Wall { epoch_ns: u64, rate: f64 },
 }
 
 impl MissionClock {
-    /// Mission time at `tick`, when the machine's clock reads `monotonic_ns`.
     pub fn at(&self, tick: u64, monotonic_ns: u64) -> MissionTime {
         match *self {
             Self::Ticks { period_ns } => MissionTime(tick.saturating_mul(period_ns)),
@@ -87,7 +87,7 @@ impl MissionClock {
     }
 }
 
-/// CLOCK_MONOTONIC, nanoseconds. All processes of the machine read the same time.
+/// Returns CLOCK_MONOTONIC, nanoseconds, which all processes of the machine share.
 pub fn monotonic_ns() -> u64 {
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64

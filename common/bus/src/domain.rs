@@ -1,6 +1,5 @@
-//! A robot's domain on this machine: its name, its runtime directory, and the prefix of its files in shared memory.
-//!
-//! Two robots share nothing: each has its own directory, lock, prefix in `/dev/shm` and services.
+//! Robot's domain on this machine: its name, runtime directory and shared memory prefix. Robots
+//! share none of these, nor locks and services.
 
 use std::{
     env, fmt,
@@ -19,9 +18,9 @@ use thiserror::Error;
 
 use crate::{claim, lock_holders::has_open};
 
-/// The name of a robot, and of its domain: 1 to 16 of a-z, 0-9 and `-`.
+/// Name of a robot and its domain: 1 to 16 of a-z, 0-9 and `-`.
 ///
-/// It is short because Linux limits the length of socket paths. It has no `_` because `_` ends the name in a shared memory prefix.
+/// Linux limits the length of socket paths. `_` ends the name in a shared memory prefix.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String")]
 pub struct RobotName(String);
@@ -59,15 +58,15 @@ impl fmt::Display for RobotName {
 
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
-/// The patience with a supervisor that makes its directory again, for which it looks five times a second.
+/// Wait for a supervisor that recreates its directory; it checks five times a second.
 const MADE_AGAIN: Duration = Duration::from_secs(2);
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
-/// The names of one robot's files on this machine, for one user.
+/// Names of one robot's files on this machine, for one user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Domain {
     pub robot: RobotName,
-    /// The user's number, or the letters of a suite of tests.
+    /// User number, or the letters of a test suite.
     owner: String,
     directory: PathBuf,
 }
@@ -82,20 +81,21 @@ impl Domain {
         Self { robot, owner, directory }
     }
 
-    /// The directory of the domain's files. Only its owner may enter it.
+    /// Returns the directory of the domain's files, which only its owner may enter.
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    /// The lock that the supervisor holds exclusively as long as it runs.
+    /// Returns the lock that the supervisor holds exclusively while it runs.
     pub fn lock_file(&self) -> PathBuf {
         self.directory.join("lock")
     }
 
-    /// The process that holds the supervisor's lock, or claims the robot; none if there is neither.
+    /// Returns the process that holds the supervisor's lock or claims the robot.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
         match self.supervision()? {
-            // A frozen supervisor does not accept connections to its claim, so the lock's own text comes first.
+            // The lock's text comes first, because a frozen supervisor accepts no connections to
+            // its claim.
             Supervision::Locked(lock) => match named_in(&lock)?.filter(|pid| has_open(*pid, &lock))
             {
                 None => claim::holder(self),
@@ -106,7 +106,7 @@ impl Domain {
         }
     }
 
-    /// Whether the robot has a supervisor; true if that cannot be found out.
+    /// Returns whether the robot has a supervisor; true if unknown.
     pub fn is_supervised(&self) -> bool {
         !matches!(self.supervision(), Ok(Supervision::None))
     }
@@ -126,14 +126,15 @@ impl Domain {
         }
     }
 
-    /// The name of the claim on the robot. Two containers may have the network in common, and with it such names, so the name has the set
-    /// of processes that this one sees.
+    /// Returns the name of the claim. It includes the PID namespace, because containers may share a
+    /// network and its abstract names.
     pub(crate) fn claim_name(&self) -> String {
         let seen = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
         format!("firsthand-{}-{}-{}", self.owner, self.robot, seen.display())
     }
 
-    /// Wait for `file` of the directory. A supervisor that runs makes it again, if a cleaner of temporary files removed it.
+    /// Waits for `file`. A running supervisor recreates it after a cleaner of temporary files
+    /// removed it.
     pub fn made_again(&self, file: PathBuf) -> PathBuf {
         let began = Instant::now();
         while !file.exists()
@@ -145,33 +146,34 @@ impl Domain {
         file
     }
 
-    /// The lock that consumers share while they join a bus. The supervisor holds it exclusively while it creates or removes a bus, so a
-    /// consumer cannot recreate files of a bus that was removed.
+    /// Returns the lock that consumers share while they join a bus. The supervisor holds it
+    /// exclusively to create or remove one, so no consumer recreates files of a removed bus.
     pub fn joining_lock_file(&self) -> PathBuf {
         self.directory.join("joining.lock")
     }
 
-    /// Prevent the supervisor from creating or removing a bus until the result is dropped or the process ends. Hold it only briefly. An
-    /// error means that there is no domain.
+    /// Keeps the supervisor from creating or removing a bus until the result is dropped; hold it
+    /// only briefly. Fails without a domain.
     pub fn joining(&self) -> io::Result<File> {
         let lock = File::open(self.made_again(self.joining_lock_file()))?;
         lock.lock_shared()?;
         Ok(lock)
     }
 
-    /// The lock that all stages share as long as they run. A new supervisor waits until the stages of the last one have released it.
+    /// Returns the lock that all stages share while they run. A new supervisor waits until the last
+    /// one's stages release it.
     pub fn stages_lock_file(&self) -> PathBuf {
         self.directory.join("stages.lock")
     }
 
-    /// Share the lock of the stages until the result is dropped or the process ends. An error means that there is no domain.
+    /// Shares the stages' lock until the result is dropped. Fails without a domain.
     pub fn enter(&self) -> io::Result<File> {
         let lock = File::open(self.stages_lock_file())?;
         lock.lock_shared()?;
         Ok(lock)
     }
 
-    /// A link to the run directory. A supervisor creates it if another program starts the stages.
+    /// Returns the link to the run directory, created if another program starts the stages.
     pub fn run_link(&self) -> PathBuf {
         self.directory.join("run")
     }
@@ -180,64 +182,66 @@ impl Domain {
         self.directory.join("run-directory")
     }
 
-    /// A link whose text names where the robot runs, if this domain is a mirror of a robot of another machine.
+    /// Returns the link whose text names the robot's machine, if this domain is a mirror.
     pub fn mirror_link(&self) -> PathBuf {
         self.directory.join("mirror")
     }
 
-    /// Where the robot runs that this domain mirrors; none if the robot itself has the domain, or nobody.
+    /// Returns the place of the mirrored robot; `None` if this domain is no mirror.
     pub fn mirrors(&self) -> Option<String> {
         Some(fs::read_link(self.mirror_link()).ok()?.display().to_string())
     }
 
-    /// The socket of the link that an operator's stop needs no middleware for.
+    /// Returns the link's socket for an operator's stop without middleware.
     pub fn stop_socket(&self) -> PathBuf {
         self.directory.join("stop")
     }
 
-    /// The socket of the stop guard that orders the stop after its link ended.
+    /// Returns the socket of the stop guard, which orders the stop after its link ended.
     pub fn guard_socket(&self) -> PathBuf {
         self.directory.join("guard")
     }
 
-    /// A link to the directory of the run whose robot may move.
+    /// Returns the link to the run directory of a robot that may be moving.
     pub fn owed_stop(&self) -> PathBuf {
         self.directory.join("owed-stop")
     }
 
-    /// The socket at which the simulated robot hears where another in its world is.
+    /// Returns the socket at which the simulated robot receives the position of another in its
+    /// world.
     pub fn place_socket(&self) -> PathBuf {
         self.directory.join("place")
     }
 
-    /// A link to the middleware's configuration of the current [`BusInstance`](crate::bus_instance::BusInstance). A consumer in any
-    /// language loads it first.
+    /// Returns the link to the middleware configuration of the current
+    /// [`BusInstance`](crate::bus_instance::BusInstance), which consumers load first.
     pub fn middleware_config(&self) -> PathBuf {
         self.directory.join("iceoryx2.toml")
     }
 
-    /// The names of all files of this domain in [`SHARED_MEMORY`] start with this prefix. No other domain's prefix starts with it,
-    /// because robot names have no `_`.
+    /// Returns the prefix of this domain's files in [`SHARED_MEMORY`]. Robot names contain no `_`,
+    /// so no domain's prefix starts with another's.
     pub fn shared_memory_prefix(&self) -> String {
         format!("fh{}_{}_", self.owner, self.robot)
     }
 }
 
-/// How it shows that a robot has a supervisor.
+/// Evidence of a supervisor.
 enum Supervision {
     Locked(File),
     Claimed(u32),
     None,
 }
 
-/// The environment variable that sets a suite of tests apart, so that two of them may run at once: `t` and four of a-z and 0-9, which
-/// stand in the place of the user's number.
+/// Environment variable that isolates concurrent test suites: `t` and four of a-z and 0-9 replace
+/// the user number.
 pub const SUITE_VARIABLE: &str = "FIRSTHAND_SUITE";
 static SUITE: OnceLock<Option<String>> = OnceLock::new();
 
-/// Set the robots that this process knows apart, as [`SUITE_VARIABLE`] does. Call it before the first [`Domain::of`].
+/// Isolates this process's robots, as [`SUITE_VARIABLE`] does. Call it before the first
+/// [`Domain::of`].
 pub fn set_apart(suite: &str) {
-    // Once a domain has been named, it is too late.
+    // After the first named domain this has no effect.
     let _ = SUITE.set(Some(suite.to_owned()).filter(|suite| is_suite(suite)));
 }
 
@@ -246,12 +250,14 @@ fn is_suite(text: &str) -> bool {
     text.len() == 5 && text.starts_with('t') && text.bytes().all(allowed)
 }
 
-/// The longest path of a directory of robots. The paths of sockets in it have at most 108 bytes.
+/// Longest path of a directory of robots; socket paths in it have at most 108 bytes.
 const LONGEST_PLACE: usize = 80;
 
-/// The directories in which the robots of `user` may be, the preferred first. Another user can take the name in `/tmp`, and no other:
-/// the package makes `/run/firsthand` for its user, and nobody else writes in the directories of a login and of a home.
-/// `$XDG_RUNTIME_DIR` is not asked, because it differs between a login, a service and a container of one user.
+/// Returns the possible directories for the robots of `user`, the preferred first.
+///
+/// Another user can occupy only the name in `/tmp`: the package makes `/run/firsthand` for its
+/// user, and login and home directories are private. `$XDG_RUNTIME_DIR` differs between a login, a
+/// service and a container of one user.
 fn places(user: &str) -> Vec<PathBuf> {
     let home = env::var_os("HOME").map(|home| Path::new(&home).join(".firsthand"));
     [
@@ -265,8 +271,10 @@ fn places(user: &str) -> Vec<PathBuf> {
     .collect()
 }
 
-/// The place of `robot` among `places`, or else the first place that this user has or may make. So a running robot is found, whatever
-/// places were made or taken since its start. If no place is left, the first is returned, and an error names it.
+/// Returns the place of `robot` among `places`, else the first usable one. This finds a running
+/// robot even if places changed since its start.
+///
+/// If none is usable, the first is returned, and an error names it.
 fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
     let is_own = |path: &Path| {
         fs::symlink_metadata(path).is_ok_and(|found| found.is_dir() && found.uid() == user)
@@ -282,7 +290,7 @@ fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
     found.cloned().unwrap_or_default()
 }
 
-/// The process that wrote its number in `lock`. A container may have another number for it.
+/// Returns the process number in `lock`; a container may use another for that process.
 fn named_in(mut lock: &File) -> io::Result<Option<u32>> {
     let mut named = String::new();
     lock.read_to_string(&mut named)?;
@@ -308,7 +316,7 @@ mod tests {
         let user = rustix::process::geteuid().as_raw();
         let found = || place(&places, user, "x80");
         assert_eq!(found(), places[0]);
-        // A link, which is no directory of this user, stands for a directory of another user.
+        // A link, which is not this user's directory, represents another user's.
         std::os::unix::fs::symlink(directory.path(), &places[0]).unwrap();
         assert_eq!(found(), places[1]);
         fs::create_dir_all(places[2].join("x80")).unwrap();

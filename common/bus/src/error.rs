@@ -32,7 +32,7 @@ pub enum BusError {
     )]
     NoPlace {
         topic: &'static str,
-        /// The number of places, the reserved ones of the stages included.
+        /// Number of places, including those reserved for stages.
         places: usize,
     },
     #[error(

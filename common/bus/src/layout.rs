@@ -1,7 +1,8 @@
-//! The layout of payloads in memory, for programs in other languages: names, types and offsets of all fields. The same
-//! description gives the values of a payload, field by field, and encodes it where there is no shared memory.
+//! Memory layout of payloads for other languages: names, types and offsets of all fields. It also
+//! yields a payload's values and encodes it outside shared memory.
 //!
-//! Why `unsafe` is allowed here: the name of a payload can be read only through an `unsafe` call, which does nothing else.
+//! Why `unsafe` is allowed here: the name of a payload can be read only through an `unsafe` call,
+//! which does nothing else.
 #![allow(unsafe_code)]
 
 use std::fmt;
@@ -10,14 +11,13 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use super::cdr::{Decoder, Encoder};
 
-/// The name of a payload in all languages.
 pub(super) fn type_name<P: ZeroCopySend>() -> &'static str {
-    // SAFETY: the call only returns the name. Each payload promises its uniform layout where it derives the trait.
+    // SAFETY: the call only returns the name. Each payload promises its uniform layout where it
+    // derives the trait.
     unsafe { <P as ZeroCopySend>::type_name() }
 }
 
 pub trait Layout: Copy {
-    /// The value of which every number is 0.
     fn zero() -> Self;
 
     fn kind() -> Kind;
@@ -30,7 +30,7 @@ pub trait Layout: Copy {
 
     fn encode(&self, to: &mut Encoder<'_>);
 
-    /// Decode the bytes that [`Layout::encode`] wrote; none where they are too short.
+    /// Decodes the output of [`Layout::encode`]; `None` if it is too short.
     fn decode(from: &mut Decoder<'_>) -> Option<Self>;
 
     fn encode_all(items: &[Self], to: &mut Encoder<'_>) {
@@ -53,7 +53,7 @@ pub enum Value {
     Signed(i64),
     Single(f32),
     Double(f64),
-    /// An array of bytes in a struct: UTF-8, filled up with zeros. Bytes that are not UTF-8 are replaced.
+    /// Byte array in a struct: UTF-8, padded with zeros. Invalid bytes are replaced.
     Text(String),
     Array(Vec<Self>),
     Struct(Vec<(&'static str, Self)>),
@@ -61,7 +61,7 @@ pub enum Value {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A number; its name in Rust.
+    /// Number, by its name in Rust.
     Number(&'static str),
     Array(Box<Self>, usize),
     Struct(Structure),
@@ -69,7 +69,7 @@ pub enum Kind {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Structure {
-    /// The name in all languages, for example `firsthand.Pose`.
+    /// Name in all languages, for example `firsthand.Pose`.
     pub name: &'static str,
     pub size: usize,
     pub fields: Vec<Field>,
@@ -81,11 +81,11 @@ pub struct Field {
     /// Bytes from the start of the struct.
     pub offset: usize,
     pub kind: Kind,
-    /// Its comment, lines joined; empty for none.
+    /// Field comment, lines joined; empty for none.
     pub doc: &'static str,
 }
 
-/// Without the comment: the checksum of a layout is that of this text, and a comment changes no layout.
+/// Omits the comment, so that it leaves the checksum of a layout unchanged.
 impl fmt::Debug for Field {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, offset, kind, .. } = self;
@@ -99,7 +99,6 @@ impl Structure {
     }
 }
 
-/// The kind of the field that an accessor of the struct returns.
 pub fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
     F::kind()
 }
@@ -151,7 +150,7 @@ numbers! {
     u16: Unsigned u32: Unsigned u64: Unsigned i32: Signed i64: Signed f32: Single f64: Double
 }
 
-/// The element of a sample without a slice.
+/// Element of a sample without a slice.
 impl Layout for () {
     fn zero() {}
 
@@ -194,7 +193,7 @@ impl<T: Layout, const N: usize> Layout for [T; N] {
     }
 }
 
-/// Implements [`Layout`] for payloads from the names of their fields. If a field is missing in the list, the code does not compile.
+/// Implements [`Layout`] for payloads from their field names. A missing field is a compile error.
 #[macro_export]
 macro_rules! layouts {
     ($($payload:ident { $($field:ident $([$($doc:literal)*])?)* })*) => {$(

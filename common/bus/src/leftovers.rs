@@ -1,13 +1,14 @@
-//! Files that a process leaves behind if it is killed while it joins the bus. The middleware neither expects nor removes them:
+//! Files that a process leaves if it is killed while it joins the bus. The middleware neither
+//! expects nor removes them:
 //!
-//! - Shared memory that the process had created and not yet filled. Root may open such a file, and the middleware then waits for
-//!   ever for it to be filled; other users are refused.
-//! - Files of an incomplete node. The middleware reads them again at each start and does not remove them.
+//! - Shared memory that was created and is still unfilled. If root opens such a file, the
+//!   middleware waits forever for its contents; other users are refused.
+//! - Files of an incomplete node, which the middleware reads again at each start.
 //!
-//! Both are found by their names, which contain ids of nodes and ports. An id contains the number of the process that made it.
+//! Their names contain ids of nodes and ports, which contain the process number.
 //!
-//! Service files may also be missing. The last consumer that leaves a bus removes the files of its services by their names, even
-//! if the bus was recreated and the files belong to the new one. Each service file therefore has a backup under a second name.
+//! Service files may also be missing: the last consumer to leave a bus removes them by name, even
+//! those of a recreated bus. Each therefore has a backup under a second name.
 
 use std::{
     fs::{self, DirEntry},
@@ -17,15 +18,15 @@ use std::{
     time::Duration,
 };
 
-/// The permissions of shared memory until it is filled: its creator may write, nobody may read.
+/// Permissions of unfilled shared memory: write-only for its creator.
 const UNFILLED: u32 = 0o200;
 
-/// Shared memory that is unfilled for so long stays unfilled, because filling takes microseconds.
+/// Age of abandoned unfilled memory; filling takes microseconds.
 const FILLED: Duration = Duration::from_secs(1);
 
-/// Remove unfilled shared memory from `directory`: all that names the process `ended`, which must have ended, and all that is
-/// older than [`FILLED`]. Only files whose names start with `prefix` are this robot's. Returns whether unfilled memory is left, which
-/// its creator may be about to fill.
+/// Removes unfilled shared memory with `prefix` from `directory`: that of `ended`, which must have
+/// ended, and all older than [`FILLED`]. Returns whether some is left, which its creator may be
+/// about to fill.
 pub(super) fn remove_unfilled(directory: &Path, prefix: &str, ended: u32) -> io::Result<bool> {
     let mut left = false;
     for entry in fs::read_dir(directory)? {
@@ -45,15 +46,16 @@ pub(super) fn remove_unfilled(directory: &Path, prefix: &str, ended: u32) -> io:
     Ok(left)
 }
 
-/// The time since a file of unfilled shared memory was created; none for other files, and if it was removed or filled meanwhile.
+/// Returns the age of unfilled shared memory; `None` for other files, even if removed or filled
+/// meanwhile.
 fn unfilled_for(entry: &DirEntry) -> Option<Duration> {
     let file = entry.metadata().ok()?;
     let unfilled = file.is_file() && file.permissions().mode() & 0o777 == UNFILLED;
-    // If the clock was set back, the file counts as new.
+    // After the clock was set back, the file counts as new.
     unfilled.then(|| file.modified().ok()?.elapsed().ok()).map(Option::unwrap_or_default)
 }
 
-/// Remove the files and directories in `nodes` that belong to nodes of the process `ended`, which must have ended.
+/// Removes the node files in `nodes` of the process `ended`, which must have ended.
 pub(super) fn remove_nodes(nodes: &Path, ended: u32) -> io::Result<()> {
     for entry in fs::read_dir(nodes)? {
         let entry = entry?;
@@ -68,7 +70,7 @@ pub(super) fn remove_nodes(nodes: &Path, ended: u32) -> io::Result<()> {
     Ok(())
 }
 
-/// Give each file in `services` a second name in the new directory `backup`, which must not exist.
+/// Hard-links each file in `services` into the new directory `backup`.
 pub(super) fn back_up(services: &Path, backup: &Path) -> io::Result<()> {
     fs::create_dir(backup)?;
     for entry in fs::read_dir(services)? {
@@ -78,7 +80,7 @@ pub(super) fn back_up(services: &Path, backup: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Link the files in `backup` that are missing in `services` back to it.
+/// Links the files that `services` lacks back from `backup`.
 pub(super) fn restore(backup: &Path, services: &Path) -> io::Result<()> {
     for entry in fs::read_dir(backup)? {
         let entry = entry?;
@@ -90,7 +92,7 @@ pub(super) fn restore(backup: &Path, services: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Counts a file that another process removed first as removed.
+/// Treats a file already removed by another process as success.
 fn removed(result: io::Result<()>) -> io::Result<()> {
     match result {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
@@ -98,12 +100,11 @@ fn removed(result: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Whether a file's name contains an id that `process` made.
 fn names(file: &str, process: u32) -> bool {
     file.split(['_', '.']).filter_map(|part| part.parse().ok()).any(|id| process_of(id) == process)
 }
 
-/// The process that made a node or a port: the third of the four words of its id.
+/// Returns the process that made an id: the third of its four words.
 pub(super) const fn process_of(id: u128) -> u32 {
     (id >> 64) as u32
 }

@@ -1,38 +1,39 @@
-//! The bus between processes on one machine: writers, readers and wakeups of the topics. This crate alone names
-//! the middleware (iceoryx2).
+//! Bus between the processes on one machine: writers, readers and wakeups of topics. Only this
+//! crate depends on the middleware (iceoryx2).
 //!
 //! | file | holds |
 //! |---|---|
 //! | [`clock`] | mission time, pace, the monotonic clock |
-//! | [`domain`] | a robot's directory, locks and shared memory on this machine |
+//! | [`domain`] | a robot's directory, locks and shared memory |
 //! | [`claim`] | a supervisor's claim on its robot, without a file |
-//! | [`lock_holders`] | the processes that hold a lock on a file |
-//! | [`bus_instance`] | the names of one bus instance |
+//! | [`lock_holders`] | processes that hold a lock on a file |
+//! | [`bus_instance`] | names of one bus instance |
 //! | [`poll`], [`waiter`] | waiting for descriptors; one wait for topics, sockets, signals, processes |
-//! | [`cdr`] | the encoding of payloads outside shared memory |
-//! | `layout` | the layout of payloads in memory, for other languages; their values; their encoding |
-//! | `payload` | the types that samples may have, the stamp that every sample begins with, and samples as messages |
-//! | `spec` | the description of a topic |
-//! | `topic` | the rows of a table of topics |
-//! | `ports` | typed publishers and subscribers; in `ports/raw.rs` the middleware's ports, compiled once for all payloads |
-//! | `make` | creating and joining a bus, and removing what killed processes leave on it |
-//! | `leftovers` | the files that killed processes leave |
-//! | `ownership` | checks of the owner and the permissions of a bus's files |
-//! | `reserve` | the memory of segments, reserved when they are made |
-//! | `close_on_exec` | descriptors that a child must not inherit |
-//! | `authors` | the processes whose samples a reader returns |
+//! | [`cdr`] | encoding of payloads outside shared memory |
+//! | `layout` | memory layout, values and encoding of payloads, for other languages |
+//! | `payload` | types of samples, the stamp of every sample, samples as messages |
+//! | `spec` | description of a topic |
+//! | `topic` | rows of a table of topics |
+//! | `ports` | typed publishers and subscribers; `ports/raw.rs` compiles the middleware's ports once |
+//! | `make` | creating and joining a bus, and cleaning up after killed processes |
+//! | `leftovers` | files that killed processes leave |
+//! | `ownership` | owner and permission checks of a bus's files |
+//! | `reserve` | memory of segments, reserved at creation |
+//! | `close_on_exec` | descriptors that children must not inherit |
+//! | `authors` | processes whose samples a reader returns |
 //! | `write`, `read` | writers; readers and wakeups |
-//! | `any` | topics of a table, and their readers and writers, without the types of their samples |
+//! | `any` | topics, readers and writers without sample types |
 //! | `error` | errors of the bus |
 //!
-//! The crate follows these rules, each found by experiment:
-//! - A recreated bus has its own names, and each node is created with the configuration of its bus. The middleware's process-wide
-//!   configuration can be set only once, so it stays that of the first bus that a process joins.
-//! - Only the supervisor creates services ([`Bus::make`]); everyone else opens them. So a stage that is killed while it starts leaves
-//!   no incomplete service.
-//! - The limits on writers are larger than needed, so readers check the author of each sample. They drop samples of older
-//!   generations, and of processes that should not write.
-//! - An event only wakes a reader. The reader then takes samples until there are none.
+//! Experiments led to these rules:
+//! - A recreated bus has its own names, and each node uses its bus's configuration. The
+//!   middleware's process-wide configuration can be set only once: it stays that of the first
+//!   joined bus.
+//! - Only the supervisor creates services ([`Bus::make`]); all others open them. A stage killed
+//!   during its start therefore leaves no incomplete service.
+//! - The limits on writers exceed the need, so readers check the author of each sample. They drop
+//!   samples of older generations and of unauthorised processes.
+//! - An event only wakes a reader, which then takes samples until none are left.
 
 mod any;
 mod authors;

@@ -1,4 +1,4 @@
-//! The processes that hold a lock on a file, and signals that reach only such a process.
+//! Processes that hold a lock on a file, and signals that reach only such a process.
 
 use std::{
     fs::{self, File, Metadata},
@@ -12,25 +12,25 @@ use rustix::{
     process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal},
 };
 
-/// Returns the processes that hold a `flock` on `file`, as the descriptors of this user's processes show. The list `/proc/locks` is
-/// not read, because each reading stops every lock operation on the machine.
+/// Returns the processes that hold a `flock` on `file`, by the descriptors of this user's
+/// processes. Reading `/proc/locks` would stop every lock operation on the machine.
 pub fn holders(file: &File) -> io::Result<Vec<u32>> {
     let file = file.metadata()?;
     let processes = fs::read_dir("/proc")?.flatten();
     let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
-    // A process of another user does not show its descriptors, and one that has ended has none.
+    // Processes of other users hide their descriptors, and ended ones have none.
     Ok(pids
         .filter(|pid| descriptors(*pid, &file).is_ok_and(|mut all| all.any(|it| locks(&it))))
         .collect())
 }
 
-/// Whether process `pid` has `file` open; false if it has ended or belongs to another user.
+/// Returns whether `pid` has `file` open; false for ended processes and other users'.
 pub(crate) fn has_open(pid: u32, file: &File) -> bool {
     let opened = file.metadata().and_then(|file| Ok(descriptors(pid, &file)?.next().is_some()));
     opened.unwrap_or(false)
 }
 
-/// The descriptors of `pid` that are open on `file`, as their entries in `/proc`.
+/// Returns the `/proc` entries of descriptors of `pid` that are open on `file`.
 fn descriptors(pid: u32, file: &Metadata) -> io::Result<impl Iterator<Item = PathBuf>> {
     let opened = fs::read_dir(format!("/proc/{pid}/fd"))?.flatten().map(|entry| entry.path());
     Ok(opened.filter(|path| {
@@ -38,21 +38,20 @@ fn descriptors(pid: u32, file: &Metadata) -> io::Result<impl Iterator<Item = Pat
     }))
 }
 
-/// Whether the descriptor holds a lock.
 fn locks(descriptor: &Path) -> bool {
     let facts = fs::read_to_string(descriptor.to_string_lossy().replace("/fd/", "/fdinfo/"));
     facts.is_ok_and(|facts| facts.contains("FLOCK"))
 }
 
-/// Sends `signal` to process `pid` if it has `file` open. Another process may have this number by now.
+/// Sends `signal` to `pid` only if it has `file` open, because numbers are reused.
 ///
 /// # Errors
-/// [`io::ErrorKind::NotFound`] if the process has ended or does not have the file open.
+/// [`io::ErrorKind::NotFound`] if the process has ended or lacks the file.
 pub fn signal(pid: u32, file: &File, signal: Signal) -> io::Result<()> {
     let gone = || io::Error::from(io::ErrorKind::NotFound);
     let gone_or = |error: Errno| if error == Errno::SRCH { gone() } else { error.into() };
     let number = i32::try_from(pid).ok().and_then(Pid::from_raw);
-    // The descriptor refers to this process even if the process ends and its number is used again.
+    // The descriptor refers to this process even if its number is reused.
     let process = pidfd_open(number.ok_or_else(gone)?, PidfdFlags::empty()).map_err(gone_or)?;
     if descriptors(pid, &file.metadata()?)?.next().is_none() {
         return Err(gone());

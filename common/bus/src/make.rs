@@ -1,4 +1,4 @@
-//! Creating and joining a bus, and removing what killed processes leave on it.
+//! Creating and joining a bus, and cleaning up after killed processes.
 
 use std::{
     any::Any,
@@ -36,15 +36,16 @@ use crate::{
 #[derive(Debug)]
 pub struct Bus {
     pub(super) node: BusNode,
-    /// The processes whose samples are read; none if nobody names them.
+    /// Processes whose samples are read; `None` without named authors.
     pub(super) writers: Option<Writers>,
-    /// Whether the process is a stage or a supervisor, which may take the places that consumers leave free.
+    /// Whether the process is a stage or supervisor, which may take the places that consumers leave
+    /// free.
     pub(super) is_stage: bool,
     pub(super) lost: Rc<Cell<u64>>,
     instance: BusInstance,
 }
 
-/// The services of all topics, which exist as long as this value is held.
+/// Services of all topics, which exist while this value is held.
 pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn Any>>);
 
 fn no_join(domain: &Domain) -> impl Fn(String) -> BusError + use<> {
@@ -67,7 +68,7 @@ impl Bus {
     ) -> Result<(Self, Services)> {
         let failed = |error: io::Error| no_join(domain)(error.to_string());
         let instance = BusInstance::new(domain);
-        // A directory that exists is an error, because another user may have created it.
+        // An existing directory is an error, because another user may have created it.
         DirBuilder::new().mode(0o700).create(instance.root()).map_err(failed)?;
         Self::write_config(&instance)?;
         ownership::create_count_of_nodes(&instance).map_err(failed)?;
@@ -82,7 +83,7 @@ impl Bus {
         Ok((bus, Services(services)))
     }
 
-    /// Write the configuration again that processes join by.
+    /// Rewrites the configuration for joining processes.
     pub fn restore_config(&self) -> Result {
         Self::write_config(&self.instance)?;
         let failed = |error: io::Error| no_join(&self.instance.domain)(error.to_string());
@@ -99,11 +100,12 @@ impl Bus {
         config.global.set_root_path(&path);
         config.global.prefix = SemanticString::new(prefix.as_bytes())
             .map_err(|error| failed(format!("{error:?} in {prefix:?}")))?;
-        // The supervisor cleans up after killed processes, so a starting stage does not wait for that.
+        // The supervisor cleans up after killed processes, so that starting stages need not wait.
         config.global.node.cleanup_dead_nodes_on_creation = false;
         config.global.node.cleanup_dead_nodes_on_destruction = false;
         config.global.service.cleanup_dead_nodes_on_open = false;
-        // A reader sees at most so many writers end at once, and has memory for the connection to each: 400 kB a topic with the default.
+        // At most this many writers end at once. The default would reserve 400 kB of connection
+        // memory per topic.
         config.defaults.publish_subscribe.subscriber_expired_connection_buffer = Limits::WRITERS;
         let text = toml::to_string(&config).map_err(|error| failed(error.to_string()))?;
         let file = instance.config();
@@ -111,29 +113,33 @@ impl Bus {
             .map_err(|error| failed(format!("{}: {error}", file.display())))
     }
 
-    /// Join the bus of a robot under a name that `iox2 node list` shows, and read the newest generation, whoever wrote it. It fails if
-    /// the robot does not run here, if it belongs to another user, or if shared memory is full.
+    /// Joins a robot's bus under a name for `iox2 node list`, and reads the newest generation of
+    /// any author.
+    ///
+    /// Fails if the robot does not run here or belongs to another user, or if shared memory is
+    /// full.
     pub fn join(domain: &Domain, name: &str) -> Result<Self> {
         let _joining = domain.joining().map_err(not_running(domain))?;
         let instance = BusInstance::current(domain).map_err(not_running(domain))?;
         Self::join_instance(instance, name)
     }
 
-    /// Join with [`Bus::join`] as a consumer. If there is a supervisor, only samples of it and of the processes that it names are read.
+    /// Joins as a consumer, like [`Bus::join`]. With a supervisor, it reads only its samples and
+    /// those of processes that it names.
     pub fn join_as_consumer(domain: &Domain, name: &str) -> Result<Self> {
         let supervisor = domain.supervisor().ok().flatten();
         Ok(Self { writers: supervisor.map(Writers::of), ..Self::join(domain, name)? })
     }
 
-    /// Join with [`Bus::join`] as a stage of the supervisor with the process number `supervisor`. Samples of processes that the
-    /// supervisor does not name are ignored, and the stage may take the places that consumers leave free.
+    /// Joins as a stage of the process `supervisor`, like [`Bus::join`]. It ignores unnamed
+    /// processes and may take the places that consumers leave free.
     pub fn join_as_stage(domain: &Domain, name: &str, supervisor: u32) -> Result<Self> {
         let writers = Some(Writers::of(supervisor));
         Ok(Self { writers, is_stage: true, ..Self::join(domain, name)? })
     }
 
     fn join_instance(instance: BusInstance, name: &str) -> Result<Self> {
-        // Errors of the middleware are in our own errors; IOX2_LOG_LEVEL turns its messages on again.
+        // This crate's errors include the middleware's; IOX2_LOG_LEVEL restores its messages.
         set_log_level_from_env_or(LogLevel::Fatal);
         let join = no_join(&instance.domain);
         let refused = |error: &dyn Debug| join(format!("{error:?}"));
@@ -145,8 +151,8 @@ impl Bus {
         let file = instance.config();
         let path = SemanticString::new(file.as_os_str().as_encoded_bytes())
             .map_err(|error| join(format!("{error:?} in {file:?}")))?;
-        // The middleware uses the global configuration where a node has none of its own. It can be set only once, so it stays that of
-        // the first bus that the process joins.
+        // The middleware falls back to this configuration, which stays that of the first bus that
+        // the process joins.
         Config::setup_global_config_from_file(&path).map_err(|error| refused(&error))?;
         let config = Config::from_file(&path).map_err(|error| refused(&error))?;
         let name = NodeName::new(name).map_err(|error| refused(&error))?;
@@ -160,24 +166,25 @@ impl Bus {
         Ok(Self { node, writers: None, is_stage: false, lost, instance })
     }
 
-    /// The processes whose samples are read; none if nobody names them, and the newest generation is read.
+    /// Returns the processes whose samples are read; `None` means the newest generation of any
+    /// author.
     pub const fn writers(&self) -> Option<&Writers> {
         self.writers.as_ref()
     }
 
-    /// The number of samples of this process that were lost because shared memory is full.
+    /// Returns the number of this process's samples lost to full shared memory.
     pub fn lost(&self) -> u64 {
         self.lost.get()
     }
 
-    /// Whether this bus is no longer used: another bus replaced it, in this run or the next one, or the run has ended. A consumer then
-    /// drops everything that it opened on this bus, and joins again.
+    /// Returns whether another bus replaced this one or the run has ended. A consumer then drops
+    /// everything opened on it and joins again.
     pub fn is_replaced(&self) -> bool {
         BusInstance::current(&self.instance.domain).map_or(true, |now| now != self.instance)
     }
 
-    /// Prevent the removal of the bus while a consumer opens a topic, which would make the bus's directory again and leave it there.
-    /// The stages share another lock as long as they run.
+    /// Prevents removal of the bus while a consumer opens a topic, which would recreate and leave
+    /// the bus's directory. Running stages share another lock.
     pub(super) fn hold(&self) -> Result<Option<File>> {
         if self.is_stage {
             return Ok(None);
@@ -199,9 +206,11 @@ impl Bus {
         self.services().with_extension("backup")
     }
 
-    /// Prepare the bus for a successor of `process`, which must have ended. Shared memory that `process` did not fill is removed, because
-    /// the successor could wait for it for ever, and missing service files are restored. Only the supervisor calls this. Returns
-    /// whether unfilled shared memory of other processes is left.
+    /// Prepares the bus for a successor of `process`, which must have ended. Only the supervisor
+    /// calls this.
+    ///
+    /// Removes unfilled shared memory of `process`, for which the successor could wait forever, and
+    /// restores missing service files. Returns whether unfilled memory of others is left.
     pub fn remove_unfinished(&self, process: u32) -> io::Result<bool> {
         leftovers::restore(&self.backup(), &self.services())?;
         self.remove_unfilled(process)
@@ -212,9 +221,11 @@ impl Bus {
         leftovers::remove_unfilled(Path::new(SHARED_MEMORY), &prefix, process)
     }
 
-    /// Free the places on topics and the memory of ended processes, remove the files of incomplete starts of the processes `killed`,
-    /// which must have ended, and restore missing service files. Only the supervisor calls this. It takes a few milliseconds for each
-    /// process. Returns whether everything was done; if not, call it again later with the same processes.
+    /// Cleans up after ended processes, at a few milliseconds each. Only the supervisor calls this.
+    ///
+    /// Frees their places and memory, removes files of incomplete starts of `killed` (which must
+    /// have ended), and restores missing service files. If it returns false, call it again later
+    /// with the same processes.
     pub fn clear_up(&self, killed: &[u32]) -> io::Result<bool> {
         leftovers::restore(&self.backup(), &self.services())?;
         let config = self.node.config();
@@ -224,9 +235,10 @@ impl Bus {
         let listed = Node::<ipc::Service>::list(config, |node| {
             if let NodeState::Dead(dead) = node {
                 match self.remove_unfilled(leftovers::process_of(dead.id().value())) {
-                    // A node that cannot be freed now is listed again by the next call.
+                    // The next call lists it again.
                     Ok(false) => drop(dead.try_remove_stale_resources()),
-                    // The middleware could wait for ever for the unfilled memory. The next call removes it, because it is old by then.
+                    // The middleware could wait forever for the unfilled memory, which the next
+                    // call finds old enough to remove.
                     Ok(true) => all = false,
                     Err(error) => {
                         outcome = Err(error);
@@ -238,7 +250,8 @@ impl Bus {
         });
         outcome?;
         listed.map_err(|error| io::Error::other(format!("{error:?}")))?;
-        // The middleware finds the places of ended processes by these files, so they are removed last.
+        // The middleware finds the places of ended processes by these files, so they are removed
+        // last.
         if all {
             killed.iter().try_for_each(|&process| {
                 self.remove_unfilled(process)?;

@@ -1,5 +1,7 @@
-//! Checks of the owner and the permissions of a bus's files. Every user may create files in the directories of shared memory, so files
-//! of another user are not used. The middleware would let everyone write one file, its count of nodes, so that file is created here.
+//! Owner and permission checks of a bus's files. Every user may create files in shared memory, so
+//! others' files are rejected.
+//!
+//! The middleware would make its count of nodes writable for all, so it is created here.
 
 use std::{
     fs,
@@ -12,15 +14,16 @@ use iceoryx2_bb_elementary::package_version::PackageVersion;
 
 use crate::{bus_instance::BusInstance, domain::SHARED_MEMORY};
 
-/// The end of the name of the middleware's count of nodes.
+/// Suffix of the middleware's count of nodes.
 const COUNT_OF_NODES: &str = ".global_mgmt";
-/// The middleware's name of the count's type: the SHA-1 of `iceoryx2::node::global_management_segment::State`.
+/// Middleware's name of the count's type: the SHA-1 of
+/// `iceoryx2::node::global_management_segment::State`.
 const TYPE_OF_COUNT: &str = "9204dd183d1c4d8e1ff592a30766ffa6765aa8b5";
-/// The permissions of all users but the owner, in a file's mode.
+/// Mode bits of all users except the owner.
 const OTHERS: u32 = 0o077;
 
-/// Check that the files which a process opens first to join belong to this user, are closed to others and are complete. The
-/// middleware would wait for files that are not. The error names the file.
+/// Checks that the first files for joining are complete and private to this user. The middleware
+/// would wait for incomplete ones. The error names the file.
 pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
     let directory = instance.domain.directory();
     let directories = [directory, &instance.root()];
@@ -46,8 +49,8 @@ pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
     Ok(())
 }
 
-/// Create the middleware's count of nodes, closed to other users. The middleware uses a count that exists; it would create one that
-/// another user can open before its permissions are restricted.
+/// Creates the middleware's count of nodes, closed to other users. The middleware's own would be
+/// open to them until its permissions are restricted.
 pub(super) fn create_count_of_nodes(instance: &BusInstance) -> io::Result<()> {
     let version = PackageVersion::get();
     let [major, minor, patch] = [version.major(), version.minor(), version.patch()];
@@ -58,7 +61,7 @@ pub(super) fn create_count_of_nodes(instance: &BusInstance) -> io::Result<()> {
         .create_new(true)
         .mode(0o600)
         .open(Path::new(SHARED_MEMORY).join(name))?;
-    // The version of the middleware, then the count, which is 0, padded to the alignment of the version.
+    // The middleware's version, then the count of 0, padded to the version's alignment.
     file.write_all(&[version.to_u64(), 0].map(u64::to_ne_bytes).concat())
 }
 
@@ -85,7 +88,7 @@ fn check_one(path: &Path, directory: bool) -> io::Result<()> {
     if kind.is_symlink() || kind.is_dir() != directory {
         return Err(wrong(path, "is of another kind than a bus has there"));
     }
-    // Others may read the configuration by its mode, because its directory is closed to them.
+    // The configuration's mode may let others read, because its directory is closed to them.
     if found.mode() & 0o022 != 0 || directory && found.mode() & OTHERS != 0 {
         return Err(wrong(path, "is open to other users"));
     }

@@ -1,7 +1,8 @@
-//! The types that samples in shared memory may have, the stamp that every sample begins with, and samples as messages.
+//! Types of samples in shared memory, the stamp of every sample, and samples as messages.
 //!
-//! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl`, which promises a self-contained type of uniform
-//! layout. [`Stamp`] is a `repr(C)` struct of numbers, so the promise holds.
+//! Why `unsafe` is allowed here: deriving `ZeroCopySend` writes an `unsafe impl`, which promises a
+//! self-contained type of uniform layout. [`Stamp`] is a `repr(C)` struct of numbers, so the
+//! promise holds.
 #![allow(unsafe_code)]
 
 use std::fmt::Debug;
@@ -16,26 +17,26 @@ use crate::{
     layouts,
 };
 
-/// A type that may lie in shared memory.
+/// Type for shared memory.
 pub trait Payload: ZeroCopySend + Layout + Debug + Default + 'static {}
 impl<P: ZeroCopySend + Layout + Debug + Default + 'static> Payload for P {}
 
-/// Whether a sample of elements `E` has a slice: it has none if `E` is `()`.
+/// Returns whether a sample of elements `E` has a slice; `()` means none.
 pub(super) const fn has_slice<E>() -> bool {
     size_of::<E>() > 0
 }
 
-/// The tick, the time and the origin of a sample: the first field of every payload and header.
+/// Tick, time and origin of a sample: the first field of every payload and header.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ZeroCopySend)]
 #[type_name("firsthand.Stamp")]
 #[repr(C)]
 pub struct Stamp {
-    /// The tick it belongs to: one tick runs from a motor frame to its command.
+    /// Tick of the sample, from a motor frame to its command.
     pub tick: u64,
     pub stamp_ns: u64,
-    /// The generation of the writer, which grows by one each time the stage is started.
+    /// Writer's generation, which grows by one with each start of the stage.
     pub generation: u32,
-    /// The number of samples that this generation published on this topic before.
+    /// Number of earlier samples of this generation on this topic.
     pub sequence: u32,
 }
 
@@ -47,13 +48,13 @@ impl Stamp {
     }
 }
 
-/// The header of a sample: a payload that starts with a [`Stamp`].
+/// Header of a sample: a payload that starts with a [`Stamp`].
 pub trait Stamped: Payload {
     fn stamp(&self) -> &Stamp;
     fn stamp_mut(&mut self) -> &mut Stamp;
 }
 
-/// `header` and `slice` as a message of their own (see [`super::cdr`]).
+/// Encodes `header` and `slice` as a message (see [`super::cdr`]).
 pub fn encode_slice<H: Layout, E: Layout>(header: &H, slice: &[E], bytes: &mut Vec<u8>) {
     let mut to = Encoder::new(bytes);
     header.encode(&mut to);
@@ -67,7 +68,7 @@ pub fn encode_sample<H: Layout>(sample: &H, bytes: &mut Vec<u8>) {
     encode_slice::<H, ()>(sample, &[], bytes);
 }
 
-/// The header and slice in a message; none if the message holds others.
+/// Decodes a header and slice; `None` for others.
 pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H, Vec<E>)> {
     let mut from = Decoder::new(message)?;
     let header = H::decode(&mut from)?;
@@ -75,7 +76,8 @@ pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H
         return Some((header, Vec::new()));
     }
     let count = u32::decode(&mut from)? as usize;
-    // The message may state any length, but an element takes a byte or more, and at least half of its size in memory.
+    // The stated length is untrusted; an element takes at least one byte and half of its size in
+    // memory.
     let least = size_of::<E>().div_ceil(2);
     let count = (count <= from.left() / least).then_some(count)?;
     let mut slice = vec![E::default(); count];
@@ -83,7 +85,7 @@ pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H
     Some((header, slice))
 }
 
-/// The header in a message; none if the message holds another.
+/// Decodes a header; `None` for another.
 pub fn decode_sample<H: Layout>(message: &[u8]) -> Option<H> {
     Some(decode_slice::<H, ()>(message)?.0)
 }

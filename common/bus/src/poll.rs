@@ -1,4 +1,4 @@
-//! Waiting for descriptors. No other module calls `poll`, and here it is called again when a signal interrupts it.
+//! Waiting for descriptors. This module alone calls `poll`, and it retries after a signal.
 
 use std::{
     io,
@@ -11,8 +11,8 @@ use rustix::{
     io::Errno,
 };
 
-/// Wait until one of `descriptors` is readable, closed or broken, or `timeout` has passed; without a timeout, for ever. Returns for
-/// each descriptor whether it is.
+/// Waits until one of `descriptors` is readable, closed or broken, or `timeout` has passed; `None`
+/// waits indefinitely. Returns one flag per descriptor.
 pub fn readable(
     descriptors: &[BorrowedFd<'_>],
     timeout: Option<Duration>,
@@ -26,29 +26,29 @@ pub(crate) fn polled(descriptor: BorrowedFd<'_>) -> PollFd<'_> {
     PollFd::from_borrowed_fd(descriptor, PollFlags::IN)
 }
 
-/// Whether `descriptor` is readable, closed or broken within `timeout`.
+/// Returns whether `descriptor` is readable, closed or broken within `timeout`.
 pub fn is_readable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool> {
     wait(&mut [polled(descriptor.as_fd())], Some(timeout))
 }
 
-/// Whether `descriptor` is writable, closed or broken within `timeout`.
+/// Returns whether `descriptor` is writable, closed or broken within `timeout`.
 pub fn is_writable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool> {
     wait(&mut [PollFd::new(&descriptor, PollFlags::OUT)], Some(timeout))
 }
 
-/// Whether the other end of `descriptor` was closed, or it broke.
+/// Returns whether the other end of `descriptor` is closed or broken.
 pub fn is_closed(descriptor: impl AsFd) -> io::Result<bool> {
     let nothing_else = PollFlags::empty();
     let mut polled = [PollFd::new(&descriptor, nothing_else)];
     wait(&mut polled, Some(Duration::ZERO))
 }
 
-/// Whether an event occurred within `timeout`; `poll` notes the events in `polled`.
+/// Returns whether an event occurred within `timeout`; `poll` records events in `polled`.
 pub(crate) fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::Result<bool> {
     let began = Instant::now();
     loop {
         let left = timeout.map(|timeout| timeout.saturating_sub(began.elapsed()));
-        // A timeout too long for the system means no timeout.
+        // A timeout beyond the system's range means none.
         let left = left.and_then(|left| Timespec::try_from(left).ok());
         match poll(polled, left.as_ref()) {
             Err(Errno::INTR) => {}

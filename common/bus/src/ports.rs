@@ -1,13 +1,16 @@
-//! Typed publishers and subscribers: a thin layer over the ports of bytes in [`raw`], so that the middleware's code is not compiled
-//! again for each payload.
+//! Typed publishers and subscribers: a thin layer over the byte ports in [`raw`], which keeps the
+//! middleware's code from being compiled for each payload.
 //!
 //! Why `unsafe` is allowed here, and why it is sound:
-//! - A sample is one `H` and a whole number of `E`, each aligned: its service is opened with their names, sizes and alignments.
-//!   Where samples have no slice, the `H` is the one element that the service says, and otherwise it is the header.
-//! - `H` and `E` are [`Payload`]s: self-contained types without a destructor, of which any bytes are a value.
+//! - A sample is one `H` and a whole number of `E`, each aligned: its service is opened with their
+//!   names, sizes and alignments. Without a slice, the `H` is the service's one element; otherwise
+//!   it is the header.
+//! - `H` and `E` are [`Payload`]s: self-contained types without a destructor, of which any bytes
+//!   are a value.
 //! - A sample does not change after it was sent.
-//! - A reference to a header is made from the address that the middleware gives for it. The middleware computes that address as a
-//!   number from the address of the sample, so access through a number is what it relies on itself.
+//! - A reference to a header is made from the address that the middleware gives for it. The
+//!   middleware computes that address as a number from the sample's address, so it relies on access
+//!   through a number itself.
 #![allow(unsafe_code)]
 
 mod raw;
@@ -42,7 +45,7 @@ impl<H: Payload, E: Payload> Service<H, E> {
         Ok(Publisher { raw: self.raw.publisher(self.spec, longest)?, carries: PhantomData })
     }
 
-    /// A subscriber with a buffer for the newest `buffer` samples that were not taken yet.
+    /// Opens a subscriber that buffers the newest `buffer` samples.
     pub(super) fn subscriber(&self, buffer: usize) -> Result<Subscriber<H, E>> {
         Ok(Subscriber {
             raw: self.raw.subscriber(self.spec, buffer)?,
@@ -74,13 +77,15 @@ impl<H: Payload, E: Payload> Publisher<H, E> {
                 true => loan.header.addr(),
                 false => loan.elements.as_mut_ptr().expose_provenance(),
             };
-            // SAFETY: uninitialised bytes are viewed as uninitialised `E`s where they are aligned for it.
+            // SAFETY: uninitialised bytes are viewed as uninitialised `E`s where they are aligned
+            // for it.
             let (_, slots, _) = unsafe { loan.elements.align_to_mut::<MaybeUninit<E>>() };
             if slots.len() != slice.len() {
                 return false;
             }
             slots.write_copy_of_slice(slice);
-            // SAFETY: the sample has an aligned `H` at this address, and nobody else uses the sample until it is sent.
+            // SAFETY: the sample has an aligned `H` at this address, and is exclusive to this call
+            // until it is sent.
             unsafe { ptr::with_exposed_provenance_mut::<H>(place).write(header) };
             true
         })
@@ -95,14 +100,13 @@ pub(super) struct Subscriber<H, E> {
 }
 
 impl<H: Payload, E: Payload> Subscriber<H, E> {
-    /// The next sample; none when all were taken.
     pub(super) fn receive(&self) -> Result<Option<Slice<H, E>>> {
         let raw = self.raw.receive_sample(self.spec)?;
         Ok(raw.map(|raw| Slice { raw, carries: PhantomData }))
     }
 }
 
-/// A header with its slice in shared memory, which the writer cannot reuse while this is held.
+/// Header and slice in shared memory, which the writer cannot reuse while this is held.
 #[derive(Debug)]
 pub struct Slice<H, E = ()> {
     raw: RawSample,
@@ -115,11 +119,12 @@ impl<H: Stamped, E: Payload> Slice<H, E> {
             true => self.raw.header().addr(),
             false => self.raw.elements().as_ptr().expose_provenance(),
         };
-        // SAFETY: the sample has an aligned `H` at this address, which does not change while the sample is held.
+        // SAFETY: the sample has an aligned `H` at this address, which does not change while the
+        // sample is held.
         unsafe { &*ptr::with_exposed_provenance::<H>(place) }
     }
 
-    /// The process and the generation that wrote the sample. The process is part of the id of the port that published it.
+    /// Returns the writer's process, which is part of its port's id, and generation.
     pub fn author(&self) -> Author {
         Author { process: self.raw.process(), generation: self.header().stamp().generation }
     }

@@ -22,7 +22,8 @@ const PLACES_FREED_WITHIN: Duration = Duration::from_secs(4);
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 impl Bus {
-    /// Read `topic`. It fails if the topic is missing, carries another payload, or has no place left, for which a consumer waits a little.
+    /// Opens a reader of `topic`. Fails if the topic is missing, has another payload, or stays
+    /// full.
     pub fn reader<H: Stamped, E: Payload>(&self, topic: &Topic<H, E>) -> Result<Reader<H, E>> {
         self.reader_that_keeps(topic, topic.spec.limits.buffer)
     }
@@ -49,7 +50,8 @@ impl Bus {
         Ok(Reader { subscriber, admitted: Admitted::of(topic.spec, self.writers.as_ref()) })
     }
 
-    /// Open an endpoint. A consumer waits for the places of killed processes, which the supervisor frees about once a second.
+    /// Opens an endpoint. A consumer waits for places of killed processes, which the supervisor
+    /// frees about once a second.
     fn once_freed<T>(&self, open: impl Fn() -> Result<T>) -> Result<T> {
         let began = Instant::now();
         loop {
@@ -64,7 +66,7 @@ impl Bus {
         }
     }
 
-    /// Refuse a consumer the last places, which the stages may need.
+    /// Denies a consumer the last places, which stages may need.
     fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result {
         if !self.is_stage && taken + Limits::KEPT_FREE >= places {
             let topic = spec.name;
@@ -81,7 +83,8 @@ pub struct Reader<H, E = ()> {
 }
 
 impl<H: Stamped, E: Payload> Reader<H, E> {
-    /// The next sample in order of publication; none when all were taken. An error means that the connection to the writer broke.
+    /// Returns the next sample in order of publication, if any. An error means a broken connection
+    /// to the writer.
     pub fn next_slice(&mut self) -> Result<Option<Slice<H, E>>> {
         if self.admitted.hold_samples()? {
             return Ok(None);
@@ -94,7 +97,7 @@ impl<H: Stamped, E: Payload> Reader<H, E> {
         Ok(None)
     }
 
-    /// Return the samples of all generations. Samples of an older generation may arrive after the first of the next one.
+    /// Includes all generations. Samples of an older one may arrive after the first of the next.
     pub fn of_all_generations(mut self) -> Self {
         self.admitted = self.admitted.of_all_generations();
         self
@@ -102,12 +105,12 @@ impl<H: Stamped, E: Payload> Reader<H, E> {
 }
 
 impl<H: Stamped> Reader<H> {
-    /// A copy of the [next](Self::next_slice) sample, which has no slice.
+    /// Copies the [next](Self::next_slice) sample, which has no slice.
     pub fn next_sample(&mut self) -> Result<Option<H>> {
         Ok(self.next_slice()?.map(|sample| *sample.header()))
     }
 
-    /// Take all samples, and return the newest. It fails as [`Self::next_slice`] does.
+    /// Takes all samples and returns the newest. Fails as [`Self::next_slice`] does.
     pub fn newest(&mut self) -> Result<Option<H>> {
         let mut newest = None;
         while let Some(sample) = self.next_sample()? {
@@ -117,7 +120,7 @@ impl<H: Stamped> Reader<H> {
     }
 }
 
-/// Becomes readable when something is published on a topic.
+/// Becomes readable after a publication on a topic.
 #[derive(Debug)]
 pub struct Wakeup {
     listener: Listener,
@@ -131,16 +134,18 @@ impl Wakeup {
         Ok(Self { listener, had_events: Cell::new(false) })
     }
 
-    /// Clear the wakeup, which stays readable until then, and return whether it had an event. Drain it before taking the samples.
+    /// Clears the wakeup and returns whether it had an event. Call it before taking the samples.
     pub(crate) fn drain(&self) -> Result<bool> {
         let had_events = self.listener.drain()?;
         self.had_events.set(had_events);
         Ok(had_events)
     }
 
-    /// Drain the wakeup once more if the last drain found an event. The middleware marks a listener as not notified, and then empties
-    /// its socket. If the socket loses the datagram of a notification in between, the listener stays marked as notified: nobody
-    /// writes to its socket again. That happens only to a drain that finds an event.
+    /// Drains again if the last drain found an event.
+    ///
+    /// The middleware marks a listener as not notified, and then empties its socket. If this loses
+    /// a notification's datagram, the listener stays marked as notified, and its socket receives no
+    /// more. Only a drain with an event can cause this.
     pub(crate) fn drain_what_came_meanwhile(&self) -> Result<bool> {
         Ok(self.had_events.get() && self.drain()?)
     }

@@ -1,15 +1,19 @@
-//! Memory of segments is reserved when they are made. The middleware makes a segment by `ftruncate`, which gives it a length and no
-//! memory: if another process fills the file system of shared memory later, the first write to a page raises SIGBUS. So this crate
-//! defines the `ftruncate` that the middleware calls. It also reserves memory, or fails, and then the middleware refuses the port.
+//! Memory of segments, reserved at creation. The middleware creates segments by `ftruncate`, which
+//! sets a length without memory. If the shared memory file system fills up later, the first write
+//! to a page raises SIGBUS.
 //!
-//! Most segments have places for samples that frozen consumers hold, many times as many as are used. The middleware takes the place
-//! that was given back last, so only the first part of such a segment is used, and only that is reserved at once. [`Places`] reserves
-//! the rest place by place.
+//! This crate therefore defines the `ftruncate` that the middleware calls. It also reserves memory,
+//! or fails so that the middleware refuses the port.
+//!
+//! Most segments have many more places than are used, for samples that frozen consumers hold. The
+//! middleware takes the most recently returned place, so only a segment's first part is used and
+//! reserved at once. [`Places`] reserves the rest place by place.
 //!
 //! Why `unsafe` is allowed here:
-//! - A function of that name replaces the one of the C library for the whole program. Here it has the same signature and meaning; it
-//!   only fails earlier. The standard library and `rustix` do not call it. It borrows the descriptor that the caller owns until it
-//!   returns, and sets `errno` as the C library does.
+//! - A function of that name replaces the C library's for the whole program. It has the same
+//!   signature and meaning; it only fails earlier. The standard library and `rustix` do not call
+//!   it. It borrows the caller's descriptor until it returns, and sets `errno` as the C library
+//!   does.
 //! - The advice that reserves places changes no byte of any memory.
 #![allow(unsafe_code)]
 
@@ -27,12 +31,12 @@ use rustix::{
     param::page_size,
 };
 
-/// Segments up to this length are reserved as a whole.
+/// Longest segment that is reserved as a whole.
 const WHOLE: u64 = 512 << 10;
-/// The share of a longer segment that is reserved: eight maps of the field, more than are under way at once.
+/// Reserved fraction (1/32) of a longer segment: eight maps of the field, more than are in flight.
 const SHARE: u64 = 32;
 
-/// Advice of Linux 5.14 and later: give pages memory, as a write to each would.
+/// Advice of Linux 5.14 and later: allocate pages as a write to each would.
 const MADV_POPULATE_WRITE: c_int = 23;
 
 unsafe extern "C" {
@@ -40,7 +44,7 @@ unsafe extern "C" {
     fn madvise(address: *mut c_void, length: usize, advice: c_int) -> c_int;
 }
 
-/// `ftruncate` of POSIX, which also reserves memory.
+/// POSIX `ftruncate` that also reserves memory.
 #[unsafe(no_mangle)]
 extern "C" fn ftruncate(descriptor: c_int, length: c_long) -> c_int {
     // SAFETY: the caller owns the descriptor.
@@ -71,22 +75,24 @@ fn lengthen(file: BorrowedFd<'_>, length: u64) -> Result<()> {
     }
 }
 
-/// The places for samples in a publisher's segment, all of one length. One that was never used is taken only while all before it are in
-/// use. So the memory of the place behind a taken one is reserved before the sample is sent, and otherwise the taken place is given back.
+/// Sample places of equal length in a publisher's segment.
+///
+/// A fresh place is taken only while all before it are in use. The place behind it gets memory
+/// before the sample is sent, or the taken place is given back.
 #[derive(Debug)]
 pub(crate) struct Places {
     length: usize,
-    /// The address up to which the places have memory.
+    /// Address up to which the places have memory.
     reserved: Cell<usize>,
 }
 
 impl Places {
-    /// The places of a segment, given the addresses of the first two.
+    /// Takes the addresses of the first two places.
     pub(crate) const fn of_segment([first, second]: [usize; 2]) -> Self {
         Self { length: second.abs_diff(first), reserved: Cell::new(first) }
     }
 
-    /// Reserve memory up to the end of the place behind `taken`. Returns whether there is some.
+    /// Reserves memory for the place behind `taken`; returns whether it succeeded.
     pub(crate) fn reserve_behind(&self, taken: usize) -> bool {
         let (start, end) = (self.reserved.get(), taken + 2 * self.length);
         if end <= start {

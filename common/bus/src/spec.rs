@@ -1,21 +1,21 @@
-//! The description of a topic in the table of topics.
+//! Description of a topic in the table of topics.
 
 use std::time::Duration;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rate {
-    /// Once a tick. It is published again for a tick that the link repeats because no command came, and completely for a new reader
+    /// Once per tick, again for a tick repeated without a command, and completely for a new reader
     /// if samples carry only changes.
     EachTick,
-    /// After each frame of the robot that contains it, about once a tick, whether the robot drives or not. It is published when the
-    /// link has no other work; if several frames came by then, only the newest.
+    /// After each robot frame that contains it, about once per tick. The link publishes it when
+    /// idle, and only the newest of several pending frames.
     EachFrame,
-    /// At every change, and again when nothing changes, for readers that joined since. The writer checks the time once in each
-    /// iteration of its loop, so a long iteration delays it.
+    /// At every change, and again without changes for late readers. The writer checks once per loop
+    /// iteration, so a long iteration delays it.
     OnChange {
-        /// Changes that follow each other sooner are published together. Zero publishes each at once.
+        /// Window in which changes are merged; zero publishes each at once.
         at_most_every: Duration,
-        /// The time after the last sample, or after the last complete one if samples carry only changes.
+        /// Time after the last sample, or the last complete one if samples carry only changes.
         again_after: Duration,
     },
     WhenItHappens,
@@ -24,17 +24,17 @@ pub enum Rate {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Logged {
     Yes,
-    /// Another topic has the same.
+    /// Duplicate of another topic.
     No,
-    /// Only recordings with fields contain it, because fields take more space than all other topics together.
+    /// Recorded only with fields, which take more space than all other topics together.
     WithFields,
 }
 
 #[derive(Debug)]
 pub struct Spec {
-    /// The name of the topic, and of its two services.
+    /// Name of the topic and of its two services.
     pub name: &'static str,
-    /// The writer: a stage, [`SUPERVISOR`], [`OPERATOR`] or [`EVERY_STAGE`].
+    /// Writer: a stage, [`SUPERVISOR`], [`OPERATOR`] or [`EVERY_STAGE`].
     pub writer: &'static str,
     pub rate: Rate,
     pub logged: Logged,
@@ -43,12 +43,12 @@ pub struct Spec {
 }
 
 pub const EVERY_STAGE: &str = "every stage";
-/// The writer of topics that commands of an operator write, each in a process of its own.
+/// Writer of operator topics; each command is a process of its own.
 pub const OPERATOR: &str = "operator";
 pub const SUPERVISOR: &str = "supervisor";
 
 impl Spec {
-    /// The time after which its writer publishes the topic again if nothing changes; zero if it does not.
+    /// Returns the republishing interval of an unchanged topic; zero if none.
     pub const fn restated_every(&self) -> Duration {
         if let Rate::OnChange { again_after, .. } = self.rate {
             again_after
@@ -57,7 +57,7 @@ impl Spec {
         }
     }
 
-    /// The least time between two changes that its writer publishes; zero if there is none.
+    /// Returns the least interval of published changes; zero if none.
     pub const fn changes_at_most_every(&self) -> Duration {
         match self.rate {
             Rate::OnChange { at_most_every, .. } => at_most_every,
@@ -65,7 +65,7 @@ impl Spec {
         }
     }
 
-    /// Whether at most one process at a time writes the topic.
+    /// Returns whether at most one process at a time writes the topic.
     pub(super) fn has_one_writer(&self) -> bool {
         ![EVERY_STAGE, OPERATOR].contains(&self.writer)
     }
@@ -73,22 +73,23 @@ impl Spec {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Samples that wait for a reader; when there are more, the oldest are dropped.
+    /// Samples buffered for a reader; beyond this the oldest are dropped.
     pub buffer: usize,
-    /// Samples that wait for a recorder.
+    /// Samples buffered for a recorder.
     pub recorder_buffer: usize,
     /// Samples that a reader may hold at once.
     pub borrowed: usize,
-    /// Readers at once: stages, displays and recorders. Consumers leave three places free.
+    /// Concurrent readers: stages, displays and recorders. Consumers leave three places free.
     pub readers: usize,
-    /// The most elements of a slice, where its writer does not say fewer.
+    /// Most elements of a slice, unless its writer states fewer.
     pub longest: usize,
 }
 
 impl Limits {
     pub const SMALL: Self =
         Self { buffer: 128, recorder_buffer: 1024, borrowed: 2, readers: 16, longest: usize::MAX };
-    /// The limits of topics that a replay needs without gaps. A recorder that is not scheduled for 0.1 s loses nothing.
+    /// Limits for topics that a replay needs without gaps, even if a recorder is not scheduled for
+    /// 0.1 s.
     pub const DEEP: Self = Self { buffer: 1024, borrowed: 2, readers: 8, ..Self::SMALL };
     pub const MAP: Self = Self { buffer: 4, recorder_buffer: 256, readers: 24, ..Self::SMALL };
     pub const WHOLE_MAP: Self = Self { recorder_buffer: 8, ..Self::MAP };
@@ -97,11 +98,13 @@ impl Limits {
         Self { longest, ..Self::SMALL }
     }
 
-    /// Writers at once. One is enough, but a process that is killed while it starts may occupy a place for ever.
+    /// Concurrent writers. One suffices, but a process killed at its start may occupy a place
+    /// forever.
     pub(super) const WRITERS: usize = 16;
-    /// Listeners at once on a topic. Many consumers listen to the topic that ends a tick and then read the others.
+    /// Concurrent listeners. Many consumers listen to the last topic of a tick and then read the
+    /// others.
     pub(super) const LISTENERS: usize = 48;
-    /// Places that consumers leave free for the successors of stages that ended.
+    /// Places that consumers leave free for successors of ended stages.
     pub(super) const KEPT_FREE: usize = 3;
     /// Processes that may have a topic open at once.
     pub(super) const NODES: usize = 64;

@@ -1,10 +1,11 @@
-//! The rows of a table of topics.
+//! Rows of a table of topics.
 
 use std::marker::PhantomData;
 
 use super::spec::Spec;
 
-/// A topic whose samples are a header `H` and a slice of elements `E`. If `E` is `()`, they are the header alone.
+/// Topic whose samples are a header `H` and a slice of elements `E`; with `()` for `E`, the header
+/// alone.
 #[derive(Debug)]
 pub struct Topic<H, E = ()> {
     pub(super) spec: &'static Spec,

@@ -1,4 +1,4 @@
-//! A wait for all inputs of a process at once: wakeups of topics, sockets, signals, other processes.
+//! Wait for all inputs of a process at once: wakeups of topics, sockets, signals, other processes.
 
 use std::{
     os::fd::{AsFd, BorrowedFd, OwnedFd},
@@ -11,7 +11,7 @@ use crate::{
     read::Wakeup,
 };
 
-/// Waits for wakeups and other descriptors (sockets, signals, processes) at once.
+/// Set of wakeups and other descriptors to wait for.
 #[derive(Debug, Default)]
 pub struct Waiter {
     wakeups: Vec<Wakeup>,
@@ -23,15 +23,16 @@ impl Waiter {
         self.wakeups.push(wakeup);
     }
 
-    /// Wait for `descriptor` too, until it is readable; the caller reads from it. An error means that the process has no descriptor left.
+    /// Adds `descriptor`, from which the caller reads. An error means that the process is out of
+    /// descriptors.
     pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result {
         let own = descriptor.as_fd().try_clone_to_owned().map_err(BusError::Wait)?;
         self.descriptors.push(own);
         Ok(())
     }
 
-    /// Wait until a wakeup or a descriptor is readable or `timeout` has passed, and drain the wakeups. Returns whether anything was
-    /// readable.
+    /// Waits until an input is readable or `timeout` has passed, and drains the wakeups. Returns
+    /// whether any was readable.
     pub fn wait(&self, timeout: Duration) -> Result<bool> {
         self.wait_also_for(&[], timeout)
     }

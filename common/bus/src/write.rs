@@ -11,17 +11,18 @@ use super::{
     topic::Topic,
 };
 
-/// An eighth of a recorder's smallest buffer for samples that wake nobody.
+/// Eighth of a recorder's smallest buffer, published without a wakeup.
 const MOST_UNNOTICED: u32 = 128;
 
 impl Bus {
-    /// Write `topic` as the `generation`-th process of its stage. It fails if the topic is missing, carries another payload, or has no
-    /// place left.
+    /// Opens a writer for the `generation`-th process of a stage. Fails if the topic is missing,
+    /// has another payload, or is full.
     pub fn writer<H: Stamped>(&self, topic: &Topic<H>, generation: u32) -> Result<Writer<H>> {
         self.slice_writer(topic, generation, 0)
     }
 
-    /// [`Bus::writer`] of slices of at most `longest` elements, or fewer where the table says so.
+    /// Opens a [`Bus::writer`] of slices of at most `longest` elements, or of the table's lower
+    /// limit.
     pub fn slice_writer<H: Stamped, E: Payload>(
         &self,
         topic: &Topic<H, E>,
@@ -54,15 +55,16 @@ pub struct Writer<H, E = ()> {
 }
 
 impl<H: Stamped> Writer<H> {
-    /// Stamp `sample` with `tick` and the mission time `time`, publish it, and wake the readers. It fails if no memory is left for the
-    /// sample: shared memory is full, and readers hold all that the topic has.
+    /// Stamps and publishes `sample`, and wakes the readers. Fails if shared memory is full and
+    /// readers hold all of the topic's memory.
     pub fn publish(&mut self, tick: u64, time: MissionTime, sample: H) -> Result {
         self.publish_slice(tick, time, sample, &[])
     }
 }
 
 impl<H: Stamped, E: Payload> Writer<H, E> {
-    /// [`Writer::publish`] of a header and its `slice`. It also fails if the slice is longer than the writer was opened for.
+    /// Publishes a header and its `slice` like [`Writer::publish`]. Fails for a slice longer than
+    /// opened for.
     pub fn publish_slice(
         &mut self,
         tick: u64,
@@ -74,9 +76,11 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         self.wake()
     }
 
-    /// [`Writer::publish_slice`] without waking the readers; [`Writer::wake`] does that. Each [`MOST_UNNOTICED`]th sample wakes them, so
-    /// none overruns the buffer of a recorder that sleeps. If no memory is left for the sample, it is lost, as if its readers had not
-    /// taken it in time: the sequence has a gap, and [`Bus::lost`] counts it.
+    /// Publishes like [`Writer::publish_slice`], without the wakeup of [`Writer::wake`].
+    ///
+    /// Each [`MOST_UNNOTICED`]th sample wakes the readers, so a sleeping recorder's buffer never
+    /// overruns. Without memory the sample is lost: the sequence has a gap, and [`Bus::lost`]
+    /// counts it.
     pub fn publish_quietly(
         &mut self,
         tick: u64,
@@ -98,7 +102,7 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         self.publisher.send(header, slice)
     }
 
-    /// Publish `header`, with the stamp that it has, and `slice`, and wake the readers.
+    /// Publishes `header`, with its own stamp, and `slice`, and wakes the readers.
     pub(super) fn publish_as_stamped(&self, header: H, slice: &[E]) -> Result {
         self.publisher.send(header, slice)?;
         self.wake()
@@ -108,7 +112,7 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         self.notifier.wake(self.publisher.topic())
     }
 
-    /// Whether a reader joined since the last call. It needs a keyframe.
+    /// Returns whether a reader joined since the last call and needs a keyframe.
     pub fn has_new_reader(&mut self) -> bool {
         let now = self.service.readers();
         let new = !now.is_subset(&self.known);

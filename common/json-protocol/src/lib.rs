@@ -1,60 +1,63 @@
-//! The protocol of robots that speak lines of JSON, over datagrams, a connection or a serial line.
+//! Protocol of robots that exchange JSON lines, over datagrams, a connection or a serial line.
 //!
-//! A message is one JSON object in a line of at most [`LONGEST_LINE`] bytes. A datagram may carry several lines.
-//! Angles are in radians, distances in metres, times in seconds; left is positive. The robot speaks [`Report`]s and
-//! hears [`Order`]s.
+//! A message is one JSON object in a line of at most [`LONGEST_LINE`] bytes. A datagram may carry
+//! several lines. Angles are in radians, distances in metres, times in seconds; left is positive.
+//! The robot sends [`Report`]s and receives [`Order`]s.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize, de::IgnoredAny};
 
-/// The greatest length of a line, bytes: a scan of 16,384 beams has 100 kB in millimetres, and 360 kB with all digits that a number may
-/// have.
+/// Most bytes of a line. A scan of 16,384 beams takes 100 kB in millimetres, 360 kB with all
+/// digits.
 pub const LONGEST_LINE: usize = 524_288;
 
-/// Each field is optional.
+/// Report of the robot; each field is optional.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Report {
-    /// Orders taken since the robot started. Each order is answered at once by a report that counts it.
+    /// Number of orders received since the start. The robot answers each order at once with a
+    /// report that counts it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heard: Option<u64>,
-    /// Angles by which the wheels have turned since the robot started. A tick begins with them.
+    /// Wheel angles since the start. They begin a tick.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheels: Option<[f64; 2]>,
-    /// Rad/s.
+    /// Wheel speeds, rad/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speeds: Option<[f64; 2]>,
-    /// The robot's clock, whose zero is its own, when it read `wheels` or `odometry`. Where lines wait on their way, what is measured is
-    /// placed by it. `scan_age_s` then counts back from it.
+    /// Robot's clock, with its own zero, at the reading of `wheels` or `odometry`. It dates
+    /// measurements in delayed lines and is the reference of `scan_age_s`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clock_s: Option<f64>,
-    /// The robot's own odometry, sent instead of `wheels`: x, y and heading.
+    /// Robot's own odometry in place of `wheels`: x, y and heading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometry: Option<[f64; 3]>,
-    /// The angle by which the robot has turned since it started, counter-clockwise, by its gyro, without a cycle; read with `wheels` or
+    /// Gyro angle since the start, counter-clockwise and unwrapped, read with `wheels` or
     /// `odometry`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro: Option<f64>,
-    /// Something holds the wheel: its motor draws the current of a stall.
+    /// Whether each wheel is blocked: its motor draws its stall current.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held: Option<[bool; 2]>,
-    /// Readings by the names of the mission's rows; null for nothing in reach.
+    /// Readings by the row names of the mission; null for nothing in reach.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub ranges: BTreeMap<String, Option<f64>>,
-    /// Beams counter-clockwise; null for nothing in reach, less than 0 for no reading.
+    /// Beams counter-clockwise; null for nothing in reach, negative for no reading.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scan: Option<Vec<Option<f32>>>,
-    /// Age of the scan's first beam when this line is sent, at most 2 s; by default it is that of the wheels.
+    /// Age of the scan's first beam when this line is sent, at most 2 s; by default that of the
+    /// wheels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scan_age_s: Option<f64>,
-    /// Time that the scan took, from its first beam to its last.
+    /// Duration of the scan, from its first beam to its last.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scan_time_s: Option<f64>,
-    /// Scans by the names of the mission's rows, where there are several lasers.
+    /// Scans by the row names of the mission, for several lasers.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scans: BTreeMap<String, Scan>,
-    /// What bumpers and cliff sensors feel, by the names of the mission's rows; one that is left out feels what it felt before.
+    /// Bumper and cliff sensor states by the row names of the mission. An omitted one keeps its
+    /// state.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub touched: BTreeMap<String, bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -74,19 +77,19 @@ pub struct Scan {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "lowercase")]
 pub enum Order {
-    /// The robot was found, or has braked: it releases its brake and reports at this rate.
+    /// Greets a new robot, or one that has braked: it releases its brake and reports at this rate.
     Hello {
         rate_hz: f64,
     },
-    /// Drive for `for_s`, then stand, unless another order came.
+    /// Drives for `for_s`, then stops, unless another order arrives.
     Drive {
         /// Left and right, rad/s.
         wheels: [f64; 2],
-        /// The speed ahead, m/s, and the turn rate, rad/s, that `wheels` give.
+        /// Resulting forward speed, m/s, and turn rate, rad/s.
         twist: [f64; 2],
         for_s: f64,
     },
-    /// Stand by every means until the next hello.
+    /// Stops by every means until the next hello.
     Brake {},
     Ping {},
 }
@@ -98,23 +101,23 @@ pub fn line(message: &impl Serialize) -> Vec<u8> {
     line
 }
 
-/// Says why a line is no message.
+/// Parses a line; the error says why it is invalid.
 pub fn parse<'a, M: Deserialize<'a>>(line: &'a [u8]) -> Result<M, String> {
     serde_json::from_slice(line).map_err(|error| error.to_string())
 }
 
-/// Empty lines and lines that are too long are dropped.
+/// Line splitter. It drops empty and overlong lines.
 #[derive(Clone, Debug, Default)]
 pub struct Lines {
     held: Vec<u8>,
-    /// The rest of a line that is too long is still to come.
+    /// Whether it drops the rest of an overlong line.
     drops: bool,
     dropped: u64,
 }
 
 impl Lines {
-    /// Returns the lines that `bytes` complete, without their line feeds. An object that ends with `bytes` needs none: a robot may leave it
-    /// out of its datagrams.
+    /// Returns the lines that `bytes` complete, without line feeds. A final object needs none,
+    /// because a robot may omit it in datagrams.
     pub fn push(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut complete = Vec::new();
         let mut pieces = bytes.split(|byte| *byte == b'\n').peekable();
@@ -137,7 +140,7 @@ impl Lines {
             let last = bytes.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
             match is_object(&self.held) {
                 Ok(()) => complete.push(std::mem::take(&mut self.held)),
-                // What came before begins no object that `last` could go on with.
+                // The earlier bytes begin no object that `last` could continue.
                 Err(error) if !error.is_eof() && is_object(last).is_ok() => {
                     self.held.truncate(self.held.len() - last.len());
                     self.reset();
@@ -149,7 +152,7 @@ impl Lines {
         complete
     }
 
-    /// Forget the beginning of a line, because its rest does not follow.
+    /// Discards an incomplete line.
     pub fn reset(&mut self) {
         self.dropped += self.held.len() as u64;
         self.held.clear();

@@ -10,20 +10,21 @@ use thiserror::Error;
 
 pub const FORMS: &str = "give \"host:port\", \"udp://host:port\", \"tcp://host:port\", \"serial:///dev/ttyUSB0\" or \"ros2:DOMAIN\"";
 
-/// `Host` is text in a mission and a number once it is resolved.
+/// Robot address; `Host` is text in a mission and a socket address once resolved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address<Host = SocketAddr> {
     /// Datagrams, the default: `host:port` or `udp://host:port`.
     Udp(Host),
-    /// A connection: `tcp://host:port`.
+    /// TCP connection: `tcp://host:port`.
     Tcp(Host),
-    /// A serial line, 8N1, with 115200 baud or the mission's `robot.arduino.baud`: `serial:///dev/ttyUSB0`.
+    /// Serial line, 8N1, with 115200 baud or the mission's `robot.arduino.baud`:
+    /// `serial:///dev/ttyUSB0`.
     Serial(PathBuf),
-    /// A domain of ROS 2: `ros2:0`, or `ros2` for the one that the environment variable `ROS_DOMAIN_ID` names, which is 0 without it.
+    /// ROS 2 domain: `ros2:0`, or `ros2` for the one in `ROS_DOMAIN_ID`, by default 0.
     Ros2(Option<u16>),
 }
 
-/// The greatest domain: the ports of a greater one do not exist.
+/// Greatest domain with valid ports.
 const LAST_DOMAIN: u16 = 232;
 
 fn domain(text: &str) -> Option<u16> {
@@ -92,7 +93,7 @@ impl FromStr for Address<String> {
 }
 
 impl Address<String> {
-    /// Ask the resolver for the host's number, which may take seconds; fails for a host that it does not know.
+    /// Resolves the host, which may take seconds; fails for an unknown host.
     pub fn resolve(&self) -> Result<Address, AddressError> {
         let number = |host: &String| {
             let unknown = |source| AddressError::Host { address: self.to_string(), source };
@@ -111,7 +112,7 @@ impl Address<String> {
     }
 }
 
-/// The domain that `ROS_DOMAIN_ID` names, 0 without it; fails if it is no domain.
+/// Returns the domain in `ROS_DOMAIN_ID`, by default 0; fails on an invalid one.
 pub fn domain_of_environment() -> Result<u16, AddressError> {
     let Some(text) = std::env::var_os("ROS_DOMAIN_ID").filter(|text| !text.is_empty()) else {
         return Ok(0);

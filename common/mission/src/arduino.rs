@@ -1,16 +1,16 @@
 use std::collections::BTreeMap;
 
-/// The driver knows the number that says the rate by its size: a board waits for an echo for a second at most, and
-/// says 17,241 cm then.
+/// Least baud rate of a board. The driver distinguishes rates from distances by size: a board
+/// reports at most 17,241 cm, after a second without an echo.
 pub const LEAST_BAUD: u32 = 19_200;
 
 keys! {
     ArduinoBoard {
-        /// Bits a second.
+        /// Bits per second.
         baud: u32 = 57_600,
-        /// The rate of the speed loop. Speeds are said in encoder counts from one run of the loop to the next.
+        /// Rate of the speed loop, Hz. Speeds are encoder counts per run of the loop.
         pid_rate_hz: f64 = 30.0,
-        /// The pins of its sonars by the names of their rows.
+        /// Sonar pins by row name.
         sonars: BTreeMap<String, u8>,
     }
 }

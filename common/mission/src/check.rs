@@ -1,4 +1,4 @@
-//! Reading a mission file: syntax, unknown keys, and every number's range, each error with line and key.
+//! Mission file validation: syntax, unknown keys and ranges, each error with line and key.
 
 mod arduino;
 mod calibration;
@@ -27,12 +27,12 @@ use super::{
 };
 use crate::{BatteryLimits, Physics, geometry::Zone, grid::MIN_CELLS};
 
-/// A mission is a page or two; a file without end is no mission.
+/// Bounds reading of an endless file; a mission has a page or two.
 const MAX_BYTES: u64 = 8 << 20;
 
 fn read_bounded(path: &Path) -> io::Result<String> {
     let mut text = String::new();
-    // Opening a pipe would wait for its writer.
+    // Opening a pipe would block until it has a writer.
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::other("it is no regular file"));
     }
@@ -47,7 +47,7 @@ const MAX_TIMEOUT_S: f64 = 86_400.0;
 
 impl Mission {
     /// # Errors
-    /// The line, the key, what is wrong and the remedy; `origin` names the file.
+    /// Returns the line, the key, the fault and the remedy; `origin` names the file.
     pub fn parse(text: &str, origin: &Path) -> Result<Self, MissionError> {
         let syntax = |error: &toml::de::Error| {
             let line = error.span().map_or(1, |span| line_of(text, span.start));
@@ -69,7 +69,7 @@ impl Mission {
         if !tree.get_ref().contains_key("target") {
             mission.target = match mission.targets.first() {
                 Some(first) => first.at,
-                // The robot stands at its target.
+                // The robot stays at its start.
                 None if mission.stay => mission.start.at,
                 None => {
                     return Err(unreadable(
@@ -96,13 +96,13 @@ impl Mission {
     }
 
     /// # Errors
-    /// As [`Mission::parse`], and when the file cannot be read.
+    /// As [`Mission::parse`], or if the file cannot be read.
     pub fn load(path: &Path) -> Result<Self, MissionError> {
         Self::parse(&Self::read(path)?, path)
     }
 
     /// # Errors
-    /// When the file cannot be read, or is far too long for a mission.
+    /// If the file cannot be read or is too long.
     pub fn read(path: &Path) -> Result<String, MissionError> {
         read_bounded(path)
             .map_err(|source| MissionError::Unreadable { file: PathBuf::from(path), source })
@@ -150,7 +150,8 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
     [car, twice, blind, shut].into_iter().flatten().chain(reversed).collect()
 }
 
-/// Thresholds that are passed in an order: a key and its value, and the key and the value that are no less.
+/// Returns thresholds with a required order: key and value, then the key and value that must be at
+/// least as great.
 fn thresholds(mission: &Mission) -> [(&'static str, f64, &'static str, f64); 4] {
     let Physics { battery, heights, radio, .. } = mission.simulation.physics();
     let BatteryLimits { board, motor, servo } = mission.robot.low_battery_v;
@@ -179,7 +180,8 @@ fn thresholds(mission: &Mission) -> [(&'static str, f64, &'static str, f64); 4] 
     ]
 }
 
-/// A list in the file that is longer than what was `read` of it: where it is, its key, and the problem.
+/// Finds a list in the file that is longer than its parsed form `read`: its offset, key and
+/// problem.
 fn dropped(key: &str, file: &DeTable<'_>, read: &toml::Value) -> Option<(usize, String, String)> {
     file.iter().find_map(|(name, value)| {
         let key = if key.is_empty() { name.to_string() } else { format!("{key}.{name}") };
@@ -207,13 +209,12 @@ fn dropped_of(
     }
 }
 
-/// Lines count from 1.
 fn line_of(text: &str, offset: usize) -> usize {
     let upto = &text.as_bytes()[..offset.min(text.len())];
     1 + upto.iter().filter(|&&byte| byte == b'\n').count()
 }
 
-/// Byte offset of the deepest part of dotted `key` that the file has; a default has no line of its own.
+/// Returns the offset of the deepest existing part of the dotted `key`; a default has no line.
 fn span_of(tree: &DeTable<'_>, key: &str) -> usize {
     let mut table = tree;
     let mut start = 0;
@@ -270,7 +271,7 @@ impl Checker {
     }
 }
 
-/// The most cells along a side for which the stages answer within their deadlines.
+/// Most cells per side for which the stages meet their deadlines.
 const MOST_DRIVEN_CELLS: u32 = 2048;
 
 fn perimeter(mission: &Mission) -> Result {
@@ -337,7 +338,7 @@ fn stages(mission: &Mission) -> Result {
     let Hurry { full_speed_within_deg: full, turns_beyond_deg: turns, .. } = mission.hurry();
     let Hurry { look_rad_s, stops_within_s, .. } = mission.hurry();
     let most_margin_m = perimeter.width_m / 4.0;
-    // What is written is judged, and not what the sensors' reach leaves of it.
+    // The check applies to the written value, before the sensors' reach limits it.
     let speed_m_s = mission.controller.speed_m_s.unwrap_or_else(|| mission.speed_m_s());
     all_within([
         ("controller.speed_m_s", speed_m_s, 0.001..=top, "m/s"),
@@ -366,7 +367,7 @@ fn stages(mission: &Mission) -> Result {
         "name an executable, or leave the key out",
     )?;
     let plan = planner.calibration.clone().unwrap_or_default();
-    // The grid does not resolve a shorter length.
+    // The grid cannot resolve a shorter length.
     let least = mission.grid_frame().resolution_m / 2.0;
     all_within([
         ("planner.calibration.ratio_sd", plan.ratio_sd, 0.0..=0.1, ""),
@@ -395,10 +396,10 @@ fn zones(mission: &Mission) -> Result {
     Ok(())
 }
 
-/// A body that reaches farther from its centre than so many tracks is given in another unit.
+/// Greatest body radius in tracks; a greater one suggests a wrong unit.
 const MOST_TRACKS: f64 = 5.0;
 
-/// A robot that starts inside a hazard has already collided.
+/// Rejects a start inside a hazard.
 fn start_is_free(mission: &Mission) -> Result {
     let radius = mission.body().radius_m;
     let track = mission.body().track_m;

@@ -8,7 +8,7 @@ pub enum MissionError {
         "cannot read mission {file}: {source}; give a shipped name (`firsthand missions`) or a readable TOML file"
     )]
     Unreadable { file: PathBuf, source: std::io::Error },
-    /// The text is not the TOML that a mission is written in: syntax, an unknown key, a wrong type.
+    /// Invalid TOML: syntax, an unknown key or a wrong type.
     #[error("{file}:{line}: {problem}")]
     Syntax {
         file: PathBuf,
@@ -32,7 +32,7 @@ pub enum MissionError {
 }
 
 impl MissionError {
-    /// Without file and line, for a value that is not from the file.
+    /// Formats the fault without file and line, for a value from elsewhere.
     pub fn without_place(&self) -> String {
         match self {
             Self::Unreadable { source, .. } => source.to_string(),
@@ -42,7 +42,7 @@ impl MissionError {
         }
     }
 
-    /// The fault may be on another line of `other`.
+    /// Returns whether both report the same fault, possibly on different lines.
     pub fn is_same_fault(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Syntax { problem, .. }, Self::Syntax { problem: its, .. }) => problem == its,

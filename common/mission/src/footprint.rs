@@ -1,4 +1,4 @@
-//! The outline of a body that is no disc: a convex polygon around the origin of the robot's frame, metres.
+//! Convex outline of a body around the origin of the robot's frame, metres.
 
 use glam::DVec2;
 
@@ -8,14 +8,14 @@ const MOST_CORNERS: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    /// Counter-clockwise; the first `count` count.
+    /// Counter-clockwise; only the first `count` are valid.
     corners: [DVec2; MOST_CORNERS],
     count: usize,
 }
 
 impl Footprint {
     /// # Errors
-    /// When the corners are not those of a convex polygon around the origin in the order of its outline, with what is wrong.
+    /// If the corners do not form a convex polygon around the origin in order; the error says why.
     pub fn new(corners: &[DVec2]) -> Result<Self, &'static str> {
         if !(3..=MOST_CORNERS).contains(&corners.len()) {
             return Err("it has 3 to 16 corners");
@@ -34,7 +34,8 @@ impl Footprint {
             let [one, two, three] = [0, 1, 2].map(|next| all[(index + next) % all.len()]);
             (two - one).perp_dot(three - two)
         };
-        // An outline that turns left at each corner may still go around more than once: then its corners' angles do, too.
+        // Left turns alone also fit an outline that winds more than once, whose angles exceed a
+        // full turn.
         let around: f64 = footprint.edges().map(|(from, to)| from.angle_to(to)).sum();
         if !(0..all.len()).all(|index| turns(index) > 1e-9) || around > 1.5 * std::f64::consts::TAU
         {
@@ -52,28 +53,27 @@ impl Footprint {
         &self.corners[..self.count]
     }
 
-    /// The corners of the robot at `pose`, in the mission frame.
     pub fn corners_at(&self, pose: Pose2) -> impl Iterator<Item = DVec2> + '_ {
         self.corners().iter().map(move |corner| pose.position + pose.axis().rotate(*corner))
     }
 
-    /// The disc around the origin that covers it at any heading.
+    /// Returns the radius of the disc around the origin that covers the outline at any heading.
     pub fn circumscribed_m(&self) -> f64 {
         self.corners().iter().map(|corner| corner.length()).fold(0.0, f64::max)
     }
 
-    /// The disc around the origin that it covers.
+    /// Returns the radius of the largest disc around the origin inside it.
     pub fn inscribed_m(&self) -> f64 {
         -self.sides().map(|(from, out)| -out.dot(from)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// A corridor of twice this width lets the body through along x.
+    /// Returns the smaller of the extents to the left and to the right of x.
     pub fn half_width_m(&self) -> f64 {
         let aside = |side: f64| self.corners().iter().map(move |at| side * at.y);
         aside(1.0).fold(0.0, f64::max).min(aside(-1.0).fold(0.0, f64::max))
     }
 
-    /// Points of the outline, no farther apart than `step_m`.
+    /// Returns points of the outline at most `step_m` apart.
     pub fn outline(&self, step_m: f64) -> impl Iterator<Item = DVec2> + '_ {
         self.edges().flat_map(move |(from, to)| {
             let steps = (from.distance(to) / step_m).ceil().max(1.0) as u32;
@@ -86,12 +86,13 @@ impl Footprint {
         corners.iter().zip(corners.iter().cycle().skip(1)).map(|(from, to)| (*from, *to))
     }
 
-    /// A corner of each side, and its unit normal outward.
+    /// Returns a corner of each side and the side's outward unit normal.
     fn sides(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         self.edges().map(|(from, to)| (from, -(to - from).perp().normalize_or_zero()))
     }
 
-    /// Metres from the body to `point` of its frame, negative inside, and the unit direction from the body to it.
+    /// Returns the distance from the body to `point` in its frame, metres (negative inside), and
+    /// the unit direction.
     pub fn gap_to_point(&self, point: DVec2) -> (f64, DVec2) {
         let sides = self.sides().map(|(from, out)| (out.dot(point - from), out));
         let inside = greatest(sides);
@@ -102,8 +103,8 @@ impl Footprint {
         least(nearest.map(|near| (near, point)))
     }
 
-    /// Metres from the body to a straight face in its frame, and the unit direction from the body to it. The distance is negative where
-    /// they overlap: the body leaves the face by that way against the direction.
+    /// Returns the distance from the body to a straight face in its frame, metres, and the unit
+    /// direction. Negative distances are overlap along the direction.
     pub fn gap_to_face(&self, from: DVec2, to: DVec2) -> (f64, DVec2) {
         let Some(across) = (to - from).perp().try_normalize() else {
             return self.gap_to_point(from);
@@ -132,7 +133,7 @@ fn greatest(gaps: impl Iterator<Item = (f64, DVec2)>) -> (f64, DVec2) {
     gaps.fold(none, |best, gap| if gap.0 > best.0 { gap } else { best })
 }
 
-/// The least distance of pairs of points of the body and a thing, and its direction.
+/// Returns the distance and direction of the closest pair of points.
 fn least(pairs: impl Iterator<Item = (DVec2, DVec2)>) -> (f64, DVec2) {
     let none = (f64::INFINITY, DVec2::X);
     pairs.fold(none, |best, (body, thing)| {

@@ -1,6 +1,4 @@
-//! The shapes of a world and of what is known of it beforehand.
-//!
-//! Metres, in the mission frame.
+//! Shapes of the world and of the a-priori map, in metres in the mission frame.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -11,24 +9,24 @@ pub enum Light {
     /// Scatters the beam: a laser detects it from any side.
     #[default]
     Matt,
-    /// Lets the beam pass, except near the normal, where the pane reflects it back into the laser.
+    /// Transmits the beam, except near the normal, where it reflects it back into the laser.
     Glass,
-    /// Scatters a tenth of the light: a laser detects it from near.
+    /// Scatters a tenth of the light: a laser detects it at short range.
     Black,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     pub bottom_m: f64,
-    /// A shape that is higher than any robot has an infinite top.
+    /// Infinite for a shape higher than any robot.
     pub top_m: f64,
-    /// A hard thing of the same form has 1.
+    /// Echo strength relative to a hard thing.
     pub echo: f64,
     pub light: Light,
 }
 
 impl Profile {
-    /// Vertical distance to the shape's nearest part, metres; 0 if the shape extends to that height.
+    /// Returns the vertical distance to the shape, metres; 0 at a height that it covers.
     pub fn height_gap(&self, height_m: f64) -> f64 {
         (self.bottom_m - height_m).max(height_m - self.top_m).max(0.0)
     }
@@ -38,7 +36,7 @@ impl Profile {
     }
 }
 
-/// A shape is what it looks like from above, and the keys of a [`Profile`].
+/// Declares a shape: its outline from above, and the keys of a [`Profile`].
 macro_rules! shape {
     (
         $(#[$about:meta])*
@@ -50,11 +48,11 @@ macro_rules! shape {
         pub struct $name {
             $($(#[$doc])* pub $field: $type,)*
             pub bottom_m: Option<f64>,
-            /// By default the shape is higher than the robot.
+            /// Defaults to a shape higher than the robot.
             pub top_m: Option<f64>,
-            /// By default the shape is hard.
+            /// Defaults to a hard shape.
             pub echo: Option<f64>,
-            /// By default the shape is matt.
+            /// Defaults to matt.
             pub light: Option<Light>,
         }
 
@@ -72,7 +70,7 @@ macro_rules! shape {
 }
 
 shape! {
-    /// A cable drum, a post, the leg of a table or chair (a radius of 0.01 to 0.015 m): a disc.
+    /// Disc: a cable drum, a post, or the leg of a table or chair (a radius of 0.01 to 0.015 m).
     Drum {
         at: DVec2,
         radius_m: f64,
@@ -80,17 +78,17 @@ shape! {
 }
 
 shape! {
-    /// A wall: a polyline without thickness.
+    /// Wall: a polyline without thickness.
     Wall {
         points: Vec<DVec2>,
     }
 }
 
 shape! {
-    /// A crate, desk or cabinet: a rectangle.
+    /// Rectangle: a crate, desk or cabinet.
     Box2 {
         at: DVec2,
-        /// The extent along its own two axes.
+        /// Extent along its own two axes.
         size_m: DVec2,
         /// Counter-clockwise.
         #[serde(default)]
@@ -105,7 +103,7 @@ impl Wall {
 }
 
 impl Box2 {
-    /// Counter-clockwise.
+    /// Returns the corners, counter-clockwise.
     pub fn corners(&self) -> [DVec2; 4] {
         let axis = DVec2::from_angle(self.angle_deg.to_radians());
         let half = self.size_m / 2.0;
@@ -119,7 +117,7 @@ impl Box2 {
     }
 }
 
-/// A keep-out zone: a polygon.
+/// Keep-out polygon.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Zone {
@@ -127,7 +125,7 @@ pub struct Zone {
 }
 
 impl Zone {
-    /// Distance to its edge, metres; negative inside.
+    /// Returns the distance to its edge, metres; negative inside.
     pub fn clearance(&self, point: DVec2) -> f64 {
         let next = self.points.iter().cycle().skip(1);
         let (mut nearest, mut is_inside) = (f64::INFINITY, false);
@@ -141,7 +139,6 @@ impl Zone {
         if is_inside { -nearest } else { nearest }
     }
 
-    /// Whether two of its edges cross.
     pub fn crosses_itself(&self) -> bool {
         let ends = self.points.iter().cycle().skip(1);
         let edges: Vec<_> = self.points.iter().copied().zip(ends.copied()).collect();
@@ -168,7 +165,7 @@ impl Shapes {
         self.drums.is_empty() && self.walls.is_empty() && self.boxes.is_empty()
     }
 
-    /// Each edge of walls and boxes is (from, to).
+    /// Returns the edges of walls and boxes as (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         let walls = self.walls.iter().flat_map(Wall::edges);
         let boxes = self.boxes.iter().flat_map(Box2::edges);
@@ -181,7 +178,7 @@ impl Shapes {
         self.drums.iter().map(Piece::Drum).chain(walls).chain(self.boxes.iter().map(Piece::Box))
     }
 
-    /// The shapes with a part between two heights, metres: a body between them can touch these.
+    /// Returns the shapes that a body between two heights, metres, can touch.
     pub fn between(&self, lower_m: f64, upper_m: f64) -> Self {
         let mut shapes = self.clone();
         let meets = |profile: Profile| profile.is_between(lower_m, upper_m);
@@ -191,7 +188,8 @@ impl Shapes {
         shapes
     }
 
-    /// Distance to the nearest surface, metres; negative inside a drum or a box, infinite where nothing stands.
+    /// Returns the distance to the nearest surface, metres: negative inside drums and boxes,
+    /// infinite without shapes.
     pub fn clearance(&self, point: DVec2) -> f64 {
         self.pieces().map(|piece| piece.clearance(point)).fold(f64::INFINITY, f64::min)
     }
@@ -206,7 +204,7 @@ pub enum Piece<'a> {
 }
 
 impl Piece<'_> {
-    /// Distance to its surface, metres; negative inside.
+    /// Returns the distance to its surface, metres; negative inside.
     pub fn clearance(&self, point: DVec2) -> f64 {
         match self {
             Self::Drum(drum) => drum.at.distance(point) - drum.radius_m,
@@ -220,7 +218,7 @@ impl Piece<'_> {
         }
     }
 
-    /// The least and the greatest corner of an upright rectangle around it, metres.
+    /// Returns the corners of its axis-aligned bounding box, metres.
     pub fn bounds(&self) -> (DVec2, DVec2) {
         match self {
             Self::Drum(drum) => {
@@ -254,15 +252,15 @@ pub fn nearest_on_segment(point: DVec2, from: DVec2, to: DVec2) -> DVec2 {
     from + along * ((point - from).dot(along) / length_squared).clamp(0.0, 1.0)
 }
 
-/// The standard deviations along the longer and the shorter axis of the covariance `[xx, xy, yy]` of a place, and the
-/// angle of the longer one from x, radians.
+/// Returns the standard deviations along the principal axes of the position covariance
+/// `[xx, xy, yy]`, and the major axis's angle from x, radians.
 pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     let variances = [mean + half.hypot(xy), mean - half.hypot(xy)];
     (variances.map(|variance| variance.max(0.0).sqrt()), 0.5 * xy.atan2(half))
 }
 
-/// The result is in (-pi, pi], radians.
+/// Wraps an angle to (-pi, pi], radians.
 pub fn wrap_angle(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let turned = angle.rem_euclid(TAU);

@@ -1,29 +1,30 @@
-//! Cells, their states and windows, and their position in the mission frame.
+//! Grid cells, their states and windows, and their position in the mission frame.
 
 use std::borrow::Cow;
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// A cell by (18), (19) and the a-priori map.
+/// Cell state by (18), (19) and the a-priori map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u8)]
 pub enum CellState {
     /// Possibly safe: 0 in the paper's DSE.
     Free = 0,
-    /// A safety event, or its margin, was mapped here.
+    /// Safety event or its margin.
     Sensed = 1,
     Known = 2,
-    /// The perimeter of operation; never cleared.
+    /// Perimeter of operation; never cleared.
     Perimeter = 3,
-    /// Possibly safe, and the sonar looked there; only the evidential method tells it from [`Free`](Self::Free).
+    /// Possibly safe and scanned by the sonar; only the evidential method distinguishes it from
+    /// [`Free`](Self::Free).
     Scanned = 4,
-    /// Scanned and empty, but the body would touch something sensed nearby: a hazard.
+    /// Scanned and empty, but the body would touch something nearby: a hazard.
     Margin = 5,
 }
 
 impl CellState {
-    /// The harmonic field is 0 here.
+    /// Returns whether the harmonic field is 0 here.
     pub const fn is_hazard(self) -> bool {
         !matches!(self, Self::Free | Self::Scanned)
     }
@@ -32,7 +33,7 @@ impl CellState {
         matches!(self, Self::Scanned | Self::Margin)
     }
 
-    /// A byte of the `grid` topic; an unknown one counts as a hazard.
+    /// Decodes a byte of the `grid` topic; an unknown one counts as a hazard.
     pub const fn from_byte(byte: u8) -> Self {
         match byte {
             0 => Self::Free,
@@ -45,19 +46,19 @@ impl CellState {
     }
 }
 
-/// Fewer cells leave no room between the perimeter's two sides.
+/// Fewest cells per side that leave space within the perimeter.
 pub const MIN_CELLS: u32 = 10;
-/// 4096 x 4096 is the largest field that is solved.
+/// Most cells per side that the solver accepts.
 pub const MAX_CELLS: u32 = 4096;
 
-/// `col` grows with x, `row` with y.
+/// Grid cell: `col` grows with x, `row` with y.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Cell {
     pub col: u32,
     pub row: u32,
 }
 
-/// Empty when either extent is 0.
+/// Rectangle of cells; empty if either extent is 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Window {
     pub col: u32,
@@ -84,7 +85,7 @@ impl Window {
         }
     }
 
-    /// Row by row.
+    /// Returns the cells row by row.
     pub fn cells(self) -> impl Iterator<Item = Cell> {
         let columns = self.col..self.col + self.width;
         (self.row..self.row + self.height)
@@ -101,14 +102,14 @@ impl Window {
     }
 }
 
-/// The N x N cells in the mission frame: (19) with the origin at the centre.
+/// Frame of the N x N cells in the mission frame: (19) with the origin at the centre.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GridFrame {
     /// N, along each side.
     pub cells: u32,
     /// Delta.
     pub resolution_m: f64,
-    /// The centre cell, metres.
+    /// Centre cell, metres.
     pub centre: DVec2,
 }
 
@@ -121,40 +122,39 @@ impl GridFrame {
         self.cells as usize * self.cells as usize
     }
 
-    /// Metres to cell units: cell centres lie at whole numbers.
+    /// Converts metres to cell units, in which cell centres are integers.
     pub fn to_cells(&self, point: DVec2) -> DVec2 {
         (point - self.centre) / self.resolution_m + DVec2::splat(f64::from(self.centre_index()))
     }
 
-    /// [x / Delta] of (19); none outside the map.
+    /// Returns [x / Delta] of (19); `None` outside the map.
     pub fn cell_at(&self, point: DVec2) -> Option<Cell> {
         let index = self.to_cells(point).round();
         let last = f64::from(self.cells) - 1.0;
-        // This form excludes NaN, too.
+        // This form also rejects NaN.
         if !(index.cmpge(DVec2::ZERO).all() && index.cmple(DVec2::splat(last)).all()) {
             return None;
         }
         Some(Cell { col: index.x as u32, row: index.y as u32 })
     }
 
-    /// The middle of `cell`, metres.
     pub fn centre_of(&self, cell: Cell) -> DVec2 {
         let centre = f64::from(self.centre_index());
         let offset = DVec2::new(f64::from(cell.col) - centre, f64::from(cell.row) - centre);
         self.centre + offset * self.resolution_m
     }
 
-    /// The corner where x and y are least, metres.
+    /// Returns the corner with the least x and y, metres.
     pub fn corner_of(&self, cell: Cell) -> DVec2 {
         self.centre_of(cell) - DVec2::splat(self.resolution_m / 2.0)
     }
 
-    /// The index in a row-major slice of the whole map.
+    /// Returns the index in a row-major slice of the whole map.
     pub const fn index(&self, cell: Cell) -> usize {
         cell.row as usize * self.cells as usize + cell.col as usize
     }
 
-    /// The cell is on the perimeter, (18).
+    /// Returns whether the cell is on the perimeter (18).
     pub const fn is_rim(&self, cell: Cell) -> bool {
         let last = self.cells - 1;
         cell.col == 0 || cell.row == 0 || cell.col >= last || cell.row >= last
@@ -164,7 +164,7 @@ impl GridFrame {
         Window { col: 0, row: 0, width: self.cells, height: self.cells }
     }
 
-    /// The window of an upright rectangle between two corners, metres; those outside the map stand for its rim.
+    /// Returns the window of an axis-aligned rectangle, metres, clamped to the map.
     pub fn between(&self, least: DVec2, greatest: DVec2) -> Window {
         let last = DVec2::splat(f64::from(self.cells) - 1.0);
         let cell = |at: DVec2| {
@@ -176,7 +176,7 @@ impl GridFrame {
             .including(cell(self.to_cells(greatest).ceil()))
     }
 
-    /// The cells of `window` in a row-major slice of the whole map.
+    /// Returns the cells of `window` from a row-major slice of the whole map.
     pub fn cells_of<'map, T: Copy>(&self, window: Window, map: &'map [T]) -> Cow<'map, [T]> {
         if window == self.whole() {
             return Cow::Borrowed(map);
@@ -189,13 +189,13 @@ impl GridFrame {
         Cow::Owned(cells)
     }
 
-    /// The smallest window outside of which two whole maps are equal; empty if the maps are.
+    /// Returns the smallest window of all differences between two whole maps.
     pub fn changed_window<T: PartialEq>(&self, old: &[T], new: &[T]) -> Window {
         let side = self.cells as usize;
         let mut window = Window::default();
         let rows = old.chunks_exact(side).zip(new.chunks_exact(side));
         for (row, (old, new)) in rows.enumerate() {
-            // Comparing a whole row at once is several times as fast, and most are equal.
+            // Comparing whole rows first is several times as fast: most are equal.
             if old == new {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! The rigid motion of the robot, (1), the maps G from what is driven to the body, (2), (3), and their inverses,
+//! Rigid motion of the robot (1), the maps G from inputs to the body (2), (3), and their inverses
 //! (17).
 
 mod ackermann;
@@ -11,12 +11,13 @@ pub use differential::DifferentialDrive;
 pub use drive::Drive;
 pub use pose::{Pose2, Twist};
 
-/// Below this speed, m/s, a wheel may stick in the dead band of its loop (20 counts/s after a gain of 0.78, 11 mm/s).
-/// A lower speed limit means stand.
+/// Least usable speed, m/s; a lower speed limit means standstill. Slower wheels may stick in the
+/// dead band of their loop (20 counts/s after a gain of 0.78, 11 mm/s).
 pub const LEAST_SPEED_M_S: f64 = 0.04;
 
-/// Within 11 degrees a robot faces its way: it does not turn on the spot, and where it may not go on it stands.
+/// Cosine of 11 degrees, within which the robot faces its way: on a blocked way it stands instead
+/// of turning on the spot.
 pub const FACES_COSINE: f64 = 0.98;
 
-/// The controller's turn rate on the spot per remaining angle, 1/s.
+/// Gain of the controller's turn on the spot, 1/s.
 pub const TURN_GAIN: f64 = 3.0;

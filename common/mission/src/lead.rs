@@ -1,6 +1,8 @@
-//! The pose at which a command will act, for planner and controller. A base that answers late turns past its direction, and drives on
-//! towards what is near, if each command is computed for the pose that was seen: the commands that it has not answered yet are foreseen
-//! by its response. A base that answers soon goes by the pose that was seen: a Jackal was a sixth slower with the lead.
+//! Predicts the pose at which a command will act, for planner and controller.
+//!
+//! A late base overshoots in turn and distance if commands are computed for the observed pose. Its
+//! response predicts the effect of pending commands. A prompt base uses the observed pose: a Jackal
+//! was a sixth slower with the lead.
 
 use std::collections::VecDeque;
 
@@ -10,14 +12,15 @@ use crate::{
     kinematics::{DifferentialDrive, Drive, Pose2, TURN_GAIN, Twist},
 };
 
-/// A proportional law is well damped up to this product of its gain and the dead time; it oscillates for ever from pi / 2 on.
+/// Product of gain and dead time up to which a proportional law is well damped; from pi / 2 on it
+/// oscillates without end.
 const DAMPED: f64 = 0.5;
-/// Steps in which the way ahead is integrated, seconds.
+/// Integration step, seconds.
 const STEP_S: f64 = 0.02;
 
-/// A longer time is not followed in steps, seconds.
+/// Longest time that is integrated in steps, seconds.
 const LONGEST_S: f64 = 60.0;
-/// Commands that are remembered at most; the oldest acts at once where more are given.
+/// Limit of the pending commands; beyond it the oldest acts at once.
 const MOST_PENDING: usize = 256;
 
 #[derive(Clone, Debug)]
@@ -25,19 +28,19 @@ pub struct Lead {
     drive: DifferentialDrive,
     base: Base,
     dead_time_s: f64,
-    /// When they act, and the commands that do not act yet.
+    /// Pending commands with their times of effect.
     pending: VecDeque<(f64, Twist)>,
     wanted: Twist,
     twist: Twist,
     at_s: f64,
-    /// The first pose and its time, until the next one tells how the robot moved when the model began.
+    /// First pose and its time, until the second gives the initial motion.
     first: Option<(Pose2, f64)>,
-    /// It is known how the robot moves.
+    /// Whether the robot's motion is known.
     has_begun: bool,
 }
 
 impl Lead {
-    /// None for a base that answers soon enough, and for a car.
+    /// Returns `None` for a car and for a base that answers soon enough.
     pub fn new(mission: &Mission) -> Option<Self> {
         let body = mission.body();
         let dead_time_s = body.response.dead_time_s();
@@ -61,7 +64,7 @@ impl Lead {
         self.dead_time_s
     }
 
-    /// The pose at which a command acts that is given at the time `now_s` of `pose`, and the motion there.
+    /// Returns the pose and motion at which a command given now acts; `pose` belongs to `now_s`.
     pub fn foresee(&mut self, pose: Pose2, now_s: f64) -> (Pose2, Twist) {
         self.go_on(pose, now_s);
         self.begin(pose, now_s);
@@ -70,7 +73,7 @@ impl Lead {
         (pose, ahead.twist)
     }
 
-    /// The robot may be on its way when its response is found, or when a stage runs again.
+    /// Estimates the initial motion, because the robot may be moving when the model begins.
     fn begin(&mut self, pose: Pose2, now_s: f64) {
         let Some((first, first_s)) = self.first else {
             self.first = Some((pose, now_s));
@@ -86,7 +89,8 @@ impl Lead {
         }
     }
 
-    /// `twist` was commanded for a pose of that time. Its curve is driven no faster than the wheels turn.
+    /// Records the command `twist` for a pose at `now_s`, with its curve limited to the wheels' top
+    /// speed.
     pub fn command(&mut self, twist: Twist, now_s: f64) {
         let twist = self.drive.twist(self.drive.wheels(twist));
         if self.pending.len() == MOST_PENDING
@@ -97,12 +101,12 @@ impl Lead {
         self.pending.push_back((now_s + self.dead_time_s, twist));
     }
 
-    /// Go on to the time `until_s`. Returns where the robot is then that is at `pose` now.
+    /// Advances to `until_s` and returns the resulting pose of a robot at `pose` now.
     fn go_on(&mut self, mut pose: Pose2, until_s: f64) -> Pose2 {
         // Before the first call no time has passed.
         self.at_s = if self.at_s.is_finite() { self.at_s } else { until_s };
         if until_s - self.at_s > LONGEST_S {
-            // Whatever it was told long ago, it does by now. Samples may say any time.
+            // The newest command has taken effect by now. Samples may carry any time.
             self.twist =
                 self.pending.drain(..).next_back().map_or(self.wanted, |(_, newest)| newest);
             self.wanted = self.twist;
@@ -157,7 +161,7 @@ mod tests {
         let close = |got: f64, want: f64| assert!((got - want).abs() < 1e-9, "{got} {want}");
         close(pose.heading, 0.2);
         close(pose.position.x, 0.4 * 0.2_f64.sin());
-        // Wheels that cannot turn so fast keep the curve.
+        // Saturated wheels keep the curve.
         lead.command(Twist { v: 1.0, omega: 1.0 }, 1.0);
         let Pose2 { position, heading } = at(&mut lead, 1.5);
         assert!(heading > 0.1 && position.length() < 0.26, "{position} {heading}");

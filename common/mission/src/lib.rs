@@ -1,21 +1,22 @@
-//! The mission file: everything that a run depends on, validated before anything starts.
+//! Mission file: every input of a run, validated before any process starts.
 //!
-//! Metres, seconds, radians inside; degrees where a person writes them (`_deg`). All positions are in
-//! the mission frame: unless `start` says otherwise, its origin is where the robot starts, and its x-axis
-//! is the robot's own.
+//! Values are metres, seconds and radians; keys that people write in degrees end in `_deg`. All
+//! positions are in the mission frame. By default its origin is the robot's start, and its x-axis
+//! is the robot's axis there; `start` overrides both.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `check` | reading: syntax, keys, ranges |
-//! | `robot`, `simulation` | its two largest parts |
+//! | `check` | parsing: syntax, keys, ranges |
+//! | `robot`, `simulation` | the two largest tables |
 //! | [`geometry`], [`grid`] | shapes; cells |
 //! | [`kinematics`] | (1)-(3) and their inverses |
-//! | `odometry` | the wheels' errors, the calibration file |
+//! | `odometry` | wheel errors, the calibration file |
 //! | `sensor`, [`sonar`] | the table of ranging sensors; their mounting, (19) |
 //! | [`address`] | a robot's address |
-//! | `arduino`, `ros2` | the board of a robot with an Arduino; topics of ROS 2 |
+//! | `arduino`, `ros2` | the Arduino board; ROS 2 topics |
 
-/// Tables of the mission file: their keys, each with the default that it has if its type has no other. An unknown key is an error.
+/// Declares mission tables as keys with optional defaults, else the type's. Unknown keys are
+/// errors.
 macro_rules! keys {
     (@) => { Default::default() };
     (@ $default:expr) => { $default };
@@ -83,59 +84,59 @@ use crate::{
 };
 
 keys! {
-    /// Every key but `target` has a default, and a mission with `stay` needs none.
+    /// Every key except `target` has a default; a mission with `stay` needs no key at all.
     Mission {
-        /// The default is the file's name.
+        /// Defaults to the file's name.
         name: String,
         /// One line for `firsthand missions`.
         description: String,
         /// X_T, metres.
         target: DVec2 = DVec2::NAN,
-        /// The places to visit one after the other; [`Mission::target`] is then the first of them.
+        /// Places to visit in order; [`Mission::target`] is the first of them.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         targets: Vec<Waypoint>,
         method: Method,
-        /// Readings of the sonar go into the map. Without them the robot knows only [`Mission::known`].
+        /// Adds sonar readings to the map; without them the robot knows only [`Mission::known`].
         sensing: bool = true,
-        /// The rows that are mapped; by default [`Mission::sensor_set`].
+        /// Sensor rows used for mapping; by default [`Mission::sensor_set`].
         sensors: Option<Sensors>,
-        /// Within this the target counts as reached.
+        /// Distance within which the target counts as reached.
         arrival_tolerance_m: f64 = 0.15,
-        /// An arrival is unsure if two standard deviations of the position's error exceed this along the worst axis. A
-        /// simulated robot that is farther off is in the wrong place.
+        /// Limit of two standard deviations of the position along the worst axis; beyond it an
+        /// arrival is unsure. A simulated robot farther off is in the wrong place.
         sure_within_m: f64 = 0.5,
         timeout_s: f64 = 180.0,
-        /// The run goes on when a target is reached or given up: the robot stands and waits for the next one. Without a target it waits
-        /// from its start on.
+        /// Keeps the run alive after the last target, or from the start without one, and waits for
+        /// the next.
         stay: bool,
-        /// Whether a service drives on by itself after it was cut off; see `firsthand run --resume-last`.
+        /// Whether a service resumes by itself; see `firsthand run --resume-last`.
         resume: Resume,
-        /// The seed of everything random in the simulation.
+        /// Random seed of the simulation.
         seed: u64 = 1,
         start: Start,
-        /// Pi: where the robot may operate, and the grid laid over it.
+        /// Pi: the permitted area and the grid over it.
         perimeter: Perimeter,
         robot: RobotConfig,
-        /// The front sonar of a robot without `[[robot.sensor]]`.
+        /// Front sonar of a robot without `[[robot.sensor]]`.
         sonar: SonarConfig,
         dead_reckoning: DeadReckoning,
         mapper: Mapper,
         planner: Planner,
         controller: Controller,
-        /// A map of the ROS map_server whose occupied cells become boxes of [`Mission::known`]. A relative name is taken
-        /// from the current directory.
+        /// ROS `map_server` map whose occupied cells become boxes of [`Mission::known`]. Relative
+        /// paths start at the current directory.
         map: Option<PathBuf>,
-        /// Hazards that the map holds before the robot starts.
+        /// Hazards in the map before the robot starts.
         #[serde(skip_serializing_if = "Shapes::is_empty")]
         known: Shapes,
-        /// Where the body may not go: hazards of the field, of which the simulator knows nothing.
+        /// Keep-out zones: hazards of the field, unknown to the simulator.
         #[serde(rename = "zone", skip_serializing_if = "Vec::is_empty")]
         zones: Vec<Zone>,
-        /// Shapes that really exist; only the simulator reads them.
+        /// Real shapes; only the simulator reads them.
         #[serde(skip_serializing_if = "Shapes::is_empty")]
         world: Shapes,
         simulation: Simulation,
-        /// One line each on a valid file: keys or values with a new name, and requests that the robot cannot fulfil.
+        /// Warnings about a valid file, one line each: renamed keys or values, impossible requests.
         #[serde(skip)]
         remarks: Vec<String>,
     }
@@ -143,15 +144,15 @@ keys! {
 
 pub const MOST_TARGETS: usize = 16;
 pub const MOST_ZONES: usize = 16;
-/// The most corners of a zone.
+/// Upper limit of the corners in a zone.
 pub const MOST_CORNERS: usize = MOST_TARGETS;
 
-/// `[x, y]`, or `[x, y, heading]`.
+/// Target written as `[x, y]` or `[x, y, heading]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Waypoint {
     pub at: DVec2,
-    /// The heading to turn to there, counter-clockwise from x; none for any.
+    /// Final heading, counter-clockwise from x; `None` accepts any.
     pub heading_deg: Option<f64>,
 }
 
@@ -176,16 +177,16 @@ impl From<Waypoint> for Vec<f64> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// Looks before it drives: evidence for and against hazards, scanned ground, a speed that fits what is known of
-    /// the way ahead.
+    /// Looks before it drives: evidence for and against hazards, scanned ground, and a speed that
+    /// fits them.
     #[default]
     Evidential,
-    /// Every hit is a hazard with its margin, (19), the map only grows, (10), and the robot drives in the direction
-    /// of the field, (15), (16).
+    /// Follows the paper. Each hit is a hazard with its margin (19), the map only grows (10), and
+    /// the robot drives along the field (15), (16).
     Paper,
 }
 
-/// Written as a [`Waypoint`].
+/// Start pose, written as a [`Waypoint`] or as its heading alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "StartKeys", into = "Waypoint")]
 pub struct Start {
@@ -222,23 +223,23 @@ impl From<Start> for Waypoint {
     }
 }
 
-/// After a supervisor's death, a power cut or a reboot.
+/// Behaviour after a supervisor crash, power failure or reboot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Resume {
-    /// The robot stands until an operator says resume.
+    /// Keeps the robot stopped until an operator resumes it.
     #[default]
     Manual,
     Automatic,
 }
 
 keys! {
-    /// The square the robot may operate in, (18).
+    /// Square that bounds the robot's operation (18).
     Perimeter {
         /// D.
         width_m: f64 = 12.0,
-        /// N along each side. By default a cell has 0.05 m, a quarter of the X80's body, for a robot that looks first
-        /// ([`Mission::looks_first`]), else 0.1 m.
+        /// N along each side. By default a cell has 0.05 m, a quarter of the X80's body, if
+        /// [`Mission::looks_first`], else 0.1 m.
         cells: Option<u32>,
         /// Metres.
         centre: DVec2,
@@ -246,60 +247,60 @@ keys! {
 }
 
 impl Perimeter {
-    /// Cells a side, unless the mission says otherwise: the planner follows such a grid at the robot's rate with time
-    /// to spare.
+    /// Default limit of N, which the planner solves at the robot's rate with time to spare.
     const DEFAULT_MOST_CELLS: f64 = 512.0;
 }
 
 keys! {
-    /// All but the wheels' values, which are in [`Odometry`].
+    /// Dead reckoning; [`Odometry`] holds the wheel parameters.
     DeadReckoning {
         integration: Integration,
     }
 }
 
-/// Integrates (20) into (21).
+/// Integration of (20) into (21).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integration {
     /// Exact along the arc of constant curvature.
     #[default]
     Arc,
-    /// The paper's forward Euler, as (21) prints it.
+    /// Forward Euler, as the paper prints (21).
     Euler,
 }
 
 keys! {
     Mapper {
-        /// Paper: cells this far around a hit are marked with it; [`Mission::margin_cells`] is Im of (19).
+        /// Paper: radius marked around a hit; [`Mission::margin_cells`] is Im of (19).
         margin_m: f64 = 0.25,
-        /// Evidential: left free between the body and a hit.
+        /// Evidential: free distance between the body and a hit.
         clearance_m: f64 = 0.03,
-        /// Hits farther than this are no safety event yet; by default [`Mission::map_within_m`].
+        /// Greatest distance of hits that enter the map; by default [`Mission::map_within_m`].
         map_within_m: Option<f64>,
-        /// Evidential: evidence falls evenly with time, and the strongest is gone after this; none for never.
+        /// Evidential: time in which the strongest evidence decays linearly to zero; by default
+        /// never.
         forget_after_s: Option<f64>,
     }
 }
 
 keys! {
     Planner {
-        /// Evidential: the robot must be able to stop within this before it meets what it believes in or has not scanned;
-        /// by default that of [`Mission::hurry`], which includes the base's dead time. A base that brakes slowly is given
-        /// as much less speed as it needs: [`Response::speed_to_stop_within`].
+        /// Evidential: time for a stop before believed hazards and unscanned ground, including the
+        /// base's dead time; by default that of [`Mission::hurry`]. Bases that brake slowly get a
+        /// lower speed: [`Response::speed_to_stop_within`].
         stops_within_s: Option<f64>,
-        /// Lambda of laplacian u = u / lambda^2. Without it the paper's method has no screening, exactly (11), and the
-        /// evidential one takes [`Planner::EVIDENTIAL_SCREENING_M`].
+        /// Lambda of laplacian u = u / lambda^2. By default none with the paper's method, exactly
+        /// (11), and [`Planner::EVIDENTIAL_SCREENING_M`] with the evidential one.
         screening_m: Option<f64>,
-        /// A planner in place of `firsthand`'s own; it is given the command line of `common::stage_command`. A run file
-        /// has it absolute.
+        /// Planner in place of `firsthand`'s own, with the command line of `common::stage_command`;
+        /// absolute in a run file.
         executable: Option<PathBuf>,
         calibration: Option<CalibrationPlan>,
     }
 }
 
 impl Planner {
-    /// The length is so short that the field still leads to a gap that an echo narrows.
+    /// Short enough for the field to lead to a gap that an echo narrows.
     pub const EVIDENTIAL_SCREENING_M: f64 = 0.35;
 }
 
@@ -318,19 +319,18 @@ keys! {
         speed_m_s: Option<f64>,
         /// wd; by default [`Mission::turn_rad_s`].
         turn_rad_s: Option<f64>,
-        /// Evidential: at full speed while the robot faces its way within this angle; by default that of
-        /// [`Mission::hurry`].
+        /// Evidential: greatest heading error at full speed; by default that of [`Mission::hurry`].
         full_speed_within_deg: Option<f64>,
-        /// Evidential: turn on the spot while the way lies farther than this to a side; at smaller angles the speed falls
-        /// with the cosine. By default that of [`Mission::hurry`].
+        /// Evidential: heading error beyond which the robot turns on the spot; below it the speed
+        /// falls with the cosine. By default that of [`Mission::hurry`].
         turns_beyond_deg: Option<f64>,
-        /// Evidential: on the spot, at most; by default that of [`Mission::hurry`].
+        /// Evidential: greatest turn rate on the spot; by default that of [`Mission::hurry`].
         look_rad_s: Option<f64>,
-        /// Rc: slowing down begins this far from the target.
+        /// Rc: distance from the target at which slowing begins.
         slow_radius_m: f64 = 0.4,
         /// |eta_c| below which an antipodal robot keeps its turning side.
         dead_zone: f64 = 0.05,
-        /// (16) modulates the speed by alignment; without it the speed is constant up to Rc.
+        /// Modulates the speed by alignment (16); without it the speed is constant up to Rc.
         modulated: bool = true,
     }
 }
@@ -353,21 +353,23 @@ impl Mission {
         GridFrame { cells, resolution_m: width_m / f64::from(cells), centre }
     }
 
-    /// Whether a place is inside the perimeter, and not on its rim.
+    /// Returns whether a place is inside the perimeter, off its rim.
     pub fn contains(&self, place: DVec2) -> bool {
         let frame = self.grid_frame();
         frame.cell_at(place).is_some_and(|cell| !frame.is_rim(cell))
     }
 
-    /// Im of (19): the least number of cells around a hit's own that covers the margin.
+    /// Returns Im of (19): the fewest cells around the hit cell that cover the margin.
     pub fn margin_cells(&self) -> u32 {
-        // The hit's own cell covers half a cell, and a rounding error adds no cell.
+        // The hit cell covers half a cell itself; rounding must not add one.
         let cells = self.mapper.margin_m / self.grid_frame().resolution_m - 0.5;
         (cells - 1e-6).ceil().max(0.0) as u32
     }
 
-    /// The robot turns to look before it drives in a direction: with the evidential method if it senses, can turn on
-    /// the spot, and has no other planner. It can then stop within scanned ground, so its defaults are faster.
+    /// Returns whether the robot looks in a direction before it drives there.
+    ///
+    /// This needs the evidential method with sensing and the built-in planner, and a robot that
+    /// turns on the spot. It can stop within scanned ground, so its defaults are faster.
     pub fn looks_first(&self) -> bool {
         self.method == Method::Evidential
             && self.sensing
@@ -375,15 +377,17 @@ impl Mission {
             && self.body().ackermann().is_none()
     }
 
-    /// The outline that the planner keeps clear where the circle that covers it does not fit: that of a robot with a laser that looks
-    /// first. Others keep the circle clear.
+    /// Returns the outline to keep clear where the covering circle does not fit. Only robots with a
+    /// laser that look first have one.
     pub fn outline(&self) -> Option<Footprint> {
         let checks = self.looks_first() && self.used(SensorKind::Scan) > 0;
         self.body().footprint.filter(|_| checks)
     }
 
-    /// vd: `controller.speed_m_s`, or by default 0.5 for a robot that looks first, 0.7 with infrared rangers, the
-    /// body's top speed with a laser; else the paper's 0.25. Never more than [`Mission::sight_speed_m_s`].
+    /// Returns vd: `controller.speed_m_s`, capped at [`Mission::sight_speed_m_s`].
+    ///
+    /// By default it is the paper's 0.25. For a robot that looks first it is the body's top speed
+    /// with a laser, 0.7 with infrared rangers, else 0.5.
     pub fn speed_m_s(&self) -> f64 {
         let asked = self.controller.speed_m_s.unwrap_or_else(|| match self.looks_first() {
             false => 0.25,
@@ -394,8 +398,10 @@ impl Mission {
         asked.min(self.sight_speed_m_s())
     }
 
-    /// The greatest speed from which the robot rests on ground that it has seen though all that looks ahead falls silent, m/s: ISO 3691-4
-    /// wants the way to rest within the range of detection in the worst condition. Infinite where nothing looks ahead.
+    /// Returns the greatest speed, m/s, that lets the robot stop on seen ground after all
+    /// forward-looking sensors fall silent; infinite without one.
+    ///
+    /// ISO 3691-4 requires the stopping distance to fit the detection range in the worst condition.
     pub fn sight_speed_m_s(&self) -> f64 {
         let response = self.trusted_response();
         let after_s = self.robot.silent_after_s() + response.dead_time_s();
@@ -414,8 +420,8 @@ impl Mission {
         self.sensor_table().iter().filter(|sensor| sensor.used && sensor.kind == kind).count()
     }
 
-    /// `sensors`, or by default all of them with the evidential method, and the front sonar alone with the paper's
-    /// method or on a car.
+    /// Returns `sensors`. By default it is all with the evidential method, and the front sonar with
+    /// the paper's method or on a car.
     pub fn sensor_set(&self) -> Sensors {
         self.sensors.unwrap_or(match (self.method, self.robot.model) {
             (Method::Paper, _) | (_, Model::Car) => Sensors::Front,
@@ -423,7 +429,7 @@ impl Mission {
         })
     }
 
-    /// A reading names its sensor by the row of this table.
+    /// Returns the sensor table. A reading names its sensor by its row here.
     pub fn sensor_table(&self) -> Vec<Sensor> {
         let RobotConfig { sensors, rate_hz, .. } = &self.robot;
         let rows = match &self.robot.preset().sensors {
@@ -434,7 +440,8 @@ impl Mission {
         sensor::table(&rows, *rate_hz, &self.sonar, self.sensor_set())
     }
 
-    /// Bumpers and cliff sensors: those that are written, or else the model's. A robot says what they feel by their names.
+    /// Returns the written bumpers and cliff sensors, or the model's. The robot reports them by
+    /// name.
     pub fn touches(&self) -> Vec<TouchRow> {
         match &self.robot.touches {
             written if !written.is_empty() => written.clone(),
@@ -443,33 +450,32 @@ impl Mission {
         }
     }
 
-    /// The ROS topic of [`ros2::Ros2Topics::hazards`].
+    /// Returns the ROS topic of [`ros2::Ros2Topics::hazards`].
     pub fn hazards_topic(&self) -> Option<String> {
         let preset = &self.robot.preset().ros2;
         self.robot.ros2.hazards.as_ref().or(preset.hazards.as_ref()).cloned()
     }
 
-    /// The lasers and their rows.
     pub fn lasers(&self) -> Vec<(usize, Sensor)> {
         let rows = self.sensor_table().into_iter().enumerate();
         rows.filter(|(_, sensor)| sensor.kind == SensorKind::Scan).collect()
     }
 
-    /// The laser by whose scans the robot knows where it is: of those that the mission uses the first one with the widest view.
+    /// Returns the laser used for localisation: of the used lasers, the first with the widest view.
     pub fn laser(&self) -> Option<(usize, Sensor)> {
         self.lasers().into_iter().rev().max_by(|(_, a), (_, b)| {
             a.used.cmp(&b.used).then(a.field_of_view_deg.total_cmp(&b.field_of_view_deg))
         })
     }
 
-    /// Those whose scans come with the robot's frames, and not on wires of their own.
+    /// Returns the lasers whose scans arrive with the robot's frames.
     pub fn lasers_of_base(&self) -> Vec<(usize, Sensor)> {
         let mut lasers = self.lasers();
         lasers.retain(|(row, sensor)| self.rplidar(*row, sensor).is_none());
         lasers
     }
 
-    /// The lasers with wires of their own.
+    /// Returns the lasers with a serial line of their own.
     pub fn rplidars(&self) -> Vec<(usize, Sensor, Rplidar)> {
         let with_product = |(row, sensor)| {
             let product = self.rplidar(row, &sensor)?;
@@ -492,11 +498,14 @@ impl Mission {
         self.sensor_table().swap_remove(self.front_row())
     }
 
-    /// A robot whose infrared rangers end at surfaces of any angle may hurry. One with sonars alone turns at 1.2
-    /// rad/s, so that a cone of 15 degrees to either side covers each direction three times at 7 Hz: with 2.0 rad/s
-    /// three times as many robots touched something, most of them the ends of loose walls.
+    /// Returns the speed limits that suit the robot's sensors.
     ///
-    /// The times to stop were found with an X80, of whose dead time they include 0.15 s.
+    /// Infrared rangers and lasers measure surfaces at any angle, so such a robot may be fast. With
+    /// sonars alone it turns at 1.2 rad/s: a cone of 15 degrees to either side then covers each
+    /// direction three times at 7 Hz. At 2.0 rad/s three times as many robots touched something,
+    /// mostly the ends of loose walls.
+    ///
+    /// The stopping times were found with an X80 and include 0.15 s of its dead time.
     pub fn hurry(&self) -> Hurry {
         let uses = |kind| self.looks_first() && self.used(kind) > 0;
         let sees = uses(SensorKind::Ray) || uses(SensorKind::Scan);
@@ -514,36 +523,37 @@ impl Mission {
         }
     }
 
-    /// The time until the robot brakes, seconds, from the pose for which the planner answers: the one at which the command acts, if the
-    /// base answers late.
+    /// Returns the time until the robot brakes, seconds, from the pose for which the planner
+    /// answers. On a late base that is where the command acts.
     pub fn brakes_within_s(&self) -> f64 {
         let within_s = self.hurry().stops_within_s;
         Lead::new(self).map_or(within_s, |lead| (within_s - lead.dead_time_s()).max(0.0))
     }
 
-    /// wd: `controller.turn_rad_s`, or by default 2.4 for a robot that looks first, else the paper's 0.8.
+    /// Returns wd: `controller.turn_rad_s`, by default 2.4 for a robot that looks first, else the
+    /// paper's 0.8.
     pub fn turn_rad_s(&self) -> f64 {
         let default = if self.looks_first() { 2.4 } else { 0.8 };
         self.controller.turn_rad_s.unwrap_or(default)
     }
 
-    /// The link makes good that the wheels turn slower than commanded: `robot.speed_trim`, by default if the robot
-    /// looks first.
+    /// Returns whether the link compensates wheels that turn slower than commanded:
+    /// `robot.speed_trim`, by default for a robot that looks first.
     pub fn speed_trim(&self) -> bool {
         self.robot.speed_trim.unwrap_or_else(|| self.looks_first())
     }
 
-    /// `mapper.map_within_m`, by default 0.6 for a robot that looks first and 1.0 for others. Farther out the arc of
-    /// an echo is wider than the gaps that it would close.
+    /// Returns `mapper.map_within_m`, by default 0.6 for a robot that looks first, else 1.0.
+    /// Farther out the arc of an echo is wider than the gaps that it would close.
     pub fn map_within_m(&self) -> f64 {
         let default = if self.looks_first() { 0.6 } else { 1.0 };
         self.mapper.map_within_m.unwrap_or(default)
     }
 
-    /// `planner.screening_m`, or by default that of the method; none is exactly (11).
+    /// Returns `planner.screening_m`, by default that of the method; `None` is exactly (11).
     pub fn screening_length_m(&self) -> Option<f64> {
         let default = match self.method {
-            // The length is at least what the grid resolves.
+            // The grid limits the resolvable length.
             Method::Evidential => {
                 let resolution = self.grid_frame().resolution_m;
                 Some(Planner::EVIDENTIAL_SCREENING_M.max(resolution / 2.0))
@@ -557,17 +567,16 @@ impl Mission {
         Pose2 { position: self.start.at, heading: self.start.heading_deg.to_radians() }
     }
 
-    /// From the start to the first target, metres.
     pub fn straight_m(&self) -> f64 {
         self.target.distance(self.start.at)
     }
 
-    /// Shapes of the world that the body can touch; the others are above or below it.
+    /// Returns the shapes of the world at the body's height.
     pub fn obstacles(&self) -> Shapes {
         self.simulation.physics().heights.touched(&self.world)
     }
 
-    /// The wheels of the simulated base: as `simulation.wheels` says, or else as the robot's response.
+    /// Returns the simulated wheels: `simulation.wheels`, then the robot's response.
     pub fn wheel_physics(&self) -> WheelPhysics {
         let (written, stated) = (&self.simulation.wheels, &self.robot.response);
         let preset = self.simulation.physics().wheels;
@@ -584,7 +593,7 @@ impl Mission {
         self.robot.body()
     }
 
-    /// Whether the mission or its model states the base's response.
+    /// Returns whether the mission or its model states the base's response.
     pub fn states_response(&self) -> bool {
         let ResponseKeys { delay_s, acceleration_m_s2, .. } = self.robot.response;
         let is_written = delay_s.is_some() && acceleration_m_s2.is_some();
@@ -592,8 +601,8 @@ impl Mission {
         is_written || is_of_model || !self.robot.protocol().has_scans()
     }
 
-    /// What the base is trusted to do: what is stated, and for the rest no more than a late and heavy base does. The link finds out
-    /// what it really does.
+    /// Returns the response that planning may rely on. Unstated values are those of a late and
+    /// heavy base until the link identifies them.
     pub fn trusted_response(&self) -> Response {
         let Body { response, track_m, .. } = self.body();
         match self.states_response() {
@@ -602,8 +611,8 @@ impl Mission {
         }
     }
 
-    /// The mission of a robot whose base was found to go on as before for `dead_time_s` and to accelerate at `acceleration_m_s2`, which
-    /// may be infinite. None if no base does that.
+    /// Returns the mission with an identified response. `acceleration_m_s2` may be infinite;
+    /// implausible values give `None`.
     pub fn with_response(&self, dead_time_s: f64, acceleration_m_s2: f64) -> Option<Self> {
         let is_a_base = (0.0..=4.0).contains(&dead_time_s) && acceleration_m_s2 >= 0.05;
         is_a_base.then(|| {
@@ -620,7 +629,7 @@ impl Mission {
         })
     }
 
-    /// Whether planner and controller let the base's response limit the speed towards what they know.
+    /// Returns whether planner and controller limit the speed by the base's response.
     pub fn brakes_by_response(&self) -> bool {
         self.method == Method::Evidential && self.sensing && self.planner.executable.is_none()
     }

@@ -1,24 +1,25 @@
-//! The wheels' differences from the nominal body, and the calibration file.
+//! Wheel deviations from the nominal body, and the calibration file.
 
 use serde::{Deserialize, Serialize};
 
 keys! {
-    /// Each value with its standard deviation. With s = `distance_scale` and rho = `diameter_ratio` the left wheel rolls
-    /// 2 s / (1 + rho) times its nominal way and the right one 2 s rho / (1 + rho) times. The track on the ground is
-    /// `track_scale` times the nominal one.
+    /// Wheel parameters, each with its standard deviation; the defaults describe an uncalibrated
+    /// robot.
     ///
-    /// The defaults are those of a robot that nobody has calibrated.
+    /// Let s = `distance_scale` and rho = `diameter_ratio`. The left wheel rolls 2 s / (1 + rho)
+    /// times its nominal distance. The right one rolls 2 s rho / (1 + rho) times. The track on the
+    /// ground is `track_scale` times the nominal one.
     Odometry {
-        /// Right over left.
+        /// Right diameter over left.
         diameter_ratio: f64 = 1.0,
         diameter_ratio_sd: f64 = 0.005,
-        /// The track on the ground over the nominal one.
+        /// Track on the ground over the nominal one.
         track_scale: f64 = 1.0,
         track_scale_sd: f64 = 0.015,
         /// Mean diameter over the nominal one.
         distance_scale: f64 = 1.0,
         distance_scale_sd: f64 = 0.01,
-        /// Standard deviation of the way lost or won, metres per square root of a metre.
+        /// Standard deviation of the distance lost or gained, metres per square root of a metre.
         slip: f64 = 0.001,
         slip_sd: f64 = 0.0005,
         calibrated: Option<Provenance>,
@@ -33,19 +34,19 @@ pub struct Provenance {
     pub robot: String,
     /// `wall`, `squares` or `gyro`.
     pub method: String,
-    /// The way that the wheels rolled, on average.
+    /// Mean distance rolled by the wheels.
     pub metres: f64,
-    /// Squared residuals over their variances.
+    /// Sum of squared residuals over their variances, per degree of freedom.
     pub chi2_per_dof: f64,
 }
 
 keys! {
     CalibrationPlan {
         procedure: Procedure,
-        /// Standard deviation of the ratio of the diameters at which it may stop.
+        /// Standard deviation of the diameter ratio at which the procedure may stop.
         ratio_sd: f64 = 0.0005,
         loops: u32 = 12,
-        /// The way from the wall, or the side of the square.
+        /// Distance from the wall, or side of the square.
         drive_m: f64 = 2.0,
     }
 }
@@ -57,16 +58,16 @@ pub enum Procedure {
     Wall,
     LeftSquare,
     RightSquare,
-    /// To and fro on the spot.
+    /// Turns to and fro on the spot.
     Turns,
     /// Ahead, around, back and around, for a gyro.
     Gyro,
-    /// All that `firsthand bring-up` looks at.
+    /// All checks of `firsthand bring-up`.
     BringUp,
 }
 
 impl Odometry {
-    /// The ways of the left and the right wheel over the nominal ones.
+    /// Returns the distances of the left and right wheel over the nominal ones.
     pub fn wheel_scales(&self) -> [f64; 2] {
         let both = 2.0 * self.distance_scale / (1.0 + self.diameter_ratio);
         [both, both * self.diameter_ratio]
@@ -86,7 +87,7 @@ impl Odometry {
     }
 }
 
-/// The table `[robot.odometry]` as a mission has it, with its provenance.
+/// Table `[robot.odometry]` in the form of a mission, with its provenance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
@@ -111,7 +112,7 @@ impl Calibration {
     }
 
     /// # Errors
-    /// The sentence that says what is wrong.
+    /// Returns a sentence that describes the fault.
     pub fn parse(text: &str) -> Result<Odometry, String> {
         let file: Self =
             toml::from_str(text).map_err(|error| error.message().trim().replace('\n', " "))?;

@@ -1,18 +1,18 @@
-//! How a robot's base answers a command: it does nothing for a while, and then its wheels gain and lose speed at a limited rate with a
-//! first-order lag.
+//! Response of a robot's base to commands: a delay, then a limited acceleration with a first-order
+//! lag.
 
 use std::collections::VecDeque;
 
 use crate::kinematics::Twist;
 
 keys! {
-    /// The keys of `[robot.response]`; those that are not written are the model's.
+    /// Keys of `[robot.response]`; unwritten ones are the model's.
     #[derive(Copy)]
     ResponseKeys {
         delay_s: Option<f64>,
         lag_s: Option<f64>,
         acceleration_m_s2: Option<f64>,
-        /// Without it that of two wheels at [`ResponseKeys::acceleration_m_s2`], if that is written.
+        /// By default that of two wheels at a written [`ResponseKeys::acceleration_m_s2`].
         turn_acceleration_rad_s2: Option<f64>,
     }
 }
@@ -22,7 +22,7 @@ impl ResponseKeys {
         *self == Self::default()
     }
 
-    /// The response of a base with `track_m` between its wheels whose model has the response `preset`.
+    /// Returns the response of a base with `track_m` between its wheels; `preset` is the model's.
     pub(crate) fn over(&self, preset: Response, track_m: f64) -> Response {
         let turn = self.acceleration_m_s2.map(|acceleration| 2.0 * acceleration / track_m);
         Response {
@@ -39,17 +39,19 @@ impl ResponseKeys {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {
-    /// From a command to its first effect in the odometry, as the link sees it, seconds: what a network delays is part of it.
+    /// Time from a command to its first effect in the odometry at the link, seconds. It includes
+    /// network delay.
     pub delay_s: f64,
     /// Time constant of the speed loop, seconds.
     pub lag_s: f64,
-    /// The most by which speed grows and falls; infinite for a base that the lag alone describes.
+    /// Limit of acceleration and braking; infinite for a base that the lag alone describes.
     pub acceleration_m_s2: f64,
     pub turn_acceleration_rad_s2: f64,
 }
 
 impl Response {
-    /// Measured on X80s, whose vendor gives no acceleration. Other models have its delay and lag, because no source states theirs.
+    /// Measured on X80s, whose vendor gives no acceleration. Other models use its delay and lag,
+    /// because no source states theirs.
     pub const X80: Self = Self {
         delay_s: 0.07,
         lag_s: 0.08,
@@ -57,35 +59,38 @@ impl Response {
         turn_acceleration_rad_s2: f64::INFINITY,
     };
 
-    /// What a base is trusted to do as long as nobody knows it: hardly any is later and heavier.
+    /// Returns a conservative response for an unknown base; hardly any base is later and heavier.
     pub(crate) fn careful(track_m: f64) -> Self {
         let acceleration_m_s2 = 0.3;
         let turn_acceleration_rad_s2 = 2.0 * acceleration_m_s2 / track_m;
         Self { delay_s: 0.5, lag_s: 0.0, acceleration_m_s2, turn_acceleration_rad_s2 }
     }
 
-    /// The time in which the base goes on as before, seconds: a lag delays the way by its time constant.
+    /// Returns the time for which the base continues as before, seconds; a lag counts with its time
+    /// constant.
     pub fn dead_time_s(&self) -> f64 {
         self.delay_s + self.lag_s
     }
 
-    /// The way from the command to stand until the robot of this speed stands, metres, if the command is given `after_s` seconds later
-    /// than what asked for it. `after_s` includes [`Response::dead_time_s`].
+    /// Returns the stopping distance, metres, if braking starts `after_s` seconds after its cause.
+    /// `after_s` includes [`Response::dead_time_s`].
     pub fn way_to_stop_m(&self, speed_m_s: f64, after_s: f64) -> f64 {
         speed_m_s * after_s + speed_m_s * speed_m_s / (2.0 * self.acceleration_m_s2)
     }
 
-    /// The greatest speed from which the robot stops within `room_m` metres, m/s: the inverse of [`Response::way_to_stop_m`].
+    /// Returns the greatest speed, m/s, that allows a stop within `room_m` metres: the inverse of
+    /// [`Response::way_to_stop_m`].
     pub fn speed_to_stop_within(&self, room_m: f64, after_s: f64) -> f64 {
         if self.acceleration_m_s2.is_infinite() {
             return room_m / after_s;
         }
-        // The root of v t + v^2 / 2a = d, written without a difference.
+        // Root of v t + v^2 / 2a = d, in a form without cancellation.
         let brakes = 2.0 * room_m.max(0.0) / self.acceleration_m_s2;
         2.0 * room_m / (after_s + (after_s * after_s + brakes).sqrt())
     }
 
-    /// The greatest turn rate from which the robot stops turning within `angle_rad`, rad/s, apart from its dead time.
+    /// Returns the greatest turn rate, rad/s, that allows a stop within `angle_rad`, excluding the
+    /// dead time.
     pub fn turn_to_stop_within(&self, angle_rad: f64) -> f64 {
         if self.turn_acceleration_rad_s2.is_infinite() {
             return f64::INFINITY;
@@ -94,12 +99,12 @@ impl Response {
     }
 }
 
-/// How two wheels bring a body to what it is told: each gains and loses speed at a limited rate, and so does the turn. So a base that is
-/// told to turn on the spot hardly brakes, and one that gains speed as fast as it can goes on turning as before.
+/// Base with a limited acceleration of each wheel and of the turn. A base told to turn on the spot
+/// therefore hardly brakes, and one at full acceleration keeps its turn rate.
 #[derive(Clone, Copy, Debug)]
 pub struct Base {
     pub response: Response,
-    /// Of a wheel from the middle between both, metres.
+    /// Distance of a wheel from the midpoint between both, metres.
     pub wheel_m: f64,
 }
 
@@ -108,12 +113,11 @@ impl Base {
         Self { response, wheel_m: track_m / 2.0 }
     }
 
-    /// Whether the rate is known.
     pub const fn is_limited(&self) -> bool {
         self.response.acceleration_m_s2.is_finite()
     }
 
-    /// The twist `for_s` seconds after `now`, if `wanted` acts.
+    /// Returns the twist `for_s` seconds after `now` while `wanted` acts.
     pub fn approach(&self, now: Twist, wanted: Twist, for_s: f64) -> Twist {
         if !self.is_limited() {
             return wanted;
@@ -128,16 +132,17 @@ impl Base {
     }
 }
 
-/// Commands that are remembered at most; the oldest acts at once where more are given.
+/// Limit of the pending commands; beyond it the oldest acts at once.
 const MOST_PENDING: usize = 256;
 
-/// A speed that follows commands after a delay and at a limited rate, in any unit. The lag counts as a part of the delay.
+/// Speed, in any unit, that follows commands after a delay and at a limited rate. The lag counts as
+/// part of the delay.
 #[derive(Clone, Debug)]
 pub struct ModelledSpeed {
     delay_s: f64,
-    /// A second.
+    /// Per second.
     most_change: f64,
-    /// When they act, and the commands that do not act yet.
+    /// Pending commands with their times of effect.
     pending: VecDeque<(f64, f64)>,
     target: f64,
     speed: f64,
@@ -163,17 +168,17 @@ impl ModelledSpeed {
         self.speed
     }
 
-    /// The commands that it does not act on yet, oldest first, with the times at which it will.
+    /// Returns the pending commands, oldest first, with their times of effect.
     pub fn pending(&self) -> impl Iterator<Item = (f64, f64)> {
         self.pending.iter().copied()
     }
 
-    /// What the speed is still to gain.
+    /// Returns the remaining change of speed.
     pub fn left(&self) -> f64 {
         self.target - self.speed
     }
 
-    /// Go on to the time `until_s`. Returns the way since the last call.
+    /// Advances to `until_s` and returns the distance since the last call.
     pub fn go_on(&mut self, until_s: f64) -> f64 {
         let mut way = 0.0;
         while let Some(&(acts_s, target)) = self.pending.front()
@@ -189,7 +194,6 @@ impl ModelledSpeed {
         way
     }
 
-    /// The way in so many seconds, in which the speed approaches its target.
     fn approach(&mut self, for_s: f64) -> f64 {
         // Before the first call no time has passed.
         let for_s = if for_s.is_finite() { for_s.max(0.0) } else { 0.0 };

@@ -13,35 +13,39 @@ use crate::{
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// Its numbers are those of `models.toml`.
+/// Robot model; `models.toml` holds its numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {
-    /// 1200 counts a wheel turn.
+    /// 1200 counts per wheel turn.
     #[default]
     X80,
-    /// 756 counts a wheel turn.
+    /// 756 counts per wheel turn.
     X80sv,
-    /// Clearpath's Jackal, four wheels, of which those of a side turn together; a disc around its corners. Source: its data sheet, and the
-    /// `jackal_control` package, also of its accelerations.
+    /// Clearpath Jackal: four wheels, coupled on each side, as a disc around its corners. Source:
+    /// its data sheet, and the `jackal_control` package, also for its accelerations.
     Jackal,
-    /// ROBOTIS' TurtleBot 3 Burger. Source: its e-Manual; its radius and accelerations are those of its Nav2 parameters.
+    /// ROBOTIS TurtleBot 3 Burger. Source: its e-Manual; radius and accelerations from its Nav2
+    /// parameters.
     #[serde(rename = "turtlebot3-burger")]
     TurtleBot3Burger,
-    /// ROBOTIS' TurtleBot 3 Waffle. Source: its e-Manual; its radius and accelerations are those of its Nav2 parameters.
+    /// ROBOTIS TurtleBot 3 Waffle. Source: its e-Manual; radius and accelerations from its Nav2
+    /// parameters.
     #[serde(rename = "turtlebot3-waffle")]
     TurtleBot3Waffle,
-    /// Clearpath's TurtleBot 4, a Create 3 with a laser that is turned to its left. Source of the laser's place: `turtlebot4_description`.
+    /// Clearpath TurtleBot 4: a Create 3 with a laser that is turned to its left. Source of the
+    /// laser's place: `turtlebot4_description`.
     TurtleBot4,
-    /// iRobot's Create 3. Source: the control parameters of `create3_sim`, and its documentation of
-    /// `safety_override`: by default it drives no faster than 0.306 m/s and hardly backwards. It has no laser of its
-    /// own; without rows of sensors one is taken to stand in its middle.
+    /// iRobot Create 3. Source: the control parameters of `create3_sim`, and its documentation of
+    /// `safety_override`: by default at most 0.306 m/s, and hardly backwards.
+    ///
+    /// It comes without a laser; a mission without sensor rows assumes one in its centre.
     Create3,
-    /// Yujin's Kobuki. Source: its user guide; its accelerations are those of its ROS velocity smoother.
+    /// Yujin Kobuki. Source: its user guide; accelerations from its ROS velocity smoother.
     Kobuki,
-    /// A Kobuki with a depth camera beside the laser, as a TurtleBot 2 has one.
+    /// Kobuki with a depth camera beside the laser, like a TurtleBot 2.
     TurtleBot2,
-    /// A small car on the X80's boards. Nominal, no product: the size of a model car of about 1:14.
+    /// Small car on the X80's boards. Nominal: the size of a model car of about 1:14.
     Car,
 }
 
@@ -64,54 +68,57 @@ impl Protocol {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
-    /// One of the two encoder channels, 0 or 1.
+    /// Encoder channel, 0 or 1.
     pub channel: u8,
-    /// Forward is the negative direction of this channel.
+    /// Counts fall when the robot drives forward.
     pub reversed: bool,
 }
 
 keys! {
     RobotConfig {
-        /// The preset of all values that are not written.
+        /// Preset of all unwritten values.
         model: Model,
-        /// The default is the model's: [`RobotConfig::protocol`].
+        /// Defaults to the model's: [`RobotConfig::protocol`].
         protocol: Option<Protocol>,
-        /// Written as [`crate::address::Address`]. Without it a simulated robot is started.
+        /// Address in the form of [`crate::address::Address`]. Without it the run starts a
+        /// simulated robot.
         address: Option<String>,
         rate_hz: f64 = 7.0,
         /// r of (2).
         wheel_radius_m: Option<f64>,
-        /// W of (2); a car does not use it.
+        /// W of (2); unused by a car.
         track_m: Option<f64>,
-        /// L of (3); of a car only, like the other keys of its steering.
+        /// L of (3); for cars only, like the other steering keys.
         wheelbase_m: Option<f64>,
         steering_limit_deg: Option<f64>,
         steering_rate_deg_s: Option<f64>,
-        /// Counts of a whole turn of the steering; 0 is straight ahead.
+        /// Counts per full turn of the steering; 0 is straight ahead.
         steering_counts_per_turn: Option<f64>,
         counts_per_turn: Option<f64>,
         radius_m: Option<f64>,
-        /// The corners of a body that is no disc, metres in the robot's frame.
+        /// Corners of a body other than a disc, metres in the robot's frame.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         footprint: Vec<DVec2>,
         top_speed_m_s: Option<f64>,
-        /// A car's: the driven axle.
+        /// Left wheel; on a car the driven axle.
         left: Channel = Channel { channel: 0, reversed: true },
-        /// A car's steering, positive to the left.
+        /// Right wheel; on a car the steering, positive to the left.
         right: Channel = Channel { channel: 1, reversed: false },
-        /// The link makes good that the wheels turn slower than commanded; without it [`crate::Mission::speed_trim`].
+        /// Compensates wheels that turn slower than commanded; by default
+        /// [`crate::Mission::speed_trim`].
         speed_trim: Option<bool>,
-        /// The robot says the angle of its gyro: the simulated one then has a gyro, and `firsthand check` counts on it. A robot of JSON or
-        /// an Arduino may say it without the key.
+        /// Declares a gyro, which `firsthand check` relies on and the simulated robot then has. A
+        /// JSON robot or an Arduino may report its angle without this key.
         gyro: Option<bool>,
-        /// Age at which a command no longer moves the robot.
+        /// Age at which a command expires.
         command_limit_s: f64 = 0.25,
         low_battery_v: BatteryLimits,
-        /// The least motor current of a wheel that something holds. A wheel that does not turn as told and draws less
-        /// counts as one with a dead encoder, and so does every such wheel if this is 0. The default is the simulated
-        /// robot's, because no X80 was measured.
+        /// Least motor current of a blocked wheel. A wheel that fails to turn and draws less counts
+        /// as having a dead encoder; with 0 every such wheel does. Defaults to the simulated
+        /// robot's value; no X80 was measured.
         held_current_ad: u16 = 1000,
-        /// Its values replace `odometry` before a run starts: [`crate::Mission::with_calibration`].
+        /// Calibration file whose values replace `odometry` before a run starts:
+        /// [`crate::Mission::with_calibration`].
         calibration: Option<PathBuf>,
         #[serde(skip_serializing_if = "ResponseKeys::is_default")]
         response: ResponseKeys,
@@ -120,19 +127,23 @@ keys! {
         arduino: ArduinoBoard,
         #[serde(skip_serializing_if = "Ros2Topics::is_default")]
         ros2: Ros2Topics,
-        /// At most [`crate::MOST_SENSORS`] rows; without any those of the X80.
+        /// Up to [`crate::MOST_SENSORS`] rows; by default those of the model.
         #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]
         sensors: Vec<SensorRow>,
-        /// At most [`crate::MOST_TOUCHES`] bumpers and cliff sensors; without any those of the model: [`crate::Mission::touches`].
+        /// Up to [`crate::MOST_TOUCHES`] bumpers and cliff sensors; by default those of the model:
+        /// [`crate::Mission::touches`].
         #[serde(rename = "touch", skip_serializing_if = "Vec::is_empty")]
         touches: Vec<TouchRow>,
     }
 }
 
 keys! {
-    /// Volts. A battery with the limit 0 is never low. The X80's packs have six NiMH cells, 7.2 V: at 1.1 V a cell nine
-    /// tenths of the charge are used, and the rest lasts for minutes. With a low board or motor battery the robot drives
-    /// at half speed. If one of them is below 10/11 of its limit for 2 s, which is 1.0 V a cell, the mission ends.
+    /// Low-battery limits, volts; 0 disables a limit.
+    ///
+    /// The X80's packs have six NiMH cells, 7.2 V. At 1.1 V per cell nine tenths of the charge are
+    /// used, and the rest lasts for minutes. With a low board or motor battery the robot drives at
+    /// half speed. If one of them stays below 10/11 of its limit (1.0 V per cell) for 2 s, the
+    /// mission ends.
     #[derive(Copy)]
     BatteryLimits {
         board: f64 = 6.6,
@@ -148,9 +159,9 @@ pub struct Body {
     /// W.
     pub track_m: f64,
     pub counts_per_turn: f64,
-    /// Of a disc that covers the body at any heading.
+    /// Radius of a disc that covers the body at any heading.
     pub radius_m: f64,
-    /// None for a disc.
+    /// `None` for a disc.
     pub footprint: Option<Footprint>,
     pub top_speed_m_s: f64,
     pub response: Response,
@@ -171,13 +182,13 @@ impl Steering {
         counts * std::f64::consts::TAU / self.counts_per_turn
     }
 
-    /// Counts at the steering `angle`, radians; per second where it is a rate.
+    /// Converts a steering `angle`, radians, to counts; a rate becomes counts per second.
     pub fn counts(&self, angle: f64) -> f64 {
         angle * self.counts_per_turn / std::f64::consts::TAU
     }
 }
 
-/// The speed of a car that is commanded to turn at a lower one.
+/// Speed of a car that is commanded to turn at a lower one.
 const CREEP_M_S: f64 = 0.1;
 
 impl Body {
@@ -192,18 +203,16 @@ impl Body {
         }
     }
 
-    /// The drive of its two wheels without a speed limit.
     pub fn unlimited(&self) -> DifferentialDrive {
         DifferentialDrive::new(self.wheel_radius_m, self.track_m, f64::INFINITY)
     }
 
-    /// Of a wheel at top speed, rad/s.
     pub fn top_rad_s(&self) -> f64 {
         self.top_speed_m_s / self.wheel_radius_m
     }
 
-    /// The speeds of the left and right wheel, rad/s, that a tick reaches on the way from the `told` to the `wanted` ones: they grow no
-    /// faster than the body's accelerations allow, and fall at once.
+    /// Returns the wheel speeds, rad/s, of the next tick on the way from `told` to `wanted`. They
+    /// grow within the body's accelerations and fall at once.
     pub fn reached(&self, told: [f64; 2], wanted: [f64; 2], rate_hz: f64) -> [f64; 2] {
         let Response { acceleration_m_s2, turn_acceleration_rad_s2, .. } = self.response;
         let acceleration = [acceleration_m_s2, turn_acceleration_rad_s2];
@@ -217,13 +226,12 @@ impl Body {
             now.clamp(-most, most)
         };
         let omega = grown(now.omega, then.omega, acceleration[1]);
-        // Slowing down so that the curve stays, which is free.
+        // Slowing down to keep the curve needs no limit.
         let turned = if omega == now.omega { 1.0 } else { (omega / now.omega).abs() };
         let v = grown(now.v * turned, then.v, acceleration[0]);
         drive.wheels(Twist { v, omega })
     }
 
-    /// None for a robot with two driven wheels.
     pub fn ackermann(&self) -> Option<Ackermann> {
         let steering = self.steering?;
         Some(Ackermann::new(
@@ -240,20 +248,20 @@ impl Body {
     }
 }
 
-/// What `robot.model` presets, in the words of `[robot]`.
+/// Presets of `robot.model`, as `[robot]` tables.
 static MODELS: LazyLock<BTreeMap<Model, RobotConfig>> =
     LazyLock::new(|| toml::from_str(include_str!("models.toml")).unwrap_or_default());
 
-/// Silence until a robot is lost, in command limits: longer than a short fade of the radio, and its last command has expired.
+/// Silence of a lost robot, in command limits. It outlasts short radio fades, and the last command
+/// has expired.
 const SILENT_LIMITS: f64 = 3.0;
 
 impl RobotConfig {
-    /// A robot or a sensor that says nothing for so long is silent, seconds.
+    /// Returns the time without data after which a robot or sensor counts as silent, seconds.
     pub fn silent_after_s(&self) -> f64 {
         SILENT_LIMITS * self.command_limit_s
     }
 
-    /// The presets of the model.
     pub(crate) fn preset(&self) -> &Self {
         MODELS.get(&self.model).unwrap_or(self)
     }

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 keys! {
-    /// The defaults are the names that ROS robots have. A relative name is taken from the root.
+    /// ROS 2 topics; defaults are the usual names. Relative names are resolved against the root.
     Ros2Topics {
         /// `nav_msgs/Odometry`.
         odom: String = "/odom".to_owned(),
@@ -9,17 +9,17 @@ keys! {
         scan: String = "/scan".to_owned(),
         /// `geometry_msgs/Twist`.
         cmd_vel: String = "/cmd_vel".to_owned(),
-        /// Commands are `geometry_msgs/TwistStamped` instead.
+        /// Sends commands as `geometry_msgs/TwistStamped`.
         stamped: bool,
         /// `sensor_msgs/BatteryState`.
         battery: String = "/battery_state".to_owned(),
         /// `sensor_msgs/Imu`; none by default.
         imu: Option<String>,
-        /// `irobot_create_msgs/HazardDetectionVector`, whose frames are the names of the rows of `robot.touch`; by default that of a
-        /// Create 3.
+        /// `irobot_create_msgs/HazardDetectionVector`, with names of `robot.touch` rows as frames;
+        /// by default that of a Create 3.
         hazards: Option<String>,
-        /// `sensor_msgs/Range` of sonars and infrared rangers, `sensor_msgs/LaserScan` of lasers, and
-        /// `std_msgs/Bool` of bumpers and cliff sensors, by the names of their rows.
+        /// Topics by row name: `sensor_msgs/Range` of sonars and infrared rangers,
+        /// `sensor_msgs/LaserScan` of lasers, `std_msgs/Bool` of bumpers and cliff sensors.
         ranges: BTreeMap<String, String>,
     }
 }

@@ -1,30 +1,33 @@
-//! THE table of the robot's ranging sensors. Link, mapper and simulator read it, and a reading names its sensor by
-//! the row.
+//! Table of the robot's ranging sensors, shared by link, mapper and simulator. A reading names its
+//! sensor by its row.
 //!
-//! A mission writes rows as `[[robot.sensor]]`. Without them the table is that of the X80: the front sonar as
-//! `[sonar]` says, the two beside it, and seven infrared rangers. The key `sensors` says which rows the mapper uses.
+//! A mission writes rows as `[[robot.sensor]]`. By default they are the X80's: the front sonar of
+//! `[sonar]`, its two neighbours, and seven infrared rangers. The key `sensors` selects those for
+//! the mapper.
 
 use serde::{Deserialize, Serialize};
 
 use crate::sonar::Mount;
 
-/// The limit also holds for the readings in a sample of `ranges`.
+/// Also limits the readings in a sample of `ranges`.
 pub const MOST_SENSORS: usize = 16;
-/// Of all lasers together.
+/// Limit of all lasers together.
 pub const MOST_BEAMS: usize = 16_384;
 pub const MOST_LASERS: usize = 4;
 pub const INFRARED_RANGERS: usize = 7;
 pub const SONARS: usize = 6;
 
-/// The two sonars beside the front one: degrees from it, and metres from the robot's centre.
+/// Side sonars: degrees from the front one, and metres from the robot's centre.
 const SIDE_BEARING_DEG: f64 = 45.0;
 const SIDE_FORWARD_M: f64 = 0.194;
-/// Sonars within this of the front one's bearing belong to the set "three-front".
+/// Sonars within this angle of the front one belong to the set "three-front".
 const BESIDE_FRONT_DEG: f64 = 60.0;
 
-/// Bearing from the robot's axis, degrees counter-clockwise, and distance from the centre as a share of the body's
-/// radius, in the order of the frames, on which two independent drivers agree: from left to right in front, then
-/// right, rear, left. The rangers at the sides of an X80 are 121 mm from the centre, the others at the rim.
+/// Bearing of each ranger (degrees counter-clockwise from the robot's axis), and distance from the
+/// centre over the body's radius.
+///
+/// The order is that of the frames, on which two independent drivers agree: front from left to
+/// right, then right, rear, left. Side rangers are 121 mm from the centre, the others at the rim.
 const RING: [(f64, f64); INFRARED_RANGERS] = [
     (33.75, 1.0),
     (11.25, 1.0),
@@ -38,64 +41,71 @@ const RING: [(f64, f64); INFRARED_RANGERS] = [
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SensorKind {
-    /// A sonar: something stands on the arc of an echo, and nothing that is square to the beam stands nearer.
+    /// Sonar: an echo means something on its arc, and no nearer surface square to the beam.
     #[default]
     Cone,
-    /// An infrared ranger: the ray is free up to where it ends.
+    /// Infrared ranger: the ray is free up to its end.
     Ray,
-    /// A laser, or a depth camera: a fan of beams, each of which is free up to where it ends.
+    /// Laser or depth camera: a fan of beams, each free up to its end.
     Scan,
 }
 
-/// A product, for the mapper's model of its readings.
+/// Product, which selects the mapper's measurement model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorModel {
-    /// The DUR5200 of the X80, 40 kHz, a cone. Source: the X80's user manual, 2006; `sonar_model` of the mapper has its numbers.
+    /// DUR5200 of the X80: a cone, 40 kHz. Source: X80 user manual, 2006; the mapper's
+    /// `sonar_model` has its numbers.
     Dur5200,
-    /// The infrared ranger of the X80, 10 to 80 cm, a ray. Source: the formula in the X80's user manual, 2006; `infrared_model` of the
-    /// mapper has its numbers.
+    /// Infrared ranger of the X80: a ray, 10 to 80 cm. Source: formula in the X80 user manual,
+    /// 2006; the mapper's `infrared_model` has its numbers.
     X80Infrared,
-    /// Hokuyo's UST-10LX, a laser: 270 degrees in 1,081 beams, 0.06 to 10 m, 40 Hz. Source: its specification, C-42-04077, 2014.
+    /// Hokuyo UST-10LX, a laser: 270 degrees in 1,081 beams, 0.06 to 10 m, 40 Hz. Source: its
+    /// specification, C-42-04077, 2014.
     #[serde(rename = "ust-10lx")]
     Ust10lx,
-    /// Slamtec's RPLIDAR A1, a laser: 360 degrees, 0.15 to 12 m, 5.5 Hz, 8,000 readings a second. Source: its data sheet, 2020.
+    /// Slamtec RPLIDAR A1, a laser: 360 degrees, 0.15 to 12 m, 5.5 Hz, 8,000 readings per second.
+    /// Source: its data sheet, 2020.
     RplidarA1,
-    /// Slamtec's RPLIDAR C1, a laser: 360 degrees in 500 readings, 0.05 to 12 m, 10 Hz, 30 mm. Source: its data sheet, 2023.
+    /// Slamtec RPLIDAR C1, a laser: 360 degrees in 500 readings, 0.05 to 12 m, 10 Hz, 30 mm.
+    /// Source: its data sheet, 2023.
     RplidarC1,
-    /// The LDS-02 of a TurtleBot 3, a laser: 360 degrees in steps of 1, 0.16 to 8 m, 5 Hz. Source: ROBOTIS e-Manual.
+    /// LDS-02 of a TurtleBot 3, a laser: 360 degrees in 1-degree steps, 0.16 to 8 m, 5 Hz. Source:
+    /// ROBOTIS e-Manual.
     #[serde(rename = "lds-02")]
     Lds02,
-    /// Intel's RealSense D435, a depth camera, as a fan: each beam is the nearest thing in a column of its picture that the body can touch,
-    /// as ROS's `pointcloud_to_laserscan` makes it. 87 by 58 degrees, 0.3 to 3 m, 2 % at 2 m. Source: its product brief, 2018; two
-    /// columns a degree are nominal.
+    /// Intel RealSense D435, a depth camera as a fan: 87 by 58 degrees, 0.3 to 3 m, 2 % at 2 m.
+    /// Source: its product brief, 2018.
+    ///
+    /// Each beam is the nearest tangible thing in an image column, as in ROS
+    /// `pointcloud_to_laserscan`. Two columns per degree are nominal.
     D435,
 }
 
-/// A laser that may have a serial line of its own.
+/// Laser that can have a serial line of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rplidar {
     pub baud: u32,
-    /// The time from one measurement of a standard scan to the next.
+    /// Time between two measurements of a standard scan.
     pub sample_us: u16,
     pub turns_hz: f64,
-    /// Its motor stands while the line's DTR is set.
+    /// The motor stops while DTR of the line is set.
     pub stands_by_dtr: bool,
-    /// The byte of its model in its own words.
+    /// Model byte in the device's own protocol.
     pub number: u8,
 }
 
-/// What the source of a [`SensorModel`] says of it.
+/// Values from the source of a [`SensorModel`].
 pub(crate) struct Product {
     pub(crate) kind: SensorKind,
-    /// A ray has 0.
+    /// 0 for a ray.
     field_of_view_deg: f64,
     reach_m: f64,
     least_m: f64,
-    /// A sensor that is no laser has 1.
+    /// 1 except for lasers.
     beams: usize,
     noise: (f64, f64),
-    /// The upright field of view of a depth camera, degrees; 0 of others.
+    /// Vertical field of view of a depth camera, degrees; 0 otherwise.
     tall_deg: f64,
 }
 
@@ -115,7 +125,8 @@ impl SensorModel {
         Product { kind, field_of_view_deg, reach_m, least_m, beams, noise, tall_deg }
     }
 
-    /// An A1 measures 8,000 times a second, of which its line carries 2,304 in a standard scan: it says one in four.
+    /// Returns the serial properties of an RPLIDAR. An A1 measures 8,000 times per second, of which
+    /// a standard scan carries 2,304; it states one in four.
     pub const fn rplidar(self) -> Option<Rplidar> {
         match self {
             Self::RplidarA1 => Some(Rplidar {
@@ -144,9 +155,10 @@ impl SensorModel {
         }
     }
 
-    /// Reach at a black surface, which reflects a tenth of the light. The specification of the UST-10LX gives 4 m, and
-    /// 10 m for white. The others are given the same share of their reach, which is nominal: Slamtec gives it for its
-    /// RPLIDAR A3 (black 10 m, white 25 m).
+    /// Returns the reach at a black surface, which reflects a tenth of the light.
+    ///
+    /// The UST-10LX specification gives 4 m, against 10 m for white. Others get the same share,
+    /// which is nominal: Slamtec states it for its RPLIDAR A3 (black 10 m, white 25 m).
     pub const fn black_reach_m(self) -> f64 {
         0.4 * self.reach_m()
     }
@@ -163,20 +175,22 @@ impl SensorModel {
         self.product().least_m
     }
 
-    /// The rise of its highest beam, and the fall of its lowest, a metre; 0 for a laser, whose beams are level.
+    /// Returns the rise of the highest beam and the fall of the lowest per metre; 0 for lasers.
     pub fn rise(self) -> f64 {
         (0.5 * self.product().tall_deg).to_radians().tan()
     }
 
-    /// The range from which a beam passes no thing that the body can touch, metres: a depth camera looks over and under what is nearer.
+    /// Returns the range from which a beam detects all that the body can touch, metres. A depth
+    /// camera looks over and under nearer things.
     pub fn clears_from_m(self) -> f64 {
         let Product { least_m, tall_deg, .. } = self.product();
         if tall_deg > 0.0 { least_m } else { 0.0 }
     }
 
-    /// Standard deviation of a range: metres, and a share of it. The manuals give 15 mm up to half a metre and 5 %
-    /// beyond for the LDS-02, less than 1 % for the A1, 40 mm at most for the UST-10LX: these are taken as two
-    /// deviations.
+    /// Returns the standard deviation of a range: metres, and a share of the range.
+    ///
+    /// The manuals give 15 mm up to half a metre and 5 % beyond for the LDS-02. They give less than
+    /// 1 % for the A1, and at most 40 mm for the UST-10LX. These count as two deviations.
     pub const fn beam_noise(self) -> (f64, f64) {
         self.product().noise
     }
@@ -187,32 +201,33 @@ impl SensorModel {
 pub struct SensorRow {
     pub name: String,
     pub kind: SensorKind,
-    /// Of an X80: a cone has the sonar's index in the standard frame, 0 to 5, a ray the infrared ranger, 0 to 6. Other robots' protocols
-    /// have no channels.
+    /// Channel of an X80. A cone has the sonar's index in the standard frame (0 to 5), a ray the
+    /// infrared ranger (0 to 6). Other protocols have no channels.
     pub channel: Option<u8>,
-    /// Distance from the robot's centre along its bearing.
+    /// Distance from the robot's centre along the bearing.
     pub forward_m: f64,
-    /// delta of (19), from the robot's axis counter-clockwise.
+    /// delta of (19), counter-clockwise from the robot's axis.
     pub bearing_deg: f64,
     /// Angle from the bearing to a laser's middle beam, counter-clockwise; 0 looks outward.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub turned_deg: f64,
-    /// 180 for a laser that is mounted upside down, otherwise 0.
+    /// 180 for a laser mounted upside down, otherwise 0.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub roll_deg: f64,
-    /// A laser's, above the ground, which the simulator alone reads; by default `simulation.heights.infrared_m`.
+    /// Height of a laser above the ground, for the simulator only; by default
+    /// `simulation.heights.infrared_m`.
     pub height_m: Option<f64>,
-    /// The default is the model's; a ray has none.
+    /// Defaults to the model's; a ray has none.
     pub field_of_view_deg: Option<f64>,
-    /// The default is the model's.
+    /// Defaults to the model's.
     pub reach_m: Option<f64>,
-    /// Beams lie evenly over the field of view; the default is the model's.
+    /// Beams, evenly spaced over the field of view; by default the model's.
     pub beams: Option<u16>,
-    /// A sensor may measure less often than the frames come. Readings between are not used.
+    /// Measurement rate, if below the frame rate. Frames in between are ignored.
     pub rate_hz: Option<f64>,
-    /// The default is the X80's.
+    /// Defaults to the X80's.
     pub model: Option<SensorModel>,
-    /// Of an RPLIDAR with a wire of its own, written as that of the robot.
+    /// Address of an RPLIDAR with its own line, in the form of the robot's address.
     pub address: Option<String>,
 }
 
@@ -221,11 +236,11 @@ fn is_zero(deg: &f64) -> bool {
 }
 
 keys! {
-    /// The front sonar of a robot without `[[robot.sensor]]`.
+    /// Front sonar of a robot without `[[robot.sensor]]`.
     SonarConfig {
-        /// The index among the six of the standard frame.
+        /// Index among the six of the standard frame.
         index: u8 = 1,
-        /// Distance from the robot's centre along its bearing; the paper writes W/2.
+        /// Distance from the robot's centre along the bearing; W/2 in the paper.
         forward_m: f64 = 0.1915,
         /// delta of (19), from the robot's axis.
         bearing_deg: f64,
@@ -236,13 +251,13 @@ keys! {
 pub struct Sensor {
     pub name: String,
     pub kind: SensorKind,
-    /// The row's, or the least that no other sensor of its kind has.
+    /// Channel of the row, or the lowest free one of its kind.
     pub channel: u8,
     pub mount: Mount,
-    /// A ray has 0.
+    /// 0 for a ray.
     pub field_of_view_deg: f64,
     pub reach_m: f64,
-    /// A sensor that is no laser has 1.
+    /// 1 except for lasers.
     pub beams: usize,
     pub is_upside_down: bool,
     pub height_m: Option<f64>,
@@ -275,19 +290,20 @@ impl Sensor {
         }
     }
 
-    /// Bearing of the first beam from the sensor's own, and the angle from beam to beam, radians counter-clockwise.
+    /// Returns the first beam's angle from the sensor's axis, and the beam spacing, radians
+    /// counter-clockwise.
     pub fn fan(&self) -> (f64, f64) {
         let wide = self.field_of_view_deg.to_radians();
-        // The first and last beam of a whole turn would coincide.
+        // In a full turn the first and the last beam would coincide.
         let steps = if wide >= std::f64::consts::TAU - 1e-9 { self.beams } else { self.beams - 1 };
         (-wide / 2.0, wide / steps.max(1) as f64)
     }
 
-    /// The robot's frame of a laser that is mounted upside down has its beams in the other order: mirrored on its middle beam. The mirror
-    /// image of the mirror image is the original.
+    /// Reverses the beams of a laser mounted upside down about its middle beam. Applying it twice
+    /// restores the order.
     pub fn mirror<T>(&self, beams: &mut [T]) {
         let is_circle = self.field_of_view_deg >= 360.0;
-        // The first beam of a whole turn looks back, and so does its mirror image.
+        // In a full turn the first beam looks back and is its own mirror image.
         if let Some(mirrored) = beams.get_mut(usize::from(is_circle)..)
             && self.is_upside_down
         {
@@ -295,7 +311,7 @@ impl Sensor {
         }
     }
 
-    /// The number of a beam before [`Sensor::mirror`] or after it.
+    /// Returns the index of a beam on the other side of [`Sensor::mirror`].
     pub fn mirrored(&self, beam: usize) -> usize {
         match (self.is_upside_down, self.field_of_view_deg >= 360.0) {
             (false, _) => beam,
@@ -304,8 +320,8 @@ impl Sensor {
         }
     }
 
-    /// Angle from the robot's axis to where it turns to look at a place. For a laser that sees all around it is the
-    /// bearing: such a laser is never turned.
+    /// Returns the robot's angle towards a place at which it looks. For a laser that sees all
+    /// around it is the bearing.
     pub fn faces_rad(&self) -> f64 {
         match self.field_of_view_deg >= 360.0 {
             true => self.mount.bearing_rad,
@@ -321,17 +337,17 @@ impl Sensor {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sensors {
-    /// The cone whose bearing is the least.
+    /// Sensor nearest to the bearing of `[sonar]`; cones take precedence.
     Front,
     #[serde(rename = "front+infrared")]
     FrontInfrared,
-    /// The front sonar and the cones within 60 degrees of it.
+    /// Front sonar and the cones within 60 degrees of it.
     ThreeFront,
     Laser,
     All,
 }
 
-/// The sensors on a robot with frames at `rate_hz`; those of `set` are marked as used.
+/// Builds the sensor table at `rate_hz` and marks the rows of `set` as used.
 pub(crate) fn table(
     rows: &[SensorRow],
     rate_hz: f64,
@@ -368,8 +384,7 @@ pub(crate) fn table(
     table
 }
 
-/// Without rows of the mission it is the first, wherever `[sonar]` says that it looks. A robot without sonars has
-/// instead the sensor that looks most nearly there.
+/// Returns the row nearest to the bearing of `[sonar]`, of a cone if there is one.
 pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     let ahead = |sensor: &Sensor| (sensor.bearing_deg() - sonar.bearing_deg).abs();
     let any_cone = table.iter().any(|sensor| sensor.kind == SensorKind::Cone);
@@ -378,7 +393,7 @@ pub(crate) fn front(table: &[Sensor], sonar: &SonarConfig) -> Option<usize> {
     candidates.min_by(|(_, a), (_, b)| ahead(a).total_cmp(&ahead(b))).map(|(index, _)| index)
 }
 
-/// The car has the same boards and sensors.
+/// Returns the rows of an X80; the car has the same boards and sensors.
 pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
     let cone = |name, beside: u8, forward_m, bearing_deg| SensorRow {
         name: String::from(name),

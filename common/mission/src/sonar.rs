@@ -1,7 +1,7 @@
-//! THE mounting of a ranging sensor, (19), for simulator and mapper.
+//! Mounting of a ranging sensor (19), for simulator and mapper.
 //!
-//! (19) puts a hit at distance S + W/2 from the robot's centre along theta + delta. So the ranger is on that line,
-//! looking outward. A laser may be turned from that line.
+//! (19) puts a hit at distance S + W/2 from the robot's centre along theta + delta. The ranger is
+//! therefore on that line and looks outward; a laser may be turned.
 
 use glam::DVec2;
 
@@ -9,16 +9,16 @@ use crate::kinematics::Pose2;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mount {
-    /// Distance from the robot's centre along the bearing; the paper writes W/2.
+    /// Distance from the robot's centre along the bearing; W/2 in the paper.
     pub forward_m: f64,
-    /// delta: from the robot's axis, counter-clockwise.
+    /// delta: counter-clockwise from the robot's axis.
     pub bearing_rad: f64,
-    /// Angle from the bearing to where it looks, counter-clockwise; 0 is outward.
+    /// Angle from the bearing to the viewing direction, counter-clockwise; 0 is outward.
     pub turned_rad: f64,
 }
 
 impl Mount {
-    /// The heading is the direction of the beam, or of the middle one.
+    /// Returns the sensor's pose, with the heading of its middle beam.
     pub fn on(&self, robot: Pose2) -> Pose2 {
         let outward = robot.heading + self.bearing_rad;
         let position = robot.position + self.forward_m * DVec2::from_angle(outward);
@@ -29,7 +29,7 @@ impl Mount {
         self.bearing_rad + self.turned_rad
     }
 
-    /// The point of (19), metres: `range_m` away on the axis of a ranger on `robot`.
+    /// Returns the point of (19), metres, at `range_m` on the axis of a ranger on `robot`.
     pub fn hit(&self, robot: Pose2, range_m: f64) -> DVec2 {
         let ranger = self.on(robot);
         ranger.position + ranger.axis() * range_m

@@ -1,4 +1,4 @@
-//! Bumpers and cliff sensors, which say no distance, but whether they feel something: rows of `[[robot.touch]]`.
+//! Bumpers and cliff sensors, which report contact without distance: rows of `[[robot.touch]]`.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,9 +7,9 @@ pub const MOST_TOUCHES: usize = 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TouchKind {
-    /// Something presses an arc of the body's edge.
+    /// Pressure on an arc of the body's edge.
     Bumper,
-    /// There is no floor below a place of the body.
+    /// Missing floor below a point of the body.
     Cliff,
 }
 
@@ -18,12 +18,12 @@ pub enum TouchKind {
 pub struct TouchRow {
     pub name: String,
     pub kind: TouchKind,
-    /// From the robot's axis counter-clockwise, to the middle of a bumper's arc.
+    /// Counter-clockwise from the robot's axis, to the middle of a bumper's arc.
     pub bearing_deg: f64,
-    /// A bumper's whole arc.
+    /// Width of a bumper's arc.
     #[serde(default = "wide_deg")]
     pub wide_deg: f64,
-    /// Distance of a cliff sensor from the robot's centre; the default is the body's radius.
+    /// Distance of a cliff sensor from the robot's centre; by default the body's radius.
     pub forward_m: Option<f64>,
 }
 

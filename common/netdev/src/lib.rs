@@ -1,9 +1,11 @@
-//! The network interfaces, in place of the crate `netdev` of which rustdds asks them.
+//! Network interfaces for rustdds, in place of the crate `netdev`.
 //!
-//! rustdds 0.15.1 sends a message in fragments if it is larger than the MTU of the interface to its reader. It writes a byte too many into
-//! a fragment that names the request which it answers (`DataFrag::write_to` writes an `Option`, not what is in it): no client reads that,
-//! and a build with assertions loses its thread of DDS. So each interface here takes the largest datagram, which IP divides, as it does
-//! those of Fast DDS. This crate can go once rustdds writes such fragments.
+//! rustdds 0.15.1 fragments messages larger than the MTU of the interface to its reader. A fragment
+//! that names its request gets one byte too many (`DataFrag::write_to` writes an `Option`, not its
+//! content). Clients cannot read it, and a build with assertions loses its DDS thread.
+//!
+//! Each interface here therefore reports the largest datagram, which IP fragments. Remove this
+//! crate once rustdds is fixed.
 
 use std::net::{Ipv4Addr, Ipv6Addr};
 
@@ -13,7 +15,7 @@ use nix::{
     sys::socket::SockaddrStorage,
 };
 
-/// The most bytes of a packet of IP.
+/// Most bytes of an IP packet.
 const LARGEST: u32 = 65_535;
 
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +34,7 @@ impl<A: Copy> Net<A> {
     }
 }
 
-/// An interface with one of its addresses, or with none that is known.
+/// Interface with one of its addresses, or without a known one.
 #[derive(Clone, Debug)]
 pub struct Interface {
     pub index: u32,
@@ -52,7 +54,7 @@ impl Interface {
     }
 }
 
-/// Empty if the system does not list its interfaces.
+/// Returns the interfaces; empty if the system does not list them.
 pub fn get_interfaces() -> Vec<Interface> {
     let ipv4 = |at: SockaddrStorage| at.as_sockaddr_in().map(|at| at.ip());
     let ipv6 = |at: SockaddrStorage| at.as_sockaddr_in6().map(|at| at.ip());

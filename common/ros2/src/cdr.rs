@@ -1,13 +1,13 @@
-//! CDR as the OMG's RTPS carries it: plain, version 1, either byte order. A message names its fields once, and the same pass over them reads
-//! and writes. Each read checks its bounds, and no length from the wire is trusted.
+//! CDR in RTPS of the OMG: plain, version 1, either byte order. One pass over a message's fields
+//! reads or writes it. Reads check bounds, and lengths from the wire are untrusted.
 
 use thiserror::Error;
 
 use crate::msg::Release;
 
-/// Bytes; ROS uses texts for the names of frames.
+/// Most bytes of a text; ROS uses texts for frame names.
 pub const LONGEST_TEXT: usize = 256;
-/// The bytes before the message name its encoding.
+/// Length of the encoding's name before the message.
 pub(crate) const ENCAPSULATION: usize = 4;
 
 #[derive(Debug, PartialEq, Eq, Error)]
@@ -26,21 +26,22 @@ pub enum Malformed {
     Layouts(usize),
 }
 
-/// For callers that report the reason as text.
+/// Converts for callers that report the reason as text.
 impl From<Malformed> for String {
     fn from(error: Malformed) -> Self {
         error.to_string()
     }
 }
 
-/// A pass over the fields of a message in their order on the wire.
+/// Pass over the fields of a message in wire order.
 pub trait Pass {
     fn release(&self) -> Release;
 
-    /// Passes a number, the least significant of its bytes first.
+    /// Passes a number, least significant byte first.
     fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Malformed>;
 
-    /// Returns how many elements the list has that is `length` long before the pass, and may have `most`.
+    /// Returns the number of elements of a list, which has `length` before the pass and at most
+    /// `most`.
     fn length(&mut self, length: usize, most: usize) -> Result<usize, Malformed>;
 }
 
@@ -48,7 +49,8 @@ pub trait Cdr: Sized {
     /// Passes its fields. Lists and texts have at most `most` elements.
     fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed>;
 
-    /// Reads a message in the newest layout that fits. What a later release appends is ignored.
+    /// Reads a message in the newest layout that fits; fields appended by later releases are
+    /// ignored.
     fn decode(payload: &[u8]) -> Result<Self, Malformed>
     where
         Self: Default,
@@ -58,7 +60,8 @@ pub trait Cdr: Sized {
         read(Release::Common).or_else(|error| older().ok_or(error))
     }
 
-    /// Reads a message in the only layout in which `payload` has nothing else, with the releases that have it, the newest first.
+    /// Reads a message in the only layout that consumes all of `payload`, and returns the releases
+    /// with it, the newest first.
     fn decode_whole(payload: &[u8]) -> Result<(Vec<Release>, Self), Malformed>
     where
         Self: Clone + Default,
@@ -80,13 +83,14 @@ pub trait Cdr: Sized {
 
     fn encode_for(mut self, release: Release) -> Vec<u8> {
         let mut writer = Writer { bytes: vec![0, 1, 0, 0], release };
-        // What is written is never malformed.
+        // Encoding never yields a malformed message.
         let _ = self.pass(&mut writer, usize::MAX);
         writer.bytes
     }
 }
 
-/// Decodes a message and reports whether it ends the payload. RTPS pads a payload to a multiple of 4 bytes.
+/// Decodes a message and returns whether it ends the payload. RTPS pads a payload to a multiple of
+/// 4 bytes.
 pub(crate) fn read<T: Cdr + Default>(
     payload: &[u8],
     release: Release,
@@ -103,7 +107,7 @@ pub(crate) fn read<T: Cdr + Default>(
 }
 
 struct Reader<'a> {
-    /// Alignment counts from its start.
+    /// Payload; alignment counts from its start.
     bytes: &'a [u8],
     at: usize,
     is_big: bool,
@@ -131,14 +135,14 @@ impl Pass for Reader<'_> {
         length.pass(self, most)?;
         match length as usize {
             length if length > most => Err(Malformed::Long(length, most)),
-            // Each element has a byte or more.
+            // Each element has at least one byte.
             length if length > self.bytes.len() - self.at => Err(Malformed::Short),
             length => Ok(length),
         }
     }
 }
 
-/// The least significant byte comes first.
+/// Writer in little-endian order.
 struct Writer {
     bytes: Vec<u8>,
     release: Release,
@@ -186,7 +190,8 @@ impl Cdr for bool {
     }
 }
 
-/// A zero byte ends it on the wire, unless an implementation writes none for an empty text. What is not UTF-8 is replaced.
+/// Text, with a final zero byte on the wire; some implementations omit it for an empty text.
+/// Invalid UTF-8 is replaced.
 impl Cdr for String {
     fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
         let mut bytes = [self.as_bytes(), &[0]].concat();
@@ -205,7 +210,7 @@ impl<T: Cdr, const N: usize> Cdr for [T; N] {
     }
 }
 
-/// It grows as its elements come.
+/// Grows as its elements arrive.
 impl<T: Cdr + Default> Cdr for Vec<T> {
     fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
         let length = pass.length(self.len(), most)?;

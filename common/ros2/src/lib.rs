@@ -1,17 +1,18 @@
-//! Shared by the link to a robot of ROS 2 and the bridge. This folder alone names the library that speaks DDS.
+//! ROS 2 code shared by the link and the bridge. Only this crate depends on the DDS library.
 //!
-//! The crate `ros2-client` 0.12 (on the same rustdds; 99 crates for 64 here) is not used: it has a task that spins, and its types are of one
-//! release. A server of an action there knows one way to name a request, so it answers clients of Fast DDS or of Cyclone DDS; keeps one
-//! client that waits for the result of a goal; and does not go on with the goals of the process before it.
+//! The crate `ros2-client` 0.12, on the same rustdds, has 99 crates instead of 64, a spinning task,
+//! and types of one release. Its action server identifies requests in one way, and so serves
+//! clients of either Fast DDS or Cyclone DDS. It keeps one waiting client per goal, and drops the
+//! goals of a previous process.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`topic`] | topics as DDS knows them |
+//! | [`topic`] | topics as DDS names them |
 //! | [`cdr`] | the encoding of messages |
-//! | [`msg`] | the messages of the files in `interfaces`, which `build.rs` writes |
-//! | [`parts`] | what many messages are made of |
+//! | [`msg`] | messages of the files in `interfaces`, written by `build.rs` |
+//! | [`parts`] | common parts of messages |
 //! | [`messages`] | messages that a robot publishes |
-//! | `participant` | a DDS domain's readers and writers, with the feature `dds` |
+//! | `participant` | readers and writers of a DDS domain, with the feature `dds` |
 
 pub mod cdr;
 pub mod messages;

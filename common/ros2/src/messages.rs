@@ -1,4 +1,4 @@
-//! Messages that a robot publishes. Lengths are metres, angles radians, times seconds unless a name says otherwise.
+//! Messages that a robot publishes, in metres, radians and seconds unless a name says otherwise.
 
 use crate::{
     cdr::Cdr as _,
@@ -9,10 +9,9 @@ use crate::{
     parts::Pose,
 };
 
-/// The count of numbers in the covariance of a pose or a twist.
+/// Numbers in the covariance of a pose or a twist.
 pub const COVARIANCE: usize = 36;
 
-/// A speed ahead and a turn rate.
 pub fn twist([v, omega]: [f64; 2]) -> Twist {
     Twist {
         linear: Vector3 { x: v, ..Vector3::default() },
@@ -20,7 +19,7 @@ pub fn twist([v, omega]: [f64; 2]) -> Twist {
     }
 }
 
-/// With the covariances of the pose and of the speeds.
+/// Encodes odometry with the covariances of pose and speeds.
 pub fn odometry(
     header: Header,
     child: &str,
@@ -32,7 +31,7 @@ pub fn odometry(
     Odometry { header, child_frame_id: child.to_owned(), pose, twist }.encode()
 }
 
-/// `times_s` are those from beam to beam and from scan to scan.
+/// Encodes a scan; `times_s` are the times between beams and between scans.
 pub fn scan(
     header: Header,
     [first, step]: [f64; 2],
@@ -59,7 +58,6 @@ pub fn scan(
     .encode()
 }
 
-/// It states the voltage only.
 pub fn battery(header: Header, volts: f64) -> Vec<u8> {
     BatteryState {
         header,

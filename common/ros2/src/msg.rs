@@ -1,6 +1,7 @@
-//! A type for each message in the files of `interfaces`, and the releases of ROS that differ in them. `build.rs` writes them.
+//! Types of the messages in `interfaces`, and the ROS releases that differ in them, written by
+//! `build.rs`.
 
-// Nobody reads what is written.
+// Generated code.
 #![allow(clippy::derivable_impls, clippy::possible_missing_else, clippy::unnecessary_cast)]
 
 use crate::cdr::{Cdr, LONGEST_TEXT, Malformed, Pass};

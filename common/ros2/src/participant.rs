@@ -1,6 +1,6 @@
-//! A participant of a DDS domain. Messages are payloads, not decoded.
+//! Participant of a DDS domain. Messages are undecoded payloads.
 //!
-//! The library's threads ring the participant's descriptor; no call here waits.
+//! The library's threads signal the participant's descriptor; calls here never wait.
 
 use std::{
     collections::BTreeMap,
@@ -32,17 +32,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::{cdr::ENCAPSULATION, topic::Topic};
 
-/// A longer message is cut, and its decoder refuses what it needs beyond: a map of 8192 x 8192 cells has 67 MB.
+/// Longest message; the decoder rejects a truncated one. A map of 8192 x 8192 cells has 67 MB.
 const LONGEST: usize = 1 << 27;
-/// A longer reply does not fit into a datagram.
+/// Longest reply that fits into a datagram.
 const LONGEST_REPLY: usize = 65_000;
-/// Messages skipped at a time because they cannot be decoded.
+/// Undecodable messages skipped at a time.
 const MOST_BROKEN: usize = 16;
-/// Writers of a [`LateReader`]'s topic that are tracked; further ones do not open it.
+/// Tracked writers of a [`LateReader`]'s topic; further ones do not open it.
 const MOST_WRITERS: usize = 256;
 
 type Payload = Vec<u8>;
-/// DDS knows a participant, a reader or a writer by it.
+/// DDS identifier of a participant, a reader or a writer.
 pub type Gid = [u8; 16];
 
 #[derive(Clone, Copy, Debug)]
@@ -81,7 +81,7 @@ impl DeserializerAdapter<Payload> for Raw {
 
     fn supported_encodings() -> &'static [RepresentationIdentifier] {
         use RepresentationIdentifier as Encoding;
-        // The decoder of the messages refuses other encodings, with the reason.
+        // The message decoder rejects other encodings with a reason.
         const { &[Encoding::CDR_LE, Encoding::CDR_BE, Encoding::CDR2_LE, Encoding::CDR2_BE] }
     }
 
@@ -125,7 +125,7 @@ struct Bell(OwnedFd);
 
 impl Wake for Bell {
     fn wake(self: Arc<Self>) {
-        // The write fails if the descriptor was rung very often, and the descriptor is readable then.
+        // The write fails only on counter overflow, and the descriptor is readable then.
         let _ = write(&self.0, &1_u64.to_ne_bytes());
     }
 }
@@ -138,8 +138,8 @@ pub struct Participant {
 }
 
 impl Participant {
-    /// Join by the interface with the address `only`, or else by all; by this machine's alone if the environment says
-    /// so as it does for ROS. Fails if DDS cannot start.
+    /// Joins by the interface with the address `only`, else by all, or only on this machine if the
+    /// ROS environment says so. Fails if DDS cannot start.
     pub fn join(domain: u16, only: Option<Ipv4Addr>) -> io::Result<Self> {
         let inner = joined(domain, only)?;
         let rung = eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?;
@@ -147,9 +147,11 @@ impl Participant {
         Ok(Self { inner, only, rung, bell })
     }
 
-    /// Join anew with the same descriptor; earlier readers and writers are of no use any more. Fails if DDS cannot
-    /// start. The library's threads end when a call of theirs is interrupted, as it is when the process is stopped
-    /// and continued, and nothing says so.
+    /// Rejoins with the same descriptor; earlier readers and writers become useless. Fails if DDS
+    /// cannot start.
+    ///
+    /// The library's threads end silently if a call is interrupted, as when the process is stopped
+    /// and continued.
     pub fn rejoin(&mut self) -> io::Result<()> {
         self.inner = joined(self.inner.domain_id(), self.only)?;
         Ok(())
@@ -186,13 +188,13 @@ impl Participant {
         topic.map_err(io::Error::other)
     }
 
-    /// Ask the readers after this call: the descriptor becomes readable again for messages that come after a reader
-    /// had none.
+    /// Resets the descriptor. Take from the readers afterwards: it signals only messages that come
+    /// after a reader was empty.
     pub fn unring(&self) {
         let _ = read(&self.rung, &mut [0_u8; 8]);
     }
 
-    /// Other threads ring the descriptor with it.
+    /// Returns a handle with which other threads signal the descriptor.
     pub fn bell(&self) -> Waker {
         self.bell.clone()
     }
@@ -202,11 +204,12 @@ impl Participant {
     }
 }
 
-/// Cyclone DDS puts it before a request: the client's number and that of the request, 8 bytes each. The reply repeats
-/// it.
+/// Length of Cyclone DDS's request prefix, repeated in the reply: client and request numbers of 8
+/// bytes each.
 const CYCLONE_HEADER: usize = 16;
 
-/// Fast DDS names the sender beside the message, as the standard has it, Cyclone DDS in the message. A later process may reply to it.
+/// Identity of a request. Fast DDS sends it beside the message, by the standard; Cyclone DDS
+/// inside. A later process may reply.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Request {
     identity: SampleIdentity,
@@ -237,10 +240,10 @@ impl Reader {
     pub fn take(&self) -> Option<Message> {
         self.inner.set_waker(Some(self.bell.clone()));
         self.inner.drain_read_notifications();
-        // A message in an encoding that is unknown here is an error, and the next may be another.
+        // A message in an unsupported encoding is an error, and so may be the next.
         let message = (0..MOST_BROKEN).find_map(|_| self.inner.try_take_one().ok())??;
         let asked = message.related_sample_identity();
-        // A client of Fast DDS names the reader that waits for the reply; the number is that of the request itself.
+        // A Fast DDS client names the waiting reader; the number is that of the request itself.
         let writer_guid = asked.map_or(message.writer_guid, |asked| asked.writer_guid);
         let after_encapsulation = message.sample.get(ENCAPSULATION..).unwrap_or_default();
         let header = match asked {
@@ -253,7 +256,7 @@ impl Reader {
         Some(Message { payload: message.sample, from, request })
     }
 
-    /// A writer that floods the topic makes them endless.
+    /// Yields the messages; endless while a writer floods the topic.
     pub fn messages(&self) -> impl Iterator<Item = Message> {
         std::iter::from_fn(|| self.take())
     }
@@ -263,9 +266,8 @@ impl Reader {
     }
 }
 
-/// The writers of one topic, and whether each is lost.
-///
-/// The library may report a writer again after it reported that it is lost, so lost writers stay until their places are needed.
+/// Writers of one topic, and whether each is lost. The library may report a lost writer again, so
+/// lost writers stay until their places are needed.
 #[derive(Debug, Default)]
 struct Writers(BTreeMap<GUID, bool>);
 
@@ -292,15 +294,17 @@ impl Writers {
     }
 }
 
-/// A reader for messages that a node publishes once.
+/// Reader for messages that a node publishes once.
 ///
-/// A node publishes when it knows a reader. The library drops messages of writers that it does not know yet. Fast DDS sends them again
-/// after its heartbeat period of 3 s, and `ros2 topic pub --once` ends before. This reader therefore opens when its writer is known.
+/// A node publishes when it knows a reader, but the library drops messages of writers that it does
+/// not know yet. Fast DDS repeats them after its heartbeat period of 3 s, too late for
+/// `ros2 topic pub --once`. This reader therefore opens only once its writer is known.
 ///
-/// Nodes that join later also see the closed readers of a participant. This reader therefore has a separate participant, and joins anew
-/// after its last writer.
+/// Nodes that join later also see a participant's closed readers. This reader therefore has a
+/// separate participant, and rejoins after its last writer.
 ///
-/// It misses a message that is published while another writer keeps it open, or within a millisecond after the node knows the reader.
+/// It misses a message that is published while another writer keeps it open, or within a
+/// millisecond after the node knows the reader.
 #[derive(Debug)]
 pub struct LateReader {
     participant: Participant,
@@ -342,12 +346,12 @@ impl LateReader {
 pub struct Writer(DataWriter<Payload, Raw>);
 
 impl Writer {
-    /// Returns whether the library took it; it takes none while it is busy.
+    /// Returns whether the library took it; a busy library takes none.
     pub fn write(&self, payload: Payload) -> bool {
         self.0.write(payload, None).is_ok()
     }
 
-    /// Returns whether the library took it; it cannot send a reply in fragments.
+    /// Returns whether the library took it; a reply must fit into one datagram.
     pub fn reply(&self, to: &Request, payload: &[u8]) -> bool {
         let options = WriteOptionsBuilder::new().related_sample_identity(to.identity).build();
         let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
@@ -360,7 +364,6 @@ impl Writer {
     }
 }
 
-/// Joins by the interface with the address `only` if there is one.
 fn joined(domain: u16, only: Option<Ipv4Addr>) -> io::Result<DomainParticipant> {
     let mut builder = DomainParticipantBuilder::new(domain);
     if let Some(only) = only.or_else(|| is_local().then_some(Ipv4Addr::LOCALHOST)) {
@@ -369,7 +372,7 @@ fn joined(domain: u16, only: Option<Ipv4Addr>) -> io::Result<DomainParticipant> 
     builder.build().map_err(io::Error::other)
 }
 
-/// The environment keeps ROS on this machine.
+/// Returns whether the environment confines ROS to this machine.
 fn is_local() -> bool {
     let is = |name: &str, value: &str| env::var(name).is_ok_and(|set| set == value);
     is("ROS_LOCALHOST_ONLY", "1") || is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

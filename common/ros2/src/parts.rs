@@ -1,10 +1,10 @@
-//! Parts of many messages. Poses are in the plane.
+//! Common parts of messages. Poses are planar.
 
 use crate::msg::{
     self, Duration, Header, Point, PoseStamped, Quaternion, Time, Transform, Vector3,
 };
 
-/// A quaternion whose length differs from 1 by more than this is no rotation.
+/// Greatest deviation of a rotation quaternion's length from 1.
 const UNIT_WITHIN: f64 = 0.1;
 
 /// x, y and heading, metres and radians.
@@ -16,7 +16,7 @@ impl Quaternion {
         Self { z, w, ..Self::default() }
     }
 
-    /// The heading, radians; none if it is no rotation.
+    /// Returns the heading, radians; `None` if the quaternion is no rotation.
     pub fn heading(&self) -> Option<f64> {
         let Self { x, y, z, w } = self;
         let length = [x, y, z, w].iter().map(|part| *part * *part).sum::<f64>().sqrt();
@@ -64,7 +64,7 @@ macro_rules! of_nanoseconds {
 of_nanoseconds! { Time Duration }
 
 impl Header {
-    /// The header of a message at this time, nanoseconds since 1970.
+    /// Returns a header at this time, nanoseconds since 1970.
     pub fn at(ns: u64, frame: &str) -> Self {
         Self { stamp: ns.into(), frame_id: frame.to_owned() }
     }

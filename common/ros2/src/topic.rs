@@ -1,26 +1,27 @@
-//! A topic as DDS knows it.
+//! Topic in DDS terms.
 
 #[derive(Clone, Debug)]
 pub struct Topic {
-    /// The name in ROS, from the root.
+    /// ROS name from the root.
     pub name: String,
     pub type_name: String,
-    /// Beginning and end of its name in DDS.
+    /// Prefix and suffix of its DDS name.
     ends: [&'static str; 2],
 }
 
 impl Topic {
-    /// The type is named as `nav_msgs::msg::dds_::Odometry_`.
+    /// Creates a topic with a type name such as `nav_msgs::msg::dds_::Odometry_`.
     pub fn new(name: &str, type_name: &str) -> Self {
         Self { name: absolute(name), type_name: type_name.to_owned(), ends: ["rt", ""] }
     }
 
-    /// A name in DDS, outside of the names of ROS.
+    /// Creates a DDS topic outside the ROS names.
     pub fn plain(name: &str, type_name: &str) -> Self {
         Self { name: name.to_owned(), type_name: type_name.to_owned(), ends: ["", ""] }
     }
 
-    /// The requests and the replies of a service; its type is named as `action_msgs::srv::dds_::CancelGoal`.
+    /// Returns the topics of a service's requests and replies, with a type name such as
+    /// `action_msgs::srv::dds_::CancelGoal`.
     pub fn service(name: &str, type_name: &str) -> [Self; 2] {
         [("Request", ["rq", "Request"]), ("Response", ["rr", "Reply"])].map(|(part, ends)| Self {
             name: absolute(name),

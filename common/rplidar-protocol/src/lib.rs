@@ -1,19 +1,19 @@
-//! The protocol of Slamtec's RPLIDARs on a serial line: a host's requests, and the sensor's answers and measurements in standard scans.
-//! Source: Slamtec, "Interface Protocol and Application Notes", rev. 2.1, 2019.
+//! Protocol of Slamtec RPLIDARs on a serial line: host requests, and the sensor's answers and
+//! standard scans. Source: Slamtec, "Interface Protocol and Application Notes", rev. 2.1, 2019.
 //!
-//! A measurement has five bytes and only four bits to check, so a reader that lost its place believes the next run of measurements
-//! whose angles follow each other.
+//! A measurement has five bytes with only four check bits. A reader without synchronization
+//! therefore trusts only a run of measurements with successive angles.
 
-/// The first byte of a request, and of what precedes an answer.
+/// First byte of a request, and of an answer's descriptor.
 pub const START: u8 = 0xa5;
-/// A request with this bit has a payload: its length, its bytes, a checksum.
+/// Bit of requests with a payload: its length, its bytes, a checksum.
 const HAS_PAYLOAD: u8 = 0x80;
 const NODE_BYTES: usize = 5;
 const TURN_Q6: u16 = 360 * 64;
-/// A reader's place is found where so many measurements follow each other. One counts when the next has begun well: bytes that were lost
-/// in it must not take the first of the next turn with them.
+/// Successive measurements that synchronize a reader. Each counts once the next has begun well, so
+/// that lost bytes cannot also take the first one of the next turn.
 const RUN: usize = 4;
-/// The most by which the angles of two that follow each other differ, 1/64 degree. An A1 corrects angles by the range.
+/// Greatest angle between successive measurements, 1/64 degree. An A1 corrects angles by the range.
 const MOST_STEP_Q6: u16 = 20 * 64;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub enum Request {
     Info,
     Health,
     SampleRate,
-    /// All others, of which no standard scan needs one.
+    /// All others, which standard scans do not need.
     Other,
 }
 
@@ -47,7 +47,7 @@ impl Request {
     }
 }
 
-/// A sensor's reader of requests.
+/// Request reader of a sensor.
 #[derive(Clone, Debug, Default)]
 pub struct Requests {
     held: Vec<u8>,
@@ -79,7 +79,7 @@ impl Requests {
     }
 }
 
-/// The sensor's status is 0 for good, 1 for a warning, 2 for an error.
+/// Sensor's answer. Status is 0 for good, 1 for a warning, 2 for an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
     Info([u8; 20]),
@@ -87,7 +87,7 @@ pub enum Answer {
         status: u8,
         code: u16,
     },
-    /// Time from one measurement to the next, microseconds.
+    /// Time between measurements, microseconds.
     SampleRate {
         standard_us: u16,
         express_us: u16,
@@ -107,7 +107,7 @@ enum Kind {
 impl Kind {
     const ALL: [Self; 4] = [Self::Info, Self::Health, Self::SampleRate, Self::Scan];
 
-    /// The length of the answer, its mode (many in a scan) and its type.
+    /// Returns the descriptor: length of the answer, its mode (many in a scan) and its type.
     const fn descriptor(self) -> [u8; 7] {
         let [length, mode, kind] = match self {
             Self::Info => [20, 0x00, 0x04],
@@ -118,7 +118,7 @@ impl Kind {
         [START, 0x5a, length, 0, 0, mode, kind]
     }
 
-    /// None if `body` is too short.
+    /// Returns `None` if `body` is too short.
     fn answer(self, body: &[u8]) -> Option<(usize, Answer)> {
         Some(match (self, body) {
             (Self::Info, _) => (20, Answer::Info(*body.first_chunk()?)),
@@ -154,7 +154,7 @@ impl Answer {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node {
-    /// A turn begins with it.
+    /// Marks the start of a turn.
     pub is_first: bool,
     /// 0 to 63; 0 is no reading.
     pub quality: u8,
@@ -193,11 +193,11 @@ impl Node {
 pub enum Said {
     Answer(Answer),
     Node(Node),
-    /// A byte that belongs to nothing.
+    /// Byte outside any message.
     Noise,
 }
 
-/// A host's reader.
+/// Reader of a host.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     held: Vec<u8>,
@@ -209,7 +209,7 @@ enum State {
     #[default]
     Idle,
     Answers(Kind),
-    /// The newest measurement; none if none came, or the place is lost.
+    /// Newest measurement; `None` before the first or without synchronization.
     Scans {
         after: Option<Node>,
         is_lost: bool,
@@ -217,7 +217,8 @@ enum State {
 }
 
 impl Decoder {
-    /// Returns the meaning of `bytes`, and of those before that they complete. Fewer than 20 bytes are held.
+    /// Returns the meaning of `bytes`, including earlier bytes that they complete. It buffers fewer
+    /// than 20 bytes.
     pub fn push(&mut self, bytes: &[u8]) -> Vec<Said> {
         let mut held = std::mem::take(&mut self.held);
         held.extend_from_slice(bytes);
@@ -232,7 +233,8 @@ impl Decoder {
         said
     }
 
-    /// The length of the next piece of `rest`, and its meaning, if it has one; none while more bytes must come.
+    /// Returns the length of the next piece of `rest` and its meaning, if any; `None` while bytes
+    /// are missing.
     fn next_piece(&mut self, rest: &[u8]) -> Option<(usize, Option<Said>)> {
         if let State::Answers(kind) = self.state {
             let (length, answer) = kind.answer(rest)?;
@@ -248,7 +250,7 @@ impl Decoder {
                 self.state = State::Answers(kind);
                 return Some((descriptor.len(), None));
             }
-            // One byte alone may be a measurement's.
+            // One byte alone may belong to a measurement.
             if descriptor.starts_with(rest) {
                 return None;
             }
@@ -264,7 +266,7 @@ impl Decoder {
     }
 }
 
-/// The first of the measurements in `bytes`, if they follow each other.
+/// Returns the first of the measurements in `bytes` if their angles are successive.
 fn first_of_run(bytes: &[u8]) -> Option<Node> {
     let (nodes, _) = bytes.as_chunks();
     let nodes: Option<Vec<_>> = nodes.iter().map(|node| Node::parse(*node)).collect();

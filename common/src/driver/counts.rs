@@ -1,16 +1,17 @@
-//! Counts of a robot's two wheels, and what lies between two of them.
+//! Counts of a robot's two wheels, and their differences.
 
 use crate::{
     samples::{CountsSample, WheelSample},
     wire::{COUNT_CYCLE, counts_between},
 };
 
-/// A robot that has just booted stands.
+/// Most counts of a freshly booted robot, which stands.
 const BOOTED_WITHIN: f64 = 4.0;
-/// A step no longer than this counts as motion; 14 mm for an X80.
+/// Longest step that always counts as motion; 14 mm for an X80.
 const NOT_WORTH_TELLING: f64 = 32.0;
 
-/// The counter of a board begins anew after its cycle. Counts that come from angles or odometry in SI units have no end.
+/// Wheel counts. A board's counter wraps around; counts from angles or odometry in SI units are
+/// unbounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WheelCounts {
     Cyclic([u16; 2]),
@@ -18,7 +19,7 @@ pub enum WheelCounts {
 }
 
 impl WheelCounts {
-    /// The counts of a tick; `endless` ones belong to the same tick.
+    /// Returns the counts of a tick; `endless` ones belong to the same tick.
     pub fn of(wheels: &WheelSample, endless: Option<&CountsSample>) -> Self {
         let endless = endless.map(|counts| [counts.left_counts, counts.right_counts]);
         // Any process may have written them.
@@ -28,7 +29,7 @@ impl WheelCounts {
         }
     }
 
-    /// The counts in their cycle.
+    /// Wraps the counts into the cycle.
     pub fn cyclic(self) -> [u16; 2] {
         match self {
             Self::Cyclic(counts) => counts,
@@ -38,7 +39,7 @@ impl WheelCounts {
         }
     }
 
-    /// Counts of each wheel since `before`, the shorter way round if either is cyclic.
+    /// Returns the counts of each wheel since `before`, the shorter way round if either is cyclic.
     pub fn since(self, before: Self) -> [f64; 2] {
         if let (Self::Endless(new), Self::Endless(old)) = (self, before) {
             return [0, 1].map(|wheel| new[wheel] - old[wheel]);
@@ -47,8 +48,9 @@ impl WheelCounts {
         [0, 1].map(|wheel| counts_between(old[wheel], new[wheel]).into())
     }
 
-    /// The robot probably booted after `before`: these counts are near the start value of a booted robot, and those were not. A robot
-    /// that drove back to its start gives the same counts, so a caller that received frames in between needs further evidence.
+    /// Returns whether the robot probably booted after `before`: these counts are near the boot
+    /// value, and those were not. So are those of a robot that drove back to its start; a caller
+    /// with frames in between needs further evidence.
     pub fn restarted_since(self, before: Self) -> bool {
         let start = match self {
             Self::Cyclic(_) => Self::Cyclic([0; 2]),

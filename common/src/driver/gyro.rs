@@ -1,22 +1,22 @@
-//! What drivers of robots with a gyro share.
+//! Shared code of drivers for robots with a gyro.
 
 use std::f64::consts::PI;
 
 use crate::{driver::Turn, mission::Body};
 
-/// Noise of a turn whose message states less or none, rad per square root of a second. Nominal: several times that of
-/// robots' gyros, such as the BMI160's 0.007 degrees.
+/// Least noise of a turn, rad per square root of a second. Nominal: several times that of robot
+/// gyros, such as the BMI160's 0.007 degrees.
 pub const NOISE: f64 = 5e-4;
-/// Gyro and odometry are compared after such a turn. It takes at most [`COMPARED_NS`], in which no bias adds up to
-/// that, and both agree within [`AGREES_WITHIN`]: wheels slip in turns, but not more.
+/// Turn after which gyro and odometry are compared. Within [`COMPARED_NS`] no bias reaches it. Both
+/// must agree within the factor [`AGREES_WITHIN`], which exceeds wheel slip in turns.
 const COMPARED_RAD: f64 = 0.2;
 const COMPARED_NS: i64 = 10_000_000_000;
 const AGREES_WITHIN: f64 = 2.0;
 
-/// The turns of ticks follow on each other, and one after a gap only says where the next one begins.
+/// Sequence of turns per tick. A turn after a gap only marks where the next one begins.
 #[derive(Clone, Copy, Debug)]
 pub struct Turns<T> {
-    /// Where the newest turn ended; none if something is missing since.
+    /// End of the newest turn; `None` after a gap.
     told: Option<T>,
     sequence: u64,
 }
@@ -32,7 +32,8 @@ impl<T: Copy> Turns<T> {
         self.told = None;
     }
 
-    /// The number of the turn that ends at `now`, and where it began; none, and a gap, without `now`.
+    /// Returns the number of the turn that ends at `now`, and its start; without `now`, `None` and
+    /// a gap.
     pub fn until(&mut self, now: Option<T>) -> Option<(u64, T)> {
         let before = std::mem::replace(&mut self.told, now);
         let now = now?;
@@ -41,7 +42,7 @@ impl<T: Copy> Turns<T> {
     }
 }
 
-/// Whether a gyro turns as the robot's odometry does. It is not used before the two were seen to agree.
+/// Comparison of gyro and odometry. The gyro is used only once both agreed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Compared {
     since_ns: i64,
@@ -55,7 +56,8 @@ impl Compared {
         self.agrees
     }
 
-    /// Turns by odometry and by the gyro up to `now_ns`, radians. Returns their difference if they agreed or were not compared before.
+    /// Adds the turns by odometry and gyro up to `now_ns`, radians. Returns a description if a
+    /// comparison fails.
     pub fn take(&mut self, now_ns: i64, turns: [f64; 2]) -> Option<String> {
         if !(0..COMPARED_NS).contains(&(now_ns - self.since_ns)) {
             (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
@@ -73,13 +75,13 @@ impl Compared {
     }
 }
 
-/// Share by which the scale of a cheap gyro may be off, such as the MPU-6050's.
+/// Relative scale error of a cheap gyro, such as the MPU-6050.
 const SCALE: f64 = 0.01;
 
-/// From the angle that a robot says of its gyro to the turn of each tick.
+/// Converts a robot's reported gyro angle to the turn of each tick.
 #[derive(Clone, Debug, Default)]
 pub struct Angle {
-    /// The newest angle of the gyro and those of the wheels, radians.
+    /// Newest angles of the gyro and of the wheels, radians.
     newest: Option<(f64, [f64; 2])>,
     turns: Turns<f64>,
     now_ns: f64,
@@ -87,7 +89,8 @@ pub struct Angle {
 }
 
 impl Angle {
-    /// A report has this angle of the gyro, if any, and of the wheels. Returns a new fault of the gyro.
+    /// Takes a report of the gyro angle, if any, and of the wheel angles. Returns a new fault of
+    /// the gyro.
     pub fn take(
         &mut self,
         angle: Option<f64>,
@@ -102,7 +105,7 @@ impl Angle {
             newest.zip(before)?;
         let turned = angle - angle_before;
         if turned.abs() > PI {
-            // It begins anew.
+            // The angle was reset.
             self.turns.interrupt();
             return None;
         }
@@ -112,7 +115,7 @@ impl Angle {
         Some(format!("gyro: {why}; say its angle counter-clockwise, in the unit of the protocol"))
     }
 
-    /// After a gap the turn only says where the next one begins.
+    /// Returns the turn of a tick. After a gap it only marks where the next one begins.
     pub fn for_tick(&mut self, rate_hz: f64) -> Option<Turn> {
         let now = self.newest.filter(|_| self.compared.agrees()).map(|(angle, _)| angle);
         let (sequence, before) = self.turns.until(now)?;

@@ -1,4 +1,4 @@
-//! The way of a robot that says its pose, as angles of its wheels.
+//! Conversion of a reported pose to wheel angles.
 
 use std::f64::consts::TAU;
 
@@ -12,24 +12,24 @@ use crate::{
     samples::{CountsSample, WheelSample},
 };
 
-/// The farthest place or heading that odometry can say, metres or radians.
+/// Greatest position or heading that odometry can report, metres or radians.
 const FARTHEST: f64 = 1e6;
-/// Whole numbers beyond are not exact.
+/// Greatest count at which whole numbers are exact.
 const MOST_COUNTS: f64 = 9e15;
-/// The farthest that a wheel can roll over its way at top speed.
+/// Greatest ratio of rolled distance to that at top speed.
 const IMPLAUSIBLE: f64 = 1.5;
-/// The most time between a pose and its stamp, seconds.
+/// Greatest time between a pose and its stamp, seconds.
 const JITTER_S: f64 = 0.1;
-/// The most error from one pose to the next, metres.
+/// Greatest error between successive poses, metres.
 const SLACK_M: f64 = 0.01;
-/// A robot that was silent for longer may have started again, seconds. Its odometry then says a pose within `NEAR_START` of 0, metres
-/// and radians.
+/// Silence after which a robot may have restarted, seconds. Its pose is then within `NEAR_START` of
+/// 0, metres and radians.
 const STARTS_IN_S: f64 = 1.0;
 const NEAR_START: f64 = 0.05;
-/// The current of a held wheel, AD counts: the maximum of an X80's converter.
+/// Current of a blocked wheel, AD counts: the maximum of an X80's converter.
 const HELD_AD: u16 = 4095;
 
-/// The angles by which wheels would have turned on the way.
+/// Wheel angles that reproduce the reported motion.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Odometry {
     last: Option<Pose2>,
@@ -37,7 +37,7 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// The newest pose and the wheels' angles there; none before the first.
+    /// Returns the newest pose and the wheel angles there; `None` before the first.
     pub fn memory(&self) -> Option<Memory> {
         let Pose2 { position, heading } = self.last?;
         let [left, right] = self.turned;
@@ -49,20 +49,20 @@ impl Odometry {
         self.turned = [left, right];
     }
 
-    /// The angles of the left and right wheel at this pose. Sideways slip, which wheels do not show, is left out. None if the numbers
-    /// are too great.
+    /// Returns the angles of the left and right wheel at this pose, without sideways slip; `None`
+    /// if the numbers are too great.
     pub fn turned(&mut self, pose: [f64; 3], body: &Body) -> Option<[f64; 2]> {
         let now = pose_at(pose)?;
         let [arc, turn, _] = self.way(now);
         self.last = Some(now);
-        // (17) is linear, so the arc and the turn give the wheels' angles.
+        // (17) is linear, so arc and turn give the wheel angles.
         let [left, right] = body.unlimited().wheels(Twist { v: arc, omega: turn });
         self.turned = [self.turned[0] + left, self.turned[1] + right];
         Some(self.turned)
     }
 
-    /// Whether the way from the newest pose is a jump: longer than this body goes in `gap_s` seconds, sideways, or a new start of the
-    /// odometry. A jump counts as no motion.
+    /// Returns whether the motion since the newest pose is a jump, which counts as no motion. Jumps
+    /// are sideways, longer than this body goes in `gap_s` seconds, or a restart of the odometry.
     pub fn takes_jump(&mut self, pose: [f64; 3], gap_s: f64, body: &Body) -> bool {
         let Some(now) = pose_at(pose) else {
             return false;
@@ -79,7 +79,8 @@ impl Odometry {
         jumps
     }
 
-    /// The arc, metres, the turn, radians, and the sideways slip, metres, to `now`; all 0 before the first pose.
+    /// Returns the arc, metres, the turn, radians, and the sideways slip, metres, to `now`; all 0
+    /// before the first pose.
     fn way(&self, now: Pose2) -> [f64; 3] {
         let Some(last) = self.last else {
             return [0.0; 3];
@@ -95,7 +96,6 @@ impl Odometry {
     }
 }
 
-/// None if the numbers are too great for a pose.
 fn pose_at([x, y, heading]: [f64; 3]) -> Option<Pose2> {
     let position = DVec2::new(x, y);
     let is_near = position.length() <= FARTHEST && heading.abs() <= FARTHEST;
@@ -106,7 +106,8 @@ fn is_start(pose: Pose2) -> bool {
     pose.position.length() <= NEAR_START && wrap_angle(pose.heading).abs() <= NEAR_START
 }
 
-/// The motion of left and right wheels at these angles and speeds, radians and rad/s; `held` by something each or not.
+/// Returns the motion of both wheels at these angles and speeds, radians and rad/s; `held` marks
+/// blocked wheels.
 pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
     let counts = |angle: f64| (angle * body.counts_per_turn / TAU).round();
     let [left, right] = turned.map(|angle| counts(angle).clamp(-MOST_COUNTS, MOST_COUNTS));
@@ -126,12 +127,12 @@ pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) 
             ..CountsSample::default()
         }),
         stamp_ns: None,
-        // A held wheel draws all that its motor can.
+        // A blocked wheel draws its motor's full current.
         currents: held.map(|held| if held { HELD_AD } else { 0 }),
     }
 }
 
-/// `counts` are wheel speeds, counts/s.
+/// Converts wheel speeds, counts/s.
 pub fn twist(body: &Body, counts: [i16; 2]) -> Twist {
     body.unlimited().twist(wheel_speeds(body, counts))
 }

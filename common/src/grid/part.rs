@@ -1,4 +1,4 @@
-//! The part of a map's version that a sample carries. Why `unsafe` is allowed here: as in [`crate::samples`].
+//! Part of a map's version in a sample. Why `unsafe` is allowed here: as in [`crate::samples`].
 #![allow(unsafe_code)]
 
 use glam::DVec2;
@@ -7,9 +7,10 @@ use bus::ZeroCopySend;
 use mission::grid::{GridFrame, Window};
 
 crate::structs! {
-    /// A map's frame, and the window of one version, in the headers of `grid` and `field`.
+    /// Frame of a map and window of one version, in the headers of `grid` and `field`.
     "firsthand.Part" Part {
-        /// The version of the map with these cells. Consecutive versions differ in one window; an empty one means no change.
+        /// Version of the map with these cells. Consecutive versions differ in one window; an empty
+        /// one means no change.
         version: u64,
         /// N: the map is N x N cells.
         cells: u32,

@@ -4,15 +4,15 @@ use super::part::Part;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
-    /// A first keyframe came: there was nothing to compare it with.
+    /// A first keyframe, without a map to compare it with.
     Whole,
-    /// The window changed; an empty one is no change.
+    /// Changed window; an empty one is no change.
     Window(Window),
-    /// A version is missing, or the cells do not fit: the map stays; wait for a keyframe.
+    /// Missing version or unsuitable cells: the map stays until the next keyframe.
     Missed,
 }
 
-/// A follower's copy of a map that is published in keyframes and windows.
+/// Follower's copy of a map that is published in keyframes and windows.
 #[derive(Clone, Debug, Default)]
 pub struct Replica<T> {
     cells: Vec<T>,
@@ -20,7 +20,7 @@ pub struct Replica<T> {
 }
 
 impl<T: Copy + PartialEq> Replica<T> {
-    /// None before the first keyframe.
+    /// `None` before the first keyframe.
     pub fn frame(&self) -> Option<GridFrame> {
         self.state.map(|(frame, _)| frame)
     }
@@ -45,8 +45,8 @@ impl<T: Copy + PartialEq> Replica<T> {
             if window != frame.whole() {
                 return Applied::Missed;
             }
-            // A keyframe for late joiners counts as what changed since: otherwise a consumer that attaches would change what the others
-            // compute.
+            // A keyframe for late joiners counts only as its difference, so that attaching
+            // consumers leave the others' results unchanged.
             let known = self.state.is_some_and(|(held, _)| held == frame);
             let changed = known.then(|| frame.changed_window(&self.cells, cells));
             self.cells.clear();
@@ -57,7 +57,7 @@ impl<T: Copy + PartialEq> Replica<T> {
         let Some((held_frame, held)) = self.state else {
             return Applied::Missed;
         };
-        // Only a change makes a new version: a new one without cells means that a part was missed.
+        // Only a change makes a new version: a new one without cells means a missed part.
         let follows =
             if window.area() == 0 { version == held } else { held.checked_add(1) == Some(version) };
         if held_frame != frame || !follows {

@@ -1,4 +1,5 @@
-//! Measurements of the robot's place and turn by sensors outside it: their sources are consumers of the bus.
+//! Measurements of the robot's position and turn by external sensors, whose sources are consumers
+//! of the bus.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +7,7 @@ use super::Name;
 use crate::bus::ZeroCopySend;
 
 payloads! {
-    /// A source outside is, for example, a camera or a satellite receiver.
+    /// Position fix of an external source, for example a camera or a satellite receiver.
     #[derive(Serialize, Deserialize)]
     "firsthand.Fix" FixSample {
         /// Mission time of the measurement, nanoseconds; at most 2 s ago.
@@ -17,15 +18,16 @@ payloads! {
         y_m: f64,
         /// Radians counter-clockwise from x; NaN for none.
         heading_rad: f64,
-        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. Without a heading the
-        /// entries of theta are not read.
+        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta;
+        /// m^2, m rad, rad^2. Without a heading the entries of theta are ignored.
         covariance: [f64; 6],
-        /// Variances of the error that all fixes of this source share (a map that the source made itself), of x as of y and of theta,
-        /// m^2 and rad^2; the covariance includes them. No number of fixes averages this error out.
+        /// Variances of the error that all fixes of this source share, for example of its own map.
+        /// They are those of x and y and of theta, m^2 and rad^2. The covariance includes them, and
+        /// averaging fixes cannot reduce them.
         shared: [f64; 2],
     }
 
-    /// Where an operator says that the standing robot is: the pose becomes this.
+    /// Operator's statement of the standing robot's pose, which replaces the estimate.
     #[derive(Serialize, Deserialize)]
     "firsthand.Place" PlaceSample {
         /// Counted from 1 in the run.
@@ -35,44 +37,44 @@ payloads! {
         y_m: f64,
         /// Radians counter-clockwise from x.
         heading_rad: f64,
-        /// Standard deviations of x as of y, and of the heading.
+        /// Standard deviations of x and y, and of the heading.
         sigma_m: f64,
         sigma_rad: f64,
     }
 
     #[derive(Serialize, Deserialize)]
     "firsthand.Turn" TurnSample {
-        /// Mission time at which the increment ends, nanoseconds.
+        /// Mission time at the end of the increment, nanoseconds.
         capture_ns: u64,
-        /// One more than the number of the increment at whose end this one begins.
+        /// Successor of the number of the increment at whose end this one begins.
         sequence: u64,
         /// Radians counter-clockwise.
         turn_rad: f64,
-        /// The variance of its error, rad^2.
+        /// Variance of its error, rad^2.
         variance_rad2: f64,
     }
 }
 
 payloads! {
-    /// Where a source outside heard or saw the thing that the robot follows.
+    /// Position of the followed thing, from an external source.
     "firsthand.Beacon" BeaconSample {
         /// Mission time of the measurement, nanoseconds; at most 1 s ago.
         capture_ns: u64,
         source: Name,
-        /// The middle of the thing, metres in the mission frame.
+        /// Centre of the thing, metres in the mission frame.
         x_m: f64,
         y_m: f64,
-        /// Standard deviation of x as of y, metres.
+        /// Standard deviation of x and y, metres.
         deviation_m: f64,
     }
 }
 
 wire_enum! {
-    /// The reason why the supervisor did not use a sample of the beacon.
+    /// Reason why the supervisor ignored a beacon sample.
     BeaconRefusal, unknown = None, text = words {
         None = 0 "none",
         Late = 1 "it is more than 1 s old, or older than the one before; publish it sooner",
-        /// More than a tick after now.
+        /// More than a tick ahead.
         Future = 2 "its capture time is in the future; give mission time",
         NotFinite = 3 "it has a number that is not finite, or a negative deviation",
         Doubtful = 4 "its deviation is more than 0.25 m",
@@ -81,10 +83,10 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// The reason why dead reckoning did not use a fix.
+    /// Reason why dead reckoning ignored a fix.
     FixRefusal, unknown = None, text = words {
         None = 0 "none",
-        /// It may also be older than the oldest tick that dead reckoning holds.
+        /// It may also be older than the oldest tick in dead reckoning.
         Late = 1 "a fix is refused: it is more than 2 s old; publish it sooner",
         /// More than a tick after the newest one.
         Future = 2 "a fix is refused: its capture time is in the future; give mission time",
@@ -92,7 +94,7 @@ wire_enum! {
         Covariance = 4 "a fix is refused: its covariance is not positive or states less than 5 mm",
         Far = 5 "a fix is refused: it contradicts the pose",
         TooMany = 6 "a fix is refused: too many came in 2 s; publish fewer",
-        /// Fixes moved the robot as often as they may.
+        /// Fixes have moved the robot as often as permitted.
         Contradicts = 7 "a fix is refused: fixes have moved the robot twice, and contradict the pose again; look at their source",
     }
 }

@@ -1,4 +1,4 @@
-//! Where the robot is, what is around it, and where it goes.
+//! Payloads of the robot's pose, its surroundings and its goals.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use crate::{
 };
 
 payloads! {
-    /// The pose follows from the wheels, and from what came on `fix` and `turn`.
+    /// Pose from the wheels and from samples of `fix` and `turn`.
     #[derive(Serialize, Deserialize)]
     "firsthand.Pose" PoseSample {
         /// Metres in the mission frame.
@@ -25,20 +25,23 @@ payloads! {
         /// omega over the last tick, rad/s.
         omega_rad_s: f64,
         travelled_m: f64,
-        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2. It covers the wheels'
-        /// errors by the mission's `[robot.odometry]`, and motions lost with their counts.
+        /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta;
+        /// m^2, m rad, rad^2. It covers the wheel errors of `[robot.odometry]` and motion lost with
+        /// its counts.
         covariance: [f64; 6],
-        /// The encoder counts at this pose.
+        /// Encoder counts at this pose.
         left_counts: u16,
         right_counts: u16,
-        /// The pose of the odometry frame in the mission frame (map from odom of REP 105): x, y, theta; metres, radians. Odometry is
-        /// this pose without the corrections by fixes and gyro, and continuous.
+        /// Pose of the odometry frame in the mission frame (map from odom of REP 105): x, y, theta;
+        /// metres, radians. Odometry is this pose without the corrections by fixes and gyro, and
+        /// continuous.
         map_from_odom: [f64; 3],
-        /// Times that fixes which agree contradicted the pose, and it became theirs, and that an operator set it; each resets the map.
+        /// Times that consistent fixes replaced the contradicting pose, or an operator set it; each
+        /// resets the map.
         relocations: u64,
         fixes: u64,
         fixes_refused: u64,
-        /// The reason of the newest refusal: a [`FixRefusal`](super::FixRefusal).
+        /// Reason of the newest refusal: a [`FixRefusal`](super::FixRefusal).
         refusal: u8,
     }
 }
@@ -48,14 +51,15 @@ impl PoseSample {
         Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
     }
 
-    /// The pose in the odometry frame, which no correction moves.
+    /// Returns the pose in the odometry frame, which is free of corrections.
     pub fn odometry(&self) -> Pose2 {
         let ([x, y, turn], Pose2 { position, heading }) = (self.map_from_odom, self.pose());
         let position = DVec2::from_angle(-turn).rotate(position - DVec2::new(x, y));
         Pose2 { position, heading: heading - turn }
     }
 
-    /// The 6x6 covariance of ROS messages, by rows: x, y, z and the rotations about them; only x, y and the last are estimated.
+    /// Returns the row-major 6x6 covariance of ROS messages: x, y, z and the rotations about them,
+    /// of which x, y and the last are estimated.
     pub fn covariance_6x6(&self) -> [f64; 36] {
         let [xx, xy, xt, yy, yt, tt] = self.covariance;
         let mut whole = [0.0; 36];
@@ -72,7 +76,7 @@ impl PoseSample {
         (xx + yy).max(0.0).sqrt()
     }
 
-    /// Two standard deviations of the position's error along its worst axis, metres.
+    /// Returns two standard deviations of the position error along its worst axis, metres.
     pub fn position_within_m(&self) -> f64 {
         let ([worst, _], _) = self.position_axes();
         2.0 * worst
@@ -83,7 +87,8 @@ impl PoseSample {
         principal_axes([xx, xy, yy])
     }
 
-    /// Whether the position is sure enough for an arrival: two standard deviations are within the mission's `sure_within_m`.
+    /// Returns whether two standard deviations of the position are within the mission's
+    /// `sure_within_m`, as an arrival needs.
     pub fn is_sure(&self, mission: &Mission) -> bool {
         self.position_within_m() <= mission.sure_within_m
     }
@@ -93,30 +98,30 @@ impl PoseSample {
     }
 }
 
-/// The most sonar readings in a `grid` sample: 128 ticks of three sonars.
+/// Most sonar readings in a `grid` sample: 128 ticks of three sonars.
 pub const CLEAR_BEAMS: usize = 3 * 128;
 
 structs! {
-    /// One reading as evidence of free ground: for a sonar, nothing square to the beam stands nearer than `clear_m`.
+    /// Reading as evidence of free ground. For a sonar, nothing square to the beam is nearer than
+    /// `clear_m`.
     #[derive(Serialize, Deserialize)]
     "firsthand.ClearBeam" ClearBeam {
-        /// The sensor's place, metres in the mission frame.
+        /// Position of the sensor, metres in the mission frame.
         x_m: f32,
         y_m: f32,
-        /// The direction of the sensor, radians counter-clockwise from x.
+        /// Direction of the sensor, radians counter-clockwise from x.
         bearing_rad: f32,
         clear_m: f32,
     }
 }
 
-/// The most infrared rays in a `grid` sample: 32 ticks.
+/// Most infrared rays in a `grid` sample: 32 ticks.
 pub const CLEAR_RAYS: usize = 32 * INFRARED_RANGERS;
 
-/// The most movers in a `grid` sample.
 pub const MOVERS: usize = 32;
 
 structs! {
-    /// A thing that moves, as a disc, at the time of the tick; in the mission's frame.
+    /// Moving thing, as a disc at the time of the tick, in the mission frame.
     #[derive(Serialize, Deserialize)]
     "firsthand.Mover" Mover {
         x_m: f32,
@@ -124,31 +129,32 @@ structs! {
         vx_m_s: f32,
         vy_m_s: f32,
         radius_m: f32,
-        /// Deviations of the place, and of the velocity, along any axis.
+        /// Standard deviations of the position and of the velocity along any axis.
         doubt_m: f32,
         doubt_m_s: f32,
     }
 }
 
 payloads! {
-    /// The slice is one [`crate::grid::CellState`] byte a cell of the window.
+    /// Safety map; the slice has one [`crate::grid::CellState`] byte per cell of the window.
     "firsthand.GridHeader" GridHeader {
         part: Part,
-        /// Range samples that have put a hazard on the map.
+        /// Range samples that added a hazard to the map.
         safety_events: u64,
-        /// Each reset of the sensed belief begins another epoch.
+        /// Epoch; each reset of the sensed belief begins another.
         epoch: u64,
-        /// 0 by the paper's method.
+        /// 0 with the paper's method.
         clear_beam_count: u64,
-        /// The newest sonar readings, oldest first.
+        /// Newest sonar readings, oldest first.
         clear_beams: [ClearBeam; CLEAR_BEAMS],
         /// 0 without infrared rangers in the evidence.
         clear_ray_count: u64,
-        /// The newest infrared readings, oldest first: nothing stands on the ray nearer than `clear_m`, at any angle.
+        /// Newest infrared readings, oldest first: the ray is free up to `clear_m`, for surfaces at
+        /// any angle.
         clear_rays: [ClearBeam; CLEAR_RAYS],
         /// 0 without a laser.
         mover_count: u64,
-        /// Things that move, also out of sight for a while.
+        /// Moving things, also for a while out of sight.
         movers: [Mover; MOVERS],
     }
 }
@@ -166,7 +172,7 @@ impl GridHeader {
         counted(&self.movers, self.mover_count)
     }
 
-    /// Movers that can be drawn: any process may have written the numbers of a sample.
+    /// Returns the movers with valid numbers, which any process may have written.
     pub fn drawn_movers(&self) -> impl Iterator<Item = &Mover> {
         self.movers().iter().filter(|mover| {
             let Mover { x_m, y_m, vx_m_s, vy_m_s, radius_m, doubt_m, doubt_m_s } = **mover;
@@ -186,13 +192,13 @@ impl Mover {
         DVec2::new(self.vx_m_s.into(), self.vy_m_s.into())
     }
 
-    /// Its place is within so many metres of its surface with 95 %, along any axis: two deviations.
+    /// Returns the radius that contains its surface with 95 % along any axis.
     pub fn reach_m(&self) -> f64 {
         f64::from(self.radius_m) + 2.0 * f64::from(self.doubt_m)
     }
 }
 
-/// The first `count` of `all`; the count comes from shared memory and may be any number.
+/// Returns the first `count` of `all`; the count from shared memory is untrusted.
 fn counted<T>(all: &[T], count: u64) -> &[T] {
     let count = usize::try_from(count).unwrap_or(all.len());
     &all[..count.min(all.len())]
@@ -200,16 +206,17 @@ fn counted<T>(all: &[T], count: u64) -> &[T] {
 
 wire_enum! {
     GuidanceStatus, unknown = Waiting {
-        /// No field yet, or something that moves must pass first: the robot stands.
+        /// No field yet, or a moving thing must pass first: the robot stands.
         Waiting = 0,
         Along = 1,
-        /// Arrived beside the target, which is not free itself: no free place is nearer.
+        /// Arrived at the free place nearest to the target, which is occupied.
         AtTarget = 2,
-        /// The robot stands in a hazard cell: (ex, ey) leads to the nearest free one.
+        /// The robot is in a hazard cell: (ex, ey) leads to the nearest free one.
         WayOut = 3,
-        /// The belief cuts the robot off from the target; (ex, ey), unless 0, says where to look meanwhile.
+        /// The belief cuts the robot off from the target; a nonzero (ex, ey) says where to look
+        /// meanwhile.
         Unreachable = 4,
-        /// Nobody has looked where the way leads: turn on the spot to face (ex, ey).
+        /// The path leads to unseen ground: turn on the spot to face (ex, ey).
         Look = 5,
     }
 }
@@ -254,16 +261,16 @@ impl From<Waypoint> for TargetPoint {
 }
 
 payloads! {
-    /// The keep-out zones. The slice is their corners.
+    /// Keep-out zones; the slice holds their corners.
     "firsthand.ZonesHeader" ZonesHeader {
-        /// Counts the changes by operators; 0: the mission's.
+        /// Number of operator changes; 0 for the mission's zones.
         number: u64,
     }
 }
 
 structs! {
     "firsthand.ZoneCorner" ZoneCorner {
-        /// Corners of the same zone follow each other.
+        /// Index of its zone; a zone's corners are adjacent.
         zone: u32,
         x_m: f64,
         y_m: f64,
@@ -286,13 +293,13 @@ impl ZoneCorner {
 
 payloads! {
     "firsthand.Target" TargetSample {
-        /// Counted from 1 in the run. A target that replaces another has a number of its own.
+        /// Counted from 1 in the run. A replacing target has a number of its own.
         number: u64,
         last: u64,
-        /// The first tick in which it holds. A stage without another target takes it at once.
+        /// First tick in which it holds. A stage without a target takes it at once.
         since_tick: u64,
         target: TargetPoint,
-        /// The targets after this one; the first `last - number` count.
+        /// Targets after this one; the first `last - number` are valid.
         ahead: [TargetPoint; MOST_TARGETS],
     }
 }
@@ -311,22 +318,22 @@ impl TargetSample {
 payloads! {
     /// E of (11) at the robot's pose.
     "firsthand.Guidance" GuidanceSample {
-        /// (ex, ey): unit vector, 0 where there is none.
+        /// (ex, ey): unit vector, or 0 for none.
         ex: f64,
         ey: f64,
         /// dst of (14): straight to the target, metres.
         distance_m: f64,
-        /// The most tangential speed by the map of the way ahead, m/s; infinite for no limit.
+        /// Greatest tangential speed by the map of the way ahead, m/s; infinite for no limit.
         speed_limit_m_s: f64,
         /// A [`GuidanceStatus`].
         status: u8,
         /// Mission time of the pose, nanoseconds.
         pose_ns: u64,
-        /// The pose: metres in the mission frame, radians counter-clockwise from x, not wrapped.
+        /// Pose: metres in the mission frame, radians counter-clockwise from x, not wrapped.
         x_m: f64,
         y_m: f64,
         heading_rad: f64,
-        /// The version of `grid`; its safety events and epoch follow.
+        /// Version of `grid`; its safety events and epoch follow.
         grid_version: u64,
         safety_events: u64,
         epoch: u64,
@@ -360,26 +367,26 @@ impl GuidanceSample {
 }
 
 payloads! {
-    /// The slice is one [`FieldCell`] a cell of the window.
+    /// Field; the slice has one [`FieldCell`] per cell of the window.
     "firsthand.FieldHeader" FieldHeader {
         part: Part,
-        /// The version of `grid`.
+        /// Version of `grid`.
         grid_version: u64,
         target_x_m: f64,
         target_y_m: f64,
-        /// The worst componentwise relative residual of the last full solve, a verification.
+        /// Worst componentwise relative residual of the last full solve, for verification.
         worst_residual: f64,
-        /// Free cells that can reach the target, a verification.
+        /// Free cells that can reach the target, for verification.
         reachable: u64,
     }
 }
 
 structs! {
     "firsthand.FieldCell" FieldCell {
-        /// (ex, ey) at the cell's centre: unit vector, 0 where there is no guidance.
+        /// (ex, ey) at the cell's centre: unit vector, or 0 without guidance.
         ex: f32,
         ey: f32,
-        /// log2 u; -inf on hazards and where the target cannot be reached.
+        /// log2 u; -inf on hazards and in cells that cannot reach the target.
         log2_u: f32,
     }
 }
@@ -389,7 +396,7 @@ wire_enum! {
         /// No guidance to follow: stand.
         Halt = 0,
         Driving = 1,
-        /// The target is reached: stand until there is another.
+        /// Target reached: stand until the next one.
         Arrived = 2,
     }
 }
@@ -399,7 +406,8 @@ payloads! {
     "firsthand.Command" CommandSample {
         /// omega_L, rad/s; omega_h of a car's driven wheel.
         left_rad_s: f64,
-        /// omega_R, rad/s; of a car the steering angle phi, radians, positive to the left: `robot.model` decides.
+        /// omega_R, rad/s; for a car by `robot.model` the steering angle phi, radians, positive to
+        /// the left.
         right_rad_s: f64,
         /// vc of (16), m/s.
         v_m_s: f64,
@@ -407,12 +415,12 @@ payloads! {
         omega_rad_s: f64,
         /// dst of (14), metres.
         distance_m: f64,
-        /// Mission time of the oldest pose behind it, the guidance's among them, nanoseconds. The link refuses an old one, whatever the
-        /// stamp says.
+        /// Mission time of the oldest pose behind it, including the guidance's, nanoseconds. The
+        /// link refuses an old one regardless of the stamp.
         pose_ns: u64,
         /// Mission time of the guidance, nanoseconds; the link checks its age too.
         guidance_ns: u64,
-        /// The target that it leads to, or that is reached.
+        /// Target that it leads to, or that is reached.
         target_number: u64,
         /// A [`CommandState`].
         state: u8,

@@ -1,4 +1,4 @@
-//! The payloads of the link: the robot's sensors, and the state of the link itself.
+//! Payloads of the link: the robot's sensors and the link's own state.
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -11,31 +11,31 @@ use crate::{
 
 wire_enum! {
     RangeStatus, unknown = Absent {
-        /// No frame with it came since the last tick: the map stays as it is.
+        /// No frame with it since the last tick: the map stays unchanged.
         Absent = 0,
         Measured = 1,
         /// No echo, or a ray without end.
         Nothing = 2,
-        /// A sonar at 4 cm or nearer.
+        /// Sonar range of 4 cm or less.
         AtContact = 3,
-        /// A sonar's 0, or the voltage of a dead or saturated infrared ranger.
+        /// Sonar range of 0, or the voltage of a dead or saturated infrared ranger.
         Invalid = 4,
     }
 }
 
 payloads! {
-    /// The slice is one [`RangeReading`] a sensor of the mission.
+    /// Ranges; the slice has one [`RangeReading`] per sensor of the mission.
     "firsthand.RangesHeader" RangesHeader {}
 }
 
 structs! {
     #[derive(Serialize, Deserialize)]
     "firsthand.RangeReading" RangeReading {
-        /// S of (19): metres from the sensor if the status says so; else 0.
+        /// S of (19): metres from the sensor if measured, else 0.
         range_m: f64,
-        /// The value as sent: centimetres of a sonar, AD counts of an infrared ranger; 0 if none came.
+        /// Raw value: centimetres of a sonar, AD counts of an infrared ranger; 0 if absent.
         raw: u16,
-        /// The row of [`crate::mission::Mission::sensor_table`].
+        /// Row of [`crate::mission::Mission::sensor_table`].
         sensor: u8,
         /// A [`RangeStatus`].
         status: u8,
@@ -49,30 +49,33 @@ impl RangeReading {
 }
 
 payloads! {
-    /// The slice is the laser's ranges counter-clockwise, metres: infinite for nothing in reach, not a number for no reading.
+    /// Laser scan; the slice holds ranges counter-clockwise, metres: infinite if nothing is in
+    /// reach, NaN for a missing reading.
     "firsthand.ScanHeader" ScanHeader {
-        /// The row of [`crate::mission::Mission::sensor_table`].
+        /// Row of [`crate::mission::Mission::sensor_table`].
         sensor: u64,
-        /// Place of the laser, metres ahead of and to the left of the robot's centre.
+        /// Position of the laser, metres ahead of and to the left of the robot's centre.
         x_m: f64,
         y_m: f64,
         /// Bearing of the first beam from the robot's axis, radians.
         first_rad: f64,
         step_rad: f64,
         reach_m: f64,
-        /// The time at which the first beam was measured, from the tick's mission time on; less than 0 is before it.
+        /// Time of the first measured beam relative to the tick; negative before it.
         first_beam_ns: i64,
-        /// The time from each beam to the next counter-clockwise; less than 0 for a laser that turns clockwise.
+        /// Time between adjacent beams counter-clockwise; negative for a laser that turns
+        /// clockwise.
         beam_ns: i64,
-        /// The beam that was measured first.
+        /// Beam that was measured first.
         first_beam: u64,
     }
 }
 
-/// The longest age and the longest duration of a scan, nanoseconds. An older one is of no use to dead reckoning.
+/// Longest age and duration of a scan, nanoseconds. Dead reckoning cannot use older ones.
 pub const LONGEST_SWEEP_NS: i64 = 2_000_000_000;
 
-/// The times at which the beams of a scan were measured, by a tick's mission time: see [`ScanHeader`]. The default is all at the tick.
+/// Measurement times of a scan's beams relative to a tick: see [`ScanHeader`]. By default all are
+/// at the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sweep {
     pub first_beam_ns: i64,
@@ -81,7 +84,8 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// Whether dead reckoning still knows the robot's motion then. The numbers, from shared memory, may be anything.
+    /// Returns whether dead reckoning still knows the motion at these times. The numbers from
+    /// shared memory are untrusted.
     pub fn is_plausible(&self, beams: usize) -> bool {
         let most = LONGEST_SWEEP_NS.unsigned_abs();
         self.first_beam_ns.unsigned_abs() <= most
@@ -89,7 +93,7 @@ impl Sweep {
             && (self.first_beam == 0 || self.first_beam < beams as u64)
     }
 
-    /// The time of a beam among so many in a plausible sweep, from the tick's on.
+    /// Returns the time of a beam among `beams` in a plausible sweep, relative to the tick.
     pub const fn beam_time_ns(&self, beam: usize, beams: usize) -> i64 {
         let (first, beams) = (self.first_beam as usize, if beams == 0 { 1 } else { beams });
         let before = match self.beam_ns < 0 {
@@ -131,26 +135,27 @@ impl ScanHeader {
 }
 
 payloads! {
-    /// A car has the driven wheel's encoder at the left, and at the right the steering's: 0 straight ahead, growing to the left.
+    /// Wheel counts. A car has the driven wheel's encoder at the left, the steering's at the right:
+    /// 0 straight ahead, growing to the left.
     "firsthand.Wheels" WheelSample {
         /// Counts modulo 32768, growing forward.
         left_counts: u16,
         right_counts: u16,
-        /// Counts a second, forward positive.
+        /// Counts per second, forward positive.
         left_counts_per_s: i32,
         right_counts_per_s: i32,
-        /// Restarts of the robot's counts that this process of the link noticed: the step from a sample with a lower number is no
-        /// motion.
+        /// Restarts of the robot's counts noticed by this link process. The step from a lower
+        /// number is no motion.
         restarts: u32,
-        /// The share of its commanded way that the right wheel counts, over the left wheel's, and the standard deviation; 1 and 0 where it
-        /// is not known, and for a car.
+        /// Counted share of the commanded distance, right wheel over left, and its standard
+        /// deviation; 1 and 0 if unknown and for a car.
         told_ratio: f64 = 1.0,
         told_ratio_sd: f64,
     }
 }
 
 payloads! {
-    /// The counts of [`WheelSample`] without their cycle, whole numbers.
+    /// Counts of [`WheelSample`] without wraparound, whole numbers.
     #[derive(Serialize, Deserialize)]
     "firsthand.Counts" CountsSample {
         left_counts: f64,
@@ -161,7 +166,7 @@ payloads! {
 payloads! {
     #[derive(Serialize, Deserialize)]
     "firsthand.BaseResponse" BaseResponseSample {
-        /// From a command to its effect, with the lag, seconds.
+        /// Time from a command to its effect, including the lag, seconds.
         dead_time_s: f64,
         /// Infinite for a base that the dead time alone describes.
         acceleration_m_s2: f64,
@@ -169,23 +174,26 @@ payloads! {
 }
 
 payloads! {
-    /// Held wheels stand by their encoders, and their motors draw a high current. Without a held wheel a bumper or a cliff sensor felt it.
+    /// Contact. Blocked wheels stand by their encoders while their motors draw a high current;
+    /// otherwise a bumper or cliff sensor reported it.
     #[derive(Serialize, Deserialize)]
     "firsthand.Contact" ContactSample {
-        /// Direction of the touch from the body's centre, radians counter-clockwise from the robot's axis.
+        /// Direction of the contact from the body's centre, radians counter-clockwise from the
+        /// robot's axis.
         bearing_rad: f64,
-        /// Half the angle in which it may be, radians; 0 if unknown, because the robot was told to turn on the spot.
+        /// Half of the angle that contains it, radians; 0 if unknown, because the command was a
+        /// turn on the spot.
         half_width_rad: f64,
-        /// 1: held; also the driven wheels of a car.
+        /// 1: blocked; also the driven wheels of a car.
         left: u8,
         right: u8,
     }
 }
 
 wire_enum! {
-    /// What the encoders say.
+    /// Motion according to the encoders.
     Rest, unknown = Unknown {
-        /// Their newest frames are old, or cannot be used.
+        /// Their newest frames are old or unusable.
         Unknown = 0,
         AtRest = 1,
         Moving = 2,
@@ -193,13 +201,13 @@ wire_enum! {
 }
 
 wire_enum! {
-    /// The action of the link's failsafe, the least severe first.
+    /// Action of the link's failsafe, the least severe first.
     #[derive(PartialOrd, Ord)]
     Action, unknown = Stop, text = effect {
         Go = 0 "goes",
         /// Commands pass at a fraction of their speed, along the same curve.
         Slow = 1 "goes at half speed",
-        /// The robot stands; it drives again when the cause has ended.
+        /// The robot stands until the cause ends.
         Stop = 2 "stands",
         /// The robot stands until the process ends: the mission is over.
         End = 3 "stands, and the mission ends",
@@ -207,8 +215,8 @@ wire_enum! {
 }
 
 impl Action {
-    /// The share of its commanded speed at which the robot goes. Motors draw less current at half of it, so a low battery lasts longer;
-    /// at still lower speeds wheels begin to stick.
+    /// Returns the share of the commanded speed. Half speed saves current on a low battery; at
+    /// lower speeds wheels begin to stick.
     pub const fn speed_share(self) -> f64 {
         match self {
             Self::Go => 1.0,
@@ -219,7 +227,7 @@ impl Action {
 }
 
 wire_enum! {
-    /// The cause of the failsafe's action; `firsthand table failsafe` explains each.
+    /// Cause of the failsafe's action; `firsthand table failsafe` explains each.
     Cause, unknown = NotOrdered, text = name {
         None = 0 "nothing is wrong",
         NotOrdered = 1 "no order to drive",
@@ -236,24 +244,25 @@ wire_enum! {
         GuidanceStale = 10 "guidance stale",
         BatteryLow = 11 "battery low",
         OdometryImplausible = 12 "odometry implausible",
-        /// The encoders have contradicted the commands for so long that the mission ends.
+        /// The encoders contradicted the commands for too long; the mission ends.
         OdometryGivenUp = 13 "odometry implausible for long",
-        /// The robot was told to stand, and its encoders say that it moves.
+        /// The robot moves by its encoders despite a command to stand.
         RobotDoesNotStop = 14 "robot does not obey",
         FramesSilent = 15 "motor frames missing",
         FramesSlow = 16 "motor frames too slow",
         RangeSilent = 17 "ranging sensor silent",
         RobotLate = 18 "robot late",
         WheelsHeld = 19 "wheels held",
-        /// A reading stays the same although the robot moves, or the front sonar hears nothing of what others see.
+        /// A reading stays constant while the robot moves, or the front sonar misses echoes of
+        /// other sensors.
         RangeImplausible = 20 "ranging sensor implausible",
         /// An infrared ranger is silent, and the other sensors cover the ground ahead.
         InfraredSilent = 21 "infrared ranger silent",
         AnotherCommander = 22 "another commander",
         BaseSlow = 23 "base slower than stated",
-        /// Its readings may not be those of the present: the robot drives slowly, which shows it.
+        /// Its readings may be outdated: the robot drives slowly, which reveals it.
         RangeDoubtful = 24 "ranging sensor doubtful",
-        /// A bumper is pressed, or a cliff sensor sees no floor.
+        /// A bumper is pressed, or a cliff sensor detects a missing floor.
         Felt = 25 "bumper or cliff sensor",
     }
 }
@@ -269,9 +278,9 @@ payloads! {
         /// A [`Rest`]. 1: no wheel turns.
         at_rest: u8,
         frames_in: u64,
-        /// Bytes that belonged to no frame.
+        /// Bytes outside any frame.
         bytes_dropped: u64,
-        /// Dropped, because another address sent them.
+        /// Dropped datagrams from other addresses.
         foreign_datagrams: u64,
         unsent: u64,
         /// Samples of processes that the supervisor does not name.
@@ -281,23 +290,24 @@ payloads! {
         /// Another port from which the robot's host answered; 0 for none.
         other_port: u32,
         losses: u64,
-        /// Times the robot was seen to restart its counts.
+        /// Restarts of the robot's counts.
         reboots: u64,
-        /// Time without an answer, of the machine's clock; 0 while the robot answers.
+        /// Time without an answer, by the machine's clock; 0 while the robot answers.
         lost_ns: u64,
-        /// Pings, or attempts to connect, since the robot was lost.
+        /// Pings or connection attempts since the robot was lost.
         attempts: u64,
-        /// Time until the next attempt, of the machine's clock.
+        /// Time until the next attempt, by the machine's clock.
         next_attempt_ns: u64,
         commands_out: u64,
         repeated_commands: u64,
-        /// Ticks given to the stages again, because no command came.
+        /// Ticks repeated to the stages for lack of a command.
         repeated_ticks: u64,
-        /// The last tick's, from the datagram in to the datagram out.
+        /// Latency of the last tick, from the incoming to the outgoing datagram.
         latency_ns: u64,
-        /// The longest in this process of the link.
+        /// Longest latency in this link process.
         latency_max_ns: u64,
-        /// A [`crate::latency::Histogram`] of this process: bucket k counts latencies from 2^(k/8) microseconds.
+        /// A [`crate::latency::Histogram`] of this process: bucket k counts latencies from 2^(k/8)
+        /// microseconds.
         latency_histogram: [u32; latency::BUCKETS],
     }
 }
@@ -321,9 +331,9 @@ impl LinkSample {
 }
 
 payloads! {
-    /// The order is that of the rangers' channels.
+    /// Infrared ranges in the order of the rangers' channels.
     "firsthand.Infrared" InfraredSample {
-        /// Metres from each ranger, 0.09 to 0.81; 0.81 is also nothing.
+        /// Metres from each ranger, 0.09 to 0.81; 0.81 may also mean nothing in reach.
         range_m: [f64; INFRARED_RANGERS],
         raw_ad: [u16; INFRARED_RANGERS],
     }
@@ -334,7 +344,7 @@ payloads! {
         board_v: f64,
         motor_v: f64,
         servo_v: f64,
-        /// The two motor drivers, degrees Celsius by the vendor's formula.
+        /// Temperatures of the two motor drivers, degrees Celsius by the vendor's formula.
         driver_c: [f64; 2],
         /// Motor currents of the six channels, AD counts; no source gives the scale in amperes.
         current_ad: [u16; 6],
@@ -353,7 +363,7 @@ impl PowerSample {
 
 payloads! {
     "firsthand.Surroundings" SurroundingsSample {
-        /// At the board, degrees Celsius by the vendor's formula.
+        /// Board temperature, degrees Celsius by the vendor's formula.
         temperature_c: f64,
         /// Presence, AD counts.
         human_alarm_ad: [u16; 2],
@@ -371,9 +381,10 @@ wire_enum! {
 }
 
 payloads! {
-    /// The slice is the bytes of one datagram, or of one read from a connection or serial line.
+    /// Wire traffic; the slice holds the bytes of one datagram, or of one read from a connection or
+    /// serial line.
     "firsthand.WireHeader" WireHeader {
-        /// The machine's monotonic clock in the step that took or gave the bytes.
+        /// Machine's monotonic clock in the step that received or sent the bytes.
         machine_ns: u64,
         /// A [`Direction`].
         direction: u8,

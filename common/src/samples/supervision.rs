@@ -1,4 +1,4 @@
-//! The payloads of supervision: health, roster, orders, requests, deaths, stalls, faults.
+//! Payloads of supervision: health, roster, orders, requests, deaths, stalls, faults.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use crate::bus::ZeroCopySend;
 
 wire_enum! {
     HealthState, unknown = Starting {
-        /// Opening its topics, or waiting for what it cannot work without.
+        /// Opening its topics, or waiting for essential input.
         Starting = 0,
         Ready = 1,
         Stopping = 2,
@@ -18,7 +18,7 @@ wire_enum! {
 
 pub type Name = [u8; 24];
 
-/// `text` as UTF-8, cut at 24 bytes and padded with zeros.
+/// Encodes `text` as UTF-8, cut at 24 bytes and padded with zeros.
 pub fn name(text: &str) -> Name {
     let mut name = [0; 24];
     for (slot, byte) in name.iter_mut().zip(text.bytes()) {
@@ -27,7 +27,7 @@ pub fn name(text: &str) -> Name {
     name
 }
 
-/// The text of a [`Name`]; what is not UTF-8 is left out.
+/// Returns the text of a [`Name`]; empty if it is invalid UTF-8.
 pub fn name_str(name: &Name) -> &str {
     let text = name.split(|&byte| byte == 0).next().unwrap_or_default();
     std::str::from_utf8(text).unwrap_or_default()
@@ -40,7 +40,7 @@ payloads! {
         /// A [`HealthState`].
         state: u8,
         turns: u64,
-        /// The newest fault request to this generation; 0 for none.
+        /// Newest fault request to this generation; 0 for none.
         last_fault: u64,
         /// A [`FaultAnswer`].
         fault_answer: u8,
@@ -48,11 +48,11 @@ payloads! {
 }
 
 wire_enum! {
-    /// The supervisor's order to the robot.
+    /// Supervisor's order to the robot.
     #[derive(Serialize, Deserialize)]
     #[serde(from = "u8", into = "u8")]
     Order, unknown = Stop {
-        /// Stand still; do not start ticks.
+        /// Stand still; start no ticks.
         Hold = 0,
         Drive = 1,
         /// Stand still; the mission ends.
@@ -62,7 +62,7 @@ wire_enum! {
 
 payloads! {
     "firsthand.Directive" DirectiveSample {
-        /// The belief's epoch: a mapper with a lower one resets the sensed belief.
+        /// Epoch of the belief: a mapper with a lower one resets the sensed belief.
         epoch: u64,
         /// An [`Order`].
         order: u8,
@@ -72,15 +72,15 @@ payloads! {
 }
 
 payloads! {
-    /// The link may go so far ahead of the supervisor in lockstep, so that a recovery step against a stall begins at a tick that no
-    /// machine's speed changes.
+    /// Lead of the link over the supervisor in lockstep. It makes a recovery step begin at a tick
+    /// that is independent of machine speed.
     "firsthand.TickLimit" TickLimitSample {
         last_tick: u64,
-        /// The first tick of the newest recovery step; 0 for none.
+        /// First tick of the newest recovery step; 0 for none.
         holds_from_tick: u64,
-        /// The belief's epoch from that tick on.
+        /// Epoch of the belief from that tick on.
         epoch: u64,
-        /// The current target: no tick follows an arrival before the next target is published.
+        /// Current target: after an arrival, ticks wait for the next target.
         target_number: u64,
     }
 }
@@ -90,36 +90,36 @@ wire_enum! {
         Down = 0,
         Starting = 1,
         Running = 2,
-        /// It died too often, and waits before the next start.
+        /// Waits before its next start after too many deaths.
         BackingOff = 3,
-        /// It was asked to stop, or aborted because it hung.
+        /// Was asked to stop, or aborted because it hung.
         Stopping = 4,
-        /// It died far too often: only an operator starts it again.
+        /// Only an operator restarts it after far too many deaths.
         Held = 5,
     }
 }
 
 wire_enum! {
-    /// Why the robot is not ordered to drive.
+    /// Reason why the robot has no order to drive.
     #[derive(Serialize, Deserialize)]
     #[serde(from = "u8", into = "u8")]
     HoldReason, unknown = Starting {
-        /// A stage is not ready, the robot does not answer, or there is no field yet.
+        /// A stage is unready, the robot does not answer, or there is no field yet.
         Starting = 0,
         None = 1,
-        /// It lasts until the operator says resume.
+        /// Lasts until the operator resumes.
         Operator = 2,
         StageHeld = 3,
         Ending = 4,
-        /// There is no target: the robot waits for the next one.
+        /// Waiting for the next target.
         Waiting = 5,
-        /// What the robot follows was not heard for a while, or not yet: it goes on when it is.
+        /// The beacon was not heard for a while, or not yet; the robot continues once it is.
         Lost = 6,
     }
 }
 
 payloads! {
-    /// The slice is one [`RosterEntry`] a stage.
+    /// Roster; the slice has one [`RosterEntry`] per stage.
     "firsthand.RosterHeader" RosterHeader {
         supervisor_pid: u32,
         /// The current [`Order`].
@@ -127,7 +127,7 @@ payloads! {
         /// A [`HoldReason`].
         reason: u8,
         simulated: u8,
-        /// The newest answered request; 0 for none.
+        /// Newest answered request; 0 for none.
         last_request: u64,
         /// A [`RequestAnswer`].
         answer: u8,
@@ -157,7 +157,7 @@ wire_enum! {
         Exited = 0,
         /// `code` is the signal's number.
         Signalled = 1,
-        /// A core was dumped; `code` is the signal's number.
+        /// Dumped core; `code` is the signal's number.
         SignalledWithCore = 2,
         /// The process was not the supervisor's child.
         Unknown = 3,
@@ -170,7 +170,7 @@ wire_enum! {
         Nothing = 0,
         StartNow = 1,
         StartLater = 2,
-        /// Only an operator starts it again.
+        /// Only an operator restarts it.
         Hold = 3,
     }
 }
@@ -183,7 +183,7 @@ structs! {
     }
 }
 
-/// `text` as [`Words`], cut at 400 bytes.
+/// Encodes `text` as [`Words`], cut at 400 bytes.
 pub fn words(text: &str) -> Words {
     let mut words = Words::default();
     for (slot, byte) in words.bytes.iter_mut().zip(text.bytes()) {
@@ -193,7 +193,7 @@ pub fn words(text: &str) -> Words {
 }
 
 impl Words {
-    /// The text; a character that was cut is replaced.
+    /// Returns the text, with a replacement for a truncated character.
     pub fn text(&self) -> std::borrow::Cow<'_, str> {
         let text = self.bytes.split(|&byte| byte == 0).next();
         String::from_utf8_lossy(text.unwrap_or_default())
@@ -204,10 +204,10 @@ payloads! {
     /// Trouble of a stage that the user can mend. The stage repeats it while it lasts.
     "firsthand.Complaint" ComplaintSample {
         stage: Name,
-        /// The part of the input, as the input names it; empty for the whole.
+        /// Part of the input, by its own name; empty for the whole.
         input: Words,
         what: Words,
-        /// Empty where `what` says it.
+        /// Empty if `what` includes it.
         remedy: Words,
     }
 }
@@ -223,13 +223,13 @@ payloads! {
         /// Pause before its successor.
         next_after_ns: u64,
         code: i32,
-        /// Counted over the last ten seconds, this one included.
+        /// Deaths in the last ten seconds, including this one.
         deaths_in_window: u32,
         /// A [`DeathCause`].
         cause: u8,
         /// A [`NextStep`].
         next: u8,
-        /// 1: the supervisor ended it, because it hung or was never ready.
+        /// 1: the supervisor ended it: it hung or was never ready.
         hung: u8,
         log_tail: Words,
     }
@@ -239,7 +239,7 @@ wire_enum! {
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
     RecoveryStep, unknown = GiveUp {
-        /// A new generation of the planner solves the full field.
+        /// A new planner generation solves the full field.
         Replan = 0,
         Reset = 1,
         GiveUp = 2,
@@ -250,33 +250,33 @@ wire_enum! {
     #[derive(Serialize)]
     #[serde(rename_all = "snake_case")]
     StallCause, unknown = Still {
-        /// It neither drives nor turns.
+        /// The robot neither drives nor turns.
         Still = 0,
-        /// It moves, but does not leave its place.
+        /// The robot moves without leaving its place.
         Pinned = 1,
-        /// The robot drives in hazard, u = 0, and does not come out.
+        /// The robot drives inside a hazard, u = 0, and fails to leave it.
         InsideHazard = 2,
-        /// The belief has no way to the target, u = 0.
+        /// The belief has no path to the target, u = 0.
         CutOff = 3,
         Held = 4,
-        /// It drives far and comes no nearer to its target.
+        /// The robot drives far without approaching its target.
         Wandering = 5,
-        /// Fixes that agree, or an operator, say that it is elsewhere.
+        /// Consistent fixes or an operator place it elsewhere.
         Relocated = 6,
     }
 }
 
 payloads! {
-    /// It is serialized as a line of `stalls.jsonl`.
+    /// Stall, serialized as a line of `stalls.jsonl`.
     "firsthand.Stall" StallSample {
-        /// The believed place, metres.
+        /// Believed position, metres.
         x_m: f64,
         y_m: f64,
-        /// It holds from now on.
+        /// Epoch from now on.
         epoch: u64,
-        /// Planner generations for a stall in this mission, this one included.
+        /// Planner generations for stalls, including this one.
         replans: u32,
-        /// Resets of the sensed map in this mission, this one included.
+        /// Resets of the sensed map, including this one.
         resets: u64,
         /// A [`StallCause`].
         cause: u8,
@@ -313,7 +313,7 @@ impl Serialize for StallSample {
 
 wire_enum! {
     FollowState, unknown = Lost {
-        /// The following is over.
+        /// Following has ended.
         Ended = 0,
         Heard = 1,
         /// Not heard for 1 s, or not yet: the robot stands.
@@ -322,25 +322,25 @@ wire_enum! {
 }
 
 payloads! {
-    /// How the robot follows a beacon, and how it followed the last one.
+    /// State of following a beacon, or of the last following.
     "firsthand.Following" FollowingSample {
         /// A [`FollowState`].
         state: u8,
-        /// A [`BeaconRefusal`](super::BeaconRefusal), the newest.
+        /// The newest [`BeaconRefusal`](super::BeaconRefusal).
         refusal: u8,
-        /// The distance that the robot keeps between its centre and the beacon, metres.
+        /// Distance that the robot keeps between its centre and the beacon, metres.
         distance_m: f64,
-        /// The newest beacon that was used, metres in the mission frame.
+        /// Newest used beacon, metres in the mission frame.
         x_m: f64,
         y_m: f64,
-        /// Mission time at which that was captured, nanoseconds; u64::MAX for never.
+        /// Mission time of its capture, nanoseconds; u64::MAX for never.
         heard_ns: u64,
         /// Samples of the beacon.
         used: u64,
         refused: u64,
-        /// Times that the beacon was lost after it was heard.
+        /// Losses of the beacon after it was heard.
         lost: u64,
-        /// The way and the time of the robot meanwhile.
+        /// Distance and time of the robot meanwhile.
         followed_m: f64,
         followed_s: f64,
     }
@@ -351,12 +351,12 @@ impl FollowingSample {
         FollowState::from_byte(self.state)
     }
 
-    /// Seconds at mission time `now_s` since the beacon was heard; none if it never was.
+    /// Returns the seconds since the beacon was heard, at mission time `now_s`; `None` if never.
     pub fn heard_ago_s(&self, now_s: f64) -> Option<f64> {
         (self.heard_ns != u64::MAX).then(|| (now_s - self.heard_ns as f64 * 1e-9).max(0.0))
     }
 
-    /// The result of the following so far.
+    /// Describes the result of the following so far.
     pub fn result(&self) -> String {
         let lost = match self.lost {
             0 => "never lost".to_owned(),
@@ -368,38 +368,38 @@ impl FollowingSample {
     }
 }
 
-/// A robot that a hand drives stands so long after the hand's last request.
+/// Silence of manual requests that stops a manually driven robot.
 pub const DEAD_MAN: Duration = Duration::from_millis(300);
 
 wire_enum! {
     RequestKind, unknown = Nothing {
         Nothing = 0,
-        /// A new generation of a stage; a held one is released.
+        /// Starts a new generation of a stage, held or not.
         Restart = 1,
         Stop = 2,
         Resume = 3,
-        /// The targets replace those that the robot has.
+        /// Replaces the robot's targets.
         Goto = 4,
-        /// The targets follow those that the robot has.
+        /// Appends to the robot's targets.
         Append = 5,
-        /// The robot, which stands, is at the target, with the deviations.
+        /// Sets the pose of the standing robot to the target, with the deviations.
         Place = 6,
-        /// The targets are the corners of a zone more.
+        /// Adds a zone with the targets as corners.
         AddZone = 7,
-        /// The zones with the first target inside are no more.
+        /// Removes the zones around the first target.
         RemoveZone = 8,
-        /// Driven by hand: towards the target, which is ahead and to the left of the robot, in shares of full speed. It stands without
-        /// another such request within [`DEAD_MAN`].
+        /// Drives manually towards the target: ahead and to the left, in shares of full speed. The
+        /// robot stops without another such request within [`DEAD_MAN`].
         Hand = 9,
-        /// Follow the beacon, at the distance that is the first of the deviations.
+        /// Follows the beacon at the distance in the first deviation.
         Follow = 10,
-        /// Follow no longer, and wait for a target.
+        /// Ends following and waits for a target.
         EndFollow = 11,
     }
 }
 
 wire_enum! {
-    /// The supervisor's answer to a request. Each text completes "the supervisor refuses: ".
+    /// Supervisor's answer to a request. Each text completes "the supervisor refuses: ".
     RequestAnswer, unknown = Unknown, text = text {
         Taken = 0 "it is not refused",
         Unknown = 1 "it knows no such request; are both of the same version?",
@@ -423,9 +423,9 @@ wire_enum! {
 
 payloads! {
     "firsthand.Request" RequestSample {
-        /// The roster's `last_request` names it when it is answered. Never 0.
+        /// Number that the roster's `last_request` repeats with the answer. Never 0.
         id: u64,
-        /// The machine's monotonic clock.
+        /// Machine's monotonic clock.
         asked_ns: u64,
         /// Empty for none.
         stage: Name,
@@ -435,22 +435,23 @@ payloads! {
         /// A [`RequestAnswer`], in `orders`.
         answer: u8,
         targets: [TargetPoint; MOST_TARGETS],
-        /// Standard deviations of a place, metres, and its heading, radians. Of a following the first is its distance, metres.
+        /// Standard deviations of position, metres, and heading, radians. For following, the first
+        /// is the distance, metres.
         deviations: [f64; 2],
     }
 }
 
 impl RequestSample {
-    /// The targets; none if there are none, or more than fit.
+    /// Returns the targets; `None` if the count is 0 or too great.
     pub fn targets(&self) -> Option<&[TargetPoint]> {
         self.targets.get(..usize::from(self.target_count)).filter(|targets| !targets.is_empty())
     }
 }
 
 payloads! {
-    /// How old what a mirror shows is.
+    /// Age of the samples that a mirror shows.
     "firsthand.Mirror" MirrorSample {
-        /// The newest sample was published on the robot's machine so long ago at most, nanoseconds.
+        /// Greatest age of the newest sample since its publication by the robot, nanoseconds.
         age_ns: u64,
     }
 }
@@ -462,20 +463,21 @@ impl MirrorSample {
 }
 
 wire_enum! {
-    /// A fault that can be injected into a running stage; [`crate::faults::TABLE`] says where and how.
+    /// Fault that can be injected into a running stage; [`crate::faults::TABLE`] says where and
+    /// how.
     #[derive(Serialize, Deserialize)]
     FaultKind, unknown = Nothing {
         Nothing = 0,
-        /// An iteration of the work loop does not end.
+        /// Endless iteration of the work loop.
         Spin = 1,
-        /// A current field whose ways all lead to the robot.
+        /// Current field whose paths all lead to the robot.
         CorruptField = 2,
-        /// No direction, as where the gradient is zero.
+        /// Missing direction, as at a zero gradient.
         Saddle = 3,
         HazardAroundRobot = 4,
-        /// A closed wall believed around the target, also after a reset.
+        /// Closed wall believed around the target, even after a reset.
         CutOff = 5,
-        /// The stage beats, and publishes no output.
+        /// Heartbeats without output.
         Mute = 6,
     }
 }
@@ -484,7 +486,7 @@ wire_enum! {
     FaultAnswer, unknown = Refused {
         None = 0,
         Taken = 1,
-        /// The robot is real, and the request does not say `although_real`.
+        /// The robot is real, and the request lacks `although_real`.
         Refused = 2,
         /// The stage has no such fault, or nothing yet to break.
         Impossible = 3,
@@ -493,7 +495,7 @@ wire_enum! {
 
 payloads! {
     "firsthand.Fault" FaultSample {
-        /// The stage's `last_fault` in `health` names it when it is answered. Never 0.
+        /// Number that the stage's `last_fault` in `health` repeats with the answer. Never 0.
         id: u64,
         stage: Name,
         /// A [`FaultKind`].
@@ -504,7 +506,8 @@ payloads! {
 }
 
 payloads! {
-    /// The slice is a piece of the entries of [`crate::inputs`]. A generation's pieces follow by sequence.
+    /// Inputs of a stage; the slice is a piece of the entries of [`crate::inputs`], ordered by
+    /// sequence within a generation.
     "firsthand.InputsHeader" InputsHeader {
         stage: Name,
     }

@@ -1,4 +1,4 @@
-//! The faults that an operator asks this process to have.
+//! Operator requests to inject faults into this process.
 
 use crate::{
     bus::{Bus, BusError, Reader},

@@ -1,11 +1,11 @@
-//! The properties of the decoder for all inputs. The fuzz target and the test that runs the corpus share them.
+//! Properties of the decoder for all inputs, shared by the fuzz target and the corpus test.
 
 use x80_protocol::{Addressing, Command, Decoder, Frame, MAX_FRAME_BYTES, Report};
 
 const PING: [u8; 10] = [0x5e, 0x02, 0x01, 0x00, 0xff, 0x01, 0x00, 0xdb, 0x5e, 0x0d];
 
-/// Feed `input` to a decoder and check the decoder's properties. The first byte gives the size of the pieces into which
-/// the rest is cut.
+/// Feeds `input` to a decoder and checks its properties. The first byte is the size of the pieces
+/// of the rest.
 pub(crate) fn check(input: &[u8]) {
     let Some((&size, bytes)) = input.split_first() else {
         return;
@@ -48,7 +48,6 @@ fn drain(decoder: &mut Decoder) {
     }
 }
 
-/// Assert that a decoded message is the same after it was encoded and decoded again.
 fn again(write: impl Fn(&mut Vec<u8>), same: impl Fn(&Frame<'_>)) {
     let mut bytes = Vec::new();
     write(&mut bytes);

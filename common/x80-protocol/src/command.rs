@@ -5,20 +5,20 @@ use super::{
     frame::{Addressing, Frame, SystemSignal},
 };
 
-/// The wheels are on two of the motor board's channels.
+/// Channels of the motor board; the wheels use two.
 pub const CHANNELS: usize = 6;
-/// The value leaves a channel unchanged.
+/// Value that leaves a channel unchanged.
 const ALONE: i16 = i16::MIN;
-/// One client sends this value instead.
+/// Alternative value, sent by one client.
 const ALSO_ALONE: i16 = i16::MIN + 1;
-/// This byte comes before the time limit of a command.
+/// Byte before the time limit of a command.
 const TIME_FOLLOWS: u8 = 28;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Counts, cyclic 0..32767 with an encoder as feedback.
+    /// Counts, cyclic 0..32767 with encoder feedback.
     Position,
-    /// Pulse width: 0..32767 is full backward to full forward, 16384 stands still.
+    /// Pulse width: 0..32767 is full backward to full forward, 16384 is standstill.
     Pwm,
     /// Counts per second.
     Velocity,
@@ -27,7 +27,7 @@ pub enum Quantity {
 impl Quantity {
     const ALL: [Self; 3] = [Self::Position, Self::Pwm, Self::Velocity];
 
-    /// Of a command for one channel, and for all.
+    /// Returns the DIDs of a command for one channel, and for all.
     const fn dids(self) -> [u8; 2] {
         match self {
             Self::Position => [did::POSITION, did::POSITION_ALL],
@@ -41,7 +41,7 @@ impl Quantity {
 pub enum Targets {
     /// Channel 0 to 5.
     One { channel: u8, value: i16 },
-    /// `None` leaves a channel alone.
+    /// `None` leaves a channel unchanged.
     All([Option<i16>; CHANNELS]),
 }
 
@@ -58,7 +58,7 @@ impl Targets {
 pub struct Motion {
     pub quantity: Quantity,
     pub targets: Targets,
-    /// The motion ends after this time. Not all robots respect it.
+    /// Duration of the motion. Some robots ignore it.
     pub limit_ms: Option<u16>,
 }
 
@@ -72,19 +72,19 @@ pub enum Feedback {
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
-    /// Pulse width, without a loop.
+    /// Pulse width, open loop.
     #[default]
     Pwm,
     Position,
     Velocity,
 }
 
-/// A command brings up to three gains.
+/// Gains; a command carries up to three.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Gains {
     pub kp: Option<u16>,
     pub kd: Option<u16>,
-    /// The gain times 100.
+    /// Gain times 100.
     pub ki_x100: Option<u16>,
 }
 
@@ -113,7 +113,7 @@ pub enum Stream {
 pub enum Request {
     Start,
     Stop,
-    /// Send 1 to 254 frames, and then no more.
+    /// Sends 1 to 254 frames, then stops.
     Count(u8),
 }
 
@@ -126,7 +126,7 @@ pub enum Command {
     },
     Enable {
         on: bool,
-        /// None is all channels.
+        /// `None` is all channels.
         channel: Option<u8>,
     },
     Stream {
@@ -137,7 +137,7 @@ pub enum Command {
 }
 
 impl Command {
-    /// Channels 0 and 1, counts per second; the others are left alone.
+    /// Commands channels 0 and 1, counts per second, and leaves the others unchanged.
     pub fn velocity(wheels: [Option<i16>; 2], limit_ms: impl Into<Option<u16>>) -> Self {
         Self::Motion(Motion {
             quantity: Quantity::Velocity,

@@ -18,7 +18,7 @@ const fn table() -> [u8; 256] {
     table
 }
 
-/// In a frame, `bytes` are RID to the last data byte.
+/// Computes the CRC; in a frame, `bytes` are RID to the last data byte.
 pub fn crc8(bytes: &[u8]) -> u8 {
     bytes.iter().fold(0, |crc, byte| TABLE[usize::from(crc ^ byte)])
 }

@@ -1,8 +1,9 @@
-//! Bytes to frames. The bytes may come in any pieces, with noise between frames and with wrong CRCs.
+//! Decoder of bytes to frames. Bytes may arrive in any pieces, with noise between frames and wrong
+//! CRCs.
 //!
-//! A frame is found by its header, LEN and CRC. Its end bytes are checked only where CRC-8 alone is too weak: one
-//! noisy header in 256 passes the CRC, and the good frames after it would count as its data. So a frame with wrong
-//! end bytes is accepted only if no frame with right end bytes begins inside it.
+//! A frame is found by its header, LEN and CRC. End bytes matter only where CRC-8 is too weak: one
+//! noisy header in 256 passes and would swallow the frames after it. A frame with wrong end bytes
+//! is therefore accepted only if no frame with right end bytes begins inside it.
 
 use std::cell::Cell;
 
@@ -11,14 +12,14 @@ use super::{
     frame::{BEFORE_DATA, Frame, HEADER, MAX_FRAME_BYTES},
 };
 
-/// The largest datagram, and a frame begun in the one before.
+/// Largest datagram, plus a frame begun in the one before.
 const CAPACITY: usize = 65_536 + MAX_FRAME_BYTES;
-/// No known message is longer: a header that claims more is likely noise, and does not hold back the complete frames
-/// behind it while the rest of its own is missing.
+/// Bound of known messages. A header that claims more is likely noise, and must not delay the
+/// complete frames after it.
 const LONGEST_PLAUSIBLE: usize = 64;
 
-/// Bytes whose CRC is computed after one push. Sound frames need as many as they have; a flood of false headers would
-/// need a thousand times as many, and hold up whoever decodes.
+/// CRC work in bytes after one push. Sound frames need their own length; a flood of false headers
+/// would need a thousand times as much.
 const MOST_WORK: usize = 1 << 20;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,32 +27,32 @@ pub struct DecoderTally {
     pub frames: u64,
     pub bad_crc: u64,
     pub noise_bytes: u64,
-    /// Bytes dropped unread because more came than is held, or too many false headers.
+    /// Bytes dropped unread because of overflow or too many false headers.
     pub dropped_bytes: u64,
 }
 
-/// [`Decoder::push`] what came, then take every [`Decoder::next_frame`].
+/// Frame decoder: [`Decoder::push`] the bytes, then take every [`Decoder::next_frame`].
 ///
-/// It holds at most 64 KiB and a frame. If a push exceeds that, the oldest bytes are dropped; if false headers take
-/// too long, all are. An incomplete frame waits for its rest, and so do the bytes after a false header until its
-/// claimed length has come.
+/// It buffers at most 64 KiB and a frame. A push beyond that drops the oldest bytes; too much work
+/// on false headers drops all. An incomplete frame waits for its rest, as do the bytes after a
+/// false header until its claimed length has arrived.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     buffer: Vec<u8>,
     start: usize,
     tally: DecoderTally,
-    /// Bytes whose CRC was computed since the last push.
+    /// CRC work in bytes since the last push.
     work: Cell<usize>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Candidate {
-    /// The CRC of LEN data bytes is right; `end` is the offset after it.
+    /// Right CRC of LEN data bytes; `end` is the offset after it.
     Sound {
         end: usize,
         ending: Ending,
     },
-    /// The rest has not come; the header announces `len` bytes of data.
+    /// Incomplete frame whose header announces `len` bytes of data.
     Half {
         len: usize,
     },
@@ -62,7 +63,7 @@ enum Candidate {
 enum Ending {
     /// `5E 0D`, or the `5E 13` that one client sends.
     Right,
-    /// Other bytes, or only the beginning of right end bytes so far.
+    /// Other bytes, or an incomplete right end.
     Wrong,
     Missing,
 }
@@ -79,7 +80,7 @@ impl Decoder {
         self.work.set(0);
     }
 
-    /// The next complete frame, in the order they came.
+    /// Returns the next complete frame in order of arrival.
     pub fn next_frame(&mut self) -> Option<Frame<'_>> {
         let end = loop {
             if self.work.get() > MOST_WORK {
@@ -106,7 +107,7 @@ impl Decoder {
                         self.tally.bad_crc += 1;
                         self.skip(noise + at);
                     }
-                    // The next bytes show which of the two frames is real.
+                    // Further bytes will show which of the two frames is real.
                     Inside::Frame(_) | Inside::Unknown => {
                         self.skip(noise);
                         return None;
@@ -123,7 +124,8 @@ impl Decoder {
                     };
                     self.skip(at);
                 }
-                // Only the header is skipped, because the next frame may begin inside the broken one.
+                // Only the header is skipped, because the next frame may begin inside the broken
+                // one.
                 Candidate::Broken => {
                     self.tally.bad_crc += 1;
                     self.skip(noise + 1);
@@ -145,7 +147,7 @@ impl Decoder {
         })
     }
 
-    /// The next bytes do not continue the held ones, which count as noise.
+    /// Discards the buffered bytes as noise, because the next ones do not continue them.
     pub fn reset(&mut self) {
         self.skip(self.buffer.len() - self.start);
     }
@@ -160,13 +162,13 @@ impl Decoder {
     }
 }
 
-/// Offset of the first header, or of a last byte that may begin one.
+/// Returns the offset of the first header, or of a last byte that may begin one.
 fn header_in(bytes: &[u8]) -> Option<usize> {
     let whole = bytes.windows(2).position(|pair| pair == HEADER);
     whole.or_else(|| bytes.last().is_some_and(|&last| last == HEADER[0]).then(|| bytes.len() - 1))
 }
 
-/// `bytes` starts with a header or the beginning of one.
+/// Classifies `bytes`, which start with a header or the beginning of one.
 fn candidate(bytes: &[u8], work: &Cell<usize>) -> Candidate {
     let Some(&len) = bytes.get(BEFORE_DATA - 1) else {
         return Candidate::Half { len: 0 };
@@ -193,7 +195,7 @@ fn is_end(bytes: &[u8]) -> Ending {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Inside {
     Nothing,
-    /// A sound frame begins at this offset.
+    /// Sound frame at this offset.
     Frame(usize),
     Unknown,
 }

@@ -1,4 +1,4 @@
-//! DID: what the data of a frame mean.
+//! DID: meaning of a frame's data.
 
 pub const POSITION: u8 = 3;
 pub const POSITION_ALL: u8 = 4;

@@ -6,10 +6,10 @@ pub(super) const HEADER: [u8; 2] = [0x5e, 0x02];
 const END: [u8; 2] = [0x5e, 0x0d];
 /// Header, RID, SN, DID, LEN.
 pub(super) const BEFORE_DATA: usize = 6;
-/// 255 data bytes with all that surrounds them.
+/// Length of a frame with 255 data bytes.
 pub const MAX_FRAME_BYTES: usize = BEFORE_DATA + 255 + 1 + END.len();
 
-/// How robot and host are numbered. A receiver answers as it was addressed.
+/// Device numbers of robot and host. A receiver answers with the numbers in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Addressing {
     /// Host 00, motion board 01, multimedia board 08: most robots.
@@ -34,7 +34,7 @@ impl Addressing {
         }
     }
 
-    /// None if `rid` is not a robot's.
+    /// Returns `None` if `rid` is not a robot's.
     pub const fn of_robot(rid: u8) -> Option<Self> {
         match rid {
             0x01 | 0x08 => Some(Self::Numbered),
@@ -43,12 +43,12 @@ impl Addressing {
         }
     }
 
-    /// The multimedia board acknowledges, and neither moves nor measures.
+    /// Returns whether `rid` is the multimedia board, which only acknowledges.
     pub const fn is_multimedia(rid: u8) -> bool {
         rid == 0x08
     }
 
-    /// None if `rid` is not a host's.
+    /// Returns `None` if `rid` is not a host's.
     pub const fn of_host(rid: u8) -> Option<Self> {
         match rid {
             0x00 => Some(Self::Numbered),
@@ -61,14 +61,14 @@ impl Addressing {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
     pub rid: u8,
-    /// Everybody sends 0.
+    /// Always sent as 0.
     pub sn: u8,
     pub did: u8,
     pub data: &'a [u8],
 }
 
 impl Frame<'_> {
-    /// Cuts data beyond 255 bytes off: LEN is one byte.
+    /// Encodes the frame, with data cut at 255 bytes: LEN is one byte.
     pub fn encode(&self, out: &mut Vec<u8>) {
         let data = &self.data[..self.data.len().min(255)];
         out.extend_from_slice(&HEADER);
@@ -81,12 +81,12 @@ impl Frame<'_> {
     }
 }
 
-/// Both sides send them with DID 255.
+/// Signals that both sides send with DID 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SystemSignal {
     /// Code 0.
     Ping,
-    /// Code 1. Acknowledging these would never end.
+    /// Code 1. Acknowledging it would never end.
     Ack,
 }
 
@@ -107,7 +107,7 @@ impl SystemSignal {
     }
 }
 
-/// The CRC was right, and no message has this length or these values. A receiver can continue.
+/// Well-formed frame without a message of this length or these values. A receiver can continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error(
     "DID {did}: no message of it has these data; pass the frame over, or add the DID to the wire module"

@@ -1,11 +1,11 @@
-//! The X80's protocol: bytes to frames, frames to messages, and back.
+//! X80 protocol: bytes to frames, frames to messages, and back.
 //!
 //! ```text
 //! 5E 02 | RID | SN | DID | LEN | DATA[LEN] | CRC | 5E 0D
 //! ```
 //!
-//! Numbers are little-endian, and nothing is escaped. CRC is CRC-8/MAXIM-DOW over RID to the last data byte. RID is
-//! the addressed device, DID the meaning of the data:
+//! Numbers are little-endian, and bytes are not escaped. CRC is CRC-8/MAXIM-DOW over RID to the
+//! last data byte. RID is the addressed device, DID the meaning of the data:
 //!
 //! | DID | host to robot ([`Command`]) | robot to host ([`Report`]) |
 //! |---|---|---|
@@ -19,8 +19,8 @@
 //! | 127 | start or stop all three | |
 //! | 255 | ping, acknowledge | ping, acknowledge |
 //!
-//! There is no official document but the vendor's manual, and drivers that are in use, so every message is sent in
-//! the commonest form and accepted in all forms.
+//! The only sources are the vendor's manual and drivers in use. Messages are therefore sent in
+//! their commonest form and accepted in all forms.
 //!
 //! ```
 //! use x80_protocol::{Addressing, Command, Decoder, Report, SystemSignal};

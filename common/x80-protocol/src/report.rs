@@ -31,7 +31,7 @@ impl Report {
     }
 
     /// # Errors
-    /// The DID is unknown, the frame too short, or a byte has no meaning.
+    /// If the DID is unknown, the frame too short, or a byte has no meaning.
     pub fn parse(&Frame { did, data, .. }: &Frame<'_>) -> Result<Self, MessageError> {
         let report = match did {
             did::MOTOR => MotorSensors::from_bytes(data).map(Self::Motor),

@@ -1,6 +1,6 @@
-//! The contents of the three sensor frames.
+//! Contents of the three sensor frames.
 
-/// Counts run 0..32767 and begin again.
+/// Cycle of the counts, which run 0..32767 and wrap around.
 pub const COUNT_CYCLE: u16 = 32_768;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,19 +12,18 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Positive in the channel's positive direction.
     pub fn velocity(&self) -> i32 {
         let speed = i32::from(self.speed);
         if self.positive { speed } else { -speed }
     }
 
-    /// The shorter way round the cycle, in the channel's positive direction.
+    /// Returns the shorter difference in the cycle, in the channel's positive direction.
     pub fn counts_since(&self, earlier: &Self) -> i32 {
         counts_between(earlier.position, self.position)
     }
 }
 
-/// The shorter way round the cycle, both below [`COUNT_CYCLE`].
+/// Returns the shorter difference in the cycle; both counts are below [`COUNT_CYCLE`].
 pub fn counts_between(old: u16, new: u16) -> i32 {
     let cycle = i32::from(COUNT_CYCLE);
     let ahead = (i32::from(new) - i32::from(old)).rem_euclid(cycle);
@@ -34,7 +33,7 @@ pub fn counts_between(old: u16, new: u16) -> i32 {
 /// DID 123.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotorSensors {
-    /// AD counts of the six channels, as are `currents`.
+    /// AD counts of the six channels, like `currents`.
     pub pots: [u16; 6],
     pub currents: [u16; 6],
     /// Channels 0 and 1.
@@ -54,9 +53,9 @@ pub struct StandardSensors {
     pub overheat: [u16; 2],
     /// Board, AD counts.
     pub temperature: u16,
-    /// The first ranger's AD counts for [`super::infrared_m`].
+    /// AD counts of the first ranger, for [`super::infrared_m`].
     pub infrared: u16,
-    /// A remote control sent it last.
+    /// Last code from a remote control.
     pub infrared_code: [u8; 4],
     /// AD counts for [`super::volts`] with 9 V full scale.
     pub board_battery: u16,
@@ -76,14 +75,14 @@ pub struct CustomSensors {
     pub io: u8,
 }
 
-/// A frame's data in their order, described once for reading and for writing.
+/// Order of a frame's data, described once for reading and writing.
 pub(super) trait Layout: Default {
     const BYTES: usize;
 
     /// Passes each byte to `byte`, which reads or replaces it.
     fn each_byte(&mut self, byte: &mut impl FnMut(&mut u8));
 
-    /// Further bytes are ignored.
+    /// Ignores further bytes.
     fn from_bytes(data: &[u8]) -> Option<Self> {
         let (mut new, mut bytes) = (Self::default(), data.get(..Self::BYTES)?.iter());
         new.each_byte(&mut |byte| *byte = bytes.next().copied().unwrap_or_default());
@@ -98,7 +97,7 @@ pub(super) trait Layout: Default {
     }
 }
 
-/// Little-endian.
+/// Passes the words in little-endian order.
 fn each_word<'a>(words: impl IntoIterator<Item = &'a mut u16>, byte: &mut impl FnMut(&mut u8)) {
     for word in words {
         let mut bytes = word.to_le_bytes();

@@ -57,7 +57,7 @@ fn the_worked_acknowledgement_of_the_robot_is_written_and_read() {
     assert_eq!(Report::parse(&decoder.next_frame().unwrap()), Ok(ack));
 }
 
-/// A command's data in a frame of `did`.
+/// Parses a command's data in a frame of `did`.
 fn parsed(did: u8, data: &[u8]) -> Result<Command, MessageError> {
     Command::parse(&Frame { rid: 1, sn: 0, did, data })
 }
@@ -223,7 +223,7 @@ proptest! {
         data in prop::collection::vec(any::<u8>(), 0..60),
     ) {
         let frame = Frame { rid: 0, sn: 0, did, data: &data };
-        // A report keeps all of its data, except the bytes that the frame leaves unused.
+        // A report keeps all of its data except the frame's unused bytes.
         if let Ok(report) = Report::parse(&frame) {
             let mut out = Vec::new();
             report.encode(Addressing::Numbered, &mut out);

@@ -1,6 +1,6 @@
-//! The decoder on the inputs that fuzzing found, and on bounded random changes of it.
+//! Runs the decoder on the fuzzing corpus and on bounded random changes of it.
 //!
-//! The long run is `common/x80-protocol/fuzz`: its target says how.
+//! The target in `common/x80-protocol/fuzz` describes the long run.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test")]
 
 #[path = "../fuzz/oracle.rs"]
@@ -11,7 +11,6 @@ use proptest::{
     test_runner::{Config, TestRunner},
 };
 
-/// The inputs: a line of hexadecimal digits each.
 fn corpus() -> Vec<Vec<u8>> {
     let byte = |digits: &str| u8::from_str_radix(digits, 16).expect("two hexadecimal digits");
     let lines = include_str!("../fuzz/decoder-corpus.hex").lines();

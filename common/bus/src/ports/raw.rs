@@ -1,11 +1,12 @@
-//! The middleware's services and ports, compiled once: every payload is bytes here, whose name, size and alignment the middleware is
-//! told when a service is created or opened.
+//! Middleware services and ports, compiled once: each payload is bytes here, with its name, size
+//! and alignment declared when a service is created or opened.
 //!
 //! Why `unsafe` is allowed here, and why it is sound:
-//! - [`samples`] tells the middleware the types of a topic's samples. The middleware refuses to open a service of other types, and
-//!   [`RawService::open`] compares them once more.
+//! - [`samples`] declares the types of a topic's samples. The middleware refuses to open a service
+//!   of other types, and [`RawService::open`] compares them again.
 //! - [`RawPublisher::send`] sends a sample only after its header and all its elements were written.
-//! - The descriptor of a listener is borrowed, and the borrow ends before the listener is dropped. Nobody else closes it.
+//! - The descriptor of a listener is borrowed, and the borrow ends before the listener is dropped.
+//!   Only the listener closes it.
 //! - A port is dropped exactly once, by its [`Drop`].
 #![allow(unsafe_code)]
 
@@ -45,8 +46,7 @@ use crate::{
     spec::{Limits, Spec},
 };
 
-/// Wraps types so that their destructors are compiled only here. The destructor of a plain field would be compiled again in each
-/// crate that drops the struct around it.
+/// Wraps types to compile their destructors only here, and not in each crate that drops them.
 macro_rules! dropped_here {
     ($($(#[$doc:meta])* $name:ident($port:ty);)*) => {$(
         $(#[$doc])*
@@ -88,7 +88,7 @@ dropped_here! {
     BusNode(Node<ipc::Service>);
     /// Wakes the readers of a topic.
     Notifier(notifier::Notifier<ipc::Service>);
-    /// Is readable when a sample was published on a topic.
+    /// Becomes readable after a publication on a topic.
     Listener(listener::Listener<ipc::Service>);
     RawService(PortFactory<ipc::Service, Bytes, CustomHeaderMarker>);
     PublisherPort(publisher::Publisher<ipc::Service, Bytes, CustomHeaderMarker>);
@@ -96,7 +96,7 @@ dropped_here! {
     RawSample(sample::Sample<ipc::Service, Bytes, CustomHeaderMarker>);
 }
 
-/// The description of a payload on which all processes must agree.
+/// Description of a payload on which all processes must agree.
 #[derive(Clone, Copy, Debug)]
 struct Type {
     name: &'static str,
@@ -119,14 +119,14 @@ impl Type {
     }
 }
 
-/// The types of a topic's samples for the middleware: a header and elements. A sample without a slice is one element, and has no
+/// Sample types of a topic for the middleware. A sample without a slice is one element without a
 /// header.
 #[derive(Clone, Copy, Debug)]
 pub struct Carried {
     header: Type,
     element: Type,
     elements: TypeVariant,
-    /// Differs where fields have other names, kinds or places in as many bytes.
+    /// Checksum of the fields' names, kinds and places.
     layout: u32,
 }
 
@@ -179,7 +179,7 @@ fn service_name(spec: &Spec) -> Result<ServiceName> {
     spec.name.try_into().map_err(refused("name", spec.name))
 }
 
-/// Create the services of a topic. They exist as long as the result is held.
+/// Creates the services of a topic, which exist while the result is held.
 pub(crate) fn create(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Box<dyn Any>> {
     let (key, layout) = carried.layout(spec)?;
     let layout = AttributeSpecifier::new().define(&key, &layout);
@@ -285,7 +285,8 @@ pub(super) struct RawPublisher {
 }
 
 impl RawPublisher {
-    /// Publish a sample of `elements` elements. `fill` writes the header and all elements, or returns false if they do not fit.
+    /// Publishes a sample. `fill` writes the header and all elements, or returns false if they do
+    /// not fit.
     pub(super) fn send(&self, elements: usize, fill: &mut dyn FnMut(Loan<'_>) -> bool) -> Result {
         let topic = self.topic;
         // SAFETY: `elements` is 1 where samples have no slice.
@@ -345,7 +346,7 @@ impl Notifier {
 }
 
 impl Listener {
-    /// Listen to a topic if `admit` allows it, which gets the number of the present listeners.
+    /// Listens to a topic if `admit` accepts the number of present listeners.
     pub(crate) fn open(
         node: &BusNode,
         spec: &Spec,
@@ -357,7 +358,7 @@ impl Listener {
         Ok(listener.map_err(refused("listen to", spec.name))?.into())
     }
 
-    /// Clear the notifications. Returns whether there was one.
+    /// Clears the notifications; returns whether there were any.
     pub(crate) fn drain(&self) -> Result<bool> {
         self.try_wait(|_| {}).map(|events| events > 0).map_err(refused("listen to", "a topic"))
     }
@@ -365,7 +366,8 @@ impl Listener {
 
 impl AsFd for Listener {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        // SAFETY: the descriptor stays open until the listener is dropped, after the borrow has ended.
+        // SAFETY: the descriptor stays open until the listener is dropped, after the borrow has
+        // ended.
         unsafe { BorrowedFd::borrow_raw(self.file_descriptor().native_handle()) }
     }
 }

@@ -1,4 +1,4 @@
-//! Tests of the ports of bytes against the middleware's own typed API.
+//! Tests of the byte ports against the middleware's typed API.
 
 use std::{
     ffi::{c_int, c_long, c_void},
@@ -76,7 +76,7 @@ static STRUCTS: Topic<Test> = Topic::new(&spec("structs"));
 static SLICES: Topic<Test, Cell> = Topic::new(&spec("slices"));
 static BYTES: Topic<Test, u8> = Topic::new(&spec("bytes"));
 
-/// Run `test` on a bus of these topics, and remove the bus.
+/// Runs `test` on a bus of these topics and removes the bus.
 fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
     let domain = Domain::of(format!("{robot}-{}", std::process::id()).parse().unwrap());
     fs::DirBuilder::new().recursive(true).mode(0o700).create(domain.directory()).unwrap();
@@ -162,7 +162,7 @@ unsafe extern "C" {
     ) -> *mut c_void;
 }
 
-/// A page behind the end of a file raises SIGBUS as one in a full file system does.
+/// A page beyond the end of a file raises SIGBUS, like one in a full file system.
 #[test]
 fn a_place_is_used_only_if_the_one_behind_it_has_memory() {
     const READ_WRITE: c_int = 3;
@@ -170,7 +170,7 @@ fn a_place_is_used_only_if_the_one_behind_it_has_memory() {
     let page = rustix::param::page_size();
     let file = tempfile::tempfile_in(SHARED_MEMORY).unwrap();
     file.set_len(4 * page as u64).unwrap();
-    // SAFETY: nothing uses the memory but the kernel.
+    // SAFETY: only the kernel uses the memory.
     let start = unsafe { mmap(ptr::null_mut(), 8 * page, READ_WRITE, SHARED, file.as_raw_fd(), 0) };
     let start = start.expose_provenance();
     let places = Places::of_segment([start, start + page]);
@@ -266,7 +266,8 @@ fn a_bus_of_another_version_is_not_joined_and_its_version_is_named() {
     });
 }
 
-/// A datagram of the second publication is lost here as in a drain that empties the socket after it marked the listener as not notified.
+/// Loses the second publication's datagram, like a drain that empties the socket after it marked
+/// the listener as not notified.
 #[test]
 fn a_waiter_is_woken_again_after_a_publication_in_the_middle_of_a_drain() {
     with_bus("woken", |bus| {

@@ -1,8 +1,8 @@
 use super::objection::{Result, all_within, objection, refuse_if};
 use crate::{LEAST_BAUD, Mission, Protocol, SensorKind};
 
-/// The greatest speed of a rim that is one count in a run of the speed loop, m/s: a robot that cannot turn its wheels
-/// slower turns past its target.
+/// Greatest rim speed of one count per run of the speed loop, m/s. With coarser steps a robot turns
+/// past its target.
 const GREATEST_STEP_M_S: f64 = 0.1;
 
 pub(super) fn check(mission: &Mission) -> Result {

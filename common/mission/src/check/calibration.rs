@@ -1,4 +1,4 @@
-//! The calibration file that a mission names.
+//! Calibration file named by a mission.
 
 use std::path::Path;
 
@@ -12,11 +12,11 @@ fn read(path: &Path) -> Result<Odometry, MissionError> {
 }
 
 impl Mission {
-    /// Put the values of the calibration file in place of its name, so that a run does not depend on the file. A
-    /// relative name is taken from the current directory.
+    /// Replaces the name of the calibration file by its values, so that a run is independent of the
+    /// file. Relative paths are resolved against the current directory.
     ///
     /// # Errors
-    /// If the file cannot be read, or is no calibration.
+    /// If the file cannot be read or is invalid.
     pub fn with_calibration(mut self) -> Result<Self, MissionError> {
         if let Some(file) = self.robot.calibration.take() {
             self.robot.odometry = read(&file)?;

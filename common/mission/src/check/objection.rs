@@ -29,7 +29,7 @@ pub(super) fn all_within<const N: usize>(
     limits.into_iter().try_for_each(|(key, value, range, unit)| within(key, value, range, unit))
 }
 
-/// `value` must lie in `range`; NaN lies in none.
+/// Requires `value` in `range`, which rejects NaN.
 pub(super) fn within(
     key: &'static str,
     value: f64,

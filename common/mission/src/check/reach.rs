@@ -1,4 +1,4 @@
-//! Whether known shapes and zones leave the body a way to a target.
+//! Checks that known shapes and zones leave the body a path to a target.
 
 use std::{
     cmp::Reverse,
@@ -9,12 +9,12 @@ use glam::DVec2;
 
 use crate::Mission;
 
-/// Bounds the work: distances from a place to a shape.
 const MOST_DISTANCES: usize = 10_000_000;
 
-/// Whether no way leads from the start to `target`. A search that takes too long finds nothing.
+/// Returns whether the start and `target` are disconnected; false if the search exceeds its limit.
 ///
-/// Best-first search over cells of half a radius, from the target. A cell is blocked only if the body fits nowhere in it.
+/// Best-first search from the target over cells of half a radius, blocked only if the body fits
+/// nowhere in them.
 pub(super) fn is_cut_off(mission: &Mission, target: DVec2) -> bool {
     let corners: usize = mission.zones.iter().map(|zone| zone.points.len()).sum();
     let shapes = mission.known.pieces().count() + corners;
@@ -28,7 +28,7 @@ pub(super) fn is_cut_off(mission: &Mission, target: DVec2) -> bool {
         let at = place(cell);
         let zones = mission.zones.iter().map(|zone| zone.clearance(at));
         let clearance = zones.fold(mission.known.clearance(at), f64::min);
-        // Clearance grows by no more than the way to the cell's corner.
+        // Within the cell, clearance grows by at most the distance to its corner.
         mission.contains(at) && clearance + step * std::f64::consts::FRAC_1_SQRT_2 > radius
     };
     let steps_off = |cell| (mission.start.at.distance(place(cell)) / step) as u64;

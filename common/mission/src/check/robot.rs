@@ -80,7 +80,8 @@ pub(super) fn check(mission: &Mission) -> Result {
         format!("wheels on channels {left} and {right}"),
         "put one on channel 0 and one on channel 1",
     )?;
-    // A third of the counter's cycle a tick keeps wrap-around unambiguous with a tick to spare.
+    // At most a third of the counter's half cycle per tick keeps wraparound unambiguous with a tick
+    // to spare.
     let counts = body.top_speed_m_s / body.metres_per_count() / rate_hz;
     let has_counter = matches!(robot.protocol(), Protocol::X80 | Protocol::Arduino);
     refuse_if(
@@ -115,7 +116,7 @@ fn steering(mission: &Mission) -> Result {
         "remove it, or choose another robot.model",
     )?;
     let [limit, rate] = [steering.limit_rad, steering.rate_rad_s].map(f64::to_degrees);
-    // A whole turn fits twice into the counter's cycle, so an angle is never ambiguous.
+    // A full turn fits twice into the counter's cycle, so an angle is unambiguous.
     let counts = steering.counts_per_turn;
     all_within([
         ("robot.wheelbase_m", steering.wheelbase_m, 0.01..=5.0, "m"),

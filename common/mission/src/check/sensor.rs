@@ -124,7 +124,6 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result {
     ])
 }
 
-/// RPLIDARs beside the robot's wire.
 fn wire(mission: &Mission) -> Result {
     let is_real = mission.robot.address.is_some();
     let rplidars = mission.rplidars();

@@ -1,7 +1,7 @@
 use super::{Checker, Result, all_within, point, refuse_if, within};
 use crate::geometry::{Profile, Shapes};
 
-/// More shapes than this in a file are a mistake.
+/// Limit that catches mistakes in a file.
 const MAX_POINTS: usize = 100_000;
 const HIGHEST_M: f64 = 1000.0;
 

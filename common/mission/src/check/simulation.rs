@@ -1,7 +1,7 @@
 use super::{Checker, MAX_TIMEOUT_S, Result, all_within, point, refuse_if, within};
 use crate::simulation::{Block, Person, Ranger, Simulation, Thing};
 
-/// More than these are a mistake.
+/// Limits that catch mistakes in a file.
 const MAX_THINGS: usize = 1000;
 const MAX_PEOPLE: usize = 100;
 const MAX_BLOCKS: usize = 100;

@@ -1,6 +1,5 @@
 use super::*;
 
-/// The error with which a mission file of this text is refused.
 #[track_caller]
 pub(super) fn refusal(text: &str) -> String {
     match Mission::parse(text, Path::new("m.toml")) {

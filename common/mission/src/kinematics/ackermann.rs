@@ -1,8 +1,8 @@
-//! The car-like robot, (3), and its inverse, (17).
+//! Car-like robot (3) and its inverse (17).
 
 use super::pose::Twist;
 
-/// G of (3): driven by the wheels of one axle, steered by those of the other.
+/// G of (3): one driven axle and one steered axle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ackermann {
     wheel_radius: f64,
@@ -13,9 +13,9 @@ pub struct Ackermann {
 }
 
 impl Ackermann {
-    /// The radius r and the `wheelbase` L from the driven axle to the steered one in metres, the top speed in rad/s,
-    /// the limit in radians, below pi/2. All positive. It creeps at `creep` m/s at most where a turn is asked for
-    /// without the speed for it.
+    /// Takes r and the `wheelbase` L (driven to steered axle) in metres, and the top speed in
+    /// rad/s. The limit is in radians, below pi/2; all are positive. `creep`, m/s, limits turns
+    /// commanded without enough speed.
     pub const fn new(
         wheel_radius: f64,
         wheelbase: f64,
@@ -26,19 +26,21 @@ impl Ackermann {
         Self { wheel_radius, wheelbase, steering_limit, top_wheel_speed, creep }
     }
 
-    /// The circle of the middle of the driven axle, metres.
+    /// Returns the radius of the driven axle's midpoint, metres.
     pub fn least_turning_radius(&self) -> f64 {
         self.wheelbase / self.steering_limit.tan()
     }
 
-    /// The map (3) of omega_h, rad/s, and phi, radians, positive to the left.
+    /// Maps omega_h, rad/s, and phi, radians, positive to the left, by (3).
     pub fn twist(&self, [wheel, steering]: [f64; 2]) -> Twist {
         let v = self.wheel_radius * wheel;
         Twist { v, omega: steering.tan() / self.wheelbase * v }
     }
 
-    /// (17): omega_h = v/r, phi = atan(L omega / v), clipped. A car cannot turn on the spot: it creeps forward where
-    /// v would leave the turn impossible. A wheel at its limit keeps the steering, and so the curvature.
+    /// Inverts the map by (17): omega_h = v/r, phi = atan(L omega / v), clipped.
+    ///
+    /// A car creeps forward if v makes the turn impossible. A saturated wheel keeps the steering,
+    /// and so the curvature.
     pub fn wheel(&self, twist: Twist) -> [f64; 2] {
         let needed = twist.omega.abs() * self.least_turning_radius();
         let v = if twist.v.abs() < needed {
@@ -61,7 +63,6 @@ mod tests {
     use super::*;
     use std::f64::consts::FRAC_PI_4;
 
-    /// r = 0.1 m, L = 0.5 m.
     fn car(steering_limit: f64) -> Ackermann {
         Ackermann::new(0.1, 0.5, steering_limit, 10.0, 0.05)
     }
@@ -70,7 +71,6 @@ mod tests {
         assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
     }
 
-    /// Twists forward and backward, to either side, slow and faster than the wheels.
     fn twists() -> impl Iterator<Item = Twist> {
         let speeds = (-30..=30).map(|v| f64::from(v) * 0.05);
         speeds.flat_map(|v| {
@@ -81,7 +81,8 @@ mod tests {
 
     #[test]
     fn equation_3_by_hand_and_back() {
-        // Wheels of 0.1 m, 0.5 m between the axles: at 45 degrees and 4 rad/s v = 0.4, omega = 0.4 / 0.5 = 0.8.
+        // Wheels of 0.1 m, 0.5 m between the axles: at 45 degrees and 4 rad/s v = 0.4, omega = 0.4
+        // / 0.5 = 0.8.
         let twist = car(1.0).twist([4.0, FRAC_PI_4]);
         close(twist.v, 0.4);
         close(twist.omega, 0.8);
@@ -106,7 +107,7 @@ mod tests {
 
     #[test]
     fn a_wheel_at_its_limit_keeps_the_curvature() {
-        // 20 rad/s are asked for and 10 are possible, so both are halved.
+        // The command needs 20 rad/s and the limit is 10, so both are halved.
         let twist = car(1.0).twist(car(1.0).wheel(Twist { v: 2.0, omega: 0.8 }));
         close(twist.v, 1.0);
         close(twist.omega, 0.4);

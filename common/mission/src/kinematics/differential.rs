@@ -1,4 +1,4 @@
-//! The differential drive, (2), and its inverse, (17).
+//! Differential drive (2) and its inverse (17).
 
 use super::pose::Twist;
 
@@ -10,18 +10,20 @@ pub struct DifferentialDrive {
 }
 
 impl DifferentialDrive {
-    /// The `radius` r and the `track` W in metres, the top speed in rad/s; all positive.
+    /// Takes the `radius` r and the `track` W in metres, and the top speed in rad/s; all positive.
     pub fn new(radius: f64, track: f64, top_wheel_speed: f64) -> Self {
         Self { radius, track, top_wheel_speed }
     }
 
-    /// (2) of omega_L and omega_R, rad/s. The map is linear, so wheel angles give (arc, turn).
+    /// Maps omega_L and omega_R, rad/s, by (2). The map is linear, so wheel angles give (arc,
+    /// turn).
     pub fn twist(&self, [left, right]: [f64; 2]) -> Twist {
         let (half, over) = (self.radius / 2.0, self.radius / self.track);
         Twist { v: half * right + half * left, omega: over * right - over * left }
     }
 
-    /// (17): omega_L and omega_R, rad/s; both are scaled by one factor when a wheel would exceed its limit, so that the curvature stays.
+    /// Inverts the map by (17) to omega_L and omega_R, rad/s. If a wheel would exceed its limit,
+    /// one factor scales both, which keeps the curvature.
     pub fn wheels(&self, twist: Twist) -> [f64; 2] {
         let (rim, turn) =
             (1.0 / self.radius * twist.v, self.track / (2.0 * self.radius) * twist.omega);

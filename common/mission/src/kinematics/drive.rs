@@ -7,8 +7,8 @@ pub enum Drive {
 }
 
 impl Drive {
-    /// (17), as far as the drive can: left and right wheel, rad/s; for a car the driven wheel, rad/s, and the
-    /// steering angle, radians, positive to the left.
+    /// Applies (17) within the drive's limits. Returns the left and right wheel, rad/s, or for a
+    /// car the driven wheel, rad/s, and the steering angle, radians, positive to the left.
     pub fn inputs(&self, twist: Twist) -> [f64; 2] {
         match self {
             Self::Differential(drive) => drive.wheels(twist),

@@ -1,7 +1,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// The robot's centre in the mission frame.
+/// Pose of the robot's centre in the mission frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2 {
     /// Metres.
@@ -23,7 +23,8 @@ impl Pose2 {
         DVec2::from_angle(self.heading)
     }
 
-    /// (1) integrated exactly for constant v and omega: `arc` metres along a circle while turning by `turn` radians.
+    /// Integrates (1) exactly for constant v and omega: `arc` metres along a circle while turning
+    /// by `turn` radians.
     pub fn along_arc(&self, arc: f64, turn: f64) -> Self {
         // sin(h)/h, the chord over its arc, stable through h = 0.
         let half = turn / 2.0;
@@ -34,7 +35,7 @@ impl Pose2 {
         }
     }
 
-    /// One forward Euler step of (21) along the heading before the turn.
+    /// Applies one forward Euler step of (21) along the heading before the turn.
     pub fn along_euler(&self, arc: f64, turn: f64) -> Self {
         Self { position: self.position + self.axis() * arc, heading: self.heading + turn }
     }

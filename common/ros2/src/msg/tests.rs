@@ -1,6 +1,7 @@
 use super::*;
 
-/// Gives each number random bytes, and each list a random length. One byte is 0 or 1, as that of a flag.
+/// Pass that fills numbers with random bytes and lists with random lengths. One-byte numbers are 0
+/// or 1, which suits flags.
 struct Random(u64, Release);
 
 impl Random {
@@ -27,7 +28,7 @@ impl Pass for Random {
     }
 }
 
-/// Writes numbers with the most significant byte first.
+/// Writer in big-endian order.
 struct Big(Vec<u8>, Release);
 
 impl Pass for Big {
@@ -81,7 +82,7 @@ fn hostile<T: Cdr + Clone + Default>() {
             let (at, byte) = (random.next() as usize % bytes.len(), random.next() as u8);
             let before = std::mem::replace(&mut bytes[at], byte);
             if let Ok((read, _)) = crate::cdr::read::<T>(&bytes, release) {
-                // What is not UTF-8 in a text is replaced by three bytes.
+                // Invalid UTF-8 in a text is replaced by three bytes.
                 assert!(read.encode_for(release).len() <= 4 * bytes.len());
             }
             bytes[at] = before;

@@ -1,4 +1,5 @@
-//! The inputs that fuzzing found are the lines of `decoder-corpus.hex`. In `common/x80-protocol/fuzz`, make them files, as cargo-fuzz wants them:
+//! Fuzz target of the decoder. The lines of `decoder-corpus.hex` are the inputs that fuzzing found;
+//! in `common/x80-protocol/fuzz`, convert them to files for cargo-fuzz:
 //!
 //! ```sh
 //! mkdir -p corpus/decoder
@@ -6,8 +7,8 @@
 //! cargo +nightly fuzz run decoder --fuzz-dir . -s none --no-trace-compares -- -max_len=300 -runs=100000000
 //! ```
 //!
-//! No sanitizer: there is no unsafe code to watch over. No traced comparisons: the corpus has the headers
-//! and CRCs they would help to find, and without them it runs several times as often. To add what was found, minimised:
+//! The code has no `unsafe`, so sanitizers are off. Comparison tracing is off too: the corpus
+//! already has headers and CRCs, and runs are several times as fast. To add new inputs, minimised:
 //!
 //! ```sh
 //! cargo +nightly fuzz cmin decoder --fuzz-dir . -s none

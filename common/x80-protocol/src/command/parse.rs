@@ -9,7 +9,7 @@ use crate::{
 
 impl Command {
     /// # Errors
-    /// The DID is unknown, the length is wrong, or a byte has no meaning.
+    /// If the DID is unknown, the length is wrong, or a byte has no meaning.
     pub fn parse(&Frame { did, data, .. }: &Frame<'_>) -> Result<Self, MessageError> {
         let of_one = Quantity::ALL.into_iter().find(|quantity| quantity.dids()[0] == did);
         let of_all = Quantity::ALL.into_iter().find(|quantity| quantity.dids()[1] == did);
@@ -53,7 +53,7 @@ fn target(low: u8, high: u8) -> Option<i16> {
 fn one(data: &[u8], quantity: Quantity) -> Option<Command> {
     let (number, low, high, limit_ms) = match *data {
         [number, low, high] => (number, low, high, None),
-        // One client leaves out the byte before the time.
+        // One client omits the byte before the time.
         [number, low, high, first, second] | [number, low, high, _, first, second] => {
             (number, low, high, Some(u16::from_le_bytes([first, second])))
         }
@@ -103,7 +103,7 @@ fn parameter(data: &[u8]) -> Option<Command> {
             _ => return None,
         }),
         (13 | 14, []) => return None,
-        // The byte is not checked, because not every parameter has a channel in second place.
+        // The byte is not checked, because some parameters have no channel in second place.
         (sub, _) => {
             return Some(Command::Parameter {
                 channel: number,

@@ -1,4 +1,4 @@
-//! Promises of the decoder, by example and by property.
+//! Guarantees of the decoder, by example and by property.
 
 use super::*;
 use crate::{Addressing, Command, MAX_FRAME_BYTES, SystemSignal};
@@ -41,7 +41,7 @@ fn what_is_forgotten_does_not_swallow_the_frame_behind_it() {
     let mut bytes = Vec::new();
     Command::System(SystemSignal::Ping).encode(Addressing::default(), &mut bytes);
     let mut decoder = Decoder::default();
-    // The beginning of a frame of 64 data bytes; its rest never comes.
+    // The start of a frame of 64 data bytes whose rest never arrives.
     decoder.push(&[0x5e, 0x02, 0x00, 0x00, 0x7d, 64, 1, 2, 3]);
     assert!(decoder.next_frame().is_none());
     decoder.reset();
@@ -129,8 +129,8 @@ fn a_noisy_header_that_claims_much_holds_no_frame_back() {
     assert_eq!(decode(&[&bytes]), vec![ping()]);
 }
 
-/// A torn frame that claims `len` data bytes, `has` some, and takes a byte of the ping behind it for its CRC:
-/// of the 256 serial numbers, one makes that right.
+/// Returns a torn frame that claims `len` data bytes, holds `has`, and takes a byte of the
+/// following ping as its CRC. One of the 256 serial numbers makes it right.
 fn torn_before_a_ping(len: u8, has: &[u8]) -> Vec<u8> {
     let crc_at = 6 + usize::from(len);
     (0..=255)
@@ -141,7 +141,7 @@ fn torn_before_a_ping(len: u8, has: &[u8]) -> Vec<u8> {
 
 #[test]
 fn a_torn_frame_whose_crc_happens_to_fit_swallows_no_frame() {
-    // The CRC falls on the fifth byte of the ping, and on its very first.
+    // The CRC falls on the fifth byte of the ping, and on its first.
     for forged in [torn_before_a_ping(4, &[]), torn_before_a_ping(1, &[7])] {
         for cut in 0..forged.len() {
             let (first, second) = forged.split_at(cut);
@@ -171,7 +171,7 @@ fn every_byte_is_accounted_for() {
     assert_eq!((tally.frames, tally.bad_crc, tally.noise_bytes), (1, 1, 13));
 }
 
-/// A piece of a stream under test.
+/// Piece of a stream under test.
 #[derive(Clone, Debug)]
 enum Piece {
     Untouched { did: u8, data: Vec<u8> },
@@ -180,7 +180,7 @@ enum Piece {
     Noise(Vec<u8>),
 }
 
-/// Bytes in which headers and ends are far commoner than chance.
+/// Generates bytes with more headers and ends than by chance.
 fn tricky_bytes(most: usize) -> impl Strategy<Value = Vec<u8>> {
     let byte = prop_oneof![
         3 => any::<u8>(),
@@ -234,7 +234,7 @@ proptest! {
                 Piece::Noise(bytes) => stream.extend(bytes),
             }
         }
-        // The decoder needs as many bytes as a noisy header announces before it can reject the header.
+        // The decoder needs the announced length of a noisy header before it can reject it.
         stream.extend([0; MAX_FRAME_BYTES]);
 
         let mut cuts: Vec<usize> = cuts.iter().map(|cut| cut.index(stream.len())).collect();
@@ -249,7 +249,7 @@ proptest! {
             from = to;
         }
 
-        // Corruption can by chance make a frame that CRC-8 cannot tell from a sent one.
+        // Corruption may by chance yield a frame that CRC-8 accepts.
         prop_assume!(came.iter().all(|frame| untouched.contains(frame) || touched.contains(frame)));
         came.retain(|frame| untouched.contains(frame));
         prop_assert_eq!(came, untouched);
