@@ -1,27 +1,27 @@
-//! The lines by which the board answers, each by its form alone.
+//! Answers of the board, recognized by form alone.
 
 use common::mission::LEAST_BAUD;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Answer {
     Done,
-    /// `Invalid Command`: none came, or a garbled one.
+    /// `Invalid Command`: the request was missing or garbled.
     Invalid,
-    /// Two numbers, left and right, and a third of a board with a gyro: the angle that it has turned by, ten thousandths of a radian
-    /// counter-clockwise. No other request is answered so.
+    /// Left and right, and a third number of a board with a gyro: its angle in 1e-4 rad,
+    /// counter-clockwise. No other answer has several numbers.
     Counts([i32; 2], Option<i32>),
-    /// A number greater than any range.
+    /// Number greater than any range.
     Baud,
-    /// A smaller number, a range if a sonar was asked.
+    /// Smaller number: a range, if requested.
     Centimetres(u16),
 }
 
 impl Answer {
-    /// Says why `line`, which has no line feed, is none.
+    /// Parses a line without line feed; the error says why it is no answer.
     pub(crate) fn parse(line: &[u8]) -> Result<Self, String> {
         let none = || format!("{:?} is no answer of the board", String::from_utf8_lossy(line));
         let line = line.strip_suffix(b"\r").unwrap_or(line);
-        // A carriage return in the line is the rest of a lost line feed, and the text before it is the end of another answer.
+        // A carriage return within marks a lost line feed, after the end of another answer.
         let text = std::str::from_utf8(line).map_err(|_| none())?.trim_matches(' ');
         match text {
             "OK" => return Ok(Self::Done),
@@ -66,7 +66,7 @@ mod tests {
 
     #[test]
     fn a_line_that_lost_or_gained_bytes_is_refused() {
-        // Two ranges that lost the line feed between them keep the carriage return, so they are no counts.
+        // Ranges that lost their line feed keep the carriage return, so they are no counts.
         for line in [
             "12\r34\r",
             "12 34 56 78\r",

@@ -1,22 +1,21 @@
-//! ROSArduinoBridge: requests of one letter, each ended by a carriage return, and answers in lines, in the order of
-//! the requests.
+//! ROSArduinoBridge: one-letter requests ended by a carriage return, and answer lines in the order
+//! of the requests.
 //!
-//! The board says nothing unasked. At each poll the driver asks it for a round: the range of each sonar, `p PIN`, and
-//! then the encoder counts, `e`, with which a tick begins. A board with a gyro says its angle after
-//! the counts. Answers carry no name and bytes may be lost, so these
-//! rules keep an answer from being taken for that of another request:
+//! The board sends only on request. Each poll requests a round: the range of each sonar, `p PIN`,
+//! and then the encoder counts, `e`, which begin a tick. A board with a gyro adds its angle.
+//! Answers carry no name and bytes may be lost, so these rules assign each answer to its request:
 //!
-//! 1. A round is asked for when nothing before it is unanswered. Its ranges count only when as many came as were
-//!    asked for, and then its counts: the form of counts is no other answer's.
-//! 2. A line that does not fit, and a round that is not complete within `robot.command_limit_s`, drops the round. The
-//!    driver then asks for the baud rate alone, `b`, and drops all that is said until a number comes that is greater
-//!    than any range.
-//! 3. That number is the answer to the only `b` that is unanswered: another is asked for after [`LATEST_S`] only.
-//!    What was asked before it is answered or lost, and rule 1 holds again.
+//! 1. A round is requested once all requests are answered. Its ranges count only if all came,
+//!    followed by its counts, whose form is unique.
+//! 2. A line that does not fit, or a round incomplete after `robot.command_limit_s`, drops the
+//!    round. The driver then requests only the baud rate, `b`, and drops all lines until a number
+//!    greater than any range.
+//! 3. That number answers the only pending `b`: another is requested only after [`LATEST_S`].
+//!    Earlier requests are answered or lost by then, so rule 1 holds again.
 //!
-//! The rules suppose that answers come in order, and within [`LATEST_S`] or not at all. A digit that arrives as
-//! another digit is not noticed, because the protocol has no check sum: counts then jump, which the link judges, and
-//! a range is wrong once. Velocity commands are answered by `OK`, which acknowledges them.
+//! Answers must come in order, and within [`LATEST_S`] or never. The protocol has no checksum, so a
+//! digit changed into another passes: counts then jump, which the link judges, or a range is wrong
+//! once. `OK` acknowledges velocity commands.
 
 mod answers;
 
@@ -32,24 +31,24 @@ use common::{
 
 use self::answers::Answer;
 
-/// More lines at once are dropped. A round has at most seven.
+/// Lines taken at once; a round has at most seven.
 const MOST_AT_ONCE: usize = 64;
-/// The board waits for an echo for one second at most.
+/// Latest answer; the board waits for an echo for at most 1 s.
 const LATEST_S: f64 = 2.0;
-/// The unit of the gyro's angle, radians.
+/// Gyro unit, radians.
 const GYRO_RAD: f64 = 1e-4;
-/// A greater multiple of a wheel's top speed is no speed.
+/// Largest plausible multiple of a wheel's top speed.
 const IMPLAUSIBLE: f64 = 1.5;
 
 #[derive(Debug)]
 enum Waits {
     No,
-    /// The rest of the round that was asked for at poll `since`, of which these ranges came, centimetres.
+    /// Round requested at poll `since`, and its ranges, centimetres.
     Round {
         since: u64,
         ranges: Vec<u16>,
     },
-    /// The baud rate, asked for at this poll; not yet if none.
+    /// Baud rate; none if not requested yet.
     Baud {
         since: Option<u64>,
     },
@@ -61,18 +60,18 @@ pub struct Arduino {
     pid_rate_hz: f64,
     rate_hz: f64,
     most_counts_s: f64,
-    /// Polls: a round is complete within `overdue`, and a request is answered or lost after `lost`.
+    /// Polls until a round is overdue, and until a request is lost.
     overdue: u64,
     lost: u64,
-    /// Pin, row and sensor, in the order in which they are asked.
+    /// In the order of requests.
     sonars: Vec<(u8, usize, Sensor)>,
     lines: Lines,
     waits: Waits,
     polls: u64,
-    /// The newest counts, the poll at which they were asked for, and the speeds up to them, counts/s.
+    /// Newest counts, their poll, and speeds up to them, counts/s.
     counts: Option<([i32; 2], u64, [i32; 2])>,
     gyro: gyro::Angle,
-    /// The link has not heard yet why the newest round was dropped.
+    /// Unreported reason for dropping the newest round.
     dropped: Option<String>,
     tally: WireTally,
 }
@@ -101,10 +100,10 @@ impl Arduino {
         }
     }
 
-    /// Says why an answer does not fit.
+    /// Takes a line; the error says why it does not fit.
     fn take(&mut self, line: &[u8], heard: &mut Heard) -> Result<(), String> {
         let answer = Answer::parse(line)?;
-        // While the driver waits for the baud rate, only that shows that the board understands it.
+        // Only the baud rate shows that the board understands it.
         heard.anything |= answer == Answer::Baud || !matches!(self.waits, Waits::Baud { .. });
         match (answer, &mut self.waits) {
             (Answer::Done, _) => heard.acknowledged += 1,
@@ -121,7 +120,7 @@ impl Arduino {
                 let (since, ranges) = (*since, std::mem::take(ranges));
                 self.waits = Waits::No;
                 for ((_, row, sensor), centimetres) in self.sonars.iter().zip(ranges) {
-                    // The board says 0 for no echo.
+                    // 0 means no echo.
                     let range = (centimetres > 0).then(|| f64::from(centimetres) / 100.0);
                     heard.readings.push(range_reading(*row, sensor, range));
                 }
@@ -141,10 +140,10 @@ impl Arduino {
         Ok(())
     }
 
-    /// The motion at counts that were asked for at poll `since`.
+    /// Returns the motion at counts requested at poll `since`.
     ///
-    /// Speeds are those of the interval before, whose length the rate of the polls gives: the link judges counts by
-    /// the speeds that come with them, and counts that jumped must not vouch for themselves.
+    /// Speeds are those of the interval before, timed by polls: the link judges counts by the
+    /// speeds beside them, and jumped counts must not vouch for themselves.
     fn motion(&mut self, counts: [i32; 2], since: u64) -> Motion {
         let (speeds, newest) = self.counts.map_or(([0; 2], [0; 2]), |(then, at, speeds)| {
             let gap_s = since.saturating_sub(at).max(1) as f64 / self.rate_hz;
@@ -155,7 +154,7 @@ impl Arduino {
             (speeds, newest)
         });
         self.counts = Some((counts, since, newest));
-        // The cycle of the samples divides that of 32 bits, so counts that wrap go on.
+        // The samples' cycle divides that of 32 bits, so wrapped counts continue.
         let [left_counts, right_counts] =
             counts.map(|count| count.rem_euclid(i32::from(COUNT_CYCLE)) as u16);
         let [left_counts_per_s, right_counts_per_s] = speeds;
@@ -170,7 +169,7 @@ impl Arduino {
         Motion { wheels, endless: None, stamp_ns: None, currents: [0; 2] }
     }
 
-    /// Start again with a request whose answer is unmistakable.
+    /// Restarts with an unmistakable request.
     fn begin_anew(&mut self) {
         if !matches!(self.waits, Waits::Baud { .. }) {
             self.waits = Waits::Baud { since: None };
@@ -241,7 +240,7 @@ impl Base for Arduino {
             }
             Waits::Baud { since } if since.is_none_or(|since| now - since >= self.lost) => {
                 self.waits = Waits::Baud { since: Some(now) };
-                // The first carriage return ends a request whose end was lost.
+                // The first carriage return ends a truncated request.
                 b"\rb\r".to_vec()
             }
             Waits::Baud { .. } | Waits::Round { .. } => Vec::new(),
@@ -252,8 +251,8 @@ impl Base for Arduino {
         usize::from(sent.starts_with(b"m "))
     }
 
-    /// The board takes whole counts in a run of its speed loop, and stands by itself after the time that its firmware has. A command that
-    /// both wheels would round to 0 is enlarged until the faster wheel turns by one count.
+    /// Encodes whole counts per run of the board's speed loop; its firmware has its own time limit.
+    /// A command that would round to 0 is enlarged to one count of the faster wheel.
     fn velocity(&self, counts: [i16; 2], _limit: Duration) -> Vec<u8> {
         let exact = counts.map(|counts| f64::from(counts) / self.pid_rate_hz);
         let greatest = exact[0].abs().max(exact[1].abs());

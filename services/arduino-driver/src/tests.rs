@@ -4,7 +4,7 @@ use common::samples::{RangeReading, RangeStatus};
 
 use super::*;
 
-/// A robot with two sonars, at 10 Hz. A round takes at most three polls, and a request is lost after 20.
+/// Returns two sonars at 10 Hz: a round takes at most three polls, and a request is lost after 20.
 fn mission(set: &str) -> Mission {
     let row = |name: &str, channel: u8, bearing: i32| {
         format!(
@@ -19,7 +19,7 @@ fn mission(set: &str) -> Mission {
     Mission::parse(&text, Path::new("m.toml")).unwrap()
 }
 
-/// A driver whose board has said its baud rate.
+/// Returns a driver that got its baud rate.
 fn driver() -> Arduino {
     let mut driver = Arduino::new(&mission(""));
     assert_eq!(polled(&mut driver), "\rb\r");
@@ -37,7 +37,6 @@ fn heard(driver: &mut Arduino, bytes: &str) -> Heard {
 
 const ROUND: &str = "p 4\rp 5\re\r";
 
-/// The driver's result of a round that the board answers so.
 fn round(driver: &mut Arduino, answers: &str) -> Heard {
     assert_eq!(polled(driver), ROUND);
     heard(driver, answers)
@@ -59,7 +58,7 @@ fn a_round_gives_the_range_of_each_sonar_and_the_counts_that_begin_a_tick() {
     assert_eq!(counts(&said), Some([32_763, 70]));
     let want = [(0, RangeStatus::Measured, 1.23), (1, RangeStatus::Nothing, 0.0)];
     assert_eq!((ranges(&said), said.refused), (want.to_vec(), None));
-    // An echo from beyond the sonar's reach counts as none, and one from beyond twice that is no reading.
+    // Beyond its reach an echo counts as none, beyond twice that as no reading.
     let said = round(&mut driver, "300\r\n17241\r\n0 0\r\n");
     let statuses: Vec<_> = ranges(&said).iter().map(|range| range.1).collect();
     assert_eq!(statuses, [RangeStatus::Nothing, RangeStatus::Invalid]);
@@ -88,7 +87,7 @@ fn nothing_is_asked_while_a_round_is_unanswered() {
 #[test]
 fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
     for (bad, why) in [
-        // An answer was lost, so that of pin 5 stands where that of pin 4 should.
+        // A lost answer: pin 5's stands in for pin 4's.
         ("34\r\n1 2\r\n", "\"1 2\" answers no request"),
         ("12\r\n34\r\n56\r\n1 2\r\n", "\"56\" answers no request"),
         ("Invalid Command\r\n", "garbled"),
@@ -103,7 +102,7 @@ fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
             said.refused.as_ref().is_some_and(|refused| refused.to_string().contains(why)),
             "{said:?}"
         );
-        // The answers to earlier requests are late, and a baud rate came unasked.
+        // Late answers, and an unrequested baud rate.
         let late = heard(&mut driver, "77\r\n88\r\n9 9\r\n57600\r\n");
         assert!(late.motion.is_none() && late.readings.is_empty(), "{late:?}");
         assert_eq!(polled(&mut driver), "\rb\r");
@@ -141,7 +140,7 @@ fn a_round_that_is_overdue_is_dropped_and_its_late_answers_are_no_answers_of_the
 fn a_baud_rate_is_asked_for_again_only_when_its_answer_is_lost() {
     let mut driver = Arduino::new(&mission(""));
     assert_eq!(polled(&mut driver), "\rb\r");
-    // The board boots and says something that is no answer: the driver does not ask again.
+    // The board boots with other text: the driver waits.
     assert!(heard(&mut driver, "booting\r\n").refused.is_some());
     for _ in 1..20 {
         assert_eq!(polled(&mut driver), "");
@@ -163,7 +162,7 @@ fn a_wire_that_opens_again_begins_anew() {
 #[test]
 fn counts_that_wrap_at_32_bits_go_on_and_their_speeds_are_those_of_the_interval_before() {
     let mut driver = driver();
-    // A wheel makes 10 counts a tick of 0.1 s.
+    // 10 counts per tick of 0.1 s.
     let before_wrap = i32::MAX - 4;
     let mut sampled = Vec::new();
     for tick in 0..4 {
@@ -183,7 +182,7 @@ fn the_speed_across_polls_without_a_round_is_by_the_time_between() {
     assert_eq!(polled(&mut driver), ROUND);
     assert_eq!(polled(&mut driver), "");
     heard(&mut driver, "1\r\n1\r\n10 10\r\n");
-    // The poll without a request stands between this round and the one before.
+    // A poll without a request precedes this round.
     round(&mut driver, "1\r\n1\r\n30 30\r\n");
     let said = round(&mut driver, "1\r\n1\r\n30 30\r\n");
     assert_eq!(said.motion.unwrap().wheels.left_counts_per_s, 100);
@@ -223,7 +222,7 @@ fn a_command_is_said_in_counts_of_the_speed_loop_and_the_slowest_turns_a_wheel()
         ([0, 0], "m 0 0\r"),
         ([600, -600], "m 20 -20\r"),
         ([44, 46], "m 1 2\r"),
-        // A wheel that hardly turns beside one that does may stand.
+        // A slow wheel beside a faster one may stand.
         ([10, 300], "m 0 10\r"),
         ([1, 0], "m 1 0\r"),
         ([-2, 2], "m -1 1\r"),
@@ -238,7 +237,7 @@ fn a_command_is_said_in_counts_of_the_speed_loop_and_the_slowest_turns_a_wheel()
 
 #[test]
 fn all_that_a_poll_and_a_stop_send_fits_into_the_boards_buffer() {
-    // An Arduino holds 63 bytes that it has not read; at most six sonars have a row.
+    // An Arduino buffers 63 unread bytes; at most six sonars have a row.
     let (round, stops) = ("p 255\r".len() * 6 + "e\r".len(), "m 0 0\r".len() * 3);
     assert!(round + stops < 63);
 }

@@ -1,4 +1,5 @@
-//! The velocity synchroniser: guidance to wheel speeds, equations (14)-(17). [`step`] is the pure controller.
+//! Velocity synchroniser: guidance to wheel speeds, equations (14)-(17). [`step`] is the pure
+//! controller.
 
 pub mod step;
 

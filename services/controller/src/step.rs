@@ -1,4 +1,4 @@
-//! Align the robot with the guidance, and let alignment set the speed.
+//! Controller: aligns the robot with the guidance, which sets its speed.
 
 mod car;
 
@@ -15,20 +15,22 @@ use common::{
 };
 use glam::DVec2;
 
-/// The wheels stick below it.
+/// Turn rate below which the wheels stick.
 const LEAST_TURN_RAD_S: f64 = 0.25;
 
-/// Farther away a robot has not arrived beside its target, whatever the planner says, metres.
+/// Largest distance of a robot that has arrived beside its target, metres, for any status of the
+/// planner.
 const MOST_OFF_TARGET_M: f64 = 0.5;
 
 const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
-/// (14), with the heading in place of the measured velocity, which has no direction at rest, where every mission starts.
+/// Alignment (14), with the heading for the measured velocity, which has no direction at rest,
+/// where every mission starts.
 #[derive(Clone, Copy, Debug)]
 pub struct Alignment {
     /// eta_d: cosine of the angle to the guidance.
     pub cosine: f64,
-    /// eta_c: its sine, positive when the guidance lies to the left. The printed sign turns away.
+    /// eta_c: its sine, positive for guidance to the left. The printed sign turns away.
     pub sine: f64,
 }
 
@@ -40,11 +42,11 @@ impl Alignment {
 
 #[derive(Clone, Copy, Debug)]
 enum SpeedLaw {
-    /// (16): the robot drives while it turns.
+    /// Law (16): the robot drives while it turns.
     Paper,
-    /// The robot turns on the spot until it faces its way, then drives no faster than guidance allows.
+    /// Turns on the spot towards the guidance, then drives within its limit.
     Evidential,
-    /// The paper's law by either method, no faster than guidance allows: a car does not turn on the spot.
+    /// Law (16) within the limit for either method, as cars cannot turn on the spot.
     Car,
 }
 
@@ -52,7 +54,7 @@ enum SpeedLaw {
 enum Arrival {
     #[default]
     OnTheWay,
-    /// The robot is there, and turns to the wanted heading.
+    /// At the target, turning to its heading.
     Turning,
     Arrived,
 }
@@ -64,7 +66,7 @@ pub struct Controller {
     speed: f64,
     turn: f64,
     look: f64,
-    /// Cosines of the angles within which the evidential method drives at full speed, and beyond which it turns on the spot.
+    /// Cosines of the evidential method's angles: full speed within, turns on the spot beyond.
     full_speed: f64,
     turns: f64,
     slow_radius: f64,
@@ -72,11 +74,11 @@ pub struct Controller {
     modulated: bool,
     law: SpeedLaw,
     response: Response,
-    /// None for a base that answers soon enough, and for a car.
+    /// None for a prompt base, and for a car.
     lead: Option<Lead>,
-    /// The turn of an antipodal robot: 1 left, -1 right.
+    /// Turn near the antipode: 1 left, -1 right.
     side: f64,
-    /// The newest target's number, and the progress to it.
+    /// Newest target's number, and progress.
     arrival: (u64, Arrival),
     mission: Mission,
     found: FoundResponse,
@@ -90,8 +92,8 @@ impl Answering for Controller {
     const INPUT: &'static Topic<GuidanceSample> = &GUIDANCE;
     const OUTPUT: &'static Topic<CommandSample> = &COMMAND;
     const NEWEST_ONLY: bool = true;
-    /// No state survives the process: a robot at its target is there for the next controller too, or drives the last centimetre again, and
-    /// commands that the base has not answered yet are forgotten.
+    /// None survives the process. A robot at its target has arrived for the next controller too, or
+    /// drives the last centimetre again. Unanswered commands are forgotten.
     type State = ();
 
     fn new(mission: &Mission) -> Self {
@@ -137,7 +139,7 @@ impl Answering for Controller {
         _: MissionTime,
     ) -> Answer<CommandSample> {
         if let Some(mission) = self.found.changed(found, &self.mission) {
-            // Commands that the base has not answered yet are foreseen no more: it stood while its response was found.
+            // Drops unanswered commands: the base stood while its response was found.
             let Self { side, arrival, found, .. } = *self;
             let stated = std::mem::take(&mut self.mission);
             *self = Self { side, arrival, mission: stated, found, ..Answering::new(&mission) };
@@ -147,7 +149,7 @@ impl Answering for Controller {
 }
 
 impl Controller {
-    /// The command under `guidance`, for the pose it was computed for.
+    /// Returns the command for the pose that `guidance` was computed for.
     pub fn command(&mut self, guidance: &GuidanceSample) -> CommandSample {
         let pose = guidance.pose();
         let distance = pose.position.distance(guidance.target.position());
@@ -171,7 +173,7 @@ impl Controller {
                     (GuidanceStatus::from_byte(guidance.status), direction)
                 }
             };
-        // Samples may hold anything: only a unit vector is followed.
+        // Samples may hold anything; only unit vectors are followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
         let is_sent = guidance.target_number != 0;
         let sane = is_sent && unit && distance.is_finite() && pose.heading.is_finite();
@@ -203,8 +205,9 @@ impl Controller {
         }
     }
 
-    /// How far the robot has come. It never goes back: a robot at rest on the edge of the circle does not start again because of one
-    /// count. A robot beside a target in a hazard has arrived, too, if the planner says that it is as near as it can be.
+    /// Advances the progress, which never reverts: a robot at rest on the circle's edge stays for
+    /// one count. Beside a target in a hazard it has arrived too, if the planner sees no nearer
+    /// place.
     fn arrival(&mut self, guidance: &GuidanceSample, distance: f64) -> Arrival {
         let number = guidance.target_number;
         if self.arrival.0 != number {
@@ -229,14 +232,15 @@ impl Controller {
         distance <= self.tolerance || beside && distance <= MOST_OFF_TARGET_M
     }
 
-    /// A body that is no disc turns to the wanted heading only where the planner sees that it can: there the limit is a number.
+    /// Returns whether the robot may turn to the wanted heading. Non-circular bodies need a numeric
+    /// limit, by which the planner shows room.
     fn may_turn(&self, guidance: &GuidanceSample, distance: f64) -> bool {
         let waits = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Waiting;
         let allows = !waits && !guidance.speed_limit_m_s.is_nan();
         self.mission.outline().is_none() || allows && self.is_there(guidance, distance)
     }
 
-    /// None to stand.
+    /// Returns None to stand.
     fn motion(
         &mut self,
         status: GuidanceStatus,
@@ -257,7 +261,8 @@ impl Controller {
                 let v = self.tangential(alignment, omega, distance);
                 Some(Twist { v, omega })
             }
-            // Back, straight: a body that is no disc may not be able to turn here, and something that comes leaves no time for it.
+            // Backs straight. A body that is no disc may lack room to turn, and an approaching
+            // obstacle leaves no time.
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential)
                 if limit < 0.0 =>
             {
@@ -266,7 +271,8 @@ impl Controller {
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
                 let v = self.cautious(alignment, distance, limit);
                 if v == 0.0 {
-                    // A robot without a limit above 0 only turns; the planner allows speed where it must get out.
+                    // Without a limit above 0 the robot only turns; the planner allows speed where
+                    // it must leave.
                     let faces = alignment.cosine > FACES_COSINE;
                     return (!faces).then(|| on_the_spot(self));
                 }
@@ -277,7 +283,7 @@ impl Controller {
         }
     }
 
-    /// wc of (15). Near the antipode the side stays, because noise would change the sign often.
+    /// Returns wc of (15). Near the antipode it holds its side against noise.
     fn angular(&mut self, alignment: Alignment) -> f64 {
         let Alignment { cosine, sine } = alignment;
         let most = self.response.turn_to_stop_within(sine.atan2(cosine).abs());
@@ -290,7 +296,8 @@ impl Controller {
         self.turn.min(most) * self.side
     }
 
-    /// The evidential wc on the spot: to the guidance and no farther, and never so slowly that the wheels stick.
+    /// Returns the evidential wc on the spot: no farther than the guidance, and fast enough for
+    /// sticking wheels.
     fn turn_to(&mut self, alignment: Alignment) -> f64 {
         let angle = alignment.sine.atan2(alignment.cosine).abs();
         let side = self.angular(alignment).signum();
@@ -299,14 +306,15 @@ impl Controller {
         side * (TURN_GAIN * angle).clamp(least, most)
     }
 
-    /// The evidential vc: none before the robot nearly faces the guidance, at most `limit`, and never so little that the wheels stick.
+    /// Returns the evidential vc: 0 until nearly aligned, at most `limit`, and fast enough for
+    /// sticking wheels.
     fn cautious(&self, alignment: Alignment, distance: f64, limit: f64) -> f64 {
         let sharp = ((alignment.cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
         let slow = (distance / self.slow_radius).min(1.0);
         let stops = self.response.speed_to_stop_within(distance, self.response.dead_time_s());
         let wanted = (self.speed * sharp.max(0.0) * slow).min(stops);
         let least = LEAST_SPEED_M_S.min(self.speed);
-        // A limit that is no number means stand.
+        // A NaN limit means stand.
         if sharp <= 0.0 {
             0.0
         } else if limit >= least {
@@ -316,8 +324,8 @@ impl Controller {
         }
     }
 
-    /// vc of (16). The slowdown for the target multiplies the speed that alignment allows; as a case of its own, as printed, it would
-    /// override that speed.
+    /// Returns vc of (16). The slowdown at the target multiplies the aligned speed; as a separate
+    /// case, as printed, it would override it.
     fn tangential(&self, alignment: Alignment, omega: f64, distance: f64) -> f64 {
         let aligned = if !self.modulated {
             1.0

@@ -1,10 +1,11 @@
-//! The covariance of the pose's error, propagated with the motion to first order.
+//! First-order covariance of the pose's error.
 //!
-//! The error has seven parts: x, y, theta; three constant errors of a mission, of the ratio of the wheels' diameters, of the track and
-//! of the mean diameter (J. Borenstein, L. Feng, IEEE Trans. Robotics and Automation 12(6), 1996); and a gyro's bias. Each wheel also
-//! slips independently, by a variance that grows with its way (K. S. Chong, L. Kleeman, "Accurate odometry and error modelling for a
-//! mobile robot", ICRA 1997). A car has the driven wheel's slip and, nominally, the same share of its curvature in place of the wheels'
-//! ratio.
+//! The error has seven parts: x, y, theta; three constant over a mission, of the wheel diameters'
+//! ratio, the track and the mean diameter (J. Borenstein, L. Feng, IEEE Trans. Robotics and
+//! Automation 12(6), 1996); and a gyro's bias. Each wheel slips independently, with a variance that
+//! grows with its travel (K. S. Chong, L. Kleeman, "Accurate odometry and error modelling for a
+//! mobile robot", ICRA 1997). A car has its driven wheel's slip and, in place of the ratio,
+//! nominally the same share of its curvature.
 
 use common::{
     kinematics::{Pose2, Twist},
@@ -13,7 +14,7 @@ use common::{
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// x, y, theta, ratio of the diameters, track, distance, bias of a gyro; m, rad, shares, rad/s.
+/// x, y, theta, diameter ratio, track, distance, gyro bias; m, rad, shares, rad/s.
 pub(crate) const PARTS: usize = 7;
 pub(crate) const BIAS: usize = 6;
 
@@ -23,10 +24,10 @@ type Matrix = SMatrix<f64, PARTS, PARTS>;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Covariance(pub(crate) Matrix);
 
-/// Standard deviation of a gyro's bias before it is learned at rest, rad/s: 0.1 degrees a second. A worse source removes its bias
-/// itself. With a greater value a robot that never rests takes unequal wheels for bias.
+/// Deviation of a gyro's bias before it is learned at rest, rad/s: 0.1 degrees/s. Worse sources
+/// remove their bias themselves. With more, a robot that never rests takes unequal wheels for bias.
 const BIAS_RAD_S: f64 = 0.002;
-/// Growth of the bias's deviation, rad/s per square root of a second.
+/// Growth of that deviation, rad/s per square root of a second.
 const BIAS_WALK: f64 = 2e-5;
 
 #[derive(Clone, Copy, Debug)]
@@ -36,11 +37,11 @@ pub(crate) struct ErrorModel {
     systematic: [f64; 3],
     track_m: f64,
     steers: bool,
-    /// Variance of a tick's turn by what its counts leave open, rad^2: each reading of either wheel is off by half a count.
+    /// Variance of a tick's turn by counts, rad^2: each reading is off by half a count.
     counted: f64,
 }
 
-/// The factor of the error before a motion, and the covariance that it adds.
+/// Factor of the earlier error, and added covariance.
 pub(crate) struct Transition {
     pub(crate) carried: Matrix,
     pub(crate) noise: Matrix,
@@ -61,7 +62,7 @@ impl ErrorModel {
         }
     }
 
-    /// The start defines the mission frame, so its pose is exact.
+    /// Returns the start, exact in pose because it defines the mission frame.
     pub(crate) fn start(&self) -> Covariance {
         let [ratio, track, distance] = self.systematic;
         Covariance(Matrix::from_diagonal(&Error::from([
@@ -75,7 +76,7 @@ impl ErrorModel {
         ])))
     }
 
-    /// The arc and turn of wheels off by `shares` (ratio, track, distance), from those of nominal wheels.
+    /// Corrects nominal arc and turn by `shares` (ratio, track, distance).
     pub(crate) fn corrected(&self, by_counts: Twist, shares: [f64; 3]) -> Twist {
         let [ratio, track, distance] = shares;
         let (v, omega) = (by_counts.v * (1.0 + distance), by_counts.omega * (1.0 + distance));
@@ -88,11 +89,11 @@ impl ErrorModel {
         }
     }
 
-    /// The effect of an arc and a turn, metres and radians, integrated from `pose` in `seconds`.
+    /// Returns the effect of arc and turn, metres and radians, from `pose` in `seconds`.
     pub(crate) fn transition(&self, pose: Pose2, moved: Twist, seconds: f64) -> Transition {
         let Twist { v: arc, omega: turn } = moved;
         let axis = Pose2 { heading: pose.heading + turn / 2.0, ..pose }.axis();
-        // The pose's error by one of arc and turn; the turn's acts half way through the arc.
+        // Pose error by errors of arc and turn; the latter acts half way.
         let effect = |arc_error: f64, turn_error: f64| {
             let aside = 0.5 * arc * turn_error;
             Error::from([
@@ -114,7 +115,7 @@ impl ErrorModel {
             let slips = [along * (self.slip * arc.abs()).sqrt(), Error::zeros()];
             (effect(0.0, turn), Error::zeros(), slips)
         } else {
-            // Each wheel rolls the arc, plus or minus half the track times the turn.
+            // Wheels roll the arc plus or minus half the track times the turn.
             let [left, right] = [arc - turn * half_track, arc + turn * half_track];
             let slip = |rolled: f64| (self.slip * rolled.abs()).sqrt();
             let slips = [
@@ -132,17 +133,17 @@ impl ErrorModel {
         Transition { carried, noise }
     }
 
-    /// The variance of a tick's turn that a gyro shows to be an error of the counts, rad^2. What one tick has too much the next has too
-    /// little, so without a gyro it does not add up. Counts that stay are at rest, as far as an eighth of a count.
+    /// Returns a tick's quantization variance, which only a gyro reveals, rad^2: successive ticks
+    /// cancel it. Constant counts mean rest within an eighth of a count.
     pub(crate) fn counted(&self, by_counts: Twist) -> f64 {
         let rests = by_counts.v == 0.0 && by_counts.omega == 0.0;
         if rests { self.counted / 64.0 } else { self.counted }
     }
 
-    /// The covariance of a motion that nobody measured: each wheel rolled up to `farthest` metres either way. The robot may have turned
-    /// first, so aside counts like ahead.
+    /// Returns the covariance of unmeasured motion by up to `farthest` metres per wheel. The robot
+    /// may have turned first, so both axes are equal.
     pub(crate) fn lost(&self, farthest: f64) -> Matrix {
-        // Evenly distributed. It holds for a car, which turns less than free wheels.
+        // Uniform distribution; cars turn less than free wheels.
         let wheel = farthest * farthest / 3.0;
         let place = wheel / 2.0;
         let heading = 2.0 * wheel / (self.track_m * self.track_m);
@@ -151,7 +152,7 @@ impl ErrorModel {
 }
 
 impl Covariance {
-    /// xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
+    /// Returns xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
     pub(crate) fn of_pose(&self) -> [f64; 6] {
         [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| self.0[entry])
     }
@@ -176,7 +177,7 @@ mod tests {
 
     const AHEAD: Twist = Twist { v: 0.002, omega: 0.0 };
 
-    /// The covariance after `steps` times the same motion.
+    /// Returns the covariance after `steps` equal motions.
     fn drive(model: &ErrorModel, steps: usize, moved: Twist) -> [f64; 6] {
         let (mut pose, mut covariance) = (Pose2::default(), model.start());
         for _ in 0..steps {
@@ -192,7 +193,7 @@ mod tests {
 
     #[test]
     fn slip_on_a_straight_way_by_hand() {
-        // The variance of the heading is 2 q s / W^2, that aside its integral q s^3 2 / (3 W^2), that ahead q s / 2.
+        // Variances: heading 2 q s / W^2, sideways its integral q s^3 2 / (3 W^2), ahead q s / 2.
         let model =
             model("slip = 0.01\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0\ndistance_scale_sd = 0");
         let [xx, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
@@ -204,7 +205,7 @@ mod tests {
 
     #[test]
     fn unequal_wheels_bend_a_straight_way_into_a_circle() {
-        // The heading is off by e s / W and the way aside by e s^2 / 2 W.
+        // Errors: heading e s / W, sideways e s^2 / 2 W.
         let model =
             model("slip = 0\ndiameter_ratio_sd = 0.006\ntrack_scale_sd = 0\ndistance_scale_sd = 0");
         let [_, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);

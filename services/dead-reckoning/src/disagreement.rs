@@ -1,9 +1,9 @@
-//! Whether laser and wheels disagree on every motion, and the likely cause.
+//! Steady disagreement of laser and wheels, and its likely cause.
 //!
-//! The way and turn from one fix of the scan matcher to the next are compared with those by the wheels between the same times. Least
-//! squares give the turn and way of the fixes over those of the wheels, and how far the way points aside; a delay is the shift of time
-//! with which the turns agree best. A cause is named where its deviation by the residuals is far below it, and the fixes share it, so
-//! that no number of them makes the pose sure.
+//! The motion between two fixes of the scan matcher is compared with that by the wheels. Least
+//! squares give the ratios of turn and distance, and the sideways share. The delay is the time
+//! shift of best agreement. A cause that far exceeds its deviation by the residuals is named. All
+//! fixes share it, so more of them do not make the pose surer.
 
 use std::collections::VecDeque;
 
@@ -18,47 +18,47 @@ use crate::{
     tick::Tick,
 };
 
-/// So much of the sums is left after each further pair of fixes: 200 pairs are remembered.
+/// Weight left after each pair of fixes: a memory of 200.
 const REMEMBERED: f64 = 1.0 - 1.0 / 200.0;
 const LEAST_PAIRS: f64 = 15.0;
-/// The fixes of a pair are so far apart, seconds: nearer ones tell more of their own errors than of the motion.
+/// Seconds between the fixes of a pair. Closer ones show mostly their own errors.
 const APART_S: std::ops::RangeInclusive<f64> = 0.18..=1.0;
-/// The least way, m^2, and turn, rad^2, squared for each pair and summed up.
+/// Least sums of squared distance, m^2, and turn, rad^2.
 const LEAST_WAY: f64 = 0.03;
 const LEAST_TURN: f64 = 0.02;
-/// The least share of turn and way that the other does not explain.
+/// Least share of turn and distance that the other does not explain.
 const LEAST_ALONE: f64 = 0.05;
-/// An estimate is this number of its deviations away from none.
+/// Least estimate, in its deviations.
 const DEVIATIONS: f64 = 6.0;
-/// The least share of a motion that a factor must explain: slipping wheels are no factor.
+/// Least explained share of a motion; slip yields no constant factor.
 const EXPLAINED: f64 = 0.95;
-/// Wheels that nobody calibrated differ less from what is stated.
+/// Least causes: uncalibrated wheels differ less.
 const FACTOR: f64 = 0.12;
 const ASIDE_RAD: f64 = 0.05;
 const DELAY_S: f64 = 0.06;
-/// A ratio of the wheels that is farther from 1 than this is a cause: wheels that nobody calibrated differ less.
+/// Least difference of the wheels' ratio from 1. Uncalibrated wheels differ less.
 const UNEVEN: f64 = 0.03;
 const SHIFTS: usize = 13;
 const FIRST_SHIFT_S: f64 = -0.1;
 const SHIFT_STEP_S: f64 = 0.05;
-/// The sum of squares without a delay is this multiple of that with it.
+/// Least ratio of squares without a delay to those with it.
 const BETTER: f64 = 1.5;
 
-/// The pose's variances where there is a cause, m^2 and rad^2.
+/// Pose variances under a cause, m^2 and rad^2.
 pub(crate) const DOUBT: [f64; 2] = [0.25, 0.01];
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Cause {
     Mirrored,
-    /// Later than stated, seconds.
+    /// Seconds beyond the stated delay.
     Late(f64),
-    /// Looks further to the left than stated, radians.
+    /// Mounted further left than stated, radians.
     Turned(f64),
-    /// The way by the fixes over that by the wheels.
+    /// Distance by fixes over that by wheels.
     Way(f64),
-    /// The turn likewise.
+    /// Turn by fixes over that by wheels.
     Turn(f64),
-    /// The way of the right wheel over that of the left one, for equal counts.
+    /// Right wheel's travel over the left's, for equal counts.
     Uneven(f64),
 }
 
@@ -94,10 +94,10 @@ pub(crate) struct Disagreement {
     turn: Line,
     way: Line,
     aside: Line,
-    /// The fixes' turn by the wheels' way, and the sum of products of the wheels' turn and way.
+    /// Fixes' turn by wheels' distance, and the products of wheels' turn and distance.
     bend: Line,
     turn_way: f64,
-    /// Squares of the turns' differences by the shift of time.
+    /// Squared turn differences by time shift.
     shifted: [f64; SHIFTS],
     cause: Option<Cause>,
 }
@@ -107,14 +107,15 @@ impl Disagreement {
         self.cause.is_some()
     }
 
-    /// Compare the two fixes before `newest` with the ticks of the last 2 s, which go on after them. Returns a cause that is new.
+    /// Compares the two fixes before `newest` with the last 2 s of ticks, which reach beyond them.
+    /// Returns a new cause.
     pub(crate) fn compare(
         &mut self,
         newest: &Fix,
         ticks: &VecDeque<Tick>,
         track_m: f64,
     ) -> Option<Cause> {
-        // Of all sources only the scan matcher states both.
+        // Only the scan matcher states both.
         if newest.heading.is_none() || newest.shared[1] <= 0.0 {
             return None;
         }
@@ -177,7 +178,7 @@ impl Disagreement {
         if let Some(by_s) = self.late() {
             return Some(Cause::Late(by_s));
         }
-        // A robot that drives curves has turns by its turning and by its way, radians for a metre.
+        // In curves the turn has one part by turning and one by distance, rad/m.
         let turns = (self.turn.xx >= LEAST_TURN)
             .then(|| Two::of(&self.turn, &self.bend, self.turn_way, self.pairs, LEAST_ALONE))
             .flatten();
@@ -197,7 +198,7 @@ impl Disagreement {
         way.or(turn.map(|turns| Cause::Turn(turns.a[0])))
     }
 
-    /// The delay, seconds, if the turns agree far better with it than without.
+    /// Returns the delay, seconds, if turns agree far better with it.
     fn late(&self) -> Option<f64> {
         let unshifted = self.shifted[(-FIRST_SHIFT_S / SHIFT_STEP_S).round() as usize];
         let best = (1..SHIFTS - 1)
@@ -216,7 +217,8 @@ fn shift_s(step: f64) -> f64 {
     FIRST_SHIFT_S + step * SHIFT_STEP_S
 }
 
-/// The motion by the wheels between two times, as a pose in the frame of the first; none where ticks are missing.
+/// Returns the wheels' motion between two times, in the frame of the first; none if ticks are
+/// missing.
 fn moved(ticks: &VecDeque<Tick>, from_s: f64, to_s: f64) -> Option<Pose2> {
     let first = ticks.front()?;
     if from_s < first.time.seconds() - first.seconds || to_s > ticks.back()?.time.seconds() {

@@ -1,27 +1,30 @@
-//! Doubts of the pose that no fix settles: wheels that count unequal shares of what they are told, and fixes that contradicted the pose
-//! until it became theirs. They widen the covariance that is given, and not the filter's, whose gates would take anything then.
+//! Doubts that no fix settles: unequal wheels, and fixes that contradicted the pose until it moved
+//! to them. They widen the published covariance only, because a wider filter's gates would accept
+//! anything.
 
 use common::samples::WheelSample;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// The wheels' ratio is off if it is so many of its deviations, and so much, from 1. In 240 missions of X80s and Kobukis with even wheels,
-/// half of them on a busy machine, it came to at most 0.89 of the greater of both, and in 320 of Jackals, Kobukis and X80s, most of them among
-/// what moves, to at most 0.64; an encoder that counts 4 % too little in half of a mission comes to 1.05.
+/// Least difference from 1 of a ratio that is off: in its deviations, and absolute.
+///
+/// Even wheels reached at most 0.89 of the greater limit in 240 missions of X80s and Kobukis, half
+/// on a busy machine. They reached 0.64 in 320 missions of Jackals, Kobukis and X80s, mostly among
+/// moving things. An encoder that counts 4 % too little for half a mission reaches 1.05.
 const DEVIATIONS: f64 = 2.5;
 const LEAST_OFF: f64 = 0.018;
-/// A doubt of the place is told from here on, metres.
+/// Reported position doubt, metres.
 const TOLD_M: f64 = 0.1;
 const WIDEST_M: f64 = 10.0;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Doubt {
-    /// The way at the rims since the newest fix by a source that does not drive with these wheels, metres.
+    /// Rim travel since a fix independent of these wheels, metres.
     rolled_m: f64,
-    /// How far the ratio was off at most.
+    /// Largest difference of the ratio from 1.
     uneven: f64,
     is_told: bool,
-    /// Squares of the ways and turns by which fixes relocated the robot, m^2 and rad^2.
+    /// Squared moves and turns by relocations, m^2 and rad^2.
     relocated: [f64; 2],
 }
 
@@ -40,7 +43,7 @@ impl Doubt {
         (self.rolled_m, self.relocated) = (0.0, [0.0; 2]);
     }
 
-    /// Returns a warning once.
+    /// Takes rim travel. Returns a warning once.
     pub(crate) fn roll(
         &mut self,
         wheels: &WheelSample,
@@ -64,14 +67,14 @@ impl Doubt {
         ))
     }
 
-    /// If the counts, and not the commands, are wrong all the way: variances, m^2 and rad^2.
+    /// Returns variances for counts wrong all the way, m^2 and rad^2.
     fn of_wheels(&self, track_m: f64) -> [f64; 2] {
         let turn = (self.uneven * self.rolled_m / track_m).min(std::f64::consts::PI);
         let aside = (turn * self.rolled_m / 2.0).min(WIDEST_M);
         [aside * aside, turn * turn]
     }
 
-    /// Variances of the place and the heading, m^2 and rad^2.
+    /// Returns variances of position and heading, m^2 and rad^2.
     pub(crate) fn variances(&self, track_m: f64) -> [f64; 2] {
         let [place, heading] = self.of_wheels(track_m);
         [place + self.relocated[0], heading + self.relocated[1]]

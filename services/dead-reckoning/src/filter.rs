@@ -1,7 +1,8 @@
-//! The error-state filter of the pose, the wheels' errors and a gyro's bias, by wheels, fixes and gyro.
+//! Error-state filter of pose, wheel errors and gyro bias, from wheels, fixes and gyro.
 //!
-//! [`Filter`] is the estimate at one tick. [`History`] has the estimate of 2 s ago and the ticks and fixes since. A late fix is taken at
-//! its own time and the present estimate computed again, as if it had come at once; a tick costs no more than those 2 s.
+//! [`Filter`] is the estimate at one tick. [`History`] holds the estimate of 2 s ago, and ticks and
+//! fixes since. A late fix applies at its own time: the estimate is recomputed, as if the fix had
+//! come at once. A tick costs at most those 2 s.
 
 use std::{collections::VecDeque, fmt, time::Duration};
 
@@ -21,19 +22,21 @@ use crate::{
     tick::Tick,
 };
 
-/// An older fix is refused.
+/// Age limit of fixes.
 const OLDEST: Duration = Duration::from_secs(2);
-/// They span less than [`OLDEST`] at a high rate.
+/// At a high rate they span less than [`OLDEST`].
 const MOST_TICKS: usize = 64;
 const MOST_FIXES: usize = 64;
-/// Squared Mahalanobis distance beyond which a fix is refused: one good one in a thousand, for 2 and 3 degrees of freedom.
+/// Squared Mahalanobis distances beyond which fixes are refused: one good one in a thousand, for 2
+/// and 3 degrees of freedom.
 pub(crate) const GATES: [f64; 2] = [13.8, 16.3];
-/// The least stated variances of x, y and the heading, m^2 and rad^2: 5 mm and a tenth of a degree.
+/// Least variances of x, y and heading, m^2 and rad^2: 5 mm and a tenth of a degree.
 const LEAST_VARIANCES: [f64; 3] = [25e-6, 25e-6, 3e-6];
-/// A fix of the scan matcher that is less sure by its scan than this, metres and radians, may lean on the pose by the wheels: the matcher
-/// holds its match at that pose with these deviations, and states the match alone several times as unsure as it is.
+/// Deviations, metres and radians, above which a scan matcher's fix may lean on the wheels. The
+/// matcher holds its match at their pose with these, and overstates the match's own uncertainty
+/// several times.
 const LEANS: [f64; 2] = [0.1, 0.05];
-/// The gyro's assumed scale error, a share.
+/// Gyro scale error, a share.
 const GYRO_SCALE: f64 = 0.005;
 
 const JOINT: usize = PARTS + 1;
@@ -59,7 +62,7 @@ pub(crate) struct Fix {
     pub(crate) position: DVec2,
     pub(crate) heading: Option<f64>,
     pub(crate) covariance: [f64; 6],
-    /// Variances that all fixes of the source share: of x as of y, and of the heading.
+    /// Variances shared by all fixes of the source: of x and of y, and of the heading.
     pub(crate) shared: [f64; 2],
 }
 
@@ -81,7 +84,7 @@ impl TryFrom<&FixSample> for Fix {
             covariance: if heading.is_some() { covariance } else { [xx, xy, 0.0, yy, 0.0, 0.0] },
             shared: if heading.is_some() { shared } else { [shared[0], 0.0] },
         };
-        // Positive: less than the least eigenvalue can be taken from the diagonal.
+        // Positive: slightly less than the least eigenvalue is subtracted from the diagonal.
         let least = SVector::from(LEAST_VARIANCES);
         let spare = fix.noise() - SMatrix::from_diagonal(&(least * (1.0 - 1e-9)));
         let positive = match heading {
@@ -123,8 +126,10 @@ impl Fix {
         0.5 * (self.covariance[0] + self.covariance[3])
     }
 
-    /// Whether a fix of the scan matcher, the only source that shares an error of the heading, says where the robot is without leaning on
-    /// the wheels. The matcher begins at the pose by the wheels and stays there where a scan shows too little; what its fix does not share
+    /// Returns whether a scan matcher's fix, the only kind with a shared heading error, locates the
+    /// robot without the wheels.
+    ///
+    /// The matcher stays at the wheels' pose if a scan shows too little, and its unshared variance
     /// says so.
     pub(crate) fn is_apart_from_wheels(&self) -> bool {
         let [place, heading] = self.shared;
@@ -133,7 +138,7 @@ impl Fix {
     }
 }
 
-/// The result is from -pi to pi.
+/// Wraps an angle to -pi..pi.
 pub(crate) fn wrapped(turn: f64) -> f64 {
     turn - (turn / std::f64::consts::TAU).round() * std::f64::consts::TAU
 }
@@ -141,23 +146,23 @@ pub(crate) fn wrapped(turn: f64) -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Filter {
     pub(crate) pose: Pose2,
-    /// Errors of the diameters' ratio, the track and the distance.
+    /// Errors of diameter ratio, track and distance.
     shares: [f64; 3],
     bias: f64,
     pub(crate) covariance: Covariance,
     anchor: Anchor,
 }
 
-/// What a source apart from the scan matcher found out: variances of x, y and the heading right after its newest fix, and those that the
-/// matcher's fixes shared then. What they share more since is drift; the rest is known.
+/// Knowledge by a source other than the scan matcher: variances of x, y and heading after its
+/// newest fix, and those that the matcher's fixes shared then. Later growth of the latter is drift.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Anchor {
     variances: Option<[f64; 3]>,
     shared: [f64; 3],
-    /// Of the matcher's newest fix.
+    /// Shared variances of the matcher's newest fix.
     newest: [f64; 3],
-    /// The matcher's frame in the estimate's: what such a source corrects of the pose, it corrects of the frame. Without this the
-    /// matcher, which holds the pose at where it once was, would undo each correction.
+    /// Matcher's frame in the estimate's, which takes such corrections of the pose. Otherwise the
+    /// matcher, which holds its old pose, would undo them.
     frame: Pose2,
 }
 
@@ -166,8 +171,8 @@ impl Anchor {
         [0, 1, 2].map(|part| (shared[part] - self.shared[part]).max(0.0))
     }
 
-    /// `fix` as unsure as it is beside what all the matcher's fixes share, but for the drift. Deviations shrink and correlations stay, so
-    /// that the matrix stays positive.
+    /// Reduces the shared variance of `fix` to the drift. Deviations shrink and correlations stay,
+    /// so the matrix stays positive.
     fn apart(&self, fix: &Fix) -> Fix {
         let (shared, stated) = (fix.shares(), fix.noise());
         let drift = self.drift(shared);
@@ -178,11 +183,12 @@ impl Anchor {
         Fix { covariance: parts(&(shrunk * stated * shrunk)), ..*fix }
     }
 
-    /// The variances below which `fix` does not make the estimate, which it corrected at `pose` by `error` and left with `variances`.
+    /// Returns the least variances after `fix`, which corrected the estimate at `pose` by `error`,
+    /// leaving `variances`.
     fn floor(&mut self, fix: &Fix, pose: Pose2, error: &Error, variances: [f64; 3]) -> [f64; 3] {
         let shared = fix.shares();
         if shared == [0.0; 3] {
-            // One fix after another says the same of what the matcher holds, and no more.
+            // Successive fixes only repeat what the matcher holds.
             let [xx, _, _, yy, _, tt] = fix.covariance;
             let own = [xx, yy, tt];
             let known = [0, 1, 2].map(|part| own[part].max(variances[part]));
@@ -220,7 +226,7 @@ impl Filter {
         self.pose = motions.along(self.pose, moved);
         self.covariance = Covariance(carried * before * carried.transpose() + noise);
         if let Some(gyro) = tick.gyro {
-            // A gyro measures the difference of two headings, so the earlier heading is one more part of the error.
+            // A gyro measures a difference of headings, so the earlier one joins the error.
             let mut both = SMatrix::<f64, JOINT, PARTS>::zeros();
             both.fixed_view_mut::<PARTS, PARTS>(0, 0).copy_from(&carried);
             both[(PARTS, 2)] = 1.0;
@@ -240,7 +246,7 @@ impl Filter {
         }
     }
 
-    /// The pose at the time of `fix`, measured during `tick` of this estimate or soon after.
+    /// Returns the pose at `fix`, during or soon after `tick` of this estimate.
     fn at(&self, motions: &Motions, tick: &Tick, fix: &Fix) -> Pose2 {
         let ago = tick.time.0 as f64 - fix.time.0 as f64;
         let share = if tick.seconds > 0.0 { ago * 1e-9 / tick.seconds } else { 0.0 };
@@ -249,13 +255,13 @@ impl Filter {
         self.pose.along_arc(-moved.v * share, -moved.omega * share)
     }
 
-    /// Use a fix measured at `there`. Returns whether it agrees.
+    /// Applies a fix at `there`. Returns whether it agrees.
     fn take(&mut self, fix: &Fix, there: Pose2) -> bool {
         let mut laid = *fix;
         if self.anchor.variances.is_some() && fix.shares() != [0.0; 3] {
             let apart = self.anchor.apart(fix);
             let fits = |frame| self.updated(&apart.laid(frame), there).is_some();
-            // The matcher may have begun anew at the estimate.
+            // The matcher may have restarted here.
             if !fits(self.anchor.frame) && fits(Pose2::default()) {
                 self.anchor.frame = Pose2::default();
             }
@@ -267,7 +273,7 @@ impl Filter {
             let floor = self.anchor.floor(fix, self.pose, &error, variances);
             self.correct(&error);
             for (part, least) in floor.into_iter().enumerate() {
-                // A greater diagonal keeps the matrix positive.
+                // More on the diagonal keeps the matrix positive.
                 covariance[(part, part)] = covariance[(part, part)].max(least);
             }
             self.covariance = Covariance(covariance);
@@ -275,7 +281,7 @@ impl Filter {
         taken.is_some()
     }
 
-    /// The correction by a fix measured at `there`, and the covariance afterwards. None if it contradicts the estimate.
+    /// Returns correction and covariance by a fix at `there`. None if it contradicts the estimate.
     fn updated(&self, fix: &Fix, there: Pose2) -> Option<(Error, SMatrix<f64, PARTS, PARTS>)> {
         let lever = self.pose.position - there.position;
         let mut seen = SMatrix::<f64, 3, PARTS>::identity();
@@ -304,7 +310,8 @@ impl Filter {
         self.bias += error[BIAS];
     }
 
-    /// The estimate moved to `pose` with these variances, where the scan matcher begins anew; wheel and gyro errors stay.
+    /// Moves the estimate to `pose` with these variances, for a restarted matcher. Wheel and gyro
+    /// errors stay.
     pub(crate) fn moved_to(mut self, pose: Pose2, position: f64, heading: f64) -> Self {
         let covariance = &mut self.covariance.0;
         for (part, variance) in [position, position, heading].into_iter().enumerate() {
@@ -316,8 +323,8 @@ impl Filter {
     }
 }
 
-/// A Kalman update in Joseph's form: the correction, and the covariance afterwards. None if `residual`, of the part `seen` with `noise`,
-/// is beyond `gate`.
+/// Computes a Kalman update in Joseph's form: correction and covariance. None if `residual` of the
+/// part `seen` exceeds `gate`.
 fn update<const N: usize, const M: usize>(
     covariance: &SMatrix<f64, N, N>,
     seen: &SMatrix<f64, M, N>,
@@ -341,10 +348,10 @@ where
 
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct History {
-    /// The estimate before `ticks`.
+    /// Estimate before `ticks`.
     base: Filter,
     ticks: VecDeque<Tick>,
-    /// The used fixes by the times of their ticks.
+    /// Used fixes, by their ticks' times.
     fixes: VecDeque<(MissionTime, Fix)>,
     newest: Filter,
 }
@@ -406,7 +413,7 @@ impl History {
         }
     }
 
-    /// Compute the newest estimate again from the oldest. `at` sees each tick, by its place, and its estimate.
+    /// Recomputes the newest estimate. `at` sees each tick, by index, and its estimate.
     fn again(
         &self,
         motions: &Motions,
@@ -418,7 +425,7 @@ impl History {
             estimate.advance(motions, tick);
             while let Some((_, fix)) = fixes.next_if(|(at, _)| *at <= tick.time) {
                 let there = estimate.at(motions, tick, fix);
-                // A used fix that contradicts later ones is left out.
+                // Leaves out a used fix that contradicts others.
                 estimate.take(fix, there);
             }
             at(place, tick, &mut estimate)?;
@@ -426,7 +433,7 @@ impl History {
         Ok(estimate)
     }
 
-    /// A fix that is too far off is refused with the pose at its time.
+    /// Takes a fix, or refuses it; if too far off, with the pose at its time.
     pub(crate) fn take(&mut self, motions: &Motions, fix: Fix) -> Result<(), Refused> {
         let not = |why| Err(Refused { why, there: None });
         let (Some(first), Some(last)) = (self.ticks.front(), self.ticks.back()) else {
@@ -458,7 +465,7 @@ impl History {
     }
 }
 
-/// It has the pose at the fix's time if the fix contradicts it.
+/// Refusal of a fix, with the pose at its time if the fix contradicts it.
 #[derive(Clone, Copy)]
 pub(crate) struct Refused {
     pub(crate) why: FixRefusal,

@@ -1,4 +1,4 @@
-//! The turns of ticks by a gyro, whose increments end at their own times and may come late.
+//! Turns of ticks by a gyro, whose increments end at their own times, and late.
 
 use std::collections::VecDeque;
 
@@ -7,23 +7,23 @@ use serde::{Deserialize, Serialize};
 
 use crate::tick::{GyroTurn, Tick};
 
-/// The error of a divided increment, a share. One tick gains what the other loses, so errors do not add up.
+/// Relative error of a divided increment, which neighbouring ticks cancel.
 const UNEVEN: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Gyro {
     sequence: u64,
     end: MissionTime,
-    /// The start of `turn`: the end of a tick, or of the first increment after missing ones.
+    /// Start of `turn`: end of a tick, or of the first increment after a gap.
     since: MissionTime,
-    /// Turn from `since` to the newest increment's end, and its variance; radians, rad^2.
+    /// Turn to the newest increment's end, and variance; radians, rad^2.
     turn: f64,
     variance: f64,
 }
 
 impl Gyro {
-    /// Take an increment and give the ticks that it completes their turns; returns whether there are any. An increment over a tick's end
-    /// is divided as if the robot turned evenly.
+    /// Takes an increment and completes ticks' turns; returns whether it did. Increments across a
+    /// tick's end are divided evenly.
     pub(crate) fn take(
         gyro: &mut Option<Self>,
         increment: &TurnSample,
@@ -51,7 +51,7 @@ impl Gyro {
             let divided = UNEVEN * share * (1.0 - share) * turn_rad;
             let turn = rest.turn + part * turn_rad;
             let variance = rest.variance + part * variance_rad2 + divided * divided;
-            // A turn that began earlier includes ticks that have left the history.
+            // Earlier turns include ticks that left the history.
             if (seconds(rest.since, tick.time) - tick.seconds).abs() < 1e-6 && tick.seconds > 0.0 {
                 tick.gyro = Some(GyroTurn { turn, variance });
                 completed = true;

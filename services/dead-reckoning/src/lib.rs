@@ -2,21 +2,23 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`step`] | the pure step: a `wheels` sample, and the fixes and turns that came with it, to a `pose` |
-//! | `sources` | the fixes and turns that came with a `wheels` sample |
-//! | `covariance` | how the covariance of the pose's error grows with the motion |
-//! | `filter` | the estimate, and the ticks and fixes of the last 2 s |
-//! | `tick` | the motion of one tick |
-//! | `gyro` | the turn of a tick from a gyro's increments |
-//! | `disagreement` | whether laser and wheels disagree on every motion, and why |
-//! | `doubt` | what no fix settles, and widens the covariance that is given |
-//! | `relocation` | whether fixes that contradict the pose agree among themselves |
+//! | [`step`] | pure step from a `wheels` sample and its sources to a `pose` |
+//! | `sources` | fixes and turns that come with a `wheels` sample |
+//! | `covariance` | growth of the pose's covariance |
+//! | `filter` | estimate, ticks and fixes of the last 2 s |
+//! | `tick` | motion of one tick |
+//! | `gyro` | turns of ticks from a gyro's increments |
+//! | `disagreement` | steady disagreement of laser and wheels, and its cause |
+//! | `doubt` | doubts that no fix settles, which widen the published covariance |
+//! | `relocation` | fixes that contradict the pose but agree among themselves |
 //!
-//! The state is saved after the pose is published, so that the tick does not wait for the file. A process killed in between has
-//! published a pose that its saved state lacks. That is safe: counts are cumulative and the link's last sample stays on the bus, so the
-//! successor computes the same pose from the state before. If the next tick has come, it takes both ticks' way as one arc, a millimetre
-//! or two off. At the first tick, and when the robot restarted its counts, the older state does not fit the counts, so the new one is
-//! saved first; if all processes are killed then, a resumed run counts the tick again.
+//! The state is saved after the pose is published, so that the tick does not wait for the file. A
+//! process killed in between has published a pose that its saved state lacks. That is safe: counts
+//! are cumulative and the link's last sample stays on the bus, so the successor computes the same
+//! pose. If the next tick has come, both ticks become one arc, a millimetre or two off.
+//!
+//! At the first tick, and after restarted counts, the older state does not fit the counts, so the
+//! new one is saved first. If all processes are killed then, a resumed run counts the tick again.
 
 mod covariance;
 mod disagreement;
@@ -43,7 +45,7 @@ use step::{STATE_BYTES, State};
 pub use sources::Sources;
 pub use step::DeadReckoning;
 
-/// Where the robot of the run in `directory` last believed it was; none before its first tick.
+/// Returns the run's last estimated place; none before its first tick.
 pub fn saved_place(
     directory: &Path,
     mission: &Mission,
@@ -51,7 +53,7 @@ pub fn saved_place(
     Ok(saved_state(directory)?.map(|state| DeadReckoning::place_of(mission, state)))
 }
 
-/// The state that the process of the run in `directory` saved; none before its first tick.
+/// Returns the run's saved state; none before its first tick.
 pub fn saved_state(directory: &Path) -> Result<Option<State>, CheckpointError> {
     let file = run::checkpoint_file(directory, DeadReckoning::NAME);
     Ok(Checkpoint::open(&file, STATE_BYTES)?.1)

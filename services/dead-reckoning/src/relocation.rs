@@ -1,4 +1,4 @@
-//! Fixes that contradict the pose and agree: the robot is elsewhere, for example because it was carried.
+//! Relocation by fixes that contradict the pose but agree, for example after the robot was carried.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -9,25 +9,25 @@ use serde::{Deserialize, Serialize};
 use crate::filter::{Filter, Fix, GATES, wrapped};
 
 const AGREE: usize = 10;
-/// Fixes that contradict the pose again after these are a source that contradicts itself.
+/// Relocations after which contradicting fixes show a source that contradicts itself.
 pub(crate) const MOST_RELOCATIONS: u64 = 2;
-/// Ten such fixes take 3 s.
+/// Least time between fixes: ten take 3 s.
 const APART: Duration = Duration::from_millis(334);
-/// Variance of the way between two fixes by the wheels, m^2.
+/// Variance of wheel travel between two fixes, m^2.
 const WHEELS: f64 = 4e-4;
-/// The robot's way among the fixes gives the heading if its deviation is lower, radians.
+/// Largest deviation of a heading from motion among fixes, radians.
 const KNOWN_RAD: f64 = 0.2;
-/// The heading's variance otherwise, rad^2.
+/// Heading variance otherwise, rad^2.
 const UNKNOWN: f64 = 1.0;
-/// A turn of less than so many deviations is none: the heading by the wheels is better than one by the robot's short way.
+/// Least turn, in deviations. Below, the wheels' heading is better than one from a short distance.
 const NO_TURN: f64 = 3.0;
 
-/// Refused fixes since one was used, each with the pose at its time.
+/// Refused fixes since a used one, with the poses at their times.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Contradictions(VecDeque<(Pose2, Fix)>);
 
 impl Contradictions {
-    /// Add `fix`, measured at the pose `there`. Returns the estimate elsewhere if the newest fixes agree.
+    /// Adds `fix`, measured at `there`. Returns the relocated estimate if the newest fixes agree.
     pub(crate) fn add(&mut self, there: Pose2, fix: &Fix, estimate: &Filter) -> Option<Filter> {
         let time = |(_, fix): &(Pose2, Fix)| fix.time;
         let last = self.0.back().map_or(MissionTime(0), time);
@@ -43,8 +43,8 @@ impl Contradictions {
         Some(elsewhere)
     }
 
-    /// `estimate` moved by the rigid motion that brings the poses nearest to the fixes (least squares). None if a fix is then beyond its
-    /// gate.
+    /// Moves `estimate` by the rigid motion that best fits poses to fixes (least squares). None if
+    /// a fix then exceeds its gate.
     fn agreed(&self, estimate: &Filter) -> Option<Filter> {
         let share = 1.0 / self.0.len() as f64;
         let mean = |of: fn(&Pose2, &Fix) -> DVec2| {

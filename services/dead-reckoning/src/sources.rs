@@ -1,4 +1,4 @@
-//! The samples of sources outside that a tick takes with its wheels.
+//! Samples of external sources that a tick takes with its wheels.
 
 use common::{
     bus::{BusError, Reader, Stamped},
@@ -10,12 +10,11 @@ use common::{
 };
 use serde::{Deserialize, Serialize};
 
-/// The most samples of a topic that are taken with a tick. Others are taken with the next one.
+/// Limits per tick; the rest waits for the next.
 const MOST_FIXES: usize = 16;
 const MOST_TURNS: usize = 128;
 const MOST_COUNTS: usize = 128;
 
-/// The samples of sources outside that came since the tick before.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Sources {
     pub fixes: Vec<FixSample>,
@@ -50,7 +49,7 @@ impl Further for Sources {
         let own = some(&mut readers.imu_turns, MOST_TURNS)?;
         let counts = some(&mut readers.counts, MOST_COUNTS)?;
         let place = readers.places.newest()?;
-        // The sequences of two gyros do not continue each other.
+        // Sequences of two gyros do not continue each other.
         Ok(Self { fixes, turns: if own.is_empty() { outside } else { own }, counts, place })
     }
 }

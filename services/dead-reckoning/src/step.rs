@@ -1,5 +1,6 @@
-//! Counts to pose, for two wheels, (20), or for a car's driven wheel and steering, (3), corrected by fixes and a gyro. The pose is an
-//! integral that nothing can recompute, so its state is in the checkpoint.
+//! Pose from counts of two wheels (20), or of a car's wheel and steering (3), corrected by fixes
+//! and a gyro. The pose is an integral that nothing can recompute, so the checkpoint holds its
+//! state.
 
 use common::{
     bus::Topic,
@@ -28,29 +29,29 @@ use crate::{
     tick::Tick,
 };
 
-/// Room for the encoded state, bytes: with 64 ticks and 64 fixes it is under 14,000.
+/// Bound on the encoded state, bytes: under 14,000 with 64 ticks and 64 fixes.
 pub const STATE_BYTES: usize = 16_384;
-/// Counts are rejected if a wheel seems to turn faster than this multiple of its top speed. A robot that slides or is pushed stays
-/// below it; a counter that restarted is nearly always above it.
+/// Largest plausible multiple of a wheel's top speed. Sliding and pushed robots stay below;
+/// restarted counters are nearly always above.
 const PLAUSIBLE: f64 = 2.0;
-/// Counts are never rejected within this time, seconds: timestamps jitter by about a tick.
+/// Time added to the tick for that limit, seconds: timestamps jitter by about a tick.
 const SLACK_S: f64 = 0.3;
 
-/// The least share of a tick for a speed: bunched frames give none of their own.
+/// Least share of a tick to compute a speed over; frames may come bunched.
 const LEAST_SHARE_OF_A_TICK: f64 = 0.5;
 
-/// A wheel still turns so long after its last command, seconds: delay and lag of its speed loop.
+/// Motion after the last command, seconds: delay and lag of the speed loop.
 const COASTS_S: f64 = 0.2;
 
-/// The least time to switch a robot off and on, seconds; a killed link is back in 0.1 s.
+/// Least power cycle, seconds; a killed link is back in 0.1 s.
 const BOOTS_IN_S: f64 = 2.0;
 
-/// The pose's largest correction in a tick, metres and radians: the map around the robot must not tear.
+/// Largest correction per tick, metres and radians, so that the map around the robot does not tear.
 const MOST_CORRECTION: (f64, f64) = (0.02, std::f64::consts::PI / 180.0);
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// It follows the estimate without jumps.
+    /// Follows the estimate smoothly.
     pose: Pose2,
     odometry: Pose2,
     history: History,
@@ -62,33 +63,33 @@ pub struct State {
     fixes: u64,
     fixes_refused: u64,
     refusal: u8,
-    /// The counts of `last` without their cycle, of a robot that has no counter. States of older recordings have none.
+    /// Unwrapped counts of a robot without a counter. Older recordings have none.
     #[serde(deserialize_with = "if_there")]
     counts: Option<CountsSample>,
     #[serde(deserialize_with = "if_there")]
     disagreement: Disagreement,
     #[serde(deserialize_with = "if_there")]
     doubt: Doubt,
-    /// The number of the newest place that an operator set.
+    /// Newest place set by an operator.
     #[serde(deserialize_with = "if_there")]
     placed: u64,
 }
 
 impl State {
-    /// The newest wheel sample's; none before the first.
+    /// Returns the newest wheel sample's tick and time; none before the first.
     pub fn newest(&self) -> Option<(u64, MissionTime)> {
         self.last.map(|last| (last.tick, last.time))
     }
 }
 
-/// The wheel sample that the pose was computed from, and the speeds by it.
+/// Wheel sample behind the pose, and speeds by it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Last {
     tick: u64,
     time: MissionTime,
     left: u16,
     right: u16,
-    /// The link's generation, and the robot's restarts that it knew of.
+    /// Link's generation, and restarts known to it.
     generation: u32,
     restarts: u32,
     v: f64,
@@ -98,31 +99,31 @@ struct Last {
 #[derive(Debug, Default)]
 pub struct Reckoned {
     pub pose: PoseSample,
-    /// The counts jumped farther than wheels turn, or the robot restarted them: the pose stays, and its covariance grows by how far the
-    /// robot can have gone.
+    /// Whether the counts restarted or made an impossible jump. The pose stays, and its covariance
+    /// grows by the possible motion.
     pub rejected: bool,
-    /// Fixes that agree contradicted the pose, which became theirs.
+    /// Whether the pose moved to agreeing fixes that contradicted it.
     pub relocated: bool,
     pub placed: bool,
-    /// Unless the fix before was refused for the same reason.
+    /// Reason of a refusal; none if repeated.
     pub refused: Option<FixRefusal>,
-    /// Why laser and wheels disagree, if that is new.
+    /// New cause of disagreement.
     pub(crate) disagree: Option<Cause>,
-    /// Why the wheels are doubted, once.
+    /// Doubt of the wheels, once.
     pub(crate) doubted: Option<String>,
 }
 
-/// (20) and (21).
+/// Dead reckoning by (20) and (21).
 #[derive(Debug)]
 pub struct DeadReckoning {
     drive: Drive,
     body: Body,
-    /// Ways of the left and right wheel over the nominal ones.
+    /// Travel of left and right wheel over the nominal.
     wheel_scales: [f64; 2],
     distance_scale: f64,
     motions: Motions,
     period_s: f64,
-    /// The longest time that wheels turn after the last tick, seconds.
+    /// Longest motion after the last tick, seconds.
     turns_on_s: f64,
     state: State,
 }
@@ -209,7 +210,7 @@ impl Answering for DeadReckoning {
 }
 
 impl DeadReckoning {
-    /// Integrate up to one wheel sample. A tick given twice gives the same pose twice.
+    /// Integrates up to a wheel sample. A repeated tick gives the same pose.
     pub fn reckon(
         &mut self,
         wheels: &WheelSample,
@@ -230,7 +231,7 @@ impl DeadReckoning {
             let counted = self.moved(last, counts, wheels, elapsed);
             rejected = counted.is_none();
             let Twist { v: arc, omega: turn } = counted.unwrap_or_default();
-            // A robot without ticks gets no commands, so its wheels soon rest.
+            // Without ticks there are no commands, so the wheels soon rest.
             let lost_s = if rejected { elapsed.min(self.turns_on_s) } else { 0.0 };
             let lost_m = self.body.top_speed_m_s * lost_s;
             tick = Tick { seconds: elapsed, arc, turn, lost_m, ..tick };
@@ -283,7 +284,7 @@ impl DeadReckoning {
         Reckoned { pose: self.sample(), rejected, relocated, placed, refused, disagree, doubted }
     }
 
-    /// The estimate becomes what an operator says; wheel and gyro errors stay.
+    /// Sets the estimate as an operator says; wheel and gyro errors stay.
     fn place(&mut self, place: &PlaceSample) {
         let state = &mut self.state;
         let estimate = state.history.newest();
@@ -297,7 +298,7 @@ impl DeadReckoning {
         state.placed = place.number;
     }
 
-    /// The first place of another run, which begins where `state` ends.
+    /// Returns the first place of a run that continues from `state`.
     pub(crate) fn place_of(mission: &Mission, state: State) -> PlaceSample {
         let reckoning = Self { state, ..Answering::new(mission) };
         let PoseSample { x_m, y_m, heading_rad, covariance: [xx, _, _, yy, _, tt], .. } =
@@ -313,7 +314,6 @@ impl DeadReckoning {
         }
     }
 
-    /// Take a fix, unless it is refused.
     fn take_fix(&mut self, sample: &FixSample) -> Taken {
         let state = &mut self.state;
         let fix = Fix::try_from(sample);
@@ -323,7 +323,7 @@ impl DeadReckoning {
             state.fixes += 1;
             state.contradictions = Contradictions::default();
             let is_of_matcher = sample.shared[1] > 0.0;
-            // A matcher that contradicted the wheels' pose may have begun anew at that pose.
+            // A matcher that contradicted the wheels may have restarted at their pose.
             let is_apart = !is_of_matcher
                 || state.fixes_refused == 0 && fix.is_ok_and(|fix| fix.is_apart_from_wheels());
             if is_apart {
@@ -348,7 +348,7 @@ impl DeadReckoning {
         Taken::Refused(why)
     }
 
-    /// All the way if the robot was relocated.
+    /// Moves the pose towards the estimate, fully if `relocated`.
     fn follow(&mut self, relocated: bool) {
         let estimate = self.state.history.newest().pose;
         let pose = &mut self.state.pose;
@@ -365,7 +365,7 @@ impl DeadReckoning {
         };
     }
 
-    /// Metres and radians; none if the counts cannot come from turning wheels.
+    /// Returns metres and radians; none if wheels cannot turn so.
     fn moved(
         &self,
         last: Last,
@@ -380,8 +380,8 @@ impl DeadReckoning {
         let per_count = std::f64::consts::TAU / self.body.counts_per_turn;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         let limit = top * PLAUSIBLE * (elapsed + SLACK_S);
-        // Of one generation the link sees a restart between frames; only a restart between two links must be read off the counts. A
-        // robot that turned back through its start gives the same counts, but sooner.
+        // The link reports restarts within its generation; only between two links must the counts
+        // show one. A robot that turned back through its start gives the same counts, but sooner.
         let restarted = match last.generation == wheels.stamp.generation {
             true => last.restarts != wheels.restarts,
             false => elapsed >= BOOTS_IN_S && counts.restarted_since(before),
@@ -389,7 +389,7 @@ impl DeadReckoning {
         if left.abs().max(right.abs()) > limit || restarted {
             return None;
         }
-        // (20) is linear in the wheels: their angles give arc and turn as their speeds give v and omega.
+        // (20) is linear: wheel angles give arc and turn as wheel speeds give v and omega.
         let wheel = left * per_count;
         Some(match &self.drive {
             Drive::Differential(drive) => {
@@ -398,7 +398,7 @@ impl DeadReckoning {
                 drive.twist([wheel * left_scale, right])
             }
             Drive::Ackermann(drive) => {
-                // The mean of the two angles stands for the steering on the way.
+                // The mean angle stands for the steering in between.
                 let middle = f64::from(counts_between(0, last.right)) + right / 2.0;
                 let angle = self.body.steering.map(|steering| steering.angle(middle));
                 let wheel = wheel * self.distance_scale;
@@ -407,7 +407,7 @@ impl DeadReckoning {
         })
     }
 
-    /// m/s and rad/s, limited to the body's speed along the same curve.
+    /// Returns m/s and rad/s, limited along the same curve.
     fn speeds(&self, moved: Twist, elapsed: f64) -> Twist {
         let time = elapsed.max(LEAST_SHARE_OF_A_TICK * self.period_s);
         let (v, omega) = (moved.v / time, moved.omega / time);
@@ -425,7 +425,7 @@ impl DeadReckoning {
         let (left_counts, right_counts, v, omega) =
             last.map_or((0, 0, 0.0, 0.0), |last| (last.left, last.right, last.v, last.omega));
         let estimate = history.newest();
-        // This pose's error is the estimate's, plus the way to the estimate.
+        // The error is the estimate's, plus the offset to it.
         let [x, y] = (estimate.pose.position - position).to_array();
         let turn = estimate.pose.heading - heading;
         let way = [x * x, x * y, x * turn, y * y, y * turn, turn * turn];

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Tick {
     pub(crate) time: MissionTime,
     pub(crate) seconds: f64,
-    /// The counts' arc and turn, for wheels without errors; metres and radians.
+    /// By the counts of ideal wheels; metres and radians.
     pub(crate) arc: f64,
     pub(crate) turn: f64,
-    /// Each wheel may have rolled so far with its counts lost, metres.
+    /// Possible travel of each wheel with lost counts, metres.
     pub(crate) lost_m: f64,
     pub(crate) gyro: Option<GyroTurn>,
 }

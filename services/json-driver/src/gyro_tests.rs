@@ -1,4 +1,4 @@
-//! The turns by the gyro of a robot of JSON.
+//! Gyro turns of a JSON robot.
 
 use std::path::Path;
 
@@ -6,8 +6,8 @@ use common::{driver::Base as _, mission::Mission};
 
 use crate::{Driver as _, Json};
 
-/// The turns of ticks, by their sequence and angle, and what was refused: each tick the robot turns by 0.1 rad by its wheels, and its
-/// gyro says so much.
+/// Returns ticks' turns, by sequence and angle, and any refusal. Wheels turn the robot by 0.1 rad a
+/// tick; its gyro reports `said`.
 fn told(said: &[Option<f64>]) -> (Vec<(u64, f64)>, Option<String>) {
     let text = "target = [3, 0]\nrobot.protocol = 'json'";
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();

@@ -1,4 +1,4 @@
-//! Robots that speak lines of JSON: [`common::json_wire`] is the protocol.
+//! Driver of robots that speak JSON lines ([`common::json_wire`]).
 
 #[cfg(test)]
 mod gyro_tests;
@@ -18,9 +18,9 @@ use common::{
     samples::{LONGEST_SWEEP_NS, RangeReading, Sweep},
 };
 
-/// No clock of a robot says more, seconds either way: twice the time since 1970.
+/// Largest plausible clock, seconds either way: twice the time since 1970.
 const MOST_CLOCK_S: f64 = 4e9;
-/// Orders that count as answered by one report.
+/// Orders that one report may acknowledge.
 const MOST_ANSWERED: usize = 64;
 
 #[derive(Debug)]
@@ -32,7 +32,8 @@ pub struct Json {
     lasers: Vec<(usize, Sensor)>,
     touches: Vec<TouchRow>,
     answered: Option<u64>,
-    /// The count before the newest line, if that line counts less: an old one, or of a robot that has restarted, as the next one tells.
+    /// Earlier count, if the newest line counts less: an old line, or a restarted robot, as the
+    /// next line tells.
     fell_from: Option<u64>,
     odometry: Odometry,
     gyro: gyro::Angle,
@@ -56,7 +57,7 @@ impl Json {
         }
     }
 
-    /// A refused report has no effect; the error says why.
+    /// Takes a report, or refuses it without effect; the error says why.
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), Refusal> {
         let readings = self.readings_of(&report.ranges)?;
         if report.clock_s.is_some_and(|clock| clock.abs() > MOST_CLOCK_S) {
@@ -178,7 +179,7 @@ fn scan_of(
         }
     };
     let beam_ns = nanoseconds("time", time_s)? / beams.len().max(1) as i64;
-    // The first beam that an upside-down laser measures is not the first of its row, and the others follow the other way around.
+    // An upside-down laser first measures another beam than its row's first, and in reverse.
     let sweep = Sweep {
         first_beam_ns: -nanoseconds("age", age_s)?,
         beam_ns: if sensor.is_upside_down { -beam_ns } else { beam_ns },
@@ -284,7 +285,8 @@ mod tests {
             [wheels.left_counts, wheels.right_counts]
         };
         assert_eq!(at(&mut driver, "[5,5,0]"), [0, 0]);
-        // A quarter circle of 1 m to the left: the right wheel goes (1 + W / 2) pi / 2, of r = 0.085 m and W = 0.26 m.
+        // A quarter circle of 1 m to the left: the right wheel rolls (1 + W / 2) pi / 2, r = 0.085
+        // m, W = 0.26 m.
         let counts = |radius: f64| (radius * 0.25 * TAU / 0.085 * 3600.0 / TAU).round() as u16;
         assert_eq!(at(&mut driver, "[6,6,1.5707963267948966]"), [counts(0.87), counts(1.13)]);
     }

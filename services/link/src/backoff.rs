@@ -1,4 +1,4 @@
-//! Pauses between attempts, each twice the one before, up to a longest one.
+//! Exponential backoff between attempts.
 
 use std::time::Duration;
 
@@ -12,7 +12,8 @@ pub struct Backoff {
 }
 
 impl Backoff {
-    /// The first attempt is due at once, the second after `first`. No pause is longer than `longest`.
+    /// Returns a backoff whose first attempt is due at once. Pauses double from `first` up to
+    /// `longest`.
     pub const fn new(first: Duration, longest: Duration) -> Self {
         Self { first, longest, pause: first, attempts: 0, next_ns: None }
     }
@@ -35,13 +36,12 @@ impl Backoff {
         self.attempts
     }
 
-    /// Nanoseconds; 0 when an attempt is due.
+    /// Returns the nanoseconds until the next attempt; 0 when it is due.
     pub fn wait_ns(&self, now_ns: u64) -> u64 {
         self.next_ns.map_or(0, |next| next.saturating_sub(now_ns))
     }
 }
 
-/// Whether `span` of the machine's clock lies between the two readings.
 pub(crate) fn has_passed(since_ns: u64, now_ns: u64, span: Duration) -> bool {
     now_ns.saturating_sub(since_ns) >= span.as_nanos() as u64
 }

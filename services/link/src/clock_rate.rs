@@ -1,27 +1,28 @@
-//! Whether a robot's clock goes as fast as mission time: otherwise it seems to drive slower or faster. A simulator's clock is slow on a
-//! weak machine, and fast if nothing holds it back.
+//! Check that a robot's clock runs as fast as mission time. Otherwise the robot seems too slow or
+//! too fast.
+//!
+//! A simulator's clock is slow on a weak machine, and fast if unthrottled.
 
 use common::clock::MissionTime;
 
-/// A comparison lasts so long, nanoseconds. A frozen process spoils one, so two count.
+/// Duration of a comparison. A frozen process spoils one, so two must agree.
 const OVER_NS: u64 = 5_000_000_000;
-/// Within this share the clocks go equally fast.
+/// Tolerated relative difference.
 const SHARE: f64 = 0.1;
-/// A stamp that steps farther means that the robot's clock was set, nanoseconds.
+/// Step between stamps that shows a reset clock, nanoseconds.
 const SET_ANEW_NS: i64 = 1_000_000_000;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ClockRate {
     newest_ns: i64,
     since: Option<(i64, MissionTime)>,
-    /// Robot seconds in a second of mission time, by the last comparison.
+    /// Last comparison, robot seconds per mission second.
     before: Option<f64>,
     told: Option<f64>,
 }
 
 impl ClockRate {
-    /// Take a stamp that came at `now`. Returns the robot's seconds in a second of mission time if they differ and were not returned
-    /// before.
+    /// Takes a stamp. Returns the robot seconds per mission second if that is off and unreported.
     pub(crate) fn take(&mut self, stamp_ns: i64, now: MissionTime) -> Option<f64> {
         let passed_ns = stamp_ns.saturating_sub(std::mem::replace(&mut self.newest_ns, stamp_ns));
         let is_set_anew = !(0..=SET_ANEW_NS).contains(&passed_ns);
@@ -49,7 +50,7 @@ mod tests {
 
     const STEP_NS: u64 = 50_000_000;
 
-    /// The rates that are returned for a clock that goes at `rates`, for 20 s each.
+    /// Returns the reports on a clock that runs at each of `rates` for 20 s.
     fn told(rates: &[f64]) -> Vec<f64> {
         let (mut clock, mut stamp_ns, mut now_ns) = (ClockRate::default(), 7e18, 0);
         let mut told = Vec::new();
@@ -76,7 +77,8 @@ mod tests {
     fn a_link_that_was_frozen_and_a_clock_that_is_set_anew_say_nothing_of_a_rate() {
         let mut clock = ClockRate::default();
         for step in 0..400_u64 {
-            // For one second in 20 only the newest stamp is heard, at its end, and the clock is set back and forth.
+            // In one second of 20, only the newest stamp arrives, at its end. The clock is also set
+            // back and forth.
             let ms = step * 50;
             let heard_ms = if ms % 20_000 > 7000 && ms % 20_000 < 8000 { 8000 } else { ms };
             let set_s = if step > 200 { -5000 } else { 9_000_000 };

@@ -1,4 +1,4 @@
-//! THE table of drivers.
+//! Table of drivers.
 
 use arduino_driver::Arduino;
 use common::{
@@ -14,13 +14,13 @@ use crate::transport::{BAUD, Line};
 
 #[derive(Debug)]
 pub struct SensorWire {
-    /// None for that of the simulated robot, which hears the sensor's requests too.
+    /// None for the simulated robot's wire, which also receives the sensor's requests.
     pub address: Option<Address<String>>,
     pub line: Line,
     pub driver: Box<dyn Driver>,
 }
 
-/// The driver of what moves the robot of `mission`, and the baud rate of its serial line.
+/// Returns the base's driver, and the baud rate of its serial line.
 pub fn base(mission: &Mission) -> (Box<dyn Base>, u32) {
     match mission.robot.protocol() {
         Protocol::X80 => (Box::new(X80::new(mission)), BAUD),
@@ -30,7 +30,7 @@ pub fn base(mission: &Mission) -> (Box<dyn Base>, u32) {
     }
 }
 
-/// The sensors of `mission` with wires of their own. Events and effects number them in this order.
+/// Returns the sensors with their own wires, in the order of their numbers in events and effects.
 pub fn sensors(mission: &Mission) -> Vec<SensorWire> {
     let wire = |(row, sensor, product): (usize, Sensor, Rplidar)| SensorWire {
         address: mission.robot.sensors.get(row).and_then(|row| row.address.as_ref()?.parse().ok()),

@@ -1,7 +1,10 @@
-//! The decision whether the robot may move. [`Monitor`]s observe the link and say which causes apply. The row of a cause in [`TABLE`]
-//! has its action and its clearing condition. The link takes the worst action of all causes that apply.
+//! Decision whether the robot may move.
 //!
-//! A new cause needs a variant of [`Cause`], a row, and a monitor, which is a file in `failsafe/` and a line in `monitors!`.
+//! [`Monitor`]s observe the link and report which causes apply. Each cause has a row in [`TABLE`]
+//! with its action and clearing condition. The link takes the worst action that applies.
+//!
+//! A new cause needs a variant of [`Cause`], a row, and a monitor: a file in `failsafe/` and a line
+//! in `monitors!`.
 
 pub mod base_response;
 pub mod battery;
@@ -74,22 +77,26 @@ monitors! {
 #[derive(Debug)]
 pub struct Rule {
     pub cause: Cause,
-    /// The condition in words, for the documentation.
+    /// Condition in words, for the documentation.
     pub when: &'static str,
     pub action: Action,
     pub clears: Clears,
-    /// The longest time from the fault until the link tells the robot to stand, or its last command is over, seconds; from the operator's
-    /// stop if the robot does not follow that. None where nothing bounds it, or an operator or another commander acts.
+    /// Longest time from the fault until the link commands a stop or the last command expires,
+    /// seconds.
+    ///
+    /// It counts from the operator's stop if the robot ignores that. None if unbounded, or if an
+    /// operator or another commander acts.
     known_within_s: Option<fn(&Mission) -> f64>,
     monitor: fn(&Monitors) -> &dyn Monitor,
 }
 
-/// Without frames there are no ticks, and without ticks no commands.
+/// Command limit: without frames there are no ticks, and without ticks no commands.
 const LIMIT: Option<fn(&Mission) -> f64> = Some(|mission| mission.robot.command_limit_s);
 
 macro_rules! rules {
     ($($cause:ident, $action:ident, $monitor:ident, $clears:expr, $known_within_s:expr, $when:literal;)*) => {
-        /// All rules, the worst action first. Of the rules with the same action, the first that applies is reported.
+        /// All rules, worst action first. Of rules with equal action, the first that applies is
+        /// reported.
         pub const TABLE: &[Rule] = {
             use self::monitor::Clears::{After, OnNewMission, OnResume, WithCondition};
             &[$(Rule {
@@ -164,10 +171,10 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// The decision if no cause applies.
+    /// Decision while no cause applies.
     pub const GO: Self = Self { action: Action::Go, cause: Cause::None };
 
-    /// Whether the link passes no command to the robot.
+    /// Returns whether the link withholds all commands.
     pub fn stops(self) -> bool {
         self.action >= Action::Stop
     }
@@ -177,7 +184,6 @@ impl Decision {
         Self::worst(rules.filter_map(|(rule, applies)| applies?.then_some(rule)))
     }
 
-    /// The worst action of the rules `applying`, and the first cause with this action.
     fn worst<'a>(applying: impl IntoIterator<Item = &'a Rule>) -> Self {
         let mut worst = Self::GO;
         for &Rule { action, cause, .. } in applying {
@@ -189,7 +195,7 @@ impl Decision {
     }
 }
 
-/// The row of a cause; none for [`Cause::None`].
+/// Returns the row of a cause; none for [`Cause::None`].
 pub fn rule(cause: Cause) -> Option<&'static Rule> {
     TABLE.iter().find(|rule| rule.cause == cause)
 }
@@ -197,7 +203,7 @@ pub fn rule(cause: Cause) -> Option<&'static Rule> {
 #[derive(Clone, Debug)]
 pub(crate) struct Failsafe {
     pub(crate) monitors: Monitors,
-    /// Whether each row of [`TABLE`] applied at the last decision.
+    /// Rows of [`TABLE`] that applied at the last decision.
     applied: [bool; TABLE.len()],
 }
 
@@ -215,7 +221,8 @@ impl Failsafe {
         }
     }
 
-    /// Decide what to do now. In lockstep, and while the robot does not answer, the monitors that judge its frames are not asked.
+    /// Decides what to do now. Monitors of frames are skipped in lockstep and while the robot is
+    /// silent.
     pub(crate) fn decide(&mut self, lockstep: bool, now: Moment) -> Decision {
         let applying = self.applying(lockstep, now);
         for (applied, applies) in self.applied.iter_mut().zip(applying) {
@@ -224,12 +231,12 @@ impl Failsafe {
         Decision::of(applying)
     }
 
-    /// The decision at a later time if nothing comes until then.
+    /// Returns the decision at a later time without further input.
     pub(crate) fn foresee(&self, lockstep: bool, then: Moment) -> Decision {
         Decision::of(self.applying(lockstep, then))
     }
 
-    /// Whether each row of [`TABLE`] applies; none where its monitor is not asked.
+    /// Returns which rows of [`TABLE`] apply; None where the monitor is skipped.
     fn applying(&self, lockstep: bool, now: Moment) -> [Option<bool>; TABLE.len()] {
         let judges_frames = !lockstep && self.monitors.presence.connected();
         std::array::from_fn(|row| {
@@ -247,7 +254,7 @@ impl Failsafe {
         rules.any(|(rule, applied)| rule.cause == cause && applied)
     }
 
-    /// An explanation of `cause` with the observed values, and a remedy.
+    /// Explains `cause` and its remedy.
     pub(crate) fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         (rule(cause)?.monitor)(&self.monitors).explain(cause, now)
     }

@@ -1,8 +1,10 @@
-//! The link: messages of a robot in, samples out, commands to it, and the one place that stops it. The table [`drivers`] gives it one
-//! [`common::driver::Base`], which speaks the protocol of its kind of robot, and a [`common::driver::Driver`] for each sensor that has a wire
-//! of its own; what they say of the surroundings meets in `sensors`. [`failsafe`] is THE table of causes for which the link slows or stops the
-//! robot or ends the mission. [`step`] is pure, [`stage`] records and publishes it, [`shell`] is the process, [`transport`] its wire, and
-//! [`stop_guard`] the process that stops a moving robot when the link ended.
+//! Link to the robot: turns messages into samples, sends commands, and alone stops the robot.
+//!
+//! [`drivers`] selects a [`common::driver::Base`] for the robot's protocol and a
+//! [`common::driver::Driver`] for each sensor with its own wire. `sensors` merges their readings.
+//! [`failsafe`] holds the causes that slow or stop the robot or end the mission. [`step`] is pure,
+//! [`stage`] records and publishes it, [`shell`] is the process, and [`transport`] its wire.
+//! [`stop_guard`] is the process that stops a moving robot after the link ended.
 
 pub mod backoff;
 mod clock_rate;

@@ -1,4 +1,4 @@
-//! The times of polls of a robot that says nothing unasked.
+//! Poll schedule for a robot that sends only on request.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ pub(crate) struct Polls {
 }
 
 impl Polls {
-    /// The first is due at once.
+    /// Schedules the first poll at once.
     pub(crate) fn new(mission: &Mission) -> Self {
         Self { period_ns: (1e9 / mission.robot.rate_hz) as u64, next: MissionTime::default() }
     }
@@ -20,7 +20,7 @@ impl Polls {
         self.next.since(now)
     }
 
-    /// Take a poll due at `now`. A late one does not delay the next; missed ones are not made up for.
+    /// Takes a due poll. A late one does not delay the next, and missed ones are skipped.
     pub(crate) fn take_due(&mut self, now: MissionTime) -> bool {
         let is_due = self.until_next(now).is_zero();
         if is_due {

@@ -1,4 +1,4 @@
-//! What the sensors of a robot said since the last tick, whichever driver heard them. A laser may be stuck or blind.
+//! Sensor readings since the last tick, with checks for stuck and blind lasers.
 
 mod robot_time;
 
@@ -12,22 +12,22 @@ use common::{
 };
 use robot_time::RobotTime;
 
-/// A laser is stuck if its scans stay the same to the bit while a wheel turns this far, radians.
+/// Wheel turn after which a bitwise constant scan is stuck, radians.
 const STUCK_RAD: f64 = 1.0;
-/// A laser whose beams all see nothing is blind if, in the scan before, more than one beam in so many ended within half its reach:
-/// nothing that fills so much of its view leaves it in a moment.
+/// A laser that sees nothing is blind if more than one beam in this many just ended within half its
+/// reach: nothing that large vanishes at once.
 const BLIND_ONE_IN: usize = 20;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Sensors {
     body: Body,
     table: Vec<Sensor>,
-    /// A row's newest reading counts for one tick.
+    /// Newest reading of each row, for one tick.
     newest: Vec<RangeReading>,
     lasers: Vec<Laser>,
     ticks: u64,
     robot_time: RobotTime,
-    /// The newest counts, and the angles that the wheels have turned by then.
+    /// Newest counts, and the wheels' angles.
     counts: Option<WheelCounts>,
     turned: [f64; 2],
 }
@@ -49,8 +49,8 @@ impl Sensors {
         }
     }
 
-    /// Take what a driver heard, `own_wire` at this time if not with the robot's motion. Returns its readings; the nearest beam of a scan
-    /// counts as one of the laser's row.
+    /// Takes a driver's message, with its arrival time if `own_wire`. Returns its readings; a
+    /// scan's nearest beam is its laser's reading.
     pub(crate) fn take_heard(
         &mut self,
         heard: &mut Heard,
@@ -76,7 +76,7 @@ impl Sensors {
         readings
     }
 
-    /// The readings for a tick that begins with `motion` now, one for each row, and the scans. Each is given once.
+    /// Takes one reading per row, and the scans, for a tick that begins with `motion`.
     pub(crate) fn for_tick(
         &mut self,
         motion: &Motion,
@@ -98,7 +98,7 @@ impl Sensors {
             let first_beam_ns = &mut scan.sweep.first_beam_ns;
             let stamp_ns = scan.stamp_ns.filter(|_| motion.stamp_ns.is_some());
             let stated_ns = stamp_ns.and_then(|stamp_ns| self.robot_time.since_tick_ns(stamp_ns));
-            // Between its scan and this tick the robot's clock may have been set.
+            // The robot's clock may have been set since the scan.
             let stated_ns = stated_ns.filter(|ns| ns.abs() <= LONGEST_SWEEP_NS);
             match (own_wire, stated_ns) {
                 (Some(came), _) => *first_beam_ns -= now.since(came).as_nanos() as i64,
@@ -120,12 +120,12 @@ fn absent(table: &[Sensor]) -> Vec<RangeReading> {
 struct Laser {
     row: usize,
     sensor: Sensor,
-    /// The newest scan that differed from the one before, and the wheels' angles then.
+    /// Newest scan that differed, and the wheels' angles then.
     newest_scan: (Vec<f32>, [f64; 2]),
-    /// The beams that ended near in the newest scan that saw anything, and the wheels' angles then.
+    /// Near beams of the newest scan with any, and the wheels' angles then.
     near: (usize, [f64; 2]),
     is_blind: bool,
-    /// For the next tick, and when it came on a wire of its own.
+    /// Scan for the next tick, with its arrival time on an own wire.
     scan: Option<(LaserScan, Option<MissionTime>)>,
 }
 
@@ -135,7 +135,7 @@ impl Laser {
         Self { row, sensor, newest_scan, near: (0, [0.0; 2]), is_blind: false, scan: None }
     }
 
-    /// Returns the reading of the nearest beam; it is invalid if the laser is blind or stuck.
+    /// Returns the nearest beam; invalid if blind or stuck.
     fn take_scan(
         &mut self,
         scan: (LaserScan, Option<MissionTime>),
@@ -175,7 +175,7 @@ impl Laser {
             let (near, turned_then) = self.near;
             let wheels = [0, 1].map(|wheel| turned[wheel] - turned_then[wheel]);
             let turn = body.unlimited().twist(wheels).omega;
-            // A turn removes things from a view that is no whole circle.
+            // Turns remove things from a partial view.
             let is_circle = self.sensor.field_of_view_deg >= 360.0;
             let lost = if is_circle { 0.0 } else { turn.abs() / self.sensor.fan().1 };
             self.is_blind |= near > beams.len() / BLIND_ONE_IN + lost.ceil() as usize;

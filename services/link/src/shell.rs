@@ -1,5 +1,5 @@
-//! The link's process: it reads the wire, `command`, `directive` and `tick_limit`, and writes the wire, `ranges`, `wheels`, `link` and
-//! telemetry.
+//! Process of the link: reads the wire, `command`, `directive` and `tick_limit`, and writes the
+//! wire, `ranges`, `wheels`, `link` and telemetry.
 
 use std::{
     io,
@@ -47,7 +47,8 @@ const REFUSAL_LASTS_NS: u64 = 2_000_000_000;
 /// Interval of the checks without input, unless nothing is due sooner than the link is restated: a fifth of the shortest deadline.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
-/// A flood delays the heartbeat by no more than this, and a datagram; the rest waits for the next turn.
+/// Longest delay of the heartbeat by a flood, besides one datagram. The rest waits for the next
+/// turn.
 const MOST_LISTENING_NS: u64 = 20_000_000;
 
 const MEMORY_BYTES: usize = 64;
@@ -70,11 +71,12 @@ pub struct Shell {
     inputs: Inputs,
     writers: Option<Writers>,
     runner: Runner<LinkStage>,
-    /// None where it could not be made, which the log says.
+    /// None if it could not be created, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
     marked: bool,
-    /// None in lockstep, where a robot waits for commands, and where it could not be started, as the log says.
+    /// None in lockstep, where a robot waits for commands, and if it could not be started, which
+    /// the log says.
     guard: Option<StopGuard>,
     owed_mark: OwedStop,
     owes_stop: bool,
@@ -110,7 +112,7 @@ impl Process for Shell {
     type Readers = Inputs;
 
     fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
-        // The socket is there before the guard, which knows this link by it.
+        // The guard identifies this link by its socket, so that comes first.
         let domain = Domain::of(context.run.robot.clone());
         let stop_socket = StopSocket::bind(domain.stop_socket())
             .inspect_err(without("operators' stops without middleware"))
@@ -137,7 +139,7 @@ impl Process for Shell {
         if let Some(socket) = &stop_socket {
             context.waiter.on_readable(socket)?;
         }
-        // What an earlier link's driver must know.
+        // Saved by an earlier link's driver.
         let memory: Option<Memory> = context.saved_state()?;
         let mut shell = Self {
             transport,
@@ -177,7 +179,7 @@ impl Process for Shell {
             let reason = HoldReason::from_byte(directive.reason);
             self.take(Event::Order(order, reason), monotonic_ns())?;
         }
-        // The limit is read after the order, because the supervisor publishes the first limit before the order.
+        // After the order, because the supervisor publishes the first limit before it.
         if let Some(limit) = self.inputs.tick_limit.newest()? {
             let TickLimitSample { last_tick, target_number, .. } = limit;
             self.take(Event::TickLimit { last_tick, target_number }, monotonic_ns())?;
@@ -193,7 +195,8 @@ impl Process for Shell {
             }
             let now = self.clock.at(self.runner.stage.link.state().next_tick, now_ns);
             let mut effects = Vec::new();
-            // A simulated laser speaks before the frames of its tick: it is heard after they came, and taken before them.
+            // A simulated laser sends before the frames of its tick: it is received after they
+            // came, and taken before them.
             let datagram = self.transport.receive(now_ns)?;
             let mut came = datagram.is_some();
             for (number, wire) in (0..).zip(&mut self.wires) {
@@ -249,7 +252,8 @@ impl Process for Shell {
         self.has_telemetry && self.runner.stage.has_telemetry()
     }
 
-    /// Called without input, the link repeats commands, runs the failsafe and polls the robot.
+    /// Returns the interval of checks without input, which repeat commands, run the failsafe and
+    /// poll the robot.
     fn looks_again_after(&self) -> Option<Duration> {
         let link = &self.runner.stage.link;
         let at = |machine_ns| {
@@ -312,7 +316,7 @@ fn log_battery(change: &BatteryChange) {
 fn log_decision(before: Decision, now: Decision) {
     let robot = now.action.effect();
     let cause = now.cause.name();
-    // The end of a mission is no fault, and no warning.
+    // A mission's end needs no warning.
     if now.action > before.action && now.cause != Cause::MissionOver {
         tracing::warn!(robot, cause, "failsafe");
     } else {
@@ -331,7 +335,7 @@ impl Shell {
         Ok(())
     }
 
-    /// Tell operators that the robot rests, and keep the mark of a stop for the next link.
+    /// Tells operators about rest, and keeps the mark of a stop for the next link.
     fn answer_operators(&mut self) {
         let link = &self.runner.stage.link;
         if link.decision().stops()
@@ -349,7 +353,7 @@ impl Shell {
         }
     }
 
-    /// Marks whether the stop is owed, before the command of motion is sent.
+    /// Marks an owed stop before a motion command is sent.
     fn mark_owed_stop(&mut self) {
         let owes = self.runner.stage.link.owes_stop(self.owes_stop);
         if owes != self.owes_stop {
@@ -364,7 +368,7 @@ impl Shell {
         }
     }
 
-    /// Starts another guard if this one was killed, and makes a mark again that a cleaner of temporary files removed.
+    /// Replaces a killed guard, and renews a mark removed by a cleaner of temporary files.
     fn keep_guard(&mut self) {
         if self.owes_stop {
             self.set_owed_mark();
@@ -375,7 +379,7 @@ impl Shell {
         }
     }
 
-    /// Reopen a closed wire, and tell the link of its changes.
+    /// Reopens closed wires, and reports changes to the link.
     fn maintain(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         if let Some(open) = self.transport.maintain(now_ns)? {
@@ -422,7 +426,7 @@ impl Shell {
                 }
                 Effect::Decided { before, now } => {
                     log_decision(before, now);
-                    // A slow robot has a fault of which nothing was said while a worse one held it.
+                    // A worse cause may have hidden a slow robot's fault.
                     if (now.action >= before.action || now.action == Action::Slow)
                         && let Some(explanation) =
                             self.runner.stage.link.explain(now.cause, monotonic_ns())
@@ -470,7 +474,7 @@ impl Shell {
                     tracing::info!("the robot is asked for its streams again");
                 }
                 Effect::Battery(change) => log_battery(&change),
-                // The stage has already published these.
+                // Published by the stage.
                 Effect::Tick { .. }
                 | Effect::Infrared(_)
                 | Effect::Power(_)
@@ -487,7 +491,7 @@ impl Shell {
         let wire = link.wire_tally();
         let tally = link.tally();
         let absence = link.absence(now_ns);
-        // Attempts to open a closed wire; otherwise pings.
+        // Attempts to open a closed wire, else pings.
         let (attempts, next_attempt_ns) = match self.transport.attempts(now_ns) {
             Some(openings) => (openings.made, openings.next_ns),
             None => (absence.pings, absence.next_ping_ns),

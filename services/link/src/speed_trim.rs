@@ -1,8 +1,8 @@
-//! The speed trim makes good that wheels turn slower than commanded.
+//! Speed trim: compensates wheels slower than commanded.
 //!
-//! The speed loops of real X80s reach 0.75 to 0.8 of a commanded speed. The link estimates that share from its commands and the encoders,
-//! and divides commands by it. Both wheels share one estimate, so commands keep their curve. A speed that the base has not reached yet by
-//! its response tells nothing.
+//! Speed loops of real X80s reach 0.75 to 0.8 of a command. The link estimates that share from
+//! commands and encoders, and divides commands by it. Both wheels share it, so commands keep their
+//! curve. Speeds not yet reached are no evidence.
 
 use common::{
     driver::counts::WheelCounts,
@@ -11,27 +11,26 @@ use common::{
 
 use crate::failsafe::modelled_wheels::{Axle, ModelledWheels};
 
-/// Agreeing commands until a wheel's speed is steady: its delay and lag take 0.15 s, a period at 7 Hz.
+/// Agreeing commands of a steady wheel. Delay and lag take 0.15 s, a period at 7 Hz.
 const STEADY: usize = 3;
-/// Commands agree if the least is at least this share of the greatest.
+/// Least ratio of agreeing commands.
 const AGREE: f64 = 0.8;
-/// Slower commands give no evidence, counts/s: dead band and noise are too large a part of them.
+/// Least speed that is evidence, counts/s: dead band and noise dominate slower ones.
 const LEAST_COUNTS_S: f64 = 250.0;
 const WEIGHT: f64 = 0.1;
-/// Outside these shares a wheel slips, is held, or has a faulty encoder, which says nothing of its speed loop.
+/// Plausible shares; others show slip, a held wheel or a faulty encoder.
 const SHARES: std::ops::RangeInclusive<f64> = 0.6..=1.15;
-/// No lower share is made good.
+/// Least compensated share.
 const LEAST_SHARE: f64 = 0.7;
 
 #[derive(Clone, Debug)]
 pub(crate) struct SpeedTrim {
-    /// The channels by the response.
     wheels: ModelledWheels,
     /// A car's second channel steers.
     driving: usize,
     /// Oldest first, counts/s.
     told: [[f64; 2]; STEADY],
-    /// The newest tick's counts, and mission time, seconds.
+    /// Newest tick's counts, and mission seconds.
     tick: Option<(WheelCounts, f64)>,
     longest_gap_s: f64,
     share: f64,
@@ -51,12 +50,12 @@ impl SpeedTrim {
         }
     }
 
-    /// It is at most 1.
+    /// Returns the share, at most 1.
     pub(crate) const fn share(&self) -> f64 {
         self.share
     }
 
-    /// `counts` were sent, counts/s.
+    /// Takes sent speeds, counts/s.
     pub(crate) fn told(&mut self, counts: [i16; 2]) {
         self.told.rotate_left(1);
         self.told[STEADY - 1] = counts.map(f64::from);
@@ -107,7 +106,7 @@ mod tests {
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
-    /// The share that the trim finds after `ticks` of a robot whose wheels reach `reached` of these commands.
+    /// Returns the share found after `ticks` of wheels that reach `reached`.
     fn found(reached: f64, ticks: usize, command: impl Fn(usize) -> [f64; 2]) -> f64 {
         let mut trim =
             SpeedTrim::new(&Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap());

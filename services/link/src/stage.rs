@@ -1,4 +1,4 @@
-//! The link as a stage: what it records and publishes, telemetry and the wire's bytes included.
+//! Link as a stage: records and publishes the step, telemetry and wire bytes.
 
 use common::{
     clock::{MissionClock, Pace},
@@ -19,7 +19,7 @@ use common::{
 
 use crate::step::{Effect, Entry, Event, Link, State};
 
-/// The step, and the samples that are published later, when no stage of the pipeline waits for the link.
+/// Step, and samples that wait until the pipeline is idle.
 #[derive(Debug)]
 pub struct LinkStage {
     pub(crate) link: Link,
@@ -36,7 +36,7 @@ impl LinkStage {
         self.infrared.is_some() || self.power.is_some() || self.surroundings.is_some()
     }
 
-    /// The most elements of a slice that it publishes.
+    /// Returns the longest published slice.
     pub(crate) fn longest(&self) -> usize {
         self.lasers.iter().map(|(_, beams)| *beams).fold(WIRE_PIECE, usize::max)
     }
@@ -47,7 +47,7 @@ impl LinkStage {
         self.wire.push((at, header, bytes.to_vec()));
     }
 
-    /// Publish an effect's sample. Returns the effect if the process has to carry it out.
+    /// Publishes an effect's sample. Returns effects for the process.
     fn carry_out(
         &mut self,
         effect: Effect,
@@ -118,7 +118,7 @@ impl LinkStage {
 impl Stage for LinkStage {
     type Start = State;
     type Entry<'a> = Entry<'a>;
-    /// The process carries them out in order.
+    /// Effects for the process, in order.
     type Outcome = Vec<Effect>;
 
     fn new(mission: &Mission) -> Self {

@@ -1,8 +1,9 @@
-//! The link's pure step: events and their times in, samples and bytes out.
+//! Pure step of the link: events and their times in, samples and bytes out.
 //!
-//! A tick starts with a motor frame and the newest readings, and ends with the command computed from them. In lockstep (a simulated
-//! robot at `--pace max`) the robot waits for that command, so the link repeats a tick that a stage's end left without one. On the wall
-//! clock an unanswered tick is dropped when the next starts.
+//! A tick starts with a motor frame and the newest readings, and ends with its command. In lockstep
+//! (a simulated robot at `--pace max`) the robot waits for that command. The link then repeats a
+//! tick whose command was lost when a stage ended. On the wall clock the next tick replaces an
+//! unanswered one.
 
 mod event;
 mod poll;
@@ -42,30 +43,31 @@ use crate::{
 
 pub use event::{Effect, Entry, Event, State, Tally};
 
-/// The pause of pings to a robot whose next motor frame is missing.
+/// Ping interval while a motor frame is missing.
 const PING_EVERY: Duration = Duration::from_millis(200);
-/// Ten times the longest tick measured.
+/// Ten times the longest measured tick.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
-/// A tick waits so long in lockstep for the supervisor's limit: longer than the planner of a stalled robot may take to restart. If the
-/// supervisor is silent, the failsafe stops the robot earlier.
+/// Longest wait in lockstep for the supervisor's limit, beyond a planner's restart for a stalled
+/// robot. If the supervisor is silent, the failsafe stops earlier.
 pub const LIMIT_WAITED: Duration = Duration::from_secs(5);
-/// The least time limit of a command: the wire carries whole milliseconds, and 0 mostly means no limit.
+/// Least time limit of a command: the wire carries milliseconds, and 0 mostly means none.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
-/// A new stop is sent so often, because datagrams may be lost.
+/// Copies of a new stop, because datagrams may be lost.
 pub const STOPS: u32 = 3;
-/// A stop is repeated after this: a fading radio may lose all stops, and the robot may ignore the limit of its last command.
+/// Stop interval: a fading radio may lose all copies, and the robot may ignore its last command's
+/// limit.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
 
 #[derive(Clone, Debug)]
 struct OpenTick {
-    /// [`Effect::Tick`], given again until it is answered.
+    /// [`Effect::Tick`], repeated until answered.
     effect: Effect,
     began_ns: u64,
-    /// When it was published; `None` while it waits for the supervisor's limit.
+    /// Publication; `None` while waiting for the supervisor's limit.
     given_ns: Option<u64>,
 }
 
-/// A sent command, repeated once because a datagram may be lost.
+/// Sent command, repeated once against loss.
 #[derive(Clone, Copy, Debug)]
 struct Repeat {
     counts: [i16; 2],
@@ -79,7 +81,7 @@ pub struct Link {
     state: State,
     now: MissionTime,
     base: Box<dyn Base>,
-    /// Drivers of sensors with wires of their own.
+    /// Drivers of sensors with their own wires.
     drivers: Vec<Box<dyn Driver>>,
     sensors: Sensors,
     polls: Polls,
@@ -90,30 +92,30 @@ pub struct Link {
     failsafe: Failsafe,
     restart: RestartWatch,
     pinged_ns: Option<u64>,
-    /// None if the mission wants commands sent as they are.
+    /// None if commands go out unchanged.
     trim: Option<SpeedTrim>,
     wheels: WheelSample,
     open: Option<OpenTick>,
-    /// The last tick that may begin in lockstep; `None` for no limit.
+    /// Last tick allowed in lockstep; `None` for no limit.
     last_tick: Option<u64>,
     target_number: u64,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
     decision: Decision,
-    /// When this link began, or an operator's stop last applied: an earlier tick moves nothing. None in lockstep, where a tick waits for
-    /// its answer.
+    /// Start of this link, or last time of an operator's stop; earlier ticks' commands are refused.
+    /// None in lockstep, where a tick waits for its answer.
     stood: Option<MissionTime>,
     stop_sent_ns: Option<u64>,
-    /// Motor frames still to come in lockstep: one for each command and ping.
+    /// Motor frames due in lockstep, one per command and ping.
     due: u32,
     tally: Tally,
     refused_ns: Option<u64>,
-    /// The newest stamp of motion, and when it came.
+    /// Newest motion stamp, and its arrival.
     stamped: Option<(i64, MissionTime)>,
 }
 
 impl Link {
-    /// A link in lockstep before tick 0.
+    /// Returns a link in lockstep before tick 0.
     pub fn new(mission: &Mission) -> Self {
         Self {
             state: State::default(),
@@ -146,12 +148,12 @@ impl Link {
         }
     }
 
-    /// The pace, and the number of the next tick.
+    /// Returns the pace and the next tick's number.
     pub const fn state(&self) -> &State {
         &self.state
     }
 
-    /// Go on from `state`.
+    /// Resumes from `state`.
     pub fn restore(&mut self, state: State) {
         self.state = state;
         self.observe(Observation::Pace(state.pace), 0);
@@ -206,7 +208,6 @@ impl Link {
         effects
     }
 
-    /// Whether the robot answers.
     pub fn connected(&self) -> bool {
         self.monitors().presence.connected()
     }
@@ -233,7 +234,8 @@ impl Link {
         self.rest() == Rest::AtRest
     }
 
-    /// What the encoders say. A held robot counts as at rest in lockstep, because mission time stands still.
+    /// Returns the rest by the encoders. In lockstep a held robot is at rest, because mission time
+    /// stands still.
     pub fn rest(&self) -> Rest {
         match (self.in_ticks(), self.connected()) {
             (true, _) if self.decision.stops() => Rest::AtRest,
@@ -254,13 +256,13 @@ impl Link {
         self.monitors().presence.losses()
     }
 
-    /// Returns whether the stop is owed, if it was so `before`.
+    /// Returns whether a stop is owed, given the state `before`.
     pub fn owes_stop(&self, before: bool) -> bool {
         let moves = self.monitors().stop.is_told_to_move();
         !self.in_ticks() && is_owed(before, moves, self.is_at_rest())
     }
 
-    /// None if the robot itself counts.
+    /// Returns None if the robot itself counts.
     pub(crate) fn driver_memory(&self) -> Option<Memory> {
         self.base.memory()
     }
@@ -289,7 +291,8 @@ impl Link {
         self.monitors().orders.drive()
     }
 
-    /// The robot is held while ticks continue, so it may be carried. In lockstep mission time stands still.
+    /// Returns whether a held robot's ticks continue, so that it may be carried. In lockstep
+    /// mission time stands still.
     fn stands_by(&self) -> bool {
         !self.in_ticks() && self.monitors().orders.stands_by()
     }
@@ -298,7 +301,7 @@ impl Link {
         self.state.pace == Pace::Max
     }
 
-    /// Whether the newest command says that the target is reached. In lockstep no tick follows before another target.
+    /// Returns whether the target is reached. In lockstep ticks then wait for another.
     fn arrived(&self) -> bool {
         self.newest_command.is_some_and(|command| {
             CommandState::from_byte(command.state) == CommandState::Arrived
@@ -307,7 +310,7 @@ impl Link {
     }
 
     fn begin_tick(&mut self, motion: Motion, now_ns: u64, effects: &mut Vec<Effect>) {
-        // The last of several due answers shows the robot's present state.
+        // The last due answer shows the present state.
         self.due = self.due.saturating_sub(1);
         if !self.ordered_to_drive() && !self.stands_by() {
             return;
@@ -319,7 +322,7 @@ impl Link {
             self.judge_tick(&motion, now_ns, effects);
         }
         if !self.in_ticks() {
-            // The tick uses up its number even if it is never answered.
+            // Unanswered ticks use up their number too.
             self.state.next_tick += 1;
         }
         let endless = motion.endless;
@@ -337,7 +340,7 @@ impl Link {
         let (ranges, scans) = self.sensors.for_tick(&motion, self.now);
         let turn = self.base.turn_for_tick().map(|turn| {
             let Turn { sequence, turn_rad, variance_rad2 } = turn;
-            // The turn ends with the motion that the tick's wheels show.
+            // The turn ends with the tick's motion.
             let capture_ns = self.now.0;
             TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
         });
@@ -427,7 +430,7 @@ impl Link {
         }
     }
 
-    /// Publish the open tick if the limit allows; in lockstep, again if it stays unanswered.
+    /// Publishes the open tick if allowed; repeats it in lockstep while unanswered.
     fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let Some(mut open) = self.open.take() else {
             return;
@@ -460,8 +463,8 @@ impl Link {
         true
     }
 
-    /// Send the newest command once more, halfway to the next tick, with the rest of its time limit, so the robot stops no later. Not in
-    /// lockstep: the robot answers each command with a frame, so a loss is noticed.
+    /// Repeats the newest command halfway to the next tick, for the rest of its limit, so that the
+    /// robot stops no later. In lockstep each command yields a frame, which reveals a loss.
     fn repeat_command(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         if self.in_ticks() {
             return;
@@ -471,7 +474,7 @@ impl Link {
             return;
         };
         let left = self.limit.saturating_sub(now.since(repeat.stamp));
-        // While a tick is open, the next command follows soon.
+        // The next command follows an open tick soon.
         let superseded = self.open.is_some();
         if superseded || left < LEAST_LEFT || self.decide(now_ns).stops() {
             return;
@@ -481,7 +484,7 @@ impl Link {
     }
 }
 
-/// True if `since_ns` is `None`.
+/// Returns true if `since_ns` is `None`.
 fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
     since_ns.is_none_or(|since_ns| has_passed(since_ns, now_ns, span))
 }

@@ -1,8 +1,9 @@
-//! The stop guard: a process that orders the stop after its link ended, while the stop is owed ([`wire_owner`](crate::wire_owner)).
+//! Stop guard: a process that orders an owed stop after its link ended
+//! ([`wire_owner`](crate::wire_owner)).
 //!
-//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link. The guard sleeps until then. It runs in
-//! a session of its own, so signals to the link, the supervisor or their process groups do not reach it. It speaks to the robot by the same
-//! [`Link`], and answers operators at a socket of its own.
+//! The link starts it and holds the writing end of a pipe, which the kernel closes with the link.
+//! The guard has its own session, so signals to the link, the supervisor or their process groups
+//! miss it. It uses the same [`Link`], and answers operators at its own socket.
 
 use std::{
     fs, io,
@@ -34,13 +35,13 @@ use crate::{
     wire_owner::{Found, Role},
 };
 
-/// Follows `firsthand stage` in the command line.
+/// Argument of `firsthand stage`.
 pub const NAME: &str = "stop-guard";
 
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
-/// A frame or a request wakes the guard at once.
+/// Check interval for a silent robot. Frames and requests wake the guard.
 const LOOKS_FOR_SILENT: Duration = Duration::from_millis(200);
-/// This machine may be out of descriptors or ports.
+/// The machine may be out of descriptors or ports.
 const TRIES_AGAIN: Duration = Duration::from_secs(1);
 
 pub(crate) struct StopGuard {
@@ -49,7 +50,7 @@ pub(crate) struct StopGuard {
 }
 
 impl StopGuard {
-    /// Fails when the process cannot be started.
+    /// Starts the guard. Fails when its process cannot be started.
     pub(crate) fn start(directory: &Path, link: &Identity) -> io::Result<Self> {
         let (ended, pipe) = io::pipe()?;
         let process = spawn("/proc/self/exe".into(), directory, link, ended.into())?;
@@ -61,7 +62,7 @@ impl StopGuard {
     }
 }
 
-/// Starts a guard whose link has ended when `ended` does. Fails when the process cannot be started.
+/// Starts a guard; `ended` closes with the link. Fails when the process cannot be started.
 pub fn spawn(
     program: PathBuf,
     directory: &Path,
@@ -80,11 +81,12 @@ pub fn spawn(
         .spawn()
 }
 
-/// Guards the robot of the link with this socket; standard input ends with the link. Fails when the run file cannot be used.
+/// Guards the robot of the link with this socket; standard input closes with the link. Fails on an
+/// unusable run file.
 pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
-    // The link's session may belong to a terminal, or end with the link.
+    // The link's session may end with it or its terminal.
     let _ = setsid();
-    // The directory may be gone when the link ends.
+    // The directory may vanish with the link.
     let run = Run::load(directory)?;
     let MissionClock::Wall { rate, .. } = run.clock else {
         // In lockstep a robot waits for commands.
@@ -111,11 +113,11 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     if !is_succeeded() {
         let _ = guard.mark.set(false, directory);
     }
-    // A newer guard has a socket of its own.
+    // A newer guard has its own.
     if Identity::now(&domain.guard_socket()) == own {
         let _ = fs::remove_file(domain.guard_socket());
     }
-    // The directory stays while another process has files in it.
+    // Fails while another process has files there.
     let _ = fs::remove_dir(domain.directory());
     Ok(())
 }
@@ -130,7 +132,8 @@ struct Guard<'a> {
 }
 
 impl Guard<'_> {
-    /// Orders the stop, by each method of the protocol in turn, until the guard leaves. Fails when the wire cannot be used.
+    /// Orders the stop, by each method in turn, until the guard leaves. Fails when the wire is
+    /// unusable.
     fn order_stop(&mut self, is_succeeded: &dyn Fn() -> bool) -> Result<(), StageError> {
         let run = self.run;
         let mut transport = Transport::of_base(&run.address, &run.mission)?;
@@ -173,7 +176,7 @@ impl Guard<'_> {
                 tracing::warn!(?found, "the stop guard leaves");
                 return Ok(());
             }
-            // A cleaner of temporary files may remove it.
+            // A cleaner of temporary files may have removed it.
             let _ = self.mark.set(true, self.directory);
             let wires = [Some(transport.as_fd()), self.socket.as_ref().map(|it| it.as_fd())];
             let wires: Vec<_> = wires.into_iter().flatten().collect();
@@ -184,7 +187,7 @@ impl Guard<'_> {
         }
     }
 
-    /// Answers operators. Returns whether one of them signs the robot off.
+    /// Answers operators. Returns whether one signs the robot off.
     fn answer(&mut self, rest: Rest, now_ns: u64) -> bool {
         let Some(socket) = &mut self.socket else {
             return false;

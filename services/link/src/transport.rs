@@ -1,5 +1,6 @@
-//! The bytes to and from the robot: datagrams, a connection or a serial line, which a `stream` reopens after each loss, or topics of ROS 2
-//! with the feature `ros2`. No call blocks. Bytes that cannot be sent now are lost.
+//! Transport of bytes to and from the robot: datagrams, a connection, a serial line, or ROS 2
+//! topics (feature `ros2`). `stream` reopens lost connections and lines. Calls never block, and
+//! bytes that cannot be sent now are lost.
 
 mod counts;
 #[cfg(feature = "ros2")]
@@ -38,21 +39,21 @@ impl From<TransportError> for StageError {
     }
 }
 
-/// Bits a second of a serial line, if its device does not say otherwise.
+/// Bits per second by default.
 pub const BAUD: u32 = 115_200;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Line {
-    /// Bits a second.
+    /// Bits per second.
     pub baud: u32,
-    /// The device works only while DTR is low, which opening the line raises.
+    /// Whether the device needs DTR low. Opening the line raises it.
     pub lowers_dtr: bool,
 }
 
 pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
 
-/// Errors mean that this machine is the cause.
+/// Wire to a device. Errors are faults of this machine.
 trait Wire: AsFd + fmt::Debug {
-    /// Reopen it if due at `now_ns` of the monotonic clock, and send the rest of a message.
+    /// Reopens the wire if due on the monotonic clock, and sends the rest of a message.
     fn maintain(&mut self, _now_ns: u64) -> io::Result<()> {
         Ok(())
     }
@@ -61,15 +62,15 @@ trait Wire: AsFd + fmt::Debug {
         true
     }
 
-    /// The length of the next bytes; none when all were taken.
+    /// Returns the next length; none when all were taken.
     fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> io::Result<Option<usize>>;
 
-    /// They are lost if the wire does not accept them now.
+    /// Sends bytes, or loses them if not accepted now.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
     fn tally(&self) -> Tally;
 
-    /// None while the wire is open.
+    /// Returns None while the wire is open.
     fn attempts(&self, _now_ns: u64) -> Option<Attempts> {
         None
     }
@@ -89,7 +90,7 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// The wire of what moves the robot of `mission`. Fails as [`Transport::open`] does.
+    /// Opens the base's wire. Fails as [`Transport::open`].
     pub fn of_base(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
         match address {
             Address::Ros2(domain) => Self::new(address, ros2(domain.unwrap_or_default(), mission)),
@@ -97,7 +98,7 @@ impl Transport {
         }
     }
 
-    /// [`Transport::maintain`] opens a connection or serial `line`. Fails when this machine cannot.
+    /// Creates a wire, which [`Transport::maintain`] opens. Fails when this machine cannot.
     pub fn open(address: &Address, line: Line) -> Result<Self, TransportError> {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(|udp| Box::new(udp) as Box<dyn Wire>),
@@ -113,13 +114,13 @@ impl Transport {
             wire: wire.map_err(|source| TransportError { address: address.clone(), source })?,
             address: address.clone(),
             reported: None,
-            // The largest datagram has 64 kB, the largest message of ROS that is read 96 kB.
+            // Datagrams have up to 64 kB, accepted ROS messages 96 kB.
             buffer: vec![0; 131_072].into_boxed_slice(),
         })
     }
 
-    /// Maintain the wire. Returns whether it is open if that changed since the last report; a close and a reopening are reported one after
-    /// the other. Fails when this machine is the cause.
+    /// Maintains the wire. Returns whether it is open if that changed since the last report. A
+    /// close and a reopening come separately. Fails when this machine is the cause.
     pub fn maintain(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
         let closed_unreported = self.reported == Some(true) && !self.is_open();
         if !closed_unreported {
@@ -137,7 +138,7 @@ impl Transport {
         self.wire.is_open()
     }
 
-    /// None when all were taken. Fails when this machine is the cause.
+    /// Returns the next bytes; none when all were taken. Fails when this machine is the cause.
     pub fn receive(&mut self, now_ns: u64) -> Result<Option<&[u8]>, TransportError> {
         match self.wire.receive(&mut self.buffer, now_ns) {
             Ok(length) => Ok(length.and_then(|length| self.buffer.get(..length))),
@@ -145,7 +146,7 @@ impl Transport {
         }
     }
 
-    /// A message of one frame or more; an empty one is not sent. Fails when this machine is the cause.
+    /// Sends whole frames; skips an empty message. Fails when this machine is the cause.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         if bytes.is_empty() {
             return Ok(());
@@ -157,7 +158,7 @@ impl Transport {
         self.wire.tally()
     }
 
-    /// None while the wire is open.
+    /// Returns None while the wire is open.
     pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
         self.wire.attempts(now_ns)
     }
@@ -183,7 +184,7 @@ fn ros2(_: u16, _: &Mission) -> io::Result<Box<dyn Wire>> {
     Err(io::Error::other("this executable speaks no ROS 2: build it with `--features ros2`"))
 }
 
-/// Readable when the wire needs attention; the same after a reopening.
+/// Readable when the wire needs attention, also after a reopening.
 impl AsFd for Transport {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.wire.as_fd()

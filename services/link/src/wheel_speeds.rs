@@ -1,5 +1,5 @@
-//! Commands in encoder counts. Speeds grow no faster than the body's accelerations allow, and fall at once: the robot stops as fast as
-//! it can.
+//! Commands in encoder counts. Speeds grow within the body's limits, and fall at once, so that the
+//! robot stops as fast as it can.
 
 use common::{
     mission::{Body, Mission, Protocol},
@@ -7,7 +7,8 @@ use common::{
     wire::counts_between,
 };
 
-/// Share of the remaining angle that the steering turns in a tick: below 1, because the speed loop's delay would make it oscillate.
+/// Share of the remaining steering angle per tick. It is below 1, because the speed loop's delay
+/// would cause oscillation.
 const STEERING_GAIN: f64 = 0.6;
 
 #[derive(Clone, Debug)]
@@ -15,7 +16,7 @@ pub(crate) struct WheelSpeeds {
     body: Body,
     rate_hz: f64,
     keeps_curve: bool,
-    /// The robot's newest command, counts/s.
+    /// Newest command, counts/s.
     told: [i16; 2],
 }
 
@@ -24,7 +25,8 @@ impl WheelSpeeds {
         Self {
             body: mission.body(),
             rate_hz: mission.robot.rate_hz,
-            // An X80 answers so soon that it makes good what it did not turn; its results are those of wheels that are limited one by one.
+            // An X80 answers so soon that it compensates for lost turn. Its results are those of
+            // wheels limited one by one.
             keeps_curve: mission.robot.protocol() != Protocol::X80,
             told: [0; 2],
         }
@@ -34,9 +36,11 @@ impl WheelSpeeds {
         self.told = counts;
     }
 
-    /// Speeds of the two wheels, or of a car's wheel and steering, for `command` at `share` of its speed, counts/s; `wheels` are the
-    /// newest counts. Wheels that would be too fast are slower together, so that the curve stays. Steering is driven towards its angle by
-    /// a speed loop like a wheel's, so a timed command ends its motion too.
+    /// Returns speeds of both wheels, or of a car's wheel and steering, for `share` of a command,
+    /// counts/s.
+    ///
+    /// Too fast wheels slow down together, to keep the curve. Steering has a speed loop like a
+    /// wheel's, so a timed command ends its motion too.
     pub(crate) fn of(&self, command: &CommandSample, share: f64, wheels: &WheelSample) -> [i16; 2] {
         let Some(steering) = self.body.steering else {
             let wanted = [command.left_rad_s, command.right_rad_s].map(|speed| share * speed);
@@ -59,14 +63,14 @@ impl WheelSpeeds {
         self.body.counts_per_turn / std::f64::consts::TAU
     }
 
-    /// Converts rad/s, limited to the wheel's top speed; NaN gives 0.
+    /// Converts rad/s, limited to the top speed; NaN gives 0.
     fn counts_per_second(&self, speed: f64) -> i16 {
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         whole((speed * self.counts_per_radian()).clamp(-top, top))
     }
 }
 
-/// NaN gives 0.
+/// Rounds to counts; NaN gives 0.
 fn whole(counts: f64) -> i16 {
     counts.round() as i16
 }
@@ -79,7 +83,8 @@ mod tests {
 
     use super::*;
 
-    /// The speeds for a car whose steering encoder reads `counts`, at 7 Hz with 3600 counts a turn.
+    /// Returns a car's speeds if its steering encoder reads `counts`, at 7 Hz with 3600 counts per
+    /// turn.
     fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
         let text = "target = [3, 0]\nrobot.model = 'car'";
         let speeds = WheelSpeeds::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
@@ -99,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_cars_steering_is_limited_in_angle_and_rate_and_no_number_holds_it() {
-        // 1200 counts a second are the most; 30 degrees are 300 counts.
+        // The rate limit is 1200 counts/s; 30 degrees are 300 counts.
         assert_eq!(counts(0.0, 1.5, 1.0, 0), [0, 1200]);
         assert_eq!(counts(0.0, 1.5, 1.0, 300), [0, 0]);
         assert_eq!(counts(f64::NAN, f64::NAN, 1.0, 7), [0, 0]);
@@ -148,10 +153,10 @@ mod tests {
             let [v, omega] = tell(said[0], said[1]);
             assert!((v - done[0]).abs() < 1e-3 && (omega - done[1]).abs() < 5e-3, "{v} {omega}");
         };
-        // 1 m/s^2 and 2 rad/s^2 are 0.1 m/s and 0.2 rad/s in a tick.
+        // 1 m/s^2 and 2 rad/s^2 are 0.1 m/s and 0.2 rad/s per tick.
         is([0.5, 0.0], [0.1, 0.0]);
         is([0.5, 0.1], [0.2, 0.1]);
-        // The curve is that of 0.5 m/s and 1 rad/s, at the turn rate that is reached.
+        // The curve of 0.5 m/s and 1 rad/s, at the turn rate reached.
         is([0.5, 1.0], [0.15, 0.3]);
         is([0.5, -1.0], [0.1, -0.2]);
         is([0.1, 0.0], [0.1, 0.0]);

@@ -1,9 +1,10 @@
-//! The owner of a robot's wire: who orders the stop of a robot that may move. Pure.
+//! Ownership of a robot's wire: who orders the stop of a robot that may move. Pure.
 //!
-//! The stop is owed from the first motion command until the encoders show rest, or a person signs it off. The link orders it while it
-//! lives, and its stop guard afterwards. Silence is not rest.
+//! A stop is owed from the first motion command until the encoders show rest, or a person signs it
+//! off. The link orders it, and its stop guard afterwards. Silence is not rest.
 
-/// Returns whether the stop is owed: `moves` if the newest command is motion, `rests` if the encoders show rest since.
+/// Returns whether a stop is owed, if the newest command `moves` and the encoders show since that
+/// it `rests`.
 pub const fn is_owed(before: bool, moves: bool, rests: bool) -> bool {
     moves || before && !rests
 }
@@ -15,15 +16,14 @@ pub enum Role {
     Leaves,
 }
 
-/// What a stop guard knows.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
     pub link_lives: bool,
     pub is_owed: bool,
-    /// Another link or a newer guard has the wire.
+    /// Another link or newer guard has the wire.
     pub is_succeeded: bool,
     pub is_signed_off: bool,
-    /// The simulator of the robot has ended.
+    /// The robot's simulator has ended.
     pub is_robot_gone: bool,
 }
 

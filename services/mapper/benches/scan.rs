@@ -1,4 +1,4 @@
-//! The time that the mapper takes for a scan of a laser: matched with a reference, and mapped. `cargo bench -p mapper`.
+//! Time per laser scan, matched with a reference and mapped: `cargo bench -p mapper`.
 #![allow(clippy::print_stdout, reason = "the result of a benchmark")]
 
 use std::{path::Path, time::Instant};
@@ -10,10 +10,10 @@ use common::{
 };
 use mapper::step::{Input, Mapper, Scan, Tick};
 
-/// A Jackal with a UST-10LX, in 12 m times 12 m of cells of 5 cm.
+/// A Jackal with a UST-10LX on 12 m by 12 m in cells of 5 cm.
 const MISSION: &str = "target = [4, 0]\nrobot.model = 'jackal'\nrobot.rate_hz = 20\nperimeter = { width_m = 12.0, cells = 240 }";
 const SCANS: u64 = 2000;
-/// Half the side of the room, metres.
+/// Half the side of the room.
 const ROOM_M: f64 = 5.0;
 
 fn main() -> Result<(), MissionError> {
@@ -40,7 +40,7 @@ fn main() -> Result<(), MissionError> {
     Ok(())
 }
 
-/// The scan of a robot at (x, 0) in a square room with four posts, with a noise of 2 cm.
+/// Returns the scan of a robot at (x, 0) in a square room with four posts, with 2 cm noise.
 fn scan(x_m: f64, tick: u64) -> Vec<f32> {
     let beam = |beam: u64| {
         let (sin, cos) = (-135.0 + 0.25 * beam as f64).to_radians().sin_cos();

@@ -1,8 +1,9 @@
-//! The newest readings as evidence of free ground.
+//! Newest readings as evidence of free ground.
 //!
-//! A smooth surface answers only a beam along its normal, so a silent beam excludes only surfaces square to it, which the evidence grid,
-//! without directions, cannot hold. So the planner compares each surface that the body could touch with the newest readings. Infrared
-//! rays, kept apart, end at a surface of any angle.
+//! A smooth surface echoes only a beam along its normal, so silence excludes only surfaces square
+//! to the beam. The evidence grid stores no directions. The planner therefore compares surfaces
+//! within the body's reach with the newest readings. Infrared rays, kept apart, end at a surface of
+//! any angle.
 
 use common::samples::{CLEAR_BEAMS, CLEAR_RAYS, ClearBeam, GridHeader};
 use glam::DVec2;
@@ -15,14 +16,14 @@ use crate::{
 
 const OF_ONE_SONAR: usize = CLEAR_BEAMS / 3;
 
-/// Oldest first: at most [`OF_ONE_SONAR`] a sonar, and [`CLEAR_RAYS`].
+/// Newest readings, oldest first: at most [`OF_ONE_SONAR`] per sonar, and [`CLEAR_RAYS`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ClearBeams {
     beams: Vec<Dated>,
     rays: Vec<Dated>,
 }
 
-/// A reading, and the way of the wheels at its time.
+/// Reading with the wheel travel at its time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Dated {
     beam: ClearBeam,
@@ -32,7 +33,7 @@ struct Dated {
 impl ClearBeams {
     pub(crate) const SAVED_BYTES: usize = (CLEAR_BEAMS + CLEAR_RAYS) * size_of::<Dated>();
 
-    /// Add a reading after `rolled_m` metres of the wheels, and drop those too old.
+    /// Adds a reading at `rolled_m` and drops old ones.
     pub(crate) fn take(&mut self, sonars: usize, reading: &Reading, rolled_m: f64) {
         let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - AHEAD_OF_ECHO_M);
         let beam = clear_beam(reading.origin, reading.axis, clear_m.min(reading.sonar.clear_m));
@@ -66,7 +67,6 @@ fn clear_beam(origin: DVec2, axis: DVec2, clear_m: f64) -> ClearBeam {
     }
 }
 
-/// Append `newest`, and drop readings too old or beyond the newest `most`.
 fn append(readings: &mut Vec<Dated>, most: usize, newest: Dated) {
     let oldest_m = newest.rolled_m - CLEAR_FOR_M;
     readings.retain(|dated| dated.rolled_m > oldest_m);

@@ -1,11 +1,11 @@
-//! Scans at the time at which they were taken: the robot's poses of the newest ticks, and the beams of a sweep as if they had been
-//! measured at once.
+//! Scans at their capture times: recent robot poses, and motion-compensated sweeps.
 //!
-//! The poses are those of odometry, which no correction moves; the newest correction lays them into the mission's frame.
+//! Poses are in the odometry frame, which corrections do not move. The newest correction transforms
+//! them into the mission frame.
 //!
-//! A laser that turns measures its beams one after another while the robot moves. Each beam's end follows from the robot's pose at its
-//! own time. A scan from the pose in the middle of the sweep is interpolated from these ends, so that matcher and evidence grid, which
-//! look beams up by their bearing, need not know of it.
+//! A rotating laser measures beam by beam while the robot moves, so each beam's end follows from
+//! the pose at its time. Interpolating between these ends gives a scan from the pose in mid-sweep.
+//! Matcher and evidence grid can then look beams up by bearing.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -18,24 +18,25 @@ use crate::{
 };
 
 const KEPT: Duration = Duration::from_secs(3);
-/// At a rate of 50 Hz they span [`KEPT`].
+/// Poses that span [`KEPT`] at 50 Hz.
 const MOST_POSES: usize = 160;
-/// A beam between two ends that are farther apart, in beams, has no reading: something stands or ends between them.
+/// Spacing of two ends, in beams, above which beams between them have no reading: a surface ends
+/// there.
 const APART_BEAMS: f64 = 3.0;
-/// Two ends whose ranges differ by more are of different surfaces, metres.
+/// Range difference of ends on different surfaces.
 const EDGE_M: f64 = 0.20;
 
-/// Oldest first, in the odometry's frame, with their mission times in nanoseconds. They are not saved: the first scans of a new process
-/// may be too old for it.
+/// Recent odometry poses with mission times in nanoseconds, oldest first. Unsaved: a new process's
+/// first scans may be too old for it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Poses {
     held: VecDeque<(i64, Pose2)>,
-    /// The robot stood still at the first pose of this process, as at the start of a mission, and so before.
+    /// First pose of this process if the robot was at rest, valid for earlier times, too.
     stood_at: Option<(i64, Pose2)>,
 }
 
 impl Poses {
-    /// A tick given twice counts once.
+    /// Adds a tick's pose; repeats have no effect.
     pub(crate) fn add(&mut self, pose: &PoseSample) {
         let ns = time_ns(pose);
         if self.held.back().is_some_and(|(newest_ns, _)| *newest_ns >= ns) {
@@ -53,7 +54,7 @@ impl Poses {
         }
     }
 
-    /// Interpolated, and extrapolated by at most the time between two ticks; none for an earlier or a later time.
+    /// Interpolates the pose at a time, or extrapolates by at most a tick.
     fn at(&self, ns: i64) -> Option<Pose2> {
         if let Some((_, pose)) = self.stood_at.filter(|(first_ns, _)| ns <= *first_ns) {
             return Some(pose);
@@ -68,8 +69,9 @@ impl Poses {
         })
     }
 
-    /// The beams of a scan of the tick with this pose, as seen from where the robot was when the middle one was measured. None if the
-    /// robot's pose at the time of a beam is not known.
+    /// Returns a scan of this tick as seen from the robot's pose at the middle beam's time.
+    ///
+    /// Returns `None` if a beam's pose is unknown.
     pub(crate) fn scan_at_once(
         &self,
         rows: &Rows,
@@ -87,7 +89,7 @@ impl Poses {
             Some(Pose2 { position, heading: heading + turn })
         };
         let middle_ns = sweep.middle_ns(beams.len());
-        // A scan from before the first tick shows where the robot still stood then; dead reckoning knows no earlier time.
+        // Before the first tick the robot stood; dead reckoning knows no earlier time.
         let first_ns = self.stood_at.map_or(0, |(first_ns, _)| first_ns);
         let capture_ns = (time_ns(pose) + middle_ns).max(first_ns) as u64;
         let robot = robot_at(middle_ns)?;
@@ -107,7 +109,7 @@ impl Poses {
     }
 }
 
-/// A scan whose beams were measured at once, with the robot then.
+/// Scan with simultaneous beams, and the robot's pose then.
 pub(crate) struct Placed {
     pub(crate) row: usize,
     pub(crate) robot: PoseSample,
@@ -119,10 +121,10 @@ fn time_ns(pose: &PoseSample) -> i64 {
     pose.stamp.time().0.min(i64::MAX as u64 / 2) as i64
 }
 
-/// The beams of `fan` if all had been measured from it, and not each from where `seen_from` says.
+/// Returns the beams of `fan` as if measured from its origin; `seen_from` gives each beam's true
+/// origin.
 fn at_once<'a>(fan: &Fan<'_>, seen_from: impl Fn(usize) -> Option<Fan<'a>>) -> Option<Vec<f32>> {
     let count = fan.beams.len();
-    // Each beam's bearing, in beams, and range.
     let end = |(beam, range): (usize, &f32)| {
         let (own, range, place) = (seen_from(beam)?, f64::from(*range), beam as f64);
         let along = DVec2::from_angle(own.first_rad + own.step_rad * place);
@@ -151,7 +153,7 @@ fn at_once<'a>(fan: &Fan<'_>, seen_from: impl Fn(usize) -> Option<Fan<'a>>) -> O
         for place in low.0.ceil() as i64..=high.0.floor() as i64 {
             let share = if apart > 0.0 { (place as f64 - low.0) / apart } else { 0.0 };
             let range = match (low.1 - high.1).abs() <= EDGE_M && low.1.min(high.1) > 0.0 {
-                // Along a straight surface the reciprocal of the range changes evenly with a small angle.
+                // Along a straight surface, the range's reciprocal is linear in a small angle.
                 true => (low.1.recip() * (1.0 - share) + high.1.recip() * share).recip(),
                 false if share < 0.5 => low.1,
                 false => high.1,

@@ -1,20 +1,21 @@
-//! The occupancy evidence grid of the evidential method.
+//! Occupancy evidence grid of the evidential method.
 //!
-//! Its cells follow the sonar's resolution, because the evidence must not depend on the field's. A cell has the weight of the evidence
-//! for an obstacle, the direction of the last echo's beam, and whether it was scanned.
+//! Its cells match the sonar's resolution, so the evidence is independent of the field's. A cell
+//! holds evidence for an obstacle, the last echo's direction, and whether it was scanned.
 //!
-//! An echo comes from somewhere on an arc: cells of the arc gain weight, most in the middle, and cells before it along the axis lose
-//! weight. A well known occupied cell on the arc explains the echo, and the rest learns nothing; otherwise every wall would grow at each
-//! end.
+//! An echo comes from somewhere on an arc. The arc's cells gain weight, most in the middle; cells
+//! before it lose weight. If a well-known occupied cell explains the echo, the others keep their
+//! weight. Otherwise every wall would grow at its ends.
 //!
-//! An infrared ray is as thin as a cell and ends at a surface of any angle: passed cells are free, the last one is occupied, and silence
-//! is no evidence against that.
+//! An infrared ray is as thin as a cell and ends at a surface of any angle. It frees passed cells
+//! and marks the last one occupied. Silence is no evidence against that cell.
 //!
-//! A laser that looks over or through a thing is no evidence against it, so each laser, and beside lasers the other rangers, have a grid
-//! of their own, and a cell of any is hazard. An echo whose range the laser confirms is put where the laser sees the thing. So glass that the laser sees
-//! only squarely stays by its echoes.
+//! A laser may look over or through an object, so each laser has its own grid; the other rangers
+//! beside lasers share one. A cell is hazard if any grid says so. An echo whose range the laser
+//! confirms goes where the laser sees the object. So echoes keep glass that the laser sees only at
+//! right angles.
 //!
-//! No ranger is evidence against a thing that the body touched: all may look over it.
+//! No ranger is evidence against a touched object, because all may look over it.
 
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -31,29 +32,29 @@ use crate::{
     sonar_model::{self as sonar, PASS, POINTED_ENOUGH},
 };
 
-/// Scanned just now. The value falls by one for every [`STEP_M`] of the wheels.
+/// Cell scanned just now, minus one per [`STEP_M`] of wheel travel.
 const SCANNED: u8 = u8::MAX;
-/// Way of the wheels until scanned ground is one step less certain, metres.
+/// Wheel travel per step of scanned ground's certainty.
 pub(crate) const STEP_M: f64 = sonar::SCANNED_FOR_M / (SCANNED - POINTED_ENOUGH) as f64;
 
-/// Steps of [`SCANNED`] for one of the weight: both are gone at the same time.
+/// Steps of [`SCANNED`] per step of weight: both expire together.
 const LOOKS_FOR_A_STEP: u8 = (SCANNED - POINTED_ENOUGH) / sonar::MOST as u8 + 1;
 
-/// Flag: an obstacle stands in the cell.
+/// Flag: occupied by an obstacle.
 const OCCUPIED: u8 = 1;
-/// Flag: an infrared ranger saw the obstacle, which the sonar may not hear.
+/// Flag: seen by an infrared ranger. The sonar may miss it.
 const SEEN: u8 = 2;
-/// Flag: the body touched the obstacle, which no ranger may see.
+/// Flag: touched by the body. Rangers may miss it.
 const TOUCHED: u8 = 4;
-/// Flag: a bumper or a cliff sensor felt the obstacle, which stays though the pose is on it later: wheels slip.
+/// Flag: felt by a bumper or cliff sensor. It stays even under a later pose, because wheels slip.
 const FELT: u8 = 8;
 
-/// A cell crossed by the axis beyond this angle is beside the sensor and not of the beam, radians.
+/// Angle beyond which a crossed cell lies beside the sensor, outside the beam.
 const WIDEST_SLACK_RAD: f64 = 1.0;
 
-/// The greatest difference of range between an echo and the laser's thing, metres: the noise of both, and a cell.
+/// Range tolerance between an echo and the laser's object: the noise of both, and a cell.
 const SAME_RANGE_M: f64 = 0.10;
-/// Off its axis, where a sonar's lobe still hears near things, radians.
+/// Half the angle in which a sonar's lobe hears near objects.
 const LOBE_RAD: f64 = 28.0 * TAU / 360.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,41 +66,42 @@ pub(crate) struct Flip {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ground {
     pub(crate) lattice: GridFrame,
-    /// The body's, metres.
+    /// Body radius, metres.
     pub(crate) radius: f64,
 }
 
-/// What readings changed since it was asked last.
+/// Changes since the last query.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct News {
     pub(crate) flips: Vec<Flip>,
-    /// It has the cells that are newly scanned, or no longer.
+    /// Bounds of newly scanned or expired cells.
     pub(crate) window: Window,
 }
 
-/// Row-major, one byte a cell and layer.
+/// Byte layers, row-major.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceGrid {
     /// Weights of the sonar model, offset by 128.
     #[serde(with = "serde_bytes")]
     weight: Vec<u8>,
-    /// Direction of the last echo's beam, 256ths of a turn.
+    /// Direction of the last echo's beam, 1/256 turns.
     #[serde(with = "serde_bytes")]
     side: Vec<u8>,
-    /// Scanned from [`SCANNED`] down to [`POINTED_ENOUGH`]; below that, how often the sonar was pointed at the cell in vain.
+    /// Scanned from [`SCANNED`] down to [`POINTED_ENOUGH`]; below, number of vain sonar readings.
     #[serde(with = "serde_bytes")]
     looks: Vec<u8>,
-    /// The flags [`OCCUPIED`], [`SEEN`], [`TOUCHED`] and [`FELT`].
+    /// Flags [`OCCUPIED`] to [`FELT`].
     #[serde(with = "serde_bytes")]
     occupied: Vec<u8>,
-    /// The mission says it again to the next process.
+    /// Body and lattice, given by the mission and so unsaved.
     #[serde(skip)]
     pub(crate) ground: Ground,
     #[serde(skip)]
     pub(crate) news: News,
 }
 
-/// The lattice over the perimeter and `beyond_m` metres further: a body whose centre is inside can touch an obstacle just outside.
+/// Returns the lattice over the perimeter and `beyond_m` around: a body centred inside can touch an
+/// obstacle outside.
 pub(crate) fn lattice(mission: &Mission, beyond_m: f64) -> GridFrame {
     let width = mission.perimeter.width_m;
     let cells = (width / sonar::RESOLUTION_M).ceil().min(f64::from(MAX_CELLS));
@@ -131,7 +133,7 @@ impl EvidenceGrid {
             .all(|layer| layer.len() == lattice.area())
     }
 
-    /// The sonar may also be unable to learn more of the cell.
+    /// Returns whether the cell is scanned or the sonar is unable to learn more.
     pub(crate) fn is_scanned(&self, index: usize) -> bool {
         self.looks[index] >= POINTED_ENOUGH
     }
@@ -140,9 +142,8 @@ impl EvidenceGrid {
         self.occupied[index] & OCCUPIED != 0
     }
 
-    /// Lower the certainty of scanned cells by `steps` of the wheels.
     pub(crate) fn grow_stale(&mut self, steps: u8) {
-        // Passes over a row have no branches, so the compiler vectorises them.
+        // Branch-free passes over a row vectorise.
         let is_over =
             |looks: u8| looks >= POINTED_ENOUGH && looks.saturating_sub(steps) < POINTED_ENOUGH;
         let rows = self.looks.chunks_exact_mut(self.ground.lattice.cells as usize);
@@ -162,7 +163,7 @@ impl EvidenceGrid {
         }
     }
 
-    /// All evidence, for and against an obstacle, and of scanned ground, becomes weaker by `steps` of the weight.
+    /// Weakens all evidence by `steps`, also of scanned ground.
     pub(crate) fn forget(&mut self, steps: i8) {
         for cell in self.ground.lattice.whole().cells() {
             let weight = self.weight_of(self.ground.lattice.index(cell));
@@ -173,8 +174,8 @@ impl EvidenceGrid {
         self.grow_stale(LOOKS_FOR_A_STEP.saturating_mul(steps.unsigned_abs()));
     }
 
-    /// Take one reading, evidence up to `reach` metres, of a robot at `robot`. If a laser has `seen` its cause, only cells occupied there
-    /// get the echo.
+    /// Applies a reading as evidence up to `reach` metres. If a laser has `seen` its cause, only
+    /// cells occupied there get the echo.
     pub(crate) fn take(&mut self, beam: &Reading, reach: f64, seen: Option<&Self>, robot: DVec2) {
         let Ground { lattice, radius } = self.ground;
         let half_cell = lattice.resolution_m / 2.0;
@@ -194,12 +195,12 @@ impl EvidenceGrid {
 
         let mut arc = Vec::new();
         let mut explained = false;
-        // All cells that matter lie within `near`, or in the triangle of the widest cone.
+        // All relevant cells lie within `near`, or in the widest cone's triangle.
         let (end, aside) = (far * beam.axis, far * outside * beam.axis.perp());
         let corners = [DVec2::splat(near), DVec2::splat(-near), end + aside, end - aside];
         let least = corners.into_iter().fold(DVec2::ZERO, DVec2::min);
         let greatest = corners.into_iter().fold(DVec2::ZERO, DVec2::max);
-        // Tangents stand for the angles: an arc tangent a cell would take most of a tick.
+        // Tangents avoid an arc tangent per cell, which would take most of a tick.
         let [scanned, pointed, against, at_edge, twice, arc_edge, explains, widest_slack] = [
             model.scanned,
             model.pointed,
@@ -219,7 +220,8 @@ impl EvidenceGrid {
                 continue;
             }
             let is_within = |tangent: f64| across <= along * tangent;
-            // Near the sensor the cone is narrower than a cell, so a crossed cell is within every angle.
+            // Near the sensor the cone is narrower than a cell, so crossed cells are within every
+            // angle.
             let is_crossed = across <= half_diagonal && is_within(widest_slack);
             let index = lattice.index(cell);
             if range <= known_to && (is_crossed || is_within(scanned)) {
@@ -263,7 +265,7 @@ impl EvidenceGrid {
         self.stand(robot);
     }
 
-    /// Whether an occupied cell may have given the echo.
+    /// Returns whether an occupied cell may have caused the echo.
     pub(crate) fn explains(&self, beam: &Reading) -> bool {
         let Some(echo) = beam.echo else {
             return false;
@@ -278,7 +280,8 @@ impl EvidenceGrid {
         })
     }
 
-    /// A robot stands here: no obstacle does but what a bumper felt, and no sensor can scan the ground that it touches.
+    /// Marks the footprint scanned and clears obstacles there except felt ones: sensors cannot scan
+    /// it.
     pub(crate) fn stand(&mut self, robot: DVec2) {
         let Ground { lattice, radius } = self.ground;
         let touches = radius + lattice.resolution_m;
@@ -296,7 +299,7 @@ impl EvidenceGrid {
         }
     }
 
-    /// Does for an infrared ranger as [`EvidenceGrid::take`].
+    /// Applies an infrared reading, as [`EvidenceGrid::take`] does for a sonar.
     pub(crate) fn take_ray(&mut self, ray: &Ray, robot: DVec2) {
         let Ground { lattice, radius } = self.ground;
         let half_cell = lattice.resolution_m / 2.0;
@@ -331,7 +334,7 @@ impl EvidenceGrid {
         }
     }
 
-    /// Change the weight of a cell that a laser saw, which is then scanned; positive is for an obstacle.
+    /// Adds `change`, positive for an obstacle, to a cell that a laser saw, and marks it scanned.
     pub(crate) fn weigh_seen(&mut self, cell: Cell, change: i8) {
         let index = self.ground.lattice.index(cell);
         let was_occupied = self.is_occupied(index);
@@ -352,7 +355,7 @@ impl EvidenceGrid {
         }
     }
 
-    /// An obstacle stands in every cell at the body's rim in the arc of `touch`.
+    /// Marks every rim cell in the arc of `touch` occupied.
     pub(crate) fn touch(&mut self, touch: &Touch) {
         let Ground { lattice, radius } = self.ground;
         let rim = radius - sonar::RIM_M..=radius + lattice.resolution_m;
@@ -369,7 +372,7 @@ impl EvidenceGrid {
         }
     }
 
-    /// Keeps echoes from within `keep` metres of `robot`.
+    /// Clears scanned ground, and weights farther than `keep` metres from `robot`.
     pub(crate) fn reset(&mut self, robot: DVec2, keep: f64) {
         self.looks.fill(0);
         let lattice = self.ground.lattice;
@@ -392,7 +395,7 @@ impl EvidenceGrid {
         self.looks[index] = SCANNED;
     }
 
-    /// Evidence for an obstacle is positive. A cell that was long free must not need as long to become occupied.
+    /// Adds evidence, positive for an obstacle. Long-free cells become occupied as fast as others.
     fn weigh(&mut self, cell: Cell, change: i8) {
         let weight = self.weight_of(self.ground.lattice.index(cell));
         self.set(cell, if change < 0 { weight } else { weight.max(-PASS) } + change);
@@ -418,12 +421,12 @@ impl EvidenceGrid {
     }
 }
 
-/// 256ths of a turn.
+/// Returns 1/256 turns.
 fn side_of(axis: DVec2) -> u8 {
     (axis.to_angle() / TAU * 256.0).rem_euclid(256.0) as u8
 }
 
-/// The angle between two of [`side_of`], radians.
+/// Returns the angle between two sides, radians.
 fn apart(a: u8, b: u8) -> f64 {
     let steps = a.wrapping_sub(b);
     f64::from(steps.min(steps.wrapping_neg())) * TAU / 256.0

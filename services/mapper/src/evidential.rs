@@ -1,4 +1,4 @@
-//! The evidential map: evidence turned into hazard and scanned ground.
+//! Evidential map: evidence converted to hazard and scanned ground.
 
 use common::{
     grid::{Cell, CellState, Window},
@@ -16,15 +16,16 @@ use crate::{
     sonar_model::NEAR_M,
 };
 
-/// The evidence, and the cells that it forbids to the body's centre.
+/// Evidence, and the cells that it forbids to the body's centre.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
-    /// Of the first laser; without one of all sensors.
+    /// Grid of the first laser; without lasers, of all sensors.
     evidence: EvidenceGrid,
-    /// Of each further laser, and then of the sonars and infrared rangers beside lasers: a laser looks over or through what others see.
+    /// Grids of further lasers, then of sonars and infrared rangers beside lasers: a laser looks
+    /// over or through what they see.
     others: Vec<EvidenceGrid>,
     pub(crate) beams: ClearBeams,
-    /// Recomputed from the evidence, so not saved.
+    /// Hazard counts, recomputed and so unsaved.
     #[serde(skip)]
     inflation: Inflation,
 }
@@ -39,7 +40,8 @@ impl EvidenceMap {
 pub(crate) struct Evidential {
     geometry: Geometry,
     ground: Ground,
-    /// The lattice's column under the middle of each of the grid's; rows are the same, as both are square with one centre.
+    /// Lattice column under each grid column's middle; rows are equal, as both are square with one
+    /// centre.
     under: Vec<Option<u32>>,
     map_within: f64,
     sonars: usize,
@@ -54,7 +56,7 @@ impl Evidential {
         let [body, radius] = mission
             .outline()
             .map_or([disc; 2], |outline| [outline.half_width_m(), outline.inscribed_m()]);
-        // A position is up to half a cell off the centre that stands for it.
+        // A position is up to half a cell off the cell's centre.
         let reach = body + mission.mapper.clearance_m + grid.resolution_m / 2.0;
         let rows = Rows::new(mission);
         let lattice = lattice(mission, reach);
@@ -70,7 +72,6 @@ impl Evidential {
         }
     }
 
-    /// A surface blocks cells within this, metres.
     pub(crate) const fn reach(&self) -> f64 {
         self.geometry.reach
     }
@@ -97,7 +98,7 @@ impl Evidential {
         4 * (1 + self.others()) * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 128
     }
 
-    /// Fails for the map of another mission.
+    /// Completes a restored map; fails for another mission's.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
         let lattice = self.geometry.lattice;
         let fits = map.others.len() == self.others() && map.grids().all(|grid| grid.fits(&lattice));
@@ -115,8 +116,8 @@ impl Evidential {
         Ok(())
     }
 
-    /// Take scans, each with the row of its laser, and the readings of a robot at `robot`, whose wheels had rolled the first of these ways before, and the second now.
-    /// Returns the grid's window that may look different, and whether there is a new obstacle.
+    /// Applies scans by laser row, and readings of a robot with wheel travel before and now.
+    /// Returns the window that may have changed, and whether there is a new obstacle.
     pub(crate) fn take<'a>(
         &self,
         map: &mut EvidenceMap,
@@ -133,7 +134,7 @@ impl Evidential {
             let by_lasers = map.grids().take(1 + self.further_lasers());
             by_lasers.for_each(|grid| grid.grow_stale(steps as u8));
         }
-        // The scans first, and then the rays: what they show explains echoes.
+        // Scans and rays come first, because they explain echoes.
         for (row, fan) in scans {
             let laser = self.lasers.iter().position(|laser| *laser == row);
             match laser {
@@ -164,19 +165,18 @@ impl Evidential {
         self.follow(map)
     }
 
-    /// Returns the window that may look different now.
+    /// Returns the window that may have changed.
     pub(crate) fn touch(&self, map: &mut EvidenceMap, touch: &Touch) -> Window {
         map.evidence.touch(touch);
         self.follow(map).0
     }
 
-    /// Returns the window that may look different now.
     pub(crate) fn forget(&self, map: &mut EvidenceMap, steps: i8) -> Window {
         map.grids().for_each(|grid| grid.forget(steps));
         self.follow(map).0
     }
 
-    /// Inflate the flipped cells. Returns the grid's window that may look different, and whether there is a new obstacle.
+    /// Inflates flipped cells. Returns as [`Evidential::take`].
     fn follow(&self, map: &mut EvidenceMap) -> (Window, bool) {
         let (mut window, mut is_new) = (Window::default(), false);
         let news: Vec<_> = map.grids().map(|grid| std::mem::take(&mut grid.news)).collect();
@@ -190,7 +190,7 @@ impl Evidential {
         (window, is_new)
     }
 
-    /// Drop all evidence that is not near the robot; every second reset drops that too, since it may be wrong.
+    /// Drops evidence away from the robot, and every second time all of it, since it may be wrong.
     pub(crate) fn reset(&self, map: &mut EvidenceMap, robot: DVec2, epoch: u64) {
         let keep = if epoch % 2 == 1 { NEAR_M } else { 0.0 };
         map.beams = ClearBeams::default();
@@ -198,7 +198,7 @@ impl Evidential {
         self.follow(map);
     }
 
-    /// The evidence decides, of a cell neither known nor perimeter.
+    /// Returns the state of a cell neither known nor perimeter.
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
         let Geometry { lattice, grid, .. } = self.geometry;
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
@@ -221,7 +221,7 @@ impl Evidential {
         }
         let Geometry { lattice, grid, .. } = self.geometry;
         let last = Cell { col: window.col + window.width - 1, row: window.row + window.height - 1 };
-        // A lattice cell acts up to half of it, and half a grid cell, beyond its centre.
+        // A lattice cell acts up to half a cell of both grids beyond its centre.
         let more = 0.5 * (lattice.resolution_m + grid.resolution_m);
         let first = Cell { col: window.col, row: window.row };
         grid.between(lattice.centre_of(first) - more, lattice.centre_of(last) + more)

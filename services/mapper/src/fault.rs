@@ -1,24 +1,22 @@
-//! The hazard of an injected fault.
+//! Hazards of injected faults.
 
 use common::samples::FaultKind;
 use glam::DVec2;
 
-/// Around the robot, metres.
 const AROUND_M: f64 = 0.5;
-/// Distance of the wall that encloses the target, metres.
+/// Radius of the wall around the target.
 const WALL_M: f64 = 0.5;
-/// No step to a neighbouring cell crosses the wall.
+/// Thickness of the wall, which no step to a neighbouring cell crosses.
 const WALL_CELLS: f64 = 1.5;
 
 #[derive(Clone, Copy)]
 pub(crate) enum Area {
     Disc(DVec2),
-    /// Its distance from this point is [`WALL_M`].
+    /// Ring of radius [`WALL_M`].
     Wall(DVec2),
 }
 
 impl Area {
-    /// Whether it covers a cell of width `side`, centred at `at`, metres.
     pub(crate) fn covers(self, at: DVec2, side: f64) -> bool {
         match self {
             Self::Disc(middle) => at.distance(middle) <= AROUND_M,
@@ -37,7 +35,7 @@ pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Ar
     }
 }
 
-/// A fault may outlast a reset of the sensed belief.
+/// Returns the fault that outlasts a reset of the belief.
 pub(crate) fn after_reset(fault: FaultKind) -> FaultKind {
     match fault {
         FaultKind::CutOff => fault,

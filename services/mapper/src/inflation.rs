@@ -1,4 +1,4 @@
-//! Cells within reach of an occupied cell, which the body's centre must not enter.
+//! Cells within reach of an occupied cell, which are forbidden to the body's centre.
 
 use common::grid::{GridFrame, Window};
 
@@ -8,11 +8,11 @@ use crate::evidence_grid::Flip;
 pub(crate) struct Geometry {
     pub(crate) lattice: GridFrame,
     pub(crate) grid: GridFrame,
-    /// An occupied cell blocks up to here, centre to centre, metres.
+    /// Maximum centre distance that an occupied cell blocks, metres.
     pub(crate) reach: f64,
 }
 
-/// Occupied lattice cells within reach of each grid cell, row-major.
+/// Number of occupied lattice cells within reach of each grid cell, row-major.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Inflation {
     count: Vec<u16>,
@@ -27,7 +27,7 @@ impl Inflation {
         self.count[index] > 0
     }
 
-    /// Returns the grid's window within reach.
+    /// Applies a flip. Returns the grid's window within reach.
     pub(crate) fn follow(&mut self, geometry: &Geometry, flip: Flip) -> Window {
         let Geometry { lattice, grid, reach } = *geometry;
         let centre = lattice.centre_of(flip.cell);

@@ -1,38 +1,38 @@
-//! The infrared model: a ranger's voltage as evidence along its ray.
+//! Infrared model: a ranger's voltage as evidence along its ray.
 //!
-//! A ranger triangulates a small spot straight ahead, 10 to 80 cm away, at any angle of the surface. Its voltage grows with 1 / range, so
-//! the noise of the range grows with the square. Nearer than 10 cm the voltage falls again: the obstacle is near, but not how near. A
-//! ranger sees no glass and no surface that reflects no infrared; the sonar hears those.
+//! A ranger triangulates a small spot 10 to 80 cm ahead, at any angle of the surface. Its voltage
+//! grows with 1 / range, so range noise grows with the square. Below 10 cm the voltage falls again:
+//! the obstacle is near at an unknown distance. A ranger misses glass and surfaces without infrared
+//! reflection; the sonar hears those.
 
 use common::{
     samples::{RangeReading, RangeStatus},
     wire::infrared_ad,
 };
 
-/// The obstacle may be nearer than a reading below this, metres.
+/// Reading below which the obstacle may be nearer.
 const UNAMBIGUOUS_M: f64 = 0.10;
-/// Farther readings are no hits, metres: a ranger that sees nothing can give them.
+/// Maximum range of a hit: a ranger that sees nothing can read more.
 const HIT_WITHIN_M: f64 = 0.70;
-/// Standard deviation, AD counts. Nominal: three times that of the AD converter alone.
+/// Standard deviation, AD counts. Nominal: three times that of the AD converter.
 const NOISE_AD: f64 = 15.0;
-/// A ray is free up to so many before the reading.
+/// Deviations before the reading at which the free ray ends.
 const SURE_DEVIATIONS: f64 = 2.0;
-/// The formula's error on a single ranger, metres; it shortens a ray's free length.
+/// Formula error of a single ranger; it shortens the free ray.
 const FORMULA_M: f64 = 0.02;
 
-/// Half the width that a ray scans, metres: the spot is some centimetres wide, and the next ray of a moving robot meets an obstacle
-/// beside it. Nominal.
+/// Half the width that a ray scans. The spot is some centimetres wide, and a moving robot's next
+/// ray meets an obstacle beside it. Nominal.
 pub(crate) const SCANNED_ASIDE_M: f64 = 0.04;
 
 #[derive(Debug, PartialEq)]
 pub(crate) struct Seen {
-    /// Metres from the ranger; at most 0.72.
+    /// Free length; at most 0.72.
     pub(crate) clear_m: f64,
-    /// An obstacle, metres from the ranger.
     pub(crate) hit_m: Option<f64>,
 }
 
-/// Ranges are used up to `reach_m`; none where the ranger may be dead or saturated.
+/// Interprets a reading up to `reach_m`; none if the ranger may be dead or saturated.
 pub(crate) fn seen(reading: &RangeReading, reach_m: f64) -> Option<Seen> {
     let range_m = match reading.status() {
         RangeStatus::Measured if reading.range_m > 0.0 => reading.range_m,

@@ -1,14 +1,15 @@
-//! The laser model: a scan as evidence along its beams.
+//! Laser model: a scan as evidence along its beams.
 //!
-//! A beam is thinner than a cell and ends at a surface of any angle: passed cells are free, the last one is occupied. A beam without a
-//! reading says nothing.
+//! A beam is thinner than a cell and ends at a surface of any angle. It frees passed cells and
+//! marks the last one occupied. A beam without a reading is no evidence.
 //!
-//! A scan counts once for a cell, which many beams cross near the laser. It is occupied where a fifth of them end and the others pass: a
-//! post, or a thing's edge, fills part of it. Fewer ends may be noise of a surface behind, which must not close a gap. Neighbours that end
-//! farther before what is behind than noise explains are a thing too: the edge of a wall along which the laser looks.
+//! A scan counts once per cell, although many beams cross near cells. A cell is occupied if a fifth
+//! of them end in it: a post or an edge fills only a part. Fewer ends may be noise of a surface
+//! behind, which must not close a gap. Neighbours that end farther before that surface than noise
+//! explains count, too, as at the edge of a wall seen lengthwise.
 //!
-//! Where beams are no farther apart than a cell, the passed cells are the polygon of their ends, filled row by row. Farther away, and
-//! beside a beam without a reading, beams are followed one by one.
+//! Where beams are closer than a cell, their ends form a polygon that is filled row by row. Farther
+//! away, and beside missing readings, each beam is traced.
 
 use std::ops::Range;
 
@@ -24,24 +25,24 @@ use crate::{
 const HIT: i8 = 6;
 /// Weight of beams that all pass a cell. Two scans free a cell that many filled.
 const PASS: i8 = 6;
-/// The same where the thing goes on behind the cell: beams along a wall's face may all miss its edge.
+/// Weight where the object continues behind: beams along a wall's face may all miss its edge.
 const PASS_ALONG: i8 = 1;
 
-/// A beam that ends this near behind a cell is no evidence against a thing in it, metres: along a slanted wall most beams pass a part of
-/// it before they end in the next.
+/// Distance behind a cell within which a beam's end is no evidence against it. Along a slanted
+/// wall, most beams pass part of a cell before they end in the next.
 const NEAR_END_M: f64 = 0.25;
-/// A robot's greatest distance from its map, cells.
+/// Maximum distance of a robot from its map, cells.
 const FARTHEST: f64 = 1e6;
 
-/// The most passing beams for each that ends in an occupied cell.
+/// Maximum passing beams per ending beam in an occupied cell.
 const PASS_FOR_ONE_THAT_ENDS: u32 = 4;
 
-/// So many neighbours that end in one cell are no stray beams.
+/// Number of neighbouring ends in a cell that are not stray.
 const NEIGHBOURS: u32 = 2;
-/// Noise hardly exceeds so many standard deviations.
+/// Practical bound of noise, standard deviations.
 const NOISE_DEVIATIONS: f64 = 3.0;
 
-/// Marks of a cell: a beam ended in it, passed it, passed it and ended far behind.
+/// Marks: a beam ended in the cell, passed it, passed it and ended far behind.
 const ENDED: u8 = 1;
 const PASSED: u8 = 2;
 const PASSED_FAR: u8 = 4;
@@ -50,12 +51,12 @@ const PASSED_FAR: u8 = 4;
 struct Beam {
     /// Unit vector.
     along: DVec2,
-    /// Cells; 0 without a reading.
+    /// Range in cells; 0 without a reading.
     range: f64,
     ends: bool,
 }
 
-/// Cells of the lattice have sides of 1.
+/// Scan in units of lattice cells.
 struct Scan<'a> {
     fan: &'a Fan<'a>,
     lattice: &'a GridFrame,
@@ -66,8 +67,10 @@ struct Scan<'a> {
 }
 
 impl EvidenceGrid {
-    /// Take a scan of a robot at `robot`. What another laser has `seen` is left to that by a depth camera, which does not see it go away
-    /// from before its feet.
+    /// Applies a scan of a robot at `robot`.
+    ///
+    /// A depth camera cannot see near objects leave, so it ignores those that another laser has
+    /// `seen`.
     pub(crate) fn take_scan(&mut self, fan: &Fan<'_>, robot: DVec2, seen: Option<&Self>) {
         let Ground { lattice, radius } = self.ground;
         let Some(mut scan) = Scan::new(&lattice, fan) else {
@@ -99,7 +102,7 @@ impl EvidenceGrid {
 }
 
 impl EvidenceGrid {
-    /// In this cell, or in one beside it.
+    /// Returns whether this cell or a neighbour is occupied.
     fn is_thing_at(&self, cell: Cell) -> bool {
         let lattice = self.ground.lattice;
         let at = lattice.centre_of(cell);
@@ -107,11 +110,10 @@ impl EvidenceGrid {
         beside.cells().any(|cell| self.is_occupied(lattice.index(cell)))
     }
 
-    /// Whether a laser at `origin` looks along the thing in this cell.
+    /// Returns whether the object continues behind this cell as seen from `origin`.
     fn goes_on_behind(&self, cell: Cell, origin: DVec2) -> bool {
         let lattice = self.ground.lattice;
         let is_thing = |cell| self.is_occupied(lattice.index(cell));
-        // Most cells are free.
         if !is_thing(cell) {
             return false;
         }
@@ -122,7 +124,7 @@ impl EvidenceGrid {
 }
 
 impl<'a> Scan<'a> {
-    /// None if the pose, from shared memory, is no place.
+    /// Returns `None` for an invalid pose, since poses come from shared memory.
     fn new(lattice: &'a GridFrame, fan: &'a Fan<'a>) -> Option<Self> {
         let origin = lattice.to_cells(fan.origin);
         let beam = |(along, range_m): (DVec2, f64)| {
@@ -140,9 +142,9 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// Mark cells that beams left at least `near` cells before their ends.
+    /// Marks cells passed at least `near` cells before beams' ends.
     fn pass(&mut self, near: f64, mark: u8) {
-        // A cell may lie between two beams beyond this range.
+        // Beyond this range, a cell may lie between two beams.
         let close = self.fan.step_rad.recip();
         let corner = |beam: &Beam| self.origin + (beam.range - near).clamp(0.0, close) * beam.along;
         let mut corners: Vec<_> = self.beams.iter().map(corner).collect();
@@ -180,14 +182,14 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// The share of its beams that end in it decides.
+    /// Decides by the share of beams that end in the cell.
     fn is_thing(&self, cell: Cell, mark: u8) -> bool {
         if mark & ENDED == 0 {
             return false;
         }
         let offset = DVec2::new(cell.col.into(), cell.row.into()) - self.origin;
         let away = offset.length();
-        // No part of the cell is farther off its middle than this angle.
+        // Every part of the cell is within this angle of its middle.
         let half = away.max(1.0).recip() / self.fan.step_rad;
         let turn = std::f64::consts::TAU / self.fan.step_rad;
         let middle = (offset.to_angle() - self.fan.first_rad) / self.fan.step_rad;
@@ -203,7 +205,6 @@ impl<'a> Scan<'a> {
             if along.perp_dot(offset).abs() > aside {
                 continue;
             }
-            // The cell's far sides, as the beam meets them.
             let leaves = ((offset + 0.5 * along.signum()) / along).min_element();
             let is_here = || (range * along - offset).abs().max_element() <= 0.5;
             let ends_here = ends && is_here();
@@ -218,20 +219,20 @@ impl<'a> Scan<'a> {
         is_enough(passed) || neighbours >= NEIGHBOURS && is_enough(passed_by_noise)
     }
 
-    /// The most by which noise brings the end of a beam nearer, cells.
+    /// Returns the maximum shortening of a range by noise.
     fn noise(&self, range: f64) -> f64 {
         let (least_m, share) = self.fan.noise;
         NOISE_DEVIATIONS * (least_m / self.lattice.resolution_m + share * range)
     }
 
     fn index(&self, cell: IVec2) -> Option<usize> {
-        // The cast makes a negative number a great one.
+        // The cast maps negative numbers to large ones.
         let (col, row, side) = (cell.x as u32, cell.y as u32, self.lattice.cells);
         (col < side && row < side).then(|| (row * side + col) as usize)
     }
 }
 
-/// Gives the rows, with columns, of cells in a lattice of `side` times `side` whose centres lie in this polygon.
+/// Passes `span` the rows and columns of cells centred in this polygon.
 fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     let last = f64::from(side) - 1.0;
     let mut crossings = vec![Vec::new(); side as usize];
@@ -239,7 +240,7 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     for (from, to) in before.zip(corners) {
         let (least, greatest) = (from.y.min(to.y), from.y.max(to.y));
         let slope = (to.x - from.x) / (to.y - from.y);
-        // One of two edges that meet on a row's centre crosses it.
+        // Of two edges that meet at a row's centre, one crosses it.
         let (first, end) = ((least.floor() + 1.0).max(0.0), greatest.floor().min(last) + 1.0);
         for (row, crossings) in
             crossings.iter_mut().enumerate().take(end as usize).skip(first as usize)
@@ -258,18 +259,18 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     }
 }
 
-/// The cells along a beam, each once, in the order of the grid's lines that it crosses.
+/// Cells along a beam, in the order of crossed grid lines.
 struct Along {
     cell: IVec2,
     step: IVec2,
-    /// Ranges of the next line of a column and of a row, and from line to line, in cells.
+    /// Ranges to the next column and row line, and from line to line, cells.
     next: DVec2,
     each: DVec2,
 }
 
 impl Along {
     fn new(origin: DVec2, along: DVec2) -> Self {
-        // Centres of cells have whole coordinates.
+        // Cell centres have integer coordinates.
         let cell = (origin + 0.5).floor();
         let ahead = |origin: f64, cell: f64, along: f64| {
             let line = if along > 0.0 { cell + 0.5 } else { cell - 0.5 };
@@ -298,7 +299,6 @@ impl Along {
     }
 }
 
-/// Whether a beam outside of the lattice goes away from it.
 fn left_behind(cell: IVec2, step: IVec2, side: i32) -> bool {
     let beyond = |at: i32, step: i32| at < 0 && step <= 0 || at >= side && step >= 0;
     beyond(cell.x, step.x) || beyond(cell.y, step.y)
@@ -310,7 +310,7 @@ mod tests {
 
     const LATTICE: GridFrame = GridFrame { cells: 100, resolution_m: 0.05, centre: DVec2::ZERO };
 
-    /// A grid after these scans of a laser at the centre, whose beams are a degree apart from bearing 0 on.
+    /// Returns a grid after scans of a central laser, a beam per degree from bearing 0.
     fn after(scans: &[Vec<f32>]) -> EvidenceGrid {
         after_clearing_from(0.0, None, scans)
     }
@@ -403,7 +403,8 @@ mod tests {
 
     #[test]
     fn a_post_in_a_cell_is_a_thing_and_a_stray_beam_before_a_wall_is_not() {
-        // Eleven beams cross the cell at 0.5 m in the directions of 0 to 10 degrees, about half of them through one cell.
+        // Eleven beams cross the cell at 0.5 m at 0 to 10 degrees, about half of them through one
+        // cell.
         let beams = |near: usize| (0..6).map(|beam| if beam < near { 0.5 } else { 1.5 }).collect();
         assert!(after(&[beams(1)]).is_occupied(index(0.5, 0.0)));
         let many = (0..12).map(|beam| if beam == 0 { 0.3 } else { 1.5 }).collect();
@@ -412,7 +413,7 @@ mod tests {
 
     #[test]
     fn beams_that_are_close_free_the_cells_that_each_of_them_passes() {
-        // The room has 4 m times 4 m, and a post.
+        // The room is 4 m by 4 m with a post.
         let beam = |number: usize| {
             let (sin, cos) = (number as f64 * 0.25).to_radians().sin_cos();
             let wall = 2.0 / cos.abs().max(sin.abs());

@@ -1,9 +1,9 @@
-//! The on-demand safety map: range samples to hazard cells, equations (8)-(10), (18), (19).
+//! On-demand safety map: range samples to hazard cells, equations (8)-(10), (18), (19).
 //!
-//! [`step`] is the pure mapper, [`stage`] records and publishes it, [`shell`] is its process. `reading` puts readings into the mission
-//! frame, the models say what they mean for cells, `evidence_grid` sums that up, `inflation` grows occupied cells by the body, and
-//! `evidential` joins both. `scan_match` gives poses by the laser, `deskew` lays its
-//! scans where they were taken.
+//! [`step`] is the pure mapper, [`stage`] records and publishes it, [`shell`] is its process.
+//! `reading` transforms readings into the mission frame, and the models interpret them.
+//! `evidence_grid` sums evidence, `inflation` grows occupied cells by the body, and `evidential`
+//! joins both. `scan_match` estimates poses by laser; `deskew` places its scans.
 
 mod clear_beams;
 mod deskew;

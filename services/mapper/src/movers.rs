@@ -1,13 +1,16 @@
-//! What moves, by a laser, and what stands.
+//! Laser tracker of moving objects.
 //!
-//! Runs of beams without a gap are things, and their middles are followed from scan to scan by a filter for what goes straight on, in the
-//! frame of odometry, which no fix moves. A thing is a mover once its velocity and its way are beyond their doubt, and it was seen whole
-//! where an earlier scan saw through, or not as far. The middle of a thing that is partly hidden slides along it, so its doubt is half the
-//! width; that of a mover whose width was seen lies as far from the end that is its own. Only what is nearest to each other belongs
-//! together; otherwise tracks would change from post to post. A mover that is not where it was foreseen may have turned round: it is the
-//! nearest thing that belongs to none.
+//! Gapless runs of beams form objects. A constant-velocity Kalman filter tracks their middles in
+//! the odometry frame, which fixes do not move. A mover's velocity and travel exceed their
+//! uncertainty, and it was seen whole where an earlier scan saw farther or less far.
 //!
-//! While something moves, a beam stands if an earlier scan, by the time that movers need to go away, saw something at its end, too.
+//! The visible middle of a partly hidden object slides along it, so its deviation is its
+//! half-width. For a mover of known width, the middle follows from its visible end. Only mutually
+//! nearest objects and tracks match; otherwise tracks would jump between posts. A mover missing at
+//! its predicted place may have turned round and takes the nearest unmatched object.
+//!
+//! While something moves, a beam counts as static only if a scan [`STANDS_S`] earlier had a surface
+//! at its end.
 
 use std::{
     collections::VecDeque,
@@ -26,67 +29,66 @@ use crate::{
     reading::{Fan, Rows},
 };
 
-/// Scans nearer in time than the first of these are not followed, seconds. One is compared with those that are older by the next ones, to
-/// see what moves and what stands, and held for the last.
+/// Interval of tracked scans, age of scans that show motion and rest, and retention of scans.
 const APART_S: f64 = 0.09;
 const CAME_S: f64 = 0.4;
 const STANDS_S: f64 = 1.5;
 const KEPT_S: f64 = 2.0;
-/// Things may move for so long after the last mover was seen, seconds.
+/// Time after the last mover during which objects may still move.
 const MOVES_FOR_S: f64 = 10.0;
-/// The surface is another one if its range differs by so much: metres, and deviations of a reading.
+/// Range difference that indicates another surface: metres, and deviations of a reading.
 const OTHER_M: f64 = 0.12;
 const OTHER: f64 = 3.0;
-/// A thing of fewer beams may be any of several posts.
+/// Minimum number of beams; fewer may hit any of several posts.
 const LEAST_BEAMS: usize = 4;
-/// One in so many of a thing's beams ends where it came.
+/// One in this many of an object's beams must end where it newly appeared.
 const OF_BEAMS: usize = 6;
-/// Neighbouring ends on a thing are nearer than this: metres, and distances of neighbouring beams.
+/// Maximum distance of neighbouring ends on an object: metres, and beam spacings.
 const GAP_M: f64 = 0.3;
 const GAP: f64 = 3.0;
-/// Wider things are not followed, metres.
+/// Maximum width of a tracked object.
 const WIDEST_M: f64 = 1.6;
-/// Nothing is expected to be faster, m/s; and the way between two middles of a thing that stands, metres.
+/// Maximum expected speed, m/s, and distance between two middles of a static object, metres.
 const FASTEST_M_S: f64 = 2.5;
 const NEAR_M: f64 = 0.15;
-/// A thing that is not where it was foreseen is forgotten after so many seconds, and a mover whose foreseen place the laser does not see
-/// after so many. The doubt of its place grows so fast meanwhile, m/s.
+/// Time until a track missing at its predicted place, or a hidden mover, is dropped. Meanwhile its
+/// uncertainty grows at [`HIDDEN_M_S`].
 const FORGOTTEN_S: f64 = 1.0;
 const HIDDEN_S: f64 = 6.0;
 const HIDDEN_M_S: f64 = 0.2;
-/// The deviation of a velocity of which nothing is known, m/s, and its growth with time: a variance a second.
+/// Deviation of an unknown velocity, and growth of its variance per second.
 const FIRST_M_S: f64 = 1.2;
 const GROWS: f64 = 0.1;
-/// A mover is at least so fast: m/s, and deviations of its velocity. It was seen so often, for so many seconds, and came in this share of
-/// its newest places.
+/// Requirements for a mover: speed, also in deviations, sightings, tracked time, and share of
+/// recent positions where it newly appeared.
 const LEAST_M_S: f64 = 0.25;
 const SURE: f64 = 3.0;
 const LEAST_PLACES: u32 = 3;
 const FOLLOWED_S: f64 = 0.25;
 const CAME_SHARE: f64 = 0.3;
-/// One place counts so much among the newest.
+/// Weight of the newest position in this share.
 const NEWEST: f64 = 0.15;
-/// The deviation of a middle that is seen whole, metres: its surface is not known.
+/// Deviation of a visible middle: the surface is unknown.
 const MIDDLE_M: f64 = 0.03;
-/// So much of a radius that was seen is left in the next scan, which may see a part of it.
+/// Share of a seen radius kept at the next scan, which may see less.
 const RADIUS_LEFT: f64 = 0.98;
 
 #[derive(Clone, Copy)]
 struct Thing {
     at_s: f64,
     origin: DVec2,
-    /// Its first and last end, if they are its own: nothing before it hides the rest.
+    /// First and last end, unless something in front hides the rest.
     own: [Option<DVec2>; 2],
-    /// Of the ends on it, and how far the nearest is.
+    /// Mean of the ends, and distance of the nearest.
     mean: DVec2,
     nearest_m: f64,
     half_width_m: f64,
-    /// The deviation of a middle of which nothing is hidden.
+    /// Deviation of a visible middle.
     noise_m: f64,
     came: bool,
 }
 
-/// A thing that is followed, as what goes straight on, by a filter of Kalman's; accelerations are its noise.
+/// Constant-velocity track; accelerations are process noise.
 #[derive(Clone, Copy, Debug)]
 struct Track {
     first: (DVec2, f64),
@@ -94,21 +96,21 @@ struct Track {
     seen_s: f64,
     was_whole: bool,
     places: u32,
-    /// The share of its newest places in which it came.
+    /// Share of recent positions where it newly appeared.
     came: f64,
     radius_m: f64,
     is_mover: bool,
-    /// At `seen_s`.
+    /// Position at `seen_s`.
     middle: DVec2,
     velocity: DVec2,
-    /// Along any axis: of the middle, of both, of the velocity.
+    /// Variances along any axis: position, covariance with velocity, velocity.
     variance: [f64; 3],
 }
 
-/// It is not saved: the next process knows what moves within a second.
+/// Tracker state, unsaved: the next process finds movers again within a second.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Movers {
-    /// Oldest first: times, the robot by odometry, beams.
+    /// Times, odometry poses and beams, oldest first.
     scans: VecDeque<(f64, Pose2, Vec<f32>)>,
     tracks: Vec<Track>,
     seen_s: Option<f64>,
@@ -116,15 +118,16 @@ pub(crate) struct Movers {
 }
 
 impl Movers {
-    /// Follow what the scan shows. Returns its beams, of which those that may not stand have no reading, and whether the first mover is
-    /// seen.
+    /// Tracks a scan's objects.
+    ///
+    /// Returns its beams, without those that may end on moving surfaces, and whether the first
+    /// mover is seen.
     pub(crate) fn take(&mut self, rows: &Rows, scan: &Placed) -> (Vec<f32>, bool) {
         let (at_s, robot) = (scan.capture_ns as f64 * 1e-9, scan.robot.odometry());
         let Some(fan) = rows.scan(scan.row, robot, &scan.beams) else {
             return (scan.beams.clone(), false);
         };
         let scans = std::mem::take(&mut self.scans);
-        // How long ago, and the scan.
         let older = |by_s: f64| {
             let older = scans.iter().rev().find(|(then, ..)| at_s - then >= by_s);
             let (then_s, robot, beams) = older?;
@@ -133,7 +136,7 @@ impl Movers {
         let moved = self.moves(at_s);
         let is_next = scans.back().is_none_or(|(newest, ..)| at_s - newest >= APART_S);
         if is_next {
-            // At first there is none so old.
+            // At first, no scan is that old.
             let came_s = scans.front().map_or(CAME_S, |(first_s, ..)| at_s - first_s);
             let came_s = came_s.clamp(0.5 * CAME_S, CAME_S);
             let before = older(came_s);
@@ -263,26 +266,26 @@ impl Track {
         ]
     }
 
-    /// Whether `fan` does not reach to the foreseen place of a mover: it lies beside the fan, or something stands before it.
+    /// Returns whether a mover's predicted place is outside `fan` or occluded.
     fn is_hidden(&self, fan: &Fan<'_>, at_s: f64) -> bool {
         let way = self.at(at_s) - fan.origin;
         let bearing = wrap_angle(way.to_angle() - fan.first_rad);
         let beam = (bearing.rem_euclid(TAU) / fan.step_rad).round() as usize;
-        // Beside the fan, or too near, there is no reading.
+        // Outside the fan, or too near, there is no reading.
         let range = fan.beams.get(beam).map_or(f64::NAN, |range| f64::from(*range));
         let is_seen = range >= way.length() - self.radius_m - GAP_M;
         self.is_mover && !is_seen
     }
 
-    /// How far from the foreseen place it may be seen, also if it `turns`.
+    /// Returns the maximum distance from the predicted place, greater if the mover `turns`.
     fn most_off_m(&self, at_s: f64, turns: bool) -> f64 {
         let way_m = if turns { 2.0 * FASTEST_M_S * (at_s - self.seen_s).min(CAME_S) } else { 0.0 };
         NEAR_M + (SURE * self.variance_at(at_s)[0].sqrt()).max(way_m).min(WIDEST_M)
     }
 
-    /// It is seen, by a laser that goes at a velocity.
+    /// Updates the track with an object seen by a laser moving at `laser`.
     fn see(&mut self, thing: &Thing, laser: DVec2, turns: bool) {
-        // What comes into view seems to move until it is whole.
+        // An object that comes into view seems to move until it is whole.
         if !self.was_whole && thing.is_whole() {
             *self = Self::new(thing);
             return;
@@ -303,7 +306,8 @@ impl Track {
             * (f64::from(u8::from(thing.came)) - self.came);
         self.radius_m = thing.half_width_m.max(RADIUS_LEFT * self.radius_m);
         let deviation_m_s = self.variance[2].sqrt();
-        // What glass throws back comes from where the laser is square to it, and goes along it as the robot does.
+        // A reflection in glass appears where the laser is perpendicular to it and follows the
+        // robot.
         let aside = (thing.mean - thing.origin).normalize_or_zero().perp();
         let glint = aside * aside.dot(laser);
         let speed = self.velocity.length();
@@ -325,7 +329,8 @@ impl Thing {
         self.own.iter().all(Option::is_some)
     }
 
-    /// The middle and its deviation, as a part of `track`: of a disc, the ends lie before it.
+    /// Returns the object's middle as a part of `track`, and its deviation. A disc's ends lie on
+    /// its near side.
     fn middle(&self, track: &Track) -> (DVec2, f64) {
         let along = (self.mean - self.origin).normalize_or_zero();
         let hidden = self.own.iter().filter(|it| it.is_none()).count() as f64;
@@ -344,7 +349,7 @@ impl Thing {
     }
 }
 
-/// The things in a scan that are not too wide, compared with an earlier scan.
+/// Returns a scan's objects up to the maximum width, compared with an earlier scan.
 fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
     let ends: Vec<_> = fan.ends().collect();
     let (count, is_circle) = (ends.len(), fan.is_circle());
@@ -356,14 +361,14 @@ fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
         let pair = ends[beam % count].zip(ends[(beam + 1) % count]);
         pair.is_some_and(|(one, next)| one.distance(next) <= GAP_M.max(GAP * spacing_m))
     };
-    // A circle is cut at a gap.
+    // Cut a circle at a gap.
     let cut = (0..count).find(|beam| is_circle && !joins(*beam)).map_or(0, |beam| beam + 1);
     let end = cut + count;
     let (mut things, mut first) = (Vec::new(), cut);
     while first < end {
         let last = (first..end - 1).find(|beam| !joins(*beam)).unwrap_or(end - 1);
         let points: Vec<_> = (first..=last).filter_map(|beam| ends[beam % count]).collect();
-        // An end is the thing's own if the next beam goes on behind it.
+        // An end belongs to the object if the next beam ends behind it.
         let is_own = |beam: usize, next: Option<usize>| {
             next.is_some_and(|it| !fan.beams[it % count].is_nan() && range(it) > range(beam))
         };
@@ -394,7 +399,7 @@ fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
     things
 }
 
-/// How much farther than an end an earlier scan saw there, metres, by three beams; no number for a beam without an end.
+/// Distances behind a point at which three earlier beams ended; NaN without an end.
 struct Difference {
     by_beams: [f64; 3],
     most_m: f64,
@@ -419,7 +424,7 @@ impl Difference {
         self.by_beams.iter().any(|by| by.abs() <= self.most_m)
     }
 
-    /// All saw through the end, or something before it.
+    /// Returns whether all beams ended behind the point, or all before it.
     fn is_other(&self) -> bool {
         let all = |side: f64| self.by_beams.iter().all(|by| side * by > self.most_m);
         all(1.0) || all(-1.0)
@@ -436,7 +441,8 @@ mod tests {
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
-    /// A robot with a laser that drives along x at 0.5 m/s in a room of 10 by 8 metres, among discs: at 0 s, their velocities, radii.
+    /// A robot with a laser drives along x at 0.5 m/s in a room of 10 m by 8 m. Discs have starts,
+    /// velocities and radii.
     struct Room {
         rows: Rows,
         movers: Movers,
@@ -450,7 +456,6 @@ mod tests {
             Self { rows: Rows::new(&mission), movers: Movers::default(), discs: discs.to_vec() }
         }
 
-        /// The scan of a tick with the discs that it sees, and what is taken of it.
         fn tick(&mut self, tick: u64) -> (Placed, (Vec<f32>, bool)) {
             let at_s = PERIOD_S * tick as f64;
             let time = MissionTime::from_seconds(at_s);

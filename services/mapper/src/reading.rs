@@ -1,4 +1,4 @@
-//! Readings in the mission's frame, by the mission's rows of sensors.
+//! Readings in the mission frame, by the mission's sensor rows.
 
 use std::f64::consts::{PI, TAU};
 
@@ -15,12 +15,12 @@ use crate::{
     sonar_model::SonarModel,
 };
 
-/// The reading "4 cm or nearer" is mapped here, metres.
+/// Mapped range of the reading "4 cm or nearer".
 const CONTACT_M: f64 = 0.04;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
-    /// None for a row that the mission does not use.
+    /// Rows; none for unused ones.
     rows: Vec<Option<Row>>,
     front: u8,
 }
@@ -30,12 +30,12 @@ struct Row {
     mount: Mount,
     reach_m: f64,
     kind: SensorKind,
-    /// The bearing of the first beam from the laser's own, and the angle from beam to beam.
+    /// First beam's bearing relative to the laser's, and angle between beams.
     fan: (f64, f64),
     noise: (f64, f64),
-    /// Metres, from which a laser's beams pass things; 0 but for a depth camera.
+    /// Distance from which beams pass objects; 0 except for depth cameras.
     clears_from_m: f64,
-    /// None for other kinds.
+    /// Sonar model; none for other kinds.
     cone: Option<SonarModel>,
 }
 
@@ -76,7 +76,7 @@ impl Rows {
         !self.lasers().is_empty() && self.rows.iter().flatten().any(is_other)
     }
 
-    /// None if the mission does not use it. The sample, from shared memory, may hold anything.
+    /// Returns the row, if used. Samples in shared memory may hold any value.
     fn of(&self, reading: &RangeReading) -> Option<Row> {
         *self.rows.get(usize::from(reading.sensor))?
     }
@@ -85,7 +85,7 @@ impl Rows {
         usize::try_from(row).is_ok_and(|row| self.rows.get(row).is_some_and(Option::is_some))
     }
 
-    /// None without beams.
+    /// Returns `None` without beams.
     pub(crate) fn scan<'a>(&self, row: usize, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
         let Row { mount, reach_m, fan: (first, step_rad), noise, clears_from_m, .. } =
             self.laser(row).filter(|_| !beams.is_empty())?;
@@ -106,7 +106,7 @@ impl Rows {
         self.uses_row(reading.sensor.into())
     }
 
-    /// The hit of (19) by the front sonar, with its distance S, metres.
+    /// Returns the distance S, metres, and the hit of (19) by the front sonar.
     pub(crate) fn front_hit(
         &self,
         robot: Pose2,
@@ -134,7 +134,7 @@ impl Rows {
         })
     }
 
-    /// Dead rays give none.
+    /// Returns infrared readings without dead rays.
     pub(crate) fn rays(
         &self,
         robot: Pose2,
@@ -149,7 +149,7 @@ impl Rows {
     }
 }
 
-/// S of (19), if the reading has a distance.
+/// Returns S of (19), if the reading has a distance.
 fn safety_distance(reading: &RangeReading) -> Option<f64> {
     match reading.status() {
         RangeStatus::Measured if reading.range_m >= 0.0 => Some(reading.range_m),
@@ -159,17 +159,17 @@ fn safety_distance(reading: &RangeReading) -> Option<f64> {
 }
 
 pub(crate) struct Reading {
-    /// The sensor's place, metres in the mission frame.
+    /// Sensor position, mission frame.
     pub(crate) origin: DVec2,
     /// Unit vector.
     pub(crate) axis: DVec2,
-    /// Metres; none where nothing answered.
+    /// Range in metres; none without an echo.
     pub(crate) echo: Option<f64>,
     pub(crate) sonar: SonarModel,
 }
 
 pub(crate) struct Ray {
-    /// The ranger's place, metres in the mission frame.
+    /// Sensor position, mission frame.
     pub(crate) origin: DVec2,
     /// Unit vector.
     pub(crate) axis: DVec2,
@@ -178,22 +178,22 @@ pub(crate) struct Ray {
 
 #[derive(Clone, Copy)]
 pub(crate) struct Fan<'a> {
-    /// The laser's place, metres in the mission frame.
+    /// Laser position, mission frame.
     pub(crate) origin: DVec2,
-    /// Bearing of the first beam, and the angle from beam to beam.
+    /// Bearing of the first beam, and angle between beams.
     pub(crate) first_rad: f64,
     pub(crate) step_rad: f64,
     pub(crate) reach_m: f64,
-    /// Deviation of a range: metres, and a share of it.
+    /// Range deviation: metres, and a share of the range.
     pub(crate) noise: (f64, f64),
-    /// A beam says nothing of the ground nearer than this, metres.
+    /// Distance below which a beam is no evidence about ground.
     pub(crate) clears_from_m: f64,
-    /// Metres: infinite for nothing in reach, not a number for no reading.
+    /// Ranges in metres: infinite for nothing in reach, NaN for no reading.
     pub(crate) beams: &'a [f32],
 }
 
 impl Fan<'_> {
-    /// Direction, a unit vector, and range of each beam.
+    /// Returns each beam's unit vector and range.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (DVec2, f64)> + '_ {
         let step = DVec2::from_angle(self.step_rad);
         let first = DVec2::from_angle(self.first_rad);
@@ -201,38 +201,36 @@ impl Fan<'_> {
         along.zip(self.beams.iter().map(|range| f64::from(*range)))
     }
 
-    /// None for a beam without an end.
+    /// Returns beam ends; none for beams without one.
     pub(crate) fn ends(&self) -> impl Iterator<Item = Option<DVec2>> + '_ {
         self.iter().map(|(along, range)| {
             (range >= 0.0 && range <= self.reach_m).then(|| self.origin + range * along)
         })
     }
 
-    /// Of the range to `end`, metres.
     pub(crate) fn deviation_m(&self, end: DVec2) -> f64 {
         let (least_m, share) = self.noise;
         least_m + share * end.distance(self.origin)
     }
 
-    /// The first beam follows the last one.
+    /// Returns whether the first beam follows the last.
     pub(crate) fn is_circle(&self) -> bool {
         (self.beams.len() as f64 * self.step_rad - TAU).abs() < 0.5 * self.step_rad
     }
 }
 
 pub(crate) struct Touch {
-    /// The body's centre, metres.
     pub(crate) robot: DVec2,
     /// Middle of the touched arc, a unit vector.
     pub(crate) axis: DVec2,
     /// Half the arc, radians.
     pub(crate) half_width: f64,
-    /// By a bumper or a cliff sensor, and not by held wheels.
+    /// Whether a bumper or a cliff sensor touched, rather than held wheels.
     pub(crate) is_felt: bool,
 }
 
 impl Touch {
-    /// None if it is not known where the body is touched. The sample, from shared memory, may hold anything.
+    /// Returns `None` if the place is unknown. Samples in shared memory may hold any value.
     pub(crate) fn of(pose: Pose2, contact: &ContactSample) -> Option<Self> {
         let &ContactSample { bearing_rad, half_width_rad, left, right, .. } = contact;
         let usable = bearing_rad.is_finite() && half_width_rad > 0.0 && half_width_rad <= PI;

@@ -1,15 +1,16 @@
-//! The scan matcher: the robot's pose by its laser, of several by the first with the widest view.
+//! Scan matcher: estimates the robot's pose from its laser, or from the widest one of several.
 //!
-//! A scan is laid so that its points lie on lines through the points of a reference scan (point-to-line matching, Censi 2008): an
-//! earlier one at its matched pose, replaced when the robot has gone so far that it sees other things. The search begins at dead
-//! reckoning's pose, which also holds the robot in directions without lines, as along a corridor.
+//! It matches scan points with lines through a reference scan (point-to-line, Censi 2008). The
+//! search starts at the dead-reckoned pose, which also constrains directions without lines, such as
+//! along a corridor. A new reference replaces the old one once the robot sees other surfaces.
 //!
-//! A new reference is laid by the scan after it: where that one is by the reference before, it is by the new one, too. Without this the
-//! errors of all references add up, and they lean to one side, because a scan that matches badly is the one that is replaced.
+//! The scan after a new reference moves it once, so that both references agree on this scan's pose.
+//! Otherwise reference errors add up with a bias, because badly matched scans become references.
 //!
-//! The result is a fix for dead reckoning, which takes the errors of fixes for independent. Those of matches are alike for a while, so the
-//! fixes of [`SHARED_S`] weigh like one. All share the error of their reference, and so of all references before; a fix states it, because
-//! no number of fixes averages it out. How much a reference adds is measured by the second scan after it, with both references again.
+//! Dead reckoning assumes independent errors of fixes. Match errors are correlated over
+//! [`SHARED_S`], so that period's fixes together weigh like one. A fix also states the error shared
+//! with all references so far, because averaging never removes it. The second scan after a new
+//! reference, matched with both, measures the added error.
 
 use common::{
     found_response::if_there,
@@ -27,78 +28,82 @@ use crate::{
     reading::{Fan, Rows},
 };
 
-/// The least deviation of a point from its line, metres: walls are rough, though a laser's noise may be less.
+/// Minimum deviation of a point from its line. Walls are rough even if the laser's noise is lower.
 const POINT_M: f64 = 0.02;
-/// Deviation of the first pose: metres and radians.
+/// Prior deviation: metres and radians.
 const PRIOR: [f64; 2] = [0.10, 0.05];
-/// A point's greatest distance from its line: metres, and deviations of a noisy point.
+/// Gate from point to line: metres, and deviations of a noisy point.
 const GATE_M: f64 = 0.08;
 const GATE: f64 = 2.5;
-/// In the first rounds it is so many deviations of dead reckoning's place of a point so far away, metres, and at most the last of these,
-/// metres. Farther lines are those of other things: a Jackal that turned took a box for another one, and was .14 m off.
+/// Gate of the first rounds: dead-reckoning deviations of a point [`AWAY_M`] away, at most
+/// [`MOST_GATE_M`]. Farther lines belong to other objects: a turning Jackal matched the wrong box
+/// and was 0.14 m off.
 const FIRST_GATE: f64 = 4.0;
 const AWAY_M: f64 = 3.0;
 const MOST_GATE_M: f64 = 0.30;
 const ROUNDS: usize = 6;
-/// A smaller change of the pose ends the rounds, metres and radians.
+/// Pose change that ends the rounds, metres and radians.
 const SETTLED: f64 = 1e-4;
-/// Matched points of each scan, about.
+/// Approximate points per match.
 const POINTS: usize = 240;
-/// Half the length of a line through points: the least, metres, and in deviations of a noisy point.
+/// Half-length of a line: minimum in metres, and deviations of a noisy point.
 const LINE_M: f64 = 0.06;
 const LINE: f64 = 2.5;
-/// A point farther from its neighbours is an edge, metres.
+/// Distance from neighbours that makes a point an edge.
 const EDGE_M: f64 = 0.20;
-/// The greatest distance of points from their line, root mean square, over half its length.
+/// Maximum RMS distance of points from their line, relative to its half-length.
 const STRAIGHT: f64 = 0.5;
-/// Lines of a point are sought within this angle of its bearing, radians.
+/// Search angle around a point's bearing.
 const BESIDE_RAD: f64 = 0.08;
-/// Points on lines that a match needs.
+/// Minimum points on lines for a match.
 const LEAST_POINTS: usize = 10;
-/// The way, metres, and turn, radians, after which the reference is replaced; also if a smaller share of the points finds a line.
+/// Travel, metres, and turn, radians, that replace the reference; a share on lines below
+/// [`LEAST_SHARE`] does, too.
 const REPLACED_AFTER: (f64, f64) = (2.0, std::f64::consts::FRAC_PI_3);
 const LEAST_SHARE: f64 = 0.6;
-/// The deviation that a new reference adds to all after it, besides its match's: metres and radians. An error of its heading turns all
-/// later poses.
+/// Deviation that a new reference adds for all later poses: metres and radians. A heading error
+/// turns all later poses.
 const OF_REFERENCE: [f64; 2] = [0.0005, 0.0002];
-/// The variance of a match over that of its scatter, because its reference has a scan's noise too.
+/// Ratio of a match's variance to its scatter's, because the reference has scan noise, too.
 const OF_SCATTER: f64 = 1.75;
-/// The least and the greatest variance of a match, over that by its points.
+/// Bounds of a match's variance, relative to that from points.
 const SCALES: [f64; 2] = [0.25, 9.0];
-/// So much of the scatter is left after each further match.
+/// Share of the scatter kept at each match.
 const REMEMBERED: f64 = 0.99;
-/// More would leave no room for the fixes of others.
+/// Maximum rate, leaving room for other fixes.
 const MOST_FIXES_HZ: f64 = 20.0;
-/// Errors of matches are alike for so long, seconds.
+/// Correlation time of match errors.
 const SHARED_S: f64 = 2.0;
-/// The least deviation of a match: metres and radians.
+/// Minimum deviation of a match: metres and radians.
 const LEAST: [f64; 2] = [0.005, 0.002];
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Reference {
     pose: Pose2,
     beams: Vec<f32>,
-    /// x, y and heading; m^2, m rad, rad^2.
+    /// Covariance of x, y and heading: m^2, m rad, rad^2.
     covariance: DMat3,
-    /// Lines by beams; not saved, because they can be computed again.
+    /// Lines by beam; recomputed after a restart.
     #[serde(skip)]
     lines: Vec<Option<Line>>,
     #[serde(deserialize_with = "if_there")]
     scatter: Scatter,
-    /// The reference before, and whether this one is laid by it; none after two scans. It is not saved, because the next one comes soon.
+    /// Previous reference, and whether this one was moved to agree with it. None after two scans.
+    /// Unsaved: the next scan comes soon.
     #[serde(skip)]
     before: Option<(Box<Self>, bool)>,
 }
 
-/// How much matches scatter from scan to scan about the places by dead reckoning, whose drift is slow.
+/// Scatter of matches around dead-reckoned poses, which drift slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Scatter {
-    /// The newest match's way from its place by dead reckoning.
+    /// Offset of the newest match from its dead-reckoned position.
     off: DVec2,
-    /// Variances of matches, m^2: as they scatter, and by their points.
+    /// Sums of match variances, m^2: from scatter, and from points.
     seen: f64,
     stated: f64,
-    /// Variances that references added, m^2: by the ways between a scan's places by a laid one and by that before, and by the points.
+    /// Sums of variances added by references, m^2: from a scan's positions by both references, and
+    /// from points.
     added: f64,
     added_stated: f64,
 }
@@ -116,13 +121,15 @@ impl Scatter {
         self.off = off;
     }
 
-    /// The variance of matches over that by their points.
+    /// Returns the ratio of scatter to point-based variance.
     fn scale(&self) -> f64 {
         let [least, most] = SCALES;
         (OF_SCATTER * self.seen / self.stated).clamp(least, most)
     }
 
-    /// The variance that a new reference adds, likewise. Until it was measured, that of a match; then the scatter counts like one
+    /// Returns this ratio for a new reference's added variance.
+    ///
+    /// Before the first measurement it is a match's ratio. Later, the scatter counts as one
     /// measurement of `variance`.
     fn scale_of_reference(&self, variance: f64) -> f64 {
         if self.added_stated == 0.0 {
@@ -133,11 +140,11 @@ impl Scatter {
     }
 }
 
-/// Its frame is the mission's.
+/// Line in the mission frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     point: DVec2,
-    /// Across the line, a unit vector.
+    /// Unit vector.
     normal: DVec2,
 }
 
@@ -145,7 +152,7 @@ struct Line {
 pub(crate) struct ScanMatcher {
     row: usize,
     every_ticks: u64,
-    /// Matches that share their errors.
+    /// Number of matches with correlated errors.
     shared: f64,
 }
 
@@ -165,8 +172,10 @@ impl ScanMatcher {
         tick.is_multiple_of(self.every_ticks)
     }
 
-    /// Match the laser's scan, if it is among `scans`, with the reference, replaced if necessary. None if too little of the reference is
-    /// seen. While something moves, only what stands counts.
+    /// Matches the laser's scan with the reference, and replaces it if necessary.
+    ///
+    /// Returns `None` if too little of the reference is visible. While something moves, only static
+    /// surfaces count.
     pub(crate) fn step(
         &self,
         rows: &Rows,
@@ -180,7 +189,7 @@ impl ScanMatcher {
         let (Placed { robot: reckoned, capture_ns, .. }, beams) = (scan, &beams[..]);
         let robot = reckoned.pose();
         let fan = rows.scan(row, robot, beams)?;
-        // What is known to move now may be a part of the reference, too.
+        // The reference may contain an object now known to move.
         let held = reference.as_mut().filter(|_| !moves_first);
         let Some(held) = held else {
             let covariance = covariance_of(reckoned) + variances(OF_REFERENCE);
@@ -206,7 +215,7 @@ impl ScanMatcher {
                 && let Some((by_before, ..)) = before.matched(&fan, &seen_from, start)
             {
                 if is_laid {
-                    // Laying and measuring have the same error, so each has half of the square.
+                    // Moving and measuring have equal errors: half the square each.
                     held.scatter.added += 0.5 * pose.position.distance_squared(by_before.position);
                     held.scatter.added_stated += variance;
                 } else {
@@ -268,7 +277,7 @@ impl Reference {
         Self { pose, beams: fan.beams.to_vec(), covariance, lines, scatter, before: None }
     }
 
-    /// Move it as a scan moves from one pose to the other.
+    /// Moves the reference as `from` moves to `to`.
     fn lay(&mut self, from: Pose2, to: Pose2) {
         let turn = to.heading - from.heading;
         let turned = DVec2::from_angle(turn);
@@ -279,15 +288,16 @@ impl Reference {
         }
     }
 
-    /// The covariance at `there`, known exactly from this pose.
+    /// Returns the covariance at `there`, by an exact transform from the reference.
     fn carried_to(&self, there: DVec2) -> DMat3 {
         let arm = (there - self.pose.position).perp();
         let carried = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(arm.x, arm.y, 1.0));
         carried * self.covariance * carried.transpose()
     }
 
-    /// The pose that lays the points of `fan` best on the lines, its covariance, and the share of points that found a line. `fan` is the
-    /// scan at `start`, `seen_from` at the reference's pose.
+    /// Returns the best-fit pose, its covariance, and the share of points that found a line.
+    ///
+    /// `fan` is the scan at `start`, `seen_from` the same scan at the reference's pose.
     fn matched(
         &self,
         fan: &Fan<'_>,
@@ -298,14 +308,15 @@ impl Reference {
         let seen: Vec<_> = (0..ends.len()).filter(|beam| ends[*beam].is_some()).collect();
         let every = seen.len().div_ceil(POINTS).max(1);
         let back = DVec2::from_angle(-start.heading);
-        // A line lies behind the points of what is round. Lines on lines lie right; points on lines move each reference towards it.
+        // Lines lie behind the points of round surfaces. Matching points with lines would bias
+        // references towards the surface; lines with lines match without bias.
         let point = |beam: &usize| {
             let line = Line::through(&ends, fan, *beam).map(|line| line.point);
             let point = line.or(ends[*beam])?;
             Some((back.rotate(point - start.position), fan.deviation_m(point)))
         };
         let points: Vec<_> = seen.iter().step_by(every).filter_map(point).collect();
-        // The points of lines have errors, too, but all of them share in lines.
+        // The reference's points have errors, too; each line averages over them.
         let of_lines = 1.0 + 1.0 / every as f64;
         let prior = variances(PRIOR).inverse();
         let (mut pose, mut information, mut found) = (start, DMat3::ZERO, 0);
@@ -338,22 +349,22 @@ impl Reference {
                 break;
             }
         }
-        // The identity is a guess in directions of which the scan says nothing.
+        // The identity stands for directions that the scan leaves unconstrained.
         let covariance = (information + DMat3::IDENTITY).inverse();
         let usable =
             pose.position.is_finite() && pose.heading.is_finite() && covariance.is_finite();
         usable.then(|| (pose, covariance, found as f64 / points.len().max(1) as f64))
     }
 
-    /// The nearest line within `gate` metres, among those near the point's bearing from the reference.
+    /// Returns the nearest line within `gate` metres around the point's bearing.
     fn line_near(&self, seen_from: &Fan<'_>, at: DVec2, gate: f64) -> Option<Line> {
         let way = at - seen_from.origin;
         let bearing = (way.to_angle() - seen_from.first_rad).rem_euclid(std::f64::consts::TAU);
         let beam = (bearing / seen_from.step_rad).round() as i32;
         let beside_rad = BESIDE_RAD.max(gate / way.length().max(gate));
         let beside = (beside_rad / seen_from.step_rad).ceil() as i32;
-        // A scan of 1,081 beams has more than are needed. Those that are taken lie alike to both sides: otherwise each point would be laid
-        // on a line to the same side, which turned a Jackal between walls at its reach by .1 rad in 15 m.
+        // A scan of 1,081 beams has spare candidates. They must be symmetric: one-sided selection
+        // turned a Jackal between walls at maximum range by 0.1 rad in 15 m.
         let stride = (beside / 6).max(1);
         let whole_turn = (std::f64::consts::TAU / seen_from.step_rad).round().max(1.0) as i32;
         let near = |line: &Line| line.point.distance_squared(at);
@@ -366,7 +377,7 @@ impl Reference {
 }
 
 impl Line {
-    /// Through the points around `beam`; none where they are too few, an edge, or off a line.
+    /// Fits a line around `beam`; none for too few points, an edge, or points off the line.
     fn through(points: &[Option<DVec2>], fan: &Fan<'_>, beam: usize) -> Option<Self> {
         let point = points[beam]?;
         let spacing = point.distance(fan.origin) * fan.step_rad;
@@ -398,7 +409,7 @@ fn covariance_of(pose: &PoseSample) -> DMat3 {
     DMat3::from_cols(DVec3::new(xx, xy, xt), DVec3::new(xy, yy, yt), DVec3::new(xt, yt, tt))
 }
 
-/// Deviations of the place, metres, and of the heading, radians.
+/// Returns the covariance for deviations in metres and radians.
 fn variances([place, heading]: [f64; 2]) -> DMat3 {
     DMat3::from_diagonal(DVec3::new(place, place, heading).map(|deviation| deviation * deviation))
 }
@@ -409,7 +420,6 @@ mod tests {
 
     use super::*;
 
-    /// The matcher of a mission's robot, with the rows that it needs.
     struct Matcher(ScanMatcher, Rows);
 
     impl Matcher {
@@ -446,7 +456,8 @@ mod tests {
         (mission, matcher)
     }
 
-    /// The scan of a robot at `pose` in a room of 6 by 4 metres, or in a corridor along x without its ends.
+    /// Returns the scan of a robot at `pose` in a room of 6 m by 4 m, or in an endless corridor
+    /// along x.
     fn scan(mission: &Mission, pose: Pose2, corridor: bool) -> Vec<f32> {
         let mount = mission.sensor_table()[0].mount.on(pose);
         (0..360)
@@ -509,7 +520,7 @@ mod tests {
     fn a_robot_that_is_sure_of_its_place_does_not_take_a_thing_for_another_one() {
         let (mission, matcher) = matcher();
         let start = Pose2::default();
-        // A corridor that ends ahead.
+        // The corridor ends ahead.
         let ends_at = |x: f64| {
             let mut beams = scan(&mission, start, true);
             for (beam, range) in beams.iter_mut().enumerate().take(200).skip(161) {
@@ -526,13 +537,13 @@ mod tests {
         assert!(sure.abs() < 0.02 && (unsure + 0.2).abs() < 0.02, "{sure} {unsure}");
     }
 
-    /// Scans in the room as [`scan`] gives them, with the noise of the laser's model.
+    /// Returns scans as [`scan`] does, with the noise of the laser's model.
     fn noisy(mission: &Mission) -> impl FnMut(Pose2) -> Vec<f32> + use<'_> {
         let mut random = 1_u32;
         move |pose| {
             let mut beams = scan(mission, pose, false);
             for range in &mut beams {
-                // A sum of twelve even numbers is nearly normal.
+                // A sum of twelve uniform numbers is nearly normal.
                 let noise: f64 = (0..12)
                     .map(|_| {
                         random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -1,5 +1,7 @@
-//! `pose`, `ranges`, `target` and `directive` in, `grid` out: a window for each change, a keyframe for each new reader and at
-//! intervals, an empty window otherwise, so that every tick goes on to the planner.
+//! Process of the mapper: `pose`, `ranges`, `target` and `directive` in, `grid` out.
+//!
+//! Changes give a window; new readers and intervals a keyframe. Other ticks give an empty window,
+//! so that all reach the planner.
 
 use std::time::Duration;
 
@@ -25,7 +27,7 @@ use crate::{
     step::{Input, Mapper, Scan, Tick},
 };
 
-/// Mission time after which the whole map is published again.
+/// Mission time between keyframes.
 const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
 
 readers! {
@@ -42,12 +44,12 @@ readers! {
     }
 }
 
-/// The newest sample of a topic, and its tick.
 #[derive(Default)]
 struct OfTick<T>(Option<(u64, T)>);
 
 impl<T: Default> OfTick<T> {
-    /// That of `tick`, if there is one: earlier ones are dropped, later ones wait for their pose.
+    /// Takes the sample of `tick`, if any. Earlier ones are dropped; later ones wait for their
+    /// pose.
     fn take(
         &mut self,
         tick: u64,
@@ -67,7 +69,7 @@ pub struct Shell {
     inputs: Inputs,
     runner: Runner<Mapper>,
     ranges: OfTick<Vec<RangeReading>>,
-    /// Those of the newest tick, each with it.
+    /// Scans of the newest tick, with their ticks.
     scans: Vec<(u64, Scan)>,
     contact: OfTick<Option<ContactSample>>,
     last_keyframe: Option<MissionTime>,
@@ -138,7 +140,7 @@ impl Process for Shell {
             let target = self.inputs.target.next(tick)?.map(|sample| sample.target.position());
             let target = target.filter(|target| *target != self.runner.stage.target());
             self.step(Input::Tick(Tick { pose, ranges, scans, contact, target }))?;
-            // Its repeats may have pushed the window of this tick out of the planner's queue.
+            // Repeats may have pushed this tick's window out of the planner's queue.
             if is_repeated {
                 self.publish_again()?;
             }
@@ -172,7 +174,7 @@ impl Process for Shell {
 }
 
 impl Shell {
-    /// Let the step take `input`. Returns whether anything was published.
+    /// Returns whether anything was published.
     fn step(&mut self, input: Input) -> Result<bool, StageError> {
         self.take(Entry::Step(input, self.runner.out.at))
     }

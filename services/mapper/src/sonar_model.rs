@@ -1,10 +1,10 @@
-//! The sonar model: an echo, or none, as evidence for the cells around.
+//! Sonar model: an echo, or none, as evidence for the cells around.
 //!
-//! The X80's front sonar is one ultrasonic ranger: one byte of centimetres a frame, "nothing" included, from a cone of about 15 degrees
-//! to either side.
+//! The X80's front sonar is an ultrasonic ranger with a cone of about 15 degrees to either side. It
+//! gives one byte of centimetres per frame, "nothing" included.
 //!
-//! Angles are radians off the axis, to one side. Weights are integers in quarters of an echo heard in the middle of its arc; positive is
-//! for an obstacle, negative for free ground.
+//! Angles are radians off the axis, to one side. Weights are quarters of an echo in the middle of
+//! its arc: positive for an obstacle, negative for free ground.
 
 use std::f64::consts::TAU;
 
@@ -12,77 +12,79 @@ use common::mission::{Sensor, SensorModel};
 
 const DEGREE: f64 = TAU / 360.0;
 
-/// Side of a cell, metres: a third of the cone's width where a hit starts to matter, as fine as the sonar resolves.
+/// Cell size: the sonar's resolution, a third of the cone's width where hits start to matter.
 pub(crate) const RESOLUTION_M: f64 = 0.05;
 
-/// Error of an echo's range, metres: noise, the byte's centimetre, half a cell.
+/// Range error of an echo: noise, the byte's centimetre, half a cell.
 pub(crate) const BAND_M: f64 = 0.04;
-/// An echo's weight in the middle of its arc. It falls linearly to 0 at the end, where the sound is weakest, so that gaps stay open: a
-/// beam that points there hears an obstacle better.
+/// Weight in the middle of an echo's arc. It falls linearly to 0 at the end, where sound is
+/// weakest, so gaps stay open until a beam points there.
 pub(crate) const HIT: f64 = 4.0;
 
-/// An obstacle this far before an echo may be its cause, metres, so the beam does not free the ground there.
+/// Distance before an echo that stays unfreed, because its cause may be there.
 pub(crate) const BEFORE_M: f64 = 0.08;
-/// Ground this far behind an echo counts as scanned, metres.
+/// Distance behind an echo that counts as scanned.
 pub(crate) const BEHIND_M: f64 = 0.10;
-/// Weight taken off a passed cell.
+/// Weight taken from a passed cell.
 pub(crate) const PASS: i8 = 2;
-/// Less, because the beam's edge may have missed.
+/// The same at the beam's edge, which may have missed.
 pub(crate) const PASS_AT_EDGE: i8 = 1;
-/// The widest angle between two beams of which one is evidence against the other's echo. A smooth wall hit at a slant gives no echo,
-/// which says nothing against one heard square to it.
+/// Maximum angle between beams that contradict each other. A smooth wall at a slant gives no echo,
+/// so an echo at right angles stays valid.
 pub(crate) const SAME_SIDE: f64 = 35.0 * DEGREE;
 
-/// Weights are bounded, so that a few readings suffice where the world has changed.
+/// Bounds of weights: a few readings must suffice after a change.
 pub(crate) const LEAST: i8 = -8;
 pub(crate) const MOST: i8 = 12;
-/// A free cell becomes occupied at this weight, and an occupied one free at [`RELEASED`].
+/// Weight that makes a free cell occupied; [`RELEASED`] frees it.
 pub(crate) const OCCUPIED: i8 = 2;
 pub(crate) const RELEASED: i8 = 0;
-/// A cell of this weight on an echo's arc is its cause: the rest learns nothing.
+/// Weight at which a cell on an echo's arc is its cause; the others then keep theirs.
 pub(crate) const EXPLAINS: i8 = 6;
 
-/// The sonar counts as pointed at a cell that it cannot see up to here, metres.
+/// Range up to which the sonar counts as pointed at an invisible cell.
 pub(crate) const POINTED_M: f64 = 0.40;
-/// The cell counts as scanned after so many such readings: there is nothing more to learn.
+/// Number of such readings that make the cell scanned.
 pub(crate) const POINTED_ENOUGH: u8 = 4;
-/// Ground stays scanned for this way of the wheels, turns included, metres. By then the pose's error is about the clearance of hazards.
+/// Wheel travel, turns included, for which ground stays scanned. By then the pose error is about
+/// the clearance of hazards.
 pub(crate) const SCANNED_FOR_M: f64 = 1.5;
 
-/// An obstacle's greatest distance before its echo, metres: noise, the byte's centimetre.
+/// Maximum distance of an obstacle before its echo: noise, the byte's centimetre.
 pub(crate) const AHEAD_OF_ECHO_M: f64 = 0.05;
-/// A reading is evidence of free ground for this way of the wheels, turns included, metres.
+/// Wheel travel for which a reading is evidence of free ground.
 pub(crate) const CLEAR_FOR_M: f64 = 6.0;
 
-/// The footprint's rim that is not certainly free, because the pose drifts, metres.
+/// Rim of the footprint that may be occupied, because the pose drifts.
 pub(crate) const RIM_M: f64 = 0.02;
-/// An obstacle nearer to the robot survives the first reset, metres: the robot may touch it.
+/// Radius around the robot in which obstacles survive the first reset: it may touch them.
 pub(crate) const NEAR_M: f64 = 0.6;
 
-/// What depends on the sensor's field of view and reach.
+/// Parameters by the sensor's field of view and reach.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SonarModel {
-    /// Half the angle of an echo's spread, the model's widest. The cone's 15 degrees, rounded up.
+    /// Half the angle of an echo's arc: the cone's 15 degrees, rounded up.
     pub(crate) arc: f64,
-    /// Half the angle in which a beam is evidence against an earlier echo. Farther out it may have missed.
+    /// Half the angle of full evidence against an earlier echo; farther out the beam may have
+    /// missed.
     pub(crate) against: f64,
-    /// Half the widest such angle.
+    /// Half the angle of any such evidence.
     pub(crate) against_at_edge: f64,
-    /// Half the angle in which a silent beam scans ground. Less than the cone's, because a surface that only just reaches into the cone
-    /// deflects the sound.
+    /// Half the angle that silence scans: below the cone's, because a surface at its edge deflects
+    /// the sound.
     pub(crate) scanned: f64,
-    /// Half the angle in which the sonar counts as pointed at a cell that it cannot see.
+    /// Half the angle in which the sonar counts as pointed at an invisible cell.
     pub(crate) pointed: f64,
-    /// Ground is scanned up to here, metres. Echoes are mapped less far, because they are too wide there; silence still says that the
-    /// ground is free.
+    /// Range of scanned ground. Echoes are too wide there for mapping, but silence means free
+    /// ground.
     pub(crate) scanned_m: f64,
-    /// Silence excludes a surface square to the beam up to here, metres: half a metre less than the sonar's reach, where answers grow
-    /// weak.
+    /// Range up to which silence excludes a square surface: half a metre below the reach, where
+    /// answers grow weak.
     pub(crate) clear_m: f64,
 }
 
 impl SonarModel {
-    /// The X80's model, scaled by field of view and reach.
+    /// Scales the X80's model by field of view and reach.
     pub(crate) fn of(sensor: &Sensor) -> Self {
         let wide = sensor.field_of_view_deg / SensorModel::Dur5200.field_of_view_deg();
         let far = (sensor.reach_m / SensorModel::Dur5200.reach_m()).min(1.0);

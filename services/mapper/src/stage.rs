@@ -1,4 +1,4 @@
-//! The mapper as a stage: what it records, publishes and persists.
+//! Mapper as a stage: its records, publications and saved state.
 
 use common::{
     grid::Part,
@@ -16,7 +16,7 @@ use crate::step::{Belief, Change, Input, Mapper};
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Start {
     belief: Option<Belief>,
-    /// Oldest first, after the snapshot.
+    /// Inputs after the snapshot, oldest first.
     inputs: Vec<Input>,
 }
 
@@ -24,7 +24,7 @@ pub struct Start {
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry {
     Step(Input, Progress),
-    /// The whole map is published although nothing changed.
+    /// Publication of the whole, unchanged map.
     Again(Progress),
 }
 
@@ -47,7 +47,7 @@ impl Stage for Mapper {
         for input in start.inputs {
             self.step(input, Progress::default().time);
         }
-        // The last input's fix was published before.
+        // The last input's fix was already published.
         self.take_fix();
         restored
     }
@@ -57,7 +57,7 @@ impl Stage for Mapper {
             Entry::Step(input, at) => {
                 out.at = at;
                 let change = self.step(input.clone(), at.time);
-                // A belief that a fault made wrong is wrong in its journal, too.
+                // The journal also holds faults, which change later beliefs.
                 if change != Change::None || matches!(input, Input::Fault(_)) {
                     out.append(&input)?;
                 }

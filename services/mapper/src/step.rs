@@ -1,7 +1,8 @@
-//! The belief: which cells are hazard.
+//! Belief: the cells that are hazard.
 //!
-//! The paper's map only grows, (10). The cells of the target and under the robot never become hazard, and the perimeter never changes,
-//! (18). The evidential map follows the evidence both ways ([`Sensed::Evidence`]).
+//! The paper's map only grows (10). Cells of the target and under the robot never become hazard,
+//! and the perimeter is constant (18). The evidential map follows the evidence both ways
+//! ([`Sensed::Evidence`]).
 
 use common::{
     clock::MissionTime,
@@ -26,47 +27,46 @@ use crate::{
     sonar_model::MOST,
 };
 
-/// The belief follows from its inputs alone, so the journal holds them.
+/// Belief input. The belief follows from inputs alone, so the journal holds them.
 #[allow(clippy::large_enum_variant, reason = "one is held at a time")]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Input {
     Tick(Tick),
     Reset {
-        /// A belief that has begun already is not reset.
+        /// Only a newer epoch resets.
         epoch: u64,
     },
-    /// An operator's; it acts from the next tick on.
+    /// Operator's fault, in effect from the next tick.
     Fault(FaultKind),
-    /// In place of those before.
+    /// Replacement for all earlier zones.
     Zones(Vec<Zone>),
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tick {
     pub pose: PoseSample,
-    /// None if none came.
+    /// Readings; empty if none came.
     pub ranges: Vec<RangeReading>,
-    /// Those that came, at most one of a laser.
+    /// Scans, at most one per laser.
     pub scans: Vec<Scan>,
-    /// Something holds the wheels at this tick.
     pub contact: Option<ContactSample>,
-    /// It holds from this tick on, metres; none if unchanged.
+    /// Metres, from this tick on; none if unchanged.
     pub target: Option<DVec2>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Scan {
     pub row: usize,
-    /// Metres.
+    /// Ranges in metres.
     pub beams: Vec<f32>,
     pub sweep: Sweep,
 }
 
 #[derive(Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Nothing changed, and no stage waits for an answer.
+    /// No change; no stage waits for an answer.
     None,
-    /// It may have changed; an empty window answers the tick.
+    /// Cells that may have changed; an empty window answers the tick.
     Window(Window),
     Whole,
 }
@@ -74,30 +74,30 @@ pub enum Change {
 #[allow(clippy::large_enum_variant, reason = "a mapper has one")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Sensed {
-    /// Method `paper`: hits are marked in the cells and stay.
+    /// Method `paper`: hits mark cells permanently.
     Hits,
     Evidence(EvidenceMap),
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Belief {
-    /// A [`CellState`] byte a cell, row-major.
+    /// [`CellState`] bytes, row-major.
     #[serde(with = "serde_bytes")]
     cells: Vec<u8>,
     version: u64,
-    /// Ticks whose readings put a hazard on the map.
+    /// Ticks whose readings added a hazard.
     safety_events: u64,
     epoch: u64,
-    /// The last mapped tick, and the robot there: metres, radians.
+    /// Last mapped tick, and the robot's pose there: metres, radians.
     tick: Option<u64>,
     robot: DVec2,
     heading: f64,
-    /// Mean way of the wheels by then, turns on the spot included, metres.
+    /// Mean wheel travel, including turns on the spot, metres.
     rolled: f64,
     sensed: Sensed,
     fault: FaultKind,
     target: DVec2,
-    /// Later scans are matched with it; none before the first.
+    /// Matching reference; none before the first scan.
     reference: Option<Reference>,
 }
 
@@ -106,7 +106,7 @@ impl Belief {
         &self.cells
     }
 
-    /// 1 for a mission's first map.
+    /// Returns 1 for a mission's first map.
     pub const fn version(&self) -> u64 {
         self.version
     }
@@ -116,7 +116,8 @@ impl Belief {
     }
 }
 
-/// `state` gives the new state of each cell of `window`, whose old one it is told. Returns the changed window.
+/// Sets cells of `window` to the result of `state`, which gets the old one. Returns the changed
+/// window.
 fn paint(
     cells: &mut [u8],
     frame: &GridFrame,
@@ -135,7 +136,7 @@ fn paint(
     changed
 }
 
-/// Cells this near to a surface are hazard, metres.
+/// Returns the distance from surfaces within which cells are hazard, metres.
 pub fn hazard_reach_m(mission: &Mission) -> f64 {
     match mission.method {
         // A known surface blocks like a hit on it: its cell and the margin around.
@@ -146,12 +147,12 @@ pub fn hazard_reach_m(mission: &Mission) -> f64 {
     }
 }
 
-/// (19), or the evidential method.
+/// Mapper by (19) or the evidential method.
 #[derive(Clone, Debug)]
 pub struct Mapper {
     frame: GridFrame,
     target: Option<Cell>,
-    /// Shapes known from the mission, and the reach of their hazard, metres.
+    /// Mission's known shapes, and their hazard's reach, metres.
     known: (Shapes, f64),
     zones: Vec<Zone>,
     /// Im of (19).
@@ -166,15 +167,15 @@ pub struct Mapper {
     movers: Movers,
     poses: Poses,
     fix: Option<FixSample>,
-    /// Of all lasers.
+    /// Total beams of all lasers.
     beams: usize,
-    /// The time after which evidence is weaker by one, seconds, and the newest tick's; none if it is never.
+    /// Time in which evidence weakens by one, seconds, and the newest tick's; none if it lasts.
     forgets: Option<(f64, Option<MissionTime>)>,
     belief: Belief,
 }
 
 impl Mapper {
-    /// A map with the perimeter, (18), and the shapes that the mission knows beforehand.
+    /// Maps the perimeter (18) and the mission's known shapes.
     pub fn new(mission: &Mission) -> Self {
         let frame = mission.grid_frame();
         let margin = mission.margin_cells();
@@ -224,10 +225,10 @@ impl Mapper {
         &self.belief
     }
 
-    /// Go on from the belief of an earlier process.
+    /// Restores the belief of an earlier process.
     ///
     /// # Errors
-    /// When the belief is of another mission. Then the map stays as it is.
+    /// Returns an error and keeps the map if the belief is of another mission.
     pub fn restore(&mut self, mut belief: Belief) -> Result<(), ForeignState> {
         match (&self.belief.sensed, &mut belief.sensed) {
             (Sensed::Hits, Sensed::Hits) => {}
@@ -259,7 +260,6 @@ impl Mapper {
         }
     }
 
-    /// Whether the mission uses the sensor of this row.
     pub fn uses_row(&self, row: u64) -> bool {
         self.rows.uses_row(row)
     }
@@ -268,7 +268,7 @@ impl Mapper {
         self.rows.uses(reading)
     }
 
-    /// The newest scan and those before may give none.
+    /// Takes the newest tick's fix; scans may give none.
     pub const fn take_fix(&mut self) -> Option<FixSample> {
         self.fix.take()
     }
@@ -289,7 +289,7 @@ impl Mapper {
         self.frame.area() + evidence + 5 * self.beams + 256
     }
 
-    /// Room for an entry of the journal: it takes 250 bytes, and the beams of a scan four each.
+    /// Returns room for a journal entry, which takes 250 bytes plus four per beam.
     pub const fn entry_bytes(&self) -> usize {
         512 + 4 * self.beams
     }
@@ -323,7 +323,8 @@ impl Mapper {
         });
     }
 
-    /// What was sensed shows again where no zone is any more; the paper's hits are forgotten there.
+    /// Replaces the zones. Sensed cells of former zones show again; the paper's hits there are
+    /// lost.
     fn set_zones(&mut self, zones: Vec<Zone>) {
         self.zones = zones;
         let Self { frame, target, evidential, belief: Belief { cells, sensed, .. }, .. } = self;
@@ -338,7 +339,8 @@ impl Mapper {
         self.belief.version += 1;
     }
 
-    /// The cell of the new target is no hazard, and that of the old one may be again. Returns the changed window.
+    /// Frees the new target's cell; the old one may become hazard again. Returns the changed
+    /// window.
     fn move_target(&mut self, target: DVec2) -> Window {
         self.belief.target = target;
         let cell = self.frame.cell_at(target).filter(|cell| !self.frame.is_rim(*cell));
@@ -352,7 +354,7 @@ impl Mapper {
         changed
     }
 
-    /// The target, the known shapes and the evidence decide. The paper's hits are in its map alone.
+    /// Decides by target, known shapes and evidence. The paper's hits exist only in its map.
     fn state_for_target(&self, cell: Cell) -> CellState {
         let (known, reach) = &self.known;
         let is_target = Some(cell) == self.target;
@@ -368,7 +370,7 @@ impl Mapper {
         }
     }
 
-    /// Map readings and contact. Returns the changed window. A tick given twice is mapped once.
+    /// Maps a tick once, even if repeated. Returns the changed window.
     fn tick(
         &mut self,
         Tick { pose, ranges, scans, contact, target }: Tick,
@@ -381,7 +383,7 @@ impl Mapper {
         let changed = if self.belief.tick == Some(pose.stamp.tick) {
             moved
         } else {
-            // A scan whose place is not known is left out.
+            // Scans without a known pose are skipped.
             let placed = |scan: Scan| match scan {
                 Scan { row, beams, sweep } if sweep == Sweep::default() => {
                     Some(Placed { row, robot: pose, capture_ns: now.0, beams })
@@ -403,7 +405,6 @@ impl Mapper {
         changed
     }
 
-    /// Returns the changed window.
     fn forget(&mut self, now: MissionTime) -> Window {
         let (Some((step_s, newest)), Sensed::Evidence(map)) =
             (&mut self.forgets, &mut self.belief.sensed)
@@ -434,7 +435,7 @@ impl Mapper {
         (belief.robot, belief.heading) = (robot.position, robot.heading);
         let (ranges, scans) = if self.sensing { (ranges, scans) } else { (&[][..], &[][..]) };
         let (seen, is_event) = match &mut belief.sensed {
-            // Hazard where the front sonar hears an obstacle.
+            // The paper's method takes hits of the front sonar.
             Sensed::Hits => {
                 let hit = self.rows.front_hit(robot, ranges);
                 let near = hit.filter(|(distance, _)| *distance <= self.map_within);
@@ -481,7 +482,7 @@ impl Mapper {
         })
     }
 
-    /// The hit's cell and the margin around it, (19), as far as they lie in the map.
+    /// Marks the hit's cell and the margin around it (19), clipped to the map.
     fn mark(&mut self, hit: DVec2, robot: DVec2) -> Window {
         let margin = f64::from(self.margin);
         let middle = self.frame.to_cells(hit).round();
@@ -505,8 +506,8 @@ impl Mapper {
         )
     }
 
-    /// Reset to the perimeter and the known shapes, if `epoch` is newer. The evidential method keeps echoes from near the robot. Returns
-    /// whether it did.
+    /// Resets to the perimeter and known shapes if `epoch` is newer, and returns whether it was.
+    /// The evidential method keeps echoes near the robot.
     fn reset_belief(&mut self, epoch: u64) -> bool {
         if epoch <= self.belief.epoch {
             return false;
@@ -536,7 +537,7 @@ impl Mapper {
         true
     }
 
-    /// Mark an injected fault's hazard. Returns the changed window.
+    /// Marks an injected fault's hazard. Returns the changed window.
     fn falsify(&mut self) -> Window {
         let Self { frame, target, belief, .. } = self;
         let Some(area) = fault::hazard(belief.fault, belief.robot, belief.target) else {

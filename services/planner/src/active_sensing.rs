@@ -1,11 +1,12 @@
-//! Active sensing: the evidential method looks before the robot goes.
+//! Active sensing of the evidential method: the robot scans ground before it drives there.
 //!
-//! The one sonar looks ahead, the body is wider than its cone, and a slanted surface does not answer. So the sonar must first have been
-//! pointed at the ground ahead, and square to every surface that could be touched there. The robot goes no faster than it could stop
-//! before the next believed hazard or unscanned ground.
+//! The sonar cone is narrower than the body, and slanted surfaces reflect its sound away. The sonar
+//! must first have pointed at the ground ahead, and square to every surface that the body could
+//! touch there. The speed limit lets the robot stop before the next believed hazard or unscanned
+//! ground.
 //!
-//! Advice follows from belief and pose: a scan turns the sonar tick by tick to unscanned ground, so a restarted planner continues it.
-//! The only memory is the side of a scan: wheels lag, so a side chosen anew each tick could alternate.
+//! Advice follows from belief and pose, so a restarted planner continues a scan. Only the side of a
+//! scan is stored: wheels lag, so a side chosen per tick could alternate.
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
@@ -21,44 +22,44 @@ use crate::{
     view::{STEP_M, View},
 };
 
-/// Ground ahead that must be scanned, without a surface that could be touched undetected, metres.
+/// Length of ground ahead that must be scanned, without undetected surfaces, metres.
 const SCANNED_AHEAD_M: f64 = 0.25;
-/// The planned way is followed so far, metres; the arc at least so far.
+/// Length of the followed field line, and least length of the arc, metres.
 const AHEAD_M: f64 = 0.6;
-/// The robot heads for a point of the planned way so many radii of its body ahead.
+/// Distance to the point that the robot heads for, in body radii.
 const AIM_RADII: f64 = 2.4;
 
 #[derive(Clone, Copy)]
 pub(crate) enum Advice {
-    /// No faster than this, m/s, and in this direction, a unit vector.
+    /// Drive with this speed limit, m/s, in this direction, a unit vector.
     Go(f64, DVec2),
-    /// Turn on the spot until this unit vector is faced.
+    /// Turn on the spot to this unit vector.
     Look(DVec2),
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct ActiveSensing {
     radius: f64,
-    /// It must be scanned so far around the way's middle, metres.
+    /// Radius of ground to scan around each point of the way, metres.
     ground_m: f64,
-    /// None for a disc.
     pub(crate) outline: Option<Outline>,
     speed: f64,
     turn: f64,
     response: Response,
-    /// The time until the robot brakes, seconds.
     brakes_within_s: f64,
-    /// Turns the robot's axis to the front sonar's, which is turned for a look.
+    /// Bearing of the front sonar in the body frame, a unit vector.
     bearing: DVec2,
-    /// The arc is followed so far: at top speed the robot can stop there, metres.
+    /// Length of the arc, metres: at least the stopping distance at top speed.
     ahead_m: f64,
     sonars: usize,
-    /// Its beams end at a surface of any angle, so ground that scans leave free is free.
+    /// Whether a laser scans. It detects surfaces of any angle, so scanned ground is free.
     has_laser: bool,
-    /// Whether it heads for a point of the way ahead. A body that is no disc fits on the way itself, and a front sonar alone
-    /// sees nothing of what it passes: such a robot touched twice as often.
+    /// Whether the robot heads for a point of the way ahead.
+    ///
+    /// Bodies other than discs fit only on the way itself. A front sonar alone sees nothing beside
+    /// it; with aiming, such a robot touched twice as often.
     aims: bool,
-    /// Left is 0, right is 1; none without a scan.
+    /// Side of the current scan: left is 0, right is 1.
     scan_side: Option<usize>,
 }
 
@@ -86,7 +87,6 @@ impl ActiveSensing {
         }
     }
 
-    /// `direction` is a unit vector.
     pub(crate) fn advise(
         &mut self,
         view: &View<'_>,
@@ -119,7 +119,8 @@ impl ActiveSensing {
         }
     }
 
-    /// The limit by the newest readings along the robot's axis, m/s: none towards an echo right before the body.
+    /// Returns the speed limit by the newest readings along the robot's axis, m/s: 0 for an echo
+    /// right before the body.
     pub(crate) fn limit_before_echoes(&self, belief: &GridHeader, pose: &Pose2) -> f64 {
         let clear_m = clear_ahead_m(belief, pose, self.radius, self.sonars);
         if clear_m < STANDS_BEFORE_M {
@@ -128,7 +129,8 @@ impl ActiveSensing {
         self.response.speed_to_stop_within(clear_m, self.brakes_within_s)
     }
 
-    /// Whether the body may go to `at` along `axis`: no hazard is there, and no ground that is not scanned.
+    /// Returns whether a body along `axis` may go to `at`: scanned, without hazards or undetected
+    /// surfaces.
     fn is_open(
         &self,
         view: &View<'_>,
@@ -141,8 +143,10 @@ impl ActiveSensing {
             && (self.has_laser || undetected.normals(at, axis).next().is_none())
     }
 
-    /// The direction to a point of the `way` ahead, with an open line to it. The field bends right before a hazard, so a robot that follows
-    /// its local direction towards the middle of a drum is at the drum before it turns.
+    /// Returns the direction to the farthest point of the `way` that a straight open line reaches.
+    ///
+    /// The field bends only right before a hazard. A robot that follows its local direction reaches
+    /// a drum in its path before it turns.
     fn aim(
         &self,
         view: &View<'_>,
@@ -161,8 +165,10 @@ impl ActiveSensing {
         points.filter(|_| self.aims).find(is_open)?.try_normalize()
     }
 
-    /// The speed by the readings and by the arc on which the controller turns the robot into `direction`, m/s. Where the arc allows
-    /// none, a robot that faces a permitted way would stand for ever: it goes as slowly as it can, if the readings allow.
+    /// Returns the speed limit by readings and by the controller's arc into `direction`, m/s.
+    ///
+    /// A robot that faces a permitted way keeps the least speed if the readings allow it, so a
+    /// blocked arc cannot stop it forever.
     fn limit(
         &self,
         view: &View<'_>,
@@ -188,14 +194,17 @@ impl ActiveSensing {
     }
 }
 
-/// The direction to turn to from `axis` to scan all of `unseen`: the far end of a side. A scan stays on its `side` until nothing is
-/// unseen there; a new one begins on the side whose nearest direction is nearer.
+/// Returns the direction that ends a scan of `unseen` directions from `axis`: the far end of one
+/// side.
+///
+/// A scan keeps its `side` until that side is seen. A new scan begins on the side with the nearest
+/// direction.
 fn scan(
     axis: DVec2,
     unseen: impl Iterator<Item = DVec2>,
     side: &mut Option<usize>,
 ) -> Option<DVec2> {
-    // Left and right: the least angle, the greatest one, and the direction of that.
+    // Left and right: least angle, greatest angle and its direction.
     let mut sides = [(f64::INFINITY, -1.0, axis); 2];
     for there in unseen {
         let angle = axis.angle_to(there);

@@ -1,16 +1,20 @@
-//! The cell that the field leads to.
+//! Cell that the field leads to.
 //!
-//! The pose drifts against the world, where the target is a point: near it the robot may find the target's cell where the body cannot
-//! be. Then the field leads to the nearest free cell, where the robot has arrived. The paper's method never marks the target's own cell,
-//! but margins may cover all around it; then the field leads to a free cell from which the target counts as reached.
+//! The target is a point in the world, and the pose drifts. The robot may therefore find the
+//! target's cell where its body cannot be. The field then leads to the nearest free cell, where the
+//! robot counts as arrived.
+//!
+//! The paper's method never marks the target's own cell, but margins may surround it. The field
+//! then leads to a free cell within the arrival tolerance.
 
 use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;
 
-/// The farthest that such a cell may be from its target, metres: less than the body's width.
+/// Limit of the distance from that cell to the target, metres; less than the width of the body.
 const REACH_M: f64 = 0.35;
 
-/// The nearest cell to `target` with free cells all around, or its own if none is within reach; none outside the map.
+/// Returns the nearest cell to `target` with free cells all around, else the target's own; `None`
+/// outside the map.
 pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cell> {
     let own = frame.cell_at(target)?;
     let is_open = |cell: Cell| around(frame, cell, 1).all(|cell| is_free(frame, cells, cell));
@@ -18,7 +22,8 @@ pub(crate) fn cell(frame: &GridFrame, cells: &[u8], target: DVec2) -> Option<Cel
         .or_else(|| cell_with_a_way_in(frame, cells, target, REACH_M))
 }
 
-/// The nearest free cell within `reach_m` that has a free neighbour; the target's own if there is none, none outside the map.
+/// Returns the nearest free cell within `reach_m` that has a free neighbour, else the target's own;
+/// `None` outside the map.
 pub(crate) fn cell_with_a_way_in(
     frame: &GridFrame,
     cells: &[u8],
@@ -38,7 +43,7 @@ fn is_free(frame: &GridFrame, cells: &[u8], cell: Cell) -> bool {
     !CellState::from_byte(cells[frame.index(cell)]).is_hazard()
 }
 
-/// The cell itself, or the nearest to `place` within `reach_m` for which `fits` says so.
+/// Returns `own`, or the nearest cell to `place` within `reach_m`, for which `fits` holds.
 fn nearest(
     frame: &GridFrame,
     (own, place): (Cell, DVec2),
@@ -67,7 +72,6 @@ mod tests {
 
     const FRAME: GridFrame = GridFrame { cells: 41, resolution_m: 0.05, centre: DVec2::ZERO };
 
-    /// The place of the cell to lead to, on a map with hazard where `is_hazard` says so of a cell's middle.
     fn aim(target: DVec2, is_hazard: impl Fn(DVec2) -> bool) -> Option<DVec2> {
         let mut cells = vec![CellState::Free as u8; FRAME.area()];
         for cell in FRAME.whole().cells().filter(|cell| is_hazard(FRAME.centre_of(*cell))) {

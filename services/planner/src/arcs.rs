@@ -1,7 +1,8 @@
-//! The evidential direction of a car: along the drivable arc that gets farthest along the field.
+//! Evidential direction of a car: along the drivable arc with the most progress along the field.
 //!
-//! The field turns sharper than a car, so arcs of several curvatures are followed over the belief. One that a hazard cuts off before the
-//! car could stop is excluded; the best has the greatest line integral of the field's direction. If all are excluded, the car stands.
+//! The field turns tighter than a car, so arcs of several curvatures are followed over the belief.
+//! An arc with less free length than [`LEAST_FREE_M`] is excluded. The best arc has the greatest
+//! line integral of the field direction. If all are excluded, the car stands.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -14,20 +15,20 @@ use harmonic::Guidance;
 
 use crate::view::View;
 
-/// To either side of straight ahead.
+/// Arcs to either side of straight ahead.
 const ARCS_A_SIDE: i32 = 8;
-/// Looked-at points of an arc are so far apart.
+/// Distance between checked points of an arc, metres.
 const STEP_M: f64 = 0.05;
-/// An arc is followed so far, metres.
+/// Length of an arc, metres.
 const AHEAD_M: f64 = 0.8;
-/// The time until the car brakes, seconds: periods of sonar and radio, the wheels' lag.
+/// Time until the car brakes, seconds: sonar period, radio period and wheel lag.
 const STOPS_WITHIN_S: f64 = 0.6;
-/// An arc cut off sooner is not driven, metres.
+/// Least free length of a drivable arc, metres.
 const LEAST_FREE_M: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arcs {
-    /// The tightest circle's, 1/m.
+    /// Curvature of the tightest circle, 1/m.
     most_curvature: f64,
     speed: f64,
     turn: f64,
@@ -38,13 +39,13 @@ pub(crate) struct Arcs {
 #[derive(Clone, Copy)]
 struct Followed {
     curvature: f64,
-    /// The length until a hazard.
+    /// Length before the first hazard.
     free_m: f64,
     progress_m: f64,
 }
 
 impl Arcs {
-    /// None for a robot that can turn on the spot.
+    /// Returns `None` for a robot that can turn on the spot.
     pub(crate) fn new(mission: &Mission) -> Option<Self> {
         let car = mission.body().ackermann()?;
         Some(Self {
@@ -56,8 +57,10 @@ impl Arcs {
         })
     }
 
-    /// The direction, a unit vector, that drives the best arc, and the most speed on it, m/s; no speed where there is no way on. The
-    /// target is `distance` metres away.
+    /// Returns the direction of the best arc, a unit vector, and its speed limit, m/s; 0 without a
+    /// drivable arc.
+    ///
+    /// `distance` is that to the target, metres.
     pub(crate) fn advise(&self, view: &View<'_>, pose: &Pose2, distance: f64) -> (DVec2, f64) {
         let arcs = (-ARCS_A_SIDE..=ARCS_A_SIDE).map(|number| {
             let share = f64::from(number) / f64::from(ARCS_A_SIDE);
@@ -91,9 +94,10 @@ impl Arcs {
         arc
     }
 
-    /// The direction that makes (15) and (16) give `curvature`.
+    /// Returns the direction for which (15) and (16) give `curvature`.
     fn direction(&self, pose: &Pose2, curvature: f64, distance: f64) -> DVec2 {
-        // The turn rate is wd s and the speed vd (1 - s/2), less near the target, with the sine s to the direction.
+        // With s the sine of the angle to the direction, the turn rate is wd s and the speed vd (1
+        // - s/2), less near the target.
         let speed = self.speed * (distance / self.slow_radius).min(1.0);
         let sine = curvature * speed / (self.turn + curvature.abs() * speed / 2.0);
         let angle = if sine.abs() < 1.0 { sine.asin() } else { FRAC_PI_2.copysign(sine) };
@@ -102,7 +106,7 @@ impl Arcs {
 }
 
 impl View<'_> {
-    /// Unit vector; zero where the field gives none.
+    /// Returns the field direction at `at`, a unit vector; zero if the field gives none.
     pub(crate) fn along(&self, at: DVec2) -> DVec2 {
         match self.guidance(at) {
             Guidance::Along(direction) | Guidance::WayOut(direction) => direction.into(),

@@ -1,4 +1,4 @@
-//! A thread that does jobs one by one beside the tick; the process's real-time priority, if any, is the tick's thread's alone.
+//! Thread that runs jobs in order beside the tick; only the tick's thread has real-time priority.
 
 use std::{
     io::{self, Read as _, Write as _},
@@ -16,20 +16,20 @@ use thread_priority::{
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
-/// Dropping this cancels the running job, if it can be, and waits for it.
+/// Background thread; dropping it cancels the running job, if possible, and waits for it.
 pub(crate) struct Background<Job, Done> {
     jobs: Option<Sender<Job>>,
     results: Receiver<Done>,
     done: UnixStream,
     unread: u64,
-    /// Read ends whose results were not taken; negative if results were taken whose ends are unread.
+    /// End signals read minus results taken.
     ended: i64,
     thread: Option<JoinHandle<()>>,
     cancellation: Cancellation,
 }
 
 impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
-    /// Fails when the system gives no pipe or thread.
+    /// Fails if the system gives no pipe or thread.
     pub(crate) fn start(
         name: &str,
         cancellation: Cancellation,
@@ -39,7 +39,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         let (finished, results) = channel();
         let (done, mut wakeup) = UnixStream::pair()?;
         done.set_nonblocking(true)?;
-        // A full pipe is readable already.
+        // A full pipe is already readable.
         wakeup.set_nonblocking(true)?;
         let all = move || {
             behind_stages();
@@ -70,7 +70,9 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         }
     }
 
-    /// The end must have been signalled: a signal after its result was taken would wake the process for ever.
+    /// Takes a result whose end was signalled.
+    ///
+    /// A signal that arrives after its result would wake the process forever.
     pub(crate) fn take(&mut self) -> Option<Done> {
         self.drain();
         let result = (self.ended > 0).then(|| self.results.try_recv().ok()).flatten();
@@ -78,7 +80,7 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         result
     }
 
-    /// Waits for it. None when the thread has ended.
+    /// Waits for a result; `None` after the thread has ended.
     pub(crate) fn wait(&mut self) -> Option<Done> {
         let result = self.results.recv().ok();
         self.ended -= i64::from(result.is_some());
@@ -88,7 +90,6 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
 
     fn drain(&mut self) {
         let mut wakeups = [0; 64];
-        // Without a job the system call is unnecessary.
         while self.unread > 0 {
             match self.done.read(&mut wakeups) {
                 Ok(read @ 1..) => {
@@ -113,17 +114,19 @@ impl<Job, Done> Drop for Background<Job, Done> {
         self.jobs = None;
         self.cancellation.cancel();
         if let Some(thread) = self.thread.take() {
-            // The thread's panic has been printed, and the process ends anyway.
+            // The panic of the thread was printed, and the process ends anyway.
             let _ = thread.join();
         }
     }
 }
 
-/// Niceness 10 by [`ThreadPriority::Crossplatform`], where 99 is the highest priority.
+/// Niceness 10 in [`ThreadPriority::Crossplatform`], where 99 is the highest priority.
 const NICENESS_10: u8 = 22;
 
-/// Give this thread a tenth of a stage's share of a processor that both want, and no less: a killed process ends only once each of its
-/// threads has run, and others wait for its locks in the kernel. With SCHED_IDLE both took seconds on a busy machine.
+/// Reduces this thread to a tenth of a stage's share of a contended processor.
+///
+/// With SCHED_IDLE, the end of a killed process took seconds on a busy machine. Each of its threads
+/// has to run first, while others wait for its kernel locks.
 fn behind_stages() {
     let Ok(value) = ThreadPriorityValue::try_from(NICENESS_10) else {
         return;
@@ -149,7 +152,7 @@ mod tests {
             thread.jobs = None;
             thread.thread.take().unwrap().join().unwrap();
             let error = thread.done.read(&mut [0]).map_err(|error| error.kind());
-            // The end of the thread is readable, too, and has no byte.
+            // The end of the thread is readable too, without a byte.
             assert!(matches!(error, Ok(0) | Err(io::ErrorKind::WouldBlock)), "{error:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! The background solver solves the newest map while the robot follows the field before.
+//! Background solver: it solves the newest map while the robot follows the previous field.
 
 use std::{io, sync::Arc, time::Instant};
 
@@ -9,7 +9,7 @@ use crate::{
     step::{Job, Solved},
 };
 
-/// A solve starts from the field before.
+/// Solver that starts from its previous field.
 #[derive(Default)]
 pub(crate) struct Worker {
     solver: Solver,

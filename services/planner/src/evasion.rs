@@ -1,13 +1,17 @@
-//! The robot is not where things that move will be.
+//! Evasion of moving obstacles.
 //!
-//! Ways of some seconds are foreseen as controller and base would follow them, leg after leg: as the field advises, in all directions
-//! around, back if a laser looks there, and to stand. Movers are foreseen as discs that go straight on. What the robot would come near to
-//! is a danger, the less the later. Advice without danger is followed. Otherwise the robot begins the way with the greatest gain along the
-//! field less its danger, so it steps aside early. It goes only where it could brake after the next tick and be at rest before it meets
-//! something, or where the whole way meets nothing: what runs into a robot at rest is not that robot's fault.
+//! The module predicts paths of some seconds, leg after leg, as controller and base would follow
+//! them. Legs follow the field, go in all directions, back up if a laser covers the rear, or stand.
+//! Movers are discs with constant velocity. Proximity to a mover is a danger that fades with time.
 //!
-//! A robot that was kept from its way for long insists on it: among people who give way it would stand and back off until its time runs
-//! out. It still goes only where it could rest in time. It evades again for its next target, and once nothing moved near it for as long.
+//! Advice without danger is followed. Otherwise the robot begins the path with the greatest gain
+//! along the field minus danger, so it steps aside early. It moves only if it could brake after the
+//! next tick and rest before any contact, or if the whole path is free. A robot at rest is not at
+//! fault for a contact.
+//!
+//! A robot hindered for long insists on its way. Otherwise, people who give way would make it stand
+//! and back off until its time ends. It still moves only where it could rest in time. It evades
+//! again for its next target, or once nothing has moved near it for as long.
 
 use std::f64::consts::{PI, TAU};
 
@@ -28,68 +32,73 @@ const AHEAD_S: f64 = 5.0;
 const DIRECTIONS: u32 = 16;
 /// Shares of the top speed.
 const SPEEDS: [f64; 2] = [1.0, 0.5];
-/// A robot in motion meets what comes nearer than this, metres, and its growth, m/s: movers turn and change their speed.
+/// Least gap between a moving robot and a mover, metres, and its growth, m/s, because movers turn
+/// and change speed.
 const APART_M: f64 = 0.1;
 const GROWS_M_S: f64 = 0.15;
-/// Danger is 1 at a touch now, and falls by a factor of e in so many metres and seconds. The doubt of a velocity counts up to m/s.
+/// Danger is 1 at a touch now and falls by a factor of e per `NEAR_M` and per `SOON_S`.
+///
+/// The velocity uncertainty counts up to `MOST_DOUBT_M_S`.
 const NEAR_M: f64 = 0.3;
 const SOON_S: f64 = 4.0;
 const MOST_DOUBT_M_S: f64 = 0.4;
 const MOST_DANGER: f64 = 3.0;
-/// Less changes no advice. The gain of the way at top speed along the advice outweighs so much less danger: with a third of that a
-/// robot of 0.7 m/s hardly got on among people who give way to it.
+/// Danger below which advice is kept, and danger that the gain at top speed along the advice
+/// outweighs.
+///
+/// With a third of `GAIN`, a robot of 0.7 m/s hardly advanced among people who give way.
 const LEAST_DANGER: f64 = 0.1;
 const GAIN: f64 = 1.0;
-/// Hazard this near to where a mover was within so many seconds may be its own, metres, because its trace fades within two scans.
+/// Hazard this near to a mover's place within the last `TRACE_S` may be its own trace, which fades
+/// within two scans.
 const TRACE_M: f64 = 0.1;
 const TRACE_S: f64 = 0.3;
-/// A way has legs that end after so many seconds. So many are gone on from, no two of which end alike.
+/// End times of the legs of a path; `KEPT` paths continue, no two of which end alike.
 const LEGS_S: [f64; 5] = [0.5, 1.0, 2.0, 3.5, AHEAD_S];
 const KEPT: usize = 16;
 const ALIKE_M: f64 = 0.25;
 const ALIKE_M_S: f64 = 0.3;
-/// At the beginning of a run the robot stands for some seconds, to see what moves.
+/// Time that the robot stands at the start of a run to detect movers, seconds.
 const WATCHES_S: f64 = 0.5;
-/// Wheels that lag are as good as at rest, m/s.
+/// Speed below which lagging wheels count as at rest, m/s.
 const FADED_M_S: f64 = 0.05;
-/// What is farther away is no danger, metres.
+/// Distance beyond which a mover is harmless, metres.
 const FAR_M: f64 = 1.5;
-/// A robot insists on its way after movers kept it from there for so long, seconds, less the time for which they did not.
+/// Time of hindrance by movers, less the time without, after which the robot insists, seconds.
 const PATIENCE_S: f64 = 16.0;
-/// It goes on with these shares of the advised speed. A slow robot rests soon.
+/// Shares of the advised speed for an insisting robot; a slow robot rests soon.
 const PATIENT_SPEEDS: [f64; 3] = [1.0, 0.5, 0.25];
-/// The longest time between two answers that counts, seconds.
+/// Longest time between two answers that counts, seconds.
 const LONGEST_TICK_S: f64 = 1.0;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Evasion {
     radius: f64,
-    /// Hazards are inflated by this, and the rest of the body's radius.
+    /// Inflation of hazards, and the remaining radius of the body, metres.
     inflated_m: f64,
     rest_m: f64,
     motion: MotionModel,
-    /// The wheels of a robot that is at rest by the model, whose lag is a delay, turn on for so long.
+    /// Time that lagging wheels still turn when the model is at rest, seconds.
     fades_s: f64,
-    /// A laser looks there.
+    /// Whether a laser covers the rear.
     backs: bool,
-    /// The newest answer's time, and how long movers kept the robot from its way, seconds.
+    /// Time of the newest answer, and how long movers hindered the robot, seconds.
     answered_s: f64,
     kept_s: f64,
     insists: bool,
 }
 
-/// A mover.
 #[derive(Clone, Copy)]
 struct Disc {
     at: DVec2,
     velocity: DVec2,
     radius: f64,
-    /// The distance from the robot's centre at a touch, metres.
+    /// Distance from the robot's centre at a touch, metres.
     touches_m: f64,
     doubt_m_s: f64,
 }
 
-/// The body is free at any heading, may touch a hazard with its corners, or touches it with its sides.
+/// Contact of the body with hazards: none at any heading, corners possible, or sides certain.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Near {
     Free,
@@ -99,17 +108,17 @@ enum Near {
 
 #[derive(Clone, Copy)]
 struct Way {
-    /// Its first and its newest leg.
+    /// First and newest leg.
     first: Advice,
     last: Advice,
-    /// Whether the robot comes to rest without a touch if it brakes after the next tick.
+    /// Whether the robot rests without a touch if it brakes after the next tick.
     rests: bool,
     now: Moving,
     steps: u32,
     moved_s: f64,
-    /// The least that the robot was near to a hazard since the start: it goes no nearer.
+    /// Least contact with a hazard since the start, which later steps may not exceed.
     near: Near,
-    /// When the robot meets something that moves, while it moves itself, and when it is at a hazard; infinite for never.
+    /// Times at which the moving robot meets a mover and reaches a hazard; infinite for never.
     meets_s: f64,
     hazard_s: f64,
     danger: f64,
@@ -117,7 +126,7 @@ struct Way {
 }
 
 impl Evasion {
-    /// None for a robot that does not see what moves, and for one that cannot turn on the spot.
+    /// Returns `None` for a robot that cannot detect movers or turn on the spot.
     pub(crate) fn new(mission: &Mission) -> Option<Self> {
         let body = mission.body();
         let half_width = mission.outline().map_or(body.radius_m, |it| it.half_width_m());
@@ -135,12 +144,11 @@ impl Evasion {
         })
     }
 
-    /// Starts over for another target.
     pub(crate) fn forget_encounter(&mut self) {
         (self.kept_s, self.insists) = (0.0, false);
     }
 
-    /// The field's `advice` for a robot at `pose`, or another one because of `movers`.
+    /// Returns the field's `advice` for a robot at `pose`, or other advice because of `movers`.
     pub(crate) fn advise(
         &mut self,
         view: &View<'_>,
@@ -156,10 +164,10 @@ impl Evasion {
         }
         let scene = Scene::new(self, view, movers, pose.pose());
         let safe = self.safe(&scene, pose, advice);
-        // A limit that is no number is one that is kept, too.
+        // A NaN limit that is kept also counts as the same.
         let is_same = safe.2.total_cmp(&advice.2).is_eq();
         let follows = (safe.0, safe.1) == (advice.0, advice.1) && is_same;
-        // Whoever insists follows its way, so only an empty scene tells that the encounter is over.
+        // An insisting robot follows its way, so only an empty scene ends the encounter.
         let is_free = scene.discs.is_empty() || follows && !self.insists;
         let change_s = if is_free { -for_s } else { for_s };
         self.kept_s = (self.kept_s + change_s).clamp(0.0, PATIENCE_S);
@@ -225,7 +233,7 @@ fn around(directions: u32, speed: f64) -> impl Iterator<Item = Advice> {
     })
 }
 
-/// The best ways, no two of them alike.
+/// Returns the best paths, no two of them alike.
 fn best(mut ways: Vec<Way>, score: impl Fn(&Way) -> f64) -> Vec<Way> {
     ways.sort_by(|one, other| score(other).total_cmp(&score(one)));
     let mut kept: Vec<Way> = Vec::with_capacity(KEPT);
@@ -250,13 +258,13 @@ struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// Movers that the robot does not meet by then are left out.
+    /// Leaves out movers that the robot cannot meet within the prediction.
     fn new(evasion: &'a Evasion, view: &'a View<'a>, movers: &[Mover], start: Pose2) -> Self {
         let reach_m = AHEAD_S * evasion.motion.speed + FAR_M;
         let comes = |disc: &Disc| {
             let way = AHEAD_S * disc.velocity;
             let share = (start.position - disc.at).dot(way) / way.length_squared();
-            // The share is no number for what stands.
+            // The share is NaN for a mover that stands.
             let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
             (disc.at + share * way).distance(start.position) <= reach_m + disc.touches_m
         };
@@ -303,8 +311,9 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// How the robot fares that follows `to` on from `way` until `until_s`, and stands before a hazard. From where it is too near by now,
-    /// it may go away, and no nearer.
+    /// Continues `way` along `to` until `until_s`; the robot stands before a hazard.
+    ///
+    /// A robot too near to a hazard may leave it but come no nearer.
     fn go(&self, way: Way, to: Advice, until_s: f64) -> Way {
         let motion = &self.evasion.motion;
         let dead_s = motion.dead_s();
@@ -342,7 +351,7 @@ impl<'a> Scene<'a> {
         STEP_S * f64::from(way.steps) <= way.moved_s + self.evasion.fades_s
     }
 
-    /// Whether the robot that brakes now comes to rest before it meets anything.
+    /// Returns whether the robot rests before any contact if it brakes now.
     fn rests(&self, mut way: Way) -> bool {
         while way.meets_s.is_infinite() && way.hazard_s.is_infinite() {
             let next_s = STEP_S * f64::from(way.steps + 1);
@@ -354,7 +363,7 @@ impl<'a> Scene<'a> {
         false
     }
 
-    /// The robot on its `way` is where something may be after `at_s` seconds.
+    /// Updates contact and danger of `way` after `at_s` seconds.
     fn meet(&self, way: &mut Way, at_s: f64, moves: bool) {
         let at = way.now.pose.position;
         for disc in &self.discs {

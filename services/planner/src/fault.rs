@@ -1,9 +1,10 @@
-//! The planner's fault: a wrong field.
+//! Injected fault of the planner: a wrong field.
 
 use harmonic::{Cell, Field, Scaled};
 
-/// Overwrites u wherever the target can be reached, so that every way leads to `summit`, in cell units: u halves with each cell away
-/// from it, through walls too. The field's verification stays.
+/// Overwrites u so that every reachable cell leads to `summit`, in cell units.
+///
+/// u halves per cell of distance, through walls too. The verification of the field stays.
 pub(crate) fn lead_astray(field: &mut Field, summit: [f64; 2]) {
     field.overwrite(|Cell { col, row }| {
         let away = (col as f64 - summit[0]).hypot(row as f64 - summit[1]);

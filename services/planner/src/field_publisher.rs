@@ -1,4 +1,5 @@
-//! Topic `field`: a thread computes every cell's policy from the field at the end of a tick, so that no later tick waits for it.
+//! Topic `field`: after a tick, a thread computes the policy of every cell, so later ticks need not
+//! wait.
 
 use std::{
     io,
@@ -34,11 +35,11 @@ impl Policy {
 struct Computed {
     policy: Policy,
     at: Progress,
-    /// Where the policy differs from the one before.
+    /// Window where the policy differs from the previous one.
     changed: Window,
 }
 
-/// While it computes a policy the thread offers the processor to others so often; each time it may have to wait.
+/// Yields of the thread per policy; each may make it wait.
 const YIELDS: usize = 8;
 
 #[derive(Default)]
@@ -50,7 +51,7 @@ impl Worker {
     fn compute(&mut self, (snapshot, at): (Snapshot, Progress)) -> Computed {
         let frame = snapshot.frame;
         let every = (frame.cells as usize).div_ceil(YIELDS);
-        // A stage that waits for this processor gets it here; otherwise it might wait for some milliseconds.
+        // This avoids a wait of some milliseconds for a stage on this processor.
         let yields = |row: usize| {
             if row.is_multiple_of(every) {
                 std::thread::yield_now();
@@ -67,7 +68,7 @@ impl Worker {
     }
 }
 
-/// Decides what to publish of which policy: the changed window, or the whole when that is due or there is a new reader.
+/// Publisher of the changed window of a policy, or of all of it if due or for a new reader.
 pub(crate) struct FieldPublisher {
     thread: Background<(Snapshot, Progress), Computed>,
     busy: bool,
@@ -109,8 +110,10 @@ impl FieldPublisher {
         self.busy
     }
 
-    /// The part of `policy` to publish `now`, and its tick. A ready policy replaces `policy` and has its own tick; one that is published
-    /// again has that of `now`.
+    /// Returns the part of `policy` to publish `now`, and its tick.
+    ///
+    /// A ready policy replaces `policy` and keeps its own tick; a repeated one gets the tick of
+    /// `now`.
     pub(crate) fn next(
         &mut self,
         now: Progress,

@@ -1,5 +1,7 @@
-//! The planner stage: hazard cells in, guidance out, equation (11). The library `harmonic` solves the field. [`step`] is pure, [`stage`]
-//! records and publishes it, [`shell`] is the process, and [`background_solver`] solves large maps on a thread.
+//! Planner stage: hazard cells in, guidance out, equation (11).
+//!
+//! The library `harmonic` solves the field. [`step`] is pure, [`stage`] records and publishes it,
+//! [`shell`] is the process, and [`background_solver`] solves large maps on a thread.
 
 mod active_sensing;
 mod aim;

@@ -1,5 +1,7 @@
-//! How a base moves on under the controller's law: its wheels gain and lose speed at a limited rate, so a heavy one goes on along the curve
-//! that it drives, and one that is told to turn on the spot hardly brakes.
+//! Motion of a base under the control law.
+//!
+//! Its wheels accelerate at a limited rate. A heavy base therefore continues along its current
+//! curve, and one commanded to turn on the spot hardly brakes.
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2, TURN_GAIN, Twist},
@@ -13,16 +15,15 @@ pub(crate) type Advice = (GuidanceStatus, DVec2, f64);
 
 pub(crate) const STAND: Advice = (GuidanceStatus::Waiting, DVec2::ZERO, 0.0);
 
-/// Motions are foreseen in steps of so many seconds.
 pub(crate) const STEP_S: f64 = 0.1;
-/// A way to rest is followed for so long.
+/// Limit of the predicted time to rest, seconds.
 const RESTS_WITHIN_S: f64 = 12.0;
-/// A base that brakes within half a cell of the map stands at once as far as the map knows, metres.
+/// Stopping distance below which the map sees no motion, metres: half a cell.
 const LEAST_WAY_M: f64 = 0.025;
-/// The doubt of a way to rest is this share of the motion until then, or within so many seconds.
+/// Uncertainty as a share of the motion until rest or within `MOST_DOUBTED_S`, seconds.
 const DOUBT: f64 = 0.1;
 const MOST_DOUBTED_S: f64 = 1.0;
-/// A turn that takes a smaller share of what the wheels gain is no matter.
+/// Share of the wheels' speed gain below which a turn is ignored.
 const LEAST_SHARE: f64 = 0.1;
 
 #[derive(Clone, Copy)]
@@ -42,11 +43,11 @@ pub(crate) struct MotionModel {
     pub(crate) speed: f64,
     turn: f64,
     look: f64,
-    /// The controller's cosines for full speed, and for turns on the spot.
+    /// Controller's cosines for full speed and for turns on the spot.
     full_speed: f64,
     turns: f64,
     base: Base,
-    /// The body's, from the middle between the wheels, metres.
+    /// Reach of the body from the middle between the wheels, metres.
     reach_m: f64,
     pub(crate) period_s: f64,
 }
@@ -66,7 +67,7 @@ impl MotionModel {
         }
     }
 
-    /// None for a base whose wheels are not known to gain and lose speed at a limited rate.
+    /// Returns `None` for a base without a known acceleration limit.
     pub(crate) fn of_limited(mission: &Mission) -> Option<Self> {
         let motion = Self::new(mission);
         motion.base.is_limited().then_some(motion)
@@ -76,11 +77,12 @@ impl MotionModel {
         self.base.response.dead_time_s()
     }
 
-    /// `advice` no faster than the wheels may go that turn as the controller asks: wheels that gain speed as fast as they can do not turn
-    /// the robot.
+    /// Limits the speed of `advice` so that the wheels can also turn as the controller asks.
+    ///
+    /// Wheels that accelerate at their limit have no reserve to turn the robot.
     pub(crate) fn turns_too(&self, now: Moving, dead_s: f64, advice: Advice) -> Advice {
         let (status, to, limit) = advice;
-        // No number, and a way back, have meanings of their own.
+        // NaN and reverse have meanings of their own.
         if limit.is_nan() || limit <= 0.0 {
             return advice;
         }
@@ -94,8 +96,9 @@ impl MotionModel {
         (status, to, limit.min(most_m_s))
     }
 
-    /// Whether a robot that follows `to` for one more tick comes to rest then without a touch. The command acts `dead_s` after `start`. One
-    /// that touches now gets out of there.
+    /// Returns whether a robot that follows `to` for one more tick then rests without a touch.
+    ///
+    /// The command acts `dead_s` after `start`. A robot that touches now may leave.
     pub(crate) fn rests(
         &self,
         start: Moving,
@@ -104,7 +107,7 @@ impl MotionModel {
     ) -> bool {
         let Twist { v, omega } = start.twist;
         let command = self.command(start.pose.axis(), to);
-        // A wheel that is to turn ahead does not brake.
+        // A wheel that turns ahead cannot brake.
         let on_the_spot = command.v == 0.0 && command.omega != 0.0;
         if on_the_spot && v > self.base.response.acceleration_m_s2 * self.period_s {
             return false;
@@ -133,7 +136,7 @@ impl MotionModel {
         true
     }
 
-    /// `for_s` seconds later, if the base follows `to`; as before where no command acts yet.
+    /// Predicts the motion after `for_s` seconds towards `to`; `None` continues the current twist.
     pub(crate) fn next(&self, now: Moving, for_s: f64, to: Option<Advice>) -> Moving {
         let twist = match to {
             Some(to) => self.base.approach(now.twist, self.command(now.pose.axis(), to), for_s),

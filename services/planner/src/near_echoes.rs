@@ -1,20 +1,23 @@
 //! Echoes right ahead of the body.
 //!
-//! The belief weighs echoes against silences, so an intermittent echo, or one for which the map has no room, may leave the way open.
-//! Right before the body the nearest echo counts.
+//! The belief weighs echoes against silences, so an intermittent echo, or one without room in the
+//! map, may leave the way open. Right before the body, the nearest echo decides.
 
 use common::{kinematics::Pose2, samples::GridHeader};
 use glam::DVec2;
 
-/// Readings of each sonar that count, about a second: no false echo stops the robot longer.
+/// Newest readings per sonar that count, about a second, which limits the stop by a false echo.
 const NEWEST: usize = 8;
-/// A reading within this angle of the robot's axis looked ahead: the cone, and a little more.
+/// Angle between a reading and the robot's axis within which it looked ahead: slightly wider than
+/// the cone.
 const AHEAD_DEG: f64 = 20.0;
-/// The least free ground right ahead with which the body goes there, metres. A reading counts as free only up to 0.05 m before its echo,
-/// so the echo is then 0.13 m away.
+/// Least free ground ahead for forward motion, metres.
+///
+/// A reading is free up to 0.05 m before its echo, so the echo is then 0.13 m away.
 pub(crate) const STANDS_BEFORE_M: f64 = 0.08;
 
-/// Free ground ahead of a body of `radius` metres: the least of the newest readings of the `sonars`; infinite if none looked ahead.
+/// Returns the free ground ahead of a body of `radius` metres: the least of the newest readings,
+/// infinite if none looked ahead.
 pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64, sonars: usize) -> f64 {
     let (axis, within) = (pose.axis(), AHEAD_DEG.to_radians().cos());
     let newest = belief.clear_beams().iter().rev().take(NEWEST * sonars);
@@ -33,8 +36,8 @@ mod tests {
 
     use super::*;
 
-    /// Readings of a sonar 0.19 m ahead of a robot at the origin: bearings in degrees, and the distances within which nothing
-    /// answered.
+    /// Readings of a sonar 0.19 m ahead of a robot at the origin: bearings in degrees, free lengths
+    /// in metres.
     fn belief(readings: &[(f32, f32)]) -> GridHeader {
         let mut belief =
             GridHeader { clear_beam_count: readings.len() as u64, ..GridHeader::default() };

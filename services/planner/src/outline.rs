@@ -1,9 +1,11 @@
-//! A body that is no disc gets through where the circle that covers it does not fit.
+//! Passage of a body that is not a disc through gaps narrower than its covering circle.
 //!
-//! Hazards are inflated by half the body's width, so the field leads wherever the body may fit. From each pose the way that the controller
-//! would take along the field is followed with its heading. Where the outline would touch, a search over poses (hybrid A*: forward along
-//! arcs, on the spot, back) finds how to get to the field's next place in the open. Where that fails, the body does not get through:
-//! cells at the narrow place are refused, no more than the covering circle would make hazard, and the field leads elsewhere.
+//! Hazards are inflated by half the width of the body, so the field leads wherever the body may
+//! fit. From each pose, the controller's path along the field is followed with its heading. If the
+//! outline would touch, a hybrid A* search finds poses to the next open place on the field's way.
+//!
+//! If the search fails, the body cannot pass. Cells at the narrow place are then refused, at most
+//! those that the covering circle would make hazard, and the field leads elsewhere.
 
 use std::{cmp::Reverse, collections::BinaryHeap, collections::HashSet, f64::consts::PI};
 
@@ -17,14 +19,14 @@ use glam::DVec2;
 
 use crate::view::{STEP_M, View};
 
-/// The most speed where the covering circle does not fit, m/s, and back.
+/// Speed limits where the covering circle does not fit, forward and back, m/s.
 const NARROW_M_S: f64 = 0.5;
 const BACK_M_S: f64 = 0.2;
-/// The controller's way is followed so many radii of the covering circle far.
+/// Length of the followed controller path, in radii of the covering circle.
 const AHEAD: f64 = 2.0;
-/// A pose that touches by the margin may be left if the outline stays so much deeper outside of things, metres.
+/// Part of the margin that a touching pose may use to leave, metres.
 const SQUEEZED_M: f64 = 0.03;
-/// The turn of a step, radians, and the length of one, metres.
+/// Turn, radians, and length, metres, of a search step: forward along arcs, on the spot, or back.
 const TURN_RAD: f64 = PI / 16.0;
 const WAY_M: f64 = 0.1;
 const STEPS: [[f64; 2]; 6] = [
@@ -35,34 +37,34 @@ const STEPS: [[f64; 2]; 6] = [
     [0.0, -TURN_RAD],
     [-WAY_M, 0.0],
 ];
-/// A radian costs as much as so many metres, and a metre back as two ahead.
+/// Cost of a radian, metres; a metre back costs as much as two ahead.
 const TURN_COSTS_M: f64 = 0.25;
-/// A step is over so near to its end, and a plan if the robot is so far off.
+/// Tolerances of a finished step, radians and metres, and the offset that voids a plan, metres.
 const TURNED_RAD: f64 = 0.05;
 const ARRIVED_M: f64 = 0.02;
 const MOST_OFF_M: f64 = 0.1;
-/// The search ends so near to its goal, metres.
+/// Distance to the goal at which the search ends, metres.
 const NEAR_M: f64 = 0.15;
-/// The goal of a search is on the field's way within this length, metres.
+/// Length of the field's way that contains the goal, metres.
 const GOAL_WITHIN_M: f64 = 2.0;
 const MOST_POSES: usize = 5_000;
 
-/// What the body does about the field's direction.
+/// Motion of the body for a field direction.
 #[derive(Clone, Debug)]
 pub(crate) enum Passage {
-    /// It follows it, no faster than this, m/s.
+    /// Follow the field with this speed limit, m/s.
     Follow(f64),
-    /// On the spot to this unit vector.
+    /// Turn on the spot to this unit vector.
     Turn(DVec2),
-    /// Along this unit vector, no faster than this, m/s; back along its axis if that is negative.
+    /// Drive along this unit vector with this limit, m/s; negative is back along the axis.
     Drive(DVec2, f64),
-    /// It does not get through these cells; none if it cannot move at all.
+    /// Refuse these cells; empty if the body cannot move at all.
     Refused(Vec<Cell>),
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct Outline {
-    /// Of the body's frame, no farther apart than a cell of the map.
+    /// Points in the body frame, at most a map cell apart.
     points: Vec<DVec2>,
     half_width: f64,
     covers: f64,
@@ -72,7 +74,7 @@ pub(crate) struct Outline {
     turns: f64,
     response: Response,
     brakes_within_s: f64,
-    /// The rest of the way that was found, its next step last.
+    /// Rest of the plan, next step last.
     plan: Vec<Planned>,
 }
 
@@ -93,7 +95,7 @@ impl Planned {
         }
     }
 
-    /// A robot at `pose` is not where the step begins or goes on.
+    /// Returns whether the robot is outside the tolerance of this step.
     fn is_elsewhere(&self, pose: &Pose2) -> bool {
         let off = self.pose.position - pose.position;
         let turned = wrap_angle(self.pose.heading - pose.heading).abs();
@@ -107,7 +109,7 @@ impl Planned {
 #[derive(Clone, Copy)]
 struct Reached {
     pose: Pose2,
-    /// The pose before, and the step from there.
+    /// Index of the previous pose, and the step from there.
     from: usize,
     step: [f64; 2],
     cost_m: f64,
@@ -129,7 +131,8 @@ impl Outline {
         }
     }
 
-    /// Points of the outline at `pose` that are nearer to a thing than the inflation's margin, or that less `squeezed` metres.
+    /// Returns the outline points at `pose` that are nearer to an obstacle than the margin minus
+    /// `squeezed` metres.
     fn touching(
         &self,
         view: &View<'_>,
@@ -145,17 +148,16 @@ impl Outline {
         self.comes_near(view, pose, 0.0)
     }
 
-    /// A thing is nearer than `apart_m` and the inflation's margin.
+    /// Returns whether an obstacle is nearer than the margin plus `apart_m`.
     pub(crate) fn comes_near(&self, view: &View<'_>, pose: &Pose2, apart_m: f64) -> bool {
         self.touching(view, pose, -apart_m.min(self.half_width)).next().is_some()
     }
 
-    /// The covering circle does not fit.
+    /// Returns whether the covering circle does not fit.
     pub(crate) fn is_narrow(&self, view: &View<'_>, at: DVec2) -> bool {
         view.has_hazard(at, self.covers - self.half_width)
     }
 
-    /// Whether the body turns by `angle` on the spot without a touch.
     pub(crate) fn turns(&self, view: &View<'_>, pose: &Pose2, angle: f64) -> bool {
         let steps = (angle.abs() / TURN_RAD * 2.0).ceil();
         !self.is_narrow(view, pose.position)
@@ -165,7 +167,7 @@ impl Outline {
             })
     }
 
-    /// How a body at `pose` gets on in the field's `direction`, a unit vector.
+    /// Returns how a body moves in the field's `direction`, a unit vector.
     pub(crate) fn pass(&mut self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Passage {
         if let Some(passage) = self.go_on(view, pose) {
             return passage;
@@ -188,7 +190,8 @@ impl Outline {
         }
     }
 
-    /// Whether a body that is at `pose` fits elsewhere. One that touches by the margin leaves, and comes no nearer.
+    /// Returns a test for poses that fit. A body that touches the margin may leave but come no
+    /// nearer.
     fn fits(&self, view: &View<'_>, pose: &Pose2) -> impl Fn(&Pose2) -> bool {
         let (squeezed, allowed) = match self.touches(view, pose) {
             true => (SQUEEZED_M, self.touching(view, pose, SQUEEZED_M).count()),
@@ -197,7 +200,7 @@ impl Outline {
         move |at| self.touching(view, at, squeezed).nth(allowed).is_none()
     }
 
-    /// The next step of the plan; none without a plan. One that touches by now, or is not where the robot is, is over.
+    /// Returns the next step of the plan; drops a plan that touches or starts elsewhere.
     fn go_on(&mut self, view: &View<'_>, pose: &Pose2) -> Option<Passage> {
         while self.plan.pop_if(|next| next.is_over(pose)).is_some() {}
         let Planned { step: [way, turn], .. } = *self.plan.last()?;
@@ -224,7 +227,7 @@ impl Outline {
             let to = to.position + WAY_M * to.axis() - pose.position;
             let pursuit = 2.0 * pose.axis().perp_dot(to) / to.length_squared();
             let speed = speed.min(self.speed);
-            // (15): the controller's turn rate is that of the sine.
+            // By (15), the controller's turn rate is proportional to the sine.
             let sines = [pursuit, turn / way].map(|curvature| curvature * speed / self.turn);
             let mut sines = sines.into_iter().map(|sine| sine.clamp(-0.9, 0.9));
             let sine = sines.find(|sine| moves(way, way * sine * self.turn / speed));
@@ -244,7 +247,7 @@ impl Outline {
         self.plan.clear();
     }
 
-    /// Whether the controller's way is narrow anywhere; none if the body touches on it.
+    /// Returns whether the controller's path is narrow anywhere; `None` if the body touches on it.
     fn follow(&self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Option<bool> {
         let (mut at, mut along, mut way, mut narrow) = (*pose, direction, 0.0, false);
         while way < AHEAD * self.covers && along != DVec2::ZERO {
@@ -267,7 +270,7 @@ impl Outline {
         Some(narrow)
     }
 
-    /// The field's way into the open, or as far as it is looked at.
+    /// Returns the field's way to the next open place, or its whole checked length.
     fn way_out(&self, view: &View<'_>, pose: &Pose2, direction: DVec2) -> Vec<DVec2> {
         let mut way = view.way(pose.position, direction, GOAL_WITHIN_M);
         let is_narrow = |at: &DVec2| self.is_narrow(view, *at);
@@ -278,7 +281,7 @@ impl Outline {
         way
     }
 
-    /// The plan, or the narrow cells that the body does not get through.
+    /// Returns the plan, or the narrow cells that block the body.
     fn search(
         &self,
         view: &View<'_>,
@@ -335,7 +338,7 @@ impl Outline {
         Err(self.refused(view, &way, &reached))
     }
 
-    /// The narrow cells where the field's `way` goes on from what was `reached`.
+    /// Returns the narrow cells where the field's `way` leaves the `reached` poses.
     fn refused(&self, view: &View<'_>, way: &[DVec2], reached: &[Reached]) -> Vec<Cell> {
         let is_reached =
             |at: &DVec2| reached.iter().any(|it| it.pose.position.distance(*at) <= NEAR_M);

@@ -1,4 +1,5 @@
-//! The planner's process: reads `grid`, `pose` and `target`, publishes `guidance` each tick and `field` when it changes.
+//! Planner process: reads `grid`, `pose` and `target`, publishes `guidance` each tick and `field`
+//! on changes.
 
 use std::borrow::Cow;
 
@@ -39,13 +40,13 @@ readers! {
 
 pub struct Shell {
     inputs: Inputs,
-    /// Without a target no grid counts as followed.
+    /// Without a target, no grid counts as followed.
     has_target: bool,
     runner: Runner<PlannerStage>,
     background: Background<Job, Solved>,
     field: FieldPublisher,
     lockstep: bool,
-    /// The last job and its tick, in lockstep, until its result is taken.
+    /// Last job and its tick in lockstep, until its result is taken.
     job: Option<(u64, u64)>,
     latest_pose: Option<PoseSample>,
     answered: Option<u64>,
@@ -61,7 +62,7 @@ impl Process for Shell {
     fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         let no_thread = |error| StageError::Other(format!("cannot start a thread: {error}"));
         let background = Worker::on_a_thread().map_err(no_thread)?;
-        // In lockstep a result is waited for when it is due.
+        // In lockstep, a due result is awaited instead.
         let lockstep = matches!(context.run.clock, MissionClock::Ticks { .. });
         if !lockstep {
             context.waiter.on_readable(&background)?;
@@ -91,7 +92,7 @@ impl Process for Shell {
         let asked = self.follow_grid()?;
         let swapped = self.take_solved()?;
         if asked && self.lockstep {
-            // A robot that waits for its command takes no second one for a tick.
+            // A robot that waits for its command takes only one per tick.
             self.take(Taken::Idle)?;
         }
         if asked || swapped && !self.lockstep {
@@ -101,7 +102,7 @@ impl Process for Shell {
             self.publish_field()?;
         }
         if !knew_target && self.has_target {
-            // A target wakes nobody, and the first field may follow from it.
+            // A target wakes no process, and the first field may follow from it.
             self.idle()?;
         }
         Ok(if self.has_target { self.runner.out.at } else { Progress::default() })
@@ -112,7 +113,7 @@ impl Process for Shell {
         Ok(self.take(Taken::Fault(fault, robot))?.changed())
     }
 
-    /// A new reader may wait for the field, which is not known before.
+    /// Returns true, because a new reader may wait for the field.
     fn has_idle_work(&self) -> bool {
         true
     }
@@ -147,8 +148,9 @@ impl Shell {
         Ok(work)
     }
 
-    /// Take the solver's results; returns whether the field changed. In lockstep a result is taken exactly one tick after its job began,
-    /// so that a run can be repeated.
+    /// Takes the solver's results and returns whether the field changed.
+    ///
+    /// In lockstep, a result is taken exactly one tick after its job began, for repeatable runs.
     fn take_solved(&mut self) -> Result<bool, StageError> {
         let tick = self.runner.out.at.tick;
         let due = self.job.take_if(|(_, began)| self.lockstep && tick > *began);
@@ -192,17 +194,17 @@ impl Shell {
                 tracing::warn!(version = part.version, "missed a grid version");
                 continue;
             }
-            // A keyframe published again after its tick was answered needs no answer, unless it changes the field.
+            // A repeated keyframe of an answered tick needs an answer only if it changes the field.
             asked |= part.keyframe == 0 || self.answered != Some(stamp.tick) || work != Work::None;
             self.runner.out.at = Progress::of(&stamp);
         }
         Ok(asked)
     }
 
-    /// The tick's pose was published before the grid.
+    /// Answers the pose of the tick, which is published before the grid.
     fn answer(&mut self) -> Result<(), StageError> {
         self.latest_pose = self.inputs.pose.newest()?.or(self.latest_pose);
-        // A keyframe for new readers may belong to a tick that is over.
+        // A keyframe for new readers may belong to a past tick.
         let tick = self.runner.out.at.tick;
         if let Some(pose) = self.latest_pose.filter(|pose| pose.stamp.tick == tick) {
             if let Some(response) = self.inputs.response.newest()? {

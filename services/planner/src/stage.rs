@@ -1,4 +1,4 @@
-//! The planner as a stage: what it records and publishes.
+//! Planner as a stage: records and publications.
 
 use std::{borrow::Cow, collections::VecDeque, time::Instant};
 
@@ -33,35 +33,34 @@ pub struct Entry<'a> {
     pub(crate) at: Progress,
 }
 
-/// An action of the planner: what its step takes.
 #[derive(Debug, Serialize, Deserialize)]
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 pub(crate) enum Taken<'a> {
     Grid(#[serde(with = "inputs::slice")] (GridHeader, Cow<'a, [u8]>)),
-    /// The pose of the tick; its guidance is published.
     Pose {
         #[serde(with = "inputs::sample")]
         pose: PoseSample,
-        /// The last full solve's, added to the guidance.
+        /// Time of the last full solve, for the guidance.
         full_solve_ns: u64,
     },
     Idle,
     Solved(u64),
-    /// The robot is here, metres.
+    /// Fault, and the position of the robot, metres.
     Fault(FaultKind, DVec2),
-    /// This part of the newest policy is published.
+    /// Part of the newest policy to publish.
     Field(#[serde(with = "inputs::sample")] Part),
     Policy,
     Target(#[serde(with = "inputs::sample")] TargetSample),
     Response(FoundResponse),
-    /// Only of a robot whose base answers late.
+    /// Command, taken only if the base answers late.
     Command(#[serde(with = "inputs::sample")] CommandSample),
 }
 
-/// The step, and the computations outside of it: threads take the jobs and give the results, or this thread does in a replay.
+/// Step and its outside computations.
+///
+/// Threads take the jobs and return results; in a replay, this thread solves them.
 pub struct PlannerStage {
     pub(crate) planner: Planner,
-    /// Not begun, oldest first.
     pub(crate) jobs: VecDeque<Job>,
     pub(crate) solved: Option<Solved>,
     pub(crate) snapshot: Option<Snapshot>,
@@ -154,7 +153,7 @@ impl Stage for PlannerStage {
 }
 
 impl PlannerStage {
-    /// A replay solves the jobs in their order, as the thread did.
+    /// Returns the result of a job; a replay solves the jobs in the order of the thread.
     fn result_of(&mut self, number: u64) -> Solved {
         if let Some(solved) = self.solved.take() {
             return solved;

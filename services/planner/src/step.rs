@@ -1,4 +1,4 @@
-//! The stage, pure: it follows the `grid`, keeps a field of it and answers a pose with guidance.
+//! Pure planner step: it follows `grid`, keeps a field of it and answers a pose with guidance.
 
 mod live;
 mod output;
@@ -32,16 +32,16 @@ use live::{Live, Robot, is_hazard};
 
 pub use output::{Job, Snapshot, Solved, Work};
 
-/// Speed out of a hazard that the robot stands in, m/s: something is near.
+/// Speed limit out of a hazard around the robot, m/s, because an obstacle is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
 #[derive(Clone, Debug)]
 enum Advisor {
-    /// The paper's method, and any without sensing.
+    /// Paper's method, and any method without sensing.
     Follow,
-    /// The evidential method: whether the sonar has looked there.
+    /// Evidential method: requires that the sonar has looked ahead.
     LookFirst(ActiveSensing),
-    /// Checks whether a car can steer there.
+    /// Evidential method of a car: requires a drivable arc.
     Steer(Arcs),
 }
 
@@ -57,27 +57,27 @@ impl Advisor {
     }
 }
 
-/// The equation is (11).
+/// Planner state; solves Laplace's equation and follows the gradient (11).
 #[derive(Debug)]
 pub struct Planner {
     mission: Mission,
     found: FoundResponse,
-    /// None before the supervisor names one.
+    /// `None` before the supervisor names one.
     target: Option<TargetSample>,
     tolerance_m: f64,
     screening: Screening,
     robot: Robot,
     advisor: Advisor,
-    /// None for a robot that does not see what moves.
+    /// `None` for a robot that cannot detect movers.
     evasion: Option<Evasion>,
-    /// None for a base whose wheels are not known to gain and lose speed at a limited rate.
+    /// `None` for a base without a known acceleration limit.
     motion: Option<MotionModel>,
-    /// None for a base that answers soon enough.
+    /// `None` for a base with a short delay.
     lead: Option<Lead>,
     solver: Solver,
     grid: Replica<u8>,
     belief: GridHeader,
-    /// None before the first keyframe.
+    /// `None` before the first keyframe.
     live: Option<Live>,
     on_a_saddle: bool,
     jobs: u64,
@@ -85,7 +85,9 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// It knows nothing until the first keyframe. It persists nothing: the mapper publishes a keyframe for each new planner.
+    /// Creates a planner without a map.
+    ///
+    /// It persists nothing, because the mapper publishes a keyframe for each new planner.
     pub fn new(mission: &Mission) -> Self {
         Self {
             mission: mission.clone(),
@@ -108,10 +110,11 @@ impl Planner {
         }
     }
 
-    /// Follow a sample of `grid` with the cells of its window.
+    /// Follows a sample of `grid` with the cells of its window.
     ///
     /// # Errors
-    /// Here and below, when there is no field: the target is outside the map, or the map is no map.
+    /// Fails, as the methods below, if there is no field: the target lies outside the map, or the
+    /// map is invalid.
     pub fn take_grid(&mut self, header: &GridHeader, cells: &[u8]) -> Result<Work, SolveError> {
         let before = self.grid.version();
         if header.epoch != self.belief.epoch && self.forget_ways() {
@@ -127,7 +130,7 @@ impl Planner {
         Ok(work)
     }
 
-    /// The link found how the base answers: speeds are limited by that from now on.
+    /// Applies the response that the link found for the base, which limits speeds from now on.
     pub fn take_response(&mut self, found: &FoundResponse) -> Work {
         if let Some(mission) = self.found.changed(found, &self.mission) {
             self.advisor = Advisor::new(&mission);
@@ -138,7 +141,7 @@ impl Planner {
         Work::None
     }
 
-    /// Whether its answers depend on the commands before.
+    /// Returns whether answers depend on previous commands.
     pub const fn foresees(&self) -> bool {
         self.lead.is_some()
     }
@@ -147,7 +150,7 @@ impl Planner {
         let CommandSample { v_m_s: v, omega_rad_s: omega, pose_ns, state, .. } = *command;
         let drives = CommandState::from_byte(state) == CommandState::Driving;
         let twist = Twist { v, omega };
-        // Samples may hold anything.
+        // Samples may hold any values.
         let twist = if drives && self.can(twist) { twist } else { Twist::default() };
         if let Some(lead) = &mut self.lead {
             lead.command(twist, MissionTime(pose_ns).seconds());
@@ -161,7 +164,7 @@ impl Planner {
         v.abs() <= body.top_speed_m_s && omega.abs() <= most_rad_s
     }
 
-    /// The robot is sent elsewhere. A target that is not inside the perimeter is ignored.
+    /// Sets the target; one that is not inside the perimeter is ignored.
     pub fn take_target(&mut self, target: &TargetSample) -> Result<Work, SolveError> {
         let before = self.target.map(|before| before.target.position());
         let Some(frame) = self.grid.frame() else {
@@ -187,7 +190,8 @@ impl Planner {
         Ok(Work::Stale)
     }
 
-    /// The way that a body plans through narrow places, and the places that it refused. Returns whether there were any.
+    /// Forgets the plan through narrow places and the refused places; returns whether any were
+    /// refused.
     fn forget_ways(&mut self) -> bool {
         if let Advisor::LookFirst(ActiveSensing { outline: Some(outline), .. }) = &mut self.advisor
         {
@@ -232,7 +236,7 @@ impl Planner {
         Ok(if changed { Work::Stale } else { Work::None })
     }
 
-    /// The guidance of the tick was given: the newest map is solved, or a background solve is to begin.
+    /// Ends the tick after its guidance: solves the newest map, or returns a background job.
     pub fn end_tick(&mut self) -> Result<(Work, Option<Job>), SolveError> {
         match self.is_solved_here() {
             true => Ok((self.solve_newest()?, None)),
@@ -240,12 +244,11 @@ impl Planner {
         }
     }
 
-    /// Whether the field is of an older map than the newest, and the newest is solved by the step itself.
+    /// Returns whether the field is outdated and the step itself solves the newest map.
     fn is_solved_here(&self) -> bool {
         self.live.as_ref().is_some_and(|live| live.is_small() && !live.is_current())
     }
 
-    /// The solve starts from the field before.
     fn solve_newest(&mut self) -> Result<Work, SolveError> {
         let Some(live) = &mut self.live else {
             return Ok(Work::None);
@@ -256,7 +259,7 @@ impl Planner {
         Ok(Work::Solved)
     }
 
-    /// The target's cell counts as free: the mapper may not know of it yet.
+    /// Builds the domain with a free target cell, because the mapper may not know the target yet.
     fn map(&self, frame: &GridFrame, aim: Option<Cell>) -> Result<Domain, SolveError> {
         let side = frame.cells as usize;
         let blocked = self.grid.cells().iter().map(|&cell| is_hazard(cell));
@@ -273,7 +276,9 @@ impl Planner {
         self.target.map(|target| target.target.position())
     }
 
-    /// The target's cell, or a free one near it where that cannot be entered or, by the evidential method, the body does not fit.
+    /// Returns the target's cell, or a free one near it that the robot can enter.
+    ///
+    /// In the evidential method, the body must also fit there.
     fn aim(&self, frame: &GridFrame) -> Option<Cell> {
         let (cells, target) = (self.grid.cells(), self.place()?);
         let aim = match self.advisor {
@@ -290,7 +295,7 @@ impl Planner {
         Some(job)
     }
 
-    /// Take the result of a job. The result of a job that nobody waits for changes nothing.
+    /// Takes the result of a job; a result that is no longer awaited is ignored.
     pub fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
         let awaited = self.live.as_mut().filter(|it| it.awaits(solved.number));
         let Some(live) = awaited else {
@@ -301,7 +306,6 @@ impl Planner {
         Ok(Work::SwappedIn)
     }
 
-    /// Inject the fault, if it is the planner's and there is a field.
     pub fn corrupt(&mut self, fault: FaultKind, robot: DVec2) -> Work {
         match (fault, &mut self.live) {
             (FaultKind::CorruptField, Some(live)) => {
@@ -317,7 +321,9 @@ impl Planner {
         }
     }
 
-    /// The guidance for a robot at that pose. A small map is solved first if its field must not be followed there.
+    /// Returns the guidance for the pose of `sample`.
+    ///
+    /// A small map is solved first if the field is not valid there.
     pub fn answer(&mut self, sample: &PoseSample) -> Result<(Work, GuidanceSample), SolveError> {
         let (pose, time_s) = (sample.pose(), sample.stamp.time().seconds());
         let twist = Twist { v: sample.v_m_s, omega: sample.omega_rad_s };
@@ -332,7 +338,7 @@ impl Planner {
         Ok((work, self.guide(sample, Moving { pose: acts_at, twist }, followed)))
     }
 
-    /// None where the field must not be followed.
+    /// Returns `None` where the field is not valid.
     fn follow_field(&self, pose: &Pose2) -> Option<(GuidanceStatus, DVec2)> {
         let (live, target) = (self.live.as_ref()?, self.place()?);
         live.guide(&self.robot, pose, target, self.grid.cells())
@@ -369,7 +375,8 @@ impl Planner {
         }
     }
 
-    /// `advice` as far as the base can follow it: it stands where it would not come to rest without a touch after one more tick.
+    /// Returns `advice` within the limits of the base: it stands if one more tick rules out a rest
+    /// without a touch.
     fn within_motion(&self, acts_at: Moving, advice: Advised) -> Advised {
         let (Some(live), Some(motion), Advisor::LookFirst(sensing)) =
             (&self.live, &self.motion, &self.advisor)
@@ -386,7 +393,6 @@ impl Planner {
         if motion.rests(acts_at, (advice, dead_s), touches) { advice } else { STAND }
     }
 
-    /// The checked advice for the field's `status` and `direction`, with a speed limit.
     fn advise(
         &mut self,
         pose: &Pose2,
@@ -415,7 +421,8 @@ impl Planner {
                 let limit = sensing.limit_before_echoes(&self.belief, pose);
                 (status, direction, limit.min(WAY_OUT_M_S))
             }
-            // A false echo may block the way: look around once before the map is reset.
+            // A false echo may block the way, so the robot looks around once before the map is
+            // reset.
             GuidanceStatus::Unreachable => (status, pose.axis().perp(), 0.0),
             _ => (status, direction, 0.0),
         };
@@ -452,7 +459,7 @@ impl Planner {
             Passage::Refused(cells) => {
                 let version = self.grid.version();
                 if let Some(live) = self.live.as_mut().filter(|_| !cells.is_empty()) {
-                    // The cells are of the map.
+                    // The cells come from this map, so they lie inside it.
                     let _ = live.refuse(&cells, version);
                 }
                 (GuidanceStatus::Along, axis, 0.0)
@@ -460,7 +467,7 @@ impl Planner {
         }
     }
 
-    /// None before the first solve.
+    /// Returns `None` before the first solve.
     pub fn snapshot(&self) -> Option<Snapshot> {
         let (live, target) = (self.live.as_ref()?, self.place()?);
         let verification = live.field.verification();
@@ -476,7 +483,7 @@ impl Planner {
     }
 }
 
-/// The unit is the mission's grid.
+/// Returns the screening of the mission; lengths are in metres.
 fn screening(mission: &Mission) -> Screening {
     mission.screening_length_m().map_or(Screening::None, |length| Screening::Uniform {
         length,

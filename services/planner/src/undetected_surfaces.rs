@@ -1,60 +1,67 @@
-//! Surfaces that could stand in the way undetected.
+//! Surfaces in the way that the readings could have missed.
 //!
-//! A smooth surface answers from the foot of the sonar's perpendicular on it, and only near its normal (Kuc and Siegel 1987: a slanted
-//! surface reflects the sound away), so a silent beam ahead does not exclude a wall at 45 degrees. A surface that the body touches has its
-//! normal within a right angle of the motion. For each point of the way and each normal a tangent surface is supposed, and a reading
-//! searched that would have detected it. An infrared ranger detects it where its ray meets it, at any angle.
+//! A smooth surface answers from the foot of the sonar's perpendicular, and only near its normal
+//! (Kuc and Siegel 1987). A slanted surface reflects the sound away, so a silent beam ahead leaves
+//! a wall at 45 degrees possible. A surface that the body touches has its normal within a right
+//! angle of the motion.
+//!
+//! For each point of the way and each normal, a tangent surface is assumed. A reading that would
+//! have detected it excludes it. An infrared ranger detects it where its ray meets it, at any
+//! angle.
 
 use std::{cell::RefCell, f64::consts::TAU};
 
 use common::samples::{ClearBeam, GridHeader};
 use glam::DVec2;
 
-/// Largest checked angle between the way and a normal: beyond it a surface is passed, not met.
+/// Largest angle between the way and a normal; the body passes surfaces beyond it.
 const WIDEST_DEG: f64 = 75.0;
-/// Angle between normals: less than a beam is wide.
+/// Angle between normals; less than the width of a beam.
 const STEP_DEG: f64 = 15.0;
-/// A surface answers a beam within this angle of its normal: the cone, and a little more.
+/// Angle between a beam and the normal within which a surface answers: slightly wider than the
+/// cone.
 const ANSWERS_WITHIN_DEG: f64 = 17.0;
-/// No farther away than [`NEAR_M`].
+/// Same angle for distances up to [`NEAR_M`].
 const NEAR_ANSWERS_WITHIN_DEG: f64 = 20.0;
 const NEAR_M: f64 = 1.2;
-/// Extent of a supposed surface from the point of touch, metres. A shorter one could be detected only from nearer; its end is an edge,
-/// which answers a beam ahead.
+/// Extent of an assumed surface from the point of touch, metres.
+///
+/// A shorter surface could be detected only from nearer, but its end is an edge, which answers a
+/// beam ahead.
 const EXTENDS_M: f64 = 1.0;
 /// Least cosine between a ray and the normal of a surface that it detects: 70 degrees.
 const LEAST_SLANT: f64 = 0.34;
-/// A ray that meets a supposed surface this near to the point of touch excludes it, metres.
+/// Distance from the point of touch within which a ray excludes a surface, metres.
 const MET_WITHIN_M: f64 = 0.35;
 /// Bound of rounding of such distances, metres.
 const ROUNDING_M: f64 = 1e-6;
 /// Required free ground between body and surface, metres.
 const MARGIN_M: f64 = 0.02;
-/// An echo at most this far before a supposed surface may be its own, metres.
+/// Distance before an assumed surface within which an echo may be its own, metres.
 const NEAR_ECHO_M: f64 = 0.25;
-/// So many such echoes weigh as much as one silence: pings are lost, but not twice as often as answered.
+/// Echoes that weigh as much as one silence: fewer than two in three pings get lost.
 const ECHOES_FOR_A_SILENCE: usize = 2;
 
-/// To either side of the way, and along it.
+/// Number of normals: to either side of the way, and along it.
 const NORMALS: usize = 2 * (WIDEST_DEG / STEP_DEG) as usize + 1;
 
-/// Sonar readings are grouped by sector, because a normal concerns few.
+/// Sectors that group sonar readings, because a normal concerns few.
 const SECTORS: usize = 32;
-/// The most sectors between a surface's normal and a beam that it answers.
+/// Sectors between a normal and a beam that its surface answers, at most.
 const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as usize + 1;
 
 #[derive(Clone)]
 pub(crate) struct UndetectedSurfaces {
     beams: BySector,
     rays: Vec<Beam>,
-    /// Those of the last question, whose memory the next one uses.
+    /// Rays near the last query; its memory is reused.
     near: RefCell<Vec<Beam>>,
     reach: f64,
-    /// A ray excludes a supposed surface no farther from the body's centre, metres.
+    /// Distance from the body's centre within which a ray excludes a surface, metres.
     met_within: f64,
-    /// The way is along x; with the normals' angles.
+    /// Normals and their angles, with the way along x.
     normals: [(DVec2, f64); NORMALS],
-    /// Least cosine between a beam and the normal of a far surface that answers it, and of a near one.
+    /// Least cosines between a beam and the normals of far and near surfaces that answer it.
     answers: [f64; 2],
 }
 
@@ -63,7 +70,7 @@ struct Beam {
     origin: DVec2,
     axis: DVec2,
     clear: f64,
-    /// A supposed surface may lie beyond its free length, so that it may have an echo before it.
+    /// Whether an assumed surface may lie beyond the free length, with its echo before it.
     may_echo: bool,
 }
 
@@ -80,14 +87,14 @@ impl From<&ClearBeam> for Beam {
 
 #[derive(Clone)]
 struct BySector {
-    /// In each sector, those that may have an echo come last.
+    /// Sorted by sector; within a sector, beams that may have an echo come last.
     beams: Vec<Beam>,
-    /// The first beam of each sector, and the end of the last.
+    /// First beam of each sector, and the end of the last.
     starts: [usize; SECTORS + 1],
 }
 
 impl BySector {
-    /// No surface is supposed farther than `within` metres from `place`.
+    /// Groups readings for surfaces at most `within` metres from `place`.
     fn new(readings: &[ClearBeam], place: DVec2, within: f64) -> Self {
         let beams = readings.iter().map(|reading| {
             let beam = Beam::from(reading);
@@ -102,7 +109,9 @@ impl BySector {
         }
     }
 
-    /// Beams that may answer a surface whose normal lies in `sector`. The sector itself comes first, because most of its beams answer.
+    /// Returns the beams that a surface with its normal in `sector` may answer.
+    ///
+    /// The sector itself comes first, because most of its beams answer.
     fn around(&self, sector: usize) -> [&[Beam]; 2 * EITHER_SIDE + 1] {
         std::array::from_fn(|step| {
             let beside = if step % 2 == 0 { step / 2 } else { SECTORS - step.div_ceil(2) };
@@ -116,13 +125,14 @@ impl BySector {
 struct Tally {
     silences: usize,
     echoes: usize,
-    /// Unweighed readings that may have an echo.
+    /// Readings left that may have an echo.
     left: usize,
 }
 
 impl Tally {
-    /// Weigh a `reading` that such a surface answers from this distance, if any. Returns whether echoes can no longer outweigh the
-    /// silences.
+    /// Weighs a `reading` that the surface answers from `distance`.
+    ///
+    /// Returns whether echoes can no longer outweigh the silences.
     fn is_decided_by(&mut self, reading: &Beam, distance: Option<f64>) -> bool {
         self.left -= usize::from(reading.may_echo);
         match distance {
@@ -139,7 +149,7 @@ fn sector_of(angle: f64) -> usize {
 }
 
 impl UndetectedSurfaces {
-    /// Surfaces that a body of `radius` metres could touch within `ahead_m` metres of `place`.
+    /// Prepares the surfaces that the body could touch within `ahead_m` metres of `place`.
     pub(crate) fn new(belief: &GridHeader, radius: f64, place: DVec2, ahead_m: f64) -> Self {
         let reach = radius + MARGIN_M;
         Self {
@@ -158,7 +168,8 @@ impl UndetectedSurfaces {
         }
     }
 
-    /// Unit vectors towards surfaces that a body at `at`, going along the unit vector `along`, could touch and no reading excludes.
+    /// Returns unit vectors towards surfaces that no reading excludes, for a body at `at` moving
+    /// `along`.
     pub(crate) fn normals(&self, at: DVec2, along: DVec2) -> impl Iterator<Item = DVec2> + use<> {
         let heading = along.to_angle();
         let mut rays = self.near.borrow_mut();
@@ -173,7 +184,7 @@ impl UndetectedSurfaces {
         undetected.into_iter().flatten()
     }
 
-    /// The ray may meet a surface that touches a body at `at`, near the body and not too far behind its end.
+    /// Returns the ray if it may meet a surface that touches a body at `at`.
     fn near(&self, ray: &Beam, at: DVec2) -> Option<Beam> {
         let offset = at - ray.origin;
         let (along, near) = (ray.axis.dot(offset), self.met_within);
@@ -182,7 +193,7 @@ impl UndetectedSurfaces {
         meets.then_some(Beam { may_echo: ray.clear < along + near, ..*ray })
     }
 
-    /// The surface touches a body at `at` on the side of `normal`.
+    /// Returns whether readings exclude a surface that touches the body on the side of `normal`.
     fn is_excluded(&self, at: DVec2, normal: DVec2, beams: &[&[Beam]], rays: &[Beam]) -> bool {
         let may_echo =
             |beams: &&[Beam]| beams.iter().rev().take_while(|beam| beam.may_echo).count();
@@ -193,11 +204,11 @@ impl UndetectedSurfaces {
             || rays.iter().any(|ray| tally.is_decided_by(ray, self.met_after(ray, at, normal)))
     }
 
-    /// The distance from which such a surface answers `beam`, metres; none if it does not.
+    /// Returns the distance from which the surface answers `beam`, metres; `None` if it is silent.
     fn answers_from(&self, beam: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let [far, near] = self.answers;
         let square = beam.axis.dot(normal);
-        // No surface at any distance answers such a beam.
+        // At this angle, a surface at any distance stays silent.
         if square < near {
             return None;
         }
@@ -207,7 +218,7 @@ impl UndetectedSurfaces {
         (square >= answers && offset.perp_dot(normal).abs() <= EXTENDS_M).then_some(distance)
     }
 
-    /// Where `ray` meets such a surface near the body, metres; none if it does not.
+    /// Returns the distance at which `ray` meets the surface near the body, metres.
     fn met_after(&self, ray: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let slant = ray.axis.dot(normal);
         if slant < LEAST_SLANT {
@@ -235,7 +246,6 @@ mod tests {
         }
     }
 
-    /// The header of a mapper's sample with these readings of the sonar and of infrared rangers.
     fn belief(beams: &[ClearBeam], rays: &[ClearBeam]) -> GridHeader {
         let mut header = GridHeader {
             clear_beam_count: beams.len() as u64,
@@ -247,7 +257,8 @@ mod tests {
         header
     }
 
-    /// Angles of the normals that no reading excludes, degrees, for a body at the origin on its way along x.
+    /// Angles of the normals that no reading excludes, degrees, for a body at the origin that moves
+    /// along x.
     fn undetected(beams: &[ClearBeam]) -> Vec<i32> {
         undetected_by(beams, &[])
     }
@@ -273,7 +284,8 @@ mod tests {
 
     #[test]
     fn a_beam_excludes_nothing_beyond_its_echo() {
-        // The sonar is 0.5 m behind the body's centre; the body with its margin extends 0.21 m ahead.
+        // The sonar is 0.5 m behind the body's centre; the body with its margin extends 0.21 m
+        // ahead.
         assert!(!undetected(&[beam(-0.5, 0.0, 0.72)]).contains(&0));
         assert!(undetected(&[beam(-0.5, 0.0, 0.70)]).contains(&0));
     }
@@ -284,7 +296,8 @@ mod tests {
         assert!(undetected(&[beam(-1.1, 75.0, 2.0)]).contains(&75));
     }
 
-    /// The front four rays of the ring, each free for `clear_m`, on a robot `behind` metres behind the origin.
+    /// Front four rays of the ring, free for `clear_m`, on a robot `behind` metres behind the
+    /// origin.
     fn ring(behind: f64, clear_m: f64) -> [ClearBeam; 4] {
         [33.75, 11.25, -11.25, -33.75].map(|bearing_deg: f64| {
             let (sin, cos) = bearing_deg.to_radians().sin_cos();
@@ -305,7 +318,7 @@ mod tests {
 
     #[test]
     fn a_ray_does_not_exclude_a_surface_that_it_meets_far_from_the_body() {
-        // The ray runs parallel to the way, 0.5 m beside it: it would meet the surface 0.5 m from where the body touches it.
+        // The parallel ray, 0.5 m beside the way, meets the surface 0.5 m from the point of touch.
         let ray = ClearBeam { y_m: 0.5, ..beam(0.0, 0.0, 0.7) };
         assert!(undetected_by(&[], &[ray]).contains(&0));
     }
@@ -320,7 +333,7 @@ mod tests {
 
     #[test]
     fn a_surface_is_decided_early_only_where_the_rest_of_the_readings_could_not_change_it() {
-        // Readings all around, of lengths about the distances of the surfaces.
+        // Readings all around, about as long as the distances of the surfaces.
         let beams: Vec<_> = (0..120_i16)
             .map(|n| {
                 let n = f64::from(n);
@@ -328,7 +341,7 @@ mod tests {
             })
             .collect();
         let belief = belief(&beams, &[]);
-        // If surfaces may be at any distance, every reading may have an echo and none is left out.
+        // With surfaces at any distance, every reading may have an echo and takes part.
         let [near, far] = [0.6, f64::INFINITY]
             .map(|ahead_m| UndetectedSurfaces::new(&belief, BODY_M, DVec2::ZERO, ahead_m));
         let mut excluded = 0;

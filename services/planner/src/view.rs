@@ -1,10 +1,10 @@
-//! The belief and a field over it.
+//! Belief and a field over it.
 
 use common::grid::{Cell, CellState, GridFrame};
 use glam::DVec2;
 use harmonic::{Field, Guidance};
 
-/// Points of a way are so far apart.
+/// Distance between points of a way, metres.
 pub(crate) const STEP_M: f64 = 0.05;
 /// Step of the search for unscanned cells on a fine grid, metres.
 const GRAIN_M: f64 = 0.025;
@@ -12,10 +12,11 @@ const GRAIN_M: f64 = 0.025;
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
     pub(crate) frame: GridFrame,
-    /// One [`CellState`] byte a cell, row-major.
+    /// [`CellState`] byte per cell, row-major.
     pub(crate) cells: &'a [u8],
     pub(crate) field: &'a Field,
-    /// Cells that the field avoids because the body does not get through there, row-major; empty without any.
+    /// Cells that the field avoids because the body cannot pass, row-major; empty if there are
+    /// none.
     pub(crate) refused: &'a [bool],
 }
 
@@ -25,7 +26,8 @@ impl View<'_> {
         self.field.guidance(cells.x, cells.y)
     }
 
-    /// Points of the field's way for `length_m` metres from `from`, first along `direction`.
+    /// Returns points of the field's way for `length_m` metres from `from`, first along
+    /// `direction`.
     pub(crate) fn way(&self, from: DVec2, direction: DVec2, length_m: f64) -> Vec<DVec2> {
         let steps = (length_m / STEP_M) as usize;
         let mut way = Vec::with_capacity(steps);
@@ -49,14 +51,16 @@ impl View<'_> {
         self.cells_within(at, radius, 1).any(|cell| self.state(cell).is_hazard())
     }
 
-    /// Whether `at` lies so deep in hazard: what hazards are inflated by is then nearer than the inflation less `depth_m`.
+    /// Returns whether all cells within `depth_m` are hazard.
+    ///
+    /// An inflated obstacle is then nearer than the inflation minus `depth_m`.
     pub(crate) fn is_deep(&self, at: DVec2, depth_m: f64) -> bool {
         let is_hazard = |cell| self.state(cell).is_hazard();
         self.frame.cell_at(at).is_some_and(is_hazard)
             && self.cells_within(at, depth_m, 1).all(is_hazard)
     }
 
-    /// Whether a cell within `radius` changed after the field's map was taken.
+    /// Returns whether a cell within `radius` differs from the map of the field.
     pub(crate) fn has_changed(&self, at: DVec2, radius: f64) -> bool {
         self.cells_within(at, radius, 1).any(|cell| {
             let refused = self.refused.get(self.frame.index(cell)).is_some_and(|it| *it);
@@ -64,7 +68,7 @@ impl View<'_> {
         })
     }
 
-    /// Centres of free and sensed cells within `radius` that the sonar has not scanned.
+    /// Returns the centres of unscanned free and sensed cells within `radius`.
     pub(crate) fn unscanned(&self, at: DVec2, radius: f64) -> impl Iterator<Item = DVec2> {
         let step = (GRAIN_M / self.frame.resolution_m).max(1.0) as usize;
         self.cells_within(at, radius, step)
@@ -72,7 +76,7 @@ impl View<'_> {
             .map(|cell| self.frame.centre_of(cell))
     }
 
-    /// Cells in every `step`th column and row, with centres within `radius`.
+    /// Returns the cells in every `step`th column and row with centres within `radius`.
     pub(crate) fn cells_within(
         &self,
         at: DVec2,

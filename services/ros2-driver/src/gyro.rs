@@ -1,8 +1,8 @@
-//! From messages of an IMU to the turn of each tick.
+//! Turn of each tick from IMU messages.
 //!
-//! Turn rates are integrated by their stamps. The odometry that begins a tick lies between two messages, so the turn
-//! goes on at the newest rate until there. The next message corrects the error of that, because each turn is the
-//! difference of two angles.
+//! Rates are integrated by their stamps. A tick's odometry lies between two messages, so the newest
+//! rate extrapolates to it. The next message corrects that error, because turns are differences of
+//! angles.
 
 use common::{
     driver::{
@@ -14,19 +14,19 @@ use common::{
 
 use crate::messages::{Imu, ImuTurn, NO_GROWTH, is_repeated};
 
-/// The turn is known if messages, and odometry and the newest message, are no farther apart.
+/// Longest gap between messages, or to odometry, of a known turn.
 const LONGEST_GAP_NS: i64 = 100_000_000;
-/// The turn rate changes no faster from the newest message to the tick, rad/s^2. Nominal.
+/// Largest change of the rate until the tick, rad/s^2. Nominal.
 const CHANGES_BY: f64 = 5.0;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Gyro {
     newest: Option<Newest>,
-    /// The turn up to the newest message, with its variance.
+    /// Up to the newest message.
     turned: Turned,
-    /// The turn up to the odometry of the newest tick, if the gyro has given it.
+    /// Up to the newest tick's odometry, if known.
     now: Option<Turned>,
     turns: Turns<Turned>,
-    /// It was reported that no message is near the newest odometry.
+    /// A gap before odometry was reported.
     is_missed: bool,
     compared: Compared,
 }
@@ -41,12 +41,12 @@ struct Newest {
 struct Turned {
     angle: f64,
     variance: f64,
-    /// Variance of the part after the newest message.
+    /// Variance after the newest message.
     ahead: f64,
 }
 
 impl Gyro {
-    /// The error says why a message is refused.
+    /// Takes a message; the error says why not.
     pub(crate) fn take(&mut self, imu: Imu) -> Result<(), String> {
         if self.newest.is_some_and(|newest| is_repeated(newest.imu.stamp_ns, imu.stamp_ns)) {
             return Err(NO_GROWTH.to_owned());
@@ -62,7 +62,7 @@ impl Gyro {
                 self.turned.angle += angle;
                 self.turned.variance += variance;
             }
-            // The turn since the message before is not known.
+            // The last turn is unknown.
             None => {
                 self.turns.interrupt();
                 self.now = None;
@@ -72,8 +72,8 @@ impl Gyro {
         Ok(())
     }
 
-    /// Odometry with this stamp begins a tick; by it the robot turned by `by_odometry` since the tick before. Returns
-    /// a new fault of the gyro.
+    /// Begins a tick at this odometry, which turned `by_odometry` since the last. Returns a new
+    /// fault of the gyro.
     pub(crate) fn odometry(&mut self, stamp_ns: i64, by_odometry: f64) -> Option<String> {
         let newest = self.newest?;
         let since_ns = stamp_ns - newest.imu.stamp_ns;
@@ -99,7 +99,7 @@ impl Gyro {
         Some(format!("{why}; publish rad/s about an axis that points up"))
     }
 
-    /// After a gap the turn only says where the next one begins.
+    /// Returns the tick's turn. After a gap it only marks the next one's start.
     pub(crate) fn for_tick(&mut self) -> Option<Turn> {
         let now = self.now.filter(|_| self.compared.agrees());
         let (sequence, before) = self.turns.until(now)?;
@@ -109,8 +109,8 @@ impl Gyro {
     }
 }
 
-/// The turn between two messages, radians, its rate and its variance; none if they are too far apart, or of different
-/// kinds.
+/// Returns turn, radians, rate and variance between two messages. None across a gap, or between
+/// different kinds.
 fn turn(before: &Imu, now: &Imu) -> Option<(f64, f64, f64)> {
     let gap_ns = now.stamp_ns - before.stamp_ns;
     if !(1..=LONGEST_GAP_NS).contains(&gap_ns) {

@@ -1,15 +1,14 @@
-//! The driver of robots that speak ROS 2, which knows no middleware.
+//! Driver of robots that speak ROS 2, free of middleware.
 //!
-//! A piece of the wire is one message: a byte, the row of its topic in [`Topics`], and its payload as DDS delivered
-//! it; before the payload of another's command stands the number of its writer. The robot is sent a payload for the
-//! topic of commands.
+//! A received piece is one message: a byte, its row in [`Topics`], and the payload from DDS. The
+//! writer's number precedes another node's command. Sent pieces are command payloads.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`topics`] | THE table of topics |
-//! | [`messages`] | what the driver needs of them |
-//! | [`publishers`] | whether two nodes publish odometry |
-//! | `gyro` | the turn of each tick by the robot's IMU |
+//! | [`topics`] | table of topics |
+//! | [`messages`] | required fields of messages |
+//! | [`publishers`] | check for two odometry publishers |
+//! | `gyro` | turn of each tick by the IMU |
 
 mod gyro;
 pub mod messages;
@@ -43,13 +42,13 @@ use self::{
     topics::{Content, Topics},
 };
 
-/// A link is started again within this. Nobody knows how far the robot drove meanwhile.
+/// Longest absence of a link, with unknown motion.
 const UNSEEN_S: f64 = 5.0;
-/// Bearings of a laser's row and of its scans differ at most by this share of the angle between beams.
+/// Bearing tolerance between a laser's row and its scans, in beam steps.
 const SAME_BEARING: f64 = 0.5;
-/// A scan's stamp is implausible if it is farther ahead of the newest odometry's.
+/// Largest lead of a scan's stamp over odometry's.
 const AHEAD_NS: i64 = 500_000_000;
-/// The angle between beams may differ by this share.
+/// Relative tolerance of beam steps.
 const SAME_STEP: f64 = 0.01;
 
 #[derive(Clone, Debug)]
@@ -63,9 +62,10 @@ pub struct Ros2 {
     told_of_scan_stamp: bool,
     odometry: odometry::Odometry,
     gyro: Gyro,
-    /// The odometry of the newest tick gives it, radians.
+    /// By the newest tick's odometry, radians.
     heading: Option<f64>,
-    /// The stamp of the newest odometry, and when the newest tick was due: at most half a period before its own.
+    /// Stamp of the newest odometry, and the newest tick's due time, at most half a period before
+    /// its own.
     stamps_ns: Option<[i64; 2]>,
     tally: WireTally,
 }
@@ -88,7 +88,7 @@ impl Ros2 {
         }
     }
 
-    /// A refused message has no effect; the error says why.
+    /// Takes a message, or refuses it without effect; the error says why.
     fn take(&mut self, piece: &[u8], heard: &mut Heard) -> Result<(), String> {
         if let Some((&publishers::TWO, gids)) = piece.split_first() {
             let odometry =
@@ -105,7 +105,7 @@ impl Ros2 {
         };
         let (content, name) = (*content, topic.name.clone());
         self.take_payload(content, payload, heard).map_err(|why| format!("{name}: {why}"))?;
-        // Commands of others do not show that the robot is there.
+        // Other nodes' commands do not show the robot's presence.
         heard.anything |= content != Content::Command;
         Ok(())
     }
@@ -128,7 +128,7 @@ impl Ros2 {
             Content::Range(row) => {
                 let range = read_range(payload)?;
                 let sensor = self.table.get(row);
-                // Infinite is nothing in reach.
+                // Infinite means nothing in reach.
                 let range = Some(range).filter(|range| *range != f64::INFINITY);
                 heard.readings.extend(sensor.map(|sensor| range_reading(row, sensor, range)));
                 Ok(())
@@ -183,10 +183,10 @@ impl Ros2 {
         }
         let turned = self.odometry.turned(odometry.pose, &self.body);
         let turned = turned.ok_or("a pose that no robot can have; say metres")?;
-        // If odometry comes faster than ticks, the message nearest to a tick's time begins the tick.
+        // If odometry is faster than ticks, the message nearest to a tick's time begins it.
         let slack_ns = (stamp_ns - newest_ns) / 2;
         let is_tick = stamp_ns - tick_ns >= self.period_ns - slack_ns;
-        // A message that was stamped late is no reason to leave out the next.
+        // A late stamp must not skip the next message.
         let due_ns = (tick_ns + self.period_ns).clamp(stamp_ns - self.period_ns / 2, stamp_ns);
         heard.stamp_ns = Some(stamp_ns);
         self.stamps_ns = Some([stamp_ns, if is_tick { due_ns } else { tick_ns }]);
@@ -215,7 +215,7 @@ impl Ros2 {
         }
         let range = |range: &f32| match *range {
             range if range < scan.least_m => Some(f32::NAN),
-            // Infinite is nothing in reach.
+            // Infinite means nothing in reach.
             f32::INFINITY => None,
             range if range > scan.most_m && range <= 2.0 * scan.most_m => None,
             range => Some(range),
@@ -244,7 +244,7 @@ impl Ros2 {
     }
 }
 
-/// Stamps of plausible scans, from the newest odometry's on.
+/// Plausible scan stamps relative to odometry's.
 const STAMPS_NS: std::ops::RangeInclusive<i64> = -LONGEST_SWEEP_NS..=AHEAD_NS;
 
 fn sweep_of(scan: &Scan, sensor: &Sensor) -> Sweep {
@@ -263,7 +263,6 @@ fn sweep_of(scan: &Scan, sensor: &Sensor) -> Sweep {
     Sweep { first_beam_ns: 0, beam_ns: beam_ns as i64, first_beam }
 }
 
-/// Each beam of `scan` is that of the laser's row.
 fn is_same_fan(scan: &Scan, sensor: &Sensor) -> bool {
     let ((first, step), (its_first, its_step)) = (scan.fan, sensor.fan());
     scan.ranges.len() == sensor.beams
@@ -271,18 +270,18 @@ fn is_same_fan(scan: &Scan, sensor: &Sensor) -> bool {
         && (step - its_step).abs() <= SAME_STEP * its_step
 }
 
-/// A whole circle, in which the last beam may be the first again.
+/// Returns whether beams form a circle, the last possibly repeating the first.
 fn is_circle(beams: usize, step: f64) -> bool {
     (beams as f64 * step.abs() - TAU).abs() <= 1.5 * step.abs()
 }
 
-/// The row is a whole circle with at most twice the beams of `scan`.
+/// Returns whether the row is a circle of at most twice the scan's beams.
 fn is_whole(sensor: &Sensor, scan: &Scan) -> bool {
     sensor.field_of_view_deg >= 360.0 && scan.ranges.len() * 2 >= sensor.beams
 }
 
-/// Each beam of a whole circle goes to the nearest of the row; the shortest of several counts, and a beam of the row
-/// that gets none has no reading.
+/// Maps a circle's beams to the nearest of the row. The shortest of several counts; others have no
+/// reading.
 fn turned_to(sensor: &Sensor, fan: (f64, f64), came: impl Iterator<Item = f32>) -> Vec<f32> {
     let ((first, step), (its_first, its_step)) = (fan, sensor.fan());
     let mut beams = vec![f32::NAN; sensor.beams];
@@ -317,7 +316,7 @@ impl Driver for Ros2 {
     }
 
     fn reset(&mut self) {
-        // A message comes whole or not at all.
+        // Messages arrive whole.
     }
 
     fn tally(&self) -> WireTally {
@@ -330,7 +329,7 @@ impl Base for Ros2 {
         self.gyro.for_tick()
     }
 
-    /// `Twist` has no field for the limit.
+    /// Omits the limit, for which `Twist` has no field.
     fn velocity(&self, counts: [i16; 2], _limit: Duration) -> Vec<u8> {
         let Twist { v, omega } = twist(&self.body, counts);
         write_twist(v, omega, self.stamped)

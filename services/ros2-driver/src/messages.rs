@@ -1,4 +1,4 @@
-//! Messages, as far as the driver needs them. Fields that a newer release of ROS appends are ignored.
+//! Required fields of messages. Fields appended by newer ROS releases are ignored.
 
 use ros2::{
     cdr::{Cdr as _, Malformed},
@@ -6,32 +6,32 @@ use ros2::{
     msg::{self, HazardDetection, HazardDetectionVector, LaserScan, Range, Twist, TwistStamped},
 };
 
-/// The first number of a covariance if its quantity is not stated.
+/// First covariance entry of unstated quantities.
 const NOT_STATED: f64 = -1.0;
 const FASTEST_TURN: f64 = 50.0;
 
-/// A stamp that goes back farther says that the robot's clock was set anew.
+/// Largest backward step of a stamp on a clock that was not reset.
 const SET_ANEW_NS: i64 = 1_000_000_000;
 pub const NO_GROWTH: &str =
     "a stamp that does not grow; let one node alone publish it, and stamp each";
 
-/// A stamp no newer than the newest, unless a clock was set anew.
+/// Returns whether a stamp does not grow, unless a clock was set.
 pub fn is_repeated(newest_ns: i64, stamp_ns: i64) -> bool {
     (newest_ns - SET_ANEW_NS..=newest_ns).contains(&stamp_ns)
 }
 
 #[derive(Clone, Copy, Debug)]
 pub struct Odometry {
-    /// The robot's clock gives it.
+    /// Stamp by the robot's clock.
     pub stamp_ns: i64,
     /// x, y and heading.
     pub pose: [f64; 3],
-    /// The speed ahead, m/s, and the turn rate, rad/s.
+    /// Forward speed, m/s, and turn rate, rad/s.
     pub twist: [f64; 2],
 }
 
 impl Odometry {
-    /// The error says why there is none.
+    /// Reads odometry; the error says why there is none.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let msg::Odometry { header, pose, twist, .. } = msg::Odometry::decode(payload)?;
         let heading = pose.pose.orientation.heading();
@@ -53,14 +53,14 @@ pub struct Imu {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ImuTurn {
-    /// Rad/s, and the variance of its error if that is stated.
+    /// Rad/s, with its variance if stated.
     Rate(f64, Option<f64>),
     /// Radians.
     Heading(f64),
 }
 
 impl Imu {
-    /// The turn rate if it is stated, else the orientation. The error says why there is none.
+    /// Reads the turn rate if stated, else the orientation. The error says why there is neither.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let imu = msg::Imu::decode(payload)?;
         let rate = imu.angular_velocity.z;
@@ -75,7 +75,7 @@ impl Imu {
                 ImuTurn::Heading(heading.ok_or(why)?)
             }
             ([.., variance], _) if rate.abs() <= FASTEST_TURN => {
-                // A variance greater than that of any rate means that it is unknown.
+                // Variances beyond that of any rate mean unknown.
                 let most = FASTEST_TURN * FASTEST_TURN;
                 ImuTurn::Rate(rate, Some(variance.min(most)).filter(|_| variance > 0.0))
             }
@@ -87,22 +87,22 @@ impl Imu {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
-    /// Of the first beam; the robot's clock gives it.
+    /// Stamp of the first beam, by the robot's clock.
     pub stamp_ns: i64,
     /// Time from beam to beam.
     pub beam_s: f32,
-    /// Bearing of the first beam, and the angle from beam to beam, radians counter-clockwise.
+    /// Bearing of the first beam, and beam step, radians counter-clockwise.
     pub fan: (f64, f64),
-    /// Other ranges are none.
+    /// Valid ranges.
     pub least_m: f32,
     pub most_m: f32,
     pub ranges: Vec<f32>,
-    /// The last beam was measured first.
+    /// Whether the last beam was measured first.
     pub is_reversed: bool,
 }
 
 impl Scan {
-    /// Fails if `payload` is no `sensor_msgs/LaserScan`.
+    /// Reads a scan. Fails if `payload` is no `sensor_msgs/LaserScan`.
     pub fn read(payload: &[u8]) -> Result<Self, Malformed> {
         let scan = LaserScan::decode(payload)?;
         Ok(Self {
@@ -116,7 +116,7 @@ impl Scan {
         })
     }
 
-    /// Its laser is mounted upside down: give the beams the order and the bearings that they have in the robot's frame.
+    /// Orders an upside-down laser's beams as in the robot's frame.
     pub fn turn_over(&mut self) {
         let (first, step) = self.fan;
         self.fan.0 = -(first + step * self.ranges.len().saturating_sub(1) as f64);
@@ -125,10 +125,11 @@ impl Scan {
     }
 }
 
-/// Metres of a `sensor_msgs/Range`: infinite for nothing, no number for no reading. Fails if `payload` is none.
+/// Reads a `sensor_msgs/Range` in metres: infinite for nothing, NaN for no reading. Fails
+/// otherwise.
 pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
     let Range { min_range: least_m, max_range: most_m, range, .. } = Range::decode(payload)?;
-    // A sensor with a single range says by an infinite one whether it is empty to there.
+    // Fixed-distance rangers report -inf for an object and +inf for none.
     Ok(match range {
         range if range == f32::NEG_INFINITY => 0.0,
         f32::INFINITY => f64::INFINITY,
@@ -138,7 +139,7 @@ pub fn read_range(payload: &[u8]) -> Result<f64, Malformed> {
     })
 }
 
-/// The frames of the bumpers and cliff sensors that feel something. Fails if `payload` is no
+/// Returns the frames of triggered bumpers and cliff sensors. Fails if `payload` is no
 /// `irobot_create_msgs/HazardDetectionVector`.
 pub fn read_hazards(payload: &[u8]) -> Result<Vec<String>, Malformed> {
     let felt = HazardDetectionVector::decode(payload)?
@@ -148,8 +149,8 @@ pub fn read_hazards(payload: &[u8]) -> Result<Vec<String>, Malformed> {
     Ok(felt.map(|hazard| hazard.header.frame_id).collect())
 }
 
-/// The `geometry_msgs/Twist` or, if `stamped`, `TwistStamped` moves a robot. A speed that is no number counts as
-/// motion. Fails if `payload` is none.
+/// Returns whether a `geometry_msgs/Twist` or, if `stamped`, `TwistStamped` moves a robot, as NaN
+/// does. Fails otherwise.
 pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
     let twist = match stamped {
         true => TwistStamped::decode(payload)?.twist,
@@ -158,8 +159,8 @@ pub fn read_moves(payload: &[u8], stamped: bool) -> Result<bool, Malformed> {
     Ok(twist != Twist::default())
 }
 
-/// The stamp is 0, which receivers take for their own time: the driver has no clock, and a stop must never be too
-/// old.
+/// Encodes a command. Receivers take stamp 0 for their own time: the driver has no clock, and a
+/// stop must never expire.
 pub fn write_twist(ahead: f64, turn: f64, stamped: bool) -> Vec<u8> {
     let twist = twist([ahead, turn]);
     match stamped {

@@ -1,13 +1,13 @@
-//! The publishers of a robot's odometry: with two of them the pose jumps from one to the other.
+//! Publishers of odometry. With two the pose alternates between theirs.
 
 use std::fmt::Write as _;
 
-/// DDS knows a writer by it.
+/// DDS writer identifier.
 pub type Gid = [u8; 16];
 
-/// The first byte of a piece that stands for no message: the numbers of two publishers of odometry follow.
+/// First byte of a piece with the numbers of two odometry publishers.
 pub(crate) const TWO: u8 = u8::MAX;
-/// A publisher is gone after such a silence, and two are reported again after as long.
+/// Silence of a publisher that is gone, and report interval.
 const GONE_NS: u64 = 1_000_000_000;
 
 #[derive(Debug, Default)]
@@ -18,8 +18,8 @@ pub struct Publishers {
 }
 
 impl Publishers {
-    /// A message came from `from`. Gives a piece for the driver if two publish in turn. A node that took the place of another that
-    /// ended is alone.
+    /// Takes a message's sender. Returns a piece if two publish in turn, and not if one replaced
+    /// another.
     pub fn take(&mut self, from: Gid, now_ns: u64) -> Option<Vec<u8>> {
         let before = self.newest.replace((from, now_ns)).filter(|(gid, _)| *gid != from)?;
         let earlier = self.other.replace(before);
@@ -33,7 +33,7 @@ impl Publishers {
     }
 }
 
-/// Two publishers of odometry on `topic` in words, by what follows [`TWO`].
+/// Describes the publishers by the bytes after [`TWO`].
 pub(crate) fn words(topic: &str, gids: &[u8]) -> Option<String> {
     let (one, other) = gids.split_first_chunk()?;
     let [one, other] = [*one, other.try_into().ok()?].map(gid_text);
@@ -47,7 +47,7 @@ pub fn gid_text(gid: Gid) -> String {
     let mut text = String::new();
     for (place, byte) in gid.into_iter().enumerate() {
         let dot = if place == 0 { "" } else { "." };
-        // A text takes everything.
+        // Writing to a string cannot fail.
         let _ = write!(text, "{dot}{byte:02x}");
     }
     text
@@ -69,7 +69,7 @@ mod tests {
         assert!(!take(bridge, 210) && !take(bridge, 240));
         assert!(take(restarted, 250) && !take(bridge, 280) && !take(restarted, 300));
         assert!(!take(bridge, 1200) && take(restarted, 1300));
-        // One that was silent for long took the other's place.
+        // One that was silent for long replaced the other.
         assert!(!take(bridge, 9000) && !take(restarted, 12_000) && !take(bridge, 15_000));
     }
 }

@@ -1,4 +1,4 @@
-//! The messages below were serialised by rclpy of ROS 2 Kilted with Fast DDS. Zeros stand for lists of zeros.
+//! Messages serialised by rclpy of ROS 2 Kilted with Fast DDS. Zeros stand for lists of zeros.
 
 mod imu;
 
@@ -20,7 +20,7 @@ const ODOMETRY: [&str; 3] = [
     "9a9999999999c93f00000000000000000000000000000000000000000000000000000000000000009a9999999999b9bf",
     "",
 ];
-/// 4 beams from 0 in steps of 1.5: 1 m, infinite, no number and 0; from 0.16 m to 8 m.
+/// 4 beams from 0 in steps of 1.5: 1 m, infinite, NaN and 0; from 0.16 m to 8 m.
 const SCAN: &str = "0001000000000000000000000a000000626173655f7363616e00b11e000000000000c0400000c03f00000000000000000ad7233e00000041040000000000803f0000807f0000c07f00000000\
      020000000000803f0000803f";
 /// 1.25 m of 0.02 to 4 m.
@@ -43,7 +43,6 @@ fn odometry() -> Vec<u8> {
     [bytes(ODOMETRY[0]), covariance.clone(), bytes(ODOMETRY[1]), covariance].concat()
 }
 
-/// The odometry with this stamp and x.
 fn odometry_at(stamp_ms: u32, x: f64) -> Vec<u8> {
     let mut payload = odometry();
     payload[4..8].copy_from_slice(&(stamp_ms / 1000).to_le_bytes());
@@ -52,8 +51,7 @@ fn odometry_at(stamp_ms: u32, x: f64) -> Vec<u8> {
     payload
 }
 
-/// A scan of beams that end at `ranges`, from `first` in steps of `step`.
-/// It is stamped at 1 s.
+/// Returns a scan at 1 s with beams of `ranges`, from `first` by `step`.
 fn scan_of(first: f32, step: f32, ranges: &[f32]) -> Vec<u8> {
     let mut payload = bytes(SCAN)[..56].to_vec();
     payload[4..8].copy_from_slice(&1_u32.to_le_bytes());
@@ -99,7 +97,7 @@ fn what_rclpy_serialises_is_read_as_what_was_said() {
 fn a_message_of_the_other_byte_order_is_the_same() {
     let mut big = bytes(RANGE);
     big[1] = 0;
-    // After stamp and length come the name of the frame with its padding and the kind, which are bytes.
+    // After stamp and length come frame name, padding and kind, which are bytes.
     for start in [4, 8, 12, 24, 28, 32, 36] {
         big[start..start + 4].reverse();
     }
@@ -173,7 +171,7 @@ fn odometry_is_the_way_of_wheels_and_begins_a_tick_at_the_missions_rate() {
     let motion = said(&mut driver, ODOM, &odometry_at(1500, 1.02)).motion.unwrap();
     let counts = (0.02 * 0.5_f64.cos() / 0.033 * 3600.0 / TAU).round() as u16;
     assert_eq!([motion.wheels.left_counts, motion.wheels.right_counts], [counts; 2]);
-    // 0.2 m/s and -0.1 rad/s of a track of 0.16 m.
+    // 0.2 m/s and -0.1 rad/s with a track of 0.16 m.
     let left = ((0.2 + 0.008) / 0.033 * 3600.0 / TAU).round() as i32;
     assert_eq!(motion.wheels.left_counts_per_s, left);
 }
@@ -183,7 +181,7 @@ fn odometry_that_was_stamped_late_does_not_hide_the_next() {
     let mut driver = driver("robot.rate_hz = 10");
     for stamp_ms in [1000, 1100, 1250, 1300, 1400, 1540, 1590, 1690, 2000, 2010] {
         let is_tick = said(&mut driver, ODOM, &odometry_at(stamp_ms, 1.0)).motion.is_some();
-        // What comes at once after a silence of three periods is of the tick that the silence ended with.
+        // A message right after three silent periods belongs to the tick that ended them.
         assert_eq!(is_tick, stamp_ms != 2010, "{stamp_ms}");
     }
 }
@@ -196,14 +194,14 @@ fn odometry_that_is_repeated_or_old_is_refused_until_it_goes_on() {
     assert!(refused(5000).is_some_and(|why| why.to_string().contains("does not grow")));
     assert!(refused(4900).is_some());
     assert_eq!(refused(5100), None);
-    // The clock was set anew.
+    // The clock was set.
     assert_eq!([refused(100), refused(200)], [None, None]);
 }
 
 #[test]
 fn a_circle_of_beams_is_turned_to_the_missions_and_lacking_ones_have_no_reading() {
     let mut driver = driver("");
-    // The first beam looks ahead, as with the driver of a TurtleBot 3: it is the mission's 180th.
+    // The first beam looks ahead, as on a TurtleBot 3: the mission's 180th.
     let mut ranges = vec![f32::INFINITY; 360];
     ranges[0] = 1.0;
     ranges[90] = 0.1;
@@ -224,7 +222,7 @@ fn beams_of(driver: &mut Ros2, scan: &[u8]) -> Vec<f32> {
     heard.scans.remove(0).beams
 }
 
-/// The scan of [`scan_of`] with this stamp, and time from beam to beam.
+/// Returns [`scan_of`] with this stamp and beam time.
 fn scan_at(stamp_ms: u32, beam_s: f32, first: f32, step: f32) -> Vec<u8> {
     let mut payload = scan_of(first, step, &[1.0; 360]);
     payload[4..8].copy_from_slice(&(stamp_ms / 1000).to_le_bytes());
@@ -338,12 +336,12 @@ fn ranges_and_the_battery_are_those_of_their_topics() {
 fn a_command_is_the_bytes_of_rclpy_and_one_of_nothing_is_a_stop() {
     assert_eq!(write_twist(0.2, -0.5, false), bytes(TWIST));
     let mut stamped = bytes(TWIST_STAMPED);
-    // Fast DDS leaves padding as it was.
+    // Fast DDS leaves padding unchanged.
     stamped[17..20].fill(0);
     assert_eq!(write_twist(0.2, -0.5, true), stamped);
     let stop = driver("").velocity([0, 0], Duration::from_millis(250));
     assert_eq!(stop, write_twist(0.0, 0.0, false));
-    // Half a turn of each wheel a second is pi r.
+    // Half a turn of each wheel per second is pi r.
     let told = driver("").velocity([1800, 1800], Duration::from_millis(250));
     assert_eq!(told, write_twist(twist(&driver("").body, [1800; 2]).v, 0.0, false));
 }
@@ -446,7 +444,6 @@ fn stand_of(driver: &Ros2) -> Vec<u8> {
     driver.velocity([0, 0], Duration::from_millis(250))
 }
 
-/// Odometry with this stamp and pose.
 fn odometry_of(stamp_ms: u32, [x, y, heading]: [f64; 3]) -> Vec<u8> {
     let mut payload = odometry_at(stamp_ms, x);
     payload[52..60].copy_from_slice(&y.to_le_bytes());
@@ -455,7 +452,7 @@ fn odometry_of(stamp_ms: u32, [x, y, heading]: [f64; 3]) -> Vec<u8> {
     payload
 }
 
-/// The jump of odometry from (1, 0.5) with heading 0.3 to `pose` after so long, if it is one, and the counts that it adds.
+/// Returns whether odometry jumps from (1, 0.5), heading 0.3, to `pose`, and the added counts.
 fn jump(after_ms: u32, pose: [f64; 3]) -> (bool, [i32; 2]) {
     let mut driver = driver("");
     let counts = |heard: &Heard| {
@@ -483,7 +480,7 @@ fn odometry_that_jumps_aside_or_farther_than_the_robot_moves_or_starts_again_cou
     for (after_ms, pose) in [
         (100, ahead(0.1)),
         (100, ahead(-0.1)),
-        // This way is a whole cycle of the counts.
+        // A whole cycle of the counts.
         (100, ahead(1.887)),
         (100, aside(0.05)),
         (100, aside(-2.0)),

@@ -1,4 +1,4 @@
-//! THE table of a robot's topics that the link reads and writes.
+//! Table of the topics that the link reads and writes.
 
 use common::mission::{Mission, SensorKind};
 use ros2::topic::Topic;
@@ -10,18 +10,18 @@ pub enum Content {
     Battery,
     Range(usize),
     Imu,
-    /// The bumper or cliff sensor in this row of the mission.
+    /// Row of a bumper or cliff sensor.
     Touch(usize),
-    /// All of them that feel something.
+    /// All triggered bumpers and cliff sensors.
     Hazards,
-    /// Another sender's. The number of its writer stands before the payload.
+    /// Command of another sender, after its writer's number.
     Command,
 }
 
 #[derive(Clone, Debug)]
 pub struct Topics {
     pub command: Topic,
-    /// A piece of the wire begins with the row of its topic here.
+    /// Subscriptions. Wire pieces begin with the row here.
     pub heard: Vec<(Content, Topic)>,
 }
 

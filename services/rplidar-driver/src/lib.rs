@@ -1,4 +1,4 @@
-//! The driver of RPLIDARs: lasers that turn clockwise and say each measurement by itself. [`rplidar_protocol`] has their words.
+//! Driver of RPLIDARs, which turn clockwise and report single measurements by [`rplidar_protocol`].
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,7 +9,8 @@ use common::{
 };
 use rplidar_protocol::{Answer, Decoder, Node, Request, Said};
 
-/// The sensor needs 1 ms after a stop before it reads a request, and 64 bytes that are none take longer at 460,800 baud.
+/// Padding after a stop: the sensor needs 1 ms before a request, and 64 invalid bytes take longer
+/// at 460,800 baud.
 const PAUSE: [u8; 64] = [0; 64];
 const HEALTH_ERROR: u8 = 2;
 
@@ -20,15 +21,15 @@ pub struct Rplidar {
     decoder: Decoder,
     sample_ns: i64,
     count: i64,
-    /// None until a turn begins, and after a loss until the next one does.
+    /// None before the first turn, and after a loss until the next.
     turn: Option<Turn>,
     tally: WireTally,
 }
 
-/// A turn that is not over.
+/// Turn in progress.
 #[derive(Clone, Debug)]
 struct Turn {
-    /// The number of its first measurement.
+    /// Number of its first measurement.
     began: i64,
     first_beam: usize,
     beams: Vec<f32>,
@@ -49,7 +50,7 @@ impl Rplidar {
 
     fn take_node(&mut self, node: Node) -> Option<LaserScan> {
         let degrees = f64::from(node.angle_q6) / 64.0;
-        // Counter-clockwise in the robot's frame; a laser upside down turns the other way there.
+        // Counter-clockwise in the robot's frame, unless upside down.
         let bearing = if self.sensor.is_upside_down { degrees } else { -degrees }.to_radians();
         let step = TAU / self.sensor.beams as f64;
         let at = ((bearing + PI).rem_euclid(TAU) / step).round() as usize % self.sensor.beams;
@@ -69,10 +70,11 @@ impl Rplidar {
         scan
     }
 
-    /// The scan's first beam is at the number of its measurement, until that becomes a time.
+    /// Returns the scan, with a measurement number for its first beam's time.
     fn scan_of(&self, turn: Turn) -> LaserScan {
         let Turn { began, first_beam, mut beams } = turn;
-        // The sensor says the same of a lost echo and of nothing in reach: nothing is there where no beam beside it ended.
+        // The sensor reports lost echoes as nothing in reach, which is trusted only where no
+        // neighbour beam ended.
         let ended: Vec<_> = beams.iter().map(|beam| beam.is_finite()).collect();
         let last = ended.len().saturating_sub(1);
         for (beam, range) in beams.iter_mut().enumerate().filter(|(_, range)| range.is_infinite()) {
@@ -115,7 +117,7 @@ impl Driver for Rplidar {
                 }
             }
         }
-        // The newest measurement is held back by the decoder.
+        // The decoder holds back the newest.
         for LaserScan { sweep, .. } in &mut heard.scans {
             sweep.first_beam_ns = (sweep.first_beam_ns - self.count) * self.sample_ns;
         }

@@ -16,7 +16,7 @@ fn rplidar(set: &str) -> Rplidar {
     Rplidar::new(row, sensor, product)
 }
 
-/// The node at `degrees` clockwise, of a reading of so many metres; 0 is none.
+/// Returns a node at `degrees` clockwise; 0 metres is no reading.
 fn node(degrees: u16, metres: f32) -> Vec<u8> {
     let quality = if metres > 0.0 { 20 } else { 0 };
     let distance_q2 = (metres * 4000.0) as u16;
@@ -24,17 +24,17 @@ fn node(degrees: u16, metres: f32) -> Vec<u8> {
     Node { is_first: degrees == 0, quality, angle_q6, distance_q2 }.encode().to_vec()
 }
 
-/// A turn in steps of 10 degrees, each beam as many metres as `range` says of its degrees.
+/// Returns a turn by 10 degrees, with `range(degrees)` metres.
 fn turn(range: impl Fn(u16) -> f32) -> Vec<u8> {
     (0..NODES as u16).flat_map(|beam| node(10 * beam, range(10 * beam))).collect()
 }
 
-/// The measurements of a turn's beginning: those of the turn before are all there.
+/// Returns a turn's beginning, which completes the one before.
 fn next() -> Vec<u8> {
     [node(0, 1.0), node(10, 1.0)].concat()
 }
 
-/// The scan's first beam looks back.
+/// Returns a beam; the first looks back.
 fn at(scan: &LaserScan, degrees: usize) -> f32 {
     scan.beams[(degrees / 10 + 18) % NODES]
 }
@@ -45,7 +45,7 @@ fn scanning(set: &str) -> Rplidar {
     driver
 }
 
-/// What the driver hears of a turn of so many metres and the beginning of the next.
+/// Returns the scans of a turn at `metres` and the next one's beginning.
 fn hears(driver: &mut Rplidar, metres: f32) -> Vec<LaserScan> {
     driver.hear(&[turn(|_| metres), next()].concat()).scans
 }
@@ -61,7 +61,7 @@ fn a_turn_is_a_scan_counter_clockwise_and_no_quality_no_range_and_one_too_short_
     };
     let mut heard = scanning("").hear(&[turn(range), next()].concat());
     let scan = heard.scans.pop().unwrap();
-    // What is 90 degrees clockwise is on the right.
+    // 90 degrees clockwise is on the right.
     assert_eq!([at(&scan, 270), at(&scan, 90), at(&scan, 30)], [1.0, 3.0, 2.0]);
     assert!(at(&scan, 0).is_nan() && at(&scan, 180).is_nan());
     let mut heard = scanning("roll_deg = 180").hear(&[turn(range), next()].concat());
@@ -71,7 +71,7 @@ fn a_turn_is_a_scan_counter_clockwise_and_no_quality_no_range_and_one_too_short_
     let open = |degrees| if degrees > 180 { 0.0 } else { 2.0 };
     let mut heard = scanning("").hear(&[turn(open), next()].concat());
     let scan = heard.scans.pop().unwrap();
-    // Nothing is in reach on the left, but for the beams beside those that end.
+    // Nothing is in reach on the left, except beside ended beams.
     assert!(at(&scan, 90) == f32::INFINITY && at(&scan, 10).is_nan() && at(&scan, 170).is_nan());
     let silent = Node { is_first: false, quality: 0, angle_q6: 64, distance_q2: 400 }.encode();
     let mut heard = scanning("").hear(&[&node(0, 0.0), &silent[..], &next()].concat());
@@ -156,7 +156,7 @@ proptest! {
     }
 }
 
-/// Bytes of any kind, and such as nearly belong to the protocol.
+/// Returns arbitrary and nearly valid bytes.
 fn hostile() -> impl Strategy<Value = Vec<u8>> {
     let near = (0..200_usize).prop_map(|cut| turn(|_| 1.0)[cut % 180..].to_vec());
     let any = proptest::collection::vec(any::<u8>(), 0..300);

@@ -1,5 +1,5 @@
-//! Two wheels, or a car's driven wheel and steering: counts of motor frames in, timed commands out, each with the
-//! channels and signs of the mission.
+//! Counts from motor frames and timed commands, with the mission's channels and signs, for two
+//! wheels or a car's wheel and steering.
 
 use std::time::Duration;
 
@@ -12,10 +12,10 @@ use common::{
     },
 };
 
-/// Counts/s: -32768 and -32767 mean that the channel is not changed.
+/// Largest command, counts/s: -32768 and -32767 leave the channel unchanged.
 const FASTEST: i16 = 32_766;
 
-/// A wheel does not turn at this pulse width.
+/// Pulse width at which a wheel stands.
 const PWM_STANDS: i16 = 16_384;
 
 #[derive(Debug)]
@@ -28,7 +28,7 @@ impl Drive {
         Self { robot: mission.robot.clone() }
     }
 
-    /// Encoders as feedback, velocity mode, enabled motors and running streams.
+    /// Returns the setup: encoder feedback, velocity mode, enabled motors, running streams.
     pub fn greeting(&self) -> Vec<u8> {
         let settings = [self.robot.left.channel, self.robot.right.channel].map(|channel| {
             [
@@ -45,7 +45,7 @@ impl Drive {
         [Stream::Motor, Stream::Custom, Stream::Standard].map(start).concat()
     }
 
-    /// The counts grow forward.
+    /// Returns counts that grow forward.
     pub fn wheels(&self, sensors: &MotorSensors) -> WheelSample {
         let left = self.wheel(sensors, self.robot.left);
         let right = self.wheel(sensors, self.robot.right);
@@ -58,7 +58,7 @@ impl Drive {
         }
     }
 
-    /// Left and right, AD counts.
+    /// Returns left and right currents, AD counts.
     pub fn currents(&self, sensors: &MotorSensors) -> [u16; 2] {
         let channels = [self.robot.left, self.robot.right];
         channels.map(|wheel| sensors.currents[usize::from(wheel.channel.min(1))])
@@ -76,7 +76,7 @@ impl Drive {
         }
     }
 
-    /// A robot that respects the limit stops by itself when the link has ended.
+    /// Encodes a velocity. A robot that respects the limit stops by itself after the link ended.
     pub fn velocity(&self, [left, right]: [i16; 2], limit: Duration) -> Vec<u8> {
         let mut channels = [None; 2];
         for (channel, counts) in [(self.robot.left, left), (self.robot.right, right)] {
@@ -93,7 +93,6 @@ impl Drive {
         channels.map(|channel| encoded(Command::Enable { on: false, channel })).concat()
     }
 
-    /// Both wheels get the pulse width at which they do not turn.
     pub fn still_pulses(&self) -> Vec<u8> {
         let mut targets = [None; CHANNELS];
         for wheel in [self.robot.left.channel, self.robot.right.channel] {

@@ -1,9 +1,9 @@
-//! The X80's driver.
+//! Driver of the X80.
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`drive`] | motor frames in, timed commands out |
-//! | `rangers` | the readings of a tick |
+//! | `rangers` | readings of a tick |
 //! | [`telemetry`] | other sensors, in the units of the topics |
 
 pub mod drive;

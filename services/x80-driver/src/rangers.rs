@@ -1,4 +1,4 @@
-//! Ranging readings for the next tick, collected from several frames.
+//! Readings for the next tick, from several frames.
 
 use common::{
     mission::{INFRARED_RANGERS, Mission, Sensor, SensorKind},
@@ -9,7 +9,7 @@ use common::{
 #[derive(Debug)]
 pub(crate) struct Rangers {
     table: Vec<Sensor>,
-    /// The first infrared ranger comes in the standard frame, the other six in the custom one.
+    /// From the standard frame; the custom one has the other six.
     first_infrared: Option<u16>,
 }
 
@@ -23,7 +23,7 @@ impl Rangers {
         self.readings(SensorKind::Cone, &standard.ultrasonic.map(heard))
     }
 
-    /// None until a standard frame has brought the first ranger's reading.
+    /// Returns None before a standard frame.
     pub(crate) fn take_custom(
         &self,
         custom: &CustomSensors,

@@ -8,7 +8,7 @@ use common::{
     },
 };
 
-/// Values of earlier frames for the next sample.
+/// Values for the next sample.
 #[derive(Debug, Default)]
 pub struct Telemetry {
     currents: [u16; 6],

@@ -1,5 +1,5 @@
-//! The protocol of ROSArduinoBridge: requests become commands of a simulated X80's boards, and their readings become
-//! answers. A sonar says its reading of the newest tick.
+//! ROSArduinoBridge protocol: requests become commands of simulated X80 boards, their readings
+//! answers. Sonar readings are the newest tick's.
 
 use common::{
     mission::{ArduinoBoard, Mission, RobotConfig},
@@ -11,9 +11,9 @@ use crate::{
     motor::Motor,
 };
 
-/// A board that restarts hears nothing for so long: its boot loader waits for a program.
+/// Deaf time of a restarted board: its boot loader waits for a program.
 const BOOTS_S: f64 = 1.5;
-/// The motors stop by themselves so long after the last command.
+/// Time after the last command at which the motors stop.
 const STOPS_AFTER_MS: u16 = 2000;
 const LONGEST: usize = 64;
 
@@ -23,7 +23,7 @@ pub enum Request {
     Counts,
     /// `r`: count from 0.
     Reset,
-    /// `m`: left and right, counts in a run of the speed loop.
+    /// `m`: left and right, counts per run of the speed loop.
     Speeds([i32; 2]),
     /// `p`: the sonar on this pin.
     Range(i32),
@@ -32,7 +32,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// `line` has no carriage return. A number that is missing or none is 0, as in the firmware.
+    /// Parses a line without carriage return. A missing or invalid number is 0, as in the firmware.
     fn parse(line: &[u8]) -> Self {
         let text = String::from_utf8_lossy(line);
         let mut words = text.split(' ');
@@ -56,7 +56,6 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    /// Returns the requests that `bytes` complete.
     pub(crate) fn push(&mut self, bytes: &[u8]) -> Vec<Request> {
         let mut complete = Vec::new();
         for byte in bytes {
@@ -75,9 +74,9 @@ pub(crate) struct ArduinoWords {
     board: ArduinoBoard,
     wheels: [OnChannel; 2],
     sonars: Vec<(i32, usize)>,
-    /// The board counts 0 here.
+    /// Counts that the board calls 0.
     zero: [f64; 2],
-    /// Mission time, seconds; none when it has booted.
+    /// Mission time in seconds; none after boot.
     boots_until: Option<f64>,
 }
 
@@ -89,7 +88,7 @@ impl ArduinoWords {
         let sonars = table.filter_map(|row| Some((pin(&row.name)?, usize::from(row.channel))));
         Self {
             board: mission.robot.arduino.clone(),
-            // Its program knows the usual wiring; that of the mission is how it was assembled.
+            // The firmware assumes the usual wiring; the mission's is the real one.
             wheels: OnChannel::left_and_right(&RobotConfig::default()),
             sonars: sonars.collect(),
             zero: [0.0; 2],
@@ -101,7 +100,7 @@ impl ArduinoWords {
         self.boots_until = Some(now + BOOTS_S);
     }
 
-    /// A board that has booted counts from 0.
+    /// Returns whether the board is up; a rebooted one counts from 0.
     pub(crate) fn hears(&mut self, now: f64, motors: &[Motor; 6]) -> bool {
         if self.boots_until.is_some_and(|until| now < until) {
             return false;
@@ -112,7 +111,7 @@ impl ArduinoWords {
         true
     }
 
-    /// Returns the answer, and the command that the request becomes.
+    /// Returns the answer, and the resulting command.
     pub(crate) fn answer(
         &mut self,
         request: Request,
@@ -132,7 +131,6 @@ impl ArduinoWords {
                 "OK".to_owned()
             }
             Request::Speeds(speeds) => {
-                // Counts in a run of the speed loop.
                 let counts = speeds.map(|speed| f64::from(speed) * self.board.pid_rate_hz);
                 command = Some(velocity(self.wheels, counts, STOPS_AFTER_MS));
                 "OK".to_owned()
@@ -149,7 +147,7 @@ impl ArduinoWords {
         (text + "\r\n", command)
     }
 
-    /// The counts as the board says them, left and right.
+    /// Returns the board's counts.
     pub(crate) fn counts(&self, motors: &[Motor; 6]) -> [i32; 2] {
         let turned = self.turned(motors);
         [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32)

@@ -1,4 +1,4 @@
-//! The body: a disc or a polygon that cannot go through things, on two driven wheels or on a car's.
+//! Body: a solid disc or polygon on two driven wheels or a car's.
 
 use common::{
     kinematics::{DifferentialDrive, Pose2, Twist},
@@ -8,9 +8,9 @@ use glam::DVec2;
 
 use crate::world::{Surface, World};
 
-/// From this distance on a body touches nothing any more.
+/// Distance from which a contact ends.
 const RELEASE_M: f64 = 0.005;
-/// It is pushed out of a thing at most so often; corners take two.
+/// Maximum pushes out of obstacles; corners take two.
 const PUSHES: usize = 4;
 
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// The true track is `track_scale` times the nominal one.
+    /// Scales the nominal track to the true one.
     pub fn new(mission: &Mission, world: &World, track_scale: f64) -> Self {
         let body = mission.body();
         let track = body.track_m * track_scale;
@@ -54,7 +54,7 @@ impl Body {
         self.pose = pose;
         self.contacts = contacts;
         self.clearance = self.clearance_in(world);
-        // A contact that lasts is not counted again.
+        // A continuing contact is counted once.
         self.touching = self.clearance <= RELEASE_M;
     }
 
@@ -66,30 +66,30 @@ impl Body {
         self.radius
     }
 
-    /// True track, metres; W is the nominal one.
+    /// Returns the true track, metres; W is the nominal one.
     pub fn track(&self) -> f64 {
         self.track
     }
 
-    /// A contact counts once, however long it lasts.
+    /// Returns contacts, each counted once however long it lasts.
     pub fn contacts(&self) -> u64 {
         self.contacts
     }
 
-    /// The bearing of what it touches now, radians counter-clockwise from its axis.
+    /// Returns the bearing of a touched obstacle, radians counter-clockwise from the body's axis.
     pub fn touched_at(&self, world: &World) -> Option<f64> {
         let is_near = self.clearance <= RELEASE_M;
         let (_, outward) = is_near.then(|| self.nearest(world)).flatten()?;
         Some(self.pose.axis().angle_to(-outward?))
     }
 
-    /// Metres from its surface to the nearest thing at its last place.
+    /// Returns metres between the body and the nearest obstacle.
     pub fn clearance(&self) -> f64 {
         self.clearance
     }
 
-    /// Move as the left and right wheels ask, metres of ground; the body slides along the thing it touches, or halts. Returns the
-    /// ground that went by under either wheel.
+    /// Moves as both wheels ask, metres of ground. On contact the body slides along the obstacle,
+    /// or halts. Returns the ground covered by each wheel.
     pub fn roll(&mut self, asked: [f64; 2], world: &World) -> [f64; 2] {
         let step = self.drive.twist(asked.map(|metres| metres / self.wheel_radius));
         let Some(arc) = self.go(step, world) else {
@@ -99,8 +99,8 @@ impl Body {
         [arc - half_turn, arc + half_turn]
     }
 
-    /// Move by `step` (metres, radians) until something is in the way. Returns the distance it moved ahead, metres,
-    /// if it touched something.
+    /// Moves by `step`, metres and radians, until an obstacle blocks it. Returns the metres ahead
+    /// on contact.
     pub fn go(&mut self, step: Twist, world: &World) -> Option<f64> {
         let before = self.pose;
         self.pose = before.along_arc(step.v, step.omega);
@@ -117,8 +117,8 @@ impl Body {
         touched.then(|| (self.pose.position - before.position).dot(middle))
     }
 
-    /// Put the body outside of what it penetrates, or back to `before` if that fails. Returns whether it penetrated
-    /// anything.
+    /// Moves the body out of obstacles, or back to `before` if that fails. Returns whether it
+    /// penetrated any.
     fn leave_things(&mut self, before: Pose2, world: &World) -> bool {
         for push in 0..PUSHES {
             let nearest = self.nearest(world);
@@ -129,7 +129,7 @@ impl Body {
             let Some(outward) = outward else {
                 break;
             };
-            // Without the margin, rounding would let the body penetrate for ever.
+            // The margin avoids endless penetration by rounding.
             self.pose.position += outward * (1e-9 - gap);
         }
         self.clearance = self.clearance_in(world);
@@ -147,7 +147,7 @@ impl Body {
         self.nearest(world).map_or(f64::INFINITY, |(gap, _)| gap)
     }
 
-    /// The distance to the nearest thing, negative inside, and the direction from the thing to the body.
+    /// Returns the nearest obstacle's distance, negative inside, and direction to the body.
     fn nearest(&self, world: &World) -> Option<(f64, Option<DVec2>)> {
         let position = self.pose.position;
         let Some(footprint) = self.footprint else {

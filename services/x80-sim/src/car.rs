@@ -1,4 +1,4 @@
-//! A car between motor board and ground: one channel drives it, another steers.
+//! Car between motor board and ground: one channel drives, another steers.
 
 use common::{
     kinematics::{Ackermann, Twist},
@@ -25,8 +25,8 @@ pub(crate) struct Car {
 }
 
 impl Car {
-    /// Driven wheel and wheelbase are off by the `errors` of a left wheel and of a track; none if the robot is no
-    /// car.
+    /// Applies the `errors` of a left wheel and a track to driven wheel and wheelbase; none for
+    /// other robots.
     pub(crate) fn new(mission: &Mission, errors: &WheelErrors) -> Option<Self> {
         let body = mission.body();
         let steering = body.steering?;
@@ -52,7 +52,7 @@ impl Car {
         self.steered.channel == channel
     }
 
-    /// Counts per second.
+    /// Returns counts per second.
     pub(crate) fn top_steering_counts(&self) -> f64 {
         self.steering.counts(self.steering.rate_rad_s)
     }
@@ -67,7 +67,7 @@ impl Car {
         self.drive.twist([wheel, self.angle(motors)])
     }
 
-    /// Move `body` as the motors ask from mission time `now` for `dt` seconds, as far as `world` lets it.
+    /// Moves `body` as the motors ask and `world` permits.
     pub(crate) fn step(
         &self,
         motors: &mut [Motor; 6],
@@ -122,7 +122,7 @@ mod tests {
         Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
     }
 
-    /// The car after `ticks` more with these counts per second: of the wheel forward, of the steering to the left.
+    /// Drives `ticks` at these counts/s: the wheel forward, the steering left.
     fn drive(robot: &mut Robot, wheel: i16, steering: i16, ticks: u32) -> GroundTruthTick {
         let mut bytes = Vec::new();
         Command::velocity([Some(-wheel), Some(steering)], None)
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn the_steering_takes_its_time_and_ends_at_its_stop() {
         let mut robot = car("[simulation.wheels]\nlag_s = 0");
-        // 120 degrees a second are 1200 counts a second, the most for any request; 30 degrees are 300 counts.
+        // 120 degrees/s are 1200 counts/s, the limit of any request; 30 degrees are 300 counts.
         let truth = drive(&mut robot, 0, 5000, 1);
         assert!((steering_counts(&truth) - 171).abs() <= 1, "{truth:?}");
         let truth = drive(&mut robot, 0, 5000, 14);

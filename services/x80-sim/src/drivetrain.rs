@@ -1,4 +1,4 @@
-//! Channel, direction and real diameter of each wheel.
+//! Channel, direction and true diameter of each wheel.
 
 use common::{
     mission::{Mission, RobotConfig, WheelPhysics},
@@ -7,19 +7,19 @@ use common::{
 
 use crate::{motor::Motor, noise::Noise};
 
-/// Metres over the ground for a rim that rolls `metres` and slips.
+/// Returns the ground covered by a slipping rim that rolls `metres`.
 pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) -> f64 {
     let lost = noise.normal(physics.slip_noise * metres.abs().sqrt());
     metres * (1.0 - physics.slip_share) + lost
 }
 
-/// The share that a `held` body's wheels go with the ground: the rest slips at the contact. A wheel that nothing
-/// holds turns as asked, even if it slips.
+/// Returns the share by which a `held` body's wheels follow the ground; the rest slips. Free wheels
+/// turn as asked.
 pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> Option<f64> {
     held.then_some(1.0 - physics.contact_slip)
 }
 
-/// The channel of a wheel, or of a car's steering, and the sign of its counts when the robot goes ahead or steers to the left.
+/// Channel of a wheel or a car's steering, and its counts' sign for driving ahead or steering left.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OnChannel {
     pub(crate) channel: usize,
@@ -29,33 +29,31 @@ pub(crate) struct OnChannel {
 impl OnChannel {
     pub(crate) fn left_and_right(robot: &RobotConfig) -> [Self; 2] {
         [robot.left, robot.right].map(|wheel| Self {
-            // The mission was checked, so channels are 0 and 1.
+            // The mission check limits channels to 0 and 1.
             channel: usize::from(wheel.channel.min(1)),
             sign: if wheel.reversed { -1.0 } else { 1.0 },
         })
     }
 
-    /// Counts since the start.
     pub(crate) fn turned(self, motors: &[Motor; 6]) -> f64 {
         self.sign * motors[self.channel].turned()
     }
 }
 
-/// The command that turns `wheels` with these counts/s for so long.
+/// Returns a timed command for `wheels` in counts/s.
 pub(crate) fn velocity(wheels: [OnChannel; 2], counts: [f64; 2], limit_ms: u16) -> Command {
     let mut channels = [None; 2];
     for (OnChannel { channel, sign }, counts) in wheels.into_iter().zip(counts) {
-        // -32768 and -32767 mean that a channel is not changed.
+        // -32768 and -32767 leave a channel unchanged.
         channels[channel] = Some((sign * counts).round().clamp(-32_766.0, 32_766.0) as i16);
     }
     Command::velocity(channels, limit_ms)
 }
 
-/// Of two wheels, the left one first.
+/// Two wheels, left first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drivetrain {
     on: [OnChannel; 2],
-    /// The wheel has the nominal diameter.
     metres_per_count: f64,
     diameter: [f64; 2],
 }
@@ -69,7 +67,7 @@ impl Drivetrain {
         }
     }
 
-    /// Metres of nominal wheels that the speed loops ask for from mission time `now` for `dt` seconds.
+    /// Returns the metres that the speed loops ask of nominal wheels.
     pub(crate) fn step(
         &self,
         motors: &mut [Motor; 6],
@@ -82,13 +80,13 @@ impl Drivetrain {
         })
     }
 
-    /// The way of the real rims when nominal wheels would roll `metres`.
+    /// Returns the true rims' travel for that of nominal wheels.
     pub(crate) fn rims(&self, metres: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|wheel| metres[wheel] * self.diameter[wheel])
     }
 
-    /// In `dt` seconds a wheel that is held by the share `grip` with the ground, which went by `went` metres, and by
-    /// the rest as it was `asked`.
+    /// Turns the wheels. A held wheel follows the ground's `went` metres by the share `grip`, and
+    /// `asked` by the rest.
     pub(crate) fn turn(
         &self,
         motors: &mut [Motor; 6],
@@ -109,14 +107,14 @@ impl Drivetrain {
         }
     }
 
-    /// m/s, forward positive.
+    /// Returns m/s, forward positive.
     pub(crate) fn rim_speeds(&self, motors: &[Motor; 6]) -> [f64; 2] {
         self.rims(self.on.map(|OnChannel { channel, sign }| {
             sign * motors[channel].speed() * self.metres_per_count
         }))
     }
 
-    /// Counts grow forward.
+    /// Returns counts that grow forward.
     pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> [u16; 2] {
         self.on.map(|OnChannel { channel, sign }| {
             let position = encoders[channel].position;

@@ -1,4 +1,4 @@
-//! The gyro of a robot: the angle that it has turned by, with noise, a bias and an error of its scale.
+//! Gyro: turned angle with noise, bias and scale error.
 
 use common::{geometry::wrap_angle, mission::Mission};
 
@@ -10,13 +10,14 @@ pub(crate) struct Gyro {
     bias_rad_s: f64,
     scale: f64,
     noise: Noise,
-    /// The time and the true heading of the newest reading.
+    /// Time and true heading of the newest reading.
     newest: Option<(f64, f64)>,
     angle: f64,
 }
 
 impl Gyro {
-    /// Bias and scale belong to the robot, so they follow from the mission's seed; the noise follows from `seed`.
+    /// Draws bias and scale, which belong to the robot, from the mission's seed; `seed` sets the
+    /// noise.
     pub(crate) fn new(mission: &Mission, seed: u64) -> Self {
         let physics = mission.simulation.physics().gyro;
         let mut errors = Noise::of_nth(mission.seed, Source::Gyro, 1);
@@ -31,7 +32,6 @@ impl Gyro {
         }
     }
 
-    /// The robot has this heading, radians.
     pub(crate) fn read(&mut self, time_s: f64, heading: f64) {
         if let Some((before_s, before)) = self.newest.replace((time_s, heading)) {
             let passed_s = time_s - before_s;
@@ -69,7 +69,8 @@ mod tests {
         assert!(read(1, [0.0; 3]).abs() < 1e-9);
         let mean_square =
             |errors| (1..=300).map(|seed| read(seed, errors).powi(2)).sum::<f64>() / 300.0;
-        // 0.1 degrees per root of a second in 100 s; an even distribution has a third of the square of its greatest.
+        // 0.1 degrees per root second over 100 s. A uniform distribution's variance is a third of
+        // its squared bound.
         let of = |degrees: f64| degrees.to_radians().powi(2);
         for (errors, want) in [
             ([0.1, 0.0, 0.0], of(1.0)),

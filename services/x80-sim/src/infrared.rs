@@ -1,4 +1,4 @@
-//! The infrared ring: seven rangers that look straight ahead of themselves.
+//! Infrared ring: seven rangers that look straight ahead.
 
 use common::{
     kinematics::Pose2,
@@ -9,10 +9,10 @@ use common::{
 
 use crate::{noise::Noise, world::World};
 
-/// A ranger without an obstacle in reach reads this.
+/// Reading without an obstacle in reach.
 const NOTHING_M: f64 = 0.81;
 
-/// AD counts of the rangers that are mounted on a robot at `pose`; 0 for others.
+/// Returns the rangers' AD counts; 0 without a mount.
 pub fn read(
     world: &World,
     pose: Pose2,
@@ -26,7 +26,7 @@ pub fn read(
         };
         let height_m = world.heights().infrared_m;
         let range = if world.is_between(pose.position, ranger.position, height_m) {
-            // A ranger pressed against the thing that the body touches sees that thing, not those behind it.
+            // A ranger pressed against an object that the body touches sees only that.
             0.0
         } else {
             let hit = world.first_hit(ranger.position, ranger.axis(), height_m);
@@ -59,8 +59,8 @@ mod tests {
             mounts[usize::from(sensor.channel)] = Some(sensor.mount);
         }
         let read = read(&world, Pose2::default(), &mounts, &physics, &mut noise).map(infrared_m);
-        // The left one, 0.127 m from the centre, is 0.473 m from the upper wall, the one at 33.75 degrees 0.6 / sin - 0.2 m,
-        // out of reach; the rear one is 0.3 m from the wall behind.
+        // The left ranger, 0.127 m off the centre, is 0.473 m from the upper wall. The one at 33.75
+        // degrees is 0.6 / sin - 0.2 m away, out of reach. The rear one is 0.3 m from the wall.
         let want = [0.81, 0.81, 0.81, 0.81, 0.81, 0.3, 0.473];
         for (read, want) in read.iter().zip(want) {
             assert!((read - want).abs() < 0.005, "{read} m instead of {want} m");

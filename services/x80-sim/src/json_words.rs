@@ -1,5 +1,4 @@
-//! Lines of JSON for a simulated robot: orders become commands of a simulated X80's boards, and their readings become
-//! reports.
+//! JSON-line protocol: orders become commands of simulated X80 boards, their readings reports.
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
@@ -31,7 +30,7 @@ pub(crate) struct JsonWords {
 impl JsonWords {
     pub(crate) fn new(mission: &Mission) -> Self {
         Self {
-            // Its program knows the usual wiring; that of the mission is how it was assembled.
+            // The firmware assumes the usual wiring; the mission's is the real one.
             wheels: OnChannel::left_and_right(&RobotConfig::default()),
             held_current_ad: mission.robot.held_current_ad.into(),
             counts_per_radian: mission.body().counts_per_turn / TAU,
@@ -40,7 +39,7 @@ impl JsonWords {
         }
     }
 
-    /// The order counts as taken.
+    /// Counts the order as accepted.
     pub(crate) fn commands(&mut self, order: &Order) -> Vec<Command> {
         self.heard += 1;
         let channels = self.wheels.map(|wheel| wheel.channel as u8);
@@ -81,7 +80,8 @@ impl JsonWords {
             self.wheels
                 .map(|OnChannel { channel, sign }| sign * value(channel) / self.counts_per_radian)
         };
-        // The current of a rolling motor is left out: it is in an X80's counts, and other robots have more of them in a turn.
+        // A rolling motor's current is omitted: it is scaled for an X80's counts, and other robots
+        // have more per turn.
         let held = self.wheels.map(|wheel| {
             let motor = &motors[wheel.channel];
             motor.enabled() && STALL_CURRENT * motor.load() >= self.held_current_ad
@@ -122,7 +122,7 @@ impl JsonWords {
     }
 }
 
-/// The encoder counts in a circle, the motor does not.
+/// Unwraps the encoder's counts.
 fn turned(sensors: &MotorSensors, motors: &[Motor; 6], channel: usize) -> f64 {
     let cycle = f64::from(common::wire::COUNT_CYCLE);
     let (read, true_counts) =
@@ -130,7 +130,7 @@ fn turned(sensors: &MotorSensors, motors: &[Motor; 6], channel: usize) -> f64 {
     read + ((true_counts - read) / cycle).round() * cycle
 }
 
-/// Metres of a sonar byte; negative for no reading, none for nothing.
+/// Returns metres: negative for no reading, `None` for nothing in reach.
 fn heard(byte: u8) -> Option<f64> {
     match Echo::from_byte(byte) {
         None => Some(-1.0),

@@ -1,9 +1,11 @@
-//! A laser: each beam ends at the first thing that stands at its height and is no pane of glass at a slant. A beam of a depth camera, which
-//! widens upright with its range, ends at the first thing in it that the body can touch.
+//! Lasers and depth cameras.
 //!
-//! A beam that ends at a black surface too far away brings nothing back, so the reading is "nothing in reach", as
-//! drivers publish it: infinity by ROS's REP 117 ("no return") and in Slamtec's `rplidar_ros`. A beam through glass
-//! with nothing behind gives the same reading.
+//! A laser's beam ends at the first surface at its height, and passes glass at a slant. A depth
+//! camera's beam widens vertically and ends at the first thing that the body can touch.
+//!
+//! A beam that ends at a distant black surface returns no light and reads "nothing in reach".
+//! Drivers publish it as infinity by ROS's REP 117 ("no return"), as does Slamtec's `rplidar_ros`.
+//! A beam through glass with nothing behind reads the same.
 
 use std::collections::VecDeque;
 
@@ -20,39 +22,38 @@ use crate::{
     world::{Solid, World},
 };
 
-/// Beams without a reading, at the edges of things and in the sun. Nominal.
+/// Beams per 1000 without a reading, at edges and in the sun. Nominal.
 const LOST_OF_1000: f64 = 2.0;
 
-/// A pane of glass gives a reading up to this angle to its normal. Nominal: L. Tibebu et al., "LiDAR-based glass
-/// detection for improved occupancy grid mapping", Sensors 21(7), 2021, find the peak of a reflection only where
-/// beams are perpendicular to the glass, falling fast beside it.
+/// Maximum angle to a pane's normal for a reading. Nominal: reflections peak only for beams
+/// perpendicular to the glass (L. Tibebu et al., "LiDAR-based glass detection for improved
+/// occupancy grid mapping", Sensors 21(7), 2021).
 const GLASS_LIMIT_DEG: f64 = 5.0;
 
-/// No simulated robot goes faster.
 const FASTEST_M_S: f64 = 5.0;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Laser {
     sensor: Sensor,
-    /// Above the floor.
+    /// Height above the floor.
     height_m: f64,
     timing: LaserTiming,
-    /// The body's newest poses with their times, seconds, as far back as a scan goes.
+    /// Recent poses by time in seconds, as far back as a scan goes.
     poses: VecDeque<(f64, Pose2)>,
     noise: Noise,
-    /// The scan of this tick; empty without one. Metres: none for nothing in reach, less than 0 for no reading.
+    /// This tick's scan, or empty. Metres: `None` for nothing in reach, negative for no reading.
     scan: Vec<Option<f32>>,
 }
 
 impl Laser {
-    /// Those whose scans come with the robot's frames; their noise follows from `seed`.
+    /// Creates the lasers whose scans come with the robot's frames.
     pub(crate) fn all(mission: &Mission, seed: u64) -> Vec<Self> {
         let (lasers, physics) = (mission.lasers_of_base(), mission.simulation.physics());
         let laser = |(nth, (_, sensor))| Self::new(sensor, &physics, (seed, nth));
         lasers.into_iter().enumerate().map(laser).collect()
     }
 
-    /// One that says each measurement by itself, up to a tick late.
+    /// Creates a laser that sends each measurement itself, up to a tick late.
     pub(crate) fn with_own_wire(sensor: Sensor, mission: &Mission, seed: u64) -> Self {
         let mut physics = mission.simulation.physics();
         physics.laser.delay_s = 0.0;
@@ -78,7 +79,7 @@ impl Laser {
         &self.sensor.name
     }
 
-    /// The scan of this tick with the times that the robot states.
+    /// Returns this tick's scan with the robot's stated times.
     pub(crate) fn said(&self) -> Option<Scan> {
         let LaserTiming { delay_s, sweep_s, stated_share } = self.timing;
         let stated = [delay_s + sweep_s, sweep_s].map(|seconds| stated_share * seconds);
@@ -86,7 +87,6 @@ impl Laser {
         (!self.scan.is_empty()).then(|| Scan { ranges: self.scan.clone(), age_s, time_s })
     }
 
-    /// Note where the body is at `time`, seconds.
     pub(crate) fn follow(&mut self, time: f64, pose: Pose2) {
         let oldest = time - self.timing.delay_s - self.timing.sweep_s;
         while self.poses.get(1).is_some_and(|(at, _)| *at <= oldest) {
@@ -95,32 +95,32 @@ impl Laser {
         self.poses.push_back((time, pose));
     }
 
-    /// The body when `beam` of the scan that is sent at `time` was measured.
+    /// Returns the body's pose at the time of `beam` in a scan sent at `time`.
     fn pose_of_beam(&self, time: f64, beam: usize) -> Option<Pose2> {
         let LaserTiming { delay_s, sweep_s, .. } = self.timing;
         let left = 1.0 - self.sensor.mirrored(beam) as f64 / self.sensor.beams.max(1) as f64;
         self.pose_at(time - delay_s - sweep_s * left)
     }
 
-    /// The body at `time`, seconds.
     fn pose_at(&self, time: f64) -> Option<Pose2> {
         let later = self.poses.partition_point(|(noted, _)| *noted < time);
         Some(self.poses.get(later).or(self.poses.back())?.1)
     }
 
-    /// What a robot at `pose` has in the laser's reach, and a little more for poses before.
+    /// Returns solids in reach, with a margin for earlier poses.
     pub(crate) fn near(&self, world: &World, pose: Pose2) -> Vec<Solid> {
         let position = self.sensor.mount.on(pose).position;
         let reach_m = self.sensor.reach_m + self.went_m();
         world.near(position, reach_m, self.height_m, self.sensor.model.rise())
     }
 
-    /// The way that the robot makes at most during a scan, until it is sent.
+    /// Returns the maximum travel from a scan's start until it is sent.
     fn went_m(&self) -> f64 {
         (self.timing.delay_s + self.timing.sweep_s) * FASTEST_M_S
     }
 
-    /// The scan that a robot at `pose` sends at `time`. Metres: none for nothing in reach, less than 0 for no reading.
+    /// Returns the scan sent at `time`. Metres: `None` for nothing in reach, negative for no
+    /// reading.
     pub(crate) fn scan(&mut self, world: &World, pose: Pose2, time: f64) -> Vec<Option<f32>> {
         let mount = self.sensor.mount.on(pose);
         let (first, step) = self.sensor.fan();
@@ -137,7 +137,7 @@ impl Laser {
         beams
     }
 
-    /// The reading at `time` of a beam at an angle clockwise from the laser's front, radians; as those of a scan.
+    /// Returns a beam's reading at an angle clockwise from the laser's front, radians.
     pub(crate) fn clockwise(&mut self, near: &[Solid], time: f64, angle: f64) -> Option<f32> {
         let mount = self.sensor.mount.on(self.pose_at(time)?);
         let angle = if self.sensor.is_upside_down { angle } else { -angle };
@@ -169,8 +169,8 @@ impl Laser {
     }
 }
 
-/// The range at which a beam from `origin` in the unit direction `along` ends at `solid`, metres, and the solid's
-/// effect on light; none if it passes.
+/// Returns the range at which a beam ends at `solid`, metres, and the solid's effect on light;
+/// `None` if it passes.
 fn end(solid: &Solid, origin: DVec2, along: DVec2) -> Option<(f64, Light)> {
     let (range, light) = (solid.surface.hit(origin, along)?, solid.profile.light);
     let is_slanted = || {
@@ -195,7 +195,8 @@ mod tests {
         let mut laser = Laser::all(&mission, 1).remove(0);
         let scan = laser.scan(&World::new(&mission), Pose2::default(), 0.0);
         assert_eq!(scan.len(), 360);
-        // The first beam looks back; the laser is 64 mm behind the centre, its deviation 5 cm at 2 m.
+        // The first beam looks back. The laser is 64 mm behind the centre; its deviation is 5 cm at
+        // 2 m.
         let at = |degrees: usize| scan[(degrees + 180) % 360];
         assert!((at(0).unwrap() - 2.064).abs() < 0.25, "{:?}", at(0));
         assert!((at(90).unwrap() - 1.5).abs() < 0.2, "{:?}", at(90));
@@ -209,7 +210,8 @@ mod tests {
         let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
         let mut laser = Laser::all(&mission, 1).remove(0);
         let scan = laser.scan(&World::new(&mission), Pose2::default(), 0.0);
-        // The middle beam looks to the left. The laser is 40 mm behind the centre; its deviation is 1.5 cm at 2 m.
+        // The middle beam looks left. The laser is 40 mm behind the centre; its deviation is 1.5 cm
+        // at 2 m.
         let at = |degrees: usize| f64::from(scan[(degrees + 180 + 270) % 360].unwrap());
         assert!((at(90) - 1.0).abs() < 0.05, "{}", at(90));
         assert!((at(0) - 2.04).abs() < 0.08, "{}", at(0));
@@ -262,11 +264,10 @@ mod tests {
             simulation.laser = { delay_s = 0.2, sweep_s = 0.1 }\n";
         let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
         let mut laser = Laser::all(&mission, 1).remove(0);
-        // The robot goes along x at 1 m/s.
         let at = |time: f64| Pose2 { position: DVec2::new(time, 0.0), heading: 0.0 };
         (0..=300).map(|step| f64::from(step) / 100.0).for_each(|s| laser.follow(s, at(s)));
         let scan = laser.scan(&World::new(&mission), at(3.0), 3.0);
-        // The 180th of 360 beams looks ahead: it was measured 0.25 s before, from 64 mm behind the centre.
+        // Beam 180 of 360 looks ahead: it was measured 0.25 s before, from 64 mm behind the centre.
         assert!((scan[180].unwrap() - (5.0 - 2.75 + 0.064)).abs() < 0.15, "{:?}", scan[180]);
         assert!(laser.poses.len() < 40);
         laser.measure(&World::new(&mission), at(3.0), (0, 3.0));
@@ -288,7 +289,7 @@ mod tests {
             let mut camera = Laser::all(&mission, 1).remove(1);
             camera.scan(&World::new(&mission), Pose2::default(), 0.0)[87]
         };
-        // The camera is 0.1 m ahead of the robot's centre, and the face as far ahead of the box's.
+        // The camera is 0.1 m ahead of the robot's centre; the face is as far ahead of the box's.
         is_near(ahead(1.0, "top_m = 0.05"), 1.0);
         is_near(ahead(1.0, "bottom_m = 0.24"), 1.0);
         assert_eq!(ahead(1.0, "top_m = 0.02"), None, "a sill is not touched");
@@ -297,7 +298,8 @@ mod tests {
         assert_eq!(ahead(3.5, "top_m = 0.25"), None, "too far away");
     }
 
-    /// The readings of a UST-10LX on a Jackal at the origin in a world, by the angle of the beam, degrees from straight ahead.
+    /// Returns the readings of a UST-10LX on a Jackal at the origin by beam angle, degrees from
+    /// ahead.
     fn reading(shapes: &str) -> impl Fn(f64) -> Option<f32> + use<> {
         let text = format!("target = [0, -5]\nrobot.model = 'jackal'\n{shapes}");
         let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();

@@ -1,24 +1,24 @@
-//! A simulated X80: the other end of the wire. The stages get only bytes from it.
+//! Simulated X80: the other end of the wire. The stages only see its bytes.
 //!
-//! Layout, a module needs only those above it:
+//! Each module depends only on those above it:
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
-//! | [`world`] | what stands around the robot |
-//! | [`body`] | a disc on wheels, and what it touches |
-//! | [`wheel_errors`] | the wheels' differences from the mission |
+//! | [`world`] | obstacles |
+//! | [`body`] | a disc on wheels, and its contacts |
+//! | [`wheel_errors`] | the wheels' deviations from the mission |
 //! | [`motor`] | one channel: modes, timed commands, the speed loop |
-//! | [`sonar`], [`infrared`], `laser`, [`sensors`] | readings, as the frames carry them |
-//! | `json_words` | lines of JSON |
+//! | [`sonar`], [`infrared`], `laser`, [`sensors`] | readings |
+//! | `json_words` | JSON lines |
 //! | [`arduino_words`] | an Arduino's requests and answers |
-//! | `rplidar` | a laser with a wire of its own |
-//! | [`noise`] | seeded, one stream for each source |
+//! | `rplidar` | a laser with its own wire |
+//! | [`noise`] | seeded streams |
 //! | [`robot`] | the pure state machine: frames in, time forward, frames out |
-//! | [`radio`] | outages, losses, delays between host and robot |
-//! | [`saved_state`] | what the next process restores |
+//! | [`radio`] | outages, losses, delays |
+//! | [`saved_state`] | state for the next process |
 //! | [`shell`] | the process: transport, pace, ground truth |
 //!
-//! Only [`shell`] and its transports know sockets and clocks:
+//! Only [`shell`] and its transports use sockets and clocks:
 //!
 //! ```
 //! use std::path::Path;

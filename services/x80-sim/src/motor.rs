@@ -1,5 +1,5 @@
-//! A channel of the motor board and the speed loop of its wheel. Values are encoder counts and counts per second in
-//! the channel's positive direction.
+//! Motor-board channel and its wheel's speed loop, in encoder counts and counts/s, positive in the
+//! channel's direction.
 
 use std::collections::VecDeque;
 
@@ -10,22 +10,22 @@ use common::{
 
 use crate::noise::Noise;
 
-/// A wheel stands at this pulse width.
+/// Pulse width at which a wheel stands.
 const PWM_STOP: f64 = 16_383.5;
-/// Pulse widths this near to [`PWM_STOP`] turn no wheel: a client that drives by them adds as much.
+/// Dead band around [`PWM_STOP`], which clients that drive by PWM compensate.
 const PWM_DEAD_BAND: f64 = 8000.0;
-/// 1/s: a position is reached in about a second.
+/// Gain in 1/s: a position is reached in about a second.
 const POSITION_GAIN: f64 = 4.0;
-/// A wheel has reached its position within this, counts.
+/// Position tolerance, counts.
 const POSITION_REACHED: f64 = 0.5;
-/// Friction holds a wheel below it that is ordered to stand, counts per second (2 mm/s); the dead band of starting is
-/// friction too, where it is wider.
+/// Speed below which friction stops a wheel with target 0, counts/s (2 mm/s), unless the starting
+/// dead band is wider.
 const STANDSTILL: f64 = 5.0;
-/// The share of the stall torque at which a tyre slips: half the robot's weight of 34 N with a friction of 0.6, over
-/// the 26 N of a stalled motor at the rim.
+/// Share of the stall torque at which a tyre slips: half the weight of 34 N times friction 0.6,
+/// over 26 N of a stalled motor at the rim.
 const SLIPS_AT: f64 = 0.4;
-/// Delayed changes of the target. At a change every 5 ms this is more than the longest delay needs. A host that sends
-/// faster overwrites the newest one.
+/// Maximum delayed target changes: more than the longest delay needs at one per 5 ms. Faster hosts
+/// overwrite the newest.
 const MOST_PENDING: usize = 1024;
 
 #[derive(Clone, Debug)]
@@ -33,12 +33,12 @@ pub struct Motor {
     physics: WheelPhysics,
     /// Counts per second.
     top_speed: f64,
-    /// Counts per second in a second.
+    /// Counts per second squared.
     acceleration: f64,
     enabled: bool,
     mode: Mode,
     order: Option<Order>,
-    /// Changes of the target with their times, before the delay.
+    /// Target changes with their times, before the delay.
     pending: VecDeque<(f64, f64)>,
     target: f64,
     speed: f64,
@@ -54,7 +54,7 @@ struct Order {
 }
 
 impl Motor {
-    /// A booted channel is suspended, in PWM mode.
+    /// Starts suspended, in PWM mode.
     pub fn new(physics: WheelPhysics, top_speed: f64) -> Self {
         Self {
             physics,
@@ -71,7 +71,7 @@ impl Motor {
         }
     }
 
-    /// A motor that gains and loses speed so fast, counts per second in a second.
+    /// Limits the acceleration, counts per second squared.
     #[must_use]
     pub fn accelerating(self, acceleration: f64) -> Self {
         Self { acceleration, ..self }
@@ -81,7 +81,7 @@ impl Motor {
         self.enabled
     }
 
-    /// Counts per second.
+    /// Returns counts per second.
     pub fn speed(&self) -> f64 {
         self.speed
     }
@@ -90,17 +90,17 @@ impl Motor {
         self.turned
     }
 
-    /// The share of its stall torque that the motor gives against something that holds its wheel or the body.
+    /// Returns the share of stall torque exerted against resistance to wheel or body.
     pub fn load(&self) -> f64 {
         self.load
     }
 
-    /// The wheel stands at the counts of an earlier process.
+    /// Restores an earlier process's counts.
     pub(crate) fn restore(&mut self, turned: f64) {
         self.turned = turned;
     }
 
-    /// Sets the mode and lets the motor run until mission time `until`.
+    /// Sets the mode and runs until mission time `until`.
     pub fn order(&mut self, quantity: Quantity, value: i16, until: Option<f64>) {
         self.enabled = true;
         self.mode = match quantity {
@@ -111,7 +111,7 @@ impl Motor {
         self.order = Some(Order { quantity, value, until });
     }
 
-    /// A suspended motor forgets its order.
+    /// Enables or suspends the motor. Suspending discards the order.
     pub fn enable(&mut self, on: bool) {
         self.enabled = on;
         if !on {
@@ -123,7 +123,7 @@ impl Motor {
         self.order = None;
     }
 
-    /// The simulated loop is the measured one with any gains and feedback.
+    /// Applies a mode. Gains and feedback have no effect: the loop follows measurements.
     pub fn configure(&mut self, parameter: Parameter) {
         if let Parameter::Mode(mode) = parameter {
             if mode != self.mode {
@@ -133,16 +133,16 @@ impl Motor {
         }
     }
 
-    /// Mission time that no step may reach across.
+    /// Returns the mission time that no step may cross.
     pub fn ends_at(&self) -> Option<f64> {
         self.order.and_then(|order| order.until)
     }
 
-    /// From mission time `now` for `dt` seconds. Returns the counts that the loop asks of the wheel.
+    /// Steps `dt` seconds. Returns the counts that the loop asks of the wheel.
     pub fn step(&mut self, now: f64, dt: f64, noise: &mut Noise) -> f64 {
         self.load = 0.0;
         if self.ends_at().is_some_and(|end| now >= end) {
-            // The time limit of a position is the duration of the motion; the wheel goes on to its last count.
+            // A position's time limit is its duration; the wheel continues to its last count.
             self.order = self
                 .order
                 .filter(|order| order.quantity == Quantity::Position)
@@ -163,7 +163,7 @@ impl Motor {
             self.pending.pop_front();
         }
         let decay = if self.physics.lag_s > 0.0 { (-dt / self.physics.lag_s).exp() } else { 0.0 };
-        // The distance of an exponential approach is its integral, not its end times dt.
+        // An exponential approach covers its integral, not its final speed times dt.
         let behind = self.speed - self.target;
         let (before, most) = (self.speed, self.acceleration * dt);
         let mut counts = self.target * dt + behind * self.physics.lag_s * (1.0 - decay);
@@ -187,9 +187,10 @@ impl Motor {
         self.turned += counts;
     }
 
-    /// The ground lets the wheel go at `speed` counts per second only. `grip` is the share of its own speed that the
-    /// wheel loses by that, 0 if it slips freely. A push adds no speed. Its loop raises the torque until the wheel
-    /// stalls or slips.
+    /// Limits the wheel to the ground's `speed`, counts per second.
+    ///
+    /// The wheel loses the share `grip` of its own speed, 0 for free slip. A push adds no speed.
+    /// The loop raises the torque until the wheel stalls or slips.
     pub fn hold(&mut self, speed: f64, grip: f64) {
         let held = speed.clamp(self.speed.min(0.0), self.speed.max(0.0));
         if self.target != 0.0 {
@@ -199,7 +200,7 @@ impl Motor {
         self.speed = held * grip + self.speed * (1.0 - grip);
     }
 
-    /// Counts per second at mission time `now`, with gain, dead band and limit.
+    /// Returns the target in counts per second, with gain, dead band and limit.
     fn wanted(&self, now: f64) -> f64 {
         let Some(order) = self.order.filter(|_| self.enabled) else {
             return 0.0;
@@ -218,7 +219,7 @@ impl Motor {
                 let way = if way > cycle / 2.0 { way - cycle } else { way };
                 let left = order.until.map_or(0.0, |end| end - now);
                 let asked = way / left.max(1.0 / POSITION_GAIN);
-                // The loop pushes until the wheel is there, so no dead band remains.
+                // The loop pushes until the wheel arrives, so no dead band applies.
                 let least = self.physics.dead_band_counts;
                 let there = way.abs() < POSITION_REACHED;
                 if there { 0.0 } else { asked.abs().max(least).copysign(way) }

@@ -1,4 +1,4 @@
-//! Random numbers, one stream for each source of noise, so that turning one off leaves the others as they were.
+//! Random numbers, one stream per source, so that disabling one leaves the others unchanged.
 
 use rand_pcg::{Pcg64, rand_core::Rng};
 
@@ -19,33 +19,33 @@ pub enum Source {
 pub struct Noise(Pcg64);
 
 impl Noise {
-    /// Each run with `seed` has the same stream.
+    /// Creates equal streams for equal seeds.
     pub fn new(seed: u64, source: Source) -> Self {
         Self::of_nth(seed, source, 0)
     }
 
-    /// The stream of one among several sources of a kind.
+    /// Creates the stream of one of several sources of a kind.
     pub fn of_nth(seed: u64, source: Source, nth: usize) -> Self {
         Self(Pcg64::new(u128::from(seed) | (nth as u128) << 64, source as u128))
     }
 
-    /// A number in [0, 1).
+    /// Returns a number in [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Mean 0, standard deviation `sd`; nothing is drawn for 0.
+    /// Returns a normal deviate of mean 0; draws nothing if `sd` is 0.
     pub fn normal(&mut self, sd: f64) -> f64 {
         if sd <= 0.0 {
             return 0.0;
         }
-        // Box and Muller; 1 - u keeps the logarithm finite.
+        // Box-Muller; 1 - u keeps the logarithm finite.
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         let angle = std::f64::consts::TAU * self.uniform();
         sd * radius * angle.cos()
     }
 
-    /// Nothing is drawn for a `mean` of 0.
+    /// Draws nothing if `mean` is 0.
     pub fn exponential(&mut self, mean: f64) -> f64 {
         if mean <= 0.0 {
             return 0.0;
@@ -53,7 +53,7 @@ impl Noise {
         -mean * (1.0 - self.uniform()).ln()
     }
 
-    /// Nothing is drawn for 0.
+    /// Draws nothing if `share` is 0.
     pub fn chance(&mut self, share: f64) -> bool {
         share > 0.0 && self.uniform() < share
     }
@@ -70,7 +70,7 @@ mod tests {
         assert_eq!(drawn, FIRST_OF_SEED_1);
     }
 
-    // These numbers were drawn once, and another release of the generator must give the same.
+    // Other releases of the generator must give the same numbers.
     const FIRST_OF_SEED_1: [f64; 3] = [0.8297300050883016, 0.7306982094730567, 0.8844419132630329];
 
     #[test]

@@ -1,8 +1,12 @@
-//! People who walk by the social-force model (D. Helbing and P. Molnar, "Social force model for pedestrian dynamics", Physical Review E
-//! 51, 1995; its constants). The distance between two is that of their bodies, as in D. Helbing, I. Farkas and T. Vicsek, Nature 407, 2000.
+//! People who walk by the social-force model.
 //!
-//! A person wants to go to the next goal at a speed of its own, and is repelled by others, by the robot, which counts as a person, and by
-//! what stands. Who comes behind counts half. Nobody walks into a body: the forces alone do not see to that. A goal that takes too long is given up: the model plans no way around what stands.
+//! Model and constants: D. Helbing and P. Molnar, "Social force model for pedestrian dynamics",
+//! Physical Review E 51, 1995. Distances are between bodies, as in D. Helbing, I. Farkas and T.
+//! Vicsek, Nature 407, 2000.
+//!
+//! A person walks to the next goal at its own speed. People, the robot and static objects repel it;
+//! those behind count half. Forces alone allow overlaps, so velocity into a near body is removed. A
+//! late goal is given up, because the model plans no path around obstacles.
 
 use common::{
     geometry::{Drum, Profile},
@@ -12,34 +16,35 @@ use glam::DVec2;
 
 use crate::world::{Solid, Surface};
 
-/// Time in which a person takes up its wanted velocity, seconds.
+/// Time constant for reaching the wanted velocity.
 const RELAXES_S: f64 = 0.5;
-/// The potential that others have, m^2/s^2, and the distance over which it falls, metres.
+/// Potential of other people, m^2/s^2, and its decay length, metres.
 const OF_OTHERS: (f64, f64) = (2.1, 0.3);
-/// The potential of walls and other things that stand, and its distance.
+/// Potential of walls and other static objects, and its decay length.
 const OF_WALLS: (f64, f64) = (10.0, 0.2);
-/// The step of another that a person keeps clear of, seconds.
+/// Length of another's step to keep clear of.
 const STEP_S: f64 = 2.0;
-/// Half the angle of view, radians, and the weight of what is outside of it.
+/// Half the field of view, and the weight of those outside it.
 const SEES_RAD: f64 = 100.0 / 180.0 * std::f64::consts::PI;
 const UNSEEN: f64 = 0.5;
-/// A person goes no faster than so many times as fast as it wants.
+/// Maximum speed, as a multiple of the wanted speed.
 const HURRIES: f64 = 1.3;
-/// A person goes no nearer to another body, metres; nominal.
+/// Minimum distance to another body; nominal.
 const KEPT_M: f64 = 0.1;
-/// What stands farther away has no force, metres.
+/// Distance beyond which static objects have no force.
 const NEAR_M: f64 = 2.0;
-/// A goal is reached within this, metres, and is given up after so many times the time of the straight way, and some seconds.
+/// Distance at which a goal is reached; multiple of the direct time, plus seconds, after which it
+/// is given up.
 const REACHED_M: f64 = 0.3;
 const PATIENCE: (f64, f64) = (2.0, 3.0);
-/// The longest step, and the most of a time that is gone through, seconds.
+/// Maximum step, and maximum time simulated at once.
 const LONGEST_S: f64 = 0.05;
 const MOST_S: f64 = 60.0;
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct People {
     walkers: Vec<Walker>,
-    /// The time, seconds, and where the robot was then.
+    /// Time, seconds, and the robot's position then.
     now: Option<(f64, DVec2)>,
 }
 
@@ -49,7 +54,7 @@ struct Walker {
     at: DVec2,
     velocity: DVec2,
     goal: usize,
-    /// Until it gives up the goal, seconds.
+    /// Time until the goal is given up.
     left_s: f64,
 }
 
@@ -72,7 +77,7 @@ impl People {
         Self { walkers: people.iter().map(walker).collect(), now: None }
     }
 
-    /// They walk until `time` among what is `standing` and a robot, a disc of `radius` that is at `robot` then.
+    /// Moves people to `time` among `standing` solids and a robot, a disc.
     pub(crate) fn advance(&mut self, time: f64, (robot, radius): (DVec2, f64), standing: &[Solid]) {
         let (from_s, from) = self.now.replace((time, robot)).unwrap_or((0.0, robot));
         let for_s = (time - from_s).clamp(0.0, MOST_S);
@@ -150,8 +155,8 @@ impl Walker {
     }
 }
 
-/// The force by another that is `offset` away and makes `step`: its potential has the form of an ellipse around its step. The bodies
-/// touch at `both_m`, metres.
+/// Returns the repulsion by a person `offset` away, whose bodies touch at `both_m`. Its potential
+/// is an ellipse around the other's `step`.
 fn by_another(offset: DVec2, step: DVec2, both_m: f64) -> DVec2 {
     let after = offset - step;
     let sum = offset.length() + after.length();
@@ -169,7 +174,7 @@ mod tests {
         Person { at, goals: vec![goal, at], speed_m_s: 1.0, radius_m: 0.25 }
     }
 
-    /// The least distance between the first two, or of the first and a robot at `robot`, in 8 s.
+    /// Returns the minimum distance in 8 s between two people, or one and a robot.
     fn least_m(people: &[Person], robot: DVec2) -> f64 {
         let mut people = People::new(people);
         let mut least = f64::INFINITY;

@@ -1,6 +1,6 @@
-//! The radio between host and robot: outages, delays, losses, and datagrams that are reordered, joined or cut.
+//! Radio between host and robot: outages, delays, losses, and reordered, joined or cut datagrams.
 //!
-//! One seeded stream decides all of this, so a run can be repeated; the losses go to the ground truth.
+//! One seeded stream decides all, so runs repeat. Losses go to the ground truth.
 
 use std::collections::VecDeque;
 
@@ -8,12 +8,12 @@ use common::{ground_truth::GroundTruthRadio, mission};
 
 use crate::noise::{Noise, Source};
 
-/// Further datagrams are lost.
+/// Maximum datagrams in flight; further ones are lost.
 const MOST_IN_FLIGHT: usize = 1024;
-/// A datagram waits so long for the next one, to go behind it or with it.
+/// Maximum wait of a datagram to follow or join the next.
 const LONGEST_HOLD_S: f64 = 0.5;
 
-/// Good and out in turns, each for an exponentially distributed time.
+/// Good and outage periods of exponentially distributed duration.
 #[derive(Clone, Debug)]
 struct Fading {
     mean_good: f64,
@@ -28,7 +28,7 @@ struct Fading {
 impl Fading {
     fn new(radio: &mission::Radio, noise: &mut Noise) -> Self {
         let (mean, longest) = (radio.outage_mean_s, radio.outage_max_s);
-        // Cutting the longest outages short makes their mean shorter, but the share must stay.
+        // Truncating the longest outages shortens their mean, but the share must stay.
         let cut_mean = mean * (1.0 - (-longest / mean).exp());
         let share = radio.outage_share;
         let mean_good = if share > 0.0 { cut_mean * (1.0 - share) / share } else { f64::INFINITY };
@@ -47,13 +47,13 @@ impl Fading {
         fading
     }
 
-    /// `now` is mission time and must not go back.
+    /// Requires mission time `now` never to decrease.
     fn is_out(&mut self, now: f64, noise: &mut Noise) -> bool {
         while now >= self.until {
             self.out = !self.out;
             self.since = self.until;
             self.until += if self.out {
-                // Without a least value, time would never pass if the mean is 0.
+                // A minimum lets time pass even for a mean of 0.
                 noise.exponential(self.mean_out).clamp(1e-3, self.longest.max(1e-3))
             } else {
                 noise.exponential(self.mean_good).max(1e-3)
@@ -83,7 +83,7 @@ enum Hold {
     Joined,
 }
 
-/// `W` is the direction of a datagram and its peer.
+/// Simulated radio; `W` is a datagram's direction and peer.
 #[derive(Clone, Debug)]
 pub struct Radio<W> {
     settings: mission::Radio,
@@ -125,7 +125,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         .all(|share| *share == 0.0)
     }
 
-    /// Counts a datagram sent at mission time `now`, and says whether it is lost.
+    /// Counts a datagram and returns whether it is lost.
     pub fn loses(&mut self, now: f64) -> bool {
         self.sent += 1;
         let out = self.fading.is_out(now, &mut self.noise);
@@ -134,7 +134,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         lost
     }
 
-    /// No host learns of a tick whose frames are lost.
+    /// Returns whether the host misses a tick, because its frames are lost.
     pub fn loses_tick(&mut self, now: f64) -> bool {
         let lost = self.loses(now);
         self.missed_ticks += u64::from(lost);
@@ -166,7 +166,7 @@ impl<W: Copy + PartialEq> Radio<W> {
     }
 
     fn dispatch(&mut self, now: f64, way: W, bytes: Vec<u8>) {
-        // Datagrams stay in order except where the radio reorders them.
+        // Datagrams stay in order unless the radio reorders them.
         let same_way = self.in_flight.iter().filter(|flight| flight.way == way);
         let before = same_way
             .filter(|flight| flight.held.is_none())

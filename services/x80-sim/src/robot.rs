@@ -1,4 +1,4 @@
-//! The robot as a pure state machine: commands in, mission time forward, frames out.
+//! Robot as a pure state machine: commands in, mission time forward, frames out.
 
 use common::{
     geometry::wrap_angle,
@@ -34,12 +34,12 @@ use crate::{
 
 const STEP_S: f64 = 0.005;
 
-/// A robot drives on so long at the end of its process if its last command does not expire.
+/// Driving time at the end of the process if the last command does not expire.
 const COMES_TO_REST_S: f64 = 3.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard {
-    /// It is not addressed to a robot.
+    /// Frame for a different addressee.
     Foreign,
     Ack,
     Ping,
@@ -76,21 +76,20 @@ pub struct Robot {
     standard: StandardSensors,
     custom: CustomSensors,
     motor: MotorSensors,
-    /// None for an X80.
+    /// JSON protocol; none for an X80.
     json: Option<JsonWords>,
     gyro: Option<Gyro>,
     arduino: Option<ArduinoWords>,
-    /// Their scans come with the robot's frames.
+    /// Lasers whose scans come with the robot's frames.
     lasers: Vec<Laser>,
     rplidar: Option<Rplidar>,
     touches: Vec<TouchRow>,
     felt: Vec<bool>,
-    /// As `felt` at the last tick.
     told: Vec<bool>,
 }
 
 impl Robot {
-    /// Booted and standing at the start, with the readings of tick 0.
+    /// Boots at the start, with the readings of tick 0.
     pub fn new(mission: &Mission) -> Self {
         Self::with_noise(mission, mission.seed)
     }
@@ -154,9 +153,9 @@ impl Robot {
         robot
     }
 
-    /// The place where an earlier process left it. Except for its counts it is in the state of a booted robot.
+    /// Boots at the place and counts of an earlier process.
     pub fn restored(mission: &Mission, saved: &SavedState) -> Self {
-        // With the same seed the noise of the first readings would be repeated.
+        // The mission's seed would repeat the noise of the first readings.
         let seed = mission.seed.wrapping_add(saved.tick + 1);
         let mut robot = Self::with_noise(mission, seed);
         robot.tick = saved.tick;
@@ -187,7 +186,7 @@ impl Robot {
         }
     }
 
-    /// Moves on without frames, because no host listens, and calls `on_tick` at each tick. A robot that would never rest is halted.
+    /// Advances without frames until the robot rests, and halts one that would never rest.
     pub fn come_to_rest(&mut self, mut on_tick: impl FnMut(&mut Self)) {
         let latest = self.time + COMES_TO_REST_S;
         while self.time < latest && self.is_moving() {
@@ -218,7 +217,6 @@ impl Robot {
         (self.tick + 1) as f64 / self.rate_hz
     }
 
-    /// `channel` is 0 to 5.
     pub fn motor(&self, channel: u8) -> Option<&Motor> {
         self.motors.get(usize::from(channel))
     }
@@ -242,7 +240,7 @@ impl Robot {
         self.addressing = addressing;
         self.heard_at = self.time;
         let heard = Self::kind(frame);
-        // Even a frame that is not understood is acknowledged; acknowledgements never are.
+        // Even unknown frames are acknowledged; acknowledgements are not.
         if heard != Heard::Ack {
             Report::System(SystemSignal::Ack).encode(addressing, replies);
         }
@@ -332,7 +330,7 @@ impl Robot {
         }
     }
 
-    /// An Arduino boots when a host opens the line.
+    /// Reboots an Arduino, as opening its line does.
     pub fn on_opened(&mut self) {
         if let Some(arduino) = &mut self.arduino {
             self.motors.iter_mut().for_each(Motor::halt);
@@ -359,14 +357,14 @@ impl Robot {
         rplidar.map_or_else(Vec::new, |rplidar| rplidar.measured(&self.world, pose, now))
     }
 
-    /// The ultrasonic rangers listen then for the next tick, if that is still to come and before the tick.
+    /// Returns when the ultrasonic rangers listen for the next tick, if still ahead.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
         (age > 0.0 && !self.ranging.has_listened()).then(|| self.next_tick_s() - age)
     }
 
-    /// Goes in short steps, none of which reaches across the end of a timed command or the moment of a range. An end
-    /// in the past does nothing.
+    /// Advances in short steps, which never cross the end of a timed command or the time of a
+    /// range.
     pub fn advance_to(&mut self, end: f64) {
         while self.time < end {
             if self.listens_at().is_some_and(|moment| moment <= self.time) {
@@ -389,7 +387,7 @@ impl Robot {
                     laser.follow(self.time, self.body.pose());
                 }
             }
-            // Time is set exactly, so that a command that ends now has ended.
+            // Exact time ends a command that expires now.
             self.time = until;
         }
     }
@@ -420,7 +418,7 @@ impl Robot {
             }
             let went = self.body.roll(ground, &self.world);
             let at_contact = drivetrain::grip(went != ground, &wheels);
-            // A blocked wheel does not slip.
+            // A blocked wheel cannot slip.
             let grip = blocked.map(|blocked| if blocked { Some(1.0) } else { at_contact });
             drivetrain.turn(&mut self.motors, asked, went, grip, dt);
         }
@@ -431,7 +429,6 @@ impl Robot {
         }
     }
 
-    /// Something in the wheel or around it blocks it now.
     fn blocked_wheels(&self) -> [bool; 2] {
         let blocks = |wheel: &Block| {
             self.time >= wheel.from_s && wheel.until_s.is_none_or(|until| self.time < until)
@@ -480,7 +477,7 @@ impl Robot {
         }
     }
 
-    /// Noise of sensors is drawn only here.
+    /// Takes all readings; sensor noise is drawn only here.
     fn measure(&mut self) {
         let noise = self.physics.wheels.count_noise;
         for (channel, encoder) in self.motor.encoders.iter_mut().enumerate() {
@@ -501,14 +498,13 @@ impl Robot {
         }
     }
 
-    /// Append one frame of every stream that runs, the motor frame last. They count against the frames that a host
-    /// has asked for.
+    /// Appends a frame of every running stream, the motor frame last, and counts them.
     pub fn stream(&mut self, out: &mut Vec<u8>) {
         let due = self.streams.take_due();
         self.write(due, out);
     }
 
-    /// Appends them once more, without counting them.
+    /// Appends the frames again, uncounted.
     pub fn repeat(&self, out: &mut Vec<u8>) {
         self.write(self.streams.running(), out);
     }
@@ -523,7 +519,7 @@ impl Robot {
             return;
         }
         if self.arduino.is_some() {
-            // This robot sends nothing unasked.
+            // This robot only answers requests.
             return;
         }
         let standard = Report::Standard(self.standard);
@@ -536,7 +532,7 @@ impl Robot {
     pub fn ground_truth(&mut self) -> GroundTruthTick {
         let pose = self.body.pose();
         let Twist { v, omega } = self.twist();
-        // The host hears these: the summary finds the tick of a pose by them.
+        // The summary finds a pose's tick by these counts, which the host hears.
         let [left_counts, right_counts] = match &self.arduino {
             Some(arduino) => arduino
                 .counts(&self.motors)

@@ -1,4 +1,5 @@
-//! An RPLIDAR beside the robot: it turns clockwise all the time, and after a request says each measurement when it was made.
+//! RPLIDAR beside the robot: it always rotates clockwise, and sends each measurement when made, on
+//! request.
 
 use common::{
     kinematics::Pose2,
@@ -8,7 +9,7 @@ use rplidar_protocol::{Answer, Node, Request, Requests};
 
 use crate::{laser::Laser, world::World};
 
-/// Of 0 to 63, of each reading. Nominal.
+/// Quality of each reading, 0 to 63. Nominal.
 const QUALITY: u8 = 47;
 
 #[derive(Clone, Debug)]
@@ -16,13 +17,13 @@ pub(crate) struct Rplidar {
     pub(crate) laser: Laser,
     product: Product,
     requests: Requests,
-    /// Mission time of the next measurement while it scans, seconds.
+    /// Mission time of the next measurement while scanning.
     next_s: Option<f64>,
     turn: f64,
 }
 
 impl Rplidar {
-    /// None if the robot has no laser with a wire of its own; the noise follows from `seed`.
+    /// Returns `None` without a laser with its own wire.
     pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
         let (_, sensor, product) = mission.rplidars().into_iter().next()?;
         let laser = Laser::with_own_wire(sensor, mission, seed);
@@ -33,7 +34,7 @@ impl Rplidar {
         self.next_s.is_some()
     }
 
-    /// Returns the answers. Requests that it does not know are not answered, as by old firmware.
+    /// Ignores unknown requests, like old firmware.
     pub(crate) fn answer(&mut self, bytes: &[u8], now: f64) -> Vec<u8> {
         let mut answers = Vec::new();
         for request in self.requests.push(bytes) {
@@ -52,7 +53,7 @@ impl Rplidar {
                     express_us: self.product.sample_us / 2,
                 },
                 Request::Info => {
-                    // Model, version 1.29 of the firmware, version of the hardware, serial number.
+                    // Model, firmware version 1.29, hardware version, serial number.
                     let mut info = [0x5a; 20];
                     info[..4].copy_from_slice(&[self.product.number, 29, 1, 7]);
                     Answer::Info(info)
@@ -64,7 +65,7 @@ impl Rplidar {
         answers
     }
 
-    /// The bytes of what was measured up to `now` since the call before. The robot is at `pose` now.
+    /// Returns the measurements since the last call up to `now`, when the robot is at `pose`.
     pub(crate) fn measured(&mut self, world: &World, pose: Pose2, now: f64) -> Vec<u8> {
         let mut bytes = Vec::new();
         let Some(mut at) = self.next_s.filter(|at| *at <= now) else {
@@ -99,7 +100,7 @@ mod tests {
 
     use super::*;
 
-    /// A wall 2 m to the right and another 1 m ahead, beside which nothing stands.
+    /// A wall 2 m to the right and a shorter one 1 m ahead.
     fn at_the_walls(model: &str) -> (Rplidar, World) {
         let text = format!(
             "target = [0, -1]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nworld.wall = [{{ points = [[-9, -2], [9, -2]] }}, {{ points = [[1, -1], [1, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = '{model}'\nforward_m = 0\nbearing_deg = 0\n"

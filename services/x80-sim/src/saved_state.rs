@@ -1,8 +1,7 @@
-//! The pose and wheel counts that a simulated robot's next process restores.
+//! Pose and wheel counts that a simulated robot's next process restores.
 //!
-//! Like a real robot whose host went away, it comes to rest, at once, and its next process begins there. By then
-//! nothing is under way: no order, no wheel speed, no datagram. The random streams of its sensors begin anew, but not
-//! as they began before.
+//! A robot without a host comes to rest, and its next process begins there, without pending orders,
+//! speeds or datagrams. The sensors' random streams restart with other numbers.
 
 use common::kinematics::Pose2;
 use serde::{Deserialize, Serialize};
@@ -14,11 +13,11 @@ pub struct SavedState {
     pub(crate) tick: u64,
     pub(crate) time_s: f64,
     pub(crate) pose: Pose2,
-    /// Each motor channel's counts since boot.
+    /// Counts of each motor channel since boot.
     pub(crate) turned: [f64; 6],
     pub(crate) contacts: u64,
-    /// Each ultrasonic ranger in a run of silence.
+    /// Rangers in a run of silence.
     pub(crate) silent: [bool; 6],
-    /// A wheel turned at most so long after the last motion command.
+    /// Maximum time that a wheel turned after the last motion command.
     pub(crate) stopping_time_s: f64,
 }

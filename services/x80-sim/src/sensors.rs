@@ -16,13 +16,14 @@ use crate::{
     world::World,
 };
 
-/// A reading in ordinary surroundings, AD counts.
+/// Reading in ordinary surroundings, AD counts.
 pub const MIDDLE: u16 = 2048;
-/// Drivers convert with this supply of the AD converters, AD counts.
+/// AD supply by which drivers convert, AD counts.
 const REFERENCE: u16 = 2048;
-/// A standing motor's current, and the current for each count per second, AD counts; nominal.
+/// Current of a standing motor, and current per count per second, AD counts; nominal.
 const CURRENT: (f64, f64) = (20.0, 0.2);
-/// Further current of a stalled motor, AD counts; nominal. It draws several times the current of a rolling one.
+/// Additional current of a stalled motor, AD counts; nominal. It is several times a rolling
+/// motor's.
 pub(crate) const STALL_CURRENT: f64 = 1500.0;
 
 #[derive(Clone, Debug)]
@@ -37,7 +38,7 @@ pub struct Ranging {
 }
 
 impl Ranging {
-    /// Includes the sonars that `simulation.ring` adds. The noise follows from `seed`.
+    /// Includes sonars of `simulation.ring`.
     pub fn new(mission: &Mission, seed: u64) -> Self {
         let (table, front) = (mission.sensor_table(), mission.front_sonar());
         let (mut mounts, mut infrared) = ([None; SONARS], [None; INFRARED_RANGERS]);
@@ -57,7 +58,7 @@ impl Ranging {
             mounts[usize::from(ranger.index) % SONARS] =
                 Some(Mount { forward_m, bearing_rad, turned_rad: 0.0 });
         }
-        // In a robot without sonars this row is another sensor.
+        // Without sonars, this row is another sensor.
         if front.kind == SensorKind::Cone {
             mounts[front_channel] = Some(front.mount);
         }
@@ -119,7 +120,7 @@ impl Ranging {
         ranges.map(|range| sonar::byte(range, physics, noise))
     }
 
-    /// At mission time `time`, seconds. Ultrasonic rangers that have not listened yet do so now.
+    /// Takes readings. Ultrasonic rangers that have not listened yet do so now.
     pub fn measure(
         &mut self,
         world: &World,
@@ -161,7 +162,7 @@ fn ad(volts: f64, full_scale: f64) -> u16 {
     (volts / full_scale * 4095.0).round().clamp(0.0, 4095.0) as u16
 }
 
-/// The encoder is off by `error` counts.
+/// Returns a reading that is off by `error` counts.
 pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     let position = (motor.turned() + error).round();
     Encoder {
@@ -171,7 +172,7 @@ pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     }
 }
 
-/// AD counts.
+/// Returns AD counts.
 pub fn currents(motors: &[Motor; 6]) -> [u16; 6] {
     std::array::from_fn(|channel| {
         let motor = &motors[channel];

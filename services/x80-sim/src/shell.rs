@@ -1,4 +1,4 @@
-//! The process around [`crate::robot`]: a socket, a pace and the ground truth.
+//! Process around [`crate::robot`]: a socket, a pace and the ground truth.
 
 mod meeting;
 mod session;
@@ -28,35 +28,41 @@ use crate::{
     transport::{Transport, Way},
 };
 
-/// More datagrams are taken only after the time and the stop signal are checked.
+/// Maximum datagrams between checks of time and stop signal.
 const MOST_AT_ONCE: usize = 64;
 
 pub struct SimOptions {
     pub mission: Mission,
-    /// At [`Pace::Max`] mission time stands until a motion command comes; then the body moves one period under it and
-    /// the frames of the next tick are sent. A ping is answered with the frames of this tick once more. Equal
+    /// Pace of mission time.
+    ///
+    /// At [`Pace::Max`], mission time stands until a motion command comes. The body then moves one
+    /// period, and the next tick's frames are sent. A ping repeats this tick's frames. Equal
     /// commands give equal bytes.
     ///
-    /// At [`Pace::Rate`] mission time follows the machine's clock and frames are sent unasked. While the process is
-    /// not scheduled for more than a period, mission time waits for it.
+    /// At [`Pace::Rate`], mission time follows the machine's clock, and frames are sent unasked.
+    /// Mission time waits for a process that was unscheduled for more than a period.
     pub pace: Pace,
-    /// Port 0 takes a free one. A pseudo-terminal gets its path from the system.
+    /// Listening address. Port 0 takes a free one; a pseudo-terminal gets its path from the system.
     pub listen: SocketAddr,
     pub transport: Transport,
-    /// Datagrams of other users or machines are refused.
+    /// Whether datagrams of other users or machines are refused.
     pub own_user_only: bool,
-    /// The robot's state is saved here, and goes on from here.
+    /// File that saves and restores the robot's state.
     pub keep: Option<PathBuf>,
-    /// A [`common::ground_truth::GroundTruthHeader`], then a [`common::ground_truth::GroundTruthTick`] each tick, one
-    /// JSON object a line, each in one write. The robot waits for a slow reader, and goes on without one that is
-    /// gone.
+    /// Sink of a [`common::ground_truth::GroundTruthHeader`], then a
+    /// [`common::ground_truth::GroundTruthTick`] per tick.
+    ///
+    /// Each is a JSON line in one write. The robot waits for a slow reader and continues without a
+    /// vanished one.
     pub ground_truth: Option<Box<dyn Write + Send>>,
-    /// The sockets over which this robot and the other in its world tell where they are.
+    /// Sockets for exchanging poses with the world's other robot.
     pub meeting: Option<[PathBuf; 2]>,
 }
 
-/// Run until `stop` becomes readable (or its other end is closed). Fails when it cannot listen, the transport fails,
-/// or its state cannot be saved.
+/// Runs until `stop` is readable or its other end is closed.
+///
+/// # Errors
+/// Returns an error if it cannot listen, the transport fails, or the state cannot be saved.
 pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     let SimOptions { mission, pace, listen, transport, own_user_only, keep, ground_truth, meeting } =
         options;
@@ -72,7 +78,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     let (robot, checkpoint, _lock) = match keep {
         None => (Robot::new(&mission), None, None),
         Some(file) => {
-            // The process before may still be coming to rest.
+            // The previous process may still be coming to rest.
             let lock =
                 lock(&file).map_err(|source| SimError::Lock { file: file.clone(), source })?;
             let (checkpoint, saved) = Checkpoint::open::<SavedState>(&file, saved_state::CAPACITY)?;
@@ -109,14 +115,13 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     }
 }
 
-/// Waits until nobody else has `file`, which it makes.
+/// Creates `file` and locks it, waiting for other holders.
 fn lock(file: &Path) -> io::Result<File> {
     let file = append(file)?;
     file.lock()?;
     Ok(file)
 }
 
-/// Returns whether bytes and whether the stop came.
 fn wait(session: &Session, stop: &impl AsFd, timeout: Option<Duration>) -> Result<[bool; 2]> {
     let mut descriptors = session.readable();
     descriptors.push(stop.as_fd());
@@ -125,10 +130,10 @@ fn wait(session: &Session, stop: &impl AsFd, timeout: Option<Duration>) -> Resul
     Ok([came.contains(&true), stopped])
 }
 
-/// Lockstep has none.
+/// Mission clock; lockstep has none.
 #[derive(Clone, Copy, Debug)]
 struct SimClock {
-    /// Machine time at mission time 0, and mission seconds a machine second.
+    /// Machine time at mission time 0, and mission seconds per machine second.
     runs: Option<(u64, f64)>,
     period_s: f64,
 }
@@ -150,15 +155,15 @@ impl SimClock {
         Some(machine_ns.saturating_sub(epoch) as f64 * 1e-9 * rate)
     }
 
-    /// Lockstep waits for ever.
+    /// Returns the time until `due`; none in lockstep.
     fn wait_for(&self, due: f64, machine_ns: u64) -> Option<Duration> {
         let (_, rate) = self.runs?;
         let seconds = ((due - self.now(machine_ns)?) / rate).max(0.0);
         Some(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
     }
 
-    /// Mission time that is more than a period behind is shifted to the next tick `due`: a robot whose process was
-    /// not scheduled must not make up for the lost time.
+    /// Shifts late mission time to the next tick `due`, so that an unscheduled process makes up no
+    /// lost time.
     fn forgive(&mut self, due: f64, machine_ns: u64) {
         let owed = self.now(machine_ns).map_or(0.0, |now| now - due);
         if let Some((epoch, rate)) = &mut self.runs

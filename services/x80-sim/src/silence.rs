@@ -1,23 +1,23 @@
-//! Runs of silence: a ranger sometimes hears nothing for several readings, whatever stands there.
+//! Runs of silence: a ranger sometimes hears nothing for several readings.
 
 use common::mission::SonarPhysics;
 
 use crate::noise::{Noise, Source};
 
-/// Two states of each of six rangers, heard and silent; a tick is a step of the chain (E. N. Gilbert, "Capacity of a burst-noise
-/// channel", 1960).
+/// Chain of two states per ranger, heard and silent, with a step per tick (E. N. Gilbert, "Capacity
+/// of a burst-noise channel", 1960).
 #[derive(Clone, Debug)]
 pub(crate) struct Silence {
-    /// A silent ranger hears again at the next reading with this probability.
+    /// Probability of hearing the next reading.
     end: f64,
-    /// A hearing ranger falls silent with this probability.
+    /// Probability of falling silent.
     begin: f64,
     silent: [bool; 6],
     noise: Noise,
 }
 
 impl Silence {
-    /// Readings are `period_s` apart. No random number is drawn if the share is 0.
+    /// Draws no random number if the share is 0.
     pub(crate) fn new(physics: &SonarPhysics, period_s: f64, seed: u64) -> Self {
         let share = physics.silence_share;
         let end = (period_s / physics.silence_mean_s).min(1.0);

@@ -1,19 +1,19 @@
-//! An ultrasonic ranger measures the distance of the nearest point in its cone that reflects the sound.
+//! Ultrasonic ranger: measures the nearest point in its cone that reflects sound.
 //!
-//! In the laboratory a surface reflects wherever the cone meets it. A smooth wall reflects only at the foot of the
-//! perpendicular, and only if that is not too far off the axis. A drum reflects over a wider angle, and an edge
-//! reflects sometimes. A surface that does not reflect still hides the surfaces behind it.
+//! In the laboratory, surfaces reflect wherever the cone meets them. Otherwise, a smooth wall
+//! reflects only at the foot of the perpendicular, within a limit off the axis. A drum reflects
+//! over a wider angle, an edge sometimes. Silent surfaces still hide those behind them.
 //!
-//! An echo is detected if its amplitude is not below a threshold. With range r it falls as 10^(-2 alpha r / 20) / r:
-//! the mirror image of the transmitter in a plane is 2 r away, and air at 40 kHz takes alpha = 1.3 dB/m (ISO 9613-1,
-//! 20 degrees Celsius, half saturated). A cylinder of radius a spreads the sound further, by sqrt(a / (a + r)): a
-//! wave front of radius r comes back from it with radius a r / (a + 2 r) in the level plane. That is geometrical
-//! acoustics, for k a well above 1: a post of 1.25 cm has k a = 9. A soft surface gives back its share `echo`. The
-//! threshold is the amplitude of a post 3 cm in diameter at `post_reach_m`. A wall is therefore detected far beyond
-//! [`REACH_M`].
+//! An echo is detected if its amplitude reaches a threshold. The amplitude falls with range r as
+//! 10^(-2 alpha r / 20) / r: the transmitter's mirror image in a plane is 2 r away. Air at 40 kHz
+//! absorbs alpha = 1.3 dB/m (ISO 9613-1, 20 degrees Celsius, half saturated). A cylinder of radius
+//! a adds sqrt(a / (a + r)). It returns a wave front of radius r with radius a r / (a + 2 r) in the
+//! level plane. This geometrical acoustics needs k a well above 1; a post of 1.25 cm has k a = 9. A
+//! soft surface returns its share `echo`. The threshold is the amplitude of a post 3 cm in diameter
+//! at `post_reach_m`, so walls are detected far beyond [`REACH_M`].
 //!
-//! A solid that ends below the ranger's height or begins above it is met by the cone, as wide upright as it is level,
-//! from a distance on. A smooth solid then answers with no more than its edge.
+//! The cone is as wide vertically as horizontally, so it meets solids below or above the ranger
+//! from some distance on. A smooth one then echoes only by its edge.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -26,27 +26,26 @@ use crate::{
 };
 
 pub const REACH_M: f64 = 2.55;
-/// A surface no farther than this before an echo does not hide it.
+/// Distance before an echo within which a surface cannot hide it.
 const HIDES_M: f64 = 0.01;
-/// A reflected beam starts this far from its mirror, or it would meet the mirror again.
+/// Offset of a reflected beam from its mirror.
 const NUDGE_M: f64 = 1e-6;
-/// Air attenuates sound of 40 kHz so.
+/// Absorption in air at 40 kHz.
 const ABSORPTION_DB_PER_M: f64 = 1.3;
 const POST_RADIUS_M: f64 = 0.015;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     range: f64,
-    /// The range seen from above, metres.
+    /// Range seen from above, metres.
     level_range: f64,
-    /// Unit vector from the ranger, from above.
+    /// Unit vector from the ranger, seen from above.
     along: DVec2,
-    /// The echo is often lost, because it is near a limit or comes from an edge.
+    /// Whether the echo is often lost: near a limit, or from an edge.
     weak: bool,
     share: f64,
 }
 
-/// A sector in front of a ranger, by the cosine and sine of its half angle.
 #[derive(Clone, Copy, Debug)]
 struct Sector {
     origin: DVec2,
@@ -63,7 +62,7 @@ impl Sector {
         off_axis(self.axis, direction) <= self.half + 1e-12
     }
 
-    /// Nearest to the sector's apex, from the apex, of the face `from`..`to`.
+    /// Returns the offset from the apex to the nearest point of a face in the sector.
     fn nearest(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
         let surface = Surface::Face { from, to };
         let foot = common::geometry::nearest_on_segment(self.origin, from, to);
@@ -84,7 +83,7 @@ fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
     axis.perp_dot(direction).atan2(axis.dot(direction)).abs()
 }
 
-/// Metres that a ranger at `pose` hears on a robot at `centre`, without noise; infinite for nothing.
+/// Returns the noiseless range of a ranger on a robot at `centre`, metres; infinite for nothing.
 pub fn listen(
     world: &World,
     centre: DVec2,
@@ -94,7 +93,7 @@ pub fn listen(
 ) -> f64 {
     let height = world.heights().sonar_m;
     if world.is_between(centre, pose.position, height) {
-        // A ranger pressed against the thing that the body touches hears that thing, not those behind it.
+        // A ranger pressed against an object that the body touches hears only that.
         return 0.0;
     }
     let receiver = Receiver::new(pose, height, physics);
@@ -130,7 +129,7 @@ pub fn byte(range: f64, physics: &SonarPhysics, noise: &mut Noise) -> u8 {
     Echo::byte_at(range + noise.normal(physics.noise_m + physics.noise_per_m * range))
 }
 
-/// The beam's axis after its reflection by a wall that does not answer itself, onto a wall that is square to it.
+/// Returns the range of a beam that bounces off a silent wall to a surface square to it.
 fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> Option<f64> {
     if !noise.chance(physics.multipath_share) {
         return None;
@@ -170,7 +169,8 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// The greatest distance of an echo this far off the axis, metres: full in the cone, less outside.
+    /// Returns an echo's maximum range by angle off the axis, metres: full in the cone, less
+    /// outside.
     fn reach(&self, off: f64) -> f64 {
         let cone = self.cone.half;
         if off <= cone + 1e-12 {
@@ -182,7 +182,7 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// At most two places may answer.
+    /// Returns up to two points that may echo.
     fn candidates(&self, solid: &Solid) -> [Option<Candidate>; 2] {
         let (found, radius) = match solid.surface {
             Surface::Drum { at, radius } => ([self.drum(at, radius), None], Some(radius)),
@@ -196,7 +196,7 @@ impl<'a> Receiver<'a> {
         })
     }
 
-    /// The nearest part of `candidate` is `gap` metres above or below the ranger.
+    /// Raises a candidate that is `gap` metres above or below the ranger.
     fn off_level(&self, candidate: Candidate, gap: f64) -> Option<Candidate> {
         if gap == 0.0 {
             return Some(candidate);
@@ -215,7 +215,6 @@ impl<'a> Receiver<'a> {
         })
     }
 
-    /// Every surface answers wherever the cone meets it.
     fn is_rough(&self) -> bool {
         self.physics.wall_limit_deg.to_radians() >= FRAC_PI_2
     }
@@ -231,7 +230,7 @@ impl<'a> Receiver<'a> {
             let weak = off > self.cone.half + 1e-12;
             return Some(heard(to_centre.normalize_or_zero() * range, weak));
         }
-        // The drum's nearest point is out of the cone, but the cone may still meet its flank.
+        // The nearest point is outside the cone, but the cone may still meet the flank.
         let drum = Surface::Drum { at, radius };
         let limit = self.physics.drum_limit_deg.to_radians();
         let flank = |edge: DVec2| {
@@ -256,7 +255,7 @@ impl<'a> Receiver<'a> {
         let foot = from + along * (origin - from).dot(along) - origin;
         let limit = self.physics.wall_limit_deg.to_radians();
         let off = if foot.length_squared() > 1e-18 { off_axis(self.cone.axis, foot) } else { 0.0 };
-        // A rough wall answers even where the cone only grazes it.
+        // A rough wall echoes even where the cone only grazes it.
         if off <= limit + 1e-12 || self.is_rough() {
             let share = (foot + origin - from).dot(along) / (to - from).length();
             if (0.0..=1.0).contains(&share) && foot.length() <= self.reach(off) {
@@ -276,7 +275,7 @@ impl<'a> Receiver<'a> {
     }
 }
 
-/// A hard plane at `range` metres, or a cylinder of `radius`.
+/// Returns the amplitude of a hard plane, or of a cylinder of `radius`.
 fn amplitude(range: f64, radius: Option<f64>) -> f64 {
     let spread = radius.map_or(1.0, |radius| (radius / (radius + range)).sqrt());
     spread * 10_f64.powf(-2.0 * ABSORPTION_DB_PER_M * range / 20.0) / range

@@ -1,8 +1,8 @@
-//! The sensor streams that run, and the frames that each has left.
+//! Running sensor streams, with the frames that each has left.
 
 use common::wire::{Request, Stream};
 
-/// Frames left of the standard, the custom and the motor stream; none for ever. All run from boot.
+/// Frames left of the standard, custom and motor stream; none for unlimited. All run from boot.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Streams([Option<u8>; 3]);
 
@@ -22,7 +22,7 @@ impl Streams {
         self.0[named].fill(left);
     }
 
-    /// Returns which run. One frame of each counts as sent.
+    /// Returns the running streams and counts one frame of each as sent.
     pub(crate) fn take_due(&mut self) -> [bool; 3] {
         let due = self.running();
         for left in self.0.iter_mut().flatten() {

@@ -1,4 +1,4 @@
-//! Bytes to the robot: datagrams, a connection or a serial line.
+//! Byte transport to the robot: datagrams, a connection or a serial line.
 
 mod owner;
 mod pty;
@@ -15,36 +15,36 @@ use crate::error::{Result, SimError};
 pub enum Transport {
     #[default]
     Udp,
-    /// One host at a time.
+    /// TCP connection, one host at a time.
     Tcp,
-    /// A pseudo-terminal, opened by its path like a serial port.
+    /// Pseudo-terminal, opened by its path like a serial port.
     Pty,
 }
 
 trait Wire {
-    /// `address:port`, or the path of the line.
+    /// Returns `address:port`, or the path of the line.
     fn address(&self) -> String;
 
-    /// Readable when bytes have come; the second only if there are two.
+    /// Becomes readable when bytes have come.
     fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>);
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>>;
 
     fn send(&mut self, to: Source, bytes: &[u8]) -> io::Result<()>;
 
-    /// A peer that exists before it sends anything: a connected host, or the other end of the line.
+    /// Returns a peer that exists before it sends.
     fn connected(&mut self) -> io::Result<Option<Source>> {
         Ok(None)
     }
 
-    /// The newest bytes are the first on a line or connection that a host opened. A line that a host closed so that
-    /// DTR stays high does not count as opened again.
+    /// Returns whether the newest bytes are the first since a host opened the line or connection. A
+    /// reopened line counts only after DTR fell.
     fn take_opened(&mut self) -> bool {
         false
     }
 }
 
-/// Bytes that cannot be sent are lost.
+/// Transport that drops bytes it cannot send.
 pub(crate) struct Way(Box<dyn Wire>);
 
 impl Way {

@@ -1,19 +1,19 @@
 //! Systematic errors of the wheels.
 //!
-//! They belong to the robot, not to the moment: drawn once from the mission's seed, with a stream of their own, they
-//! are the same in each process of a run.
+//! They belong to the robot: a stream of their own draws them once from the mission's seed, so all
+//! processes of a run agree.
 
 use common::mission::Mission;
 
 use crate::noise::{Noise, Source};
 
-/// True values over nominal ones.
+/// Ratios of true to nominal values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelErrors {
-    /// Of the left and the right one; their mean is 1.
+    /// Left and right wheel; their mean is 1.
     pub diameter: [f64; 2],
     pub track: f64,
-    /// Share of the rolled way that slips away; below 0 it is won.
+    /// Share of the rolled distance lost to slip; negative for a gain.
     pub slip_share: f64,
 }
 

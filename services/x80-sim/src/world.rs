@@ -1,4 +1,4 @@
-//! The mission's world, with things that appear, vanish or move.
+//! World of a mission, with things that appear, vanish or move.
 
 use common::{
     geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
@@ -9,7 +9,7 @@ use glam::DVec2;
 
 use crate::people::People;
 
-/// A sensor this near to a surface touches it.
+/// Distance from a surface at which a sensor touches it.
 const TOUCHES_M: f64 = 1e-3;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ pub enum Surface {
         at: DVec2,
         radius: f64,
     },
-    /// A straight face of a wall or a box.
+    /// Straight face of a wall or a box.
     Face {
         from: DVec2,
         to: DVec2,
@@ -26,7 +26,7 @@ pub enum Surface {
 }
 
 impl Surface {
-    /// Metres; negative inside a drum.
+    /// Returns metres; negative inside a drum.
     pub fn distance(&self, point: DVec2) -> f64 {
         match *self {
             Self::Drum { at, radius } => at.distance(point) - radius,
@@ -34,7 +34,7 @@ impl Surface {
         }
     }
 
-    /// Straight out; a point on the surface has none.
+    /// Returns the outward direction; none on the surface.
     pub fn outward(&self, point: DVec2) -> Option<DVec2> {
         let from = match *self {
             Self::Drum { at, .. } => at,
@@ -43,7 +43,7 @@ impl Surface {
         (point - from).try_normalize()
     }
 
-    /// Metres along the ray from `origin` in the unit direction `along`.
+    /// Returns metres along the ray from `origin` in the unit direction `along`.
     pub fn hit(&self, origin: DVec2, along: DVec2) -> Option<f64> {
         match *self {
             Self::Drum { at, radius } => {
@@ -70,7 +70,7 @@ impl Surface {
         }
     }
 
-    /// `along` is a unit direction; `point` is on the surface, whose normal counts.
+    /// Returns the cosine between the unit vector `along` and the normal at a surface's `point`.
     pub fn incidence_cos(&self, point: DVec2, along: DVec2) -> f64 {
         let normal = match *self {
             Self::Drum { at, .. } => point - at,
@@ -105,20 +105,20 @@ fn solids_of(shapes: &Shapes) -> Vec<Solid> {
     drums.chain(walls).chain(shapes.boxes.iter().flat_map(boxes)).collect()
 }
 
-/// The other robot of a world, as it was at `time_s`.
+/// The world's other robot at `time_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Other {
     pub time_s: f64,
     pub pose: Pose2,
     pub twist: Twist,
     pub radius_m: f64,
-    /// In place of the disc.
+    /// Polygon that replaces the disc.
     pub footprint: Option<Footprint>,
     pub profile: Profile,
 }
 
 impl Other {
-    /// At another time, if it went on as it did.
+    /// Extrapolates at constant velocity.
     fn solids_at(&self, time: f64) -> Vec<Solid> {
         let for_s = time - self.time_s;
         let pose = self.pose.along_arc(self.twist.v * for_s, self.twist.omega * for_s);
@@ -140,7 +140,6 @@ pub struct World {
     things: Vec<Visitor>,
     people: People,
     other: Option<Other>,
-    /// The other robot now.
     met: Vec<Solid>,
     holes: Vec<Hole>,
     heights: Heights,
@@ -155,7 +154,7 @@ struct Visitor {
 }
 
 impl World {
-    /// The world at time 0, with the robot at the start.
+    /// Starts at time 0, with the robot at the start.
     pub fn new(mission: &Mission) -> Self {
         let visitor = |thing: &Thing| Visitor {
             solids: solids_of(&thing.shape),
@@ -176,8 +175,7 @@ impl World {
         world
     }
 
-    /// An obstacle that would appear inside the robot, a disc of `radius` at `centre`, appears when its place is
-    /// free.
+    /// Advances to `time`. An obstacle due inside the robot, a disc, waits until its place is free.
     pub fn advance(&mut self, time: f64, centre: DVec2, radius: f64) {
         for visitor in &mut self.things {
             visitor.offset = visitor.thing.offset_at(time);
@@ -189,7 +187,7 @@ impl World {
         self.people.advance(time, (centre, radius), &self.standing);
     }
 
-    /// The other robot goes on from there as it did.
+    /// Sets the other robot, extrapolated from there.
     pub fn set_other(&mut self, other: Option<Other>) {
         self.other = other;
     }
@@ -216,12 +214,12 @@ impl World {
             .map(|solid| solid.surface)
     }
 
-    /// Metres to the nearest surface that the body can touch; infinite where nothing stands.
+    /// Returns metres to the nearest touchable surface; infinite without one.
     pub fn clearance(&self, point: DVec2) -> f64 {
         self.touchable().map(|surface| surface.distance(point)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Metres along the level ray at `height_m` from `origin` in the unit direction `along`, and that surface.
+    /// Returns metres along the level ray at `height_m`, and the surface.
     pub fn first_hit(&self, origin: DVec2, along: DVec2, height_m: f64) -> Option<(f64, Surface)> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
@@ -231,8 +229,10 @@ impl World {
 }
 
 impl World {
-    /// What a beam within `reach_m` may end at that starts at `height_m`: a level one at what stands there, one that rises and falls by
-    /// `rise` a metre at what the body can touch.
+    /// Returns solids within `reach_m` at which a beam from `height_m` may end.
+    ///
+    /// A level beam meets solids at that height. One that widens by `rise` per metre meets those
+    /// that the body can touch.
     pub fn near(&self, point: DVec2, reach_m: f64, height_m: f64, rise: f64) -> Vec<Solid> {
         let Heights { ground_clearance_m, body_top_m, .. } = self.heights;
         let is_touched =
@@ -244,8 +244,10 @@ impl World {
             .collect()
     }
 
-    /// A surface at `height_m` stands between the points, or within [`TOUCHES_M`] of the second: a thing that the
-    /// body touches may stand between a sensor at its edge and its centre.
+    /// Returns whether a surface at `height_m` is between the points, or within [`TOUCHES_M`] of
+    /// the second.
+    ///
+    /// A touched object may lie between the body's centre and a sensor at its edge.
     pub fn is_between(&self, from: DVec2, to: DVec2, height_m: f64) -> bool {
         let Some(along) = (to - from).try_normalize() else {
             return false;

@@ -1,4 +1,4 @@
-//! A car: (15) and (16), limited in speed, and never on the spot.
+//! Car motion: (15) and (16), limited in speed, never on the spot.
 
 use common::{
     kinematics::{LEAST_SPEED_M_S, Twist},
@@ -8,7 +8,7 @@ use common::{
 use super::{Alignment, Controller};
 
 impl Controller {
-    /// None to stand, also where a car would have to turn on the spot.
+    /// Returns None to stand, also instead of a turn on the spot.
     pub(super) fn car_motion(
         &mut self,
         status: GuidanceStatus,
@@ -23,10 +23,10 @@ impl Controller {
         let omega = self.angular(alignment);
         let wanted = self.tangential(alignment, omega, distance);
         let wanted = wanted.max(least);
-        // A limit that is no number means stand.
+        // A NaN limit means stand.
         if limit >= least {
             let v = wanted.min(limit);
-            // A lower speed, on the same curve.
+            // A lower speed on the same curve.
             let omega = omega * v / wanted;
             Some(Twist { v, omega })
         } else {
@@ -52,7 +52,7 @@ mod tests {
         Mission::parse(&text, Path::new("m.toml")).unwrap()
     }
 
-    /// The command of a car at the origin, facing x, under guidance at `angle` radians.
+    /// Returns the command at the origin, facing x, under guidance at `angle` radians.
     fn command(
         mission: &Mission,
         status: GuidanceStatus,

@@ -8,7 +8,7 @@ use std::{
     path::Path,
 };
 
-/// vd = 0.4, wd = 0.8, Rc = 0.5, target (3, 0), r = 0.1, W = 0.4.
+/// Returns a controller with vd = 0.4, wd = 0.8, Rc = 0.5, target (3, 0), r = 0.1, W = 0.4.
 fn controller(extra: &str) -> Controller {
     let text = format!(
         "target = [3, 0]\nmethod = 'paper'\narrival_tolerance_m = 0.1\n\
@@ -19,7 +19,6 @@ fn controller(extra: &str) -> Controller {
 }
 
 impl Controller {
-    /// A step with the pose apart from the direction.
     fn at(&mut self, pose: Pose2, guidance: &GuidanceSample) -> CommandSample {
         let Pose2 { position, heading } = pose;
         let (x_m, y_m) = (position.x, position.y);
@@ -31,12 +30,11 @@ fn state(command: &CommandSample) -> CommandState {
     CommandState::from_byte(command.state)
 }
 
-/// The paper's first command to a robot at the origin whose guidance is along x.
+/// Returns the paper's first command at the origin, with guidance along x.
 fn first(heading: f64) -> CommandSample {
     controller("").at(facing(heading), &ahead())
 }
 
-/// The robot `short_m` before its target.
 fn short(short_m: f64) -> Pose2 {
     Pose2 { position: DVec2::new(3.0 - short_m, 0.0), heading: 0.0 }
 }
@@ -45,7 +43,7 @@ fn facing(heading: f64) -> Pose2 {
     Pose2 { position: DVec2::ZERO, heading }
 }
 
-/// Guidance along x.
+/// Returns guidance along x.
 fn ahead() -> GuidanceSample {
     GuidanceSample {
         ex: 1.0,
@@ -63,7 +61,7 @@ fn close(got: f64, want: f64) {
 
 #[test]
 fn equation_14_by_hand() {
-    // The robot faces 45 degrees, so guidance along x lies 45 degrees to the right.
+    // Facing 45 degrees, guidance along x lies 45 degrees to the right.
     let alignment = Alignment::of(facing(FRAC_PI_4).axis(), DVec2::X);
     close(alignment.cosine, FRAC_1_SQRT_2);
     close(alignment.sine, -FRAC_1_SQRT_2);
@@ -110,7 +108,7 @@ fn equation_16_is_continuous_where_its_cases_meet() {
 
 #[test]
 fn near_the_target_slowing_down_multiplies_alignment() {
-    // At 0.25 m with Rc = 0.5, vc is half of what alignment allows.
+    // At 0.25 m with Rc = 0.5, vc is half of the aligned speed.
     let pose = Pose2 { position: DVec2::new(2.75, 0.0), heading: FRAC_PI_3 };
     let command = controller("").at(pose, &ahead());
     close(command.v_m_s, 0.2 * (1.0 - 3_f64.sqrt() / 4.0));
@@ -130,7 +128,6 @@ fn equation_17_by_hand() {
     close(command.right_rad_s, 4.0);
 }
 
-/// The controller of the same robot with the evidential method.
 fn evidential() -> Controller {
     let text = "target = [3, 0]\nrobot = { wheel_radius_m = 0.1, track_m = 0.4 }\n\
                 controller = { speed_m_s = 0.4, turn_rad_s = 0.8, look_rad_s = 1.4 }";
@@ -184,7 +181,7 @@ fn a_limit_of_0_is_0_however_well_the_robot_faces_its_way() {
 
 #[test]
 fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
-    // The dead band is 20 counts/s after a gain of 0.78, at 1200 counts a turn.
+    // A dead band of 20 counts/s after a gain of 0.78, at 1200 counts per turn.
     let dead = 20.0 / 0.78 / 1200.0 * std::f64::consts::TAU;
     for degrees in -180..180 {
         for limit in [0.0, 0.01, 0.03, 0.05, 0.4] {
@@ -255,7 +252,7 @@ fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
             close(command.v_m_s, 0.0);
             assert!(command.omega_rad_s > 0.0, "{method}: the shorter way");
             pose.heading += command.omega_rad_s / 7.0;
-            // The robot slips on the spot, and stays at its target.
+            // It slips on the spot, and stays at its target.
             pose.position.x -= 0.02;
             command = controller.at(pose, &guidance);
             turned += 1;
@@ -318,7 +315,7 @@ fn a_controller_goes_by_the_response_that_the_link_found_as_if_it_were_stated() 
     assert_eq!(told.response, before);
 }
 
-/// A body that is no disc.
+/// Returns a body that is no disc.
 fn jackal() -> Controller {
     let text = "target = [3, 0]\nrobot.model = 'jackal'";
     Controller::new(&Mission::parse(text, Path::new("test.toml")).unwrap())

@@ -6,18 +6,18 @@ use super::*;
 const PERIOD_S: f64 = 0.1;
 const TRACK_M: f64 = 0.26;
 
-/// How a robot differs from what is stated of it.
+/// Deviations from stated parameters.
 #[derive(Clone, Copy, Debug)]
 struct Robot {
     late_s: f64,
     turned_rad: f64,
     mirrored: bool,
-    /// True way and turn over those by the wheels.
+    /// True over wheels' distance and turn.
     way: f64,
     turn: f64,
-    /// The right wheel's way over the left one's, for equal counts.
+    /// Right over left travel, for equal counts.
     uneven: f64,
-    /// Its wheels slip: every tenth second they say twice what they went.
+    /// Every tenth second the wheels report twice their travel.
     slips: bool,
 }
 
@@ -31,7 +31,7 @@ const RIGHT: Robot = Robot {
     slips: false,
 };
 
-/// The cause that is named within `for_s` of driving to both sides, and when.
+/// Returns the cause and time, within `for_s` of driving to both sides.
 fn named(robot: Robot, seed: u64, for_s: f64) -> Option<(f64, Cause)> {
     let mut state = seed;
     let mut random = || {
@@ -80,7 +80,7 @@ fn named(robot: Robot, seed: u64, for_s: f64) -> Option<(f64, Cause)> {
             true => [-seen.position.y, -seen.heading],
             false => [seen.position.y, seen.heading],
         };
-        // A laser that looks to the left sees the robot's frame turned to the right.
+        // To a laser turned left, the robot's frame is turned right.
         let position = DVec2::new(seen.position.x, y);
         let fix = Fix {
             time: MissionTime::from_seconds(now),

@@ -7,7 +7,7 @@ use glam::dvec2;
 const TICK_NS: u64 = 100_000_000;
 const FIVE_CM: [f64; 6] = [25e-4, 0.0, 0.0, 25e-4, 0.0, 4e-4];
 
-/// A robot whose right wheel is larger than its left one by a share, ten ticks a second.
+/// Robot with a larger right wheel, at ten ticks per second.
 struct Robot {
     truth: Pose2,
     larger: f64,
@@ -21,7 +21,6 @@ impl Robot {
         Self { truth: Pose2::default(), larger, counts: [0.0; 2], tick: 0, seed: 7 }
     }
 
-    /// The wheels after a tick of arc `arc` and turn `turn`.
     fn drive(&mut self, arc: f64, turn: f64) -> WheelSample {
         let (track, per_metre) = (0.26, 1200.0 / (std::f64::consts::TAU * 0.085));
         self.truth = self.truth.along_arc(arc, turn);
@@ -36,13 +35,13 @@ impl Robot {
         WheelSample { stamp, left_counts, right_counts, ..WheelSample::default() }
     }
 
-    /// The wheels after a tick along a curve that winds to either side.
+    /// Drives a tick of a winding curve.
     fn wind(&mut self) -> WheelSample {
         let turn = 0.06 * (self.tick as f64 / 15.0).sin();
         self.drive(0.04, turn)
     }
 
-    /// A number that is nearly normally distributed: the sum of twelve even ones.
+    /// Returns nearly normal noise: twelve uniform numbers.
     fn noise(&mut self) -> f64 {
         let mut even = || {
             self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -51,7 +50,7 @@ impl Robot {
         (0..12).map(|_| even()).sum::<f64>() - 6.0
     }
 
-    /// A fix at the present time, off by 5 cm.
+    /// Returns a fix off by 5 cm.
     fn fix(&mut self) -> FixSample {
         let at = self.truth.position + dvec2(self.noise(), self.noise()) * 0.05;
         FixSample {
@@ -73,7 +72,7 @@ fn x80() -> DeadReckoning {
     reckoning_of("target = [3, 0]")
 }
 
-/// The root mean square of the pose's error over `ticks` ticks, with the fixes of `source`.
+/// Returns the pose's RMS error over `ticks` with fixes of `source`.
 fn rms(
     robot: &mut Robot,
     reckoning: &mut DeadReckoning,
@@ -113,7 +112,7 @@ fn fixes_hold_the_pose_of_a_robot_with_unequal_wheels_and_teach_their_ratio() {
     let (mut robot, mut reckoning) = (Robot::new(0.005), x80());
     let on = rms(&mut robot, &mut reckoning, 600, each_second);
     assert!(on < 0.06 && off > 1.0, "{on} with fixes, {off} without");
-    // The wheels are known now.
+    // By now the wheels are known.
     let covariance = reckoning.sample().covariance;
     let later = rms(&mut robot, &mut reckoning, 300, none);
     assert!(later < 0.15, "{later} afterwards, {on} with fixes, {off} without");
@@ -156,7 +155,7 @@ fn the_pose_follows_a_fix_without_tearing_the_map_and_odometry_does_not_jump() {
     let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
     let mut before = reckoning.given(&robot.wind(), &[], &[]).pose;
     let mut lost = robot.drive(0.0, 0.0);
-    // The counts are lost in motion, so the pose may be a way off.
+    // Counts are lost in motion, so the pose may be off.
     lost.restarts = 1;
     robot.truth.position += dvec2(0.1, 0.08);
     let odometry = |pose: &PoseSample| {
@@ -234,7 +233,8 @@ fn a_fix_that_cannot_be_used_is_refused_with_its_cause() {
     }
 }
 
-/// The robot is carried after 10 s, and seen from `source` for 20 s. The seconds after which it was relocated, and its error then.
+/// Carries the robot after 10 s, and sees it from `source` for 20 s. Returns each relocation's
+/// seconds, and the error then.
 fn carried(source: impl Fn(&mut Robot, u64) -> FixSample) -> Vec<(u64, f64)> {
     let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
     rms(&mut robot, &mut reckoning, 100, each_second);
@@ -265,7 +265,7 @@ fn fixes_that_agree_for_three_seconds_relocate_a_robot_that_was_carried() {
     assert_eq!(scattered, []);
 }
 
-/// The greatest error in 60 s with a source whose fixes are all `aside_m` aside, and the deviation that the pose then gives.
+/// Returns the largest error in 60 s of fixes all `aside_m` off, and the pose's deviation.
 fn aside(aside_m: f64) -> (f64, f64, u64) {
     let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
     let mut worst = 0.0_f64;
@@ -321,10 +321,10 @@ fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_u
         (reckoning.sample().covariance[3].sqrt(), told)
     };
     let (even, _) = deviation(1.01, false);
-    // Of 20 missions with an encoder 5 % low it is no nearer to 1 in any.
+    // In none of 20 missions with an encoder 5 % low is it nearer to 1.
     let (uneven, told) = deviation(0.965, false);
     assert!(even < 0.15 && uneven > 0.5 && told == 1, "{even} and {uneven}, told {told} times");
-    // What an encoder that counts 4 % too little since half of a short mission has come to.
+    // An encoder 4 % low for half a short mission.
     assert!(deviation(1.02, false).0 > 0.25);
     assert!(deviation(0.965, true).0 < 0.1);
 }
@@ -350,15 +350,16 @@ fn a_doubt_of_the_wheels_is_settled_by_a_scan_that_says_where_the_robot_is_and_b
         reckoning.sample().covariance[3].sqrt()
     };
     assert!(deviation([0.05, 0.03], false) < 0.1);
-    // It may have begun anew where the wheels said.
+    // It may have restarted at the wheels' pose.
     assert!(deviation([0.05, 0.03], true) > 0.5);
-    // A hall without anything near, and a round room.
+    // An empty hall, and a round room.
     for own in [[0.3, 0.03], [0.05, 0.2]] {
         assert!(deviation(own, false) > 0.5, "{own:?}");
     }
 }
 
-/// The error of the heading after 20 s at rest and 60 s of driving, with a gyro of this bias that says how often it is off.
+/// Returns the heading error after 20 s of rest and 60 s of driving; `gyro` gets ticks and biased
+/// increments.
 fn heading_error(bias: f64, mut gyro: impl FnMut(u64, f64) -> Vec<TurnSample>) -> f64 {
     let (mut robot, mut reckoning) = (Robot::new(0.01), x80());
     let mut turned = 0.0;
@@ -372,7 +373,6 @@ fn heading_error(bias: f64, mut gyro: impl FnMut(u64, f64) -> Vec<TurnSample>) -
     pose.heading_rad - robot.truth.heading
 }
 
-/// The increment that ends at `tick`.
 fn turn(tick: u64, turn_rad: f64) -> TurnSample {
     TurnSample {
         capture_ns: tick * TICK_NS,
@@ -386,7 +386,7 @@ fn turn(tick: u64, turn_rad: f64) -> TurnSample {
 #[test]
 fn a_gyro_whose_increments_come_after_their_ticks_have_left_the_history_does_no_harm() {
     let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-    // The source stands still for 4 s, again and again, while the robot drives in a circle.
+    // The source pauses for 4 s repeatedly, while the robot circles.
     let mut waiting = Vec::new();
     for _ in 0..400 {
         let wheels = robot.drive(0.04, 0.03);
@@ -403,7 +403,7 @@ fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
     let without = heading_error(0.0, |_, _| Vec::new());
     let with = heading_error(0.01, |tick, increment| vec![turn(tick, increment)]);
     assert!(without.abs() > 0.5 && with.abs() < 0.01, "{with} with a gyro, {without} without");
-    // Increments come three ticks late, two at a time, and one in ten is lost.
+    // Three ticks late, two at a time, one in ten lost.
     let mut waiting = Vec::new();
     let late = heading_error(0.01, |tick, increment| {
         waiting.extend((tick % 10 != 5).then(|| turn(tick, increment)));
@@ -411,7 +411,7 @@ fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
         waiting.drain(..due).collect()
     });
     assert!(late.abs() < 0.2 * without.abs(), "{late}");
-    // Increments end between the ticks.
+    // Ends between the ticks.
     let mut before = 0.0;
     let between = heading_error(0.01, |tick, increment| {
         let half = 0.5 * (before + increment);
@@ -431,7 +431,7 @@ fn what_counts_leave_open_is_not_taken_for_a_gyros_bias() {
         let mut turned = 0.0;
         let mut pose = PoseSample::default();
         for tick in 0..200 {
-            // It goes, stands for a moment, turns and goes; each reading of a wheel is off by half a count.
+            // Drives, stands, turns, drives; readings are off by half a count.
             let (arc, rate) = [(0.04, 0.02), (0.0, 0.0), (0.0, -0.25), (0.05, 0.0)][tick / 5 % 4];
             let mut wheels = robot.drive(arc, rate);
             for counts in [&mut wheels.left_counts, &mut wheels.right_counts] {
@@ -494,7 +494,7 @@ fn an_operator_sets_the_pose_once_with_its_deviations_and_the_way_goes_on_from_t
     assert!((wrapped(pose.heading_rad - 3.0)).abs() < 1e-9, "{pose:?}");
     assert_eq!([pose.covariance[0], pose.covariance[3]], [0.25; 2]);
     assert!((pose.covariance[5] - 0.04).abs() < 1e-9, "{pose:?}");
-    // It is said again, and nothing new.
+    // A repeated place changes nothing.
     assert!(!reckoned().placed);
     let mut pose = pose;
     for _ in 0..25 {
@@ -538,7 +538,8 @@ fn a_camera_holds_the_pose_whose_scan_matcher_drifts_farther_than_it_says() {
     rms(&mut robot, &mut reckoning, 700, drifting);
     let off_m = rms(&mut robot, &mut reckoning, 100, drifting);
     assert!(off_m < 0.1 && reckoning.sample().relocations == 0, "{off_m} m off");
-    // A turn that no wheel saw, as while a process is replaced: the matcher's fixes contradict the pose for a while.
+    // A turn that no wheel saw, as while a process is replaced: matcher fixes contradict the pose
+    // for a while.
     robot.truth.heading += 0.55;
     let off_m = rms(&mut robot, &mut reckoning, 100, drifting);
     assert!(off_m < 0.15 && reckoning.sample().relocations == 0, "{off_m} m off after a turn");

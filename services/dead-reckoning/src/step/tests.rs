@@ -6,7 +6,7 @@ use common::{
 use std::{f64::consts::PI, path::Path};
 
 fn reckoning(extra: &str) -> DeadReckoning {
-    // r = 0.1 m, W = 0.4 m, 1000 counts a turn: a count is 0.2 pi mm of rim.
+    // r = 0.1 m, W = 0.4 m, 1000 counts per turn: a count is 0.2 pi mm of rim.
     let text = format!(
         "target = [3, 0]\n[robot]\nwheel_radius_m = 0.1\ntrack_m = 0.4\ncounts_per_turn = 1000\n{extra}"
     );
@@ -26,7 +26,6 @@ fn wheels(tick: u64, left: u16, right: u16) -> WheelSample {
     }
 }
 
-/// Steps at the sample's own time.
 impl DeadReckoning {
     pub(super) fn given(
         &mut self,
@@ -48,7 +47,7 @@ impl DeadReckoning {
     }
 }
 
-/// A robot whose counts are these at first.
+/// Starts with these counts.
 fn begun(extra: &str, left: u16, right: u16) -> DeadReckoning {
     let mut reckoning = reckoning(extra);
     reckoning.take(0, left, right);
@@ -71,7 +70,7 @@ fn equation_20_straight_by_hand() {
     close(pose.travelled_m, 0.1 * PI);
 }
 
-/// As [`wheels`], of a robot without a counter.
+/// As [`wheels`], without a counter.
 fn endless(tick: u64, left: f64, right: f64) -> (WheelSample, Sources) {
     let counts = WheelCounts::Endless([left, right]);
     let [left_cyclic, right_cyclic] = counts.cyclic();
@@ -83,7 +82,7 @@ fn endless(tick: u64, left: f64, right: f64) -> (WheelSample, Sources) {
 
 #[test]
 fn a_way_longer_than_the_cycle_of_a_counter_is_in_the_pose_of_a_robot_that_has_none() {
-    // 5 s at 2.5 m/s between two ticks, and a restart that ends at a whole cycle.
+    // 5 s at 2.5 m/s in one tick, and a restart that ends at a whole cycle.
     for way in [15.0, -15.0, 20.588_741_6, 3.0] {
         let mut reckoning = reckoning("top_speed_m_s = 2.5");
         let mut at = |tick: u64, counts: f64| {
@@ -96,7 +95,7 @@ fn a_way_longer_than_the_cycle_of_a_counter_is_in_the_pose_of_a_robot_that_has_n
         assert!(!after.rejected && (after.pose.x_m - way).abs() < 0.001, "{}", after.pose.x_m);
         let on = at(11, 78.0 + counts);
         assert!(!on.rejected && (on.pose.x_m - way).abs() < 0.002, "{}", on.pose.x_m);
-        // Nobody turns his wheels so far in half a second.
+        // Wheels cannot turn this far in half a second.
         let jump = at(12, 78.0 + 2.0 * counts + 32_768.0);
         assert!(jump.rejected && jump.pose.covariance[0] > on.pose.covariance[0] + 0.1);
     }
@@ -128,7 +127,7 @@ fn a_recorded_state_and_entry_of_an_earlier_version_are_read_without_counts() {
     let mut reckoning = reckoning("");
     reckoning.alone(&wheels);
     let state = postcard::to_allocvec(reckoning.state()).unwrap();
-    // The last byte says that there are no counts.
+    // The last byte says: no counts.
     let earlier = postcard::from_bytes::<State>(&state[..state.len() - 1]).unwrap();
     assert_eq!(&earlier, reckoning.state());
 }
@@ -136,7 +135,7 @@ fn a_recorded_state_and_entry_of_an_earlier_version_are_read_without_counts() {
 #[test]
 fn equation_20_turns_left_when_the_right_wheel_leads() {
     let mut reckoning = begun("", 0, 0);
-    // +-1000 counts: 2 pi 0.1 m a side over a track of 0.4 m: pi radians, on the spot.
+    // +-1000 counts are 2 pi 0.1 m a side over a track of 0.4 m: pi radians on the spot.
     let pose = reckoning.take(1, COUNT_CYCLE - 1000, 1000);
     close(pose.heading_rad, PI);
     close(pose.x_m, 0.0);
@@ -189,7 +188,7 @@ fn a_restored_state_goes_on_as_if_nothing_had_happened() {
 
 #[test]
 fn no_speed_is_more_than_the_body_can_do_however_the_frames_come() {
-    // The rim does at most 1 m/s, so the robot does 5 rad/s on the spot.
+    // A rim of at most 1 m/s is 5 rad/s on the spot.
     let mut reckoning = begun("", 0, 0);
     let at = |tick, stamp_ns, left, right| {
         let stamp = Stamp { tick, stamp_ns, ..Stamp::default() };
@@ -206,7 +205,7 @@ fn no_speed_is_more_than_the_body_can_do_however_the_frames_come() {
         close(reckoning.alone(&turned).pose.omega_rad_s, 5.0);
         reckoning.alone(&at(102 + 2 * tick, now_ns + 900_000_000, 0, 0));
     }
-    // Two ticks of 7 Hz that come at once are no motion that is too fast.
+    // Two 7 Hz ticks at once are not too fast a motion.
     reckoning.alone(&at(200, 9_000_000_000, 0, 0));
     let bunched = reckoning.alone(&at(201, 9_001_000_000, 50, 50)).pose;
     close(bunched.v_m_s, 50.0 * 2e-4 * PI / (0.5 / 7.0));
@@ -217,12 +216,12 @@ fn a_motion_that_nobody_measured_is_in_the_covariance() {
     let mut reckoning = begun("", 600, 700);
     let before = reckoning.take(1, 600, 700);
     let after = reckoning.alone(&WheelSample { restarts: 1, ..wheels(2, 0, 1) }).pose;
-    // In 0.5 s each wheel rolls up to 0.5 m at the top speed; the even distribution has the variance 0.25 / 3.
+    // 0.5 s at top speed are up to 0.5 m per wheel; uniformly distributed the variance is 0.25 / 3.
     let wheel = 0.25 / 3.0;
     for (entry, more) in [(0, wheel / 2.0), (3, wheel / 2.0), (5, 2.0 * wheel / 0.16)] {
         close(after.covariance[entry] - before.covariance[entry], more);
     }
-    // However long it was away, the wheels stood when its last command was over: after 1 / 7 + 0.25 + 0.2 s.
+    // However long the absence, the last command was over after 1 / 7 + 0.25 + 0.2 s.
     let much_later = reckoning.alone(&WheelSample { restarts: 2, ..wheels(200, 5, 6) }).pose;
     let lost = (1.0 / 7.0 + 0.45_f64).powi(2) / 3.0;
     close(much_later.covariance[5] - after.covariance[5], 2.0 * lost / 0.16);
@@ -240,7 +239,7 @@ fn counters_that_restart_do_not_move_the_robot() {
 #[test]
 fn a_robot_that_restarted_while_it_was_away_does_not_move() {
     let mut reckoning = begun("", 600, 700);
-    // In the 5 s since then, wheels could have turned so far.
+    // Wheels could have turned this far in the 5 s.
     let after = WheelSample { restarts: 1, ..wheels(10, 0, 1) };
     assert!(reckoning.alone(&after).rejected);
     close(reckoning.alone(&after).pose.x_m, 0.0);
@@ -271,7 +270,7 @@ fn a_robot_that_turns_back_through_its_start_while_the_link_is_killed_loses_no_t
         sample
     };
     reckoning.alone(&by(1, wheels(0, 0, 0)));
-    // Each wheel rolls a tenth of a turn, against the other, and back.
+    // The wheels roll a tenth of a turn oppositely, and back.
     reckoning.alone(&by(1, wheels(1, COUNT_CYCLE - 100, 100)));
     let back = by(2, wheels(2, COUNT_CYCLE - 3, 2));
     assert!(!reckoning.alone(&back).rejected);
@@ -280,17 +279,17 @@ fn a_robot_that_turns_back_through_its_start_while_the_link_is_killed_loses_no_t
 
 #[test]
 fn equation_3_of_a_car_by_hand() {
-    // r = 0.1 m, 1000 counts a turn; L = 0.5 m; 45 degrees of steering are 450 of 3600 counts.
+    // r = 0.1 m, 1000 counts per turn; L = 0.5 m; 45 degrees of steering are 450 of 3600 counts.
     let car = "model = 'car'\nwheelbase_m = 0.5\nsteering_limit_deg = 60";
     let mut steered = begun(car, 100, 450);
-    // Half a turn of the wheel is 0.1 pi metres, on a circle of radius 0.5 m to the left.
+    // Half a wheel turn is 0.1 pi metres, on a circle of 0.5 m radius to the left.
     let pose = steered.take(1, 600, 450);
     let turn = 0.1 * PI / 0.5;
     close(pose.heading_rad, turn);
     close(pose.x_m, 0.5 * turn.sin());
     close(pose.y_m, 0.5 * (1.0 - turn.cos()));
     close(pose.travelled_m, 0.1 * PI);
-    // The steering goes from 45 degrees to the left to 45 degrees to the right, so its mean is straight.
+    // From 45 degrees left to 45 right the mean is straight.
     let mut swung = begun(car, 100, 450);
     let pose = swung.take(1, 600, COUNT_CYCLE - 450);
     close(pose.heading_rad, 0.0);
@@ -308,11 +307,11 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
         successor.restore(saved.clone()).unwrap();
         successor
     };
-    // The link's last sample is still that of the tick.
+    // The link's last sample is still the tick's.
     let mut again = successor();
     assert_eq!(again.take(2, 190, 200), published);
     assert_eq!(again.state(), killed.state());
-    // The next tick has come meanwhile: nothing of the way is lost, but 127 mm are one arc in place of two.
+    // The next tick has come: no distance is lost, but 127 mm are one arc instead of two.
     let (got, want) = (successor().take(3, 280, 310), killed.take(3, 280, 310));
     close(got.heading_rad, want.heading_rad);
     close(got.travelled_m, want.travelled_m);

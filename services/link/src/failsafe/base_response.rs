@@ -1,6 +1,9 @@
-//! A base that answers later, or brakes more slowly, than stated, or one of which nobody stated how it answers. What was found is given with each tick, so that planner and controller
-//! go by it; until a command follows from such a tick, the robot drives at half speed, because whatever allows it a speed counts on the
-//! stated response. It stays slow where nothing lets the response limit the speed: by the paper's method and with another planner.
+//! Monitor for a base with an unstated response, or one that answers later or brakes more slowly
+//! than stated.
+//!
+//! Ticks carry the found response to planner and controller. Speed limits count on the stated one,
+//! so the robot drives at half speed until a command follows from such a tick. It stays slow with
+//! the paper's method and with another planner, where the response cannot limit the speed.
 
 use common::{
     clock::MissionTime,
@@ -13,25 +16,25 @@ use super::{
     response_fit::{ACCELERATION_RATIO, DEAD_TIME_STEP_S},
 };
 
-/// A way to stop that is longer by this share and by so many metres is not as stated: what was found is no more exact.
+/// Factor and metres over the stated stopping distance that contradict it. The fit is no more
+/// exact.
 const LONGER_SHARE: f64 = 1.3;
 const LONGER_M: f64 = 0.02;
 
-/// Whether a way to stop is longer than that of the stated response, metres.
 pub(super) fn is_longer(stops_within_m: f64, stated_m: f64) -> bool {
     stops_within_m > LONGER_SHARE * stated_m + LONGER_M
 }
 
 #[derive(Clone, Debug)]
 pub struct BaseResponse {
-    /// Or what the base is trusted to do, if nothing is stated.
+    /// Trusted response if none is stated.
     stated: Response,
     is_stated: bool,
     top_speed_m_s: f64,
     brakes_by_response: bool,
-    /// The newest that stops later than stated, or the newest if nothing is stated.
+    /// Newest response that stops later than stated, or the newest if none is stated.
     found: Option<Response>,
-    /// Ticks since then have told it.
+    /// Time of the first tick that carries the found response.
     told_from: MissionTime,
     is_followed: bool,
 }
@@ -41,7 +44,7 @@ impl BaseResponse {
         response.way_to_stop_m(self.top_speed_m_s, response.dead_time_s())
     }
 
-    /// What was found, at the slow end of its steps.
+    /// Returns the found response, at the slow end of its grid step.
     pub(crate) fn sample(&self) -> Option<BaseResponseSample> {
         let found = self.found.filter(|_| self.brakes_by_response)?;
         Some(BaseResponseSample {
@@ -51,7 +54,7 @@ impl BaseResponse {
         })
     }
 
-    /// What was found, and what to do about it.
+    /// Describes the found response and its remedy.
     pub(crate) fn words(&self) -> Option<String> {
         let found = self.found?;
         let Response { delay_s, acceleration_m_s2, .. } = found;

@@ -1,4 +1,4 @@
-//! The battery monitor.
+//! Battery monitor.
 
 use std::time::Duration;
 
@@ -10,24 +10,24 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// A low battery counts as charged this far above its limit, volts. Stopping motors raise the voltage by less.
+/// Margin above the limit to count as charged, volts. Stopping motors raise the voltage by less.
 pub(crate) const RECOVERED_V: f64 = 0.3;
-/// A battery is empty below this share of its limit: 1.0 V a cell if the limit is 1.1 V. Lower voltages damage cells, and the voltage
-/// then falls faster than a robot can be fetched.
+/// Share of the limit at which a battery is empty: 1.0 V per cell for a limit of 1.1 V. Lower
+/// voltages damage cells, and then fall faster than a robot can be fetched.
 pub(crate) const EMPTY_SHARE: f64 = 1.0 / 1.1;
-/// Time below the empty voltage until a battery is empty, mission time. Starting motors lower the voltage for some tenths of a second.
+/// Mission time below the empty voltage until a battery is empty. Starting motors lower it for some
+/// tenths of a second.
 pub(crate) const EMPTY_AFTER: Duration = Duration::from_secs(2);
-/// A robot could not send frames on less: there is no such battery, volts.
+/// Least voltage of a fitted battery, volts. A robot could send no frames on less.
 const FITTED_V: f64 = 1.0;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Charge {
-    /// Enough, or there is no such battery.
     #[default]
     Enough,
-    /// The robot drives slowly.
+    /// Low: the robot drives slowly.
     Low,
-    /// The robot cannot drive any more.
+    /// Empty: the robot cannot drive.
     Empty,
 }
 
@@ -71,7 +71,7 @@ impl Gauge {
         self.sunk_since = sunk.then_some(since);
         let ends = if self.charge == Charge::Enough { limit } else { limit + RECOVERED_V };
         self.charge = if self.charge == Charge::Empty || sunk && now.since(since) >= EMPTY_AFTER {
-            // The voltage rises when the robot stands, but the battery stays empty.
+            // The voltage of an empty battery rises when the robot stands.
             Charge::Empty
         } else if fitted && volts < ends {
             Charge::Low
@@ -91,7 +91,7 @@ pub struct Batteries {
 }
 
 impl Batteries {
-    /// Low or empty: of the boards, the motors, the servos.
+    /// Returns which batteries are low or empty: boards, motors, servos.
     pub fn low(&self) -> [bool; 3] {
         self.gauges.map(|gauge| gauge.charge > Charge::Enough)
     }
@@ -100,7 +100,7 @@ impl Batteries {
         std::mem::take(&mut self.changes)
     }
 
-    /// The worst of all but the servos', without which the robot drives.
+    /// Returns the worst charge. The robot drives without servos.
     fn charge(&self) -> Charge {
         let [board, motor, _] = self.gauges;
         board.charge.max(motor.charge)

@@ -1,14 +1,15 @@
-//! The monitor of other commanders: nodes that publish commands for the robot beside the link, and hosts whose commands the robot
+//! Monitor for other commanders: nodes that publish commands, and hosts whose commands the robot
 //! acknowledges.
 //!
-//! The robot obeys the newest command, so two commanders drive it where neither wants. A node that could publish and is silent is no
-//! commander.
+//! The robot obeys the newest command, so two commanders drive it where neither wants. A silent
+//! publisher is harmless.
 //!
-//! A robot acknowledges each command, and over a serial server every host hears that; one that speaks JSON counts the orders of all. A
-//! few acknowledgements too many may be of datagrams that came twice.
+//! A robot acknowledges each command. Over a serial server every host receives that, and a JSON
+//! robot counts all hosts' orders. Duplicated datagrams may add a few acknowledgements.
 //!
-//! An X80 acknowledges datagrams to their sender, and sends its frames to the last one. So if some frames stay away and all
-//! acknowledgements come at once, frames go to another host: a bad radio loses both, and a busy machine delays both.
+//! An X80 acknowledges datagrams to their sender, and sends frames to the last sender. Missing
+//! frames with prompt acknowledgements thus show another host. A bad radio loses both, and a busy
+//! machine delays both.
 
 use std::{collections::VecDeque, iter::repeat_n, time::Duration};
 
@@ -24,20 +25,20 @@ use super::monitor::{Condition, Moment, Monitor, Observation};
 use crate::backoff::has_passed;
 
 pub(crate) const GONE_AFTER: Duration = Duration::from_secs(1);
-/// A sender of stops alone is a commander after this time. An earlier link's stop guard leaves sooner.
+/// Time after which a sender of stops alone is a commander. An earlier link's stop guard leaves
+/// sooner.
 pub(crate) const STAYS: Duration = Duration::from_secs(2);
-/// Frames and acknowledgements are counted for so long. An acknowledgement that took longer is lost.
+/// Counting window. Later acknowledgements are lost.
 pub(crate) const WINDOW: Duration = Duration::from_secs(2);
-/// So many acknowledgements in a window that the robot did not owe show another commander.
+/// Unowed acknowledgements per window that show another commander.
 pub(crate) const UNOWED: usize = 6;
-/// A robot that was found may acknowledge so much that it was sent before.
+/// Acknowledgements that a found robot may owe for earlier commands.
 const OWED_WHEN_FOUND: usize = 64;
-/// Another host has a share of the frames if more than this stay away in each of [`WINDOWS`], and fewer than half as many acknowledgements
-/// are late or lost.
+/// Share of missing frames in [`WINDOWS`] successive windows that shows another host, with at most
+/// half as many late acknowledgements.
 const AWAY_SHARE: f64 = 0.2;
 const WINDOWS: usize = 2;
 
-/// The counts of a window.
 #[derive(Clone, Copy, Debug, Default)]
 struct Window {
     began_ns: u64,
@@ -65,22 +66,22 @@ pub struct OtherCommander {
     topic: String,
     told: Option<Told>,
     in_ticks: bool,
-    /// When the owed acknowledgements became so, nanoseconds.
+    /// When each acknowledgement became owed, nanoseconds.
     owed: VecDeque<u64>,
     window: Window,
-    /// The most frames of a window, and the windows in which another host had a share.
+    /// Most frames of a window, and successive windows with another host.
     most: usize,
     shared: usize,
-    /// The frames of a window of a robot that answers the last sender; 0 of another.
+    /// Expected frames per window of a robot that answers its last sender; 0 for others.
     stated: f64,
     half_period: Duration,
-    /// What the robot has done that shows another commander.
+    /// Evidence of another commander.
     shows: Option<&'static str>,
     is_told: bool,
 }
 
 impl OtherCommander {
-    /// Whether an acknowledgement since the last call was of another's command.
+    /// Returns whether another's command was acknowledged since the last call.
     pub(crate) fn take_told(&mut self) -> bool {
         std::mem::take(&mut self.is_told)
     }
@@ -90,7 +91,7 @@ impl OtherCommander {
     }
 
     fn acknowledged(&mut self, now_ns: u64) {
-        // One that was lost makes no later one late.
+        // Pops the newest, so that a lost acknowledgement makes no later one late.
         match self.owed.pop_back() {
             Some(then_ns) => {
                 self.window.late += usize::from(has_passed(then_ns, now_ns, self.half_period));
@@ -116,7 +117,8 @@ impl OtherCommander {
             if !is_shared {
                 self.shared = 0;
             } else if frames > 0 {
-                // Streams may have stopped; but a host that commands often takes all frames of some windows.
+                // Streams may have stopped, but a host that commands often takes all frames of some
+                // windows.
                 self.shared += 1;
             }
             self.most = self.most.max(frames);
@@ -173,7 +175,7 @@ impl Monitor for OtherCommander {
             (told.moves || has_passed(told.began_ns, told.newest_ns, STAYS))
                 && !has_passed(told.newest_ns, now.machine_ns, GONE_AFTER)
         };
-        // A robot in lockstep answers whenever its process comes to it.
+        // A robot in lockstep answers whenever its process is scheduled.
         let shows = !self.in_ticks && self.shows().is_some();
         (shows || self.told.is_some_and(commands)).into()
     }

@@ -1,10 +1,10 @@
-//! Contacts, seen by held wheels.
+//! Contacts, detected by held wheels.
 //!
-//! A wheel that does not turn as told is held, or its encoder is dead. A held motor draws several times the current of a rolling one.
-//! The encoder is suspected where a current cannot be right:
-//! - it is above the range of the AD converter
-//! - it stays high while the wheel is told to stand: the frames repeat
-//! - it is high while the wheel rolls as told: `robot.held_current_ad` is not this robot's
+//! A wheel that does not turn as commanded is held, or its encoder is dead. A held motor draws
+//! several times the current of a rolling one. The encoder is suspected instead if the current:
+//! - exceeds the range of the AD converter
+//! - stays high after a commanded stop: the frames repeat
+//! - is high while the wheel rolls as commanded: `robot.held_current_ad` is wrong for this robot
 
 use std::{f64::consts::PI, time::Duration};
 
@@ -12,31 +12,31 @@ use common::{clock::MissionTime, mission::Mission, samples::ContactSample};
 
 use super::monitor::Condition;
 
-/// A wheel with a held one's current is held after this.
+/// Duration of high current that shows a held wheel.
 pub(crate) const HELD_AFTER: Duration = Duration::from_millis(400);
-/// The robot stands while the contact is mapped and the planner restarted.
+/// Stand-still for mapping the contact and restarting the planner.
 pub(crate) const STANDS_FOR: Duration = Duration::from_millis(500);
-/// The least time between two contacts: one is answered before the next, in lockstep too.
+/// Least time between contacts, so that one is answered before the next, in lockstep too.
 const NEXT_AFTER: Duration = Duration::from_secs(1);
-/// A standing wheel's current has fallen by then.
+/// Time for a standing wheel's current to fall.
 const FALLEN_AFTER: Duration = Duration::from_millis(350);
-/// A current that is so long high while its wheel rolls as told is no sign of a held wheel.
+/// Duration of high current on a rolling wheel after which current is no evidence.
 const HIGH_AND_ROLLS: Duration = Duration::from_secs(2);
 const MOST_AD: u16 = 4095;
-/// Half the arc of a touch with both wheels held, radians.
+/// Half the touched arc with both wheels held, radians.
 const HALF_WIDTH: f64 = PI / 4.0;
-/// The touched arc of a body with one wheel held: its bearing, to that side, and half of it, radians.
+/// Touched arc with one wheel held: bearing to its side, and half the width, radians.
 const AT_ONE_WHEEL: (f64, f64) = (PI / 4.0, PI / 6.0);
-/// A command below this share of the rims' relative speed is a turn on the spot.
+/// Least share of the rims' relative speed that is not a turn on the spot.
 const LEAST_AHEAD_SHARE: f64 = 0.5;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Contacts {
     limit_ad: u16,
     currents: [u16; 2],
-    /// High while the wheel rolled as told, seconds.
+    /// Time of high current on a rolling wheel, seconds.
     high_and_rolls_s: [f64; 2],
-    /// The held wheels, and since when that is known.
+    /// Held wheels, and since when.
     held: Option<([bool; 2], MissionTime)>,
     new: Option<ContactSample>,
 }
@@ -50,7 +50,7 @@ impl Contacts {
         self.currents = currents;
     }
 
-    /// Whether each motor draws a held one's current.
+    /// Returns whether each motor draws a held one's current.
     pub(super) fn high(&self) -> [bool; 2] {
         let range = self.limit_ad.max(1)..=MOST_AD;
         let is_sign = |s: &f64| self.limit_ad > 0 && *s < HIGH_AND_ROLLS.as_secs_f64();
@@ -63,7 +63,7 @@ impl Contacts {
         self.high_and_rolls_s[wheel] += gap_s;
     }
 
-    /// These wheels are held, told these speeds, counts/s. Returns whether the contact is new.
+    /// Registers held wheels with commanded speeds, counts/s. Returns whether the contact is new.
     pub(super) fn begin(&mut self, held: [bool; 2], asked: [f64; 2], now: MissionTime) -> bool {
         if self.held.is_some_and(|(_, since)| now.since(since) < NEXT_AFTER) {
             return false;
@@ -81,7 +81,7 @@ impl Contacts {
         true
     }
 
-    /// A held wheel whose current stays although it was told to stand.
+    /// Returns a held wheel whose current stays high after a stop.
     pub(super) fn repeats(&self, now: MissionTime) -> Option<usize> {
         let (held, since) = self.held?;
         let stood = now.since(since);
@@ -90,7 +90,6 @@ impl Contacts {
         [0, 1].into_iter().find(|&wheel| stands && held[wheel] && high[wheel])
     }
 
-    /// The next tick alone has it.
     pub(super) const fn take(&mut self) -> Option<ContactSample> {
         self.new.take()
     }
@@ -113,7 +112,7 @@ impl Contacts {
     }
 }
 
-/// The direction of the touch, and half the angle in which it may be, radians.
+/// Returns bearing and half width of the touch, radians.
 fn arc(held: [bool; 2], [left, right]: [f64; 2]) -> (f64, f64) {
     let ahead = left + right;
     if ahead.abs() < LEAST_AHEAD_SHARE * (right - left).abs() {

@@ -1,28 +1,30 @@
-//! Whether the ranging sensors hear anything at all: one that says "nothing in range" reads like one before open ground.
+//! Detection of sensors that are all deaf, as "nothing in range" is also normal in the open.
 //!
-//! Where nothing is in reach, infrared rangers give readings at the end of their scale in about a quarter of the frames, by their noise. In
-//! 107 recorded missions of robots with seven of them, moving things and harsh noise among them, no two frames in a row were without any
-//! reading. So frames without one are less likely the more readings at the end of the scale came with each frame before.
+//! With nothing in reach, infrared rangers still read the end of their scale in a quarter of the
+//! frames, by noise. In 107 recorded missions of robots with seven rangers, some with moving things
+//! and harsh noise, two successive frames were never empty. Empty frames are thus unlikely if
+//! earlier frames had many end-of-scale readings.
 //!
-//! Nothing tells deaf sensors without such noise from an empty hall, which a robot must cross: it goes slowly where it has heard nothing for
-//! as far as its sensors reach.
+//! Without such noise deafness looks like an empty hall, which a robot must cross. It then goes
+//! slowly once it has driven the reach of its sensors without a reading.
 
 use common::{
     mission::Mission,
     samples::{RangeReading, RangeStatus},
 };
 
-/// Readings beyond this share of a sensor's reach are at the end of its scale. Fewer than one in a frame prove nothing.
+/// Share of a sensor's reach beyond which readings are end-of-scale. Fewer than `LEAST_ENDS` per
+/// frame prove nothing.
 const END_SHARE: f64 = 0.85;
 const LEAST_ENDS: f64 = 1.0;
-/// Their mean is of so many frames.
+/// Averaging length, frames.
 const MEAN_OF: f64 = 30.0;
-/// Readings at the end of the scale that are missing: sensors are doubted, and surely deaf. Of healthy ones at most 3.7 were.
+/// Missing end-of-scale readings for doubt and for certainty. Healthy sensors reached 3.7.
 const MISSING: [f64; 2] = [6.0, 12.0];
-/// Sensors that were surely deaf so often, and heard again whenever the robot stood, are deaf in motion.
+/// Spells of certain deafness, each ended by a reading, that show sensors deaf in motion.
 const SPELLS: u32 = 3;
 
-/// What should have been read, summed up while nothing is.
+/// Sum of readings due during a silence.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Missing {
     sum: f64,
@@ -36,7 +38,6 @@ impl Missing {
         self.spells += u32::from(!was_sure && self.sum >= sure);
     }
 
-    /// Something was read.
     pub(super) fn end(&mut self) {
         self.sum = 0.0;
     }
@@ -54,12 +55,12 @@ impl Missing {
 pub(super) struct Deafness {
     /// Row and reach, metres.
     sensors: Vec<(u8, f64)>,
-    /// Of this frame.
+    /// Values of the current frame.
     answers: bool,
     hears: bool,
     ends: f64,
     mean_ends: f64,
-    /// Since a reading came.
+    /// Values since the last reading.
     frames: u32,
     missing: Missing,
     way_m: f64,
@@ -89,7 +90,7 @@ impl Deafness {
         }
     }
 
-    /// The robot went so far since the frame before.
+    /// Completes a frame after a motion of `way_m`.
     pub(super) fn went(&mut self, way_m: f64) {
         if self.hears {
             self.mean_ends += (self.ends - self.mean_ends) / MEAN_OF;
@@ -105,7 +106,7 @@ impl Deafness {
         (self.answers, self.hears, self.ends) = (false, false, 0.0);
     }
 
-    /// The explanation if the sensors are doubted, or surely deaf.
+    /// Explains doubtful, or surely deaf, sensors.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let reach_m = self.sensors.iter().fold(0.0, |most: f64, (_, reach_m)| most.max(*reach_m));
         let is_open = !sure && self.way_m > reach_m;
@@ -129,8 +130,8 @@ mod tests {
 
     use super::*;
 
-    /// What is doubted, and sure, after the frames of these readings, metres, of the ranger of row 3, from a robot that goes 0.05 m in
-    /// each.
+    /// Judges a ranger, row 3, with these readings, metres, on a robot that drives 0.05 m per
+    /// frame.
     fn judged(ranges: impl Iterator<Item = Option<f64>>) -> [bool; 2] {
         let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
         let mut deafness = Deafness::of(&mission);

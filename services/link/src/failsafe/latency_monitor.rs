@@ -1,8 +1,9 @@
-//! The latency monitor: whether the robot's frames arrive late. Buffers may delay them by seconds, and they carry no time.
+//! Latency monitor: detects frames delayed by buffers. Frames carry no time.
 //!
-//! A robot acknowledges every command. When a lost robot answers again, and while it is late, the link sends nothing for a window. An
-//! acknowledgement when nothing was sent for longer than a command's limit is late; a sooner one proves nothing. A robot without
-//! acknowledgements counts as timely.
+//! A robot acknowledges every command. The link stops sending for a window when a lost robot
+//! answers again, and at intervals while it is late. An acknowledgement is late if the last send is
+//! longer ago than a command's limit; a sooner one proves nothing. A robot without acknowledgements
+//! counts as timely.
 
 use std::time::Duration;
 
@@ -10,24 +11,23 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// Machine time: any process may be delayed by so much at any pace.
+/// Least limit, machine time: a process may be delayed by this at any pace.
 const LEAST_LIMIT: Duration = Duration::from_millis(100);
-/// The window beyond the limit, mission time: a standing robot gets commands every 0.2 s.
+/// Window beyond the limit, mission time. A standing robot gets commands every 0.2 s.
 const WINDOW: Duration = Duration::from_millis(400);
-/// A late robot is tested again after this mission time.
+/// Retest interval of a late robot, mission time.
 const AGAIN: Duration = Duration::from_secs(2);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum State {
-    /// Nothing shows that the robot is late.
     #[default]
     Timely,
-    /// Nothing was sent since then, to see late acknowledgements.
+    /// Sending is paused since this time, to expose late acknowledgements.
     Testing(u64),
     Late(u64),
 }
 
-/// Times are the machine's, nanoseconds.
+/// Latency monitor. Times are machine times, nanoseconds.
 #[derive(Clone, Debug, Default)]
 pub struct LatencyMonitor {
     command_limit: Duration,
@@ -64,7 +64,7 @@ impl LatencyMonitor {
         }
     }
 
-    /// The link must send nothing, so that late acknowledgements are seen.
+    /// Returns whether sending must pause, to expose late acknowledgements.
     pub const fn is_testing(&self) -> bool {
         matches!(self.state, State::Testing(_))
     }
@@ -98,7 +98,7 @@ impl Monitor for LatencyMonitor {
         }
     }
 
-    /// A tested robot may be late.
+    /// Holds during a test too, because the robot may be late.
     fn condition(&self, _: Cause, _: Moment) -> Condition {
         (self.state != State::Timely).into()
     }
@@ -126,8 +126,8 @@ mod tests {
         monitor.condition(Cause::RobotLate, Moment::default()) == Condition::Holds
     }
 
-    /// The monitor of a robot that gets a command every 70 ms and acknowledges each after `delay_ms`. The robot is found at 10 s and
-    /// then gets nothing for `quiet_ms`.
+    /// Returns the monitor of a robot found at 10 s after commands every 70 ms, acknowledged after
+    /// `delay_ms`. Then nothing is sent for `quiet_ms`.
     fn found(delay_ms: u64, quiet_ms: u64) -> LatencyMonitor {
         let text = "target = [3, 0]";
         let mission = Mission::parse(text, Path::new("test.toml")).unwrap();

@@ -1,13 +1,15 @@
-//! Whether sonars still hear what they heard.
+//! Detection of sonars that stop hearing a known surface.
 //!
-//! A sonar that falls deaf says "nothing in range" from then on, which reads like open ground. What it heard until then is still there: an
-//! echo came from somewhere on the arc of its range, and each further reading tells from where. Once it must lie well within a sonar's cone,
-//! seen from the side from which it answered, a sonar that hears nothing misses it. What moves away is heard elsewhere meanwhile, or a sonar
-//! hears what is behind it, and it is forgotten.
+//! A deaf sonar reports "nothing in range", as in the open, but the surface it heard is still
+//! there. Each echo lies somewhere on the arc of its range, and further readings narrow down where.
+//! If a remembered echo lies well inside the cone and faces the sonar, a silent reading counts as a
+//! miss. An echo is forgotten when a sonar hears past it, as with a thing that moved away, and
+//! after [`FORGOTTEN_S`].
 //!
-//! The likelihoods with which echoes were missed, summed up from one reading to the next that hears anything: in 450 missions of
-//! robots with one, three and six sonars, 160 with harsh noise and 70 of bases that answer late, at most 7.9 for one sonar, and 3.2 while no
-//! sonar heard anything where there are more. When three fell deaf before drums, in 6 missions, 20 to 45.
+//! Likelihoods of misses add up until the next reading that hears anything. In 450 missions with
+//! one, three and six sonars, the sum reached 7.9 for one sonar. It reached 3.2 while all of
+//! several were silent. Of these missions, 160 had harsh noise, and 70 bases that answer late. In 6
+//! missions in which three sonars fell deaf before drums, it reached 20 to 45.
 
 use common::{
     kinematics::Pose2,
@@ -19,33 +21,33 @@ use glam::DVec2;
 use super::deafness::Missing;
 
 const PLACES: usize = 9;
-/// The share of a sonar's reach up to which its echoes are sure to come again.
+/// Share of the reach within which an echo surely returns.
 const SURE: f64 = 0.7;
-/// The share of its cone within which an answer is sure, and that from which one may come.
+/// Shares of the cone in which an answer is sure, and possible.
 const INNER: f64 = 0.67;
 const OUTER: f64 = 1.2;
-/// A reading that differs by no more is of the same thing, metres.
+/// Largest difference of readings of one surface, metres.
 const SAME_M: f64 = 0.12;
-/// How much less likely a place is that does not fit a reading, and one that a reading missed.
+/// Weights of places that a reading contradicts, and that a silent reading missed.
 const UNFIT: f64 = 0.2;
 const MISSED: f64 = 0.7;
-/// A smooth surface answers within this of the direction from which it was heard, radians.
+/// Angle from the last echo's direction within which a smooth surface answers, radians.
 const TURNED_RAD: f64 = 0.21;
-/// So many readings make an echo known. A reading is of it with the first likelihood, and misses it with the second.
+/// Readings that make an echo known, and likelihoods above which a reading belongs to it, and
+/// misses it.
 const KNOWN: u32 = 5;
 const LIKELY: [f64; 2] = [0.2, 0.5];
 const FORGOTTEN_S: f64 = 20.0;
 const MOST: usize = 64;
-/// What one sonar misses, and all of several: doubted, and surely deaf.
+/// Sums of misses of one sonar, and of all: doubted, and surely deaf.
 const ONE: [f64; 2] = [10.0, 16.0];
 const ALL: [f64; 2] = [4.5, 8.0];
 
-/// Something that answered.
 #[derive(Clone, Debug)]
 struct Echo {
-    /// Where it may be, with their likelihoods.
+    /// Candidate places with their likelihoods.
     places: [(DVec2, f64); PLACES],
-    /// Where the sonar was that heard it last, and when.
+    /// Sonar position and time of the last echo.
     from: DVec2,
     at_s: f64,
     readings: u32,
@@ -56,7 +58,6 @@ impl Echo {
         self.places.map(|(place, _)| is_so(place))
     }
 
-    /// The likelihood of these places.
     fn share(&self, of: [bool; PLACES]) -> f64 {
         self.places.iter().zip(of).filter(|(_, of)| *of).map(|((_, share), _)| share).sum()
     }
@@ -74,7 +75,7 @@ impl Echo {
 struct Listener {
     from: Pose2,
     half_rad: f64,
-    /// The cosines of what is well within its cone, and of what may still answer.
+    /// Cosines of the sure and the possible cone.
     inner: f64,
     outer: f64,
     reach_m: f64,
@@ -98,7 +99,7 @@ impl Listener {
         Echo { places: std::array::from_fn(place), from, at_s, readings: 1 }
     }
 
-    /// Whether the angle from its axis to a place has a greater cosine.
+    /// Returns whether a place lies within this cosine of the axis.
     fn sees(&self, place: DVec2, cosine: f64) -> bool {
         let way = place - self.from.position;
         way.dot(self.from.axis()) > cosine * way.length()
@@ -109,7 +110,8 @@ impl Listener {
         off_m.abs() < SAME_M && self.sees(place, self.outer)
     }
 
-    /// Whether what was heard from there and lies nearer than this must be heard.
+    /// Returns whether an echo last heard from `heard_from` must be heard at `place`, if nearer
+    /// than `nearer_m`.
     fn must_hear(&self, place: DVec2, heard_from: DVec2, nearer_m: f64) -> bool {
         let turned = (place - heard_from).angle_to(place - self.from.position);
         place.distance(self.from.position) < nearer_m
@@ -139,7 +141,7 @@ impl LostEcho {
         self.sonars.iter_mut().for_each(|(.., missing)| *missing = Missing::default());
     }
 
-    /// Readings of one moment, seconds, at which the robot was there by its wheels.
+    /// Takes readings at a time, seconds, with the pose by the wheels.
     pub(super) fn take(&mut self, readings: &[RangeReading], robot: Pose2, at_s: f64) {
         self.echoes.retain(|echo| (0.0..FORGOTTEN_S).contains(&(at_s - echo.at_s)));
         let is_silent = readings.iter().all(|it| it.status() != RangeStatus::Measured);
@@ -165,7 +167,7 @@ impl LostEcho {
         }
     }
 
-    /// The explanation if a sonar is doubted, or surely deaf.
+    /// Explains doubtful, or surely deaf, sonars.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let it = usize::from(sure);
         let deaf = self.sonars.iter().find(|(.., missing)| missing.is(ONE[it]));
@@ -204,7 +206,7 @@ fn hears(echoes: &mut Vec<Echo>, listener: Listener, range_m: f64, at_s: f64) {
     }
 }
 
-/// How likely it is that something known must have been heard.
+/// Returns the likelihood that a known echo was missed.
 fn misses(echoes: &mut [Echo], listener: Listener) -> f64 {
     let mut likely = 0.0_f64;
     for echo in echoes {
@@ -224,8 +226,9 @@ mod tests {
 
     use super::*;
 
-    /// What a robot with two sonars hears of a post of 0.1 m at (1.2, 0.1), or nothing of it from a tick on or at some of them, while it goes
-    /// to it, by 2 cm in each, and turns to and fro by 0.3 rad.
+    /// Judges two sonars that approach a post of 0.1 m radius at (1.2, 0.1). The robot drives 2 cm
+    /// per tick, and turns to and fro by 0.3 rad. `is_heard` selects the ticks and sonars that hear
+    /// the post.
     fn judged(ticks: u32, is_heard: impl Fn(u32, u8) -> bool) -> [bool; 2] {
         let rows = "[[robot.sensor]]\nname = 'a'\nkind = 'cone'\nforward_m = 0.2\nbearing_deg = 10\n\
             [[robot.sensor]]\nname = 'b'\nkind = 'cone'\nforward_m = 0.2\nbearing_deg = -10\n";

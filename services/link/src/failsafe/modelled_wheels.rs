@@ -1,12 +1,13 @@
-//! The wheels that a base turns as it is told. What limits them is each wheel's acceleration, or that of their mean and that of their
-//! difference: bases that take a speed and a turn rate limit them so, and their wheels differ from others as they turn.
+//! Model of wheels that follow their commands.
+//!
+//! Acceleration is limited per wheel, or in the wheels' mean and difference. Bases that take speed
+//! and turn rate limit the latter, and their wheels differ in turns.
 
 use common::mission::{Body, ModelledSpeed, Response};
 
-/// A turn that is as fast within this share as the wheels' accelerations allow is limited by them.
+/// Relative difference within which a turn is limited by the wheels alone.
 const AS_WHEELS: f64 = 0.01;
 
-/// What makes counts of a body's motion.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Axle {
     pub(crate) counts_per_m: f64,
@@ -25,7 +26,7 @@ impl Axle {
     pub(super) fn limits(self, response: &Response) -> Limits {
         let most = response.acceleration_m_s2;
         let turn = self.track_m.map(|track| response.turn_acceleration_rad_s2 * track / 2.0);
-        // Of two infinite ones the share is no number.
+        // inf / inf is NaN.
         let apart = turn.filter(|turn| (turn / most - 1.0).abs() > AS_WHEELS);
         let both = [most, apart.unwrap_or(most)];
         Limits { are_apart: apart.is_some(), most: both.map(|most| most * self.counts_per_m) }
@@ -39,7 +40,8 @@ impl Axle {
     }
 }
 
-/// Accelerations of the left and the right wheel, or of half their sum and half their difference, counts/s in a second.
+/// Acceleration limits of the left and right wheel, or of half their sum and half their difference,
+/// counts/s^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub(super) are_apart: bool,
@@ -47,7 +49,7 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// What is limited of these wheels.
+    /// Converts wheels to limited axes.
     pub(super) fn axes(self, [left, right]: [f64; 2]) -> [f64; 2] {
         if self.are_apart { [(left + right) / 2.0, (right - left) / 2.0] } else { [left, right] }
     }
@@ -57,7 +59,7 @@ impl Limits {
     }
 }
 
-/// Speeds and ways in counts.
+/// Modelled speeds and distances of both wheels, in counts.
 #[derive(Clone, Debug)]
 pub(crate) struct ModelledWheels {
     limits: Limits,
@@ -76,17 +78,17 @@ impl ModelledWheels {
         self.axes[1].command(at_s, other);
     }
 
-    /// See [`ModelledSpeed::go_on`].
+    /// Advances both axes; see [`ModelledSpeed::go_on`].
     pub(crate) fn go_on(&mut self, until_s: f64) -> [f64; 2] {
         self.limits.wheels(self.axes.each_mut().map(|axis| axis.go_on(until_s)))
     }
 
-    /// What `of` says of each axis, for the wheels.
+    /// Applies `of` to each axis, and returns wheels.
     pub(crate) fn each(&self, of: impl Fn(&ModelledSpeed) -> f64) -> [f64; 2] {
         self.limits.wheels(self.axes.each_ref().map(of))
     }
 
-    /// See [`ModelledSpeed::pending`].
+    /// Returns pending commands; see [`ModelledSpeed::pending`].
     pub(crate) fn pending(&self) -> impl Iterator<Item = (f64, [f64; 2])> {
         let both = self.axes[0].pending().zip(self.axes[1].pending());
         both.map(|((at_s, one), (_, other))| (at_s, self.limits.wheels([one, other])))

@@ -1,4 +1,4 @@
-//! Monitors: the observations they take, and when a cause applies and clears.
+//! Monitors, their observations, and when a cause applies and clears.
 
 use std::{fmt, time::Duration};
 
@@ -12,7 +12,7 @@ use common::{
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moment {
     pub time: MissionTime,
-    /// Reading of the machine's monotonic clock, nanoseconds.
+    /// Machine's monotonic clock, nanoseconds.
     pub machine_ns: u64,
 }
 
@@ -21,32 +21,32 @@ pub enum Observation<'a> {
     Pace(Pace),
     Time,
     Directive(Order, HoldReason),
-    /// An operator resumed the robot, so faults count as repaired.
+    /// Operator's resume: faults count as repaired.
     Resumed,
     Command(&'a CommandSample),
-    /// A command with these speeds was sent to the wheels, counts/s, forward positive.
+    /// Speeds sent to the wheels, counts/s, forward positive.
     Commanded([i16; 2]),
     Sent,
-    /// The robot owes so many acknowledgements for what was sent.
+    /// Further acknowledgements owed.
     Owed(usize),
     Acknowledged,
-    /// The motor currents of the wheels in the motor frame that follows, AD counts.
+    /// Motor currents for the next motor frame, AD counts.
     Currents([u16; 2]),
-    /// A motor frame came, with these counts of the wheels, growing forward.
+    /// Motor frame with counts that grow forward.
     Motor(WheelCounts, Counts),
-    /// The voltages of the batteries of the boards, the motors and the servos came; 0 for a battery that is not fitted.
+    /// Board, motor and servo voltages; 0 if not fitted.
     Batteries([f64; 3]),
     Readings(&'a [RangeReading]),
-    /// A scan came that says it was measured at this mission time, seconds, in the middle of its beams.
+    /// Scan, and the stated time of its middle beam, mission seconds.
     Scan(&'a LaserScan, f64),
-    /// Rows of bumpers and cliff sensors, and whether they feel something.
+    /// Rows of bumpers and cliff sensors, and whether they are triggered.
     Touched(&'a [(usize, bool)]),
-    /// The base responds so, and not as it is stated to.
+    /// Found response that differs from the stated one.
     Responds(Response),
-    /// A sender other than the link told the robot something.
+    /// Command from a sender other than the link.
     Commander(Commander),
     TwoPublishers(&'a str),
-    /// The robot answers again or for the first time, and was asked for its streams.
+    /// Robot that answers, and was asked for its streams.
     Found {
         /// Whether it had answered before.
         again: bool,
@@ -54,26 +54,26 @@ pub enum Observation<'a> {
     Lost,
 }
 
-/// The relation of a frame's counts to the counts before.
+/// Relation of a frame's counts to earlier ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Counts {
-    /// The wheels turned by the difference since the frame before.
+    /// The wheels turned by the difference.
     Follow,
-    /// The robot restarted: the difference is no motion.
+    /// The robot restarted; the difference is not motion.
     Restarted {
-        /// Whether the robot did not answer until this frame.
+        /// Whether the robot was silent until now.
         was_away: bool,
     },
-    /// The wheels cannot have turned so far, but later frames continue from these counts: the difference is no motion.
+    /// An impossible step from which later frames continue; not motion.
     Elsewhere,
-    /// The wheels cannot have turned so far.
+    /// An impossible step.
     Implausible,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
     Holds,
-    /// The condition has not held for so long; `Duration::MAX` if that is not measured.
+    /// Time since it held; `Duration::MAX` if unmeasured.
     OverFor(Duration),
 }
 
@@ -87,18 +87,17 @@ impl From<bool> for Condition {
 pub enum Clears {
     WithCondition,
     After(Duration),
-    /// The cause clears when an operator resumes the robot after a stop; if a time is given, also when its condition has been over for
-    /// so long.
+    /// Clears at an operator's resume after a stop.
     OnResume {
-        /// The time for which the condition must have been over.
+        /// Clears also after the condition was over for this time.
         or_after: Option<Duration>,
     },
-    /// The cause clears with the next mission, in a new process.
+    /// Clears with the next mission, in a new process.
     OnNewMission,
 }
 
 impl Clears {
-    /// Whether a cause applies now; `before` says whether it applied until now.
+    /// Returns whether a cause applies now, if it did so `before`.
     pub fn applies(self, before: bool, condition: Condition) -> bool {
         let Condition::OverFor(over) = condition else {
             return true;
@@ -127,26 +126,25 @@ impl fmt::Display for Clears {
     }
 }
 
-/// Observes the link and says whether the conditions of its causes hold.
+/// Observer of the link that judges the conditions of its causes.
 pub trait Monitor {
-    /// A monitor of the robot of `mission` that has observed nothing yet.
     fn new(mission: &Mission) -> Self
     where
         Self: Sized;
 
     fn observe(&mut self, what: &Observation<'_>, now: Moment);
 
-    /// Whether the condition of `cause` holds, which must be one of its causes.
+    /// Returns whether the condition of `cause`, one of its own, holds.
     fn condition(&self, cause: Cause, now: Moment) -> Condition;
 
-    /// An explanation with the observed values, and a remedy.
+    /// Explains the cause and its remedy.
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         let _ = (cause, now);
         None
     }
 
-    /// Whether the monitor judges the robot's frames by their time. Such a monitor is not asked in lockstep, nor while the robot does
-    /// not answer.
+    /// Returns whether it judges the timing of frames. It is then skipped in lockstep and while the
+    /// robot is silent.
     fn judges_frames(&self) -> bool {
         true
     }

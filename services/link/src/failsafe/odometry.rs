@@ -1,27 +1,33 @@
-//! The odometry monitor: whether wheels turn as commanded, by their encoders. Each wheel is checked, and the difference of both, because
-//! a robot with swapped wheels turns the wrong way.
+//! Odometry monitor: checks that the encoders follow the commands.
 //!
-//! An interval between two frames is evidence about a wheel that was commanded in one direction for as long as the base's response
-//! takes to settle, at [`LEAST_M_S`] or more; a command counts as far as the base's acceleration has reached it. The dead band of 20
-//! counts/s (9 mm/s) is well below. The wheel must then roll [`LEAST_SHARE`] of the smaller speed of the two newest commands; real
-//! wheels roll 0.75 to 0.8 of it. Intervals over two periods are no evidence, because commands may have been lost.
+//! Checks cover each wheel, and their difference, because a robot with swapped wheels turns the
+//! wrong way.
 //!
-//! Evidence against a wheel adds up; evidence for it counts down at most twice as fast. The other direction counts twice, and already
-//! when a wheel has turned around: a controller whose robot turns away from the target changes direction every other tick. At
-//! [`SUSPECTED_AFTER`] the robot must stand: an X80 at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
+//! A frame interval is evidence if the wheel's command, at [`LEAST_M_S`] or more, kept its sign for
+//! the settling time of the response. Commands count as far as the base's acceleration has reached
+//! them. The dead band of 20 counts/s (9 mm/s) is well below. The wheel must roll [`LEAST_SHARE`]
+//! of the smaller of the two newest commands; real wheels roll 0.75 to 0.8. Intervals over two
+//! periods are no evidence, because commands may have been lost.
 //!
-//! [`super::response_fit`] looks for a response that explains the motion, then and until the robot stands. If there is one, it replaces
-//! the stated one, and the link's log names it: a base that is heavier than stated is no fault.
+//! Evidence against a wheel adds up, and evidence for it counts down at most twice as fast.
+//! Opposite motion counts twice, once a wheel could have reversed: a robot that turns away from its
+//! target gets a new direction every other tick. At [`SUSPECTED_AFTER`] the robot must stand: an
+//! X80 at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
 //!
-//! A commanded wheel that counts nothing is suspected after [`STILL_AFTER`]: a controller whose pose turns the wrong way changes
-//! direction too often for the other evidence. If its motor draws a held one's current, it is held, and not suspected
-//! ([`super::contact`]).
+//! Until the robot stands, [`super::response_fit`] looks for a response that explains the motion.
+//! If found, it replaces the stated one, and the link's log names it. A base heavier than stated is
+//! healthy.
 //!
-//! A wheel, or the difference of both, that turns by [`LEAST_TURN_M_S`] and a quarter of the wheels' speed farther than any command
-//! of the last moments told turns untold: at [`UNTOLD_AFTER`] another host may command it. A robot that is told to stand is judged by its
-//! stop.
+//! A commanded wheel without counts is suspected after [`STILL_AFTER`]. A controller whose pose
+//! turns the wrong way changes direction too often for the other evidence. With a held motor's
+//! current the wheel counts as held instead ([`super::contact`]).
 //!
-//! Single counts farther off than wheels turn are dropped ([`super::restart`]); [`MOST_JUMPS`] within [`JUMPS_WITHIN`] are suspect too.
+//! Motion is uncommanded if a wheel or the difference exceeds every recent command by
+//! [`LEAST_TURN_M_S`] plus a quarter of the wheels' speed. At [`UNTOLD_AFTER`] another host may
+//! command it. The stop monitor judges commanded stops.
+//!
+//! Single impossible counts are dropped ([`super::restart`]); [`MOST_JUMPS`] within
+//! [`JUMPS_WITHIN`] are suspect too.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -41,41 +47,43 @@ use super::{
     wheel_shares::{WheelRatio, WheelShares},
 };
 
-/// The slowest judged motion, m/s at the rim.
+/// Slowest judged rim speed, m/s.
 const LEAST_M_S: f64 = 0.03;
-/// The least judged difference of the wheels, m/s.
+/// Least judged difference of the wheels, m/s.
 const LEAST_TURN_M_S: f64 = 0.1;
-/// The least judged share of the wheels' mean speed: two motors differ by some hundredths.
+/// Least judged difference as a share of the mean speed. Two motors differ by some hundredths.
 const LEAST_TURN_SHARE: f64 = 0.25;
-/// A plausible wheel turns at least this share of its command.
+/// Least plausible share of a command.
 const LEAST_SHARE: f64 = 0.25;
 const ROLLS_SHARE: f64 = 0.5;
-/// Evidence for a suspicion. A radio that delivers frames does not lose commands for so long.
+/// Evidence that raises a suspicion. A radio that delivers frames loses commands for less time.
 pub(crate) const SUSPECTED_AFTER: Duration = Duration::from_millis(550);
-/// Commands may be lost for so long.
+/// Time without counts that raises a suspicion. Commands may be lost for less.
 pub(crate) const STILL_AFTER: Duration = Duration::from_millis(1000);
-/// A wheel that is held makes the body turn for a moment, and is suspected itself sooner.
+/// Time of uncommanded motion that raises a suspicion. A held wheel turns the body briefly, and is
+/// suspected sooner.
 pub(crate) const UNTOLD_AFTER: Duration = Duration::from_millis(1000);
-/// What raises a suspicion happens within so long before it, and a base stands within so long after it.
+/// Time before a suspicion that holds its evidence, and after it within which a base stops.
 const JUDGED: Duration = Duration::from_millis(1500);
 pub(crate) const MOST_JUMPS: usize = 3;
 pub(crate) const JUMPS_WITHIN: Duration = Duration::from_secs(2);
-/// A suspicion about jumps ends without one for so long.
+/// Time without jumps that ends a jump suspicion.
 pub(crate) const CALM: Duration = Duration::from_secs(2);
-/// So often it ends by itself: a faulty robot's counts may jump only while it moves.
+/// Limit on jump suspicions that end by themselves. A faulty robot's counts may jump only in
+/// motion.
 const MOST_RECOVERIES: u32 = 2;
-/// A response that was searched for is new if the way to stop is longer by the second factor or shorter by the first: what is new makes
-/// planner and controller forget the commands that the base has not answered yet.
+/// Stopping-distance ratios of an unchanged response. A new one makes planner and controller forget
+/// unanswered commands.
 const UNCHANGED: std::ops::Range<f64> = 0.67..1.2;
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 pub(crate) const GIVEN_UP_AFTER: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Suspicion {
-    /// It may be the wheel of a car.
+    /// Also the driven wheel of a car.
     Left,
     Right,
-    /// Both wheels roll: they are swapped, or one is read wrongly.
+    /// Both wheels roll: they are swapped, or one is misread.
     Turn,
     Jumps,
     Untold,
@@ -101,11 +109,11 @@ impl Suspicion {
     }
 }
 
-/// When counts are evidence about a command in one direction, by the base's response, seconds.
+/// Times at which counts become evidence about a command, by the base's response, seconds.
 #[derive(Clone, Copy)]
 struct Settles {
     settled_s: f64,
-    /// A wheel has changed direction by then; that of an X80 at 7 Hz has 0.6 of its speed.
+    /// Time until a wheel has reversed; an X80's at 7 Hz has 0.6 of its speed.
     turned_s: f64,
 }
 
@@ -118,7 +126,7 @@ impl From<Response> for Settles {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Known {
     Unknown,
-    /// No motion has contradicted what is stated.
+    /// No motion has contradicted the stated response.
     Stated,
     Found,
 }
@@ -128,9 +136,9 @@ struct Evidence {
     asked: [f64; 2],
     since: MissionTime,
     against_s: f64,
-    /// Counting nothing although commanded.
+    /// Commanded time without counts.
     still_s: f64,
-    /// Not turning as commanded, with a high current.
+    /// Commanded time without motion, at a high current.
     held_s: f64,
 }
 
@@ -143,8 +151,8 @@ impl Evidence {
         self.asked = [before, counts_s];
     }
 
-    /// The wheel rolled `counts` in `gap_s` until `now`, its motor drawing a held one's current if `high`. Commands below `least`
-    /// counts/s are no evidence. Returns whether it rolled as told.
+    /// Weighs `counts` rolled in `gap_s`; `high` is a held motor's current. Commands below `least`
+    /// counts/s are no evidence. Returns whether the wheel rolled as commanded.
     fn weigh(
         &mut self,
         (counts, gap_s): (f64, f64),
@@ -161,7 +169,8 @@ impl Evidence {
         }
         let share = counts * newest.signum() / (gap_s * asked);
         if high && share < LEAST_SHARE {
-            // The motor pushes in vain. A body that turns about what it touches may even push its wheel back.
+            // The motor pushes in vain. A body that pivots on the contact may even push its wheel
+            // back.
             self.still_s = 0.0;
             if told_s >= settles.settled_s {
                 self.held_s += gap_s;
@@ -185,15 +194,15 @@ impl Evidence {
 pub struct Odometry {
     axle: Axle,
     response: Response,
-    /// Whether it looks for the response as it drives.
+    /// Whether it identifies the response while driving.
     searches: bool,
     known: Known,
     top_speed_m_s: f64,
-    /// The commands, as far as the base's acceleration has reached them, counts/s.
+    /// Commands as far as accelerations have reached them, counts/s.
     reached: ModelledWheels,
     fit: ResponseFit,
     shares: WheelShares,
-    /// The response that explained a motion, until it is told.
+    /// Found response, until reported.
     found: Option<Response>,
     /// Two periods.
     longest_gap: Duration,
@@ -208,10 +217,10 @@ pub struct Odometry {
     jumps: VecDeque<MissionTime>,
     recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
-    /// When a delay was looked for.
+    /// Time of the last search for a delay.
     looked: MissionTime,
     ordered_to_drive: bool,
-    /// A bring-up looks for wheels that do not turn as commanded: its robot goes on, slowly and for a minute.
+    /// A bring-up tests for disobedient wheels, so its robot drives on, slowly and for a minute.
     is_bring_up: bool,
     two_publishers: Option<(String, MissionTime)>,
 }
@@ -241,7 +250,7 @@ impl Odometry {
         self.turn.ask(if tells { turn } else { 0.0 }, now);
     }
 
-    /// The wheels are to turn at `counts`, counts/s. Returns what they have reached by the base's acceleration.
+    /// Commands `counts`, counts/s. Returns the speeds reached by the base's acceleration.
     fn ask(&mut self, counts: [f64; 2], now: MissionTime) -> [f64; 2] {
         self.fit.commanded(counts, now);
         self.reached.command(now.seconds(), counts);
@@ -263,12 +272,12 @@ impl Odometry {
         self.shares.ratio()
     }
 
-    /// Whether it looks for the base's response as the robot drives.
+    /// Returns whether it identifies the response while driving.
     pub(crate) const fn searches(&self) -> bool {
         self.searches
     }
 
-    /// The response that explained a motion that the one before did not; the next call gives none.
+    /// Takes a response that explained a motion its predecessor did not.
     pub(crate) const fn take_found(&mut self) -> Option<Response> {
         self.found.take()
     }
@@ -300,7 +309,7 @@ impl Odometry {
         self.fit.turned((gap <= self.longest_gap).then_some(turned), now);
         let lapsed = |at| now.since(at) > self.limit;
         if gap > self.longest_gap || self.commanded.is_none_or(lapsed) {
-            // Commands since the last frame may have been lost, or have expired.
+            // Commands since the last frame may be lost or expired.
             self.restart_evidence(now);
             return;
         }
@@ -345,7 +354,7 @@ impl Odometry {
         self.look_for_delay(now);
     }
 
-    /// Frames or commands that come later than stated make a base that answers later.
+    /// Looks for added delay: late frames or commands look like a late base.
     fn look_for_delay(&mut self, now: MissionTime) {
         if self.suspicion.is_some() || self.is_bring_up || now.since(self.looked) < LOOK_EVERY {
             return;
@@ -362,8 +371,8 @@ impl Odometry {
         }
     }
 
-    /// A base of which nobody stated how it answers shows it as it drives; so does one that stops later than stated, whatever explains
-    /// its motion.
+    /// Returns the response that driving reveals, if none is stated or the base stops later than
+    /// stated.
     fn searched(&mut self) -> Option<Response> {
         if !self.searches {
             return None;
@@ -383,8 +392,8 @@ impl Odometry {
         (found.are_told_apart && is_new).then_some(found.slowest)
     }
 
-    /// A suspicion ends when a response explains the motion that raised it, because the motion after it, until the robot stands, tells
-    /// more.
+    /// Ends a suspicion if a response explains the motion behind it. Motion until the robot stands
+    /// tells more.
     fn look_for_explanation(&mut self, now: MissionTime) {
         let Some((suspicion, since)) = self.suspicion else {
             return;
@@ -400,7 +409,7 @@ impl Odometry {
         }
         let suspected = Suspected { channel, from_s: since.seconds() - JUDGED.as_secs_f64() };
         if let Some(found) = self.fit.explain(self.response, suspected) {
-            // A moment explains less than all that was seen, from which the search takes what is slow enough.
+            // A short interval tells less than the whole history, which the search uses.
             let is_news = self.known == Known::Stated
                 || self.stops_within_m(found) > self.stops_within_m(self.response);
             if found != self.response && is_news {
@@ -427,7 +436,6 @@ impl Odometry {
         }
     }
 
-    /// The newest frame's contact; the next call gives none.
     pub(crate) const fn take_contact(&mut self) -> Option<ContactSample> {
         self.contacts.take()
     }
@@ -533,7 +541,7 @@ impl Monitor for Odometry {
     fn condition(&self, cause: Cause, now: Moment) -> Condition {
         match (cause, self.suspicion, self.jumps.back()) {
             (Cause::WheelsHeld, ..) => self.contacts.condition(now.time),
-            // A mission does not end while its robot is ordered not to drive.
+            // The mission continues while the robot must not drive.
             (Cause::OdometryGivenUp, Some((_, since)), _) => {
                 (self.ordered_to_drive && now.time.since(since) >= GIVEN_UP_AFTER).into()
             }

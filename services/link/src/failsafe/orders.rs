@@ -1,4 +1,4 @@
-//! The monitor of the supervisor's directives and of an operator's stop at the link.
+//! Monitor of the supervisor's directives and of operators' stops at the link.
 
 use std::time::Duration;
 
@@ -9,8 +9,8 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// A silent supervisor has ended. Ten times the interval of directives, so that a loaded machine does not stop the robot, and a second
-/// before systemd's watchdog would kill the supervisor.
+/// Silence of an ended supervisor: ten directive intervals, so that load does not stop the robot,
+/// and a second before systemd's watchdog would kill it.
 pub(crate) const SUPERVISOR_SILENT: Duration = Duration::from_secs(2);
 
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +36,7 @@ impl Orders {
             || self.newest.is_some_and(|directive| directive.reason == HoldReason::Operator)
     }
 
-    /// The robot stands by and its ticks go on: it is known where it is, also if it is carried.
+    /// Returns whether the robot stands while ticks go on, so that it stays localized if carried.
     pub fn stands_by(&self) -> bool {
         self.by_operator()
             || self.newest.is_some_and(|directive| {
@@ -48,7 +48,8 @@ impl Orders {
         self.stopped_here
     }
 
-    /// An operator's stop or resume came to the link itself. A supervisor that has not heard of this stop does not end it.
+    /// Applies an operator's stop or resume at the link. A supervisor that missed the stop does not
+    /// end it.
     pub const fn stop_here(&mut self, stop: bool) {
         self.stopped_here = stop;
     }

@@ -1,4 +1,4 @@
-//! The presence monitor: whether the robot answers, and when to ping one that does not.
+//! Presence monitor: whether the robot answers, and when to ping it.
 
 use std::time::Duration;
 
@@ -7,22 +7,22 @@ use common::{clock::Pace, mission::Mission, samples::Cause};
 use super::monitor::{Condition, Moment, Monitor, Observation};
 use crate::backoff::{Backoff, has_passed};
 
-/// Machine time: any process may be delayed by so much at any pace.
+/// Least silence, machine time: a process may be delayed by this at any pace.
 const LEAST_SILENCE: Duration = Duration::from_millis(100);
 const FIRST_PAUSE: Duration = Duration::from_millis(200);
-/// A robot that waits for a ping is found only then; one that sends by itself at once.
+/// Longest time to find a robot that waits for a ping; one that sends unasked is found at once.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 
-/// Times are the machine's.
+/// State of an absent robot, in machine time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Absence {
-    /// Counted from the loss, or from the first attempt to find the robot; 0 while it answers.
+    /// Time since the loss, or since the first attempt to find the robot; 0 while it answers.
     pub lost_ns: u64,
     pub pings: u64,
     pub next_ping_ns: u64,
 }
 
-/// A present robot sends nothing for so long at most.
+/// Longest silence of a present robot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Silence {
     mission: Duration,
@@ -71,7 +71,7 @@ impl Presence {
         self.losses
     }
 
-    /// A frame came. Returns whether the robot did not answer until now.
+    /// Registers a frame. Returns whether the robot was silent before.
     pub fn heard(&mut self, now_ns: u64) -> bool {
         self.heard_ns = Some(now_ns);
         self.lost_since_ns = None;
@@ -83,7 +83,7 @@ impl Presence {
         self.heard_ns.is_none_or(|heard_ns| self.silence.is_over(heard_ns, now_ns))
     }
 
-    /// Returns whether that is new.
+    /// Registers a loss. Returns whether it is new.
     pub fn lose(&mut self, now_ns: u64) -> bool {
         let new = std::mem::replace(&mut self.connected, false);
         if new {
@@ -93,7 +93,7 @@ impl Presence {
         new
     }
 
-    /// The robot is pinged at once after a change.
+    /// Sets whether the wire is open. A change causes a ping at once.
     pub const fn wire(&mut self, open: bool) {
         self.wire_open = open;
         self.pings.reset();
@@ -126,7 +126,7 @@ impl Presence {
 }
 
 impl Monitor for Presence {
-    /// The wire counts as open until [`Presence::wire`] says otherwise.
+    /// Assumes an open wire until [`Presence::wire`].
     fn new(mission: &Mission) -> Self {
         Self {
             silence: Silence::new(mission),

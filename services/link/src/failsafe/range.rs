@@ -1,15 +1,17 @@
-//! The range monitor: whether readings change with motion as they must, and the front sonar hears what the infrared rangers see
-//! ([`super::undetected_surface`]). Scans are judged by [`super::scan_motion`].
+//! Range monitor: checks that readings change with motion, and that the front sonar hears what the
+//! infrared rangers see ([`super::undetected_surface`]). [`super::scan_motion`] judges scans.
 //!
-//! A standing thing's echo comes nearer as the robot drives, and another thing answers when it turns: a reading that stays the same is
-//! stuck. In 240 recorded missions, 150 with measured realism, [`READINGS`] and more readings equal to the centimetre never came with
-//! more than 0.53 of the motion needed here. In 180 others, readings within [`BANDS_M`] of 7 cm came with as much in 3: two robots that
-//! followed a moving thing, and one along a rough wall. So the robot goes on slowly at first, and things that move get away. A sensor that looks aside
-//! reads the same along a wall, so only turns on the spot count for it. Motion does not judge a reading of nothing, which stays long in
-//! the open, and before smooth slanted walls.
+//! A constant reading in motion is stuck, because surfaces come nearer, and turns show other
+//! surfaces. In 240 recorded missions, 150 with measured realism, at least [`READINGS`] readings
+//! equal to the centimetre came with at most 0.53 of the required motion. In 180 others, readings
+//! within 7 cm ([`BANDS_M`]) came with all of it in 3: two robots followed a moving thing, and one
+//! a rough wall. The robot thus slows first, and moving things get away. For sensors that look
+//! aside only turns on the spot count, because walls read constant. Readings of nothing are exempt,
+//! because they last long in the open and before smooth slanted walls.
 //!
-//! Readings between which the robot hardly turned follow from one another. Of a healthy sensor's in 179 missions at most 0.71
-//! did not, in a corridor of ideal rough walls, and elsewhere 0.53; of random ones 0.7 to 0.9 did not.
+//! Readings must also follow from one another while the robot hardly turns. Healthy sensors broke
+//! this in at most 0.71 of readings in a corridor of ideal rough walls, and 0.53 elsewhere (179
+//! missions). Random readings break it in 0.7 to 0.9.
 
 use std::{f64::consts::TAU, ops::RangeInclusive, time::Duration};
 
@@ -30,38 +32,39 @@ use super::{
     undetected_surface::UndetectedSurface,
 };
 
-/// Readings stay if they differ by no more, metres: a centimetre to either side and rounding; noise of a stuck sensor.
+/// Spread of stuck readings, metres: a centimetre to either side plus rounding, and a stuck
+/// sensor's noise.
 const BANDS_M: [f64; 2] = [0.0202, 0.0702];
-/// Staying readings, 1.1 s at 7 Hz: fewer may be chance.
+/// Least stuck readings, 1.1 s at 7 Hz; fewer may be chance.
 const READINGS: u32 = 8;
-/// Way, metres, or turn, radians, that must change a reading. Fractions of both add up.
+/// Distance, metres, or turn, radians, that must change a reading. Fractions add up.
 const WAY_M: f64 = 0.4;
 const TURN_RAD: f64 = std::f64::consts::FRAC_PI_2;
-/// So much of these, in twice as many readings, is sure in the wider band.
+/// Multiple of that motion, over twice the readings, that is sure in the wider band.
 const SURE: f64 = 1.8;
-/// Metres. The ends of a sensor's scale are limits, not distances.
+/// Judged ranges, metres. Ends of a scale are limits, not distances.
 const JUDGED_SONAR_M: RangeInclusive<f64> = 0.05..=2.49;
 const JUDGED_INFRARED_M: RangeInclusive<f64> = 0.10..=0.70;
-/// The wheels' mean way is less than this share of half their difference.
+/// Largest ratio of mean travel to half the wheels' difference of a turn on the spot.
 const ON_THE_SPOT: f64 = 0.25;
-/// A share is of so many readings, each of which must follow from one of the two before to within this, metres, unless the robot turned
-/// farther, radians.
+/// Averaging length, tolerance to one of the two readings before, metres, and largest judged turn,
+/// radians.
 const SHARE_OF: f64 = 14.0;
 const FOLLOWS_M: f64 = 0.1;
 const FOLLOWS_RAD: f64 = 0.12;
 const ODD_SHARES: [f64; 2] = [0.5, 0.72];
-/// The cause clears after readings changed for so long.
+/// Time of changing readings that clears the cause.
 pub(crate) const CHANGES: Duration = Duration::from_secs(2);
 
-/// Until a reading that stays is known to be stuck, seconds, at full speed.
+/// Returns the time until a stuck reading is known at full speed, seconds.
 pub(crate) fn known_within_s(mission: &Mission) -> f64 {
     (WAY_M / mission.speed_m_s()).max(f64::from(READINGS) / mission.robot.rate_hz)
 }
 
-/// A reading and the way and heading by the wheels, metres and radians.
+/// Reading, distance and heading by the wheels, metres and radians.
 type Value = [f64; 3];
 
-/// Readings that stay, in which the robot moved from the least to the most.
+/// Run of constant readings, with their and the motion's extremes.
 #[derive(Clone, Copy, Debug, Default)]
 struct Staying {
     readings: u32,
@@ -79,14 +82,13 @@ impl Staying {
         };
     }
 
-    /// The motion in shares of what must change a reading.
+    /// Returns the motion relative to that which must change a reading.
     fn motion(&self, readings: u32) -> f64 {
         let [_, way_m, turn_rad] = [0, 1, 2].map(|it| self.most[it] - self.least[it]);
         if self.readings < readings { 0.0 } else { way_m / WAY_M + turn_rad / TURN_RAD }
     }
 }
 
-/// What the readings of one sensor were, and how the robot moved meanwhile.
 #[derive(Clone, Debug, Default)]
 struct Past {
     staying: [Staying; 2],
@@ -101,7 +103,7 @@ struct Row {
     looks_ahead: bool,
     judged_m: RangeInclusive<f64>,
     past: Past,
-    /// Doubted, and sure: when it last was so.
+    /// Times at which the row was last doubted, and surely implausible.
     implausible: [Option<Moment>; 2],
     words: String,
 }
@@ -124,7 +126,7 @@ impl Row {
         }
     }
 
-    /// The robot went and turned so far by now, and on the spot.
+    /// Takes a reading, with the accumulated distance, heading and turn on the spot.
     fn take(&mut self, reading: &RangeReading, [way_m, heading, spot]: [f64; 3], now: Moment) {
         let range_m = reading.range_m;
         let is_judged =
@@ -203,7 +205,7 @@ pub struct Range {
     sensing: bool,
     body: Body,
     counts: Option<WheelCounts>,
-    /// By the wheels.
+    /// Pose by the wheels.
     pose: Pose2,
     way_m: f64,
     spot_rad: f64,
@@ -221,7 +223,7 @@ impl Range {
             let wheels = counts.since(before).map(|it| it * TAU / self.body.counts_per_turn);
             let twist = match (self.body.ackermann(), self.body.steering) {
                 (Some(car), Some(steers)) => {
-                    // Its second encoder is the steering's, 0 straight ahead.
+                    // The second encoder is the steering's, 0 straight ahead.
                     let [_, angle] = counts.since([0; 2].into());
                     car.twist([wheels[0], steers.angle(angle)])
                 }
@@ -240,7 +242,7 @@ impl Range {
         self.motion.poses.robot_is(self.pose, now);
     }
 
-    /// The explanation by the first judge of more than one reading that finds them doubtful, or surely implausible.
+    /// Returns the first explanation by a judge of several readings.
     fn judged(&self, sure: bool) -> Option<String> {
         let front = self.rows.iter().find(|row| row.looks_ahead);
         let surface = self.undetected.as_ref().filter(|it| sure && it.is_implausible());
@@ -352,12 +354,13 @@ mod tests {
 
     use super::*;
 
-    /// The first tick at which a sonar with these readings is implausible, on a robot whose wheels turn so many metres a tick.
+    /// Returns the first tick at which a sonar with these readings is implausible, with wheel
+    /// travel per tick.
     fn implausible_at(wheels_m: [f64; 2], reading: impl Fn(u32) -> u16) -> Option<u32> {
         sensor_implausible_at(0, wheels_m, reading)
     }
 
-    /// [`implausible_at`] for the sensor of row `sensor`, which gives centimetres.
+    /// As [`implausible_at`], for any row, in centimetres.
     fn sensor_implausible_at(
         sensor: u8,
         wheels_m: [f64; 2],
@@ -390,7 +393,7 @@ mod tests {
     #[test]
     fn a_reading_that_stays_while_the_robot_drives_0_4_m_or_turns_by_a_right_angle_is_implausible()
     {
-        // 0.05 m a tick: 0.4 m in 8 ticks. A turn of a right angle rolls each wheel 0.204 m.
+        // 0.05 m per tick is 0.4 m in 8. A quarter turn rolls each wheel 0.204 m.
         assert_eq!(implausible_at([0.05; 2], |_| 100), Some(8));
         assert_eq!(implausible_at([-0.02, 0.02], |tick| 100 + (tick % 2) as u16), Some(11));
         assert_eq!(implausible_at([0.1; 2], |_| 100), Some(7), "no fewer readings");
@@ -411,11 +414,11 @@ mod tests {
     fn a_sensor_that_looks_aside_is_stuck_if_its_reading_stays_while_the_robot_turns_on_the_spot() {
         for sensor in [1, 2, 3, 9] {
             assert_eq!(sensor_implausible_at(sensor, [-0.02, 0.02], |_| 50), Some(11), "{sensor}");
-            // The robot drives along a wall, or around a drum.
+            // Along a wall, or around a drum.
             assert_eq!(sensor_implausible_at(sensor, [0.05; 2], |_| 50), None);
             assert_eq!(sensor_implausible_at(sensor, [0.03, 0.05], |_| 50), None);
         }
-        // An infrared ranger that sees nothing says so at each heading.
+        // Infrared rangers with nothing in range stay silent at each heading.
         assert_eq!(sensor_implausible_at(3, [-0.02, 0.02], |_| 255), None);
     }
 
@@ -458,7 +461,8 @@ mod tests {
         let text = "target = [3, 0]\nrobot.model = 'car'";
         let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
         let mut monitor = Range::new(&mission);
-        // A wheel of 0.04 m rolls half a turn; 300 of 3600 counts are 30 degrees to the right, 0.18 m from axle to axle.
+        // A wheel of 0.04 m rolls half a turn. 300 of 3600 counts are 30 degrees right; the
+        // wheelbase is 0.18 m.
         for left in [0, 300] {
             monitor.turn([left, 32_768 - 300].into(), MissionTime::default());
         }

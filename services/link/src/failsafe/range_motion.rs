@@ -1,16 +1,18 @@
-//! Whether readings of sonars and infrared rangers are as old as they say.
+//! Detection of sonar and infrared readings that are later than they say.
 //!
-//! Late readings are placed where the robot is, and not where it was. At a constant speed and turn that moves all they show alike, but
-//! what is seen again after the robot has turned or slowed, or the readings have become late, then lies beside itself. So each hit is
-//! compared with those of the last seconds, as if all were prompt and as if all were later by a number of delays: by how much it lies nearer
-//! to them with another delay is summed up. A surface that a sonar hears may lie anywhere on its arc, so it is compared by its range.
+//! Late readings are placed by the robot's present pose. At constant speed and turn rate this
+//! shifts all hits alike. After the robot turns or slows, or the lag begins, hits of one surface
+//! disagree. Each hit is compared with those of the last seconds, as prompt and with each of
+//! several delays. The monitor sums how much nearer another delay brings them. A sonar's surface
+//! may lie anywhere on its arc, so its range is compared.
 //!
-//! Readings are taken while the robot moved at the time of the latest of these: from so long after its start, because a wall beside which it
-//! starts looks as what a late one saw at rest, to so long after its stop. No sum changes at rest, and what is sure stays so until the
-//! operator resumes the robot: a late robot that was made to stand does not go on.
+//! Sums change only while the robot moved at the longest delay, because a wall beside a starting
+//! robot looks like a late view from rest. A sure verdict holds until the operator resumes, so that
+//! a late robot keeps standing.
 //!
-//! In 416 recorded missions, 144 in corridors among them and 80 with harsh noise, no sum was more than 2.1, and in 8 more than 1.4. Of 48 with
-//! readings 1 s late from a moment on all were above both limits, at the median after 2.3 and 3.8 s.
+//! In 416 recorded missions, 144 in corridors and 80 with harsh noise, no sum exceeded 2.1, and 8
+//! exceeded 1.4. In 48 whose readings became 1 s late, all passed both limits, at the median after
+//! 2.3 and 3.8 s.
 
 use std::collections::VecDeque;
 
@@ -24,23 +26,25 @@ use glam::DVec2;
 use super::scan_motion::{Poses, best};
 
 const DELAYS_S: [f64; 7] = [0.0, 0.3, 0.5, 0.75, 1.0, 1.25, 1.5];
-/// The share of a sensor's reach up to which a hit is well known.
+/// Share of the reach within which hits are reliable.
 const KNOWN: f64 = 0.82;
-/// The share of a sonar's field of view within which its surface may lie to either side: its edge reaches beyond the middle.
+/// Share of a sonar's field of view, to either side, that may hold its surface: its edge reaches
+/// beyond the middle.
 const HEARD: f64 = 2.0 / 3.0;
-/// A robot moved if it went so far, metres, or turned by ten times as much, radians, since readings were taken.
+/// Least motion between readings: metres plus a tenth of the turn in radians.
 const MOVED_M: f64 = 0.004;
-/// The least and the most time that passes in motion from readings to readings, seconds.
+/// Least and most motion time between readings, seconds.
 const APART_S: [f64; 2] = [0.1, 0.5];
-/// Hits are compared with those between these ages, seconds of motion, and no more than so many.
+/// Ages of compared hits, seconds of motion, and their number.
 const LEAST_AGE_S: f64 = 0.7;
 const MOST_AGE_S: f64 = 7.0;
 const MOST_HITS: usize = 1024;
-/// A hit farther from others is of something new, metres. One delay must bring it near, and the delays must differ by so much.
+/// Metres: a hit beyond `NEW_M` is of a new surface, one delay must bring it within `NEAR_M`, and
+/// delays must differ by `TELLS_M`.
 const NEW_M: f64 = 0.2;
 const NEAR_M: f64 = 0.1;
 const TELLS_M: f64 = 0.03;
-/// As for scans: [`super::scan_motion`].
+/// As in [`super::scan_motion`].
 const FACTOR: f64 = 1.15;
 const FADE_S: f64 = 12.0;
 const BETTER: [f64; 2] = [1.4, 2.6];
@@ -52,10 +56,10 @@ pub(super) struct RangeMotion {
     sensors: Vec<(u8, Sensor)>,
     pub(super) poses: Poses,
     hits: VecDeque<(f64, Hit)>,
-    /// Where the robot was by the longest delay when readings were last taken.
+    /// Pose at the longest delay for the last readings.
     latest: Pose2,
     newest_s: f64,
-    /// The time for which it has moved.
+    /// Time in motion, seconds.
     motion_s: f64,
     better: [f64; DELAYS_S.len()],
 }
@@ -131,7 +135,7 @@ impl RangeMotion {
         }
     }
 
-    /// The explanation by the delay that is best, if readings are doubted, or surely late.
+    /// Explains doubtful, or surely late, readings.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let likely_s = best(&DELAYS_S, &self.better, BETTER[usize::from(sure)])?;
         Some(format!(
@@ -148,7 +152,7 @@ mod tests {
 
     use super::*;
 
-    /// The least range, within a field of view, to the post at (1, 0) or to a wall at y = 0.7.
+    /// Returns the least range in a field of view to the post at (1, 0) or the wall at y = 0.7.
     fn range(sensor: &Sensor, robot: Pose2) -> Option<f64> {
         let (from, radius_m) = (sensor.mount.on(robot), 0.15);
         let seen = |range: &f64| (0.1..0.98 * sensor.reach_m).contains(range);
@@ -164,8 +168,8 @@ mod tests {
         all.filter(seen).reduce(f64::min)
     }
 
-    /// What is said of readings of these rows from a robot that drives to and fro before a post and turns meanwhile. For 20 s they are so
-    /// late, and then prompt for as long.
+    /// Judges readings of these rows on a robot that drives to and fro before a post and turns.
+    /// They are `late` ticks late for 20 s, then prompt.
     fn said(rows: Range<u8>, late: usize) -> Option<String> {
         let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
         let table = mission.sensor_table();

@@ -1,9 +1,9 @@
-//! Whether another response than the stated one explains what the wheels did.
+//! Fit of a base response to the newest commands and counts.
 //!
-//! The newest commands and counts are compared with what wheels would have rolled that answer after any delay and with any acceleration of
-//! a grid, and with what those of a base would that limits their mean and their difference apart. What tells of the one tells nothing of
-//! the other, so the difference is fitted by itself. A response explains the wheels if each, and the difference of both, rolled as it says,
-//! apart from one factor. Dead, swapped and reversed wheels roll as no response says.
+//! A grid of delays and accelerations predicts wheel travel. Part of it limits each wheel; the rest
+//! limits their mean and difference separately, and fits the difference by itself. A response
+//! explains the wheels if each, and their difference, rolled as predicted up to one factor. Dead,
+//! swapped and reversed wheels fit no response.
 
 use std::collections::VecDeque;
 
@@ -11,82 +11,81 @@ use common::{clock::MissionTime, mission::Response};
 
 use super::modelled_wheels::{Axle, Limits};
 
-/// Counts are kept for so long, seconds.
 const KEPT_S: f64 = 5.0;
-/// Commands are kept for so much longer, seconds: the wheels may be rolling when the oldest counts are taken.
+/// Extra retention of commands, because the wheels may roll when the oldest counts are taken.
 const BEFORE_S: f64 = 2.0;
-/// Whatever is sent and received, no more is kept.
+/// Bound on kept entries at any input rate.
 const MOST_KEPT: usize = 512;
 const DEAD_TIMES: u32 = 21;
 pub(super) const DEAD_TIME_STEP_S: f64 = 0.05;
-/// Speeds grow by so much in a second: the slowest is that of a heavy base that a person pushes in vain, and the last but one is
-/// [`ACCELERATION_RATIO`] to the power of [`ACCELERATIONS`] times as much. The last is infinite.
+/// Acceleration grid: [`ACCELERATIONS`] entries at a ratio of [`ACCELERATION_RATIO`], then
+/// infinite. The slowest is a heavy base that a person pushes in vain.
 const LEAST_ACCELERATION_M_S2: f64 = 0.15;
 pub(super) const ACCELERATION_RATIO: f64 = 1.25;
 const ACCELERATIONS: i32 = 16;
-/// What a turn that is limited apart gives a wheel, over that grid: the slowest is that of a narrow and heavy base, and none is that of two
-/// wheels, as it lies 4.5 steps of the grid lower.
+/// Scale of the turn grid, per wheel: the slowest is a narrow, heavy base. At 4.5 grid steps lower,
+/// no entry equals single wheels.
 const TURN_SHARE: f64 = 0.366;
-/// The least square of the correlation of a wheel's way with that of the response.
+/// Least squared correlation of travel and model.
 const EXPLAINED: f64 = 0.8;
-/// The factors that real wheels have.
+/// Plausible factors of wheels.
 const FACTORS: std::ops::RangeInclusive<f64> = 0.5..=1.5;
-/// A wheel that was to roll less, metres, tells nothing.
+/// Least modelled travel that is evidence, metres.
 const LEAST_M: f64 = 0.04;
-/// The most of the motion of that time, squares of counts, that is not as modelled.
+/// Largest unexplained share of judged motion, in squared counts.
 const UNEXPLAINED: f64 = 0.25;
 
-/// How much later motions are looked for: in 240 recorded missions of robots that were as stated nothing was later, and
-/// of those whose frames were 0.5 s late five in six were found, at the median after 1.6 s.
+/// Grid of added delay. In 240 recorded missions of robots as stated it found none. With frames 0.5
+/// s late it found five of six, at the median after 1.6 s.
 const LATER_STEP_S: f64 = 0.1;
 const LATER_STEPS: i32 = 20;
 const LEAST_LATER_S: f64 = 0.25;
 const LEAST_INTERVALS: usize = 8;
-/// Squares of m/s, times seconds: how much better a later motion is, and noise; and the factor.
+/// Least improvement, and noise, (m/s)^2 s; least ratio.
 const LEAST_BETTER: f64 = 0.03;
 const NOISE: f64 = 0.01;
 const BETTER: f64 = 1.5;
-/// The most of the wheels' motion that is not as the later response says, and the least of their difference that is.
+/// Largest unexplained share of the wheels' motion, and least explained share of their difference.
 const LATER_UNEXPLAINED: f64 = 0.1;
 const TURN_EXPLAINED: f64 = 0.5;
 
-/// The least motion of both wheels that tells a response, and what two responses leave unexplained that are alike: squares of m/s, times
-/// seconds.
+/// Least motion that identifies a response, and tolerance of alike responses, (m/s)^2 s.
 const LEAST_MOTION: f64 = 0.05;
 const ALIKE: f64 = 0.003;
-/// The ways to stop of responses that are told apart differ by this factor and by those of so many seconds.
+/// Largest spread of alike stopping distances: a factor, plus travel for these seconds.
 const TOLD_APART: f64 = 1.3;
 const TOLD_APART_S: f64 = 0.15;
 
-/// The square of the share by which two wheels that are told the same differ.
+/// Squared relative difference of equally commanded wheels.
 const DIFFERENT: f64 = 0.05 * 0.05;
 
-/// The share of the fastest wheel's speed by which a wheel may be faster than told.
+/// Allowed excess over a command, as a share of the fastest wheel's speed.
 const UNTOLD_SHARE: f64 = 0.25;
 
 /// Left, right, and their difference.
 const CHANNELS: usize = 3;
 const TURN: usize = 2;
 
-/// What a response must explain to end a suspicion, and not only what a wheel rolled before it died.
+/// Motion that a response must explain to end a suspicion, besides that of a wheel before it died.
 #[derive(Clone, Copy)]
 pub(super) struct Suspected {
     pub(super) channel: usize,
-    /// What raised the suspicion happened from then on.
+    /// Start of the evidence, seconds.
     pub(super) from_s: f64,
 }
 
 #[derive(Clone, Copy)]
 pub(super) struct Alike {
-    /// The one that stops last from top speed.
+    /// Response that stops last from top speed.
     pub(super) slowest: Response,
-    /// The way to stop of the one that stops first, metres.
+    /// Shortest stopping distance among them, metres.
     pub(super) stops_within_m: f64,
-    /// They differ little: delay and acceleration, which both make a start late, are told apart by more motion.
+    /// Whether the alike responses differ little. Delay and acceleration both delay a start; more
+    /// motion separates them.
     pub(super) are_told_apart: bool,
 }
 
-/// Whether a response that leaves `unlike` unexplained is far more like the motion than one that leaves `other`.
+/// Returns whether deviation `unlike` is far better than `other`.
 fn is_far_better(unlike: f64, other: f64) -> bool {
     other > (unlike + LEAST_BETTER).max(BETTER * (unlike + NOISE))
 }
@@ -98,9 +97,9 @@ fn channels([left, right]: [f64; 2]) -> [f64; CHANNELS] {
 #[derive(Clone, Debug)]
 pub(super) struct ResponseFit {
     axle: Axle,
-    /// When they were given, and counts/s.
+    /// Times and commands, counts/s.
     commands: VecDeque<(f64, [f64; 2])>,
-    /// The end of an interval, and the counts that the wheels turned in it; none where they are not known.
+    /// Interval ends and counts; None if unknown.
     turned: VecDeque<(f64, Option<[f64; 2]>)>,
 }
 
@@ -114,7 +113,7 @@ impl ResponseFit {
     }
 
     pub(super) fn turned(&mut self, counts: Option<[f64; 2]>, now: MissionTime) {
-        // In lockstep further frames may come at the time of a tick.
+        // In lockstep several frames may share a tick's time.
         if let Some((at, Some(before))) = self.turned.back_mut()
             && *at == now.seconds()
         {
@@ -125,8 +124,10 @@ impl ResponseFit {
         keep(&mut self.turned, (now.seconds(), counts), KEPT_S);
     }
 
-    /// Whether a speed that is limited, or the difference of wheels that are, is beyond every command since `from_s`, beyond what is left
-    /// of an earlier one where it slows down by its limit, and beyond 0, by `least` and a share of the fastest; counts/s.
+    /// Returns whether wheels or limited axes exceed every command.
+    ///
+    /// The bound is the largest of 0, commands since `from_s`, and earlier ones less the limit's
+    /// deceleration. The excess must pass `least` counts/s plus a share of the fastest.
     pub(super) fn is_untold(
         &self,
         speeds: [f64; 2],
@@ -151,7 +152,7 @@ impl ResponseFit {
             && channels(limits.axes(speeds)).into_iter().enumerate().take(judged).any(is_beyond)
     }
 
-    /// The channels of the wheels that drive.
+    /// Returns how many channels drive.
     fn judged(&self) -> usize {
         self.axle.track_m.map_or(1, |_| CHANNELS)
     }
@@ -161,8 +162,8 @@ impl ResponseFit {
         self.turned.clear();
     }
 
-    /// The response that explains the motion best, with the lag of `stated`, and also what is suspected; none if none does. Each wheel that
-    /// does not drive is left out.
+    /// Returns the best response for both motion and suspicion, with the lag of `stated`. Wheels
+    /// that do not drive are left out.
     pub(super) fn explain(&self, stated: Response, suspected: Suspected) -> Option<Response> {
         let explained = self.weighed(|dead_time_s, limits, ways| {
             let explained = self.explained(limits, ways, suspected)?;
@@ -174,10 +175,11 @@ impl ResponseFit {
         best.filter(|(explained, _)| *explained >= EXPLAINED).map(|(_, response)| response)
     }
 
-    /// `stated` as much later as is far more like the motion. Delays are then those of the base, of its network, or of both.
+    /// Returns `stated` with the added delay that fits far better. It may lie in the base or its
+    /// network.
     pub(super) fn later(&self, stated: Response) -> Option<Response> {
         let (last_s, _) = self.turned.back()?;
-        // A network that begins to be late delivers nothing for a moment.
+        // A network that begins to lag is silent for a moment.
         let is_gap = |(_, turned): &&(f64, Option<[f64; 2]>)| turned.is_none();
         let (from_s, _) = self.turned.iter().rfind(is_gap).or(self.turned.front())?;
         let intervals = self.turned.iter().filter(|(at, _)| at > from_s).count();
@@ -202,7 +204,7 @@ impl ResponseFit {
             .map(fit);
         let (later, prompt): (Vec<_>, Vec<_>) =
             later.partition(|(_, later_s, _)| *later_s >= LEAST_LATER_S);
-        // Of a motion that repeats itself, a base that answers sooner than stated is as much like one that answers a whole round later.
+        // In repeating motion, an early base looks like one a whole round late.
         let prompt = prompt.into_iter().map(|(unlike, ..)| unlike).fold(f64::INFINITY, f64::min);
         let (unlike, later_s, explains) =
             later.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
@@ -210,26 +212,26 @@ impl ResponseFit {
         is_later.then_some(Response { delay_s: stated.delay_s + later_s, ..stated })
     }
 
-    /// The responses that explain the wheels' motion about as well as the best one does. None if none explains it, or not far better
-    /// than the response that is `believed`.
+    /// Returns the responses that explain the motion about as well as the best one, unless
+    /// `believed` fits nearly as well.
     pub(super) fn alike(&self, believed: Option<Response>, top_speed_m_s: f64) -> Option<Alike> {
         let ((first_s, _), (last_s, _)) = (self.turned.front()?, self.turned.back()?);
         let intervals = self.turned.iter().filter(|(_, turned)| turned.is_some()).count();
         let scale = self.scale(intervals, last_s - first_s);
-        // What is not as this response says, all, and the factor.
+        // Unexplained motion, all motion, and the factor.
         let fit = |[channels, _]: [[Motion; CHANNELS]; 2]| {
             let (wheels, factor) = self.of_wheels(&channels);
             (scale * wheels.unlike(factor), scale * wheels.turned, factor)
         };
         let of = |it: Response| fit(self.motions_of(it.dead_time_s(), &it, *first_s)).0;
         let believed = believed.map(of);
-        // Most robots answer as stated, and nothing is far better than that.
+        // Most robots answer as stated: even a perfect fit is not far better.
         if believed.is_some_and(|believed| !is_far_better(0.0, believed)) {
             return None;
         }
         let fits = self.weighed(|dead_time_s, limits, ways| {
             let (unlike, all, factor) = fit(self.motions(limits, ways, *first_s));
-            // Wheels that reach less of a speed reach it sooner.
+            // Wheels that reach less speed reach it sooner.
             let most = limits.most.map(|most| most * factor);
             let response = self.axle.response(dead_time_s, Limits { most, ..limits });
             let stops_m = response.way_to_stop_m(top_speed_m_s, dead_time_s);
@@ -250,8 +252,8 @@ impl ResponseFit {
         })
     }
 
-    /// The least share of a channel's motion that the response explains; none if a channel moved by no factor of it, or
-    /// otherwise in the time that raised the suspicion, or the suspected one was hardly to move.
+    /// Returns the least explained share of the channels' motion. None for an implausible factor,
+    /// deviating judged motion, or a suspected channel with hardly any command.
     fn explained(&self, limits: Limits, ways: Ways<'_>, suspected: Suspected) -> Option<f64> {
         let [all, judged_all] = self.motions(limits, ways, suspected.from_s);
         let mut least: Option<f64> = None;
@@ -266,7 +268,7 @@ impl ResponseFit {
                 let explained = all.both * all.both / (all.model * all.turned);
                 least = Some(least.map_or(explained, |least| least.min(explained)));
             } else if channel == suspected.channel {
-                // A difference that is modelled as small may be that of two wheels.
+                // A small difference may be a mismatch of wheels.
                 let wheels = judged_all[0].turned + judged_all[1].turned;
                 if channel != TURN || judged.unlike(1.0) > DIFFERENT * wheels + judged.rounding {
                     return None;
@@ -276,13 +278,13 @@ impl ResponseFit {
         least
     }
 
-    /// Squares of counts in one of so many intervals to squares of m/s, times seconds.
+    /// Returns the scale from squared counts to (m/s)^2 s.
     fn scale(&self, intervals: usize, in_s: f64) -> f64 {
         intervals as f64 / in_s / self.axle.counts_per_m.powi(2)
     }
 
-    /// What `weigh` makes of each response of the grid: of its dead time, its limits, and their ways. Of a turn that is limited apart the
-    /// grid has only the one that is most like the wheels. Those of wheels are last.
+    /// Applies `weigh` to each response of the grid. Of separate turns only the best fit is tried;
+    /// responses of single wheels come last.
     fn weighed<T>(&self, weigh: impl Fn(f64, Limits, Ways<'_>) -> Option<T>) -> Vec<T> {
         let mut weighed = Vec::new();
         let accelerations = (0..ACCELERATIONS)
@@ -319,7 +321,7 @@ impl ResponseFit {
         weighed
     }
 
-    /// What is not half the wheels' difference; no number if none is modelled.
+    /// Returns the deviation from half the wheels' difference; NaN if unmodelled.
     fn unlike_turn(&self, ways: &[f64]) -> f64 {
         let mut turn = Motion::default();
         for ((_, turned), modelled) in self.turned.iter().skip(1).zip(ways) {
@@ -330,7 +332,7 @@ impl ResponseFit {
         turn.unlike(turn.factor())
     }
 
-    /// The course of an axis that answers at once.
+    /// Returns an axis' course without dead time.
     fn course(&self, limits: Limits, axis: usize) -> Course {
         let (mut way, mut speed) = (0.0, 0.0);
         let mut course = Vec::new();
@@ -349,11 +351,11 @@ impl ResponseFit {
         course
     }
 
-    /// What an axis of this course rolls in each interval but the first, counts, if it answers later.
+    /// Returns a delayed course's travel in each interval but the first, counts.
     fn ways(&self, course: &Course, dead_time_s: f64) -> Vec<f64> {
         let mut pieces = course.iter().peekable();
         let mut piece = &[0.0; 4];
-        // The oldest counts say only when the others begin.
+        // The oldest counts only start the first interval.
         let mut before = None;
         let rolled = |(until, _): &(f64, _)| {
             while let Some(next) = pieces.next_if(|[from, ..]| *from <= until - dead_time_s) {
@@ -378,7 +380,7 @@ impl ResponseFit {
         self.motions(limits, [&one, &other], from_s)
     }
 
-    /// The channels' motion by these ways: all, and from then on.
+    /// Returns the channels' motion: all, and that since `from_s`.
     fn motions(
         &self,
         limits: Limits,
@@ -399,27 +401,27 @@ impl ResponseFit {
         [all, judged_all]
     }
 
-    /// The motion of all wheels that drive, and the factor by which it is that of the model.
+    /// Returns the driving wheels' motion, and its factor.
     fn of_wheels(&self, [left, right, _]: &[Motion; CHANNELS]) -> (Motion, f64) {
         let wheels = if self.judged() == 1 { *left } else { left.with(right) };
         (wheels, wheels.factor())
     }
 }
 
-/// Of a speed: from when on, the way until then, the speed then, and how much it grows in a second; seconds and counts.
+/// Pieces of a course: start, travel, speed, acceleration; seconds and counts.
 type Course = Vec<[f64; 4]>;
-/// What is limited rolls so far in each interval but the first.
+/// Travel of both axes in each interval but the first.
 type Ways<'a> = [&'a [f64]; 2];
 
-/// Sums over the intervals of a channel: of the modelled way, of the squares of the modelled and the counted way, and of their product,
-/// counts.
+/// Sums over intervals, counts: modelled travel, squares of modelled and counted travel, their
+/// product.
 #[derive(Clone, Copy, Default)]
 struct Motion {
     way: f64,
     model: f64,
     turned: f64,
     both: f64,
-    /// Each interval begins and ends between two counts of each wheel.
+    /// Each interval begins and ends between two counts.
     rounding: f64,
 }
 
@@ -442,7 +444,7 @@ impl Motion {
         }
     }
 
-    /// The sum of squares of what was counted less `factor` times what was modelled.
+    /// Returns the squared deviation from `factor` times the model.
     fn unlike(&self, factor: f64) -> f64 {
         self.turned - 2.0 * factor * self.both + factor * factor * self.model
     }
@@ -473,14 +475,14 @@ mod tests {
     const PERIOD_S: f64 = 0.1;
     const AXLE: Axle = Axle { counts_per_m: 1000.0, track_m: Some(0.3) };
 
-    /// Drives a base with a track of 0.3 m as a controller does: on, to the left, on, to the right; its wheels turn by `model`, seen
-    /// through `encoders`.
+    /// Explains a drive ahead, left, ahead, right on a track of 0.3 m; `encoders` alters the
+    /// counts.
     fn explained(response: [f64; 2], encoders: impl Fn([f64; 2]) -> [f64; 2]) -> Option<Response> {
         let suspected = Suspected { channel: 0, from_s: 3.0 };
         driven(response, 1.0, 45, encoders).explain(Response::X80, suspected)
     }
 
-    /// What is known after so many ticks of a base whose wheels reach `gain` of what they are told.
+    /// Returns the fit of wheels that reach `gain` of their commands.
     fn driven(
         [delay_s, acceleration]: [f64; 2],
         gain: f64,
@@ -561,7 +563,7 @@ mod tests {
         fit.commanded([500.0, 500.0], MissionTime::from_seconds(1.0));
         fit.commanded([0.0, 0.0], MissionTime::from_seconds(1.25));
         fit.commanded([100.0, 100.0], MissionTime::from_seconds(2.9));
-        // At 3 s, a second after what the base has answered; it slows down by 0.3 m/s in a second.
+        // At 3 s, judged from 2 s on, slowing by 0.3 m/s^2.
         let is_untold = |speed, most| {
             let limits = Limits { are_apart: false, most: [most; 2] };
             fit.is_untold([speed; 2], (2.0, limits), 100.0)
@@ -579,7 +581,7 @@ mod tests {
         assert_eq!(explained([0.1, 0.6], |_| [0.0; 2]), None);
     }
 
-    /// How much later than stated a base is found that answers so much later, and whose encoders are seen so.
+    /// Returns the delay found for a base that is `late_s` later; `encoders` alters the counts.
     fn later(late_s: f64, encoders: impl Fn([f64; 2]) -> [f64; 2]) -> Option<f64> {
         let mut fit = ResponseFit::new(AXLE);
         let dead_time_s = Response::X80.dead_time_s() + late_s;
@@ -624,7 +626,7 @@ mod tests {
             let turned = wheels.each_mut().map(|wheel| wheel.go_on(now));
             let time = MissionTime::from_seconds(now);
             fit.turned((tick > 0).then_some(turned), time);
-            // It looks to both sides, goes on, and stands, each 2 s.
+            // Looks to both sides, drives, stands: 2 s per round.
             let command = match tick % 20 {
                 0..6 => [-180.0, 180.0],
                 6..11 => [180.0, -180.0],

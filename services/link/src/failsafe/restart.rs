@@ -1,33 +1,34 @@
-//! Whether a frame's counts can follow those before.
+//! Check that a frame's counts can follow the earlier ones.
 //!
-//! A robot that was switched off and on, or got another battery, restarts its counts, and the step is no motion. Other counts farther
-//! off than wheels turn are implausible; the next are compared with the last plausible ones, so one outdated frame has no effect.
+//! A power cycle restarts the counts, and that step is not motion. Other impossible steps are
+//! implausible. Later counts are compared with the last plausible ones, so one outdated frame has
+//! no effect.
 //!
-//! A driven wheel turns no farther than it was commanded, than it turned before, or than the robot reports as its speed. Otherwise
-//! counts that restart within half a metre of the start would pass for a motion.
+//! A driven wheel turns no farther than its command, its last speed or its reported speed allows.
+//! Otherwise counts that restart within half a metre of the start would pass as motion.
 
 use common::{clock::MissionTime, driver::counts::WheelCounts, mission::Mission};
 
 use super::monitor::Counts;
 
-/// Counts are implausible from this multiple of the way at top speed on.
+/// Largest plausible multiple of the travel at top speed.
 const IMPLAUSIBLE: f64 = 1.5;
-/// Plausible beyond a wheel's known speeds, metres: a tick hardly accelerates it more.
+/// Slack beyond known speeds, metres: acceleration adds hardly more in a tick.
 const SLACK_M: f64 = 0.06;
-/// Periods after a command in which known speeds bound the motion.
+/// Periods in which a command bounds the motion.
 const PERIODS: f64 = 6.0;
-/// Frames that can follow each other until implausible counts are accepted.
+/// Consistent frames that make implausible counts accepted.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
 #[derive(Clone, Debug)]
 pub struct RestartWatch {
     last: Option<(WheelCounts, MissionTime)>,
-    /// The wheels' speeds at the last plausible counts: as reported, and by counts; counts/s.
+    /// Reported and counted speeds at the last plausible counts, counts/s.
     turned: [[f64; 2]; 2],
-    /// The two newest commands, counts/s, and the time of the newest that was to move a wheel.
+    /// Two newest commands, counts/s, and the time of the newest nonzero one.
     commanded: [[f64; 2]; 2],
     driven: Option<MissionTime>,
-    /// The newest implausible counts, their time, and the frames that can follow each other.
+    /// Newest implausible counts, their time, and the number of consistent frames.
     suspected: Option<(WheelCounts, MissionTime, u32)>,
     away: bool,
     jumped: bool,
@@ -55,7 +56,7 @@ impl RestartWatch {
         }
     }
 
-    /// `counts` are counts/s.
+    /// Takes a command, counts/s.
     pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         self.commanded = [self.commanded[1], counts.map(f64::from)];
         if counts != [0, 0] {
@@ -67,13 +68,15 @@ impl RestartWatch {
         self.away = true;
     }
 
-    /// The robot's odometry jumped, which the next counts leave out.
+    /// Registers a jump of the robot's odometry, which the next counts omit.
     pub const fn jumped(&mut self) {
         self.jumped = true;
     }
 
-    /// Classify counts, with the reported `speeds`, counts/s. After a robot that `was_away` (did not answer until this frame), counts
-    /// near the start value mean a restart; otherwise only if they are also farther off than wheels turn.
+    /// Classifies counts with reported `speeds`, counts/s.
+    ///
+    /// Counts near the start value mean a restart if the robot was lost, or if the step is
+    /// impossible. `was_away`: silent until this frame.
     pub fn step(
         &mut self,
         counts: impl Into<WheelCounts>,
@@ -122,7 +125,7 @@ impl RestartWatch {
         self.restarts += 1;
     }
 
-    /// The step over the most that wheels can turn in that time.
+    /// Returns the step relative to the most that wheels can turn.
     fn share_of_reach(
         &self,
         before: WheelCounts,
@@ -135,7 +138,8 @@ impl RestartWatch {
         left.max(right) / reach
     }
 
-    /// The step over [`IMPLAUSIBLE`] of the most that wheels turn by their known speeds; 0 for a robot that is not driven.
+    /// Returns the step relative to the most by known speeds times [`IMPLAUSIBLE`]; 0 if not
+    /// driven.
     fn share_of_driven(
         &self,
         before: WheelCounts,
@@ -172,7 +176,7 @@ mod tests {
     use std::path::Path;
 
     fn watch() -> RestartWatch {
-        // 1 m/s is 2247 counts a second, 321 a tick.
+        // 1 m/s is 2247 counts/s, 321 per tick.
         RestartWatch::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
     }
 
@@ -208,7 +212,7 @@ mod tests {
         watch.lost();
         assert_eq!(watch.step([32_000, 768], [0; 2], false, at(3.0)), Counts::Follow);
         watch.lost();
-        // The robot stood at its start all the time.
+        // The robot stood at its start.
         watch.step([3, 32_765], [0; 2], false, at(6.0));
         watch.lost();
         assert_eq!(watch.step([0, 0], [0; 2], false, at(9.0)), Counts::Follow);
@@ -263,7 +267,7 @@ mod tests {
 
     #[test]
     fn counts_that_begin_anew_while_the_robot_drives_are_no_motion_however_near_the_start() {
-        // 0.3 m/s are 674 counts/s, 96 a tick; a look turns the wheels against each other.
+        // 0.3 m/s are 674 counts/s, 96 per tick. A look around turns the wheels oppositely.
         for (driven, start) in [([674, 674], [300, 300]), ([-580, 580], [32_568, 200])] {
             let mut watch = watch();
             let speeds = driven.map(i32::from);
@@ -297,7 +301,7 @@ mod tests {
     fn wheels_that_follow_their_commands_are_plausible_also_backwards_and_bunched() {
         let mut watch = watch();
         let mut counts = [20_000_i32; 2];
-        // The wheels count the wrong way, start and stop, and every third frame comes with the next.
+        // Wheels count the wrong way, start and stop, and every third frame comes with the next.
         for number in 0..60_i32 {
             let speed = if number / 10 % 2 == 1 { 1100 } else { 0 };
             watch.commanded([speed; 2], at(0.143 * f64::from(number)));

@@ -1,36 +1,36 @@
-//! Whether a laser's scans change as the robot moves.
+//! Check that a laser's scans change as the robot moves.
 //!
-//! A scan is predicted from one of half a second before by the motion of the wheels between them: as if both were prompt, as if both were
-//! later by a number of delays, and as if the robot had not moved. By how much another prediction is better than the prompt one is summed up
-//! while predictions differ, which those of a robot at rest or in a long straight corridor do not. In 62 recorded missions with moving
-//! things, slip and noise no sum was more than 0.0106.
+//! Each scan is predicted from one half a second earlier by the wheels' motion: for prompt scans,
+//! for several delays, and for no motion. The monitor sums how much better another prediction fits
+//! than the prompt one, while they differ. At rest or in a long straight corridor they agree. In 62
+//! recorded missions with moving things, slip and noise no sum exceeded 0.0106.
 
 use std::collections::VecDeque;
 
 use common::{clock::MissionTime, driver::LaserScan, kinematics::Pose2, mission::Sensor};
 use glam::DVec2;
 
-/// Seconds; the last is in place of no motion at all.
+/// Candidate delays, seconds; infinity stands for no motion.
 const DELAYS_S: [f64; 10] = [0.0, 0.3, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, f64::INFINITY];
 const APART_S: f64 = 0.45;
 const MOST_APART_S: f64 = 1.0;
-/// Poses are kept for the longest delay and the time between two scans, whatever comes no more than this number.
+/// Retention of poses, seconds: the longest delay plus the time between two scans, up to
+/// `MOST_KEPT`.
 const POSES_S: f64 = 3.5;
 const MOST_KEPT: usize = 2048;
 const BEAMS: usize = 180;
 const LEAST_BEAMS: f64 = 20.0;
-/// A greater difference, metres, is that of another surface.
+/// Largest difference of one surface, metres.
 const MOST_M: f64 = 0.3;
-/// The sums fade within so many seconds that tell the delays apart.
+/// Time constant of the sums, in seconds of distinct predictions.
 const FADE_S: f64 = 4.0;
-/// Delays are told apart by mean differences that differ by so much, metres.
+/// Least spread of mean differences that distinguishes delays, metres.
 const TELLS_M: f64 = 0.005;
-/// A delay is better if its difference is less by this factor. The sums of these, metres times seconds, at which scans are doubted, and
-/// surely late.
+/// Factor by which a delay must fit better, and sums for doubt and for certainty, metre-seconds.
 const FACTOR: f64 = 1.2;
 const BETTER: [f64; 2] = [0.016, 0.03];
 
-/// Where the robot was by its wheels in the last seconds.
+/// Recent poses by the wheels.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Poses(VecDeque<(f64, Pose2)>);
 
@@ -57,7 +57,7 @@ impl Poses {
     }
 }
 
-/// The delay with the greatest sum, if that is more than `least`.
+/// Returns the delay with the greatest sum above `least`.
 pub(super) fn best(delays_s: &[f64], better: &[f64], least: f64) -> Option<f64> {
     let better = delays_s.iter().zip(better);
     let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
@@ -69,9 +69,9 @@ pub(super) struct ScanMotion {
     pub(super) row: usize,
     sensor: Sensor,
     pub(super) poses: Poses,
-    /// The newest is judged when poses after it are known.
+    /// Recent scans. The newest is judged once later poses are known.
     scans: VecDeque<(f64, Vec<f32>)>,
-    /// By how much each delay is better than none.
+    /// Advantage of each delay over none.
     better: [f64; DELAYS_S.len()],
 }
 
@@ -85,7 +85,7 @@ impl ScanMotion {
         *self = Self::new(self.row, self.sensor.clone());
     }
 
-    /// The scan says that it was measured at `at_s`.
+    /// Takes a scan, stated to be measured at `at_s`.
     pub(super) fn take(&mut self, scan: &LaserScan, at_s: f64) {
         if self.poses.0.is_empty() || scan.beams.len() != self.sensor.beams {
             return;
@@ -104,7 +104,7 @@ impl ScanMotion {
             };
             let unlike = DELAYS_S.map(unlike);
             let [least, most] = [f64::min, f64::max].map(|of| unlike.into_iter().reduce(of));
-            // A difference is no number where too few beams are compared, and no number is no more than others.
+            // NaN, from too few beams, fails the comparison.
             if unlike.iter().all(|it| it.is_finite())
                 && most.zip(least).is_some_and(|(most, least)| most - least >= TELLS_M)
             {
@@ -123,7 +123,8 @@ impl ScanMotion {
         }
     }
 
-    /// The mean difference, metres, of the first scan's ranges and those that the points of the second would have had there.
+    /// Returns the mean difference of the first scan's ranges and the second's points seen from
+    /// there, metres.
     fn unlike(&self, (first, from): (&[f32], Pose2), (second, to): (&[f32], Pose2)) -> f64 {
         let [from, to] = [from, to].map(|robot| self.sensor.mount.on(robot));
         let (first_rad, step_rad) = self.sensor.fan();
@@ -142,7 +143,7 @@ impl ScanMotion {
         if beams < LEAST_BEAMS { f64::NAN } else { sum / beams }
     }
 
-    /// The explanation by the delay that is best, if scans are doubted, or surely late.
+    /// Explains doubtful, or surely late, scans.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let likely_s = best(&DELAYS_S, &self.better, BETTER[usize::from(sure)])?;
         let name = &self.sensor.name;
@@ -165,7 +166,7 @@ mod tests {
 
     use super::*;
 
-    /// The range in a room of 6 m by 4 m.
+    /// Returns the range in a room of 6 m by 4 m.
     fn range(at: DVec2, bearing: f64) -> f64 {
         let axis = DVec2::from_angle(bearing);
         let walls = [3.0, 2.0].into_iter().zip([(at.x, axis.x), (at.y, axis.y)]);
@@ -173,8 +174,8 @@ mod tests {
         hits.fold(f64::INFINITY, f64::min)
     }
 
-    /// What is said of scans that come at 10 Hz and are as `seen` says, of the times of all and the newest, from a robot that drives and
-    /// turns by turns for 6 s.
+    /// Judges 10 Hz scans for 6 s of alternate driving and turning; `seen` maps the present index
+    /// to the scan sent.
     fn said(speed_m_s: f64, seen: impl Fn(usize) -> usize) -> Option<String> {
         let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.protocol = 'json'";
         let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
@@ -187,7 +188,7 @@ mod tests {
             pose = pose.along_arc(0.1 * speed_m_s, turn);
             let laser = sensor.mount.on(pose);
             let beam = |beam: usize| {
-                // Another beam each time is 1 % off.
+                // Every third beam is 1 % off.
                 let noise = if (beam + tick).is_multiple_of(3) { 1.01 } else { 1.0 };
                 let bearing = laser.heading + first_rad + beam as f64 * step_rad;
                 (noise * range(laser.position, bearing)) as f32

@@ -1,4 +1,4 @@
-//! The staleness monitor: the age of the newest command, and of the pose and guidance behind it.
+//! Staleness monitor: ages of the newest command, its pose and its guidance.
 
 use std::time::Duration;
 
@@ -58,7 +58,7 @@ impl Monitor for Staleness {
             Cause::GuidanceStale => newest.guidance,
             _ => newest.command,
         };
-        // A stamp from the future would not expire, so it counts as too old.
+        // Stamps from the future would never expire, so they count as too old.
         (then > now || now.since(then) > self.limit).into()
     }
 

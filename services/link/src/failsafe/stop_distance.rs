@@ -1,5 +1,5 @@
-//! How far the robot goes, and for how long it moves, from a fault until it rests, at its full speed: the time until the link knows of the
-//! fault, and the base's way to stop. What no time bounds, or another commander does, is not here.
+//! Distance and time from a fault to rest at full speed: the time until the link knows, and the
+//! base's stopping distance. Unbounded faults and other commanders are excluded.
 
 use common::{ground_truth::GroundTruthTick, mission::Mission, samples::Cause};
 
@@ -7,20 +7,20 @@ use super::{TABLE, rule};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Stop {
-    /// Until the link knows of it: it tells the robot to stand, or its last command is over.
+    /// Time until the link commands a stop, or its last command expires.
     pub known_s: f64,
-    /// Until wheels rest.
+    /// Time until the wheels rest.
     pub rest_s: f64,
     pub way_m: f64,
 }
 
 impl Stop {
-    /// The stop of a robot whose fault is known after `known_s`.
+    /// Returns the stop for a fault known after `known_s`.
     pub fn known_after(known_s: f64, mission: &Mission) -> Self {
         let (response, speed) = (mission.trusted_response(), mission.speed_m_s());
         let turns_s = mission.turn_rad_s() / response.turn_acceleration_rad_s2;
         let brakes_s = turns_s.max(speed / response.acceleration_m_s2);
-        // A lag leaves of the speed what is called rest after so many time constants.
+        // A lag takes this many time constants to decay to rest.
         let lags_s = response.lag_s * (speed / GroundTruthTick::AT_REST_M_S).ln().max(0.0);
         Self {
             known_s,
@@ -29,14 +29,14 @@ impl Stop {
         }
     }
 
-    /// The stop by `cause`; none if no time bounds it.
+    /// Returns the stop by `cause`; none if unbounded.
     pub fn by(cause: Cause, mission: &Mission) -> Option<Self> {
         let known_s = rule(cause)?.known_within_s?(mission);
         Some(Self::known_after(known_s, mission))
     }
 }
 
-/// Each cause that stops the robot for which the time is bounded.
+/// Returns the causes that stop the robot within a bounded time.
 pub fn from_faults(mission: &Mission) -> Vec<(Cause, Stop)> {
     let causes = TABLE.iter().map(|rule| rule.cause);
     causes.filter_map(|cause| Some((cause, Stop::by(cause, mission)?))).collect()

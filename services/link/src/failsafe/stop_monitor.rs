@@ -1,4 +1,5 @@
-//! The stop monitor: whether a stopped robot comes to rest, by its encoders, and the next method if not.
+//! Stop monitor: checks that a stopped robot comes to rest, and picks the next stop method
+//! otherwise.
 
 use std::time::Duration;
 
@@ -11,22 +12,22 @@ use common::{
 
 use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 
-/// A robot comes to rest within this, the dead time of its response, and the time for which it brakes: a lost stop or two are included.
+/// Time for a lost stop or two, besides dead time and braking.
 const STOPS_ARE_LOST_S: f64 = 0.45;
-/// It counts from the time in which the robot comes to rest. A repeated stop has an effect sooner.
+/// Motion past the due rest that shows a robot which does not stop. A repeated stop acts sooner.
 pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
-/// Speed of the rim.
+/// Rim speed of a moving wheel.
 const MOVES_M_S: f64 = 0.03;
-/// Rest is below this, m/s, or below [`RESTS_COUNTS`] between two frames: a resting encoder's counts vary.
+/// Rest: this rim speed, or [`RESTS_COUNTS`] between frames, because resting encoders vary.
 const RESTS_M_S: f64 = 0.01;
 const RESTS_COUNTS: f64 = 4.0;
-/// Wheels rest so long until the robot does.
 const AT_REST_AFTER: Duration = Duration::from_millis(200);
-/// Motion between frames that are farther apart is not judged. Another host may take most of them.
+/// Longest judged gap. Another host may take most frames.
 const LONGEST_GAP: Duration = Duration::from_secs(1);
 const NEXT_METHOD_AFTER: Duration = Duration::from_millis(300);
 
-/// Until a robot that does not stop at full speed is told by its next method, seconds. It moves in whole intervals between frames.
+/// Returns the time until a robot that ignores a stop at full speed gets the next method, seconds.
+/// Motion counts in whole frame intervals.
 pub(crate) fn known_within_s(mission: &Mission) -> f64 {
     let comes_to_rest = comes_to_rest_s(mission.trusted_response(), mission.speed_m_s());
     comes_to_rest + DOES_NOT_STOP_AFTER.as_secs_f64() + 2.0 / mission.robot.rate_hz
@@ -41,9 +42,10 @@ pub struct StopMonitor {
     counts_per_m: f64,
     longest_gap: Duration,
     response: Response,
-    /// Found while it was told to stand: a robot that does not stop looks like a base that brakes slowly, until it rests.
+    /// Response found while stopping. It applies after rest, because an ignored stop looks like
+    /// slow braking.
     found: Option<Response>,
-    /// The greater of the speeds of the wheels by the newest command to move, counts/s.
+    /// Faster wheel's newest motion command, counts/s.
     driven: f64,
     told_to_stand: Option<MissionTime>,
     frame: Option<(WheelCounts, MissionTime)>,
@@ -84,10 +86,11 @@ impl StopMonitor {
         let within = |speed: f64| speed * self.counts_per_m * gap.as_secs_f64();
         let rests = farthest <= RESTS_COUNTS.max(within(RESTS_M_S));
         let moves = !rests && farthest >= within(MOVES_M_S);
-        // Wheels that rest sooner may still start by the last command before the stop.
+        // Wheels that rest earlier may still start by the previous command.
         let shows_after = Duration::from_secs_f64(self.response.dead_time_s());
         let shows_stop = self.told_to_stand.is_none_or(|told| then.since(told) >= shows_after);
-        // Wheels that rest may have turned there and back in a long gap. Those that moved in it did so though they were told to stand.
+        // In a long gap resting wheels may have moved there and back; moving ones disobeyed in any
+        // case.
         self.resting = if rests && shows_stop && gap <= self.longest_gap {
             self.resting + gap
         } else {
@@ -116,7 +119,7 @@ impl StopMonitor {
         Duration::from_secs_f64(comes_to_rest_s(self.response, self.driven / self.counts_per_m))
     }
 
-    /// Nothing is known without two usable frames, of which the newer is no older than they may lie apart.
+    /// Returns the rest, which is unknown without two recent frames.
     pub fn rest(&self, now: MissionTime) -> Rest {
         match self.frame {
             Some((_, then)) if now.since(then) > self.longest_gap => Rest::Unknown,
@@ -126,17 +129,17 @@ impl StopMonitor {
         }
     }
 
-    /// Whether the newest command is motion.
     pub fn is_told_to_move(&self) -> bool {
         self.told_to_stand.is_none() && self.driven > 0.0
     }
 
-    /// It grows on after the last method, when the first follows.
+    /// Returns the method's number. It grows past the last method; the first then follows.
     pub const fn method(&self) -> usize {
         self.method
     }
 
-    /// The next method may be due; returns whether it was. `does_not_stop` is whether the cause applies.
+    /// Advances if the next method is due; returns whether it was. `does_not_stop`: the cause
+    /// applies.
     pub fn takes_next_method(&mut self, does_not_stop: bool, now: MissionTime) -> bool {
         if !does_not_stop {
             self.tried = None;

@@ -1,8 +1,8 @@
-//! The monitor of streams: whether frames come, and often enough. Silence is by the machine's clock, as in [`super::presence`],
-//! intervals by mission time.
+//! Stream monitor: checks that frames come often enough. Silence is by the machine's clock, as in
+//! [`super::presence`], and intervals by mission time.
 //!
-//! Without one infrared ranger that looks aside, or into a sonar's cone, the robot goes on at half speed: the sonar still hears what
-//! stands in the cone, and unscanned ground is looked at before the robot drives over it.
+//! Without one infrared ranger that looks aside or into a sonar's cone, the robot drives at half
+//! speed. The sonar covers the cone, and unscanned ground is looked at before it is driven on.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -18,8 +18,8 @@ use super::{
 };
 use crate::backoff::Backoff;
 
-/// All of so many intervals but the two shortest must be too long for a slow robot. A radio that is out half of the time gives more
-/// short ones.
+/// Judged intervals. All but the `SHORT_ONES` shortest must be too long; a radio in outage half the
+/// time gives more short ones.
 pub(crate) const INTERVALS: usize = 9;
 pub(crate) const SHORT_ONES: usize = 2;
 const FIRST_PAUSE: Duration = Duration::from_secs(1);
@@ -30,11 +30,11 @@ pub enum Motor {
     #[default]
     Regular,
     Silent,
-    /// So few a second that a command expires before the next.
+    /// Frames per second, too few to keep a command alive.
     Slow(f64),
 }
 
-/// A sensor within this of the front sonar's bearing looks where the robot drives, degrees.
+/// Bearing from the front sonar within which a sensor looks ahead, degrees.
 const AHEAD_DEG: f64 = 60.0;
 
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ struct Newest {
     row: u8,
     name: String,
     is_covered: bool,
-    /// Time of the machine's clock.
+    /// Machine time of the newest valid reading.
     ns: u64,
 }
 
@@ -86,12 +86,12 @@ impl Streams {
     }
 
     fn silent_sensors(&self, now_ns: u64) -> Vec<&Newest> {
-        // A robot that was just found must send a new reading: older ones do not show what is ahead now.
+        // A robot just found must send a new reading; older ones may be outdated.
         let is_silent = |sensor: &&Newest| self.sensing && self.silence.is_over(sensor.ns, now_ns);
         self.sensors.iter().filter(is_silent).collect()
     }
 
-    /// Sensors without which the robot stands, or one without which it goes slowly.
+    /// Returns the cause by which silent sensors stop or slow the robot.
     fn silent(&self, now_ns: u64) -> Option<Cause> {
         match self.silent_sensors(now_ns)[..] {
             [] => None,
@@ -100,11 +100,11 @@ impl Streams {
         }
     }
 
-    /// Pauses between requests grow.
+    /// Returns whether a request is due, at growing pauses.
     pub fn wants_request(&mut self, now_ns: u64) -> bool {
         let ranges_come = self.silent(now_ns) != Some(Cause::RangeSilent);
         if self.motor_frames(now_ns) == Motor::Regular && ranges_come {
-            // A robot that sends only when asked is not asked more often.
+            // A robot that sends on request is asked no more often.
             return false;
         }
         let due = self.requests.is_due(now_ns);
@@ -115,8 +115,8 @@ impl Streams {
     }
 }
 
-/// Whether a robot that lacks only `sensor` may go on: an infrared ranger that looks aside or back, or into the cone of a used sonar of
-/// `table`. The front sonar looks at `front_deg`.
+/// Returns whether a robot without `sensor` may go on: an infrared ranger that looks aside, back,
+/// or into a used sonar's cone.
 fn is_covered(sensor: &Sensor, table: &[Sensor], front_deg: f64) -> bool {
     let from = |bearing_deg: f64| {
         ((sensor.bearing_deg() - bearing_deg + 180.0).rem_euclid(360.0) - 180.0).abs()

@@ -20,7 +20,6 @@ fn mission() -> Mission {
     Mission::parse(text, Path::new("test.toml")).unwrap()
 }
 
-/// The moment `ns` nanoseconds before the tested one.
 fn ago(ns: u64) -> Moment {
     let machine_ns = 100_000 * MS - ns;
     Moment { time: MissionTime(machine_ns), machine_ns }
@@ -40,18 +39,16 @@ fn command(tick_ago: u64, pose_ago: u64, guidance_ago: u64) -> CommandSample {
     }
 }
 
-/// The voltage of the boards' battery, the only one that is fitted.
 const fn boards(volts: f64) -> [f64; 3] {
     [volts, 0.0, 0.0]
 }
 
-/// A reading of the front sonar.
 fn front(status: RangeStatus, raw: u16) -> [RangeReading; 1] {
     let range_m = f64::from(raw) / 100.0;
     [RangeReading { range_m, status: status.into(), raw, ..RangeReading::default() }]
 }
 
-/// A failsafe in which no cause applies, with all inputs as old as they may be.
+/// Returns a failsafe without any cause, all inputs at their age limit.
 fn well() -> Failsafe {
     let mut failsafe = Failsafe::new(&mission());
     failsafe.monitors.presence.heard(now().machine_ns);
@@ -89,7 +86,7 @@ fn jumps(failsafe: &mut Failsafe, when: Moment) {
     }
 }
 
-/// Take frames with these counts of both wheels, one every 100 ms.
+/// Takes frames with both wheels' counts every 100 ms.
 fn frames(failsafe: &mut Failsafe, counts: impl IntoIterator<Item = u16>, first_ago_ms: u64) {
     for (frame, counts) in (0..).zip(counts) {
         let when = ago((first_ago_ms - 100 * frame) * MS);
@@ -117,7 +114,7 @@ const fn commander(moves: bool) -> Commander {
     Commander { number: [0xab; 16], moves }
 }
 
-/// The robot has all sensors, and infrared-1, which looks into the cone of the front sonar, gives no reading.
+/// Omits infrared-1, which looks into the front sonar's cone.
 fn without_an_infrared_ranger(failsafe: &mut Failsafe) {
     let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
     let status = RangeStatus::Nothing.into();
@@ -129,7 +126,7 @@ fn without_an_infrared_ranger(failsafe: &mut Failsafe) {
     failsafe.monitors.streams = streams;
 }
 
-/// For each cause, a change that alone leads to it, and its action.
+/// Sole change that leads to each cause, and its action.
 const CASES: &[(Break, Action, Cause)] = &[
     (|it| directive(it, Order::Stop, HoldReason::Ending), Action::End, Cause::MissionOver),
     (
@@ -269,7 +266,6 @@ fn fresh(newest: Option<CommandSample>) -> staleness::Staleness {
     staleness
 }
 
-/// A failsafe in which only the change `by` was made.
 fn broken(by: Break) -> Failsafe {
     let mut failsafe = well();
     by(&mut failsafe);
@@ -466,7 +462,7 @@ fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found(
 
 #[test]
 fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doubled_ones_do_not() {
-    // The robot is sent 50 commands at the end of each window, and acknowledges so many.
+    // Each window ends with 50 commands; the robot acknowledges `count`.
     let after = |failsafe: &mut Failsafe, windows: std::ops::Range<u64>, count: usize| {
         let monitor = &mut failsafe.monitors.commander;
         for when in windows.map(|window| ago((20 - 2 * window) * 1000 * MS)) {
@@ -490,7 +486,8 @@ fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doub
 
 #[test]
 fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_commander() {
-    // The first 6 s are undisturbed. Then one in `every` frames comes, and an acknowledgement after `late_ms`, of one in `answered`.
+    // After 6 undisturbed seconds, one frame in `every` comes, and one acknowledgement in
+    // `answered`, after `late_ms`.
     let cause = |every: u64, late_ms: u64, answered: u64| {
         let mut monitor = commander::OtherCommander::new(&mission());
         for tick in 0..140_u64 {
@@ -524,7 +521,7 @@ fn a_cause_that_the_log_explains_is_explained_by_what_was_seen_in_a_clause_witho
         let mut failsafe = broken(by);
         failsafe.decide(false, now());
         let explained = failsafe.explain(cause, now());
-        // How slow a base is, is told when that is found.
+        // A slow base is explained once found.
         let is_promised =
             rule(cause).unwrap().when.contains("link.log") && cause != Cause::BaseSlow;
         assert!(!is_promised || explained.is_some(), "{cause:?}");

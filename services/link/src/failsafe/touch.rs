@@ -1,6 +1,7 @@
-//! Bumpers and cliff sensors: the robot stands when one begins to feel something, and then goes no nearer while it does.
+//! Bumpers and cliff sensors: the robot stops at a touch, and goes no nearer while it lasts.
 //!
-//! The contact is given when the robot rests. Its wheels may slip before, so a place that was told earlier would be under the body.
+//! The contact is reported at rest. The wheels may slip before, which would place it under the
+//! body.
 
 use std::{f64::consts::PI, ops::RangeInclusive, time::Duration};
 
@@ -12,9 +13,9 @@ use common::{
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
 
-/// The robot stands for this, or as long as its response needs from top speed.
+/// Least stand-still; the response may need more from top speed.
 const STANDS_FOR: Duration = Duration::from_millis(500);
-/// Half the arc that is mapped, radians: the robot can get around it, and it has a cell of the map.
+/// Half the mapped arc, radians: small enough to drive around, and at least a map cell.
 const HALF_WIDTH: RangeInclusive<f64> = PI / 12.0..=PI / 6.0;
 
 #[derive(Clone, Debug)]
@@ -22,9 +23,9 @@ pub struct Touches {
     rows: Vec<TouchRow>,
     feel: Vec<bool>,
     stands_for: Duration,
-    /// A robot that stands, or is carried, touches nothing by its own motion.
+    /// Whether the robot moves. At rest, or carried, its own motion causes no touch.
     moves: bool,
-    /// The row that began to feel something last, and when.
+    /// Last triggered row, and when.
     newest: Option<(usize, MissionTime)>,
     is_told: bool,
 }
@@ -46,7 +47,7 @@ impl Touches {
         self.newest.is_some_and(|(_, since)| now.since(since) < self.stands_for)
     }
 
-    /// The contact at which the robot has come to rest; the next call gives none.
+    /// Takes the contact once the robot rests.
     pub(crate) fn take_contact(&mut self, now: MissionTime) -> Option<ContactSample> {
         let (row, _) = self.newest.filter(|_| !self.is_told && !self.stands(now))?;
         self.is_told = true;
@@ -59,8 +60,8 @@ impl Touches {
         })
     }
 
-    /// The command, or what of it leads no nearer to what is felt: a turn on the spot. In lockstep the robot also stands by it. No car
-    /// has a word for a touch.
+    /// Returns the permitted command: a turn on the spot if it leads nearer to a touch. In lockstep
+    /// the robot also stops by it. Cars have no touch sensors.
     pub(crate) fn permitted(&self, command: &CommandSample, now: MissionTime) -> CommandSample {
         let CommandSample { left_rad_s: left, right_rad_s: right, .. } = *command;
         let felt = self.rows.iter().zip(&self.feel).filter(|(_, feels)| **feels);
@@ -142,7 +143,6 @@ mod tests {
         assert!(touches.take_contact(MissionTime::from_seconds(3.1)).is_none());
         assert_eq!(speeds(&touches, [2.0, 4.0], 3.1), [-1.0, 1.0]);
         assert_eq!(speeds(&touches, [-2.0, -2.0], 3.1), [-2.0; 2]);
-        // It goes on to feel the same, and then nothing.
         touches.take(&[(1, true)], MissionTime::from_seconds(3.2));
         assert!(touches.take_contact(MissionTime::from_seconds(9.0)).is_none());
         touches.take(&[(1, false), (9, true)], MissionTime::from_seconds(9.1));

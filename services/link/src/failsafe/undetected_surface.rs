@@ -1,8 +1,8 @@
-//! Whether the front sonar hears what the infrared rangers beside it see.
+//! Check that the front sonar hears a surface that the infrared rangers beside it see.
 //!
-//! A sonar stuck at "nothing in range" reads like one before open ground. Where the rangers on both sides of it see a near surface, and
-//! the line through their hits is square to its axis, the sonar must hear it: even a smooth wall answers within 20 degrees of its
-//! normal.
+//! A sonar stuck at "nothing in range" looks like open ground. It must hear a near surface seen on
+//! both sides whose line of hits is square to its axis. Even a smooth wall answers within 20
+//! degrees of its normal.
 
 use common::{
     kinematics::Pose2,
@@ -12,13 +12,13 @@ use common::{
 };
 use glam::DVec2;
 
-/// Both rangers must see a surface nearer than this, metres.
+/// Largest range of the surface, metres.
 const NEARER_M: f64 = 0.45;
-/// The greatest angle between the surface's normal and the sonar's axis.
+/// Largest angle between normal and axis.
 const SQUARE_DEG: f64 = 12.0;
-/// Rangers within this of the axis look into the sonar's cone, degrees.
+/// Angle from the axis of rangers that look into the cone, degrees.
 const BESIDE_DEG: f64 = 15.0;
-/// Readings without an echo that may be chance: runs of four come with a healthy sonar.
+/// Silent readings that may be chance: healthy sonars give runs of four.
 pub(super) const SILENCES: u32 = 4;
 
 #[derive(Clone, Debug)]
@@ -38,7 +38,7 @@ struct Ranger {
 }
 
 impl UndetectedSurface {
-    /// None without a ranger on either side of the front sonar.
+    /// Returns None without rangers on both sides of the front sonar.
     pub(super) fn of(mission: &Mission) -> Option<Self> {
         let (table, front) = (mission.sensor_table(), mission.front_row());
         let ahead = table.get(front)?.mount.bearing_rad;
@@ -122,7 +122,7 @@ mod tests {
         UndetectedSurface::of(&Mission::parse(&text, Path::new("test.toml")).unwrap())
     }
 
-    /// The readings of the front sonar and of the rangers at 11.25 and -11.25 degrees; none for nothing.
+    /// Returns readings of the front sonar and of the rangers at 11.25 and -11.25 degrees.
     fn readings(front: Option<f64>, left: Option<f64>, right: Option<f64>) -> [RangeReading; 3] {
         [(0, front), (4, left), (5, right)].map(|(sensor, range)| {
             let status = range.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
@@ -131,7 +131,6 @@ mod tests {
         })
     }
 
-    /// The number of readings after which the front sonar is implausible.
     fn implausible_after(left: f64, right: f64) -> Option<usize> {
         let mut watch = watch("").unwrap();
         (1..50).find(|_| {
@@ -149,7 +148,7 @@ mod tests {
     #[test]
     fn a_surface_that_is_far_aslant_or_not_before_both_rangers_proves_nothing() {
         assert_eq!(implausible_after(0.46, 0.44), None);
-        // The two points are 0.19 m apart; 12 degrees are 4 cm of difference in depth.
+        // The points are 0.19 m apart, so 12 degrees are 4 cm in depth.
         assert_eq!(implausible_after(0.3, 0.33), Some(5));
         assert_eq!(implausible_after(0.3, 0.36), None);
         let mut watch = watch("").unwrap();

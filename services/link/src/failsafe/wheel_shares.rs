@@ -1,13 +1,17 @@
-//! The share of its commanded way that the right wheel counts, over the left wheel's.
+//! Ratio of the wheels' counted shares of their commanded travel, right over left.
 //!
-//! Speed loops that fall short do so alike, and commands keep their curve ([`crate::speed_trim`]). Where one wheel counts another share
-//! than the other, its encoder, its loop or the ground is not as stated, and nothing here tells which: dead reckoning gets the ratio as a
-//! doubt of the curve that the robot drove. With ways x that are modelled and y that are counted, the ratio is (y/x) of the right wheel
-//! over that of the left one. Least squares of `y_right x_left` over `y_left x_right` give it, so that what both wheels share, as a
-//! frame that comes late, is no error. Wheels that answer sooner or later than modelled count another ratio while the commanded curve
-//! changes, so the change of the curve is fitted along. In a curve that narrows steadily that fit takes one for the other, and so the ratio
-//! nearer to 1 counts, of the fit with the change and of the one without. Wheels that approach their speeds begin to answer before a model
-//! with one dead time does, and what that adds in one tick the next ones take away: none of these ticks counts without the others.
+//! Slow speed loops fall short alike, and commands keep their curve ([`crate::speed_trim`]).
+//! Unequal shares show a wrong encoder, loop or ground. Which one is unknown, so dead reckoning
+//! takes the ratio as uncertainty of the curve.
+//!
+//! With modelled travel x and counted travel y, the ratio is y/x of the right wheel over that of
+//! the left. Least squares of `y_right x_left` over `y_left x_right` cancel common errors, such as
+//! a late frame. Early or late wheels shift the ratio while the curve changes, so the fit includes
+//! that change. A steadily narrowing curve confuses the two, so the ratio nearer to 1 counts, from
+//! the fits with and without the change.
+//!
+//! Accelerating wheels start before a model with one dead time does, and the next ticks cancel
+//! that. Such ticks count together or not at all.
 
 use common::{
     driver::counts::WheelCounts,
@@ -17,24 +21,24 @@ use common::{
 
 use super::modelled_wheels::{Axle, ModelledWheels};
 
-/// So much of the sums is left after each further metre: 3 m are remembered.
+/// Weight left after each metre: a memory of 3 m.
 const LEFT_AFTER_A_METRE: f64 = 0.72;
-/// The wheels must have been told to roll so far, metres.
+/// Least commanded travel, metres.
 const LEAST_M: f64 = 1.0;
-/// A wheel that counts less than this share of its commanded way in a tick is held, or dead: other monitors judge it.
+/// Share of commanded travel below which a wheel is held or dead, for other monitors to judge.
 const TURNS: f64 = 0.25;
 
-/// A base that still gains or loses speed says nothing of its encoders. Of so many ticks the least way, by the model and by the counts, is
-/// this share of the greatest.
+/// Steady motion: over `STEADY` ticks the least travel, modelled and counted, is at least `AGREE`
+/// of the greatest. Changing speeds say nothing about encoders.
 const STEADY: usize = 3;
 const AGREE: f64 = 0.75;
-/// A slower wheel, by its share of the top speed, says little: what the model leaves out is a large part of its way.
+/// Least share of the top speed. Model errors are a large part of slower travel.
 const LEAST_SPEED: f64 = 0.15;
-/// A modelled wheel has its commanded speed within this share.
+/// Relative difference of a settled wheel from its command.
 const SETTLED: f64 = 0.05;
 
-/// Of a tick's change of the curve, the logarithm of the ways' ratio: the least square, as wheels answer within some ticks of when they
-/// should, and the most by which the next commands change it otherwise.
+/// Change of the curve per tick, the logarithm of the travel ratio: its least square, as wheels
+/// answer some ticks off, and the most that pending commands may alter it.
 const LEAST_CHANGE: f64 = 1e-8;
 const MOST_CORNER: f64 = 0.05;
 
@@ -48,7 +52,8 @@ struct Sums {
 }
 
 impl Sums {
-    /// The modelled and the counted ways of a tick, left and right, metres, and how much the ratio of the modelled ones grows in a tick.
+    /// Adds a tick's modelled and counted travel, metres, with the modelled curve's change per
+    /// tick.
     fn add(&mut self, told: [f64; 2], counted: [f64; 2], change: f64) {
         let [left, right] = told;
         let way_m = f64::midpoint(left.abs(), right.abs());
@@ -83,12 +88,11 @@ impl Sums {
     }
 }
 
-/// The logarithm of the ratio of the right way or speed to the left one.
+/// Returns the logarithm of right over left.
 fn curve([left, right]: [f64; 2]) -> f64 {
     (right / left).abs().ln()
 }
 
-/// The right wheel's share over the left one's, and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct WheelRatio {
     pub(crate) ratio: f64,
@@ -103,10 +107,10 @@ impl WheelRatio {
 pub(crate) struct WheelShares {
     axle: Axle,
     top_speed_m_s: f64,
-    /// None for a car, which has one driven wheel.
+    /// None for a car, with one driven wheel.
     wheels: Option<ModelledWheels>,
     sums: Sums,
-    /// The modelled and counted ways of the newest ticks, oldest first.
+    /// Modelled and counted travel, oldest first.
     newest: [[[f64; 2]; 2]; STEADY],
     frame: Option<(WheelCounts, f64)>,
     longest_gap_s: f64,
@@ -129,14 +133,14 @@ impl WheelShares {
         shares
     }
 
-    /// `counts` were sent, counts/s.
+    /// Takes sent speeds, counts/s.
     pub(crate) fn told(&mut self, counts: [i16; 2], now_s: f64) {
         if let Some(wheels) = &mut self.wheels {
             wheels.command(now_s, counts.map(f64::from));
         }
     }
 
-    /// The counts may start anew.
+    /// Forgets the last frame; counts may restart.
     pub(crate) const fn interrupt(&mut self) {
         self.frame = None;
     }
@@ -152,7 +156,7 @@ impl WheelShares {
         {
             let rolled = counts.since(before);
             let metres = |counts: [f64; 2]| counts.map(|count| count / self.axle.counts_per_m);
-            // Ways of wheels that gain or lose speed differ by when they do, which the model knows less well.
+            // Travel during speed changes depends on timing, which the model knows less well.
             let (left, speeds) =
                 (wheels.each(ModelledSpeed::left), wheels.each(ModelledSpeed::speed));
             let settles = |wheel: usize| left[wheel].abs() <= SETTLED * speeds[wheel].abs();
@@ -169,9 +173,10 @@ impl WheelShares {
         }
     }
 
-    /// Whether the commands that the model does not act on yet change the curve as the last ticks did. Wheels answer a corner in part
-    /// before the model does. The ticks after it, which make good what that adds to the ratio, are unsteady and left out, and so the tick
-    /// before must be, too.
+    /// Returns whether pending commands continue the curve's recent change.
+    ///
+    /// Wheels answer a corner partly before the model. The ticks that would compensate are unsteady
+    /// and left out, so the tick before must be too.
     fn goes_on(&self, told: [f64; 2], change: f64, [then_s, now_s]: [f64; 2]) -> bool {
         let Some(wheels) = &self.wheels else {
             return false;
@@ -217,7 +222,8 @@ mod tests {
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
-    /// The ratio after 16 s of a robot whose wheels reach `reached` of their speeds and count `counted` of that.
+    /// Returns the ratio after 16 s of wheels that reach `reached` of their speeds and count
+    /// `counted` of that.
     fn ratio(reached: f64, counted: [f64; 2], told: impl Fn(usize) -> [i16; 2]) -> WheelRatio {
         let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
         let mut shares = WheelShares::new(&mission);
@@ -271,7 +277,7 @@ mod tests {
         assert!(once > 2.0 && repeated > 0.9 * once, "{once} {repeated}");
     }
 
-    /// The remembered way of such wheels, metres, whose link says each command so often.
+    /// Returns the remembered travel, metres, if each command is sent `says` times.
     fn turned_aside(says: usize) -> f64 {
         let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
         let Response { delay_s, lag_s, .. } = mission.body().response;
@@ -282,7 +288,7 @@ mod tests {
         for tick in 0..300 {
             let now_s = f64::from(tick) * PERIOD_S;
             shares.rolled(WheelCounts::Endless(rolled), now_s);
-            // Aside for a wall or a person that comes, and back along a curve that narrows.
+            // Aside for a wall or person, and back along a narrowing curve.
             let aside = match tick % 12 {
                 0..4 => 0,
                 4..6 => 450,
@@ -323,7 +329,7 @@ mod tests {
                 _ => [700, 250],
             };
             shares.told(told, now_s);
-            // They gain speed as stated, and less of it.
+            // Stated acceleration, but less speed.
             wheels.command(now_s, told.map(|counts| 0.78 * f64::from(counts)));
             for (rolled, way) in rolled.iter_mut().zip(wheels.go_on(now_s + PERIOD_S)) {
                 *rolled += way;

@@ -1,7 +1,7 @@
-//! When something was measured, by the robot's stamps between those of its ticks.
+//! Measurement times from the robot's stamps.
 //!
-//! On a busy machine messages wait and come together, so ticks are not as far apart as the motions that began them. The wheels' way between
-//! two ticks is known as evenly spread over the time between, so what was stamped between their stamps has its share of that time.
+//! Messages queue on a busy machine, so ticks are not spaced like their motions. Wheel travel is
+//! spread evenly between ticks, so stamps between theirs are interpolated.
 
 use std::collections::VecDeque;
 
@@ -11,7 +11,7 @@ const MOST_TICKS: usize = 32;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct RobotTime {
-    /// Stamps and times of the newest ticks, both rising.
+    /// Stamps and times of the newest ticks, rising.
     ticks: VecDeque<(i64, MissionTime)>,
 }
 
@@ -27,7 +27,7 @@ impl RobotTime {
         self.ticks.push_back((stamp_ns, now));
     }
 
-    /// Nanoseconds from the newest tick to what was stamped so; by the stamps alone before the oldest tick and after the newest.
+    /// Returns nanoseconds from the newest tick to a stamp; outside the kept ticks by stamps alone.
     pub(super) fn since_tick_ns(&self, stamp_ns: i64) -> Option<i64> {
         let (newest_ns, newest) = *self.ticks.back()?;
         let before_ns = |time: MissionTime| -(newest.since(time).as_nanos() as i64);
@@ -57,7 +57,7 @@ mod tests {
         let time = |ms: u64| MissionTime(ms * 1_000_000);
         let mut robot = RobotTime::default();
         assert_eq!(robot.since_tick_ns(ms(70_000)), None);
-        // The second tick came late, and the third right after it.
+        // The second tick came late, right before the third.
         for (stamp, at) in [(70_000, 5_000), (70_100, 5_180), (70_200, 5_200)] {
             robot.tick(ms(stamp), time(at));
         }

@@ -14,8 +14,9 @@ fn mission(text: &str) -> Mission {
     Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml")).unwrap()
 }
 
-/// The status of the laser of `model` after scans of so many beams that end at a range, the others at nothing, each after the wheels
-/// have turned, to either side, by an angle more. A reading that is invalid comes with no scan.
+/// Returns the laser status after each of `scans`: the number of beams that end, their range, and a
+/// further turn of the wheels in opposite directions. Other beams see nothing. Invalid readings
+/// come without scans.
 fn scanned(model: &str, scans: &[(usize, f32, f64)]) -> Vec<RangeStatus> {
     let mission = mission(&format!("robot.model = '{model}'"));
     let (row, laser) = mission.laser().unwrap();
@@ -57,7 +58,7 @@ fn a_laser_sees_nothing_where_what_it_saw_was_small_far_or_is_out_of_view_by_the
     for small_or_far in [(18, 1.0, 0.0), (360, 7.0, 0.0)] {
         assert_eq!(scanned("kobuki", &[small_or_far, (0, 0.0, 0.0)]), [Measured, Nothing]);
     }
-    // 100 beams of a Jackal's laser are 25 degrees; a wheel that turns by 1 rad turns it by 30.
+    // 100 beams of a Jackal's laser are 25 degrees; 1 rad of a wheel turns it by 30.
     assert_eq!(scanned("jackal", &[(100, 1.0, 0.0), (0, 0.0, 1.0)]), [Measured, Nothing]);
     assert_eq!(scanned("jackal", &[(100, 1.0, 0.0), (0, 0.0, 0.1)]), [Measured, Invalid]);
 }

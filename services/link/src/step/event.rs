@@ -1,4 +1,4 @@
-//! The link's events and effects.
+//! Events and effects of the link.
 
 use common::{
     clock::{MissionTime, Pace},
@@ -14,11 +14,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::failsafe::{Decision, battery::BatteryChange};
 
-/// A generation starts from it: the pace of mission time, and its first tick's number, which the supervisor gives because it follows the
-/// ticks. The link's checkpoint has only its driver's state of the robot's odometry.
+/// Start of a generation. The supervisor gives the first tick's number, because it follows the
+/// ticks. The link's checkpoint holds only its driver's odometry state.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
-    /// [`Pace::Max`] is lockstep: the robot waits for each command. At other paces mission time is wall-clock time multiplied by a rate.
+    /// [`Pace::Max`] is lockstep: the robot waits for each command. Otherwise mission time is
+    /// wall-clock time multiplied by a rate.
     pub pace: Pace,
     pub next_tick: u64,
 }
@@ -29,12 +30,12 @@ impl Default for State {
     }
 }
 
-/// What the link takes at once, and when. Recordings hold it in this encoding.
+/// Event with its times, as recorded.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Entry<'a> {
     #[serde(borrow)]
     pub event: Event<'a>,
-    /// Reading of the machine's monotonic clock, nanoseconds, which the deadlines of wires use.
+    /// Machine's monotonic clock, nanoseconds, for the deadlines of wires.
     pub machine_ns: u64,
     pub now: MissionTime,
 }
@@ -43,73 +44,73 @@ pub struct Entry<'a> {
 pub enum Event<'a> {
     /// Bytes from the robot.
     Datagram(#[serde(with = "serde_bytes")] &'a [u8]),
-    /// Whether the wire is open now. A wire counts as open until the first such event. A wire of datagrams is always open.
+    /// Whether the wire is open, as it is until the first such event. Datagram wires always are.
     Wire(bool),
-    /// Bytes on the wire of a sensor, by its number in [`crate::drivers::sensors`].
+    /// Bytes from a sensor, by its number in [`crate::drivers::sensors`].
     Sensor(u8, #[serde(with = "serde_bytes")] &'a [u8]),
-    /// Whether the wire of a sensor is open now.
+    /// Whether a sensor's wire is open.
     SensorWire(u8, bool),
-    /// A command from the controller.
+    /// Command from the controller.
     Command(#[serde(with = "inputs::sample")] CommandSample),
-    /// The supervisor's directive: an order, and the reason for not driving.
+    /// Supervisor's order, and why not to drive.
     Order(Order, HoldReason),
-    /// The supervisor's limit in lockstep: the last tick that may begin, and the number of the current target.
+    /// Supervisor's limit in lockstep: last tick allowed, and current target.
     TickLimit { last_tick: u64, target_number: u64 },
     /// Time passed without input.
     Quiet,
-    /// An operator's request at the link.
+    /// Operator's request at the link.
     Operator(Request),
-    /// The driver's state of the link before.
+    /// Driver state of the previous link.
     Remember(Memory),
-    /// The process has time to publish the newest telemetry.
+    /// Time to publish the newest telemetry.
     Telemetry,
-    /// The process ends.
+    /// End of the process.
     End,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     Send(Vec<u8>),
-    /// To the sensor of this number.
+    /// Bytes for a sensor, by number.
     SendSensor(u8, Vec<u8>),
-    /// `ranges` come first, since `wheels` wakes the pipeline.
+    /// Start of a tick. `ranges` come first, since `wheels` wakes the pipeline.
     Tick {
         tick: u64,
         time: MissionTime,
         ranges: Vec<RangeReading>,
         scans: Vec<LaserScan>,
-        /// The turn since the tick before, by the robot's own gyro.
+        /// Turn since the last tick by the robot's gyro.
         turn: Option<TurnSample>,
         wheels: WheelSample,
-        /// The counts of `wheels` without their cycle, of a robot that has no counter.
+        /// Unwrapped counts of a robot without a counter.
         endless: Option<CountsSample>,
         contact: Option<ContactSample>,
         response: Option<Box<BaseResponseSample>>,
     },
     Answered {
-        /// The tick's beginning on the monotonic clock, nanoseconds.
+        /// Start on the monotonic clock, nanoseconds.
         began_ns: u64,
     },
-    /// A tick begins beyond the supervisor's limit, which did not rise in time.
+    /// Tick begun beyond the supervisor's limit, which did not rise in time.
     Unlimited {
         tick: u64,
     },
-    /// The stops that follow are separate effects.
+    /// New decision. The stops that follow are separate effects.
     Decided {
         before: Decision,
         now: Decision,
     },
     Connected(bool),
     Restarted,
-    /// Counts jumped farther than wheels turn, and continue from there.
+    /// Counts that continue after an impossible jump.
     CountsElsewhere,
-    /// The robot did not stop, so this next method was used.
+    /// Next stop method, because the robot did not stop.
     StopBy(&'static str),
-    /// The base answers otherwise than stated, in these words.
+    /// Description of a response that differs from the stated one.
     FoundResponse(String),
-    /// A message is none of the protocol, for this reason.
+    /// Why a message violates the protocol.
     Refused(Refusal),
-    /// The speed of the robot's clock over mission time's.
+    /// Robot clock relative to mission time.
     ClockRate(f64),
     AskedForStreams,
     Infrared(InfraredSample),

@@ -1,4 +1,4 @@
-//! The part of the step that polls a robot which says nothing unasked, and says when the step is due without input.
+//! Polls of robots that send only on request, and due times without input.
 
 use std::time::Duration;
 
@@ -8,14 +8,14 @@ use super::{Effect, Link};
 use crate::failsafe::monitor::Moment;
 
 impl Link {
-    /// Mission time until the next poll or repeated command; none if neither depends on time.
+    /// Returns mission time until the next poll or repeat; none if neither is pending.
     pub(crate) fn until_due(&self, now: MissionTime) -> Option<Duration> {
         let polls = self.polls_by_time().then(|| self.polls.until_next(now));
         let repeat = self.repeat.map(|repeat| repeat.due.since(now));
         polls.into_iter().chain(repeat).min()
     }
 
-    /// Whether the robot drives, and goes on as it does if nothing comes until `then`.
+    /// Returns whether the robot drives, and keeps doing so without input until `then`.
     pub(crate) fn is_calm_until(&self, then: Moment) -> bool {
         !self.in_ticks()
             && !self.decision.stops()
@@ -33,7 +33,7 @@ impl Link {
         self.base.is_polled() && !self.in_ticks() && self.monitors().presence.is_wire_open()
     }
 
-    /// The robot waits for commands and pings in lockstep: it is polled after each, and begins one tick however many came.
+    /// Polls in lockstep after each command and ping; the robot begins one tick however many came.
     pub(super) fn poll_in_ticks(&mut self, effects: &mut Vec<Effect>) {
         if self.base.is_polled() && self.in_ticks() {
             self.due = self.due.min(1);

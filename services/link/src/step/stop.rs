@@ -1,4 +1,4 @@
-//! The part of the step that stops the robot.
+//! Handling of stops.
 
 use std::time::Duration;
 
@@ -15,14 +15,14 @@ impl Link {
         self.failsafe.decide(self.in_ticks(), self.moment(now_ns))
     }
 
-    /// Stop the robot when it must not move. In lockstep the link only passes no command, which stops mission time, so a run continues
-    /// as if it had not been held.
+    /// Stops the robot when it must not move. In lockstep the link only withholds commands: mission
+    /// time stands still, so the run continues as if never held.
     pub(super) fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         self.observe(Observation::Time, now_ns);
         let now = self.decide(now_ns);
         let before = std::mem::replace(&mut self.decision, now);
         if now.cause == Cause::AnotherCommander {
-            // The wheels obey the other.
+            // The wheels obey the other commander.
             let now = self.moment(now_ns);
             self.failsafe.monitors.odometry.observe(&Observation::Resumed, now);
         }
@@ -32,7 +32,7 @@ impl Link {
                 if self.failsafe.applied(Cause::OperatorStop) {
                     self.stood = Some(self.now);
                 }
-                // The robot may still drive by a command of an earlier link.
+                // The robot may still obey a command of an earlier link.
                 let new = !before.stops()
                     || self.stop_sent_ns.is_none() && self.monitors().presence.is_wire_open();
                 self.send_stop(new, now_ns, effects);
@@ -43,7 +43,7 @@ impl Link {
         }
     }
 
-    /// `counts` are counts/s.
+    /// Sends speeds, counts/s.
     pub(super) fn tell(
         &mut self,
         counts: [i16; 2],
@@ -52,14 +52,14 @@ impl Link {
         effects: &mut Vec<Effect>,
     ) {
         if self.monitors().stop.method() > 0 && counts != [0, 0] {
-            // Another method than velocity may have stopped the robot, which needs its settings again.
+            // Another stop method may have changed the robot's settings.
             effects.push(Effect::Send(self.base.greeting()));
         }
         self.commanded(counts, now_ns);
         effects.push(Effect::Send(self.base.velocity(counts, limit)));
     }
 
-    /// Several times when it is new, then at intervals.
+    /// Sends copies of a new stop, then repeats it at intervals.
     pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         if new {
             effects.extend(self.final_stops());
@@ -71,7 +71,7 @@ impl Link {
             effects
                 .push(Effect::StopBy(self.other_stop().map_or("velocity 0", |other| other.name)));
         } else if self.failsafe.applied(Cause::RobotDoesNotStop) {
-            // The last method needs time to have an effect.
+            // The last method needs time to take effect.
             return;
         } else if self.is_stop_due(now_ns) {
             effects.push(Effect::Send(self.stop()));
@@ -82,7 +82,7 @@ impl Link {
         self.stop_sent_ns = Some(now_ns);
     }
 
-    /// A robot that nobody hears may hear: it gets a stop with each ping.
+    /// Returns whether a stop is due. A silent robot may receive, so it gets one with each ping.
     fn is_stop_due(&self, now_ns: u64) -> bool {
         match self.connected() {
             true => passed(self.stop_sent_ns, now_ns, STOP_AGAIN),
@@ -96,9 +96,9 @@ impl Link {
         self.restart.commanded(counts, self.now);
     }
 
-    /// None for velocity 0, which is the first method and follows the last.
+    /// Returns None for velocity 0, the first method, which also follows the last.
     pub(super) fn other_stop(&self) -> Option<StopMethod> {
-        // Mostly nothing is to be encoded.
+        // Usually nothing needs encoding.
         let method = Some(self.monitors().stop.method()).filter(|method| *method > 0)?;
         let mut others = self.base.other_stops();
         let method = method % (others.len() + 1);

@@ -17,7 +17,7 @@ const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 142_857_142;
 
 fn mission() -> Mission {
-    // The X80 has 1200 counts a turn, its left wheel on channel 0, reversed, and its right wheel on channel 1.
+    // X80: 1200 counts per turn, left wheel on channel 0, reversed, right wheel on channel 1.
     let text = "target = [3, 0]\nsensors = 'front'";
     Mission::parse(text, Path::new("test.toml")).unwrap()
 }
@@ -40,7 +40,7 @@ fn on_the_wall() -> Link {
     link
 }
 
-/// Takes an event at a reading of the machine's clock, which on the wall clock began with the mission.
+/// Events at machine-clock readings; wall-clock missions begin at 0.
 trait At {
     fn at(&mut self, event: Event<'_>, machine_ns: u64) -> Vec<Effect>;
 }
@@ -55,7 +55,6 @@ impl At for Link {
     }
 }
 
-/// A datagram of the robot with a sonar byte and the counts of two channels.
 fn datagram(sonar: u8, channel_0: u16, channel_1: u16) -> Vec<u8> {
     let mut standard = StandardSensors::default();
     standard.ultrasonic[1] = sonar;
@@ -80,7 +79,6 @@ fn command(tick: u64, time_ns: u64, left: f64, right: f64) -> CommandSample {
     }
 }
 
-/// A link whose robot answers, and which is ordered to drive.
 fn driving(mut link: Link) -> Link {
     link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
     link.at(Event::Order(Order::Drive, HoldReason::None), 0);
@@ -133,7 +131,7 @@ fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
     assert_eq!((first.len(), &first[0]), (1 + STOPS as usize, &ping), "{first:?}");
     assert_eq!(sent(&link.at(Event::Quiet, 100 * MS)), []);
     let again = sent(&link.at(Event::Quiet, 200 * MS));
-    // A robot that is not heard may hear.
+    // A silent robot may still receive.
     assert_eq!((again.len(), &again[0]), (2, &ping), "{again:?}");
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 201 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
@@ -176,7 +174,7 @@ fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 7950 * MS);
     assert!(effects.contains(&Effect::Connected(true)));
     assert_eq!(link.absence(7960 * MS), Absence::default());
-    // When the robot is lost again, it is pinged at once and often.
+    // A robot lost again is pinged at once and often.
     let effects = link.at(Event::Quiet, 8700 * MS);
     assert!(effects.contains(&Effect::Connected(false)) && sent(&effects).contains(&ping));
     assert!(sent(&link.at(Event::Quiet, 8900 * MS)).contains(&ping));
@@ -193,7 +191,7 @@ fn a_robot_that_restarted_its_counts_is_noticed_and_set_up_again() {
     assert!(effects.contains(&Effect::Restarted));
     assert_eq!(ticks(&effects)[0].2.restarts, 1);
     assert_eq!(link.restarts(), 1);
-    // The same holds for a robot whose absence was not noticed.
+    // The same after an unnoticed absence.
     link.at(Event::Datagram(&datagram(255, 31_168, 1600)), 3500 * MS);
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3600 * MS);
     assert!(effects.contains(&Effect::Restarted));
@@ -215,7 +213,7 @@ fn a_robot_that_comes_back_with_its_counts_has_not_restarted() {
     assert_eq!(ticks(&effects)[0].2.restarts, 0);
 }
 
-/// The target of channel 1 and the time limit of each velocity command.
+/// Returns channel 1's target and the time limit of velocity commands.
 fn timed(effects: &[Effect]) -> Vec<(Option<i16>, Option<u16>)> {
     let motion = |command: Command| match command {
         Command::Motion(motion) => Some((motion.targets.of(1), motion.limit_ms)),
@@ -231,7 +229,7 @@ fn a_command_is_sent_again_once_halfway_to_the_next_tick_with_what_remains_of_it
     let turn = std::f64::consts::TAU;
     let effects = link.at(Event::Command(command(0, 10 * MS, turn, turn)), 12 * MS);
     assert_eq!(timed(&effects), [(Some(1200), Some(250))]);
-    // The command is repeated half of 142.9 ms after the tick.
+    // Repeated half of 142.9 ms after the tick.
     assert_eq!(timed(&link.at(Event::Quiet, 81 * MS)), []);
     let effects = link.at(Event::Quiet, 90 * MS);
     assert_eq!(timed(&effects), [(Some(1200), Some(170))]);
@@ -301,7 +299,7 @@ fn a_tick_has_the_infrared_counts_that_came_with_it_and_the_next_without_any_has
 
 #[test]
 fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
-    // The link before this one was killed, and the robot ignores the time limit of its last command.
+    // The previous link was killed, and the robot ignores its last command's limit.
     let mut link = on_the_wall();
     let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
     assert_eq!(velocities(&effects), [[Some(0), Some(0)]; STOPS as usize]);
@@ -333,7 +331,7 @@ fn a_command_from_the_future_moves_nothing() {
 #[test]
 fn a_tick_carries_the_newest_sonar_and_forward_counts() {
     let mut link = driving(on_the_wall());
-    // Channel 0 counts down when driving forward: 32768 - 100 there is 100 counts forward.
+    // Channel 0 counts down driving forward: 32768 - 100 is 100 counts forward.
     let effects = link.at(Event::Datagram(&datagram(80, 32_668, 250)), 10 * MS);
     let [(tick, ranges, wheels)] = &ticks(&effects)[..] else {
         panic!("{effects:?}");
@@ -357,7 +355,7 @@ fn a_motor_frame_alone_makes_a_tick_without_a_reading() {
 fn a_command_reaches_the_wheels_signed_timed_and_in_counts() {
     let mut link = driving(on_the_wall());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    // A turn a second is 1200 counts/s, below the top speed of 2247.
+    // One turn per second: 1200 counts/s, below the top speed of 2247.
     let turn = std::f64::consts::TAU;
     let effects = link.at(Event::Command(command(0, 10 * MS, turn, -0.5 * turn)), 11 * MS);
     assert_eq!(velocities(&effects), [[Some(-1200), Some(-600)]]);
@@ -373,7 +371,7 @@ fn no_number_moves_no_wheel() {
     let mut link = driving(on_the_wall());
     link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
     let effects = link.at(Event::Command(command(0, 10 * MS, f64::NAN, 1e300)), 11 * MS);
-    // NaN becomes 0, and other speeds are limited to the top speed of 1 m/s.
+    // NaN becomes 0; other speeds are limited to 1 m/s.
     assert_eq!(velocities(&effects), [[Some(0), Some(2247)]]);
 }
 
@@ -423,7 +421,7 @@ fn a_robot_that_another_host_commands_is_told_to_stand_after_each_acknowledgemen
     let mut acknowledged = Vec::new();
     Report::System(SystemSignal::Ack).encode(Addressing::default(), &mut acknowledged);
     let mut causes = Vec::new();
-    // The robot was found at 0 s. It acknowledges what it is sent, and from 5 s on commands of another host.
+    // The robot, found at 0 s, acknowledges another host's commands too from 5 s on.
     for (tick, ms) in (0..100).map(|tick| (tick, 100 * (tick + 1))) {
         let mut effects = link.at(Event::Datagram(&datagram(255, 0, 0)), ms * MS);
         effects.extend(link.at(Event::Order(Order::Drive, HoldReason::None), ms * MS));

@@ -1,4 +1,4 @@
-//! The part of the step that hears the robot and follows its presence.
+//! Handling of the robot's messages and presence.
 
 use std::time::Duration;
 
@@ -12,7 +12,7 @@ use common::{
 use super::{Effect, Link, PING_EVERY, passed};
 use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
 
-/// Pause between logs of refused messages, and the letters of a reason that are logged.
+/// Log interval of refused messages, and logged characters of a reason.
 const REFUSED_AGAIN: Duration = Duration::from_secs(1);
 const LONGEST_REFUSAL: usize = 200;
 
@@ -20,7 +20,7 @@ impl Link {
     pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
         self.failsafe.monitors.presence.wire(open);
         self.base.reset();
-        // What was sent to a closed wire is lost.
+        // Bytes for a closed wire are lost.
         self.stop_sent_ns = None;
         self.due = 0;
         if !open {
@@ -28,7 +28,7 @@ impl Link {
         }
     }
 
-    /// A sensor says nothing of the robot's motion or presence.
+    /// Takes a sensor's bytes, which say nothing about the robot's motion or presence.
     pub(super) fn take_sensor(
         &mut self,
         number: u8,
@@ -59,7 +59,7 @@ impl Link {
             && passed(self.refused_ns, now_ns, REFUSED_AGAIN)
         {
             self.refused_ns = Some(now_ns);
-            // The reason may quote the device, which may send any text.
+            // The reason may quote arbitrary text.
             let clean = |letter: char| if letter.is_control() { '?' } else { letter };
             let [input, what, remedy] = [why.input, why.what, why.remedy]
                 .map(|text| text.chars().take(LONGEST_REFUSAL).map(clean).collect());
@@ -81,7 +81,8 @@ impl Link {
             self.observe(Observation::Commander(commander), now_ns);
         }
         let is_told = self.failsafe.monitors.commander.take_told();
-        // The robot obeys the newest command: at another commander's first one the failsafe stops it, below.
+        // The robot obeys the newest command, so each of another commander gets a stop. At the
+        // first one, the failsafe stops it below.
         if (is_told || heard.commander.is_some_and(|commander| commander.moves))
             && self.decision.stops()
             && !self.in_ticks()
@@ -105,7 +106,7 @@ impl Link {
         }
         if (restarted || counts == Some(Counts::Elsewhere)) && self.connected() && !self.in_ticks()
         {
-            // A restarted robot has its default settings.
+            // A restarted robot has default settings.
             effects.push(Effect::Send(self.base.greeting()));
         }
         self.take_power(&heard, now_ns, effects);
@@ -118,7 +119,7 @@ impl Link {
             self.observe(Observation::Found { again }, now_ns);
             effects.push(Effect::Connected(true));
             effects.push(Effect::Send(self.base.greeting()));
-            // The robot may still drive by a command of an earlier link.
+            // The robot may still obey an earlier link's command.
             self.stop_sent_ns = None;
             if self.in_ticks() && self.base.is_polled() {
                 // Its answer to a ping has no motion, and it was not polled yet.
@@ -129,7 +130,8 @@ impl Link {
             }
         }
         if counts == Some(Counts::Implausible) {
-            // These counts start no tick: the robot stands until its motion is known again, so that little of it is lost.
+            // No tick starts here. The robot stands until its motion is known again, to lose little
+            // of it.
             self.repeat = None;
             self.tell([0, 0], self.limit, now_ns, effects);
         } else if let Some(motion) = motion {
@@ -137,8 +139,9 @@ impl Link {
         }
     }
 
-    /// In lockstep all counts are plausible, because a simulated robot does not restart. There the motion is judged once, as its tick begins:
-    /// how many more frames come depends on the machine.
+    /// Classifies counts. In lockstep all are plausible, because a simulated robot does not
+    /// restart. Its motion is judged as a tick begins, because the number of further frames depends
+    /// on the machine.
     fn judge_counts(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) -> Counts {
         if self.in_ticks() {
             return Counts::Follow;
@@ -162,7 +165,7 @@ impl Link {
         }
     }
 
-    /// In lockstep the motion that begins a tick shows contacts, the wheels' shares, and a response that is not stated.
+    /// Judges a lockstep tick's motion: contacts, wheel shares, and an unstated response.
     pub(super) fn judge_tick(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) {
         let now = self.moment(now_ns);
         let odometry = &mut self.failsafe.monitors.odometry;
@@ -174,7 +177,7 @@ impl Link {
         }
     }
 
-    /// `own_wire` is the time at which readings came that did not come with the robot's motion.
+    /// Takes readings, which came at `own_wire` if apart from the robot's motion.
     fn take_readings(&mut self, heard: &mut Heard, own_wire: Option<MissionTime>, now_ns: u64) {
         if let Some(stamp_ns) = heard.motion.and_then(|motion| motion.stamp_ns) {
             self.stamped = Some((stamp_ns, self.now));
@@ -218,7 +221,8 @@ impl Link {
 
     pub(super) fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
         let silent = self.monitors().presence.is_silent(now_ns);
-        // A robot that waits for a command is not lost: if its next motor frame is missing, a datagram was lost.
+        // A robot that waits for a command is present: if its next motor frame is missing, a
+        // datagram was lost.
         let owes = self.ordered_to_drive() && self.open.is_none();
         if silent && !self.in_ticks() {
             self.lose(now_ns, effects);
@@ -253,7 +257,7 @@ impl Link {
     }
 }
 
-/// The robot's own counts wrap as on the wire; those of a robot that reports angles are endless.
+/// Returns wire-cyclic counts, or endless ones of reported angles.
 fn cyclic(motion: &Motion) -> WheelCounts {
     match WheelCounts::of(&motion.wheels, motion.endless.as_ref()) {
         WheelCounts::Cyclic(counts) => counts.map(|count| count % COUNT_CYCLE).into(),

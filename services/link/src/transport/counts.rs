@@ -1,19 +1,19 @@
-//! The counts of a transport.
+//! Counts of a transport.
 
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
-    /// Dropped, because they came from another address than the robot's.
+    /// Datagrams dropped because their sender is not the robot's address.
     pub foreign_datagrams: u64,
-    /// The first dropped datagram's from the robot's host; 0 for none.
+    /// Port of the first dropped datagram from the robot's host; 0 for none.
     pub other_port: u16,
-    /// Lost, because the wire did not accept them.
+    /// Messages that the wire did not accept.
     pub unsent: u64,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Attempts {
-    /// Counted since the robot last sent something.
+    /// Attempts since the robot last sent something.
     pub made: u64,
-    /// 0 during an attempt.
+    /// Time to the next attempt; 0 during one.
     pub next_ns: u64,
 }

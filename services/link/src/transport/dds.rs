@@ -1,9 +1,10 @@
-//! Topics of ROS 2: the robot's are read, and its commands written.
+//! ROS 2 topics: reads the robot's, and writes its commands.
 //!
-//! A received piece is one message: the row of its topic in [`Topics`] and its payload. Others' commands are read too, with the number
-//! of their writer before the payload. Two publishers of odometry are a piece of their own, too. A killed link writes nothing, so it is no other writer, however long the network remembers it.
-//! Readers are best-effort and volatile, so they match every publisher. At most [`DEPTH`] messages of a topic wait; older ones are
-//! dropped.
+//! A received piece is one message: its row in [`Topics`] and its payload. Other nodes' commands
+//! have their writer's number before the payload, and two odometry publishers yield their own
+//! piece. A killed link writes nothing, so it counts as no other writer however long the network
+//! remembers it. Readers are best-effort and volatile, so they match every publisher. At most
+//! [`DEPTH`] messages of a topic wait; older ones are dropped.
 
 use std::{
     io,
@@ -20,9 +21,10 @@ use super::{Wire, counts::Tally};
 
 const DEPTH: u16 = 16;
 
-/// A participant may be cut off after such a silence, and joins anew.
+/// Silence that suggests a cut-off participant, which then rejoins.
 const DEAF_NS: u64 = 2_000_000_000;
-/// A participant that has heard nothing yet waits longer: over a slow network, others discover it late.
+/// Silence before the first message that makes a participant rejoin. Discovery takes long on a slow
+/// network.
 const UNDISCOVERED_NS: u64 = 10_000_000_000;
 
 #[derive(Debug)]
@@ -33,7 +35,7 @@ pub(super) struct Dds {
     commands: Option<usize>,
     odometry: Option<usize>,
     publishers: Publishers,
-    /// The reader that is asked next, so that a flood on one topic does not hold back others.
+    /// Next reader, so that a flood on one topic does not hold back others.
     next: usize,
     heard_ns: Option<u64>,
     joined_ns: Option<u64>,
@@ -42,7 +44,7 @@ pub(super) struct Dds {
 }
 
 impl Dds {
-    /// Fails when the library gives no participant.
+    /// Opens the topics. Fails when the library gives no participant.
     pub(super) fn open(domain: u16, topics: Topics) -> io::Result<Self> {
         let participant = Participant::join(domain, None)?;
         let (readers, writer) = endpoints(&participant, &topics)?;
@@ -82,7 +84,7 @@ impl Wire for Dds {
         Ok(())
     }
 
-    /// Copies the next message, after its topic's row, into `buffer`.
+    /// Copies the next message after its row.
     fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> io::Result<Option<usize>> {
         self.participant.unring();
         let count = self.readers.len();
@@ -94,7 +96,7 @@ impl Wire for Dds {
             self.heard_ns = Some(now_ns);
             let writer = if self.commands == Some(row) { &from[..] } else { &[] };
             let is_odometry = self.odometry == Some(row);
-            // The message that shows two publishers is left out for the piece that names them.
+            // The piece that names two publishers replaces the message that shows them.
             let two = is_odometry.then(|| self.publishers.take(from, now_ns)).flatten();
             let piece = two.unwrap_or_else(|| [&[row as u8], writer, &payload].concat());
             let length = piece.len().min(buffer.len());

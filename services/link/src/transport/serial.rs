@@ -1,7 +1,7 @@
-//! A serial line: 8 data bits, no parity, 1 stop bit, no translation. rustix opens it, because
-//! the waiter needs a `BorrowedFd`, which the crate `serialport` gives only by `unsafe`.
+//! Serial line: 8 data bits, no parity, 1 stop bit, no translation.
 //!
-//! `unsafe` is needed for one request to the line that rustix does not have: it lowers DTR.
+//! rustix opens it, because the waiter needs a `BorrowedFd`, which `serialport` gives only by
+//! `unsafe`. Lowering DTR needs `unsafe`, because rustix lacks that request.
 
 #![allow(unsafe_code)]
 
@@ -36,11 +36,12 @@ impl Serial {
     }
 }
 
-/// A line without DTR, such as a pseudo-terminal, stays as it is.
+/// Lowers DTR, if the line has it; pseudo-terminals do not.
 fn lower_dtr(line: &OwnedFd) {
     const TIOCMBIC: Opcode = 0x5417;
     const TIOCM_DTR: i32 = 0x002;
-    // SAFETY: Linux reads an `int` for this request, by the header `asm-generic/termios.h`, and writes nothing.
+    // SAFETY: Linux reads an `int` for this request, by the header `asm-generic/termios.h`, and
+    // writes nothing.
     let lowered = unsafe { ioctl(line, Setter::<TIOCMBIC, _>::new(TIOCM_DTR)) };
     if let Err(error) = lowered {
         tracing::debug!(%error, "DTR stays as it is");
@@ -54,7 +55,7 @@ impl fmt::Display for Serial {
 }
 
 impl Dial for Serial {
-    /// A silent line is not reopened: the system reports an unplugged adapter.
+    /// Silence is fine: the system reports an unplugged adapter.
     const SILENCE: Option<Duration> = None;
 
     fn dial(&self) -> io::Result<OwnedFd> {
@@ -63,8 +64,8 @@ impl Dial for Serial {
         if !isatty(&line) {
             return Err(Errno::NOTTY.into());
         }
-        // The lock ends with this process. TIOCEXCL would outlast a killed one while any process has the line open, and refuse the
-        // successor.
+        // The lock ends with this process. TIOCEXCL would outlast a killed one while any process
+        // holds the line, and refuse the successor.
         flock(&line, FlockOperation::NonBlockingLockExclusive)?;
         let mut settings = tcgetattr(&line)?;
         settings.make_raw();
@@ -74,13 +75,13 @@ impl Dial for Serial {
             | ControlModes::CSTOPB
             | ControlModes::CRTSCTS;
         settings.control_modes.remove(flow);
-        // An Arduino restarts when DTR rises. Without HUPCL it stays high when this process ends, so the stop guard and the next link do
-        // not restart the board.
+        // An Arduino restarts when DTR rises. Without HUPCL it stays high after this process, so
+        // the stop guard and the next link do not restart the board.
         settings.control_modes.remove(ControlModes::HUPCL);
-        // CLOCAL ignores modem lines, so three wires are enough.
+        // CLOCAL ignores modem lines: three wires suffice.
         let eight = ControlModes::CS8 | ControlModes::CLOCAL | ControlModes::CREAD;
         settings.control_modes.insert(eight);
-        // A read without bytes fails with EAGAIN; with VMIN = 0 it would return 0, the end of the line.
+        // An empty read fails with EAGAIN; with VMIN = 0 it would return 0, the end of the line.
         settings.special_codes[SpecialCodeIndex::VMIN] = 1;
         settings.special_codes[SpecialCodeIndex::VTIME] = 0;
         tcsetattr(&line, OptionalActions::Now, &settings)?;
@@ -97,7 +98,7 @@ impl Dial for Serial {
     }
 
     fn abandon(&self, line: &OwnedFd) {
-        // An error means that the line is gone, with nothing to discard.
+        // An error means that the line is gone.
         let _ = tcflush(line, QueueSelector::IOFlush);
     }
 }

@@ -1,9 +1,9 @@
-//! A connection or serial line, reopened whenever it closes.
+//! Connection or serial line that is reopened whenever it closes.
 //!
-//! Frames are sent whole, because a partial one would corrupt the next. If the system accepts part of a message, the rest goes first,
-//! and messages meanwhile are lost.
+//! Frames are sent whole, because a partial one corrupts the next. After a partial write the rest
+//! goes first, and messages meanwhile are lost.
 //!
-//! The stream's descriptor changes, and a waiter needs one that stays: an epoll descriptor, readable when the present one is ready.
+//! A waiter needs a constant descriptor, so it gets an epoll one that follows the stream's.
 
 use std::{
     fmt, io,
@@ -23,24 +23,24 @@ use super::{
 };
 use crate::backoff::{Backoff, has_passed};
 
-/// The first pause is short, so that a robot that only restarts its network is found at once.
+/// Short, so that a robot that restarts its network is found at once.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
-/// It is also the longest wait for a robot that answers again.
+/// Longest wait for a robot that answers again.
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
-/// An attempt is given up after this: a robot that is off does not answer.
+/// Time limit of an attempt, as a robot that is off stays silent.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) trait Dial: fmt::Display + fmt::Debug {
-    /// An open stream counts as closed after this; none if the system reports that.
+    /// Silence of a dead stream; none if the system reports that.
     const SILENCE: Option<Duration>;
 
-    /// Start to open, without waiting. Fails when the system refuses.
+    /// Starts opening without waiting. Fails when the system refuses.
     fn dial(&self) -> io::Result<OwnedFd>;
 
-    /// Check that the writable `descriptor` is connected. Fails when it is not.
+    /// Checks that a writable `descriptor` is connected. Fails otherwise.
     fn finish(&self, descriptor: &OwnedFd) -> io::Result<()>;
 
-    /// Discard unsent bytes, so that closing does not wait for them.
+    /// Discards unsent bytes, so that closing does not wait.
     fn abandon(&self, descriptor: &OwnedFd);
 }
 
@@ -147,8 +147,8 @@ impl<D: Dial> Wire for Stream<D> {
             Ok(0) => self.close(&io::ErrorKind::UnexpectedEof.into()),
             Ok(length) => {
                 *heard_ns = now_ns;
-                // Only received bytes reset the pauses: a peer that closes each connection at once must not be called ten times a
-                // second.
+                // Only received bytes reset the pauses. Otherwise a peer that closes each
+                // connection would be called ten times a second.
                 self.backoff.reset();
                 self.down = None;
                 return Ok(Some(length));
@@ -223,7 +223,7 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    /// The epoll descriptor drops a closed one by itself.
+    /// Closes the stream, whose descriptor leaves the epoll one.
     fn close(&mut self, error: &io::Error) {
         self.log(error);
         if let State::Opening { descriptor, .. } | State::Open { descriptor, .. } =
@@ -235,7 +235,7 @@ impl<D: Dial> Stream<D> {
     }
 
     fn log(&mut self, error: &io::Error) {
-        // The end of a stream has no error number: EPIPE.
+        // The end of a stream has no error number; EPIPE stands for it.
         let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
         if self.down.replace(errno) != Some(errno) {
             let remedy = remedy(errno);

@@ -1,4 +1,4 @@
-//! A TCP connection to the robot or its radio module.
+//! TCP connection to the robot or its radio module.
 
 use std::{fmt, io, net::SocketAddr, os::fd::OwnedFd, time::Duration};
 
@@ -12,8 +12,8 @@ use rustix::{
 
 use super::stream::Dial;
 
-/// The system does not report that the other end was switched off. The slowest robot of a mission sends every 2 s, and answers pings at
-/// once.
+/// The system does not report a peer that was switched off. The slowest robot sends every 2 s, and
+/// answers pings at once.
 const SILENCE: Duration = Duration::from_secs(5);
 
 #[derive(Debug)]
@@ -48,15 +48,15 @@ impl Dial for Tcp {
 
     fn finish(&self, socket: &OwnedFd) -> io::Result<()> {
         sockopt::socket_error(socket)??;
-        // A socket can connect to itself if nobody listens on this port of this machine.
+        // A socket can connect to itself on a port without a listener.
         if getpeername(socket)? == Some(getsockname(socket)?) {
             return Err(Errno::CONNREFUSED.into());
         }
-        // A command must not wait for the next.
+        // Commands go out at once.
         sockopt::set_tcp_nodelay(socket, true)?;
         Ok(())
     }
 
-    /// The system closes connections in the background.
+    /// Does nothing: the system closes connections in the background.
     fn abandon(&self, _: &OwnedFd) {}
 }

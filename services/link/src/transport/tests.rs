@@ -26,20 +26,17 @@ fn open_at(address: &Address) -> Result<Transport, TransportError> {
 
 const MS: u64 = 1_000_000;
 
-/// Wait until the descriptor is readable.
 fn ready(descriptor: impl AsFd) {
     let came = poll::is_readable(descriptor, Duration::from_secs(10)).unwrap();
     assert!(came, "nothing came");
 }
 
-/// Maintain the wire at `now_ns` until it reports the state `open`.
 fn maintain_until(transport: &mut Transport, open: bool, now_ns: u64) {
     while transport.maintain(now_ns).unwrap() != Some(open) {
         ready(&*transport);
     }
 }
 
-/// Receive at `now_ns` until the bytes `wanted` have come.
 fn expect(transport: &mut Transport, wanted: &[u8], now_ns: u64) {
     let mut came = Vec::new();
     while came.len() < wanted.len() {
@@ -51,7 +48,6 @@ fn expect(transport: &mut Transport, wanted: &[u8], now_ns: u64) {
     assert_eq!(came, wanted);
 }
 
-/// Receive at `now_ns` until the wire has closed.
 fn expect_closing(transport: &mut Transport, now_ns: u64) {
     while transport.is_open() {
         ready(&*transport);
@@ -71,7 +67,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     ready(&transport);
     assert_eq!(transport.receive(0).unwrap(), None);
     assert_eq!(transport.tally().foreign_datagrams, 1);
-    // The sender may be the robot, if the mission has a wrong port.
+    // It may be the robot, if the mission has a wrong port.
     let port = other.local_addr().unwrap().port();
     let trouble = transport.trouble().unwrap().to_string();
     assert!(trouble.contains(&format!("answers from port {port}; name that port")), "{trouble}");
@@ -146,7 +142,7 @@ fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
     assert_eq!(transport.maintain(0).unwrap(), Some(false));
     let (mut now, mut pauses) = (0, Vec::new());
     for _ in 0..7 {
-        // The connection is refused at once or a moment later, and the wire stays closed.
+        // Refused at once or a moment later; the wire stays closed.
         while transport.attempts(now).unwrap().next_ns == 0 {
             assert_eq!(transport.maintain(now).unwrap(), None);
         }
@@ -170,8 +166,8 @@ fn a_connection_without_a_word_is_taken_for_dead() {
     connected(&listener, &mut transport, 5000 * MS);
 }
 
-/// Send commands to a robot that does not read until some are lost. Then let it read, send more, and assert that it reads only
-/// complete frames.
+/// Sends to a robot that does not read until commands are lost. It then must read only complete
+/// frames, while more are sent.
 fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) -> Option<usize>) {
     let mut message = Vec::new();
     Command::velocity([Some(400), Some(-400)], 250).encode(Addressing::default(), &mut message);
@@ -196,7 +192,7 @@ fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) ->
         sent += 1;
     }
     assert_eq!(decoder.tally().bad_crc, 0, "half a frame went out");
-    // The last one is still on its way.
+    // The last one is in flight.
     assert_eq!(frames + 1, sent - transport.tally().unsent);
 }
 
@@ -209,7 +205,7 @@ fn a_connection_that_takes_no_more_loses_whole_frames_only() {
     overfill(&mut transport, |buffer| robot.read(buffer).ok());
 }
 
-/// The robot's end of a serial line, and a path of the other end that stays the same.
+/// Robot's end of a serial line, and a stable path to the other.
 struct Line {
     robot: OwnedFd,
     name: PathBuf,
@@ -296,7 +292,7 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     write(&line.robot, b"here").unwrap();
     expect(&mut transport, b"here", 0);
     std::fs::remove_file(&line.name).unwrap();
-    // The line hangs up when the last holder of the robot's end closes it.
+    // The line hangs up when the robot's end is closed.
     line.robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     expect_closing(&mut transport, 0);
     for now in [0, 100 * MS, 300 * MS] {
@@ -317,7 +313,7 @@ fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
     maintain_until(&mut first, true, 0);
     let mut second = open_at(&Address::Serial(line.name.clone())).unwrap();
     assert_eq!(second.maintain(0).unwrap(), Some(false));
-    // Another process has the line open all the time, as a simulated robot does.
+    // Another process holds the line, as a simulated robot does.
     let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
     drop(first);
     maintain_until(&mut second, true, 100 * MS);

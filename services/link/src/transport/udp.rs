@@ -18,10 +18,10 @@ pub(super) struct Udp {
 }
 
 impl Udp {
-    /// Binds any free port. Fails when the system refuses a socket.
+    /// Binds any free port. Fails when the system refuses.
     pub(super) fn open(robot: SocketAddr) -> io::Result<Self> {
         let any = match robot.ip() {
-            // A loopback socket receives nothing from other machines.
+            // Loopback sockets receive nothing from other machines.
             IpAddr::V4(ip) if ip.is_loopback() => IpAddr::V4(Ipv4Addr::LOCALHOST),
             IpAddr::V6(ip) if ip.is_loopback() => IpAddr::V6(Ipv6Addr::LOCALHOST),
             IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::UNSPECIFIED),
@@ -34,7 +34,7 @@ impl Udp {
 }
 
 impl Wire for Udp {
-    /// Those from other addresses are dropped and counted.
+    /// Drops and counts datagrams from other addresses.
     fn receive(&mut self, buffer: &mut [u8], _: u64) -> io::Result<Option<usize>> {
         loop {
             match self.socket.recv_from(buffer) {
@@ -62,7 +62,7 @@ impl Wire for Udp {
         match self.socket.send_to(bytes, self.robot) {
             Ok(_) => Ok(()),
             Err(error) if Errno::from_io_error(&error) == Some(Errno::BADF) => Err(error),
-            // A full queue, a firewall or a network that is down refuses it.
+            // Full queue, firewall, or network down.
             Err(_) => {
                 self.tally.unsent += 1;
                 Ok(())
@@ -81,7 +81,7 @@ impl Wire for Udp {
     }
 }
 
-/// The robot does not answer, or a signal came.
+/// Returns whether the robot is unreachable, or a signal came.
 fn is_passing(error: &io::Error) -> bool {
     matches!(
         error.kind(),

@@ -12,9 +12,9 @@ enum Happens {
     LinkEnds,
     LinkStarts,
     GuardIsKilled,
-    /// Commands reach the robot, or do not.
+    /// Whether commands reach the robot.
     Commands(bool),
-    /// Frames reach the host, or do not.
+    /// Whether frames reach the host.
     Frames(bool),
     SignedOff,
 }
@@ -40,12 +40,12 @@ struct World {
     moves: bool,
     commands: bool,
     frames: bool,
-    /// Motion was ordered, and nobody saw rest or signed it off since.
+    /// Motion was ordered, without rest or sign-off since.
     due: bool,
 }
 
 impl World {
-    /// The supervisor matters only by whether it starts a link.
+    /// Applies an event. Of the supervisor only starting a link matters.
     fn happen(&mut self, what: Happens) {
         match what {
             Drives if self.link => {
@@ -55,7 +55,7 @@ impl World {
             }
             LinkEnds => self.link = false,
             LinkStarts => self.link = true,
-            // A guard that orders and is killed leaves the mark, from which `firsthand stop` starts another.
+            // A killed guard leaves the mark, and `firsthand stop` starts another.
             GuardIsKilled if self.link => self.guard = false,
             Commands(pass) => self.commands = pass,
             Frames(pass) => self.frames = pass,
@@ -69,7 +69,7 @@ impl World {
         self.settle(false);
     }
 
-    /// The guard takes its role, and a link starts one that is missing.
+    /// Lets the guard take its role, and a link replace a missing guard.
     fn settle(&mut self, is_signed_off: bool) {
         self.guard |= self.link;
         let found = Found {
@@ -81,13 +81,13 @@ impl World {
         };
         if self.guard && found.role() == Role::Leaves {
             self.guard = false;
-            // A guard leaves for one of these.
+            // The guard leaves for one of these.
             self.mark &= !is_signed_off;
             self.due &= !is_signed_off;
         }
     }
 
-    /// Whoever orders the stop does, and looks at the encoders.
+    /// Orders the stop, if a process can, and checks the encoders.
     fn stop(&mut self) {
         if !self.link && !self.guard {
             return;

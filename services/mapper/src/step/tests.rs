@@ -54,12 +54,12 @@ fn mapper_of(mission: &str) -> Mapper {
     Mapper::new(&Mission::parse(mission, Path::new("test.toml")).unwrap())
 }
 
-/// D = 5 m, N = 50: Delta = 0.1 m, the origin in cell (25, 25). Sensor 0.2 m ahead.
+/// D = 5 m, N = 50: Delta = 0.1 m, the origin in cell (25, 25). The sensor is 0.2 m ahead.
 fn mapper(extra: &str) -> Mapper {
     of(&format!("mapper.margin_m = 0.15\n{extra}"), 0.1)
 }
 
-/// A mapper of the same place with cells of `cell_m` metres; `set` is the end of its mission file.
+/// Returns a mapper of the same place with other cells; `set` ends its mission file.
 fn of(set: &str, cell_m: f64) -> Mapper {
     mapper_of(&format!(
         "target = [1.5, 0.0]\nmethod = 'paper'\nperimeter = {{ width_m = 5, cells = {} }}\n\
@@ -103,7 +103,7 @@ fn equation_18_blocks_the_border_and_nothing_else() {
 
 #[test]
 fn equation_19_by_hand() {
-    // From (0.3, -0.2) facing y, S + offset = 0.5 + 0.2, so the hit is at (0.3, 0.5), cell (28, 30).
+    // From (0.3, -0.2) facing y, S + offset = 0.5 + 0.2: the hit is at (0.3, 0.5), cell (28, 30).
     let mut mapper = mapper("");
     let window = mapper.sense(at(0, 0.3, -0.2, FRAC_PI_2), &[echo(0.5)]);
     let want: Vec<_> = (29..=31).flat_map(|row| (27..=29).map(move |col| (col, row))).collect();
@@ -132,7 +132,8 @@ fn equation_19_takes_the_sensors_offset_along_its_bearing() {
 #[test]
 fn a_hit_just_outside_the_map_marks_the_part_of_its_margin_that_is_inside() {
     let mut mapper = mapper("");
-    // The hit is at (2.5, 0), the cell after the last; the margin is a cell, and the last one stays border.
+    // The hit is at (2.5, 0), one cell outside. The margin is a cell, and the last cell stays
+    // border.
     let outside = echo(0.5);
     mapper.sense(at(0, 1.8, 0.0, 0.0), &[outside]);
     assert_eq!(sensed(&mapper), []);
@@ -241,7 +242,7 @@ fn a_contact_is_hazard_where_the_body_touches_by_the_papers_method() {
     assert!(!mapper.is_hazard(0.0, -0.3) && !mapper.is_hazard(0.0, 0.0));
 }
 
-/// Send the robot to (x, 0) in `tick`. Returns how many cells changed.
+/// Sends the robot to (x, 0). Returns the number of changed cells.
 fn send(mapper: &mut Mapper, tick: u64, x: f64) -> usize {
     let (pose, target) = (at(tick, 0.0, 0.0, 0.0), Some(DVec2::new(x, 0.0)));
     mapper.give(Tick { pose, target, ..Tick::default() }).area()
@@ -253,14 +254,13 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
         let drum = "known.drum = [{ at = [-1.5, 0], radius_m = 0.2 }]";
         let text = format!("target = [1.5, 0.0]\nmethod = '{method}'\n{drum}");
         let mut mapper = mapper_of(&text);
-        // The place is in the margin of the drum; a list may name such a place beforehand.
+        // Listed targets may lie in a drum's margin.
         let margin = -1.25;
         assert_eq!(mapper.state_at(margin, 0.0), CellState::Known, "{method}");
         let version = mapper.state().version();
         assert_eq!(send(&mut mapper, 1, margin), 1, "{method}");
         assert!(!mapper.is_hazard(margin, 0.0), "{method}");
         assert_eq!(mapper.state().version(), version + 1, "{method}");
-        // The target survives the process.
         let mut restored = mapper.clone();
         restored.restore(mapper.state().clone()).unwrap();
         assert_eq!(restored.target(), DVec2::new(margin, 0.0));
@@ -288,7 +288,7 @@ fn zones_are_hazard_by_either_method_and_what_was_sensed_shows_again_without_the
         assert_eq!(set(&mut mapper, vec![zone(1.0)]), Change::Whole);
         assert!(!mapper.is_hazard(-0.75, -0.75), "{method}");
         assert_eq!(mapper.state_at(1.25, -0.75), CellState::Known);
-        // A target moves away from beside the zone, and its cell becomes hazard again.
+        // The target moves away from the zone, and its cell becomes hazard again.
         let tick = |target| Tick { target: Some(target), ..Tick::default() };
         mapper.give(tick(DVec2::new(1.25, -0.45)));
         assert!(!mapper.is_hazard(1.25, -0.45));

@@ -1,4 +1,4 @@
-//! `cargo run --example arrows` draws, on a small map, the direction in which the field leads from each free cell.
+//! `cargo run --example arrows` draws the direction of the field in each free cell of a small map.
 #![allow(clippy::print_stdout, reason = "a program for a terminal")]
 
 use harmonic::{Cancellation, Cell, Domain, Solver};

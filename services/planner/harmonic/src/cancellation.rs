@@ -1,4 +1,4 @@
-//! A flag by which one thread tells another that its solve is no longer wanted.
+//! Cancellation of a running solve from another thread.
 
 use std::sync::{
     Arc,
@@ -7,20 +7,21 @@ use std::sync::{
 
 use crate::SolveError;
 
-/// Cancels the solves it is handed to. Clones share one flag.
+/// Token that cancels the solves it is passed to.
+///
+/// Clones share one flag.
 #[derive(Clone, Debug, Default)]
 pub struct Cancellation(Arc<AtomicBool>);
 
 impl Cancellation {
-    /// A token nobody has cancelled yet.
+    /// Creates a token that is not cancelled.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Asks every solve that holds this token, or a clone of it, to stop soon with
-    /// [`SolveError::Cancelled`].
+    /// Makes every solve that holds this token or a clone stop soon with [`SolveError::Cancelled`].
     pub fn cancel(&self) {
-        // Relaxed: the flag carries no other data, and a solve that sees it a little later is only a little late.
+        // Relaxed is enough: the flag carries no other data, and a late read only delays the stop.
         self.0.store(true, Ordering::Relaxed);
     }
 

@@ -1,29 +1,31 @@
-//! A cell of a map, and a change to one.
+//! Cells of a map, and changes to them.
 
 /// Longest side of a map, in cells.
 pub const MAX_SIDE: usize = 16_384;
 
-/// A cell of the map, by column and row from 0.
+/// Cell of a map.
+///
+/// Column and row count from 0.
 #[derive(Clone, Copy, Debug, Eq, Hash, Ord, PartialEq, PartialOrd)]
 pub struct Cell {
-    /// Cells left of it.
+    /// Column index.
     pub col: usize,
-    /// Rows before its own.
+    /// Row index.
     pub row: usize,
 }
 
 impl Cell {
-    /// The cell at column `col` of row `row`.
+    /// Creates the cell at column `col` of row `row`.
     pub const fn new(col: usize, row: usize) -> Self {
         Self { col, row }
     }
 }
 
-/// A cell that became blocked or free since the field was solved.
+/// Cell that became blocked or free since the last solve.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub struct Change {
-    /// The cell that changed.
+    /// Changed cell.
     pub cell: Cell,
-    /// Whether the cell is blocked from now on.
+    /// New state: true for blocked.
     pub blocked: bool,
 }

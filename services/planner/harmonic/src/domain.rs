@@ -1,28 +1,34 @@
-//! The map a field is solved on: free and blocked cells, the target, the screening.
+//! Map that a field is solved on: blocked cells, target, screening and costs.
 
 use crate::{Cell, Change, MAX_SIDE, MIN_SCREENING_CELLS, Screening, SolveError, real::Real};
 
-/// A map of `width` x `height` cells with its target and screening, row-major: index = row * width + col.
+/// Map of `width` x `height` cells with its target, screening and costs.
 ///
-/// Cells outside the map count as blocked, so the rim of a map may be free.
+/// Arrays are row-major: index = row * width + col. Cells outside the map count as blocked, so
+/// cells at the rim may be free.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Domain {
     width: usize,
     height: usize,
     blocked: Vec<bool>,
-    /// The screening coefficient k of cells that cost 1.
+    /// Screening coefficient k of cells with cost 1.
     screening: f64,
-    /// The cost of each cell; none where all cost 1.
+    /// Cost of each cell; empty if all costs are 1.
     costs: Vec<f32>,
     target: Cell,
 }
 
 impl Domain {
-    /// A map without screening. `blocked` is row-major.
+    /// Creates a map without screening.
+    ///
+    /// `blocked` is row-major, with `width * height` values.
     ///
     /// # Errors
-    /// [`SolveError::MapEmpty`], [`SolveError::MapTooLarge`], [`SolveError::WrongLength`], [`SolveError::Outside`] and
-    /// [`SolveError::TargetBlocked`].
+    /// - [`SolveError::MapEmpty`] if a side is 0.
+    /// - [`SolveError::MapTooLarge`] if a side exceeds [`MAX_SIDE`] cells.
+    /// - [`SolveError::WrongLength`] if the length of `blocked` differs from `width * height`.
+    /// - [`SolveError::Outside`] if the target lies outside the map.
+    /// - [`SolveError::TargetBlocked`] if the target is blocked.
     pub fn new(
         width: usize,
         height: usize,
@@ -46,10 +52,10 @@ impl Domain {
         Ok(domain)
     }
 
-    /// Replaces the screening.
+    /// Replaces the screening, and with it the coefficient k of every cell.
     ///
     /// # Errors
-    /// [`SolveError::ScreeningLength`].
+    /// [`SolveError::ScreeningLength`] if the length is NaN or below [`MIN_SCREENING_CELLS`].
     pub fn with_screening(mut self, screening: &Screening) -> Result<Self, SolveError> {
         if let Screening::Uniform { length, cell } = screening {
             check_length(length / cell)?;
@@ -58,12 +64,18 @@ impl Domain {
         Ok(self)
     }
 
-    /// Makes some cells dearer than others: the screening length of a cell is that of the map divided by its cost. In the limit
-    /// of short screening lengths the field leads along the way of the least sum of costs; without screening costs change nothing.
-    /// Row-major, from 0 on; they are checked against the screening that the map has by then.
+    /// Sets the cost of each cell: the screening length of a cell becomes that of the map divided
+    /// by its cost.
+    ///
+    /// `costs` is row-major, with values from 0 up. For short screening lengths, the field
+    /// approaches the path with the least sum of costs. Without screening, costs have no effect.
+    /// They are checked against the current screening, so call
+    /// [`with_screening`](Self::with_screening) first.
     ///
     /// # Errors
-    /// [`SolveError::WrongLength`], and [`SolveError::ScreeningLength`] for a cost that is not a number or makes a length too short.
+    /// - [`SolveError::WrongLength`] if the length of `costs` differs from the number of cells.
+    /// - [`SolveError::ScreeningLength`] if a cost is NaN or negative, or makes a length shorter
+    ///   than [`MIN_SCREENING_CELLS`].
     pub fn with_costs(mut self, costs: Vec<f32>) -> Result<Self, SolveError> {
         let expected = self.blocked.len();
         if costs.len() != expected {
@@ -77,9 +89,11 @@ impl Domain {
 
     /// Blocks or frees cells.
     ///
+    /// An error leaves the map unchanged.
+    ///
     /// # Errors
-    /// [`SolveError::Outside`], and [`SolveError::TargetBlocked`] when the target itself would be blocked; the map is
-    /// then unchanged.
+    /// - [`SolveError::Outside`] if a cell lies outside the map.
+    /// - [`SolveError::TargetBlocked`] if a change blocks the target.
     pub fn apply(&mut self, changes: &[Change]) -> Result<(), SolveError> {
         for change in changes {
             self.checked_index(change.cell, "a changed cell")?;
@@ -94,44 +108,45 @@ impl Domain {
         Ok(())
     }
 
-    /// Cells along a row.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Cells along a column.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The target's cell; it is free.
+    /// Returns the cell of the target, which is free.
     pub fn target(&self) -> Cell {
         self.target
     }
 
-    /// The mask of blocked cells, row-major.
+    /// Returns the mask of blocked cells, row-major.
     pub fn blocked(&self) -> &[bool] {
         &self.blocked
     }
 
-    /// Whether `cell` is blocked or outside the map.
+    /// Returns whether `cell` is blocked or outside the map.
     pub fn is_blocked(&self, cell: Cell) -> bool {
         cell.col >= self.width || cell.row >= self.height || self.blocked[self.index(cell)]
     }
 
-    /// The screening coefficient k of cells that cost 1.
+    /// Returns the screening coefficient k of cells with cost 1: (h / (2 L))^2 for cells of side h.
     pub fn screening_coefficient(&self) -> f64 {
         self.screening
     }
 
-    /// The screening coefficient k of the cell with this row-major index.
+    /// Returns the screening coefficient k of the cell at row-major `index`: the map's k times the
+    /// squared cost.
     pub fn screening_of(&self, index: usize) -> f64 {
         self.costs
             .get(index)
             .map_or(self.screening, |&cost| self.screening * f64::from(cost).powi(2))
     }
 
-    /// The root mean square over the free cells of 1 / L, as a screening coefficient.
+    /// Returns the root mean square of 1 / L over the free cells, as a screening coefficient.
     pub(crate) fn mean_screening(&self) -> f64 {
         if self.costs.is_empty() {
             return self.screening;
@@ -146,7 +161,7 @@ impl Domain {
         &self.costs
     }
 
-    /// 0.25 / (1 + k) of the cells of a row.
+    /// Writes 0.25 / (1 + k) of each cell of a row.
     pub(crate) fn weights_of_row<R: Real>(&self, row: usize, into: &mut [R]) {
         let width = self.width;
         match self.costs.get(row * width..(row + 1) * width) {
@@ -161,7 +176,6 @@ impl Domain {
         }
     }
 
-    /// Row-major index of a cell of the map.
     pub(crate) fn index(&self, cell: Cell) -> usize {
         cell.row * self.width + cell.col
     }

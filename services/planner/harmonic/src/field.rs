@@ -1,4 +1,4 @@
-//! The harmonic field: u of every cell, and the result of its verification.
+//! Harmonic field: u of every cell, and the result of its verification.
 
 use crate::{
     Cell, Domain, Method, Scaled,
@@ -6,9 +6,10 @@ use crate::{
     verification::{Check, Verification},
 };
 
-/// The field of one domain: u = 1 at the target, 0 where blocked or cut off, positive wherever the target can be reached.
+/// Verified field of one [`Domain`].
 ///
-/// Row-major, as [`Domain`]; cells outside the map count as blocked.
+/// u is 1 at the target, 0 in blocked and cut-off cells, and positive in every cell that can reach
+/// the target. Cells outside the map count as blocked.
 #[derive(Clone, Debug)]
 pub struct Field {
     width: usize,
@@ -19,7 +20,6 @@ pub struct Field {
 }
 
 impl Field {
-    /// The field of `domain` that `method` computed, with the result of its check.
     pub(crate) fn new(domain: &Domain, store: Store, check: &Check, method: Method) -> Self {
         Self {
             width: domain.width(),
@@ -35,27 +35,29 @@ impl Field {
         }
     }
 
-    /// Cells along a row.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Cells along a column.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The target the field leads to.
+    /// Returns the target of the field.
     pub fn target(&self) -> Cell {
         self.target
     }
 
-    /// What the check of every cell found.
+    /// Returns the findings of the check over all cells.
     pub fn verification(&self) -> &Verification {
         &self.verification
     }
 
-    /// u of `cell`; zero where blocked, cut off from the target, or outside the map.
+    /// Returns u of `cell`, from 0 to 1.
+    ///
+    /// u is 0 in cells that are blocked, cut off from the target or outside the map.
     pub fn u(&self, cell: Cell) -> Scaled {
         if cell.col >= self.width || cell.row >= self.height {
             return Scaled::ZERO;
@@ -63,8 +65,11 @@ impl Field {
         self.store.u(cell.row * self.width + cell.col)
     }
 
-    /// Replaces u of every reachable cell but the target, which must not become zero: a fault injected on purpose, to see the effects
-    /// of a wrong field. The [`verification`](Self::verification) no longer holds.
+    /// Replaces u of every reachable cell except the target: injects a fault to test the effects of
+    /// a wrong field.
+    ///
+    /// `u` must return positive values. The [`verification`](Self::verification) no longer applies
+    /// afterwards.
     pub fn overwrite(&mut self, u: impl Fn(Cell) -> Scaled) {
         let raw = |index: usize| {
             let cell = Cell::new(index % self.width, index / self.width);
@@ -76,19 +81,20 @@ impl Field {
         self.store = Store::Extended { mantissas, exponents };
     }
 
-    /// Whether the target can be reached from `cell`.
+    /// Returns whether `cell` can reach the target.
     pub fn is_reachable(&self, cell: Cell) -> bool {
         !self.u(cell).is_zero()
     }
 
-    /// Whether `cell` was blocked when the field was computed, or lies outside the map.
+    /// Returns whether `cell` was blocked during the solve or lies outside the map.
     pub fn is_blocked(&self, cell: Cell) -> bool {
         cell.col >= self.width
             || cell.row >= self.height
             || self.store.raw(cell.row * self.width + cell.col).0 < 0.0
     }
 
-    /// log10 of the smallest u of a reachable cell: how far below the range of a floating-point number the field goes.
+    /// Returns log10 of the smallest u of a reachable cell, to compare with the range of
+    /// floating-point numbers.
     pub fn log10_u_min(&self) -> f64 {
         let mut least = Scaled::ONE;
         for index in 0..self.width * self.height {
@@ -100,7 +106,7 @@ impl Field {
         least.log10()
     }
 
-    /// The step, along columns or rows, to the neighbour with the largest u.
+    /// Returns the step along columns or rows to the neighbour with the largest u.
     pub(crate) fn steepest_ascent(&self, col: i64, row: i64) -> [i64; 2] {
         let mut best = (Scaled::ZERO, [0; 2]);
         for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
@@ -112,12 +118,12 @@ impl Field {
         best.1
     }
 
-    /// Whether this is a field of a map of the same size and the same target.
+    /// Returns whether the map size and the target equal those of `domain`.
     pub(crate) fn fits(&self, domain: &Domain) -> bool {
         (self.width, self.height, self.target) == (domain.width(), domain.height(), domain.target())
     }
 
-    /// u at a signed column and row: zero outside the map.
+    /// Returns u at a signed column and row; 0 outside the map.
     pub(crate) fn u_at(&self, col: i64, row: i64) -> Scaled {
         match (usize::try_from(col), usize::try_from(row)) {
             (Ok(col), Ok(row)) => self.u(Cell { col, row }),

@@ -1,40 +1,51 @@
-//! The direction to follow at any position, equation (11): grad u / |grad u|.
+//! Direction to follow at any position, equation (11): grad u / |grad u|.
 //!
-//! At a cell's centre the gradient is the central difference of u, in which blocked cells count as 0. Between centres it is
-//! interpolated bilinearly between the free cells among the four nearest centres, so it is continuous. Cells that meet only across
-//! a blocked corner are left out. Near a wall the component into the wall decreases with the distance and is 0 at the wall, so
-//! the gradient never leads into a blocked cell. Only ratios of neighbouring u matter, so the common exponent is removed first.
+//! At cell centres, the gradient is the central difference of u, with blocked cells as 0. Between
+//! centres, it is interpolated bilinearly over the free cells among the four nearest centres, so it
+//! is continuous. Cells that meet only across a blocked corner are left out.
+//!
+//! Near a wall, the component into the wall decreases with the distance and vanishes at the wall.
+//! The gradient therefore never leads into a blocked cell. Only ratios of neighbouring u matter, so
+//! the common exponent is removed first.
 
 use crate::{Cell, Field};
 
-/// The field's answer at a position. Directions are unit vectors (along columns, along rows).
+/// Answer of a field at a position.
+///
+/// Directions are unit vectors (along growing columns, along growing rows).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Guidance {
-    /// Free space: follow this direction.
+    /// Direction to follow in free space.
     Along([f64; 2]),
-    /// The position lies in the target's cell.
+    /// Position in the cell of the target.
     AtTarget,
-    /// The position lies in a blocked cell or outside the map: this way lies the nearest free cell that can reach the
-    /// target.
+    /// Position in a blocked cell or outside the map; the direction leads to the nearest free cell
+    /// that can reach the target.
     WayOut([f64; 2]),
-    /// No path leads from here to the target, or the position is not a number.
+    /// Position without a path to the target, or NaN or infinite coordinates.
     Unreachable,
 }
 
-/// Distance from a wall, in cells, below which the gradient's component into the wall decreases.
+/// Distance from a wall, in cells, below which the component of the gradient into the wall
+/// decreases.
 const WALL_REACH: f64 = 0.5;
 
-/// Gradients shorter than this fraction of the local u are those of saddle points, where the direction is that to the
-/// neighbour of largest u. It is above the rounding of the stored u and far below the gradient of other cells.
+/// Gradient length, relative to the local u, below which a cell is a saddle point.
+///
+/// At a saddle point the direction leads to the neighbour with the largest u. The limit is above
+/// the rounding of the stored u and far below the gradient of other cells.
 pub(crate) const SADDLE: f64 = 1e-7;
 
 impl Field {
-    /// The guidance at a position in cell units (cell centres at the integers).
+    /// Returns the guidance at a position in cell units, with cell centres at the integers.
+    ///
+    /// The direction is the normalised gradient, equation (11), without its component into walls
+    /// closer than half a cell.
     pub fn guidance(&self, col: f64, row: f64) -> Guidance {
         if !(col.is_finite() && row.is_finite()) {
             return Guidance::Unreachable;
         }
-        // The casts saturate: positions beyond the map are outside at any distance.
+        // The casts saturate, so far positions stay outside the map.
         let here = (col.round() as i64, row.round() as i64);
         if self.blocked_at(here.0, here.1) {
             return self.way_out(col, row);
@@ -50,8 +61,8 @@ impl Field {
         let gradient =
             self.interpolate(here, position, |c, r| self.central_difference(here, (c, r)));
         let allowed = self.without_wall_component(here, position, gradient);
-        // The component removed is replaced by steepest ascent from cell to cell, which leads around walls; a gradient
-        // straight into a wall would otherwise keep its direction, however small it gets.
+        // Steepest ascent replaces the removed component and leads around walls. A gradient
+        // straight into a wall would otherwise keep its direction.
         let removed = (gradient[0] - allowed[0]).hypot(gradient[1] - allowed[1]);
         let mut total = allowed;
         if removed > 0.0 {
@@ -66,8 +77,10 @@ impl Field {
             .map_or(Guidance::Unreachable, Guidance::Along)
     }
 
-    /// The direction at a cell's centre, or `None` if there is none (blocked, cut off, the target): the answer of
-    /// [`guidance`](Self::guidance) there, where no wall is near enough to matter, for whole maps of cells.
+    /// Returns the direction at the centre of a cell, as a unit vector (along columns, along rows).
+    ///
+    /// Returns `None` in blocked cells, cut-off cells and the target. The result equals that of
+    /// [`guidance`](Self::guidance), because walls have no effect at centres.
     pub fn direction(&self, cell: Cell) -> Option<[f64; 2]> {
         if cell == self.target() || !self.is_reachable(cell) {
             return None;
@@ -85,8 +98,10 @@ impl Field {
         }
     }
 
-    /// The bilinear mean of `value` over the reachable cells among the four centres around `position`, which lies in the
-    /// reachable cell `here`.
+    /// Returns the bilinear mean of `value` over the reachable cells among the four centres around
+    /// `position`.
+    ///
+    /// `position` lies in the reachable cell `here`.
     fn interpolate(
         &self,
         here: (i64, i64),
@@ -118,7 +133,8 @@ impl Field {
         sum
     }
 
-    /// Central difference of u at `there`, which is `here` or one of its eight neighbours, in units of u(here).
+    /// Returns the central difference of u at `there`, which is `here` or one of its eight
+    /// neighbours, in units of u(here).
     fn central_difference(&self, here: (i64, i64), there: (i64, i64)) -> [f64; 2] {
         let own = self.u_at(there.0, there.1);
         let u = |dc: i64, dr: i64| {
@@ -130,7 +146,9 @@ impl Field {
         relative.map(|component| weight * component)
     }
 
-    /// u(there) / u(here) of the same cell, a neighbour, or a diagonal neighbour by way of a free cell beside both.
+    /// Returns u(there) / u(here).
+    ///
+    /// A diagonal neighbour is reached by way of a free cell beside both.
     fn ratio(&self, here: (i64, i64), there: (i64, i64)) -> f64 {
         let step = |from: (i64, i64), to: (i64, i64)| {
             let own = self.u_at(from.0, from.1);
@@ -148,11 +166,12 @@ impl Field {
         }
     }
 
-    /// Removes from `gradient` the component into blocked cells: all of it at the wall, nothing half a cell away.
+    /// Removes from `gradient` the component into blocked cells: all at the wall, nothing half a
+    /// cell away.
     ///
-    /// Each blocked neighbour acts through its point nearest to the position. A diagonal neighbour counts only if both cells beside it
-    /// are free; otherwise a wall that runs past the corner would stop the motion along it. At most two neighbours, at right angles,
-    /// are within reach of a position, so their order does not matter.
+    /// Each blocked neighbour acts through its nearest point. A diagonal neighbour counts only if
+    /// both cells beside it are free; otherwise a wall past the corner would stop motion along it.
+    /// At most two neighbours, at right angles, are within reach, so their order is irrelevant.
     fn without_wall_component(
         &self,
         here: (i64, i64),
@@ -190,17 +209,20 @@ impl Field {
         allowed
     }
 
-    /// The direction straight to the centre of the neighbour with the largest u. Two adjacent cells are convex together, so the way
-    /// there is free from anywhere in this one, and leads away from every wall it touches.
+    /// Returns the direction to the centre of the neighbour with the largest u.
+    ///
+    /// Two adjacent cells are convex together. The straight way is therefore free from anywhere in
+    /// `here` and leads away from every adjacent wall.
     fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
         let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);
         unit([here.0 as f64 + dc - position[0], here.1 as f64 + dr - position[1]], 0.0)
     }
 
-    /// The direction to the centre of the nearest reachable cell, by rings of growing distance.
+    /// Returns the direction to the centre of the nearest reachable cell, searched in growing
+    /// rings.
     fn way_out(&self, col: f64, row: f64) -> Guidance {
         let (width, height) = (self.width() as i64, self.height() as i64);
-        // Far outside, the search starts at the map's own rim.
+        // Far outside, the search starts at the rim of the map.
         let from = ((col.round() as i64).clamp(-1, width), (row.round() as i64).clamp(-1, height));
         let mut best: Option<(f64, (i64, i64))> = None;
         for ring in 1..=width.max(height) + 1 {
@@ -222,7 +244,7 @@ impl Field {
     }
 }
 
-/// The cells inside the map at Chebyshev distance `ring` from `centre`.
+/// Returns the cells inside the map at Chebyshev distance `ring` from `centre`.
 fn ring_cells(
     centre: (i64, i64),
     ring: i64,
@@ -240,7 +262,7 @@ fn ring_cells(
         .chain(sides.flat_map(move |c| rows.clone().map(move |r| (c, r))))
 }
 
-/// `vector` at unit length, or `None` if it is no longer than `least`.
+/// Scales `vector` to unit length; returns `None` if its length is at most `least` or not finite.
 fn unit(vector: [f64; 2], least: f64) -> Option<[f64; 2]> {
     let length = vector[0].hypot(vector[1]);
     (length > least && length.is_finite()).then(|| [vector[0] / length, vector[1] / length])

@@ -1,24 +1,27 @@
-//! The methods a field can be computed by.
+//! Methods that compute a field.
 
-/// The method by which a field was computed.
+/// Method that computed a field.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]
 pub enum Method {
-    /// Multifrontal factorisation in order of decreasing distance from the target, in extended range.
+    /// Multifrontal factorisation by decreasing distance from the target, in extended range.
     Multifrontal,
     /// Multigrid in single precision.
     MultigridSingle,
-    /// Multigrid in single precision, and multifrontal factorisation of the passages in which u is below its range.
+    /// Multigrid in single precision, with multifrontal factorisation of the passages in which u is
+    /// below its range.
     MultigridAndMultifrontal,
-    /// Multigrid in double precision: for halls of some 3000 cells and more, and one map in a hundred of scattered obstacles, both
-    /// too wide to be factorised.
+    /// Multigrid in double precision.
+    ///
+    /// It serves halls of some 3000 cells and more, and one map in a hundred of scattered
+    /// obstacles. Both are too wide for the factorisation.
     MultigridDouble,
-    /// Multigrid in single precision, one band of u after the other, each with an exponent of its own.
+    /// Multigrid in single precision, in successive bands of u with an exponent each.
     MultigridBands,
 }
 
 impl Method {
-    /// The method's name, for logs and reports.
+    /// Returns the name of the method, for logs and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Multifrontal => "multifrontal",

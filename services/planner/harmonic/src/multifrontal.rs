@@ -1,19 +1,22 @@
-//! Multifrontal factorisation with the cells in order of decreasing distance from the target.
+//! Multifrontal factorisation, with the cells in order of decreasing distance from the target.
 //!
-//! Cells are eliminated from the farthest inwards, a few distances at a time. What has been eliminated beyond a distance
-//! falls into connected pieces, and pieces join as the distance shrinks: a tree of fronts, each a small dense matrix over
-//! the cells it eliminates and their neighbours nearer to the target. The target itself is never eliminated, so there is no
-//! right-hand side to carry inwards, and u follows outwards from u(target) = 1: each cell's u is a sum, with positive
-//! weights of moderate size, of the u of cells nearer to the target. Nothing is iterated, nothing cancels and nothing
-//! underflows, whatever the range of u. The cost is about the cube of the fronts' width: right for corridors, not halls.
+//! Cells are eliminated from the farthest inwards, a few distances at a time. The eliminated cells
+//! form connected pieces, which join as the distance shrinks. The result is a tree of fronts. A
+//! front is a small dense matrix over the cells it eliminates and their neighbours nearer to the
+//! target.
 //!
-//! - [`tree`]: the cells of each front, and the order of the fronts where many passages run side by side.
-//! - [`dense`]: the matrix of a front.
-//! - [`back_substitution`]: computes u from the factors.
-//! - [`gauss_seidel`]: corrects the cells that `f64` factors cannot reach.
-//! - [`breadth_first`]: the order of the cells.
-//! - [`budget`]: the memory that the method may use.
-//! - [`workspace`]: the factors, and memory reused between solves.
+//! The target is never eliminated, so the elimination has no right-hand side. u follows outwards
+//! from u(target) = 1, as sums with moderate positive weights of u nearer to the target. Nothing
+//! iterates, cancels or underflows at any range of u. The cost grows with about the cube of the
+//! front width, which suits corridors better than halls.
+//!
+//! - [`tree`]: cells and order of the fronts.
+//! - [`dense`]: matrix of a front.
+//! - [`back_substitution`]: u from the factors.
+//! - [`gauss_seidel`]: correction of cells beyond the range of `f64` factors.
+//! - [`breadth_first`]: order of the cells.
+//! - [`budget`]: memory limit.
+//! - [`workspace`]: factors, and memory reused between solves.
 
 mod back_substitution;
 mod breadth_first;
@@ -33,8 +36,9 @@ pub(crate) use gauss_seidel::relax;
 pub(crate) use tree::Tree;
 pub(crate) use workspace::Workspace;
 
-/// The solution of the five-point equations on `domain`, exact but for rounding; with `known`, in the cells that `pass` visits, from
-/// the values in those from which it begins.
+/// Solves the five-point equations on `domain`, exact except for rounding.
+///
+/// With `known`, solves only the cells that `pass` visits, from the values of its first cells.
 pub(crate) fn solve(
     domain: &Domain,
     (pass, tree): (&BreadthFirst, &Tree),
@@ -50,7 +54,7 @@ pub(crate) fn solve(
     solved
 }
 
-/// The cell is not part of the front.
+/// Slot of a cell outside the front.
 const NOWHERE: u32 = u32::MAX;
 
 fn factor(
@@ -67,7 +71,7 @@ fn factor(
     factors.lengths.reserve(pass.len());
     slot.clear();
     slot.resize(pass.len(), NOWHERE);
-    // The update that each front leaves on its boundary until its parent takes it in; spent buffers are reused.
+    // Updates wait here for the parent front; spent buffers are reused.
     let mut left: Vec<Vec<f64>> = vec![Vec::new(); tree.fronts.len()];
     let mut spent: Vec<Vec<f64>> = Vec::new();
     let mut slots = Vec::new();
@@ -92,7 +96,8 @@ fn factor(
         for (at, &place) in cells[..own].iter().enumerate() {
             matrix.add(at, at, 4.0 * (1.0 + domain.screening_of(pass.cell(place))));
             for neighbour in pass.neighbours(place) {
-                // Cells that a child eliminated before have no slot here; pairs within the front are met twice.
+                // Cells that a child eliminated have no slot here; pairs within the front are met
+                // twice.
                 let other = slot.get(neighbour as usize).copied().unwrap_or(NOWHERE);
                 if other != NOWHERE && other as usize > at {
                     matrix.add(at, other as usize, -1.0);

@@ -1,14 +1,14 @@
-//! Multigrid with interpolation by the equations themselves (after Dendy's BoxMG).
+//! Multigrid with interpolation by the equations themselves, after Dendy's BoxMG.
 //!
-//! Every second column and row makes the next level. The interpolation follows the equations, so it stops at walls, and
-//! the coarse equations are the Galerkin product, so corrections do not leak through them: that, and not a norm, is what
-//! makes the solution relatively right in cells where u is 1e-40. The set-up depends on the map alone, the target is a
-//! source of inflow in the solve, and u is divided by its own value there at the end.
+//! The next level takes every second column and row. Interpolation follows the equations, so it
+//! stops at walls. The coarse equations are the Galerkin product, so corrections stay on their side
+//! of a wall. The solution is therefore relatively right even where u is 1e-40. The set-up depends
+//! on the map alone. The target is a source of inflow, and the result is divided by u there.
 //!
-//! - [`grid`]: the layout in four parity planes.
+//! - [`grid`]: layout in four parity planes.
 //! - [`finest`], [`coarse`], [`coarsest`]: relaxation and transfer on the three kinds of level.
-//! - [`galerkin`], [`couplings`]: the interpolation and the equations of a level from those of the finer one.
-//! - [`sources`]: the inflow on the coarse levels.
+//! - [`galerkin`], [`couplings`]: interpolation and equations from those of the finer level.
+//! - [`sources`]: inflow on the coarse levels.
 
 mod coarse;
 mod coarsest;
@@ -37,55 +37,65 @@ use galerkin::Products;
 
 use grid::Grid;
 
-/// A cell whose direction a coarse correction turns by more than this, radians, has not settled. The correction is applied, and
-/// the next would be smaller by a factor of three or more, which leaves directions well within a degree.
+/// Angle, in radians, above which a correction leaves a direction unsettled.
+///
+/// The next correction is smaller by a factor of three or more, which leaves directions well within
+/// a degree.
 const TOLERANCE: f64 = 0.02;
 
-/// Cycles before the first check: the first ones have not reached every cell, and a cell that is still zero does not count
-/// as unsettled.
+/// Cycles before the first check.
+///
+/// The first cycles leave some cells at zero, and these count as settled.
 pub(crate) const FIRST_CHECK: usize = 3;
 
-/// A cycle divides residuals by at least this.
+/// Factor by which a cycle divides residuals, at least.
 const PER_CYCLE: f64 = 3.0;
-/// Most cycles between a check that failed and the next.
+/// Limit of cycles between a failed check and the next.
 const BETWEEN_CHECKS: f64 = 4.0;
 
-/// Most cycles in a precision: its range of u at 1.4 orders of magnitude a cycle, with a reserve.
+/// Cycle limits per precision: its range of u at 1.4 orders of magnitude per cycle, with a reserve.
 pub(crate) const SINGLE_CYCLES: usize = 60;
 pub(crate) const DOUBLE_CYCLES: usize = 450;
 
 const SMOOTHING: usize = 2;
 
-/// The levels visited twice each time, as in a W-cycle, counted from the first coarse one. One visit of the levels below is
-/// not exact, and its error reaches far into cells where u is much smaller; here, on a sixteenth of the map's cells and on a
-/// quarter of that, second visits are cheap, and save up to every other cycle.
+/// Levels visited twice, as in a W-cycle, counted from the first coarse one.
+///
+/// The inexact first visit leaves an error that reaches far into cells of much smaller u. These
+/// levels have a sixteenth of the cells and fewer, so second visits are cheap. They save up to
+/// every other cycle.
 const VISITED_TWICE: Range<usize> = 1..3;
 
-/// The factors of coarse corrections, on the finest level and between coarse ones. Interpolation bends u more than a
-/// solution is bent, at doors above all, so the correction that is best by energy is too small (Braess, "Towards algebraic
-/// multigrid for elliptic problems of second order", 1995). Measured: 1.2 and 1.07 save a quarter of the cycles, 1.3 or 1.2
-/// cost some on some maps. On small maps the second is one: their levels are visited once, and its powers would add up.
+/// Factors of coarse corrections, on the finest level and between coarse ones.
+///
+/// Interpolation bends u too much, especially at doors. The correction that is best by energy is
+/// therefore too small (Braess, "Towards algebraic multigrid for elliptic problems of second
+/// order", 1995). In measurements, 1.2 and 1.07 save a quarter of the cycles; 1.3 or 1.2 cost some
+/// on some maps. On small maps the second factor is one, because they visit levels once and its
+/// powers would accumulate.
 const OVERCORRECTION: f64 = 1.2;
 const COARSE_OVERCORRECTION: f64 = 1.07;
 
-/// The longer side of small maps is at most this. On them second visits and second sweeps save fewer cycles than they cost.
+/// Longest side of a small map, on which second visits and sweeps cost more than the cycles they
+/// save.
 const SMALL_SIDE: usize = 128;
 
-/// Full sweeps in a pass over the finest level of a large map: all but the first read no more from memory, and dead ends a few
-/// cells wide, which the coarser levels do not resolve, need them.
+/// Full sweeps per pass over the finest level of a large map.
+///
+/// Only the first reads from memory. Dead ends a few cells wide, too narrow for coarser levels,
+/// need the others.
 const SWEEPS: usize = 3;
 
 const COARSEST_SIDE: usize = 5;
 
-/// The levels of one map, in one precision.
 #[derive(Debug, Default)]
 pub(crate) struct Multigrid<R> {
     finest: Finest<R>,
     coarse: Vec<Coarse<R>>,
     coarsest: Coarsest,
-    /// The products for the set-up of the next level, for all levels but the coarsest, the finest first.
+    /// Set-up products of all levels but the coarsest, finest first.
     products: Vec<Products<R>>,
-    /// Whether the first coarse level holds a correction of u, and not a first guess or nothing.
+    /// Whether the first coarse level holds a correction of u.
     corrects: bool,
     /// Whether u falls so steeply that second visits save no cycle.
     is_steep: bool,
@@ -93,15 +103,15 @@ pub(crate) struct Multigrid<R> {
 }
 
 impl<R: Real> Multigrid<R> {
-    /// Levels for maps of this size, with no equations yet.
     pub(crate) fn new(width: usize, height: usize) -> Self {
         let mut levels = Self::default();
         levels.reshape(width, height);
         levels
     }
 
-    /// Makes these levels for maps of another size, with no equations yet, in the memory they have: fresh pages from the system
-    /// cost as much as several cycles.
+    /// Reshapes the levels for a map of another size and clears the equations.
+    ///
+    /// Memory is reused, because fresh pages from the system cost as much as several cycles.
     pub(crate) fn reshape(&mut self, width: usize, height: usize) {
         let mut grid = Grid::new(width, height);
         self.finest.reshape(grid);
@@ -118,7 +128,7 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Sets the equations that depend on `rows` of the map, and no others, on all levels.
+    /// Sets the equations that depend on `rows` of the map on all levels.
     pub(crate) fn set_up_rows(&mut self, domain: &Domain, rows: Range<usize>) {
         self.is_steep = false;
         let finest = &mut self.finest;
@@ -137,7 +147,6 @@ impl<R: Real> Multigrid<R> {
         self.set_up_levels(rows);
     }
 
-    /// Interpolation and coarse equations, where they depend on `rows` of the finest level.
     fn set_up_levels(&mut self, rows: Range<usize>) {
         let (first, products) = (&mut self.coarse[0], &mut self.products[0]);
         let mut rows = set_up_next(&mut self.finest, first, rows, products, self.simd);
@@ -151,7 +160,7 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Makes `target` the only inflow and starts from the coarsest level's solution.
+    /// Makes `target` the only inflow and starts from the solution of the coarsest level.
     pub(crate) fn start(&mut self, target: Cell) {
         let (plane, at) = self.finest.grid.locate(target.col, target.row);
         let value = R::of(pow2(R::TOP));
@@ -159,7 +168,9 @@ impl<R: Real> Multigrid<R> {
         self.start_from_sources();
     }
 
-    /// Makes `target` the only inflow and starts from a first guess, given row by row with 2^TOP at the target.
+    /// Makes `target` the only inflow and starts from a first guess.
+    ///
+    /// `guess` writes a row, with 2^TOP at the target.
     pub(crate) fn start_near(&mut self, target: Cell, mut guess: impl FnMut(usize, &mut [R])) {
         self.corrects = false;
         let finest = &mut self.finest;
@@ -169,7 +180,7 @@ impl<R: Real> Multigrid<R> {
             guess(row, &mut buffer[..grid.width]);
             grid::split_row(&grid, &mut finest.u, row, &buffer);
         }
-        // The inflow that satisfies the target's own equation; the sweeps relax the others.
+        // This inflow satisfies the equation of the target; the sweeps relax the others.
         let u = |col: Option<usize>, row: Option<usize>| match (col, row) {
             (Some(col), Some(row)) if col < grid.width && row < grid.height => {
                 let (plane, at) = grid.locate(col, row);
@@ -188,8 +199,8 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Starts from the coarser levels' solution for the inflow, each interpolated from the next and improved by a cycle (full
-    /// multigrid).
+    /// Starts from the coarser levels by full multigrid: each level is interpolated from the next
+    /// and improved by a cycle.
     fn start_from_sources(&mut self) {
         self.corrects = false;
         for plane in &mut self.finest.u {
@@ -214,8 +225,10 @@ impl<R: Real> Multigrid<R> {
         width.max(height) > SMALL_SIDE
     }
 
-    /// Loads equations other than a map's: for each row 1 / diagonal (0 for a cell that stays zero), and the inflow by cell.
-    /// Every pair of neighbours is coupled by one. `is_steep` says that u falls within a few cells. Starts from the coarsest level's solution.
+    /// Loads equations of another problem and starts from the solution of the coarsest level.
+    ///
+    /// `rows` gives 1 / diagonal, 0 for a cell that stays zero. Couplings of neighbours are 1.
+    /// `is_steep` says that u falls within a few cells.
     pub(crate) fn load<'a>(
         &mut self,
         rows: impl Fn(usize) -> &'a [R],
@@ -240,7 +253,6 @@ impl<R: Real> Multigrid<R> {
         self.start_from_sources();
     }
 
-    /// u of every cell as it is, given row by row.
     pub(crate) fn unload(&self, mut row_is: impl FnMut(usize, &[R])) {
         let grid = &self.finest.grid;
         let mut buffer = vec![R::default(); 2 * grid.columns];
@@ -250,8 +262,11 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Cycles until every cell has settled and `after` finds no fault, or `most` are done. `after` is called after each cycle, with
-    /// true where the field is to be checked; it returns the largest residual as a multiple of its limit if that is too large.
+    /// Runs cycles until every cell has settled and `after` finds no fault, or `most` cycles are
+    /// done.
+    ///
+    /// After each cycle, `after` receives whether to check the field. It returns the largest
+    /// residual as a multiple of its limit, if that is too large.
     ///
     /// # Errors
     /// [`SolveError::Cancelled`].
@@ -279,7 +294,10 @@ impl<R: Real> Multigrid<R> {
         Ok(())
     }
 
-    /// Runs a cycle and counts the cells whose direction the correction turns by more than `tolerance`, radians; without a tolerance none.
+    /// Runs a cycle and counts the cells whose direction turns by more than `tolerance`, in
+    /// radians.
+    ///
+    /// Without a tolerance, the count is 0.
     pub(crate) fn cycle(&mut self, tolerance: Option<f64>) -> usize {
         let sweeps = if self.corrects && self.is_large() { SWEEPS } else { 1 };
         let unsettled = self.pass(sweeps, true, tolerance);
@@ -288,16 +306,15 @@ impl<R: Real> Multigrid<R> {
         unsettled
     }
 
-    /// Solves on a coarse level, from zero, by one cycle through it and those below; on some it is followed by another.
+    /// Solves on a coarse level from zero, by one cycle through the levels below, or two on some
+    /// levels.
     fn solve_level(&mut self, level: usize) {
         self.visit(level);
-        // The coarsest level of a large map is none of these.
         if self.is_large() && !self.is_steep && VISITED_TWICE.contains(&level) {
             self.second_visit(level);
         }
     }
 
-    /// Run a cycle from zero through a coarse level and the levels below.
     fn visit(&mut self, level: usize) {
         if level == self.coarse.len() - 1 {
             return self.coarsest.solve(&mut self.coarse[level]);
@@ -308,7 +325,8 @@ impl<R: Real> Multigrid<R> {
         self.ascend(level, R::of(overcorrection));
     }
 
-    /// Solves for the residual that the first visit left on a coarse level. The right-hand side is overwritten.
+    /// Solves for the residual of the first visit to a coarse level, and overwrites the right-hand
+    /// side.
     fn second_visit(&mut self, level: usize) {
         let fine = &mut self.coarse[level];
         self.simd.run(
@@ -328,8 +346,10 @@ impl<R: Real> Multigrid<R> {
         );
     }
 
-    /// Interpolates the last coarse correction to the finest level, for u to be read, and smoothes the error that leaves from
-    /// cell to cell: near a saddle point the direction depends on the last digits. Cycles may follow.
+    /// Interpolates the last coarse correction and smooths the remaining error, so that u can be
+    /// read.
+    ///
+    /// Near a saddle point the direction depends on the last digits. Further cycles may follow.
     pub(crate) fn finish(&mut self) {
         self.pass(1 + SMOOTHING, false, None);
         for plane in &mut self.coarse[0].u {
@@ -347,7 +367,6 @@ impl<R: Real> Multigrid<R> {
         )
     }
 
-    /// Adds `share` of the next level's u to a coarse level and relaxes.
     fn ascend(&mut self, level: usize, share: R) {
         let (fine, next) = self.coarse.split_at_mut(level + 1);
         let fine = &mut fine[level];
@@ -357,7 +376,7 @@ impl<R: Real> Multigrid<R> {
         );
     }
 
-    /// u of every cell, row by row, times 2^TOP over u(target); `blocked` where the map is.
+    /// Reads u of every cell, row by row, times 2^TOP / u(target); blocked cells become `blocked`.
     pub(crate) fn read(&self, target: Cell, blocked: R, into: &mut Vec<R>) {
         let grid = &self.finest.grid;
         let (plane, at) = grid.locate(target.col, target.row);
@@ -371,7 +390,7 @@ impl<R: Real> Multigrid<R> {
             grid::join_row(grid, &self.finest.u, row, R::ONE, &mut u);
             grid::join_row(grid, &self.finest.inverse, row, R::ONE, &mut inverse);
             for ((out, u), inverse) in out.iter_mut().zip(&u).zip(&inverse) {
-                // Cells that have not converged may be below zero; the verification finds a zero there.
+                // Unconverged cells may be below zero; the verification finds a zero there.
                 let u = if *u > R::default() { *u * scale } else { R::default() };
                 *out = if *inverse > R::default() { u } else { blocked };
             }
@@ -380,8 +399,10 @@ impl<R: Real> Multigrid<R> {
     }
 }
 
-/// Sets the interpolation to `fine` from `next` and the equations of `next`, where they depend on `rows` of the cells of `fine`; returns
-/// the rows of the cells of `next` that were set.
+/// Sets the interpolation to `fine` and the equations of `next` that depend on `rows` of cells of
+/// `fine`.
+///
+/// Returns the rows of cells of `next` that were set.
 fn set_up_next<R: Real>(
     fine: &mut impl Level<R>,
     next: &mut Coarse<R>,

@@ -1,10 +1,13 @@
-//! Multigrid for maps on which u spans more than single precision holds, in bands of u from the target outwards.
+//! Multigrid in bands of u, from the target outwards, for maps whose u exceeds the range of single
+//! precision.
 //!
-//! The unknowns of a band are cells that are not resolved yet; u of the resolved cells beside them is their inflow, scaled to the
-//! top of the range. Unknowns that come out well inside the range are resolved, with the exponent of the band. The others are left
-//! to the next band: their influence on resolved cells goes with the square of the ratio of both u, since a random walk has to get
-//! there and back. For the same reason a band needs no cells in which u is below its range, so its equations are those of the
-//! rectangle around the cells within a number of steps from the inflow, which the band before told.
+//! The unknowns of a band are unresolved cells. u of adjacent resolved cells is their inflow,
+//! scaled to the top of the range. Unknowns well inside the range become resolved, with the
+//! exponent of the band. The next band takes the others.
+//!
+//! The others affect resolved cells by the square of the ratio of both u, because a random walk has
+//! to get there and back. A band can therefore omit cells below its range. It covers the rectangle
+//! around the cells within a number of steps from the inflow, estimated from the previous band.
 
 use crate::{
     Cancellation, Cell, Domain, Scaled, SolveError,
@@ -14,54 +17,55 @@ use crate::{
     verification,
 };
 
-/// Binary orders of magnitude below the largest inflow at which inflow has no effect on a band.
+/// Binary orders of magnitude below the largest inflow at which inflow has no effect.
 const NO_INFLOW: i32 = 2 * f32::TOP;
 
-/// u in the farthest cells of a band is at most this, a thousandth of what is resolved; else the band was cut too short.
+/// Limit of u in the farthest cells of a band, a thousandth of resolved values; above it, the band
+/// is too short.
 const CUT: f64 = 1e-3 * f32::KNOWN;
 
-/// Cells are checked in which u is above this, so that those beside resolved ones are.
+/// Threshold of u for checks; it includes the cells beside resolved ones.
 const CHECKED: f64 = 0.1 * f32::KNOWN;
 
-/// Residuals in a band are smaller by this factor than they must be, as those at its end change with the next band.
+/// Margin on the residual limit, because residuals at the end change with the next band.
 const MARGIN: f64 = 16.0;
 
-/// u of resolved cells is at most this in a band's units; larger ones are not beside an unknown.
+/// Limit of u of resolved cells in units of the band; larger values are never beside an unknown.
 const LARGEST: f32 = 1e35;
 
-/// Steps of a band beyond those in which u fell out of range in the band before, and as a multiple of them. A band that is cut too
-/// short is computed again.
+/// Steps of a band beyond the last ones in range in the previous band, absolute and relative.
+///
+/// A band that is cut too short is computed again.
 const MORE: usize = 4;
 const RESERVE: f64 = 1.1;
 
-/// In a band of at most so many steps the second visits of coarse levels save no cycle, and take up to a third of the time.
+/// Steps up to which second visits of coarse levels save no cycle and take up to a third of the
+/// time.
 const STEEP: usize = 96;
 
-/// The sides of rectangles are multiples of this, for whole vectors.
+/// Multiple for the sides of rectangles, to fill whole vectors.
 const SIDES: usize = 16;
 
 type Place = [u16; 2];
 
-/// u of the cells resolved so far, and the cells from which the next band begins.
 struct Bands<'a> {
     domain: &'a Domain,
-    /// 0 in cells that are not resolved; [`BLOCKED`] in blocked ones.
+    /// 0 in unresolved cells, [`BLOCKED`] in blocked ones.
     mantissas: Vec<f64>,
-    /// In cells that are not resolved the number of the last band they were in.
+    /// Number of the last band, in unresolved cells.
     exponents: Vec<i32>,
-    /// Resolved cells beside others that are not.
+    /// Resolved cells beside unresolved ones.
     edge: Vec<Place>,
 }
 
 #[derive(Default)]
 struct Unknowns {
-    /// In order of their distance in steps from the inflow.
+    /// Sorted by distance in steps from the inflow.
     places: Vec<Place>,
-    /// The start of each distance in `places`.
+    /// Start of each distance in `places`.
     starts: Vec<usize>,
 }
 
-/// The part of the map that holds a band's unknowns and their neighbours.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
 struct Rectangle {
     col: usize,
@@ -70,8 +74,10 @@ struct Rectangle {
     height: usize,
 }
 
-/// u of every cell of `domain` that can be reached, from that of the cells in which `known` is above [`KNOWN`](Real::KNOWN). The
-/// memory of `levels` is used.
+/// Computes u of every reachable cell from the cells in which `known` is above
+/// [`KNOWN`](Real::KNOWN).
+///
+/// The memory of `levels` is reused.
 pub(crate) fn solve(
     domain: &Domain,
     known: Store,
@@ -168,13 +174,13 @@ impl<'a> Bands<'a> {
         self.mantissas[self.index(at)] > 0.0 && self.open(at).next().is_some()
     }
 
-    /// The cells of the edge from which there is inflow into a band.
+    /// Returns the edge cells with inflow into a band.
     fn inflow(&self, top: i32) -> impl Iterator<Item = Place> {
         let least = top.saturating_sub(NO_INFLOW);
         self.edge.iter().copied().filter(move |&at| self.u(at).exponent > least)
     }
 
-    /// The cells within so many `steps` from the inflow, marked by the `number` of the band.
+    /// Returns the cells within `steps` of the inflow and marks them with the `number` of the band.
     fn unknowns(&mut self, top: i32, number: i32, steps: usize) -> Unknowns {
         let mut unknowns = Unknowns::default();
         let mut before: Vec<Place> = self.inflow(top).collect();
@@ -200,7 +206,8 @@ impl<'a> Bands<'a> {
         unknowns
     }
 
-    /// The rectangle around the unknowns and their neighbours, extended to whole multiples of [`SIDES`] within the map.
+    /// Returns the rectangle around the unknowns and their neighbours, extended to multiples of
+    /// [`SIDES`].
     fn rectangle(&self, unknowns: &Unknowns) -> Rectangle {
         let (width, height) = (self.domain.width(), self.domain.height());
         let (mut cols, mut rows) = ((width, 0), (height, 0));
@@ -217,7 +224,8 @@ impl<'a> Bands<'a> {
         Rectangle { col, row, width, height }
     }
 
-    /// Loads the equations of a band; `inverse` takes 1 / diagonal of its unknowns, `values` u of the resolved cells beside them.
+    /// Loads a band: `inverse` takes 1 / diagonal of its unknowns, `values` takes u of the adjacent
+    /// resolved cells.
     fn load(
         &self,
         here: Rectangle,
@@ -246,7 +254,8 @@ impl<'a> Bands<'a> {
         levels.load(|row| &inverse[row * width..(row + 1) * width], inflow, is_steep);
     }
 
-    /// Resolves the unknowns whose `value` is well inside the range; false if there is none.
+    /// Resolves the unknowns whose `value` is well inside the range; returns false if there are
+    /// none.
     fn resolve(&mut self, unknowns: &[Place], value: impl Fn(Place) -> f64, top: i32) -> bool {
         let before = self.edge.len();
         for &at in unknowns {

@@ -1,18 +1,21 @@
-//! The way along the field from a cell to the target.
+//! Path along the field from a cell to the target.
 
 use crate::{Cell, Field, Guidance};
 
 /// Length of a step, in cells.
 const STEP: f64 = 0.25;
-/// Most steps in one cell: it is crossed in six.
+/// Limit of steps within one cell; six steps cross it.
 const MOST_STEPS: usize = 8;
 
 impl Field {
-    /// The positions of one who follows the [guidance](Self::guidance) from the centre of `start` to that of the target, in
-    /// steps of a quarter of a cell; none if no path leads there.
+    /// Returns the positions along [`guidance`](Self::guidance) from the centre of `start` to the
+    /// centre of the target.
     ///
-    /// u grows from each of its cells to the next, so it ends: where a step would lead to a smaller u or touch a blocked cell, it
-    /// goes to the neighbour with the largest.
+    /// Positions are (column, row) in cells, in steps of a quarter of a cell. Returns `None` if
+    /// `start` cannot reach the target.
+    ///
+    /// u grows from each cell of the path to the next, so the path ends. A step to a smaller u or
+    /// across a blocked cell goes to the centre of the neighbour with the largest u instead.
     pub fn path(&self, start: Cell) -> Option<Vec<[f64; 2]>> {
         if !self.is_reachable(start) {
             return None;
@@ -25,7 +28,7 @@ impl Field {
             let next = (ahead[0].round() as i64, ahead[1].round() as i64);
             let stays = next == cell && steps < MOST_STEPS;
             let u = |col, row| self.u_at(col, row);
-            // A step to a diagonal neighbour must not cut the corner of a blocked cell.
+            // A diagonal step must not cut the corner of a blocked cell.
             let cuts = u(next.0, cell.1).is_zero() || u(cell.0, next.1).is_zero();
             if stays || u(next.0, next.1) > u(cell.0, cell.1) && !cuts {
                 (at, cell) = (ahead, next);

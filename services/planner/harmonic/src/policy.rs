@@ -1,20 +1,23 @@
-//! The direction and the logarithm of u of every cell of a row. For whole maps, [`Field::direction`] cell by cell would
-//! take several times as long.
+//! Direction and logarithm of u for the cells of a row.
+//!
+//! For whole maps, [`Field::direction`] per cell takes several times as long.
 
 use crate::{Cell, Field, Scaled, guidance::SADDLE, store::Store};
 
-/// The field's answer at a cell's centre.
+/// Direction and log2 u at the centre of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Policy {
-    /// The [direction](Field::direction); zero where there is none.
+    /// [Direction](Field::direction), a unit vector (along columns, along rows); zero if the cell
+    /// has none.
     pub direction: [f64; 2],
-    /// log2 u; negative infinity where u is zero.
+    /// log2 u; negative infinity if u is zero.
     pub log2_u: f64,
 }
 
 impl Field {
-    /// Calls `each` for the cells of `row`, in the order of their columns. A direction may differ from that of
-    /// [`direction`](Self::direction) by rounding.
+    /// Calls `each` for the cells of `row`, in column order.
+    ///
+    /// Directions equal those of [`direction`](Self::direction) except for rounding.
     pub fn policy_of_row(&self, row: usize, mut each: impl FnMut(Policy)) {
         let width = self.width();
         let inside = (1..self.height().saturating_sub(1)).contains(&row);
@@ -29,7 +32,8 @@ impl Field {
         }
     }
 
-    /// [`policy_of_row`](Self::policy_of_row) for a row between two others; `values` are the stored values of all cells.
+    /// Implements [`policy_of_row`](Self::policy_of_row) for a row between two others; `values`
+    /// covers all cells.
     fn of_row<T: Copy + Into<f64>>(
         &self,
         values: &[T],
@@ -44,12 +48,11 @@ impl Field {
         }
     }
 
-    /// The policy of any cell.
     fn policy(&self, cell: Cell) -> Policy {
         Policy { direction: self.direction(cell).unwrap_or_default(), log2_u: self.u(cell).log2() }
     }
 
-    /// The policy of `cell`; `rows` are the stored rows above it, its own and below.
+    /// Returns the policy of `cell`; `rows` are the stored rows above, at and below it.
     fn of_cell<T: Copy + Into<f64>>(&self, rows: [&[T]; 3], exponent: i32, cell: Cell) -> Policy {
         let [above, row, below] = rows;
         let col = cell.col;
@@ -60,7 +63,7 @@ impl Field {
         if own <= 0.0 {
             return NONE;
         }
-        // Blocked cells are negative, and count as 0.
+        // Blocked cells are stored as negative values and count as 0.
         let u = |there: T| -> f64 { Into::<f64>::into(there).max(0.0) / own };
         let gradient = [0.5 * (u(*right) - u(row[col - 1])), 0.5 * (u(below[col]) - u(above[col]))];
         let square = gradient[0] * gradient[0] + gradient[1] * gradient[1];
@@ -76,14 +79,12 @@ impl Field {
     }
 }
 
-/// The policy of a cell that is blocked or cut off.
 const NONE: Policy = Policy { direction: [0.0; 2], log2_u: f64::NEG_INFINITY };
 
 #[cfg(test)]
 mod tests {
     use crate::{Cancellation, Cell, Domain, Settings, Solver};
 
-    /// A hall with blocked cells, a region that is cut off, and the perimeter.
     fn domain(side: usize, seed: u64) -> Domain {
         let mut state = seed;
         let mut blocked = Vec::new();
@@ -101,7 +102,6 @@ mod tests {
 
     #[test]
     fn a_whole_row_answers_what_each_of_its_cells_answers() {
-        // The small values of u on the larger maps are stored otherwise.
         for (side, seed) in [(24, 1), (40, 2), (64, 3), (200, 4)] {
             let mut solver = Solver::new(Settings::default());
             let domain = domain(side, seed);

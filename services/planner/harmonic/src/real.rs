@@ -1,4 +1,4 @@
-//! The two precisions of multigrid and of the verification.
+//! Two precisions of multigrid and of the verification.
 
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
@@ -17,34 +17,36 @@ pub(crate) trait Real:
     + 'static
 {
     const ONE: Self;
-    /// Power of two at which the target's u is put, so that both ends of the exponent's range serve.
+    /// Power of two for u at the target, so that both ends of the exponent range are used.
     const TOP: i32;
 
-    /// The least number; smaller ones count as zero.
+    /// Smallest number; smaller ones count as zero.
     const TINY: Self;
 
-    /// The least u that is right once its residuals are small, if the target's is 2^TOP. A smaller u is held down by so much that
-    /// cells beyond it do not count.
+    /// Smallest u that is right once its residuals are small, for u = 2^TOP at the target.
+    ///
+    /// A smaller u is too low, because cells beyond it are missing from its sum.
     const KNOWN: f64;
 
     fn of(value: f64) -> Self;
     fn wide(self) -> f64;
     fn size(self) -> Self;
 
-    /// 1 / self where positive, 0 elsewhere: so inactive cells drop out of every sum.
+    /// Returns 1 / self if positive, else 0, so that inactive cells drop out of every sum.
     #[inline(always)]
     fn inverse(self) -> Self {
         if self > Self::default() { Self::ONE / self } else { Self::default() }
     }
 
-    /// The number, or 0 if it, or its product with a weight, would be subnormal: subnormal numbers cost a hundred times as much as
-    /// others, and the first cycles have many.
+    /// Flushes a number to 0 if it, or its product with a weight, would be subnormal.
+    ///
+    /// Subnormal numbers cost a hundred times as much as others, and the first cycles have many.
     #[inline(always)]
     fn flushed(self) -> Self {
         if self.size() > Self::TINY { self } else { Self::default() }
     }
 
-    /// 1 where positive, 0 elsewhere.
+    /// Returns 1 if positive, else 0.
     #[inline(always)]
     fn is_active(self) -> Self {
         if self > Self::default() { Self::ONE } else { Self::default() }

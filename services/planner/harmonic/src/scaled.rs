@@ -1,26 +1,30 @@
-//! Non-negative numbers with the mantissa of an `f64` and an exponent of 32 bits: u reaches 1e-70000 on real mazes.
+//! Non-negative numbers with an `f64` mantissa and a 32-bit exponent.
 
-/// A non-negative number, `mantissa` * 2^`exponent`, the mantissa in 1.0 .. 2.0; zero is (0.0, 0).
+/// Non-negative number `mantissa` * 2^`exponent`.
+///
+/// The mantissa lies in 1.0 .. 2.0; zero is (0.0, 0).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scaled {
-    /// 1.0 .. 2.0, or 0.
+    /// Mantissa in 1.0 .. 2.0, or 0.
     pub mantissa: f64,
-    /// Of base 2.
+    /// Exponent to base 2.
     pub exponent: i32,
 }
 
 impl Scaled {
-    /// The number 0.
+    /// Zero.
     pub const ZERO: Self = Self { mantissa: 0.0, exponent: 0 };
-    /// The number 1.
+    /// One.
     pub const ONE: Self = Self { mantissa: 1.0, exponent: 0 };
 
-    /// `value` * 2^`exponent`. A value that is no positive finite number becomes zero.
+    /// Creates `value` * 2^`exponent`.
+    ///
+    /// A value that is NaN, infinite, zero or negative becomes zero.
     pub fn new(value: f64, exponent: i32) -> Self {
         if !(value > 0.0 && value.is_finite()) {
             return Self::ZERO;
         }
-        // Subnormals first become normal, so that their exponent can be read from the bits.
+        // Scaling makes subnormals normal, so that the bits hold their exponent.
         let (value, exponent) = if value < f64::MIN_POSITIVE {
             (value * pow2(64), exponent.saturating_sub(64))
         } else {
@@ -32,12 +36,12 @@ impl Scaled {
         Self { mantissa, exponent: exponent.saturating_add(own) }
     }
 
-    /// Whether the number is 0.
+    /// Returns whether the number is 0.
     pub fn is_zero(self) -> bool {
         self.mantissa == 0.0
     }
 
-    /// The sum of `terms`, in their order.
+    /// Sums `terms` in their order.
     pub(crate) fn sum(terms: impl Iterator<Item = Self> + Clone) -> Self {
         let largest = terms.clone().filter(|it| !it.is_zero()).map(|it| it.exponent).max();
         largest.map_or(Self::ZERO, |largest| {
@@ -45,9 +49,9 @@ impl Scaled {
         })
     }
 
-    /// The number divided by 2^`reference`: an ordinary `f64`, 0 where that underflows and infinite where it overflows.
+    /// Divides the number by 2^`reference`; an underflow gives 0 and an overflow infinity.
     pub fn relative_to(self, reference: i32) -> f64 {
-        // Zero has no exponent to compare, and 0 * 2^huge would be no number.
+        // For zero, 0 * 2^huge would give NaN.
         if self.is_zero() {
             0.0
         } else {
@@ -55,12 +59,12 @@ impl Scaled {
         }
     }
 
-    /// Logarithm to base 2; negative infinity for zero.
+    /// Returns the logarithm to base 2; negative infinity for zero.
     pub fn log2(self) -> f64 {
         self.mantissa.log2() + f64::from(self.exponent)
     }
 
-    /// Logarithm to base 10; negative infinity for zero.
+    /// Returns the logarithm to base 10; negative infinity for zero.
     pub fn log10(self) -> f64 {
         self.mantissa.log10() + f64::from(self.exponent) * std::f64::consts::LOG10_2
     }
@@ -77,7 +81,9 @@ impl PartialOrd for Scaled {
     }
 }
 
-/// 2^`n`, exactly; 0 below the normal range and infinity above it. It has no branch, so that loops over it use vectors.
+/// Returns 2^`n` exactly; 0 below the normal range and infinity above it.
+///
+/// The body is branch-free so that loops over it vectorise.
 #[inline(always)]
 pub(crate) fn pow2(n: i32) -> f64 {
     f64::from_bits(((n.clamp(-1023, 1024) + 1023) as u64) << 52)

@@ -1,34 +1,32 @@
-//! Screening: the decay of u in open space.
-//!
-//! The screened equation is laplacian u = u / L^2; L, the screening length, is the distance in which u falls by a factor of
-//! e besides what the geometry takes. On cells of side h its five-point form is u = (mean of the four neighbours) / (1 + k)
-//! with the screening coefficient k = (h / (2 L))^2.
+//! Screening: the decay of u in open space, in addition to that from the geometry.
 
-/// Shortest screening length, in cells, at which k = 1e6. A cell with a shorter one is as good as blocked.
+/// Shortest screening length, in cells; it gives k = 1e6.
+///
+/// A cell with a shorter length is as good as blocked.
 pub const MIN_SCREENING_CELLS: f64 = 5e-4;
 
-/// The screening of a map.
+/// Screening of a map: k = (h / (2 L))^2 for cells of side h.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Screening {
-    /// There is no screening: Laplace's equation.
+    /// No screening: Laplace's equation, k = 0.
     #[default]
     None,
-    /// All cells have the same screening length.
+    /// One screening length for all cells.
     Uniform {
-        /// The screening length, in the unit of `cell`.
+        /// Screening length L, in the unit of `cell`.
         length: f64,
-        /// The side of a cell; 1 where lengths are in cells.
+        /// Side h of a cell; 1 if `length` is in cells.
         cell: f64,
     },
 }
 
 impl Screening {
-    /// The same screening length for all cells, in cells; infinite for no screening.
+    /// Creates a screening with `length` in cells; an infinite length means no screening.
     pub const fn cells(length: f64) -> Self {
         Self::Uniform { length, cell: 1.0 }
     }
 
-    /// The coefficient k.
+    /// Returns the coefficient k.
     pub(crate) fn coefficient(&self) -> f64 {
         match self {
             Self::None => 0.0,
@@ -43,7 +41,7 @@ mod tests {
 
     #[test]
     fn u_falls_by_a_factor_of_e_in_a_screening_length_on_any_grid() {
-        // Along a line 1 + 2 k = cosh(cell / length), nearly.
+        // Along a line, 1 + 2 k = cosh(cell / length), nearly.
         for cells in [200, 1000] {
             let cell = 10.0 / f64::from(cells);
             let length = 0.5;

@@ -1,8 +1,8 @@
-//! Runs kernels with the widest vectors the machine has.
+//! Kernels run with the widest vectors of the machine.
 //!
-//! The kernels are plain loops over slices, compiled once for every machine and once for wide vectors; which of the two
-//! runs is decided when the program starts. No operation is fused or reordered by that, so the results are the same bit
-//! for bit on every machine.
+//! Kernels are plain loops over slices, compiled once for every machine and once for wide vectors.
+//! The choice is made when the program starts. It neither fuses nor reorders operations, so results
+//! are the same to the bit on every machine.
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Simd(pulp::Arch);
@@ -14,12 +14,12 @@ impl Default for Simd {
 }
 
 impl Simd {
-    /// Runs `kernel`, which must be `#[inline(always)]` all the way down: functions that are not inlined keep the narrow
-    /// code.
+    /// Runs `kernel`, which must be `#[inline(always)]` throughout: functions that are not inlined
+    /// keep the narrow code.
     #[inline(always)]
     pub(crate) fn run<O>(self, kernel: impl FnMut() -> O) -> O {
         struct Run<F>(F);
-        // `FnMut` is used because a call through `FnOnce` goes by way of a shim that is not inlined.
+        // A call through `FnOnce` goes through a shim that is not inlined, hence `FnMut`.
         impl<O, F: FnMut() -> O> pulp::WithSimd for Run<F> {
             type Output = O;
 

@@ -1,5 +1,7 @@
-//! The solver computes a verified field of a domain. It tries the method that [`plan()`] chooses and verifies the field; if that
-//! fails, it tries the costlier methods.
+//! Solver that computes a verified field of a domain.
+//!
+//! The solver tries the method that [`plan()`] chooses and verifies the field. After a failure it
+//! tries the costlier methods.
 
 mod plan;
 
@@ -17,45 +19,56 @@ use crate::{
 
 use plan::{beyond_single, plan};
 
-/// Cycles before the first check of a solve that starts from the field of a similar map: the first cycle has no correction to judge by.
+/// Cycles before the first check of a solve that starts from a similar field: the first cycle has
+/// no correction to judge by.
 const FIRST_CHECK_NEAR: usize = 2;
 
-/// Most cycles from the field of a similar map, before a solve from scratch. Maps that need more are mostly those in which cells were
-/// cut off: their u falls by an order of magnitude a cycle, and is zero at once in a solve from scratch.
+/// Cycle limit of a solve that starts from a similar field, before a solve from scratch.
+///
+/// Maps that exceed it mostly have newly cut-off cells. Their u falls by an order of magnitude per
+/// cycle, while a solve from scratch starts at zero.
 const NEAR_CYCLES: usize = 20;
 
-/// The resources of a solver. The results of full solves do not depend on them.
+/// Resources of a solver.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The number of threads that a solve may use; the result is the same to the bit. Only the verification of large maps uses more than
-    /// one.
+    /// Threads that a solve may use; the result is the same to the bit for every number.
+    ///
+    /// Only the verification of large maps uses more than one.
     pub threads: NonZeroUsize,
-    /// Bytes the multifrontal factorisation may take; a solve that needs more ends in [`SolveError::TooCostly`].
+    /// Memory for the multifrontal factorisation, in bytes.
+    ///
+    /// A solve that depends on a larger factorisation ends in [`SolveError::TooCostly`].
     pub memory_limit: u64,
 }
 
 impl Default for Settings {
-    /// One thread and 2 GiB.
+    /// Returns one thread and 2 GiB.
     fn default() -> Self {
         Self { threads: NonZeroUsize::MIN, memory_limit: 2 << 30 }
     }
 }
 
-/// A step of a solve that has just ended, for callers that measure time.
+/// Step of a solve that has just ended, for callers that measure time.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 #[non_exhaustive]
 pub enum Phase {
-    /// The part that does not depend on the target is ready.
+    /// Target-independent set-up is ready.
     SetUp,
-    /// A cycle of multigrid has ended.
+    /// Multigrid cycle has ended.
     Cycled,
-    /// A field was computed.
+    /// Field was computed.
     Solved,
-    /// The field was checked. If it failed, more cycles or a costlier method follow, with phases of their own.
+    /// Field was checked.
+    ///
+    /// After a failed check, more cycles or a costlier method follow, with their own phases.
     Verified,
 }
 
-/// Solves fields. Between solves it stores the set-up, which does not depend on the target, and updates it where cells changed.
+/// Solver of fields.
+///
+/// Between solves it keeps the target-independent set-up and updates it where cells changed. Every
+/// returned field has passed verification.
 #[derive(Debug, Default)]
 pub struct Solver {
     settings: Settings,
@@ -65,15 +78,18 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// A solver without a set-up.
+    /// Creates a solver without a set-up.
     pub fn new(settings: Settings) -> Self {
         Self { settings, ..Self::default() }
     }
 
-    /// The verified field of `domain`.
+    /// Solves `domain` and verifies the field.
     ///
     /// # Errors
-    /// [`SolveError::Cancelled`], [`SolveError::TooCostly`], [`SolveError::Unverified`].
+    /// - [`SolveError::Cancelled`] after [`Cancellation::cancel`].
+    /// - [`SolveError::TooCostly`] if the last method needs more memory than
+    ///   [`Settings::memory_limit`].
+    /// - [`SolveError::Unverified`] if the field of every method fails verification.
     pub fn solve(
         &mut self,
         domain: &Domain,
@@ -82,9 +98,10 @@ impl Solver {
         self.solve_observed(domain, cancellation, &mut |_| {})
     }
 
-    /// [`solve`](Self::solve), starting from the field of a similar map with the same size and target, which saves most of
-    /// the cycles of multigrid; a field of another size or target is not used. The result is verified as ever, and depends on
-    /// nothing but the arguments.
+    /// Solves `domain` from the field of a similar map, which saves most multigrid cycles.
+    ///
+    /// A field of another map size or target is ignored. The result passes the same verification as
+    /// that of [`solve`](Self::solve) and depends on the arguments alone.
     ///
     /// # Errors
     /// See [`solve`](Self::solve).
@@ -97,7 +114,9 @@ impl Solver {
         self.run(domain, Some(near), cancellation, &mut |_| {})
     }
 
-    /// [`solve`](Self::solve), calling `observe` at the end of each phase: the library has no clock of its own.
+    /// Solves `domain` and calls `observe` at the end of each phase.
+    ///
+    /// The library has no clock of its own, so a caller measures time here.
     ///
     /// # Errors
     /// See [`solve`](Self::solve).
@@ -111,7 +130,6 @@ impl Solver {
     }
 }
 
-/// The inputs of a solve by cycles of multigrid.
 #[derive(Clone, Copy)]
 struct Task<'a> {
     threads: NonZeroUsize,
@@ -119,7 +137,6 @@ struct Task<'a> {
     cancellation: &'a Cancellation,
 }
 
-/// The levels of one precision, and the map they were set up for.
 #[derive(Debug, Default)]
 pub(super) struct Prepared<R> {
     levels: Option<Multigrid<R>>,
@@ -130,7 +147,6 @@ pub(super) struct Prepared<R> {
 }
 
 impl Solver {
-    /// A solve that starts from the field `near` of a similar map, where there is one.
     pub(super) fn run(
         &mut self,
         domain: &Domain,
@@ -144,7 +160,8 @@ impl Solver {
         let budget = Budget::of(domain, self.settings.memory_limit);
         if let Some(near) = near.filter(|near| near.fits(domain)) {
             let method = near.verification().method;
-            // The cost of the factorisation follows from the shape of the map alone.
+            // The shape of the map alone decides the cost of the factorisation, so the usual plan
+            // applies.
             if method != Method::Multifrontal {
                 let ((store, check), method) =
                     self.multigrid(method, task, Some(near), &budget, observe)?;
@@ -205,8 +222,10 @@ impl Solver {
 }
 
 impl Solver {
-    /// The field by multigrid, in double precision if that is the `method`. Where u falls below the range of single precision, the
-    /// cheaper of two methods continues: multifrontal factorisation of the passages, or multigrid in bands.
+    /// Solves by multigrid, in double precision if `method` says so.
+    ///
+    /// Where u falls below the range of single precision, the cheaper of two methods continues:
+    /// multifrontal factorisation of the passages, or multigrid in bands.
     fn multigrid(
         &mut self,
         method: Method,
@@ -234,7 +253,7 @@ impl Solver {
             (store, Method::MultigridAndMultifrontal)
         } else {
             let cycled = &mut || observe(Phase::Cycled);
-            // The next solve sets the levels up again.
+            // The bands overwrite the levels, so the next solve sets them up again.
             self.single.width = 0;
             let levels = self.single.levels.get_or_insert_with(|| Multigrid::new(1, 1));
             let store = multigrid_bands::solve(domain, store, levels, cancellation, cycled)?;
@@ -251,8 +270,8 @@ impl<R: Real> Prepared<R>
 where
     Store: From<Vec<R>>,
 {
-    /// Runs cycles, from the field `near` if there is one, until every cell has converged and the check holds, or the method is given
-    /// up; returns the result so far.
+    /// Runs cycles, from `near` if given, until every cell has converged and the check holds, or to
+    /// the cycle limit.
     fn solve(
         &mut self,
         task: Task<'_>,
@@ -290,7 +309,8 @@ where
             observe(Phase::Verified);
             let mut excess = check.excess();
             if check.unreached > 0 {
-                // u falls below the least number of this precision, so the cells above it are right, or need more cycles.
+                // u falls below the range of this precision, so the check covers only the cells
+                // above it.
                 excess = verification::check_above(domain, &store, threads, R::KNOWN).excess();
             }
             found = (store, check);
@@ -299,7 +319,7 @@ where
         Ok(found)
     }
 
-    /// The levels for `domain`: new, patched where it changed, or as they are.
+    /// Returns the levels: new, patched where the map changed, or unchanged.
     fn prepare(&mut self, domain: &Domain) -> &mut Multigrid<R> {
         let same_size =
             self.width == domain.width() && self.blocked.len() == domain.blocked().len();
@@ -329,7 +349,7 @@ where
         levels
     }
 
-    /// The rows between the first and the last in which the map differs from that of before.
+    /// Returns the range from the first to the last row in which the map changed.
     fn changed_rows(&self, domain: &Domain) -> Option<Range<usize>> {
         let width = domain.width();
         let differs = |row: &usize| {

@@ -1,30 +1,30 @@
-//! Storage of u: one number a cell, in the narrowest format that holds the whole field.
+//! Storage of u: one number per cell, in the narrowest format that holds the whole field.
 
 use std::ops::Range;
 
 use crate::{Scaled, real::Real, scaled::pow2};
 
-/// u of a blocked cell in the stores: any negative number would do, the accessors hide it.
+/// Stored u of a blocked cell; any negative number works, because the accessors hide it.
 pub(crate) const BLOCKED: f64 = -1.0;
 
-/// Exponent of the largest u in a store of many bands or fronts with a common exponent: so high that four of it can be added.
+/// Exponent of the largest u in a store with a common exponent; four such values can be added.
 const TOP: i32 = 1020;
 
-/// Exponent of the smallest u in such a store: so low that the u keeps all of its digits.
+/// Exponent of the smallest u in such a store; u keeps all its digits.
 const BOTTOM: i32 = -960;
 
-/// u as stored: positive where reachable, 0 where free but cut off, [`BLOCKED`] where blocked.
+/// Stored u: positive if reachable, 0 if free but cut off, [`BLOCKED`] if blocked.
 #[derive(Clone, Debug)]
 pub(crate) enum Store {
-    /// All of u fits an `f32` with one common exponent.
+    /// `f32` with one common exponent.
     Single { values: Vec<f32>, exponent: i32 },
-    /// All of u fits an `f64` with one common exponent.
+    /// `f64` with one common exponent.
     Double { values: Vec<f64>, exponent: i32 },
-    /// A mantissa and an exponent a cell.
+    /// Mantissa and exponent per cell.
     Extended { mantissas: Vec<f64>, exponents: Vec<i32> },
 }
 
-/// The values are u times 2^TOP.
+/// Takes values of u times 2^TOP.
 impl From<Vec<f32>> for Store {
     fn from(values: Vec<f32>) -> Self {
         let exponent = -f32::TOP;
@@ -32,7 +32,7 @@ impl From<Vec<f32>> for Store {
     }
 }
 
-/// The values are u times 2^TOP.
+/// Takes values of u times 2^TOP.
 impl From<Vec<f64>> for Store {
     fn from(values: Vec<f64>) -> Self {
         let exponent = -f64::TOP;
@@ -41,7 +41,6 @@ impl From<Vec<f64>> for Store {
 }
 
 impl Store {
-    /// The stored value and its exponent.
     pub(crate) fn raw(&self, index: usize) -> (f64, i32) {
         match self {
             Self::Single { values, exponent } => (f64::from(values[index]), *exponent),
@@ -50,13 +49,14 @@ impl Store {
         }
     }
 
-    /// u of a cell; zero where blocked or cut off.
+    /// Returns u of a cell; zero if blocked or cut off.
     pub(crate) fn u(&self, index: usize) -> Scaled {
         let (value, exponent) = self.raw(index);
         Scaled::new(value, exponent)
     }
 
-    /// u of a run of cells in units of 2^`reference`, 0 where the result is below the range of `R`.
+    /// Reads u of a range of cells in units of 2^`reference`; 0 if the result is below the range of
+    /// `R`.
     pub(crate) fn read_row_as<R: Real>(&self, cells: Range<usize>, reference: i32, into: &mut [R]) {
         if let Self::Single { values, exponent } = self
             && *exponent == reference
@@ -69,13 +69,14 @@ impl Store {
         for (to, index) in into.iter_mut().zip(cells) {
             let (value, exponent) = self.raw(index);
             let shift = exponent.saturating_sub(reference);
-            // The multiplication is done in two steps, because the factor may be out of range where the product is not.
+            // Two multiplications are needed: the factor may be out of range where the product is
+            // not.
             *to = R::of(value.max(0.0) * pow2(shift / 2) * pow2(shift - shift / 2));
         }
     }
 
-    /// The store of mantissas, which may be 0 or [`BLOCKED`], and exponents: with a common exponent if an `f64` holds them
-    /// all.
+    /// Stores mantissas, which may be 0 or [`BLOCKED`], with a common exponent if an `f64` holds
+    /// all values.
     pub(crate) fn narrowest(mut mantissas: Vec<f64>, exponents: Vec<i32>) -> Self {
         let positive = mantissas.iter().zip(&exponents).filter(|(mantissa, _)| **mantissa > 0.0);
         if positive.map(|(_, &exponent)| exponent).min().is_none_or(|it| it < BOTTOM - TOP) {

@@ -1,4 +1,4 @@
-//! The exact field, for tests and benchmarks.
+//! Exact field, for tests and benchmarks.
 
 use std::num::NonZeroUsize;
 
@@ -8,10 +8,13 @@ use crate::{
     verification,
 };
 
-/// The field of `domain` by multifrontal factorisation: exact but for the rounding of `f64`, on maps of any shape.
+/// Solves `domain` by multifrontal factorisation, exact except for `f64` rounding, on maps of any
+/// shape.
+///
+/// The field is returned even if its check fails.
 ///
 /// # Errors
-/// See [`Solver::solve`](crate::Solver::solve).
+/// Succeeds on every valid map: the memory is unlimited and nothing cancels the solve.
 pub fn solve_exactly(domain: &Domain) -> Result<Field, SolveError> {
     let cancellation = Cancellation::new();
     let budget = Budget::of(domain, u64::MAX);

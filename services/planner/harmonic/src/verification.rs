@@ -1,15 +1,13 @@
-//! The verification that every field passes before the solver returns it.
+//! Verification that every field passes before the solver returns it.
 //!
-//! Two things are checked of every cell: the residual of its equation is small relative to its own u (a norm over the map
-//! says nothing about cells where u is 1e-50), and one of its neighbours has a larger u, so steepest ascent from it ends at
-//! the target. A free cell of u = 0 beside one of u > 0 fails too. So the cells of u > 0 are connected components without a
-//! local maximum but the target, hence one component: exactly the cells that can reach the target. No search is needed.
+//! The crate page lists the checks. A free cell of u = 0 beside one of u > 0 also fails. The target
+//! is then the only local maximum, so the cells of u > 0 form one component. They are exactly the
+//! cells that can reach the target, and no search is needed.
 //!
-//! Small residuals are not enough for right directions: if all have one sign they act as screening of that coefficient
-//! would, and in a wide hall a coefficient of 1e-4 turns most directions. What counts is their sum over many cells, beside
-//! how much the field bends there anyhow: with screening k, laplacian u = 4 k u, and (|grad u| / u)^2 is what
-//! laplacian (ln u) is made of. The ratio of both is limited in every tile of the map. That is no bound of angles; the
-//! angles themselves are measured against exact solutions, on thousands of maps (`cargo bench`, `-- accuracy`).
+//! Residuals of one sign act like screening with that coefficient. In a wide hall, 1e-4 turns most
+//! directions. Their sum over a tile is therefore compared with the curvature of the field. With
+//! screening k, laplacian u = 4 k u; and laplacian (ln u) contains (|grad u| / u)^2. This leaves
+//! angles unbounded; `cargo bench`, `-- accuracy` measures them against exact solutions.
 
 mod cells;
 mod rows;
@@ -27,29 +25,32 @@ use tiles::{TILE, Tiles};
 
 pub(crate) use cells::Check;
 
-/// The result of a field's verification, cell by cell.
+/// Result of the verification over all cells of a field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verification {
-    /// The largest |u - mean / (1 + k)| / u over the reachable cells but the target.
+    /// Largest |u - mean / (1 + k)| / u over the reachable cells except the target, without unit.
     pub worst_residual: f64,
-    /// The largest share, over tiles of 64 x 64 cells, of the field's curvature that residuals of one sign account for: 4
-    /// |sum of the relative residuals| over the sum of (|grad u| / u)^2.
+    /// Largest share of the curvature that residuals of one sign explain, over tiles of 64 x 64
+    /// cells.
+    ///
+    /// A share is 4 |sum of the relative residuals| / sum of (|grad u| / u)^2.
     pub worst_tile: f64,
-    /// The method by which the field was computed.
+    /// Method that computed the field.
     pub method: Method,
-    /// Free cells from which the target can be reached, the target's own included.
+    /// Number of free cells that can reach the target, including the target.
     pub reachable: usize,
 }
 
 /// Least cells for a further thread, which takes some ten microseconds to start.
 const CELLS_PER_THREAD: usize = 1 << 18;
 
-/// Checks every cell of a field, on up to `threads` threads; the result does not depend on their number.
+/// Checks every cell of a field on up to `threads` threads; their number does not change the
+/// result.
 pub(crate) fn check(domain: &Domain, store: &Store, threads: NonZeroUsize) -> Check {
     check_above(domain, store, threads, 0.0)
 }
 
-/// Checks the cells of a field whose stored value is above `floor`.
+/// Checks the cells whose stored value is above `floor`.
 pub(crate) fn check_above(
     domain: &Domain,
     store: &Store,
@@ -69,7 +70,6 @@ pub(crate) fn check_above(
     }
 }
 
-/// Runs `check` on strips of rows, on several threads if that is faster.
 fn in_strips(
     domain: &Domain,
     threads: NonZeroUsize,
@@ -80,7 +80,7 @@ fn in_strips(
     if strips == 1 {
         return check(0..height);
     }
-    // Strips have whole tiles, so no sum depends on the number of strips.
+    // Strips consist of whole tiles, so no sum depends on the number of strips.
     let start = |strip: usize| (height * strip / strips).next_multiple_of(TILE).min(height);
     let rows = |strip: usize| start(strip)..start(strip + 1);
     let check = &check;
@@ -94,7 +94,6 @@ fn in_strips(
     })
 }
 
-/// Checks rows of a field with one common exponent.
 fn check_plain<R: Real>(domain: &Domain, values: &[R], strip: Range<usize>, floor: f64) -> Check {
     let width = domain.width();
     let row_of = |row: usize| values.get(row * width..(row + 1) * width);
@@ -102,7 +101,6 @@ fn check_plain<R: Real>(domain: &Domain, values: &[R], strip: Range<usize>, floo
     check_rows(values, cells, Rows::new(width), row_of, strip, weights_of(domain))
 }
 
-/// Checks rows of a field with an exponent a cell.
 fn check_extended(
     domain: &Domain,
     mantissas: &[f64],
@@ -118,7 +116,7 @@ fn check_extended(
     check_rows(mantissas, cells, ScaledRows::new(width), row_of, strip, weights_of(domain))
 }
 
-/// Sets the weights of a row of `domain`; no equation holds at the target.
+/// Sets the weights of a row of `domain`; 0 at the target, where no equation holds.
 fn weights_of<R: Real>(domain: &Domain) -> impl Fn(usize, &mut [R]) {
     let target = domain.target();
     move |row, weights| {
@@ -129,7 +127,7 @@ fn weights_of<R: Real>(domain: &Domain) -> impl Fn(usize, &mut [R]) {
     }
 }
 
-/// Checks the cells of a part of a map that have a `weight`, 0.25 / (1 + k), and in which u is above `floor`.
+/// Checks the cells of a part of a map with a positive weight, 0.25 / (1 + k), and u above `floor`.
 pub(crate) fn check_above_with<R: Real>(
     width: usize,
     values: &[R],
@@ -143,8 +141,10 @@ pub(crate) fn check_above_with<R: Real>(
     check_rows(values, Cells::above(width, floor), Rows::new(width), row_of, strip, set)
 }
 
-/// Checks a strip of rows with wide vectors: `raw` are the stored values, `row_of` gives rows by number, none beyond the
-/// map, and `set_weights` the weights of the cells of a row.
+/// Checks a strip of rows with wide vectors.
+///
+/// `raw` holds the stored values, `row_of` returns a row or `None` beyond the map, and
+/// `set_weights` sets the weights of a row.
 fn check_rows<'f, R: Real, W: Window<R>>(
     raw: &[R],
     mut cells: Cells<R>,
@@ -183,7 +183,7 @@ mod tests {
     use crate::solver::Solver;
     use crate::store::BLOCKED;
 
-    /// A hall of so many cells a side with a box in it.
+    /// Returns a hall of `side` x `side` cells with a box in it.
     fn hall(side: usize) -> Domain {
         let mut blocked = vec![false; side * side];
         for row in side / 2..side / 2 + side / 8 {
@@ -235,7 +235,7 @@ mod tests {
                 [common, extended].map(|store| check(&domain, &store, NonZeroUsize::MIN));
             let counts = |check: Check| (check.local_maxima, check.unreached, check.reachable);
             assert_eq!(counts(common), counts(extended));
-            // Two infinities, or two results that are no numbers, agree as well.
+            // Two infinities or two NaN agree as well.
             let agree =
                 |a: f64, b: f64| !a.is_finite() && !b.is_finite() || (a / b - 1.0).abs() < 1e-6;
             assert!(agree(common.worst_residual, extended.worst_residual));

@@ -6,8 +6,8 @@ use harmonic::{Cancellation, Domain, Solver};
 use super::*;
 use crate::view::field_cell;
 
-/// Speed limit and turn (positive to the left) of a car at the origin that faces `heading`, with `hazard` in a square of 4 m
-/// and the target 1.5 m ahead along x.
+/// Returns speed limit and turn (positive to the left) of a car at the origin; the target is 1.5 m
+/// ahead along x.
 fn advice(heading: f64, hazard: impl Fn(DVec2) -> bool) -> (f64, f64) {
     let text = "target = [1.5, 0]\nrobot.model = 'car'\nperimeter = { width_m = 4, cells = 80 }";
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
@@ -38,7 +38,7 @@ fn a_car_drives_straight_to_a_target_ahead_and_turns_to_one_at_its_side() {
 
 #[test]
 fn an_arc_that_a_hazard_cuts_off_is_not_driven() {
-    // The hazard extends from y = -0.2 to 0.9, so it is passed on the right.
+    // The hazard extends from y = -0.2 to 0.9, so the car passes on the right.
     let (limit, turn) = advice(0.0, |at| (at.x - 0.5).abs() < 0.1 && at.y > -0.2 && at.y < 0.9);
     assert!(limit > 0.0 && turn < 0.0, "{limit} m/s, {turn}");
 }
@@ -47,7 +47,6 @@ fn an_arc_that_a_hazard_cuts_off_is_not_driven() {
 fn a_car_that_cannot_steer_clear_of_a_wall_stands_although_there_is_a_way_behind_it() {
     let (limit, _) = advice(0.0, |at| at.x > 0.05 && at.x < 0.3 && at.y.abs() < 1.0);
     assert_eq!(limit, 0.0);
-    // No robot that turns on the spot needs arcs.
     let x80 = Mission::parse("target = [1.5, 0]", Path::new("m.toml")).unwrap();
     assert!(Arcs::new(&x80).is_none());
 }

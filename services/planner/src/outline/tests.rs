@@ -6,10 +6,10 @@ use harmonic::{Cancellation, Domain, Field, Solver};
 use super::*;
 use crate::view::field_cell;
 
-/// What hazards are inflated by: half the width and the mapper's margin.
+/// Inflation of hazards: half the width and the mapper's margin.
 const INFLATED_M: f64 = 0.2 + 0.055;
 
-/// A robot of 0.9 by 0.4 m with a laser, in a square of 4 m whose target is 1.5 m ahead along x.
+/// Robot of 0.9 by 0.4 m with a laser, in a square of 4 m with the target 1.5 m ahead along x.
 fn long() -> (Mission, Outline) {
     let text = "target = [1.5, 0]\nrobot.model = 'jackal'\n\
          robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]\n\
@@ -19,7 +19,6 @@ fn long() -> (Mission, Outline) {
     (mission, outline)
 }
 
-/// The map among things whose distance from a place is `clearance`, and its field.
 fn room(mission: &Mission, clearance: impl Fn(DVec2) -> f64) -> (Vec<u8>, Field) {
     let frame = mission.grid_frame();
     let state = |cell: Cell| match frame.is_rim(cell) {
@@ -43,7 +42,7 @@ fn pose(x: f64, y: f64, heading_deg: f64) -> Pose2 {
     Pose2 { position: DVec2::new(x, y), heading: heading_deg.to_radians() }
 }
 
-/// The distance from a wall across the room at x = 0.3 with a gap of 0.6 m.
+/// Returns the distance from a wall at x = 0.3 with a gap of 0.6 m.
 fn gap(at: DVec2) -> f64 {
     DVec2::new((at.x - 0.3).abs(), (0.3 - at.y.abs()).max(0.0)).length()
 }
@@ -61,7 +60,7 @@ fn an_outline_touches_what_is_nearer_than_the_margin_and_nothing_else() {
         let local = DVec2::from_angle(-at.heading).rotate(post - at.position);
         let (gap_m, _) = footprint.gap_to_point(local);
         let touches = outline.touches(&view(&mission, &map), &at);
-        // A post within the body is on its outline before.
+        // A post inside the body was on its outline before.
         if gap_m.abs() < 0.04 {
             assert!(touches, "{gap_m} m");
             touched += 1;
@@ -84,7 +83,6 @@ fn a_long_body_turns_in_the_open_and_not_between_walls() {
     assert!(outline.turns(&view(&mission, &empty), &along, PI));
 }
 
-/// The place where a body that starts at `pose` ends: it does what it is told for so many steps.
 fn drive(mission: &Mission, map: &(Vec<u8>, Field), outline: &Outline, start: Pose2) -> Pose2 {
     let mut outline = outline.clone();
     let (view, mut at) = (view(mission, map), start);
@@ -122,7 +120,7 @@ fn a_long_body_passes_a_gap_narrower_than_its_length_from_any_side_and_touches_n
 #[test]
 fn a_long_body_that_faces_a_dead_end_backs_out() {
     let (mission, outline) = long();
-    // A corridor 0.7 m wide around the body, closed ahead, whose way out is behind.
+    // A corridor 0.7 m wide, closed ahead and open behind.
     let pocket = |at: DVec2| {
         let aside = DVec2::new((-0.3 - at.x).max(0.0).max(at.x - 1.0), at.y.abs() - 0.35);
         let end = DVec2::new(at.x - 1.0, (at.y.abs() - 0.35).max(0.0)).length();
@@ -139,7 +137,8 @@ fn a_long_body_that_faces_a_dead_end_backs_out() {
 #[test]
 fn narrow_cells_where_a_long_body_cannot_turn_are_refused() {
     let (mission, outline) = long();
-    // Behind the gap, 0.6 m farther, a wall with a gap 1.2 m aside: between them the body would have to turn.
+    // A second wall 0.6 m behind the gap has its gap 1.2 m aside, so the body would have to turn
+    // between them.
     let bend = |at: DVec2| {
         let beside = DVec2::new((at.x - 0.9).abs(), (0.3 - (at.y - 1.2).abs()).max(0.0));
         gap(at).min(beside.length())

@@ -1,15 +1,15 @@
-//! The newest map and the field that follows it.
+//! Newest map and the field that follows it.
 //!
 //! | event | [`Current`](State::Current) | [`Stale`](State::Stale) | [`Solving`](State::Solving) |
 //! |---|---|---|---|
-//! | the map changes | `Stale` | `Stale` | `Solving`, `changed` |
-//! | the tick is over, and the map is small | `Current` | solved: `Current` | - |
-//! | the tick is over, and the map is large | `Current` | a job begins: `Solving` | `Solving` |
-//! | the job's result comes | ignored | ignored | `Current`, or `Stale` if the map `changed` meanwhile |
+//! | map changes | `Stale` | `Stale` | `Solving`, `changed` |
+//! | tick ends, small map | `Current` | solved: `Current` | - |
+//! | tick ends, large map | `Current` | a job begins: `Solving` | `Solving` |
+//! | result of the job | ignored | ignored | `Current`, or `Stale` if `changed` |
 //!
-//! While the field is not the newest map's, a robot follows it only where nothing changed ahead. Elsewhere a small map is solved within
-//! the tick, and on a large one the robot waits. Each tick looks at the way again, and on a wall clock a tick is answered once more when
-//! its map is solved.
+//! A robot follows an outdated field only where nothing changed ahead. Elsewhere a small map is
+//! solved within the tick, and on a large one the robot waits. Each tick checks the way again. On a
+//! wall clock, a tick is answered once more when its map is solved.
 
 use std::sync::Arc;
 
@@ -25,21 +25,23 @@ use harmonic::{Cell, Change, Domain, Field, Guidance, SolveError};
 use super::output::Job;
 use crate::view::{View, field_cell};
 
-/// Maps of at most this many cells (512 a side) are solved by the step, before the answer or after it; larger ones in the background.
+/// Limit of cells (512 x 512) for a solve within the step; larger maps are solved in the
+/// background.
 const SMALL_CELLS: usize = 1 << 18;
 
-/// Nothing may have changed within the way of so many seconds: until the next tick looks again, and then to stop.
+/// Time horizon of the way that must be unchanged, seconds: until the next tick looks again, and
+/// then to stop.
 const AHEAD_S: f64 = 0.8;
 
-/// A robot this near to the field's cell beside the target has arrived, metres.
+/// Distance to the field's cell beside the target at which the robot has arrived, metres.
 const AT_CELL_M: f64 = 0.12;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Current,
-    /// The map changed, and no solve of it has begun.
+    /// Map changed, and no solve of it has begun.
     Stale,
-    /// The background solver runs `job` on version `version`; `changed` says whether the map changed since.
+    /// Background solver runs `job` on `version`; `changed` says whether the map changed since.
     Solving {
         job: u64,
         version: u64,
@@ -51,13 +53,13 @@ enum State {
 pub(super) struct Live {
     pub(super) frame: GridFrame,
     pub(super) map: Domain,
-    /// The field of `map` or of one before; shared with its snapshots.
+    /// Field of `map` or of an older one; shared with its snapshots.
     pub(super) field: Arc<Field>,
-    /// Unless the field is current.
+    /// Version of an outdated field.
     field_version: u64,
-    /// It leads to the target before, so it is not followed.
+    /// Whether the field leads to the previous target and must not be followed.
     leads_elsewhere: bool,
-    /// Row-major; empty without any.
+    /// Refused cells, row-major; empty if there are none.
     refused: Vec<bool>,
     state: State,
 }
@@ -95,14 +97,14 @@ impl Live {
         }
     }
 
-    /// The newest map has version `version`. No job is awaited any longer.
+    /// Marks the field as outdated at `version` and drops the awaited job.
     pub(super) fn target_changed(&mut self, version: u64) {
         self.map_changed(version);
         self.leads_elsewhere = true;
         self.state = State::Stale;
     }
 
-    /// None unless the field is stale and no job runs; the newest map has version `version`.
+    /// Begins a job on `version` if the field is stale.
     pub(super) fn begin_job(&mut self, number: u64, version: u64) -> Option<Job> {
         if self.state != State::Stale {
             return None;
@@ -139,7 +141,9 @@ impl Live {
         }
     }
 
-    /// Status and direction at `pose`; `cells` are the newest map's. None where the field must not be followed.
+    /// Returns status and direction at `pose`; `None` where the field must not be followed.
+    ///
+    /// `cells` are those of the newest map.
     pub(super) fn guide(
         &self,
         robot: &Robot,
@@ -157,7 +161,7 @@ impl Live {
         let (status, direction) = match view.guidance(pose.position) {
             Guidance::Along(direction) => (GuidanceStatus::Along, direction.into()),
             Guidance::WayOut(direction) => (GuidanceStatus::WayOut, direction.into()),
-            // Within the target's cell the field says nothing more; the rest is straight.
+            // Inside its cell the field ends, so the robot drives straight to the target.
             Guidance::AtTarget => {
                 let to_target = target - pose.position;
                 (GuidanceStatus::Along, to_target.normalize_or(DVec2::X))
@@ -166,7 +170,7 @@ impl Live {
         };
         let follow = match (self.state, status) {
             (State::Current, _) => true,
-            // There may be a way by now.
+            // The newest map may have a way.
             (_, GuidanceStatus::Unreachable) => false,
             _ => {
                 let way = view.way(pose.position, direction, robot.ahead_m);
@@ -185,7 +189,6 @@ impl Live {
         self.refused.get(self.frame.index(cell)).is_some_and(|it| *it)
     }
 
-    /// The field is not to lead through `cells` of a map of `version` any more.
     pub(super) fn refuse(&mut self, cells: &[grid::Cell], version: u64) -> Result<(), SolveError> {
         self.refused.resize(self.frame.area(), false);
         cells.iter().for_each(|cell| self.refused[self.frame.index(*cell)] = true);
@@ -193,7 +196,7 @@ impl Live {
         self.refuse_again()
     }
 
-    /// `map` is new.
+    /// Blocks the refused cells in a new `map`.
     pub(super) fn refuse_again(&mut self) -> Result<(), SolveError> {
         let refused = self.refused.iter().enumerate().filter(|(_, refused)| **refused);
         let side = self.frame.cells as usize;
@@ -203,7 +206,8 @@ impl Live {
         self.map.apply(&changes)
     }
 
-    /// Returns whether there were any. They are in `map` until it is new.
+    /// Forgets the refused cells and returns whether there were any; they stay in `map` until it is
+    /// new.
     pub(super) fn forget_refused(&mut self) -> bool {
         let refused = std::mem::take(&mut self.refused);
         refused.contains(&true)

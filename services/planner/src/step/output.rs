@@ -1,5 +1,6 @@
-//! What the planner's step gives, and the field at one moment, from which the policy of every cell is computed while the
-//! planner goes on.
+//! Results of the planner's step, and a snapshot of the field.
+//!
+//! The policy of every cell is computed from the snapshot while the planner continues.
 
 use std::sync::Arc;
 
@@ -9,18 +10,17 @@ use common::{
 };
 use harmonic::{Domain, Field, SolveError};
 
-/// The effect of an input on the field.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Work {
     #[default]
     None,
     Solved,
-    /// The field is now of an older map.
+    /// Field belongs to an older map now.
     Stale,
-    /// The result of a background solve replaced the field.
+    /// Background result replaced the field.
     SwappedIn,
     Broken,
-    /// A version of the grid is missing: the field stays as it is until a keyframe comes.
+    /// Grid version is missing; the field stays until a keyframe arrives.
     Missed,
 }
 
@@ -40,25 +40,25 @@ pub struct Job {
 pub struct Solved {
     pub number: u64,
     pub field: Result<Arc<Field>, SolveError>,
-    /// No decision depends on it.
+    /// Duration of the solve, ns; decisions ignore it.
     pub took_ns: u64,
 }
 
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// Without stamp and part.
+    /// Header without stamp and part.
     pub header: FieldHeader,
     pub frame: GridFrame,
     pub(super) field: Arc<Field>,
 }
 
 impl Snapshot {
-    /// Row-major.
+    /// Returns the cells, row-major.
     pub fn cells(&self) -> Vec<FieldCell> {
         self.cells_with(|_| ())
     }
 
-    /// Likewise; `after_row` is told each row.
+    /// Returns the cells, row-major, and calls `after_row` after each row.
     pub(crate) fn cells_with(&self, after_row: impl Fn(usize)) -> Vec<FieldCell> {
         let mut cells = Vec::with_capacity(self.frame.area());
         for row in 0..self.frame.cells as usize {

@@ -10,7 +10,6 @@ fn mission() -> Mission {
     mission_of(40)
 }
 
-/// A perimeter of 4 m in so many cells a side.
 fn mission_of(cells: u32) -> Mission {
     let text = format!(
         "target = [1.5, 0]\nmethod = 'paper'\nperimeter = {{ width_m = 4, cells = {cells} }}"
@@ -19,7 +18,7 @@ fn mission_of(cells: u32) -> Mission {
 }
 
 impl Planner {
-    /// The guidance a minute later, when the robot has seen what moves.
+    /// Returns the guidance a minute later, when the robot has detected what moves.
     fn ask(&mut self, pose: &PoseSample) -> GuidanceSample {
         let stamp_ns = pose.stamp.stamp_ns + 60_000_000_000;
         let pose = PoseSample { stamp: Stamp { stamp_ns, ..pose.stamp }, ..*pose };
@@ -27,7 +26,6 @@ impl Planner {
     }
 }
 
-/// A planner that is told the mission's target.
 fn sent(mission: &Mission) -> Planner {
     let mut planner = Planner::new(mission);
     let target = TargetSample::first(mission);
@@ -35,7 +33,6 @@ fn sent(mission: &Mission) -> Planner {
     planner
 }
 
-/// A keyframe with the perimeter, and hazard in the cells for which `hazard` says so.
 fn keyframe(version: u64, hazard: impl Fn(DVec2) -> bool) -> (GridHeader, Vec<u8>) {
     keyframe_of(mission().grid_frame(), version, hazard)
 }
@@ -51,7 +48,6 @@ fn keyframe_of(
     (header, cells.collect())
 }
 
-/// A planner in a room with the perimeter, and hazard in the cells for which `hazard` says so.
 fn in_room(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> Planner {
     let mut planner = sent(mission);
     let (header, cells) = keyframe_of(mission.grid_frame(), 1, hazard);
@@ -67,7 +63,6 @@ fn at(x_m: f64, y_m: f64) -> PoseSample {
     PoseSample { x_m, y_m, ..PoseSample::default() }
 }
 
-/// The result of a job.
 fn solve(job: &Job) -> Solved {
     let field = Solver::default().solve(&job.domain, &Cancellation::default());
     Solved { number: job.number, field: field.map(Arc::new), took_ns: 0 }
@@ -100,7 +95,8 @@ fn an_empty_room_is_crossed_straight() {
     assert_eq!(guidance.distance_m, 1.5);
 }
 
-/// A planner with the field of an empty room, and the keyframe of a wall that is open only above y = 1.
+/// Planner with the field of an empty room, and the keyframe of a wall that is open only above y =
+/// 1.
 fn with_a_wall_to_come() -> (Planner, impl Fn(u64) -> (GridHeader, Vec<u8>)) {
     let (mission, frame) = (mission_of(200), mission_of(200).grid_frame());
     let planner = in_room(&mission, |_| false);
@@ -157,7 +153,6 @@ fn in_the_targets_cell_the_rest_is_straight() {
     assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
 }
 
-/// An evidential planner in a room where only the cells for which `scanned` says so were scanned.
 fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
     evidential_in(&Mission { method: Method::Evidential, ..mission() }, |_| false, scanned)
 }
@@ -175,7 +170,6 @@ fn evidential_in(
         let (x_m, y_m, clear_m) = (0.0, 0.0, 2.0);
         *beam = ClearBeam { x_m, y_m, bearing_rad: bearing, clear_m };
     }
-    // The first of the beams looked ahead.
     header.clear_beams.swap(0, 5);
     let frame = mission.grid_frame();
     for (cell, state) in frame.whole().cells().zip(&mut cells) {
@@ -190,7 +184,7 @@ fn evidential_in(
 
 #[test]
 fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
-    // All is scanned but the ground to the left of the way ahead.
+    // Only the ground to the left of the way ahead is unscanned.
     let mut planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
     let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Look);
@@ -209,7 +203,7 @@ fn an_evidential_robot_without_sensing_does_not_look_first() {
 
 #[test]
 fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() {
-    // All ground is scanned, by a sonar that looked ahead only.
+    // A sonar that looked ahead only scanned all ground.
     let mut planner = evidential(|_| true);
     planner.belief.clear_beam_count = 1;
     let guidance = planner.ask(&at(0.0, 0.0));
@@ -298,7 +292,7 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
     for (clear_m, may_go) in [(-0.01, false), (0.07, false), (0.5, true)] {
         let mut planner = evidential(|_| true);
         let count = planner.belief.clear_beam_count as usize;
-        // Every second reading hears nothing.
+        // Every second reading is silent.
         for beam in planner.belief.clear_beams[..count].iter_mut().step_by(2) {
             (beam.x_m, beam.clear_m) = (0.19, clear_m);
             beam.bearing_rad = 0.0;
@@ -321,10 +315,10 @@ fn a_scan_goes_on_in_a_planner_that_was_restarted() {
     }
 }
 
-/// Cells a side of a map that the background solver solves.
+/// Cells per side of a map for the background solver.
 const LARGE: u32 = 600;
 
-/// A planner in a large room with a wall across it at x = 0.8, and two gaps in the wall.
+/// Large room with a wall at x = 0.8 that has two gaps.
 struct LargeRoom {
     planner: Planner,
     header: GridHeader,
@@ -347,7 +341,6 @@ impl LargeRoom {
         Self { planner, header, cells }
     }
 
-    /// Make the cells hazard for whose centres `becomes` says so.
     fn block(&mut self, becomes: impl Fn(DVec2) -> bool) {
         let frame = self.header.part.frame();
         for (cell, state) in frame.whole().cells().zip(&mut self.cells) {
@@ -368,7 +361,6 @@ impl LargeRoom {
         self.block(|at| (at.x - 0.8).abs() < 0.03 && at.y < 1.0);
     }
 
-    /// The background solver runs the job that is due.
     fn solve(&mut self) {
         let job = self.planner.begin_job().unwrap();
         assert_eq!(self.planner.swap_in(solve(&job)).unwrap(), Work::SwappedIn);
@@ -538,7 +530,7 @@ fn on_a_large_map_the_robot_waits_until_the_field_leads_to_its_new_target() {
     assert!(guidance.ex < -0.9, "{guidance:?}");
 }
 
-/// A planner of a robot of 0.9 by 0.4 m with a laser, in a scanned room with hazard where `hazard` says so, and what it was told.
+/// Planner of a robot of 0.9 by 0.4 m with a laser, in a scanned room, and its keyframe.
 fn long_in_room(target: &str, hazard: impl Fn(DVec2) -> bool) -> (Planner, GridHeader, Vec<u8>) {
     let text = format!(
         "{target}\nrobot.model = 'jackal'\nperimeter = {{ width_m = 4, cells = 80 }}\n\
@@ -556,7 +548,7 @@ fn long_in_room(target: &str, hazard: impl Fn(DVec2) -> bool) -> (Planner, GridH
 
 #[test]
 fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
-    // Two walls 0.55 m apart, each with a gap, grown by half the body's width; there is a way around both at y = -1.5.
+    // Two inflated walls 0.55 m apart, each with a gap; a way around both passes y = -1.5.
     let wall = |at: DVec2, x: f64, gap: f64| {
         (at.x - x).abs() < 0.255 && at.y > -1.0 && (at.y - gap).abs() > 0.05
     };
@@ -593,8 +585,7 @@ fn a_long_body_is_not_turned_to_a_targets_heading_where_it_would_touch() {
     }
 }
 
-/// The guidance of a robot at the origin that drives at 0.4 m/s along x, which is its way, in the middle of a hall whose ground was
-/// scanned, beside a mover at `at` with `velocity`.
+/// Robot at the origin that drives at 0.4 m/s along x in a wide, scanned hall, beside a mover.
 fn guidance_beside(at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
     guidance_of("kobuki", at, velocity)
 }
@@ -603,7 +594,7 @@ fn guidance_of(model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64)
     guidance_between(6.0, model, at, velocity)
 }
 
-/// Likewise between two walls, each so far from the robot's way, metres.
+/// Same hall with two walls at `wall_m` metres from the robot's way.
 fn guidance_between(wall_m: f64, model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
     let mut hall = Hall::new(wall_m, model);
     let pose = PoseSample { v_m_s: 0.4, ..PoseSample::default() };
@@ -702,7 +693,7 @@ fn a_robot_gets_out_of_the_way_of_what_comes() {
 
 #[test]
 fn a_robot_steps_aside_while_what_comes_is_far_off() {
-    // A Jackal cannot back, because its laser does not look there.
+    // A Jackal cannot back up, because its laser does not cover the rear.
     let (guidance, _) = guidance_of("jackal", DVec2::new(4.5, 0.1), DVec2::new(-1.2, 0.0));
     assert!(status(&guidance) == GuidanceStatus::Along && guidance.ey.abs() > 0.3, "{guidance:?}");
 }

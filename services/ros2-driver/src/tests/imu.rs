@@ -19,7 +19,7 @@ fn imu() -> Vec<u8> {
     [begin, zeros(8), zeros(2), rate, diagonal, zeros(3), zeros(9)].concat()
 }
 
-/// A message with this stamp, microseconds, and turn rate.
+/// Returns a message with this stamp, microseconds.
 fn imu_at(stamp_us: u64, rate: f64) -> Vec<u8> {
     let mut payload = imu();
     payload[4..8].copy_from_slice(&((stamp_us / 1_000_000) as u32).to_le_bytes());
@@ -28,8 +28,7 @@ fn imu_at(stamp_us: u64, rate: f64) -> Vec<u8> {
     payload
 }
 
-/// A robot that winds to either side. Its odometry, at 10 Hz, has `odometry` times its turns; its gyro, at 100 Hz, has `gyro`
-/// times its turns.
+/// Winding robot. `odometry`, at 10 Hz, and `gyro`, at 100 Hz, scale its measured turns.
 struct Winding {
     driver: Ros2,
     odometry: f64,
@@ -46,12 +45,12 @@ impl Winding {
         0.8 * (f64::from(self.ms) / 1000.0).sin()
     }
 
-    /// Let a tick pass, in which the IMU speaks or not. Returns the turn of the tick, and the reason of a refusal.
+    /// Runs a tick, with IMU messages or not. Returns its turn, and any refusal.
     fn tick(&mut self, imu_speaks: bool) -> (Option<Turn>, Option<String>) {
         let mut refused = None;
         for _ in 0..10 {
             self.ms += 10;
-            // The messages come 3 ms before those of odometry.
+            // 3 ms before odometry.
             let at_us = u64::from(self.ms) * 1000 - 3000;
             let rate = self.gyro * 0.8 * (at_us as f64 / 1e6).cos();
             if imu_speaks {
@@ -74,7 +73,7 @@ fn an_imu_is_read_as_rclpy_serialises_it_and_what_it_does_not_state_is_not_used(
         heading[at..at + 8].copy_from_slice(&value.to_le_bytes());
         Imu::read(&heading).map(|imu| imu.turn)
     };
-    // Without a turn rate there is no turn, until there is an orientation.
+    // Without a rate the orientation gives the turn.
     assert!(set(148, -1.0).unwrap_err().contains("remove robot.ros2.imu"));
     assert!(matches!(set(52, 0.0), Ok(ImuTurn::Heading(at)) if (at - 0.5).abs() < 1e-12));
     assert!(set(44, 7.0).unwrap_err().contains("no rotation"));
@@ -104,7 +103,8 @@ fn the_turns_of_ticks_are_those_of_the_gyro_up_to_the_stamp_of_odometry_and_foll
         (sum, variance) = (sum + turn.turn_rad, variance + turn.variance_rad2);
     }
     assert!((sum - (robot.heading() - from)).abs() < 1e-4, "{sum}");
-    // 10 messages with an error of 0.02 rad/s for 10 ms each, and 3 ms at both ends in which the rate may change by 5 rad/s^2.
+    // 10 messages with 0.02 rad/s of error for 10 ms each, and 3 ms at both ends with up to 5
+    // rad/s^2 of change.
     let ends = 2.0 * 2.25e-5_f64.powi(2);
     assert!((variance / 57.0 - 10.0 * 4e-8 - ends).abs() < 1e-10, "{variance}");
 }

@@ -10,7 +10,7 @@ fn ideal() -> WheelPhysics {
     WheelPhysics { lag_s: 0.0, ..WheelPhysics::preset(Realism::Laboratory) }
 }
 
-/// Run for `seconds` from mission time `from`. Returns the speed at every step.
+/// Returns the speed at every step for `seconds` from mission time `from`.
 fn run(motor: &mut Motor, from: f64, seconds: f64) -> Vec<f64> {
     let mut noise = Noise::new(1, Source::Wheels);
     let steps = (seconds / DT).round() as usize;

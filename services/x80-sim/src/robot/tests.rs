@@ -11,7 +11,7 @@ use super::*;
 
 mod realism;
 
-/// A mission with ideal sensors and wheels, unless `text` names a realism.
+/// Returns a mission with ideal sensors and wheels, unless `text` names a realism.
 fn mission(text: &str) -> Mission {
     let mut mission =
         Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml")).unwrap();
@@ -25,7 +25,7 @@ fn robot(text: &str) -> Robot {
     Robot::new(&mission(text))
 }
 
-/// Send the robot `command`. Returns the meaning that it had to the robot, and the answer.
+/// Returns the command's meaning to the robot, and the answer.
 fn send_as(robot: &mut Robot, command: Command, addressing: Addressing) -> (Heard, Vec<u8>) {
     let mut bytes = Vec::new();
     command.encode(addressing, &mut bytes);
@@ -40,12 +40,11 @@ fn send(robot: &mut Robot, command: Command) -> (Heard, Vec<u8>) {
     send_as(robot, command, Addressing::Numbered)
 }
 
-/// A command that drives both wheels forward at `counts` per second.
 fn forward(counts: i16, limit_ms: impl Into<Option<u16>>) -> Command {
     Command::velocity([Some(-counts), Some(counts)], limit_ms)
 }
 
-/// The streamed frames of this tick: RIDs and DIDs, and the reports.
+/// Returns this tick's frames: RIDs and DIDs, and the reports.
 fn streamed(robot: &mut Robot) -> (Vec<(u8, u8)>, Vec<Report>) {
     let mut bytes = Vec::new();
     robot.stream(&mut bytes);
@@ -152,7 +151,8 @@ fn counts_come_from_real_motion_on_the_wired_channels_and_wrap() {
     for _ in 0..7 {
         robot.advance_to_next_tick();
     }
-    // In one second the wheels turn 1000 counts of 2 pi 0.085 / 1200 m. Channel 0 is reversed and wraps below 0.
+    // In one second the wheels turn 1000 counts of 2 pi 0.085 / 1200 m. Channel 0 is reversed and
+    // wraps below 0.
     let sensors = motor(&mut robot);
     assert_eq!(sensors.encoders.map(|e| e.position), [32_768 - 1000, 1000]);
     assert_eq!(sensors.encoders.map(|e| e.velocity()), [-1000, 1000]);
@@ -170,7 +170,6 @@ fn wheels_may_be_wired_the_other_way_round() {
     let mut robot = robot(
         "[robot]\nleft = { channel = 1, reversed = false }\nright = { channel = 0, reversed = true }\n[simulation.wheels]\nlag_s = 0",
     );
-    // Only the right wheel turns, so the robot turns left.
     send(&mut robot, Command::velocity([Some(-500), None], None));
     robot.advance_to_next_tick();
     let ground_truth = robot.ground_truth();
@@ -193,7 +192,8 @@ fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
 
 #[test]
 fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
-    // A speed loop of 60 ms falls from 250 mm/s to the 10 mm/s that count as rest in 3.2 of them.
+    // A speed loop of 60 ms falls from 250 mm/s to 10 mm/s, which counts as rest, in 3.2 time
+    // constants.
     let coasting = 0.06 * 25_f64.ln();
     let stopping_time = |text: &str| {
         let mut robot = robot(text);
@@ -279,8 +279,8 @@ fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
     let Some(Report::Standard(sensors)) = streamed(&mut robot).1.first().copied() else {
         panic!("no standard frame");
     };
-    // Ahead is a wall at 1 - 0.1915 m. To the left the drum at (0, 1) lies 45 degrees off that ranger, so its flank or
-    // nothing is heard; to the right only the end of the wall is.
+    // A wall is 1 - 0.1915 m ahead. The drum is 45 degrees off the left ranger, which hears its
+    // flank or nothing. The right ranger meets only the wall's end.
     assert_eq!(sensors.ultrasonic[3], 81);
     assert_eq!(sensors.ultrasonic[0], 255);
     assert_eq!(sensors.ultrasonic[1], 255);
@@ -337,7 +337,6 @@ fn a_thing_that_moves_into_the_robot_pushes_it_and_is_a_contact() {
     let ground_truth = robot.ground_truth();
     assert!((ground_truth.x + 0.49).abs() < 0.01, "{ground_truth:?}");
     assert_eq!(ground_truth.contacts, 1);
-    // The robot is pushed straight back, and its wheels roll.
     let back = 0.49 / (std::f64::consts::TAU * 0.085 / 1200.0);
     let counted = 32_768.0 - f64::from(ground_truth.left_counts);
     assert!((counted - back).abs() < 25.0, "{counted} counts for {back}");
@@ -402,7 +401,7 @@ fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_it
     let later = next.ground_truth();
     assert_eq!((later.x, later.y), (stands.x, stands.y), "it stands");
     assert!(later.time_s > driving.time_s && later.tick > driving.tick);
-    // A robot that restarted its counts would show zero.
+    // Restarted counts would show zero.
     let rolled = counts_between(driving.left_counts, later.left_counts);
     assert!((50..600).contains(&rolled), "{rolled} counts");
 }

@@ -1,8 +1,10 @@
-//! The other robot of this robot's world, a whole run of its own: each simulator tells the other where its robot is after every tick, over
-//! a datagram socket in the robot's directory. No stage hears of it.
+//! Link to the world's other robot, which is a separate run.
 //!
-//! In lockstep a tick waits for the other's place at the tick before, so that a pair repeats to the bit. Within a tick the other goes on at
-//! the velocity that it told.
+//! After every tick, simulators exchange their robots' poses over datagram sockets in the robots'
+//! directories. The stages never see them.
+//!
+//! In lockstep a tick waits for the other's pose at the previous tick, so that paired runs repeat
+//! bit for bit. Within a tick the other continues at its stated velocity.
 
 use std::{
     collections::VecDeque,
@@ -31,19 +33,20 @@ use crate::{
     world::Other,
 };
 
-/// A tick waits so long for the other robot, by the machine's clock: less than a run without a tick is given up after.
+/// Maximum wait for the other robot, by wall clock: below the time after which a run without ticks
+/// is given up.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// A place that did not get through, because the other did not listen yet, is sent again after this.
+/// Interval for resending a pose to a robot that may not listen yet.
 const AGAIN: Duration = Duration::from_millis(20);
-/// Times this near are one, seconds.
+/// Tolerance of equal times.
 const SAME_S: f64 = 1e-6;
-/// A robot that said nothing for longer stands at its last place, seconds of mission time.
+/// Mission time without poses after which the other stands at its last place.
 const FRESH_S: f64 = 0.5;
-/// A larger datagram is no place.
+/// Maximum datagram.
 const LONGEST: usize = 4096;
 const MOST_AT_ONCE: usize = 64;
 
-/// Metres and seconds of the mission frame, which both missions share.
+/// Pose in the shared mission frame, metres and seconds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Place {
@@ -53,11 +56,11 @@ struct Place {
     v: f64,
     omega: f64,
     radius_m: f64,
-    /// The corners of a body that is no disc; none of a disc.
+    /// Corners of a polygonal body; empty for a disc.
     footprint: Vec<DVec2>,
     bottom_m: f64,
     top_m: f64,
-    /// The robot's run is over, and it stays where it is.
+    /// Whether the robot's run is over; it stays here.
     ended: bool,
 }
 
@@ -95,19 +98,20 @@ pub(super) struct Meeting {
     stop: OwnedFd,
     waits: bool,
     goes_on_after_contact: bool,
-    /// This robot's, with the size of its body.
     own: Place,
     is_told: bool,
-    /// The other's at this robot's time or before it, and those after.
+    /// Newest place up to this robot's time, and later ones.
     newest: Option<Place>,
     later: VecDeque<Place>,
-    /// It was waited for in vain.
     is_missed: bool,
     refused: u64,
 }
 
 impl Meeting {
-    /// `own` and `other` are the robots' sockets. Once `stop` is readable nobody is waited for. Fails if it cannot listen.
+    /// Binds the socket `own`; `other` is the other robot's. A readable `stop` ends waits.
+    ///
+    /// # Errors
+    /// Returns an error if it cannot listen.
     pub(super) fn open(
         mission: &Mission,
         [own, other]: [PathBuf; 2],
@@ -118,7 +122,7 @@ impl Meeting {
             if let Some(directory) = own.parent() {
                 DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
             }
-            // It may be an earlier simulator's.
+            // An earlier simulator may have left its socket.
             match fs::remove_file(&own) {
                 Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
                 _ => {}
@@ -152,7 +156,6 @@ impl Meeting {
         })
     }
 
-    /// The other robot as this one at `now_s` knows it.
     pub(super) fn other_at(&mut self, now_s: f64) -> Result<Option<Other>> {
         let began = Instant::now();
         loop {
@@ -181,7 +184,7 @@ impl Meeting {
         !self.later.is_empty() || self.newest.as_ref().is_some_and(has)
     }
 
-    /// Takes what came. A place of a time after `now_s` waits until then.
+    /// Takes received places; those after `now_s` wait.
     fn take(&mut self, now_s: f64) {
         let mut bytes = [0; LONGEST];
         while self.later.len() < MOST_AT_ONCE
@@ -204,7 +207,7 @@ impl Meeting {
         }
     }
 
-    /// Tells the other robot where this one is. A contact ends its mission, and it stays there.
+    /// Sends this robot's pose. A contact ends its mission, and it stays there.
     pub(super) fn tell(&mut self, truth: &GroundTruthTick, ended: bool) {
         if self.own.ended {
             return;
@@ -223,13 +226,14 @@ impl Meeting {
         let began = Instant::now();
         self.is_told = loop {
             match self.socket.send_to(&bytes, &self.other) {
-                // In lockstep no place may be lost, and the other takes some with each of its ticks.
+                // In lockstep every place must arrive.
                 Err(error) if error.kind() == ErrorKind::WouldBlock && self.waits => {
                     if self.is_missed || began.elapsed() > PATIENCE {
                         self.is_missed = true;
                         break false;
                     }
-                    // Only a connected socket waits for the other's room, and it would hear nobody but the other of now.
+                    // Waiting for room requires a connected socket, which would only hear the
+                    // present other.
                     let has_room = UnixDatagram::unbound().and_then(|asks| {
                         asks.connect(&self.other)?;
                         poll::is_writable(asks, AGAIN)
@@ -249,11 +253,11 @@ mod tests {
     use super::*;
     use std::{os::unix::net::UnixStream, path::Path};
 
-    /// Two that meet; `waits` is in lockstep.
+    /// Returns two robots that meet; `waits` is in lockstep.
     fn pair(folder: &Path, waits: bool) -> [Meeting; 2] {
         let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
         let sockets = ["one", "two"].map(|robot| folder.join(robot));
-        // The other end is closed, so a wait ends at once.
+        // Waits end at once, because the other end is closed.
         let (stop, _) = UnixStream::pair().unwrap();
         [[0, 1], [1, 0]].map(|order| {
             Meeting::open(&mission, order.map(|at| sockets[at].clone()), &stop, waits).unwrap()

@@ -1,4 +1,4 @@
-//! Robot, radio, transport and ground truth together take bytes and make ticks.
+//! Session of robot, radio, transport and ground truth.
 
 use std::{
     io::Write,
@@ -26,13 +26,14 @@ use crate::{
     transport::{Source, Way},
 };
 
-/// Ticks without an answer in lockstep, before it waits for a ping: the longest outage at the highest rate.
+/// Maximum unanswered ticks in lockstep before waiting for a ping: the longest outage at the
+/// highest rate.
 const MOST_UNHEARD: usize = 120_000;
 
-/// After this silence, by the machine's clock, a host has gone and another may take the robot.
+/// Host silence by wall clock after which another host may take the robot.
 const HOST_SILENT: Duration = Duration::from_secs(2);
 
-/// Time between the messages of an RPLIDAR, seconds: a serial adapter gathers bytes for a few milliseconds.
+/// Interval of RPLIDAR messages: a serial adapter buffers for a few milliseconds.
 const GATHERS_S: f64 = 0.004;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,17 +47,17 @@ pub(super) struct Session {
     lock_step: bool,
     way: Way,
     radio: Option<Radio<Leg>>,
-    /// Source of the served host's last valid frame: all streams go there.
+    /// Source of the served host's last valid frame, and destination of all streams.
     peer: Option<Source>,
     heard: Instant,
-    /// Frames of other hosts ignored since the last warning.
+    /// Ignored frames of other hosts since the last warning.
     strangers: u64,
-    /// The peer's, and one other source's: half a frame of one must not garble the other's.
+    /// Decoders of the peer and one other source: partial frames must stay apart.
     decoders: Vec<SourceDecoder>,
-    /// The RPLIDAR's; none if its host sends datagrams to the robot's address.
+    /// Transport of the RPLIDAR; none if its host sends datagrams to the robot's address.
     laser_way: Option<Way>,
     laser_peer: Option<Source>,
-    /// Mission time of the newest message of the RPLIDAR.
+    /// Mission time of the newest RPLIDAR message.
     gathered_s: f64,
     protocol: Protocol,
     ground_truth: Option<Box<dyn Write + Send>>,
@@ -80,7 +81,7 @@ impl Words {
         match protocol {
             Protocol::X80 => Self::X80(Decoder::default()),
             Protocol::Arduino => Self::Arduino(Requests::default()),
-            // A robot that speaks ROS 2 is not simulated: its mission has an address.
+            // ROS 2 robots are external: their missions have an address.
             Protocol::Json | Protocol::Ros2 => Self::Json(Lines::default()),
         }
     }
@@ -112,7 +113,7 @@ impl Said<'_> {
 }
 
 impl Session {
-    /// The robot is at its first tick, which is written to the ground truth.
+    /// Starts at the first tick, which goes to the ground truth.
     pub(super) fn new(
         mission: &Mission,
         robot: Robot,
@@ -153,9 +154,9 @@ impl Session {
         Ok(())
     }
 
-    /// The process ends, and with it all commands: the robot comes to rest.
+    /// Ends the process and all commands: the robot comes to rest.
     pub(super) fn end(mut self) -> Result {
-        // The other robot sees the same way to rest, however many commands came after the mission was decided.
+        // The other robot sees the same path to rest, regardless of late commands.
         let Self { robot, meeting, .. } = &mut self;
         let mut tell = |robot: &mut Robot, ended| {
             if let Some(meeting) = meeting {
@@ -176,7 +177,7 @@ impl Session {
         self.robot.next_tick_s()
     }
 
-    /// Mission time of what happens by itself next, seconds.
+    /// Returns the mission time of the next self-triggered event.
     pub(super) fn next_due_s(&self) -> f64 {
         let flight = self.radio.as_ref().and_then(Radio::next_due);
         let laser = self.robot.is_scanning().then_some(self.gathered_s + GATHERS_S);
@@ -203,7 +204,7 @@ impl Session {
         self.send_laser(&answers);
     }
 
-    /// Takes at most `most` pieces of what has come; `now` is mission time by a clock, if there is one.
+    /// Takes up to `most` received pieces; `now` is mission time, if there is a clock.
     pub(super) fn listen(
         &mut self,
         buffer: &mut [u8],
@@ -223,7 +224,7 @@ impl Session {
                 return Ok(());
             };
             let opened = self.way.take_opened();
-            // No robot's protocol has messages that begin so.
+            // Messages of the robot protocols begin differently.
             let is_laser = self.robot.has_rplidar()
                 && (self.laser_peer == Some(source) || bytes.starts_with(&[START]))
                 && self.laser_way.is_none();
@@ -254,10 +255,10 @@ impl Session {
         Ok(())
     }
 
-    /// Lets all that is due by mission time `now` happen, in order.
+    /// Processes everything due by mission time `now`.
     pub(super) fn pass(&mut self, now: f64) -> Result {
         self.meet()?;
-        // A delay of more than a period is not made up for, because the shell lets the clock wait.
+        // The shell's clock waits, so a delay beyond a period is dropped.
         let now = now.min(self.next_tick_s() + self.robot.period_s());
         loop {
             let due = self.next_due_s();
@@ -277,7 +278,7 @@ impl Session {
         Ok(())
     }
 
-    /// To the next tick: its ground truth is written and its frames sent.
+    /// Advances to the next tick, writes its ground truth and sends its frames.
     fn tick(&mut self) -> Result {
         let frames = self.measured()?;
         self.peer()?;
@@ -285,8 +286,8 @@ impl Session {
         Ok(())
     }
 
-    /// If the radio loses the frames, the host sends no next command, so mission time passes by itself until the
-    /// radio delivers again.
+    /// Ticks until the radio delivers: a host without frames sends no command, so mission time must
+    /// pass by itself.
     fn tick_until_heard(&mut self) -> Result {
         for _ in 0..MOST_UNHEARD {
             let frames = self.measured()?;
@@ -305,7 +306,7 @@ impl Session {
         Ok(())
     }
 
-    /// The frames of the next tick; its ground truth is written, its state saved.
+    /// Advances a tick, writes its ground truth and saves its state. Returns its frames.
     fn measured(&mut self) -> Result<Vec<u8>> {
         self.meet()?;
         self.robot.advance_to_next_tick();
@@ -369,7 +370,7 @@ impl Session {
         }
         match said.kind() {
             Heard::Foreign => {}
-            // The radio may lose the command or make it late; the period passes all the same.
+            // The period passes even if the radio loses or delays the command.
             Heard::Motion => {
                 self.peer = Some(source);
                 let now = self.robot.time_s();
@@ -401,7 +402,7 @@ impl Session {
         Ok(())
     }
 
-    /// A host that is connected and has sent nothing yet is the peer.
+    /// Returns the peer, which a connected host is before it sends.
     fn peer(&mut self) -> Result<Option<Source>> {
         if let Some(connected) = self.way.connected()? {
             self.peer = Some(connected);
@@ -409,7 +410,7 @@ impl Session {
         Ok(self.peer)
     }
 
-    /// The host that sent first, or any after that host's silence.
+    /// Returns whether `source` is the served host, or may replace it after its silence.
     fn serves(&mut self, source: Source) -> bool {
         let silent = self.heard.elapsed() >= HOST_SILENT;
         let serves = silent || self.peer.is_none_or(|peer| peer.is_same_host(source));
@@ -450,12 +451,12 @@ impl Session {
         self.write(&ground_truth);
     }
 
-    /// After the reader has closed the pipe, nothing is written.
+    /// Writes a record until the reader closes the pipe.
     fn write(&mut self, record: &impl Serialize) {
         let Some(ground_truth) = &mut self.ground_truth else {
             return;
         };
-        // Each line is one write, because a write to a pipe costs far more than its bytes.
+        // One write per line: a pipe write costs far more than its bytes.
         let written = serde_json::to_vec(record)
             .map_err(std::io::Error::from)
             .and_then(|mut line| {

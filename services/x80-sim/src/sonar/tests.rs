@@ -1,4 +1,4 @@
-//! Tests with ranges worked by hand, in the laboratory and with smooth walls.
+//! Tests with hand-computed ranges, in the laboratory and with smooth walls.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn laboratory(text: &str, heading_deg: f64) -> f64 {
     heard_in(text, &physics, heading_deg)
 }
 
-/// The range with the measured reflections, without random errors.
+/// Returns the range with measured reflections but no random errors.
 fn smooth(text: &str, heading_deg: f64) -> f64 {
     let physics = SonarPhysics {
         edge_share: 0.0,
@@ -52,7 +52,8 @@ fn the_nearest_point_in_the_cone_answers() {
 
 #[test]
 fn a_drum_half_out_of_the_cone_answers_with_its_flank() {
-    // The cone's edge passes 5 degrees beside a centre at 20 degrees: 2 cos 5 - sqrt(.25 - (2 sin 5)^2).
+    // The cone's edge passes 5 degrees beside a centre at 20 degrees: 2 cos 5 - sqrt(.25 - (2 sin
+    // 5)^2).
     let (sin, cos) = 5_f64.to_radians().sin_cos();
     let want = 2.0 * cos - (0.25 - 4.0 * sin * sin).sqrt();
     close(laboratory(DRUM, 20.0), want);
@@ -88,7 +89,7 @@ fn a_smooth_wall_answers_square_on_and_not_when_oblique() {
 
 #[test]
 fn an_oblique_smooth_wall_hides_what_stands_behind_it() {
-    // The wall passes 45 degrees across the axis; the drum behind it is square on.
+    // The wall crosses the axis at 45 degrees; the drum behind it is square on.
     let scene = "world.wall = [{ points = [[0, -1], [2, 1]] }]\nworld.drum = [{ at = [2, 0], radius_m = 0.5 }]";
     assert_eq!(smooth(scene, 0.0), f64::INFINITY);
 }
@@ -104,7 +105,7 @@ fn a_drum_answers_over_a_wider_angle_than_a_wall() {
 
 #[test]
 fn an_oblique_wall_throws_the_beam_on_to_a_square_one() {
-    // The way is 1.8 m in all: 1 m to a wall at 45 degrees ahead, then 0.8 m to a wall on the left.
+    // The path is 1.8 m: 1 m to a wall at 45 degrees ahead, then 0.8 m to a wall on the left.
     let scene =
         "world.wall = [{ points = [[0.9, -0.1], [1.3, 0.3]] }, { points = [[0, 0.8], [3, 0.8]] }]";
     let physics = SonarPhysics {
@@ -154,7 +155,7 @@ fn the_byte_has_the_noise_of_its_range_and_whole_centimetres() {
     assert_eq!(byte(f64::INFINITY, &physics, &mut noise), 255);
 }
 
-/// The farthest range at which a smooth disc of `radius_m` and `echo` straight ahead is heard, metres.
+/// Returns the reach of a smooth disc of `radius_m` and `echo` straight ahead, metres.
 fn reach_of(radius_m: f64, echo: f64) -> f64 {
     let is_heard = |centimetres: &u16| {
         let at = f64::from(*centimetres) / 100.0 + radius_m;
@@ -186,13 +187,14 @@ fn in_the_laboratory_every_hard_thing_thicker_than_a_post_is_heard_as_far_as_the
 fn what_is_low_hides_nothing_that_is_higher() {
     let scene =
         format!("{WALL}\nworld.box = [{{ at = [0.35, 0], size_m = [0.1, 2], top_m = 0.05 }}]");
-    // The cone meets a thing of 0.05 m height from 0.13 m / tan(15 degrees) = 0.49 m on.
+    // The cone meets an object 0.05 m high from 0.13 m / tan(15 degrees) = 0.49 m on.
     close(laboratory(&scene, 0.0), 1.5);
 }
 
 #[test]
 fn a_sensor_at_or_within_the_bodys_edge_never_looks_through_a_wall_that_the_body_touches() {
-    // A body of 0.19 m with its centre at x = 1 touches the wall at x = 1.19; another wall is 2.33 m behind it.
+    // A body of 0.19 m with its centre at x = 1 touches the wall at x = 1.19; another wall is 2.33
+    // m behind.
     let text = "target = [0, -5]\nworld.wall = [{ points = [[1.19, -3], [1.19, 3]] }, { points = [[3.52, -3], [3.52, 3]] }]";
     let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
     let world = World::new(&mission);

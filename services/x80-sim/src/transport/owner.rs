@@ -1,4 +1,4 @@
-//! The user whose process sends datagrams, by the system's table of sockets.
+//! Lookup of the user who sends datagrams, in the system's socket table.
 
 use std::{
     collections::VecDeque,
@@ -7,12 +7,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// A sender's port may be another user's later.
+/// Lifetime of a lookup: another user may get the sender's port later.
 const ASKED_AGAIN: Duration = Duration::from_millis(500);
 const MOST_SENDERS: usize = 16;
 const READINGS: usize = 3;
 
-/// Admits senders of this user on this machine only.
+/// Filter that admits only this user on this machine.
 #[derive(Debug, Default)]
 pub(super) struct OwnUser {
     senders: VecDeque<(SocketAddr, Instant, bool)>,
@@ -40,8 +40,10 @@ impl OwnUser {
     }
 }
 
-/// Whether all sockets of the sender's port are this user's; none if no reading of the table shows one. While sockets come and go a reading
-/// may leave out others, and a sender may have ended. A system that hides its sockets shows none of another user.
+/// Returns whether all sockets of the sender's port are this user's; `None` if none shows.
+///
+/// Readings may miss sockets while others come and go, and the sender may have ended. Systems that
+/// hide sockets show none of other users.
 fn is_own(sender: SocketAddr) -> Option<bool> {
     (0..READINGS).find_map(|_| read(sender))
 }

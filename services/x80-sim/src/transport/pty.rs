@@ -1,4 +1,4 @@
-//! A serial line: a pseudo-terminal whose other end a host opens like a serial port.
+//! Serial line: a pseudo-terminal whose other end a host opens like a serial port.
 
 use std::{
     io,
@@ -14,17 +14,17 @@ use rustix::{
 
 use super::{Wire, source::Source};
 
-/// The robot sets the line to this speed; a host sets its own when it opens the line, which shows the robot that it
-/// did.
+/// Speed that the robot sets. A host sets its own when it opens the line, which reveals the
+/// opening.
 const NOBODYS_BAUD: u32 = 50;
 
 #[derive(Debug)]
 pub(crate) struct Pty {
     robot: OwnedFd,
-    /// The host's end is held open: while nobody holds it, reading the robot's end is an error.
+    /// Host's end, held open: reading the robot's end fails while no process holds it.
     host: OwnedFd,
-    /// DTR falls when the host closes the line, by the host's own setting (HUPCL), so that it rises when the next
-    /// host opens it.
+    /// Whether DTR falls when the host closes the line (HUPCL, set by the host), and so rises when
+    /// the next host opens it.
     hangs_up: bool,
     opened: bool,
     path: String,
@@ -88,7 +88,7 @@ impl Wire for Pty {
         std::mem::take(&mut self.opened)
     }
 
-    /// Bytes that a host does not read in time are lost; its decoder finds the next frame.
+    /// Sends bytes. A slow host loses some; its decoder finds the next frame.
     fn send(&mut self, _: Source, bytes: &[u8]) -> io::Result<()> {
         write(&self.robot, bytes).map(drop).map_err(io::Error::from)
     }

@@ -8,7 +8,7 @@ pub(crate) enum Source {
 }
 
 impl Source {
-    /// A host may send from another port after a restart.
+    /// Returns whether both are one host; it may use another port after a restart.
     pub(crate) fn is_same_host(self, other: Self) -> bool {
         match (self, other) {
             (Self::Peer(one), Self::Peer(other)) => one.ip() == other.ip(),

@@ -1,4 +1,4 @@
-//! A connection: one host at a time, the newest.
+//! TCP connection to the newest host.
 
 use std::{
     io::{self, ErrorKind, Read, Write},
@@ -13,9 +13,9 @@ pub(crate) struct Tcp {
     listener: TcpListener,
     address: SocketAddr,
     connection: Option<TcpStream>,
-    /// Connections so far; the newest is the open one.
+    /// Number of connections so far; the newest is open.
     accepted: u64,
-    /// [`Tcp::take_opened`] has not yet returned the newest connection.
+    /// Whether [`Tcp::take_opened`] has yet to return the newest connection.
     opened: bool,
 }
 
@@ -75,7 +75,7 @@ impl Wire for Tcp {
             Ok(length) => Ok(Some((Source::Connection(self.accepted), length))),
             Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(None),
             Err(error) if error.kind() == ErrorKind::Interrupted => Ok(None),
-            // A host that vanished is no error of the robot.
+            // The robot outlives a vanished host.
             Err(_) => {
                 self.connection = None;
                 Ok(None)
@@ -93,7 +93,8 @@ impl Wire for Tcp {
         Ok(open.map(|_| Source::Connection(self.accepted)))
     }
 
-    /// The connection to a host that does not read is closed: half a frame would garble all later ones.
+    /// Sends bytes, and closes the connection if the host does not read: half a frame would garble
+    /// all later ones.
     fn send(&mut self, to: Source, bytes: &[u8]) -> io::Result<()> {
         let is_newest = to == Source::Connection(self.accepted);
         let Some(connection) = self.connection.as_mut().filter(|_| is_newest) else {

@@ -6,14 +6,15 @@ use std::{
 
 use super::{Wire, owner::OwnUser, source::Source};
 
-/// A line with a scan of thousands of beams takes several datagrams, of which each has at most 65,507 bytes.
+/// Maximum datagram, below UDP's limit of 65,507 bytes. Lines with a scan of thousands of beams
+/// take several.
 const LONGEST: usize = 60_000;
 
 #[derive(Debug)]
 pub(crate) struct Udp {
     socket: UdpSocket,
     address: SocketAddr,
-    /// None admits every sender.
+    /// Sender filter; none admits every sender.
     own_user: Option<OwnUser>,
 }
 
@@ -42,7 +43,7 @@ impl Wire for Udp {
                 Ok((length, from)) => return Ok(Some((Source::Peer(from), length))),
                 Err(error) => match error.kind() {
                     ErrorKind::WouldBlock => return Ok(None),
-                    // An answer to a peer that has gone comes back as an error here.
+                    // An answer to a vanished peer comes back as an error here.
                     ErrorKind::Interrupted
                     | ErrorKind::ConnectionRefused
                     | ErrorKind::ConnectionReset => {}

@@ -14,8 +14,7 @@ fn forward(counts: i16) -> Vec<u8> {
     bytes
 }
 
-/// Drive in lockstep for `rounds` of `at_once` commands each. Returns every byte that came, and the ground truth of every
-/// tick.
+/// Drives in lockstep for `rounds` of `at_once` commands. Returns received bytes and ground truth.
 fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<GroundTruthTick>) {
     let mut sim = Sim::start(mission, Pace::Max);
     let host = sim.host();
@@ -36,7 +35,7 @@ fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<Grou
             }
         }
     }
-    // The ground truth of the tick whose frames came last was written before they were sent.
+    // Ground truth is written before a tick's frames.
     sim.finish();
     (bytes, std::iter::from_fn(|| sim.last_truth()).collect())
 }
@@ -46,7 +45,7 @@ const OUT_HALF_THE_TIME: &str = "robot.rate_hz = 20\nperimeter.width_m = 200\n[s
 #[test]
 fn in_lock_step_time_passes_through_an_outage_and_the_run_can_be_had_again() {
     let (bytes, ground_truth) = lock_step(OUT_HALF_THE_TIME, 400, 1);
-    // The same holds when commands come early, and wait until time has passed.
+    // Commands that come early and wait give the same run.
     for (rounds, at_once) in [(400, 1), (200, 2)] {
         let (again, truth_again) = lock_step(OUT_HALF_THE_TIME, rounds, at_once);
         assert!(bytes == again && ground_truth == truth_again, "the same seed gave another run");
@@ -70,7 +69,8 @@ fn in_lock_step_a_lost_command_is_not_acknowledged_and_moves_nothing() {
         acks += u16::from(matches!(Report::parse(&frame), Ok(Report::System(_))));
     }
     assert!((120..160).contains(&acks), "{acks} of 200 commands were acknowledged");
-    // The wheel turns 400 counts/s for the period of 1/7 s, or for all of the 150 ms if no command follows.
+    // The wheel turns 400 counts/s for the period of 1/7 s, or for all of the 150 ms if no command
+    // follows.
     let counts = ground_truth.last().unwrap().right_counts;
     assert!((acks * 57..=acks * 60).contains(&counts), "{counts} counts for {acks} commands");
 }
@@ -102,7 +102,7 @@ fn in_an_outage_a_robot_that_obeys_time_or_minds_silence_is_soon_at_rest() {
                 continue;
             }
             let since = *out_since.get_or_insert(tick.time_s);
-            // A command that came just before the outage lasts 0.15 s, the loop's lag 0.26 s more.
+            // A command just before the outage lasts 0.15 s, the loop's lag 0.26 s more.
             if tick.time_s - since > 0.15 + 0.3 {
                 outages_at_rest += 1;
                 assert_eq!(tick.v, 0.0, "it still moves: {tick:?}");
@@ -122,7 +122,7 @@ fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
     let mut decoder = Decoder::default();
     let mut motor_frames = 0;
     while motor_frames < 100 {
-        // The robot has no peer and sends nothing until a command arrives.
+        // Without a peer, the robot sends nothing until a command arrives.
         host.set_read_timeout(Some(std::time::Duration::from_millis(20))).unwrap();
         host.send(&forward(0)).unwrap();
         let mut buffer = [0; 4096];
@@ -135,7 +135,6 @@ fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
             motor_frames += usize::from(matches!(report, Report::Motor(_)));
         }
     }
-    // A frame that is split and put out of order is lost to its reader; most are not.
     sim.finish();
     let last = std::iter::from_fn(|| sim.last_truth()).last().unwrap();
     assert!(last.tick < 400, "100 motor frames of {} ticks", last.tick);

@@ -1,5 +1,6 @@
-//! Tests with hosts that other people wrote, as the protocol notes describe them. They share no code with the wire
-//! module, so that a mistake in it does not meet the same mistake here.
+//! Tests with third-party hosts, as the protocol notes describe them.
+//!
+//! They share no code with the wire module, so that its mistakes cannot cancel out.
 
 use std::{
     collections::VecDeque,
@@ -14,7 +15,7 @@ use x80_sim::Transport;
 
 use crate::support::{self, PATIENCE, Sim};
 
-/// The CRC bit by bit, as the vendor's documents have it.
+/// Computes the CRC bit by bit, as in the vendor's documents.
 fn checksum(bytes: &[u8]) -> u8 {
     let mut register = 0_u8;
     for &byte in bytes {
@@ -29,7 +30,7 @@ fn checksum(bytes: &[u8]) -> u8 {
     register
 }
 
-/// A way to the robot, as a foreign host opens it.
+/// Transport to the robot, as a foreign host opens it.
 trait Wire {
     fn send(&mut self, bytes: &[u8]);
     fn receive(&mut self) -> Vec<u8>;
@@ -63,13 +64,13 @@ impl Wire for File {
 }
 
 fn read_some(stream: &mut impl Read) -> Vec<u8> {
-    // The buffer is small, so that frames come in pieces.
+    // A small buffer splits frames.
     let mut buffer = [0; 13];
     let length = stream.read(&mut buffer).expect("the robot sends");
     buffer[..length].to_vec()
 }
 
-/// A foreign host: the end of its frames, and its unread bytes.
+/// Foreign host with its frame end and unread bytes.
 struct Host<W> {
     wire: W,
     end: [u8; 2],
@@ -91,7 +92,7 @@ impl<W: Wire> Host<W> {
         self.wire.send(&frame);
     }
 
-    /// The next frame that is no ACK. Each frame must be whole and addressed to this host.
+    /// Returns the next frame except ACKs, whole and addressed to this host.
     fn next(&mut self) -> (u8, Vec<u8>) {
         loop {
             if let Some(frame) = self.frames.pop_front() {
@@ -101,7 +102,6 @@ impl<W: Wire> Host<W> {
         }
     }
 
-    /// Take bytes until a frame is complete.
     fn hear(&mut self) {
         let came = self.wire.receive();
         self.bytes.extend(came);
@@ -130,7 +130,7 @@ impl<W: Wire> Host<W> {
         }
     }
 
-    /// Wheel counts of the next motor frame: channel 0, channel 1.
+    /// Returns channel counts of the next motor frame.
     fn counts(&mut self) -> [u16; 2] {
         loop {
             let (did, data) = self.next();
@@ -210,7 +210,7 @@ fn one_that_begins_with_zeros_ends_wrong_and_leaves_channels_alone_its_own_way()
     let mut host = Host::new(sim.host());
     host.end = [0x5e, 0x13];
     Wire::send(&mut host.wire, &[0; 65]);
-    // The command is timed, with LEN 15: a flag stands before the time.
+    // The command has LEN 15: a flag precedes the time.
     let mut data = words(&[-400, 400, -32_767, -32_767, -32_767, -32_767]);
     data.extend([28, 0xf4, 0x01]);
     host.send(27, &data);
@@ -219,7 +219,7 @@ fn one_that_begins_with_zeros_ends_wrong_and_leaves_channels_alone_its_own_way()
     for _ in 0..20 {
         counts = host.counts();
     }
-    // The wheel turned 400 counts/s for half a second of mission time, and then stood.
+    // The wheel turned 400 counts/s for half a second of mission time, then stood.
     assert!((195..=205).contains(&counts[1]), "it moved {counts:?}");
     assert_eq!(host.counts(), counts);
 }
@@ -230,7 +230,6 @@ fn one_on_a_connection_and_one_on_a_serial_line() {
     let stream = TcpStream::connect(&sim.listening).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
     drive(Host::new(stream));
-    // The next host is served when the first has hung up.
     drive(Host::new(TcpStream::connect(&sim.listening).unwrap()));
 
     let sim = Sim::start_on(QUICK, Pace::Rate(5.0), Transport::Pty);
@@ -238,7 +237,7 @@ fn one_on_a_connection_and_one_on_a_serial_line() {
     drive(Host::new(line));
 }
 
-/// Send a velocity command in two pieces, and assert its ACK and that the robot moves.
+/// Sends a velocity command in two pieces, and asserts its ACK and motion.
 fn drive<W: Wire>(mut host: Host<W>) {
     host.wire.send(&[0x5e, 0x02, 0x01]);
     host.wire.send(&[0x00, 0xff, 0x01, 0x00, 0xdb, 0x5e, 0x0d]);
@@ -267,7 +266,7 @@ fn one_of_another_host_is_ignored_until_the_first_is_silent() {
     let short = Duration::from_millis(300);
     second.set_read_timeout(Some(short)).unwrap();
     let began = Instant::now();
-    // The second host asks again and again; the first has sent nothing since.
+    // The second host keeps asking; the first has sent nothing since.
     loop {
         ping(&second);
         if second.recv(&mut [0; 512]).is_ok() {

@@ -33,7 +33,6 @@ fn reports(datagram: &[u8]) -> Vec<Report> {
     reports
 }
 
-/// Send a command at the pace of the commands. Returns the datagrams that answer it.
 fn exchange(host: &UdpSocket, command: Command) -> [Vec<u8>; 2] {
     host.send(&encoded(command)).unwrap();
     [receive(host), receive(host)]
@@ -87,7 +86,6 @@ fn at_max_the_same_seed_and_commands_give_the_same_bytes() {
     assert!(first != run(8), "another seed gave the same bytes");
 }
 
-/// Assert that sensor frames come without a message from the host.
 fn listen_only(mut line: impl std::io::Read) {
     let mut decoder = Decoder::default();
     let (mut motor, mut standard) = (0, 0);
@@ -172,7 +170,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
     let (reader, writer) = std::os::unix::net::UnixStream::pair().unwrap();
     drop(reader);
     let (stop, stopped) = std::os::unix::net::UnixStream::pair().unwrap();
-    // The ground truth would have told the port, so take one that was free a moment ago.
+    // Take a port that was just free: the ground truth, which states it, is closed.
     let listen: SocketAddr = {
         let probe = UdpSocket::bind("127.0.0.1:0").unwrap();
         probe.local_addr().unwrap()
@@ -194,7 +192,7 @@ fn a_robot_whose_truth_nobody_reads_goes_on() {
     let deadline = std::time::Instant::now() + support::PATIENCE;
     let mut answered = false;
     while !answered && std::time::Instant::now() < deadline {
-        // Sending or receiving fails until the robot listens.
+        // Sending and receiving fail until the robot listens.
         let _ = host.send(&encoded(forward(100)));
         answered = host.recv(&mut [0; 2048]).is_ok();
     }

@@ -1,4 +1,4 @@
-//! Tests of whole simulated robots. They are one executable, because each takes long to link.
+//! Tests of whole simulated robots, in one executable because linking is slow.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

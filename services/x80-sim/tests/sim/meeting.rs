@@ -17,7 +17,7 @@ use crate::support::{Sim, receive};
 
 const DIAMETER_M: f64 = 0.38;
 
-/// Two robots that face each other, 2 m apart, in lockstep, with their sockets in `folder`.
+/// Starts two robots facing each other, 2 m apart, in lockstep, with their sockets in `folder`.
 fn pair(folder: &Path, text: &str) -> [(Sim, UdpSocket); 2] {
     let sockets = ["one", "two"].map(|robot| folder.join(robot));
     [("start = [0, 0, 0]", [0, 1]), ("start = [2, 0, 180]", [1, 0])].map(|(start, order)| {
@@ -29,7 +29,6 @@ fn pair(folder: &Path, text: &str) -> [(Sim, UdpSocket); 2] {
     })
 }
 
-/// The truth of the robot's next tick, at `counts` a second ahead.
 fn tick((sim, host): &mut (Sim, UdpSocket), counts: i16) -> GroundTruthTick {
     let mut bytes = Vec::new();
     let command = Command::velocity([Some(-counts), Some(counts)], 250);
@@ -39,7 +38,6 @@ fn tick((sim, host): &mut (Sim, UdpSocket), counts: i16) -> GroundTruthTick {
     sim.next_truth()
 }
 
-/// Both drive at each other until both have touched something.
 fn meet(text: &str) -> Vec<[GroundTruthTick; 2]> {
     let folder = tempfile::tempdir().unwrap();
     let mut pair = pair(folder.path(), text);
@@ -61,7 +59,6 @@ fn two_robots_see_and_touch_each_other_and_the_pair_repeats_to_the_bit() {
     let [one, two] = truths.last().unwrap();
     assert_eq!((one.contacts, two.contacts), (1, 1));
     assert!(one.x > 0.5 && two.x < 1.5, "both drove: {one:?} {two:?}");
-    // In a tick each pushes the other back.
     let gap_m = two.x - one.x - DIAMETER_M;
     assert!((0.0..0.1).contains(&gap_m), "{gap_m} m apart");
     assert_eq!(truths, meet("simulation.realism = 'measured'"));

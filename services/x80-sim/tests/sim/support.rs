@@ -1,4 +1,4 @@
-//! A simulated robot in a thread, and a host that talks to it.
+//! Simulated robot in a thread, and its host.
 
 use std::{
     io::{BufRead, BufReader},
@@ -17,10 +17,10 @@ use common::{
 };
 use x80_sim::{SimError, SimOptions, Transport, run};
 
-/// The time after which a waiting test has failed; nothing here takes as long.
+/// Timeout of waits; every test finishes earlier.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A mission with ideal sensors and wheels, unless `text` names a realism.
+/// Returns a mission with ideal sensors and wheels, unless `text` names a realism.
 pub(crate) fn mission(text: &str) -> Mission {
     let mut mission =
         Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("test.toml")).unwrap();
@@ -30,10 +30,9 @@ pub(crate) fn mission(text: &str) -> Mission {
     mission
 }
 
-/// A running simulated robot; dropping it stops it.
 pub(crate) struct Sim {
     pub(crate) listening: String,
-    /// Lines of ground truth, read as they come: a robot waits for a slow reader.
+    /// Lines, read as they come: a robot waits for a slow reader.
     ground_truth: Receiver<String>,
     stop: Option<UnixStream>,
     thread: Option<JoinHandle<Result<(), SimError>>>,
@@ -48,7 +47,7 @@ impl Sim {
         Self::start_with(text, pace, transport, None)
     }
 
-    /// In a world with another robot; the sockets are this robot's and the other's.
+    /// Starts a robot in a world with another one; the sockets are its own and the other's.
     pub(crate) fn start_with(
         text: &str,
         pace: Pace,
@@ -81,24 +80,22 @@ impl Sim {
         Self { listening: header.listening, ground_truth, stop: Some(stop), thread: Some(thread) }
     }
 
-    /// The ground truth of the next tick.
     pub(crate) fn next_truth(&mut self) -> GroundTruthTick {
         serde_json::from_str(&self.ground_truth.recv_timeout(PATIENCE).unwrap()).unwrap()
     }
 
-    /// Stop the robot; its ground truth stays to be read.
+    /// Stops the robot; its ground truth stays readable.
     pub(crate) fn finish(&mut self) {
         drop(self.stop.take());
         self.thread.take().unwrap().join().unwrap().unwrap();
     }
 
-    /// The ground truth of the next tick of a robot that has finished.
+    /// Returns the next tick of a finished robot.
     pub(crate) fn last_truth(&mut self) -> Option<GroundTruthTick> {
         let line = self.ground_truth.recv().ok()?;
         Some(serde_json::from_str(&line).unwrap())
     }
 
-    /// A host's socket that speaks to this robot alone.
     pub(crate) fn host(&self) -> UdpSocket {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(&self.listening).unwrap();
@@ -106,7 +103,6 @@ impl Sim {
         socket
     }
 
-    /// Stop the robot, and return how it ended.
     pub(crate) fn stop(mut self) -> Result<(), SimError> {
         drop(self.stop.take());
         self.thread.take().unwrap().join().unwrap()
@@ -122,7 +118,6 @@ impl Drop for Sim {
     }
 }
 
-/// The next datagram.
 pub(crate) fn receive(socket: &UdpSocket) -> Vec<u8> {
     let mut buffer = [0; 2048];
     let length = socket.recv(&mut buffer).expect("the robot answers");

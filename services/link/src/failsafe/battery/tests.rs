@@ -10,7 +10,7 @@ fn batteries(limits: BatteryLimits) -> Batteries {
 }
 
 impl Batteries {
-    /// Take voltages at a time in seconds. Returns which batteries are low, and the changes.
+    /// Returns which batteries are low, and the changes.
     fn at(&mut self, seconds: f64, volts: [f64; 3]) -> ([bool; 3], Vec<(Pack, Charge)>) {
         self.read(volts, MissionTime::from_seconds(seconds));
         let changes = self.take_changes().into_iter();
@@ -49,7 +49,7 @@ fn a_battery_that_stays_sunk_is_empty_for_good_and_one_that_dips_is_only_low() {
         batteries.at(seconds, [7.2, motor, 1.2]);
         batteries.charge()
     };
-    // The battery is low below 11 V and empty below 10 V.
+    // Low below 11 V, empty below 10 V.
     assert_eq!(at(0.0, 12.0), Charge::Enough);
     assert_eq!(at(1.0, 9.9), Charge::Low);
     assert_eq!(at(2.9, 10.1), Charge::Low, "a dip");

@@ -1,4 +1,4 @@
-//! Bases that answer late and accelerate slowly, or limit their turn apart, which nobody stated, and encoders that die on them.
+//! Tests of slow and late bases with an unstated response, and of encoders that die on them.
 
 use std::path::Path;
 
@@ -7,7 +7,6 @@ use common::mission::ModelledSpeed;
 use super::*;
 
 const PERIOD_S: f64 = 0.1;
-/// Missions of each base.
 const SEEDS: u64 = 6;
 const COUNTS_PER_M: f64 = 7162.0;
 const MISSION: &str = "target = [3, 0]
@@ -25,10 +24,10 @@ kind = 'cone'
 forward_m = 0.2
 bearing_deg = 0";
 
-/// When a robot was suspected and when it was no longer, seconds.
+/// Times at which a suspicion began (true) or ended (false), seconds.
 type Suspected = Vec<(f64, bool)>;
 
-/// How a base that nobody stated answers, m/s^2; what its turn gives each wheel, if that is limited apart; and its track, metres.
+/// Accelerations, m/s^2; `turn` is that of each wheel, if limited apart.
 #[derive(Clone, Copy, Debug)]
 struct Base {
     delay_s: f64,
@@ -37,8 +36,8 @@ struct Base {
     track_m: f64,
 }
 
-/// Drive a base for 40 s, on, to both sides and backwards by turns, and let it stand while it is suspected. Its frames come up to 40 ms
-/// late, and so do commands. The left encoder counts nothing from `dies_s` on.
+/// Drives a base for 40 s, ahead and turning to both sides, and stops it while suspected. Frames
+/// and commands are up to 40 ms late. The left encoder dies at `dies_s`.
 fn drive(base: Base, seed: u64, dies_s: f64) -> Suspected {
     let text = MISSION.replace("TRACK", &base.track_m.to_string());
     let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
@@ -102,7 +101,6 @@ fn drive(base: Base, seed: u64, dies_s: f64) -> Suspected {
     suspected
 }
 
-/// The bases of 20 cells.
 fn bases() -> impl Iterator<Item = Base> {
     let delays = [0.0, 0.1, 0.25, 0.4].into_iter();
     delays.flat_map(|delay_s| {
@@ -111,7 +109,7 @@ fn bases() -> impl Iterator<Item = Base> {
     })
 }
 
-/// Bases that take a speed and a turn, and limit both: m/s^2 and rad/s^2.
+/// Returns bases that limit speed and turn separately, m/s^2 and rad/s^2.
 fn bases_apart() -> impl Iterator<Item = Base> {
     let tracks = [0.16, 0.3].into_iter();
     tracks.flat_map(|track_m| {

@@ -2,13 +2,13 @@ use super::*;
 use common::samples::HoldReason;
 use std::path::Path;
 
-/// The period of the frames at 7 Hz, seconds.
+/// Frame period at 7 Hz, seconds.
 const PERIOD: f64 = 1.0 / 7.0;
-/// One turn of a wheel a second, which is 0.53 m/s.
+/// One wheel turn per second, 0.53 m/s.
 const TURN: i16 = 1200;
 
 fn odometry() -> Odometry {
-    // 1 m/s is 2247 counts a second.
+    // 1 m/s is 2247 counts/s.
     Odometry::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
 }
 
@@ -16,7 +16,7 @@ fn suspicion(odometry: &Odometry) -> Option<Suspicion> {
     odometry.suspicion.map(|(suspicion, _)| suspicion)
 }
 
-/// Wheels with the values measured on a real robot: 0.07 s of delay, 0.08 s of lag, 0.78 of the speed, a dead band of 20 counts/s.
+/// Measured wheels: 0.07 s delay, 0.08 s lag, 0.78 of the speed, a dead band of 20 counts/s.
 #[derive(Default)]
 struct Wheels {
     speed: [f64; 2],
@@ -55,8 +55,8 @@ impl Wheels {
 
 const COUNTS: u16 = common::wire::COUNT_CYCLE;
 
-/// Run ticks of a robot that is commanded `tells(tick)` and is out of reach where `out` returns true; `says` turns the counts of its
-/// wheels into the counts of its frames. Returns the first suspicion, and its time in seconds after the first command.
+/// Runs a robot with commands `tells(tick)`, out of reach where `out`; `says` maps wheel counts to
+/// frames. Returns the first suspicion, in seconds after the first command.
 fn drive(
     ticks: u32,
     tells: impl Fn(u32) -> [i16; 2],
@@ -90,8 +90,7 @@ fn honest(_: u32, counts: [u16; 2]) -> [u16; 2] {
     counts
 }
 
-/// Assert that the robot is at rest within 1.5 s of the first motion. That includes 0.2 s for the wheels to come to rest, and a
-/// frame's jitter.
+/// Asserts rest within 1.5 s of the first motion, including 0.2 s to stop and a frame's jitter.
 fn in_time(suspected: Option<(f64, Suspicion)>, why: Suspicion) {
     let (after, suspicion) = suspected.unwrap();
     assert!(after <= 1.15 && suspicion == why, "{suspicion:?} after {after} s");
@@ -116,7 +115,7 @@ fn an_honest_robot_is_not_suspected_whatever_it_is_told() {
 
 #[test]
 fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_time() {
-    // The radio is out for 1 to 8 frames at a time.
+    // Radio outages of 1 to 8 frames.
     for share in [5, 2] {
         for seed in 1..60_u32 {
             let mut state = seed;
@@ -140,7 +139,7 @@ fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_ti
 
 #[test]
 fn wheels_held_for_half_a_second_are_not_suspected() {
-    // The frames repeat for a while, and then continue from the same counts.
+    // The frames repeat, and then continue from the same counts.
     let mut held = 0;
     let says = |tick: u32, counts: [u16; 2]| {
         if tick == 21 {
@@ -182,12 +181,12 @@ fn a_dead_encoder_is_suspected_though_the_direction_changes_with_every_tick_and_
 fn wheels_that_are_reversed_or_swapped_are_suspected_in_time() {
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
     in_time(drive(40, |_| [TURN, TURN], never, reversed), Suspicion::Left);
-    // A controller whose robot turns away from the target gives such commands.
+    // Commands for a robot that turns away from the target.
     let chatter = |tick: u32| [if (tick / 2).is_multiple_of(2) { 584 } else { -584 }; 2];
     in_time(drive(40, chatter, never, reversed), Suspicion::Left);
     let swapped = |_, [left, right]: [u16; 2]| [right, left];
     in_time(drive(40, |_| [-TURN, TURN], never, swapped), Suspicion::Left);
-    // In a curve both wheels roll forward as commanded, but the robot turns the other way.
+    // In a curve both wheels roll forward, but the robot turns the other way.
     let curve = drive(40, |_| [TURN / 2, TURN], never, swapped);
     in_time(curve, Suspicion::Turn);
 }
@@ -257,14 +256,13 @@ fn an_old_frame_now_and_then_is_not_suspected() {
     }
 }
 
-/// A suspicion, and its time in seconds.
 type Suspected = Option<(f64, Suspicion)>;
-/// The current of a wheel that rolls, and of one that is held, AD counts.
+/// Current of a rolling and of a held wheel.
 const ROLLS_AD: u16 = 260;
 const HELD_AD: u16 = 1520;
 
-/// Drive a robot whose wheels are held from the start and draw `current(told to stand)`. Returns the contacts, and the suspicion
-/// with its time in seconds. The robot is told to stand while its wheels are known to be held.
+/// Drives a robot whose wheels are always held and draw `current(told to stand)`. The robot stands
+/// while they are known to be held. Returns the contacts, and the suspicion with its seconds.
 fn held(current: impl Fn(bool) -> [u16; 2]) -> (Vec<(f64, ContactSample)>, Suspected) {
     let mut odometry = odometry();
     let (mut contacts, mut told_to_stand) = (Vec::new(), true);
@@ -316,7 +314,7 @@ fn a_current_that_is_high_on_rolling_wheels_is_no_sign_of_held_ones() {
         wheels.roll_to(time);
         let now = MissionTime::from_seconds(time);
         odometry.contacts.take_currents([HELD_AD; 2]);
-        // The encoders die after five seconds.
+        // The encoders die after 5 s.
         if tick <= 35 {
             odometry.plausible(wheels.counts(), now);
         } else {
@@ -362,11 +360,11 @@ fn one_held_wheel_is_a_contact_at_its_side_and_behind_a_robot_that_backs() {
     assert_eq!((right.left, right.right, right.bearing_rad), (0, 1, -left.bearing_rad));
     let behind = at([true, true], [-TURN, -TURN]);
     assert!((behind.bearing_rad - PI).abs() < 1e-9, "{behind:?}");
-    // A robot that turns on the spot may be touched anywhere.
+    // A turn on the spot may touch anywhere.
     assert_eq!(at([true, true], [-TURN, TURN]).half_width_rad, 0.0);
 }
 
-/// Drive a robot that is told `tells`, while another host tells it `other` `hertz` times a second.
+/// Drives a robot by `tells`, while another host commands `other` at `hertz`.
 fn beside_another(tells: [i16; 2], other: [i16; 2], hertz: f64) -> Option<(f64, Suspicion)> {
     let mut odometry = odometry();
     let mut wheels = Wheels::default();

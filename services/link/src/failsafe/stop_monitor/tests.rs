@@ -2,27 +2,26 @@ use super::*;
 use crate::failsafe::{monitor::Clears, rule};
 use std::path::Path;
 
-/// The period of the frames at 7 Hz, seconds.
+/// Frame period at 7 Hz, seconds.
 const PERIOD: f64 = 1.0 / 7.0;
 
 fn stop_monitor() -> StopMonitor {
     StopMonitor::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
 }
 
-/// The monitor and its row of the failsafe table.
 struct Watch {
     monitor: StopMonitor,
     clears: Clears,
     does_not_stop: bool,
 }
 
-/// The time of the last frame that [`told_to_stand`] gives.
+/// Returns the time of the last frame from [`told_to_stand`].
 fn last() -> MissionTime {
     MissionTime::from_seconds(41.0 * PERIOD)
 }
 
-/// Stop a robot at 1 s whose wheels then turn at `speed(seconds since)` counts/s. Returns the seconds after which the monitor found
-/// that it does not stop.
+/// Stops a robot at 1 s whose wheels then turn at `speed(seconds since)` counts/s. Returns when the
+/// monitor found that it does not stop, seconds.
 fn told_to_stand(speed: impl Fn(f64) -> f64) -> (Watch, Option<f64>) {
     let mut watch = Watch {
         monitor: stop_monitor(),
@@ -95,7 +94,7 @@ fn a_robot_that_did_not_obey_does_when_it_has_been_seen_at_rest() {
 #[test]
 fn a_robot_that_is_stopped_before_it_obeys_a_command_to_drive_is_not_at_rest_until_that_would_show()
 {
-    // Frames every quarter of a second, as on a loaded machine.
+    // Also with a loaded machine's frames.
     for period in [PERIOD, 0.25] {
         let mut stop_monitor = stop_monitor();
         let time = |frame: i32| MissionTime::from_seconds(1.0 + f64::from(frame) * period);
@@ -141,7 +140,7 @@ fn whether_a_robot_rests_or_moves_is_not_known_without_two_new_frames_that_can_b
         assert_eq!(monitor.rest(at(5)), seen, "a frame late");
         assert_eq!(monitor.rest(at(7)), Rest::Unknown, "frames end");
         for frame in [7, 10, 13] {
-            // What moved between two of them is known to have moved.
+            // Motion between them is known.
             let seen = if seen == Rest::Moving { seen } else { Rest::Unknown };
             assert_eq!(hear(&mut monitor, frame), seen, "frames too far apart");
         }

@@ -11,14 +11,13 @@ fn streams(text: &str) -> Streams {
     streams
 }
 
-/// Take a standard frame with a reading of the front sonar.
 fn range(streams: &mut Streams, machine_ns: u64) {
     let front = RangeReading { status: RangeStatus::Nothing.into(), ..RangeReading::default() };
     let now = Moment { time: MissionTime(machine_ns), machine_ns };
     streams.observe(&Observation::Readings(&[front]), now);
 }
 
-/// Take motor frames after these intervals, milliseconds. Returns the time of the last frame.
+/// Takes motor frames at these intervals, milliseconds. Returns the last time.
 fn frames(streams: &mut Streams, intervals: impl IntoIterator<Item = u64>) -> u64 {
     let mut now = 0;
     streams.motor(MissionTime(now), now);
@@ -73,7 +72,7 @@ fn a_front_sonar_without_readings_is_missed_by_a_mission_that_senses_only() {
     }
 }
 
-/// The cause and its explanation when the `silent` of the ten sensors give no valid reading.
+/// Returns the cause and explanation while the `silent` of ten sensors give no valid reading.
 fn without(text: &str, silent: &[u8]) -> (Option<Cause>, String) {
     let text = format!("target = [3, 0]\n{text}");
     let mut streams = Streams::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
@@ -100,7 +99,7 @@ fn each_sensor_that_the_mission_uses_must_give_valid_readings_and_the_one_that_d
     assert_eq!(without("", &[]).0, None);
     for (row, sensor) in (0..).zip(mission.sensor_table()) {
         let (cause, told) = without("", &[row]);
-        // Each infrared ranger of the X80 looks aside, back, or into the cone of a sonar.
+        // X80 infrared rangers look aside, back, or into a sonar's cone.
         let stands = sensor.kind == SensorKind::Cone;
         let expected = if stands { Cause::RangeSilent } else { Cause::InfraredSilent };
         assert_eq!(cause, Some(expected), "{}", sensor.name);
@@ -113,7 +112,7 @@ fn without_a_second_sensor_or_a_ranger_whose_ground_no_sonar_covers_the_robot_st
     let (cause, told) = without("", &[4, 7]);
     assert_eq!(cause, Some(Cause::RangeSilent));
     assert!(told.contains("infrared-1") && told.contains("infrared-4"), "{told}");
-    // The side sonars are not used: only the front one's cone and the sides are covered.
+    // Without side sonars, only the front cone and the sides are covered.
     let infrared = "sensors = 'front+infrared'";
     for (ranger, cause) in [
         (3, Cause::RangeSilent),

@@ -1,4 +1,4 @@
-//! Tests of a robot that says nothing unasked: when it is polled, and the effect of late or missing answers.
+//! Tests of a robot that sends only on request: polls, and late or missing answers.
 
 use super::*;
 
@@ -13,14 +13,13 @@ fn mission() -> Mission {
     Mission::parse(&text, Path::new("test.toml")).unwrap()
 }
 
-/// A board that answers each request after a delay, its link, and their time.
+/// Board that answers after a delay, its link and clock.
 struct Scene {
     link: Link,
     rate: f64,
     ms: u64,
-    /// The delay of the board; none if it says nothing.
+    /// None if the board is silent.
     delay_ms: Option<u64>,
-    /// The answers that it will give, and their times.
     answers: Vec<(u64, String)>,
     sent: Vec<(u64, String)>,
     ticks: Vec<u64>,
@@ -46,7 +45,6 @@ impl Scene {
         }
     }
 
-    /// A robot that drives.
     fn driving() -> Self {
         let mut scene = Self::at(Pace::Rate(1.0));
         scene.run(2000);
@@ -80,7 +78,7 @@ impl Scene {
             let words: Vec<_> = request.split(' ').collect();
             let answer = match words[..] {
                 ["e"] => format!("{0} {0}\r\n", self.turned),
-                // The range changes as the robot drives.
+                // Changes as the robot drives.
                 ["p", "4"] => format!("{}\r\n", 200 - self.turned / 100),
                 ["b"] => "57600\r\n".to_owned(),
                 ["m", left, _] => {
@@ -93,7 +91,7 @@ impl Scene {
         }
     }
 
-    /// Let time pass in steps of 5 ms of the machine's clock. Each tick is answered at once.
+    /// Advances the machine's clock by 5 ms steps; ticks are answered at once.
     fn run(&mut self, for_ms: u64) {
         for _ in 0..for_ms / 5 {
             self.ms += 5;
@@ -115,7 +113,7 @@ impl Scene {
         }
     }
 
-    /// The times at which the board was asked for a round.
+    /// Returns the times of polls.
     fn rounds(&self) -> Vec<u64> {
         let rounds = self.sent.iter().filter(|(_, said)| said == ROUND);
         rounds.map(|(at, _)| *at).collect()
@@ -131,7 +129,7 @@ fn a_robot_is_polled_at_its_rate_of_mission_time_and_each_answer_begins_a_tick()
         scene.run(period * 20);
         let rounds = scene.rounds();
         assert!((19..=20).contains(&rounds.len()), "{rate}: {rounds:?}");
-        // 5 ms are the steps of this test.
+        // The test's step is 5 ms.
         assert!(rounds.windows(2).all(|two| (two[1] - two[0]).abs_diff(period) <= 5), "{rounds:?}");
         assert!(scene.ticks.len().abs_diff(rounds.len()) <= 1, "{rate}: {:?}", scene.ticks);
     }
@@ -142,7 +140,7 @@ fn a_poll_that_is_late_does_not_delay_the_next_and_none_is_made_up_for() {
     let mut scene = Scene::at(Pace::Rate(1.0));
     scene.run(310);
     scene.sent = Vec::new();
-    // The link's process is not scheduled for a while. Polls are due each 100 ms.
+    // The link's process is not scheduled for a while; polls are due each 100 ms.
     scene.ms = 455;
     scene.run(255);
     assert_eq!(scene.rounds(), [460, 500, 600, 700]);
@@ -191,7 +189,6 @@ fn one_garbled_line_costs_three_ticks_and_no_more() {
 #[test]
 fn in_lockstep_each_command_and_ping_is_followed_by_one_poll_and_one_tick() {
     let mut scene = Scene::at(Pace::Max);
-    // The order comes before the robot is found.
     scene.event(Event::Order(Order::Drive, HoldReason::None));
     scene.run(300);
     let commands = scene.sent.iter().filter(|(_, said)| said.starts_with('m')).count();

@@ -1,12 +1,12 @@
-//! The inputs of the failsafe in the step, and the effects of its decisions.
+//! Inputs of the failsafe, and effects of its decisions.
 
 use super::*;
 
 const STAND: [Option<i16>; 2] = [Some(0), Some(0)];
-/// A turn a second is 1200 counts/s.
+/// One turn per second, 1200 counts/s.
 const TURN: f64 = std::f64::consts::TAU;
 
-/// Run a tick and its command for a robot whose wheels have turned as commanded since time 0.
+/// Runs a tick and its command; wheels have turned as commanded since time 0.
 fn tick(link: &mut Link, number: u64, now_ns: u64) -> Vec<Effect> {
     let rolled = (now_ns / MS * 12 / 10) as u16;
     tick_by(
@@ -23,12 +23,10 @@ fn tick_by(link: &mut Link, now_ns: u64, frames: &[u8], command: &CommandSample)
     effects
 }
 
-/// A limit on ticks, on the way to target 1.
 const fn limit(last_tick: u64) -> Event<'static> {
     Event::TickLimit { last_tick, target_number: 1 }
 }
 
-/// The frames of a robot whose batteries have `volts`.
 fn powered(volts: f64) -> Vec<u8> {
     let ad = |scale: f64| (volts / scale * 4095.0).round() as u16;
     let standard = StandardSensors {
@@ -52,7 +50,7 @@ fn a_supervisor_that_says_nothing_stops_the_robot_and_its_next_directive_lets_it
         let effects = tick(&mut link, number, now);
         assert!(!velocities(&effects).contains(&STAND), "{now} {effects:?}");
     }
-    // Between two ticks the last command is fresh.
+    // The last command is fresh.
     let effects = link.at(Event::Quiet, 2001 * MS);
     assert_eq!(velocities(&effects), [STAND; 3]);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::SupervisorSilent)]);
@@ -90,7 +88,7 @@ fn a_fresh_command_from_an_old_pose_or_guidance_moves_nothing() {
     let fresh = command(2, 300 * MS, TURN, TURN);
     let old_pose = CommandSample { pose_ns: 49 * MS, ..fresh };
     let old_guidance = CommandSample { guidance_ns: 49 * MS, ..fresh };
-    // A command without these times has 0 in their place.
+    // Commands without these times hold 0.
     let silent = CommandSample { pose_ns: 0, guidance_ns: 0, ..fresh };
     for (command, cause) in [
         (old_pose, Cause::PoseStale),
@@ -135,7 +133,7 @@ fn on_an_empty_battery_the_robot_stands_for_good() {
                 ended.get_or_insert(number);
             }
         }
-        // Two seconds are 14 periods.
+        // 2 s are 14 periods.
         assert!(matches!(ended, Some(14..=15)), "{ended:?}");
         let charged = command(21, 21 * period, TURN, TURN);
         let effects = tick_by(&mut link, 21 * period, &powered(7.8), &charged);

@@ -1,4 +1,4 @@
-//! A robot that speaks JSON.
+//! Tests of a robot that speaks JSON.
 
 use super::*;
 
@@ -10,7 +10,7 @@ fn link() -> Link {
     link
 }
 
-/// The counts of the tick that a robot begins which is at `x` metres by its own odometry.
+/// Returns the counts of a tick at `x` metres of odometry.
 fn counts_at(link: &mut Link, x: f64, machine_ns: u64) -> WheelSample {
     let line = format!("{{\"odometry\":[{x},0,0],\"speeds\":[0,0]}}\n");
     ticks(&link.at(Event::Datagram(line.as_bytes()), machine_ns))[0].2

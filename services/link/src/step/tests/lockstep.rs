@@ -1,4 +1,4 @@
-//! The link in lockstep, where the robot waits for each command.
+//! Tests of lockstep, in which the robot waits for each command.
 
 use common::wire::COUNT_CYCLE;
 
@@ -45,7 +45,7 @@ fn in_lockstep_a_late_answer_to_a_ping_is_none_to_a_command() {
         let ping = Command::System(SystemSignal::Ping);
         sent(effects).iter().filter(|sent| **sent == ping).count()
     };
-    // The robot is slow, so it is pinged again before it is found, and answers each ping once.
+    // A slow robot is pinged again before it is found, and answers each ping once.
     let mut owed = pings(&link.at(Event::Quiet, 0));
     owed += pings(&link.at(Event::Quiet, 200 * MS));
     assert_eq!(owed, 2);

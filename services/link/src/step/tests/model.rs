@@ -1,8 +1,10 @@
-//! Every history of twelve events around an operator's stop: the real step of the link, and beside it a plain model of what talks to it.
+//! Model check of every history of twelve events around an operator's stop: the real step beside a
+//! plain model of its peers.
 //!
-//! Histories are explored breadth first, and those that lead to the same state are continued once. Two states are the same if all that
-//! stops and starts the robot is, with times as ages. The evidence of monitors that judge motion (odometry, ranges, response, other
-//! commanders) is not compared: the modelled robot moves as it is told, too slowly to be judged.
+//! The search is breadth first, and continues equal states once. States are equal if everything
+//! that stops and starts the robot is, with times as ages. Evidence of motion monitors (odometry,
+//! ranges, response, other commanders) is ignored: the modelled robot obeys, too slowly to be
+//! judged.
 
 use std::{collections::HashSet, sync::LazyLock, thread};
 
@@ -18,13 +20,13 @@ use crate::failsafe::{
     monitor::{Condition, Monitor as _},
 };
 
-/// Readings of the clock are above this, and no other number is.
+/// Least clock reading, above all other numbers.
 const BEGAN_NS: u64 = 1_000_000_000_000_000;
 const DEPTH: usize = 12;
 const TICK_MS: u64 = 100;
-/// No deadline of the link is longer than this: greater ages are equal.
+/// Longest deadline: greater ages are equal.
 const OLD_NS: u64 = 2_400_000_000;
-/// Commands last for 250 ms: the ages of older ones are equal.
+/// Beyond a command's 250 ms ages are equal.
 const OLD_COMMAND_NS: u64 = 300_000_000;
 
 #[derive(Clone, Copy, Debug)]
@@ -34,16 +36,15 @@ enum Happens {
     Pause,
     CauseBegins,
     CauseEnds,
-    /// The operator's word reaches the link, and the supervisor later, in whatever order.
+    /// Requests reach the link and the supervisor separately, in any order.
     Stop,
     Resume,
     SupervisorHearsStop,
     SupervisorHearsResume,
-    /// The command of the newest tick before the last stop comes late, or again.
+    /// The last command before the stop, late or again.
     OldCommand,
     LinkRestarts,
     SupervisorRestarts,
-    /// Another supervisor orders the robot to drive.
     SecondSupervisor,
 }
 
@@ -64,7 +65,7 @@ const ALL: [Happens; 12] = [
     SecondSupervisor,
 ];
 
-/// The causes that are tried, and after how many milliseconds each must hold the robot.
+/// Causes, and the milliseconds within which each must hold the robot.
 const CAUSES: [(Cause, u64); 6] = [
     (Cause::RobotLost, 750),
     (Cause::FramesSilent, 750),
@@ -80,7 +81,7 @@ struct Supervisor {
     is_starting: bool,
     operator_stop: bool,
     resumed_ns: u64,
-    /// When an operator asked for what the supervisor has not heard.
+    /// When an operator asked; not yet received.
     asked_stop: Option<u64>,
     asked_resume: Option<u64>,
     said: Option<(Order, HoldReason)>,
@@ -104,7 +105,7 @@ struct World {
     history: Vec<Happens>,
 }
 
-/// It is read once, for reading it takes longer than a step.
+/// Read once, as that takes longer than a step.
 static MISSION: LazyLock<Mission> = LazyLock::new(mission);
 
 fn started(now_ns: u64, next_tick: u64) -> Link {
@@ -118,7 +119,7 @@ fn admitted(process: u32) -> Admitted {
     Admitted::of(DIRECTIVE.spec(), Some(&Writers::of(process)))
 }
 
-/// A driver keeps nothing of whole datagrams that a stop depends on.
+/// Copies a link. Whole datagrams leave nothing in a driver that a stop depends on.
 fn copy(link: &Link) -> Link {
     Link {
         state: link.state,
@@ -181,11 +182,11 @@ impl World {
         world
     }
 
-    /// The link takes `event`, and what it sends is judged, obeyed and acknowledged. Returns its effects.
+    /// Gives `event` to the link; judges, obeys and acknowledges its output. Returns its effects.
     fn give(&mut self, event: Event<'_>) -> Vec<Effect> {
         let entry = Entry { event, machine_ns: self.now_ns, now: MissionTime(self.now_ns) };
         let effects = self.link.step(entry);
-        // The process writes the mark after each turn.
+        // The process does so after each turn.
         self.is_marked = self.link.is_stopped_by_operator();
         for velocity in velocities(&effects) {
             let counts = velocity.map(Option::unwrap_or_default);
@@ -281,7 +282,7 @@ impl World {
             let effects = self.give(Event::Datagram(&bytes));
             for (tick, ..) in ticks(&effects) {
                 if !self.has(Cause::CommandStale) {
-                    // Under 0.03 m/s at the rim, so that no monitor of motion judges it.
+                    // Below 0.03 m/s at the rim, so no monitor judges it.
                     let command = command(tick, self.now_ns, 0.3, 0.3);
                     self.newest = Some(command);
                     self.give(Event::Command(command));
@@ -290,7 +291,7 @@ impl World {
         }
     }
 
-    /// Returns whether it can happen.
+    /// Returns whether the event can happen.
     fn happen(&mut self, what: Happens) -> bool {
         self.history.push(what);
         match what {
@@ -332,7 +333,7 @@ impl World {
                 supervisor.process += 1;
                 supervisor.is_starting = true;
                 supervisor.resumed_ns = 0;
-                // Its bus is made again, and its link started again.
+                // Its bus and link restart.
                 (supervisor.asked_stop, supervisor.asked_resume) = (None, None);
                 self.admitted = admitted(supervisor.process);
                 self.restart_link();
@@ -348,7 +349,7 @@ impl World {
         true
     }
 
-    /// Requests that are made at one time differ by their number.
+    /// Returns distinct times for simultaneous requests.
     fn asked_ns(&self) -> u64 {
         self.now_ns + self.history.len() as u64
     }
@@ -357,7 +358,7 @@ impl World {
         self.link = started(self.now_ns, self.link.state().next_tick);
         self.supervisor.said = None;
         if self.has(Cause::BatteryEmpty) {
-            // The next link has to see it again; the supervisor has ended the mission.
+            // The next link must see it again; the supervisor ended the mission.
             self.cause_since = Some(self.now_ns);
         }
         if self.is_marked {
@@ -365,7 +366,7 @@ impl World {
         }
     }
 
-    /// What tells this state from others.
+    /// Identifies the state.
     fn key(&self) -> String {
         let moment = Moment { time: MissionTime(self.now_ns), machine_ns: self.now_ns };
         let (link, supervisor) = (&self.link, &self.supervisor);
@@ -373,7 +374,7 @@ impl World {
         let applied: Vec<_> = TABLE.iter().map(|row| link.failsafe.applied(row.cause)).collect();
         let does_not_stop = all.stop.condition(Cause::RobotDoesNotStop, moment);
         let presence = (all.presence.connected(), all.presence.is_silent(self.now_ns));
-        // When it last sent something matters to a robot that acknowledges late only.
+        // The last send's time matters only for late acknowledgements.
         let latency = format!("{:?}", all.latency);
         let latency = latency.split("came_late").last();
         let command = |command: Option<CommandSample>| {
@@ -417,7 +418,7 @@ impl World {
     }
 }
 
-/// Returns how many states there are, and how often the robot was told to move.
+/// Returns the numbers of states and of commands to move.
 fn explore(cause: (Cause, u64)) -> (usize, u64) {
     let first = World::new(cause);
     let mut seen = HashSet::from([first.key()]);

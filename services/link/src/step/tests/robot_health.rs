@@ -1,14 +1,14 @@
-//! The link with a robot whose frames are implausible or do not come.
+//! Tests with a robot whose frames are implausible or missing.
 
 use super::*;
 use common::wire::{COUNT_CYCLE, Quantity};
 
 const STAND: [Option<i16>; 2] = [Some(0), Some(0)];
-/// A turn a second is 1200 counts/s.
+/// One turn per second, 1200 counts/s.
 const TURN: f64 = std::f64::consts::TAU;
 
-/// Run ticks of a robot on the wall clock that is always commanded to drive and whose frames are `frames(tick)`. Returns the decisions
-/// with their mission times in milliseconds.
+/// Runs wall-clock ticks, always commanded to drive, with frames `frames(tick)`. Returns decisions
+/// with mission milliseconds.
 fn drive(
     link: &mut Link,
     numbers: std::ops::Range<u64>,
@@ -102,7 +102,7 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
     }
     assert!(seen.unwrap() < 1500, "{seen:?}");
     assert_eq!(tried[..4], [Some(0), Some(1), Some(99), None]);
-    // The robot comes to rest, and drives again only after its motors were enabled.
+    // It rests, and drives only after its motors are enabled.
     for number in 30..36 {
         let frames = datagram(255, 2320, 29_680);
         link.at(Event::Datagram(&frames), number * PERIOD_NS);
@@ -152,7 +152,6 @@ fn a_robot_that_only_acknowledges_is_asked_for_its_streams_and_the_cause_is_name
         causes.extend(decided(&effects).into_iter().map(|(_, cause)| cause));
         let streams = |command: &Command| matches!(command, Command::Stream { .. });
         asked += sent(&effects).into_iter().filter(streams).count();
-        // The first velocity repeats the last command.
         let stands = |velocity: &[Option<i16>; 2]| *velocity == STAND;
         assert!(number == 3 || velocities(&effects).iter().all(stands));
     }
@@ -183,7 +182,7 @@ fn a_robot_that_was_lost_and_acknowledges_what_was_sent_long_ago_is_not_driven()
         }
     }
     assert_eq!(causes.first(), Some(&Cause::RobotLate), "{causes:?}");
-    // The robot is tested again every 2 s.
+    // Retested every 2 s.
     assert!(moving.first().is_some_and(|first| *first > 28), "{moving:?}");
     assert_eq!(causes.last(), Some(&Cause::None), "{causes:?}");
 }

@@ -21,25 +21,25 @@ fn mission() -> Mission {
     Mission::parse(text, Path::new("test.toml")).unwrap()
 }
 
-/// A robot, its link and their time. The robot moves by its newest command.
+/// Robot that obeys its newest command, its link and clock.
 struct Scene {
     link: Link,
     topics: Topics,
     ms: u64,
-    /// The robot's odometry: x, y and heading.
+    /// Odometry: x, y and heading.
     pose: [f64; 3],
     told: [f64; 2],
     tick: u64,
     odometry: bool,
-    /// Whether its odometry follows its motion.
+    /// Odometry follows the motion.
     counts: bool,
     scans: bool,
-    /// Whether its beams change.
+    /// Beams change.
     sees: bool,
-    /// The shares of the speed that its left and its right wheel are commanded.
+    /// Reached shares of commanded speeds, left and right.
     shares: [f64; 2],
     turns: Vec<TurnSample>,
-    /// The speed of the robot's clock, and the speed that the link says.
+    /// Speed of the robot's clock, and those reported.
     clock: f64,
     rates: Vec<f64>,
     decided: Vec<(u64, Cause)>,
@@ -50,7 +50,7 @@ struct Scene {
 }
 
 impl Scene {
-    /// A robot that drives straight ahead at 0.15 m/s.
+    /// Drives straight ahead at 0.15 m/s.
     fn driving() -> Self {
         let mut link = Link::new(&mission());
         link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 });
@@ -122,7 +122,7 @@ impl Scene {
 
     fn scan(&self) -> Vec<u8> {
         let noise = if self.sees { self.ms as f32 * 1e-6 } else { 0.0 };
-        // Fewer beams than show whether they follow the motion, which they do not.
+        // Too few beams to contradict the motion, which they do.
         let range = |beam| if beam % 30 == 0 { 2.0 + noise } else { f32::INFINITY };
         let (header, ranges) = (Header::at(self.ms * MS, "scan"), (0..360).map(range).collect());
         messages::scan(header, [0.0, TAU / 360.0], [0.12, 3.5], [0.0, 0.1], ranges)
@@ -134,7 +134,7 @@ impl Scene {
         imu.encode()
     }
 
-    /// Let time pass: the robot says its odometry and its turn rate at 20 Hz and its scan at 10 Hz, and each tick is answered.
+    /// Advances time with odometry and turn rate at 20 Hz and scans at 10 Hz; ticks are answered.
     fn run(&mut self, for_ms: u64) {
         for _ in 0..for_ms / FRAME_MS {
             self.ms += FRAME_MS;
@@ -179,7 +179,7 @@ fn beside_another_commander_the_robot_is_told_to_stand_after_each_of_its_command
     let mut scene = Scene::driving();
     for _ in 0..20 {
         scene.commanded(0.1);
-        // The robot obeys the other commander only until a stop arrives.
+        // It obeys the other commander until a stop arrives.
         assert_eq!(scene.sent.last(), Some(&(scene.ms, [0.0; 2])));
         scene.holds(Cause::AnotherCommander);
         scene.told = [0.0; 2];
@@ -283,7 +283,7 @@ fn what_a_robot_drove_while_the_network_was_down_is_its_motion_as_far_as_it_can_
         }
         assert_eq!(scene.wheels.restarts, restarts, "{ahead}");
     }
-    // Nobody knows the way of a robot that is too far away.
+    // Too far to drive in that time, so the travel is unknown.
     let mut scene = Scene::driving();
     let (before, restarts) = (scene.endless, scene.wheels.restarts);
     (scene.odometry, scene.scans) = (false, false);

@@ -1,10 +1,10 @@
-//! A laser on a wire of its own beside the robot's.
+//! Tests of a laser on its own wire.
 
 use common::driver::{Driver, Heard, LaserScan, WireTally};
 
 use super::*;
 
-/// It says one byte for a scan: the range of all beams, decimetres; or 0, which is none of its protocol.
+/// One byte per scan: the range of all beams, decimetres; 0 is outside the protocol.
 #[derive(Debug)]
 struct Laser;
 
@@ -46,7 +46,7 @@ fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign
     link.at(Event::Datagram(wheels), 10 * MS);
     link.at(Event::Order(Order::Drive, HoldReason::None), 11 * MS);
     link.at(Event::Sensor(0, &[20]), 50 * MS);
-    // There is no such sensor.
+    // No such sensor.
     link.at(Event::Sensor(7, &[30]), 60 * MS);
     let effects = link.at(Event::Datagram(wheels), 110 * MS);
     let scans = effects.iter().filter_map(|effect| match effect {
@@ -59,7 +59,7 @@ fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign
     assert_eq!((scans[0].beams[0], scans[0].sweep.first_beam_ns), (2.0, -60_000_000));
     let refused = link.at(Event::Sensor(0, &[0]), 120 * MS);
     assert!(refused.contains(&Effect::Refused("no scan".into())));
-    // It falls silent.
+    // The laser falls silent.
     let again = (3..30).flat_map(|tick| link.at(Event::Datagram(wheels), 50 * tick * MS));
     assert!(again.filter(|effect| matches!(effect, Effect::SendSensor(..))).count() > 0);
 }

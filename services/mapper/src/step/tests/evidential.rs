@@ -1,4 +1,4 @@
-//! The evidential method, reading by reading.
+//! Tests of the evidential method.
 
 use super::*;
 use common::wire::{infrared_ad, infrared_m};
@@ -11,13 +11,13 @@ fn mapper(extra: &str) -> Mapper {
 }
 
 impl Mapper {
-    /// A robot at (x, 0) facing `heading` hears an echo, or nothing.
+    /// Maps an echo or silence at (x, 0).
     fn hear(&mut self, tick: u64, x: f64, heading: f64, heard: Option<f64>) {
         let heard = heard.map_or(reading(RangeStatus::Nothing, 0.0), echo);
         self.sense(at(tick, x, 0.0, heading), &[heard]);
     }
 
-    /// The infrared rangers of a robot at the origin facing along x give these counts, and its sonar gives nothing.
+    /// Maps infrared counts at the origin, facing along x, without sonar reading.
     fn see(&mut self, tick: u64, infrared_ad: [u16; 7]) {
         self.sense(at(tick, 0.0, 0.0, 0.0), &rays(infrared_ad));
     }
@@ -27,7 +27,7 @@ impl Mapper {
 fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept() {
     let mut mapper = mapper("");
     mapper.hear(0, 0.0, 0.0, Some(0.7));
-    // The hit is at 0.9; the body and its clearance reach 0.22 m and half a cell around.
+    // The hit is at 0.9. Body and clearance reach 0.22 m and half a cell around it.
     assert!(mapper.is_hazard(0.9, 0.0));
     assert_eq!(mapper.state_at(0.7, 0.0), CellState::Margin);
     assert_eq!(mapper.state_at(0.5, 0.0), CellState::Scanned);
@@ -38,7 +38,8 @@ fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept(
 #[test]
 fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
     let mut mapper = mapper("");
-    // The map ends at x = 2.45; a wall stands at 2.5, 0.5 m ahead of the sensor. The body reaches 0.22 m and half a cell.
+    // The map ends at x = 2.45. A wall stands at 2.5, 0.5 m ahead of the sensor. The body reaches
+    // 0.22 m and half a cell.
     for tick in 0..3 {
         mapper.hear(tick, 1.8, 0.0, Some(0.5));
     }
@@ -46,7 +47,7 @@ fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
     assert!(!mapper.is_hazard(2.2, 0.0));
 }
 
-/// The readings that the link computes from these counts.
+/// Returns the link's readings of these counts.
 fn rays(infrared_ad: [u16; 7]) -> Vec<RangeReading> {
     let of = |(sensor, ad)| {
         let status = match ad {
@@ -61,7 +62,7 @@ fn rays(infrared_ad: [u16; 7]) -> Vec<RangeReading> {
 
 const INFRARED: &str = "sensors = 'front+infrared'";
 
-/// The rear ranger, which looks along -x from (-0.19, 0), sees something at `range_m`; the others are dead.
+/// Returns counts of the rear ranger, which looks along -x from (-0.19, 0); the others are dead.
 fn rear(range_m: f64) -> [u16; 7] {
     let mut counts = [0; 7];
     counts[5] = infrared_ad(range_m);
@@ -72,7 +73,7 @@ fn rear(range_m: f64) -> [u16; 7] {
 fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
     let mut mapper = mapper(INFRARED);
     mapper.see(0, rear(0.6));
-    // The echo is at -0.79; the body and its clearance reach 0.22 m and half a cell around it.
+    // The echo is at -0.79. Body and clearance reach 0.22 m and half a cell around it.
     assert_eq!(mapper.state_at(-0.4, 0.0), CellState::Scanned);
     assert!(mapper.is_hazard(-0.8, 0.0));
     assert!(!mapper.is_hazard(-0.5, 0.0));
@@ -147,7 +148,7 @@ fn no_echo_at_a_slant_does_not_take_back_what_was_heard_squarely() {
     for tick in 0..3 {
         mapper.hear(tick, 0.0, 0.0, Some(0.7));
     }
-    // The beam comes from the other side now, from where a smooth wall would give no echo.
+    // The beam comes from the other side, where a smooth wall would give no echo.
     for tick in 3..30 {
         mapper.hear(tick, 1.9, std::f64::consts::PI, None);
     }
@@ -161,7 +162,7 @@ fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
         mapper.hear(tick, 0.0, 0.0, Some(0.7));
     }
     let before = mapper.hazards();
-    // The robot turned by half the arc: its edge meets the thing, its middle meets nothing new.
+    // After half the arc's turn, its edge meets the object, its middle nothing new.
     mapper.hear(4, 0.0, 0.25, Some(0.7));
     assert_eq!(mapper.hazards(), before);
 }
@@ -179,7 +180,7 @@ fn scanned_ground_grows_stale_as_the_wheels_roll() {
     let mut mapper = mapper("");
     mapper.hear(0, 0.0, 0.0, None);
     assert_eq!(mapper.state_at(0.9, 0.0), CellState::Scanned);
-    // The robot turns six times on the spot: each wheel rolls 4.9 m, and the beam looks the other way at the end.
+    // Six turns on the spot roll each wheel 4.9 m; the beam finally looks the other way.
     let heading = 13.0 * std::f64::consts::PI;
     mapper.hear(1, 0.0, heading, None);
     assert_eq!(mapper.state_at(0.9, 0.0), CellState::Free);
@@ -245,12 +246,11 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     assert!((f64::from(echo.x_m) - 0.2).abs() < 1e-6 && echo.bearing_rad == 0.0);
     assert!((0.6..0.7).contains(&echo.clear_m), "{echo:?}");
     assert!(silence.bearing_rad == 0.5 && silence.clear_m >= 1.5, "{silence:?}");
-    // The robot turns on the spot until the wheels have rolled farther than a reading is valid.
     for tick in 2..200 {
         mapper.hear(tick, 0.0, 0.5 + tick as f64, None);
     }
     assert!(beams(&mapper).len() < 50, "{}", beams(&mapper).len());
-    // A reset deletes the readings, because a wrong pose may be the cause.
+    // A wrong pose may be the cause of a reset.
     mapper.reset(1);
     assert!(beams(&mapper).is_empty());
 }
@@ -264,7 +264,7 @@ fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_
         mapper.is_hazard(0.2, 0.0) && mapper.is_hazard(0.4, 0.0)
     };
     assert!(touched(&mapper));
-    // The robot has backed off, and the ranger looks over the thing.
+    // The ranger looks over the object.
     let far = [infrared_ad(0.8); 7];
     for tick in 1..40 {
         let mut readings = rays(far);
@@ -272,7 +272,6 @@ fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_
         mapper.sense(at(tick, -0.3, 0.0, 0.0), &readings);
     }
     assert!(touched(&mapper));
-    // Nothing stands where the body is.
     mapper.hear(40, 0.2, 0.0, None);
     assert!(!mapper.is_hazard(0.2, 0.0));
 }
@@ -334,7 +333,7 @@ fn evidence_that_nothing_renews_is_weaker_with_time_and_gone_when_it_should_be()
         (gone, mapper.state_at(0.5, 0.0))
     };
     let forgets = "forget_after_s = 120";
-    // Three echoes have the greatest weight, and one a third of it.
+    // Three echoes reach the maximum weight, one a third of it.
     assert_eq!(gone_after(forgets, 3), (Some(120), CellState::Free));
     assert_eq!(gone_after(forgets, 1), (Some(40), CellState::Scanned));
     assert_eq!(gone_after("", 3), (None, CellState::Scanned));

@@ -12,7 +12,6 @@ fn stand(mapper: &mut Mapper, tick: u64, x_m: f64) {
     mapper.sense(at(tick, x_m, 0.0, 0.0), &[]);
 }
 
-/// Whether free cells lead from the origin to the target's cell.
 fn is_connected(mapper: &Mapper) -> bool {
     let frame = mapper.frame();
     let free =

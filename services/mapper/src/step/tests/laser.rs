@@ -4,7 +4,7 @@ use common::kinematics::Pose2;
 
 use super::*;
 
-/// The robot's laser has 360 beams around its centre, its sonar looks ahead from 0.2 m.
+/// The laser has 360 beams around the robot's centre; the sonar looks ahead from 0.2 m.
 fn mapper() -> Mapper {
     let text = "target = [2, 0]\nrobot.model = 'kobuki'\nperimeter = { width_m = 5, cells = 50 }\n\
         [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nforward_m = 0\nbearing_deg = 0\nmodel = 'rplidar-a1'\n\
@@ -12,7 +12,7 @@ fn mapper() -> Mapper {
     mapper_of(text)
 }
 
-/// A robot at the origin facing along x whose laser sees a wall across its way at `wall` metres, and whose sonar hears an echo.
+/// Maps a wall at `wall` metres by laser, and an echo, at the origin facing along x.
 fn sense(mapper: &mut Mapper, tick: u64, wall: f64, echo: f64) {
     let beam = |degrees: u32| {
         let ahead = (f64::from(degrees) - 180.0).to_radians().cos();
@@ -52,7 +52,6 @@ fn an_echo_of_what_the_laser_sees_marks_nothing_beside_it() {
     sense(&mut mapper, 0, 1.0, 0.8);
     let by_scan = mapper.hazards();
     for tick in 1..5 {
-        // The range has the noise of the sonar.
         sense(&mut mapper, tick, 1.0, 0.78 + 0.01 * tick as f64);
     }
     assert_eq!(mapper.hazards(), by_scan);
@@ -104,7 +103,6 @@ fn what_one_laser_sees_is_hazard_though_another_looks_over_it_and_both_scan_grou
     let mut restarted = mapper_of(&text);
     restarted.restore(mapper.state().clone()).unwrap();
     assert!(restarted.is_hazard(0.8, 0.0) && restarted.is_hazard(-1.2, 0.0));
-    // The low thing is gone.
     for tick in 10..14 {
         let scans = vec![scan(0, 2.0), scan(1, 2.0)];
         mapper.give(Tick { pose: at(tick, 0.0, 0.0, 0.0), scans, ..Tick::default() });
@@ -127,8 +125,10 @@ fn what_a_bumper_felt_stays_though_the_laser_looks_over_it_and_the_pose_is_on_it
     assert!(mapper.is_hazard(0.2, 0.0) && !mapper.is_hazard(0.5, 0.0));
 }
 
-/// The least y that is hazard before the wall y = 1.25, for several x, by a laser with this row that is mounted at `at`, metres ahead
-/// of and to the left of the robot's centre, and whose middle beam looks to `looks_deg`.
+/// Returns the least hazard y before the wall y = 1.25 for several x.
+///
+/// The laser of `row` is mounted at `at`, ahead and left of the robot's centre; its middle beam
+/// looks to `looks_deg`.
 fn wall_of(row: &str, at: DVec2, looks_deg: f64) -> Vec<f64> {
     let text = format!(
         "target = [2, 0]\nrobot.model = 'create3'\nperimeter = {{ width_m = 5, cells = 100 }}\n\
@@ -169,12 +169,11 @@ fn a_laser_that_is_turned_and_off_the_centre_maps_a_wall_where_it_is() {
     }
 }
 
-/// A robot that drives a circle of 0.5 m, seconds after the origin.
 fn circling(s: f64) -> Pose2 {
     Pose2::default().along_arc(0.5 * s, s)
 }
 
-/// The scan of a laser on the circling robot in a room of 6 by 4 metres, with the tick at `s`.
+/// Returns a tick's laser scan on the circling robot in a room of 6 m by 4 m.
 fn scan_in_room(s: f64, sweep: Sweep) -> Vec<f32> {
     let beam = |beam: usize| {
         let robot = circling(s + sweep.beam_time_ns(beam, 360) as f64 / 1e9);
@@ -205,7 +204,7 @@ fn a_scan_is_matched_and_mapped_where_it_was_taken_however_late_it_is_and_howeve
         for tick in 10..80_u64 {
             let s = tick as f64 / 10.0;
             let mut pose = circling(s);
-            // A correction of the pose on the way is no motion.
+            // Corrections of the pose are no motion.
             let moved = if tick > 40 { DVec2::new(0.0, 0.02) } else { DVec2::ZERO };
             pose.position += moved;
             let Pose2 { position, heading } = pose;

@@ -1,12 +1,11 @@
-//! The angles between computed and exact directions, after solves from scratch on thousands of maps.
+//! Angles between computed and exact directions, after solves from scratch on thousands of maps.
 
 use crate::support::{Angles, Kind, Map};
 use harmonic::{Cancellation, Screening, Solver, solve_exactly};
 
-/// Maps of each kind and screening.
+/// Maps per kind and screening.
 const MAPS: u64 = 100;
 
-/// Side of those maps, cells.
 const SIDE: usize = 128;
 
 const KINDS: [Kind; 10] = [
@@ -22,7 +21,7 @@ const KINDS: [Kind; 10] = [
     Kind::Noise { density: 0.35 },
 ];
 
-/// Print the worst angles of each kind of map: the median, the 99th percentile and the maximum over the cells.
+/// Prints the worst p50, p99 and maximum angles per kind of map.
 pub(crate) fn angle_table() {
     println!(
         "\nDirections of full solves beside exact ones, {MAPS} maps of {SIDE} x {SIDE} cells a row, degrees"

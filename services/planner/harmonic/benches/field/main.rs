@@ -1,12 +1,14 @@
-//! `cargo bench -p firsthand-field --features bench` prints the times of the solver and of other algorithms.
+//! `cargo bench -p firsthand-field --features bench` prints the times of the solver and of other
+//! algorithms.
 //!
-//! It does not use criterion, because the results are ratios, which hold only between times that are measured in turn in one run.
-//! Every time is the least of several runs. Arguments after `--` select the measurements:
-//! - `quick` leaves out the large maps.
-//! - `updates` measures only the updates.
+//! Ratios hold only between times measured in turn in one run, so a custom harness replaces
+//! criterion. Every time is the least of several runs. Arguments after `--` select the
+//! measurements:
+//! - `quick` omits the large maps.
+//! - `updates` measures only updates.
 //! - `accuracy` measures angles instead of times.
-//! - `growth` measures time and memory by the size of the map.
-//! - `sweep` measures a sweep over widths of corridors and doors, densities and depths of u, the worst first.
+//! - `growth` measures time and memory by map size.
+//! - `sweep` measures widths of corridors and doors, densities and depths of u, worst first.
 //! - `--maps DIR` adds the PGM and MovingAI maps of a directory.
 #![allow(
     clippy::expect_used,
@@ -30,7 +32,7 @@ use std::{path::Path, time::Instant};
 use crate::support::{Kind, Map};
 use harmonic::{Cancellation, Cell, Change, Domain, Solver};
 
-/// Milliseconds of the fastest of `runs` calls.
+/// Returns the milliseconds of the fastest of `runs` calls.
 fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..runs {
@@ -41,7 +43,7 @@ fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
     best
 }
 
-/// More runs of what is short.
+/// Returns the number of runs; small maps get more.
 fn runs(cells: usize) -> usize {
     (4_000_000 / cells).clamp(3, 50)
 }
@@ -74,7 +76,6 @@ fn main() {
     updates::table(quick);
 }
 
-/// The directory that `--maps` names.
 fn maps_directory() -> Option<String> {
     std::env::args().skip_while(|it| it != "--maps").nth(1)
 }
@@ -106,7 +107,7 @@ fn full_table(quick: bool) {
     for n in if quick { vec![50, 512] } else { vec![50, 256, 512, 1024, 2048, 4096] } {
         for kind in kinds {
             let narrow = matches!(kind, Kind::Maze { .. } | Kind::Serpentine { .. });
-            // Seconds and gigabytes each, for nothing new.
+            // Each takes seconds and gigabytes and shows nothing new.
             if n > 512 && narrow {
                 continue;
             }
@@ -116,8 +117,10 @@ fn full_table(quick: bool) {
     }
 }
 
-/// Maps of the same size to solve before one that is timed: their memory is reused, their set-up is not. The map upside down
-/// takes the same precision, and drums take the other.
+/// Returns maps of the same size to solve before a timed one, so that memory is reused and the
+/// set-up is not.
+///
+/// The map upside down takes the same precision, and drums take the other.
 fn others_than(domain: &Domain) -> [Domain; 2] {
     let (width, height) = (domain.width(), domain.height());
     let rows = domain.blocked().chunks_exact(width).rev();
@@ -128,7 +131,6 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
     [upside_down, drums].map(|it| it.expect("a valid map"))
 }
 
-/// Print the times of a map from scratch and with the set-up reused, and those of other algorithms.
 fn full_row(name: &str, domain: &Domain, with_dijkstra: bool) {
     let cells = domain.blocked().len();
     let cancellation = Cancellation::new();

@@ -4,7 +4,6 @@ use harmonic::{Cell, Domain};
 
 use crate::fastest;
 
-/// Distances from the target to all cells, by the `pathfinding` crate.
 pub(crate) fn dijkstra(domain: &Domain) -> f64 {
     const STRAIGHT: u32 = 1000;
     const DIAGONAL: u32 = 1414;

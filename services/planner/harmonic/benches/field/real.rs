@@ -1,13 +1,12 @@
-//! Maps of real places, a cell a pixel.
+//! Maps of real places, one cell per pixel.
 
 use std::path::{Path, PathBuf};
 
 use harmonic::{Cell, Domain};
 
-/// The ROS map_server's threshold: a darker cell is not free.
+/// Threshold of the ROS map_server; darker cells are not free.
 const FREE_FROM: u8 = 206;
 
-/// The maps in the PGMs and in the MovingAI files of a directory, by name.
 pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
     let entries = std::fs::read_dir(directory).expect("a directory of maps");
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
@@ -22,7 +21,7 @@ pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
     files.iter().map(named).collect()
 }
 
-/// The map in a file, its target the free cell nearest to the middle.
+/// Loads a map; the target is the free cell nearest to the middle.
 fn load(file: &Path) -> Domain {
     let bytes = std::fs::read(file).expect("a map");
     let (width, height, mut blocked) =
@@ -41,7 +40,6 @@ fn load(file: &Path) -> Domain {
     Domain::new(width, height, blocked, target).expect("a valid map")
 }
 
-/// Columns, rows and blocked cells of a MovingAI map.
 fn moving_ai(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
     let text = std::str::from_utf8(bytes).expect("a map in ASCII");
     let (header, rows) = text.split_once("\nmap").expect("a map after its header");
@@ -54,7 +52,7 @@ fn moving_ai(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
     (number("width"), number("height"), blocked)
 }
 
-/// Columns, rows and blocked cells of a binary PGM of 8 bits, whose comments are lines of their own.
+/// Reads a binary 8-bit PGM with comments on separate lines.
 fn pgm(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
     let mut numbers = Vec::new();
     let mut rest = bytes.strip_prefix(b"P5\n").expect("a binary PGM");

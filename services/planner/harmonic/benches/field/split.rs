@@ -1,4 +1,4 @@
-//! The cycles and checks of a solve, and the growth of time and memory with the map.
+//! Cycles and checks of a solve, and growth of time and memory with the map.
 
 use std::process::Command;
 use std::time::Instant;
@@ -8,7 +8,7 @@ use harmonic::{Cancellation, Domain, Phase, Solver};
 
 use crate::{others_than, runs, wavefront};
 
-/// The time of a solve, milliseconds, and what it did.
+/// Time of a solve, milliseconds, and its counts.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Split {
     pub total: f64,
@@ -16,7 +16,6 @@ pub(crate) struct Split {
     pub checks: usize,
 }
 
-/// A solve of `domain`, and its method.
 pub(crate) fn split(solver: &mut Solver, domain: &Domain) -> (Split, &'static str) {
     let mut split = Split::default();
     let start = Instant::now();
@@ -30,7 +29,7 @@ pub(crate) fn split(solver: &mut Solver, domain: &Domain) -> (Split, &'static st
     (split, field.verification().method.name())
 }
 
-/// The fastest of several solves from scratch.
+/// Returns the fastest of several solves from scratch.
 fn least(domain: &Domain) -> (Split, &'static str) {
     let others = others_than(domain);
     let mut solver = Solver::default();
@@ -48,7 +47,6 @@ fn least(domain: &Domain) -> (Split, &'static str) {
     best
 }
 
-/// Time and memory of a solve from scratch, by the size of the map.
 pub(crate) fn growth_table() {
     println!(
         "\nGrowth with the map: ms per million cells, and bytes a cell that a solver and its field hold at most"
@@ -75,16 +73,15 @@ pub(crate) fn growth_table() {
     }
 }
 
-/// The word that makes this program solve one map and print what [`most_bytes`] says.
+/// Argument that makes this program solve one map and print [`most_bytes`].
 pub(crate) const BYTES: &str = "bytes";
 
-/// [`most_bytes`] in a process of its own, in which no memory was used and freed before.
+/// Runs [`most_bytes`] in a new process, without memory that was used and freed before.
 fn bytes_of_a_process(map: &str) -> Option<f64> {
     let output = Command::new(std::env::current_exe().ok()?).args([BYTES, map]).output().ok()?;
     String::from_utf8(output.stdout).ok()?.trim().parse().ok()
 }
 
-/// Solves the map that the last argument names, and prints the bytes it took.
 pub(crate) fn print_bytes() {
     let map = std::env::args().next_back().unwrap_or_default();
     let domain = [Kind::Drums, Kind::Office].into_iter().find_map(|kind| {
@@ -96,17 +93,17 @@ pub(crate) fn print_bytes() {
     }
 }
 
-/// The most that the resident memory of this process grows by during a solve by a new solver; `None` where the system does not
-/// tell.
+/// Returns the growth of resident memory during a solve by a new solver; `None` if the system does
+/// not report it.
 fn most_bytes(domain: &Domain) -> Option<f64> {
-    // Makes the peak the present size.
+    // Resets the peak to the present size.
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     let before = status("VmRSS:")?;
     Solver::default().solve(domain, &Cancellation::new()).ok()?;
     Some((status("VmHWM:")? - before).max(0.0))
 }
 
-/// A line of what Linux tells of this process, in bytes.
+/// Returns a line of `/proc/self/status`, in bytes.
 fn status(line: &str) -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let value = status.lines().find_map(|it| it.strip_prefix(line))?;

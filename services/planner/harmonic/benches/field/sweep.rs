@@ -1,5 +1,5 @@
-//! A sweep over the shapes of maps that decide what a solve costs: the width of corridors and of doors, the density of obstacles and
-//! the depth of u.
+//! Sweep over the map shapes that decide the cost of a solve: corridor and door width, obstacle
+//! density, depth of u.
 
 use crate::support::{Kind, Map};
 use harmonic::{Cancellation, Domain, Screening, Solver};
@@ -7,13 +7,12 @@ use harmonic::{Cancellation, Domain, Screening, Solver};
 use crate::split::split;
 use crate::{others_than, wavefront};
 
-/// Side of the maps whose time is measured, cells.
 const SIDE: usize = 512;
 
-/// Runs of each solve; the fastest counts.
+/// Runs per solve; the fastest counts.
 const RUNS: usize = 3;
 
-/// The maps of the sweep by name, without making them: their kinds and screening lengths.
+/// Returns names, kinds and screening lengths of the maps.
 fn kinds() -> Vec<(String, Kind, f64)> {
     const NONE: f64 = f64::INFINITY;
     let mut kinds = vec![(Kind::Empty, NONE), (Kind::Drums, NONE), (Kind::Office, NONE)];
@@ -30,7 +29,7 @@ fn kinds() -> Vec<(String, Kind, f64)> {
     for density in [0.01, 0.03, 0.1, 0.2, 0.25, 0.3, 0.35, 0.38, 0.4, 0.45] {
         kinds.push((Kind::Noise { density }, NONE));
     }
-    // Screening of this length lowers u across a hall by 1e-3 to 1e-2000.
+    // These lengths lower u across a hall by 1e-3 to 1e-2000.
     for length in [70.0, 20.0, 7.0, 3.0, 1.0, 0.5, 0.1] {
         kinds.extend([Kind::Empty, Kind::Drums, Kind::Office].map(|kind| (kind, length)));
     }
@@ -50,13 +49,13 @@ fn domain(kind: Kind, length: f64, side: usize, seed: u64) -> Domain {
     domain.expect("a valid map")
 }
 
-/// Whether the words after `only` on the command line, if any, choose the map `name`.
+/// Returns whether the words after `only` on the command line, if any, select `name`.
 fn chosen(name: &str) -> bool {
     let mut only = std::env::args().skip_while(|word| word != "only").skip(1).peekable();
     only.peek().is_none() || only.any(|word| name.contains(&word))
 }
 
-/// Print the time of a solve from scratch of every map and of the wavefront that was run in turn with it, the worst ratio first.
+/// Prints times of each map and of a wavefront measured in turn, worst ratio first.
 pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
     let generated = kinds().into_iter().filter(|it| chosen(&it.0));
     let mut rows: Vec<_> =
@@ -75,7 +74,6 @@ pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
     }
 }
 
-/// The multiple of a wavefront's time that a map takes, and the line to print.
 fn row(name: &str, domain: &Domain) -> (f64, String) {
     let cells = domain.blocked().len() as f64;
     let others = others_than(domain);

@@ -1,4 +1,4 @@
-//! Solves that start from the field before, after a few cells changed.
+//! Solves that start from the previous field, after a few cells changed.
 
 use std::time::Instant;
 
@@ -7,10 +7,9 @@ use harmonic::{Cancellation, Cell, Screening, Solver};
 
 use crate::block;
 
-/// Solves timed for a row of a map of at most 1024 x 1024 cells; of a larger one a tenth.
+/// Timed solves per map of at most 1024 x 1024 cells; larger maps get a tenth.
 const UPDATES: usize = 100;
 
-/// 3 x 3 blocks that appear one by one and vanish again.
 pub(crate) fn table(quick: bool) {
     println!("\nUpdates: 3 x 3 blocks that appear and vanish at random, us");
     println!("{:<10} {:>5} {:>7} {:>8} {:>8} {:>8}", "map", "N", "length", "p50", "p90", "p99");

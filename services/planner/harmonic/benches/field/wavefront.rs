@@ -1,22 +1,24 @@
-//! A wavefront as NavFn's, the planner of Nav2, runs one: an upwind distance from the target over flat arrays, cells waiting
-//! in buffers, those within a step of the front and those beyond it. Unlike NavFn it has no cap: every cell that can be
-//! reached is.
+//! Wavefront like that of NavFn, a planner of Nav2: an upwind distance from the target over flat
+//! arrays.
+//!
+//! Waiting cells are buffered: those within a step of the front and those beyond it. Unlike NavFn,
+//! it reaches every reachable cell without a cap.
 
 use harmonic::Domain;
 
 use crate::fastest;
 
-/// Distance a step of the front takes in, in cells: more waits in the second buffer.
+/// Distance per step of the front, in cells; farther cells wait in the second buffer.
 const STEP: f32 = 2.0;
 
-/// Far enough that a neighbour's distance is not taken up again for rounding.
+/// Least gain, so that rounding does not repeat a neighbour.
 const LEAST_GAIN: f32 = 1e-3;
 
-/// The wavefront's arrays, reused between runs, with a frame of blocked cells.
+/// Arrays of the wavefront, reused between runs, with a frame of blocked cells.
 pub(crate) struct Wavefront {
     stride: usize,
     distance: Vec<f32>,
-    /// Whether a cell is free and does not wait yet.
+    /// Whether a cell is free and not yet waiting.
     open: Vec<bool>,
     now: Vec<u32>,
     soon: Vec<u32>,
@@ -44,7 +46,6 @@ impl Wavefront {
         }
     }
 
-    /// Distances of all cells from the target of `domain`.
     pub(crate) fn run(&mut self, domain: &Domain) {
         let Self { stride, distance, open, now, soon, later } = self;
         let stride = *stride;
@@ -68,7 +69,8 @@ impl Wavefront {
                         (around[stride - 1], around[stride], around[stride + 1]);
                     let (across, along) = (west.min(east), north.min(south));
                     let (near, gap) = (across.min(along), (across - along).abs());
-                    // The plane wave through both neighbours, by a parabola; none if only one of them has been reached.
+                    // Plane wave through both neighbours, as a parabola; a single neighbour gives a
+                    // step of 1.
                     let step = if gap < 1.0 {
                         std::f32::consts::FRAC_1_SQRT_2 + gap * (0.5 - 0.2071 * gap)
                     } else {
@@ -92,13 +94,12 @@ impl Wavefront {
         }
     }
 
-    /// Cells that were reached.
     pub(crate) fn reached(&self) -> usize {
         self.distance.iter().filter(|it| it.is_finite()).count()
     }
 }
 
-/// Lets the neighbours of a cell wait that its distance may improve: none is nearer than half a diagonal step.
+/// Queues the neighbours of a cell that may get nearer: none is nearer than half a diagonal step.
 #[inline(always)]
 fn push_around(
     at: usize,
@@ -117,7 +118,7 @@ fn push_around(
     }
 }
 
-/// Milliseconds of the fastest of `runs` wavefronts, and the cells it reached.
+/// Returns milliseconds of the fastest run, and the number of reached cells.
 pub(crate) fn time(domain: &Domain, runs: usize) -> (f64, usize) {
     let mut wavefront = Wavefront::new(domain);
     let time = fastest(runs, || wavefront.run(domain));

@@ -1,6 +1,6 @@
-//! The crate `firsthand-field` for Python. `harmonic_field.pyi` documents it.
+//! Python binding of the crate `firsthand-field`, documented in `harmonic_field.pyi`.
 //!
-//! A cell is (row, column), as NumPy indexes it; a position or direction is (x, y), x along columns.
+//! A cell is (row, column), as in NumPy. A position or direction is (x, y), with x along columns.
 
 use harmonic::{
     Cancellation, Cell, Change, Domain, Field as Solved, Guidance, Screening, Settings, Solver,

@@ -1,4 +1,5 @@
-//! Back substitution: from the factors to u, outwards from the cells whose u is known, in extended range.
+//! Back substitution in extended range: from the factors to u, outwards from the cells with known
+//! u.
 
 use super::{breadth_first::BreadthFirst, tree::Tree, workspace::Workspace};
 use crate::{
@@ -6,13 +7,15 @@ use crate::{
     store::{BLOCKED, Store},
 };
 
-/// Binary orders of magnitude a front may span to be computed in plain `f64` with one common exponent.
+/// Binary orders of magnitude up to which a front uses plain `f64` with one common exponent.
 const PLAIN_SPAN: i32 = 300;
 
-/// The least sum in plain `f64` that loses no terms to underflow.
+/// Smallest plain `f64` sum that loses no terms to underflow.
 const PLAIN_LEAST: f64 = 1e-180;
 
-/// u of every cell of `domain`; the cells from which `pass` begins have the u in `known`, or 1 at the target.
+/// Computes u of every cell of `domain`.
+///
+/// The first cells of `pass` take u from `known`, or 1 at the target.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
@@ -24,7 +27,7 @@ pub(super) fn substitute(
     cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
     let Workspace { factors, u, .. } = workspace;
-    // The cells are in order of their place, where the cells of a front lie close together.
+    // Sorted by place, the cells of a front lie close together.
     u.clear();
     u.resize(pass.len(), Scaled::ZERO);
     for place in 0..pass.unknown().start {
@@ -49,7 +52,7 @@ pub(super) fn substitute(
     Ok(store(domain, pass, u, known))
 }
 
-/// The store of `u`, which is given by place, and of the `known` u of other cells.
+/// Stores `u`, sorted by place, and the `known` u elsewhere.
 fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled], known: Option<&Store>) -> Store {
     let (width, height) = (domain.width(), domain.height());
     let blocked = |row: usize| domain.blocked()[row * width..(row + 1) * width].iter();
@@ -76,7 +79,7 @@ struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// The rows and their positions, the last eliminated first.
+    /// Returns rows and positions, last eliminated first.
     fn backwards(self) -> impl Iterator<Item = (usize, &'a [f64])> {
         let mut rest = self.rows;
         self.lengths.iter().enumerate().rev().map(move |(row, &length)| {
@@ -87,8 +90,9 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Computes a front with one common exponent. Returns false, with nothing written, if the front's range is too wide for
-/// that.
+/// Computes a front with one common exponent.
+///
+/// Returns false, with nothing written, if the range of the front is too wide.
 fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut Vec<f64>) -> bool {
     let own = rows.lengths.len();
     let boundary = cells[own..].iter().map(|&place| u[place as usize]).filter(|u| !u.is_zero());
@@ -113,7 +117,7 @@ fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut V
     true
 }
 
-/// Computes a front with an exponent for every term.
+/// Computes a front with an exponent per term.
 fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
     for (row, weights) in rows.backwards() {
         let terms = weights.iter().zip(&cells[row + 1..]).map(|(&weight, &place)| {
@@ -124,7 +128,7 @@ fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
     }
 }
 
-/// Scalar product in four partial sums, which the compiler can keep in vector registers.
+/// Returns the scalar product, in four partial sums that fit vector registers.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let ((a4, a_rest), (b4, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());

@@ -1,21 +1,21 @@
-//! A breadth-first pass over the free cells, from the target or from all cells whose u is known.
+//! Breadth-first pass over the free cells, from the target or from all cells with known u.
 
 use super::budget::Budget;
 use crate::{Cancellation, Domain, SolveError};
 
-/// The cell has no place in the order: blocked, or cut off from the target.
+/// Place of a blocked or cut-off cell.
 pub(crate) const ABSENT: u32 = u32::MAX;
 
-/// Distances between two checks of the cancellation: at most some hundred microseconds on the largest maps.
+/// Distances between cancellation checks: at most some hundred microseconds on the largest maps.
 const CHECKED_EVERY: usize = 64;
 
-/// The cells whose u is known and that have others beside them, and the others that can be reached, in order of their distance.
+/// Reachable cells by distance from the known cells that border them.
 pub(crate) struct BreadthFirst {
-    /// Indices into the padded map of the cells by distance, at first those whose u is known, such as the target.
+    /// Padded-map indices by distance; cells with known u come first.
     order: Vec<u32>,
     /// Place in `order` of each cell of the padded map, or [`ABSENT`].
     place: Vec<u32>,
-    /// Places at which a new distance starts: distance d takes `level[d] .. level[d + 1]`.
+    /// First place of each distance: distance d takes `levels[d] .. levels[d + 1]`.
     pub levels: Vec<u32>,
     width: usize,
 }
@@ -34,7 +34,7 @@ impl BreadthFirst {
         Self::from_known(domain, |index| index == target, budget, cancellation)
     }
 
-    /// Visits the cells of `domain` whose u is not known from those whose u `is_known`, by row-major index.
+    /// Visits the cells with unknown u from those that `is_known`, by row-major index.
     ///
     /// # Errors
     /// [`SolveError::Cancelled`] and [`SolveError::TooCostly`].
@@ -45,10 +45,9 @@ impl BreadthFirst {
         cancellation: &Cancellation,
     ) -> Result<Self, SolveError> {
         let (width, height) = (domain.width(), domain.height());
-        // The place of each cell and the order of the free ones.
         let entries = (width + 2) * (height + 2) + width * height;
         budget.ask((entries * size_of::<u32>()) as u64)?;
-        // A border of absent cells makes it unnecessary to check whether a neighbour exists.
+        // A border of absent cells makes bounds checks for neighbours unnecessary.
         const UNSEEN: u32 = u32::MAX - 1;
         const KNOWN: u32 = u32::MAX - 2;
         let stride = width + 2;
@@ -115,7 +114,6 @@ impl BreadthFirst {
         self.levels[1]..self.len() as u32
     }
 
-    /// Cells with a place.
     pub(crate) fn len(&self) -> usize {
         self.order.len()
     }
@@ -132,7 +130,7 @@ impl BreadthFirst {
         &self.place[start..start + self.width]
     }
 
-    /// Places of the four neighbours of the cell at `place`: west, east, north, south.
+    /// Returns the places of the west, east, north and south neighbours.
     pub(crate) fn neighbours(&self, place: u32) -> [u32; 4] {
         let padded = self.order[place as usize] as usize;
         let stride = self.width + 2;
@@ -140,7 +138,9 @@ impl BreadthFirst {
             .map(|neighbour| self.place[neighbour])
     }
 
-    /// Mean width of the passages, cells, estimated from a sample: between two walls each cell has 2 / width blocked neighbours.
+    /// Estimates the mean width of the passages, in cells, from a sample.
+    ///
+    /// Between two walls, each cell has 2 / width blocked neighbours.
     pub(crate) fn width(&self) -> f64 {
         const EVERY: usize = 16;
         let (mut cells, mut walls) = (0_usize, 0_usize);

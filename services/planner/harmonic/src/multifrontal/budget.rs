@@ -1,4 +1,4 @@
-//! The memory and the operations that a factorisation may take, asked about before they are spent.
+//! Limits of memory and operations, checked before a factorisation spends them.
 
 use crate::{Domain, SolveError};
 
@@ -12,25 +12,21 @@ pub(crate) struct Budget {
 }
 
 impl Budget {
-    /// `allowed` bytes for the factorisation of `domain`.
     pub(crate) fn of(domain: &Domain, allowed: u64) -> Self {
         let (width, height) = (domain.width(), domain.height());
         Self { allowed, operations: f64::INFINITY, width, height }
     }
 
-    /// The same bytes, and at most so many `operations`.
     pub(crate) fn with_operations(self, operations: f64) -> Self {
         Self { operations, ..self }
     }
 
-    /// # Errors
-    /// [`SolveError::TooCostly`] if these are more `operations` than are allowed.
+    /// Returns [`SolveError::TooCostly`] if `operations` exceed the limit.
     pub(super) fn ask_operations(&self, operations: f64) -> Result<(), SolveError> {
         if operations <= self.operations { Ok(()) } else { self.ask(u64::MAX) }
     }
 
-    /// # Errors
-    /// [`SolveError::TooCostly`] if `needed` bytes are more than are allowed.
+    /// Returns [`SolveError::TooCostly`] if `needed` bytes exceed the limit.
     pub(super) fn ask(&self, needed: u64) -> Result<(), SolveError> {
         let Self { allowed, width, height, .. } = *self;
         if needed <= allowed {

@@ -1,25 +1,26 @@
-//! The dense matrix of a front: symmetric, upper triangle stored by rows.
+//! Dense matrix of a front: symmetric, upper triangle stored by rows.
 
 use crate::simd::Simd;
 
-/// Columns that are computed together: a wide vector.
+/// Columns computed together: a wide vector.
 const BLOCK: usize = 4;
 
-/// A square symmetric matrix of which only the upper triangle is stored, and whose first rows are to be eliminated.
+/// Square symmetric matrix, stored as its upper triangle, whose first rows are eliminated.
 #[derive(Default)]
 pub(super) struct Matrix {
     entries: Vec<f64>,
     size: usize,
     /// Entries from one row to the next; a multiple of [`BLOCK`].
     stride: usize,
-    /// For each row to be eliminated, the column after its last entry that is not zero. It is never less than that of the row before,
-    /// because the rows of one distance meet those of the next in order.
+    /// Column after the last nonzero entry, for each row to eliminate.
+    ///
+    /// The values never decrease, because the rows of one distance meet those of the next in order.
     ends: Vec<usize>,
     simd: Simd,
 }
 
 impl Matrix {
-    /// Makes this the zero matrix of `size` rows, the first `pivots` of which are to be eliminated.
+    /// Clears the matrix to `size` rows, the first `pivots` of which are eliminated.
     pub(super) fn reset(&mut self, size: usize, pivots: usize) {
         self.size = size;
         self.entries.clear();
@@ -29,7 +30,7 @@ impl Matrix {
         self.ends.extend(1..=pivots);
     }
 
-    /// Adds `value` to the entry of `row` and `column`, in either order.
+    /// Adds `value`; row and column may be swapped.
     pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
         let (row, column) = (row.min(column), row.max(column));
         self.entries[row * self.stride + column] += value;
@@ -72,14 +73,15 @@ impl Matrix {
         }
     }
 
-    /// The diagonal entry of an eliminated row and the entries after it, up to the last that is not zero.
+    /// Returns the diagonal entry of an eliminated row and its later entries, up to the last
+    /// nonzero.
     pub(super) fn row(&self, row: usize) -> (f64, &[f64]) {
         let start = row * self.stride;
         let entries = &self.entries[start + row..start + self.ends[row]];
         (entries[0], &entries[1..])
     }
 
-    /// Appends the upper triangle of the rows that were not eliminated, row by row.
+    /// Appends the upper triangle of the remaining rows, row by row.
     pub(super) fn copy_rest(&self, into: &mut Vec<f64>) {
         for row in self.ends.len()..self.size {
             let start = row * self.stride;
@@ -87,7 +89,7 @@ impl Matrix {
         }
     }
 
-    /// Gauss elimination of the rows to be eliminated; the rest becomes the Schur complement on the other rows.
+    /// Eliminates the first rows by Gauss; the rest becomes the Schur complement.
     pub(super) fn eliminate(&mut self) {
         for row in 1..self.ends.len() {
             self.ends[row] = self.ends[row].max(self.ends[row - 1]);
@@ -103,7 +105,7 @@ impl Matrix {
 fn eliminate(entries: &mut [f64], stride: usize, ends: &[usize]) {
     let mut start = 0;
     while start < ends.len() {
-        // The rows eliminated at once are a power of two in number, the largest of those that fit up to the limit.
+        // Each panel takes the largest power of two of rows that fits, up to eight.
         start += match ends.len() - start {
             8.. => panel::<8>(entries, stride, start, ends),
             4.. => panel::<4>(entries, stride, start, ends),
@@ -113,10 +115,10 @@ fn eliminate(entries: &mut [f64], stride: usize, ends: &[usize]) {
     }
 }
 
-/// Eliminates `P` rows from `start` on and applies them to the rest in one pass over it; returns `P`.
+/// Eliminates `P` rows from `start` on and applies them to the rest in one pass; returns `P`.
 ///
-/// The pass works on whole blocks of columns, so that short rows need no loops for remainders. The values that it writes below the
-/// diagonal are never read, and beyond `stop` it adds zeros.
+/// The pass takes whole blocks of columns, so short rows need no remainder loops. It writes values
+/// below the diagonal that are never read, and adds zeros beyond `stop`.
 #[inline(always)]
 fn panel<const P: usize>(
     entries: &mut [f64],
@@ -179,7 +181,7 @@ fn panel<const P: usize>(
     P
 }
 
-/// The first column of the block that holds the diagonal of `row`.
+/// Returns the first column of the block that holds the diagonal of `row`.
 #[inline(always)]
 fn first_block(row: usize) -> usize {
     row - row % BLOCK

@@ -1,9 +1,11 @@
-//! Gauss-Seidel relaxation in extended range, for cells that `f64` factors cannot reach.
+//! Gauss-Seidel relaxation in extended range, for cells beyond the range of `f64` factors.
 //!
-//! A weight below the smallest `f64` becomes zero. This matters only where a cell takes its u from such a weight. In a long narrow
-//! passage whose far end joins a much wider one, u grows again towards that end, but cells just behind the turning point depend on
-//! the wide passage through weights of 1e-400. The values of their neighbours are right, and a few sweeps of relaxation in extended
-//! range propagate them, because in such passages u changes by orders of magnitude a cell.
+//! A weight below the smallest `f64` becomes zero. This matters in a long narrow passage whose far
+//! end joins a much wider one. u grows again towards that end, but cells just behind the turning
+//! point depend on it through weights of 1e-400.
+//!
+//! The values of their neighbours are right. A few sweeps in extended range propagate them, because
+//! u changes by orders of magnitude per cell there.
 
 use super::breadth_first::{ABSENT, BreadthFirst};
 use crate::{
@@ -11,13 +13,13 @@ use crate::{
     store::{BLOCKED, Store},
 };
 
-/// Most sweeps, each in both directions.
+/// Limit of sweeps, each in both directions.
 const SWEEPS: usize = 200;
 
-/// Largest relative change of a sweep that ends them.
+/// Largest relative change in the last sweep.
 const CONVERGED: f64 = 1e-7;
 
-/// u of `store`, relaxed from the farthest cell to the nearest and back until it converges.
+/// Relaxes u of `store` from the farthest cell to the nearest and back until it converges.
 pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &Store) -> Store {
     let cells = 0..domain.blocked().len();
     let mut u: Vec<Scaled> = cells.map(|index| store.u(index)).collect();

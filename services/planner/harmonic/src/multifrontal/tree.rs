@@ -1,29 +1,31 @@
-//! The tree of fronts: the cells that are eliminated together, and the cost.
+//! Tree of fronts: the cells that are eliminated together, and the cost.
 //!
-//! Cells are eliminated stage by stage, from the farthest inwards. Where the free space is one passage, a stage is a few
-//! distances. Where many passages run side by side and loops join them, everything beyond a distance is one piece, and its
-//! fronts are as wide as all passages together; so there the space between two distances, a slab, is eliminated first,
-//! passage by passage, and only the separators, one distance in many, have wide fronts:
+//! Cells are eliminated in stages, from the farthest inwards. In a single passage, a stage is a few
+//! distances. Where loops join many parallel passages, everything beyond a distance is one piece,
+//! and its fronts are as wide as all passages together. There, the space between two distances, a
+//! slab, is eliminated first, passage by passage. Only the separators, one distance in many, have
+//! wide fronts:
 //!
 //! ```text
 //! target ... separator | slab: stages inwards | separator | slab ...
 //!                8     <--7---6---5---4---3---      2
 //! ```
 //!
-//! Each separator is eliminated once both slabs beside it are, so what it then touches is the next separator inwards, a
-//! bounded number of cells nearer to the target: weights stay far above the smallest `f64` as they do without slabs.
+//! A separator follows both adjacent slabs. It then touches only the next separator inwards, a
+//! bounded number of cells nearer to the target. Weights therefore stay far above the smallest
+//! `f64`, as without slabs.
 
 use std::{cmp::Reverse, ops::Range};
 
 use super::{breadth_first::BreadthFirst, budget::Budget};
 use crate::{Cancellation, SolveError};
 
-/// Cells that are eliminated together, followed by the cells on which they leave an update.
+/// Cells that are eliminated together, followed by the cells that take their update.
 #[derive(Clone, Copy)]
 pub(crate) struct Front {
     first: usize,
     pub own: u32,
-    /// Cells eliminated later on which the front leaves an update.
+    /// Number of cells, eliminated later, that take the update.
     pub boundary: u32,
     /// Whether a later front eliminates the boundary; otherwise the boundary is the target alone.
     pub has_parent: bool,
@@ -36,7 +38,7 @@ const NONE: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cost {
     pub operations: f64,
-    /// Most weights stored for the substitution.
+    /// Upper limit of the weights stored for the substitution.
     pub weights: usize,
     /// Bytes that the factorisation allocates.
     pub bytes: u64,
@@ -44,9 +46,9 @@ pub(crate) struct Cost {
 
 #[derive(Clone, Copy, Debug)]
 struct Shape {
-    /// Distances a stage takes at once.
+    /// Distances per stage.
     thickness: usize,
-    /// Distances from one separator to the next; none for no separators.
+    /// Distances between separators; `None` without separators.
     slab: Option<usize>,
 }
 
@@ -64,14 +66,13 @@ impl Shape {
     }
 }
 
-/// Passages up to these widths, cells, are eliminated several distances at a time: their fronts would be too small.
+/// Passage widths, in cells, up to which a stage takes several distances, for larger fronts.
 const NARROW: f64 = 1.5;
 const MIDDLING: f64 = 10.0;
 
-/// Passages side by side from which on slabs reduce the cost.
+/// Number of parallel passages from which slabs reduce the cost.
 const MANY: f64 = 6.0;
 
-/// Stages between two checks of the cancellation.
 const CHECKED_EVERY: usize = 16;
 
 /// Fronts in order of elimination, children before their parents.
@@ -82,11 +83,12 @@ pub(crate) struct Tree {
 }
 
 impl Tree {
-    /// The tree over all cells of `pass` but the target.
+    /// Builds the tree over all cells of `pass` except the target.
     ///
     /// # Errors
-    /// [`SolveError::Cancelled`], and [`SolveError::TooCostly`] as soon as it is known that the factorisation takes more
-    /// memory or operations than `budget` has.
+    /// - [`SolveError::Cancelled`].
+    /// - [`SolveError::TooCostly`] as soon as the factorisation needs more memory or operations
+    ///   than `budget` allows.
     pub(crate) fn of(
         pass: &BreadthFirst,
         budget: &Budget,
@@ -98,10 +100,11 @@ impl Tree {
         let mut stages = 0_usize;
         let distances = pass.levels.len() - 1;
         let slab = shape.slab.unwrap_or(distances);
-        // Two cells at one distance from a single cell are never neighbours: their parities are equal.
+        // Two cells at one distance from a single cell have equal parity, so they are never
+        // neighbours.
         let several = pass.levels[1] > 1;
         let at = |distance: usize| pass.levels[distance.min(distances)];
-        // Distance 0, the target, stands in for the innermost separator.
+        // Distance 0, the target, acts as the innermost separator.
         for inner in (0..distances).step_by(slab).rev() {
             let outer = at(inner + slab)..at(inner + slab + 1);
             builder.begin_slab();
@@ -128,17 +131,17 @@ impl Tree {
         Ok(tree)
     }
 
-    /// Places of the cells of a front: its own, then its boundary.
+    /// Returns its own places, then those of its boundary.
     pub(crate) fn cells(&self, front: &Front) -> &[u32] {
         &self.places[front.first..front.first + (front.own + front.boundary) as usize]
     }
 
-    /// Places of the boundary of a front, those of the outer separator last.
+    /// Returns the boundary, with the outer separator last.
     pub(crate) fn boundary(&self, front: &Front) -> &[u32] {
         &self.cells(front)[front.own as usize..]
     }
 
-    /// The fronts whose boundary `front` eliminates.
+    /// Returns the fronts whose boundary `front` eliminates.
     pub(super) fn children(&self, front: &Front) -> impl Iterator<Item = usize> {
         let mut next = front.first_child;
         std::iter::from_fn(move || {
@@ -148,14 +151,14 @@ impl Tree {
         })
     }
 
-    /// Bytes of the memory that grows with every front, and of the weights that the factorisation will keep.
+    /// Returns the bytes that grow with every front, including the weights to store.
     fn growing_bytes(&self) -> u64 {
         let fronts = self.places.len() * size_of::<u32>() + self.fronts.len() * size_of::<Front>();
         fronts as u64 + 8 * self.cost.weights as u64
     }
 
     fn bytes(&self, pass: &BreadthFirst) -> u64 {
-        // The places of the pass and the slots are fixed; the updates alive at once are bounded by the largest few fronts.
+        // The largest few fronts bound the updates that exist at once.
         let fixed = pass.len() * 12;
         let largest = self
             .fronts
@@ -171,18 +174,16 @@ impl Cost {
     fn add_front(&mut self, own: usize, boundary: usize) {
         let size = (own + boundary) as f64;
         let rest = boundary as f64;
-        // The sum of (n - k)^2 / 2 over the pivots k, and a constant a cell for the assembly.
+        // Sum of (n - k)^2 / 2 over the pivots k, and a constant per cell for the assembly.
         self.operations += (size * size * size - rest * rest * rest) / 6.0 + 60.0 * size;
         self.weights += (own + boundary) * (own + boundary) / 2 - boundary * boundary / 2;
     }
 }
 
-/// The inward neighbour of a stage.
 #[derive(Clone, Copy, Eq, PartialEq)]
 enum Next {
-    /// Another stage of the same slab.
     Stage,
-    /// The inner separator, or the target.
+    /// Inner separator, or the target.
     Separator,
 }
 
@@ -190,9 +191,9 @@ struct Builder<'a> {
     pass: &'a BreadthFirst,
     tree: Tree,
     pieces: Pieces,
-    /// The front on whose boundary a place was last put.
+    /// Front on whose boundary a place was last put.
     seen: Vec<u32>,
-    /// Fronts that wait for the next stage of this slab, for its outer separator, and for its inner one.
+    /// Fronts that wait for the next stage, for the outer separator and for the inner one.
     for_stage: Vec<u32>,
     for_outer: Vec<u32>,
     for_inner: Vec<u32>,
@@ -203,7 +204,6 @@ impl<'a> Builder<'a> {
         (pass.len() / 4, pass.len() * 3)
     }
 
-    /// Bytes that [`new`](Self::new) allocates.
     fn bytes(pass: &BreadthFirst) -> u64 {
         let (fronts, places) = Self::capacities(pass);
         let numbers = places + pass.len();
@@ -227,12 +227,11 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Moves on to the next slab inwards.
     fn begin_slab(&mut self) {
         self.for_outer.append(&mut self.for_inner);
     }
 
-    /// Adds the fronts of a stage inside the slab whose outer separator takes the places `outer`.
+    /// Adds the fronts of a stage; the outer separator of its slab takes the places `outer`.
     fn add_stage(&mut self, stage: &Range<u32>, outer: &Range<u32>, joins: bool, next: Next) {
         self.begin_pieces(stage, joins);
         let mut waiting = std::mem::take(&mut self.for_stage);
@@ -249,7 +248,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds the fronts of a separator, the slabs on both sides of which are eliminated.
     fn add_separator(&mut self, separator: &Range<u32>, joins: bool) {
         self.begin_pieces(separator, joins);
         let mut waiting = std::mem::take(&mut self.for_outer);
@@ -262,7 +260,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Makes every cell of a stage a piece; if `joins`, neighbours are joined.
+    /// Makes every cell of a stage a piece; `joins` merges neighbours.
     fn begin_pieces(&mut self, stage: &Range<u32>, joins: bool) {
         self.pieces.reset(stage.len());
         for place in stage.clone().filter(|_| joins) {
@@ -274,8 +272,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Joins the pieces of a stage by the boundaries of the fronts that waited for it, and makes these fronts its
-    /// children.
+    /// Joins the pieces of a stage by the boundaries of the waiting fronts, its children.
     fn adopt(&mut self, stage: &Range<u32>, waiting: &[u32]) {
         for &child in waiting {
             let boundary = self.tree.boundary(&self.tree.fronts[child as usize]);
@@ -299,15 +296,16 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds the front of one piece: of a separator, or of a stage of the slab inside the separator `outer`. Returns the
-    /// front's index and whether it touches `outer`.
+    /// Adds the front of a piece of a separator, or of a stage inside the separator `outer`.
+    ///
+    /// Returns the index of the front and whether it touches `outer`.
     fn add_front(
         &mut self,
         piece: usize,
         stage: &Range<u32>,
         outer: Option<&Range<u32>>,
     ) -> (u32, bool) {
-        // None of the neighbours of a separator remains.
+        // All neighbours of a separator are eliminated.
         let (inwards, outer) = outer.map_or((0, 0..0), |outer| (stage.start, outer.clone()));
         let tree = &mut self.tree;
         let index = tree.fronts.len() as u32;
@@ -317,7 +315,7 @@ impl<'a> Builder<'a> {
         let own = members.len();
         for at in first..first + own {
             for neighbour in self.pass.neighbours(tree.places[at]) {
-                // Other cells farther out are eliminated already.
+                // Other cells farther out are already eliminated.
                 let remains = neighbour < inwards || outer.contains(&neighbour);
                 if remains && self.seen[neighbour as usize] != index {
                     self.seen[neighbour as usize] = index;
@@ -339,8 +337,8 @@ impl<'a> Builder<'a> {
             }
             child = front.next_sibling;
         }
-        // The next stage comes first and the outer separator last: so the rows of an update mostly stay in order on their
-        // way up the tree.
+        // With the next stage first and the outer separator last, the rows of an update mostly stay
+        // in order up the tree.
         let boundary = &mut tree.places[first + own..];
         boundary.sort_unstable_by_key(|&place| (outer.contains(&place), Reverse(place)));
         let touches_outer = boundary.last().is_some_and(|place| outer.contains(place));
@@ -358,12 +356,11 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// Connected pieces of one stage, by union and find; reused between stages for its memory.
+/// Connected pieces of one stage, by union-find; reused between stages for its memory.
 #[derive(Default)]
 struct Pieces {
     parent: Vec<u32>,
     piece: Vec<u32>,
-    /// The end of each piece's members.
     ends: Vec<u32>,
     members: Vec<u32>,
     first_child: Vec<u32>,
@@ -386,11 +383,10 @@ impl Pieces {
 
     fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
-        // The smaller index becomes the root, so a root comes before its members.
+        // The smaller index becomes the root, so a root precedes its members.
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// Numbers the pieces and lists their members, once all are joined.
     fn number(&mut self) {
         let len = self.parent.len();
         self.piece.clear();
@@ -411,7 +407,7 @@ impl Pieces {
         for end in &mut self.ends {
             sum += std::mem::replace(end, sum);
         }
-        // Each end counts up from the start of its piece as the members come in.
+        // Each end counts up from the start of its piece as members arrive.
         self.members.clear();
         self.members.resize(len, 0);
         for at in (0..len as u32).rev() {
@@ -451,7 +447,7 @@ mod tests {
             solve(&domain, (&pass, &tree), known, &budget, &mut workspace, &none).unwrap()
         };
         let right = field(BreadthFirst::from_target(&domain, &budget, &none).unwrap(), None);
-        // Cells in the middle between both ends are as far from one as from the other.
+        // Cells in the middle are equally far from both ends.
         let is_known = |index: usize| !(10..50).contains(&(index % 60));
         let pass = BreadthFirst::from_known(&domain, is_known, &budget, &none).unwrap();
         let found = field(pass, Some(&right));

@@ -1,4 +1,4 @@
-//! The factors, and the memory a factorisation works in.
+//! Factors and working memory of a factorisation.
 
 use crate::Scaled;
 
@@ -11,12 +11,11 @@ pub(crate) struct Workspace {
     pub(super) u: Vec<Scaled>,
 }
 
-/// The most bytes held between solves: a maze of half a million cells takes this. A map that needs more takes so long that fresh pages
-/// no longer count.
+/// Limit of bytes held between solves: a maze of half a million cells. For larger maps, fresh pages
+/// cost little in comparison.
 const MOST_HELD_BYTES: usize = 64 << 20;
 
 impl Workspace {
-    /// Frees the memory if it exceeds [`MOST_HELD_BYTES`].
     pub(super) fn trim(&mut self) {
         let bytes = size_of::<f64>() * self.factors.rows.capacity()
             + size_of::<u32>() * (self.factors.lengths.capacity() + self.slot.capacity())
@@ -27,10 +26,9 @@ impl Workspace {
     }
 }
 
-/// The rows of the factor that the back substitution needs.
 #[derive(Debug, Default)]
 pub(super) struct Factors {
-    /// The weights of the cells after each eliminated cell in its front, up to the last that is not zero.
+    /// Weights of the cells after each eliminated cell in its front, up to the last nonzero.
     pub(super) rows: Vec<f64>,
     pub(super) lengths: Vec<u32>,
 }

@@ -1,9 +1,12 @@
-//! A coarser level: nine-point equations for the correction of the finer one, solved from a zero guess.
+//! Coarser level: nine-point equations for the correction of the finer one, solved from a zero
+//! guess.
 //!
-//! The four planes are relaxed in turn. On the way down they start from zero, so each plane only sees those before it, and the residual
-//! on a plane is the sum over the planes after it: neither the right-hand side nor the diagonal is read again. The odd-odd cells are
-//! last on the way down, so their residual is zero, and first on the way up, so they need no correction. So no interpolation to them is
-//! stored.
+//! The four planes are relaxed in turn. On the way down they start from zero, so each plane sees
+//! only those before it. The residual on a plane is then the sum over the planes after it, without
+//! the right-hand side or the diagonal.
+//!
+//! The odd-odd cells are last on the way down, so their residual is zero. They are first on the way
+//! up, so they need neither a correction nor a stored interpolation.
 
 use super::{
     couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST},
@@ -26,10 +29,10 @@ const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
 pub(super) struct Coarse<R> {
     pub grid: Grid,
     pub u: Planes<R>,
-    /// u of the first of two visits in a W-cycle, while the second solves for its residual.
+    /// u of the first visit in a W-cycle.
     first_visit: Planes<R>,
     pub f: Planes<R>,
-    /// 1 / diagonal, 0 where the cell is inactive.
+    /// 1 / diagonal; 0 if the cell is inactive.
     pub inverse: Planes<R>,
     /// Couplings (minus the matrix entries) by direction, then by plane.
     pub coupling: [Planes<R>; 4],
@@ -38,7 +41,6 @@ pub(super) struct Coarse<R> {
 }
 
 impl<R: Real> Coarse<R> {
-    /// Makes this a level of `grid` without cells.
     pub(super) fn reshape(&mut self, grid: Grid) {
         self.grid = grid;
         let values = self.u.iter_mut().chain(&mut self.first_visit).chain(&mut self.f);
@@ -83,7 +85,6 @@ impl<R: Real> Coarse<R> {
         self.scratch = scratch;
     }
 
-    /// Adds `share` of the correction from `next` and relaxes.
     #[inline(always)]
     pub(super) fn ascend(&mut self, next: &Self, share: R) {
         let grid = self.grid;
@@ -119,7 +120,7 @@ impl<R: Real> Coarse<R> {
                 self.f[plane] = f;
             }
         }
-        // The next descent starts from zero and overwrites all of u.
+        // The next descent overwrites all of u.
         std::mem::swap(&mut self.first_visit, &mut self.u);
     }
 
@@ -131,7 +132,7 @@ impl<R: Real> Coarse<R> {
         }
     }
 
-    /// u = (f + couplings times u of the neighbours at `steps`) / diagonal, for the `n` places of a plane from `o` on.
+    /// Relaxes `n` places of a plane from `o`: u = (f + couplings times u at `steps`) / diagonal.
     #[inline(always)]
     fn relax<const COUNT: usize>(
         &mut self,
@@ -147,7 +148,7 @@ impl<R: Real> Coarse<R> {
         self.u[plane] = row;
     }
 
-    /// The couplings and u of the neighbours at `steps` of the `n` places of a plane from `o` on.
+    /// Returns couplings and u of the neighbours at `steps`, for `n` places of a plane from `o`.
     #[inline(always)]
     fn terms<const COUNT: usize>(
         &self,
@@ -156,7 +157,7 @@ impl<R: Real> Coarse<R> {
         n: usize,
         steps: [(isize, isize); COUNT],
     ) -> [(&[R], &[R]); COUNT] {
-        // This is a plain loop because `map` is not always inlined, and the loop runs for every row.
+        // `map` is not always inlined, and this loop runs for every row.
         let mut terms: [(&[R], &[R]); COUNT] = [(&[], &[]); COUNT];
         for (term, &step) in terms.iter_mut().zip(&steps) {
             *term = self.term(plane, o, n, step);

@@ -1,4 +1,4 @@
-//! The coarsest level, a few dozen cells at most: solved by its inverse.
+//! Coarsest level of at most a few dozen cells, solved by its inverse.
 
 use super::{
     coarse::Coarse,
@@ -9,7 +9,7 @@ use crate::real::Real;
 #[derive(Debug, Default)]
 pub(super) struct Coarsest {
     cells: Vec<(usize, usize)>,
-    /// The inverse, row-major, `cells.len()` squared.
+    /// Inverse matrix, row-major, `cells.len()` squared.
     inverse: Vec<f64>,
     right: Vec<f64>,
 }
@@ -24,7 +24,7 @@ impl Coarsest {
         let mut matrix = vec![0.0; n * n];
         for (i, &(plane, at)) in self.cells.iter().enumerate() {
             let inverse = level.inverse[plane][at].wide();
-            // Inactive cells keep the identity, and a right-hand side of zero.
+            // Inactive cells keep the identity and a right-hand side of zero.
             matrix[i * n + i] = if inverse > 0.0 { 1.0 / inverse } else { 1.0 };
             let (col, row) = (i % grid.width, i / grid.width);
             let steps = [(EAST, 1, 0), (SOUTH, 0, 1), (SOUTH_EAST, 1, 1), (SOUTH_WEST, -1, 1)];
@@ -56,7 +56,7 @@ impl Coarsest {
     }
 }
 
-/// The inverse of a symmetric positive definite matrix, by Gauss and Jordan.
+/// Inverts a symmetric positive definite matrix by Gauss-Jordan elimination.
 fn invert(mut matrix: Vec<f64>, n: usize) -> Vec<f64> {
     for k in 0..n {
         let pivot = 1.0 / matrix[k * n + k];

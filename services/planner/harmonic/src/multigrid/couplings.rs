@@ -1,8 +1,8 @@
-//! The couplings of a level's equations, as its set-up reads them.
+//! Couplings of the equations of a level, as the set-up reads them.
 //!
-//! On the finest level a coupling is 1 between free cells and there is none between diagonal neighbours; on the others all are stored. Each
-//! kind has a type of its own, so that one text compiles to loops in which those that are 1 or none take no work: a loop that
-//! loads all couplings takes 30 % longer for the whole set-up.
+//! On the finest level, couplings between free cells are 1 and diagonal neighbours are uncoupled.
+//! Other levels store all couplings. A type per kind lets generic loops skip those of 1 or 0. A
+//! loop that loads all couplings takes 30 % longer for the whole set-up.
 
 use super::{
     coarse::Coarse,
@@ -11,18 +11,17 @@ use super::{
 };
 use crate::real::Real;
 
-/// The directions in which a cell stores its couplings. Those in the others are its neighbours' own.
+/// Directions in which a cell stores its couplings; the neighbours store the others.
 pub(super) const EAST: usize = 0;
 pub(super) const SOUTH: usize = 1;
 pub(super) const SOUTH_EAST: usize = 2;
 pub(super) const SOUTH_WEST: usize = 3;
 
-/// A plane and a place in it.
 pub(super) type Place = (usize, usize);
 
-/// The couplings of a row of cells to their neighbours in one direction.
+/// Couplings of a row of cells to their neighbours in one direction.
 pub(super) trait Couplings<R>: Copy {
-    /// The coupling of the cell with number `x`, times `value`.
+    /// Returns the coupling of cell `x` times `value`.
     fn times(self, x: usize, value: R) -> R;
 }
 
@@ -64,16 +63,17 @@ impl<R: Real> Couplings<R> for NoCouplings {
     }
 }
 
-/// A level whose equations make those of the next. The couplings are those of `n` cells from `owner` on, in the direction in which
-/// they are stored.
+/// Level whose equations make those of the next.
+///
+/// Couplings are those of `n` cells from `owner` on, in the direction of storage.
 pub(super) trait Level<R: Real> {
     fn grid(&self) -> Grid;
-    /// 1 / diagonal, 0 where the cell is inactive.
+    /// Returns 1 / diagonal; 0 if the cell is inactive.
     fn inverse(&self) -> &Planes<R>;
     fn weights(&self) -> &Weights<R>;
     fn weights_mut(&mut self) -> &mut Weights<R>;
 
-    /// Couplings whose other side is at `neighbour`.
+    /// Returns the couplings whose other side is at `neighbour`.
     fn along(
         &self,
         direction: usize,
@@ -81,7 +81,8 @@ pub(super) trait Level<R: Real> {
         neighbour: Place,
         n: usize,
     ) -> impl Couplings<R>;
-    /// Couplings between odd-odd cells and others, for products that are zero in inactive odd-odd cells.
+    /// Returns the couplings between odd-odd cells and others, for products that vanish in inactive
+    /// odd-odd cells.
     fn across(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R>;
     fn diagonal(&self, direction: usize, owner: Place, n: usize) -> impl Couplings<R>;
 }

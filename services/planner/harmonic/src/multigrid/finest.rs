@@ -1,10 +1,14 @@
-//! The finest level: the five-point equation itself.
+//! Finest level: the five-point equation itself.
 //!
-//! Even-even and odd-odd cells are red, the others black; red cells have black neighbours alone and the reverse. One pass
-//! over the rows does all of the level's work between two visits to the coarser ones, so the level is read from memory
-//! once a cycle: the coarse correction goes to the black cells, red is relaxed from black (and needs no correction of its
-//! own), black from red, then red again. The changes of that last half sweep, summed over the red neighbours of a black cell,
-//! are exactly its residual, which is restricted at once.
+//! Even-even and odd-odd cells are red, the others black. Red cells have only black neighbours and
+//! vice versa. One pass over the rows does all work between two visits to the coarser levels, so a
+//! cycle reads the level from memory once.
+//!
+//! 1. The coarse correction goes to the black cells.
+//! 2. Red is relaxed from black and needs no correction of its own.
+//! 3. Black is relaxed from red, then red again.
+//! 4. The changes of that last half sweep, summed over the red neighbours of a black cell, are
+//!    exactly its residual. It is restricted at once.
 
 use super::{
     coarse::Coarse,
@@ -12,7 +16,6 @@ use super::{
 };
 use crate::real::Real;
 
-/// An inflow at one cell: the right-hand side of its equation.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source<R> {
     pub plane: usize,
@@ -21,40 +24,38 @@ pub(super) struct Source<R> {
     pub value: R,
 }
 
-/// Relative change of u by a coarse correction above which a cell has not settled, whatever its direction.
+/// Relative change of u by a coarse correction above which a cell counts as unsettled in any case.
 const LARGEST_CHANGE: f64 = 0.05;
 
-/// Changes of u over two cells, relative to u, times the map's longer side, below which a cell lies at a saddle point: there
-/// the tolerance is that of a cell with a change as large as this.
+/// Threshold of a saddle point: change of u over two cells, relative to u, times the longer side of
+/// the map.
+///
+/// Below it, the tolerance is that of a cell with this change.
 const FLAT: f64 = 0.5;
 
 #[derive(Debug, Default)]
 pub(super) struct Finest<R> {
     pub grid: Grid,
     pub u: Planes<R>,
-    /// 1 / diagonal, 0 where blocked.
+    /// 1 / diagonal; 0 if blocked.
     pub inverse: Planes<R>,
     pub weights: Weights<R>,
-    /// The sources, sorted by plane and row.
+    /// Sorted by plane and row.
     pub sources: Vec<Source<R>>,
     scratch: Scratch<R>,
 }
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Work<R> {
-    /// The factor of the correction from the next level.
     pub share: R,
-    /// Full sweeps after the correction.
     pub sweeps: usize,
-    /// Whether a half sweep follows whose changes are restricted to the next level as the residual.
+    /// Whether a half sweep follows that restricts its changes as the residual.
     pub descend: bool,
-    /// The angle, radians, beyond which a cell whose direction the correction turns counts as unsettled; none for no such
-    /// check.
+    /// Angle, in radians, beyond which a turned cell counts as unsettled; `None` skips the check.
     pub tolerance: Option<R>,
 }
 
 impl<R: Real> Finest<R> {
-    /// Makes this a level of `grid` without cells.
     pub(super) fn reshape(&mut self, grid: Grid) {
         self.grid = grid;
         grid.reset(self.u.iter_mut().chain(&mut self.inverse).chain(&mut self.weights));
@@ -62,7 +63,7 @@ impl<R: Real> Finest<R> {
         self.scratch.reset(&grid);
     }
 
-    /// Sets one row of cells; `inverse` is 1 / diagonal of each where it is free.
+    /// Sets one row of cells; `inverse` is 1 / diagonal of the free ones.
     #[inline(always)]
     pub(super) fn set_row(&mut self, row: usize, blocked: &[bool], inverse: &[R]) {
         let Grid { width, columns, .. } = self.grid;
@@ -82,8 +83,10 @@ impl<R: Real> Finest<R> {
         }
     }
 
-    /// A pass over the level: correction from `next`, sweeps, and residual. Returns the number of even-even cells whose direction the
-    /// correction turned by more than the tolerance, or whose u it changed by more than [`LARGEST_CHANGE`].
+    /// Applies the correction from `next`, sweeps and restricts the residual.
+    ///
+    /// Returns the number of unsettled even-even cells: direction turned by more than the
+    /// tolerance, or u changed by more than [`LARGEST_CHANGE`].
     #[inline(always)]
     pub(super) fn pass(&mut self, next: &mut Coarse<R>, work: Work<R>) -> usize {
         let Work { share, sweeps, descend, tolerance } = work;
@@ -103,7 +106,7 @@ impl<R: Real> Finest<R> {
                 }
                 correct(&mut self.u, &self.weights, (upper, lower), o, n);
             }
-            // Every sweep follows the one before at a distance of one strip.
+            // Each sweep follows the previous one at a distance of one strip.
             for sweep in 0..sweeps {
                 if (sweep..strips + sweep).contains(&y) {
                     self.relax(EE, y - sweep, None);
@@ -128,13 +131,13 @@ impl<R: Real> Finest<R> {
             };
             let ((o, n), [first, second]) = (grid.strip(y), grid.buffered(y));
             if y + 1 == strips {
-                // The margin beyond the last row does not change.
+                // The margin beyond the last row stays unchanged.
                 let beyond = second + (grid.strip_rows - 1) * grid.stride;
                 change_ee[beyond..][..grid.stride].fill(R::default());
             }
             self.relax(OO, y, Some(&mut change_oo[second..]));
-            // The residual of black cells is the sum of the changes of their red neighbours. Blocked cells get one too; their
-            // interpolation weights are zero.
+            // The residual of black cells is the sum of the changes of their red neighbours.
+            // Blocked cells get one too, but their interpolation weights are zero.
             let (even, even_below) = (&change_ee[first..], &change_ee[second..]);
             let (odd_above, odd) = (&change_oo[first - 1..], &change_oo[second - 1..]);
             let odd_even = [even, &even[1..], &odd_above[1..], &odd[1..]];
@@ -150,10 +153,10 @@ impl<R: Real> Finest<R> {
         unsettled
     }
 
-    /// Counts the even-even cells that the coarse correction unsettles, of `n` places from `o` on.
+    /// Counts the even-even cells that the coarse correction unsettles, of `n` places from `o`.
     ///
-    /// The differences of u to the next even-even cell east and south are those of one gradient. The correction's differences
-    /// are the change of the gradient, so the cross product of both is the angle by which the correction turns it.
+    /// Differences of u to the next even-even cell east and south form a gradient, and those of the
+    /// correction its change. Their cross product gives the angle of the turn.
     #[inline(always)]
     fn unsettled(&self, o: usize, upper: &[R], lower: &[R], tolerance: R, n: usize) -> usize {
         let stride = self.grid.stride;
@@ -179,7 +182,7 @@ impl<R: Real> Finest<R> {
         unsettled as usize
     }
 
-    /// Relaxes a strip of a plane from its four neighbours; `change`, if given, takes the change of each cell.
+    /// Relaxes a strip of a plane; `change` takes the change of each cell.
     #[inline(always)]
     fn relax(&mut self, plane: usize, strip: usize, mut change: Option<&mut [R]>) {
         let (o, n) = self.grid.strip(strip);

@@ -1,9 +1,9 @@
-//! The interpolation from a coarser level, and that level's equations: interpolation transposed times the finer equations times interpolation.
+//! Interpolation from a coarser level, and its equations: interpolation transposed times the finer
+//! equations times interpolation.
 //!
-//! The interpolation to an odd-odd cell satisfies that cell's own equation, so the product of the equations and the
-//! interpolation vanishes there: only the rows of the even-even, odd-even and even-odd cells are formed, one row of cells
-//! at a time, and added up with their weights on the coarse cell.
-//! A loop for each term takes 7 % longer for the whole set-up.
+//! Interpolation to an odd-odd cell satisfies the equation of that cell, so that product row
+//! vanishes. The rows of the other cells are formed one row of cells at a time and summed with
+//! their weights on the coarse cell. A loop per term takes 7 % longer for the whole set-up.
 
 use std::ops::Range;
 
@@ -14,8 +14,10 @@ use super::{
 };
 use crate::real::Real;
 
-/// Columns of a product row by the coarse cell they belong to. Around an odd-even cell these are west, east and the
-/// two north and south of each; around an even-odd cell north, south and the two west and east of each.
+/// Columns of a product row, by coarse cell.
+///
+/// Around an odd-even cell: west, east, and the two north and south of each. Around an even-odd
+/// cell: north, south, and the two west and east of each.
 const FIRST: usize = 0;
 const SECOND: usize = 1;
 const NORTH_EAST: usize = 3;
@@ -24,15 +26,15 @@ const BELOW_EAST: usize = 5;
 
 type Rows<R, const COUNT: usize> = [Vec<R>; COUNT];
 
-/// Rows under way from a fine level to the next, reused between set-ups.
+/// Intermediate rows from a fine level to the next, reused between set-ups.
 #[derive(Debug)]
 pub(super) struct Products<R> {
     n: usize,
-    /// Interpolation weights of the odd-odd cells of the row above and of this row.
+    /// Interpolation weights of the odd-odd cells: row above, this row.
     corner: [Rows<R, 4>; 2],
-    /// Product rows of the odd-even cells of this row.
+    /// Product rows of the odd-even cells.
     odd_even: Rows<R, 6>,
-    /// Product rows of the even-odd cells of the row above and of this row.
+    /// Product rows of the even-odd cells: row above, this row.
     even_odd: [Rows<R, 6>; 2],
     /// Even-even products: diagonal, then the four stored directions.
     even_even: Rows<R, 5>,
@@ -76,7 +78,7 @@ impl<R: Real> Products<R> {
         self.even_odd.swap(0, 1);
     }
 
-    /// Adds up row `y` of the coarse equations, with the weights of the cells around its cells, and stores it in `next`.
+    /// Sums row `y` of the coarse equations with the weights of the surrounding cells.
     #[inline(always)]
     fn finish_row(
         &mut self,
@@ -123,8 +125,10 @@ impl<R: Real> Products<R> {
     }
 }
 
-/// The weights of the `n` odd-odd cells from `o` on, on the coarse cells north-west, north-east, south-west and south-east of each: its
-/// own equation, with its neighbours interpolated.
+/// Computes the weights of `n` odd-odd cells from `o` on their north-west, north-east, south-west
+/// and south-east coarse cells.
+///
+/// They follow from the equation of the cell, with its neighbours interpolated.
 #[inline(always)]
 pub(super) fn corner_weights<R: Real>(
     fine: &impl Level<R>,
@@ -158,7 +162,6 @@ pub(super) fn corner_weights<R: Real>(
     }
 }
 
-/// Sets `rows` of the equations of `next`.
 #[inline(always)]
 pub(super) fn coarsen<R: Real>(
     fine: &impl Level<R>,
@@ -172,7 +175,7 @@ pub(super) fn coarsen<R: Real>(
     let [west, east, north, south] = fine.weights();
     let we = |at: usize| [&west[at..][..n], &east[at..][..n]];
     let ns = |at: usize| [&north[at..][..n], &south[at..][..n]];
-    // The row before the first is included, because its contribution belongs to the first row.
+    // The row before the first contributes to the first row.
     for y in rows.start.saturating_sub(1)..rows.end {
         products.next_row();
         let o = fine.grid().start(y);
@@ -289,12 +292,14 @@ pub(super) fn coarsen<R: Real>(
     }
 }
 
-/// Sets `rows` of the interpolation along the lines between coarse cells: the couplings across the line are added to those along it,
-/// those straight across are taken off the diagonal.
+/// Sets `rows` of the interpolation along the lines between coarse cells.
 ///
-/// A coarse cell gives only to cells coupled to it. If a wall lies between them, or the coarse cell is itself a wall, the couplings
-/// to cells beside it would couple the corrections on both sides of the wall, and far from the target the cycles would not
-/// converge.
+/// Couplings to diagonal neighbours are added to those along the line. Couplings straight across
+/// are subtracted from the diagonal.
+///
+/// A coarse cell contributes only to cells coupled to it. Otherwise a wall between them or at the
+/// coarse cell would couple the corrections on both sides. Far from the target, the cycles would
+/// then fail to converge.
 #[inline(always)]
 pub(super) fn interpolate<R: Real>(fine: &mut impl Level<R>, rows: Range<usize>) {
     let Grid { columns: n, stride: s, .. } = fine.grid();

@@ -1,8 +1,8 @@
-//! A level's cells, split by the parity of column and row into four planes.
+//! Cells of a level, split by the parity of column and row into four planes.
 //!
-//! The cells of one colour are side by side in a plane, so every kernel runs over whole rows with plain loads and no
-//! masks; the even-even plane is the next coarser grid. Around each plane is a margin of zeros, so that no kernel asks
-//! whether a neighbour exists.
+//! The cells of one colour are contiguous, so kernels run over whole rows with plain loads and
+//! without masks. The even-even plane is the next coarser grid. A margin of zeros around each plane
+//! makes bounds checks unnecessary.
 
 use crate::real::Real;
 
@@ -12,29 +12,30 @@ pub(super) const OE: usize = 1;
 pub(super) const EO: usize = 2;
 pub(super) const OO: usize = 3;
 
-/// Weights of the coarse cells to the west and east in each odd-even cell, and to the north and south in each even-odd cell.
+/// Weights of the coarse cells west and east of each odd-even cell, and north and south of each
+/// even-odd cell.
 pub(super) type Weights<R> = [Vec<R>; 4];
 
-/// Zeros before the first row; one would do, eight keep the rows aligned.
+/// Zeros before the first row; eight instead of one keep the rows aligned.
 pub(super) const MARGIN: usize = 8;
 
 /// Largest plane that a pass takes as one row, in values.
 const SMALL: usize = 1 << 15;
 
-/// Makes each of these rows `n` of its values from `start` on, to be written. It is a macro because loops are vectorised only where the
-/// lengths of their rows are known, and `array::map` is not always inlined.
+/// Slices each row to `n` values from `start` on, mutably.
+///
+/// Loops vectorise only if the lengths of their rows are known. It is a macro, because `array::map`
+/// is not always inlined.
 macro_rules! cut {
     ($start:expr, $n:expr, $($row:ident),+) => { $(let $row = &mut $row[$start..][..$n];)+ };
 }
 pub(super) use cut;
 
-/// Likewise, makes each of these rows the first `n` of its values, to be read.
 macro_rules! first {
     ($n:expr, $($row:ident),+) => { $(let $row = &$row[..$n];)+ };
 }
 pub(super) use first;
 
-/// A value for each cell, by plane.
 pub(super) type Planes<R> = [Vec<R>; 4];
 
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -46,25 +47,25 @@ pub(super) struct Grid {
     pub rows: usize,
     /// Values from one row of a plane to the next.
     pub stride: usize,
-    /// Rows of a plane that a pass takes at once, as one row: all of a small level, because there the work for each row and the partial
-    /// vectors at its end would cost more than the margins between the rows, which stay zero, because their diagonals and weights are
-    /// zero. The results are equal either way.
+    /// Rows of a plane that a pass takes as one row.
+    ///
+    /// A small level is one strip: work per row and partial vectors would cost more than the
+    /// margins between rows. The margins stay zero, because their diagonals and weights are zero.
+    /// The results are equal either way.
     pub strip_rows: usize,
-    /// The number of strips of so many rows.
     pub strips: usize,
 }
 
 impl Grid {
     pub(super) fn new(width: usize, height: usize) -> Self {
         let (columns, rows) = (width.div_ceil(2), height.div_ceil(2));
-        // There is at least one zero between rows.
+        // At least one zero separates two rows.
         let stride = (columns + 1).next_multiple_of(8);
         let strip_rows = if rows * stride <= SMALL { rows } else { 1 };
         let strips = rows / strip_rows;
         Self { width, height, columns, rows, stride, strip_rows, strips }
     }
 
-    /// Values of a plane with its margin.
     pub(super) fn len(&self) -> usize {
         self.stride * (self.rows + 2) + MARGIN
     }
@@ -79,28 +80,27 @@ impl Grid {
         ((col & 1) + 2 * (row & 1), self.start(row / 2) + col / 2)
     }
 
-    /// The first place of a strip in its plane and the number of its places.
+    /// Returns the first place of a strip in its plane, and the number of its places.
     #[inline(always)]
     pub(super) fn strip(&self, number: usize) -> (usize, usize) {
         let rows = self.strip_rows;
         (self.start(number * rows), (rows - 1) * self.stride + self.columns)
     }
 
-    /// Two places in the buffers of a pass: those of strip `number` and of the next, or of the one before and of strip `number`.
-    /// Single rows take turns in two places, the rows of a small level lie one after the other.
+    /// Returns the places of two consecutive strips in the buffers of a pass.
+    ///
+    /// Single rows alternate between two places. The rows of a small level are contiguous.
     #[inline(always)]
     pub(super) fn buffered(&self, number: usize) -> [usize; 2] {
         let first = MARGIN + number % 2 * self.stride;
         [first, 2 * MARGIN + self.stride - first]
     }
 
-    /// Makes `planes` the planes of this level, filled with zeros.
     pub(super) fn reset<'a, R: Real>(&self, planes: impl IntoIterator<Item = &'a mut Vec<R>>) {
         zero_values(planes, self.len());
     }
 }
 
-/// Makes `rows` so many zeros each.
 fn zero_values<'a, R: Real>(rows: impl IntoIterator<Item = &'a mut Vec<R>>, len: usize) {
     for row in rows {
         if row.capacity() < len {
@@ -113,13 +113,12 @@ fn zero_values<'a, R: Real>(rows: impl IntoIterator<Item = &'a mut Vec<R>>, len:
     }
 }
 
-/// The buffers of a pass over a level, each of the strip at hand and a row beside it, reused between passes.
+/// Buffers of a pass, for the current strip and a row beside it, reused between passes.
 #[derive(Debug, Default)]
 pub(super) struct Scratch<R> {
-    /// Rows of the next level in column order: of its correction, and of its right-hand side.
+    /// Rows of the next level in column order: its correction and its right-hand side.
     pub correction: Vec<R>,
     pub restricted: Vec<R>,
-    /// Changes of even-even and odd-odd cells.
     pub change_ee: Vec<R>,
     pub change_oo: Vec<R>,
     pub residual_eo: Vec<R>,
@@ -136,13 +135,14 @@ impl<R: Real> Scratch<R> {
         zero_values(others.into_iter().chain(residuals), len);
     }
 
-    /// Puts the first row of `next`, times `share`, where [`correction_below`](Self::correction_below) expects it.
+    /// Puts the first row of `next`, times `share`, where
+    /// [`correction_below`](Self::correction_below) expects it.
     #[inline(always)]
     pub(super) fn begin_correction(&mut self, next: &Grid, planes: &Planes<R>, share: R) {
         join_row(next, planes, 0, share, &mut self.correction[MARGIN..]);
     }
 
-    /// The correction in the rows of `next` at strip `number` of the level of `grid`, and in the rows below each of them.
+    /// Returns the correction in the rows of `next` at strip `number`, and in the rows below.
     #[inline(always)]
     pub(super) fn correction_below(
         &mut self,
@@ -159,7 +159,6 @@ impl<R: Real> Scratch<R> {
         (&self.correction[upper..], &self.correction[lower..])
     }
 
-    /// Writes the restricted rows of strip `number` of the level of `grid` to the planes of `next`.
     #[inline(always)]
     pub(super) fn split_restricted(
         &self,
@@ -175,7 +174,8 @@ impl<R: Real> Scratch<R> {
     }
 }
 
-/// The weights on the coarse cells from place `o` on in the cells around them: to the east, west, south and north.
+/// Returns the weights on the coarse cells from `o` on in the surrounding cells: east, west, south
+/// and north.
 #[inline(always)]
 pub(super) fn around<R>(
     [west, east, north, south]: &Weights<R>,
@@ -223,7 +223,7 @@ pub(super) fn split_row<R: Real>(grid: &Grid, planes: &mut Planes<R>, row: usize
     }
 }
 
-/// Reads row `row` of a level from the planes, times `share`, in column order; zeros beyond the last row.
+/// Reads row `row` of a level in column order, times `share`; zeros beyond the last row.
 #[inline(always)]
 pub(super) fn join_row<R: Real>(
     grid: &Grid,

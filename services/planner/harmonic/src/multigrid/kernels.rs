@@ -1,10 +1,10 @@
-//! The work of a coarser level on rows of values. These are functions of their own because only an argument tells the
-//! compiler that the output overlaps no input.
+//! Row kernels of the coarser levels, separate because only an argument tells the compiler that the
+//! output overlaps no input.
 
 use super::grid::first;
 use crate::real::Real;
 
-/// `f` and the sum of `terms`, divided by the diagonal.
+/// Writes (`f` + sum of `terms`) / diagonal.
 #[inline(always)]
 pub(super) fn relax<R: Real, const COUNT: usize>(
     out: &mut [R],
@@ -26,7 +26,7 @@ pub(super) fn add_active<R: Real>(u: &mut [R], inverse: &[R], values: &[R]) {
     }
 }
 
-/// The sum of `own` where active and four weighted values.
+/// Sums `own` where active and four weighted values.
 #[inline(always)]
 pub(super) fn sum_weighted<R: Real>(
     out: &mut [R],
@@ -44,7 +44,7 @@ pub(super) fn sum_weighted<R: Real>(
     }
 }
 
-/// f less the equations' left side; 0 for inactive cells.
+/// Subtracts the left side of the equations from f; 0 for inactive cells.
 #[inline(always)]
 pub(super) fn subtract<R: Real, const COUNT: usize>(
     f: &mut [R],
@@ -66,8 +66,9 @@ pub(super) fn gather<R: Real, const COUNT: usize>(out: &mut [R], terms: &[(&[R],
     }
 }
 
-/// The sum of products at one place of the rows. It is pairwise and by index: the compiler then keeps the rows in
-/// registers.
+/// Sums the products at one place of the rows.
+///
+/// Pairwise sums by index let the compiler keep the rows in registers.
 #[inline(always)]
 fn sum_at<R: Real, const COUNT: usize>(terms: &[(&[R], &[R]); COUNT], x: usize) -> R {
     let product = |k: usize| terms[k].0[x] * terms[k].1[x];

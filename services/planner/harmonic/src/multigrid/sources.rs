@@ -1,4 +1,4 @@
-//! The inflow at single cells, restricted to the coarse levels: interpolation transposed, for a handful of cells a level.
+//! Inflow at single cells, restricted to the coarse levels by the transposed interpolation.
 
 use super::{
     coarse::Coarse,
@@ -9,7 +9,6 @@ use super::{
 };
 use crate::real::Real;
 
-/// Inflow at a cell, by column and row.
 type Flow<R> = ((usize, usize), R);
 
 /// Makes the inflow of the finest level the right-hand side of every coarse one.
@@ -43,7 +42,7 @@ pub(super) fn restrict<R: Real>(finest: &Finest<R>, coarse: &mut [Coarse<R>]) {
     }
 }
 
-/// Adds `value` of the cell at `at` of a plane of `level` to the coarse cells it is interpolated from.
+/// Distributes `value` of a cell to the coarse cells it is interpolated from.
 fn spread_flow<R: Real>(
     level: &impl Level<R>,
     plane: usize,
@@ -60,8 +59,10 @@ fn spread_flow<R: Real>(
     }
 }
 
-/// The weights of the cell at `at` of a plane on the coarse cells north-west, north-east, south-west and south-east of it, the first
-/// of which is in its own column or row if that is even.
+/// Returns the weights of a cell on the coarse cells north-west, north-east, south-west and
+/// south-east.
+///
+/// The first is in the same column or row if that is even.
 pub(super) fn interpolation_weights<R: Real>(
     level: &impl Level<R>,
     plane: usize,

@@ -1,11 +1,10 @@
-//! Tests of the algebra of the levels against dense matrices.
+//! Tests of the level algebra against dense matrices.
 
 use super::{couplings::Level, grid::EE, sources::interpolation_weights, *};
 use crate::Screening;
 
 type Dense = Vec<Vec<f64>>;
 
-/// A map with walls, corners and single cells.
 fn domain() -> Domain {
     let rows = [
         "...........",
@@ -30,7 +29,6 @@ fn levels() -> Multigrid<f64> {
     levels
 }
 
-/// Interpolation to a level from the next, by the weights that level stores.
 fn interpolation(level: &impl Level<f64>) -> Dense {
     let grid = level.grid();
     let mut matrix = vec![vec![0.0; grid.columns * grid.rows]; grid.width * grid.height];
@@ -63,7 +61,6 @@ fn galerkin(equations: &Dense, interpolation: &Dense) -> Dense {
     product
 }
 
-/// The equations a coarse level stores, zero for inactive cells.
 fn stored(level: &Coarse<f64>) -> Dense {
     let grid = &level.grid;
     let mut matrix = vec![vec![0.0; grid.width * grid.height]; grid.width * grid.height];

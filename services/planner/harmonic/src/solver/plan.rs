@@ -1,9 +1,11 @@
-//! The choice of the first method, by the shape of the free space.
+//! Choice of the first method, by the shape of the free space.
 //!
-//! Multigrid costs some nanoseconds a cell for every few orders of magnitude that u spans; the multifrontal
-//! factorisation costs the square of the passages' width a cell, whatever u spans. The mean width of the free space is
-//! counted first. Where it is large, multigrid is chosen at once; elsewhere one breadth-first pass from the target gives
-//! the length of the ways, with that the range of u, and the exact cost of the factorisation.
+//! Multigrid costs some nanoseconds per cell for every few orders of magnitude of u. Multifrontal
+//! factorisation costs the square of the passage width per cell at any range of u.
+//!
+//! Where the mean width of the free space is large, multigrid is chosen at once. Otherwise a
+//! breadth-first pass from the target gives the path lengths, hence the range of u, and the exact
+//! cost of the factorisation.
 
 use crate::{
     Cancellation, Domain, Method, SolveError,
@@ -12,53 +14,55 @@ use crate::{
     store::Store,
 };
 
-/// The mean width of free space, cells, from which multigrid is chosen without a further look.
+/// Mean width of free space, in cells, from which multigrid is chosen at once.
 const WIDE: f64 = 32.0;
 
-/// Orders of magnitude of u that fit single precision between the largest and the smallest normal number, less some.
+/// Orders of magnitude of u between the largest and smallest normal `f32`, less a reserve.
 const SINGLE_DECADES: f64 = 62.0;
 
-/// Nanoseconds, measured on one machine; only their ratios matter.
+/// Times in nanoseconds on one machine; only their ratios matter.
 const SET_UP_PER_CELL: f64 = 3.0;
 const SINGLE_CYCLE_PER_CELL: f64 = 1.1;
 const MULTIFRONTAL_PER_CELL: f64 = 65.0;
 const MULTIFRONTAL_PER_OPERATION: f64 = 0.15;
 
-/// A further band has a set-up of its own and more cycles, but no more cycles than its depth in cells needs: a cycle takes u some
-/// cells further where u falls steeply.
+/// Costs of a further band: a set-up and cycles of its own, in nanoseconds per cell.
+///
+/// Its depth limits the cycles, because a cycle takes u some cells further where u falls steeply.
 const BAND_PER_CELL: f64 = 15.0;
 const BAND_CYCLE_PER_CELL: f64 = 2.2;
 const BAND_CYCLES: f64 = 20.0;
 const CELLS_PER_CYCLE: f64 = 6.0;
 
-/// Nanoseconds a cell of the map for a range of u beyond single precision that takes so many `bands`.
+/// Returns nanoseconds per cell for `bands` beyond the range of single precision.
 fn further_bands(bands: f64, decades_per_cell: f64) -> f64 {
     let depth = SINGLE_DECADES / decades_per_cell;
     let cycles = (depth / CELLS_PER_CYCLE).min(BAND_CYCLES);
     bands.max(0.0) * (BAND_PER_CELL + BAND_CYCLE_PER_CELL * cycles)
 }
 
-/// Cycles of multigrid for a range of u: in narrow passages one cycle converges three to four orders of magnitude.
+/// Returns the multigrid cycles for a range of u; in narrow passages, one covers three to four
+/// orders of magnitude.
 fn cycles(decades: f64) -> f64 {
     6.0 + decades / 3.5
 }
 
 pub(super) struct Plan {
-    /// Methods in the order in which to try them; the multifrontal factorisation is the last resort in any case.
+    /// Methods in order; the multifrontal factorisation is always the last.
     pub methods: Vec<Method>,
-    /// The breadth-first pass and the tree of fronts, if they were needed.
+    /// Breadth-first pass and tree of fronts, if needed.
     pub multifrontal: Option<(BreadthFirst, Tree)>,
 }
 
 impl Plan {
-    /// Multigrid in single precision and beyond its range, then in double precision.
+    /// Plans single precision with its continuations, then double precision.
     fn multigrid() -> Self {
         use Method::{Multifrontal, MultigridDouble, MultigridSingle};
         Self { methods: vec![MultigridSingle, MultigridDouble, Multifrontal], multifrontal: None }
     }
 }
 
-/// The plan for `domain`. If `budget` refuses the multifrontal factorisation, it is only the last resort.
+/// Plans the methods for `domain`; beyond `budget`, the factorisation is only the last resort.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
@@ -76,7 +80,7 @@ pub(super) fn plan(
         pass => pass?,
     };
     let cells = pass.len() as f64;
-    // The runs along a passage count into the mean width too; on mazes that makes it about 1.7 times too large.
+    // Runs along a passage also count; on mazes they make the mean width about 1.7 times too large.
     let passage = (width + 1.0) / 1.7 - 1.0;
     let per_cell = decades_per_cell(domain, passage);
     let decades = pass.levels.len() as f64 * per_cell;
@@ -96,7 +100,8 @@ pub(super) fn plan(
     })
 }
 
-/// The tree of fronts of the cells that `pass` visits, if their factorisation takes at most so many nanoseconds.
+/// Returns the tree of fronts for the unknown cells of `pass` if its factorisation takes at most
+/// `nanoseconds`.
 fn cheaper_tree(
     pass: &BreadthFirst,
     nanoseconds: f64,
@@ -111,8 +116,9 @@ fn cheaper_tree(
     }
 }
 
-/// The cells whose u is smaller than that in `store`, which has the range of single precision, and the tree of their fronts; none if
-/// multigrid in bands costs less.
+/// Returns the cells with u below the range of single precision, and their tree of fronts.
+///
+/// Returns `None` if multigrid in bands costs less.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
@@ -136,22 +142,23 @@ pub(super) fn beyond_single(
     Ok(cheaper_tree(&pass, bands, budget, cancellation)?.map(|tree| (pass, tree)))
 }
 
-/// The orders of magnitude by which u falls a cell along a passage of this width: like exp(-pi x / width), and by screening, by which
-/// cosh(1 / L) = 1 + 2 k.
+/// Returns the orders of magnitude by which u falls per cell along a passage.
+///
+/// u falls like exp(-pi x / width), and by screening with cosh(1 / L) = 1 + 2 k.
 fn decades_per_cell(domain: &Domain, width: f64) -> f64 {
     let confined = std::f64::consts::PI / (width + 1.0) / std::f64::consts::LN_10;
     let screened = (1.0 + 2.0 * domain.mean_screening()).acosh() / std::f64::consts::LN_10;
     confined.hypot(screened)
 }
 
-/// The mean length of the runs of free cells along rows or along columns, whichever is the shorter.
+/// Returns the mean length of runs of free cells along rows or columns, whichever is shorter.
 fn mean_width(domain: &Domain) -> f64 {
     let width = domain.width();
     let walls = vec![true; width];
     let mut above: &[bool] = &walls;
     let (mut free, mut along_rows, mut along_columns) = (0_usize, 0_usize, 0_usize);
     for row in domain.blocked().chunks_exact(width) {
-        // Short sums fit in bytes, of which the compiler adds up sixteen or more at a time.
+        // Short sums fit in bytes, of which the compiler adds sixteen or more at a time.
         for (row, above) in row.chunks(128).zip(above.chunks(128)) {
             let (mut open, mut starts) = (0_u8, 0_u8);
             for (&here, &above) in row.iter().zip(above) {

@@ -1,30 +1,27 @@
-//! The checks of the cells of one row.
+//! Checks of the cells of one row.
 
 use crate::real::Real;
 
-/// Largest componentwise relative residual of a published field.
+/// Limit of the relative residual of a cell in a published field.
 pub(super) const RESIDUAL_LIMIT: f64 = 2e-5;
 
-/// Largest [`Verification::worst_tile`](super::Verification::worst_tile) of a published field.
+/// Limit of [`Verification::worst_tile`](super::Verification::worst_tile) in a published field.
 pub(super) const TILE_LIMIT: f64 = 0.01;
 
-/// The result of a verification.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Check {
-    /// Largest relative residual of the cells with u > 0 but the target.
+    /// See [`Verification`](super::Verification).
     pub worst_residual: f64,
     /// See [`Verification`](super::Verification).
     pub worst_tile: f64,
-    /// Cells with u > 0, other than the target, that no neighbour exceeds.
+    /// Cells with u > 0, except the target, that no neighbour exceeds.
     pub local_maxima: usize,
     /// Free cells with u = 0 beside one with u > 0.
     pub unreached: usize,
-    /// Cells with u > 0.
     pub reachable: usize,
 }
 
 impl Check {
-    /// The combined result of both.
     pub(super) fn and(self, other: Self) -> Self {
         Self {
             worst_residual: self.worst_residual.max(other.worst_residual),
@@ -35,17 +32,16 @@ impl Check {
         }
     }
 
-    /// The largest residual as a multiple of the limit.
+    /// Returns the largest residual as a multiple of the limit.
     pub(crate) fn excess(&self) -> f64 {
         self.worst_residual / RESIDUAL_LIMIT
     }
 
-    /// Whether the field may be handed out.
     pub(crate) fn holds(&self) -> bool {
         self.unreached == 0 && self.holds_where_reached()
     }
 
-    /// Whether the cells of u > 0 are right.
+    /// Returns whether the cells with u > 0 pass.
     pub(crate) fn holds_where_reached(&self) -> bool {
         self.local_maxima == 0
             && self.worst_residual <= RESIDUAL_LIMIT
@@ -53,7 +49,8 @@ impl Check {
     }
 }
 
-/// u of the cells of a row and of their neighbours, all with the exponent of the cell itself; 0 where blocked.
+/// u of the cells of a row and of their neighbours, with the exponent of the cell itself; 0 if
+/// blocked.
 #[derive(Clone, Copy)]
 pub(super) struct Around<'a, R> {
     pub here: &'a [R],
@@ -63,26 +60,23 @@ pub(super) struct Around<'a, R> {
     pub south: &'a [R],
 }
 
-/// The equations of the cells of a row, and their residuals.
 pub(super) struct Cells<R> {
-    /// 0.25 / (1 + k) of each cell, 0 where no equation holds.
+    /// 0.25 / (1 + k) of each cell; 0 where no equation holds.
     pub weights: Vec<R>,
-    /// Relative residuals, with their signs, of the cells an equation holds for.
+    /// Signed relative residuals of the cells that have an equation.
     pub residuals: Vec<R>,
     /// (|grad u| / u)^2 of the cells in `residuals`.
     pub slopes: Vec<R>,
-    /// Cells in which u is no larger are not checked.
+    /// Threshold of u; only cells above it are checked.
     floor: R,
 }
 
 impl<R: Real> Cells<R> {
-    /// Rows of `width` cells, of which those with a larger u than `floor` are checked.
     pub(super) fn above(width: usize, floor: f64) -> Self {
         let row = vec![R::default(); width];
         Self { weights: row.clone(), residuals: row.clone(), slopes: row, floor: R::of(floor) }
     }
 
-    /// Checks the cells of a row; `raw` are their stored values.
     #[inline(always)]
     pub(super) fn check(&mut self, raw: &[R], u: Around<'_, R>, found: &mut Check) {
         let (n, zero, floor) = (raw.len(), R::default(), self.floor);
@@ -98,7 +92,7 @@ impl<R: Real> Cells<R> {
             let best = larger(larger(west[x], east[x]), larger(north[x], south[x]));
             let positive = here[x] > floor;
             reachable += u32::from(positive);
-            // A value that is no number is neither blocked nor positive, so it counts as unreached.
+            // NaN is neither blocked nor positive, so it counts as unreached.
             let blocked = raw[x] < zero;
             unreached += u32::from(!positive & !blocked & (sum > zero));
             let residual = here[x] - weights[x] * sum;
@@ -109,7 +103,7 @@ impl<R: Real> Cells<R> {
             let (across, along) = ((east[x] - west[x]) * scale, (south[x] - north[x]) * scale);
             slopes[x] = quarter * (across * across + along * along);
         }
-        // The maximum is taken in lanes, because a running maximum over floats is not vectorised.
+        // A running maximum over floats does not vectorise, so the maximum is taken in lanes.
         let mut worst = [zero; 16];
         let chunks = residuals.chunks_exact(16);
         for (lane, &residual) in worst.iter_mut().zip(chunks.remainder()) {

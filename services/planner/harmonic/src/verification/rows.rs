@@ -1,21 +1,18 @@
-//! Rows of u under way over the map, three at a time.
+//! Sliding window of three rows of u over the map.
 
 use super::cells::Around;
 use crate::{real::Real, scaled::pow2};
 
-/// Three neighbouring rows of u.
 pub(super) trait Window<R> {
-    /// A row as the field stores it.
     type Row<'f>;
 
-    /// Moves one row on; `next` is the row below, none after the last.
+    /// Moves down one row; `next` is the row below, `None` after the last.
     fn take(&mut self, next: Option<Self::Row<'_>>);
 
-    /// The middle row and the rows around it.
     fn around(&mut self) -> Around<'_, R>;
 }
 
-/// Three rows of numbers with a zero at either end, blocked cells zero.
+/// Three rows of numbers with a zero at either end; blocked cells are zero.
 pub(super) struct Rows<R> {
     above: Vec<R>,
     here: Vec<R>,
@@ -62,13 +59,13 @@ impl<R: Real> Window<R> for Rows<R> {
     }
 }
 
-/// Three rows of numbers with an exponent each.
+/// Three rows of numbers with an exponent per cell.
 pub(super) struct ScaledRows {
     mantissas: Rows<f64>,
     above: Vec<i32>,
     here: Vec<i32>,
     below: Vec<i32>,
-    /// The neighbours to the west, east, north and south, with the exponent of the cell itself.
+    /// West, east, north and south neighbours, with the exponent of the cell itself.
     relative: [Vec<f64>; 4],
 }
 
@@ -86,7 +83,7 @@ impl ScaledRows {
 }
 
 impl Window<f64> for ScaledRows {
-    /// The mantissas and exponents.
+    /// Mantissas and exponents.
     type Row<'f> = (&'f [f64], &'f [i32]);
 
     #[inline(always)]
@@ -115,8 +112,8 @@ impl Window<f64> for ScaledRows {
             let (into, mantissas, theirs) = (&mut into[..n], &mantissas[..n], &theirs[..n]);
             for x in 0..n {
                 let steps = theirs[x].saturating_sub(exponents[x]);
-                // A cell of zero has no exponent. The only check there is whether a neighbour is larger. A neighbour of zero has no exponent
-                // either, and stays zero.
+                // Zero has no exponent. A cell of zero only needs to know whether a neighbour is
+                // larger, and a neighbour of zero stays zero.
                 let known = (u.here[x] > 0.0) & (mantissas[x] > 0.0);
                 into[x] = mantissas[x] * pow2(if known { steps } else { 0 });
             }

@@ -2,12 +2,10 @@
 
 use crate::real::Real;
 
-/// Side of the tiles over which residuals are summed.
 pub(super) const TILE: usize = 64;
 
-/// Sums over tiles of the map, one row of tiles at a time.
 pub(super) struct Tiles {
-    /// Sums of the relative residuals with their signs, and of (|grad u| / u)^2.
+    /// Sums of the signed relative residuals and of (|grad u| / u)^2.
     sums: Vec<[f64; 2]>,
     worst: f64,
 }
@@ -17,7 +15,7 @@ impl Tiles {
         Self { sums: vec![[0.0; 2]; width.div_ceil(TILE)], worst: 0.0 }
     }
 
-    /// Adds row `row` of the map; the first of a tile ends the tiles above.
+    /// Adds row `row` of the map; the first row of a tile ends the tiles above.
     #[inline(always)]
     pub(super) fn add_row<R: Real>(&mut self, row: usize, residuals: &[R], slopes: &[R]) {
         if row.is_multiple_of(TILE) {
@@ -35,7 +33,7 @@ impl Tiles {
         for sums in &mut self.sums {
             let [residual, slope] = std::mem::take(sums);
             if residual != 0.0 {
-                // A share that is no number counts as large.
+                // A share that is NaN counts as large.
                 let share = 4.0 * residual.abs() / slope;
                 self.worst = if share <= self.worst { self.worst } else { share };
             }
@@ -49,7 +47,7 @@ impl Tiles {
     }
 }
 
-/// The sum in lanes, whose order is the same with any width of vectors.
+/// Sums in lanes, in an order independent of the vector width.
 #[inline(always)]
 fn sum<R: Real>(values: &[R]) -> f64 {
     let mut lanes = [R::default(); 16];

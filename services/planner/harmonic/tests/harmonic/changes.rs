@@ -1,9 +1,9 @@
-//! Tests that directions after changes, where each solve starts from the field before, are those of a solve from scratch.
+//! Tests that solves from the previous field give the directions of a solve from scratch.
 
 use crate::support::{Angles, Kind, Map, Random, follow};
 use harmonic::{Cancellation, Cell, Change, Domain, Field, Solver, solve_exactly};
 
-/// A map, and a field that is solved again after every change.
+/// Map with a field that is solved again after every change.
 struct Case {
     solver: Solver,
     domain: Domain,
@@ -26,7 +26,7 @@ impl Case {
             .expect("the map has a field");
     }
 
-    /// The changes that block the free cells of a rectangle inside the map's rim, except the target.
+    /// Returns changes that block a rectangle inside the rim, except the target.
     fn block(&self, (col, row): (usize, usize), (width, height): (usize, usize)) -> Vec<Change> {
         let (right, bottom) = (self.domain.width() - 1, self.domain.height() - 1);
         (row.max(1)..(row + height).min(bottom))
@@ -38,7 +38,6 @@ impl Case {
             .collect()
     }
 
-    /// The angles between the field and the exact directions.
     fn angles(&self) -> Angles {
         let exact = solve_exactly(&self.domain).expect("a field");
         Angles::between(&self.field, &exact)

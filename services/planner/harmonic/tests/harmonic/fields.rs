@@ -10,12 +10,11 @@ fn solve(domain: &Domain) -> Field {
     Solver::default().solve(domain, &Cancellation::new()).expect("the map has a field")
 }
 
-/// The screening of coefficient `k`: u is the mean of the four neighbours over 1 + k.
+/// Returns the screening of coefficient `k`: u is the mean of the four neighbours over 1 + k.
 fn screening(k: f64) -> Screening {
     Screening::cells(0.5 / k.sqrt())
 }
 
-/// Checks one map against the reference.
 fn assert_right(map: &Map, name: &str) {
     let domain = map.domain().expect("a valid map");
     let field = solve(&domain);
@@ -121,7 +120,7 @@ fn costs_are_refused_that_are_too_few_or_no_amounts() {
 
 #[test]
 fn a_field_leads_round_cells_that_cost_more_than_the_way_round() {
-    // A band of dear cells across a hall, with a gap at one side.
+    // A band of expensive cells crosses the hall, with a gap at one side.
     let (n, target) = (80, Cell::new(40, 10));
     let dear = |i: usize| (36..44).contains(&(i / n)) && i % n < 55;
     for (cost, through_gap) in [(1.0, false), (8.0, true)] {
@@ -145,7 +144,8 @@ fn a_cancelled_solve_says_so() {
 
 #[test]
 fn a_screened_strip_falls_as_its_difference_equation_does() {
-    // u_i = (u_(i-1) + u_(i+1)) / (4 (1 + k)) has the decaying solution (a - sqrt(a^2 - 1))^i, a = 2 (1 + k).
+    // u_i = (u_(i-1) + u_(i+1)) / (4 (1 + k)) has the decaying solution (a - sqrt(a^2 - 1))^i, a =
+    // 2 (1 + k).
     let domain = Domain::new(600, 1, vec![false; 600], Cell::new(0, 0)).expect("a valid map");
     let domain = domain.with_screening(&screening(0.3)).expect("a valid screening");
     let a = 2.6_f64;
@@ -205,7 +205,7 @@ fn a_wide_map_with_strong_screening_is_right_beyond_the_range_of_f64() {
 #[test]
 fn a_hall_with_a_long_passage_one_cell_wide_is_not_factorised_and_right_in_the_passage_too() {
     let mut map = Map::generate(Kind::Empty, 260, 250, 0);
-    // The hall has a passage along its rim, closed but for a door.
+    // The hall has a passage along its rim, closed except for a door.
     for (columns, rows) in [(2..258, 2..6), (2..258, 244..248), (2..6, 2..248), (254..258, 2..248)]
     {
         map.fill(columns, rows, true);
@@ -225,8 +225,8 @@ fn a_hall_with_a_long_passage_one_cell_wide_is_not_factorised_and_right_in_the_p
 
 #[test]
 fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
-    // The narrow way loses 0.57 orders of magnitude a cell, the wide one 0.07: beyond a certain cell the way back to the
-    // far end and around is the better one, by weights of 1e-400.
+    // The narrow way loses 0.57 orders of magnitude per cell, the wide one 0.07. Beyond a certain
+    // cell, the way back to the far end and around is better, by weights of 1e-400.
     let mut map = Map::generate(Kind::Empty, 1520, 25, 0);
     map.fill(15..1505, 21..22, true);
     map.fill(15..1505, 23..25, true);

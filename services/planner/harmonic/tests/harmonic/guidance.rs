@@ -95,7 +95,8 @@ fn guidance_never_points_into_a_wall_it_touches() {
                         row as f64 + 0.499_999_9 * dr + along * dc,
                     ];
                     if let Guidance::Along(d) = field.guidance(at[0], at[1]) {
-                        // If the saddle rule decides, the direction may lean towards the cell's centre line, but never outwards.
+                        // Under the saddle rule, the direction may lean towards the centre line of
+                        // the cell, but never outwards.
                         assert!(
                             d[0] * dc + d[1] * dr < 1e-4,
                             "{kind:?}: {d:?} into the wall at {at:?}"
@@ -117,7 +118,7 @@ fn guidance_is_continuous_across_cell_borders_in_open_space() {
         if domain.is_blocked(Cell::new(col, row)) || domain.is_blocked(Cell::new(col + 1, row)) {
             continue;
         }
-        // The positions are just left and just right of the border between two cells, and of a line of centres.
+        // The positions lie just left and right of a cell border and of a line of centres.
         for border in [col as f64 + 0.5, col as f64] {
             let y = row as f64 + random.between(-0.49, 0.49);
             let (a, b) = (field.guidance(border - 1e-7, y), field.guidance(border + 1e-7, y));
@@ -132,8 +133,8 @@ fn guidance_is_continuous_across_cell_borders_in_open_space() {
 
 #[test]
 fn at_a_saddle_point_the_better_neighbour_decides() {
-    // The target is straight behind a wall, and everything is mirrored about row 4: at the middle of the wall's face the
-    // gradient along the wall is zero by symmetry, and that across it points off the wall.
+    // The target is behind a wall, mirrored about row 4. At the middle of the wall, the gradient
+    // along it is zero by symmetry and that across it points away.
     let mut map = Map::generate(Kind::Empty, 13, 9, 0);
     map.fill(7..8, 1..8, true);
     map.fill(7..8, 1..2, false);

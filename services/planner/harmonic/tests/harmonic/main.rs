@@ -1,4 +1,4 @@
-//! Tests of the library, against a reference solver and exact fields.
+//! Tests of the library against a reference solver and exact fields.
 #![allow(
     clippy::expect_used,
     clippy::panic,

@@ -1,10 +1,12 @@
-//! Tests on any map: there is an answer, each number is one, and every reachable cell leads to the target.
+//! Tests on any map: an answer exists, every number is valid, and every reachable cell leads to the
+//! target.
 
 use crate::support::{Kind, Map, Reference, follow};
 use harmonic::{Cancellation, Cell, Change, Domain, Field, Guidance, Screening, Settings, Solver};
 use proptest::prelude::*;
 
-/// Any grid of up to 48 x 48 cells, any free target, any screening, with costs or without.
+/// Generates grids of up to 48 x 48 cells with any free target, any screening, with or without
+/// costs.
 fn any_domain() -> impl Strategy<Value = Domain> {
     // Lengths for screening coefficients of 0, of 0 .. 0.1 and of 0 .. 2.
     let screened = |most: f64| (0.0..most).prop_map(|k| Screening::cells(0.5 / k.sqrt()));
@@ -27,7 +29,6 @@ fn any_domain() -> impl Strategy<Value = Domain> {
     )
 }
 
-/// Cells from which the target can be reached, by search.
 fn reachable(domain: &Domain) -> Vec<bool> {
     let (width, height) = (domain.width(), domain.height());
     let mut seen = vec![false; width * height];
@@ -80,7 +81,7 @@ proptest! {
         let reference = Reference::solve(&domain);
         prop_assume!(reference.worst_residual < 1e-9);
         let (off, worst) = reference.compare(&field);
-        // On a small map a single cell on a saddle point exceeds the allowed share.
+        // On a small map, a single cell on a saddle point exceeds the allowed share.
         let cells = off * field.verification().reachable as f64;
         assert!(off <= 1e-3 || cells < 2.5, "{cells} directions are off");
         assert!(worst <= 1.0, "a clear direction is {worst} degrees off");

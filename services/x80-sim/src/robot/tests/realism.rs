@@ -1,9 +1,8 @@
-//! Tests of the errors of a robot, each set by its own key.
+//! Tests of robot errors, each set by its own key.
 
 use super::{Robot, forward, mission, motor, robot, send};
 use common::wire::{Command, counts_between};
 
-/// The robot of `text` after `ticks` under `command`.
 fn driven(text: &str, command: Command, ticks: u32) -> Robot {
     let mut robot = robot(text);
     send(&mut robot, command);
@@ -21,7 +20,7 @@ fn a_larger_right_wheel_curves_the_path_to_the_left() {
     let curved = driven(key, command, 28).ground_truth();
     assert_eq!((straight.heading, straight.y), (0.0, 0.0));
     assert_eq!(curved.right_counts, straight.right_counts);
-    // The rims differ by 0.01 / 1.005 of the way.
+    // The rims differ by 0.01 / 1.005 of the distance.
     let track = mission("").body().track_m;
     let want = straight.x * 0.01 / 1.005 / track;
     assert!((curved.heading - want).abs() < 1e-9, "{curved:?}");
@@ -40,7 +39,7 @@ fn a_robot_on_a_wider_track_turns_less_than_its_counts_say() {
 
 #[test]
 fn an_aged_range_lags_a_turn_by_age_times_turn_rate() {
-    // The beam has no width and meets a rough wall: range + forward_m = 1.5 m / cos(heading).
+    // The beam has zero width and meets a rough wall: range + forward_m = 1.5 m / cos(heading).
     let wall = "world.wall = [{ points = [[1.5, -9], [1.5, 9]] }]\n\
         [simulation.wheels]\nlag_s = 0\n\
         [simulation.sonar]\ncone_deg = 0\nlobe_deg = 0\nnoise_m = 0\nnoise_per_m = 0\n";
@@ -59,7 +58,7 @@ fn an_aged_range_lags_a_turn_by_age_times_turn_rate() {
     assert!(lag_deg(0.0).abs() < 0.5, "{}", lag_deg(0.0));
     // The robot turns for 0.07 s at 1.4 rad/s.
     assert!((lag_deg(0.07) - 5.6).abs() < 0.5, "{}", lag_deg(0.07));
-    // No range is older than the tick before.
+    // Ranges are at most a tick old.
     let tick_deg = 1.4_f64.to_degrees() / 7.0;
     assert!((lag_deg(0.9) - tick_deg).abs() < 0.5, "{}", lag_deg(0.9));
 }
@@ -126,8 +125,8 @@ fn what_is_low_is_heard_at_middle_ranges_only_and_touched_and_a_sill_is_passed_o
             let truth = robot.ground_truth();
             let ahead = 1.7 - truth.x - 0.1915;
             let heard = u32::from(truth.sonar_cm < 255);
-            // The box's edge is too weak beyond 1.2 m; nearer than 0.08 m / tan(15 degrees) = 0.3 m the beam passes above
-            // it.
+            // Beyond 1.2 m the box's edge is too weak. Below 0.08 m / tan(15 degrees) = 0.3 m the
+            // beam passes above it.
             if !(0.27..1.25).contains(&ahead) {
                 outside += heard;
             } else if (0.35..1.15).contains(&ahead) {
@@ -178,7 +177,7 @@ fn a_resumed_robot_has_the_wheels_and_the_silences_it_had() {
     let saved = first.saved_state();
     let mut resumed = Robot::restored(&mission(text), &saved);
     assert!((curvature(&mut resumed) - had).abs() < 1e-3);
-    // A run of a minute does not end within a few readings. If the states were drawn again, half of the six would differ.
+    // A one-minute run outlasts a few readings. Redrawn states would differ for half of the six.
     let silent = resumed.saved_state().silent;
     let kept = silent.iter().zip(saved.silent).filter(|(now, then)| **now == *then);
     assert!(kept.count() >= 5, "{silent:?} {:?}", saved.silent);

@@ -1,29 +1,27 @@
-//! The angles between the directions of two fields.
+//! Angles between the directions of two fields.
 
 use harmonic::{Cell, Field};
 
 use super::reference::angle;
 
-/// Angles between the directions of two fields of one map, degrees, over the cells that can reach the target.
+/// Angles in degrees, over the cells that can reach the target.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Angles {
-    /// The median.
     pub(crate) p50: f64,
-    /// The 99th percentile.
     pub(crate) p99: f64,
-    /// The largest angle.
     pub(crate) max: f64,
-    /// The largest angle away from saddle points: in cells where u changes by at least [`CLEAR`] of itself from one cell to the
-    /// next.
+    /// Maximum away from saddle points: where u changes by at least [`CLEAR`] of itself between
+    /// cells.
     pub(crate) clear_max: f64,
 }
 
-/// The relative change of u to the next cell from which on a direction is clear. Nearer to a saddle point, a change of u by a
-/// thousandth turns the direction by degrees in any solution.
+/// Relative change of u to the next cell from which a direction is clear.
+///
+/// Nearer to a saddle point, a change of u by a thousandth turns the direction by degrees in any
+/// solution.
 const CLEAR: f64 = 2e-3;
 
 impl Angles {
-    /// The angles between `field` and `right`.
     pub(crate) fn between(field: &Field, right: &Field) -> Self {
         let mut angles = Vec::new();
         let mut clear_max = 0.0_f64;
@@ -49,10 +47,10 @@ impl Angles {
     }
 }
 
-/// |grad u| / u at a cell.
+/// Returns |grad u| / u at a cell.
 fn steepness(field: &Field, cell: Cell) -> f64 {
     let own = field.u(cell);
-    // Beyond the first column or row the number wraps to one outside the map, where u is zero.
+    // Beyond the first column or row, the number wraps to a cell outside the map, where u is zero.
     let u = |col: usize, row: usize| {
         field.u(Cell::new(col, row)).relative_to(own.exponent) / own.mantissa
     };

@@ -1,43 +1,41 @@
-//! Generated maps: the kinds of place a ground robot meets, and those that break solvers.
+//! Generated maps: typical places of a ground robot, and those that break solvers.
 
 use super::random::Random;
 use harmonic::{Cell, Domain, SolveError};
 
-/// A kind of generated map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {
-    /// The outer walls only.
+    /// Outer walls only.
     Empty,
     /// Round obstacles over a fifth of the floor.
     Drums,
     /// Eight by eight rooms joined by doors.
     Office,
-    /// A spanning tree of corridors of this width, a twentieth of the walls opened again.
+    /// Spanning tree of corridors of this width, with a twentieth of the walls opened again.
     Maze { corridor: usize },
-    /// A corridor of this width, folded over the whole map.
+    /// Corridor of this width, folded over the whole map.
     Serpentine { corridor: usize },
-    /// A corridor of this width, wound up from the rim to the middle.
+    /// Corridor of this width, wound from the rim to the middle.
     Spiral { corridor: usize },
-    /// Rooms of so many cells a side, joined by doors of this width.
+    /// Rooms of `side` cells, joined by doors of this width.
     Rooms { side: usize, door: usize },
-    /// A U-shaped wall that opens away from the target.
+    /// U-shaped wall that opens away from the target.
     Trap,
-    /// Every cell blocked with this chance: islands, pockets, diagonal leaks.
+    /// Cells blocked with this probability: islands, pockets, diagonal leaks.
     Noise { density: f64 },
 }
 
-/// A map under construction: blocked cells and a target.
 #[derive(Clone, Debug)]
 pub(crate) struct Map {
     pub(crate) width: usize,
     pub(crate) height: usize,
     pub(crate) blocked: Vec<bool>,
-    /// The target, a free cell.
+    /// Free cell.
     pub(crate) target: Cell,
 }
 
 impl Map {
-    /// A map of `kind`, its rim blocked, its target free.
+    /// Generates a map with a blocked rim and a free target.
     pub(crate) fn generate(kind: Kind, width: usize, height: usize, seed: u64) -> Self {
         let mut random = Random::new(seed);
         let mut map =
@@ -74,10 +72,6 @@ impl Map {
         map
     }
 
-    /// The domain of this map.
-    ///
-    /// # Errors
-    /// See [`Domain::new`].
     pub(crate) fn domain(&self) -> Result<Domain, SolveError> {
         Domain::new(self.width, self.height, self.blocked.clone(), self.target)
     }
@@ -96,7 +90,7 @@ impl Map {
         }
     }
 
-    /// Puts the target on the free cell nearest to `wanted`, freeing that one if there is none.
+    /// Puts the target on the free cell nearest to `wanted`, or frees `wanted` if there is none.
     pub(crate) fn aim(&mut self, wanted: (usize, usize)) {
         let wanted = (wanted.0.min(self.width - 1), wanted.1.min(self.height - 1));
         let nearest = (0..self.blocked.len()).filter(|&i| !self.blocked[i]).min_by_key(|&i| {
@@ -157,14 +151,13 @@ impl Map {
         }
     }
 
-    /// The number of columns and rows of squares of this side, with walls of one cell between them, for which the map has
-    /// room.
+    /// Returns the columns and rows of squares of this side that fit, with walls of one cell.
     fn squares(&self, side: usize) -> (usize, usize) {
         let count = |cells: usize| cells.saturating_sub(1) / (side + 1);
         (count(self.width), count(self.height))
     }
 
-    /// Frees only the squares of this side in `pairs`, each joined to the other by an opening of the same width.
+    /// Frees only the squares in `pairs`, each pair joined by an opening of the same width.
     fn carve(&mut self, side: usize, pairs: impl IntoIterator<Item = Pair>) {
         let pitch = side + 1;
         self.fill(0..self.width, 0..self.height, true);
@@ -244,7 +237,8 @@ impl Map {
 /// Two neighbouring rooms, or one room twice, by column and row.
 type Pair = ((usize, usize), (usize, usize));
 
-/// Pairs of neighbouring rooms that a door joins: a random spanning tree, and each other pair with chance `more`.
+/// Returns a random spanning tree of rooms joined by doors, plus each other pair with probability
+/// `more`.
 fn spanning_tree(wide: usize, high: usize, more: f64, random: &mut Random) -> Vec<Pair> {
     let mut seen = vec![false; wide * high];
     let mut doors = Vec::new();

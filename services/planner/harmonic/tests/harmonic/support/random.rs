@@ -1,4 +1,4 @@
-//! A small deterministic source of random numbers: the same seed gives the same map on every machine.
+//! Deterministic random numbers: the same seed gives the same map on every machine.
 
 /// SplitMix64.
 #[derive(Clone, Debug)]
@@ -17,17 +17,16 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// A number in 0 .. `below`; 0 if `below` is 0.
+    /// Returns a number in 0 .. `below`; 0 if `below` is 0.
     pub(crate) fn below(&mut self, below: usize) -> usize {
         if below == 0 { 0 } else { (self.bits() % below as u64) as usize }
     }
 
-    /// A number in 0.0 .. 1.0.
+    /// Returns a number in 0.0 .. 1.0.
     pub(crate) fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// A number in `low` .. `high`.
     pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }

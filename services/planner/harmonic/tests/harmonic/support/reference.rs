@@ -1,24 +1,28 @@
-//! A slow solver that shares nothing with the fast ones: banded elimination in row order, the right-hand side carried in
-//! extended range, then polished and its residual measured.
+//! Slow solver that shares nothing with the fast ones.
+//!
+//! Banded elimination in row order carries the right-hand side in extended range. The result is
+//! polished and its residual measured.
 
 use harmonic::{Cell, Domain, Field, Scaled};
 
-/// u of every cell to about 1e-12, relatively.
+/// u of every cell to a relative error of about 1e-12.
 pub(crate) struct Reference {
     domain: Domain,
     u: Vec<Scaled>,
-    /// Largest relative residual of any cell with u > 0.
+    /// Largest relative residual of the cells with u > 0.
     pub(crate) worst_residual: f64,
 }
 
 impl Reference {
-    /// Solves `domain`. Takes width^3 * height operations and width^2 * height numbers: for small or narrow maps.
+    /// Solves `domain` in width^3 * height operations and width^2 * height numbers, for small or
+    /// narrow maps.
     pub(crate) fn solve(domain: &Domain) -> Self {
         let width = domain.width();
         let cells = domain.blocked().len();
         let target = domain.target().row * width + domain.target().col;
         let free = |i: usize| !domain.blocked()[i];
-        // Row i has its couplings (positive, i.e. minus the entry) to i + 1 ..= i + width, and its diagonal.
+        // Row i holds its positive couplings (minus the entries) to i + 1 ..= i + width, and its
+        // diagonal.
         let mut coupling = vec![0.0; cells * width];
         let mut diagonal = vec![1.0; cells];
         let mut right = vec![Scaled::ZERO; cells];
@@ -62,7 +66,8 @@ impl Reference {
         reference
     }
 
-    /// Central difference of u in units of the largest u around, and that largest u; `None` where u is zero.
+    /// Returns the central difference of u in units of the largest u around, and that u; `None`
+    /// where u is zero.
     fn gradient(&self, cell: Cell) -> Option<[f64; 2]> {
         let i = cell.row * self.domain.width() + cell.col;
         let [west, east, north, south] = self.around(i);
@@ -76,8 +81,10 @@ impl Reference {
         Some([relative(east) - relative(west), relative(south) - relative(north)])
     }
 
-    /// Share of directions of `field` more than one degree off, and the worst angle in degrees among the cells whose
-    /// gradient is above 1e-4 of the largest u around.
+    /// Returns the share of directions of `field` more than one degree off, and the worst clear
+    /// angle in degrees.
+    ///
+    /// Clear cells have a gradient above 1e-4 of the largest u around.
     pub(crate) fn compare(&self, field: &Field) -> (f64, f64) {
         let (mut off, mut seen, mut worst) = (0, 0, 0.0_f64);
         for index in 0..self.u.len() {
@@ -100,13 +107,13 @@ impl Reference {
         (off as f64 / f64::from(seen.max(1)), worst)
     }
 
-    /// u of the neighbours of a cell: west, east, north, south.
+    /// Returns u of the west, east, north and south neighbours.
     fn around(&self, index: usize) -> [Scaled; 4] {
         let around = neighbours(&self.domain, index);
         around.map(|there| there.map_or(Scaled::ZERO, |there| self.u[there]))
     }
 
-    /// Two Gauss-Seidel passes; returns the largest relative change of the second.
+    /// Runs two Gauss-Seidel passes and returns the largest relative change of the second.
     fn polish(&mut self) -> f64 {
         let target = self.domain.target().row * self.domain.width() + self.domain.target().col;
         let mut worst = 0.0_f64;
@@ -131,7 +138,7 @@ impl Reference {
     }
 }
 
-/// Row-major indices of the neighbours inside the map: west, east, north, south.
+/// Returns the indices of the west, east, north and south neighbours inside the map.
 fn neighbours(domain: &Domain, index: usize) -> [Option<usize>; 4] {
     let (width, height) = (domain.width(), domain.height());
     let (col, row) = (index % width, index / width);
@@ -143,16 +150,16 @@ fn neighbours(domain: &Domain, index: usize) -> [Option<usize>; 4] {
     ]
 }
 
-/// The angle between two vectors, degrees.
+/// Returns the angle between two vectors, degrees.
 pub(crate) fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]).abs().to_degrees()
 }
 
-/// Share of the reachable cells from which steepest ascent ends at the target.
+/// Returns the share of the reachable cells from which steepest ascent ends at the target.
 pub(crate) fn follow(field: &Field) -> f64 {
     let width = field.width();
     let cell = |index: usize| Cell::new(index % width, index / width);
-    // For each cell, whether the walk from it arrives, once known.
+    // Whether the walk from each cell arrives, once known.
     let mut arrives = vec![None; width * field.height()];
     arrives[field.target().row * width + field.target().col] = Some(true);
     let (mut arrived, mut all) = (0_usize, 0_usize);
@@ -163,7 +170,8 @@ pub(crate) fn follow(field: &Field) -> f64 {
             if let Some(known) = arrives[here] {
                 break known;
             }
-            // The cell counts as not arriving until proven, because a walk that meets itself does not arrive.
+            // A walk that meets itself never arrives, so the cell counts as not arriving until
+            // proven.
             arrives[here] = Some(false);
             path.push(here);
             let Cell { col, row } = cell(here);
