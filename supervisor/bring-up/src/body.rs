@@ -1,25 +1,26 @@
-//! What the body does against what its wheels count, as the laser or else the sonars see it: motors, and the sizes of wheels and track.
+//! Body motion against wheel counts, as the laser or else the sonars see it: motors, and the sizes
+//! of wheels and track.
 
 use common::mission::{Mission, Protocol};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::Finding;
 
-/// The body's motion over that of its wheels.
+/// Motion of the body relative to its wheels.
 pub(crate) struct Moves {
-    /// It turns, or drives, the other way; none if nothing shows it.
+    /// Whether it turns, or drives, the other way; `None` if undetermined.
     pub(crate) turns_back: Option<bool>,
     pub(crate) drives_back: Option<bool>,
-    /// It drives where the wheels say that it turns, and turns where they say that it drives.
+    /// Whether it drives where the wheels turn, and turns where they drive.
     pub(crate) exchanged: bool,
-    /// True turn and way over the wheels'; none if nothing shows it.
+    /// True turn and distance over the wheels'; `None` if undetermined.
     pub(crate) turn: Option<f64>,
     pub(crate) way: Option<f64>,
-    /// True turn for each metre, radians.
+    /// True turn per metre, radians.
     pub(crate) curl: f64,
 }
 
-/// Shares of way and turn, and of the diameters, that are told.
+/// Least deviations of motion and diameters that are reported, shares.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SizesTold {
     pub(crate) sizes: f64,
@@ -28,9 +29,11 @@ pub(crate) struct SizesTold {
 
 pub(crate) const MOTOR: &str = "motor turns";
 
-/// Motors that let the body move so: in each row, a wheel's, 1 or -1 at the wheel that it goes as, when that is told.
+/// Returns the motors that explain such a motion. Each row, a wheel's, has 1 or -1 in the column of
+/// the wheel that it acts as.
 pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Matrix2<f64> {
-    // Turn and way are the difference and the sum of the rims' ways, and those of turn and way are twice the rims'.
+    // Turn and drive are the difference and the sum of the rims' motions. Applied twice, this
+    // doubles them.
     let sums = Matrix2::new(-1.0, 1.0, 1.0, 1.0);
     let sign = |back| if back { -1.0 } else { 1.0 };
     let signs = Matrix2::from_diagonal(&Vector2::new(sign(turns_back), sign(drives_back)));
@@ -38,7 +41,8 @@ pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Ma
     sums * goes * sums / 2.0
 }
 
-/// What is wrong with a motor of each wheel, or an encoder: a `part` for each row that is not as it should be, in the column of its wheel.
+/// Describes the faults of motors or encoders: one `part` for each row that differs from the
+/// identity.
 pub(crate) fn words(parts: Matrix2<f64>, part: &str) -> String {
     let sides = ["left", "right"].into_iter().enumerate();
     let wrong = sides.filter_map(|(row, side)| {
@@ -67,7 +71,8 @@ impl Moves {
         possible.first().copied().filter(|_| possible.len() == 1)
     }
 
-    /// Motors that are swapped or turn backwards; none if they may be right. Keys mend them if the encoders are connected `alike`.
+    /// Returns the finding about swapped or reversed motors; `None` if they may be right. Keys mend
+    /// them if the encoders are connected `alike`.
     pub(crate) fn finding(&self, mission: &Mission, alike: bool) -> Option<Finding> {
         let possible = self.possible();
         if possible.contains(&Matrix2::identity()) {
@@ -99,15 +104,15 @@ impl Moves {
         Some(finding)
     }
 
-    /// Wheels and track that are not as stated.
     pub(crate) fn sizes(&self, mission: &Mission, told: SizesTold) -> Vec<Finding> {
         let mut found = Vec::new();
         let (body, odometry) = (mission.body(), &mission.robot.odometry);
-        // Sizes change nothing of what a robot's own odometry says.
+        // Sizes do not affect a robot's own odometry.
         let is_own = mission.robot.protocol() == Protocol::Ros2;
         let said = if is_own { "its odometry says" } else { "the wheels count" };
         let is_told = |share: &f64| (share - 1.0).abs() > told.sizes;
-        // A turn alone does not tell the wheels' size from the track; large errors are those of the wheels.
+        // A turn alone does not separate wheel size from track; large errors are those of the
+        // wheels.
         let way = self.way.or(self.turn);
         let other = way.filter(is_told);
         if let Some(way) = other {
@@ -126,7 +131,7 @@ impl Moves {
             };
             found.push(Finding::wrong("wheel size", text).with_key(key, value));
         }
-        // The stated wheels stay where their error is not told.
+        // The stated wheels hold where their error is undetermined.
         let track = self.turn.map(|turn| other.unwrap_or(1.0) / turn);
         if let Some(track) = track.filter(is_told) {
             let text = format!("the body turns {:.0} % of what {said}", 100.0 / track);
@@ -145,7 +150,7 @@ impl Moves {
             );
             let key = "robot.odometry.diameter_ratio";
             let finding = Finding::wrong("wheel ratio", text);
-            // Nobody knows to which side, if a laser upside down may have seen it.
+            // The side is unknown if a laser upside down may have seen it.
             found.push(match self.turns_back {
                 None => finding,
                 Some(_) => finding.with_key(key, format!("{:.3}", odometry.diameter_ratio * ratio)),

@@ -1,19 +1,20 @@
-//! Bring-up: what a new robot does, against what its mission says of it.
+//! Bring-up: a comparison of a new robot's behaviour with its mission.
 //!
-//! The robot stands, turns on the spot to both sides, drives a short way there and back, and turns to and fro, ordered by the planner
-//! stage of [`calibration`]. A [`Trace`] holds what was recorded meanwhile. [`findings`] compares it with the mission: each
-//! [`Finding`] is a verdict about one part, with the keys of the mission that are to be changed, or what is to be mended.
+//! The planner stage of [`calibration`] lets the robot stand, turn on the spot to both sides, drive
+//! a short distance there and back, and turn to and fro. A [`Trace`] holds the recording.
+//! [`findings`] compares it with the mission. Each [`Finding`] is a verdict about one part, with
+//! the mission keys to change or the part to mend.
 //!
-//! The wheels' counts are compared with what they were told, which finds encoders. What the body does is seen by its lasers, rangers and
-//! gyro, which finds motors, mountings and sizes.
+//! Comparing counts with commands finds encoders. Lasers, rangers and the gyro observe the body,
+//! which finds motors, mountings and sizes.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`trace`] | what was told, counted and seen, and the parts of the procedure |
-//! | `wheels` | which wheel counts what it is told, and how fast the base answers |
-//! | `scans` | the body's motion and the laser's mounting that place all scans on each other |
-//! | `rangers` | liveliness and noise of sensors, bearings of sonars, way and turn where there is no laser |
-//! | `body` | motors and sizes, by what laser or sonars saw of the body's motion |
+//! | [`trace`] | commands, counts and readings, and the legs of the procedure |
+//! | `wheels` | commands that each encoder follows; response of the base |
+//! | `scans` | body motion and laser mounting that align all scans |
+//! | `rangers` | liveliness and noise of sensors, bearings of sonars, motion without a laser |
+//! | `body` | motors and sizes, from the observed body motion |
 
 mod body;
 mod rangers;
@@ -29,20 +30,18 @@ pub use trace::Trace;
 
 #[derive(Debug)]
 pub struct Finding {
-    /// The part, as a user calls it: "wheels", "laser".
+    /// Name of the part for users: "wheels", "laser".
     pub part: String,
     pub verdict: Verdict,
     pub text: String,
-    /// Keys of the mission, and the values that were found.
+    /// Mission keys, and the values found.
     pub keys: Vec<(String, String)>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
     Right,
-    /// Not as stated.
     Wrong,
-    /// Nothing could be told.
     Unknown,
 }
 
@@ -79,8 +78,11 @@ impl Finding {
     }
 }
 
-/// What the trace says of the robot of `mission`, and where the beams of a laser, or without one the echoes of rangers, ended: metres from
-/// the robot's first place, x ahead. With `lifted` wheels nothing is said of what the body does.
+/// Returns the findings about the robot of `mission`, and the ends of laser beams, or else of
+/// ranger echoes.
+///
+/// The ends are in metres from the robot's first place, x ahead. With `lifted` wheels the body is
+/// left out.
 pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Vec<DVec2>) {
     let mut found = vec![wheels::rate(mission, trace)];
     if !trace.begins_at_rest() {

@@ -1,4 +1,4 @@
-//! Liveliness and noise of sensors, bearings of sonars, and what rangers and gyro say of way and turn.
+//! Liveliness and noise of sensors, bearings of sonars, and body motion by rangers and gyro.
 
 use std::f64::consts::TAU;
 
@@ -17,38 +17,39 @@ use crate::{
     wheels::Motion,
 };
 
-/// The least share of ticks with a reading of a sensor that measures in each.
+/// Least share of ticks with a reading, for a sensor that measures in each.
 const LIVES: f64 = 0.5;
-/// The noise of ranges at rest that is told, metres.
+/// Least range noise at rest that is reported, metres.
 const NOISE_M: f64 = 0.1;
-/// Width of the bins of a profile of ranges over bearings.
+/// Number of bearing bins of a range profile.
 const BINS: usize = 72;
-/// Ranges that differ by more count as different, metres.
+/// Cap of a range difference, metres.
 const DIFFERENT_M: f64 = 0.5;
-/// A bearing is told if it explains this share of the stated one's differences, and the least difference of the stated one, metres.
+/// Share of the stated bearing's difference that a reported bearing must undercut, and the least
+/// difference of the stated one, metres.
 const EXPLAINS: f64 = 0.55;
 const LEAST_DIFFERENCE_M: f64 = 0.12;
 const LEAST_SAMPLES: usize = 30;
-/// A bearing less beside the stated one is not told, bins.
+/// Least reported deviation of a bearing, bins.
 const BESIDE_BINS: usize = 3;
-/// A sonar is wider than a beam; so much are the shares of way and turn that sonars tell.
+/// Least deviations that sonars report, because a sonar is wider than a beam.
 const SIZES_TOLD: SizesTold = SizesTold { sizes: 0.15, ratio: f64::INFINITY };
-/// The scales of the turn that are tried: half to double, by equal factors.
+/// Scales of the turn that are tried: half to double, by equal factors.
 const SCALE_RATIO: f64 = 1.02;
 const SCALES: i32 = 35;
-/// Scales at which the sonars disagree by no more than so many times the least are as good.
+/// Multiple of the least disagreement within which scales count as equally good.
 const ALIKE: f64 = 1.5;
-/// Shares of way that wheels of another size may have; an echo that changes by another is not of what is ahead.
+/// Shares of distance that wheels of another size may have. An echo that changes by another share
+/// is not from ahead.
 const SHARES: std::ops::Range<f64> = 0.3..3.0;
 const GYRO_TOLD: f64 = 0.05;
-/// A turn that tells something of a gyro, radians.
+/// Least turn for a comparison with the gyro, radians.
 const LEAST_TURN: f64 = 2.0;
 
 fn range_m(reading: &RangeReading) -> Option<f64> {
     (reading.status() == RangeStatus::Measured).then_some(reading.range_m)
 }
 
-/// None of fewer than `least` values.
 fn mean(values: &[f64], least: usize) -> Option<f64> {
     (values.len() >= least).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
@@ -58,7 +59,8 @@ fn readings(trace: &Trace, row: usize) -> impl Iterator<Item = (f64, &RangeReadi
     trace.ranges.iter().filter_map(move |(at, all)| Some((*at, all.iter().find(of)?)))
 }
 
-/// Whether each sensor of the table says something, and how noisy it is at rest; `turned` if the robot turned around.
+/// Returns a finding for each sensor: whether it reports, and its noise at rest. `turned` says
+/// whether the robot turned around.
 pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<Finding> {
     let until = trace.rest_until_s();
     let ticks = trace.rolled.len().max(1) as f64;
@@ -141,12 +143,12 @@ fn laser_lives(trace: &Trace, row: usize, sensor: &Sensor) -> Finding {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gyro {
-    /// Its turns over those by the wheels.
+    /// Gyro turns over wheel turns.
     scale: f64,
 }
 
 impl Gyro {
-    /// None without a gyro, or if the wheels hardly turned the body.
+    /// Returns `None` without a gyro, or if the wheels hardly turned the body.
     pub(crate) fn of(trace: &Trace, motion: &Motion) -> Option<Self> {
         let (mut squares, mut products, mut wheels) = (0.0, 0.0, 0.0);
         for (at, turn) in &trace.gyro {
@@ -163,13 +165,13 @@ impl Gyro {
         (wheels > LEAST_TURN).then(|| Self { scale: products / squares })
     }
 
-    /// Whether it turns the way the wheels say.
+    /// Returns whether the gyro turns in the wheels' direction.
     pub(crate) const fn agrees(&self) -> bool {
         self.scale > 0.0
     }
 }
 
-/// Ranges over the bearings from the robot as it stood first.
+/// Ranges by bearing from the robot's first place.
 struct Profile(Vec<Vec<f64>>);
 
 impl Profile {
@@ -193,7 +195,8 @@ impl Profile {
         ranges.get(ranges.len() / 2).copied()
     }
 
-    /// Mean difference of `seen` from the profile when it is turned by so many bins, metres; none if too little is comparable.
+    /// Returns the mean difference of `seen` from the profile turned by so many bins, metres;
+    /// `None` if too little is comparable.
     fn difference(&self, seen: &[(f64, f64)], turned: usize) -> Option<f64> {
         let each = seen.iter().filter_map(|(bearing, range)| {
             Some((self.range(Self::bin(*bearing) + turned)? - range).abs().min(DIFFERENT_M))
@@ -202,7 +205,8 @@ impl Profile {
     }
 }
 
-/// What sonars and infrared rangers saw while the robot turned: bearing from the first heading, and distance from the robot's centre.
+/// Returns a ranger's echoes while the robot turned: bearing from the first heading, and distance
+/// from the robot's centre.
 fn seen_turning(
     trace: &Trace,
     row: usize,
@@ -219,13 +223,13 @@ fn seen_turning(
         .collect()
 }
 
-/// The turns before the robot drives away from its first place.
+/// Returns the turns before the robot leaves its first place.
 fn turning_legs(trace: &Trace) -> Vec<Leg> {
     let legs = trace.legs().into_iter().take_while(|leg| leg.told != Told::Drive);
     legs.filter(|leg| leg.told != Told::Stand).collect()
 }
 
-/// What rangers say, and without a laser that saw the way, what the body did.
+/// Returns findings about rangers, and about the body if no laser saw its motion.
 pub(crate) fn findings(
     mission: &Mission,
     trace: &Trace,
@@ -258,7 +262,7 @@ pub(crate) fn findings(
             found.push(Finding::unknown("turn", text));
         }
         let sizes = moves.sizes(mission, SIZES_TOLD);
-        // By wheels of another size no bearing is known well.
+        // With wheels of another size no bearing is known well.
         if !sizes.is_empty() {
             found.extend(sizes);
             return found;
@@ -268,14 +272,14 @@ pub(crate) fn findings(
         placed.map_or_else(|| turned(motion, at), |placed| placed.pose(at).heading)
     });
     for (place, (sensor, seen)) in all.iter().enumerate() {
-        // Each is compared with what all others saw, or with the laser.
+        // Each is compared with all others, or with the laser.
         let reference = match placed {
             Some(placed) => {
                 Profile::of(placed.points.iter().map(|it| (it.to_angle(), it.length())))
             }
             None => others(&all, place),
         };
-        // Of two sonars that disagree nobody knows which is wrong.
+        // If two sonars disagree, either may be wrong.
         if placed.is_some() || all.len() > 2 {
             found.extend(bearing(&reference, sensor, seen));
         }
@@ -287,7 +291,6 @@ fn turned(motion: &Motion, at_s: f64) -> f64 {
     between(motion, at_s).map_or(0.0, |[angle, _]| angle)
 }
 
-/// What each sonar saw while the robot turned.
 fn seen_by_cones<'a>(
     table: &'a [Sensor],
     trace: &Trace,
@@ -299,31 +302,32 @@ fn seen_by_cones<'a>(
 
 type Seen<'a> = (&'a Sensor, Vec<(f64, f64)>);
 
-/// What all sonars saw but the one at `place`.
 fn others(all: &[Seen<'_>], place: usize) -> Profile {
     let others = all.iter().enumerate().filter(|(other, _)| *other != place);
     Profile::of(others.flat_map(|(_, (_, seen))| seen.iter().copied()))
 }
 
-/// Mean difference of what the sonars saw at the same bearings, metres; none for fewer than three, or where they saw little.
+/// Returns the mean disagreement of sonars at the same bearings, metres; `None` for fewer than
+/// three, or with few echoes.
 fn disagreement(all: &[Seen<'_>]) -> Option<f64> {
     let each =
         all.iter().enumerate().map(|(place, (_, seen))| others(all, place).difference(seen, 0));
     mean(&each.flatten().collect::<Vec<f64>>(), 2).filter(|_| all.len() > 2)
 }
 
-/// The turns over those by the wheels at which the sonars agree best.
+/// Ratio of true and wheel turns at which the sonars agree best.
 #[derive(Clone, Copy, Debug)]
 struct Turn {
-    /// None if they agree as well the other way round.
+    /// `None` if both directions agree equally.
     turns_back: Option<bool>,
-    /// None if the sonars agree at the turns that the wheels say, or at none.
+    /// `None` if the sonars agree at the wheels' turns, or at no scale.
     scale: Option<f64>,
     agrees: bool,
 }
 
 impl Turn {
-    /// `differs` gives the disagreement of the sonars at a scale of the wheels' turns.
+    /// Finds the best scale; `differs` returns the disagreement of the sonars at a scale of the
+    /// wheels' turns.
     fn best(differs: impl Fn(f64) -> Option<f64>) -> Option<Self> {
         let scales = (-SCALES..=SCALES).map(|power| SCALE_RATIO.powi(power));
         let each = scales.flat_map(|scale| [scale, -scale]);
@@ -353,7 +357,8 @@ pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves 
     });
     let rims_m = mission.body().track_m / 2.0;
     let turned_m = |[angle, _]: [f64; 2]| angle * rims_m;
-    // A wheel that turns backwards drives the body where it is told to turn. Sonars that agree on a turn saw one.
+    // A reversed wheel makes the body drive when commanded to turn. Sonars that agree on a turn saw
+    // one.
     let mut driven = [Told::TurnLeft, Told::TurnRight].into_iter().filter_map(|told| {
         let share = share_of_way(mission, trace, motion, told, turned_m)?;
         (0.5..2.0).contains(&share.abs()).then_some(share)
@@ -373,7 +378,6 @@ pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves 
     }
 }
 
-/// The gyro by what the laser saw, or else by the wheels.
 pub(crate) fn gyro_finding(
     mission: &Mission,
     gyro: Option<&Gyro>,
@@ -407,7 +411,7 @@ fn bearing(reference: &Profile, sensor: &Sensor, seen: &[(f64, f64)]) -> Option<
     let turned = |bins: usize| Some((reference.difference(seen, bins)?, bins));
     let (least, bins) = (0..BINS).filter_map(turned).min_by(|a, b| a.0.total_cmp(&b.0))?;
     let beside = bins.min(BINS - bins);
-    // Where the wheels' sizes are wrong no bearing fits.
+    // With wrong wheel sizes no bearing fits.
     let fits = least < LEAST_DIFFERENCE_M.min(EXPLAINS * stated);
     if stated < LEAST_DIFFERENCE_M || !fits || beside < BESIDE_BINS {
         return None;
@@ -424,7 +428,7 @@ fn bearing(reference: &Profile, sensor: &Sensor, seen: &[(f64, f64)]) -> Option<
     )
 }
 
-/// Where the echoes ended by the motion that the wheels count, metres from the first place.
+/// Returns the ends of echoes by the wheels' motion, metres from the first place.
 pub(crate) fn echoes(mission: &Mission, trace: &Trace, motion: &Motion) -> Vec<DVec2> {
     let table = mission.sensor_table();
     let (mut at, mut before_m) = (DVec2::ZERO, 0.0);
@@ -442,8 +446,10 @@ pub(crate) fn echoes(mission: &Mission, trace: &Trace, motion: &Motion) -> Vec<D
     points
 }
 
-/// The way by the front sonar's echo over `way` by the wheels, in the legs in which the robot is told so; less than 0 for a way back. None
-/// if the echo shows none.
+/// Returns the motion by the front sonar over `way` by the wheels, in legs of this command;
+/// negative for a reversed one.
+///
+/// Returns `None` if the echo shows no motion.
 fn share_of_way(
     mission: &Mission,
     trace: &Trace,

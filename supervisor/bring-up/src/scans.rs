@@ -1,10 +1,13 @@
-//! The body's motion and the laser's mounting that place all scans on the first one.
+//! Body motion and laser mounting that align all scans with the first one.
 //!
-//! The scans of the robot at rest make a reference, a range for each bearing. Each later beam ends somewhere in the room: where, follows
-//! from the motion by the wheels and from the unknowns below. Seen from the laser's first place it should end where the reference does.
-//! Gauss-Newton with weights that fall for what the reference does not show makes the differences least, first for the scans near the
-//! beginning, then for all. It starts from eight directions of the laser, with the turns as the wheels say and the other way round, and
-//! with turning and driving exchanged, as one reversed wheel does.
+//! The scans at rest form a reference, a range for each bearing. The end of each later beam follows
+//! from the wheels' motion and the unknowns below. Seen from the laser's first place it should
+//! match the reference.
+//!
+//! Gauss-Newton minimises the differences. Its weights fall for points off the reference. It takes
+//! the scans near the beginning first, then all. It starts from eight directions of the laser, with
+//! turns as counted and reversed. It also starts with turning and driving exchanged, as one
+//! reversed wheel does.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -20,8 +23,9 @@ use crate::{
     wheels::Motion,
 };
 
-/// The unknowns, and how far from 0 they may well be: the laser's yaw, radians, and place, metres; the age of its scans beyond what they
-/// say, seconds; the logarithms of true turn and way over the wheels'; turn per metre, radians.
+/// Unknowns and their prior deviations from 0: the laser's yaw, radians, and place, metres; the age
+/// of its scans beyond their stamps, seconds; the logarithms of true turn and distance over the
+/// wheels'; turn per metre, radians.
 const UNKNOWNS: usize = 7;
 const PRIOR: [f64; UNKNOWNS] = [3.0, 0.2, 0.2, 0.5, 0.3, 0.3, 0.3];
 const YAW: usize = 0;
@@ -33,26 +37,27 @@ const WAY: usize = 5;
 const CURL: usize = 6;
 /// Steps of the numerical derivatives.
 const STEPS: [f64; UNKNOWNS] = [1e-3, 1e-3, 1e-3, 2e-3, 1e-3, 5e-3, 5e-3];
-/// The turn by the wheels up to which scans are placed, radians, the distance at which a point counts half, metres, and rounds.
+/// Stages: greatest wheel turn of the scans, radians; distance at which a point counts half,
+/// metres; rounds.
 const STAGES: [(f64, f64, usize); 4] =
     [(0.7, 0.4, 6), (2.5, 0.2, 6), (f64::INFINITY, 0.1, 8), (f64::INFINITY, 0.04, 8)];
 const STARTS: usize = 8;
-/// While a solution is looked for, all scans up to such a turn, radians, and about so many others are placed, and so many beams of each;
-/// while it is made exact, so many beams of all scans.
+/// Sampling during the search: all scans up to this turn, radians, about so many others, and so
+/// many beams of each. The refinement takes all scans with `BEAMS` beams.
 const EARLY: f64 = 2.5;
 const SCANS: usize = 60;
 const FEW_BEAMS: usize = 30;
 const BEAMS: usize = 90;
-/// A point so near the reference is placed, metres.
+/// Distance from the reference within which a point counts as placed, metres.
 const PLACED_M: f64 = 0.08;
 const LEAST_PLACED: f64 = 0.6;
-/// The share at which no other solution is looked for, and how much of it a logarithm of turn or way over the wheels' takes: a turn the
-/// other way round that is longer ends at the same heading.
+/// Share of placed points that ends the search, and its loss per logarithm of turn or distance over
+/// the wheels'. Without the loss, a longer turn the other way round could end at the same heading.
 const CERTAIN: f64 = 0.93;
 const UNLIKELY: f64 = 0.25;
-/// What is told: an angle, radians, a distance, metres, a time, seconds, and shares.
+/// Least reported deviations: an angle, radians, a distance, metres, a time, seconds, and shares.
 const YAW_TOLD: f64 = 4.0 * PI / 180.0;
-/// A laser that looks back within this may as well be on a robot that drives back.
+/// Angle within which a laser that looks back may also be on a robot that drives back.
 const BACK_RAD: f64 = 10.0 * PI / 180.0;
 const PLACE_TOLD_M: f64 = 0.05;
 const AGE_TOLD_S: f64 = 0.06;
@@ -62,19 +67,19 @@ type Unknowns = SVector<f64, UNKNOWNS>;
 
 #[derive(Clone, Copy)]
 struct Hypothesis {
-    /// It turns against the wheels, as it seems to the laser.
+    /// Whether it seems to the laser to turn against the wheels.
     turns_back: bool,
-    /// It drives where the wheels say that it turns, and turns where they say that it drives.
+    /// Whether it drives where the wheels turn, and turns where they drive.
     exchanged: bool,
 }
 
-/// The scans in one frame, in which the robot stood at the origin first.
+/// Scans in one frame, whose origin is the robot's first place.
 pub(crate) struct Placed {
     hypothesis: Hypothesis,
     unknowns: Unknowns,
     share: f64,
     row: usize,
-    /// Where the beams ended, metres.
+    /// Ends of the beams, metres.
     pub(crate) points: Vec<DVec2>,
     poses: Vec<(f64, [f64; 3])>,
 }
@@ -84,13 +89,15 @@ impl Placed {
         self.share >= LEAST_PLACED
     }
 
-    /// It seems to the laser that the body drives back.
+    /// Returns whether the body seems to the laser to drive back.
     fn seems_back(&self) -> bool {
         PI - self.unknowns[YAW].abs() < BACK_RAD
     }
 
-    /// A laser upside down or looking back sees what motors that are swapped or reversed show, but for turns that drive. A gyro, if it turns
-    /// with the wheels, tells which.
+    /// Returns the body's motion.
+    ///
+    /// A laser upside down or looking back sees the same as swapped or reversed motors, except for
+    /// turns that drive. A gyro that turns with the wheels decides.
     pub(crate) fn moves(&self, gyro: Option<&Gyro>) -> Moves {
         let Hypothesis { turns_back, exchanged } = self.hypothesis;
         let scale = |it: usize| Some(self.unknowns[it].exp());
@@ -124,11 +131,11 @@ struct Problem<'a> {
     motion: &'a Motion,
     track_m: f64,
     header: ScanHeader,
-    /// Ranges of the robot at rest; not finite for nothing.
+    /// Ranges at rest; not finite without an echo.
     reference: Vec<f64>,
     /// All scans since it moved, each with the wheels' turn until then.
     scans: Vec<(usize, f64)>,
-    /// Of later scans one in so many is placed.
+    /// Interval of later scans that are placed.
     every: usize,
     beams_of_each: usize,
 }
@@ -189,7 +196,8 @@ impl<'a> Problem<'a> {
         DVec2::new(self.header.x_m + unknowns[X], self.header.y_m + unknowns[Y])
     }
 
-    /// Where the beams end in the frame of the first pose; none for beams without an end. The order does not depend on the unknowns.
+    /// Returns the beam ends in the frame of the first pose; `None` for beams without an end. The
+    /// order is independent of the unknowns.
     fn ends(
         &self,
         hypothesis: Hypothesis,
@@ -199,7 +207,7 @@ impl<'a> Problem<'a> {
         let poses = self.poses(hypothesis, unknowns);
         let laser = self.laser(unknowns);
         let mut ends = Vec::new();
-        // The beams of a scan that says nothing of its sweep have one pose.
+        // Beams of a scan without sweep times share one pose.
         let mut held = (f64::NAN, DVec2::ZERO, DVec2::X);
         let is_placed = |(number, (_, turned)): &(usize, &(usize, f64))| {
             *turned <= most_turn && (*turned <= EARLY || number.is_multiple_of(self.every))
@@ -223,7 +231,8 @@ impl<'a> Problem<'a> {
         ends
     }
 
-    /// How much farther than the reference a point is from the laser's first place, metres.
+    /// Returns the distance of a point beyond the reference, seen from the laser's first place,
+    /// metres.
     fn beyond(&self, end: DVec2, unknowns: &Unknowns) -> Option<f64> {
         let seen = end - self.laser(unknowns);
         let along = seen.to_angle() - unknowns[YAW] - self.header.first_rad;
@@ -247,7 +256,7 @@ impl<'a> Problem<'a> {
         ends.into_iter().map(|end| self.beyond(end?, unknowns)).collect()
     }
 
-    /// A round of Gauss-Newton; points at `half_m` count half.
+    /// Does a round of Gauss-Newton; points at `half_m` count half.
     fn improve(
         &self,
         hypothesis: Hypothesis,
@@ -281,7 +290,7 @@ impl<'a> Problem<'a> {
         }
         for it in 0..UNKNOWNS {
             normal[(it, it)] += PRIOR[it].powi(-2);
-            // The yaw starts anywhere.
+            // The yaw may start anywhere, so its prior exerts no pull.
             right[it] -= if it == YAW { 0.0 } else { unknowns[it] * PRIOR[it].powi(-2) };
         }
         if let Some(change) = normal.cholesky().map(|it| it.solve(&right)) {
@@ -290,17 +299,17 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The share of all points that lie on the reference, among those that it shows.
+    /// Returns the share of points on the reference, among those that it shows.
     fn placed(&self, hypothesis: Hypothesis, unknowns: &Unknowns) -> f64 {
         let residuals = self.residuals(hypothesis, unknowns, f64::INFINITY);
         let shown = residuals.iter().flatten().count();
         let placed = residuals.iter().flatten().filter(|it| it.abs() <= PLACED_M).count();
-        // A solution that turns the points away from what the reference shows is none.
+        // Solutions that turn most points away from the reference do not count.
         placed as f64 / shown.max(residuals.len() / 3).max(1) as f64
     }
 }
 
-/// Place the scans of the first laser; none without scans from before the robot moved and after.
+/// Places the scans of the first laser; `None` without scans before and after the robot moved.
 pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option<Placed> {
     let mut problem = Problem::new(trace, motion, mission.body().track_m)?;
     let mut best: Option<(f64, Hypothesis, Unknowns)> = None;
@@ -309,7 +318,7 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
         .into_iter()
         .flat_map(|exchanged| both.map(|turns_back| Hypothesis { turns_back, exchanged }));
     let mut starts = hypotheses.flat_map(|it| (0..STARTS).map(move |start| (it, start)));
-    // What places nearly all points needs no other start.
+    // A solution that places nearly all points ends the search.
     while best.as_ref().is_none_or(|(likely, ..)| *likely < CERTAIN)
         && let Some((hypothesis, start)) = starts.next()
     {
@@ -322,7 +331,7 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
         }
         let share = problem.placed(hypothesis, &unknowns);
         let likely = share - UNLIKELY * (unknowns[TURN].abs() + unknowns[WAY].abs());
-        // As good is not better: the robot is as stated unless the scans say otherwise.
+        // Another solution must be better, so that the stated robot wins ties.
         if best.as_ref().is_none_or(|(most, ..)| likely > most + 0.03) {
             best = Some((likely, hypothesis, unknowns));
         }
@@ -345,7 +354,6 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
     })
 }
 
-/// What the placed scans say of the laser and of the wheels' sizes.
 pub(crate) fn findings(
     mission: &Mission,
     trace: &Trace,
@@ -374,7 +382,7 @@ pub(crate) fn findings(
     if moves.exchanged {
         return found;
     }
-    // What the motors explain is not the laser's.
+    // The laser is not blamed for what the motors explain.
     let seen_back = placed.hypothesis.turns_back && moves.turns_back != Some(true);
     let looks_back = placed.seems_back() && moves.drives_back != Some(true);
     let or_motors = format!(
@@ -399,7 +407,7 @@ pub(crate) fn findings(
     let mount = sensor.mount;
     let off = DVec2::new(it[X], it[Y]);
     let yaw = it[YAW];
-    // Nobody knows where a laser stands and looks that may be upside down or look back.
+    // If the laser may be upside down or look back, its place and direction are unknown.
     let is_known = (!seen_back || gyro.is_some()) && !placed.seems_back();
     let (turns, stands) =
         (is_known && yaw.abs() > YAW_TOLD, is_known && off.length() > PLACE_TOLD_M);
@@ -407,7 +415,8 @@ pub(crate) fn findings(
     if stands {
         let at = DVec2::from_angle(bearing_rad) * mount.forward_m + off;
         let aside = wrap_angle(at.to_angle() - bearing_rad);
-        // A place behind the centre is ahead of it by less than nothing, so that the bearing hardly changes.
+        // A place behind the centre gets a negative `forward_m`, so that the bearing hardly
+        // changes.
         let behind = aside.abs() > FRAC_PI_2;
         bearing_rad = wrap_angle(at.to_angle() + if behind { PI } else { 0.0 });
         let forward_m = if behind { -at.length() } else { at.length() };

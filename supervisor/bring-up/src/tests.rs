@@ -16,7 +16,6 @@ use super::*;
 const BEAMS: usize = 180;
 const RATE_HZ: f64 = 10.0;
 
-/// How a robot differs from what its mission says.
 #[derive(Clone, Copy)]
 struct Robot {
     yaw_rad: f64,
@@ -24,11 +23,11 @@ struct Robot {
     late_s: f64,
     track: f64,
     wheel: f64,
-    /// The right wheel's diameter over the left one's.
+    /// Diameter of the right wheel over the left one's.
     ratio: f64,
-    /// Which wheel each encoder follows, and in which direction it counts.
+    /// Wheel that each encoder follows, and its direction of count.
     encoders: Wires,
-    /// As which wheel is told each goes, and in which direction.
+    /// Command that each motor follows, and its direction.
     motors: Wires,
     laser_m: f64,
 }
@@ -38,7 +37,6 @@ type Wires = [(usize, f64); 2];
 const AS_STATED: Wires = [(0, 1.0), (1, 1.0)];
 const SWAPPED: Wires = [(1, 1.0), (0, 1.0)];
 
-/// What comes through `wires`.
 fn through(wires: Wires, values: [f64; 2]) -> [f64; 2] {
     wires.map(|(from, sign)| sign * values[from])
 }
@@ -60,7 +58,7 @@ fn mission() -> Mission {
     Mission::parse(text, Path::new("m.toml")).unwrap()
 }
 
-/// Three sonars, and counts that only a driver knows.
+/// A robot with three sonars, and counts that only a driver knows.
 fn with_sonars() -> Mission {
     let mut text = "target = [1, 0]\n[robot]\nmodel = 'x80'\nrate_hz = 10.0\n".to_owned();
     for (channel, bearing) in [(0, 0), (1, 40), (2, -40)] {
@@ -71,7 +69,8 @@ fn with_sonars() -> Mission {
     Mission::parse(&text, Path::new("m.toml")).unwrap()
 }
 
-/// Range from `at` along `along` in a room whose walls stand 1.4 m ahead, 1.9 m behind, 1.6 m to the left and 1.2 m to the right.
+/// Range from `at` along `along` in a room with walls 1.4 m ahead, 1.9 m behind, 1.6 m to the left
+/// and 1.2 m to the right.
 fn range(at: DVec2, along: DVec2) -> f64 {
     let walls = [
         (1.4, at.x, along.x),
@@ -84,11 +83,9 @@ fn range(at: DVec2, along: DVec2) -> f64 {
     ends.fold(f64::INFINITY, f64::min)
 }
 
-/// The trace of `robot` in the room; without lag or noise.
 fn trace(mission: &Mission, robot: Robot) -> Trace {
     let track_m = mission.body().track_m;
     let turn = |side: f64| [-side * 0.12, side * 0.12];
-    // Seconds, and the speeds of the rims.
     let mut legs = vec![
         (2.5, [0.0; 2]),
         (8.0, turn(1.0)),
@@ -140,7 +137,7 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
         }
     }
     trace.sent = trace.told.clone();
-    // The driver drops a gyro that turns otherwise than the wheels by their counts.
+    // The driver drops a gyro that contradicts the wheels' counts.
     let by_counts = |it: usize| {
         let [now, before] = [trace.rolled[it].1, trace.rolled[it - 1].1];
         (now[1] - before[1] - now[0] + before[0]) / track_m
@@ -225,7 +222,7 @@ fn a_laser_upside_down_sees_a_larger_wheel_on_the_other_side() {
     let robot = Robot { ratio: 1.06, mirrored: true, ..RIGHT };
     let ratio = key(robot, "robot.odometry.diameter_ratio");
     assert!((ratio - 1.06).abs() < 0.02, "{ratio}");
-    // Motors that are swapped see it on this side.
+    // With swapped motors the deviation is on this side.
     let (found, _) = findings(&mission(), &without_gyro(trace(&mission(), robot)), false);
     let ratio = found.iter().find(|it| it.part == "wheel ratio").unwrap();
     assert!(ratio.verdict == Verdict::Wrong && ratio.keys.is_empty(), "{found:?}");
@@ -236,7 +233,7 @@ fn an_encoder_that_counts_nothing_is_named() {
     assert_eq!(wrong(Robot { encoders: [(0, 0.0), (1, 1.0)], ..RIGHT })[0], "wheels");
 }
 
-/// Both wires as they are or swapped, each in one of two directions.
+/// Both wires straight or swapped, each in one of two directions.
 fn all_wires() -> impl Iterator<Item = Wires> {
     (0..8).map(|bits: usize| {
         let sign = |bit: usize| if bits & bit == 0 { 1.0 } else { -1.0 };
@@ -245,7 +242,8 @@ fn all_wires() -> impl Iterator<Item = Wires> {
     })
 }
 
-/// Names of what must be wrong with `robot`, in which the motors are told if `is_told`, and the keys that mend an X80.
+/// Returns the parts wrong with `robot`, whose motors are determined if `is_told`, and the keys
+/// that mend an X80.
 fn expected(robot: Robot, mission: &Mission, is_told: bool) -> (Vec<&'static str>, Vec<Channel>) {
     let probe = [1.0, 2.0];
     let as_told = through(robot.encoders, through(robot.motors, probe)) == probe;
@@ -262,7 +260,7 @@ fn expected(robot: Robot, mission: &Mission, is_told: bool) -> (Vec<&'static str
     (parts, if as_told && is_told { mended.to_vec() } else { stated.to_vec() })
 }
 
-/// The channels of `mission` with the keys of `found`.
+/// Returns the channels of `mission` with the keys of `found`.
 fn with_keys(mission: &Mission, found: &[Finding]) -> Vec<Channel> {
     let keys: Vec<_> = found.iter().flat_map(|it| &it.keys).collect();
     let of = |side: &str, stated: Channel| {
@@ -282,7 +280,7 @@ fn wrong_parts(found: &[Finding]) -> Vec<&str> {
     found.iter().filter(|it| it.verdict == Verdict::Wrong).map(|it| it.part.as_str()).collect()
 }
 
-/// One wheel alone turns backwards: the body drives where it is told to turn.
+/// Returns whether a single wheel turns backwards, so that the body drives when commanded to turn.
 fn exchanges(motors: Wires) -> bool {
     motors[0].1 != motors[1].1
 }
@@ -303,7 +301,7 @@ fn sonars_tell_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecide
 fn a_laser_tells_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecided() {
     let mission = mission();
     for motors in all_wires() {
-        // The encoders are wired as the motors, or right, or otherwise.
+        // The encoders are wired like the motors, correctly, or otherwise.
         for encoders in [motors.map(|(_, sign)| sign), [1.0, 1.0], [-1.0, 1.0]] {
             let encoders = [0, 1].map(|it| (motors[it].0, encoders[it]));
             let robot = Robot { motors, encoders, ..RIGHT };

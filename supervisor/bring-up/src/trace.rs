@@ -1,4 +1,4 @@
-//! What was told, counted and seen while the robot went through the procedure.
+//! Commands, counts and readings of the procedure.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use common::{
 };
 use recording::{Recording, RecordingError};
 
-/// The parts of the procedure differ by what the robot is told.
+/// Command by which the parts of the procedure differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
     Stand,
@@ -19,23 +19,24 @@ pub enum Told {
     Drive,
 }
 
-/// Times are mission time, seconds.
+/// Recorded data. Times are mission time, seconds.
 #[derive(Debug, Default)]
 pub struct Trace {
-    /// Way of the left and the right rim since the beginning by the counts, metres, with nominal wheels.
+    /// Distances of the left and the right rim since the beginning by the counts, metres, with
+    /// nominal wheels.
     pub rolled: Vec<(f64, [f64; 2])>,
-    /// Speeds of the rims as told, m/s.
+    /// Commanded speeds of the rims, m/s.
     pub told: Vec<(f64, [f64; 2])>,
-    /// What the link made of it, when it sent that.
+    /// Commands that the link sent, at the time of sending.
     pub sent: Vec<(f64, [f64; 2])>,
-    /// Turn by the gyro since the tick before, radians counter-clockwise, where it is known.
+    /// Gyro turn since the previous tick, radians counter-clockwise, where known.
     pub gyro: Vec<(f64, f64)>,
-    /// The readings of a tick, a row of the mission's table each.
+    /// Readings of a tick, one per row of the mission's table.
     pub ranges: Vec<(f64, Vec<RangeReading>)>,
     pub scans: Vec<(f64, ScanHeader, Vec<f32>)>,
 }
 
-/// A stretch of time in which the robot is told one thing.
+/// Stretch of time with one command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
     pub told: Told,
@@ -53,9 +54,9 @@ impl Leg {
     }
 }
 
-/// A wheel that rolls no farther rests, metres.
+/// Distance below which a wheel rests, metres.
 const RESTS_M: f64 = 0.02;
-/// Slower rims are told to stand, m/s.
+/// Rim speed below which the command is to stand, m/s.
 const STANDS_M_S: f64 = 0.005;
 
 impl Told {
@@ -70,10 +71,10 @@ impl Told {
 }
 
 impl Trace {
-    /// What `recording` holds, by the sizes that `mission` states.
+    /// Reads `recording` with the sizes stated by `mission`.
     ///
     /// # Errors
-    /// The recording cannot be read.
+    /// Fails if the recording cannot be read.
     pub fn read(mission: &Mission, recording: &Recording) -> Result<Self, RecordingError> {
         let body = mission.body();
         let scales = mission.robot.odometry.wheel_scales();
@@ -121,7 +122,7 @@ impl Trace {
         let mut before = None;
         for turn in recording.samples(&IMU_TURN)? {
             let turn = turn?.sample;
-            // A number that is left out is that of a turn that is not known.
+            // A gap in the sequence numbers marks an unknown turn.
             if before.replace(turn.sequence) == turn.sequence.checked_sub(1) {
                 trace.gyro.push((turn.stamp.time().seconds(), turn.turn_rad));
             }
@@ -137,7 +138,8 @@ impl Trace {
         Ok(trace)
     }
 
-    /// The legs in their order. The first begins with the trace, because no command comes before the robot moves.
+    /// Returns the legs in order. The first begins with the trace, because no command comes before
+    /// the robot moves.
     pub fn legs(&self) -> Vec<Leg> {
         let begins = self.rolled.first().map_or(0.0, |(at, _)| *at);
         let ends = self.rolled.last().map_or(0.0, |(at, _)| *at);
@@ -154,7 +156,7 @@ impl Trace {
         legs
     }
 
-    /// A recording that lacks the beginning begins in a turn.
+    /// Returns whether the trace begins at rest. One that lacks the beginning begins in a turn.
     pub fn begins_at_rest(&self) -> bool {
         let until = self.rest_until_s();
         let (first, last) = (self.rolled.first(), self.rolled.iter().rfind(|it| it.0 < until));
@@ -162,13 +164,13 @@ impl Trace {
         went.is_none_or(|went| went.iter().all(|it| it.abs() < RESTS_M))
     }
 
-    /// The time until which the robot has not been told to move.
+    /// Returns the time of the first command to move.
     pub fn rest_until_s(&self) -> f64 {
         self.legs().first().map_or(0.0, |rest| rest.until_s)
     }
 }
 
-/// A value between the two that `at_s` lies between, or the nearest; none without values.
+/// Interpolates at `at_s`, or takes the nearest value; `None` without values.
 pub(crate) fn between<const N: usize>(values: &[(f64, [f64; N])], at_s: f64) -> Option<[f64; N]> {
     let after = values.partition_point(|(at, _)| *at < at_s);
     let (later, earlier) = (values.get(after).or(values.last())?, values.get(after.max(1) - 1)?);

@@ -1,4 +1,4 @@
-//! Which wheel counts what it is told, and how fast the base answers.
+//! Commands that each encoder follows, and the response of the base.
 
 use calibration::response;
 use common::mission::Mission;
@@ -10,13 +10,14 @@ use crate::{
     trace::{Told, Trace, between},
 };
 
-/// A base of any response goes as told by then, seconds after it was told.
+/// Time for a base of any response to follow a command, seconds.
 const SETTLED_S: f64 = 1.0;
-/// A wheel that counts less of what it is told counts nothing, and another wheel's share that is less is noise.
+/// Least share of a command that counts. A wheel below it counts nothing; another wheel's share
+/// below it is noise.
 const LEAST_SHARE: f64 = 0.15;
-/// Shares of what they were told by which the two wheels may differ.
+/// Greatest difference of the two wheels' shares.
 const ALIKE: f64 = 0.1;
-/// Rates of motor frames differ from the stated one by this share at most.
+/// Greatest deviation of the motor-frame rate from the stated one, a share.
 const RATE_SHARE: f64 = 0.2;
 
 pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
@@ -32,20 +33,21 @@ pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
     }
 }
 
-/// By how much each wheel counts what each was told.
+/// Dependence of each wheel's counts on each command.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct Wheels {
-    /// Rows are the wheels that count, columns the wheels that were told; left and right.
+    /// Rows are counting wheels, columns commanded wheels; left and right.
     counted: Matrix2<f64>,
-    /// It was told to turn and to drive for long enough.
+    /// Whether the commands to turn and to drive lasted long enough.
     is_told: bool,
 }
 
-/// Turn and way of the body by the wheels, as if they counted what they were told: angle, radians, and way, metres.
+/// Body motion by the wheels, as if they counted their commands: angle, radians, and distance,
+/// metres.
 pub(crate) type Motion = Vec<(f64, [f64; 2])>;
 
 impl Wheels {
-    /// Least squares over all moments at which the base had time to answer.
+    /// Fits by least squares over all moments at which the base had time to answer.
     pub(crate) fn of(trace: &Trace) -> Self {
         let (mut squares, mut products) = (Matrix2::zeros(), Matrix2::zeros());
         let legs = trace.legs();
@@ -57,7 +59,7 @@ impl Wheels {
                 if let Some(before) = before
                     && let Some(told) = between(&trace.sent, before.0)
                 {
-                    // Frames that a busy machine takes late and close together weigh less.
+                    // Late frames close together, as on a busy machine, weigh less.
                     let told = Vector2::from(told);
                     squares += told * told.transpose() * (now.0 - before.0);
                     products += (Vector2::from(now.1) - Vector2::from(before.1)) * told.transpose();
@@ -65,14 +67,15 @@ impl Wheels {
                 before = Some(now);
             }
         }
-        // Turns and ways alone tell the two wheels apart.
+        // Only turns together with drives separate the wheels.
         let is_told = squares.determinant() > 1e-6 * squares[(0, 0)] * squares[(1, 1)];
         let inverse = squares.try_inverse().filter(|_| is_told);
         let counted = inverse.map_or_else(Matrix2::identity, |inverse| products * inverse);
         Self { counted, is_told: inverse.is_some() }
     }
 
-    /// In each row, an encoder's, 1 at the wheel that it follows as told, or -1 if it counts backwards; 0 for one that counts nothing.
+    /// Returns the wheel that each encoder follows. Each row, an encoder's, has 1 in the column of
+    /// its wheel, or -1 if it counts backwards. A dead encoder has zeros.
     fn follows(&self) -> Matrix2<f64> {
         Matrix2::from_fn(|row, column| {
             let (share, other) = (self.counted[(row, column)], self.counted[(row, 1 - column)]);
@@ -81,7 +84,7 @@ impl Wheels {
         })
     }
 
-    /// `motors` are the wheels that go as each is told, if that was seen.
+    /// Returns the finding; `motors` has the wheels that follow each command, if observed.
     pub(crate) fn finding(&self, motors: Option<Matrix2<f64>>) -> Finding {
         if !self.is_told {
             let text = "it moved for too short a time: was something within 0.2 m of its front, or what stopped it? Look at the logs of the run, and give it more room";
@@ -89,7 +92,7 @@ impl Wheels {
         }
         let [left, right] = [0, 1].map(|row| self.counted.row(row).amax());
         let follows = self.follows();
-        // Encoders that count as told are as right or wrong as the motors.
+        // Encoders that count their commands are as right or wrong as the motors.
         let (encoders, or_motors) = match motors {
             _ if self.is_as_told() => (follows, ""),
             Some(motors) => (follows * motors.transpose(), ""),
@@ -112,7 +115,7 @@ impl Wheels {
         Finding::wrong("wheels", format!("{text}: {why}"))
     }
 
-    /// The encoders count what each wheel is told.
+    /// Returns whether each encoder counts its wheel's command.
     pub(crate) fn is_as_told(&self) -> bool {
         self.follows() == Matrix2::identity()
     }
@@ -127,7 +130,7 @@ impl Wheels {
     }
 }
 
-/// Delay and acceleration of the base against the stated ones.
+/// Compares delay and acceleration of the base with the stated ones.
 pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Finding {
     let body = mission.body();
     let turn = |(at, told): &(f64, [f64; 2])| (*at, (told[1] - told[0]) / body.track_m);
@@ -165,9 +168,10 @@ pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Fin
     finding
 }
 
-/// A delay that is so many periods of the motor frames longer than stated is told: a busy machine adds half of one.
+/// Least excess of the delay that is reported, in periods of motor frames. A busy machine adds half
+/// of one.
 const DELAY_FRAMES: f64 = 0.75;
-/// An acceleration below this share of the stated one is told, if it is less than [`STRONG_M_S2`].
+/// Share of the stated acceleration below which an acceleration under [`STRONG_M_S2`] is reported.
 const WEAKER: f64 = 0.8;
-/// Turns on the spot at their speed do not tell greater accelerations from none.
+/// Acceleration beyond which turns on the spot show no limit.
 const STRONG_M_S2: f64 = 3.0;

@@ -1,37 +1,39 @@
-//! Ratio and track from ways and turns between two rests, by a gyro. Pure.
+//! Ratio and track from distances and turns between two rests, by a gyro. Pure.
 //!
-//! The equation is that of [`crate::loops`] with the gyro's turn, less its bias, in place of whole turns. The bias is the mean at rest before,
-//! and the noise is how much the gyro scatters there. An error of the gyro's scale is common to all motions: the ratio, which ways show on
-//! which the robot hardly turns, does not notice it, and no number of turns tells it from one of the track, whose deviation has it.
+//! The equation is that of [`crate::loops`] with the gyro's turn, less its bias, in place of whole
+//! turns. The rest before gives the bias (mean) and the noise (scatter).
+//!
+//! An error of the gyro's scale is common to all motions. It does not affect the ratio, which
+//! follows from drives with hardly any turn. No number of turns separates it from an error of the
+//! track, so the track's deviation includes it.
 
 use nalgebra::DMatrix;
 
 use crate::loops::{Estimate, Refusal, Rows};
 
-/// Between two rests.
+/// Motion between two rests.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Motion {
-    /// Nominal ways, forward less backward.
+    /// Nominal distances, forward less backward.
     pub left_m: f64,
     pub right_m: f64,
-    /// Both wheels together, whichever way they rolled.
+    /// Sum of both wheels' distances.
     pub rolled_m: f64,
-    /// By the gyro, counter-clockwise, with its bias.
+    /// Turn by the gyro, counter-clockwise, including its bias.
     pub turned_rad: f64,
     pub seconds: f64,
 }
 
-/// The ways that must be driven in all, metres, and the turns, radians: less says hardly anything of the ratio, or of the track.
+/// Least total distance, metres, and turn, radians. Less hardly determines the ratio or the track.
 const LEAST_M: f64 = 1.5;
 const LEAST_RAD: f64 = 3.0;
-/// The least time at rest, and seconds at rest for one deviation of the noise.
+/// Least time at rest, seconds.
 const LEAST_REST_S: f64 = 2.0;
 
-/// What a gyro says at rest: times, seconds, and turns, radians, of increments.
 struct Rest {
     seconds: f64,
     bias_rad_s: f64,
-    /// Of a turn, rad^2/s.
+    /// Variance of a turn, rad^2/s.
     noise: f64,
 }
 
@@ -50,11 +52,13 @@ impl Rest {
     }
 }
 
-/// `at_rest` has the seconds and turns of the gyro's increments before the first motion. `scale_sd` is the gyro's, a share, and `track_m`
-/// is nominal.
+/// Estimates ratio and track.
+///
+/// `at_rest` has the seconds and turns of the gyro's increments before the first motion. `scale_sd`
+/// is the deviation of the gyro's scale, a share. `track_m` is nominal.
 ///
 /// # Errors
-/// Says why nothing may be written.
+/// Returns why nothing may be written.
 pub fn checked(
     at_rest: &[(f64, f64)],
     motions: &[Motion],
@@ -88,8 +92,7 @@ mod tests {
 
     const TRACK_M: f64 = 0.3;
 
-    /// The estimate of a robot whose right wheel is larger by `ratio` over 1 on a track of `track` nominal ones, by a gyro with a bias and an
-    /// error of its scale.
+    /// Returns the estimate for wheels of this ratio and track, with gyro bias and scale error.
     fn estimate(
         ratio: f64,
         track: f64,

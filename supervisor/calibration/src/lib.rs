@@ -1,20 +1,21 @@
-//! Calibration: the ratio of a robot's wheels, their track on the ground, and their slip.
+//! Calibration of a robot's wheels: their diameter ratio, the track on the ground, and their slip.
 //!
-//! The planner stage of such a run is [`shell::Shell`]. It orders loops before a wall. The normal of the wall, found
-//! by turning to and fro, shows how far the robot really turned between two visits, and the encoders show how far it
-//! turned by them. The stage saves its findings in each tick, and the command reads them when the run has ended.
+//! In a calibration run, [`shell::Shell`] takes the place of the planner stage and orders loops
+//! before a wall. Sweeps to and fro find the wall's normal. It shows how far the robot really
+//! turned between two visits; the encoders show the nominal turn. The stage saves its findings in
+//! each tick. The command reads them after the run.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`wall`] | the procedure before a wall |
-//! | `ways` | nominal ways from counts |
+//! | [`wall`] | procedure before a wall |
+//! | `ways` | nominal wheel distances from counts |
 //! | `normal` | the wall's normal from a sweep |
-//! | [`loops`] | ratio, track and slip from loops, and refusals |
+//! | [`loops`] | ratio, track and slip from loops; refusals |
 //! | [`gyro`] | ratio and track from a gyro |
 //! | [`squares`] | ratio and track from the ends of squares, measured by tape |
-//! | [`script`] | the procedures of a bring-up, of turns and of squares |
+//! | [`script`] | procedures of a bring-up, turns and squares |
 //! | [`response`] | delay and acceleration from turns to and fro |
-//! | [`shell`] | the process in the planner's place |
+//! | [`shell`] | process in the planner's place |
 
 pub mod gyro;
 pub mod loops;

@@ -1,15 +1,16 @@
 //! Ratio, track and slip from loops that end before the wall they began at. Pure.
 //!
-//! Between two visits the robot really turned by whole turns, k. With the nominal ways l and r of the wheels, e = (rho - 1) / (rho + 1),
-//! the ratio rho of their diameters and the track W tau
+//! Between two visits the robot really turned by whole turns, k. With the nominal distances l and r
+//! of the wheels, e = (rho - 1) / (rho + 1), the ratio rho of their diameters and the track W tau
 //!
 //! ```text
 //! (r - l + e (r + l)) / (W tau) = 2 pi k,   so   e (r + l) / W - 2 pi k tau = -(r - l) / W,
 //! ```
 //!
-//! which is linear in e and tau. The right side is off by slip, with variance q^2 times the way that both wheels rolled, over W^2, and by
-//! the two normals, each of which is shared with the next loop. Weighted least squares with a prior gives e and tau; q has the
-//! likelihood of the residuals, with a prior of its own.
+//! This is linear in e and tau. Slip disturbs the right side with variance q^2 times the distance
+//! that both wheels rolled, over W^2. So do the two normals, each shared with the next loop.
+//! Weighted least squares with a prior gives e and tau. The likelihood of the residuals and a prior
+//! give q.
 
 use std::f64::consts::TAU;
 
@@ -24,42 +25,45 @@ const PRIOR_TRACK: f64 = 0.02;
 /// Median, metres per square root of a metre, and the deviation of the logarithm.
 const PRIOR_SLIP: f64 = 0.002;
 const PRIOR_LN_SLIP: f64 = 1.2;
-/// Considered values, from the least to the greatest by equal factors.
+/// Number of slip values tried, a geometric series.
 const SLIPS: u32 = 60;
 const LEAST_SLIP: f64 = 0.0001;
-/// A floor with more cannot be driven on.
+/// Greatest slip; a floor with more is unfit for driving.
 const MOST_SLIP: f64 = 0.01;
-/// A normal's standard deviation, and the number of sweeps that it is worth.
+/// Prior standard deviation of a normal, and its weight in sweeps.
 const PRIOR_NORMAL_RAD: f64 = 0.01;
 const PRIOR_NORMALS: f64 = 4.0;
 pub const HELD_OUT: usize = 2;
 pub const FEWEST_LOOPS: usize = 6;
-/// The held-out loops lie within so many deviations.
+/// Deviations within which held-out loops must lie.
 const AGREES: f64 = 3.0;
-/// A residual of more deviations is an accident; two such residuals are a fault of the floor or the robot.
+/// Deviations beyond which a residual is an accident. Two accidents are a fault of the floor or the
+/// robot.
 const ACCIDENT: f64 = 5.0;
-/// Per degree of freedom.
+/// Limit per degree of freedom.
 const MOST_CHI2: f64 = 4.0;
 
-/// From one visit to the wall to the next.
+/// Loop from one visit to the wall to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Loop {
-    /// The number among all: loops next to each other share a normal.
+    /// Number among all loops; neighbours share a normal.
     pub number: u32,
-    /// Counter-clockwise positive.
+    /// Turns, counter-clockwise positive.
     pub turns: f64,
-    /// Nominal ways, forward less backward.
+    /// Nominal distances, forward less backward.
     pub left_m: f64,
     pub right_m: f64,
-    /// Both wheels together, whichever way they rolled.
+    /// Sum of both wheels' distances.
     pub rolled_m: f64,
 }
 
-/// Radians, from the differences between the two ways of each sweep.
+/// Returns the deviation of a normal, radians, from the differences between both directions of each
+/// sweep.
 pub fn normal_sd(differences: &[f64]) -> f64 {
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n.max(1.0);
-    // The normal is the mean of both ways: a quarter of the variance of their difference.
+    // The normal is the mean of both directions, so it has a quarter of their difference's
+    // variance.
     let sum = differences.iter().map(|it| (it - mean).powi(2) / 4.0).sum::<f64>();
     let freedom = (n - 1.0).max(0.0);
     ((sum + PRIOR_NORMALS * PRIOR_NORMAL_RAD.powi(2)) / (freedom + PRIOR_NORMALS)).sqrt()
@@ -67,22 +71,22 @@ pub fn normal_sd(differences: &[f64]) -> f64 {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wheels {
-    /// (rho - 1) / (rho + 1).
+    /// Value of (rho - 1) / (rho + 1).
     pub(crate) e: f64,
-    /// tau.
+    /// Value of tau.
     pub(crate) track: f64,
 }
 
 impl Wheels {
     pub const NOMINAL: Self = Self { e: 0.0, track: 1.0 };
 
-    /// The turn for these nominal ways, radians.
+    /// Returns the turn for these nominal distances, radians.
     pub fn turned(self, left_m: f64, right_m: f64, track_m: f64) -> f64 {
         (right_m - left_m + self.e * (right_m + left_m)) / (track_m * self.track)
     }
 }
 
-/// Mean and standard deviation, by the logarithm of the likelihood.
+/// Returns mean and standard deviation of the slip, given the logarithm of the likelihood.
 fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
     let step = (MOST_SLIP / LEAST_SLIP).ln() / f64::from(SLIPS - 1);
     let slips = (0..SLIPS).map(|index| LEAST_SLIP * (step * f64::from(index)).exp());
@@ -104,12 +108,11 @@ fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
 
 #[derive(Debug, PartialEq)]
 pub struct Estimate {
-    /// (rho - 1) / (rho + 1) and tau.
     values: Vector2<f64>,
     covariance: Matrix2<f64>,
     pub slip: f64,
     pub slip_sd: f64,
-    /// In units of its standard deviation, per loop.
+    /// Residual per loop, in its standard deviations.
     pub residuals: Vec<f64>,
     pub chi2_per_dof: f64,
 }
@@ -149,13 +152,13 @@ pub enum Refusal {
 pub(crate) struct Rows {
     design: DMatrix<f64>,
     values: DVector<f64>,
-    /// Variance by slip for q = 1, and covariance by what else is off.
+    /// Variance by slip for q = 1, and covariance by other errors.
     by_slip: DMatrix<f64>,
     otherwise: DMatrix<f64>,
 }
 
 impl Rows {
-    /// Each row is the factors of e and tau, the value, and the variance by slip.
+    /// Each row has the factors of e and tau, the value, and the variance by slip.
     pub(crate) fn new(rows: &[([f64; 2], f64, f64)], otherwise: DMatrix<f64>) -> Self {
         let n = rows.len();
         let by_slip = DVector::from_fn(n, |row, _| rows[row].2);
@@ -190,10 +193,10 @@ impl Rows {
 }
 
 impl Estimate {
-    /// `track_m` is nominal.
+    /// Estimates the wheels from loops; `track_m` is nominal.
     ///
     /// # Errors
-    /// The numbers are not finite.
+    /// Fails if the numbers are not finite.
     pub fn by_loops(loops: &[Loop], normal_sd: f64, track_m: f64) -> Result<Self, Refusal> {
         Self::of(&Rows::by_loops(loops, normal_sd, track_m))
     }
@@ -228,8 +231,10 @@ impl Estimate {
         is_finite.then_some(found).ok_or(Refusal::Singular)
     }
 
+    /// Checks the residuals.
+    ///
     /// # Errors
-    /// The residuals are greater than the noise explains.
+    /// Fails if they exceed what the noise explains.
     pub(crate) fn unless_scattered(self) -> Result<Self, Refusal> {
         match self.chi2_per_dof > MOST_CHI2 {
             true => Err(Refusal::Scattered { chi2_per_dof: self.chi2_per_dof }),
@@ -237,7 +242,7 @@ impl Estimate {
         }
     }
 
-    /// rho: right over left.
+    /// Returns rho: right over left.
     pub fn ratio(&self) -> f64 {
         (1.0 + self.values.x) / (1.0 - self.values.x)
     }
@@ -246,7 +251,7 @@ impl Estimate {
         2.0 * self.covariance[(0, 0)].max(0.0).sqrt() / (1.0 - self.values.x).powi(2)
     }
 
-    /// tau: on the ground over nominal.
+    /// Returns tau: on the ground over nominal.
     pub fn track(&self) -> f64 {
         self.values.y
     }
@@ -259,7 +264,8 @@ impl Estimate {
         Wheels { e: self.values.x, track: self.values.y }
     }
 
-    /// The distance of what was held out from the prediction, in its standard deviations, root mean square.
+    /// Returns the root mean square error of the prediction of held-out values, in standard
+    /// deviations.
     fn deviations(&self, held_out: &Rows) -> f64 {
         let off = &held_out.values - &held_out.design * self.values;
         let by_values = &held_out.design * self.covariance * held_out.design.transpose();
@@ -268,15 +274,18 @@ impl Estimate {
         (square / off.len() as f64).sqrt()
     }
 
+    /// Checks held-out values.
+    ///
     /// # Errors
-    /// What was held out lies elsewhere.
+    /// Fails if they lie far from the prediction.
     pub(crate) fn agrees_with(&self, held_out: &Rows) -> Result<(), Refusal> {
         let deviations = self.deviations(held_out);
-        // A deviation that is no number does not agree.
+        // NaN counts as a contradiction.
         (deviations <= AGREES).then_some(()).ok_or(Refusal::Contradicted { deviations })
     }
 
-    /// Values for `[robot.odometry]`, without provenance. The loops do not tell the distance, which stays as it was.
+    /// Returns values for `[robot.odometry]`, without provenance. Loops do not determine the
+    /// distance scale, so it stays.
     pub fn odometry(&self, before: &Odometry) -> Odometry {
         Odometry {
             diameter_ratio: self.ratio(),
@@ -292,11 +301,12 @@ impl Estimate {
     }
 }
 
-/// The wheels and the loops that were used, if they agree: at most one is an accident, which is left out, and two
-/// that are held out lie where the others predict.
+/// Returns the estimate and the loops used.
+///
+/// At most one accident is left out. The two held-out loops must lie where the others predict.
 ///
 /// # Errors
-/// Says why nothing may be written.
+/// Returns why nothing may be written.
 pub fn checked(
     loops: &[Loop],
     normal_sd: f64,

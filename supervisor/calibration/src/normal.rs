@@ -1,23 +1,25 @@
-//! The normal of a wall from the echoes of a sweep.
+//! Normal of a wall from the echoes of a sweep.
 
 use serde::{Deserialize, Serialize};
 
-/// An echo this near to the median range is of the wall. A rough wall answers over the whole sweep; the next limit
-/// leaves its ends out.
+/// Distances from the median range within which an echo belongs to the wall. A rough wall answers
+/// over the whole sweep; then the next limit leaves its ends out.
 const WITHIN_M: [f64; 3] = [0.12, 0.06, 0.03];
-/// So many readings at either end of a leg must not be of the wall: then the arc that answers is whole.
+/// Readings off the wall required at either end of a leg, to show that the arc is whole.
 const MARGIN: usize = 2;
 const FEWEST: usize = 5;
-/// More readings of one leg are dropped: three times those of the slowest sweep at 7 Hz.
+/// Most readings of a leg, three times those of the slowest sweep at 7 Hz. Further ones are
+/// dropped.
 const MOST: usize = 200;
-/// If both legs' arcs differ more, one was cut short, by a run of silence or by a thing beside the wall.
+/// Greatest difference of both legs' arcs. Beyond it, silence or an object beside the wall cut one
+/// short.
 const UNEQUAL_RAD: f64 = 0.12;
 
-/// A turn to one side, in the order of time: heading and range, metres, NaN without an echo.
+/// Turn to one side, in order of time: heading and range, metres, NaN without an echo.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Leg(Vec<(f64, f64)>);
 
-/// Headings at which the wall begins and ends to answer, radians.
+/// Headings of the first and the last echo of the wall, radians.
 #[derive(Clone, Copy, Debug)]
 struct Arc {
     first: f64,
@@ -59,25 +61,23 @@ impl Leg {
     }
 }
 
-/// The mean of the turns to both sides.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Normal {
     pub(crate) heading: f64,
-    /// Middle of the first turn's arc less that of the second. The age of the ranges makes this the same in each
-    /// sweep; its scatter is that of the normals.
+    /// Middle of the first turn's arc less that of the second. The age of the ranges shifts every
+    /// sweep equally, so the scatter is that of the normals.
     pub(crate) difference: f64,
-    /// The wall's distance from the sonar.
+    /// Distance of the wall from the sonar.
     pub(crate) range_m: f64,
 }
 
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum NoNormal {
-    /// A leg lacks an end of the arc that answers.
+    /// A leg lacks an end of the arc.
     Narrow,
     Unequal,
 }
 
-/// Both legs must have seen the whole arc that answers.
 pub(crate) fn normal(legs: &[Leg; 2]) -> Result<Normal, NoNormal> {
     let [Some(there), Some(back)] = [legs[0].arc(), legs[1].arc()] else {
         return Err(NoNormal::Narrow);
@@ -98,7 +98,8 @@ pub(crate) fn normal(legs: &[Leg; 2]) -> Result<Normal, NoNormal> {
 mod tests {
     use super::*;
 
-    /// A turn from `from` to `to`, with a wall at heading `wall` that answers within `half` to either side, `late` radians behind.
+    /// Returns a turn past a wall at heading `wall`, which answers within `half` to either side,
+    /// `late` radians behind.
     fn leg(from: f64, to: f64, wall: f64, half: f64, late: f64) -> Leg {
         let mut leg = Leg::default();
         for step in 0..=90 {

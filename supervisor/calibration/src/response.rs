@@ -1,7 +1,8 @@
 //! Delay and acceleration of a base, from turns on the spot to and fro.
 //!
-//! The turn rates that were commanded pass through the model of a response, and what is left between its turns and those of the base is
-//! least for the base's own. Each turn and its return give an estimate; their spread is the deviation.
+//! The commanded turn rates pass through a model of the response. The base's own parameters
+//! minimise the remainder between its turns and the model's. Each turn with its return gives an
+//! estimate; their spread is the deviation.
 
 use std::ops::Range;
 
@@ -15,30 +16,31 @@ use crate::script::LEG_S;
 const LONGEST_DELAY_S: f64 = 1.0;
 const COARSE_S: f64 = 0.04;
 const DELAY_STEP_S: f64 = 0.01;
-/// Turn accelerations that are tried, rad/s^2: from the least, each by a tenth more.
+/// Turn accelerations to try, rad/s^2: from the least up, each a tenth greater.
 const LEAST: f64 = 0.2;
 const RATIO: f64 = 1.1;
 const ACCELERATIONS: i32 = 64;
-/// The least share of the turned angles that the response explains.
+/// Least share of the turned angles that the response explains.
 const EXPLAINED: f64 = 0.95;
-/// The estimates that make a deviation.
+/// Fewest estimates for a deviation.
 const FEWEST: usize = 3;
-/// The model goes on in steps of so many seconds.
+/// Time step of the model, seconds.
 const STEP_S: f64 = 0.01;
-/// A pause between two headings is cut into no more.
+/// Most steps within a pause between two headings.
 const MOST_STEPS: f64 = 100.0;
 
-/// What of the model and the base is compared.
+/// Quantity by which model and base are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {
-    /// The turns between frames tell delay and acceleration apart best, but frames that come late on a busy machine change them.
+    /// Turns between frames, which separate delay and acceleration best. Late frames on a busy
+    /// machine disturb them.
     Turns,
-    /// Headings are hardly changed by such frames.
+    /// Headings, which late frames hardly disturb.
     Headings,
 }
 
 impl By {
-    /// An explained share that is less by no more than this is the same.
+    /// Returns the loss of explained share that counts as none.
     const fn as_much(self) -> f64 {
         match self {
             Self::Turns => 1e-3,
@@ -47,27 +49,27 @@ impl By {
     }
 }
 
-/// A value and its standard deviation.
+/// Value and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     pub value: f64,
     pub sd: f64,
 }
 
-/// What the turns say.
 #[derive(Debug, PartialEq)]
 pub struct Estimate {
-    /// With the lag that was stated, seconds.
+    /// Delay, given the stated lag, seconds.
     pub delay_s: Measured,
-    /// Of the rims, m/s^2; none for a base whose speed is limited by no acceleration that the turns show.
+    /// Acceleration of the rims, m/s^2; `None` if the turns show no limit.
     pub acceleration_m_s2: Option<Measured>,
 }
 
-/// The response of a base with `stated` lag and this body. `commands` are times and turn rates, `headings` times and headings, which may be
-/// wrapped.
+/// Estimates the response of this body with its stated lag.
+///
+/// `commands` are times and turn rates. `headings` are times and headings, which may be wrapped.
 ///
 /// # Errors
-/// The motion is not what a base that turns as told would show; the text says what to look for.
+/// Fails if the motion is not that of an obedient base; the text says where to look.
 pub fn estimate(
     commands: &[(f64, f64)],
     headings: &[(f64, f64)],
@@ -80,7 +82,7 @@ pub fn estimate(
     let windows = turns.windows(3).map(|ends| (ends[0], ends[2]));
     let fits = windows.filter_map(|window| Fit::best(commands, headings, (body, by), window));
     let mut fits: Vec<Fit> = fits.filter(|fit| fit.explained >= EXPLAINED).collect();
-    // A busy machine lets the robot stand for a moment in some of the windows.
+    // On a busy machine the robot stands for a moment in some windows.
     fits.sort_by(|one, other| other.explained.total_cmp(&one.explained));
     fits.truncate(FEWEST.max(fits.len().div_ceil(2)));
     if fits.len() < FEWEST {
@@ -96,13 +98,14 @@ pub fn estimate(
         acceleration_m_s2: (2 * limited > fits.len()).then(|| {
             let finite = fits.iter().filter(|fit| fit.acceleration.is_finite());
             let found = measured(finite.map(rims));
-            // The accelerations that were tried are no closer.
+            // The accelerations tried are this coarse.
             Measured { sd: found.sd.max((RATIO - 1.0) / 2.0 * found.value), ..found }
         }),
     })
 }
 
-/// The median of `values`, which are not none, and its standard deviation by their median distance from it.
+/// Returns the median of non-empty `values` and its standard deviation, from their median distance
+/// to it.
 fn measured(values: impl Iterator<Item = f64>) -> Measured {
     let median = |mut values: Vec<f64>| {
         values.sort_by(f64::total_cmp);
@@ -122,7 +125,7 @@ struct Fit {
 }
 
 impl Fit {
-    /// The response that explains the turns of a window of time best; none without turns.
+    /// Returns the response that best explains the turns of a window of time; `None` without turns.
     fn best(
         commands: &[(f64, f64)],
         headings: &[(f64, f64)],
@@ -144,7 +147,7 @@ impl Fit {
             };
             let better = |one: &Self, other: &Self| one.explained.total_cmp(&other.explained);
             let limited = delays.clone().flat_map(limited).max_by(better)?;
-            // It is without a limit, or, of headings, as stated, if that explains as much.
+            // No limit, or for headings the stated one, is preferred if it explains as much.
             let stated = (by == By::Headings).then_some(stated);
             let simple = stated.into_iter().chain([f64::INFINITY]);
             let mut simple = simple.filter_map(|acceleration| {
@@ -158,7 +161,7 @@ impl Fit {
     }
 }
 
-/// A base, as the simulated one is: a delay, and a lag that is limited in acceleration.
+/// Model of a base, like the simulated one: a delay, and a lag of limited acceleration.
 #[derive(Clone, Copy)]
 struct Model {
     delay_s: f64,
@@ -167,8 +170,8 @@ struct Model {
 }
 
 impl Model {
-    /// The square of the correlation of the base's turns with those of the model, within `window`, and their ratio: the link or the base may
-    /// turn slower than commanded.
+    /// Returns the squared correlation of the base's turns with the model's within `window`, and
+    /// their ratio. Link or base may turn slower than commanded.
     fn explains(
         self,
         commands: &[(f64, f64)],
@@ -176,7 +179,7 @@ impl Model {
         window: (f64, f64),
         by: By,
     ) -> Option<(f64, f64)> {
-        // Before it, the model needs time to forget that it began at rest.
+        // The model starts at rest, and needs earlier time to forget that.
         let begins = window.0 - self.delay_s - 2.0 * LEG_S;
         let mut waiting = commands.iter().skip_while(|(at, _)| *at < begins).peekable();
         let share = if self.lag_s > 0.0 { 1.0 - (-STEP_S / self.lag_s).exp() } else { 1.0 };
@@ -208,7 +211,7 @@ impl Model {
     }
 }
 
-/// Sums of the squares of the first values from their mean, of the products of both, and of the squares of the second.
+/// Returns the centred sums of squares and products: first values, both, second values.
 pub fn spread(points: &[[f64; 2]]) -> [f64; 3] {
     let mean = [0, 1].map(|of| points.iter().map(|it| it[of]).sum::<f64>() / points.len() as f64);
     [(0, 0), (0, 1), (1, 1)].map(|(one, other)| {
@@ -238,7 +241,8 @@ mod tests {
 
     use super::*;
 
-    /// Commands to and fro at 10 Hz, and the headings of a base without a lag that answers them by `model`.
+    /// Returns commands to and fro at 10 Hz, and the headings of a base without a lag that obeys by
+    /// `model`.
     fn turned(mut model: ModelledSpeed, factor: f64) -> [Vec<(f64, f64)>; 2] {
         let (mut commands, mut headings, mut heading) = (Vec::new(), Vec::new(), 0.0);
         for tick in 0..160 {

@@ -1,7 +1,9 @@
-//! Procedures that are a list of legs: a bring-up, turns to and fro, squares, ways and turns for a gyro.
+//! Procedures that are a list of legs: a bring-up, turns to and fro, squares, drives and turns for
+//! a gyro.
 //!
-//! In a bring-up the robot stands, turns on the spot to both sides, drives a short way and back, and turns to and fro. A leg ends when the
-//! wheels have counted its way in either direction, because a wheel of a new robot may count backwards, or after a time.
+//! In a bring-up the robot stands, turns on the spot to both sides, drives a short distance and
+//! back, and turns to and fro. A leg ends after a time, or when the wheels have counted its
+//! distance in either direction. A wheel of a new robot may count backwards.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -17,25 +19,27 @@ use crate::{
     ways::Ways,
 };
 
-/// A turn to one side lasts so long, seconds: a base that answers after 0.5 s and gains 1 rad/s in a second turns by then.
+/// Duration of a turn to one side, seconds. A base that answers after 0.5 s and gains 1 rad/s in a
+/// second turns by then.
 pub(crate) const LEG_S: f64 = 1.6;
 const LEGS: u32 = 8;
-/// The direction is so far aside that the robot turns as fast as it may.
+/// Direction that makes the robot turn as fast as it may.
 const ASIDE_RAD: f64 = 1.2;
-/// The speed of the way there and back, m/s.
 const SLOWLY_M_S: f64 = 0.15;
 const WAY_M: f64 = 0.3;
-/// Nearer things ahead end a leg, metres; those ahead of a robot that is to drive metres away from where it was put are to be farther.
+/// Range ahead that ends a leg, metres. It is longer for a robot that drives metres away from its
+/// start.
 const NEAR_M: f64 = 0.2;
 const AHEAD_M: f64 = 0.5;
-/// One and a half turns: what was seen in the first third is seen again.
+/// One and a half turns: the first third is seen twice.
 const TURN_RAD: f64 = 3.0 * PI;
-/// Longer than a slow base needs for [`TURN_RAD`] at its speed.
+/// Time beyond what a slow base needs for [`TURN_RAD`].
 const LONGEST_TURN_S: f64 = 20.0;
-/// A corner of a square with so little rest counts as turned.
+/// Remaining angle at which a square's corner counts as turned.
 const TURNED_RAD: f64 = 0.03;
 
-/// What the robot is told, and after how much it is told the next: seconds, radians or metres by the counts, to the left if positive.
+/// Order to the robot, with its end in seconds, radians or metres by the counts; positive to the
+/// left.
 #[derive(Clone, Copy, Debug)]
 enum Leg {
     Stand(f64),
@@ -62,8 +66,8 @@ const PARTS: [Leg; 12] = [
     Leg::Turn(-PI),
 ];
 
-/// The link uses a gyro that it saw to agree with the wheels in a turn. Its bias shows in the longest rest, the ratio of the wheels on the
-/// ways, the track in the turns.
+/// The link uses a gyro once it has agreed with the wheels in a turn. The longest rest shows its
+/// bias, the drives the ratio of the wheels, the turns the track.
 const WITH_GYRO: [Leg; 13] = [
     STILL,
     Leg::Turn(FRAC_PI_2),
@@ -86,14 +90,15 @@ pub struct Script {
     side_m: f64,
     rate_hz: f64,
     leg: u32,
-    /// Ticks of this leg, and the ways at its beginning.
+    /// Ticks of this leg, and the distances at its beginning.
     ticks: u32,
     from: Ways,
     ways: Ways,
 }
 
 impl Script {
-    /// Every procedure but that before a wall; squares have this side, and the ways for a gyro this length.
+    /// Creates any procedure but the one before a wall. `side_m` is the side of squares, and the
+    /// length of drives for a gyro.
     pub fn new(procedure: Procedure, side_m: f64, rate_hz: f64) -> Self {
         let (from, ways) = (Ways::default(), Ways::default());
         Self { procedure, side_m, rate_hz, leg: 0, ticks: 0, from, ways }
@@ -120,7 +125,10 @@ impl Script {
         if self.leg().is_none() { State::Finished } else { State::Running }
     }
 
-    /// `echo_m` is the front sonar's, or a laser's for a gyro: a robot that drives where it is told to turn ends its leg before what is there.
+    /// Advances by a tick.
+    ///
+    /// `echo_m` is the front sonar's, or a laser's for a gyro. A robot that drives although it is
+    /// told to turn ends its leg before an obstacle.
     pub fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
         self.ways.step(counts, body);
         let (from, ways) = (self.from, self.ways);
@@ -156,7 +164,7 @@ impl Script {
         }
         let left = left(self.leg);
         let (status, aside_rad, speed_limit_m_s) = match self.leg() {
-            // A robot that faces its way and may go at no speed stands.
+            // A robot that faces ahead with a speed limit of zero stands.
             Some(Leg::Stand(_)) => (GuidanceStatus::Along, 0.0, 0.0),
             Some(Leg::Turn(side) | Leg::ToAndFro(side)) => {
                 (GuidanceStatus::Look, ASIDE_RAD.copysign(side), 0.0)

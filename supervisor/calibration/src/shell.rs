@@ -1,5 +1,5 @@
-//! `pose`, `ranges` and `scan` in, `guidance` out, in the planner's place. The state is saved before the guidance is
-//! published.
+//! Process in the planner's place: reads `pose`, `ranges` and `scan`, publishes `guidance`. The
+//! state is saved before the guidance is published.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ use crate::{
 };
 
 const SCAN_HOLDS_S: f64 = 0.5;
-/// Encoded: two legs of 200 readings, and 64 loops.
+/// Encoded size of two legs of 200 readings, and 64 loops.
 pub(crate) const STATE_BYTES: usize = 16 << 10;
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -37,11 +37,11 @@ pub enum Drive {
 }
 
 impl Drive {
-    /// The procedure at the end of the run in `directory`, as saved in its last tick: a recording may lack ticks,
-    /// because no stage waits for a recorder.
+    /// Reads the procedure that the run in `directory` saved in its last tick. A recording may lack
+    /// ticks, because no stage waits for a recorder.
     ///
     /// # Errors
-    /// The checkpoint cannot be read.
+    /// Fails if the checkpoint cannot be read.
     pub fn of_run(directory: &Path) -> Result<Option<Self>, CheckpointError> {
         let file = run::checkpoint_file(directory, Shell::NAME);
         Ok(Checkpoint::open(&file, STATE_BYTES)?.1)
@@ -72,11 +72,10 @@ readers! {
     }
 }
 
-/// What a laser sees ahead of a robot whose way it watches.
 #[derive(Default)]
 struct FreeByScan {
     half_width_m: f64,
-    /// When it saw that, and the free way before the body, metres.
+    /// Time of the scan, and the free distance before the body, metres.
     seen: Option<(f64, f64)>,
 }
 
@@ -94,7 +93,7 @@ impl FreeByScan {
         self.seen = Some((at_s, free_m));
     }
 
-    /// Ground that no scan has seen for [`SCAN_HOLDS_S`] is not free.
+    /// Returns the free distance; zero if the last scan is older than [`SCAN_HOLDS_S`].
     fn free_m(&self, now_s: f64) -> f64 {
         self.seen.filter(|(at_s, _)| now_s - at_s <= SCAN_HOLDS_S).map_or(0.0, |(_, free_m)| free_m)
     }
@@ -105,10 +104,10 @@ pub struct Shell {
     front: usize,
     out: Outputs,
     body: Body,
-    /// The robot faces the wall there.
+    /// Place where the robot faces the wall.
     target: TargetSample,
     drive: Drive,
-    /// The newest tick with readings, and the front sonar's echo, metres.
+    /// Newest tick with readings, and the front sonar's echo, metres.
     newest: Option<(u64, Option<f64>)>,
     scan: Option<FreeByScan>,
     answered: Option<GuidanceSample>,
@@ -153,7 +152,7 @@ impl Process for Shell {
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(pose) = self.inputs.pose.next_sample()? {
             self.progress = Progress::of(&pose.stamp);
-            // A tick that is given again gets its answer again.
+            // A repeated tick gets its answer again.
             if let Some(answered) = self.answered.filter(|it| it.pose_ns == pose.stamp.stamp_ns) {
                 self.out.at = self.progress;
                 self.out.publish(&GUIDANCE, answered)?;
@@ -196,7 +195,8 @@ impl Shell {
             distance_m: self.target.target.position().distance(DVec2::new(order.x_m, 0.0)),
             speed_limit_m_s: order.speed_limit_m_s,
             status: order.status.into(),
-            // This is the place before the wall: dead reckoning with uncalibrated wheels would be metres off after some loops.
+            // The place before the wall: dead reckoning with uncalibrated wheels would be metres
+            // off after some loops.
             x_m: order.x_m,
             y_m: 0.0,
             heading_rad,

@@ -1,9 +1,9 @@
 //! Ratio and track from squares whose ends were measured by tape.
 //!
-//! The squares are those of J. Borenstein and L. Feng, "Measurement and correction of systematic odometry errors in
-//! mobile robots", IEEE Trans. Robotics and Automation 12(6), 1996: some to the left and as many to the right, each
-//! from the same mark. In place of their formulae the ways of the wheels are integrated again with other values,
-//! until the ends are those of the tape.
+//! The squares follow J. Borenstein and L. Feng, "Measurement and correction of systematic odometry
+//! errors in mobile robots", IEEE Trans. Robotics and Automation 12(6), 1996: equally many to the
+//! left and to the right, each from the same mark. Instead of their formulae, the wheel distances
+//! are integrated with other values until the ends match the tape.
 
 use common::{kinematics::Pose2, mission::Body};
 use glam::DVec2;
@@ -16,11 +16,11 @@ use crate::{
 
 /// Standard deviation of a coordinate by tape.
 const TAPE_M: f64 = 0.005;
-/// The fit's problem is nearly linear.
+/// Iterations of the fit; the problem is nearly linear.
 const STEPS: u32 = 5;
-/// A value's effect is found by this change.
+/// Change for the numerical derivative of a value.
 const NUDGE: f64 = 1e-4;
-/// Half of them are to the left.
+/// Fewest squares, half of them to the left.
 pub const FEWEST_SQUARES: usize = 6;
 
 pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
@@ -33,7 +33,8 @@ pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
     counts.iter().map(step).collect()
 }
 
-/// Nominal ways of both wheels in each tick, metres, and the end by tape, in the frame of its start.
+/// Nominal distances of both wheels in each tick, metres, and the end by tape, in the frame of its
+/// start.
 #[derive(Debug)]
 pub struct Driven {
     pub ways: Vec<[f64; 2]>,
@@ -41,7 +42,8 @@ pub struct Driven {
 }
 
 impl Driven {
-    /// The end, and the variance of a coordinate by slip of 1 m per square root of a metre, m^2.
+    /// Returns the end, and the variance of a coordinate for a slip of 1 m per square root of a
+    /// metre, m^2.
     fn by(&self, wheels: Wheels, track_m: f64) -> (DVec2, f64) {
         let mut pose = Pose2::default();
         let mut poses = Vec::with_capacity(self.ways.len());
@@ -59,7 +61,8 @@ impl Driven {
     }
 }
 
-/// The ends by tape, linear in e and tau near `wheels`: x and y of each square.
+/// Returns the ends by tape as equations in e and tau, linear near `wheels`: x and y of each
+/// square.
 fn rows(squares: &[Driven], wheels: Wheels, track_m: f64) -> Rows {
     let Wheels { e, track } = wheels;
     let rows = squares.iter().flat_map(|square| {
@@ -86,10 +89,10 @@ fn estimate(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
     Ok(found)
 }
 
-/// The last pair must lie where the others say.
+/// Returns the estimate, if the last pair lies where the others predict.
 ///
 /// # Errors
-/// Says why nothing may be written.
+/// Returns why nothing may be written.
 pub fn checked(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
     if squares.len() < FEWEST_SQUARES {
         return Err(Refusal::TooFewSquares { found: squares.len() });

@@ -1,8 +1,8 @@
-//! The procedure before a wall: sweep, turn, drive away, turn, come back, sweep again. Pure.
+//! Procedure before a wall: sweep, turn, drive away, turn, come back, sweep again. Pure.
 //!
-//! Headings are measured from the last normal, with the wheels as the loops so far have them. The first two loops
-//! have a single turn, because nothing is known of the track yet; later ones have as many as the robot can make and
-//! still find the wall.
+//! Headings are measured from the last normal, with the wheels as the loops so far estimate them.
+//! The first two loops have a single turn, because the track is still unknown. Later ones have as
+//! many turns as still let the robot find the wall.
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -18,37 +18,38 @@ use crate::{
     ways::Ways,
 };
 
-/// The range at which a drive to the wall ends, and that at which it goes slowly.
+/// Range at which a drive to the wall ends, and range at which it slows down.
 const STOP_M: f64 = 0.42;
 const NEAR_M: f64 = 0.7;
-/// Less free distance ahead ends a drive away from the wall.
+/// Least free distance ahead for a drive away from the wall.
 const AHEAD_M: f64 = 0.5;
-/// The longest first drive to the wall, and the readings without an echo at which it ends before.
+/// Longest first drive to the wall, and the readings without an echo that end it earlier.
 const APPROACH_M: f64 = 2.0;
 const SILENT: u32 = 7;
 /// Near echoes in a row; a single one may be false.
 const NEAR: u32 = 2;
-/// A loop gains knowledge from a drive away this long.
+/// Shortest drive away from which a loop gains knowledge.
 const SHORTEST_M: f64 = 0.5;
-/// A drive back this far beyond its limit has missed the wall's echo.
+/// Excess of a drive back that has missed the wall's echo.
 const BEYOND_M: f64 = 0.15;
-/// Half a sweep. If that was too narrow, because the robot turned by less or more than it reckoned, the next one is
-/// wider by a third, up to the greatest share.
+/// Half a sweep. If that was too narrow, because the robot mistook its turn, the next is wider by a
+/// third, up to the greatest share.
 const SWEEP_RAD: f64 = FRAC_PI_4;
 const WIDER: f64 = 1.0 / 3.0;
 const MOST_WIDER: u32 = 2;
 const SWEEPS: u32 = 5;
-/// Whole turns of a loop before the half one: the first number after which the heading is known to [`HEADING_SD_RAD`].
+/// Whole turns of a loop before the half one: the first number after which the heading is known to
+/// [`HEADING_SD_RAD`].
 const TURNS: [f64; 2] = [3.0, 1.0];
 const HEADING_SD_RAD: f64 = 0.13;
-/// The ordered direction is so far ahead of the robot, in a sweep and at most in another turn. The controller turns
-/// on the spot by a rate in proportion to the angle that is left, at least 0.25 rad/s.
+/// Least and greatest angle of the ordered direction ahead of the robot, in a sweep and in another
+/// turn. The controller's turn rate is proportional to the remaining angle, at least 0.25 rad/s.
 const SLOW_RAD: f64 = 0.08;
 pub(crate) const FAST_RAD: f64 = 0.5;
 const TURNED_RAD: f64 = 0.04;
 pub(crate) const SPEED_M_S: f64 = 0.35;
 const NEAR_M_S: f64 = 0.12;
-/// The deviation of the track that is good enough, over that of the ratio.
+/// Deviation of the track that is good enough, relative to that of the ratio.
 const TRACK_OVER_RATIO: f64 = 3.0;
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -57,13 +58,14 @@ pub struct Wall {
     ways: Ways,
     wheels: Wheels,
     visit: Ways,
-    /// The wall was faced by a measured normal: at first it is where the robot started.
+    /// Whether a measured normal faced the wall. Initially the robot's start stands in for it.
     is_measured: bool,
     facing: f64,
     phase: Phase,
-    /// The middle between the wheels at the start of this phase.
+    /// Distance of the midpoint between the wheels at the start of this phase.
     phase_from_m: f64,
-    /// The middle's way at the start of the drive away, the drive's length, and the range of the sweep before it.
+    /// Midpoint distance at the start of the drive away, the drive's length, and the range of the
+    /// sweep before it.
     away_from_m: f64,
     away_m: f64,
     swept_m: f64,
@@ -73,7 +75,7 @@ pub struct Wall {
     sweeps: u32,
     wider: u32,
     legs: [Leg; 2],
-    /// The two ways of each sweep differ so, radians.
+    /// Differences between both directions of each sweep, radians.
     differences: Vec<f64>,
     loops: Vec<Loop>,
     visits: u32,
@@ -84,7 +86,6 @@ enum Phase {
     Approach,
     Aside,
     Sweep(usize),
-    /// The turn before the drive away from the wall.
     Turn(f64),
     Away(f64),
     Back,
@@ -105,10 +106,11 @@ pub enum Fault {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Order {
     pub status: GuidanceStatus,
-    /// The angle from the robot's axis to the direction, counter-clockwise.
+    /// Angle from the robot's axis to the direction, counter-clockwise.
     pub aside_rad: f64,
     pub speed_limit_m_s: f64,
-    /// The robot's place and heading: the origin is where it faces the wall, which is ahead on the x-axis.
+    /// Place and heading of the robot. The origin is where it faces the wall, which is ahead on the
+    /// x-axis.
     pub x_m: f64,
     pub heading_rad: f64,
 }
@@ -128,7 +130,7 @@ pub(crate) fn echo_m(reading: &RangeReading) -> Option<f64> {
     }
 }
 
-/// The ordered direction of a robot that turns on the spot and has `left` to turn, radians.
+/// Returns the ordered direction of a robot with `left` to turn on the spot, radians.
 pub(crate) fn direction_aside(left: f64, most: f64) -> f64 {
     left.abs().clamp(SLOW_RAD, most) * left.signum()
 }
@@ -185,7 +187,6 @@ impl Wall {
         self.order(self.heading(body), echo_m)
     }
 
-    /// The turn since the wall was faced, radians.
     fn heading(&self, body: &Body) -> f64 {
         let left = self.ways.left_m - self.visit.left_m;
         let right = self.ways.right_m - self.visit.right_m;
@@ -247,7 +248,7 @@ impl Wall {
             }
             Phase::Back => {
                 if (self.facing - heading) * self.facing.signum() <= TURNED_RAD {
-                    // The robot rolled on for a while when the drive was over.
+                    // The robot rolled on for a while after the drive.
                     self.away_m = (self.ways.arc_m() - self.away_from_m).abs();
                     self.enter(Phase::Approach);
                 }
@@ -256,7 +257,7 @@ impl Wall {
         }
     }
 
-    /// The sweep ends at the `nominal` heading; the loop is complete if the wall was found.
+    /// Ends the sweep at the `nominal` heading. The loop is complete if the wall was found.
     fn end_sweep(&mut self, nominal: f64, body: &Body) {
         self.sweeps += 1;
         let normal = match normal(&self.legs) {
@@ -270,7 +271,7 @@ impl Wall {
                 return;
             }
         };
-        // The wheels would stand there if the robot had turned on the spot from here to the normal.
+        // Wheel distances as if the robot had turned on the spot from here to the normal.
         let aside_m = (normal.heading - nominal) * body.track_m / 2.0;
         let mut faced = self.ways;
         faced.left_m -= aside_m;
@@ -304,7 +305,7 @@ impl Wall {
         SWEEP_RAD * (1.0 + WIDER * f64::from(self.wider))
     }
 
-    /// None until both sides were tried once.
+    /// Returns the turns of the next loop; none until both sides were tried once.
     fn turns(&self, estimate: Option<&Estimate>, body: &Body) -> f64 {
         let Some(estimate) = estimate.filter(|_| self.loops.len() >= 2) else {
             return 0.0;
@@ -341,7 +342,8 @@ impl Wall {
         };
         let is_near = echo_m.is_some_and(|echo| echo <= NEAR_M);
         let speed = if is_near { NEAR_M_S } else { SPEED_M_S };
-        // The ordered direction is beyond the end of a leg, so that the robot is still turning there.
+        // The ordered direction lies beyond the end of a leg, so that the robot is still turning
+        // there.
         let beyond = self.half_rad() + SLOW_RAD;
         let (status, aside_rad, speed_limit_m_s) = match self.phase {
             Phase::Approach => along(self.facing, speed),

@@ -1,4 +1,4 @@
-//! Nominal ways of the wheels from their counts.
+//! Nominal distances of the wheels from their counts.
 
 use common::{mission::Body, wire::counts_between};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ pub(crate) struct Ways {
     counts: Option<[u16; 2]>,
     pub(crate) left_m: f64,
     pub(crate) right_m: f64,
-    /// The sum of both, each counted forward whichever way the wheel rolled.
+    /// Sum of both distances, each counted as positive.
     pub(crate) rolled_m: f64,
 }
 
@@ -23,7 +23,7 @@ impl Ways {
         self.rolled_m += left.abs() + right.abs();
     }
 
-    /// The way of the middle between the wheels.
+    /// Returns the distance of the midpoint between the wheels.
     pub(crate) fn arc_m(&self) -> f64 {
         f64::midpoint(self.left_m, self.right_m)
     }

@@ -1,4 +1,4 @@
-//! The one list of subcommands: parser, dispatch and the groups of `--help` follow from it.
+//! List of subcommands, from which the parser, the dispatch and the groups of `--help` follow.
 
 mod bring_up;
 mod calibrate;
@@ -39,8 +39,9 @@ use console::{completion, failure::Result};
 
 use crate::companions;
 
-/// Groups of subcommands: a name, and the module with its `Arguments` and its `main`, whose further arguments stand
-/// in parentheses. Companions stand behind `@`.
+/// Declares groups of subcommands: a name, and the module with its `Arguments` and `main`.
+///
+/// Parentheses hold further arguments of `main`. Companions follow `@`.
 macro_rules! commands {
     ($($heading:literal {
         $($name:ident $module:ident $(($whole:ident))?,)*
@@ -109,9 +110,10 @@ commands! {
     }
 }
 
-/// Time-critical mobility for ground robots: a target, a perimeter, one sonar.
+/// Drive a ground robot through unknown, cluttered places to a target.
 ///
-/// Without a subcommand: `firsthand run obstacle-course`.
+/// It needs encoders and range sensors: a front sonar suffices. Other sonars, infrared rangers,
+/// lasers and depth cameras are optional. Without a subcommand: `firsthand run obstacle-course`.
 #[derive(Debug, Parser)]
 #[command(
     name = "firsthand",
@@ -140,7 +142,7 @@ const EXIT_CODES: &str = "Exit codes of run:
 
 An error message ends with a code in brackets, which scripts can match.";
 
-/// Help, completions and the manual page come from it.
+/// Returns the command line for help, completions and the manual page.
 pub fn command_line() -> clap::Command {
     Arguments::command().subcommands(companions::TABLE.iter().map(companions::Companion::command))
 }
@@ -153,7 +155,7 @@ pub fn parse<T: AsRef<OsStr>>(words: &[T]) -> Result<Command, clap::Error> {
 }
 
 impl Command {
-    /// None if the command sees to its log itself.
+    /// Returns `None` for a command that sets up its own log.
     pub fn log_level(&self) -> Option<&'static str> {
         match self {
             Self::Run(_) | Self::BringUp(_) | Self::Calibrate(_) => None,
@@ -164,13 +166,13 @@ impl Command {
     }
 }
 
-/// Each stands with the beginning of its help.
+/// Lists the groups of subcommands, each with the beginning of its help.
 fn listed() -> String {
     let all = Command::augment_subcommands(clap::Command::new(""));
     let all = all.subcommands(companions::TABLE.iter().map(companions::Companion::command));
     let mut text = String::new();
     for (heading, names) in GROUPS {
-        // Writing to a String cannot fail.
+        // Infallible for a String.
         let _ = writeln!(text, "{heading}:");
         for name in *names {
             let is_it = |it: &&clap::Command| it.get_name().replace('-', "") == name.to_lowercase();

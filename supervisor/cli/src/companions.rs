@@ -1,5 +1,4 @@
-//! Subcommands that are executables beside this one, started as git starts its own: `firsthand page` becomes
-//! `firsthand-page`.
+//! Subcommands that are separate executables. Like git, `firsthand page` starts `firsthand-page`.
 
 use std::{
     env,
@@ -19,7 +18,7 @@ use processes::executable;
 pub struct Companion {
     pub name: &'static str,
     executable: &'static str,
-    /// The executable has further subcommands and is told this one's name.
+    /// Whether the executable has several subcommands and needs this one's name.
     is_one_of_many: bool,
     pub about: &'static str,
 }
@@ -32,10 +31,10 @@ const fn laboratory(name: &'static str, about: &'static str) -> Companion {
     Companion { name, executable: LABORATORY, is_one_of_many: true, about }
 }
 
-/// It measures robots and contains the planners to compare with.
+/// Executable that measures robots and contains the planners for comparison.
 pub const LABORATORY: &str = "firsthand-lab";
 
-/// THE table: the package, completions, help and the manual page know them from here.
+/// Companions for the package, completions, help and the manual page.
 pub static TABLE: [Companion; 9] = [
     viewer(
         "top",
@@ -63,8 +62,8 @@ pub fn find(named: &OsStr) -> Option<&'static Companion> {
     TABLE.iter().find(|companion| named == companion.name)
 }
 
-/// `words` after `firsthand` name a companion or ask for its help. None if they name none, else the error of an
-/// executable that does not start.
+/// Starts the companion that `words` (after `firsthand`) name, or its help. Returns an error if it
+/// does not start.
 pub fn execute(words: &[OsString]) -> Option<Result<ExitCode>> {
     let (first, rest) = words.split_first()?;
     let (companion, options) = match find(first) {
@@ -78,7 +77,8 @@ pub fn execute(words: &[OsString]) -> Option<Result<ExitCode>> {
     Some(Err(companion.become_executable(options)))
 }
 
-/// A companion answers a shell itself. `words` are the executable, `--`, and the line that is completed.
+/// Passes a completion request on to the companion. `words` are the executable, `--`, and the line
+/// to complete.
 pub fn answer_shell(words: &[OsString]) {
     let Some(companion) = words.get(3).and_then(|word| find(word)) else { return };
     if env::var_os(VARIABLE).is_none() || words.len() < 5 {
@@ -96,13 +96,11 @@ pub fn answer_shell(words: &[OsString]) {
 }
 
 impl Companion {
-    /// Returns why that is impossible.
     fn become_executable(&self, options: Vec<OsString>) -> Failure {
         let name = self.is_one_of_many.then(|| self.name.into());
         become_executable(self.executable, name.into_iter().chain(options))
     }
 
-    /// Help, completions and the manual page show it.
     pub fn command(&self) -> clap::Command {
         let words = Arg::new("words")
             .num_args(0..)
@@ -112,7 +110,7 @@ impl Companion {
     }
 }
 
-/// The executable is beside this one or on PATH. Returns why that is impossible.
+/// Executes `named` from beside this executable or from PATH. Returns only on failure.
 pub fn become_executable(named: &str, words: impl Iterator<Item = OsString>) -> Failure {
     match executable::find(Path::new(named)) {
         Ok(found) => {

@@ -1,11 +1,11 @@
-//! `firsthand`, the robot: the command line of its supervisor, its stages, its recordings, and the simulated robot.
+//! Command line of `firsthand`: supervisor, stages, recordings, and the simulated robot.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`commands`] | the one list of subcommands |
-//! | [`companions`] | the subcommands that are executables beside this one: viewers, laboratory |
+//! | [`commands`] | the list of subcommands |
+//! | [`companions`] | subcommands that are separate executables: viewers, laboratory |
 
-// No other crate uses these modules: `pub` says that another module does, and what none uses is reported all the same.
+// `pub` marks use by another module; unused items are still reported.
 #![allow(unreachable_pub)]
 
 mod commands;

@@ -1,4 +1,5 @@
-//! `cargo run --example log_pose -- x80` prints the poses of a robot, through restarts of its stages and its runs.
+//! `cargo run --example log_pose -- x80` prints the poses of a robot through restarts of stages and
+//! runs.
 #![allow(clippy::print_stdout, reason = "a program for a terminal")]
 
 use std::{env, time::Duration};

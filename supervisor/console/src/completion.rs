@@ -1,5 +1,5 @@
-//! The script of a shell asks the executable at each tab, so that it completes robots, stages, topics, missions and
-//! pages too.
+//! Shell completions. The script asks the executable at each tab, which also completes robots,
+//! stages, topics, missions and pages.
 
 use std::ffi::OsStr;
 
@@ -17,19 +17,21 @@ use processes::stages;
 
 use crate::{failure::Result, missions, output::print_text, robots};
 
-/// Print completions for a shell: `firsthand completions bash > ~/.local/share/bash-completion/completions/firsthand`.
+/// Print the completion script for a shell.
+///
+/// Example: `firsthand completions bash > ~/.local/share/bash-completion/completions/firsthand`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The shell.
+    /// Shell that reads the script.
     #[arg(value_parser = PossibleValuesParser::new(Shells::builtins().names()))]
     shell: String,
 }
 
-/// The script of a shell asks by it.
+/// Variable by which the script of a shell asks.
 pub const VARIABLE: &str = "FIRSTHAND_COMPLETE";
-/// Bash and zsh give the number of the completed word in it.
+/// Variable in which Bash and zsh give the index of the completed word.
 pub const INDEX: &str = "_CLAP_COMPLETE_INDEX";
-/// The shell finds it on PATH.
+/// Name that the shell finds on PATH.
 const EXECUTABLE: &str = "firsthand";
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -40,15 +42,14 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(print_text(&String::from_utf8_lossy(&script))?)
 }
 
-/// Answers a shell that asks, and ends the process. `whole` is the executable's command line, `pages` those of the
-/// guide.
+/// Answers a shell's request and ends. `whole` is the command line, `pages` are guide pages.
 pub fn answer_shell(whole: fn() -> Command, pages: fn() -> Vec<String>) {
     CompleteEnv::with_factory(|| with_candidates(whole(), pages)).var(VARIABLE).complete();
 }
 
 fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
     command
-        // Only `stage` asks for these, because no other command takes a word that is no subcommand.
+        // Only `stage` uses these, because it accepts unknown words.
         .add(SubcommandCandidates::new(|| candidates("", stage_names())))
         .mut_args(|argument| match completer(&argument, pages) {
             Some(completer) => argument.add(completer),
@@ -57,7 +58,7 @@ fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
         .mut_subcommands(|subcommand| with_candidates(subcommand, pages))
 }
 
-/// A robot, a stage, a topic, a mission, or a page of the guide.
+/// Completes a robot, stage, topic, mission or page of the guide.
 fn completer(argument: &Arg, pages: fn() -> Vec<String>) -> Option<ArgValueCompleter> {
     let robot = ValueParser::new(|name: &str| name.parse::<RobotName>()).type_id();
     if argument.get_value_parser().type_id() == robot {

@@ -4,7 +4,7 @@ use std::io::{self, IsTerminal as _};
 
 use super::{failure::Result, output::write_stderr};
 
-/// Says what will be done, and asks whether it shall be. Fails if it shall not, or nobody is there to answer.
+/// Asks a person to confirm `will`. Fails after a no, or if standard input is not a terminal.
 pub fn ask(will: &str, question: &str) -> Result {
     if !io::stdin().is_terminal() {
         return Err(format!("{will}; give --yes to agree").into());

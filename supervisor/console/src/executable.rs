@@ -1,4 +1,4 @@
-//! The main function of a viewer, or of the laboratory.
+//! Main function of viewers and the laboratory.
 
 use std::process::ExitCode;
 
@@ -10,7 +10,7 @@ use crate::{
     logging,
 };
 
-/// Answer a shell that asks for completions; or log to standard error from `log_level` on, and `execute`.
+/// Answers a completion request, or logs to standard error from `log_level` up and calls `execute`.
 pub fn run<A: Parser>(log_level: &str, execute: fn(&A) -> Result<ExitCode>) -> ExitCode {
     completion::answer_shell(A::command, Vec::new);
     let arguments = A::parse();

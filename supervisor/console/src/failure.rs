@@ -1,7 +1,7 @@
-//! A failure is one sentence, a code for scripts, an exit code, and sometimes a remark.
+//! Failures: a sentence, a code for scripts, an exit code, and sometimes a remark.
 //!
-//! `firsthand` prints the code in brackets at the end of the message, `[not-running]`. A script matches the code; the
-//! sentence before it may change.
+//! `firsthand` prints the code in brackets at the end, such as `[not-running]`. Scripts match the
+//! code, and the sentence may change.
 
 use std::{error::Error, path::Path, process::ExitCode};
 
@@ -16,7 +16,7 @@ use thiserror::Error;
 
 use super::{missions::LookupError, output::write_stderr, robots};
 
-/// A sentence that names the input and the remedy.
+/// Sentence that names the input and the remedy.
 pub type Failure = Box<dyn Error>;
 
 pub type Result<T = (), E = Failure> = std::result::Result<T, E>;
@@ -35,7 +35,6 @@ impl Refused {
     }
 }
 
-/// Reports an error and its code on standard error.
 pub fn report(result: Result<ExitCode>) -> ExitCode {
     result.unwrap_or_else(|error| {
         let error = error.as_ref();
@@ -46,7 +45,7 @@ pub fn report(result: Result<ExitCode>) -> ExitCode {
     })
 }
 
-/// A service manager need not retry.
+/// Exit code at which a service manager need not retry.
 const INVALID_MISSION: u8 = 78;
 
 fn exit_code(error: &(dyn Error + 'static)) -> ExitCode {
@@ -61,7 +60,7 @@ fn exit_code(error: &(dyn Error + 'static)) -> ExitCode {
     }
 }
 
-/// None stands for errors to which no script could react in particular.
+/// Returns the code, or `None` for errors that no script can handle.
 pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     macro_rules! codes {
         ($($type:ty { $($pattern:pat => $code:expr,)* })*) => {{
@@ -136,7 +135,7 @@ pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     }
 }
 
-/// A robot that does not run for this user may run for another one, whose bus nobody else can join; or its name is wrong.
+/// Explains a robot that is not running: it may be another user's, or misspelt.
 fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
     let operator = error.downcast_ref().and_then(|error| match error {
         OperatorError::Bus(error) => Some(error),
@@ -155,7 +154,8 @@ fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
     (!names.is_empty()).then(|| format!("{error}; these run here: {}", names.join(", ")))
 }
 
-/// Users with files of that robot in `shared` memory: file names begin with the user's number.
+/// Returns the users with files of `robot` in `shared` memory. The user's number begins a file
+/// name.
 fn users<'a>(shared: &Path, robot: &'a str) -> impl Iterator<Item = u32> + use<'a> {
     robots::entries(shared).filter_map(move |entry| {
         let name = entry.file_name();

@@ -1,14 +1,15 @@
 //! Wrapped text, and items of a Markdown list.
 
-/// A line's columns, unless a code span alone is longer.
+/// Line width, which only longer code spans exceed.
 const WIDTH: usize = 120;
 
-/// No line ends within a code span.
+/// Formats a list item and keeps code spans on one line.
 pub fn item(text: &str) -> String {
     format!("- {}\n", wrapped(text, WIDTH - "- ".len(), true).join("\n  "))
 }
 
-/// Wraps `text` into lines of at most `width` letters. A longer word gets a separate line. With `whole_code`, a code span counts as one word.
+/// Wraps `text` at `width` letters. Longer words get their own line. With `whole_code`, a code span
+/// is one word.
 pub fn wrapped(text: &str, width: usize, whole_code: bool) -> Vec<String> {
     let mut in_code = false;
     let words = text.split_inclusive(|letter| {

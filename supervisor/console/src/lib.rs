@@ -1,19 +1,19 @@
-//! The common part of all executables' command lines.
+//! Command line code that all executables share.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`output`], [`stream`] | standard output, once or going on |
-//! | [`executable`] | the main function beside `firsthand`'s |
-//! | [`completion`] | completions of shells |
+//! | [`output`], [`stream`] | standard output, once or continuous |
+//! | [`executable`] | main function of the other executables |
+//! | [`completion`] | shell completions |
 //! | [`consent`] | questions to a person |
-//! | [`failure`] | why a subcommand failed, and its exit code |
+//! | [`failure`] | errors of subcommands, and exit codes |
 //! | [`table`], [`item`] | text tables; Markdown items |
-//! | [`progress_line`], [`waiting`] | progress, and a robot that is waited for |
+//! | [`progress_line`], [`waiting`] | progress, and waiting for a robot |
 //! | [`words`] | states, ages and sizes in words |
 //! | [`missions`] | shipped missions and files, with assignments |
 //! | [`robots`], [`runs`] | this machine's robots and runs |
 //! | [`operator`] | requests and signals to a robot's processes |
-//! | [`rates`] | how often topics are published, against the table |
+//! | [`rates`] | topic rates, compared with the table |
 //! | [`logging`] | logs to standard error, a file, the journal |
 
 pub mod completion;

@@ -1,10 +1,10 @@
-//! The log of this process.
+//! Log of this process.
 //!
-//! The journal takes lines from standard error and reads a priority from a leading `<N>` (sd-daemon(3)); that needs
-//! no library, and a line is the same wherever it is read.
+//! The journal reads standard error, with priorities in a leading `<N>` (sd-daemon(3)). This needs
+//! no library.
 //!
-//! A line that cannot be written, because the disk is full or the terminal is closed, is dropped silently: tracing
-//! would report it on standard error and panic if that fails too.
+//! Lines that cannot be written, due to a full disk or a closed terminal, are dropped. Otherwise
+//! tracing would report them on standard error, and panic if that fails too.
 
 use std::{
     fs::File,
@@ -31,7 +31,7 @@ use tracing_subscriber::{
 
 type AnyLayer = Box<dyn Layer<Registry> + Send + Sync>;
 
-/// `JOURNAL_STREAM` says which file the journal reads, and children inherit it even if their standard error is
+/// Returns whether the journal reads standard error. Children inherit `JOURNAL_STREAM` even if
 /// redirected, so the file is compared.
 pub fn to_journal() -> bool {
     let Some(journal) = std::env::var_os("JOURNAL_STREAM") else {
@@ -44,12 +44,12 @@ pub fn to_journal() -> bool {
     journal.to_str() == Some(&format!("{}:{}", found.dev(), found.ino()))
 }
 
-/// FIRSTHAND_LOG says what is logged, or else everything from level `default` up.
+/// Logs by the filter in FIRSTHAND_LOG, or from level `default` up.
 pub fn to_stderr(default: &str) {
     start(vec![stderr_layer()], default);
 }
 
-/// Appends what is informational or more to `file`, and to the journal if there is one. Fails if the file cannot be opened.
+/// Logs from level info up to `file`, and to the journal if present.
 pub fn to_file(file: &Path) -> io::Result<()> {
     let log = Mutex::new(append(file)?);
     let mut layers: Vec<AnyLayer> =
@@ -61,10 +61,10 @@ pub fn to_file(file: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// The date as logs have it: UTC, year-month-day.
+/// Returns the UTC date as in logs: year-month-day.
 pub fn today() -> String {
     let mut now = String::new();
-    // Writing to a String cannot fail.
+    // Infallible for a String.
     let _ = SystemTime.format_time(&mut Writer::new(&mut now));
     now.truncate("1970-01-01".len());
     now
@@ -80,7 +80,7 @@ fn stderr_layer() -> AnyLayer {
 }
 
 fn start(layers: Vec<AnyLayer>, default: &str) {
-    // The library of ROS 2 logs each of its sockets and each message that it sends to itself.
+    // The ROS 2 library logs each of its sockets and each message to itself.
     let wanted = std::env::var("FIRSTHAND_LOG").ok().and_then(|wanted| wanted.parse().ok());
     let filter: Targets = wanted
         .or_else(|| format!("rustdds=error,{default}").parse().ok())
@@ -103,7 +103,7 @@ impl<'writer> MakeWriter<'writer> for Journal {
     }
 }
 
-/// syslog(3): 3 error, 4 warning, 6 informational, 7 debug.
+/// Returns the priority by syslog(3).
 fn priority(level: Level) -> &'static str {
     match level {
         Level::ERROR => "<3>",
@@ -114,8 +114,8 @@ fn priority(level: Level) -> &'static str {
 }
 
 impl Write for Journal {
-    /// Each line of an event is an entry of the journal and gets the priority. All are written at once, so that lines
-    /// of two processes do not mix.
+    /// Prefixes each line with the priority, because each is a journal entry. A single write keeps
+    /// processes apart.
     fn write(&mut self, event: &[u8]) -> io::Result<usize> {
         let mut entry = Vec::with_capacity(event.len() + self.0.len());
         for line in event.split_inclusive(|&byte| byte == b'\n') {

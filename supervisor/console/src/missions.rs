@@ -1,4 +1,4 @@
-//! The missions that ship with the program, mission files, and assignments over both.
+//! Shipped missions and mission files, with assignments.
 
 use std::path::Path;
 
@@ -39,8 +39,7 @@ pub fn shipped(name: &str) -> Option<&'static str> {
     found.map(|(_, text)| *text)
 }
 
-/// The shipped mission or the file `name`, with `KEY=VALUE` assignments on top and the values of its calibration in
-/// place. Fails if there is none or it is invalid.
+/// Loads the shipped mission or the file `name`, with `KEY=VALUE` assignments and its calibration.
 pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     let file = Path::new(name);
     match shipped(name) {
@@ -52,13 +51,13 @@ pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> 
     }
 }
 
-/// Puts the content of the files that it names in place. Fails if one cannot be read.
+/// Inlines the files that the mission names. Fails if one cannot be read.
 pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
     let mission = mission.with_calibration()?;
     let has_map = mission.map.is_some();
     let mission = maps::with_prior_map(mission)?;
     if has_map {
-        // Start and targets may lie in what stands on the map.
+        // Start and targets may lie inside the map's obstacles.
         let failed = |problem| LookupError::OnMap { name: mission.name.clone(), problem };
         let text = toml::to_string(&mission).map_err(|error| failed(error.to_string()))?;
         Mission::parse(&text, Path::new(&mission.name))
@@ -67,19 +66,19 @@ pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
     Ok(mission)
 }
 
-/// `origin` names `text`. Fails if it or an assignment is invalid.
+/// Parses `text`, which is named `origin`.
 pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     let as_written = Mission::parse(text, Path::new(origin));
-    // Values are checked after all assignments, because one assignment may correct what would be refused without it.
+    // Validation follows all assignments, because one may correct another.
     let table = text.parse::<toml::Table>();
     let (false, Ok(table)) = (assignments.is_empty(), table) else {
         return complete(as_written?);
     };
     let mission = Mission::parse(&assign(table, assignments)?, Path::new(origin));
     complete(mission.map_err(|error| match as_written {
-        // The error of the file is better, because it names the line.
+        // The file's own error names the line.
         Err(of_file) if of_file.is_same_fault(&error) => of_file.into(),
-        // The fault is in no line of the file.
+        // No line of the file is at fault.
         _ => assigned(origin, assignments, &error.without_place()),
     })?)
 }
@@ -88,7 +87,7 @@ fn assigned(name: &str, assignments: &[String], problem: &str) -> LookupError {
     LookupError::Assigned(format!("{name} with --set {}: {problem}", assignments.join(" --set ")))
 }
 
-/// None if there are no assignments. Fails if one is invalid.
+/// Returns `None` without assignments.
 pub fn with(mission: &Mission, assignments: &[String]) -> Result<Option<Mission>, LookupError> {
     if assignments.is_empty() {
         return Ok(None);

@@ -17,7 +17,7 @@ use super::{
     output::write_stderr,
 };
 
-/// Waits until the robot rests. Fails if it does not.
+/// Stops the robot and waits until it is at rest.
 pub fn stand(robot: &RobotName) -> Result {
     if let Some(why) = operator::stand(robot)? {
         write_stderr(&format!("firsthand: the robot rests; its supervisor was not told: {why}\n"));
@@ -25,7 +25,6 @@ pub fn stand(robot: &RobotName) -> Result {
     Ok(())
 }
 
-/// Fails if the table has no such stage.
 pub fn known(stage: &str) -> Result<&'static str> {
     Ok(known_stage(stage)?.name)
 }
@@ -34,8 +33,8 @@ pub fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
     stages::find(stage).ok_or_else(|| Refused::new("unknown-stage", stages::unknown(stage)))
 }
 
-/// Sends a signal to the process of this name that holds the lock of its robot, and to no other. The roster comes five times a second:
-/// where it still names a process that has ended, the successor is waited for.
+/// Signals only the named process that holds the lock of its robot. Waits for a successor if the
+/// roster, published at 5 Hz, still names an ended process.
 pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result {
     let domain = Domain::of(robot.clone());
     operator::refuse_mirror(&domain)?;

@@ -7,7 +7,7 @@ use std::{
 
 use serde::Serialize;
 
-/// Written at once. A reader that has read enough is no failure (`firsthand help tables | head`).
+/// Writes and flushes. Accepts a closed reader (`firsthand help tables | head`).
 pub fn print_text(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout();
     unless_closed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
@@ -22,13 +22,13 @@ pub fn json_lines<T: Serialize>(values: &[T]) -> serde_json::Result<String> {
     lines.map(|line| Ok(line? + "\n")).collect()
 }
 
-/// A closed reader does not end the work under way.
+/// Ignores errors: a closed reader must not end the work under way.
 pub fn write_stderr(text: &str) {
     let mut stderr = io::stderr();
     let _ = stderr.write_all(text.as_bytes()).and_then(|()| stderr.flush());
 }
 
-/// A pipe whose reader has ended, or a terminal that was closed, is no failure.
+/// Accepts a pipe without reader, or a closed terminal.
 pub(crate) fn unless_closed(written: io::Result<()>) -> io::Result<()> {
     match written {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -37,7 +37,7 @@ pub(crate) fn unless_closed(written: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Writing to a closed terminal gives this error.
+/// Error of a write to a closed terminal.
 const CLOSED_TERMINAL: i32 = rustix::io::Errno::IO.raw_os_error();
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Progress on standard error: one line rewritten on a terminal, lines at intervals elsewhere.
+//! Progress on standard error: one rewritten line on a terminal, periodic lines elsewhere.
 
 use std::{
     io::{self, IsTerminal as _},
@@ -7,7 +7,7 @@ use std::{
 
 use super::output::write_stderr;
 
-/// The time between lines of a run that cannot be rewritten.
+/// Interval of lines without a terminal.
 pub const LINE_EVERY: Duration = Duration::from_secs(5);
 
 pub struct ProgressLine {
@@ -17,12 +17,13 @@ pub struct ProgressLine {
 }
 
 impl ProgressLine {
-    /// Lines that cannot be rewritten are shown once in each `every`.
+    /// Shows one line per `every` if standard error is not a terminal.
     pub fn new(every: Duration) -> Self {
         Self { rewrites: io::stderr().is_terminal(), every, shown: None }
     }
 
-    /// Show a line if one is due, and before the first one a `title`. A line that cannot be rewritten is shown only if it `may_stay`.
+    /// Shows a line if one is due, and `title` before the first. Without a terminal, shows it only
+    /// if it `may_stay`.
     pub fn update(&mut self, title: &str, line: impl FnOnce() -> String, may_stay: bool) {
         let waits = |shown: Instant| !self.rewrites && shown.elapsed() < self.every;
         if self.shown.is_some_and(waits) {
@@ -46,13 +47,14 @@ impl ProgressLine {
     }
 }
 
-/// 0 if the terminal does not say.
+/// Returns 0 if the width is unknown.
 fn columns() -> usize {
     let size = rustix::termios::tcgetwinsize(io::stderr());
     size.map_or(0, |size| size.ws_col.into())
 }
 
-/// The last column stays free; 0 columns show all. A line that the terminal wraps cannot be rewritten.
+/// Cuts a line before the last column, because a wrapped line cannot be rewritten. 0 columns mean
+/// no limit.
 fn cut(line: &str, columns: usize) -> &str {
     let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
     let end = line.char_indices().nth(shown);

@@ -1,4 +1,4 @@
-//! Rates and gaps of topics, against the table.
+//! Rates and gaps of topics, compared with the table.
 
 use std::{
     collections::BTreeMap,
@@ -13,13 +13,13 @@ use serde::Serialize;
 
 use super::{table::Table, words::age};
 
-/// A topic is late after so many intervals: its writer looks at the clock only once in each turn of its loop.
+/// Intervals after which a topic is late. Writers check the clock only once per loop iteration.
 const LATE: u32 = 2;
 
 #[derive(Debug)]
 pub struct TopicRates {
     spec: &'static Spec,
-    /// The newest sample of each process and its time, because a topic may have many writers.
+    /// Newest sample and arrival per process, because topics may have many writers.
     writers: BTreeMap<u32, (Instant, Stamp)>,
     at: Option<Instant>,
     since: Instant,
@@ -40,16 +40,16 @@ struct Counts {
 pub struct Report {
     pub topic: &'static str,
     pub rate_hz: f64,
-    /// The gap between two samples of one process, or since the last sample; none before the first.
+    /// Longest gap within a process, or since the last sample.
     pub longest_gap_s: Option<f64>,
-    /// Time since the last sample; none before the first.
+    /// Time since the last sample.
     pub age_s: Option<f64>,
-    /// Overwritten before this reader took them.
+    /// Samples overwritten before this reader took them.
     pub lost: u64,
     pub ticks: u64,
-    /// Ticks without a sample; none if the table does not promise one in each tick.
+    /// Ticks without a sample, if the table promises one per tick.
     pub missing_ticks: Option<u64>,
-    /// A gap was more than twice as long as the table promises; none if it promises nothing.
+    /// Whether a gap exceeded twice the promised interval.
     pub late: Option<bool>,
     #[serde(skip)]
     rate: Rate,
@@ -60,7 +60,7 @@ impl TopicRates {
         Self { spec, writers: BTreeMap::new(), at: None, since: now, counts: Counts::default() }
     }
 
-    /// The first sample of each process is not counted, because it may be old: a topic stores one for new readers.
+    /// Ignores each process's first sample, which may be a stored old one.
     pub fn add(&mut self, author: Author, stamp: Stamp, now: Instant) {
         self.at = Some(now);
         let Some((at, last)) = self.writers.insert(author.process, (now, stamp)) else { return };
@@ -76,20 +76,20 @@ impl TopicRates {
         counts.ticks += ticks;
         counts.missing_ticks += ticks.saturating_sub(1);
         let gap = now.saturating_duration_since(at);
-        // A rate may be in mission time, which may pass faster or slower than the clock.
+        // Rates may be in mission time, which may differ from the clock.
         let mission = stamp.stamp_ns.saturating_sub(last.stamp_ns);
         counts.late |= is_late(self.spec.rate, gap.min(Duration::from_nanos(mission)));
         counts.longest_gap = counts.longest_gap.max(gap);
     }
 
-    /// Counting begins again.
+    /// Reports and restarts the counts.
     pub fn report(&mut self, now: Instant) -> Report {
         let counts = std::mem::take(&mut self.counts);
         let over = now.saturating_duration_since(self.since).as_secs_f64();
         self.since = now;
         let age = self.at.map(|at| now.saturating_duration_since(at));
         let gap = (!counts.longest_gap.is_zero()).then_some(counts.longest_gap);
-        // The gap of a topic that is silent now has no second sample yet.
+        // A silent topic lacks the second sample of its gap.
         let gap = gap.max(age);
         let rate = self.spec.rate;
         Report {

@@ -6,17 +6,16 @@ use std::{
 
 use common::domain::{Domain, RobotName};
 
-/// The supervisor's, in the directory of its run.
 pub const SUPERVISOR_LOG: &str = "supervisor.log";
-/// The user's number follows it in the name of each user's directory.
+/// Prefix of user directories, before the user's number.
 const USER_DIRECTORY: &str = "firsthand-";
 
 #[derive(Debug)]
 pub struct Robot {
     pub name: RobotName,
-    /// Its process; none if the supervisor was killed.
+    /// Supervisor's process. `None` if killed.
     pub supervisor: Option<u32>,
-    /// The run's directory; none if the system does not say.
+    /// Directory of the run, if the system reports it.
     pub run: Option<PathBuf>,
 }
 
@@ -27,9 +26,9 @@ impl Robot {
     }
 }
 
-/// This user's robots that run, or whose supervisor was killed, by name.
+/// Returns this user's robots by name, including those with a killed supervisor.
 pub fn own() -> Vec<Robot> {
-    // The name does not matter, because all robots of a user are in one directory.
+    // All robots of a user share one directory.
     let Ok(any) = "any".parse() else {
         return Vec::new();
     };
@@ -42,12 +41,12 @@ pub fn own() -> Vec<Robot> {
     robots
 }
 
-/// The entries of `directory` that can be read; none where it is missing.
+/// Returns the readable entries of `directory`.
 pub(crate) fn entries(directory: &Path) -> impl Iterator<Item = fs::DirEntry> + use<> {
     fs::read_dir(directory).into_iter().flatten().flatten()
 }
 
-/// Users who have, or had, robots on this machine. Only they can list them.
+/// Returns users with present or former robots here. Only they can list them.
 pub fn other_users() -> Vec<u32> {
     let own = rustix::process::geteuid().as_raw();
     users_in(Path::new("/tmp"), own)
@@ -57,7 +56,7 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
     let user = |entry: fs::DirEntry| {
         let name = entry.file_name();
         let user = name.to_str()?.strip_prefix(USER_DIRECTORY)?.parse().ok()?;
-        // Every user can create a directory of any name there.
+        // Any user can create directories there.
         let its = entry.metadata().ok()?.uid() == user;
         (user != own && its).then_some(user)
     };
@@ -66,7 +65,7 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
     users
 }
 
-/// The process `supervisor` has its log open there.
+/// Finds the directory of the log that the process `supervisor` has open.
 fn run_directory(supervisor: u32) -> Option<PathBuf> {
     let opened = fs::read_dir(format!("/proc/{supervisor}/fd")).ok()?;
     let files = opened.flatten().filter_map(|entry| fs::read_link(entry.path()).ok());

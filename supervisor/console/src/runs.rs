@@ -1,4 +1,4 @@
-//! Runs: each is a directory with a run file.
+//! Runs, each a directory with a run file.
 
 use std::{
     fs, io,
@@ -19,9 +19,9 @@ use super::{
     robots::{Robot, entries},
 };
 
-/// Results of 20,000 targets.
+/// Bytes for the results of 20,000 targets.
 const LARGEST_TARGETS: u64 = 4 << 20;
-/// A summary takes 2 kB; a larger file is not read.
+/// Largest summary that is read. A summary takes 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,21 +29,21 @@ pub struct RunDirectory {
     pub began: SystemTime,
     pub directory: PathBuf,
     pub robot: RobotName,
-    /// None if another version wrote the run file.
+    /// `None` if another version wrote the run file.
     pub mission: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     Running,
-    /// The supervisor was killed, or the machine switched off.
+    /// Run whose supervisor was killed, or whose machine was switched off.
     CutOff,
     Ended(Ended),
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Ended {
-    /// A word such as `reached`.
+    /// Word such as `reached`.
     pub outcome: String,
     pub mission_time_s: Option<f64>,
     #[serde(default)]
@@ -63,12 +63,12 @@ pub struct Target {
     pub truth_m: Option<f64>,
 }
 
-/// The results of the targets of the run in `directory` so far, the newest [`LARGEST_TARGETS`] bytes of them.
+/// Returns the newest [`LARGEST_TARGETS`] bytes of a run's target results.
 pub fn targets(directory: &Path) -> Vec<Target> {
     Results::of(directory, LARGEST_TARGETS).take()
 }
 
-/// Reads the results of a run's targets as they are recorded.
+/// Reader of a run's target results as they are recorded.
 #[derive(Debug)]
 pub struct Results {
     file: PathBuf,
@@ -76,7 +76,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// The newest `most` bytes of those of the run in `directory`, and what comes.
+    /// Starts at the newest `most` bytes of the results in `directory`.
     pub fn of(directory: &Path, most: u64) -> Self {
         let (file, mut tail) = (directory.join(records::TARGETS), Tail::default());
         tail.skip(&file, most);
@@ -90,7 +90,7 @@ impl Results {
             if lines.is_empty() {
                 return targets;
             }
-            // The line at which it begins may be cut.
+            // The first line may be cut.
             targets.extend(lines.lines().filter_map(|line| serde_json::from_str(line).ok()));
         }
     }
@@ -122,7 +122,7 @@ pub fn list(runs: &Path) -> Vec<RunDirectory> {
 }
 
 impl RunDirectory {
-    /// The run has a summary, so nobody continues it.
+    /// Returns whether the run has a summary, and thus is never continued.
     pub fn has_ended(&self) -> bool {
         self.directory.join(SUMMARY).exists()
     }
@@ -150,12 +150,12 @@ impl RunDirectory {
     }
 }
 
-/// Deeper levels are not counted; a run directory has one.
+/// Counted directory levels. A run directory has one.
 const MOST_LEVELS: u32 = 8;
 
 fn size(directory: &Path, levels: u32) -> u64 {
     let sizes = entries(directory).filter_map(|entry| {
-        // A link counts by itself, without the file to which it leads.
+        // A link counts without its target.
         let file = entry.metadata().ok()?;
         let below = if file.is_dir() && levels > 0 { size(&entry.path(), levels - 1) } else { 0 };
         // The kernel counts blocks of 512 bytes on every file system.
@@ -179,7 +179,7 @@ pub fn own(directory: &Path) -> Result<PathBuf> {
     Ok(fs::canonicalize(directory)?)
 }
 
-/// `NAME-NNN`, after the highest number there. Fails if it cannot be made.
+/// Makes `NAME-NNN` after the highest existing number.
 pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf> {
     fs::create_dir_all(runs).map_err(|error| {
         format!("cannot make {}: {error}; say where with --out", runs.display())
@@ -206,8 +206,7 @@ fn highest_number(runs: &Path, name: &str) -> u64 {
     entries(runs).filter_map(number).max().unwrap_or_default()
 }
 
-/// All but the newest `keep` runs of `robot` that have ended are removed. If one cannot be removed, it stays and the
-/// mission starts all the same.
+/// Removes all but the newest `keep` ended runs of `robot`. A failure does not prevent the mission.
 pub fn prune(runs: &Path, robot: &RobotName, keep: usize) {
     let mut ended = runs_of(robot, runs);
     ended.retain(RunDirectory::has_ended);
@@ -280,7 +279,6 @@ mod tests {
         assert_eq!(numbers, [1, 3]);
     }
 
-    /// The directory of a run of `robot` that has begun.
     fn begun(runs: &Path, robot: &str, name: &str) -> PathBuf {
         let directory = runs.join(name);
         fs::create_dir(&directory).unwrap();

@@ -1,4 +1,4 @@
-//! Standard output until a signal comes or its reader closes it.
+//! Standard output until a signal or a closed reader.
 
 use std::{
     io::{self, Write as _},
@@ -9,15 +9,15 @@ use common::{poll, signals::Signals};
 
 use super::output::unless_closed;
 
-/// A writable pipe takes them at once (pipe(7)).
+/// Bytes that a writable pipe takes at once (pipe(7)).
 const CHUNK: usize = 4096;
-/// A waiting command looks so often whether it must end.
+/// Interval at which a waiting command checks whether it must end.
 pub const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 const NICE: i32 = 5;
 
 pub fn let_stages_go_first() {
-    // If the kernel refuses, the processes share the processor.
+    // If the kernel refuses, processes share the processor equally.
     let _ = rustix::process::nice(NICE);
 }
 
@@ -28,13 +28,13 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// From now on a signal lets the command leave the bus before it ends. Fails if signals cannot be caught.
+    /// Catches signals, so that the command leaves the bus before it ends.
     pub fn open() -> io::Result<Self> {
         let_stages_go_first();
         Self::with_usual_priority()
     }
 
-    /// [`Self::open`] without the lower priority.
+    /// Opens like [`Self::open`], without the lower priority.
     pub fn with_usual_priority() -> io::Result<Self> {
         Ok(Self { signals: Signals::that_end()?, ended: false })
     }
@@ -44,7 +44,7 @@ impl Stream {
         self.ended
     }
 
-    /// The rest is dropped if the command must end. Fails if standard output does.
+    /// Drops the rest if the command must end.
     pub fn write(&mut self, text: &str) -> io::Result<()> {
         let mut stdout = io::stdout();
         for chunk in text.as_bytes().chunks(CHUNK) {

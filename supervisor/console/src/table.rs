@@ -1,4 +1,4 @@
-//! Text tables; each column is as wide as its widest cell.
+//! Text tables whose columns fit their widest cells.
 
 use std::fmt::{Display, Formatter, Result};
 
@@ -8,7 +8,7 @@ pub struct Table<const N: usize> {
 }
 
 impl<const N: usize> Table<N> {
-    /// A heading that begins with `>` stands above cells that are aligned to the right.
+    /// Takes headings. A leading `>` aligns the cells to the right.
     pub fn new(headings: [&str; N]) -> Self {
         let names = headings.map(|heading| heading.trim_start_matches('>').to_owned());
         Self { to_the_right: headings.map(|heading| heading.starts_with('>')), rows: vec![names] }

@@ -1,4 +1,4 @@
-//! Messages about a robot that a command waits for, one each time.
+//! Messages about an absent robot, one per change.
 
 use common::{domain::RobotName, follower::Event};
 
@@ -11,7 +11,7 @@ pub struct Waiting {
 }
 
 impl Waiting {
-    /// Say where the robot is, if an `event` of its follower changes that.
+    /// Reports the robot's state if `event` changes it.
     pub fn tell<Topics>(&mut self, event: &Event<'_, Topics>, robot: &RobotName) {
         match event {
             Event::Connected => (self.connected, self.reported) = (true, false),
@@ -31,7 +31,7 @@ impl Waiting {
     }
 }
 
-/// The robot was not there yet.
+/// Message before the first connection.
 pub const NOT_RUNNING: &str = "is not running here; waiting for it";
-/// The robot was there.
+/// Message after a lost connection.
 pub const ENDED: &str = "has ended its run; waiting for it";

@@ -27,12 +27,12 @@ pub const fn state(state: StageState) -> &'static str {
     }
 }
 
-/// `u64::MAX` stands for never.
+/// Converts nanoseconds, with `u64::MAX` for never.
 pub fn seconds(nanoseconds: u64) -> Option<f64> {
     (nanoseconds != u64::MAX).then_some(nanoseconds as f64 * 1e-9)
 }
 
-/// The unit fits; none is never.
+/// Chooses a fitting unit; `None` means never.
 pub fn age(seconds: Option<f64>) -> String {
     match seconds {
         None => "never".to_owned(),

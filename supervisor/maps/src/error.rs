@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::map::MOST_BOXES;
 
-/// A file that is no map, or cannot be read or written.
+/// Map file that is invalid, or cannot be read or written.
 #[derive(Debug, Error)]
 #[error("{}: {problem}", file.display())]
 pub struct MapError {
@@ -16,7 +16,7 @@ pub struct MapError {
 }
 
 impl MapError {
-    /// `problem` names the remedy.
+    /// Makes an error whose `problem` names the remedy.
     pub(crate) fn of(file: &Path, problem: impl Into<String>) -> Self {
         Self { file: file.to_owned(), problem: problem.into() }
     }

@@ -1,4 +1,4 @@
-//! Map files with limits of length and of cells.
+//! Map files, with limits of length and of cells.
 
 use std::{
     fs::{self, File},
@@ -10,12 +10,12 @@ use harmonic::MAX_SIDE;
 
 use crate::error::MapError;
 
-/// Files that are not regular may never end.
+/// Refuses files that are not regular, because they may never end.
 pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
-    // The check comes before opening, because opening a pipe waits for its other end.
+    // The check precedes opening: opening a pipe waits for its other end.
     let metadata = fs::metadata(file).map_err(MapError::unreadable(file))?;
     if !metadata.is_file() {
-        // A directory, a pipe or a device.
+        // Directory, pipe or device.
         return Err(MapError::of(file, "not a regular file; give a map file"));
     }
     let bytes = metadata.len();
@@ -33,7 +33,7 @@ pub(crate) fn read(file: &Path, most: u64) -> Result<Vec<u8>, MapError> {
     Ok(bytes)
 }
 
-/// An empty map is refused, too.
+/// Refuses empty maps, too.
 pub(crate) fn check_size(file: &Path, cols: u64, rows: u64) -> Result<(), MapError> {
     let sides = 1..=MAX_SIDE as u64;
     if sides.contains(&cols) && sides.contains(&rows) {

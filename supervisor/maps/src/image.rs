@@ -14,28 +14,28 @@ use crate::{
     map::Map,
 };
 
-/// 16 bits a channel, four channels, with room for the words of a Netpbm in ASCII.
+/// Bytes of 4 channels of 16 bits, with margin for ASCII Netpbm.
 const LONGEST: u64 = (MAX_SIDE as u64).pow(2) * 8 + (1 << 20);
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lightness {
-    /// Dark means free.
+    /// Whether dark means free.
     pub negate: bool,
-    /// A pixel is free below this darkness, 0 to 1.
+    /// Darkness below which a pixel is free, 0 to 1.
     pub free_thresh: f64,
-    /// A pixel is occupied above this darkness.
+    /// Darkness above which a pixel is occupied.
     pub occupied_thresh: f64,
 }
 
 impl Default for Lightness {
-    /// The map_saver writes these thresholds.
+    /// Returns the thresholds that the map_saver writes.
     fn default() -> Self {
         Self { negate: false, free_thresh: 0.196, occupied_thresh: 0.65 }
     }
 }
 
 impl Lightness {
-    /// Brightness is 0 to 1.
+    /// Takes a brightness of 0 to 1.
     fn is_free(self, brightness: f64) -> bool {
         let darkness = if self.negate { brightness } else { 1.0 - brightness };
         darkness < self.free_thresh && darkness <= self.occupied_thresh
@@ -44,7 +44,7 @@ impl Lightness {
 
 type Cause = Box<dyn Error>;
 
-/// Row by row.
+/// Free pixels, row by row.
 pub(super) struct Free {
     pub cols: usize,
     pub pixels: Vec<bool>,
@@ -58,7 +58,7 @@ pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
 pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError> {
     let mut reader = BufReader::new(open(file, LONGEST)?);
     let start = reader.fill_buf().map_err(MapError::unreadable(file))?;
-    // The first bytes decide: a PNG that is called .pgm is still a PNG.
+    // The first bytes decide: a PNG may be called .pgm.
     let decoded = match start {
         [0x89, b'P', b'N', b'G', ..] => png(reader, lightness, file),
         [b'P', kind @ (b'2' | b'3' | b'5' | b'6'), ..] => {
@@ -82,7 +82,7 @@ pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError
     })
 }
 
-/// Greys (kinds 2 and 5) or colours (3 and 6), in ASCII (2 and 3) or binary.
+/// Reads greys (2 and 5) or colours (3 and 6), in ASCII (2 and 3) or binary.
 fn netpbm(
     reader: impl BufRead,
     kind: u8,
@@ -92,7 +92,7 @@ fn netpbm(
     let mut bytes = reader.bytes();
     let mut header = || number(&mut bytes);
     let (cols, rows, most) = (header()?, header()?, header()?);
-    // The size is checked first: decoding takes as much memory as the header claims.
+    // The size is checked first, because decoding allocates what the header claims.
     check_size(file, cols.into(), rows.into())?;
     if !(1..=0xffff).contains(&most) {
         return Err(format!("its brightest is {most}").into());
@@ -150,7 +150,7 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
     check_size(file, cols.into(), rows.into())?;
     let mut reader = decoder.read_info()?;
     let (colour, depth) = reader.output_color_type();
-    // The map_server's trinary mode takes alpha for a fourth colour.
+    // Like the map_server's trinary mode, which takes alpha as a fourth colour.
     let weights: &[f64] = match colour {
         png::ColorType::Grayscale => &[1.0],
         png::ColorType::GrayscaleAlpha => &[0.75, 0.25],
@@ -178,7 +178,6 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
 mod tests {
     use super::*;
 
-    /// The map in a file of these bytes.
     fn map_of(bytes: &[u8], lightness: Lightness) -> Result<Map, MapError> {
         let directory = tempfile::tempdir().unwrap();
         let file = directory.path().join("map.pgm");
@@ -186,7 +185,6 @@ mod tests {
         load(&file, lightness)
     }
 
-    /// Whether the middle of 3 x 3 pixels is free.
     fn middle_is_free(header: &[u8], pixel: &[u8], lightness: Lightness) -> bool {
         let map = map_of(&[header, &pixel.repeat(9)].concat(), lightness).unwrap();
         assert_eq!((map.cols, map.rows), (3, 3));
@@ -196,7 +194,7 @@ mod tests {
     #[test]
     fn a_pixel_is_free_from_the_lightness_of_the_usual_threshold_on() {
         let usual = Lightness::default();
-        // 1 - 205 / 255 = 0.19607..., which the map_server's 0.196 takes for unknown.
+        // 1 - 205 / 255 = 0.19607..., unknown by the map_server's 0.196.
         for (grey, free) in [(0, false), (205, false), (206, true), (255, true)] {
             assert_eq!(middle_is_free(b"P5 3 3 255\n", &[grey], usual), free, "{grey}");
         }
@@ -234,7 +232,6 @@ mod tests {
         }
     }
 
-    /// The middle of a PNG of 3 x 3 pixels.
     fn middle_of_png_is_free(colour: png::ColorType, depth: png::BitDepth, pixel: &[u8]) -> bool {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 3, 3);

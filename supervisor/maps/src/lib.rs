@@ -1,15 +1,16 @@
-//! Maps in the formats of others: ROS map_server, PGM, PNG, MovingAI. A map says which cells are free.
+//! Maps of ROS map_server, PGM, PNG and MovingAI. A map says which cells are free.
 //!
 //! | module | reads |
 //! |---|---|
-//! | `ros` | a map_server YAML and its image |
-//! | `image` | any Netpbm, or PNG |
+//! | `ros` | map_server YAML and its image |
+//! | `image` | Netpbm or PNG |
 //! | `prior` | a ROS map as known hazards; writes a robot's belief as one |
-//! | `moving_ai` | the `.map` grids of the MovingAI benchmarks |
+//! | `moving_ai` | `.map` grids of the MovingAI benchmarks |
 //!
-//! [`load`] chooses a reader by the file's name; [`load_placed`] reads a ROS map with its place in metres.
+//! [`load`] chooses a reader by file extension. [`load_placed`] reads a ROS map with its position
+//! in metres.
 //!
-//! Sizes are checked before memory is allocated; errors name file, cause and remedy.
+//! Sizes are checked before allocation. Errors name file, cause and remedy.
 
 mod error;
 mod file;
@@ -26,10 +27,10 @@ pub use map::{MOST_BOXES, Map, PlacedMap};
 pub use prior::{save_believed, with_prior_map};
 pub use ros::load_placed;
 
-/// The ending of the file's name gives the format.
+/// Loads a map in the format of its file extension.
 ///
 /// # Errors
-/// The file cannot be read, or is no map of that format.
+/// The file cannot be read, or is not a map of that format.
 pub fn load(file: &Path) -> Result<Map, MapError> {
     let extension = file.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {

@@ -1,15 +1,15 @@
 use common::geometry::Box2;
 use glam::DVec2;
 
-/// A mission file with so many has 2 MB.
+/// Largest number of boxes. A mission file with them has 2 MB.
 pub const MOST_BOXES: usize = 20_000;
 
-/// Row-major, row 0 at the top.
+/// Row-major cells, row 0 at the top.
 #[derive(Debug)]
 pub struct Map {
     pub cols: usize,
     pub rows: usize,
-    /// The whole rim is blocked, too.
+    /// Blocked cells, including the whole rim.
     pub blocked: Vec<bool>,
 }
 
@@ -17,12 +17,12 @@ pub struct Map {
 pub struct PlacedMap {
     pub map: Map,
     pub cell_m: f64,
-    /// The corner where x and y are least.
+    /// Corner of least x and y.
     pub corner_m: [f64; 2],
 }
 
 impl Map {
-    /// The rim is blocked, like the perimeter of a mission.
+    /// Blocks the rim like a mission's perimeter.
     pub(crate) fn new(cols: usize, rows: usize, free: impl Iterator<Item = bool>) -> Self {
         let mut blocked: Vec<bool> = free.map(|free| !free).collect();
         for (row, line) in blocked.chunks_mut(cols.max(1)).enumerate() {
@@ -38,26 +38,26 @@ impl Map {
         Self { cols, rows, blocked }
     }
 
-    /// Column and row; none if no cell is free.
+    /// Returns column and row, or `None` if no cell is free.
     pub fn nearest_free(&self, col: usize, row: usize) -> Option<(usize, usize)> {
         let free = self.blocked.iter().enumerate().filter(|cell| !cell.1);
         free.map(|(at, _)| (at % self.cols, at / self.cols)).min_by_key(|cell| {
             let (x, y) = (cell.0.abs_diff(col) as u64, cell.1.abs_diff(row) as u64);
-            // Far outside the map a distance may not fit.
+            // Saturates, because distances far outside the map may overflow.
             x.saturating_mul(x).saturating_add(y.saturating_mul(y))
         })
     }
 }
 
 impl PlacedMap {
-    /// Metres, `cols` cells from the left edge and `rows` from the top one.
+    /// Returns the point `cols` from the left and `rows` from the top, metres.
     pub fn place(&self, cols: f64, rows: f64) -> DVec2 {
         let up = self.map.rows as f64 - rows;
         DVec2::from(self.corner_m) + DVec2::new(cols, up) * self.cell_m
     }
 
-    /// Boxes that cover the cells `wanted` and none but `solid` ones: each grows to the right as far as cells are
-    /// solid, and down while that covers more. They are made as they are asked for.
+    /// Returns boxes over the `wanted` cells within `solid` ones, lazily. Each grows right, then
+    /// down while that covers more.
     pub fn boxes(&self, solid: &[bool], mut wanted: Vec<bool>) -> impl Iterator<Item = Box2> {
         let Map { cols, rows, .. } = self.map;
         (0..wanted.len()).filter_map(move |first| {

@@ -1,6 +1,7 @@
-//! The grids of the MovingAI benchmarks: N. R. Sturtevant, "Benchmarks for Grid-Based Pathfinding" (2012).
+//! Grids of the MovingAI benchmarks: N. R. Sturtevant, "Benchmarks for Grid-Based Pathfinding"
+//! (2012).
 //!
-//! The file has a header of four lines, `type`, `height`, `width` and `map`, then a character for each cell.
+//! A header of four lines, `type`, `height`, `width` and `map`, precedes one character per cell.
 
 use std::path::Path;
 
@@ -12,7 +13,7 @@ use crate::{
     map::Map,
 };
 
-/// The largest map with two characters at the end of every line, and its header.
+/// Bytes of the largest map, with two characters at each line end, and its header.
 const LONGEST: u64 = MAX_SIDE as u64 * (MAX_SIDE as u64 + 2) + 4096;
 
 pub(super) fn load(file: &Path) -> Result<Map, MapError> {
@@ -59,13 +60,13 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
     Ok(Map::new(cols, rows, free.into_iter()))
 }
 
-/// Returns columns and rows; the following lines are the cells.
+/// Returns columns and rows, and leaves the cell lines.
 fn header<'a>(
     file: &Path,
     lines: &mut impl Iterator<Item = &'a [u8]>,
 ) -> Result<(u64, u64), MapError> {
     let (mut cols, mut rows, mut begun) = (None, None, false);
-    // `type` is the kind of motion from cell to cell and is not used.
+    // `type` is the kind of motion between cells, and unused.
     for line in lines.take(4) {
         let text = String::from_utf8_lossy(line);
         let mut words = text.split_whitespace();
@@ -90,7 +91,8 @@ fn header<'a>(
     }
 }
 
-/// A robot can be on plain ground and swamp, not out of bounds, in trees or water. None for another character.
+/// Returns true for ground and swamp, false for out of bounds, trees and water, `None` for other
+/// characters.
 fn is_free(cell: u8) -> Option<bool> {
     match cell {
         b'.' | b'G' | b'S' => Some(true),

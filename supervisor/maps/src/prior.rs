@@ -1,4 +1,4 @@
-//! A ROS map as known hazards, and a robot's belief as such a map.
+//! ROS maps as known hazards, and a robot's belief as a ROS map.
 
 use std::path::Path;
 
@@ -10,17 +10,17 @@ use common::{
 
 use crate::{MOST_BOXES, MapError, PlacedMap, ros};
 
-/// Cells farther outside of the perimeter concern no robot inside.
+/// Margin around the perimeter beyond which cells are irrelevant, metres.
 const BEYOND_M: f64 = 1.0;
 
 const OCCUPIED: u8 = 0;
 const UNKNOWN: u8 = 205;
 const FREE: u8 = 254;
 
-/// Adds the occupied cells of the map to the known shapes: a run does not depend on the file any more.
+/// Adds the map's occupied cells to the known shapes, so that the run no longer needs the file.
 ///
 /// # Errors
-/// The file is no map, or its occupied cells are too many boxes.
+/// The file is not a map, or needs too many boxes.
 pub fn with_prior_map(mut mission: Mission) -> Result<Mission, MapError> {
     if let Some(file) = mission.map.take() {
         let boxes = known(&file, &ros::load_occupied(&file)?, &mission.grid_frame())?;
@@ -29,7 +29,7 @@ pub fn with_prior_map(mut mission: Mission) -> Result<Mission, MapError> {
     Ok(mission)
 }
 
-/// They cover the occupied cells in the perimeter `frame` and no other cell.
+/// Returns boxes over exactly the occupied cells in the perimeter `frame`.
 fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>, MapError> {
     let within = f64::from(frame.cells) * frame.resolution_m / 2.0 + BEYOND_M;
     let map = &placed.map;
@@ -46,8 +46,8 @@ fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>
 
 /// Writes `cells`, one [`CellState`] byte each, to the YAML `file` and an image beside it.
 ///
-/// Hazards of the grid reach as far around a surface as the body does. The map has the surfaces: cells with nothing
-/// but hazard within that reach, so that a mission which starts from the map has the same hazards again.
+/// Grid hazards surround a surface by the body's reach. The map has only surfaces: cells with
+/// nothing but hazard within that reach. A mission from the map then has the same hazards.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -63,7 +63,7 @@ pub fn save_believed(
         let byte = is_inside.then(|| cells.get((row * side + col) as usize)).flatten();
         byte.map_or(CellState::Perimeter, |byte| CellState::from_byte(*byte))
     };
-    // Half a cell is taken off, because the believed surface may lie anywhere in its cell.
+    // Minus half a cell, because the surface may lie anywhere in its cell.
     let reach = mapper::step::hazard_reach_m(mission) / frame.resolution_m - 0.5;
     let around = (reach + 0.5).ceil() as i64;
     let beyond = |cells: i64| (cells.abs() as f64 - 0.5).max(0.0);
@@ -83,7 +83,7 @@ pub fn save_believed(
             }
         }
     };
-    // Row 0 is the lowest row of the grid and the highest of an image.
+    // Row 0 is the lowest of the grid and the highest of an image.
     let pixels = (0..side).rev().flat_map(|row| (0..side).map(move |col| (col, row)));
     let map = ros::Saved {
         cols: frame.cells as usize,
@@ -141,7 +141,7 @@ mod tests {
             let cells = vec![0; frame.area()];
             save_believed(&file, &mission, &frame, &cells).unwrap();
             let placed = ros::load_occupied(&file).unwrap();
-            // The image's rows count from the top.
+            // Image rows count from the top.
             let place = placed.place(7.5, f64::from(frame.cells) - 2.5);
             let apart = place - frame.centre_of(Cell { col: 7, row: 2 });
             assert!(apart.length() < 1e-6, "{apart} m apart of {} cells", frame.cells);

@@ -1,6 +1,6 @@
-//! Map files of the ROS map_server: YAML that names an image and its thresholds.
+//! Map files of the ROS map_server: YAML that names an image and thresholds.
 //!
-//! [`load`] does not read resolution and origin, because a field is solved in cells. [`load_placed`] does.
+//! [`load_placed`] also reads resolution and origin. [`load`] works in cells.
 
 use std::{
     collections::HashMap,
@@ -18,12 +18,12 @@ use crate::{
     map::{Map, PlacedMap},
 };
 
-/// A map file has a dozen short lines.
+/// Largest map file. A usual one has a dozen short lines.
 const LONGEST: u64 = 64 << 10;
 const CELL_M: RangeInclusive<f64> = 0.005..=1.0;
 const FARTHEST_M: f64 = 1e6;
 
-/// Keys with a scalar or a list of scalars. Other programs' keys may be among them.
+/// Scalars and lists of scalars, including other programs' keys.
 struct Keys<'a> {
     file: &'a Path,
     values: HashMap<String, Vec<String>>,
@@ -33,15 +33,15 @@ pub(super) fn load(file: &Path) -> Result<Map, MapError> {
     image_of(file, &text(file)?)
 }
 
-/// The map of a map_server's YAML, with its place.
+/// Loads a map with its position.
 ///
 /// # Errors
-/// The YAML or its image cannot be read, or is no map.
+/// The YAML or its image cannot be read, or is not a map.
 pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, image_of)
 }
 
-/// Only cells that the map says are occupied are blocked.
+/// Loads a map that blocks only occupied cells.
 pub(super) fn load_occupied(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, |file, text| {
         let (image, lightness) = named_image(file, text)?;
@@ -93,22 +93,21 @@ fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
     image::load(&image, lightness)
 }
 
-/// The image, and the rule by which its pixels are free.
 fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError> {
     let keys = Keys::parse(file, text)?;
     let image = keys.scalar("image")?.ok_or_else(|| keys.missing("image: FILE"))?;
     let folder = file.parent().unwrap_or(Path::new(""));
-    // `join` leaves an absolute path as it is.
+    // `join` keeps an absolute path.
     Ok((folder.join(image), keys.lightness()?))
 }
 
-/// Row-major, row 0 at the top.
+/// Row-major image, row 0 at the top.
 pub(super) struct Saved {
     pub cols: usize,
-    /// 0 is occupied, 254 free, 205 unknown, as the map_saver writes them.
+    /// 0 occupied, 254 free, 205 unknown, as the map_saver writes them.
     pub pixels: Vec<u8>,
     pub cell_m: f64,
-    /// The corner where x and y are least.
+    /// Corner of least x and y.
     pub corner_m: [f64; 2],
 }
 
@@ -120,7 +119,7 @@ pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
     bytes.extend_from_slice(&map.pixels);
     file::replace(&image, bytes).map_err(unwritable)?;
     let (name, [x, y]) = (image.file_name().unwrap_or_default().to_string_lossy(), map.corner_m);
-    // A name in single quotes is taken literally, except that quotes in it are doubled.
+    // A name in single quotes is literal, except for doubled quotes.
     let name = name.replace('\'', "''");
     let yaml = format!(
         "image: '{name}'\nmode: trinary\nresolution: {:?}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
@@ -130,7 +129,7 @@ pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
 }
 
 impl<'a> Keys<'a> {
-    /// The YAML is read event by event, and aliases are refused, so that no text needs more memory than it has bytes.
+    /// Reads YAML event by event and refuses aliases, which bounds memory by the text's length.
     fn parse(file: &'a Path, text: &str) -> Result<Self, MapError> {
         let refused =
             |problem: &str| MapError::of(file, format!("not a map_server map: {problem}"));
@@ -156,7 +155,7 @@ impl<'a> Keys<'a> {
                     }
                     (1 | 2, Some(named)) => {
                         values.entry(named.clone()).or_default().push(scalar);
-                        // A list goes on until its end.
+                        // A list continues until its end.
                         key = (depth == 2).then_some(named);
                     }
                     _ => {}
@@ -171,7 +170,7 @@ impl<'a> Keys<'a> {
         MapError::of(self.file, problem)
     }
 
-    /// None where the file has no such key.
+    /// Returns `None` for a missing key.
     fn scalar(&self, key: &str) -> Result<Option<&str>, MapError> {
         match self.values.get(key).map(Vec::as_slice) {
             None => Ok(None),
@@ -224,7 +223,6 @@ impl<'a> Keys<'a> {
 mod tests {
     use super::*;
 
-    /// The map of that YAML beside an image of 5 x 5 pixels of one grey.
     fn map_of(yaml: &str, grey: u8) -> Result<Map, MapError> {
         read_by(load, yaml, grey)
     }

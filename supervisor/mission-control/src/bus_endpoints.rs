@@ -1,4 +1,4 @@
-//! The supervisor's readers and writers on one bus. They are replaced when the bus is recreated.
+//! Readers and writers of the supervisor on one bus.
 
 use std::{
     io,
@@ -27,7 +27,7 @@ use crate::{
 
 pub(crate) struct BusEndpoints {
     pub observer: Observer,
-    /// Wakes for heartbeats, ends of ticks and requests.
+    /// Waiter for heartbeats, ends of ticks and requests.
     pub waiter: Waiter,
     pub target: Writer<TargetSample>,
     pub place: Writer<PlaceSample>,
@@ -41,7 +41,7 @@ pub(crate) struct BusEndpoints {
     orders: Writer<RequestSample>,
     pub requests: Reader<RequestSample>,
     pub beacon: Reader<BeaconSample>,
-    /// The request that was answered last, and the answer, which the roster has; 0 for none.
+    /// Id and answer of the newest request; id 0 before the first.
     pub last_request: (u64, RequestAnswer),
     published: Option<Instant>,
     // The bus is dropped last.
@@ -85,17 +85,18 @@ impl BusEndpoints {
         })
     }
 
-    /// Replace the bus. After an error, these are the endpoints of the old one, on which nobody is left.
+    /// Replaces the bus. After an error, these remain endpoints of the old, abandoned bus.
     pub(crate) fn recreate(&mut self, lock: &mut DomainLock) -> Result {
         lock.recreate_bus()?;
         let mut record = std::mem::take(&mut self.observer.record);
-        // The next link opens the connection to the robot again.
+        // The next link connects to the robot anew.
         record.link = None;
         *self = Self::continued(lock, record, self.last_request)?;
         Ok(())
     }
 
-    /// Whether the state was last published a `period` ago or earlier, or a consumer waits for the first roster.
+    /// Returns whether the last publication is a `period` old, or a consumer waits for its first
+    /// roster.
     pub(crate) fn is_due(&mut self, period: Duration) -> bool {
         self.roster.has_new_reader() || self.published.is_none_or(|last| last.elapsed() >= period)
     }
@@ -115,7 +116,7 @@ impl BusEndpoints {
         self.roster.publish_slice(tick, time, header, entries)
     }
 
-    /// Publish a death. A failure is a warning in the log, because this only reports.
+    /// Publishes a death; a failure only logs a warning.
     pub(crate) fn publish_death(&mut self, death: DeathSample) {
         let stamp = self.observer.record.pose.unwrap_or_default().stamp;
         warn_if_failed(self.deaths.publish(stamp.tick, stamp.time(), death));

@@ -1,7 +1,7 @@
-//! The event that ended a mission first, and the part of the run that counts. Pure.
+//! Event that ended a mission first, and the part of the run that counts. Pure.
 //!
-//! The stages go on until the supervisor has seen an event and stopped the robot. How far they get by then depends on
-//! the machine; which event came first does not.
+//! After an event, the stages go on until the supervisor has stopped the robot. How far they get
+//! depends on the machine; the order of events does not.
 
 use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 
@@ -17,16 +17,17 @@ pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTic
 
 pub(crate) struct Decided {
     pub ending: Ending,
-    /// The last complete tick; none if no tick decided. That of a contact, a timeout or a stall may be incomplete.
+    /// Last complete tick; `None` if no tick decided. The tick of a contact, timeout or stall may
+    /// be incomplete.
     pub last_tick: Option<u64>,
-    /// Number of ticks of the ground truth that count: up to the contact, or up to the last tick.
+    /// Ground-truth ticks that count: up to the contact, or up to the last tick.
     pub truth_ticks: usize,
 }
 
 #[derive(Clone, Copy)]
 pub(crate) struct Timeout {
     pub deadline: Deadline,
-    /// Whether time is that of the simulated robot's own clock, which also counts ticks that nobody received, in lockstep.
+    /// Whether the simulated robot's clock decides. In lockstep it also counts lost ticks.
     pub by_robot: bool,
 }
 
@@ -42,8 +43,9 @@ impl Timeout {
     }
 }
 
-/// The first event of a run that the supervisor saw end with `ending`. `contact` is the one that ends it, `stall` the tick and the ending of the stall at
-/// which no recovery step was left.
+/// Returns the first event of a run that the supervisor saw end with `ending`.
+///
+/// `stall` holds the tick and the ending of the stall at which no recovery step was left.
 pub(crate) fn first(
     ending: Ending,
     record: &Record,
@@ -71,7 +73,7 @@ pub(crate) fn first(
         return undecided(ending);
     };
     let last_tick = match ending.outcome {
-        // The command of the arrival is the last command of the mission.
+        // The arrival's command is the mission's last.
         Outcome::Reached | Outcome::Unreachable if arrived_in == Some(tick) => tick,
         _ => tick.saturating_sub(1),
     };
@@ -88,13 +90,13 @@ pub(crate) fn first(
     Decided { ending, last_tick: Some(last_tick), truth_ticks }
 }
 
-/// The index in the ground truth of the tick that `pose` was computed from: of those with its counts the one with the nearest number.
+/// Returns the ground-truth index of the tick behind `pose`: same counts, nearest number.
 pub(crate) fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
     let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
     shown.min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick)).map(|(index, _)| index)
 }
 
-/// The tick of the pose that was computed from `truth`; if there is none, the number that it would have.
+/// Returns the tick of the pose computed from `truth`, or else the number it would have.
 fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
     poses
         .iter()
@@ -126,7 +128,7 @@ mod tests {
         }
     }
 
-    /// A run of `ticks` ticks of a second, in which the robot arrived and touched something at given ones.
+    /// A run with ticks of one second.
     fn run(
         ticks: u64,
         arrival: Option<u64>,

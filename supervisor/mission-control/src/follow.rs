@@ -1,4 +1,4 @@
-//! The part of the loop that follows a beacon: it takes its samples, and moves the target with it.
+//! Part of the loop that follows a beacon.
 
 use crate::{
     error::Result,
@@ -13,14 +13,16 @@ use common::{
     },
 };
 
-/// What the loop knows of the beacon beside the [`Following`] that is saved.
+/// State of the beacon beside the saved [`Following`].
 #[derive(Default)]
 pub(crate) struct Beacon {
-    /// The newest sample before a following waits for it, and in lockstep each until all stages have answered the tick of its capture.
+    /// Newest sample before following begins. In lockstep, a sample that waits until all stages
+    /// have answered the tick of its capture.
     waiting: Option<BeaconSample>,
-    /// In lockstep the robot goes so far before the next sample, so that the same samples lead to the same run.
+    /// Last tick before the next sample, in lockstep. It makes the same samples lead to the same
+    /// run.
     last_tick: u64,
-    /// What is published of the following, also of the last one.
+    /// Published state of the current or the last following.
     pub told: Option<FollowingSample>,
 }
 
@@ -59,7 +61,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Let the robot wait if it follows something. Returns whether it did.
+    /// Ends the following, if any, and lets the robot wait. Returns whether it did.
     pub(crate) fn end_following(&mut self, outcome: TargetOutcome) -> bool {
         let Some(following) = self.state_file.state.following.take() else { return false };
         let (now, pose) = (self.beacon_time(), self.bus.observer.record.pose);
@@ -72,7 +74,7 @@ impl Supervisor<'_> {
         true
     }
 
-    /// Take the samples of the beacon. Returns whether there is something to publish.
+    /// Takes the beacon's samples. Returns whether to publish.
     pub(crate) fn take_beacon(&mut self) -> Result<bool> {
         let mut changed = false;
         if self.state_file.state.following.is_none() {
@@ -100,7 +102,7 @@ impl Supervisor<'_> {
         Ok(changed)
     }
 
-    /// Mission time. In lockstep it is the newest pose's, so that nothing depends on the machine.
+    /// Returns the mission time. In lockstep it is the newest pose's, independent of the machine.
     fn beacon_time(&self) -> MissionTime {
         match self.clock.in_ticks() {
             true => self.clock.pose_time(self.bus.observer.record.pose.as_ref()),
@@ -108,7 +110,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Whether the stages, in lockstep, have not answered the tick in which `beacon` was captured.
+    /// Returns whether, in lockstep, the stages have yet to answer the tick of `beacon`'s capture.
     fn is_early(&self, beacon: &BeaconSample) -> bool {
         let (Some(following), Some(captured)) =
             (&self.state_file.state.following, self.clock.tick_at(beacon.capture_ns))
@@ -118,7 +120,7 @@ impl Supervisor<'_> {
         let record = &self.bus.observer.record;
         let newest = record.pose.map(|pose| pose.stamp.tick);
         let begins = newest.is_none() && following.is_new();
-        // A sample of a still later tick is of the future, and refused.
+        // Samples of even later ticks lie in the future and are refused.
         let next = newest.map_or(0, |tick| tick + 1);
         !begins && captured <= next && record.published.tick < Some(captured)
     }
@@ -148,7 +150,7 @@ impl Supervisor<'_> {
         let current = (!self.targets.waits()).then(|| self.targets.current().position());
         let arrived = record.arrival.is_some();
         let next = following.next_place(&record.grid, mission, (here, current), arrived);
-        // In lockstep no tick follows an arrival before another target.
+        // In lockstep no tick follows an arrival until the target changes.
         let again = current.filter(|_| self.clock.in_ticks() && arrived);
         let Some(place) = next.or(again) else { return was_lost };
         self.targets.move_to(place, self.first_tick());
@@ -158,7 +160,7 @@ impl Supervisor<'_> {
 
     fn log_refusal(&mut self, refusal: BeaconRefusal, beacon: [f64; 3]) {
         let [x_m, y_m, deviation_m] = beacon;
-        // A source may send thousands of them: one of each kind in a row is told.
+        // A source may send thousands of them, so a repeated reason is logged once.
         if self.beacon.told.is_none_or(|told| told.refusal != u8::from(refusal)) {
             let why = refusal.words();
             tracing::warn!(x_m, y_m, deviation_m, "a sample of the beacon is refused: {why}");
@@ -173,12 +175,11 @@ impl Supervisor<'_> {
         }
     }
 
-    /// The last tick of a robot in lockstep that waits for its beacon; none if it does not.
+    /// Returns the last tick before the next beacon sample in lockstep; `None` without a following.
     pub(crate) fn beacon_limit(&self) -> Option<u64> {
         self.state_file.state.following.map(|_| self.beacon.last_tick)
     }
 
-    /// Whether the robot follows something and is as near to it as it is to be.
     pub(crate) fn stands_beside(&self) -> bool {
         self.targets.follows() && self.bus.observer.record.arrival.is_some()
     }

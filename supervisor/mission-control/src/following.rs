@@ -1,8 +1,8 @@
-//! What the robot follows, a beacon, and where it goes for that. Pure.
+//! Followed beacon, and the robot's place beside it. Pure.
 //!
-//! The thing followed is a body, not a place: where it stands the sensors see a hazard, so the robot is sent to a free place beside it.
-//! Of the places that are as near to the beacon as the robot is to keep, and that see it, it is the one with the shortest way from the
-//! robot. The field leads there as to any other target.
+//! The sensors see the followed body as a hazard, so the robot goes to a free place beside it.
+//! Candidates lie within the distance to keep and see the beacon. The one with the shortest way
+//! from the robot wins. The field leads there as to any other target.
 
 use std::{cmp::Reverse, collections::BinaryHeap, time::Duration};
 
@@ -17,25 +17,27 @@ use serde::{Deserialize, Serialize};
 
 use crate::target_list::Followed;
 
-/// The robot stands when it has not heard the beacon for so long: a person walks 1 m meanwhile, as far as the robot stays away, and a
-/// source of ten samples a second may lose several in a row.
+/// Silence of the beacon after which the robot stands.
+///
+/// A person walks 1 m meanwhile, the distance that the robot keeps. A source of ten samples a
+/// second may lose several in a row.
 pub(crate) const SILENT: Duration = Duration::from_secs(1);
-/// Two deviations are the room that the robot keeps by default between the bodies, metres.
+/// Greatest deviation of a used sample, metres. Two deviations make up [`ROOM_M`].
 const MOST_DEVIATION_M: f64 = 0.25;
-/// The radius of the thing followed, metres: a person, or a robot of an X80's size.
+/// Radius of the followed body, metres: a person or an X80.
 const BODY_M: f64 = 0.3;
-/// The room between the bodies by default, metres.
+/// Default gap between the bodies, metres.
 const ROOM_M: f64 = 0.5;
-/// What the sensors see within so much of the thing's body is taken for the thing itself, metres: echoes spread.
+/// Spread of echoes around the followed body, metres.
 const SPREAD_M: f64 = 0.15;
 const MOST_DISTANCE_M: f64 = 10.0;
 
-/// The least distance between the middles at which the bodies do not touch, metres.
+/// Returns the distance of the centres at which the bodies touch, metres.
 fn least_m(mission: &Mission) -> f64 {
     BODY_M + mission.body().radius_m
 }
 
-/// The distance that the robot keeps if it is asked for `distance_m`, 0 for the default; none if that is too near or too far.
+/// Returns the distance to keep for a request of `distance_m` (0: default); `None` if out of range.
 pub(crate) fn kept_m(distance_m: f64, mission: &Mission) -> Option<f64> {
     let least_m = least_m(mission);
     let wanted_m = if distance_m == 0.0 { least_m + ROOM_M } else { distance_m };
@@ -46,9 +48,9 @@ pub(crate) fn kept_m(distance_m: f64, mission: &Mission) -> Option<f64> {
 pub(crate) struct Following {
     distance_m: f64,
     began: MissionTime,
-    /// The way of the robot by then, metres.
+    /// Odometer reading at the beginning, metres.
     began_m: f64,
-    /// The newest sample that was used: its time and its place.
+    /// Time and place of the newest used sample.
     heard: Option<(MissionTime, DVec2)>,
     is_lost: bool,
     used: u64,
@@ -72,7 +74,6 @@ impl Following {
         }
     }
 
-    /// Whether no sample came so far.
     pub(crate) const fn is_new(&self) -> bool {
         self.used + self.refused == 0
     }
@@ -85,7 +86,10 @@ impl Following {
         self.heard.map_or(DVec2::ZERO, |(_, place)| place)
     }
 
-    /// Take a sample at `now`. Returns why it is not used.
+    /// Takes a sample at `now`.
+    ///
+    /// # Errors
+    /// Returns why the sample is not used.
     pub(crate) fn take(
         &mut self,
         beacon: &BeaconSample,
@@ -115,7 +119,7 @@ impl Following {
         let BeaconSample { capture_ns, x_m, y_m, deviation_m, .. } = *beacon;
         let (captured, place) = (MissionTime(capture_ns), DVec2::new(x_m, y_m));
         let tick_ns = (1e9 / mission.robot.rate_hz) as u64;
-        // Samples may hold anything.
+        // Samples come from outside and may hold any value.
         if !(place.is_finite() && deviation_m.is_finite() && deviation_m >= 0.0) {
             Err(BeaconRefusal::NotFinite)
         } else if capture_ns > now.0.saturating_add(tick_ns) {
@@ -131,7 +135,6 @@ impl Following {
         }
     }
 
-    /// Whether the beacon is lost at `now` and was not before.
     pub(crate) fn loses(&mut self, now: MissionTime) -> bool {
         let silent = self.heard.is_none_or(|(at, _)| now.since(at) > SILENT);
         let loses = silent && !self.is_lost;
@@ -140,7 +143,7 @@ impl Following {
         loses
     }
 
-    /// The supervisor was another one before, so the beacon must be heard again.
+    /// Marks the beacon as lost after a change of supervisor, so that it must be heard again.
     pub(crate) const fn resumed(&mut self) {
         self.is_lost = true;
     }
@@ -173,7 +176,9 @@ impl Following {
         }
     }
 
-    /// The place to send the robot to, which would come to rest at `rest`; none if it goes on to `current`, where it has `arrived` or not.
+    /// Returns the place to send the robot to; `None` if it goes on to `current`.
+    ///
+    /// `rest` is where the robot would come to rest, `arrived` whether it is at `current`.
     pub(crate) fn next_place(
         &self,
         grid: &Replica<u8>,
@@ -214,7 +219,7 @@ impl Around<'_> {
         byte.is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
     }
 
-    /// Whether nothing stands between `at` and the thing's own body.
+    /// Returns whether the line from `at` to the followed body is free.
     fn sees(&self, at: DVec2) -> bool {
         let way_m = at.distance(self.beacon) - self.least_m - SPREAD_M;
         let steps = (way_m / self.frame.resolution_m).ceil().max(0.0) as u32;
@@ -225,13 +230,13 @@ impl Around<'_> {
         })
     }
 
-    /// The place within `distance_m` that sees the beacon, with the shortest way over free cells from `from`. Where there is none, the
-    /// place nearest to the beacon that has a way.
+    /// Returns the place within `distance_m` that sees the beacon, with the shortest way over free
+    /// cells from `from`. If there is none, returns the reachable place nearest to the beacon.
     fn nearest(&self, from: DVec2, distance_m: f64) -> Option<DVec2> {
         let start = self.start(from)?;
         let side = self.frame.cells as usize;
         let mut costs = vec![u32::MAX; self.frame.area()];
-        // No way over the cells to the circle around the beacon costs less: the search goes there first.
+        // A* heuristic: no way to the circle around the beacon costs less.
         let least_cost = |at: DVec2| {
             let way_m = (at.distance(self.beacon) - distance_m).max(0.0);
             (way_m / self.frame.resolution_m * 9.8) as u32
@@ -273,7 +278,7 @@ impl Around<'_> {
         best.map(|(_, at)| at)
     }
 
-    /// The free cell nearest to `from`: the robot may stand in the margin of a hazard.
+    /// Returns the nearest free cell, because the robot may stand in the margin of a hazard.
     fn start(&self, from: DVec2) -> Option<Cell> {
         let own = self.frame.cell_at(from).filter(|cell| self.is_free_cell(*cell));
         own.or_else(|| {
@@ -284,7 +289,7 @@ impl Around<'_> {
     }
 }
 
-/// The cells beside a cell, and the costs of the ways there, tenths of a cell.
+/// Neighbours of a cell and the costs of reaching them, tenths of a cell.
 const NEXT: [(i32, i32, u32); 8] = [
     (1, 0, 10),
     (-1, 0, 10),

@@ -1,4 +1,4 @@
-//! Whether the mission is over, and how it ended. Pure.
+//! Decision whether the mission is over, and how it ended. Pure.
 
 use std::time::Duration;
 
@@ -14,31 +14,32 @@ use processes::{policy::Now, records};
 
 use crate::outcome::{Ending, Outcome};
 
-/// Observed time without a tick after which a pipeline that nothing holds is stuck: in lockstep the mission's timeout does not pass.
+/// Observed time without a tick after which an unheld pipeline is stuck. In lockstep mission time
+/// stands still, so the mission's timeout cannot end such a run.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 
-/// The time within which a robot that was told to stand rests: by then the link has used each method of the protocol twice.
+/// Time for the robot to come to rest. The link tries each method of the protocol twice in it.
 pub(crate) const RESTS_WITHIN: Duration = Duration::from_secs(5);
 
 pub(crate) struct Snapshot<'a> {
     pub arrival: Option<Arrival>,
     pub link: Option<&'a LinkSample>,
-    /// Whether the robot may be out of reach for any time: a real one, for which no procedure waits.
+    /// Whether the robot may be out of reach for any time: a real robot outside a procedure.
     pub may_be_away: bool,
     pub simulator_ended: bool,
-    /// Place at which a simulated robot touched something, metres.
+    /// Contact of a simulated robot, metres.
     pub collision_m: Option<[f64; 2]>,
     pub time: MissionTime,
     pub deadline: Deadline,
     pub in_ticks: bool,
-    /// The time when the newest tick was first seen or the order last changed, whichever is later.
+    /// Time of the newest tick or change of order.
     pub progress: Now,
     pub has_ticked: bool,
-    /// What a stage cannot use, with the remedy.
+    /// Input that a stage cannot use, with the remedy.
     pub complaint: Option<String>,
     pub reason: HoldReason,
     pub held: Vec<&'static str>,
-    /// Stages that do not run although another should have started them.
+    /// Stages left to another program to start.
     pub not_started: Vec<&'static str>,
     pub robot: &'a RobotName,
     pub address: &'a Address,
@@ -52,7 +53,8 @@ pub(crate) struct Arrival {
     pub since: Now,
 }
 
-/// A target in or beside a hazard is not reached from as near as the robot gets.
+/// Returns the ending of an arrival. Beside a hazard, outside the tolerance, the target is
+/// unreachable.
 pub(crate) fn arrived(distance_m: f64, beside: Option<DVec2>) -> Ending {
     let reason = format!("{distance_m:.2} m from the target");
     let Some(place) = beside else {
@@ -69,10 +71,10 @@ pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
     Ending::failed(Outcome::Collision, reason)
 }
 
-/// The deadline of a target. Time in which an operator stopped the robot does not count.
+/// Deadline of a target. Operators' stops do not count.
 #[derive(Clone, Copy)]
 pub(crate) struct Deadline {
-    /// Mission time at which the robot was sent to the target, seconds.
+    /// Mission time of the target's start, seconds.
     pub began_s: f64,
     pub timeout_s: f64,
     /// Mission time of operators' stops, seconds.
@@ -80,7 +82,7 @@ pub(crate) struct Deadline {
 }
 
 impl Deadline {
-    /// Mission time at which the target is given up, seconds.
+    /// Returns the mission time of giving up, seconds.
     pub(crate) const fn at_s(self) -> f64 {
         self.began_s + self.timeout_s + self.stopped_s
     }
@@ -96,7 +98,7 @@ impl Deadline {
 }
 
 impl Snapshot<'_> {
-    /// The end of the mission at `now`, if it has come. The first rule that applies decides.
+    /// Applies the rules in order; the first match decides.
     pub(crate) fn ending(&self, now: Now) -> Option<Ending> {
         self.simulator_ended()
             .or_else(|| self.arrived(now))
@@ -111,7 +113,8 @@ impl Snapshot<'_> {
         self.simulator_ended.then(|| Ending::failed(Outcome::Aborted, reason))
     }
 
-    /// An arrival counts when the encoders say that the robot rests. In lockstep it does when no command follows.
+    /// Accepts an arrival once the encoders report rest. In lockstep no command follows, so it
+    /// counts at once.
     fn arrived(&self, now: Now) -> Option<Ending> {
         let Arrival { distance_m, beside, since } = self.arrival?;
         let at_rest = self.link.is_some_and(|link| link.at_rest == 1);
@@ -185,12 +188,13 @@ impl Snapshot<'_> {
 
 #[derive(Default)]
 pub(crate) struct StopClock {
-    /// Time of the last call, if the robot was stopped then.
+    /// Time of the last call, if stopped then.
     stopped_at: Option<MissionTime>,
 }
 
 impl StopClock {
-    /// Seconds of the stop since the last call; `stopped` says whether a stop holds at `now`.
+    /// Returns the seconds of stop since the last call. `stopped` says whether a stop holds at
+    /// `now`.
     pub(crate) fn passed_s(&mut self, stopped: bool, now: MissionTime) -> f64 {
         let before = std::mem::replace(&mut self.stopped_at, stopped.then_some(now));
         before.map_or(0.0, |before| now.since(before).as_secs_f64())

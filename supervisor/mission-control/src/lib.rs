@@ -1,7 +1,8 @@
-//! A mission of a robot: lets it drive, looks for stalls, keeps its targets, judges when the mission is over, stops it.
+//! Mission control of one robot: its order to drive, stalls, targets, and the end of the mission.
 //!
-//! The supervisor owns the robot's directory and shared memory, and has the crate `processes` start and restart the stages. It reads
-//! their outputs from the bus and orders the robot to drive or to stand. Code that only reports may fail; it never ends a mission.
+//! The supervisor owns the robot's directory and shared memory. It reads the stages' outputs from
+//! the bus and orders the robot to drive or to stand. The crate `processes` starts and restarts the
+//! stages. Failures of code that only reports never end a mission.
 //!
 //! # The loop
 //!
@@ -21,25 +22,27 @@
 //!
 //! # The files, in reading order
 //!
+//! Pure modules do no I/O and read no clock.
+//!
 //! | module | holds |
 //! |---|---|
-//! | `order` | whether the robot may drive, pure |
-//! | `judge` | whether the mission is over, pure; [`outcome`] is its result |
-//! | `decisive` | which of the things that end a mission came first, and at which tick, pure |
-//! | `stall` | whether the robot stalls, and the next recovery step, pure |
-//! | `supervisor`, `stall_recovery` | the loop, which asks these; what it does about stalls |
-//! | `recovery_step` | when a recovery step is carried out, and in lockstep how far the link may go meanwhile, pure |
-//! | `run`, `shutdown` | a run from start to end; the robot to rest and the stages stopped |
-//! | [`target_list`], `requests` | the robot's targets, pure; operators' requests, and the next target |
-//! | `following`, `follow` | how a beacon is followed, pure; its samples, and the target that moves with it |
+//! | `order` | permission to drive, pure |
+//! | `judge` | end of the mission, pure; [`outcome`] is its result |
+//! | `decisive` | the first event that ended a mission, and its tick, pure |
+//! | `stall` | stalls and their next recovery step, pure |
+//! | `supervisor`, `stall_recovery` | the loop that asks these; its reaction to stalls |
+//! | `recovery_step` | time of a recovery step, tick limit of the link in lockstep, pure |
+//! | `run`, `shutdown` | a run from start to end; robot and stages stopped |
+//! | [`target_list`], `requests` | targets, pure; operators' requests, the next target |
+//! | `following`, `follow` | place beside a beacon, pure; its samples, the moving target |
 //! | [`operator`] | requests of an operator, in any process |
-//! | `bus_endpoints`, `observer` | what the supervisor reads from and writes to the bus |
-//! | `long_record` | records of each tick that stay bounded, pure |
-//! | `run_clock` | mission time of a run, and its first tick that is not made yet |
-//! | [`recovery`] | what another supervisor needs to go on with a run |
+//! | `bus_endpoints`, `observer` | writers and readers on the bus |
+//! | `long_record` | bounded records of each tick, pure |
+//! | `run_clock` | mission time, first new tick |
+//! | [`recovery`] | saved state from which another supervisor resumes |
 //! | [`simulator`] | the simulated robot as a child process |
-//! | `progress` | how far a run has come, as shown to its user |
-//! | `error` | why a run could not be carried out |
+//! | `progress` | progress shown to the user |
+//! | `error` | reasons why a run failed |
 
 mod bus_endpoints;
 mod decisive;

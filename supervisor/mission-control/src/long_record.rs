@@ -1,13 +1,13 @@
-//! Records of each tick of a run whose memory is bounded: older ticks are thinned out.
+//! Records of each tick in bounded memory: older ticks are thinned out.
 
 use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 
-/// The greatest length of a record, 10 minutes at 7 Hz, 0.7 MB: the picture draws no more points, and what ends a run is among the newest
-/// half, of which none is thinned out.
+/// Greatest length: 10 minutes at 7 Hz, 0.7 MB. The picture draws no more points. The newest half
+/// stays complete and holds the tick that ends a run.
 const MOST_TICKS: usize = 4096;
 
 pub(crate) trait Recorded: Copy {
-    /// This tick in place of itself and the `next` one; none if both are needed.
+    /// Merges this tick and the `next`; `None` if both are needed.
     fn with(self, next: Self) -> Option<Self>;
 }
 
@@ -24,7 +24,7 @@ impl Recorded for GroundTruthTick {
     }
 }
 
-/// Append `tick` to `record`. When the record is full, pairs of ticks of its older half become one.
+/// Appends `tick`. In a full record, pairs of older ticks are merged first.
 pub(crate) fn push<T: Recorded>(record: &mut Vec<T>, tick: T) {
     if record.len() >= MOST_TICKS {
         let (older, newer) = record.split_at(MOST_TICKS / 2);

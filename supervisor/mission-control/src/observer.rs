@@ -1,4 +1,4 @@
-//! The supervisor's readers on the bus, and the record by which a run is judged.
+//! Readers of the supervisor, and the record by which a run is judged.
 
 use std::{
     collections::VecDeque,
@@ -23,9 +23,9 @@ use processes::stage_processes::StageProcesses;
 
 use crate::{long_record, target_list::TargetOutcome};
 
-/// The most guidance samples that are kept: that of the arrival must still be there when its command is read.
+/// Guidance history. It still holds the arrival's guidance when the arrival's command is read.
 const MOST_GUIDANCE: usize = 1024;
-/// The most contacts that are recorded: more than come between two checks for stalls.
+/// Contact history, longer than the contacts between two stall checks.
 const MOST_CONTACTS: usize = 64;
 
 /// A stage repeats its trouble several times a second, and may wait seconds for a processor.
@@ -35,15 +35,15 @@ const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
 pub(crate) struct Published {
     pub tick: Option<u64>,
     pub commands: u64,
-    /// The generation of the planner's newest heartbeat, and the tick of the newest grid that it has used.
+    /// Generation of the planner's newest heartbeat, and the tick of the newest grid that it used.
     pub planner: (u32, u64),
     pub epoch: u64,
     pub grid_epoch: u64,
-    /// Whether the grid changed when that epoch began. The planner does not answer a grid that did not change.
+    /// Whether the grid changed when its epoch began. The planner answers only changed grids.
     pub grid_changed: bool,
 }
 
-/// A sample that a run has read, for whoever computes numbers or draws from it.
+/// Sample read by a run, for code that computes numbers or draws.
 pub enum Heard<'a> {
     Command(&'a CommandSample),
     Guidance(&'a GuidanceSample),
@@ -52,7 +52,7 @@ pub enum Heard<'a> {
     Link(&'a LinkSample),
 }
 
-/// Called with every such sample. It only listens: nothing that the run does depends on it.
+/// Callback for every sample. The run never depends on it.
 pub type Listener = Box<dyn FnMut(Heard<'_>)>;
 
 pub(crate) struct Observer {
@@ -71,29 +71,30 @@ pub(crate) struct Observer {
 
 #[derive(Default)]
 pub struct Record {
-    /// The pose of every tick; in a long run older ticks are thinned out.
+    /// Pose of every tick; in a long run older ticks are thinned out.
     pub poses: Vec<PoseSample>,
     pub pose: Option<PoseSample>,
     pub(crate) guidance: VecDeque<GuidanceSample>,
     pub command: Option<CommandSample>,
     pub(crate) published: Published,
-    /// The newest ticks at which something held the wheels, oldest first.
+    /// Newest ticks at which something held the wheels, oldest first.
     contacts: VecDeque<u64>,
-    /// The number of the current target, and the first command that said that this target is reached.
+    /// Number of the current target. `arrival` is the first command that reports it reached.
     pub(crate) target_number: u64,
     pub arrival: Option<CommandSample>,
     pub link: Option<LinkSample>,
-    /// The newest, and when it was read.
     complaint: Option<(ComplaintSample, Instant)>,
-    /// The time when a sample of the link was last read in which the encoders say whether the robot rests.
+    /// Time of reading the newest link sample with a known encoder state.
     pub(crate) rest_read: Option<Instant>,
     pub grid: Replica<u8>,
     pub field_known: bool,
 }
 
 impl Observer {
-    /// Read everything on `bus`, to complete `record`. `waiter` wakes for heartbeats, fields and the state of the link, which ends a
-    /// tick: during a tick the supervisor takes no processor time from the stages.
+    /// Opens all readers on `bus`, to complete `record`.
+    ///
+    /// `waiter` wakes for heartbeats, fields and link samples, which end a tick. During a tick the
+    /// processor belongs to the stages.
     pub(crate) fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::LINK)?);
@@ -114,7 +115,7 @@ impl Observer {
         })
     }
 
-    /// Read all new samples, and tell `listener` of them. Returns whether the roster changed by them.
+    /// Reads all new samples. Returns whether they changed the roster.
     pub(crate) fn read_all(
         &mut self,
         stages: &mut StageProcesses,
@@ -130,8 +131,8 @@ impl Observer {
             }
         }
         let record = &mut self.record;
-        // The command of a tick is read before the samples it was computed from, so that these are in the record whenever
-        // the command is.
+        // The command is read before the samples it was computed from. The record then holds those
+        // samples whenever it holds the command.
         while let Some(command) = self.command.next_sample()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
@@ -169,9 +170,9 @@ impl Observer {
             record.pose = Some(pose);
             long_record::push(&mut record.poses, pose);
         }
-        // Poses are computed from the link's samples, so these are read last.
+        // Poses are computed from link samples, so these are read last.
         while let Some(contact) = self.contact.next_sample()? {
-            // What a bumper feels holds no wheel: the robot goes around it by itself.
+            // A bumper holds no wheel: the robot drives around such a contact.
             if contact.left + contact.right > 0 {
                 push(&mut record.contacts, contact.stamp.tick, MOST_CONTACTS);
             }
@@ -179,7 +180,7 @@ impl Observer {
         while let Some(link) = self.link.next_sample()? {
             listener(Heard::Link(&link));
             record.link = Some(link);
-            // Without motor frames the link begins no tick that another stage could answer.
+            // Without motor frames the link begins no tick that a stage could answer.
             if link.rest() != Rest::Unknown {
                 stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
                 record.rest_read = Some(Instant::now());
@@ -192,7 +193,6 @@ impl Observer {
     }
 }
 
-/// Append `item`, in place of the oldest one if there are `most`.
 fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
     if items.len() == most {
         items.pop_front();
@@ -207,7 +207,7 @@ impl Record {
         Some(complaint.to_string())
     }
 
-    /// Whether a place is in a believed hazard, or outside the map.
+    /// Treats places outside the map as hazards.
     pub(crate) fn is_hazard(&self, place: DVec2) -> bool {
         let frame = self.grid.frame();
         frame
@@ -215,7 +215,6 @@ impl Record {
             .is_none_or(|index| CellState::from_byte(self.grid.cells()[index]).is_hazard())
     }
 
-    /// The arrival at the current target, and what it is worth.
     pub(crate) fn sure_arrival(&self, mission: &Mission) -> Option<(CommandSample, TargetOutcome)> {
         let command = self.arrival?;
         let pose = self.pose_at(command.stamp.tick);
@@ -229,7 +228,8 @@ impl Record {
         Some((command, outcome))
     }
 
-    /// Where the robot stands that arrived outside the tolerance, as near to a target in or beside a hazard as the planner says it gets.
+    /// Returns the robot's place if it arrived outside the tolerance, as near as the planner gets
+    /// it to a target in or beside a hazard.
     pub(crate) fn beside(&self, arrival: &CommandSample, tolerance_m: f64) -> Option<DVec2> {
         let guidance = self.guidance_at(arrival.stamp.tick)?;
         let is_near = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
@@ -241,13 +241,14 @@ impl Record {
         self.guidance.iter().rev().find(|guidance| guidance.stamp.tick <= tick)
     }
 
-    /// Whether something held the wheels after the tick `last`, up to `tick`: a slow planner may answer no tick with a contact.
+    /// Returns whether something held the wheels after tick `last`, up to `tick`. A slow planner
+    /// may skip the tick of a contact.
     pub(crate) fn has_contact(&self, last: Option<u64>, tick: u64) -> bool {
         let is_new = |contact: &u64| *contact <= tick && last.is_none_or(|last| *contact > last);
         self.contacts.iter().any(is_new)
     }
 
-    /// The pose and the guidance of every tick after `last` that has both, oldest first.
+    /// Iterates over the pose and guidance of every tick after `last` that has both, oldest first.
     pub(crate) fn ticks_since(
         &self,
         last: Option<u64>,

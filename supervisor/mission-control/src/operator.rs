@@ -1,5 +1,7 @@
-//! An operator's requests to a robot, from any process. Each function returns when the robot's link or its supervisor has confirmed
-//! the request, or says why not.
+//! An operator's requests to a robot, from any process.
+//!
+//! Each function returns once link or supervisor has confirmed the request, or with the reason why
+//! not.
 
 use std::{
     env, fs,
@@ -32,9 +34,10 @@ use link::stop_guard;
 use processes::{executable, process};
 use thiserror::Error;
 
-/// The patience with a supervisor, whose roster comes five times a second. Beside 25 busy processes a core one took more than 4 s.
+/// Timeout for a supervisor, whose roster comes five times a second. Beside 25 busy processes per
+/// core, one took over 4 s.
 pub const PATIENCE: Duration = Duration::from_secs(10);
-/// A request that a run refuses because it starts is made again after this.
+/// Interval for repeating a request that a starting run refused.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
 #[derive(Debug, Error)]
@@ -79,23 +82,24 @@ const fn code(answer: RequestAnswer) -> &'static str {
     }
 }
 
-/// A stop that holds although its supervisor was not told; the text says why.
+/// Reason why the supervisor was not told of a stop, which holds anyway.
 pub type Untold = Option<String>;
 
-/// The time for a process to start and to tell the supervisor.
+/// Time for a process to start and tell the supervisor.
 const TOLD_WITHIN: Duration = PATIENCE.saturating_add(Duration::from_secs(2));
 
-/// The patience with a stop: the link changes its method after a second.
+/// Timeout for a stop; the link changes its method after a second.
 const REST_PATIENCE: Duration = Duration::from_secs(5);
 
-/// The patience with a link, which answers within milliseconds if it is scheduled.
+/// Timeout for a link, which answers within milliseconds if it is scheduled.
 const LINK_ANSWERS: Duration = Duration::from_millis(200);
 
-/// Between looks for a stop guard that starts.
 const GUARD_STARTS: Duration = Duration::from_millis(20);
 
-/// Let the robot stand, and wait until it rests. The link is asked without the middleware; the supervisor is told too, so that the
-/// stop holds for its successors. Where no link answers, the robot itself is told.
+/// Stops the robot and waits until it rests.
+///
+/// The request reaches the link without the middleware. The supervisor is told too, so that the
+/// stop holds for its successors. If no link answers, a stop guard tells the robot itself.
 pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let asked_ns = monotonic_ns();
     let domain = Domain::of(robot.clone());
@@ -121,9 +125,9 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let supervisor = tell_supervisor(robot, asked_ns)?;
     let rests = match (link, run) {
         (Some(link), _) => rests_by(&link),
-        // A link that answers nobody does not command the robot either.
+        // A link that does not answer does not command the robot either.
         (None, Ok(_)) if owes_stop(robot) => rests_by(&guard(&domain)?),
-        // It was seen at rest, and nobody told it to move since.
+        // The robot was seen at rest, and has had no order to move since.
         (None, Ok(_)) => true,
         (None, Err(_)) => false,
     };
@@ -137,7 +141,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     }
 }
 
-/// Tells the robot's link to stop it, and waits for nothing. [`stand`] does the rest.
+/// Tells the robot's link to stop it, without waiting. [`stand`] does the rest.
 pub fn stop_at_once(robot: &RobotName) {
     let link = stop_socket::Operator::connect(&Domain::of(robot.clone()).stop_socket());
     if let Ok(Some(link)) = link {
@@ -145,7 +149,7 @@ pub fn stop_at_once(robot: &RobotName) {
     }
 }
 
-/// Returns whether the robot may move although no link drives it: its stop is owed.
+/// Returns whether the robot may move although no link drives it.
 pub fn owes_stop(robot: &RobotName) -> bool {
     OwedStop::of(Domain::of(robot.clone())).is_set()
 }
@@ -178,7 +182,7 @@ fn guard(domain: &Domain) -> Result<stop_socket::Operator, OperatorError> {
     }
 }
 
-/// Returns what the stop guard of a robot without a link sees, in words and as a number of seconds of silence; none without a guard.
+/// Returns the stop guard's observation, in words and seconds of silence; `None` without a guard.
 pub fn sees(robot: &RobotName) -> Option<(String, u8)> {
     let guard = stop_socket::Operator::connect(&Domain::of(robot.clone()).guard_socket());
     let guard = guard.ok().flatten()?;
@@ -195,7 +199,10 @@ pub fn sees(robot: &RobotName) -> Option<(String, u8)> {
     }
 }
 
-/// Ends the orders of the stop guard, after a person saw that the robot rests or is off. Fails while a link runs.
+/// Ends the orders of the stop guard after a person saw that the robot rests or is off.
+///
+/// # Errors
+/// Fails while a link runs.
 pub fn sign_off(robot: &RobotName) -> Result<(), OperatorError> {
     let domain = Domain::of(robot.clone());
     let system = |error| OperatorError::System("sign the robot off", error);
@@ -207,7 +214,7 @@ pub fn sign_off(robot: &RobotName) -> Result<(), OperatorError> {
         return guard.send(Request::SignOff).map_err(system);
     }
     OwedStop::of(domain.clone()).set(false, Path::new("")).map_err(system)?;
-    // A guard that was killed left them.
+    // A killed guard leaves these files.
     let _ = fs::remove_file(domain.guard_socket());
     let _ = fs::remove_dir(domain.directory());
     Ok(())
@@ -224,7 +231,7 @@ fn rests_by(link: &stop_socket::Operator) -> bool {
     }
 }
 
-/// The robot's executable: this very program, even if its file was replaced meanwhile, or the one beside a viewer.
+/// Returns this program, even if its file was replaced meanwhile, or the one beside a viewer.
 fn robot_executable() -> PathBuf {
     let own = env::current_exe().unwrap_or_default();
     let is_viewer =
@@ -233,7 +240,8 @@ fn robot_executable() -> PathBuf {
     beside.unwrap_or_else(|| PathBuf::from("/proc/self/exe"))
 }
 
-/// Tell the supervisor of a stop, in a process of its own: the files of a damaged bus can end the process that opens them.
+/// Tells the supervisor of a stop in a separate process. Files of a damaged bus can kill the
+/// process that opens them.
 fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorError> {
     let (robot, asked) = (robot.to_string(), asked_ns.to_string());
     let child = process::child(robot_executable())
@@ -249,7 +257,7 @@ fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorEr
 fn told(mut teller: Child) -> Result<(), OperatorError> {
     let mut why = String::new();
     let mut said = teller.stderr.take();
-    // The end of the process closes the pipe.
+    // The pipe closes when the process ends.
     let ended =
         said.as_ref().is_none_or(|said| poll::is_readable(said, TOLD_WITHIN).unwrap_or(true));
     if !ended {
@@ -270,7 +278,7 @@ fn told(mut teller: Child) -> Result<(), OperatorError> {
     }
 }
 
-/// Wait until the link says that it stopped the robot, and the encoders say that the robot rests, as `rests` says of what it tells.
+/// Waits until `rests` accepts a link sample.
 fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result<(), OperatorError> {
     let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
     let mut links = bus.reader(&topics::LINK)?;
@@ -304,7 +312,8 @@ fn not_at_rest(robot: &RobotName, seen: &str) -> OperatorError {
     OperatorError::refused("not-at-rest", message)
 }
 
-/// Whether the link stops the robot for the operator, or ends the mission, and the robot rests.
+/// Returns whether the link stops the robot for the operator or the mission's end, and the robot
+/// rests.
 fn stopped_for_good(link: &LinkSample) -> bool {
     let stopped = link.cause() == Cause::OperatorStop || link.action() == Action::End;
     stopped && link.at_rest == 1
@@ -314,7 +323,7 @@ pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
     let domain = Domain::of(robot.clone());
     refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
-    // The link's own stop ends with this alone. Where no link runs, the next one need not know of it.
+    // Only this request ends the link's own stop. Without a link, the mark alone holds it.
     let _ = match stop_socket::Operator::connect(&domain.stop_socket()) {
         Ok(Some(link)) => link.send(Request::Resume),
         _ => StopMark::of(&domain.run_directory()).set(false),
@@ -322,7 +331,8 @@ pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
     ask(robot, request(RequestKind::Resume))
 }
 
-/// Tell the supervisor alone of a stop that was asked at `asked_ns` of the monotonic clock. A later resume ends it.
+/// Tells only the supervisor of a stop asked at `asked_ns` of the monotonic clock. A later resume
+/// ends it.
 pub fn request_stop(robot: &RobotName, asked_ns: u64) -> Result<(), OperatorError> {
     ask(robot, RequestSample { asked_ns, ..request(RequestKind::Stop) })
 }
@@ -331,7 +341,7 @@ pub fn restart(robot: &RobotName, stage: &str) -> Result<(), OperatorError> {
     ask(robot, RequestSample { stage: name(stage), ..request(RequestKind::Restart) })
 }
 
-/// Send the robot to `points` one after the other: now, or if it `appends` after the targets that it has.
+/// Sends the robot to `points` in turn: now, or after its present targets if `appends`.
 pub fn send_to(
     robot: &RobotName,
     points: &[TargetPoint],
@@ -354,23 +364,23 @@ fn ask_with(
     ask(robot, request)
 }
 
-/// Drive by hand: towards `stick`, ahead and to the left of the robot, in shares of full speed, for 0.3 s after the last call.
+/// Drives by hand for 0.3 s. `stick` points ahead and to the left, in shares of full speed.
 pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result<(), OperatorError> {
     ask_with(robot, request(RequestKind::Hand), &[TargetPoint::at(stick)])
 }
 
-/// Follow the beacon at `distance_m`, 0 for the robot's own default.
+/// Follows the beacon at `distance_m` (0: the robot's default).
 pub fn follow(robot: &RobotName, distance_m: f64) -> Result<(), OperatorError> {
     ask(robot, RequestSample { deviations: [distance_m, 0.0], ..request(RequestKind::Follow) })
 }
 
-/// Follow the beacon no longer. Returns when the robot rests.
+/// Ends the following. Returns when the robot rests.
 pub fn end_follow(robot: &RobotName) -> Result<(), OperatorError> {
     ask(robot, request(RequestKind::EndFollow))?;
     await_rest(robot, |link| link.stopped() && link.at_rest == 1)
 }
 
-/// Add the keep-out zone with these corners, or remove those that hold a place.
+/// Adds the keep-out zone with these corners, or removes the zones that contain a point.
 pub fn change_zones(
     robot: &RobotName,
     points: &[TargetPoint],
@@ -386,7 +396,7 @@ pub fn send_back(robot: &RobotName) -> Result<(), OperatorError> {
     send_to(robot, &[TargetPoint::at(start)], false)
 }
 
-/// Tell where the standing robot is: at `point`, with standard deviations in metres and radians.
+/// Sets the pose of the standing robot, with standard deviations in metres and radians.
 pub fn place(
     robot: &RobotName,
     point: TargetPoint,
@@ -404,10 +414,10 @@ fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
     OperatorError::refused(code(answer), message)
 }
 
-/// Refuse an order to a mirror: the robot is on another machine, which lets none in.
+/// Refuses an order to a mirror, whose robot is on another machine.
 ///
 /// # Errors
-/// Where `domain` is a mirror; the order is given on the robot's machine.
+/// Fails if `domain` is a mirror; the order must be given on the robot's machine.
 pub fn refuse_mirror(domain: &Domain) -> Result<(), OperatorError> {
     let Some(at) = domain.mirrors() else { return Ok(()) };
     let message = format!(
@@ -417,7 +427,6 @@ pub fn refuse_mirror(domain: &Domain) -> Result<(), OperatorError> {
     Err(OperatorError::refused("mirror", message))
 }
 
-/// Send a request to the supervisor, and wait until the roster has its answer.
 fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
     let domain = Domain::of(robot.clone());
     refuse_mirror(&domain)?;
@@ -430,7 +439,8 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
         RequestKind::Goto | RequestKind::Append | RequestKind::Follow
     );
     if goes {
-        // A supervisor that starts does not read yet. A hand's requests come too often to wait for a roster each time.
+        // A starting supervisor does not read yet. Hand requests come too often to wait for a
+        // roster each time.
         roster.find(PATIENCE, |_, _| Some(()))?;
     }
     let began = Instant::now();
@@ -442,7 +452,8 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
         })?;
         match answer {
             RequestAnswer::Taken => return Ok(()),
-            // So answers a run that starts, or one whose supervisor missed a part of the map and waits for the next whole one.
+            // Answer of a run that starts, or whose supervisor missed a part of the map and waits
+            // for the next whole one.
             RequestAnswer::NotRunning if goes && began.elapsed() < PATIENCE => {
                 roster.find(AGAIN_AFTER, |_, _| None::<()>)?;
             }
@@ -451,7 +462,7 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
     }
 }
 
-/// An id for a request, which no other process uses: it mixes time and process id.
+/// Returns a unique request id, mixed from time and process id.
 pub fn new_id() -> u64 {
     monotonic_ns() ^ u64::from(std::process::id()) << 40 | 1
 }

@@ -1,9 +1,9 @@
-//! The decision whether the robot may drive, and the reason if not. Pure.
+//! Decision whether the robot may drive, and the reason if not. Pure.
 
 use common::samples::{HoldReason, Order};
 
 pub(crate) struct Snapshot {
-    /// Whether the robot was once ready to drive on this bus.
+    /// Whether the robot was ever ready on this bus.
     pub was_ready: bool,
     pub all_running: bool,
     /// Whether the link receives data from the robot.
@@ -12,15 +12,15 @@ pub(crate) struct Snapshot {
     pub field_known: bool,
     pub operator_stop: bool,
     pub stage_held: bool,
-    /// The robot has no target any more.
+    /// Whether the robot has no target left.
     pub waits: bool,
-    /// The robot follows something that it does not hear.
+    /// Whether the robot follows a beacon that it does not hear.
     pub lost: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Decision {
-    /// Whether the robot was ever ready to drive. From then on the link stops it when a stage is down.
+    /// Whether the robot was ever ready. From then on the link stops it when a stage is down.
     pub ready: bool,
     pub reason: HoldReason,
 }
@@ -65,7 +65,6 @@ pub(crate) const fn decide(snapshot: &Snapshot) -> Decision {
 mod tests {
     use super::*;
 
-    /// A snapshot in which nothing holds the robot, and it is about to drive for the first time.
     const CAN_START: Snapshot = Snapshot {
         was_ready: false,
         all_running: true,
@@ -76,7 +75,6 @@ mod tests {
         waits: false,
         lost: false,
     };
-    /// The robot has driven, and now nothing is as it should be.
     const ALL_LOST: Snapshot = Snapshot {
         was_ready: true,
         all_running: false,

@@ -1,14 +1,14 @@
-//! The ending of a run.
+//! Endings of runs.
 
 use common::{ground_truth::GroundTruthTick, mission::Mission, samples::PoseSample};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// The greatest true distance from its target of a simulated robot that has arrived, metres, as in other benchmarks. A wider
-/// tolerance of the mission takes its place.
+/// Greatest true distance from its target of an arrived simulated robot, metres, as in other
+/// benchmarks. A wider tolerance of the mission replaces it.
 pub const RIGHT_PLACE_M: f64 = 0.5;
 
-/// The greatest distance from its target of a robot that reports its arrival, metres.
+/// Returns the greatest allowed distance between an arrived robot and its target, metres.
 pub(crate) const fn allowed_m(mission: &Mission) -> f64 {
     RIGHT_PLACE_M.max(mission.arrival_tolerance_m)
 }
@@ -16,24 +16,26 @@ pub(crate) const fn allowed_m(mission: &Mission) -> f64 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The robot is within the tolerance of the target: by its own pose, and in simulation also by the ground truth.
+    /// The robot is within the tolerance of the target by its own pose, and in simulation also by
+    /// the ground truth.
     Reached,
-    /// The robot reports its arrival, and the ground truth contradicts it.
+    /// The ground truth contradicts the reported arrival.
     WrongPlace,
-    /// The robot reports its arrival, and by the covariance of its pose it may be farther off than the mission allows.
+    /// The robot reports its arrival, but its pose covariance exceeds what the mission allows.
     ReachedUnsure,
     /// The robot stalled, and no recovery step was left.
     Unreachable,
-    /// Of a target it is called `timed_out`.
+    /// Timeout of the mission; `timed_out` for a target.
     #[serde(alias = "timed_out")]
     Timeout,
     Collision,
-    /// The robot stood and waited for its first target when the run was ended.
+    /// The run was ended while the robot waited before its first target, or followed a beacon, or
+    /// was driven by hand.
     Waited,
     /// The run was stopped by hand, or something failed.
     #[default]
     Aborted,
-    /// The robot was told to stand by every method of its protocol, and its encoders say that it moves.
+    /// The encoders report motion although every method of the protocol told the robot to stand.
     CouldNotBeStopped,
 }
 
@@ -66,11 +68,10 @@ impl Outcome {
     }
 }
 
-/// What the encoders say at the end.
 #[derive(Clone, PartialEq, Eq)]
 pub(crate) enum Wheels {
     AtRest,
-    /// Nothing, and why.
+    /// Silence, and its reason.
     Unknown(String),
     Turning,
 }
@@ -79,9 +80,9 @@ pub(crate) enum Wheels {
 pub struct Ending {
     pub outcome: Outcome,
     pub reason: String,
-    /// The row of the failsafe table that ended the mission, by its name.
+    /// Name of the failsafe-table row that ended the mission.
     pub cause: Option<&'static str>,
-    /// Whether the run ended as the user asked: with the target reached or a stop by hand.
+    /// Whether the run ended as asked: at the target, or by a stop by hand.
     pub asked_for: bool,
 }
 
@@ -90,8 +91,10 @@ impl Ending {
         Self { outcome, reason: reason.into(), cause: None, asked_for: false }
     }
 
-    /// This ending; or the wrong place by the ground truth `ended` or by its own pose `at_rest`; or unsure, if the error of that pose
-    /// may be larger than the mission allows.
+    /// Checks an arrival against the ground truth `ended` and the own pose `at_rest`.
+    ///
+    /// The result is the wrong place if either contradicts it, or unsure if the pose error may
+    /// exceed the mission's tolerance.
     pub(crate) fn checked(
         self,
         mission: &Mission,
@@ -129,7 +132,7 @@ impl Ending {
         Self::failed(outcome, contradicted)
     }
 
-    /// This ending, with the encoders' answer when the stages were stopped.
+    /// Adds the encoder state at the stop of the stages.
     pub(crate) fn with(self, wheels: Wheels) -> Self {
         match wheels {
             Wheels::AtRest => self,

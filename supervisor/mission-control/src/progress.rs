@@ -1,4 +1,4 @@
-//! The progress of a run, as its user sees it.
+//! Progress of a run, as its user sees it.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ pub struct Progress<'a> {
     pub record: &'a Record,
     pub running: (usize, usize),
     pub driving: bool,
-    /// The distance from the start to the target, metres.
+    /// Distance from the start to the target, metres.
     pub straight_m: f64,
 }
 

@@ -1,7 +1,7 @@
-//! The state from which another supervisor resumes a run whose supervisor ended.
+//! State from which another supervisor resumes a run.
 //!
-//! The stages and the simulated robot have checkpoints of their own; this is the supervisor's. Mission time stands still
-//! without a supervisor, and so does the robot.
+//! The stages and the simulated robot have their own checkpoints. Without a supervisor, mission
+//! time and robot stand still.
 
 use std::{fs, path::Path};
 
@@ -19,9 +19,10 @@ use thiserror::Error;
 
 use crate::{following::Following, target_list::TargetList};
 
-/// Room for the encoded [`SupervisorState`], bytes: its targets and their results take under 10,000, its zones 5,000.
+/// Room for the encoded [`SupervisorState`], bytes. Targets and results take under 10,000, zones
+/// 5,000.
 const CAPACITY: usize = 18 << 10;
-/// The summary of a run that ended, in its run directory.
+/// Summary of a finished run, in its run directory.
 pub const SUMMARY: &str = "summary.json";
 const SIMULATOR: &str = "x80-sim";
 
@@ -33,9 +34,9 @@ pub struct SupervisorState {
     pub resumes: u32,
     pub(crate) targets: Option<TargetList>,
     pub(crate) following: Option<Following>,
-    /// The newest that an operator set; number 0 for none.
+    /// Newest place set by an operator; number 0 for none.
     pub(crate) place: PlaceSample,
-    /// Those that operators left, and how often they changed them; none for the mission's.
+    /// Zones left by operators, and the number of changes; `None` for the mission's zones.
     pub(crate) zones: Option<(u64, Vec<Zone>)>,
 }
 
@@ -57,7 +58,8 @@ impl StateFile {
     }
 }
 
-/// Where the robot of the run in `directory` last believed it was, and how long ago, seconds; none if it never knew.
+/// Returns the last believed place of the robot of the run in `directory`, and its age, seconds;
+/// `None` if it never knew.
 pub fn last_place(directory: &Path, mission: &Mission) -> Option<(PlaceSample, f64)> {
     let place = saved_place(directory, mission).ok().flatten()?;
     let saved =
@@ -68,7 +70,6 @@ pub fn last_place(directory: &Path, mission: &Mission) -> Option<(PlaceSample, f
 #[derive(Debug)]
 pub struct RecoveredRun {
     pub run: Run,
-    /// The first tick that did not happen yet.
     pub first_tick: u64,
     pub time: MissionTime,
 }

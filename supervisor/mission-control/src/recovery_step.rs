@@ -1,9 +1,10 @@
-//! The recovery step under way after a stall: when it is carried out, and from when on further ticks are checked. Pure.
+//! Recovery step under way after a stall, and the tick from which checks continue. Pure.
 //!
-//! In wall-clock time nothing waits: a step is carried out at once. In lockstep its result must not depend on the machine: the newest
-//! [`TickLimitSample`] names the last tick that the link may begin, [`AHEAD`] ticks after the last one that was checked. So a stall at
-//! tick T leaves the pipeline at rest after tick T + [`AHEAD`]. The step is carried out there, and the limit rises once the planner
-//! and, after a reset, the controller have answered it.
+//! In wall-clock time a step is carried out at once. In lockstep its result must be independent of
+//! the machine. So the newest [`TickLimitSample`] names the last tick that the link may begin,
+//! [`AHEAD`] ticks after the last checked one. A stall at tick T leaves the pipeline at rest after
+//! tick T + [`AHEAD`], where the step is carried out. The limit rises once the planner and, after a
+//! reset, the controller have answered.
 
 use std::time::{Duration, Instant};
 
@@ -11,36 +12,35 @@ use common::samples::{RecoveryStep, StallSample, TickLimitSample};
 
 use crate::observer::Published;
 
-/// The number of ticks that the link may be ahead: it seldom waits, and a robot that stalls loses little time.
+/// Ticks that the link may be ahead: few enough for a stalled robot to lose little time, enough
+/// that the link seldom waits.
 const AHEAD: u64 = 4;
-/// The longest time that a recovery step waits for its answer. It is less than the link waits for the limit, and as long as a
-/// planner may take to start.
+/// Timeout for the answer to a recovery step. It is shorter than the link waits for the limit, and
+/// as long as a planner may take to start.
 const ANSWERED: Duration = Duration::from_secs(3);
 
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// No recovery step is under way, so further ticks are to be checked.
+    /// No recovery step is under way, so checks go on.
     Check,
     Wait,
     Begin(RecoveryStep),
 }
 
-/// A recovery step, from the stall until it was answered.
 #[derive(Clone, Copy)]
 struct Step {
     stall: StallSample,
-    /// The time when the step was carried out, and the samples that were published by then.
+    /// Time when the step was carried out, and the samples published by then.
     begun: Option<(Instant, Published)>,
 }
 
-/// The recovery step under way, and in lockstep the limit of the link.
 pub(crate) struct RecoverySteps {
     limit: Option<TickLimitSample>,
     step: Option<Step>,
 }
 
 impl RecoverySteps {
-    /// In lockstep the ticks from `first_tick` on are not checked yet; in wall-clock time there is none.
+    /// Starts with all ticks from `first_tick` on unchecked; `None` in wall-clock time.
     pub(crate) fn new(first_tick: Option<u64>) -> Self {
         let limit = first_tick.map(|first_tick| TickLimitSample {
             last_tick: first_tick + AHEAD,
@@ -49,7 +49,7 @@ impl RecoverySteps {
         Self { limit, step: None }
     }
 
-    /// The limit of the link; none in wall-clock time.
+    /// Returns the link's limit; `None` in wall-clock time.
     pub(crate) const fn limit(&self) -> Option<TickLimitSample> {
         self.limit
     }
@@ -60,13 +60,13 @@ impl RecoverySteps {
         }
     }
 
-    /// Note that the robot stalled. Later ticks are not checked before the recovery step is in force.
+    /// Records a stall. Later ticks stay unchecked until the recovery step is in force.
     pub(crate) fn on_stall(&mut self, stall: StallSample) {
         self.on_checked(stall.stamp.tick);
         self.step = Some(Step { stall, begun: None });
     }
 
-    /// Whether `epoch`, the newest stall's, must not be published yet.
+    /// Returns whether `epoch`, that of the newest stall, must not be published yet.
     pub(crate) fn withholds(&self, epoch: u64) -> bool {
         self.step.is_some_and(|step| {
             let forgets = step.stall.recovery() == RecoveryStep::Reset;
@@ -74,7 +74,6 @@ impl RecoverySteps {
         })
     }
 
-    /// The next action, given the output of the stages at `now`.
     pub(crate) fn next(&mut self, published: Published, now: Instant) -> Next {
         let Some(step) = &mut self.step else {
             return Next::Check;
@@ -105,7 +104,7 @@ impl RecoverySteps {
 fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
     let commanded = now.commands > before.commands;
     match stall.recovery() {
-        // There is no pose to guide before the next tick, so a new planner has answered once it has a field.
+        // Before the next tick there is no pose to guide, so a field is a new planner's answer.
         RecoveryStep::Replan => {
             now.planner.0 > before.planner.0 && now.planner.1 >= stall.stamp.tick + AHEAD
         }

@@ -1,4 +1,4 @@
-//! The part of the loop that takes operators' requests, and sends the robot to its next target.
+//! Part of the loop that takes operators' requests and sends the robot to its next target.
 
 use std::time::Instant;
 
@@ -23,11 +23,12 @@ use crate::{
     target_list::{self, TargetOutcome},
 };
 
-/// A hand's target is so much farther ahead than the robot slows down, metres: it moves on with each request.
+/// Distance of a hand's target beyond the slow-down radius, metres. The target moves on with each
+/// request.
 const HAND_AHEAD_M: f64 = 0.3;
 
 impl Supervisor<'_> {
-    /// Carry out and answer the requests of operators. Returns whether there was one.
+    /// Returns whether there was a request.
     pub(crate) fn take_requests(&mut self, first_tick: u64) -> Result<bool> {
         let mut asked = false;
         while let Some(request) = self.bus.requests.next_sample()? {
@@ -39,7 +40,7 @@ impl Supervisor<'_> {
             }
             self.bus.last_request = (request.id, answer);
             self.bus.publish_order(self.mission_time(), request, answer);
-            // Each answer is published, because the roster has one.
+            // The roster has room for one answer, so each is published by itself.
             self.publish_state()?;
         }
         Ok(asked)
@@ -47,7 +48,7 @@ impl Supervisor<'_> {
 
     fn carry_out_request(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
         match RequestKind::from_byte(request.kind) {
-            // A run that ends takes stops alone.
+            // A run that ends takes only stops.
             kind if kind != RequestKind::Stop && self.decision == Decision::ENDING => {
                 return RequestAnswer::NotRunning;
             }
@@ -57,7 +58,8 @@ impl Supervisor<'_> {
                 tracing::warn!(stage, "an operator asks for a new generation");
                 self.stages.replace(stage, first_tick);
             }
-            // The process that told of this stop was slow: the link obeyed at once, and an operator has resumed since.
+            // The process that told of this stop was slow: the link obeyed at once, and an operator
+            // has resumed since.
             RequestKind::Stop if request.asked_ns < self.resumed_ns => {
                 tracing::warn!("an operator's stop is over, because the robot was resumed since");
             }
@@ -85,7 +87,8 @@ impl Supervisor<'_> {
         RequestAnswer::Taken
     }
 
-    /// The stages are told with the state; dead reckoning sets its pose with the next tick, and the map is reset by that.
+    /// Sets the place of the robot. Dead reckoning takes it with the next tick, which resets the
+    /// map.
     fn place_robot(&mut self, request: &RequestSample) -> RequestAnswer {
         let Some([point]) = request.targets() else { return RequestAnswer::Malformed };
         let [sigma_m, sigma_rad] = request.deviations;
@@ -175,7 +178,8 @@ impl Supervisor<'_> {
         self.on_new_target();
     }
 
-    /// The hand's target moves before the robot, no farther than the ground is free. The planner leads there as to any other.
+    /// Moves the target ahead of the robot, as far as the ground is free. The planner leads there
+    /// as to any other.
     fn drive_by_hand(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
         let mission = &self.options.mission;
         if !mission.stay {
@@ -185,7 +189,7 @@ impl Supervisor<'_> {
         let (Some([stick]), Some(pose)) = (request.targets(), record.pose) else {
             return RequestAnswer::Malformed;
         };
-        // At full speed the robot does not slow down for it.
+        // At full speed the robot does not slow down for this target.
         let reach_m = HAND_AHEAD_M + mission.controller.slow_radius_m;
         let here = pose.pose().position;
         let way = pose.pose().axis().rotate(stick.position().clamp_length_max(1.0)) * reach_m;
@@ -203,7 +207,7 @@ impl Supervisor<'_> {
         RequestAnswer::Taken
     }
 
-    /// Let the robot stand if the hand that drove it has gone. Returns whether it has.
+    /// Lets the robot stand if its hand has gone. Returns whether it has.
     pub(crate) fn miss_hand(&mut self) -> bool {
         let is_gone = self.hand_until.take_if(|until| *until <= Instant::now()).is_some();
         let released = is_gone && self.targets.release();
@@ -213,7 +217,7 @@ impl Supervisor<'_> {
         released
     }
 
-    /// The link may obey an operator before the supervisor does.
+    /// Returns the reason of a hold. The link may obey an operator before the supervisor does.
     pub(crate) fn why_held(&self) -> HoldReason {
         let link = self.bus.observer.record.link;
         let stopped = self.state_file.state.operator_stop
@@ -221,7 +225,8 @@ impl Supervisor<'_> {
         if stopped { HoldReason::Operator } else { self.decision.reason }
     }
 
-    /// Let the robot wait for its next target if the run stays, and `ending` is that of its target. Returns whether it waits.
+    /// Lets the robot wait for its next target if the run stays after `ending`. Returns whether it
+    /// waits.
     pub(crate) fn settle(&mut self, ending: &Ending) -> bool {
         let ends =
             matches!(ending.outcome, Outcome::Reached | Outcome::Timeout | Outcome::Unreachable);
@@ -244,14 +249,14 @@ impl Supervisor<'_> {
         true
     }
 
-    /// No command is an arrival before there is a target.
+    /// Voids arrivals until there is a target.
     pub(crate) fn await_target(&mut self) {
         let record = &mut self.bus.observer.record;
         (record.target_number, record.arrival) = (u64::MAX, None);
         self.arrived = None;
     }
 
-    /// Send the robot to its next target if it has arrived at one that is not the last. Returns whether it is sent.
+    /// Sends the robot on after an arrival. Returns whether there was one.
     pub(crate) fn take_arrival(&mut self) -> bool {
         let mission = &self.options.mission;
         let record = &self.bus.observer.record;
@@ -267,7 +272,7 @@ impl Supervisor<'_> {
             return false;
         }
         let since_tick = match self.clock.in_ticks() {
-            // No tick follows an arrival in lockstep.
+            // In lockstep no tick follows an arrival.
             true => stamp.tick + 1,
             false => self.first_tick(),
         };
@@ -287,7 +292,7 @@ impl Supervisor<'_> {
         self.bus.observer.record.target_number = self.targets.number();
         self.bus.observer.record.arrival = None;
         self.arrived = None;
-        // The deadline counts anew for each target.
+        // Each target has its own deadline.
         self.state_file.state.operator_stopped_s = 0.0;
     }
 }

@@ -1,4 +1,4 @@
-//! A run from start to end: the domain locked, the stages started, the mission driven, everything stopped.
+//! A run from start to end: lock the domain, start the stages, drive the mission, stop everything.
 
 use std::collections::BTreeMap;
 
@@ -21,30 +21,33 @@ use crate::{
 
 pub struct Finished {
     pub ending: Ending,
-    /// The last complete tick before the deciding event; none if no tick decided. Later ticks do not count.
+    /// Last complete tick before the deciding event, after which no tick counts; `None` if no tick
+    /// decided.
     pub last_tick: Option<u64>,
-    /// Seconds of the robot's clock from the first motion order, or in a resumed run on a wall clock from its start, to the end.
+    /// Seconds of the robot's clock from the first motion order to the end. A resumed run on a wall
+    /// clock counts from its own start.
     pub duration_s: f64,
     pub record: Record,
     pub truth: Vec<GroundTruthTick>,
     pub drove: bool,
     pub restarts: BTreeMap<&'static str, u32>,
     pub resumes: u32,
-    /// Generations of the planner started because the robot stalled.
+    /// Generations of the planner started because of stalls.
     pub replans: u32,
     pub resets: u64,
-    /// All targets, in the order in which the robot was sent to them.
+    /// Targets, in the order in which the robot is sent to them.
     pub targets: Vec<TargetResult>,
 }
 
-/// A robot that could not be stopped. Its link goes on ordering it to stand, by each method of the protocol in turn.
+/// Robot that could not be stopped. Its link tries each method of the protocol in turn.
 pub struct StillMoving<'a> {
     supervisor: Supervisor<'a>,
     signals: Signals,
 }
 
 impl StillMoving<'_> {
-    /// Wait until the robot rests or a signal tells this process to leave it. Returns what the robot did then.
+    /// Waits until the robot rests or a signal tells this process to leave it. Returns the robot's
+    /// last state.
     pub fn watch(mut self) -> Result<&'static str> {
         let supervisor = &mut self.supervisor;
         let did = loop {
@@ -67,37 +70,43 @@ impl StillMoving<'_> {
     }
 }
 
-/// The signals that end a run, for its loop and for the last resort, which acts when the loop does not.
+/// Signals that end a run, for its loop and for the last resort, which acts if the loop does not.
 pub type EndSignals = [Signals; 2];
 
-/// Catch them from now on. Call this before the first file of a run is made, so that a signal leaves none.
+/// Catches the signals from now on. Called before the first file of a run is made, so that a signal
+/// leaves none.
 pub fn end_signals() -> Result<EndSignals> {
     let catch = || Signals::that_end().map_err(system("catch signals"));
     Ok([catch()?, catch()?])
 }
 
-/// A process that should miss no sample of a run. The run waits for it, and neither call waits longer than is good for the run or until one
-/// of `signals` comes.
+/// Process that should miss no sample of a run.
+///
+/// The run waits for it. Both calls return at the latest on a signal or after a timeout of their
+/// own.
 pub trait Consumer {
-    /// Start it. The bus exists, and no stage has started.
+    /// Starts the consumer. The bus exists, and no stage has started.
     fn attach(&mut self, signals: &Signals);
-    /// Wait until it has taken what there is. In lockstep this is called every [`CAUGHT_UP_EVERY`] ticks, fewer than the bus keeps for it;
-    /// and always before the stages end, because what a writer published that ended before it was first read is gone.
+    /// Waits until the consumer has taken all samples.
+    ///
+    /// In lockstep this is called every [`CAUGHT_UP_EVERY`] ticks, fewer than the bus keeps. It is
+    /// always called before the stages end, because an unread writer's samples vanish with the
+    /// writer.
     fn catch_up(&mut self, signals: &Signals);
 }
 
-/// Nobody reads along.
 impl Consumer for () {
     fn attach(&mut self, _: &Signals) {}
 
     fn catch_up(&mut self, _: &Signals) {}
 }
 
-/// Ticks in lockstep after which the run waits for its consumer.
 pub(crate) const CAUGHT_UP_EVERY: u64 = 32;
 
-/// Carry out a run, with a `consumer` that misses nothing of it. `listener` hears the samples that the run reads. `show` is called a few
-/// times a second. The files of the robot stay until `lock` is dropped, which is after the consumers have ended.
+/// Carries out a run.
+///
+/// `listener` hears the samples that the run reads. `show` is called a few times a second. The
+/// robot's files stay until `lock` is dropped, after the consumers have ended.
 pub fn run<'a>(
     options: &'a Options,
     [mut signals, for_last_resort]: EndSignals,
@@ -124,7 +133,7 @@ pub fn run<'a>(
             Err(error) => break Ending::failed(Outcome::Aborted, error.to_string()),
         }
     };
-    // The robot is stopped first after an error, too, and then the stages in order.
+    // After an error, too, the robot stops before the stages.
     let stopped = supervisor.end_mission(&mut || {
         turns.rest(true);
         consumer.catch_up(&signals);

@@ -1,4 +1,4 @@
-//! Mission time of a run, and the first tick that did not happen yet.
+//! Mission time of a run, and its first tick that has not happened yet.
 
 use common::{
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
@@ -11,7 +11,7 @@ use crate::{observer::Record, recovery::RecoveredRun};
 
 pub(crate) struct RunClock {
     pub clock: MissionClock,
-    /// The first tick that no earlier supervisor has seen.
+    /// First tick that no earlier supervisor has seen.
     first_tick: u64,
     start: MissionTime,
 }
@@ -21,8 +21,8 @@ impl RunClock {
         Self { clock: run.clock(), first_tick: run.first_tick, start: run.time }
     }
 
-    /// The clock of a new run. Only a `simulated` robot, and one that speaks ROS 2 and may be simulated elsewhere, has another pace
-    /// than the wall clock's.
+    /// Starts the clock of a new run. The pace applies to `simulated` robots, and to ROS 2 robots,
+    /// which may be simulated elsewhere.
     pub(crate) fn begin(pace: Pace, robot: &RobotConfig, simulated: bool) -> Self {
         let has_pace = simulated || robot.protocol() == Protocol::Ros2;
         let clock = match pace {
@@ -40,12 +40,12 @@ impl RunClock {
         Self { clock, first_tick: 0, start: MissionTime::default() }
     }
 
-    /// Whether mission time advances with ticks, not with the wall clock.
+    /// Returns whether mission time advances with ticks instead of the wall clock.
     pub(crate) const fn in_ticks(&self) -> bool {
         matches!(self.clock, MissionClock::Ticks { .. })
     }
 
-    /// The tick at mission time `at_ns`; none in wall-clock time.
+    /// Returns the tick at mission time `at_ns`; `None` in wall-clock time.
     pub(crate) fn tick_at(&self, at_ns: u64) -> Option<u64> {
         match self.clock {
             MissionClock::Ticks { period_ns } => at_ns.checked_div(period_ns),
@@ -53,7 +53,8 @@ impl RunClock {
         }
     }
 
-    /// The tick that a new generation of a stage starts from: the one after `newest`, the newest tick of any sample.
+    /// Returns the first tick of a new generation of a stage; `newest` is the newest tick of any
+    /// sample.
     pub(crate) fn first_tick(&self, newest: Option<u64>) -> u64 {
         // The link publishes tick 0 before its first tick.
         newest.map_or(0, |tick| tick + 1).max(self.first_tick)
@@ -63,8 +64,10 @@ impl RunClock {
         pose.map_or(self.start, |pose| pose.stamp.time())
     }
 
-    /// Seconds from the first motion order until `last_tick`, or the newest tick. In lockstep the ground `truth` says it: its time
-    /// also passes while the link receives no frames.
+    /// Returns the seconds from the first motion order to `last_tick`, or to the newest tick.
+    ///
+    /// In lockstep the ground `truth` decides, because its time also passes while the link receives
+    /// no frames.
     pub(crate) fn duration_s(
         &self,
         last_tick: Option<u64>,
@@ -82,7 +85,7 @@ impl RunClock {
         last.map_or(0.0, |last| last.since(first).as_secs_f64())
     }
 
-    /// Mission time now, where `truth` is the newest ground truth of a simulated robot.
+    /// Returns the mission time now; `truth` is the newest ground truth.
     pub(crate) fn now(
         &self,
         pose: Option<&PoseSample>,
@@ -93,7 +96,7 @@ impl RunClock {
                 || self.pose_time(pose),
                 |truth| MissionTime::from_seconds(truth.time_s),
             ),
-            // Wall-clock time passes also without a robot or a pose.
+            // Wall-clock time passes even without a robot or a pose.
             MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
         }
     }

@@ -1,4 +1,4 @@
-//! Bringing the robot to rest and stopping the stages: at the end, or to recreate the bus.
+//! Shutdown: the robot stops, then the stages, at the end or before the bus is recreated.
 
 use std::time::Duration;
 
@@ -16,16 +16,18 @@ use crate::{
     supervisor::Supervisor,
 };
 
-/// Time for the link to confirm that the robot was ordered to stand, before the link is stopped.
+/// Time for the link to confirm the order to stand, before the link is stopped.
 const STAND_CONFIRMED: Duration = Duration::from_millis(100);
-/// The time for which a robot is waited for whose encoders say nothing: its link may be starting, or has not obeyed.
+/// Timeout for a robot with silent encoders: its link may be starting, or has not obeyed.
 const HEARD_WITHIN: Duration = Duration::from_secs(2);
-/// What the link said of the encoders so long ago, when it says it ten times a second, does not count.
+/// Greatest age of a usable encoder report; the link sends ten a second.
 const NEW: Duration = Duration::from_secs(1);
 
 impl Supervisor<'_> {
-    /// Brings the robot to rest and stops the stages. The link goes on while wheels turn; its stop guard takes over from a link that ends
-    /// before the robot was seen at rest. `catch_up` waits for consumers.
+    /// Brings the robot to rest and stops the stages. `catch_up` waits for consumers.
+    ///
+    /// The link goes on while wheels turn. If it ends before the robot was seen at rest, its stop
+    /// guard takes over.
     pub(crate) fn end_mission(&mut self, catch_up: &mut dyn FnMut()) -> Result<Wheels> {
         self.service.stopping();
         self.decision = Decision::ENDING;
@@ -48,13 +50,15 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Recreate the bus, files of which block the start of a stage, and restart all stages from their checkpoints. A consumer of the old
-    /// bus asks [`Bus::is_replaced`](common::bus::Bus::is_replaced).
+    /// Recreates a bus whose files block the start of a stage, and restarts all stages from their
+    /// checkpoints.
+    ///
+    /// Consumers of the old bus ask [`Bus::is_replaced`](common::bus::Bus::is_replaced).
     pub(crate) fn recreate_bus(&mut self, lock: &mut DomainLock) -> Result {
         tracing::error!("the bus is recreated; consumers must join it again");
         self.decision = Decision::STARTING;
         self.stand()?;
-        // A stage that dies meanwhile is not started again on the old bus.
+        // A stage that dies now must not start again on the old bus.
         self.stages.start_no_more();
         self.stop_all()?;
         self.bus.recreate(lock)?;
@@ -64,7 +68,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Order the robot to stand, and wait a moment for the link to confirm it.
+    /// Orders the robot to stand, and waits briefly for the link's confirmation.
     fn stand(&mut self) -> Result {
         self.publish_state()?;
         let began = self.stages.now();
@@ -78,7 +82,8 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Order the end of the mission, and wait until the encoders say that the robot rests, or have said nothing for too long.
+    /// Orders the end of the mission, and waits until the encoders report rest or stay silent for
+    /// too long.
     fn come_to_rest(&mut self) -> Result<Wheels> {
         self.publish_state()?;
         let began = self.stages.now();
@@ -105,7 +110,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// What the encoders say since the end of the mission was ordered.
+    /// Returns the encoder state since the end of the mission was ordered.
     pub(crate) fn wheels(&self) -> Wheels {
         let Some(link) = self.connected_link() else {
             return Wheels::Unknown("it does not answer".to_owned());
@@ -123,7 +128,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// The state of a link that runs and hears the robot.
+    /// Returns the state of a link that runs and hears the robot.
     fn connected_link(&self) -> Option<LinkSample> {
         let runs = self.stages.runs(topics::LINK.spec().writer);
         self.bus.observer.record.link.filter(|link| runs && link.connected == 1)
@@ -150,7 +155,7 @@ impl Supervisor<'_> {
         self.stop_stages(0)
     }
 
-    /// Stop the stages from the `first` of the start order on, all at once.
+    /// Stops the stages from the `first` of the start order on, all at once.
     fn stop_stages(&mut self, first: usize) -> Result {
         while self.stages.stop_from(first) {
             self.wait()?;

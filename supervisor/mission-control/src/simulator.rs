@@ -1,4 +1,4 @@
-//! The simulated robot as a child process, and the ground truth that it writes to its standard output.
+//! Simulated robot as a child process, with the ground truth on its standard output.
 
 use std::{
     fs::{self, File},
@@ -24,11 +24,12 @@ use thiserror::Error;
 
 use crate::long_record;
 
-/// Beside 30 busy processes a core it takes seconds.
+/// Timeout for the start, which takes seconds beside 30 busy processes per core.
 const STARTUP: Duration = Duration::from_secs(30);
-/// A simulator comes to rest and tells the other robot of its world each tick until then, which takes seconds on a busy machine.
+/// Timeout for the end. The simulator comes to rest and tells the other robot of its world each
+/// tick, which takes seconds on a busy machine.
 const REST: Duration = Duration::from_secs(5);
-/// The greatest length of a line of ground truth, which has under 300 bytes; a longer one is an error.
+/// Greatest accepted length of a ground-truth line, bytes; real lines stay under 300.
 const LONGEST_LINE: usize = 64 * 1024;
 
 #[derive(Debug, Error)]
@@ -54,7 +55,7 @@ pub struct Simulator {
 
 struct GroundTruth {
     pipe: ChildStdout,
-    /// The file of the lines of ticks, for simulated sources of fixes; none once it cannot be written.
+    /// Copy of the tick lines for simulated sources of fixes; `None` once it cannot be written.
     file: Option<File>,
     unfinished: Vec<u8>,
     listening: Option<SocketAddr>,
@@ -62,8 +63,11 @@ struct GroundTruth {
 }
 
 impl Simulator {
-    /// Start the simulator of `robot`, if it has a name, in the world of `mission` and wait until it listens, or `given_up` is readable. `firsthand` starts that
-    /// executable. The simulator goes on from an earlier one's checkpoint in `directory`.
+    /// Starts the simulator of `robot` in the world of `mission`. Returns once it listens, or
+    /// `given_up` is readable.
+    ///
+    /// `firsthand` starts that executable. The simulator continues from an earlier one's checkpoint
+    /// in `directory`.
     pub fn start(
         mut firsthand: Command,
         robot: Option<&RobotName>,
@@ -134,12 +138,13 @@ impl Simulator {
         self.address
     }
 
-    /// A descriptor that is readable when the process ended. Ground truth wakes nobody: it is read when the tick ends.
+    /// Returns a descriptor that becomes readable when the process ends. Ground truth wakes no
+    /// reader; it is read at the end of a tick.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.process.as_fd()
     }
 
-    /// Read the output of the simulator. Returns whether it still runs.
+    /// Reads the simulator's output. Returns whether it still runs.
     pub fn poll(&mut self) -> Result<bool, SimulatorError> {
         self.truth.take()?;
         Ok(self.process.try_reap().map_err(system("watch"))?.is_none())
@@ -149,7 +154,7 @@ impl Simulator {
         &self.truth.ticks
     }
 
-    /// End the simulator. The ground truth stays.
+    /// Ends the simulator. The ground truth stays.
     pub fn stop(&mut self) -> Result<(), SimulatorError> {
         self.process.end(REST);
         self.truth.take()

@@ -1,17 +1,17 @@
-//! Whether the robot stalls, and which recovery step comes next. Pure.
+//! Decision whether the robot stalls, and the next recovery step. Pure.
 //!
-//! The paper's rule: if a robot should move and does not, the planner is at fault. Recovery steps, in order: replan from
-//! the same map; reset the sensed map and replan; give up.
+//! The paper's rule: if a robot should move and does not, the planner is at fault. Recovery steps,
+//! in order: replan from the same map; reset the sensed map and replan; give up.
 //!
 //! | cause | sign | first step |
 //! |---|---|---|
-//! | still | it neither drives nor turns | replan |
-//! | pinned | it drives or turns, and stays at its place | replan |
-//! | inside hazard | it stands in a hazard, and has driven far without leaving it | reset |
-//! | held | something holds its wheels: its motors push and its encoders stand | replan |
-//! | wandering | it has driven several times as far as its target was away; with a laser, on ground where it had been | reset |
-//! | relocated | fixes or an operator say that it is elsewhere, so the map is of another place; no limit | reset |
-//! | cut off | no way leads from its place to the target, and it has looked around | reset |
+//! | still | neither drives nor turns | replan |
+//! | pinned | drives or turns, and stays at its place | replan |
+//! | inside hazard | stands in a hazard, and has driven far without leaving it | reset |
+//! | held | something holds the wheels: motors push, encoders stand | replan |
+//! | wandering | has driven several times the distance to its target; with a laser, over known ground | reset |
+//! | relocated | fixes or an operator put it elsewhere, so the map is of another place; no limit | reset |
+//! | cut off | no way leads to the target, and it has looked around | reset |
 
 use std::{collections::HashSet, f64::consts::TAU, time::Duration};
 
@@ -22,36 +22,40 @@ use common::{
 };
 use glam::{DVec2, IVec2};
 
-/// Mission time without motion that is a stall. The slowest turn on the spot begins earlier.
+/// Mission time without motion that is a stall. The slowest turn on the spot starts sooner.
 const STALLED_AFTER: Duration = Duration::from_secs(3);
-/// Mission time without a way to the target that is a stall. A false echo is gone earlier.
+/// Mission time without a way to the target that is a stall. A false echo vanishes sooner.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
-/// Mission time for which the robot may stand while the planner computes a field: the largest takes several seconds.
+/// Mission time allowed for a field; the largest takes several seconds.
 const FIELD_WITHIN: Duration = Duration::from_secs(60);
-/// Turns on the spot that a robot makes first when it is cut off, with the evidential method, at half the ordered speed.
+/// Turns on the spot of a cut-off robot with the evidential method, at half the ordered speed.
 const SCAN_TURNS: f64 = 1.2;
 /// Turns at one place, at the slower of the robot's two rates, beyond which it makes no progress.
 const TURNS_AT_A_PLACE: f64 = 2.0;
-/// The distance within which poses count as the same place, metres. For a slow robot it is less.
+/// Radius of a place, metres; less for a slow robot.
 const PLACE_M: f64 = 0.2;
-/// The radii of a circle around its target at which the place of a circling robot ends.
+/// Radius of a circling robot's place, in diameters of its circle.
 const CIRCLES: f64 = 1.2;
-/// The distance below which a robot counts as standing, metres. For a slow robot it is less.
+/// Distance below which a robot stands, metres; less for a slow robot.
 const MOVED_M: f64 = 0.02;
-/// The turn below which a robot counts as not turning, radians. For a slow robot it is less.
+/// Angle below which a robot does not turn, radians; less for a slow robot.
 const TURNED_RAD: f64 = 0.1;
-/// Share of the motion at full speed that counts as motion: near its target a robot crawls.
+/// Share of full-speed motion that counts as motion, because a robot crawls near its target.
 const SHARE: f64 = 0.05;
 /// Distance that leads out of any margin, even of several overlapping ones, metres.
 const WAY_OUT_M: f64 = 1.0;
-/// The distance within which contacts are at the same place, metres: a robot turns about a blocked wheel.
+/// Distance within which contacts share a place, metres, because a robot turns about a blocked
+/// wheel.
 const HELD_WITHIN_M: f64 = 0.5;
-/// The multiple of the distance to its target after which a robot wanders. The way around a trap is two to three times as long.
+/// Multiple of the target distance after which a robot wanders. The way around a trap is two to
+/// three times as long.
 const WANDERS: f64 = 3.0;
-/// The least distance after which a robot wanders, metres.
+/// Least distance after which a robot wanders, metres.
 const WANDERS_LEAST_M: f64 = 12.0;
-/// The side of a square, metres. A laser's map is to be trusted, and the way through a building may be long: each square in which a
-/// robot with a laser has not been lets it drive [`WANDERS`] times that farther.
+/// Side of a map square, metres.
+///
+/// A laser's map is trustworthy, and the way through a building may be long. So each new square
+/// lets a robot with a laser drive [`WANDERS`] squares farther.
 const SQUARE_M: f64 = 1.0;
 const MOST_SQUARES: usize = 10_000;
 const MOST_REPLANS: u32 = 2;
@@ -111,27 +115,28 @@ pub(crate) struct StallWatch {
     waits_since: Option<MissionTime>,
     /// Distance travelled when the robot was first seen in a hazard, metres.
     inside_hazard_since: Option<f64>,
-    /// Whether long ways are a reason to reset the map. The paper's method has no such rule.
+    /// Whether long ways reset the map. The paper's method has no such rule.
     forgets: bool,
-    /// The distance travelled at which the robot wanders, metres; none before the first tick, and after a reset.
+    /// Distance travelled at which the robot wanders, metres; `None` before the first tick and
+    /// after a reset.
     wanders_at: Option<f64>,
-    /// The squares in which a robot with a laser was on the way to its target; none without a laser.
+    /// Squares visited on the way to the target; `None` without a laser.
     been: Option<HashSet<IVec2>>,
     replans_here: u32,
     replans: u32,
-    /// The place where the wheels were held, and the replans there since the last reset.
+    /// Place where the wheels were held, and the replans there since the last reset.
     held_at: Option<(DVec2, u32)>,
     epoch: u64,
-    /// Epochs without a reset of their own, and resets because the robot was relocated.
+    /// Epochs skipped beside resets, and resets by relocations.
     skipped: u64,
     relocated: u64,
-    /// The resets before its present target, without those of relocations.
+    /// Resets before the present target, without relocations.
     resets_before: u64,
     target: Option<u64>,
     relocations: u64,
     tick: Option<u64>,
     stalls: Vec<StallSample>,
-    /// The number of stalls up to the newest target that was given up while the run went on.
+    /// Stalls up to the newest target that was given up while the run went on.
     settled: usize,
 }
 
@@ -146,7 +151,7 @@ struct Anchor {
 struct Place {
     since: MissionTime,
     middle: DVec2,
-    /// Least distance to the target there, metres.
+    /// Least distance to the target from this place, metres.
     nearest_m: f64,
 }
 
@@ -156,7 +161,7 @@ impl StallWatch {
         let slowest_turn = TAU / mission.turn_rad_s().min(mission.hurry().look_rad_s);
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
         let car = mission.body().ackermann();
-        // A robot turns on the spot, or as it drives.
+        // A robot turns on the spot, or while it drives.
         let on_the_spot = mission.method == Method::Evidential && car.is_none();
         let tightest = car.map_or(0.0, |car| car.least_turning_radius());
         let circle = tightest.max(mission.speed_m_s() / mission.turn_rad_s());
@@ -175,7 +180,7 @@ impl StallWatch {
             } else {
                 CUT_OFF_AFTER
             },
-            // A calibration drives to and fro, so its long way is no reason.
+            // A calibration drives to and fro, so its long way is no stall.
             forgets: mission.method == Method::Evidential && mission.planner.calibration.is_none(),
             been: (mission.used(SensorKind::Scan) > 0).then(HashSet::new),
             ..Self::default()
@@ -186,7 +191,7 @@ impl StallWatch {
         self.epoch
     }
 
-    /// Replans and resets in this mission up to `tick`, or in all of it.
+    /// Returns the replans and resets up to `tick`, or of the whole mission.
     pub(crate) fn recoveries(&self, tick: Option<u64>) -> (u32, u64) {
         let Some(tick) = tick else {
             return (self.replans, self.resets());
@@ -208,7 +213,7 @@ impl StallWatch {
         self.stalls.iter().skip(self.settled).find(is_last)
     }
 
-    /// The run goes on although the target was given up.
+    /// Continues the run after a target was given up.
     pub(crate) const fn settle(&mut self) {
         self.settled = self.stalls.len();
     }
@@ -217,8 +222,10 @@ impl StallWatch {
         self.tick
     }
 
-    /// Check a tick of a robot that is ordered to drive; each tick once. `held`: the link's failsafe or a stage that is down holds
-    /// it. `contact`: something holds its wheels.
+    /// Checks a tick of a robot that is ordered to drive; each tick counts once.
+    ///
+    /// `held`: the link's failsafe or a missing stage holds the robot. `contact`: something holds
+    /// its wheels.
     pub(crate) fn step(
         &mut self,
         pose: &PoseSample,
@@ -261,8 +268,9 @@ impl StallWatch {
         Some(self.recover(cause, pose))
     }
 
-    /// Note that the robot is not ordered to drive at `pose`, so nothing by then is a stall, except that it is elsewhere since the pose
-    /// before. The map is of `epoch`.
+    /// Records that the robot is not ordered to drive at `pose`, with a map of `epoch`.
+    ///
+    /// Only a relocation since the pose before counts as a stall.
     pub(crate) fn stand(&mut self, pose: &PoseSample, epoch: u64) -> Option<StallSample> {
         let is_first = self.tick.is_none();
         self.hold(pose.stamp.tick);
@@ -278,7 +286,7 @@ impl StallWatch {
             self.replans += 1;
             RecoveryStep::Replan
         } else if relocated || self.resets() - self.relocated - self.resets_before < MOST_RESETS {
-            // In an even epoch the mapper resets the evidence near the robot, too.
+            // In an even epoch the mapper also resets the evidence near the robot.
             let skips = u64::from(relocated) * ((self.epoch + 1) % 2);
             self.relocated += u64::from(relocated);
             self.skipped += skips;
@@ -311,7 +319,7 @@ impl StallWatch {
         stall
     }
 
-    /// Whether a fresh planner is the next step against `cause`; if so, that is counted.
+    /// Returns whether a fresh planner is the next step against `cause`, and counts it.
     fn may_replan(&mut self, cause: StallCause, here: DVec2) -> bool {
         let replans = match cause {
             StallCause::Still | StallCause::Pinned => &mut self.replans_here,
@@ -330,7 +338,7 @@ impl StallWatch {
         may
     }
 
-    /// Note that the robot is sent elsewhere, so nothing so far is a stall on the way there.
+    /// Clears stalls on the way to the old target.
     fn on_new_target(&mut self, tick: u64) {
         self.hold(tick);
         (self.inside_hazard_since, self.wanders_at, self.held_at) = (None, None, None);
@@ -339,19 +347,20 @@ impl StallWatch {
         self.resets_before = self.resets() - self.relocated;
     }
 
-    /// Note that the robot was not ordered to drive until `tick`, so nothing by then is a stall.
+    /// Records that the robot was not ordered to drive until `tick`, so it cannot have stalled by
+    /// then.
     pub(crate) fn hold(&mut self, tick: u64) {
         self.tick = Some(tick);
         self.forget_motion();
     }
 
-    /// Note that something held the robot until now, perhaps without a tick.
+    /// Clears motion while something held the robot, perhaps without a tick.
     pub(crate) const fn forget_motion(&mut self) {
         (self.anchor, self.place) = (None, None);
         (self.cut_off_since, self.waits_since) = (None, None);
     }
 
-    /// Whether the robot stands because the planner computes a field, within the time for that.
+    /// Returns whether the robot waits for a field within [`FIELD_WITHIN`].
     fn waits_for_field(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> bool {
         if GuidanceStatus::from_byte(guidance.status) != GuidanceStatus::Waiting {
             self.waits_since = None;
@@ -361,7 +370,8 @@ impl StallWatch {
         now.since(*self.waits_since.get_or_insert(now)) < FIELD_WITHIN
     }
 
-    /// Whether u = 0 at the robot, in the field of the current map, for longer than a robot needs to get away.
+    /// Detects u = 0 at the robot, in the field of the current map, for longer than it needs to get
+    /// away.
     fn without_policy(
         &mut self,
         pose: &PoseSample,
@@ -383,7 +393,7 @@ impl StallWatch {
         None
     }
 
-    /// Whether the robot has driven for so long, since the start or the last reset, that its map must be wrong.
+    /// Detects a drive so long, since the start or the last reset, that the map must be wrong.
     fn without_end(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> Option<StallCause> {
         let most_m = (WANDERS * guidance.distance_m).max(WANDERS_LEAST_M);
         let wanders_at = self.wanders_at.get_or_insert(pose.travelled_m + most_m);
@@ -395,7 +405,7 @@ impl StallWatch {
         (self.forgets && pose.travelled_m >= *wanders_at).then_some(StallCause::Wandering)
     }
 
-    /// Whether the robot has not moved or turned for a while, or moves or turns for longer at one place.
+    /// Detects a robot that has not moved for a while, or has moved for longer at one place.
     fn without_motion(
         &mut self,
         pose: &PoseSample,
@@ -420,7 +430,7 @@ impl StallWatch {
             *place = Place { middle: place.middle, ..arrived };
         }
         let since = place.since;
-        // The planner looks around first, which has a timeout of its own.
+        // The planner looks around first, which has its own timeout.
         if GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable {
             return None;
         }

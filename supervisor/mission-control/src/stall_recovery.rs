@@ -1,5 +1,4 @@
-//! The part of the loop that looks for stalls, restarts the planner or resets the belief, and ends the mission when no
-//! recovery step is left.
+//! Part of the loop that detects stalls and carries out recovery steps.
 
 use std::time::Instant;
 
@@ -15,7 +14,7 @@ use crate::{
 };
 
 impl Supervisor<'_> {
-    /// Look for stalls, and take the next recovery step. The last one ends the mission.
+    /// Looks for stalls, and takes the next recovery step. The last one ends the mission.
     pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>> {
         if self.decision.order() != Order::Drive {
             // In lockstep mission time stands still meanwhile.
@@ -52,11 +51,10 @@ impl Supervisor<'_> {
         Ok(None)
     }
 
-    /// Check the ticks that are not checked yet, up to the next one at which the robot stalls.
     fn next_stall(&mut self) -> Option<StallSample> {
         let record = &self.bus.observer.record;
         let in_ticks = self.clock.in_ticks();
-        // The link stops a robot whose wheels are held, and only the supervisor can free it.
+        // The link stops a robot with held wheels, and only the supervisor can free it.
         let stopped =
             record.link.is_none_or(|link| link.stopped() && link.cause() != Cause::WheelsHeld);
         // In lockstep mission time stands still while something holds the robot.
@@ -105,8 +103,9 @@ impl Supervisor<'_> {
         Some(Ending::failed(Outcome::Unreachable, reason))
     }
 
-    /// The tick at which no recovery step was left, and the ending. In lockstep the ticks that were not checked before the end, whose
-    /// number depends on the machine, are checked now.
+    /// Returns the tick and ending of the stall without a recovery step left.
+    ///
+    /// In lockstep the number of unchecked ticks depends on the machine, so they are checked now.
     pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
         while self.clock.in_ticks()
             && self.stall_watch.gave_up().is_none()
@@ -116,7 +115,6 @@ impl Supervisor<'_> {
         Some((tick, self.given_up()?))
     }
 
-    /// Publish the limit of the link, if there is one and it changed.
     pub(crate) fn publish_tick_limit(&mut self) -> Result {
         let target_number = self.targets.number();
         let limit = self.recovery_steps.limit();

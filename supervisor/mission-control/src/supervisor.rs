@@ -1,4 +1,5 @@
-//! The loop of one robot's supervisor: it reads events, asks the pure functions for decisions, and carries them out.
+//! Loop of the supervisor: reads events, asks the pure functions for decisions, and carries them
+//! out.
 
 use std::{net::Ipv4Addr, os::fd::AsFd as _, path::PathBuf, time::Instant};
 
@@ -49,15 +50,15 @@ use crate::{
 pub struct Options {
     pub mission: Mission,
     pub robot: RobotName,
-    /// Speed of mission time. A real robot's is always wall-clock time, unless it speaks ROS 2.
+    /// Speed of mission time. A real robot always uses the wall clock, unless it speaks ROS 2.
     pub pace: Pace,
     /// Directory of logs, checkpoints and results; it must exist.
     pub directory: PathBuf,
     pub starter: Starter,
     pub recovered: Option<RecoveredRun>,
-    /// The robot stands until an operator says resume.
+    /// Whether the robot stands until an operator resumes it.
     pub stands: bool,
-    /// Where the robot of a new run believes it is; by default at the start of its mission.
+    /// Believed place of a new run's robot; by default the mission's start.
     pub place: Option<PlaceSample>,
 }
 
@@ -81,7 +82,7 @@ impl Robot {
             Some(signals.as_fd()),
         );
         let simulator = match started {
-            // The run ends before anyone speaks to a robot.
+            // The run ends before it contacts a robot.
             Err(SimulatorError::GivenUp) => None,
             started => Some(started?),
         };
@@ -94,7 +95,7 @@ impl Robot {
         self.simulator.as_ref().map_or(&[], Simulator::truth)
     }
 
-    /// Read the ground truth. Returns whether a simulated robot's process still runs.
+    /// Reads the ground truth. Returns whether a simulated robot still runs.
     pub(crate) fn poll(&mut self) -> Result<bool> {
         Ok(self.simulator.as_mut().map(Simulator::poll).transpose()?.unwrap_or(true))
     }
@@ -102,7 +103,7 @@ impl Robot {
 
 pub(crate) struct Supervisor<'a> {
     pub options: &'a Options,
-    // The fields are dropped in this order: the stages end before the robot.
+    // Fields are dropped in this order: the stages end before the robot.
     pub stages: StageProcesses,
     pub robot: Robot,
     pub bus: BusEndpoints,
@@ -110,15 +111,15 @@ pub(crate) struct Supervisor<'a> {
     pub state_file: StateFile,
     pub clock: RunClock,
     pub decision: Decision,
-    /// The time when an operator last resumed, nanoseconds of the monotonic clock.
+    /// Time of the last resume, nanoseconds of the monotonic clock.
     pub resumed_ns: u64,
     pub drove: bool,
     pub tick_progress: TickProgress,
     pub targets: TargetList,
-    /// Then the hand that drives the robot is missed.
+    /// Time when the driving hand counts as gone.
     pub hand_until: Option<Instant>,
     pub beacon: Beacon,
-    /// The time when the arrival was first seen.
+    /// Time when the arrival was first seen.
     pub arrived: Option<Now>,
     stop_clock: StopClock,
     pub stall_watch: StallWatch,
@@ -130,7 +131,8 @@ pub(crate) struct Supervisor<'a> {
 }
 
 impl<'a> Supervisor<'a> {
-    /// Start the robot, write the run file, start the stages. After one of `signals` no stage is started.
+    /// Starts the robot, writes the run file, starts the stages. After one of `signals` no stage
+    /// starts.
     pub(crate) fn start(
         options: &'a Options,
         lock: &mut DomainLock,
@@ -212,7 +214,7 @@ impl<'a> Supervisor<'a> {
         Ok(supervisor)
     }
 
-    /// Iterate until the mission ends. Returns none if the bus must be recreated.
+    /// Iterates until the mission ends. Returns `None` if the bus must be recreated.
     pub(crate) fn drive(
         &mut self,
         signals: &mut Signals,
@@ -221,7 +223,7 @@ impl<'a> Supervisor<'a> {
         show: &mut dyn FnMut(&Progress<'_>),
     ) -> Result<Option<Ending>> {
         self.bus.waiter.on_readable(&*signals)?;
-        // In wall-clock time nothing waits for a consumer that is slow.
+        // In wall-clock time the run does not wait for slow consumers.
         let mut catch_up_at = self.clock.in_ticks().then_some(0);
         loop {
             if signals.came() {
@@ -281,7 +283,7 @@ impl<'a> Supervisor<'a> {
         })
     }
 
-    /// Reap and restart stages; log, publish and record each death once. Returns whether there was one.
+    /// Reaps and restarts stages, and reports each death. Returns whether there was one.
     pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool> {
         let deaths = self.stages.poll(&self.bus.bus, first_tick)?;
         for death in &deaths {
@@ -293,14 +295,14 @@ impl<'a> Supervisor<'a> {
         Ok(!deaths.is_empty())
     }
 
-    /// Decide whether the robot may drive. Returns whether the decision changed.
+    /// Returns whether the decision changed.
     fn decide_order(&mut self) -> bool {
         let record = &self.bus.observer.record;
         let decision = order::decide(&order::Snapshot {
             was_ready: self.decision.ready,
             all_running: self.stages.all_running(),
             robot_answers: record.link.is_some_and(|link| link.connected == 1),
-            // A planner of the user need not publish a field.
+            // A user's planner need not publish a field.
             field_known: record.field_known || self.options.mission.planner.executable.is_some(),
             operator_stop: self.state_file.state.operator_stop,
             stage_held: !self.stages.held().is_empty(),
@@ -326,7 +328,7 @@ impl<'a> Supervisor<'a> {
         let record = &self.bus.observer.record;
         let target = self.targets.current().position();
         let newest_m = record.pose.map(|pose| target.distance(pose.pose().position));
-        // A robot that follows goes on when the beacon does.
+        // A robot that follows goes on with its beacon.
         let ends = self.targets.is_last() && !self.targets.follows();
         let arrival = record.arrival.filter(|_| ends).map(|command| Arrival {
             distance_m: newest_m.unwrap_or(command.distance_m),
@@ -365,7 +367,7 @@ impl<'a> Supervisor<'a> {
         self.clock.now(self.bus.observer.record.pose.as_ref(), self.robot.truth().last())
     }
 
-    /// The deadline of the current target; a robot that waits for a target, or follows one, has any time.
+    /// Returns the current target's deadline; infinite while waiting or following.
     pub(crate) const fn deadline(&self) -> Deadline {
         let timeout_s = match self.targets.waits() || self.targets.follows() {
             true => f64::INFINITY,
@@ -378,20 +380,19 @@ impl<'a> Supervisor<'a> {
         }
     }
 
-    /// The tick that a new generation of a stage starts from.
     pub(crate) fn first_tick(&self) -> u64 {
         self.clock.first_tick(self.bus.observer.record.newest_tick())
     }
 
     pub(crate) fn published_as_of(&self) -> (u64, MissionTime) {
-        // An external stage takes its first tick from this sample, so the tick must be a new one.
+        // An external stage takes its first tick from this sample, so the tick must be new.
         let tick = self.first_tick().saturating_sub(1);
         let time = self.clock.pose_time(self.bus.observer.record.pose.as_ref());
         (tick, time)
     }
 
-    /// Save the state, then publish the order and the roster. The roster confirms an operator's request, so the state is
-    /// saved before.
+    /// Saves the state, then publishes order and roster. The roster confirms requests, so saving
+    /// comes first.
     pub(crate) fn publish_state(&mut self) -> Result {
         self.state_file.state.targets = Some(self.targets.clone());
         if let Err(error) = self.state_file.save() {
@@ -399,7 +400,7 @@ impl<'a> Supervisor<'a> {
             tracing::error!(%error, "cannot save the state; a supervisor that resumes this run will not know the last requests");
         }
         let (tick, time) = self.published_as_of();
-        // A stage that is told to drive already knows the target.
+        // A stage must know the target before it is told to drive.
         self.bus.target.publish(tick, time, self.targets.sample())?;
         if let Some(following) = self.beacon.told {
             self.bus.following.publish(tick, time, following)?;
@@ -412,7 +413,7 @@ impl<'a> Supervisor<'a> {
             let header = ZonesHeader { number: *number, ..ZonesHeader::default() };
             self.bus.zones.publish_slice(tick, time, header, &ZoneCorner::of(zones))?;
         }
-        // The limit is published again, before the order that starts the first tick.
+        // The limit comes before the order that starts the first tick.
         self.published_limit = None;
         self.publish_tick_limit()?;
         let (order, reason) = (self.decision.order(), self.decision.reason);

@@ -1,4 +1,4 @@
-//! The targets of a run: the one that the robot is sent to, those after it, and the outcomes of those before. Pure.
+//! Targets of a run, past, present and future, with their outcomes. Pure.
 
 use common::{
     ground_truth::GroundTruthTick,
@@ -14,27 +14,27 @@ use crate::{
     outcome::{Ending, Outcome},
 };
 
-/// The most results that are stored; the oldest are dropped, and remain in the file of records.
+/// Most results stored. Older ones remain only in the file of records.
 const MOST_RESULTS: usize = 128;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TargetOutcome {
     Reached,
-    /// The robot reports its arrival, and the ground truth contradicts it.
+    /// The ground truth contradicts the reported arrival.
     WrongPlace,
-    /// The robot reports its arrival and is not sure of it, as in [`Outcome::ReachedUnsure`].
+    /// The robot is unsure of its reported arrival, as in [`Outcome::ReachedUnsure`].
     ReachedUnsure,
-    /// An operator named another target before it was reached.
+    /// An operator named another target before this one was reached.
     Replaced,
     /// The robot stalled, and no recovery step was left.
     Unreachable,
-    /// The robot was not there in time.
+    /// The robot was late.
     TimedOut,
     Missed,
-    /// The run ended before the robot was sent to it.
+    /// The run ended before the robot was sent there.
     NotTried,
-    /// The robot followed a beacon, which was there at last.
+    /// The robot followed a beacon, last seen there.
     Followed,
 }
 
@@ -42,7 +42,7 @@ pub enum TargetOutcome {
 pub struct Followed {
     pub way_m: f64,
     pub time_s: f64,
-    /// Times that it lost the beacon.
+    /// Times that the robot lost the beacon.
     pub lost: u64,
 }
 
@@ -52,20 +52,20 @@ pub struct TargetResult {
     pub x_m: f64,
     pub y_m: f64,
     pub outcome: TargetOutcome,
-    /// Mission time at which the outcome was known; none for a target that was not tried.
+    /// Mission time of the outcome; `None` for an untried target.
     pub at_s: Option<f64>,
-    /// The robot's distance from the target by its own pose on arrival.
+    /// Distance from the target on arrival, by the robot's own pose.
     pub distance_m: Option<f64>,
-    /// The distance by the ground truth of a simulated robot.
+    /// Distance by a simulated robot's ground truth.
     pub truth_m: Option<f64>,
-    /// Of a beacon alone.
+    /// Present for beacons only.
     pub followed: Option<Followed>,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Stored {
     result: TargetResult,
-    /// The tick of the arrival; none if the robot did not arrive.
+    /// Tick of the arrival; `None` without one.
     tick: Option<u64>,
 }
 
@@ -74,16 +74,16 @@ pub struct TargetList {
     number: u64,
     current: TargetPoint,
     since_tick: u64,
-    /// Mission time at which the target became the current one, seconds.
+    /// Mission time at which this target became the current one, seconds.
     began_s: f64,
     ahead: Vec<TargetPoint>,
     results: Vec<Stored>,
-    /// How many of them, the oldest, are in the file of records.
+    /// Number of results, oldest first, that are in the file of records.
     recorded: usize,
-    /// The current target has its result, and the robot waits for the next one.
+    /// Whether the current target has its result, and the robot waits for the next.
     waits: bool,
     by_hand: bool,
-    /// The current target moves with a beacon; one result tells of all its places.
+    /// Whether the current target moves with a beacon; one result covers all its places.
     follows: bool,
 }
 
@@ -127,7 +127,7 @@ impl TargetList {
         self.waits
     }
 
-    /// Whether there is a target that has a result when it ends.
+    /// Returns whether the current target gets a result when it ends.
     pub(crate) const fn has_target(&self) -> bool {
         !self.waits && !self.by_hand && !self.follows
     }
@@ -136,7 +136,7 @@ impl TargetList {
         self.follows
     }
 
-    /// Follow a beacon from now on. There is no target before the beacon is heard.
+    /// Follows a beacon from now on. There is no target before the first sample.
     pub(crate) fn follow(&mut self, now_s: f64, arrival: Option<(CommandSample, TargetOutcome)>) {
         self.replace(&[], (0, now_s), arrival);
         (self.waits, self.by_hand, self.follows) = (true, false, true);
@@ -148,7 +148,7 @@ impl TargetList {
         self.waits = false;
     }
 
-    /// The beacon, which was at `place` at last, is not followed any more at `now_s`, and the robot waits.
+    /// Ends the following at `now_s`, with the beacon last seen at `place`. The robot waits.
     pub(crate) fn end_following(
         &mut self,
         (outcome, followed): (TargetOutcome, Followed),
@@ -165,7 +165,7 @@ impl TargetList {
         self.by_hand = true;
     }
 
-    /// The hand has gone, and the robot waits. Returns whether a hand drove it.
+    /// Lets the robot wait without its hand. Returns whether a hand drove it.
     pub(crate) const fn release(&mut self) -> bool {
         let was = self.by_hand;
         self.waits |= was;
@@ -173,10 +173,10 @@ impl TargetList {
         was
     }
 
-    /// The ending of a run whose robot waits for its next target: the outcome of the newest one.
+    /// Returns the outcome of a run that ends while the robot waits: that of the newest target.
     pub(crate) fn outcome_while_waiting(&self) -> Option<Outcome> {
         let tried = |it: &&Stored| it.result.outcome != TargetOutcome::NotTried;
-        // A hand's target, which is the current one then, has no result.
+        // A hand's target is the current one and has no result.
         let newest = self.results.iter().rfind(tried).filter(|_| !self.by_hand);
         let newest = newest.map(|it| it.result.outcome);
         (self.waits || self.by_hand).then_some(match newest {
@@ -213,7 +213,8 @@ impl TargetList {
         fits
     }
 
-    /// Send the robot to `points` instead, from `since_tick` at `now_s` on. `arrival` is that at the current target, if there is one.
+    /// Sends the robot to `points` instead, from `since_tick` at `now_s` on. `arrival` is that at
+    /// the current target.
     pub(crate) fn replace(
         &mut self,
         points: &[TargetPoint],
@@ -232,8 +233,8 @@ impl TargetList {
         }
     }
 
-    /// The run of a robot that stays goes on without a target: the current one ended with `outcome` at `now_s`, by an `arrival` or not,
-    /// and those after it are not tried.
+    /// Ends the current target with `outcome` at `now_s`, and drops those after it as not tried.
+    /// The robot stays and waits.
     pub(crate) fn settle(
         &mut self,
         outcome: Outcome,
@@ -273,7 +274,6 @@ impl TargetList {
         }
     }
 
-    /// Send the robot, whose `arrival` is a command and what it is worth, to the next target, from `since_tick` on.
     pub(crate) fn advance(&mut self, arrival: (CommandSample, TargetOutcome), since_tick: u64) {
         if self.ahead.is_empty() {
             return;
@@ -314,7 +314,7 @@ impl TargetList {
         self.results.push(Stored { result, tick });
     }
 
-    /// The results that are to be recorded now, in their order: where there `is_truth`, arrivals wait for it.
+    /// Returns the results to record now, in order. If there `is_truth`, arrivals wait for it.
     pub(crate) fn take_known(&mut self, is_truth: bool) -> Vec<TargetResult> {
         let is_known = |it: &&Stored| !is_truth || it.tick.is_none() || it.result.truth_m.is_some();
         let known = self.results.iter().skip(self.recorded).take_while(is_known);
@@ -323,14 +323,15 @@ impl TargetList {
         known
     }
 
-    /// Complete the results of arrivals by the ground truth as far as that is known, with `allowed_m` as the greatest error.
+    /// Completes the results of arrivals by the known ground truth; `allowed_m` is the greatest
+    /// error.
     pub(crate) fn compare(&mut self, record: &Record, truth: &[GroundTruthTick], allowed_m: f64) {
         for Stored { result, tick } in &mut self.results {
             let Some(tick) = tick.filter(|_| result.truth_m.is_none()) else {
                 continue;
             };
             let pose = record.pose_at(tick).filter(|pose| pose.stamp.tick == tick);
-            // The ground truth of a tick that is not over may be missing.
+            // The ground truth of an unfinished tick may be missing.
             let known = truth.last().is_some_and(|last| last.heard_tick() >= tick);
             if let Some(index) = pose.filter(|_| known).and_then(|pose| truth_of(pose, truth)) {
                 let distance_m = apart_m(&truth[index], result);
@@ -342,7 +343,8 @@ impl TargetList {
         }
     }
 
-    /// The results of all targets of a run that ended with `ending` after `last_tick`, at a place by the ground truth.
+    /// Returns the results of all targets of a run that ended with `ending` after `last_tick`.
+    /// `ended` is the final ground truth.
     pub(crate) fn results(
         &self,
         ending: &Ending,
@@ -388,7 +390,8 @@ fn apart_m(truth: &GroundTruthTick, target: &TargetResult) -> f64 {
     (truth.x - target.x_m).hypot(truth.y - target.y_m)
 }
 
-/// The ending of a run whose last target ended with `ending`: a target before it that was not reached makes it worse.
+/// Returns the ending of a run whose last target ended with `ending`. A worse earlier arrival takes
+/// its place.
 pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
     if ending.outcome != Outcome::Reached {
         return ending;
@@ -407,7 +410,7 @@ pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
     first.unwrap_or(ending)
 }
 
-/// The reason why a robot that is held for `reason` is not sent anywhere; none if it may be.
+/// Returns the refusal of orders to a robot held for `reason`, if any.
 pub(crate) const fn held_refusal(reason: HoldReason) -> Option<RequestAnswer> {
     match reason {
         HoldReason::Starting | HoldReason::Ending => Some(RequestAnswer::NotRunning),
@@ -416,7 +419,7 @@ pub(crate) const fn held_refusal(reason: HoldReason) -> Option<RequestAnswer> {
     }
 }
 
-/// The reason why the robot is not sent to `points`; none if it is.
+/// Returns the refusal to send the robot to `points`, if any.
 pub(crate) fn refusal(
     points: Option<&[TargetPoint]>,
     reason: HoldReason,

@@ -1,4 +1,4 @@
-//! The first message of a page, and the results of targets.
+//! First message of a page, and results of targets.
 
 use common::{mission::SensorKind, run::Run};
 use robot_state::{Event, Kind};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::collector::COLUMNS;
 
-/// The result of a target, a line of the run's records, as an event at the time at which it was known.
+/// Converts a target's result, a line of the run's records, to an event at its time.
 pub fn result(target: &Value) -> Value {
     let outcome = target["outcome"].as_str().unwrap_or_default();
     let kind = match outcome {
@@ -27,7 +27,7 @@ pub fn result(target: &Value) -> Value {
     })
 }
 
-/// The first message of a page, which describes `run`.
+/// Builds the first message of a page, which describes `run`.
 pub fn about(run: &Run) -> Value {
     let mission = &run.mission;
     let simulated = mission.robot.address.is_none();

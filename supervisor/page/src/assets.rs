@@ -1,6 +1,6 @@
-//! The files of the page, embedded.
+//! Embedded files of the page.
 
-/// A file that the live page serves: its path, its type, its text.
+/// Served file: path, type and text.
 pub type Asset = (&'static str, &'static str, &'static str);
 
 const HTML: &str = "text/html; charset=utf-8";

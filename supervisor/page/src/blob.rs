@@ -1,8 +1,8 @@
-//! Maps and fields as the binary messages of the page.
+//! Maps and fields as binary messages of the page.
 //!
 //! | bytes | content, little-endian |
 //! |---|---|
-//! | 0 | 1: a map, 2: a field, 3: the field of a target that is only looked at |
+//! | 0 | 1: a map, 2: a field, 3: the field of a previewed target |
 //! | 2..4 | N: N x N cells |
 //! | 4..8 | side of a cell, metres, f32 |
 //! | 8..16 | lower left corner, metres, two f32 |
@@ -10,8 +10,9 @@
 //! | 24..32 | target of a field, metres, two f32 |
 //! | 32.. | cells, row-major from below, as raw deflate |
 //!
-//! A cell of a map is its [`common::grid::CellState`] byte. A field has first for all cells the direction (254 steps of a turn from
-//! x, counter-clockwise; 255 for none), then -2 log2 u (255 for u = 0).
+//! A map cell is its [`common::grid::CellState`] byte. A field has a plane of directions: 254 steps
+//! of a turn from x, counter-clockwise, and 255 for none. A plane of -2 log2 u follows, with 255
+//! for u = 0.
 
 use std::io::Write as _;
 
@@ -21,7 +22,7 @@ use glam::DVec2;
 
 const STEPS: f32 = 254.0;
 const NONE: u8 = 255;
-/// The most cells a side of a field; from a larger one every second, third, ... cell is sent.
+/// Most cells on a side of a field. Larger ones are subsampled.
 const MOST_A_SIDE: usize = 256;
 
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +44,6 @@ pub fn map(frame: GridFrame, cells: &[u8], time_s: f64) -> Vec<u8> {
     header.message(cells)
 }
 
-/// The field of `cells` to `target` at mission time `time_s`.
 pub fn field(
     shown: Shown,
     frame: GridFrame,
@@ -103,7 +103,7 @@ impl Header {
             message.extend((value as f32).to_le_bytes());
         }
         let mut deflated = DeflateEncoder::new(message, Compression::fast());
-        // Writing to a Vec cannot fail.
+        // Infallible for a Vec.
         let _ = deflated.write_all(cells);
         deflated.finish().unwrap_or_default()
     }

@@ -1,5 +1,5 @@
-//! Samples of a robot as the page shows them: rows of its charts, states, maps and fields. The live page and the recorded one
-//! both come from here.
+//! Converts a robot's samples to chart rows, states, maps and fields for the live and the recorded
+//! page.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 
 use crate::blob;
 
-/// The columns of a row before those of the sensors.
+/// Columns of a row before those of the sensors.
 pub(crate) const COLUMNS: [&str; 24] = [
     "t",
     "x",
@@ -45,24 +45,24 @@ pub(crate) const COLUMNS: [&str; 24] = [
     "true_y",
     "true_heading",
 ];
-/// The mission time after which a state is given again although only ages have changed, seconds.
+/// Interval of states that differ only in ages, mission time in seconds.
 const STATE_AGAIN_S: f64 = 1.0;
-/// Most ticks whose samples come in at a time.
+/// Most ticks whose samples arrive at a time.
 const MOST_TICKS: usize = 4096;
-/// Most ticks of the ground truth that wait for their pose.
+/// Most ground truth ticks that wait for their pose.
 const MOST_TRUTHS: usize = 4096;
 
-/// The samples of a tick. A recording has them by topics, some ticks at a time.
+/// Samples of a tick. A recording yields them by topic, several ticks at a time.
 #[derive(Clone, Debug, Default)]
 struct Tick {
     pose: Option<PoseSample>,
-    /// Speeds of the left and the right wheel by their encoders, rad/s.
+    /// Encoder speeds of the left and the right wheel, rad/s.
     wheels: Option<[f64; 2]>,
     command: Option<CommandSample>,
     guidance: Option<GuidanceSample>,
     ranges: Option<Vec<Option<f64>>>,
     movers: Option<Vec<Mover>>,
-    /// The latency of the tick, and the share of the command that the link sends.
+    /// Latency of the tick, and the share of the command that the link sends.
     link: Option<(u64, f64)>,
 }
 
@@ -74,9 +74,9 @@ pub struct Collector {
     newest: Tick,
     pub state: RobotState,
     usage: Vec<Usage>,
-    /// The ground truth from the tick of the newest row on, as far as it was read.
+    /// Ground truth from the newest row's tick on.
     truths: VecDeque<GroundTruthTick>,
-    /// The facts that decided the newest state, and their time.
+    /// Key and time of the newest state.
     state_of: Option<(Vec<u64>, f64)>,
     map_of: Option<u64>,
     field_of: Option<u64>,
@@ -148,7 +148,8 @@ impl Collector {
             Some(speeds.map(|speed| f64::from(speed) * per_count));
     }
 
-    /// The row of `tick`. Values that did not come in it are as before. Behind those of the sensors it has the movers, if there are any.
+    /// Returns the row of `tick`. Missing values repeat their predecessors. Movers, if any, follow
+    /// the sensors.
     fn row(&mut self, tick: Tick) -> Option<Value> {
         let pose = &tick.pose?;
         let Tick { wheels, command, guidance, ranges, movers, link, .. } =
@@ -205,8 +206,8 @@ impl Collector {
         Some(values.into_iter().map(rounded).chain(ranges).chain(movers).collect())
     }
 
-    /// Take a line of the ground truth, which is written before the tick's pose is published. Returns whether a further line may come
-    /// before the next pose.
+    /// Takes a line of ground truth, written before its tick's pose is published. Returns whether
+    /// to read on before the next pose.
     pub fn truth(&mut self, line: &str) -> bool {
         if let Ok(truth) = serde_json::from_str(line) {
             if self.truths.len() == MOST_TRUTHS {
@@ -222,12 +223,12 @@ impl Collector {
         stages.chain([self.roster().supervisor_pid]).collect()
     }
 
-    /// Take the usage of these processes, in the order of [`Self::processes`].
+    /// Takes the usage of [`Self::processes`], in their order.
     pub fn used(&mut self, usage: Vec<Usage>) {
         self.usage = usage;
     }
 
-    /// The rows of the ticks that have ended since the last time: a sample of the link ends a tick.
+    /// Returns the rows of newly ended ticks. A sample of the link ends a tick.
     pub fn take_rows(&mut self) -> Vec<Value> {
         let last = self.link().stamp.tick.min(self.pose_tick);
         let mut rows = Vec::new();
@@ -246,7 +247,7 @@ impl Collector {
         self.state.link.unwrap_or_default()
     }
 
-    /// The map as a message, if it has changed since the last time.
+    /// Returns a changed map as a message.
     pub fn take_map(&mut self) -> Option<Vec<u8>> {
         let map = &self.state.map;
         let changed = self.map_of.replace(map.version()) != Some(map.version());
@@ -254,7 +255,7 @@ impl Collector {
         Some(blob::map(frame, map.cells(), self.state.now_s()))
     }
 
-    /// The field as a message, if it has changed since the last time.
+    /// Returns a changed field as a message.
     pub fn take_field(&mut self) -> Option<Vec<u8>> {
         let (field, header) = (&self.state.field, &self.state.field_header);
         let changed = self.field_of.replace(field.version()) != Some(field.version());
@@ -263,14 +264,13 @@ impl Collector {
         Some(blob::field(blob::Shown::Field, frame, field.cells(), target, self.state.now_s()))
     }
 
-    /// The map, for a planner; none before the first keyframe.
+    /// Returns the map for a planner, from the first keyframe on.
     pub fn belief(&self) -> Option<(GridHeader, &[u8])> {
         let map = &self.state.map;
         let part = common::grid::Part::whole(map.frame()?, map.version());
         Some((GridHeader { part, ..self.state.map_header }, map.cells()))
     }
 
-    /// The target of the robot, metres.
     pub fn target(&self) -> DVec2 {
         self.state.target.map_or(self.mission.target, |sent| sent.target.position())
     }
@@ -279,7 +279,7 @@ impl Collector {
         &self.mission
     }
 
-    /// The state of the robot's processes, if it has changed since the last time; if only ages differ, once a second.
+    /// Returns a changed state of the processes. If only ages differ, once a second.
     pub fn take_state(&mut self) -> Option<Value> {
         if self.state.stages.is_empty() {
             return None;
@@ -341,19 +341,20 @@ impl Collector {
     }
 }
 
-/// Place, velocity, radius, and the radius within which its surface is with 95 %, to a centimetre: the page holds many.
+/// Formats place, velocity, radius and the 95 % radius of the surface, rounded to a centimetre to
+/// save space.
 fn mover(mover: &Mover) -> Value {
     let (at, velocity) = (mover.place(), mover.velocity());
     let values = [at.x, at.y, velocity.x, velocity.y, mover.radius_m.into(), mover.reach_m()];
     values.into_iter().map(|value| Value::from((value * 1e2).round() / 1e2)).collect()
 }
 
-/// `value` to a tenth of a millimetre; null if it is no number.
+/// Rounds to a tenth of a millimetre. Non-finite values become null.
 fn rounded(value: f64) -> Value {
     Value::from((value * 1e4).round() / 1e4)
 }
 
-/// An age in seconds; null if it is not known.
+/// Converts an age to seconds, or null if it is unknown.
 fn seconds(ns: u64) -> Value {
     if ns == u64::MAX { Value::Null } else { Value::from((ns / 1_000_000) as f64 / 1e3) }
 }

@@ -1,12 +1,12 @@
-//! The robot's page: what a browser is sent, and a recorded run in one file that refers to nothing else. The live page, which
-//! `firsthand-page` serves, sends the same messages to the same modules.
+//! The robot's page in a browser, and a recorded run as one self-contained file. `firsthand-page`
+//! serves the same messages live.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `about` | the first message of a page |
+//! | `about` | first message of a page |
 //! | `collector` | samples as rows, states, maps and fields |
 //! | [`blob`] | maps and fields as binary messages |
-//! | [`assets`] | HTML, CSS and the modules of JavaScript, which lie in `web/` |
+//! | [`assets`] | HTML, CSS and JavaScript modules from `web/` |
 //! | `recorded` | a recorded run as one file |
 
 mod about;

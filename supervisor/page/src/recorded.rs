@@ -1,4 +1,4 @@
-//! A recorded run as one file: the page, its styles, its modules and its messages.
+//! Recorded run as one file: page, styles, modules and messages.
 
 use std::io::Write as _;
 
@@ -8,15 +8,15 @@ use serde_json::Value;
 
 use crate::assets;
 
-/// The policy that blocks a page from everything to which it might refer.
+/// Policy that blocks all external references of the page.
 const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; \
 style-src 'unsafe-inline'; img-src data:\">";
-/// The modules, each before those that import it.
+/// Modules, each before its importers.
 const MODULES: [&str; 9] =
     ["store", "field", "map", "charts", "timeline", "orders", "hand", "net", "page"];
 const TITLE: &str = "<title>firsthand</title>";
 
-/// The messages of a recorded run, in the order in which a server would have sent them.
+/// Messages of a recorded run, in a server's order.
 #[derive(Debug)]
 pub struct Recorded {
     packed: DeflateEncoder<Vec<u8>>,
@@ -37,16 +37,16 @@ impl Recorded {
         self.add(1, message);
     }
 
-    /// Add a message with its length, and a byte that is 0 for text.
+    /// Adds a message with its length, and a byte that is 0 for text.
     fn add(&mut self, kind: u8, message: &[u8]) {
         let length = message.len() as u32;
-        // Writing to a Vec cannot fail.
+        // Infallible for a Vec.
         let _ = self.packed.write_all(&length.to_le_bytes());
         let _ = self.packed.write_all(&[kind]);
         let _ = self.packed.write_all(message);
     }
 
-    /// The file. `title` may be any text.
+    /// Returns the file. `title` may be any text.
     pub fn html(self, title: &str) -> String {
         let data = BASE64_STANDARD.encode(self.packed.finish().unwrap_or_default());
         let title = title.replace('&', "&amp;").replace('<', "&lt;");
@@ -87,7 +87,7 @@ fn asset(file: &str) -> &'static str {
     found.map_or("", |(_, _, text)| text)
 }
 
-/// The modules as one script, each in a scope of its own, which gives its exports.
+/// Bundles the modules in one script, each as a scope that returns its exports.
 fn bundle() -> String {
     let mut bundle = String::new();
     for module in MODULES {

@@ -1,4 +1,4 @@
-// The page's connection beside a server that is not there: node net.mjs net.js
+// Test of the page's connection without a server: node net.mjs net.js
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 
@@ -40,12 +40,12 @@ const ends = (code) => {
   waiting.splice(0).forEach((again) => again());
 };
 
-// A token that came late is sent again.
+// A late token is sent again.
 newest().onopen();
 ends(4408);
 assert.equal(sockets.length, 2, "the page tries again after 4408");
 
-// A stop waits for the connection, and is sent again until it is answered; another order is not.
+// A stop waits for the connection and is resent until answered. Other orders are not.
 const stop = net.ask({ order: "stop" });
 assert.equal((await net.ask({ order: "resume" })).ok, false, "only a stop waits");
 newest().opens();
@@ -62,7 +62,7 @@ ends(1006);
 newest().opens();
 assert.deepEqual(newest().orders(), [], "an answered stop is not sent again");
 
-// A token that is wrong stays wrong.
+// A wrong token stays wrong.
 const before = sockets.length;
 ends(4401);
 assert.equal(sockets.length, before);

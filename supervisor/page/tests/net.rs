@@ -1,4 +1,4 @@
-//! The page's JavaScript in Node.js, without a browser.
+//! Tests of the page's JavaScript in Node.js.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::process::Command;

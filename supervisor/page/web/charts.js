@@ -1,4 +1,4 @@
-// The charts, drawn by uPlot: all but a histogram are on one axis of time.
+// Charts, drawn by uPlot on one time axis, except for the histogram.
 
 import { colour } from "./map.js";
 
@@ -6,10 +6,10 @@ import { colour } from "./map.js";
 
 const HEIGHT = 120;
 
-// Buckets of the histogram an octave, from a microsecond.
+// Histogram buckets per octave, from a microsecond.
 const PER_OCTAVE = 8;
 
-/// How many of `values`, ms, are in each bucket: the lower ends of the buckets, and the counts.
+/// Counts `values`, ms, per bucket. Returns the lower ends of the buckets, and the counts.
 function histogram(values) {
   const counts = [];
   for (const value of values) {
@@ -25,7 +25,7 @@ function histogram(values) {
   return [ends, heights];
 }
 
-/// What the charts show: a title, a unit, and series with a name and their values in the store.
+/// Lists the charts: a title, a unit, and series with names and their values in the store.
 function charts(store) {
   const column = (name, text) => ({ text, of: () => store.columns[name] });
   const sensors = (cone) => store.about.sensors.map((sensor, at) => ({ sensor, text: sensor.name, of: () => store.ranges[at] })).filter(({ sensor }) => sensor.cone === cone && !sensor.scan);
@@ -46,7 +46,7 @@ function charts(store) {
 }
 
 export class Charts {
-  /// `onTime` is told the mission time that is clicked.
+  /// `onTime` receives a clicked mission time.
   constructor(parent, store, onTime) {
     this.parent = parent;
     this.store = store;
@@ -57,7 +57,7 @@ export class Charts {
     new ResizeObserver(() => this.resize()).observe(parent);
   }
 
-  /// Make the charts of the store's run, in the colours of now.
+  /// Makes the charts of the store's run, in the current colours.
   make() {
     for (const { plot } of this.plots) plot.destroy();
     this.parent.replaceChildren();
@@ -119,7 +119,7 @@ export class Charts {
     }
   }
 
-  /// A line at the time that is shown.
+  /// Draws a line at the shown time.
   mark(plot) {
     const at = Math.round(plot.valToPos(this.t, "x", true));
     const { left, top, width, height } = plot.bbox;
@@ -142,7 +142,7 @@ export class Charts {
       if (end !== this.shown) plot.setData(this.data(chart));
       else plot.redraw(false, false);
       if (chart.isHistogram) continue;
-      // Without a pointer the legend has the values at the time that is shown.
+      // Without a pointer the legend has the values at the shown time.
       if (!(plot.cursor.left >= 0)) plot.setLegend({ idx: Math.max(this.store.rowAt(t), 0) });
     }
     this.shown = end;

@@ -1,4 +1,4 @@
-// The guidance field: its direction anywhere, streamlines, colours, the way of a robot that follows it.
+// Guidance field: direction at any point, streamlines, colours, and the path of a robot along it.
 
 const STEPS = 254;
 const NONE = 255;
@@ -17,14 +17,14 @@ export class Field {
     return col >= 0 && row >= 0 && col < this.n && row < this.n ? row * this.n + col : -1;
   }
 
-  /// The angle at a place, radians; null where there is none.
+  /// Returns the angle at a point, radians, or null without one.
   angle(x, y) {
     const at = this.index(x, y);
     if (at < 0 || this.cells[at] === NONE) return null;
     return (this.cells[at] / STEPS) * 2 * Math.PI;
   }
 
-  /// Points from a place along the field until `stop` of a point says so.
+  /// Returns points along the field until `stop` returns true for one.
   trace(x, y, sense, most, stop = () => false) {
     const points = [[x, y]];
     const step = this.blob.side * 0.6;
@@ -44,7 +44,7 @@ export class Field {
     return points;
   }
 
-  /// The way of a robot that follows the field from a place, and whether it ends at the target.
+  /// Returns the path of a robot along the field, and whether it ends at the target.
   way(x, y) {
     const points = this.trace(x, y, 1, 4000);
     const [lx, ly] = points[points.length - 1];
@@ -52,7 +52,7 @@ export class Field {
     return { points, arrives: Math.hypot(tx - lx, ty - ly) < this.blob.side * 2 };
   }
 
-  /// Streamlines about `apart` metres from each other.
+  /// Returns streamlines about `apart` metres from each other.
   lines(apart) {
     const side = Math.max(1, Math.round(apart / this.blob.side));
     const coarse = Math.ceil(this.n / side);
@@ -85,7 +85,7 @@ export class Field {
     return found;
   }
 
-  /// An image with a colour for the depth of each cell: light near the target, dark far from it.
+  /// Returns an image of the cells' depths: light near the target, dark far from it.
   image(isDark) {
     const image = new ImageData(this.n, this.n);
     const area = this.n * this.n;
@@ -94,7 +94,7 @@ export class Field {
         const depth = this.cells[area + row * this.n + col];
         const to = 4 * ((this.n - 1 - row) * this.n + col);
         if (depth === NONE) continue;
-        // Bands of eight halvings each are seen as lines of equal depth.
+        // Bands of eight halvings appear as lines of equal depth.
         const share = Math.min(1, Math.log2(1 + depth / 4) / 6);
         const band = (depth >> 4) % 2 ? 8 : 0;
         const [from, towards] = isDark ? [[56, 120, 150], [22, 30, 48]] : [[255, 246, 205], [92, 140, 200]];

@@ -1,7 +1,8 @@
-// Driving by hand: arrow keys, or the stick that is held. The robot stands when nothing is held, or this page is hidden or gone.
+// Manual driving: arrow keys or a held stick. The robot stands when both are released, or this page
+// is hidden or closed.
 
 const EVERY_MS = 100;
-// Ahead and to the left.
+// Forward and left.
 const KEYS = { ArrowUp: [1, 0], ArrowLeft: [0, 1], ArrowRight: [0, -1] };
 
 export class Hand {

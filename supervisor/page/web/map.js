@@ -1,20 +1,20 @@
-// The map: what the robot believes, the field, its way, its beams, targets, and the truth where it is simulated.
+// Map: the robot's belief, the field, its path, its beams, targets, and the truth in simulation.
 
 import { Field } from "./field.js";
 import { Unpacker } from "./store.js";
 
 const TAU = 2 * Math.PI;
-// A finger is on a target within this distance, CSS pixels.
+// Distance within which a finger grabs a target, CSS pixels.
 const GRAB = 26;
-// The height of the actions, which lie over the lowest part of the map.
+// Height of the actions over the lowest part of the map.
 const ACTIONS = 70;
-// The names of the colours of the states of a cell.
+// Colour names of cell states.
 const CELLS = [null, "sensed", "known", "rim", "scanned", "margin"];
 const LEGEND = [["sensed", "believed hazard"], ["margin", "its margin"], ["known", "known before"], ["scanned", "scanned"], ["way", "way"], ["beam", "beams"], ["target", "target"], ["mover", "moving: arrow to its place in 1 s, ring of doubt"]];
 
 const colours = new Map();
 
-/// The colour of that name in the style sheet.
+/// Returns a colour of the style sheet by name.
 export function colour(name) {
   if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
   return colours.get(name);
@@ -27,7 +27,8 @@ function rgb(name) {
 }
 
 export class MapView {
-  /// `changed` asks for a new drawing; `onChoose` is told the places that the operator chooses, when they may choose.
+  /// `changed` requests a redraw. `onChoose` receives the places that an operator with permission
+  /// chooses.
   constructor(canvas, store, changed, onChoose) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d");
@@ -47,13 +48,12 @@ export class MapView {
     new ResizeObserver(changed).observe(canvas);
   }
 
-  /// Show the whole map.
   fit() {
     this.view = null;
     this.changed();
   }
 
-  /// Colours have changed.
+  /// Redraws after a change of colours.
   repaint() {
     colours.clear();
     this.images = {};
@@ -290,12 +290,12 @@ export class MapView {
     }
   }
 
-  /// The simulated things that come, go and move, where they really are.
+  /// Draws the simulated things that appear, vanish and move, at their true places.
   drawThings(t) {
     for (const { shape, from_s: from, until_s: until, moves = [] } of this.store.about.things ?? []) {
       if (t < from || t >= (until ?? Infinity)) continue;
       const next = moves.findIndex((station) => station.at_s > t);
-      // Before the first station it is there, and after the last one, too, whose index is then -1.
+      // It rests before the first station and after the last, whose index is then -1.
       const after = moves.at(next);
       const before = moves[next - 1] ?? after;
       const share = before === after ? 0 : (t - before.at_s) / (after.at_s - before.at_s);
@@ -307,7 +307,8 @@ export class MapView {
     }
   }
 
-  /// What moves, by the laser: a disc, a ring for the doubt of its place, an arrow to where it will be in 1 s, and its speed in words.
+  /// Draws the laser's moving objects: a disc, a ring for the uncertainty, an arrow to the place in
+  /// 1 s, and the speed.
   drawMovers(at) {
     const { context } = this;
     const texts = [];
@@ -335,7 +336,7 @@ export class MapView {
       this.stroke("mover", 2);
       texts.push([`${this.width < 500 ? "" : "moving, "}${Math.hypot(vx, vy).toFixed(1)} m/s`, px + reach * this.scale + 4, py + 4]);
     }
-    // A text that would lie over another one is lower.
+    // An overlapping text moves down.
     texts.forEach(([text, left, bottom], nth) => {
       const wide = 7 * text.length;
       const lies = ([, x, y]) => Math.abs(x - left) < wide && Math.abs(y - bottom) < 14;
@@ -345,7 +346,7 @@ export class MapView {
     });
   }
 
-  /// A text that is legible over any colour.
+  /// Draws a text that is legible over any colour.
   label(text, left, bottom) {
     const { context } = this;
     context.font = "12px system-ui, sans-serif";
@@ -386,7 +387,7 @@ export class MapView {
     const [x, y, heading] = robot;
     this.store.about.sensors.forEach((sensor, row) => {
       const range = this.store.ranges[row]?.[at];
-      // Of a laser the readings have the nearest beam only.
+      // A laser's readings have only the nearest beam.
       if (range === null || range === undefined || sensor.scan) return;
       const bearing = heading + sensor.bearing;
       const from = [x + sensor.forward_m * Math.cos(bearing), y + sensor.forward_m * Math.sin(bearing)];
@@ -477,7 +478,7 @@ export class MapView {
     this.stroke(name, 2, dash);
   }
 
-  /// A bar of a round length.
+  /// Draws a scale bar of a round length.
   drawScale() {
     const metres = [0.1, 0.2, 0.5, 1, 2, 5, 10].findLast((it) => it * this.scale < this.width / 4) ?? 0.1;
     const [left, bottom] = [12, 30];
@@ -488,7 +489,7 @@ export class MapView {
     this.label(`${metres} m`, left, bottom - 6);
   }
 
-  /// The colours and their meanings.
+  /// Lists the colours and their meanings.
   legend(list) {
     const rows = this.store.about?.world ? [...LEGEND, ["truth", "true way"], ["shape", "what is really there"]] : LEGEND;
     list.replaceChildren(...rows.map(([name, text]) => {

@@ -1,15 +1,16 @@
-// The connection to the server: it shows the token, tells what comes, asks for orders, and says when the server is gone.
+// Connection to the server: shows the token, passes messages on, sends orders, and reports a lost
+// server.
 
-// The server sends something every 300 ms; without anything for this time it is lost.
+// Silence after which the server is lost. It sends something every 300 ms.
 const LOST_AFTER_MS = 900;
 const AGAIN_AFTER_MS = 500;
-// After these codes a new attempt would end alike, so the notice stays.
+// A new attempt after these codes would fail again, so the notice stays.
 const FINAL = {
   4401: "this page has no token, or one that is wrong or expired: open an address that `firsthand page` printed when it started, or an address in the file that it named",
   4409: "another browser has taken the place of this page; reload it to take a place again",
 };
 
-/// The token of the address's fragment. The tab remembers it, and the address bar does not show it.
+/// Returns the token of the address's fragment. The tab stores it, and the address bar hides it.
 function token() {
   const shown = location.hash.slice(1);
   if (shown) history.replaceState({ token: shown }, "", location.pathname);
@@ -85,8 +86,8 @@ export class Net {
     this.asked.delete(id);
   }
 
-  /// Ask for an order. The answer says what was confirmed, or why it was not done. A stop is asked for again after each loss of the
-  /// server until it is answered.
+  /// Sends an order. The answer is the confirmation, or the reason of a failure. A stop is resent
+  /// after each loss of the server until it is answered.
   ask(order) {
     if (!this.isOpen && (this.isRefused || !isStop(order))) return Promise.resolve({ ok: false, text: "there is no server to ask" });
     const id = this.next++;

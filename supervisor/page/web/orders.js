@@ -1,4 +1,5 @@
-// What the operator asks for: stop and resume, targets, restarts and kills of stages. The page says what was confirmed.
+// Orders of the operator: stop and resume, targets, restarts and kills of stages. The page shows
+// the confirmation.
 
 const PREVIEW_EVERY_MS = 250;
 
@@ -20,7 +21,7 @@ export class Orders {
       const { order, stage } = target.dataset;
       if (order) this.ask(`${order} ${stage}`, { order, stage });
     });
-    // The space bar stops the robot wherever the focus is.
+    // The space bar stops the robot with any focus.
     addEventListener("keydown", (event) => {
       if (event.code !== "Space" || event.repeat) return;
       event.preventDefault();
@@ -53,7 +54,7 @@ export class Orders {
 
   // --- targets ---
 
-  /// The operator chose these places; `at` is the one that moved, and `isDone` says whether it is let go.
+  /// Takes the chosen places. `at` is the moved one, and `isDone` means that it is released.
   choose(places, at = places.length - 1, isDone = true) {
     this.map.chosen = places;
     const text = places.map(([x, y]) => `(${x.toFixed(2)}, ${y.toFixed(2)})`).join(" → ");
@@ -63,7 +64,7 @@ export class Orders {
     this.map.changed();
   }
 
-  /// Show the way to `place`.
+  /// Shows the path to `place`.
   preview([x, y], isDone) {
     const now = performance.now();
     if (!isDone && now - this.previewed < PREVIEW_EVERY_MS) return;

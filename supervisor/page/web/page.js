@@ -1,4 +1,5 @@
-// The page: it joins the store, the map, the charts, the time line, and for a live robot the connection and the orders.
+// Page that joins store, map, charts and time line. A live robot adds the connection and the
+// orders.
 
 import { Store } from "./store.js";
 import { MapView } from "./map.js";
@@ -10,12 +11,12 @@ import { Net } from "./net.js";
 
 const byId = (id) => document.getElementById(id);
 
-// A recorded page has its data with it.
+// A recorded page contains its data.
 const recording = byId("data");
 const store = new Store(!recording);
 let asked = false;
 let isLost = false;
-// A robot that runs says something several times a second.
+// Age of an outdated state. A running robot sends several a second.
 const OLD_AFTER_S = 1.5;
 
 function changed() {
@@ -35,7 +36,7 @@ function draw(now) {
   timeline.tick(now);
   map.draw(timeline.t);
   timeline.draw();
-  // Charts cost most: five times a second is enough while time runs.
+  // Charts cost most, so they are drawn at 5 Hz while time runs.
   if (now - drawnCharts > 200 || !timeline.plays) {
     drawnCharts = now;
     charts.draw(timeline.t);
@@ -43,7 +44,8 @@ function draw(now) {
   drawStatus();
 }
 
-/// What is known of the robot now, whatever time the map shows; of a recorded robot, at the time that is shown.
+/// Returns the current state, independent of the shown time. For a recorded robot, the state at the
+/// shown time.
 function newest() {
   const state = store.stateAt(recording ? timeline.t : Infinity);
   if (recording && store.summary?.kind && timeline.t >= store.end) return [store.summary.kind, store.summary.outcome];
@@ -67,7 +69,7 @@ function drawStatus() {
   byId("past").textContent = `You look at ${timeline.t.toFixed(1)} s, ${(store.end - timeline.t).toFixed(1)} s ago.`;
 }
 
-/// A run is shown from its beginning.
+/// Shows a run from its beginning.
 function begin() {
   const { about } = store;
   byId("title").textContent = about ? `${about.robot} · ${about.mission}` : "firsthand";
@@ -95,7 +97,7 @@ async function openRecording() {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
   const buffer = await new Response(stream).arrayBuffer();
   const view = new DataView(buffer);
-  // Each message has its length and whether it is text, as the server would have sent it.
+  // Each message has its length and whether it is text, as from a server.
   for (let at = 0; at + 5 <= buffer.byteLength;) {
     const length = view.getUint32(at, true);
     const message = buffer.slice(at + 5, at + 5 + length);
@@ -108,7 +110,7 @@ async function openRecording() {
   timeline.go(store.end);
 }
 
-/// The table of metrics of a recorded run, how it ended, and what is missing from its recording.
+/// Shows the metrics of a recorded run, its outcome, and what its recording lacks.
 function showMetrics() {
   const { metrics, outcome, remarks = [] } = store.summary ?? {};
   if (!metrics) return;
@@ -140,7 +142,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   charts.make();
   changed();
 });
-/// Paper has light colours. Canvases that are drawn for it are printed as lines and letters.
+/// Uses light colours for paper. Canvases print as lines and letters.
 function print(prints) {
   document.documentElement.classList.toggle("print", prints);
   map.repaint();
@@ -177,6 +179,6 @@ if (recording) {
   orders = new Orders(net, map);
   new Hand(orders, byId("by-hand"));
   orders.choose([]);
-  // What does not come any more grows old.
+  // Silence makes the shown state outdated.
   setInterval(changed, 500);
 }

@@ -1,12 +1,12 @@
-// What the page knows: rows of the charts, states, events, maps and fields, each with its mission time.
+// Data of the page: chart rows, states, events, maps and fields, each with its mission time.
 
-// Ten minutes of a live run at 10 Hz; older rows are dropped. A recording is held whole.
+// Ten minutes of a live run at 10 Hz. Older rows are dropped, and a recording is kept whole.
 const MOST_ROWS = 6000;
 const MOST_STATES = 3000;
 const MOST_EVENTS = 1000;
 const MOST_BLOBS = 1200;
 
-/// The last index of `list` whose `time` is at most `t`; -1 where there is none.
+/// Returns the last index of `list` whose `time` is at most `t`, or -1.
 export function lastBefore(list, t, time = (item) => item) {
   let low = 0;
   let high = list.length;
@@ -53,7 +53,7 @@ export class Store {
     return this.columns.t ?? [];
   }
 
-  /// The newest mission time.
+  /// Newest mission time.
   get end() {
     const states = this.states;
     return this.times[this.times.length - 1] ?? (states.length ? states[states.length - 1].t : 0);
@@ -63,7 +63,7 @@ export class Store {
     return this.times[0] ?? 0;
   }
 
-  /// Take a message of the server, or of a recording.
+  /// Takes a message of the server, or of a recording.
   take(message) {
     if ("about" in message) this.clear(message.about);
     if ("running" in message) this.running = message.running;
@@ -92,7 +92,7 @@ export class Store {
     }
   }
 
-  /// Take a binary message: a map or a field, packed.
+  /// Takes a packed map or field.
   takeBlob(buffer) {
     const view = new DataView(buffer);
     const blob = {
@@ -115,12 +115,12 @@ export class Store {
     return blob;
   }
 
-  /// The index of the row at `t`.
+  /// Returns the index of the row at `t`.
   rowAt(t) {
     return lastBefore(this.times, t);
   }
 
-  /// The age of the newest row or state, seconds.
+  /// Age of the newest row or state, seconds.
   get age() {
     return this.heard === null ? 0 : (performance.now() - this.heard) / 1000;
   }
@@ -143,7 +143,7 @@ export class Store {
   }
 }
 
-/// Unpacks the newest blob that is asked for, one at a time.
+/// Unpacks the newest requested blob, one at a time.
 export class Unpacker {
   constructor(changed) {
     this.changed = changed;
@@ -152,7 +152,8 @@ export class Unpacker {
     this.busy = false;
   }
 
-  /// The cells of `blob` if they are unpacked; else those of the one before, and `changed` is called when they are.
+  /// Returns the cells of `blob` if unpacked. Otherwise returns the previous ones, and calls
+  /// `changed` later.
   of(blob) {
     if (blob && this.done?.blob !== blob) {
       this.wanted = blob;

@@ -1,10 +1,10 @@
-// The mission time that is shown: the newest of a live run, or any that is still held. Lists and tables at that time.
+// Shown mission time: the newest of a live run, or any stored one. Lists and tables at that time.
 
 const byId = (id) => document.getElementById(id);
 const MOST_LISTED = 400;
 
 export class Timeline {
-  /// `changed` asks for a new drawing.
+  /// `changed` requests a redraw.
   constructor(store, isLive, changed) {
     this.store = store;
     this.changed = changed;
@@ -20,7 +20,7 @@ export class Timeline {
     byId("logs").addEventListener("change", () => changed());
   }
 
-  /// Show `t`, and stay there.
+  /// Shows `t`, and stays there.
   go(t) {
     this.t = Math.min(Math.max(t, this.store.start), this.store.end);
     this.follows = this.plays = false;
@@ -39,7 +39,7 @@ export class Timeline {
     this.changed();
   }
 
-  /// Move the time on; `now` is in milliseconds.
+  /// Advances the time. `now` is in milliseconds.
   tick(now) {
     const since = this.at === null ? 0 : (now - this.at) / 1000;
     this.at = now;
@@ -75,7 +75,7 @@ export class Timeline {
     if (!state) return body.replaceChildren();
     if (this.stagesOf === key) return;
     this.stagesOf = key;
-    // Buttons stay, so that a tap is not lost between two states.
+    // Buttons persist, so that no tap is lost between two states.
     const rows = [...state.stages, { name: "supervisor", state: state.order, ...state.supervisor }];
     while (body.rows.length > rows.length) body.deleteRow(-1);
     rows.forEach((stage, at) => {
@@ -112,7 +112,7 @@ export class Timeline {
     return row;
   }
 
-  /// Draw the newest of `all` first; each leads to its time.
+  /// Draws `all`, newest first. Each item links to its time.
   drawList(id, all) {
     const events = all.slice(-MOST_LISTED);
     const last = events[events.length - 1];

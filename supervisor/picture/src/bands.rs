@@ -1,5 +1,4 @@
-//! log2 u behind everything: pale bands between level sets, the same factor of u from each to the
-//! next.
+//! Background: pale bands between level sets of log2 u, each a constant factor of u wide.
 
 use common::samples::FieldCell;
 use glam::DVec2;
@@ -10,9 +9,9 @@ use super::{
 };
 
 pub(super) struct Style {
-    /// Bytes of this layer: an irregular field is drawn coarser, not larger.
+    /// Size limit of this layer, bytes; an irregular field is drawn coarser.
     pub(super) budget: usize,
-    /// Samples along the longer side: more would be finer than the bands are wide.
+    /// Most samples along the longer side, enough for the width of the bands.
     pub(super) finest: usize,
     pub(super) bands: f64,
     /// Colours from the target outwards.
@@ -20,7 +19,7 @@ pub(super) struct Style {
     pub(super) stroke: &'static str,
 }
 
-/// Pale, with as many bands as the eye can distinguish.
+/// Pale style, with as many bands as the eye can distinguish.
 pub(super) const MISSION: Style = Style {
     budget: 130_000,
     finest: 160,
@@ -35,10 +34,10 @@ pub(super) const MISSION: Style = Style {
     stroke: "stroke=\"#fff\" stroke-width=\"0.9\" stroke-opacity=\"0.75\"",
 };
 
-/// This share of the map may lie below the last level: close to hazards u has no floor.
+/// Share of the map that may lie below the last level, because u has no floor close to hazards.
 const BELOW: f64 = 0.02;
 
-/// The levels are -step, -2 step, ..., -count step of log2 u.
+/// Levels at -step, -2 step, ..., -count step of log2 u.
 #[derive(Clone, Copy)]
 pub(super) struct Levels {
     pub(super) step: f64,
@@ -48,11 +47,11 @@ pub(super) struct Levels {
 
 impl Levels {
     pub(super) fn band(&self, log2_u: f32) -> u32 {
-        // The cast saturates: there is no level above the target's own.
+        // The cast saturates: the target's own level is the highest.
         ((-f64::from(log2_u) / self.step) as u32).min(self.count)
     }
 
-    /// 0 holds the target, `count` is the last.
+    /// Returns the colour of a band, from 0 around the target to `count`.
     pub(super) fn colour(&self, nth: u32) -> String {
         let along = f64::from(nth) / f64::from(self.count.max(1)) * (self.ramp.len() - 1) as f64;
         let from = (along as usize).min(self.ramp.len() - 2);
@@ -73,7 +72,7 @@ pub(super) struct Bands<'a> {
 }
 
 impl<'a> Bands<'a> {
-    /// None if the target can be reached from nowhere.
+    /// Returns `None` if the target is unreachable from everywhere.
     pub(super) fn of(
         lattice: &Lattice,
         cells: &'a [FieldCell],
@@ -114,7 +113,8 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// The lowest level comes first; `finest` samples a side at most.
+    /// Returns the areas above each level, the lowest level first, with at most `finest` samples a
+    /// side.
     fn areas(&self, finest: usize) -> Vec<Path> {
         let samples = Samples::of(&self.lattice, self.cells, finest, self.levels);
         (1..=self.levels.count + 1)
@@ -123,7 +123,7 @@ impl<'a> Bands<'a> {
             .collect()
     }
 
-    /// Each area is drawn over the one that contains it.
+    /// Draws each area over the one that contains it.
     fn paint(&self, areas: &[Path]) -> String {
         let painted: String = (0..=self.levels.count)
             .rev()
@@ -137,21 +137,21 @@ impl<'a> Bands<'a> {
     }
 }
 
-/// Inner samples around the map continue the bands to the edge of the plot, outer ones have no value, so that every
-/// level set closes.
+/// Rings of samples around the map. The inner one continues the bands to the edge of the plot. The
+/// outer one has no value, so that every level set closes.
 const AROUND: usize = 2;
 
-/// log2 u at the middles of square blocks of cells, and [`AROUND`] them.
+/// Samples of log2 u at the middles of square blocks of cells, and [`AROUND`] them.
 struct Samples {
-    /// Samples, those around the map included.
+    /// Number of samples, including those around the map.
     across: usize,
     down: usize,
     block: usize,
-    /// Row-major, all finite.
+    /// Row-major values, all finite.
     values: Vec<f64>,
 }
 
-/// A level set crosses it, from a sample to the next one along x or y.
+/// Side of a square that a level set crosses, from a sample to the next one along x or y.
 #[derive(Clone, Copy)]
 enum Side {
     Below,
@@ -175,7 +175,7 @@ impl Samples {
                 }
             }
         }
-        // Far below the last level no values can be told apart, and a floor keeps the level sets smooth.
+        // Values far below the last level look alike, and a floor keeps the level sets smooth.
         let last = -levels.step * f64::from(levels.count);
         let floor = last - 0.5 * levels.step;
         let nowhere = last - 2.0 * levels.step;
@@ -196,7 +196,7 @@ impl Samples {
     }
 
     fn above(&self, lattice: &Lattice, level: f64) -> Path {
-        // Marching squares: each crossing has a next one such that the area is on the left.
+        // Marching squares: each crossing leads to the next, with the area on the left.
         let mut next = vec![usize::MAX; 2 * self.values.len()];
         for row in 0..self.down - 1 {
             for col in 0..self.across - 1 {
@@ -220,7 +220,7 @@ impl Samples {
         path
     }
 
-    /// The square's lower left sample is (col, row).
+    /// Returns the passages of the square whose lower left sample is (col, row).
     fn passages(&self, col: usize, row: usize, level: f64) -> &'static [(Side, Side)] {
         use Side::{Above, Below, Left, Right};
         let at = row * self.across + col;
@@ -249,7 +249,7 @@ impl Samples {
         PASSAGES[inside]
     }
 
-    /// Even indices lead from their sample along x, odd ones along y.
+    /// Returns the index of a crossing: even along x from its sample, odd along y.
     fn crossing(&self, col: usize, row: usize, side: Side) -> usize {
         let at = row * self.across + col;
         match side {
@@ -279,8 +279,8 @@ impl Samples {
     }
 }
 
-/// With this sum for a sample without a value the bands continue below the hazard cells, which are drawn over them,
-/// instead of following every step of their outline.
+/// Sums the neighbours of a sample without a value. The bands then continue below the hazard cells
+/// drawn over them, instead of following their outline.
 fn sum_around(sums: &[(f64, u32)], across: usize, at: usize) -> (f64, u32) {
     let (col, row) = (at % across, at / across);
     (row - 1..=row + 1)

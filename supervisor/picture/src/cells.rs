@@ -1,4 +1,4 @@
-//! Hazard cells of the map at the end, by their source.
+//! Hazard cells of the final map, by their source.
 
 use std::collections::BTreeMap;
 
@@ -10,14 +10,14 @@ use super::{
     page::{Path, ink},
 };
 
-/// Bytes of this layer: an irregular belief is drawn coarser, not larger.
+/// Size limit of this layer, bytes; an irregular belief is drawn coarser.
 const BUDGET: usize = 90_000;
 
-/// Areas with their colours and what the legend calls them, the lowest first.
+/// Areas with their colours and names in the legend, the lowest first.
 pub(super) struct BelievedHazard(pub(super) [(&'static str, &'static str, Path); 3]);
 
 impl BelievedHazard {
-    /// `cells` has one byte a cell, row-major.
+    /// Creates the areas; `cells` has one byte a cell, row-major.
     pub(super) fn of(lattice: &Lattice, cells: &[u8]) -> Self {
         let mut block = 1;
         loop {
@@ -48,11 +48,10 @@ impl BelievedHazard {
 pub(super) struct Blocks<'a, Kind> {
     pub(super) lattice: &'a Lattice,
     pub(super) side: usize,
-    /// Row-major.
     pub(super) kinds: Vec<Kind>,
 }
 
-/// A block is hazard if any of its cells is, of the most frequent kind of hazard.
+/// Coarsens to blocks. A block with a hazard cell gets the most frequent kind of hazard.
 fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
     let across = lattice.cols.div_ceil(block);
     let mut tally = vec![[0_u32; 6]; across * lattice.rows.div_ceil(block)];
@@ -75,11 +74,11 @@ fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
 }
 
 impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
-    /// Runs along x are joined along y where they are equal.
+    /// Joins equal runs of neighbouring rows.
     pub(super) fn area(&self, kind: Kind) -> Path {
         let across = self.lattice.cols.div_ceil(self.side).max(1);
         let mut path = Path::default();
-        // The first row of each run that goes on.
+        // First row of each unfinished run.
         let mut open = BTreeMap::new();
         for (row, line) in self.kinds.chunks(across).enumerate() {
             let mut goes_on = BTreeMap::new();
@@ -98,7 +97,7 @@ impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
     }
 
     fn draw(&self, path: &mut Path, runs: BTreeMap<(usize, usize), usize>, end_row: usize) {
-        // The last block of a row or column may be cut short by the map's edge.
+        // The map's edge may cut the last block of a row or column.
         let edge = |block: usize, cells: usize| (block * self.side).min(cells) as f64 - 0.5;
         let corner = |col: usize, row: usize| {
             let (col, row) = (edge(col, self.lattice.cols), edge(row, self.lattice.rows));

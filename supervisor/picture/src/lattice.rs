@@ -1,5 +1,3 @@
-//! Cells and their place on a sheet.
-
 use common::grid::GridFrame;
 use glam::DVec2;
 
@@ -11,7 +9,7 @@ pub(super) struct Lattice {
     pub(super) rows: usize,
     pub(super) width: f64,
     pub(super) height: f64,
-    /// The outer corner of the first cell, and the step from a cell to the next in both directions.
+    /// Outer corner of the first cell, and the step from cell to cell in both directions.
     corner: DVec2,
     step: DVec2,
 }
@@ -30,7 +28,8 @@ impl Lattice {
         }
     }
 
-    /// Like an image, from `corner` of the sheet, with the first row at the top. Each cell is `cell` units wide.
+    /// Creates a lattice like an image, from `corner` of the sheet, with the first row at the top
+    /// and cells `cell` units wide.
     pub(super) fn of_image((cols, rows): (usize, usize), corner: DVec2, cell: f64) -> Self {
         Self {
             cols,
@@ -46,7 +45,7 @@ impl Lattice {
         self.cols.max(self.rows)
     }
 
-    /// `cells` has cell centres at whole numbers.
+    /// Returns the place of cell coordinates, whose centres are whole numbers.
     pub(super) fn place(&self, cells: DVec2) -> DVec2 {
         self.corner + (cells + 0.5) * self.step
     }

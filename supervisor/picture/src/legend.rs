@@ -1,4 +1,4 @@
-//! The legend explains every symbol of the plot.
+//! Legend, which explains every symbol of the plot.
 
 use common::geometry::Shapes;
 use glam::DVec2;
@@ -17,7 +17,7 @@ pub(super) struct Legend<'a> {
     pub(super) view: &'a View,
     pub(super) levels: Option<Levels>,
     pub(super) guidance: bool,
-    /// The target cannot be reached from some free cells of the map.
+    /// Whether the target is unreachable from some free cells of the map.
     pub(super) isolated: bool,
     pub(super) hazard: Option<&'a BelievedHazard>,
     pub(super) world: &'a Shapes,
@@ -27,7 +27,7 @@ pub(super) struct Legend<'a> {
 
 const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;
 const ROW: f64 = 25.0;
-/// Middle of the symbols, and start of their text, from the left edge of a column.
+/// Middle of the symbols and start of their text, from the left edge of a column.
 const SYMBOL: f64 = 19.0;
 const WORDS: f64 = 50.0;
 
@@ -117,7 +117,7 @@ impl Legend<'_> {
         }
     }
 
-    /// A round length, a sixth to a third of the plot, in the lower corner.
+    /// Draws a round length, a sixth to a third of the plot, in the lower corner.
     fn scale_bar(&self) -> String {
         let length = round_up(self.view.side_m / 8.0);
         let (y, right) = (PLOT_TOP + PLOT_SIDE - 4.0, COLUMN + self.view.px(length));
@@ -209,7 +209,7 @@ fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
             levels.colour(nth)
         );
     }
-    // Labels are so many levels apart that the longest has room.
+    // Labels are spaced for the longest one.
     let longest = format!("-{}", levels.step * f64::from(levels.count)).len() as f64;
     let apart = ((longest * 7.0 + 14.0) / width).ceil().max(1.0) as usize;
     let style = format!(" font-size=\"11\" text-anchor=\"middle\" fill=\"{}\"", ink::QUIET);

@@ -1,6 +1,6 @@
-//! Pictures of runs, SVG files without references to others, and of fields on maps.
+//! Pictures of runs and of fields on maps, as self-contained SVG files.
 //!
-//! Layers from the bottom to the top, in the mission frame (metres, y up):
+//! Layers from bottom to top, in the mission frame (metres, y up):
 //!
 //! | module | draws |
 //! |---|---|
@@ -9,14 +9,14 @@
 //! | `cells` | hazard cells of the map |
 //! | `world` | real obstacles |
 //! | `motion` | trajectories, bodies, start, target |
-//! | `movers` | ways of things that moved |
+//! | `movers` | tracks of moving things |
 //! | `margin`, `legend` | title, axes, captions; symbols |
 //! | `page`, `lattice` | the page, and cells on it |
-//! | [`Scene`] | the data of a picture |
+//! | [`Scene`] | data of a picture |
 //!
-//! `map` draws the field of a bare map, `points` what a robot saw.
+//! `map` draws the field of a bare map, `points` the points that a robot saw.
 //!
-//! Every layer but the frame may be missing, and every input gives a valid file.
+//! Only the frame layer is mandatory, and every input gives a valid file.
 
 mod bands;
 mod cells;
@@ -56,7 +56,7 @@ use self::{
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
 };
 
-/// The target cannot be reached from a free cell of the map.
+/// Returns whether the target is unreachable from a free cell of the map.
 fn has_isolated_cells(
     grid: Option<(GridFrame, &[u8])>,
     field: Option<(GridFrame, &[FieldCell])>,
@@ -64,7 +64,7 @@ fn has_isolated_cells(
     let (Some((grid_frame, states)), Some((field_frame, policy))) = (grid, field) else {
         return false;
     };
-    // The field follows the grid: at the end of a run it may be one version behind, never elsewhere.
+    // The field follows the grid: at the end of a run it may lag by one version, in the same frame.
     grid_frame == field_frame
         && states.iter().zip(policy).any(|(&state, policy)| {
             !CellState::from_byte(state).is_hazard() && policy.log2_u == f32::NEG_INFINITY

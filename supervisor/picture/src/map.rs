@@ -1,7 +1,7 @@
-//! The field of a bare map.
+//! Field of a bare map.
 //!
-//! Unlike the picture of a mission, this is drawn for conversion to pixels, large and without text. Cells become
-//! squares of whole pixels if there is room for that.
+//! This picture is meant for conversion to pixels: large, without text. Cells become squares of
+//! whole pixels if there is room.
 
 use common::samples::FieldCell;
 use glam::DVec2;
@@ -16,7 +16,8 @@ use super::{
 
 /// Longest side, pixels.
 const LARGEST: usize = 2368;
-/// A map with fewer cells a side is drawn smaller: on a large sheet its lines would be lost.
+/// Cells per side below which a map is drawn smaller, because its lines would be lost on a large
+/// sheet.
 const SMALL: usize = 100;
 const SMALL_SIDE: usize = 1200;
 const FRAME: f64 = 16.0;
@@ -50,12 +51,12 @@ const LINES: streamlines::Style = streamlines::Style {
     stroke: (1.0, 0.6, 0.8),
 };
 
-/// Row-major, the first row at the top.
+/// Field and map, row-major, the first row at the top.
 pub struct FieldOnMap<'a> {
     /// Columns and rows.
     pub size: (usize, usize),
     pub blocked: &'a [bool],
-    /// E along columns and rows, log2 u negative infinity where blocked or cut off.
+    /// E along columns and rows; log2 u is negative infinity where blocked or cut off.
     pub cells: &'a [FieldCell],
     /// Column and row.
     pub target: (usize, usize),
@@ -68,7 +69,7 @@ enum Kind {
     Blocked,
 }
 
-/// SVG whose units are pixels.
+/// Draws an SVG whose units are pixels.
 pub fn map_svg(map: &FieldOnMap<'_>) -> String {
     let lattice = Lattice::of_image(map.size, DVec2::splat(FRAME), cell_size(map.size));
     let bands = Bands::of(&lattice, map.cells, &BANDS);
@@ -76,7 +77,7 @@ pub fn map_svg(map: &FieldOnMap<'_>) -> String {
         .map_or(String::new(), |bands| bands.layer() + &flat_cells(map, &lattice, bands.levels));
     let lines = streamlines::layer(&lattice, map.cells, &LINES);
     let kinds = Blocks { lattice: &lattice, side: 1, kinds: kinds(map) };
-    // Neighbouring rectangles would show a seam if they were anti-aliased.
+    // Anti-aliasing would show seams between neighbouring rectangles.
     let crisp = "shape-rendering=\"crispEdges\"";
     let cut_off = kinds.area(Kind::CutOff);
     let squares = [
@@ -100,11 +101,11 @@ pub fn map_svg(map: &FieldOnMap<'_>) -> String {
     )
 }
 
-/// The pattern over cells from which no path leads to the target.
+/// Pattern of cells without a path to the target.
 const HATCH: &str = "<pattern id=\"hatch\" width=\"8\" height=\"8\" patternUnits=\"userSpaceOnUse\" \
      patternTransform=\"rotate(45)\"><path d=\"M0 0V8\" stroke=\"#8b9199\" stroke-width=\"3\"/></pattern>";
 
-/// A whole number of pixels, or the reciprocal of one, so that the squares are sharp.
+/// Returns a whole number of pixels, or the reciprocal of one, for sharp squares.
 fn cell_size((cols, rows): (usize, usize)) -> f64 {
     let longest = cols.max(rows).max(1);
     let room = if longest < SMALL { SMALL_SIDE } else { LARGEST };
@@ -123,10 +124,10 @@ fn kinds(map: &FieldOnMap<'_>) -> Vec<Kind> {
         .collect()
 }
 
-/// Cells beside a wall so thin that the level sets of its other side would show on this one: each gets the one colour of
-/// its centre.
+/// Draws cells beside a thin wall in the single colour of their centre. The level sets of the other
+/// side would show through.
 fn flat_cells(map: &FieldOnMap<'_>, lattice: &Lattice, levels: Levels) -> String {
-    // A wall of a pixel or less hides nothing.
+    // A wall of at most a pixel hides nothing.
     if cell_size(map.size) < 2.0 {
         return String::new();
     }
@@ -144,10 +145,11 @@ fn flat_cells(map: &FieldOnMap<'_>, lattice: &Lattice, levels: Levels) -> String
         .collect()
 }
 
-/// Change of log2 u between cells this near to each other that no wall separates.
+/// Change of log2 u between cells this close without a wall between.
 const OPEN: f64 = 8.0;
 
-/// A reachable cell and one across a blocked neighbour lie more than two bands apart, because of the wall.
+/// Returns whether a reachable cell and one across a blocked neighbour lie more than two bands
+/// apart.
 fn is_beside_thin_wall(map: &FieldOnMap<'_>, at: usize, step: f64) -> bool {
     let own = map.cells[at].log2_u;
     let apart = OPEN.max(2.0 * step);
@@ -159,7 +161,7 @@ fn is_beside_thin_wall(map: &FieldOnMap<'_>, at: usize, step: f64) -> bool {
             .any(|across| across.is_finite() && f64::from((across - own).abs()) > apart)
 }
 
-/// The 3 x 3 cells that lie on the map.
+/// Iterates over the 3 x 3 cells that lie on the map.
 fn around((cols, rows): (usize, usize), at: usize) -> impl Iterator<Item = usize> {
     let (col, row) = (at % cols, at / cols);
     let columns = col.saturating_sub(1)..(col + 2).min(cols);
@@ -209,7 +211,8 @@ mod tests {
 
     #[test]
     fn a_wide_map_is_drawn_with_its_first_row_at_the_top() {
-        // 90 x 10 cells of 13 pixels; the target at the left, a wall in the first row, a cell cut off in the last.
+        // A map of 90 x 10 cells of 13 pixels: target at the left, wall in the first row, a cell
+        // cut off in the last.
         let size = (90, 10);
         let mut blocked = vec![false; 900];
         blocked[7] = true;

@@ -1,4 +1,4 @@
-//! The parts around the plot: title, axes, captions.
+//! Parts around the plot: title, axes, captions.
 
 use glam::DVec2;
 
@@ -10,17 +10,16 @@ use super::{
     world,
 };
 
-/// The font of all text, which needs no font file; digits have one width if the font has such.
+/// Font of all text, without a font file; its digits have equal widths where available.
 const FONT: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, \
      'DejaVu Sans', sans-serif";
-/// Characters of 12 px that surely fit across the sheet.
+/// Characters of 12 px that fit across the sheet.
 const ACROSS: usize = 150;
 const MOST_CAPTIONS: usize = 8;
-/// The distance from the plot to the first caption.
+/// Distance from the plot to the first caption.
 const BELOW: f64 = 58.0;
 const LINE: f64 = 18.0;
 
-/// The start of the file: size, description, definitions.
 pub(super) fn open(name: &str, description: &str, captions: usize) -> String {
     let lines = captions.min(MOST_CAPTIONS) as f64;
     let height = PLOT_TOP + PLOT_SIDE + BELOW + lines * LINE;
@@ -38,7 +37,6 @@ pub(super) fn open(name: &str, description: &str, captions: usize) -> String {
     )
 }
 
-/// Mission and outcome, and below them the numbers of the run.
 pub(super) fn title(scene: &Scene<'_>) -> String {
     let colour = if scene.facts.reached { ink::TARGET } else { ink::FAILURE };
     format!(
@@ -72,7 +70,6 @@ pub(super) fn facts(scene: &Scene<'_>) -> String {
     parts.join("  ·  ")
 }
 
-/// The frame of the plot with ticks in metres.
 pub(super) fn axes(view: &View) -> String {
     let step = round_up(view.side_m / 12.0);
     let low = view.low;

@@ -8,11 +8,11 @@ use super::{
     scene::Scene,
 };
 
-/// Poses drawn of one trajectory: a day at 7 Hz still makes a small file.
+/// Most poses of a drawn trajectory; a day at 7 Hz still makes a small file.
 const MOST_POSES: usize = 4000;
-/// About so many bodies stand along the way.
+/// Approximate number of bodies along the trajectory.
 const BODIES: f64 = 16.0;
-/// Within so many standard deviations 95 % of a normal distribution in a plane are: the root of -2 ln 0.05.
+/// Standard deviations that contain 95 % of a planar normal distribution: the root of -2 ln 0.05.
 const WITHIN_95: f64 = 2.4477;
 
 pub(super) struct Motion<'a> {
@@ -33,7 +33,7 @@ impl<'a> Motion<'a> {
         motion
     }
 
-    /// The estimated one if the true one is unknown.
+    /// Returns the true trajectory, or else the estimated one.
     fn way(&self) -> &'a [Pose2] {
         if self.scene.truth.is_empty() { self.scene.believed } else { self.scene.truth }
     }
@@ -54,7 +54,7 @@ impl<'a> Motion<'a> {
         self.every.map(|(seconds, _)| seconds)
     }
 
-    /// The times at which the robot's body is drawn, about [`BODIES`], and the robot.
+    /// Iterates over the times at which the robot's body is drawn, about [`BODIES`], and its poses.
     pub(super) fn instants(&self) -> impl Iterator<Item = (f64, &'a Pose2)> {
         (0..).map(f64::from).map_while(|nth| {
             let (seconds, stride) = self.every?;
@@ -94,14 +94,14 @@ impl<'a> Motion<'a> {
         outlines.element(BODY)
     }
 
-    /// The outline of a body that is no disc, inside the disc that covers it.
+    /// Adds the outline of a body that is no disc, inside the disc that covers it.
     fn add_footprint(&self, path: &mut Path, view: &View, pose: &Pose2) {
         if let Some(footprint) = self.scene.mission.body().footprint {
             path.polygon(footprint.corners_at(*pose).map(|corner| view.place(corner)));
         }
     }
 
-    /// The robot's centre is in this ellipse with 95 %.
+    /// Draws the ellipse that contains the robot's centre with 95 %.
     fn region(&self, view: &View) -> String {
         let (Some(covariance), Some(end)) = (self.scene.covariance, self.scene.believed.last())
         else {
@@ -114,7 +114,7 @@ impl<'a> Motion<'a> {
             return String::new();
         }
         let at = view.place(end.position);
-        // The sheet's y axis points downwards.
+        // The sheet's y axis points down.
         let angle = Px(-angle.to_degrees());
         format!(
             "<ellipse rx=\"{}\" ry=\"{}\" transform=\"translate({} {}) rotate({angle})\" {}/>\n",
@@ -126,7 +126,7 @@ impl<'a> Motion<'a> {
         )
     }
 
-    /// The true body is filled, the estimated one dashed.
+    /// Draws the true body filled, the estimated one dashed.
     fn end(&self, view: &View, radius: f64) -> String {
         let body = |pose: Option<&Pose2>, style: &str| {
             let mut path = Path::default();
@@ -181,7 +181,7 @@ fn line_style(colour: &str, width: &str, dashes: &str) -> String {
     )
 }
 
-/// A white line below separates a line from field and hatch.
+/// Draws a white line below, which separates a line from field and hatch.
 fn halo(line: &Path) -> String {
     line.element(
         "fill=\"none\" stroke=\"#fff\" stroke-width=\"5.5\" stroke-opacity=\"0.75\" \
@@ -196,20 +196,20 @@ fn trajectory(view: &View, poses: &[Pose2]) -> Path {
 }
 
 fn is_shown(view: &View, pose: &Pose2) -> bool {
-    // A body beside the plot would only be cut off.
+    // A body beside the plot would be cut off.
     view.shows(pose.position, 0.0) && pose.heading.is_finite()
 }
 
-/// A disc with a tick along the heading.
+/// Adds a disc with a tick along the heading.
 pub(super) fn add_body(path: &mut Path, at: DVec2, radius: f64, heading: f64) {
     path.circle(at, radius);
-    // The sheet's y axis points downwards.
+    // The sheet's y axis points down.
     let axis = DVec2::from_angle(-heading);
     path.move_to(at + axis * (radius * 0.35));
     path.line_to(at + axis * radius);
 }
 
-/// A ring of the tolerance around a bull's eye.
+/// Draws a ring of the tolerance around a bull's eye.
 pub(super) fn target(at: DVec2, tolerance: f64) -> String {
     let (x, y, ring) = (Px(at.x), Px(at.y), Px(tolerance));
     let colour = ink::TARGET;

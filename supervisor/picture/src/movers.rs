@@ -1,4 +1,4 @@
-//! The ways of things that moved, and where they and the robot were at the same times: the same number stands on all of them.
+//! Tracks of moving things. Equal numbers mark places of things and robot at the same time.
 
 use common::kinematics::Pose2;
 use glam::DVec2;
@@ -9,14 +9,14 @@ use super::{
     scene::{Scene, Trail},
 };
 
-/// What was followed for less time, seconds, is left out.
+/// Least duration of a drawn track, seconds.
 const LEAST_S: f64 = 1.0;
-/// The most ways, the longest of a run.
+/// Most tracks drawn, the longest of a run.
 const MOST_WAYS: usize = 24;
 
 pub(super) struct Movers<'a> {
     trails: Vec<&'a Trail<'a>>,
-    /// Times of the discs, every second one of those of the robot's body, and the robot at each.
+    /// Times of the discs, every second one of the body's, and the robot at each.
     instants: Vec<(f64, &'a Pose2)>,
     body_m: f64,
 }
@@ -35,7 +35,7 @@ impl<'a> Movers<'a> {
         self.trails.is_empty()
     }
 
-    /// Whether discs have numbers, and seconds from one to the next.
+    /// Returns the seconds between discs; `None` if they have no numbers.
     pub(super) fn period_s(&self) -> Option<f64> {
         self.instants.first().map(|(at_s, _)| *at_s)
     }
@@ -68,7 +68,6 @@ fn lasts_s(trail: &Trail<'_>) -> f64 {
     ends.map_or(0.0, |((from_s, _), (until_s, _))| until_s - from_s)
 }
 
-/// The place at a time between two places of a way.
 fn place_at(places: &[(f64, DVec2)], at_s: f64) -> Option<DVec2> {
     let next = places.partition_point(|(then_s, _)| *then_s < at_s);
     let (after_s, after) = places.get(next)?;
@@ -90,7 +89,7 @@ pub(super) fn disc() -> String {
     format!("fill=\"{0}\" fill-opacity=\"0.18\" stroke=\"{0}\" stroke-width=\"1.2\"", ink::MOVER)
 }
 
-/// The time, in a white outline that separates it from lines.
+/// Draws the time in a white outline, which separates it from lines.
 pub(super) fn number(at: DVec2, at_s: f64) -> String {
     let style = " text-anchor=\"middle\" font-size=\"12\" font-weight=\"700\" stroke=\"#fff\" \
          stroke-width=\"3\" paint-order=\"stroke\"";

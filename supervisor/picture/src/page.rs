@@ -1,4 +1,4 @@
-//! The sheet: the mission frame on it, and the format of numbers, lines and text.
+//! Sheet: mission frame, and the format of numbers, lines and text.
 
 use std::fmt::{self, Display, Write};
 
@@ -9,15 +9,16 @@ use glam::DVec2;
 pub(super) const WIDTH: f64 = 1150.0;
 pub(super) const PLOT_LEFT: f64 = 62.0;
 pub(super) const PLOT_TOP: f64 = 92.0;
-/// The plot is a square, because the perimeter of a mission is one.
+/// Side of the plot, a square like a mission's perimeter.
 pub(super) const PLOT_SIDE: f64 = 800.0;
 
-/// Lines are cut so far outside the plot, and not only hidden, so that a far pose gives no far coordinates.
+/// Distance outside the plot at which lines are cut, so that a far pose gives no far coordinates.
 const OVERHANG: f64 = 20.0;
-/// Shorter steps of a line cannot be seen.
+/// Shortest visible step of a line.
 const FINEST: f64 = 0.6;
 
-/// Hue tells belief (orange, violet) from motion (black, magenta) and that of others (red); the field stays pale below both.
+/// Colours. Hue separates belief (orange, violet), motion (black, magenta) and others' motion
+/// (red); the field below stays pale.
 pub(super) mod ink {
     pub(crate) const TEXT: &str = "#1f2933";
     pub(crate) const QUIET: &str = "#5b6773";
@@ -42,18 +43,18 @@ pub(super) struct View {
 }
 
 impl View {
-    /// Rim cells included.
+    /// Creates a view of all cells, including the rim.
     pub(super) fn of(frame: &GridFrame) -> Self {
         let side_m = f64::from(frame.cells) * frame.resolution_m;
         let low = metres(frame, DVec2::splat(-0.5));
         if side_m.is_finite() && side_m > 0.0 && low.is_finite() {
             return Self { low, side_m };
         }
-        // No valid mission leads here, but a picture is made all the same.
+        // Valid missions never get here, but a picture is made all the same.
         Self { low: DVec2::splat(-0.5), side_m: 1.0 }
     }
 
-    /// The origin, all `points`, which are finite, and a rim.
+    /// Creates a view of the origin, all finite `points`, and a rim.
     pub(super) fn around(points: &[DVec2]) -> Self {
         let (low, high) = points
             .iter()
@@ -71,14 +72,14 @@ impl View {
         metres * PLOT_SIDE / self.side_m
     }
 
-    /// Any of a disc (metres) is on the plot; false for NaN.
+    /// Returns whether any part of a disc (metres) is on the plot; false for NaN.
     pub(super) fn shows(&self, centre: DVec2, radius_m: f64) -> bool {
         let reach = radius_m + self.side_m / 2.0;
         let from_middle = (centre - self.low - DVec2::splat(self.side_m / 2.0)).abs();
         from_middle.cmple(DVec2::splat(reach)).all()
     }
 
-    /// A line through metres, cut at the plot and broken where a point is not finite.
+    /// Draws a line through metres, cut at the plot and broken at points that are not finite.
     pub(super) fn line(&self, points: impl IntoIterator<Item = DVec2>) -> Path {
         let mut path = Path::default();
         let mut last: Option<DVec2> = None;
@@ -105,13 +106,13 @@ impl View {
     }
 }
 
-/// `cells` has cell centres at whole numbers.
+/// Returns the place of cell coordinates, whose centres are whole numbers, in metres.
 pub(super) fn metres(frame: &GridFrame, cells: DVec2) -> DVec2 {
     let centre = DVec2::splat(f64::from(frame.centre_index()));
     frame.centre + (cells - centre) * frame.resolution_m
 }
 
-/// Liang and Barsky's clipping to the plot and a little beside it.
+/// Clips with Liang and Barsky's method to the plot and [`OVERHANG`].
 fn cut(from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
     let low = DVec2::new(PLOT_LEFT, PLOT_TOP) - OVERHANG;
     let high = low + PLOT_SIDE + 2.0 * OVERHANG;
@@ -134,7 +135,7 @@ fn cut(from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
     (enter <= leave && ends.0.is_finite() && ends.1.is_finite()).then_some(ends)
 }
 
-/// A tenth is finer than any screen, and a value that is no number is left out.
+/// Number on the sheet in tenths, finer than any screen; a value that is not finite becomes 0.
 pub(super) struct Px(pub(super) f64);
 
 impl Display for Px {
@@ -146,7 +147,7 @@ impl Display for Px {
     }
 }
 
-/// The `d` of an SVG path, in sheet coordinates.
+/// Data attribute `d` of an SVG path, in sheet coordinates.
 #[derive(Clone, Default)]
 pub(super) struct Path {
     data: String,
@@ -162,7 +163,6 @@ impl Path {
         self.data.len()
     }
 
-    /// Lift the pen and set it down at `to`.
     pub(super) fn move_to(&mut self, to: DVec2) {
         self.push('M', to);
     }
@@ -171,7 +171,7 @@ impl Path {
         self.push('L', to);
     }
 
-    /// Sets the pen down at `to` unless it is there.
+    /// Moves to `to` unless the pen is there.
     pub(super) fn join(&mut self, to: DVec2) {
         if self.pen != Some(to) {
             self.move_to(to);
@@ -215,7 +215,7 @@ impl Path {
         let _ = self.data.write_fmt(text);
     }
 
-    /// `style` are further attributes; nothing if nothing was drawn.
+    /// Returns the element with the attributes `style`, or nothing for an empty path.
     pub(super) fn element(&self, style: &str) -> String {
         if self.is_empty() {
             return String::new();
@@ -224,12 +224,12 @@ impl Path {
     }
 }
 
-/// `words` are XML, `style` further attributes, each behind a space.
+/// Returns a text element. `words` are XML, `style` further attributes, each after a space.
 pub(super) fn text(at: DVec2, style: &str, words: &str) -> String {
     format!("<text x=\"{}\" y=\"{}\"{style}>{words}</text>\n", Px(at.x), Px(at.y))
 }
 
-/// XML character data of at most `limit` characters.
+/// Returns XML character data of at most `limit` characters.
 pub fn escape(text: &str, limit: usize) -> String {
     let mut escaped = String::new();
     for (nth, character) in text.chars().enumerate() {
@@ -242,7 +242,7 @@ pub fn escape(text: &str, limit: usize) -> String {
             '>' => escaped.push_str("&gt;"),
             '&' => escaped.push_str("&amp;"),
             '"' => escaped.push_str("&quot;"),
-            // XML 1.0 has no way to write these, not even as references.
+            // XML 1.0 cannot represent these, even as references.
             '\u{fffe}' | '\u{ffff}' => escaped.push(' '),
             other if other.is_control() => escaped.push(' '),
             other => escaped.push(other),
@@ -251,18 +251,19 @@ pub fn escape(text: &str, limit: usize) -> String {
     escaped
 }
 
-/// The multiples of `step` from `low` to `high`, and these numbers as text.
+/// Iterates over the multiples of `step` from `low` to `high`, and their texts.
 pub(super) fn ticks(low: f64, high: f64, step: f64) -> impl Iterator<Item = (f64, String)> {
     let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
     let first = (low / step - 1e-6).ceil();
-    // There are a dozen steps by construction; the bound holds for numbers at any distance from 0. Adding 0 turns -0 into 0.
+    // About a dozen ticks fit; the bound ends the loop for numbers at any distance from 0. Adding 0
+    // turns -0 into 0.
     (0..40)
         .map(move |nth| (first + f64::from(nth)) * step + 0.0)
         .take_while(move |value| *value <= high + step * 1e-6)
         .map(move |value| (value, format!("{value:.digits$}")))
 }
 
-/// 1, 2, 5, 10, 20, ... and their fractions; not below `least`.
+/// Returns the next of 1, 2, 5, 10, 20, ... and their fractions that is at least `least`.
 pub(super) fn round_up(least: f64) -> f64 {
     if !(least.is_finite() && least > 0.0) {
         return 1.0;

@@ -7,10 +7,10 @@ use super::{
     page::{PLOT_LEFT, Path, View, escape, ink, text},
 };
 
-/// Points farther away are left out, metres: they would hide the others.
+/// Distance limit of points, metres; farther ones would hide the others.
 const FARTHEST_M: f64 = 1e4;
 
-/// The picture of `points`, metres, around the robot's first place.
+/// Draws `points`, metres, around the robot's first place.
 pub fn points_svg(title: &str, description: &str, points: &[DVec2]) -> String {
     let is_near = |at: &DVec2| at.abs().cmplt(DVec2::splat(FARTHEST_M)).all();
     let points: Vec<DVec2> = points.iter().copied().filter(is_near).collect();

@@ -3,21 +3,21 @@ use glam::DVec2;
 
 pub struct Scene<'a> {
     pub mission: &'a Mission,
-    /// One [`common::grid::CellState`] byte a cell, row-major.
+    /// Map, one [`common::grid::CellState`] byte a cell, row-major.
     pub grid: Option<(GridFrame, &'a [u8])>,
-    /// The field of that belief, row-major.
+    /// Field of that map, row-major.
     pub field: Option<(GridFrame, &'a [FieldCell])>,
-    /// Dead reckoning, at equal steps of mission time from its beginning.
+    /// Dead reckoning at equal steps of mission time from its beginning.
     pub believed: &'a [Pose2],
-    /// The estimated end's xx, xy, yy, m^2; none if unknown.
+    /// Covariance of the estimated end, xx, xy, yy, m^2; `None` if unknown.
     pub covariance: Option<[f64; 3]>,
     /// True poses at the same times; empty with a real robot.
     pub truth: &'a [Pose2],
-    /// Metres; empty for those of the mission.
+    /// Targets, metres; empty for those of the mission.
     pub targets: &'a [DVec2],
     pub trails: &'a [Trail<'a>],
     pub facts: Facts<'a>,
-    /// Each is cut where the page ends.
+    /// Captions, cut where the page ends.
     pub captions: &'a [String],
 }
 
@@ -30,7 +30,7 @@ pub struct Trail<'a> {
 
 #[derive(Debug)]
 pub struct Facts<'a> {
-    /// A word: reached, unreachable, timeout, ...
+    /// One word: reached, unreachable, timeout, ...
     pub outcome: &'a str,
     pub reached: bool,
     pub mission_time_s: f64,
@@ -38,6 +38,6 @@ pub struct Facts<'a> {
     pub straight_m: f64,
     /// Range samples that put a hazard on the map.
     pub safety_events: u64,
-    /// None with a real robot.
+    /// Seed; `None` with a real robot.
     pub seed: Option<u64>,
 }

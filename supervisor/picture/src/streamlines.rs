@@ -1,5 +1,5 @@
-//! Evenly spaced lines of E, whatever the grid: B. Jobard, W. Lefer, "Creating evenly-spaced streamlines of arbitrary
-//! density" (1997).
+//! Evenly spaced lines of E on any grid: B. Jobard, W. Lefer, "Creating evenly-spaced streamlines
+//! of arbitrary density" (1997).
 
 use common::samples::FieldCell;
 use glam::DVec2;
@@ -10,11 +10,11 @@ use super::{
 };
 
 pub(super) struct Style {
-    /// Bytes of the lines: an irregular field is drawn sparser, not larger.
+    /// Size limit of the lines, bytes; an irregular field is drawn sparser.
     pub(super) budget: usize,
-    /// The distance from a line to the beginning of the next one, on the sheet.
+    /// Distance from a line to the beginning of the next one, on the sheet.
     pub(super) spacing: f64,
-    /// The field has no further details between two cells.
+    /// Least spacing in cells; the field has no detail within a cell.
     pub(super) least_cells: f64,
     pub(super) colour: &'static str,
     /// Width on the sheet, and opacity of lines and arrowheads.
@@ -29,11 +29,11 @@ pub(super) const MISSION: Style = Style {
     stroke: (0.8, 0.6, 0.75),
 };
 
-/// A line ends this near to another, in spacings.
+/// Distance to another line at which a line ends, in spacings.
 const MERGED: f64 = 0.5;
-/// Shorter lines are left out, in spacings.
+/// Shortest line, in spacings.
 const SHORTEST: f64 = 1.4;
-/// Arrowheads along a line, in spacings.
+/// Distance of arrowheads along a line, in spacings.
 const ARROWS_APART: f64 = 6.0;
 /// Cosine of the turn up to which a line is straight.
 const STRAIGHT: f64 = 0.9985;
@@ -70,7 +70,7 @@ fn paint(lines: &Path, arrowheads: &Path, style: &Style) -> String {
     )) + &arrowheads.element(&format!("fill=\"{colour}\" fill-opacity=\"{head_opacity}\""))
 }
 
-/// Points only where the line bends, and arrowheads.
+/// Draws points only where the line bends, and arrowheads.
 fn draw(line: &[DVec2], spacing: f64, lines: &mut Path, arrowheads: &mut Path) {
     let Some((&first, rest)) = line.split_first() else {
         return;
@@ -106,7 +106,7 @@ pub(super) fn arrowhead(at: DVec2, heading: DVec2) -> [DVec2; 3] {
     [at + ahead, at - ahead + aside, at - ahead - aside]
 }
 
-/// Lines in cells (centres at whole numbers), each along E.
+/// Returns lines along E in cell coordinates (centres at whole numbers).
 fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Vec<DVec2>> {
     let bins = [lattice.width, lattice.height].map(|side| (side / spacing) as usize + 2);
     let mut tracer = Tracer {
@@ -118,13 +118,13 @@ fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Ve
     };
 
     let mut lines: Vec<Vec<DVec2>> = Vec::new();
-    // Seeds all over the map come last, in the regions into which no line led.
+    // Seeds all over the map serve regions that no line has reached.
     for at in 0..bins[0] * bins[1] {
         let (col, row) = (at % bins[0], at / bins[0]);
         let seed = DVec2::new(col as f64, row as f64) * tracer.spacing;
         let mut seeded_from = lines.len();
         lines.extend(tracer.line_through(seed));
-        // The next lines are begun beside a line that was drawn.
+        // The next lines begin beside a drawn one.
         while let Some(line) = lines.get(seeded_from) {
             let beside = tracer.beside(line);
             for seed in beside {
@@ -146,7 +146,7 @@ struct Tracer<'a> {
 }
 
 impl Tracer<'_> {
-    /// A unit vector; none in a hazard and without guidance.
+    /// Returns a unit vector; `None` in a hazard and without guidance.
     fn direction(&self, at: DVec2) -> Option<DVec2> {
         let e_at = |col: f64, row: f64| {
             let last = |cells: usize| cells.saturating_sub(1) as f64;
@@ -172,7 +172,7 @@ impl Tracer<'_> {
         below.lerp(above, part.y).try_normalize()
     }
 
-    /// None without room for a line that is long enough; it counts as drawn.
+    /// Adds and returns the line through `seed`; `None` without room for a long enough one.
     fn line_through(&mut self, seed: DVec2) -> Option<Vec<DVec2>> {
         if self.is_crowded(seed, 0.98) || self.direction(seed).is_none() {
             return None;
@@ -185,7 +185,7 @@ impl Tracer<'_> {
         if length < SHORTEST * self.spacing {
             return None;
         }
-        // Points a tenth of the spacing apart are enough to keep other lines away.
+        // Points a tenth of the spacing apart suffice to keep other lines away.
         let mut kept: Option<DVec2> = None;
         for &point in &line {
             if kept.is_some_and(|kept| kept.distance(point) < 0.1 * self.spacing) {
@@ -200,7 +200,7 @@ impl Tracer<'_> {
         Some(line)
     }
 
-    /// E, or its reverse, until there is no guidance or another line is near.
+    /// Follows E, or its reverse, until guidance ends or another line is near.
     fn followed(&self, seed: DVec2, sense: f64) -> Vec<DVec2> {
         // A step is shorter than a cell, so that it cannot skip a wall of one cell.
         let step = (0.2 * self.spacing).min(0.9) * sense;
@@ -230,7 +230,6 @@ impl Tracer<'_> {
         }
     }
 
-    /// One spacing beside a line, on both sides.
     fn beside(&self, line: &[DVec2]) -> Vec<DVec2> {
         line.iter()
             .step_by(4)
@@ -245,7 +244,7 @@ impl Tracer<'_> {
         (bin.x as usize, bin.y as usize)
     }
 
-    /// A line lies nearer than `share` of the spacing.
+    /// Returns whether a line lies nearer than `share` of the spacing.
     fn is_crowded(&self, at: DVec2, share: f64) -> bool {
         let (col, row) = self.bin(at);
         let limit = share * self.spacing;

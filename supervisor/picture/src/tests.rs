@@ -12,7 +12,6 @@ use glam::DVec2;
 
 use super::{Facts, Scene, Trail, svg};
 
-/// The owned data of a run.
 struct Run {
     mission: Mission,
     grid: Vec<u8>,
@@ -115,18 +114,17 @@ fn three_drums() -> Run {
     }
 }
 
-/// Pseudorandom numbers, the same in every run of the tests.
 struct Dice(u64);
 
 impl Dice {
     fn next(&mut self) -> u64 {
-        // This is Knuth's MMIX generator, whose low bits are poor.
+        // Knuth's MMIX generator, whose low bits are poor.
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 >> 33
     }
 
-    /// A number that is mostly ordinary, at times an extreme one.
+    /// Returns a mostly ordinary number, at times an extreme one.
     fn number(&mut self) -> f64 {
         match self.next() % 12 {
             0 => f64::NAN,
@@ -202,7 +200,7 @@ fn a_run_that_ended_at_once_still_makes_a_picture() {
     assert_well_formed(&picture);
     assert!(picture.contains("three-drums"));
 
-    // A field of another size than its frame says is not drawn.
+    // A field whose size differs from its frame's is not drawn.
     scene.field = Some((run.mission.grid_frame(), &run.field[1..]));
     assert_eq!(svg(&scene), picture);
 }
@@ -229,7 +227,7 @@ fn far_poses_leave_no_far_coordinates() {
         })
         .filter_map(|number| number.parse::<f64>().ok())
         .filter(|number| *number > 1200.0);
-    // The address of the SVG namespace holds the one other large number, its year.
+    // The year in the address of the SVG namespace is the only other large number.
     assert_eq!(far.collect::<Vec<_>>(), [2000.0]);
 }
 
@@ -283,7 +281,8 @@ fn what_moved_is_on_its_way_where_it_was_at_the_numbered_places_of_the_robot() {
     let mut scene = run.scene();
     let without = svg(&scene);
     assert!(!without.contains("what moves"), "there is no clutter without movers");
-    // It crosses in front of the robot, which takes 14 s, and a glimpse of something else is left out.
+    // It crosses in front of the robot, which takes 14 s, and a glimpse of something else is left
+    // out.
     let at = |nth: u32| (f64::from(nth) * 0.5, DVec2::new(2.0, 2.0 - 0.2 * f64::from(nth)));
     let places: Vec<_> = (0..16).map(at).collect();
     let trails = [&places[..], &places[..2]].map(|places| Trail { places, radius_m: 0.25 });
@@ -294,7 +293,8 @@ fn what_moved_is_on_its_way_where_it_was_at_the_numbered_places_of_the_robot() {
     let numbers =
         |picture: &str, number: &str| picture.matches(&format!(">{number}</text>")).count();
     let drawn = |number: &str| numbers(&picture, number) - numbers(&without, number);
-    // Bodies are 1 s apart, and every second one is numbered: twice while it is there and in the legend, then on the robot alone.
+    // Bodies are 1 s apart, and every second one is numbered. The number stands twice while the
+    // mover is there, and in the legend, then only on the robot.
     assert_eq!(["2", "4", "6", "8"].map(drawn), [3, 2, 2, 1]);
     // At 4 s it is at (2, 0.4).
     let view = super::View::of(&run.mission.grid_frame());

@@ -1,7 +1,7 @@
-//! Real shapes over the robot's map, in dark outlines and a hatch so that both are visible.
+//! Real shapes over the robot's map, in dark outlines and a hatch that keep both visible.
 //!
-//! Shapes that do not reach from the floor to above the robot have dashed outlines, shapes of glass dash-dotted ones,
-//! shapes that absorb sound dotted ones.
+//! Outlines of shapes that do not reach from the floor to above the robot are dashed. Glass has
+//! dash-dotted outlines, sound absorbers dotted ones.
 
 use common::geometry::{Light, Profile, Shapes};
 
@@ -19,7 +19,7 @@ pub(super) enum Outline {
     Partial,
     /// Glass, as high as the robot.
     Glass,
-    /// Absorbs sound, as high as the robot.
+    /// Sound-absorbing, as high as the robot.
     Soft,
 }
 

@@ -1,13 +1,15 @@
-//! What a process does with its time, as the kernel counts it. Pure judgement: a starved process is not a hung one.
+//! Activity of a process as the kernel counts it, which tells a starved process from a hung one.
 //!
-//! The leading thread beats, so its time on a processor counts. Any thread may be starved, because the leading one may wait for it. The
-//! kernel adds a wait for a processor when it ends: until then, the state of the thread shows it.
+//! The leading thread beats, so its processor time counts. It may wait for any other thread, so
+//! starvation of all threads counts. The kernel adds a wait for a processor only when it ends;
+//! until then the thread's state shows it.
 
 use std::{fs, time::Duration};
 
 use common::process_status::{field, scheduled};
 
-/// A process sleeps this many deadlines before it counts as blocked: a slow disk delays a healthy one by more than one.
+/// Deadlines that a process may sleep before it counts as blocked. A slow disk delays a healthy one
+/// by more than one.
 pub(crate) const BLOCKED_DEADLINES: u32 = 4;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,17 +21,18 @@ pub enum State {
     Asleep,
 }
 
-/// The activity of a process since its start or its last beat.
+/// Activity of a process since its start or last beat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Activity {
     pub ran: Duration,
-    /// The time for which it was ready to run and others ran.
+    /// Time ready to run while others ran.
     pub starved: Duration,
     pub state: State,
 }
 
 impl Activity {
-    /// Whether a process that owes a sign of life since `age` hangs: it is stopped, has run for the `deadline`, or sleeps.
+    /// Returns whether a process without a sign of life for `age` is stopped, has run for the
+    /// `deadline`, or sleeps.
     pub(crate) fn is_hung(&self, age: Duration, deadline: Duration) -> bool {
         let slept = age.saturating_sub(self.ran + self.starved);
         let blocked = self.state == State::Asleep && slept >= deadline * BLOCKED_DEADLINES;
@@ -37,7 +40,7 @@ impl Activity {
     }
 }
 
-/// The times of a process since its start.
+/// Times of a process since its start.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Times {
     ran: Duration,
@@ -45,7 +48,8 @@ pub(crate) struct Times {
 }
 
 impl Times {
-    /// The times of process `pid`; none if it has ended or the kernel does not count them.
+    /// Returns the times of process `pid`; `None` if it has ended or the kernel does not count
+    /// them.
     pub(crate) fn of(pid: u32) -> Option<Self> {
         let [ran, _] = scheduled(&pid.to_string())?;
         let threads = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
@@ -54,7 +58,6 @@ impl Times {
         Some(Self { ran, starved })
     }
 
-    /// The activity of process `pid` since it had these times.
     pub(crate) fn activity(self, pid: u32) -> Option<Activity> {
         let now = Self::of(pid)?;
         let state = match field(&pid.to_string(), "State")?.as_bytes().first()? {

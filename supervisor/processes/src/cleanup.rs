@@ -1,4 +1,4 @@
-//! The cleanup of the resources of ended processes on the bus: places on topics, shared memory, files of nodes.
+//! Cleanup of ended processes' resources on the bus: places on topics, shared memory, node files.
 
 use std::time::{Duration, Instant};
 
@@ -6,17 +6,19 @@ use common::bus::Bus;
 
 use crate::{death::Death, stages};
 
-/// Longest time between cleanups. The end of a consumer is not notified.
+/// Longest interval between cleanups, because a consumer's end is not notified.
 const PERIOD: Duration = Duration::from_secs(1);
-/// Delay after a stage's death: another death often follows within it, and a recorder that gets little of a busy machine reads meanwhile
-/// what the stage published. Beside 13 busy processes a core 250 ms were too short.
+/// Delay after a stage's death.
+///
+/// Another death often follows within it. A starved recorder meanwhile reads the stage's last
+/// samples; beside 13 busy processes per core 250 ms were too short.
 const DELAY: Duration = Duration::from_secs(1);
 
 pub struct Cleanup {
     done: Instant,
-    /// Deaths since that time, and the time of the last one.
+    /// Deaths since `done`, and the time of the last one.
     deaths: (usize, Instant),
-    /// Ended processes whose resources are not all freed.
+    /// Ended processes with resources left to free.
     pending: Vec<u32>,
 }
 
@@ -28,7 +30,7 @@ impl Default for Cleanup {
 }
 
 impl Cleanup {
-    /// Note that these stages died. Their successors are started already.
+    /// Records deaths of stages. Their successors have already started.
     pub fn on_deaths(&mut self, deaths: &[Death], bus: &Bus) {
         if deaths.is_empty() {
             return;
@@ -41,8 +43,8 @@ impl Cleanup {
         }
     }
 
-    /// Clean up if that is due: after deaths once no stage is starting, which would wait for it, or earlier if so many processes died
-    /// that places on the bus may run out.
+    /// Cleans up if that is due: after deaths, once no stage is starting, because a starting stage
+    /// would wait. Many deaths hasten it, before places on the bus run out.
     pub fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
         let due = deaths > 0 && !any_starting || self.done.elapsed() >= PERIOD;
@@ -53,7 +55,7 @@ impl Cleanup {
         }
     }
 
-    /// Free the resources of ended processes. Resources that cannot be freed make the bus slower, not wrong.
+    /// Frees the resources of ended processes. Leftovers only slow the bus.
     fn run(&mut self, bus: &Bus) {
         self.done = Instant::now();
         self.deaths.0 = 0;

@@ -1,5 +1,5 @@
-//! The record of a stage's death. [`Death`] is a line of `deaths.jsonl` as it is; the sample on the bus and the line in
-//! the log are derived from it.
+//! Record of a stage's death. [`Death`] is a line of `deaths.jsonl`; the bus sample and the log
+//! line derive from it.
 
 use std::{
     fs::File,
@@ -27,10 +27,10 @@ pub struct Death {
     /// Whether the supervisor ended the process because it hung or was never ready.
     pub hung: bool,
     pub noticed_after_s: Option<f64>,
-    /// Age of its last beat; none if the process never beat.
+    /// Age of the last beat; `None` if the process never beat.
     pub beat_age_s: Option<f64>,
     pub uptime_s: f64,
-    /// Deaths of this stage within the policy's window, this one among them.
+    /// Deaths of this stage within the policy's window, including this one.
     pub deaths_in_window: u32,
     pub next: Next,
     pub log_tail: String,
@@ -49,7 +49,7 @@ pub enum Next {
 }
 
 impl Death {
-    /// Whether the process ended because the bus refused it.
+    /// Returns whether the bus refused the process.
     pub fn was_refused(&self) -> bool {
         self.cause == ExitCause::Exited(start::REFUSED.into())
     }
@@ -106,7 +106,7 @@ fn nanoseconds(seconds: f64) -> u64 {
     Duration::try_from_secs_f64(seconds).map_or(u64::MAX, |time| time.as_nanos() as u64)
 }
 
-/// The end of a stage's log, from the beginning of a line; empty if there is none.
+/// Returns the end of a stage's log in whole lines; empty without a log.
 pub fn log_tail(log: &Path, since: u64) -> String {
     let read = || -> io::Result<Vec<u8>> {
         let mut file = File::open(log)?;

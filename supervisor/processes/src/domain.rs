@@ -1,4 +1,4 @@
-//! The domain of a robot, its directory and shared memory: locked by one supervisor, wiped, its bus made and held open.
+//! Domain of a robot: its directory and shared memory, locked by one supervisor, with the bus.
 
 use std::{
     fs::{self, DirBuilder, File, OpenOptions},
@@ -24,37 +24,38 @@ use crate::{
     orphans,
 };
 
-/// Shared memory for the topics of small structs: twice the measured size; and for samples that a frozen recorder
-/// holds: a page or more for each piece of `inputs` of five stages, and grids.
+/// Shared memory for small topics: twice the measured size. The second term covers samples held by
+/// a frozen recorder: grids, and a page or more for each piece of `inputs` of five stages.
 const SMALL_TOPICS_BYTES: u64 = (16 << 20) + (32 << 20);
-/// Shared memory for a cell of the map: a byte in `grid` and twelve in `field`, in each of the eight samples
-/// that are under way at once.
+/// Shared memory per map cell, bytes: one in `grid` and twelve in `field`, for eight samples under
+/// way at once.
 const CELL_BYTES: u64 = 8 * 13;
 
-/// The longest time that a killed supervisor holds its lock, even on a loaded machine.
+/// Longest time that a killed supervisor holds its lock, even on a loaded machine.
 const LAST_HOLDER_ENDS: Duration = Duration::from_secs(1);
 
-/// A domain locked by this process. Dropping it removes all files of the domain.
+/// Domain locked by this process. Dropping it removes all its files.
 pub struct DomainLock {
     domain: Domain,
     // The bus is dropped before the files are removed.
     bus: Option<(Services, Rc<Bus>)>,
-    // This lock is held while the bus is made and removed, so that no stage joins meanwhile.
+    // Held while the bus is made and removed, so that no stage joins meanwhile.
     stages_lock: Option<File>,
-    // This lock keeps consumers from joining while the bus is made and removed, except one that is stuck.
+    // Held while the bus is made and removed, so that no consumer joins, except a stuck one.
     joining_lock: Option<File>,
     cells: usize,
-    /// Links to the run's directory, each with where it leads.
+    /// Links to the run's directory, with their destinations.
     links: Vec<(PathBuf, PathBuf)>,
-    /// Whether what is missing could not be made again, which the log says once.
+    /// Whether restoring failed, which is logged once.
     stays_missing: bool,
     lock: File,
-    // None where another user has taken its name. The claim is given up last.
+    // `None` if another user took the name. The claim is given up last.
     claim: Option<Claim>,
 }
 
 impl DomainLock {
-    /// Lock `domain`, remove the files of an earlier supervisor, create the services for a map of `cells` cells.
+    /// Locks `domain`, removes an earlier supervisor's files, creates services for a map of `cells`
+    /// cells.
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
         // A robot whose directory was removed is still claimed.
@@ -71,14 +72,15 @@ impl DomainLock {
             lock,
             claim,
         };
-        // No consumer mistakes the bus of a supervisor that was killed for the new one.
+        // Without its configuration, consumers cannot mistake a killed supervisor's bus for the new
+        // one.
         remove_file(&acquired.domain.middleware_config())?;
         remove_run(&acquired.domain)?;
         acquired.recreate_bus()?;
         Ok(acquired)
     }
 
-    /// Make the bus. It replaces an old one, which nobody uses any more.
+    /// Makes the bus, in place of an old, unused one.
     pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
         self.clear()?;
         check_shared_memory(SHARED_MEMORY, SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64)?;
@@ -88,13 +90,13 @@ impl DomainLock {
         Ok(())
     }
 
-    /// Remove the bus. No stage can join until there is one again.
+    /// Removes the bus. No stage can join until there is a new one.
     fn clear(&mut self) -> Result<(), DomainError> {
         self.bus = None;
-        // A cleaner of temporary files may have removed it.
+        // A cleaner of temporary files may have removed the directory.
         make_directory(&self.domain)?;
         if self.stages_lock.is_none() {
-            // External stages may still be stopping, or just starting.
+            // External stages may still be stopping or starting.
             self.stages_lock = Some(orphans::wait_for(&self.domain)?);
         }
         if self.joining_lock.is_none() {
@@ -107,15 +109,18 @@ impl DomainLock {
         self.bus.as_ref().map(|(_, bus)| Rc::clone(bus))
     }
 
-    /// Link `at` in the domain's directory to `run`: the directory of the run, or the place of the robot that is mirrored.
+    /// Links `at` in the domain's directory to `run`: the run's directory, or the place of a
+    /// mirrored robot.
     pub fn link_to_run(&mut self, run: &Path, at: PathBuf) -> Result<(), DomainError> {
         symlink(run, &at).map_err(failed("make", &at))?;
         self.links.push((at, run.to_path_buf()));
         Ok(())
     }
 
-    /// Make again what is missing in the domain's directory, because a cleaner of temporary files may remove it while the robot drives.
-    /// Without it nobody finds the robot. Call this a few times a second.
+    /// Restores missing files of the domain's directory; called a few times a second.
+    ///
+    /// A cleaner of temporary files may remove them while the robot drives, and then no process
+    /// finds the robot.
     pub fn restore(&mut self) {
         if let Some(claim) = &self.claim {
             claim.forget_askers();
@@ -132,7 +137,7 @@ impl DomainLock {
             return;
         }
         let again = self.make_again();
-        // An error that stays is said once.
+        // A lasting error is logged once.
         if again.is_ok() || !self.stays_missing {
             tracing::warn!(
                 ?again,
@@ -155,7 +160,7 @@ impl DomainLock {
             remove_file(at)?;
             symlink(run, at).map_err(failed("make", at))?;
         }
-        // A consumer that waits for the last of them finds all others.
+        // These come last: a consumer that waits for one finds all others.
         for file in [domain.stages_lock_file(), domain.joining_lock_file()] {
             let made = append(&file);
             made.map_err(failed("make", &file))?;
@@ -166,13 +171,13 @@ impl DomainLock {
 
 impl Drop for DomainLock {
     fn drop(&mut self) {
-        // The lock is removed last, with its directory; a process that waits for the lock then makes its own.
+        // The lock goes last, with its directory. A process that waits for it then makes its own.
         let _ = self.clear();
         remove_directory_of(&self.domain);
     }
 }
 
-/// Remove all files of a domain whose stages have ended. A supervisor that hangs ends like this.
+/// Removes all files of a domain whose stages have ended, for a supervisor that hangs.
 pub(crate) fn remove_all(domain: &Domain) {
     let _ = wipe(domain);
     remove_directory_of(domain);
@@ -186,7 +191,7 @@ fn remove_directory_of(domain: &Domain) {
     let _ = fs::remove_dir(domain.directory());
 }
 
-/// Claim the robot. A killed supervisor holds its claim until the kernel has removed the process.
+/// Claims the robot. A killed supervisor holds its claim until the kernel has removed the process.
 fn claim(domain: &Domain) -> Result<Option<Claim>, DomainError> {
     let began = Instant::now();
     loop {
@@ -211,7 +216,7 @@ fn make_directory(domain: &Domain) -> Result<(), DomainError> {
     both.try_for_each(make_own_directory)
 }
 
-/// Make a directory for its owner only, in a place where another user may have made it before.
+/// Makes a directory for its owner only, where another user may have made one before.
 pub fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     match DirBuilder::new().mode(0o700).create(path) {
         Ok(()) => {}
@@ -229,7 +234,7 @@ pub fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     Ok(())
 }
 
-/// Lock the domain; the file names the holder, for the error message of another supervisor.
+/// Locks the domain. The file names the holder, for the error message of another supervisor.
 fn lock(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.lock_file();
     let began = Instant::now();
@@ -243,7 +248,7 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
             Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
             Err(error) => return Err(failed("open", &path)(error)),
         };
-        // A killed supervisor holds the lock until the kernel has removed the process.
+        // The kernel may still be removing a killed holder.
         let left = LAST_HOLDER_ENDS.saturating_sub(began.elapsed());
         if !orphans::locked_within(&file, left).map_err(failed("lock", &path))? {
             let holder = fs::read_to_string(&path).unwrap_or_default();
@@ -270,9 +275,10 @@ fn remove_run(domain: &Domain) -> Result<(), DomainError> {
     files.iter().try_for_each(|file| remove_file(file))
 }
 
-/// Remove all files of the middleware in this domain, but none of another user: a new bus has random names.
+/// Removes the user's own middleware files in this domain. Names of other users' files do not
+/// collide, because a new bus has random names.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
-    // A process cannot join a bus without a configuration.
+    // No process can join a bus without a configuration.
     remove_file(&domain.middleware_config())?;
     let directory = domain.directory();
     let configs = fs::read_dir(directory).map_err(failed("read", directory))?;
@@ -295,7 +301,7 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
             continue;
         }
         let path = entry.path();
-        // A consumer that leaves at the same time removes its own files.
+        // A consumer that leaves now removes its own files.
         let Ok(found) = entry.metadata() else {
             continue;
         };
@@ -310,7 +316,8 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
     Ok(())
 }
 
-/// Remove the directory of a bus. It is renamed first, because a consumer that is joining would add files meanwhile.
+/// Removes the directory of a bus. It is renamed first, because a joining consumer would add files
+/// meanwhile.
 fn remove_root(root: &Path) -> Result<(), DomainError> {
     let aside = root.with_extension("old");
     remove_directory(&aside)?;
@@ -321,7 +328,7 @@ fn remove_root(root: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// Remove a file, if it exists: a consumer that leaves the old bus at the same time removes its own.
+/// Removes a file if it exists; a leaving consumer removes its own.
 fn remove_file(path: &Path) -> Result<(), DomainError> {
     removed(fs::remove_file(path), path)
 }
@@ -337,7 +344,7 @@ fn removed(result: io::Result<()>, path: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// Check for space first: the use of a segment in a full file system raises SIGBUS.
+/// Checks for space: use of a segment in a full file system raises SIGBUS.
 fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
     let space = rustix::fs::statvfs(mount).map_err(|error| DomainError::SharedMemory {
         problem: format!("cannot be examined: {error}"),
@@ -364,7 +371,7 @@ mod tests {
 
     use super::*;
 
-    /// The domain of a robot of this process, so that a killed test leaves nothing for the next.
+    /// Returns a domain unique to this process, so that a killed test does not affect the next.
     fn domain(name: &str) -> Domain {
         Domain::of(format!("{name}-{}", std::process::id()).parse().unwrap())
     }
@@ -373,7 +380,7 @@ mod tests {
     fn a_domain_that_could_not_be_acquired_keeps_no_lock() {
         let domain = domain("no-lock");
         make_directory(&domain).unwrap();
-        // A directory cannot be removed as the file that should be there.
+        // A directory in the file's place cannot be removed as a file.
         fs::create_dir(domain.middleware_config()).unwrap();
         let refused = DomainLock::acquire(domain.clone(), 1).err().unwrap();
         fs::remove_dir(domain.middleware_config()).unwrap();
@@ -404,7 +411,7 @@ mod tests {
                 });
             }
             let (began, mut missed) = (Instant::now(), 0);
-            // The list misses a lock now and then.
+            // The list of locks sometimes misses one.
             while began.elapsed() < Duration::from_secs(2) {
                 missed += u32::from(domain.supervisor().unwrap().is_none());
             }

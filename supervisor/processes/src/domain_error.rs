@@ -1,5 +1,3 @@
-//! Errors of locking a robot's domain and creating its bus.
-
 use std::{
     io,
     path::{Path, PathBuf},
@@ -16,7 +14,7 @@ pub enum DomainError {
         "robot {robot:?} is already supervised by process {holder}; stop that first, or give this one another name with --robot"
     )]
     Supervised { robot: String, holder: String },
-    /// Stages of an earlier supervisor still run although they were killed.
+    /// Killed stages of an earlier supervisor still run.
     #[error(
         "robot {robot:?} is held by stages that do not end even when killed: {holders}; give this one another name with --robot, or restart the machine"
     )]

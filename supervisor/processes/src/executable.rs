@@ -1,4 +1,4 @@
-//! Finds and checks a named executable before anything starts.
+//! Lookup and check of a named executable before any start.
 
 use std::{
     env, io,
@@ -6,8 +6,8 @@ use std::{
 };
 
 use rustix::fs::{Access, access};
-/// The absolute path of the executable `named`: a path from the current directory, or a plain name beside this executable
-/// or on `PATH`.
+/// Returns the absolute path of `named`: a path from the current directory, or a plain name beside
+/// this executable or on `PATH`.
 pub fn find(named: &Path) -> io::Result<PathBuf> {
     let is_name = named.components().count() == 1 && !named.is_absolute();
     let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');
@@ -27,7 +27,6 @@ pub fn find(named: &Path) -> io::Result<PathBuf> {
     }
 }
 
-/// The folders in which a plain name is searched, in order, as absolute paths.
 fn folders() -> impl Iterator<Item = PathBuf> {
     let own = env::current_exe().ok();
     let beside = own.and_then(|own| Some(own.parent()?.to_path_buf()));

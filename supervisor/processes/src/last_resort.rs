@@ -1,9 +1,9 @@
-//! The end of a run whose supervisor hangs. The middleware may wait for ever for a file that another process truncated, and the
-//! supervisor's loop does not react to signals then.
+//! End of a run whose supervisor hangs. The middleware may wait forever for a file that another
+//! process truncated; then the loop ignores signals.
 //!
-//! A separate thread receives the signals too. If the loop makes no iteration for [`STUCK`] after a signal, the thread ends the
-//! stages and the process, and removes their files. The robot stands by then: its link stops it when the supervisor is silent, and a
-//! command expires if no other follows.
+//! A separate thread receives the signals too. If the loop makes no iteration for [`STUCK`] after a
+//! signal, the thread ends the stages and the process, and removes their files. The robot stands by
+//! then: its link stops it when the supervisor is silent, and an unrenewed command expires.
 
 use std::{
     fs,
@@ -28,16 +28,16 @@ use rustix::{
 
 use crate::{domain, policy::STOP_GRACE};
 
-/// The time without an iteration after which the loop hangs; a healthy one turns five times a second.
+/// Time without an iteration after which the loop hangs; a healthy one turns five times a second.
 const STUCK: Duration = Duration::from_secs(2);
-/// The exit code of a run that ends like this, which is that of any run that failed.
+/// Exit code, as of any failed run.
 const FAILED: u8 = 1;
 
 const HANGS: &str = "the supervisor hangs, perhaps in a file of the bus that was changed; the stages and the run are ended";
 
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// The number of turns of the supervisor's loop, and whether it need not turn now.
+/// Iterations of the supervisor's loop, and whether it may pause.
 #[derive(Clone, Default)]
 pub struct Turns {
     count: Arc<AtomicU64>,
@@ -49,12 +49,12 @@ impl Turns {
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Note whether the loop need not turn: it waits for something that has a time limit, or the stages have ended in order.
+    /// Sets whether the loop may pause: it waits with a time limit, or the stages have ended in
+    /// order.
     pub fn rest(&self, rests: bool) {
         self.rests.store(rests, Ordering::Relaxed);
     }
 
-    /// Wait until the loop of `thread` has not turned for [`STUCK`].
     fn await_stuck(&self, thread: Pid) {
         let (mut seen, mut stuck, mut waited) = (0, Duration::ZERO, processor_awaited(thread));
         loop {
@@ -69,13 +69,14 @@ impl Turns {
             }
             let began = Instant::now();
             thread::park_timeout(LOOK_EVERY);
-            // A machine on which this thread has to wait delays the loop, too.
+            // If this thread has to wait, the machine delays the loop, too.
             stuck += began.elapsed().min(2 * LOOK_EVERY);
         }
     }
 }
 
-/// The time for which `thread` was ready to run and other processes ran; zero where the kernel does not count it.
+/// Returns the time for which `thread` was ready while others ran; zero if the kernel does not
+/// count it.
 fn processor_awaited(thread: Pid) -> Duration {
     scheduled(&format!("self/task/{thread}")).map_or(Duration::ZERO, |[_, awaited]| awaited)
 }
@@ -97,7 +98,7 @@ pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
     });
 }
 
-/// Signal all children of this process. Nobody reaps them, so their ids are not reused.
+/// Signals all children. They stay unreaped, so their ids are not reused.
 fn end_children(signal: Signal) {
     let Ok(threads) = fs::read_dir("/proc/self/task") else {
         return;

@@ -1,26 +1,27 @@
-//! A robot's processes: starts its stages, watches them, kills and restarts them. Nothing here computes, draws or judges.
+//! Process control of one robot: starts, watches, kills and restarts its stages.
 //!
-//! Each stage is a process of its own, known by its heartbeats and outputs. A stage that ends, stops beating or leaves its inputs
-//! unanswered is replaced by a new generation, which goes on from its checkpoint; the link stops the robot meanwhile. Code that
-//! only reports (logs, records, published deaths) may fail; it never ends a mission.
+//! Each stage is a process, judged by its heartbeats and outputs. A stage that ends, stops beating
+//! or leaves inputs unanswered gets a successor, a new generation, which continues from its
+//! checkpoint. The link stops the robot meanwhile. Failures of code that only reports (logs,
+//! records, published deaths) never end a mission.
 //!
 //! # The files, in reading order
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`stages`] | THE table of stages: inputs, outputs, deadlines |
-//! | [`policy`] | what to do with one stage, pure |
-//! | `output_watchdog` | whether each stage answers what it reads, pure |
-//! | [`activity`] | whether a process hangs, is blocked or only waits for a processor |
-//! | `observed_time` | time that the supervisor was there to see: what deadlines count |
+//! | [`stages`] | the only table of stages: inputs, outputs, deadlines |
+//! | [`policy`] | actions for one stage, pure |
+//! | `output_watchdog` | unanswered inputs, pure |
+//! | [`activity`] | whether a process hangs, is blocked or waits for a processor |
+//! | `observed_time` | time that counts for deadlines |
 //! | [`process`] | a process that is watched, signalled, reaped |
 //! | `stage_process`, [`stage_processes`] | one stage with its policy and process; all of them |
-//! | [`death`], [`records`] | the record of a death; files of records in the run directory |
-//! | [`cleanup`] | when the bus is cleaned of what ended processes held |
-//! | [`domain`], `orphans`, `descriptors` | the robot's directory and shared memory, locked and wiped; stages that outlive their supervisor; the limit of descriptors |
+//! | [`death`], [`records`] | record of a death; files of records in the run directory |
+//! | [`cleanup`] | removal of ended processes' resources from the bus |
+//! | [`domain`], `orphans`, `descriptors` | directory and shared memory; stages that outlive their supervisor; descriptor limit |
 //! | [`service_manager`] | notifications to systemd |
-//! | [`last_resort`] | the end of a run whose supervisor hangs |
-//! | [`executable`], [`planner_executable`] | a named executable, checked before anything starts; the one for the planner |
+//! | [`last_resort`] | end of a run whose supervisor hangs |
+//! | [`executable`], [`planner_executable`] | named executables, checked before any start; the planner's |
 
 pub mod activity;
 pub mod cleanup;

@@ -1,12 +1,12 @@
-//! Time in which the supervisor ran. Deadlines of stages count only that: if the whole machine stood still, or this process
-//! was not scheduled, nobody can say that a stage was late.
+//! Time in which the supervisor ran. Only that counts for deadlines: a stage is not late because
+//! the machine or this process stood still.
 
 use std::time::{Duration, Instant};
 
 use crate::policy::Now;
 
-/// The excess over its plan beyond which a wait, or the work between two waits, does not count. Usually a wait is late by at most a
-/// hundredth of this.
+/// Excess over its plan beyond which a wait, or the work between two, does not count. Usually a
+/// wait is late by at most a hundredth of this.
 const TOLERANCE: Duration = Duration::from_millis(20);
 
 pub(crate) struct ObservedTime {
@@ -23,8 +23,10 @@ impl ObservedTime {
         self.observed + self.since(now).min(TOLERANCE)
     }
 
-    /// Note that a wait ended at `now` which should have taken at most `planned`. If it took longer, it is unknown when the machine stood
-    /// still, so only a little of it counts. Some must count, or a supervisor that is always late would never notice anything.
+    /// Records that a wait planned to take at most `planned` ended at `now`.
+    ///
+    /// Of a longer wait only [`TOLERANCE`] counts, because the standstill may have been anywhere in
+    /// it. It must count something, or a supervisor that is always late would miss everything.
     pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
         let took = self.since(now);
         self.observed += if took <= planned + TOLERANCE { took } else { TOLERANCE };
@@ -58,7 +60,7 @@ mod tests {
         let mut time = ObservedTime::new(began);
         // The work between two waits stalls.
         assert_eq!(time.at(began + 600 * MS), TOLERANCE);
-        // Several waits stall, so that the stages have no time to beat between them.
+        // Several waits stall, so that the stages cannot beat between them.
         for stall in 1..=5 {
             time.on_waited(200 * MS, began + stall * 600 * MS);
             assert_eq!(time.at(began + stall * 600 * MS), stall * TOLERANCE);

@@ -1,8 +1,8 @@
-//! Stages that still run in a robot's domain when a new supervisor has locked it, which waits for them and kills those that
-//! stay.
+//! Stages that still run in a domain that a new supervisor has locked. It waits for them, and kills
+//! those that stay.
 //!
-//! Each stage holds a shared lock on one file of the domain as long as it runs, and stops when its supervisor ends. A frozen
-//! stage cannot, and nobody needs it.
+//! Each stage holds a shared lock on one file of the domain while it runs, and stops when its
+//! supervisor ends. A frozen stage cannot stop, and is of no use.
 
 use std::{
     fs::{self, File},
@@ -18,15 +18,16 @@ use rustix::process::Signal;
 
 use crate::domain_error::{DomainError, failed};
 
-/// The time within which stages end: they get SIGTERM when their supervisor ends.
+/// Time for stages to end; they get SIGTERM when their supervisor ends.
 const STOP_GRACE: Duration = Duration::from_secs(2);
-/// The time within which a killed process ends, unless it hangs in the kernel.
+/// Time for a killed process to end, unless it hangs in the kernel.
 const KILLED: Duration = Duration::from_secs(1);
 const JOINED_WITHIN: Duration = Duration::from_millis(300);
-/// Pause between attempts to lock. A file lock has no descriptor to wait on.
+/// Interval of lock attempts; a file lock has no descriptor to wait on.
 pub(crate) const RETRY: Duration = Duration::from_millis(10);
 
-/// Wait until no stage runs in the domain, because its files are removed next. No stage can join while the result is held.
+/// Waits until no stage runs in the domain, before its files are removed. No stage can join while
+/// the result is held.
 pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.stages_lock_file();
     let lock = File::create(&path).map_err(failed("make", &path))?;
@@ -37,7 +38,7 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     let holders = holders(&lock).map_err(failed("look for who locks", &path))?;
     for &pid in &holders {
         tracing::warn!(pid, "a stage has outlived its supervisor and is killed");
-        // A stage that has just ended by itself needs no signal.
+        // A stage that has just ended needs no signal.
         let _ = signal(pid, &lock, Signal::KILL);
     }
     if locked_within(&lock, KILLED).map_err(system)? {
@@ -47,8 +48,8 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     Err(DomainError::Orphans { robot: domain.robot.to_string(), holders: holders.join(", ") })
 }
 
-/// Wait until no consumer is joining the bus, but not longer than [`JOINED_WITHIN`], because one may be frozen. None can begin to join
-/// while the result is held.
+/// Waits up to [`JOINED_WITHIN`] for joining consumers, because one may be frozen. None can begin
+/// to join while the result is held.
 pub(crate) fn wait_for_consumers(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.joining_lock_file();
     let lock = File::create(&path).map_err(failed("make", &path))?;

@@ -1,7 +1,8 @@
-//! A watchdog that checks whether each stage answers its inputs, because a stage may beat and yet publish nothing. Pure.
+//! A watchdog for unanswered inputs, because a stage may beat without publishing. Pure.
 //!
-//! A stage must publish an output for each tick that all its inputs have reached. So a stage without input is never late,
-//! and if the pipeline stands still, only the stage that stopped it is blamed: the stages behind it have no input.
+//! A stage must publish an output for each tick that all its inputs have reached. So a stage
+//! without input is never late. If the pipeline stands still, the blame falls on the stage that
+//! stopped it: later stages have no input.
 
 use std::time::Duration;
 
@@ -14,14 +15,12 @@ use crate::{
 
 pub(crate) struct OutputWatchdog(Vec<StageOutput>);
 
-/// The newest output of one stage, and the time since which its input is unanswered.
 struct StageOutput {
     stage: &'static Stage,
-    /// Longest time that its input may stay unanswered.
     patience: Duration,
     reads: Vec<&'static str>,
     published: Option<u64>,
-    /// Ticks up to this one belong to an earlier generation.
+    /// Newest tick of an earlier generation.
     excused: Option<u64>,
     unanswered_since: Option<Now>,
 }
@@ -54,7 +53,7 @@ impl OutputWatchdog {
         }
     }
 
-    /// Note that a generation of `stage` starts. Ticks under way belong to an earlier one.
+    /// Records the start of a generation of `stage`. Ticks under way belong to an earlier one.
     pub(crate) fn on_start(&mut self, stage: &str) {
         let newest = self.0.iter().filter_map(|output| output.published).max();
         if let Some(output) = self.find(stage) {
@@ -62,15 +61,16 @@ impl OutputWatchdog {
         }
     }
 
-    /// Forget unanswered inputs: the robot stands, so ticks may end within the pipeline.
+    /// Clears unanswered inputs: the robot stands, so ticks may end within the pipeline.
     pub(crate) fn clear_unanswered(&mut self) {
         for output in &mut self.0 {
             output.unanswered_since = None;
         }
     }
 
-    /// The first stage, in the order of the pipeline, whose input is unanswered for too long. Each stage has its own `now`, because time
-    /// in which it waited for a processor does not count.
+    /// Returns the first stage in pipeline order with an overdue answer.
+    ///
+    /// Each stage has its own `now`, because waiting for a processor does not count.
     pub(crate) fn stale(&mut self, now: impl Fn(&str) -> Now) -> Option<&'static str> {
         let published: Vec<_> = self.0.iter().map(|it| (it.stage.name, it.published)).collect();
         let published = |writer: &str| published.iter().find(|(name, _)| *name == writer)?.1;
@@ -109,7 +109,7 @@ mod tests {
         watchdog
     }
 
-    /// The stage that is blamed when nothing further is published for a minute.
+    /// Returns the stage blamed after a minute without new outputs.
     fn blamed(watchdog: &mut OutputWatchdog) -> Option<&'static str> {
         watchdog.stale(|_| Duration::ZERO).or_else(|| watchdog.stale(|_| MINUTE))
     }
@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn a_stage_without_input_is_never_blamed() {
         assert_eq!(blamed(&mut published(&[])), None);
-        // The map has not reached the planner, although the pose has.
+        // The pose has reached the planner, the map has not.
         let mut watchdog = published(&[("dead-reckoning", 9), ("planner", 0), ("controller", 0)]);
         let blamed = blamed(&mut watchdog);
         for stage in ["mapper", "planner", "controller"] {

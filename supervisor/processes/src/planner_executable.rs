@@ -1,5 +1,5 @@
-//! Finds the planner that a mission names, before anything starts: an executable, which is checked and made absolute, or another
-//! planner that `firsthand stage NAME` starts.
+//! Planner of a mission, resolved before any start: a checked executable, or another planner of
+//! `firsthand stage NAME`.
 
 use std::{
     io,
@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use crate::executable;
 
-/// The executable that a mission names for its planner cannot be started.
+/// The mission's planner executable cannot be started.
 #[derive(Debug, Error)]
 #[error(
     "planner.executable {}: {problem}; give {}a path to an executable of a planner, a name on PATH, or leave the key out", named.display(),
@@ -23,10 +23,10 @@ pub struct PlannerExecutableError {
     others: &'static [&'static str],
 }
 
-/// Make the `planner.executable` of `mission` absolute, if it names one that is none of the `others`.
+/// Makes the `planner.executable` of `mission` absolute, unless it is one of the `others`.
 ///
 /// # Errors
-/// If it cannot be executed.
+/// Fails if it cannot be executed.
 pub fn resolve(
     mission: &mut Mission,
     others: &'static [&'static str],
@@ -37,10 +37,11 @@ pub fn resolve(
     Ok(())
 }
 
-/// The one of `others`, the planners of `firsthand stage NAME`, that is `named`; or the absolute path of that executable.
+/// Returns the planner of `firsthand stage NAME` among `others` that is `named`, or the
+/// executable's absolute path.
 ///
 /// # Errors
-/// If it cannot be executed.
+/// Fails if it cannot be executed.
 pub fn find_planner(
     named: &Path,
     others: &'static [&'static str],

@@ -1,4 +1,4 @@
-//! The policy for one stage: a pure function from events and their times to actions.
+//! Policy for one stage: a pure function from events and their times to actions.
 //!
 //! ```text
 //!          start            beat            exit
@@ -11,27 +11,31 @@
 //!                      |              |        +-------exit-------------------> Starting
 //!                      +--stop------->+--> Stopping --exit--> Down
 //! ```
-//! Other stages are not touched: a stage that cannot run is held, and the robot stands meanwhile. The one exception is a
-//! bus on which a stage cannot start: it is recreated, and all stages are restarted on it.
+//! Other stages run on: a stage that cannot run is held, and the robot stands meanwhile. One
+//! exception: a bus on which a stage cannot start is recreated, and all stages restart on it.
 
 use std::{collections::VecDeque, time::Duration};
 
 use crate::{activity::Activity, stages::Deadlines};
 
-/// The time for which a generation must be ready to be stable; the count of deaths in a row then begins again.
+/// Time for which a generation must be ready to be stable, which resets the count of deaths in a
+/// row.
 pub const STABLE_AFTER: Duration = Duration::from_millis(500);
-/// Wait before the second start in a row; it doubles with each further one. It is shorter than a start, because a death
-/// in the start-up is mostly chance.
+/// Wait before the second start in a row; it doubles with each further one. Deaths during start-up
+/// are mostly chance, so it is shorter than a start.
 const FIRST_BACKOFF: Duration = Duration::from_millis(2);
-/// Longest wait between starts: a person who has repaired the cause should not wait longer.
+/// Longest wait between starts, short for a person who has repaired the cause.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
-/// The number of deaths within [`HOLD_WINDOW`], or in a row without a stable generation, after which a stage is held. A stage that cannot
-/// run at all is held after two seconds; no person or test kills one stage that fast.
+/// Deaths within [`HOLD_WINDOW`], or in a row without a stable generation, after which a stage is
+/// held.
+///
+/// A stage that cannot run at all is held after two seconds. No person or test kills one stage that
+/// fast.
 pub const HOLD_AFTER: usize = 12;
-/// The window in which deaths are counted.
+/// Window in which deaths are counted.
 pub const HOLD_WINDOW: Duration = Duration::from_secs(10);
-/// Starts in a row that the bus may have blocked before it is recreated. A single one may have met incomplete files of the generation
-/// before, which are removed when that ends.
+/// Starts in a row that the bus may have blocked before it is recreated. A single one may have met
+/// incomplete files of the previous generation, which are removed when that ends.
 const BLOCKED_STARTS: u32 = 2;
 const ABORT_GRACE: Duration = Duration::from_millis(100);
 /// Time for a terminated stage to stop in order. The link sends three datagrams in it.
@@ -49,13 +53,13 @@ pub enum Event {
     /// The process beats, but does not answer its inputs.
     OutputStale,
     Exited,
-    /// The process is reaped, and its exit code says that the bus refused it.
+    /// The process is reaped; its exit code says that the bus refused it.
     Refused,
-    /// The stage should be replaced by a new generation. A held stage is released.
+    /// Request for a new generation, which releases a held stage.
     Replace,
-    /// The stage should stop, without a successor.
+    /// Request to stop without a successor.
     Stop,
-    /// Time passed. Without the process's activity, all of it counts.
+    /// Passage of time. Without the process's activity, all of it counts.
     Time(Option<Activity>),
 }
 
@@ -72,12 +76,12 @@ pub enum Action {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
-    /// There is no process, and none is wanted.
+    /// No process, and none wanted.
     Down,
     BackingOff {
         until: Now,
     },
-    /// There is no process; the stage died too often, and only an operator starts it again.
+    /// No process; after too many deaths only an operator starts it again.
     Held,
     Starting {
         since: Now,
@@ -86,32 +90,31 @@ pub enum Phase {
         since: Now,
         beat: Now,
     },
-    /// A process that was aborted, because it was without readiness, beat or output for too long.
+    /// Process aborted for missing readiness, beat or output.
     Aborted {
         stability: Stability,
         kill: Now,
     },
-    /// A process that was asked to stop for its successor. Its end is no death.
+    /// Process asked to stop for its successor. Its end is no death.
     Replaced {
         kill: Now,
     },
-    /// A process that was asked to stop, and no successor is wanted.
+    /// Process asked to stop without a successor.
     Stopping {
         kill: Now,
     },
 }
 
-/// The time for which a generation was ready before its end.
+/// Time for which a generation was ready before its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stability {
     NeverReady,
     Brief,
-    /// The generation was ready for [`STABLE_AFTER`].
+    /// Ready for at least [`STABLE_AFTER`].
     Stable,
 }
 
 impl Stability {
-    /// The stability of a generation that was ready from `since` to its last sign of life, at `until`.
     fn of(since: Now, until: Now) -> Self {
         if until.saturating_sub(since) >= STABLE_AFTER { Self::Stable } else { Self::Brief }
     }
@@ -121,16 +124,15 @@ impl Stability {
 pub struct Policy {
     deadlines: Deadlines,
     phase: Phase,
-    /// Deaths in a row, none of a stable generation.
+    /// Deaths in a row without a stable generation.
     deaths: usize,
     /// Deaths within the window; at most [`HOLD_AFTER`].
     recent: VecDeque<Now>,
-    /// Starts in a row that the bus may have blocked.
     blocked_starts: u32,
 }
 
 impl Policy {
-    /// The policy of a stage with these deadlines that has never run.
+    /// Creates the policy of a stage that has never run.
     pub fn new(deadlines: Deadlines) -> Self {
         Self {
             deadlines,
@@ -141,7 +143,7 @@ impl Policy {
         }
     }
 
-    /// Deaths within [`HOLD_WINDOW`], as of the last one.
+    /// Returns the deaths within [`HOLD_WINDOW`], as of the last one.
     pub fn recent_deaths(&self) -> usize {
         self.recent.len()
     }
@@ -150,7 +152,7 @@ impl Policy {
         self.phase
     }
 
-    /// The time from which [`Event::Time`] is due; none if only other events matter.
+    /// Returns the time from which [`Event::Time`] is due; `None` if only other events matter.
     pub fn deadline(&self) -> Option<Now> {
         match self.phase {
             Phase::Down | Phase::Held => None,
@@ -176,7 +178,7 @@ impl Policy {
                 Some(self.start(now))
             }
             (Phase::Starting { .. }, Event::StartFailed) => {
-                // Some resource is used up, so the stage is not started again at once.
+                // Some resource is used up, so the next start waits.
                 self.deaths = self.deaths.max(1);
                 self.record_death(Stability::NeverReady, now)
             }
@@ -277,7 +279,8 @@ impl Policy {
         }
     }
 
-    /// Note that a generation ended which the bus may have blocked. A recreated bus is not recreated again before a generation was ready.
+    /// Records the end of a generation that the bus may have blocked. The bus is recreated once
+    /// until a generation becomes ready.
     fn record_blocked_start(&mut self, now: Now) -> Option<Action> {
         self.blocked_starts = self.blocked_starts.saturating_add(1);
         let next = self.record_death(Stability::NeverReady, now);

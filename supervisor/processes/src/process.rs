@@ -1,5 +1,5 @@
-//! A process: a child started from this very executable, or an external one that somebody else started; watched
-//! through a pidfd, signalled, and reaped if it is a child.
+//! A process: a child started from this executable, or an external one. It is watched through a
+//! pidfd, signalled, and reaped if it is a child.
 
 use std::{
     ffi::OsStr,
@@ -17,20 +17,19 @@ use common::{bus::close_all_on_exec, poll, stage_command, start::Generation};
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 
-/// The time within which the kernel ends a killed process, unless the process hangs in the kernel itself.
+/// Time in which the kernel ends a killed process, unless that hangs in the kernel itself.
 const KILLED_WITHIN: Duration = Duration::from_millis(50);
 
-/// This very program, even if its file was replaced by a rebuild meanwhile.
+/// This program, even if a rebuild has replaced its file.
 const OWN: &str = "/proc/self/exe";
 
-/// A `firsthand` subcommand in a process of its own.
 pub fn firsthand(arguments: &[&str]) -> Command {
     let mut command = child(OWN);
     command.arg0("firsthand").args(arguments);
     command
 }
 
-/// A process of the stage of `generation`, a child of this one. A mission may name another `executable` for it.
+/// Returns the command of a stage's `generation`. A mission may name another `executable`.
 pub fn stage(executable: Option<&Path>, generation: &Generation) -> Command {
     let (program, called) = program_of(executable, generation.stage);
     let mut command = child(program);
@@ -41,8 +40,9 @@ pub fn stage(executable: Option<&Path>, generation: &Generation) -> Command {
     command
 }
 
-/// The program of `stage`, and the name that it is called there: the mission's `executable`, if that is a path; otherwise this
-/// program, which may have another planner of that name.
+/// Returns the program of `stage`, and the stage's name there.
+///
+/// An absolute `executable` is the program. Any other names a planner of this program.
 pub fn program_of<'a>(executable: Option<&'a Path>, stage: &'a str) -> (&'a Path, &'a str) {
     match executable {
         Some(path) if path.is_absolute() => (path, stage),
@@ -50,12 +50,13 @@ pub fn program_of<'a>(executable: Option<&'a Path>, stage: &'a str) -> (&'a Path
     }
 }
 
-/// A process of `program`, in a process group of its own: a terminal's Ctrl-C reaches the supervisor alone.
+/// Returns a command in its own process group, so that a terminal's Ctrl-C reaches only the
+/// supervisor.
 pub fn child(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command
         .process_group(0)
-        // The supervisor's connection to systemd is not for its children.
+        // Only the supervisor may notify systemd.
         .env_remove("NOTIFY_SOCKET")
         .env_remove("WATCHDOG_USEC")
         .env_remove("WATCHDOG_PID")
@@ -65,7 +66,7 @@ pub fn child(program: impl AsRef<OsStr>) -> Command {
 
 #[derive(Debug)]
 pub struct Process {
-    /// The child; none for an external process, which its parent reaps.
+    /// Child process; `None` for an external one, which its parent reaps.
     child: Option<Child>,
     id: u32,
     pidfd: OwnedFd,
@@ -79,7 +80,7 @@ pub enum ExitCause {
         signal: i32,
         core: bool,
     },
-    /// The process was the child of another one, which alone knows the cause.
+    /// Only its parent knows the cause.
     Unknown,
 }
 
@@ -108,14 +109,14 @@ impl fmt::Display for ExitCause {
 }
 
 impl Process {
-    /// Start `command`. The process inherits no descriptor but the standard ones.
+    /// Starts `command`. The process inherits only the standard descriptors.
     pub fn spawn(mut command: Command) -> io::Result<Self> {
         close_all_on_exec()?;
         let mut child = command.spawn()?;
         match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
             Ok(pidfd) => Ok(Self { id: child.id(), child: Some(child), pidfd }),
             Err(error) => {
-                // The process must not run without being watched.
+                // A process must not run unwatched.
                 let _ = child.kill();
                 let _ = child.wait();
                 Err(error.into())
@@ -123,12 +124,12 @@ impl Process {
         }
     }
 
-    /// Watch process `id`, called `name`, which somebody else started and which published a moment ago.
+    /// Watches the external process `id`, called `name`, which published a moment ago.
     pub fn adopt(id: u32, name: &str) -> io::Result<Self> {
         let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
         let pid = pid.ok_or(io::ErrorKind::NotFound)?;
         let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
-        // Its id may belong to another one meanwhile, which must not be signalled.
+        // The id may meanwhile belong to another process, which must not be signalled.
         let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
         if called.trim_end() != name {
             return Err(io::ErrorKind::NotFound.into());
@@ -168,7 +169,7 @@ impl Process {
         poll::is_readable(&self.pidfd, patience)
     }
 
-    /// Send SIGTERM, and SIGKILL if the process has not ended after `grace`.
+    /// Sends SIGTERM, then SIGKILL if the process has not ended after `grace`.
     pub fn end(&mut self, grace: Duration) {
         self.signal(Signal::TERM);
         let began = Instant::now();
@@ -189,7 +190,6 @@ impl AsFd for Process {
 }
 
 impl Drop for Process {
-    /// The destructor leaves no child running after an error.
     fn drop(&mut self) {
         if let Some(child) = &mut self.child
             && !matches!(child.try_wait(), Ok(Some(_)))

@@ -1,5 +1,5 @@
-//! Files of records in the run directory, one JSON object a line. A record that cannot be written is a warning in the
-//! log, and the mission goes on.
+//! Files of records in the run directory, one JSON object a line. A failed write logs a warning,
+//! and the mission goes on.
 
 use std::{
     io::{self, Write as _},
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 pub const DEATHS: &str = "deaths.jsonl";
 pub const STALLS: &str = "stalls.jsonl";
-/// The results of targets, each once it is known.
+/// Results of targets, as they become known.
 pub const TARGETS: &str = "targets.jsonl";
 
 pub fn append(directory: &Path, name: &str, record: &impl Serialize) {

@@ -1,6 +1,5 @@
-//! Notifications to systemd, if it started this process: ready, status, watchdog, stopping.
-//!
-//! If `NOTIFY_SOCKET` is not set, the functions do nothing.
+//! Notifications to systemd: ready, status, watchdog, stopping. Without `NOTIFY_SOCKET` the
+//! functions do nothing.
 
 use std::time::{Duration, Instant};
 
@@ -40,8 +39,8 @@ impl ServiceManager {
         }
     }
 
-    /// Feed the watchdog if that is due. Only the loop may call this, because another thread would feed the watchdog while the
-    /// loop hangs.
+    /// Feeds the watchdog if that is due. Only the loop may call this: another thread would feed it
+    /// while the loop hangs.
     pub fn feed(&mut self) {
         if self.time_to_feed().is_some_and(|left| left.is_zero()) {
             self.fed = Some(Instant::now());
@@ -49,7 +48,7 @@ impl ServiceManager {
         }
     }
 
-    /// Time until the watchdog is to be fed: half of its time limit, as systemd recommends.
+    /// Returns the time until the next feed: half of the limit, as systemd recommends.
     pub fn time_to_feed(&self) -> Option<Duration> {
         let every = self.watchdog? / 2;
         let since = self.fed.map(|fed| fed.elapsed());
@@ -57,7 +56,7 @@ impl ServiceManager {
     }
 }
 
-/// A failed notification does not stop the robot.
+/// Sends a notification. Failures never stop the robot.
 fn notify(states: &[NotifyState<'_>]) {
     if let Err(error) = sd_notify::notify(states) {
         tracing::debug!(%error, "systemd does not listen");

@@ -31,24 +31,24 @@ pub struct StageProcessError {
     source: io::Error,
 }
 
-/// A stage and its current generation. Times are of the owner's clock.
+/// Stage and its current generation. Times are of the owner's clock.
 pub(crate) struct StageProcess {
     pub stage: &'static Stage,
-    /// The mission's executable for this stage, if it names one.
     executable: Option<PathBuf>,
     pub policy: Policy,
     pub process: Option<Process>,
     generation: u32,
     started: Now,
     beat: Option<Now>,
-    /// The times of the process at its start or its last ready beat; none if the kernel does not count them.
+    /// Times of the process at its start or last ready beat; `None` if the kernel does not count
+    /// them.
     times: Option<Times>,
     pub output: Option<Now>,
     log_start: u64,
     hung: Option<Now>,
-    /// Whether the last beat announced that the process stops on request.
+    /// Whether the last beat announced a stop on request.
     pub stopping: bool,
-    /// Whether the iteration before found that the process had ended.
+    /// Whether the previous iteration found the process ended.
     found_ended: bool,
 }
 
@@ -88,9 +88,10 @@ impl StageProcess {
         self.generation.saturating_sub(1)
     }
 
-    /// Watch the external process that published `health`, if it is a successor. Returns whether it is.
+    /// Watches the external process that published `health`, if it is a successor. Returns whether
+    /// it is.
     pub(crate) fn adopt(&mut self, health: &HealthSample, now: Now) -> bool {
-        // Beats of a process that ended may still arrive.
+        // Beats of an ended process may still arrive.
         if self.process.is_some() || self.generation >= health.stamp.generation {
             return false;
         }
@@ -104,7 +105,7 @@ impl StageProcess {
         true
     }
 
-    /// Take a heartbeat of this stage. Returns whether the roster is to be published.
+    /// Takes a heartbeat. Returns whether the roster must be published.
     pub(crate) fn on_beat(&mut self, health: &HealthSample, now: Now) -> bool {
         if self.process.is_none() || self.pid() != health.pid {
             return false;
@@ -121,7 +122,7 @@ impl StageProcess {
             self.times = Times::of(health.pid);
         }
         self.policy.step(event, now);
-        // A process that starts waits for a roster that names it.
+        // A starting process waits for a roster that names it.
         state == HealthState::Starting || !was_running && event == Event::BeatReady
     }
 
@@ -174,19 +175,21 @@ impl StageProcess {
         }
     }
 
-    /// The activity since the start or the last beat, if a deadline has passed by `now`.
+    /// Returns the activity since the last beat, if a deadline has passed.
     pub(crate) fn overdue_activity(&self, now: Now) -> Option<Activity> {
         self.policy.deadline().filter(|deadline| now >= *deadline)?;
         self.times?.activity(self.pid())
     }
 
-    /// The time `now` without that in which the process waited for a processor, as of its last beat.
+    /// Returns `now` without the process's wait for a processor, as of its last beat.
     pub(crate) fn unstarved(&self, now: Now) -> Now {
         now.saturating_sub(self.times.unwrap_or_default().starved)
     }
 
-    /// The cause of the end of the process, if it has ended. That of an external process that did not announce it comes an iteration
-    /// later, because a last beat may be unread.
+    /// Returns the cause if the process has ended.
+    ///
+    /// An unannounced end of an external process is reported one iteration later, because a last
+    /// beat may be unread.
     pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
         let Some(process) = &mut self.process else {
             return Ok(None);
@@ -199,7 +202,6 @@ impl StageProcess {
         Ok(cause.filter(|_| is_known))
     }
 
-    /// Note that the process is reaped. Returns the record of the death, without the next step.
     pub(crate) fn record_death(&mut self, cause: ExitCause, directory: &Path, now: Now) -> Death {
         let age = |then: Now| now.saturating_sub(then).as_secs_f64();
         let hung_after = |(hung, beat): (Now, Now)| hung.saturating_sub(beat).as_secs_f64();

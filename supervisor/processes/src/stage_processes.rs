@@ -1,5 +1,5 @@
-//! The stages of a run, each under its own policy. Beats, deaths and deadlines become events of the policies, and the
-//! policies' actions are carried out.
+//! Stages of a run, each under its own policy, which turns beats, deaths and deadlines into
+//! actions.
 
 use std::{
     os::fd::{AsFd, BorrowedFd},
@@ -30,7 +30,7 @@ pub enum Starter {
     External,
 }
 
-/// The pause between looks at a stage that is late and may only be starved.
+/// Interval of checks on a late stage that may only be starved.
 const LOOK_AGAIN: Duration = Duration::from_millis(10);
 
 pub struct StageProcesses {
@@ -44,7 +44,7 @@ pub struct StageProcesses {
 }
 
 impl StageProcesses {
-    /// The stages before any runs. They log to the run `directory`.
+    /// Creates all stages, not yet running. They log to the run `directory`.
     pub fn new(directory: PathBuf, starter: Starter, mission: &Mission) -> Self {
         let cells = mission.grid_frame().area();
         let stages = start_order().into_iter();
@@ -63,7 +63,8 @@ impl StageProcesses {
         self.clock.at(Instant::now())
     }
 
-    /// Note the end of a wait that should have taken at most `planned`. Longer time does not count against the stages.
+    /// Records the end of a wait planned to take at most `planned`. Excess time does not count
+    /// against the stages.
     pub fn on_waited(&mut self, planned: Duration) {
         self.clock.on_waited(planned, Instant::now());
     }
@@ -72,7 +73,8 @@ impl StageProcesses {
         self.stages.iter().position(|it| it.stage.name == stage)
     }
 
-    /// Start every stage that is down, in order, from `first_tick` on. External stages are not started here.
+    /// Starts every stage that is down, in order, from `first_tick` on. External stages start by
+    /// themselves.
     pub fn start_all(&mut self, first_tick: u64) {
         self.ending = false;
         if self.starter == Starter::External {
@@ -96,7 +98,7 @@ impl StageProcesses {
         Some(if left.is_zero() { LOOK_AGAIN } else { left })
     }
 
-    /// Take a heartbeat. Returns whether the roster changed by it.
+    /// Takes a heartbeat. Returns whether it changed the roster.
     pub fn on_health(&mut self, health: &HealthSample) -> bool {
         let Some(index) = self.position(name_str(&health.stage)) else {
             return false;
@@ -118,7 +120,7 @@ impl StageProcesses {
         }
     }
 
-    /// Abort a stage that beats but does not answer its inputs, while the robot drives and all stages run.
+    /// Aborts a stage that beats without answering, while the robot drives and all stages run.
     pub fn check_outputs(&mut self, driving: bool, first_tick: u64) {
         if !driving || !self.all_running() {
             self.watchdog.clear_unanswered();
@@ -138,10 +140,12 @@ impl StageProcesses {
         }
     }
 
-    /// Reap ended stages, start successors on `bus` from `first_tick` on, apply deadlines. Returns the deaths.
+    /// Reaps ended stages, starts successors on `bus` from `first_tick` on, applies deadlines.
+    /// Returns the deaths.
     pub fn poll(&mut self, bus: &Bus, first_tick: u64) -> Result<Vec<Death>, StageProcessError> {
         let mut deaths = Vec::new();
-        // Heartbeats were read until now. The rest may wait for the disk, which must not make a stage late.
+        // Heartbeats were read until now. Later work may wait for the disk, which must not make a
+        // stage late.
         let taken = self.now();
         for index in 0..self.stages.len() {
             if let Some(cause) = self.stages[index].try_reap()? {
@@ -172,24 +176,25 @@ impl StageProcesses {
         Ok(deaths)
     }
 
-    /// Whether a stage could not start on this bus since the last call.
+    /// Returns whether a stage could not start on this bus since the last call.
     pub fn is_start_blocked(&mut self) -> bool {
         std::mem::take(&mut self.start_blocked)
     }
 
-    /// Do not restart stages that end until all are started again.
+    /// Suspends restarts until [`Self::start_all`].
     pub fn start_no_more(&mut self) {
         self.ending = true;
     }
 
-    /// Replace `stage` by a new generation from `first_tick` on. A held stage is released.
+    /// Replaces `stage` by a new generation from `first_tick` on. This releases a held stage.
     pub fn replace(&mut self, stage: &str, first_tick: u64) {
         if let Some(index) = self.position(stage) {
             self.apply(index, Event::Replace, self.now(), first_tick);
         }
     }
 
-    /// Stop all stages from the `first` of the start order on. Returns whether one of them has a process or waits for one.
+    /// Stops all stages from the `first` of the start order on. Returns whether one of them still
+    /// has or awaits a process.
     pub fn stop_from(&mut self, first: usize) -> bool {
         let mut any = false;
         for index in first..self.stages.len() {
@@ -251,7 +256,7 @@ impl StageProcesses {
         (running.count(), self.stages.len())
     }
 
-    /// The stages that are not started by the supervisor and do not beat as ready.
+    /// Returns the external stages that do not beat as ready.
     pub fn not_started(&self) -> Vec<&'static str> {
         let external = self.starter == Starter::External;
         self.names(|stage| external && !stage.is_running())
@@ -276,7 +281,7 @@ impl StageProcesses {
     }
 }
 
-/// The destructor stops the stages in reverse order, after an error too. The link is the last and stops the robot.
+/// Stops the stages in reverse order, after an error too. The link comes last and stops the robot.
 impl Drop for StageProcesses {
     fn drop(&mut self) {
         while let Some(mut stage) = self.stages.pop() {

@@ -1,7 +1,8 @@
-//! THE table of the stages of a robot, and their deadlines. Each stage declares in its own crate the topics that it opens and the state
-//! that it persists.
+//! Single table of a robot's stages and their deadlines. Each stage's crate declares the topics
+//! that it opens and the state that it persists.
 //!
-//! Start order, deadlines, `firsthand stage`, `firsthand stage list` and the tables of the documentation come from this table.
+//! Start order, deadlines, `firsthand stage`, `firsthand stage list` and the documentation's tables
+//! come from this table.
 
 use std::{path::Path, time::Duration};
 
@@ -16,11 +17,11 @@ use common::{
 
 pub struct Stage {
     pub name: &'static str,
-    /// The topics that its process opens on the bus, and the state that it persists.
+    /// Topics that the process opens on the bus, and the state that it persists.
     pub wiring: &'static Wiring,
     /// Deadlines on a map without cells.
     pub deadlines: Deadlines,
-    /// The time added to each deadline for a million cells of the map.
+    /// Addition to each deadline per million map cells.
     pub per_million_cells: Duration,
     pub while_down: &'static str,
     pub run: fn(&Start) -> Result<(), StageError>,
@@ -30,10 +31,12 @@ pub struct Stage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Deadlines {
     pub startup: Duration,
-    /// The longest time from beat to beat. Beats come every 150 ms, or with a tick. Time in which the stage waits for a processor does
-    /// not count, and a stage that sleeps has four times as long: see [`Activity`](crate::activity::Activity).
+    /// Longest time between beats, which come every 150 ms or with a tick.
+    ///
+    /// Waiting for a processor does not count, and a sleeping stage has four times as long: see
+    /// [`Activity`](crate::activity::Activity).
     pub heartbeat: Duration,
-    /// The longest time from a tick on its inputs to its output of that tick, or of a later one.
+    /// Longest time from a tick on the inputs to the output of that tick or a later one.
     pub answers: Duration,
 }
 
@@ -54,7 +57,7 @@ impl Stage {
         Self::new::<Answers<A>>(replay::<A>, while_down)
     }
 
-    /// The executable that `mission` names for this stage; none if the stage is `firsthand`'s own.
+    /// Returns the executable that `mission` names for this stage; `None` for `firsthand`'s own.
     pub fn executable<'mission>(&self, mission: &'mission Mission) -> Option<&'mission Path> {
         let named = mission.planner.executable.as_deref();
         named.filter(|_| self.name == PLANNER)
@@ -70,14 +73,16 @@ impl Stage {
     }
 }
 
-/// The time after which a stage that has not opened its topics is stuck, for example by incomplete services. On a loaded machine of two
-/// cores the slowest start took a tenth of it.
+/// Time for a stage to open its topics. Incomplete services, for example, block it. On a loaded
+/// machine of two cores the slowest start took a tenth of it.
 const STARTUP: Duration = Duration::from_secs(3);
-/// The time of five beats. A loaded machine with more stages than cores delays a beat by 200 ms at times; with 500 ms and a build on
-/// the same machine, three healthy stages were aborted in 70 missions. The robot's stop does not depend on this: the link stops the
-/// robot when the command is stale.
+/// Five beats.
+///
+/// A loaded machine with more stages than cores sometimes delays a beat by 200 ms. With 500 ms and
+/// a build on the same machine, three healthy stages were aborted in 70 missions. The robot's stop
+/// is independent of this: the link stops the robot when the command is stale.
 const HEARTBEAT: Duration = Duration::from_millis(750);
-/// The time for an answer; the slowest take a hundredth of it.
+/// Time for an answer; the slowest take a hundredth of it.
 const ANSWERS: Duration = Duration::from_secs(1);
 const DEADLINES: Deadlines = Deadlines { startup: STARTUP, heartbeat: HEARTBEAT, answers: ANSWERS };
 /// The planner beats between solves, and leaves ticks unanswered while it solves.
@@ -86,19 +91,21 @@ const PLANNER_DEADLINES: Deadlines = Deadlines {
     heartbeat: Duration::from_secs(2),
     answers: Duration::from_secs(4),
 };
-/// The allowance of the mapper, which restores its map and publishes all of it in one iteration. At 16.8 million cells no beat was
-/// late even without it.
+/// The mapper restores and publishes its whole map in one iteration. At 16.8 million cells no beat
+/// was late even without this allowance.
 const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
-/// The allowance of the planner: a full solve, a keyframe of the field and the backlog may fall into one iteration. At 16.8 million
-/// cells it did not beat for more than 2 s forty times in a mission, and with this allowance it was never late in a run of 97 s.
+/// A full solve, a keyframe of the field and the backlog may fall into one planner iteration.
+///
+/// At 16.8 million cells its beats paused for more than 2 s forty times in a mission. With this
+/// allowance it was never late in a run of 97 s.
 const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
 
-/// The name of the stage that gives guidance: a mission may name an executable for it.
+/// Name of the stage that gives guidance, for which a mission may name an executable.
 pub const PLANNER: &str = "planner";
 
 const STOPPED: &str = "stopped by the link when the command is stale";
 
-/// Every stage, in the order of the pipeline.
+/// All stages in pipeline order.
 pub static TABLE: &[Stage] = &[
     Stage::new::<link::shell::Shell>(
         replay::<link::stage::LinkStage>,
@@ -121,14 +128,15 @@ pub fn find(name: &str) -> Option<&'static Stage> {
     TABLE.iter().find(|stage| stage.name == name)
 }
 
-/// The error message for a name that no stage has.
+/// Returns the error message for an unknown stage name.
 pub fn unknown(name: &str) -> String {
     let names: Vec<_> = TABLE.iter().map(|stage| stage.name).collect();
     let names = names.join(", ");
     format!("no stage is called {name:?}; the stages are {names}")
 }
 
-/// The stages in start order: each after the writers of its inputs. They stop in reverse order.
+/// Returns the stages in start order, each after the writers of its inputs. They stop in reverse
+/// order.
 pub fn start_order() -> Vec<&'static Stage> {
     let mut order: Vec<&'static Stage> = Vec::with_capacity(TABLE.len());
     while order.len() < TABLE.len() {
@@ -142,7 +150,7 @@ pub fn start_order() -> Vec<&'static Stage> {
                 !waiting.iter().any(|other| other.name == writer)
             })
         });
-        // If the inputs form a circle, there is no such stage, and the others start in the table's order.
+        // If the inputs form a circle, the remaining stages start in the table's order.
         order.extend(next.or(waiting.first()));
     }
     order

@@ -1,4 +1,4 @@
-//! Writing a bag of rosbag2: a folder with `metadata.yaml` and an MCAP file of messages of ROS 2.
+//! Writer of a rosbag2 bag: a folder with `metadata.yaml` and an MCAP file of ROS 2 messages.
 
 use std::{
     collections::BTreeMap,
@@ -12,9 +12,9 @@ use serde_json::{Value, json};
 use crate::{error::Result, file::Output};
 
 const FILE: &str = "bag_0.mcap";
-/// Readers of ROS 2 Humble and later know this version of `metadata.yaml`, in which numbers stand for policies.
+/// Version of `metadata.yaml`, with numbers for policies, for ROS 2 Humble and later.
 const VERSION: u8 = 5;
-/// The quality with which a player publishes for those who join later: reliable, transient local, without deadlines.
+/// QoS for late joiners: reliable, transient local, without deadlines.
 const LATCHED: &str = "[{history: 1, depth: 1, reliability: 1, durability: 1, deadline: {sec: 9223372036, nsec: 854775807}, \
      lifespan: {sec: 9223372036, nsec: 854775807}, liveliness: 1, \
      liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}, avoid_ros_namespace_conventions: false}]";
@@ -25,41 +25,42 @@ pub struct Bag {
 }
 
 impl Bag {
-    /// Make `folder`.
+    /// Makes `folder`.
     ///
     /// # Errors
-    /// When it exists or cannot be made.
+    /// Fails if it exists or cannot be made.
     pub fn create(folder: &Path) -> Result<Self> {
         fs::create_dir(folder).map_err(FileError::of("make bag", folder))?;
         let mut output = Output::create(&folder.join(FILE), "ros2")?;
-        // An empty text here tells readers that the policies of channels are of a version before 9.
+        // An empty text tells readers that the channel policies predate version 9.
         let about = BTreeMap::from([("serialized_metadata".to_owned(), String::new())]);
         output.metadata("rosbag2", about)?;
         Ok(Self { output, folder: folder.to_path_buf() })
     }
 
-    /// Add a topic with the name and the definition of its type, whose newest message those who join later get if it `is_latched`.
+    /// Adds a topic with the name and the definition of its type. Late joiners get its newest
+    /// message if it `is_latched`.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// Fails if the file cannot be written.
     pub fn add(&mut self, [topic, kind, definition]: [&str; 3], is_latched: bool) -> Result {
         let quality = if is_latched { LATCHED } else { "" };
         let about = BTreeMap::from([("offered_qos_profiles".to_owned(), quality.to_owned())]);
         self.output.add(topic, kind, "ros2msg", definition.as_bytes(), "cdr", &about)
     }
 
-    /// Add a message in CDR, with its encapsulation.
+    /// Adds a message in CDR, with its encapsulation.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// Fails if the file cannot be written.
     pub fn message(&mut self, topic: &str, at_ns: u64, message: &[u8]) -> Result {
         self.output.write(topic, 0, [at_ns; 2], message)
     }
 
-    /// Write the rest. Returns the count of messages.
+    /// Writes the rest. Returns the count of messages.
     ///
     /// # Errors
-    /// When the files cannot be written.
+    /// Fails if the files cannot be written.
     pub fn finish(self) -> Result<u64> {
         let summary = self.output.finish()?;
         let stats = summary.stats.unwrap_or_default();
@@ -82,7 +83,7 @@ impl Bag {
             "files": [{"path": FILE, "starting_time": begin, "duration": span, "message_count": count}],
         }});
         let file = self.folder.join("metadata.yaml");
-        // JSON is YAML.
+        // JSON is valid YAML.
         fs::write(&file, format!("{metadata:#}\n")).map_err(FileError::of("write", &file))?;
         Ok(count)
     }

@@ -1,10 +1,11 @@
-//! The disk budget of a recorder: its files have at most a share of it and last an hour at most, and the oldest are removed.
+//! Disk budget of a recorder. It limits each file to a share and an hour, and removes the oldest
+//! files.
 
 use std::{collections::VecDeque, fs, path::PathBuf, time::Duration};
 
-/// The number of files for which a budget has room, so that at least three quarters of it are the newest samples.
+/// Files per budget, so that at least three quarters of it hold the newest samples.
 const FILES: u64 = 4;
-/// A robot that waits for days leaves files that one opens for the hour in question.
+/// Longest time in one file. After days of waiting, a user opens only the hour in question.
 const LONGEST: Duration = Duration::from_secs(3600);
 
 pub(crate) struct Budget {
@@ -18,18 +19,17 @@ fn size(file: &PathBuf) -> u64 {
 }
 
 impl Budget {
-    /// A budget that counts the `earlier` files, too, the oldest first.
+    /// Creates a budget that includes the `earlier` files, the oldest first.
     pub(crate) fn new(bytes: u64, earlier: impl IntoIterator<Item = PathBuf>) -> Self {
         let complete = earlier.into_iter().map(|file| (file.clone(), size(&file))).collect();
         Self { bytes, complete }
     }
 
-    /// Whether `file` has its share, or is an hour old.
     pub(crate) fn ends(&self, file: &PathBuf, age: Duration) -> bool {
         age >= LONGEST || size(file) >= self.bytes / FILES
     }
 
-    /// Count a complete `file`, and remove the oldest until there is room for the next.
+    /// Counts a complete `file`, and removes the oldest until the next has room.
     pub(crate) fn complete(&mut self, file: PathBuf) {
         let its = size(&file);
         self.complete.push_back((file, its));

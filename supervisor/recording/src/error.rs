@@ -1,5 +1,3 @@
-//! Errors of recordings.
-
 use std::path::PathBuf;
 
 use common::{bus::BusError, file::FileError, run::RunError};

@@ -1,5 +1,3 @@
-//! Writing the file.
-
 use std::{
     collections::{BTreeMap, HashMap},
     fs::{self, File},
@@ -26,33 +24,34 @@ use crate::{
     viewers::{self, Channel},
 };
 
-/// The bytes at which a chunk is written, unless it is written after [`CHUNK_EVERY`].
+/// Size at which a chunk is written before [`CHUNK_EVERY`], bytes.
 const CHUNK_BYTES: u64 = 1 << 19;
-/// Longest time between two chunks: a killed recorder loses no more.
+/// Longest interval of chunks, the most that a killed recorder loses.
 const CHUNK_EVERY: Duration = Duration::from_secs(1);
-/// The name of the metadata record about the run.
 pub(crate) const RUN: &str = "run";
 pub(crate) const LOST: &str = "recorder";
 const LOST_SCHEMA: &[u8] = br#"{"title": "firsthand.Recorder", "type": "object", "properties": {"lost": {"type": "object"}}}"#;
 
 pub(crate) struct RecordingFile {
     output: Output,
-    /// The start of the mission, nanoseconds since 1970.
+    /// Start of the mission, nanoseconds since 1970.
     began_ns: u64,
     clock: Option<MissionClock>,
     newest: MissionTime,
     chunk_began: Instant,
 }
 
-/// The machine's time, nanoseconds since 1970.
+/// Returns the machine's time, nanoseconds since 1970.
 pub fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0, |since| since.as_nanos() as u64)
 }
 
 impl RecordingFile {
-    /// Make a new file `about` a `run`, with a channel for each of `topics` and for the drawings of its mission in viewers. The file gets
-    /// its name when all of that is written, so a file of this name can always be read.
+    /// Makes a file `about` a `run`, with channels for `topics` and for drawings in viewers.
+    ///
+    /// The file gets its name once all of that is written, so a file of this name is always
+    /// readable.
     pub(crate) fn create(
         path: &Path,
         topics: &[&'static dyn AnyTopic],
@@ -103,7 +102,7 @@ impl RecordingFile {
         Ok(recording)
     }
 
-    /// The same file with the times of the file `before`.
+    /// Continues the times of the file `before`.
     pub(crate) const fn continuing(mut self, before: &Self) -> Self {
         (self.began_ns, self.newest) = (before.began_ns, before.newest);
         self
@@ -116,15 +115,15 @@ impl RecordingFile {
         }
     }
 
-    /// Mission time as nanoseconds since 1970.
+    /// Returns the mission time as nanoseconds since 1970.
     pub(crate) fn now_ns(&self) -> u64 {
         self.began_ns.saturating_add(self.mission_time().0)
     }
 
-    /// Add `message`, a sample of a topic. Returns its log time.
+    /// Adds a topic's sample. Returns its log time.
     pub(crate) fn sample(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> Result<u64> {
         let mut times = [self.now_ns(); 2];
-        // An operator knows no mission time, and a heartbeat has that of the tick before it.
+        // An operator knows no mission time, and a heartbeat has that of the previous tick.
         if ![OPERATOR, EVERY_STAGE].contains(&spec.writer) {
             self.newest = self.newest.max(stamp.time());
             times[1] = self.began_ns.saturating_add(stamp.stamp_ns);
@@ -140,13 +139,11 @@ impl RecordingFile {
         self.output.write(topic, 0, [log_ns; 2], message)
     }
 
-    /// Add the numbers of samples that were lost so far.
     pub(crate) fn lost(&mut self, lost: &BTreeMap<&str, u64>) -> Result {
         let json = serde_json::json!({"lost": lost}).to_string();
         self.message(LOST, self.now_ns(), json.as_bytes())
     }
 
-    /// Write the current chunk, if the last one was written [`CHUNK_EVERY`] ago.
     pub(crate) fn flush_if_due(&mut self) -> Result {
         if self.chunk_began.elapsed() >= CHUNK_EVERY {
             self.flush()?;
@@ -160,7 +157,7 @@ impl RecordingFile {
         writer.flush().map_err(failed(path))
     }
 
-    /// Write the rest, and the summary that readers use as an index.
+    /// Writes the rest, and the summary that serves as an index.
     pub(crate) fn finish(self) -> Result {
         self.output.finish().map(drop)
     }
@@ -181,7 +178,7 @@ impl Output {
             .compression(Some(Compression::Zstd))
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
-            // A chunk is written in one piece when it is complete, and never changed.
+            // A complete chunk is written in one piece and never changed.
             .disable_seeking(true);
         let writer = options.create(BufWriter::new(file)).map_err(failed(path))?;
         Ok(Self { writer, path: path.to_path_buf(), channels: HashMap::new() })

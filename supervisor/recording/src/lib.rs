@@ -1,24 +1,27 @@
-//! Recordings: all samples of a robot's bus in one file, written by a consumer, read by reports and replays.
+//! Recordings: all samples of a robot's bus in one file, written by a consumer, read by reports and
+//! replays.
 //!
 //! # The file
-//! MCAP, in chunks compressed with Zstandard; each chunk is written whole, at least once a second. A recorder that is killed
-//! leaves a file that ends after its last whole chunk.
+//! MCAP in chunks compressed with Zstandard, each written whole, at least once a second. The file
+//! of a killed recorder ends after its last whole chunk.
 //!
-//! - A channel for each topic of the table that its column `logged` names, under the topic's name. A message is one
-//!   whole sample in the CDR encoding of ROS 2; its schema is the text of a ROS 2 message (`ros2msg`), made from the
-//!   topic's layout. A message of a topic of slices has a `header` and `elements`.
-//! - Channels for viewers, in Foxglove's schemas as Protobuf: `foxglove/transforms` (`FrameTransforms`: `map`, `base`, sensors),
-//!   `foxglove/pose` (`PoseInFrame`), `foxglove/odometry` (`Odometry`: with covariance), `foxglove/grid` (`Grid`), `foxglove/scene`
-//!   (`SceneUpdate`: trajectory, targets, body, uncertainty), `foxglove/scan/SENSOR` (`LaserScan`), `log` (`Log`: the logs of the
-//!   stages and the supervisor).
-//! - A channel `recorder` (JSON): numbers of samples by topic that the recorder lost so far, whenever they grow.
-//! - A metadata record `run`: robot, mission, seed, build, machine, date, and `run_toml`, the run file of the stages.
+//! - A channel for each topic that the topic table marks as `logged`, under the topic's name. A
+//!   message is one sample in the CDR encoding of ROS 2. Its schema is the text of a ROS 2 message
+//!   (`ros2msg`), made from the topic's layout. Topics of slices have a `header` and `elements`.
+//! - Channels for viewers, in Foxglove's schemas as Protobuf: `foxglove/transforms`
+//!   (`FrameTransforms`: `map`, `base`, sensors), `foxglove/pose` (`PoseInFrame`),
+//!   `foxglove/odometry` (`Odometry`: with covariance), `foxglove/grid` (`Grid`), `foxglove/scene`
+//!   (`SceneUpdate`: trajectory, targets, body, uncertainty), `foxglove/scan/SENSOR` (`LaserScan`),
+//!   `log` (`Log`: the logs of the stages and the supervisor).
+//! - A channel `recorder` (JSON): samples lost so far by topic, whenever they grow.
+//! - A metadata record `run`: robot, mission, seed, build, machine, date, and `run_toml`, the run
+//!   file of the stages.
 //!
-//! Times are mission time, counted from the mission's start in nanoseconds since 1970, so that viewers play a run at its speed, in
-//! lockstep too. The publish time of a message is that of its sample. The log time is that at which the recorder read it, in lockstep the
-//! publish time. The sequence of a message is that of its sample.
+//! Times are mission time, counted from the mission's start in nanoseconds since 1970, so that
+//! viewers play a run at its speed, even in lockstep. A message has its sample's publish time and
+//! sequence. The log time is the time of reading, in lockstep the publish time.
 //!
-//! A new run of the robot begins a new file: `F.mcap`, `F-2.mcap`.
+//! Each new run of the robot begins a new file: `F.mcap`, `F-2.mcap`.
 //!
 //! # Reading
 //! ```no_run
@@ -43,15 +46,15 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`schema`] | the schema of a topic, made from its layout |
-//! | `bag` | writing a bag of rosbag2 |
-//! | `budget` | the disk budget of a recorder's files |
-//! | `file` | writing the file |
-//! | `log_files` | lines that the processes of a run append to their logs |
-//! | `places` | the names of recordings |
+//! | [`schema`] | schema of a topic, made from its layout |
+//! | `bag` | writer of rosbag2 bags |
+//! | `budget` | disk budget of a recorder's files |
+//! | `file` | writer of the file |
+//! | `log_files` | new lines in the logs of a run |
+//! | `places` | names of recordings |
 //! | `losses` | samples that the recorder missed |
 //! | [`recorder`] | the recorder |
-//! | [`reader`] | reading the file |
+//! | [`reader`] | reader of the file |
 //! | [`replay`] | recordings replayed to the bit |
 //! | [`viewers`], `protobuf` | messages for viewers, and their encoding |
 //! | `error` | errors |

@@ -1,4 +1,4 @@
-//! Lines that the processes of a run append to their logs, in the run directory.
+//! New lines in the logs of a run's processes, in the run directory.
 
 use std::{
     collections::HashMap,
@@ -7,10 +7,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Most bytes that are read of one log at once.
+/// Most bytes read of one log at once.
 const AT_ONCE: usize = 1 << 16;
 
-/// Reads the lines that are appended to a file.
+/// Reader of the lines appended to a file.
 #[derive(Debug, Default)]
 pub struct Tail {
     read: u64,
@@ -18,7 +18,7 @@ pub struct Tail {
 }
 
 impl Tail {
-    /// The new whole lines of `file`, of which at most 64 KiB are read at once. Without the file there are none.
+    /// Returns the new whole lines of `file`, at most 64 KiB at once; none without the file.
     pub fn lines(&mut self, file: &Path) -> String {
         let mut bytes = vec![0; AT_ONCE];
         let read = File::open(file).and_then(|file| file.read_at(&mut bytes, self.read));
@@ -26,14 +26,14 @@ impl Tail {
         self.read += length as u64;
         self.partial.extend_from_slice(&bytes[..length]);
         let whole = self.partial.iter().rposition(|&byte| byte == b'\n').map_or(0, |at| at + 1);
-        // A line without an end is given in parts.
+        // A line without an end is returned in parts.
         let is_endless = whole == 0 && self.partial.len() > AT_ONCE;
         let given = if is_endless { self.partial.len() } else { whole };
         let lines: Vec<u8> = self.partial.drain(..given).collect();
         String::from_utf8_lossy(&lines).into_owned()
     }
 
-    /// Leave out what `file` contains but its last `most` bytes, if it is not read so far yet.
+    /// Skips unread content of `file` except its last `most` bytes.
     pub fn skip(&mut self, file: &Path, most: u64) {
         let from = file.metadata().map_or(0, |file| file.len()).saturating_sub(most);
         if self.read < from {
@@ -49,7 +49,7 @@ pub struct LogFiles {
 }
 
 impl LogFiles {
-    /// Follow logs from their beginning, or only from their present ends on.
+    /// Follows logs from their beginning, or only from their present ends.
     pub fn follow(directory: &Path, from_the_beginning: bool) -> Self {
         let mut files = Self { directory: directory.to_path_buf(), read: HashMap::new() };
         if !from_the_beginning {
@@ -66,7 +66,8 @@ impl LogFiles {
         files.filter(|file| file.extension().is_some_and(|extension| extension == "log")).collect()
     }
 
-    /// Call `each` with the process and the text of every new line. A log that cannot be read is tried again later.
+    /// Calls `each` with the process and the text of every new line. An unreadable log is retried
+    /// later.
     pub fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
         for file in self.files() {
             let process = file.file_stem().map(|name| name.to_string_lossy().into_owned());

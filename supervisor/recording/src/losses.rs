@@ -1,4 +1,4 @@
-//! Counts missing samples and detects repeated ones: each writer numbers its samples.
+//! Detection of missing and repeated samples by their writers' numbers.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -8,7 +8,7 @@ use common::{
     topics::{EVERY_STAGE, OPERATOR, Spec},
 };
 
-/// Bytes of the stamp in a message, behind the encoding's header.
+/// Bytes of the stamp in a message, after the encoding's header.
 const STAMP: std::ops::Range<usize> = 4..28;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,9 +20,9 @@ struct Last {
 
 #[derive(Default)]
 pub(crate) struct Losses {
-    /// The recorder was there before all writers, so their first samples are missing if they do not come.
+    /// Whether the recorder preceded all writers, so that missing first samples count as lost.
     whole: bool,
-    /// The last sample by topic, by stage if every stage writes the topic, and by generation.
+    /// Last sample by topic, stage (if every stage writes the topic) and generation.
     last: HashMap<(&'static str, Name, u32), Last>,
     bus: u32,
     counts: BTreeMap<&'static str, u64>,
@@ -34,9 +34,10 @@ impl Losses {
         Self { whole, ..Self::default() }
     }
 
-    /// Take a sample. Returns whether it is new: a consumer that joins a bus again receives the last sample of each writer again.
+    /// Takes a sample. Returns whether it is new: a consumer that rejoins a bus receives each
+    /// writer's last sample again.
     pub(crate) fn came(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> bool {
-        // Each request has a writer of its own.
+        // Each request has its own writer.
         if spec.writer == OPERATOR {
             return true;
         }
@@ -57,13 +58,13 @@ impl Losses {
         last.is_none_or(|last| (now.sequence, now.crc32) != (last.sequence, last.crc32))
     }
 
-    /// Note that a bus was joined, another one or the same again. Writers may have restarted, and samples published meanwhile
-    /// cannot be counted.
+    /// Records that a bus was joined, perhaps the same again. Writers may have restarted, so
+    /// samples published meanwhile cannot be counted.
     pub(crate) const fn joined_again(&mut self) {
         self.bus += 1;
     }
 
-    /// Losses by topic, if they grew since the last call.
+    /// Returns the losses by topic, if they grew since the last call.
     pub(crate) fn grown(&mut self) -> Option<&BTreeMap<&'static str, u64>> {
         std::mem::take(&mut self.changed).then_some(&self.counts)
     }

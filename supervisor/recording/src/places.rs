@@ -1,5 +1,3 @@
-//! The names of recordings.
-
 use std::{
     collections::BTreeMap,
     fs,
@@ -8,7 +6,7 @@ use std::{
 
 use crate::{RecordingError, Result};
 
-/// The name of recording `number`: `F.mcap`, `F-2.mcap`, ...
+/// Returns the name of recording `number`: `F.mcap`, `F-2.mcap`, ...
 pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     if number <= 1 {
         return out.to_path_buf();
@@ -17,8 +15,8 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     out.with_file_name(format!("{stem}-{number}.mcap"))
 }
 
-/// What stands in a run's directory under the names of recordings, by number: a resumed run begins another, and so does a file that
-/// reached its size.
+/// Returns the entries with recordings' names in a run's directory, by number. A resumed run begins
+/// another file, and so does a full one.
 fn taken(run: &Path) -> BTreeMap<u32, PathBuf> {
     let first = run.join("recording.mcap");
     let paths = fs::read_dir(run).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -30,21 +28,22 @@ fn taken(run: &Path) -> BTreeMap<u32, PathBuf> {
     with_numbers.collect()
 }
 
-/// The next free one.
+/// Returns the next free name.
 pub fn next_place(run: &Path) -> PathBuf {
     let last = taken(run).into_keys().next_back().unwrap_or(0);
     numbered(&run.join("recording.mcap"), last.saturating_add(1))
 }
 
-/// The recordings in a run's directory, in order. A recorder with a disk budget removes the oldest.
+/// Returns the recordings in a run's directory, in order. A recorder with a disk budget removes the
+/// oldest.
 pub fn parts(run: &Path) -> Vec<PathBuf> {
     taken(run).into_values().filter(|file| file.is_file()).collect()
 }
 
-/// The recordings of `run`, in order and never none: those in a run's directory, or one file.
+/// Returns the recordings of `run`, a run's directory or one file, in order.
 ///
 /// # Errors
-/// When the directory has none.
+/// Fails if the directory has none.
 pub fn files(run: &Path) -> Result<Vec<PathBuf>> {
     if !run.is_dir() {
         return Ok(vec![run.to_path_buf()]);

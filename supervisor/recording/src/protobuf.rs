@@ -1,11 +1,12 @@
-//! The encoding of Protobuf, as far as messages for viewers need it: <https://protobuf.dev/programming-guides/encoding/>.
+//! Part of the Protobuf encoding that messages for viewers need:
+//! <https://protobuf.dev/programming-guides/encoding/>.
 
 const VARINT: u64 = 0;
 const FIXED_64: u64 = 1;
 const BYTES: u64 = 2;
 const FIXED_32: u64 = 5;
 
-/// A message that is written field by field. A number that is zero is left out, as the encoding has it.
+/// Message written field by field. As the encoding prescribes, zero numbers are left out.
 #[derive(Default)]
 pub(crate) struct Message(Vec<u8>);
 
@@ -26,7 +27,7 @@ impl Message {
         self.varint(field << 3 | kind);
     }
 
-    /// Add an integer, an enum or a bool.
+    /// Adds an integer, an enum or a bool.
     pub(crate) fn integer(mut self, field: u64, value: u64) -> Self {
         if value != 0 {
             self.tag(field, VARINT);
@@ -76,7 +77,8 @@ impl Message {
     }
 }
 
-/// The last text of `message` in `field`, empty if it has none. None if `message` is malformed.
+/// Returns the last text of `message` in `field`, empty if there is none; `None` if `message` is
+/// malformed.
 pub(crate) fn text_in(message: &[u8], field: u64) -> Option<String> {
     let (mut rest, mut found) = (message, &[][..]);
     while !rest.is_empty() {

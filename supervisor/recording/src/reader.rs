@@ -1,4 +1,4 @@
-//! Reads the file. Its content is not trusted, and only one chunk is held in memory.
+//! Reader of the file. It distrusts the content, and holds only one chunk in memory.
 
 use std::{
     collections::BTreeMap,
@@ -27,7 +27,7 @@ use crate::{
     schema,
 };
 
-/// Most bytes of a record or chunk. The recorder's are shorter.
+/// Most bytes of a record or chunk, more than the recorder writes.
 const LONGEST_RECORD: usize = 1 << 28;
 
 #[derive(Debug, PartialEq, Eq)]
@@ -44,15 +44,14 @@ pub enum End {
 pub struct Recording {
     pub path: PathBuf,
     pub run_text: String,
-    /// The run file: mission, clock, robot.
+    /// Run file: mission, clock, robot.
     pub run: Run,
     pub build: String,
     pub machine: String,
-    /// When the recorder was attached; empty in a recording of an earlier version.
+    /// Time when the recorder was attached; empty in a recording of an earlier version.
     pub began: String,
     pub end: End,
     pub counts: BTreeMap<String, u64>,
-    /// Numbers of samples by topic that the recorder lost.
     pub lost: BTreeMap<String, u64>,
 }
 
@@ -61,7 +60,7 @@ pub struct Message {
     pub topic: Arc<str>,
     /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
-    /// The sample's number, counted by its writer.
+    /// Number of the sample, counted by its writer.
     pub sequence: u32,
     pub data: Vec<u8>,
 }
@@ -82,8 +81,8 @@ pub struct SliceSample<H, T> {
 }
 
 impl Recording {
-    /// Read the run, the counts and the end of the recording at `path`, a file or a run's directory. The file is read once and
-    /// not held in memory.
+    /// Reads the run, the counts and the end of the recording at `path`, a file or a run's
+    /// directory. The file is read once and streamed.
     pub fn open(path: &Path) -> Result<Self> {
         if path.is_dir() {
             return match &parts(path)[..] {
@@ -151,7 +150,7 @@ impl Recording {
         })
     }
 
-    /// What is not in the recording, in sentences.
+    /// Returns sentences about the data missing from the recording.
     pub fn gaps(&self) -> Vec<String> {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
         let mut gaps = Vec::new();
@@ -168,8 +167,8 @@ impl Recording {
         gaps
     }
 
-    /// The messages of the topics that `wanted` names, or of all without names, in the order of the file. They end where the
-    /// file is cut.
+    /// Returns the messages of the topics in `wanted`, or of all if that is empty, in file order.
+    /// They end where the file is cut.
     pub fn messages(&self, wanted: &[&str]) -> Result<Messages> {
         Ok(Messages {
             records: Some(Records::open(&self.path)?),
@@ -187,7 +186,7 @@ impl Recording {
         })
     }
 
-    /// The headers and slices of `topic`, in the order of the file.
+    /// Returns the headers and slices of `topic` in file order.
     pub fn slices<H: Payload + Stamped + Layout, T: Payload + Layout>(
         &self,
         topic: &'static Topic<H, T>,
@@ -198,7 +197,6 @@ impl Recording {
         })
     }
 
-    /// The results of `decode` for the messages of `topic`, given their times and data.
     fn decoded<S, D: Fn(u64, &[u8]) -> Option<S>>(
         &self,
         topic: &str,
@@ -225,16 +223,15 @@ fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
     Some(recorder.lost)
 }
 
-/// The messages of some topics, in the order of the file.
+/// Messages of some topics in file order.
 #[derive(Debug)]
 pub struct Messages {
-    /// The rest of the file; none after the last record.
     records: Option<Records>,
     wanted: Vec<String>,
 }
 
 impl Messages {
-    /// The next message; none at the end of the file, or where it is cut.
+    /// Returns the next message; `None` at the end of the file, or where it is cut.
     fn read(&mut self) -> Result<Option<Message>> {
         let Some(records) = &mut self.records else {
             return Ok(None);
@@ -314,7 +311,7 @@ impl Records {
         })
     }
 
-    /// The next relevant record; none at the end of a complete file.
+    /// Returns the next relevant record; `None` at the end of a complete file.
     fn next(&mut self) -> Result<Option<Found>, Stop> {
         while let Some(event) = self.reader.next_event() {
             let cut = |error: McapError| Stop::Cut(error.to_string());
@@ -365,7 +362,6 @@ mod tests {
 
     use super::*;
 
-    /// Why a recording with a schema of this text and a run file of this text is refused.
     fn refused(schema_text: &str, run_text: &str) -> RecordingError {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("recording.mcap");
@@ -384,7 +380,7 @@ mod tests {
         let own = schema::of(&topics::POSE).text;
         let other = refused(&own.replacen("float64 x_m", "float32 x_m", 1), "");
         assert!(matches!(other, RecordingError::Schema { .. }), "{other}");
-        // A topic that only says more about itself is read, up to a run file with other keys.
+        // Extra comments in the schema are accepted; the run file's unknown keys are refused.
         let other = refused(&format!("# More.\n{own}"), "firsthand = '99.0.0'\nrobots = 2");
         assert!(matches!(other, RecordingError::Run(RunError::OtherVersion { .. })), "{other}");
         assert!(other.to_string().contains("99.0.0"), "{other}");

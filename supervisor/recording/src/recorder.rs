@@ -1,8 +1,9 @@
-//! The recorder is a consumer: it attaches to a robot at any time, records all topics, and follows the robot from run to run.
+//! Recorder: a consumer that attaches to a robot at any time, records all topics, and follows the
+//! robot from run to run.
 //!
-//! It holds only the chunk that is written next. When the disk is slow or the machine busy, samples that no longer fit in
-//! the bus's buffers are lost to it and counted. No stage waits; a run waits at its end, and in lockstep from time to time, until the
-//! recorder of that run has taken what there is.
+//! It holds only the chunk to be written next. On a slow disk or a busy machine, samples that
+//! overflow the bus's buffers are lost and counted. No stage waits for it. A run waits for its own
+//! recorder at its end, and in lockstep from time to time.
 
 use std::{
     collections::BTreeMap,
@@ -35,28 +36,28 @@ use crate::{
     viewers::{self, Drawn},
 };
 
-/// Longest time between two looks for a run, whose first samples a recorder misses that comes late.
+/// Longest interval of checks for a run. A late recorder misses its first samples.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
-/// Longest time between two reads of the bus. Events wake the recorder before a buffer is full; scans are the exception, and theirs
-/// lasts for 0.4 s of a laser at 40 Hz and four times its pace.
+/// Longest interval of bus reads. Events wake the recorder before a buffer is full, except for
+/// scans. The scan buffer lasts 0.4 s with a laser at 40 Hz at four times its pace.
 const READ_EVERY: Duration = Duration::from_millis(100);
 const LOGS_EVERY: Duration = Duration::from_millis(250);
 const LONGEST_RUN_FILE: u64 = 1 << 24;
-/// Niceness of a recorder of stages that answer a robot.
+/// Niceness of a recorder beside stages that answer a robot.
 const NICE: i32 = 5;
 
 #[derive(Clone)]
 pub struct Options {
     pub domain: Domain,
-    /// The file. The file of the robot's next run is called `F-2.mcap`.
+    /// Path of the first file. The next run's is called `F-2.mcap`.
     pub out: PathBuf,
-    /// The topics; without names, those that the table logs.
+    /// Topics to record; `None` for those that the table logs.
     pub topics: Option<Vec<&'static dyn AnyTopic>>,
-    /// Whether topics that the table logs only with fields are recorded too.
+    /// Whether to record topics that the table logs only with fields.
     pub fields: bool,
-    /// The directory of the one run that is recorded; none to find it and to follow the robot from run to run.
+    /// Directory of the only run to record; `None` to find it and follow the robot from run to run.
     pub run: Option<PathBuf>,
-    /// Most bytes of all files; none for no limit. The oldest files are removed.
+    /// Most bytes of all files, enforced by removing the oldest; `None` for no limit.
     pub budget: Option<u64>,
 }
 
@@ -79,26 +80,25 @@ impl Options {
 pub enum Happened<'a> {
     /// The recorder is attached, and records into this file from now on.
     Attached(&'a Path),
-    /// All samples were taken that had been published when the caller asked.
+    /// All samples published before the caller's request are taken.
     CaughtUp,
-    /// A file is complete, and this number of samples was lost.
+    /// A file is complete, with this number of lost samples.
     Complete(&'a Path, u64),
 }
 
-/// What the caller wants of the recorder.
+/// Request of the caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wish {
     Record,
-    /// Take all samples there are, and say so.
+    /// Take all present samples, then report.
     CatchUp,
     Stop,
 }
 
-/// The caller's wishes.
 pub trait Wishes {
     fn next_wish(&mut self) -> Wish;
 
-    /// Readable when there may be another wish.
+    /// Returns descriptors that are readable when another request may be there.
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
         Vec::new()
     }
@@ -114,7 +114,7 @@ type TopicReader = (&'static dyn AnyTopic, Box<dyn AnyReader>);
 /// The readers of one bus.
 type Readers = Vec<TopicReader>;
 
-/// Record until the caller wishes it to stop, or a single run until its end.
+/// Records until the caller requests a stop, or a single run until its end.
 pub fn record(
     options: &Options,
     wishes: &mut dyn Wishes,
@@ -128,8 +128,9 @@ pub fn record(
         chosen.iter().map(read).collect()
     };
     let domain = options.domain.clone();
-    // The recorder wakes at the end of a tick, at the start of a generation, which may be killed soon, for what processes publish that
-    // end with it, and before the buffer of a topic overflows whose samples wake nobody.
+    // Besides LINK, which ends a tick, three more topics wake the recorder. INPUTS marks the start
+    // of a generation, which may be killed soon. The others prevent losses at the end of their
+    // processes and overflow of buffers without events.
     let mut follower = Follower::new(domain, "recorder", &topics::LINK, open).also_on([
         &topics::INPUTS as &'static dyn AnyTopic,
         &topics::WIRE,
@@ -156,11 +157,11 @@ pub fn record(
         };
         joins = news.unwrap_or(joins);
         left = news.map_or(left, |joined| !joined);
-        // A bus is there before its run.
+        // A bus exists before its run.
         if joins && let Some(run) = find_run(options) {
             joins = false;
             let holder = options.domain.supervisor().ok().flatten();
-            // Another supervisor resumes the run, and starts a recorder of its own.
+            // Another supervisor resumes the run, and starts its own recorder.
             if options.run.is_some() && supervisor.is_some() && supervisor != holder {
                 if let Some(ended) = current.take() {
                     ended.finish(tell)?;
@@ -196,7 +197,7 @@ pub fn record(
             run.file.flush_if_due()?;
             let age = run.began.elapsed();
             if let Some(budget) = budget.as_mut().filter(|budget| budget.ends(&run.path, age)) {
-                // Readers that are new get whole maps, with which the next file begins.
+                // New readers get whole maps, with which the next file begins.
                 if let Ok(Some(mut before)) = follower.reopen() {
                     run.take(&mut before)?;
                 }
@@ -225,12 +226,12 @@ pub fn record(
     }
 }
 
-/// Let the stages go first that answer a robot, once the recorder is attached, which misses what they publish until then. In lockstep no
-/// robot waits for them, and a recorder that falls behind them loses what they publish.
+/// Yields to stages that answer a robot, once the recorder is attached; until then it misses
+/// samples. In lockstep no robot waits, and a slow recorder would lose samples.
 fn give_way(run: Option<&Run>) {
     let in_lockstep = run.is_some_and(|run| matches!(run.clock, MissionClock::Ticks { .. }));
     if !in_lockstep && rustix::process::getpriority_process(None).is_ok_and(|nice| nice < NICE) {
-        // If the kernel refuses, the recorder shares the processor with the stages.
+        // If the kernel refuses, the recorder competes with the stages.
         let _ = rustix::process::setpriority_process(None, NICE);
     }
 }
@@ -294,7 +295,7 @@ impl CurrentRun {
         })
     }
 
-    /// Go on in another file, which can be read alone. Returns the file that is now complete.
+    /// Continues in another, self-contained file. Returns the completed file.
     fn go_on_in(&mut self, path: &Path, topics: &[&'static dyn AnyTopic]) -> Result<PathBuf> {
         let next = RecordingFile::create(path, topics, self.run.as_ref(), self.about.clone())?;
         let next = next.continuing(&self.file);
@@ -367,13 +368,12 @@ impl CurrentRun {
     }
 }
 
-/// The build: its version, and a checksum of this executable.
+/// Returns the build: version and checksum of this executable.
 fn build() -> String {
     let crc = File::open("/proc/self/exe").and_then(checksum).unwrap_or_default();
     format!("{}, executable crc32 {crc:08x}", env!("CARGO_PKG_VERSION"))
 }
 
-/// The CRC-32 of a file, which is never in memory as a whole.
 fn checksum(file: File) -> io::Result<u32> {
     let mut reader = BufReader::with_capacity(1 << 16, file);
     let mut crc = crc32fast::Hasher::new();
@@ -388,7 +388,6 @@ fn checksum(file: File) -> io::Result<u32> {
     }
 }
 
-/// The machine: name, system and processors.
 fn machine() -> String {
     let text = |file| fs::read_to_string(file).unwrap_or_default();
     let (name, system) = (text("/proc/sys/kernel/hostname"), text("/proc/sys/kernel/osrelease"));
@@ -441,7 +440,8 @@ mod tests {
                 let began = Instant::now();
                 let mut wish = || {
                     rounds.fetch_add(1, Ordering::Relaxed);
-                    // A recorder that is stopped completes its file too, so it is stopped after the test has failed.
+                    // A stopped recorder completes its file too, so it is stopped only after the
+                    // test has failed.
                     let failed = began.elapsed() > PATIENCE * 4;
                     let over = failed || complete.load(Ordering::Relaxed) > 0;
                     if over { Wish::Stop } else { Wish::Record }

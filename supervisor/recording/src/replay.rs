@@ -1,18 +1,18 @@
-//! Replays every generation of every stage of a recording: from its checkpoint, through the same step, with the recorded
-//! inputs. The outputs are compared with the recorded ones to the bit.
+//! Replay of every generation of every stage in a recording, from its checkpoint, through the same
+//! step, with the recorded inputs. Outputs are compared with the recorded ones to the bit.
 //!
-//! A generation is replayed only from its beginning, because its state follows from all its inputs. The report says why a
-//! generation was not replayed.
+//! A generation's state follows from all its inputs, so it is replayed only from its beginning. The
+//! report explains why a generation was not replayed.
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`report`] | the result of a replay |
+//! | [`report`] | result of a replay |
 //! | `generation` | one generation, replayed while its inputs are read |
-//! | `pieces` | the entries of a generation's inputs, from their pieces |
-//! | [`driver`] | the replay of a recording |
-//! | `values` | the fields of a message as text |
-//! | [`diff`] | where two recordings part |
-//! | `samples` | recorded samples of a tick, and where two of them differ |
+//! | `pieces` | entries of a generation's inputs, from their pieces |
+//! | [`driver`] | replay of a recording |
+//! | `values` | fields of a message as text |
+//! | [`diff`] | first difference of two recordings |
+//! | `samples` | recorded samples of a tick and their differences |
 
 pub mod diff;
 pub mod driver;

@@ -1,4 +1,4 @@
-//! The schema of a topic, made from its layout: the text of a ROS 2 message, and the texts of the messages in it.
+//! Schema of a topic, made from its layout: the text of a ROS 2 message and its nested messages.
 
 use std::{collections::BTreeMap, sync::LazyLock};
 
@@ -9,19 +9,19 @@ use common::{
 
 #[derive(Debug)]
 pub struct Schema {
-    /// The name, for example `firsthand/msg/Pose`.
+    /// Schema name, for example `firsthand/msg/Pose`.
     pub name: String,
-    /// The fields of the message, then the messages that it contains.
+    /// Fields of the message, then the nested messages.
     pub text: String,
 }
 
-/// The texts of all schemas by their names, without comments.
+/// All schemas by name, without comments.
 static OWN: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| {
     let schemas = topics::TABLE.iter().map(|topic| of(*topic));
     schemas.map(|Schema { name, text }| (name, uncommented(&text))).collect()
 });
 
-/// Whether a recorded schema has the name of one of this program's and other fields.
+/// Returns whether a recorded schema has the name of a known one and other fields.
 pub(crate) fn differs(name: &str, text: &[u8]) -> bool {
     let own = OWN.get(name);
     own.is_some_and(|own| uncommented(&String::from_utf8_lossy(text)) != *own)

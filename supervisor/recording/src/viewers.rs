@@ -1,6 +1,8 @@
-//! Messages that Foxglove and Lichtblick draw, in Foxglove's schemas as Protobuf (<https://docs.foxglove.dev/docs/sdk/schemas>).
-//! Recordings and the live server have the same. The schemas in `foxglove/` are those of Foxglove's SDK 0.30.3 (MIT licence); tests
-//! of `firsthand-foxglove`, which contains the SDK, compare them and decode the messages with it.
+//! Messages for Foxglove and Lichtblick, in Foxglove's schemas as Protobuf
+//! (<https://docs.foxglove.dev/docs/sdk/schemas>). Recordings and the live server share them.
+//!
+//! The schemas in `foxglove/` are those of Foxglove's SDK 0.30.3 (MIT licence). Tests of
+//! `firsthand-foxglove`, which contains the SDK, compare them and decode the messages with it.
 
 use std::collections::BTreeMap;
 
@@ -24,25 +26,26 @@ const MOVERS: &str = "foxglove/movers";
 pub const LOG: &str = "log";
 
 const MAP: &str = "map";
-/// The frame of the robot: its centre, x ahead. Each sensor has a frame of its name.
+/// Frame of the robot: its centre, x ahead. Each sensor has a frame of its name.
 const BASE: &str = "base_link";
 /// Mission time between scenes and between maps, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
-/// The most cells a side of a drawn map; in a larger one a cell stands for several.
+/// Most cells per side of a drawn map; in a larger one a drawn cell covers several.
 const MOST_A_SIDE: usize = 1024;
-/// The bytes of a drawn cell and their names. `state` is a [`CellState`]; viewers use the other four as its colour by default.
+/// Names of a drawn cell's bytes. `state` is a [`CellState`]; viewers use the other four as its
+/// default colour.
 const CELL: [&str; 5] = ["state", "red", "green", "blue", "alpha"];
 
 static DRAWN: [&dyn AnyTopic; 5] =
     [&topics::POSE, &topics::RANGES, &topics::SCAN, &topics::GRID, &topics::TARGET];
 
-/// A channel for viewers, whose messages are in the encoding `protobuf`, and the schema too.
+/// Channel for viewers, with messages and schema in the encoding `protobuf`.
 #[derive(Debug)]
 pub struct Channel {
     pub topic: String,
-    /// The name of its schema, such as `foxglove.Grid`.
+    /// Schema name, such as `foxglove.Grid`.
     pub schema: &'static str,
-    /// The schema, a `FileDescriptorSet`.
+    /// Schema as a `FileDescriptorSet`.
     pub descriptors: &'static [u8],
 }
 
@@ -98,8 +101,10 @@ impl Drawn {
         }
     }
 
-    /// Give `sink` the drawings of a `message` of `topic` that has the time `now_ns` since 1970, by which viewers play it. A
-    /// message that does not match its topic, or of another topic, is not drawn.
+    /// Passes the drawings of a `message` of `topic` to `sink`.
+    ///
+    /// Viewers play it at `now_ns`, nanoseconds since 1970. Unknown topics and malformed messages
+    /// are ignored.
     pub fn message(&mut self, topic: &str, message: &[u8], now_ns: u64, sink: Sink<'_>) {
         let is_drawn = DRAWN.iter().any(|drawn| drawn.spec().name == topic);
         let Some(sample) = is_drawn.then(|| Sample::decoded(topic, message)).flatten() else {
@@ -119,7 +124,7 @@ impl Drawn {
             Sample::Grid(header, _) => self.grid(header, &time, sink),
             _ => {}
         }
-        // Nobody reads them here.
+        // Events are not used here.
         self.state.take_events();
     }
 
@@ -131,7 +136,7 @@ impl Drawn {
             sink(GRID, grid(frame, map.cells(), time).bytes());
         }
         let movers: Vec<_> = header.drawn_movers().collect();
-        // Without movers the entity is sent once more, empty, and takes the place of the last ones.
+        // Without movers the entity is sent once more, empty, to replace the last ones.
         if std::mem::replace(&mut self.has_movers, !movers.is_empty()) || self.has_movers {
             sink(MOVERS, Message::default().part(2, &drawn_movers(&movers, time)).bytes());
         }
@@ -154,7 +159,7 @@ impl Drawn {
         }
         for reading in readings {
             let sensor = self.sensors.get(usize::from(reading.sensor));
-            // The beams of a laser are a topic of their own.
+            // A laser's beams have their own topic.
             if let Some(sensor) = sensor.filter(|sensor| sensor.used)
                 && sensor.kind != SensorKind::Scan
                 && reading.status() != RangeStatus::Absent
@@ -164,7 +169,8 @@ impl Drawn {
         }
     }
 
-    /// A `SceneUpdate`: the trajectory, the targets, the body, and its place within two standard deviations.
+    /// Returns a `SceneUpdate`: trajectory, targets, body, and its place within two standard
+    /// deviations.
     fn scene(&self, time: &Message) -> Message {
         let entity = |id: &str, frame: &str| entity(time, id, frame);
         // A `LinePrimitive` through all points.
@@ -194,12 +200,12 @@ impl Drawn {
     }
 }
 
-/// A `SceneEntity` that moves with its frame.
 fn entity(time: &Message, id: &str, frame: &str) -> Message {
     framed(time, frame).text(3, id).integer(5, true.into())
 }
 
-/// A `SceneEntity` of what moves: discs, arrows to where they will be in 1 s, discs within which their surfaces are, and speeds.
+/// Returns a `SceneEntity` of movers: discs, arrows to their places in 1 s, discs that bound their
+/// surfaces, and speeds.
 fn drawn_movers(movers: &[&Mover], time: &Message) -> Message {
     let at =
         |mover: &Mover| Pose2 { position: mover.place(), heading: mover.velocity().to_angle() };
@@ -245,7 +251,6 @@ fn draw_pose(sample: &PoseSample, time: &Message, sink: Sink<'_>) {
     sink(ODOMETRY, odometry.bytes());
 }
 
-/// A `Grid`.
 fn grid(frame: GridFrame, cells: &[u8], time: &Message) -> Message {
     let side = frame.cells as usize;
     let each = side.div_ceil(MOST_A_SIDE).max(1);
@@ -280,7 +285,6 @@ fn grid(frame: GridFrame, cells: &[u8], time: &Message) -> Message {
         .data(9, &data)
 }
 
-/// The colour of a state: red, green, blue, alpha.
 const fn paint(state: CellState) -> [u8; 4] {
     match state {
         CellState::Free => [0; 4],
@@ -292,10 +296,11 @@ const fn paint(state: CellState) -> [u8; 4] {
     }
 }
 
-/// A `LaserScan`. A sonar's echo comes from the whole arc; a ray's from its end. A reading without an echo has no points.
+/// Returns a `LaserScan`. A sonar's echo covers the whole arc, a ray's only its end. A reading
+/// without an echo has no points.
 fn scan(sensor: &Sensor, reading: &RangeReading, time: &Message) -> Message {
     let half = sensor.field_of_view_deg.to_radians() / 2.0;
-    // Viewers divide by the number of angles between points, so a ray has two of them.
+    // Viewers divide by the number of angles between points, so a ray has two points.
     let points = match (reading.status(), sensor.kind) {
         (RangeStatus::Measured, SensorKind::Cone) => 9,
         (RangeStatus::Measured, SensorKind::Ray) => 2,
@@ -304,7 +309,7 @@ fn scan(sensor: &Sensor, reading: &RangeReading, time: &Message) -> Message {
     laser_scan(sensor, [-half, half], (0..points).map(|_| reading.range_m), time)
 }
 
-/// The beams of a laser; those without an end have the range infinity, as viewers expect it.
+/// Returns a laser's beams. Those without an end have infinite range, as viewers expect.
 fn beams_of(sensor: &Sensor, header: &ScanHeader, beams: &[f32], time: &Message) -> Message {
     let first = header.first_rad - sensor.mount.looks_rad();
     let last = first + header.step_rad * beams.len().saturating_sub(1) as f64;
@@ -324,7 +329,7 @@ fn laser_scan(
         .numbers(6, ranges)
 }
 
-/// Give `sink` a line of the log of `process`, read at `now_ns` since 1970.
+/// Passes a log line of `process`, read at `now_ns` since 1970, to `sink`.
 pub fn log(process: &str, line: &str, now_ns: u64, sink: Sink<'_>) {
     let log = Message::default()
         .part(1, &time(now_ns))
@@ -337,7 +342,8 @@ pub fn log(process: &str, line: &str, now_ns: u64, sink: Sink<'_>) {
 const LOG_MESSAGE: u64 = 3;
 const LOG_NAME: u64 = 4;
 
-/// The number of a line's level in Foxglove's schema. Lines without a level say why a process ended, so they are errors.
+/// Returns a line's level in Foxglove's schema. Lines without a level explain the end of a process,
+/// so they are errors.
 fn level(line: &str) -> u64 {
     let levels = ["DEBUG", "INFO", "WARN", "ERROR"];
     let named = (1..)
@@ -346,7 +352,7 @@ fn level(line: &str) -> u64 {
     named.map_or(4, |(number, _)| number)
 }
 
-/// The process and the text of a message of the channel `log`. Older recordings have JSON.
+/// Returns process and text of a message of the channel `log`. Older recordings have JSON.
 pub fn log_line(message: &[u8]) -> Option<(String, String)> {
     if message.first() == Some(&b'{') {
         let mut fields: BTreeMap<String, serde_json::Value> =
@@ -365,7 +371,6 @@ fn is_due(last: &mut Option<u64>, now: u64) -> bool {
     due
 }
 
-/// A `Timestamp`.
 fn time(ns: u64) -> Message {
     Message::default().integer(1, ns / 1_000_000_000).integer(2, ns % 1_000_000_000)
 }
@@ -374,7 +379,6 @@ fn framed(time: &Message, frame: &str) -> Message {
     Message::default().part(1, time).text(2, frame)
 }
 
-/// A `FrameTransform`.
 fn transform(time: &Message, parent: &str, child: &str, at: Pose2) -> Message {
     framed(time, parent)
         .text(3, child)
@@ -387,18 +391,17 @@ fn pose(at: Pose2) -> Message {
     Message::default().part(1, &position).part(2, &rotation(at.heading))
 }
 
-/// A `Quaternion`.
 fn rotation(heading: f64) -> Message {
     let (z, w) = (heading / 2.0).sin_cos();
     Message::default().number(3, z).number(4, w)
 }
 
-/// A `Vector3`, a `Point3` or a `Color`.
+/// Encodes a `Vector3`, a `Point3` or a `Color`.
 fn vector<const PARTS: usize>(parts: [f64; PARTS]) -> Message {
     (1..).zip(parts).fold(Message::default(), |vector, (field, part)| vector.number(field, part))
 }
 
-/// A flat ellipse of these widths, a `CylinderPrimitive`.
+/// Returns a flat ellipse of these widths, a `CylinderPrimitive`.
 fn disc(at: Pose2, [x, y]: [f64; 2], painted: [f64; 4]) -> Message {
     Message::default()
         .part(1, &pose(at))

@@ -1,4 +1,5 @@
-//! The map at a few moments of a run, and the field of each. Fields are computed, because recordings contain none by default.
+//! Map and its field at a few moments of a run. Fields are computed, because recordings contain
+//! none by default.
 
 use common::{
     mission::Mission,
@@ -9,25 +10,24 @@ use page::blob;
 use planner::step::Planner;
 use robot_state::drop_every_second;
 
-/// Most maps. When there are more, every second one is dropped, and half as many are taken from then on.
+/// Most maps. Beyond it, every second one is dropped, and half as many are taken from then on.
 const MOST: usize = 8;
 /// First period of maps, seconds of mission time.
 const FIRST_APART_S: f64 = 2.0;
-/// The most cells of a map whose field is computed here.
+/// Most cells of a map whose field is computed.
 const LARGEST: usize = 1024 * 1024;
 
 #[derive(Clone)]
 struct Belief {
     time_s: f64,
     header: GridHeader,
-    /// One [`common::grid::CellState`] byte a cell, row-major.
+    /// Map cells, one [`common::grid::CellState`] byte each, row-major.
     cells: Vec<u8>,
-    /// The target of the robot, metres.
     target: DVec2,
 }
 
 impl Belief {
-    /// The field of the map as a message of the page, as the planner computes it; none if there is none.
+    /// Returns the map's field as a message of the page, as the planner computes it, if it exists.
     fn field(&self, mission: &Mission) -> Option<Vec<u8>> {
         let mut planner = Planner::new(mission);
         let target = TargetPoint::at(self.target);
@@ -52,7 +52,7 @@ impl Default for Beliefs {
 }
 
 impl Beliefs {
-    /// Take the map `cells` at `time_s`, when the robot is sent to `target`.
+    /// Takes the map `cells` at `time_s`, with the robot's present `target`.
     pub(crate) fn push(&mut self, time_s: f64, target: DVec2, header: &GridHeader, cells: &[u8]) {
         if self.held.last().is_some_and(|last| time_s < last.time_s + self.apart_s) {
             return;

@@ -1,4 +1,4 @@
-//! The recordings of a run as a page and as metrics.
+//! Recordings of a run as a page and as metrics.
 
 use std::{
     fs::File,
@@ -27,9 +27,10 @@ use crate::{
 const LOG: &str = "log";
 /// Most bytes of the ground truth: an hour at 10 Hz takes 10 MB.
 const LARGEST_TRUTH: u64 = 1 << 28;
-/// The least mission time between two maps, seconds.
+/// Least mission time between two maps, seconds.
 const MAP_EVERY_S: f64 = 0.5;
-/// Most rows, states and events of a page. The page shows the beginning of a longer run; metrics count all.
+/// Most rows, states and events of a page. The page shows the beginning of a longer run; metrics
+/// count all.
 const MOST: usize = 60_000;
 const MOST_MAPS: usize = 2400;
 
@@ -40,7 +41,7 @@ pub(crate) struct Content {
     about: Vec<(&'static str, String)>,
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
-    /// The row of the front sonar; none for a robot without sonars.
+    /// Row of the front sonar; `None` for a robot without sonars.
     front: Option<usize>,
     pub(crate) measured: Measured,
     pub(crate) heard: Hearer,
@@ -106,7 +107,7 @@ impl Content {
         Ok(())
     }
 
-    /// Take a message. None if the message does not match its topic.
+    /// Takes a message. Returns `None` if it does not match its topic.
     fn take(&mut self, message: &Message) -> Option<()> {
         if *message.topic == *LOG {
             let (process, line) = recording::log_line(&message.data)?;
@@ -114,7 +115,7 @@ impl Content {
             return Some(());
         }
         let sample = Sample::decoded(&message.topic, &message.data)?;
-        // Ground truth that is not of this tick waits in the collector.
+        // Ground truth of another tick waits in the collector.
         if let Sample::Pose(_) = sample {
             while let Some(Ok(line)) = self.truth.as_mut().and_then(Iterator::next) {
                 if !self.collector.truth(&line) {
@@ -153,7 +154,6 @@ impl Content {
         Some(())
     }
 
-    /// Add to the page the new content of the collector.
     fn add(&mut self) {
         let (rows, events) = (self.collector.take_rows(), self.collector.state.take_events());
         let state = self.collector.take_state();
@@ -182,7 +182,6 @@ impl Content {
         }
     }
 
-    /// The page of the run with these rows of metrics.
     pub(crate) fn html(mut self, metrics: Vec<Value>) -> String {
         self.add();
         if let Some(map) = self.collector.take_map() {
@@ -231,12 +230,11 @@ impl Content {
         self.summary.get(field)?.as_f64()
     }
 
-    /// The outcome of the run; none if that is not known.
     pub(crate) fn outcome(&self) -> Option<&str> {
         self.summary.get("outcome")?.as_str()
     }
 
-    /// Mission time of the end, seconds.
+    /// Returns the mission time of the end, seconds.
     pub(crate) fn duration_s(&self) -> f64 {
         self.measured.time_s
     }

@@ -1,4 +1,4 @@
-//! The report of a run: the robot's page with the recording in it, one file that refers to nothing else.
+//! Report of a run: the robot's page with the recording in it, one self-contained file.
 //!
 //! ```no_run
 //! let report = report::write("runs/obstacle-course-1".as_ref(), None)?;
@@ -6,16 +6,17 @@
 //! # Ok::<(), recording::RecordingError>(())
 //! ```
 //!
-//! A recording is read once, and the page has a bounded number of rows, maps and fields; metrics count all.
+//! A recording is read once. The page has a bounded number of rows, maps and fields; metrics count
+//! all.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `source` | the recordings of the run, and its summary |
-//! | `content` | the page and the metrics of the recordings |
+//! | `source` | recordings of the run, and its summary |
+//! | `content` | page and metrics of the recordings |
 //! | `measured` | metrics of the recording itself |
-//! | `beliefs` | the map at a few moments, and the field of each |
-//! | `metrics` | the table of metrics, under their field names |
-//! | [`shortest_path`] | the shortest path of a body through known shapes |
+//! | `beliefs` | map and field at a few moments |
+//! | `metrics` | table of metrics, under their field names |
+//! | [`shortest_path`] | shortest path of a body through known shapes |
 
 mod beliefs;
 mod content;
@@ -38,8 +39,11 @@ use self::{content::Content, source::Source};
 
 pub const PAGE: &str = "report.html";
 
-/// Write the report of `run`, a run's directory or a recording, into `out`: by default `report` in the run's directory, or
-/// `F-report` beside the recording `F.mcap`. Returns the path of the page.
+/// Writes the report of `run`, a run's directory or a recording, into `out`. Returns the path of
+/// the page.
+///
+/// By default `out` is `report` in the run's directory, or `F-report` beside the recording
+/// `F.mcap`.
 pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, RecordingError> {
     let source = Source::find(run)?;
     let out = out.map_or_else(|| source.default_out(), Path::to_path_buf);
@@ -47,7 +51,7 @@ pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, RecordingError> 
     fs::create_dir_all(&out).map_err(FileError::of("make", &out))?;
     let page = out.join(PAGE);
     fs::write(&page, html(content)).map_err(|error| {
-        // An incomplete page is of no use.
+        // An incomplete page is useless.
         let _ = fs::remove_file(&page);
         FileError::of("write", &page)(error)
     })?;

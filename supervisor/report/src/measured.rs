@@ -1,4 +1,4 @@
-//! Metrics of all samples of the recording, not only of those that are drawn.
+//! Metrics of all recorded samples, including those that are not drawn.
 
 use common::{
     mission::Mission,
@@ -10,10 +10,9 @@ pub(crate) struct Measured {
     pub(crate) ticks: u64,
     /// Mission time of the newest pose, seconds.
     pub(crate) time_s: f64,
-    /// Length of the estimated path, metres.
     pub(crate) path_m: f64,
     pub(crate) last_pose: Option<PoseSample>,
-    /// v of the newest pose whose speeds are valid.
+    /// Speed v of the newest pose with valid speeds.
     last_speed: Option<f64>,
     speed_change: f64,
     changes: u64,
@@ -25,7 +24,8 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// Take a pose. If a late machine receives two ticks together, the speed does not count: it is a distance divided by almost no time.
+    /// Takes a pose. If a late machine receives two ticks together, the speed is invalid: a
+    /// distance divided by almost no time.
     pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) {
         self.ticks += 1;
         self.time_s = self.time_s.max(pose.stamp.time().seconds());
@@ -56,17 +56,17 @@ impl Measured {
         }
     }
 
-    /// Mean of |dv/dt|, m/s^2.
+    /// Returns the mean of |dv/dt|, m/s^2.
     pub(crate) fn speed_change(&self) -> Option<f64> {
         share(self.speed_change, self.changes)
     }
 
-    /// Share of the ticks in which the sonar gave no distance.
+    /// Returns the share of ticks without a distance from the sonar.
     pub(crate) fn unavailable(&self) -> Option<f64> {
         share(self.unavailable as f64, self.ranges)
     }
 
-    /// Share of the ticks with a reading below the range in which hits are mapped.
+    /// Returns the share of ticks with a reading below the range in which hits are mapped.
     pub(crate) fn near(&self) -> Option<f64> {
         share(self.near as f64, self.ranges)
     }

@@ -1,5 +1,5 @@
-//! The table of metrics, under their field names. A value comes from the run's summary, which knows the ground truth of a
-//! simulated robot; or else from the recording, which knows the robot's estimate.
+//! Table of metrics, under their field names. Values come from the run's summary, which knows a
+//! simulated robot's ground truth, or else from the recording, which knows the robot's estimate.
 
 use common::samples::PoseSample;
 use serde_json::{Value, json};
@@ -14,7 +14,8 @@ fn shown(value: Option<f64>, digits: usize, unit: &str) -> String {
     }
 }
 
-/// Success weighted by path length: 1 for the shortest path, 0 if the target was not reached.
+/// Returns the success weighted by path length: 1 for the shortest path, 0 if the target was not
+/// reached.
 fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     if !content.outcome()?.starts_with("reached") {
         return Some(0.0);
@@ -26,8 +27,8 @@ fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     Some(shortest / path?.max(shortest))
 }
 
-/// The rows of the table as the page takes them: the name in the literature, the value with its unit or a dash, and the field in
-/// `summary.json` or the formula.
+/// Returns the rows of the page's table: the name in the literature, the value with its unit or a
+/// dash, and the field in `summary.json` or the formula.
 pub(crate) fn rows(content: &Content) -> Vec<Value> {
     let measured = &content.measured;
     let has_poses = measured.ticks > 0;
@@ -49,7 +50,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
     let row = |name, field: &str, value: Option<f64>, digits, unit| {
         json!([name, shown(value, digits, unit), field])
     };
-    // The recording says what the summary does not.
+    // The recording completes the summary.
     let known =
         |name, field, measured, digits, unit| row(name, field, of(field, measured), digits, unit);
     let count = |value: u64| Some(value as f64);
@@ -109,7 +110,8 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
     ]
 }
 
-/// The range of the wheel speeds; none for a car, which has only one wheel speed and a steering angle.
+/// Returns the range of the wheel speeds; `None` for a car, which has one wheel speed and a
+/// steering angle.
 fn wheel_range(content: &Content) -> Option<f64> {
     if content.mission.body().steering.is_some() {
         return None;

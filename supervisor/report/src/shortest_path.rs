@@ -1,8 +1,9 @@
-//! The shortest path of a body from start to target, if there is one.
+//! Shortest path of a body from start to target, if there is one.
 //!
-//! The body is a disc on a grid of 5 cm: cells nearer to a thing than its radius are blocked, A* over eight neighbours finds a
-//! path, and straight lines shorten it. The result is at most some percent longer than the shortest path; a gap counts as open
-//! if it is wider than the body by a cell.
+//! The body is a disc on a grid of 5 cm. Cells nearer to an obstacle than its radius are blocked.
+//! A* over eight neighbours finds a path, and straight lines shorten it. The result is at most some
+//! percent longer than the shortest path. A gap counts as open if it is wider than the body by a
+//! cell.
 
 use std::hash::Hash;
 
@@ -10,18 +11,19 @@ use common::geometry::{Piece, Shapes};
 use glam::{DVec2, IVec2};
 use pathfinding::prelude::astar;
 
-/// Side of a cell, metres.
 const CELL_M: f64 = 0.05;
-/// Margin around start, target and things in which the path may lead, metres.
+/// Margin around start, target and obstacles that the path may use, metres.
 const RIM_M: f64 = 0.5;
 /// Most cells of a world: 100 m by 100 m.
 const MOST_CELLS: f64 = 4e6;
-/// A* counts in thousandths of a cell.
+/// Costs of A*, thousandths of a cell.
 const STRAIGHT: u32 = 1000;
 const DIAGONAL: u32 = 1414;
 
-/// The length of the shortest path of a disc of `radius` metres from `start` to `target` among `shapes`, metres; none if there is none, or
-/// the world is too large.
+/// Returns the length of the shortest path of a disc of `radius` metres from `start` to `target`
+/// among `shapes`, metres.
+///
+/// Returns `None` if there is no path or the world is too large.
 pub fn shortest_path(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) -> Option<f64> {
     let grid = Grid::new(shapes, start, target, radius)?;
     let (from, to) = (grid.cell(start), grid.cell(target));
@@ -33,8 +35,10 @@ pub fn shortest_path(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) 
     Some(grid.straightened(&cells, start, target))
 }
 
-/// The shortest path over eight neighbours from `start` to `goal`, both included. `apart` gives the columns and rows from a cell to the
-/// goal, `neighbour` the free cell that is so many columns and rows away.
+/// Returns the shortest path over eight neighbours from `start` to `goal`, including both.
+///
+/// `apart` returns the columns and rows from a cell to the goal, `neighbour` the free cell at such
+/// a step.
 pub fn over_neighbours<C: Copy + Eq + Hash>(
     start: C,
     goal: C,
@@ -119,14 +123,15 @@ impl Grid {
         inside && !self.blocked[self.index(cell)]
     }
 
-    /// The free cell at this step from `cell`. A diagonal step cuts no corner of a blocked cell.
+    /// Returns the free cell at this step from `cell`. A diagonal step must not cut the corner of a
+    /// blocked cell.
     fn neighbour(&self, cell: IVec2, [cols, rows]: [i32; 2]) -> Option<IVec2> {
         let next = cell + IVec2::new(cols, rows);
         let through = [next, cell + IVec2::new(cols, 0), cell + IVec2::new(0, rows)];
         through.into_iter().all(|cell| self.is_free(cell)).then_some(next)
     }
 
-    /// Length of the path over `cells` after shortening it by straight lines, metres.
+    /// Returns the length of the path over `cells`, shortened by straight lines, metres.
     fn straightened(&self, cells: &[IVec2], start: DVec2, target: DVec2) -> f64 {
         let mut points: Vec<DVec2> = cells.iter().map(|&cell| self.centre(cell)).collect();
         if let Some(first) = points.first_mut() {
@@ -173,7 +178,8 @@ mod tests {
 
     #[test]
     fn the_way_around_a_wall_is_as_long_as_by_hand() {
-        // The path leads around the end at (1, 1) at the body's radius: two legs of about sqrt(1 + 1.2^2).
+        // The path leads around the end at (1, 1) at the body's radius: two legs of about sqrt(1 +
+        // 1.2^2).
         let shapes = wall(&[[1.0, -9.0], [1.0, 1.0]]);
         let found = shortest_path(&shapes, DVec2::ZERO, DVec2::new(2.0, 0.0), 0.2);
         let Some(length) = found else {

@@ -1,4 +1,4 @@
-//! The recordings of a run, and its summary.
+//! Recordings of a run, and its summary.
 
 use std::path::{Path, PathBuf};
 
@@ -6,11 +6,11 @@ use common::{file, run::Run};
 use recording::{Recording, RecordingError};
 use serde_json::{Map, Value};
 
-/// The greatest size of a summary, which takes 2 kB.
+/// Greatest size of a summary, bytes; real ones take 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
 pub(crate) struct Source {
-    /// Parts of the run, the first one first; never empty.
+    /// Parts of the run in order; never empty.
     pub(crate) files: Vec<PathBuf>,
     is_run: bool,
 }
@@ -36,9 +36,9 @@ pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
     serde_json::from_str(&file::text(&file, LARGEST_SUMMARY)?).ok()
 }
 
-/// The directory of the run of `recording`; none if the recording lies elsewhere.
+/// Returns the run's directory if `recording` lies in it.
 pub(crate) fn run_directory(recording: &Recording) -> Option<&Path> {
     let directory = recording.path.parent()?;
-    // The directory may be of another run, or of none.
+    // The directory may belong to another run, or to none.
     (Run::load(directory).ok()? == recording.run).then_some(directory)
 }

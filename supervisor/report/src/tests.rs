@@ -1,5 +1,3 @@
-//! Tests of reports, on recordings made by the tests.
-
 use std::path::Path;
 
 use common::{

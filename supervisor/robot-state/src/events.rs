@@ -22,14 +22,14 @@ const MOST_WAITING: usize = 20_000;
 pub struct Event {
     /// Mission time, seconds.
     pub t: f64,
-    /// The stage, or the part of the system, that the event is about.
+    /// Stage or part of the system that the event is about.
     pub of: String,
     pub kind: Kind,
     pub text: String,
 }
 
 impl Event {
-    /// Whether a process died or the robot stalled: what a supervisor recovers from.
+    /// Returns whether a process died or the robot stalled, from which a supervisor recovers.
     pub fn is_recovery(&self) -> bool {
         self.kind == Kind::Bad && self.of != FAILSAFE
     }
@@ -38,13 +38,12 @@ impl Event {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// The event is a death, a stall or a stop.
+    /// Death, stall or stop.
     Bad,
-    /// Somebody has to do something before the robot is of use.
+    /// Problem that a person must solve before the robot is of use.
     Warn,
     Good,
     Note,
-    /// The event is a line of a process's log.
     Log,
 }
 
@@ -55,19 +54,17 @@ pub(crate) struct Events {
     waiting: VecDeque<Event>,
     failsafe: Option<(u8, u8)>,
     directive: Option<(u8, u8)>,
-    /// The newest complaint, of which only a change is an event.
+    /// Newest complaint; only changes are events.
     complaint: String,
-    /// The number of the current target, of the last of the list, and of the one that was reached.
+    /// Numbers of the current target, the last of the list, and the one reached.
     target: u64,
     last: u64,
     arrived: u64,
-    /// Whether the target moves with a beacon.
     follows: bool,
-    /// The generation of each stage that was seen to run.
+    /// Generation of each stage seen to run.
     running: Vec<(String, u32)>,
-    /// Mission time of the newest pose, seconds. A process that has just started knows no mission time.
+    /// Mission time of the newest pose, seconds; a process that has just started knows none.
     pub(crate) now_s: f64,
-    /// Mission time of the next event.
     at_s: f64,
 }
 
@@ -93,7 +90,7 @@ impl Events {
             self.now_s = self.now_s.max(pose.stamp.time().seconds());
         }
         self.at_s = match sample {
-            // What happens once is read late by a process that has just started.
+            // A process that has just started reads earlier single events late.
             Sample::Death(_) | Sample::Stall(_) | Sample::Order(_) | Sample::Fault(_) => {
                 sample.time().seconds()
             }

@@ -1,13 +1,15 @@
-//! What a robot is doing, as one value. Dashboards, bridges and reports draw from it; each lists here what it reads, and nothing else of
-//! the bus.
+//! The state of a robot as one value, from which dashboards, bridges and reports draw. Each lists
+//! the topics it reads here, and reads no others.
 //!
-//! A [`Feed`] reads [`Sample`]s from a robot's bus; [`Sample::decoded`] reads them from a recording. [`RobotState::apply`] takes either.
+//! A [`Feed`] reads [`Sample`]s from a robot's bus; [`Sample::decoded`] reads them from a
+//! recording. [`RobotState::apply`] takes either.
 //!
-//! The guide's page `attach.md` has a dashboard, which is compiled with the doc tests of this crate.
+//! The guide's page `attach.md` has a dashboard, which is compiled with the doc tests of this
+//! crate.
 //!
 //! | file | holds |
 //! |---|---|
-//! | `sample` | THE table of what is read, and the feed |
+//! | `sample` | the only table of topics read, and the feed |
 //! | `state` | the value |
 //! | `events` | deaths, stalls, orders, the failsafe and log lines as one list |
 //! | `words` | states and causes in words |
@@ -28,7 +30,8 @@ pub use self::{
     words::{death_in_words, failsafe_in_words, guidance_in_words, words},
 };
 
-/// The newest run of the robot of `domain` and its directory; none if its run file is missing, as it is before the first samples.
+/// Returns the newest run of the robot of `domain` and its directory; `None` without a run file, as
+/// before the first samples.
 pub fn newest_run(domain: &Domain) -> Option<(PathBuf, Run)> {
     // The link leads to another directory when the next run begins.
     let directory = domain.run_directory().canonicalize().ok()?;
@@ -36,7 +39,7 @@ pub fn newest_run(domain: &Domain) -> Option<(PathBuf, Run)> {
     Some((directory, run))
 }
 
-/// The guide's Rust is compiled with the doc tests.
+/// Doc test of the guide's Rust.
 #[cfg(doctest)]
 #[doc = include_str!("../../guide/attach.md")]
 pub struct Attach;

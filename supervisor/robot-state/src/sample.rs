@@ -1,4 +1,4 @@
-//! THE table of what is read of a robot, and its readers.
+//! Single table of the topics read of a robot, and its readers.
 
 use common::{
     bus::{AnyReader, Bus, BusError, decode_sample, decode_slice},
@@ -14,16 +14,17 @@ use common::{
 
 macro_rules! samples {
     ($($name:ident($($part:ty),+): $topic:ident by $decode:ident,)*) => {
-        /// A sample of one of [`TOPICS`]: a struct, or a header and its slice.
+        /// Sample of one of [`TOPICS`]: a struct, or a header and its slice.
         #[allow(clippy::large_enum_variant, reason = "one at a time is held")]
         #[derive(Clone, Debug, PartialEq)]
         pub enum Sample { $($name($($part),+)),* }
 
-        /// The topics that are read. A sample of the link ends a tick, so it is read last.
+        /// Topics to read. A sample of the link ends a tick, so it is read last.
         pub static TOPICS: &[&dyn AnyTopic] = &[$(&topics::$topic),*];
 
         impl Sample {
-            /// The sample of `topic` that a recording has as `message`; none if the topic is not read, or the message does not match it.
+            /// Returns the sample of `topic` recorded as `message`; `None` if the topic is not
+            /// read, or does not match the message.
             pub fn decoded(topic: &str, message: &[u8]) -> Option<Self> {
                 $(if topic == topics::$topic.spec().name {
                     return samples!(@$decode $name, message);
@@ -68,7 +69,6 @@ samples! {
 struct OneTopic {
     spec: &'static Spec,
     reader: Box<dyn AnyReader>,
-    /// The newest generation of its writer.
     generation: u32,
 }
 
@@ -78,10 +78,10 @@ pub struct Feed {
 }
 
 impl Feed {
-    /// Read some of [`TOPICS`] on `bus`, in this order.
+    /// Opens readers of some of [`TOPICS`] on `bus`, in this order.
     ///
     /// # Errors
-    /// When a topic is missing or has no place left for a reader.
+    /// Fails if a topic is missing or has no place left for a reader.
     pub fn open(bus: &Bus, topics: &[&'static dyn AnyTopic]) -> Result<Self, BusError> {
         let open = |topic: &&'static dyn AnyTopic| {
             Ok(OneTopic { spec: topic.spec(), reader: topic.recorder_reader(bus)?, generation: 0 })
@@ -90,14 +90,14 @@ impl Feed {
         Ok(Self { readers, message: Vec::new() })
     }
 
-    /// Give `each` all samples that were published since the last time.
+    /// Passes all samples published since the last call to `each`.
     ///
     /// # Errors
-    /// When the connection to a writer breaks.
+    /// Fails if the connection to a writer breaks.
     pub fn read(&mut self, each: &mut dyn FnMut(Sample)) -> Result<(), BusError> {
         for OneTopic { spec, reader, generation } in &mut self.readers {
             while let Some(stamp) = reader.next_message(&mut self.message)? {
-                // A sample of an older generation may come behind those of the next one.
+                // A sample of an older generation may come after those of the next one.
                 if spec.writer != OPERATOR && stamp.generation < *generation {
                     continue;
                 }

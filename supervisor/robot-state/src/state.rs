@@ -1,4 +1,4 @@
-//! The state of a robot: its newest samples.
+//! State of a robot: its newest samples.
 
 use std::{collections::BTreeMap, time::Duration};
 
@@ -21,31 +21,33 @@ use crate::{
 };
 
 const MOST_POINTS: usize = 2000;
-/// The least distance between two points of the way, metres.
+/// Least distance between two points of the path, metres.
 const POINT_EVERY_M: f64 = 0.05;
 
-/// From this age on, what a mirror shows does not count as what the robot does. A robot's state comes several times a second.
+/// Age from which a mirror's picture is outdated, seconds. A robot's state comes several times a
+/// second.
 const OLD_S: f64 = 1.0;
 /// A stage repeats its trouble several times a second, and may wait seconds for a processor.
 const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
 
-/// What a robot is doing. Samples that have not come yet are none, lists are empty. Lengths are metres in the mission frame.
+/// State of a robot. Missing samples are `None`, lists start empty. Lengths are metres in the
+/// mission frame.
 #[derive(Clone, Debug, Default)]
 pub struct RobotState {
     pub supervisor: Option<RosterHeader>,
     pub stages: Vec<RosterEntry>,
     pub pose: Option<PoseSample>,
-    /// Where the robot believes to have been, at about equal distances.
+    /// Believed path of the robot, at about equal distances.
     pub way: Vec<DVec2>,
-    /// The distance between two points of the way; 0 before the first.
+    /// Distance between two points of the path; 0 before the first.
     way_every_m: f64,
-    /// The safety map, a [`common::grid::CellState`] a cell.
+    /// Safety map, a [`common::grid::CellState`] a cell.
     pub map: Replica<u8>,
     pub map_header: GridHeader,
     pub field: Replica<FieldCell>,
     pub field_header: FieldHeader,
     pub target: Option<TargetSample>,
-    /// How it follows a beacon, or followed the last one.
+    /// State of the present or the last following of a beacon.
     pub following: Option<FollowingSample>,
     pub guidance: Option<GuidanceSample>,
     pub command: Option<CommandSample>,
@@ -53,7 +55,7 @@ pub struct RobotState {
     /// The newest complaint of a stage. Its stage repeats it while it lasts.
     complaint: Option<ComplaintSample>,
     pub power: Option<PowerSample>,
-    /// The age of what is shown, if a mirror shows a robot of another machine.
+    /// Age of the data, if a mirror shows a robot of another machine.
     pub mirror: Option<MirrorSample>,
     pub deaths: BTreeMap<String, DeathSample>,
     pub stalls: u64,
@@ -65,7 +67,8 @@ impl RobotState {
         Self { target: Some(TargetSample::first(mission)), ..Self::default() }
     }
 
-    /// Take a sample. Returns false for a part of a map that does not follow the parts before it; then a whole map is awaited.
+    /// Takes a sample. Returns false for a part of a map that does not follow the previous parts;
+    /// then the next whole map is awaited.
     pub fn apply(&mut self, sample: &Sample) -> bool {
         self.events.sample(sample);
         match sample {
@@ -127,12 +130,12 @@ impl RobotState {
         self.events.log(process, line);
     }
 
-    /// The events since the last call, the oldest first. Only the newest are held.
+    /// Returns the events since the last call, the oldest first. Only the newest are held.
     pub fn take_events(&mut self) -> Vec<Event> {
         self.events.drain()
     }
 
-    /// The mission time of the newest pose, seconds.
+    /// Returns the mission time of the newest pose, seconds.
     pub const fn now_s(&self) -> f64 {
         self.events.now_s
     }
@@ -141,7 +144,7 @@ impl RobotState {
         self.target().into_iter().flat_map(|sent| [&sent.target].into_iter().chain(sent.ahead()))
     }
 
-    /// What the robot does, in a sentence, and how important that is. A mirror says how old that is.
+    /// Returns the robot's activity in a sentence, and its importance. A mirror adds the age.
     pub fn doing(&self) -> (Kind, String) {
         let (kind, mut text) = self.does();
         if let Some(complaint) = self.complaint() {
@@ -155,7 +158,8 @@ impl RobotState {
         }
     }
 
-    /// The age of what a mirror shows, and whether it is too old; none on the robot's machine.
+    /// Returns the age of a mirror's data, and whether it is outdated; `None` on the robot's
+    /// machine.
     pub fn age_in_words(&self) -> Option<(bool, String)> {
         let age_s = self.mirror?.age_s();
         let is_old = age_s >= OLD_S;
@@ -195,7 +199,7 @@ impl RobotState {
         (kind, format!("{text}; {}", guidance_in_words(status)))
     }
 
-    /// The target to which the robot is sent; none while it waits for one.
+    /// Returns the target to which the robot is sent; `None` while it waits for one.
     pub fn target(&self) -> Option<&TargetSample> {
         let waits = |it: RosterHeader| {
             matches!(HoldReason::from_byte(it.reason), HoldReason::Waiting | HoldReason::Lost)
@@ -203,7 +207,7 @@ impl RobotState {
         self.target.as_ref().filter(|_| !self.supervisor.is_some_and(waits))
     }
 
-    /// How the robot follows a beacon; none if it follows none.
+    /// Returns the state of the following of a beacon, if any.
     pub fn following(&self) -> Option<&FollowingSample> {
         self.following.as_ref().filter(|following| following.state() != FollowState::Ended)
     }
@@ -216,13 +220,14 @@ impl RobotState {
         }
     }
 
-    /// How far the target is by the robot's own pose, metres.
+    /// Returns the distance to the target by the robot's own pose, metres.
     pub fn to_go_m(&self) -> Option<f64> {
         let at = self.target()?.target.position();
         Some(self.pose?.pose().position.distance(at))
     }
 
-    /// The way to go in words, and the number of the target; none while there is none.
+    /// Returns the remaining distance in words, with the number of the target; `None` without a
+    /// target.
     pub fn way_to_go(&self) -> Option<String> {
         let TargetSample { number, last, .. } = self.target()?;
         if let Some(following) = self.following() {

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use common::samples::{Action, Cause, DeathCause, DeathSample, GuidanceStatus, LinkSample};
 
-/// The name of a variant in words: `CommandStale` as `command stale`.
+/// Returns the name of a variant in words: `CommandStale` as `command stale`.
 pub fn words(variant: impl Debug) -> String {
     let mut words = String::new();
     for letter in format!("{variant:?}").chars() {

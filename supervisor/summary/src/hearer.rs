@@ -1,4 +1,4 @@
-//! The numbers of a run that only its samples say.
+//! Numbers of a run that only its samples contain.
 
 use std::{cell::RefCell, collections::BTreeMap, rc::Rc};
 
@@ -16,7 +16,7 @@ use crate::{
 
 #[derive(Default)]
 pub struct Hearer {
-    /// The newest state of each generation of the link.
+    /// Newest state of each generation of the link.
     links: BTreeMap<u32, LinkSample>,
     pub(crate) interruptions: Interruptions,
     solves: BTreeMap<u32, u64>,
@@ -27,7 +27,7 @@ pub struct Hearer {
     trails: Trails,
 }
 
-/// How often each cause of the failsafe took a robot that had gone to standing or to half speed.
+/// Times that each failsafe cause stopped, or slowed to half speed, a robot that had gone.
 #[derive(Default)]
 pub(crate) struct Interruptions {
     has_gone: bool,
@@ -58,7 +58,7 @@ impl Interruptions {
 }
 
 impl Hearer {
-    /// A hearer, and the listener that tells it of a run's samples.
+    /// Creates a hearer, and the listener that passes it a run's samples.
     pub fn with_listener() -> (Rc<RefCell<Self>>, Listener) {
         let hearer = Rc::new(RefCell::new(Self::default()));
         let told = Rc::clone(&hearer);
@@ -85,7 +85,7 @@ impl Hearer {
     fn hear_guidance(&mut self, guidance: &GuidanceSample) {
         let GuidanceSample { stamp, full_solves, .. } = *guidance;
         let before = self.solves.insert(stamp.generation, full_solves);
-        // If a sample covers several solves, only the time of the last solve is known.
+        // If a sample covers several solves, only the time of the last one is known.
         if full_solves > before.unwrap_or_default() {
             self.full_solves.record(guidance.full_solve_ns);
         }
@@ -96,7 +96,8 @@ impl Hearer {
         &self.trails.0
     }
 
-    /// The full solves of all planners until its newest answer, or until the `last` one that counts.
+    /// Returns the full solves of all planners until the newest answer, or until the `last` one
+    /// that counts.
     pub fn solves_until(&self, last: Option<&GuidanceSample>) -> u64 {
         let (newest, its) =
             last.map_or((u32::MAX, None), |last| (last.stamp.generation, Some(last.full_solves)));
@@ -104,7 +105,7 @@ impl Hearer {
         before + its.or(self.solves.get(&newest).copied()).unwrap_or_default()
     }
 
-    /// The greatest commanded speed of either wheel less the least one, until `tick`, rad/s.
+    /// Returns the greatest commanded speed of either wheel minus the least, until `tick`, rad/s.
     pub fn wheel_range_rad_s(&self, tick: u64) -> Option<f64> {
         self.wheels.at(tick).range_rad_s()
     }

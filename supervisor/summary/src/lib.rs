@@ -1,4 +1,5 @@
-//! The summary of a run: its outcome and its numbers, from the ground truth and from the samples that a [`Hearer`] heard.
+//! Summary of a run: its outcome and its numbers, from the ground truth and from a [`Hearer`]'s
+//! samples.
 
 mod hearer;
 mod totals;
@@ -21,7 +22,7 @@ use mission_control::{
     target_list::{TargetOutcome, TargetResult},
 };
 
-/// Quantiles of a duration, microseconds; none if nothing was measured.
+/// Quantiles of a duration, microseconds; `None` without measurements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quantiles {
     pub p50: Option<f64>,
@@ -39,62 +40,68 @@ impl From<&Histogram> for Quantiles {
     }
 }
 
-/// The last line of `run --json`. Distances are in metres. An unknown value is none (null), such as the ground truth of a real
-/// robot.
+/// Last line of `run --json`. Distances are in metres. An unknown value, such as a real robot's
+/// ground truth, is `None` (null).
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Summary {
     pub outcome: Outcome,
     pub reason: String,
-    /// The row of the failsafe table that ended the mission, by its name (`firsthand table failsafe`).
+    /// Name of the failsafe-table row that ended the mission (`firsthand table failsafe`).
     pub cause: Option<String>,
-    /// The time from the first motion order to the end by the robot's clock, which goes on while the link is lost.
+    /// Time from the first motion order to the end by the robot's clock, including lost links.
     pub mission_time_s: f64,
     pub path_length_m: f64,
     pub straight_m: f64,
     pub min_clearance_m: Option<f64>,
-    /// Share of the time in which the body's surface was within [`SAFE_M`] of something: p_o of MRPB (J. Wen et al., ICRA 2021), (2).
+    /// Share of the time with the body's surface within [`SAFE_M`] of an obstacle: p_o of MRPB (J.
+    /// Wen et al., ICRA 2021), (2).
     pub p_o: Option<f64>,
-    /// Sum of the squared changes of the way from tick to tick: f_ps of MRPB, (5). It depends on the rate of the ticks.
+    /// Sum of the squared changes of displacement between ticks: f_ps of MRPB, (5). It depends on
+    /// the tick rate.
     pub f_ps_m2: Option<f64>,
     /// Mean |dv/dt|: f_vs of MRPB, (6).
     pub f_vs_m_s2: Option<f64>,
     pub collisions: Option<u64>,
-    /// The speed of the faster wheel's rim in the tick before the first contact, m/s: a robot at rest was run into.
+    /// Rim speed of the faster wheel in the tick before the first contact, m/s. It is 0 if a robot
+    /// at rest was run into.
     #[serde(default)]
     pub contact_speed_m_s: Option<f64>,
     pub pose_error_m: Option<f64>,
-    /// The root mean square of the pose error by the covariance of the last pose.
+    /// Root mean square pose error by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
-    /// Two standard deviations of that pose's position along the worst axis: an arrival is sure within `sure_within_m` of the mission.
+    /// Two standard deviations of that pose's position along the worst axis. An arrival is sure
+    /// within the mission's `sure_within_m`.
     #[serde(default)]
     pub pose_within_m: Option<f64>,
     pub true_distance_m: Option<f64>,
-    /// The time at which the robot had moved 0.1 m, by the ground truth.
+    /// Time at which the robot had moved 0.1 m, by the ground truth.
     pub departed_s: Option<f64>,
-    /// The longest that a wheel turned after the last command that the robot had received.
+    /// Longest time that a wheel turned after the last received command.
     pub stopping_time_s: Option<f64>,
     pub safety_events: u64,
     pub full_solves: u64,
     pub looks: u64,
     pub look_s: f64,
-    /// Share of the ticks in which the front sonar gave no distance, by the ground truth.
+    /// Share of ticks without a distance from the front sonar, by the ground truth.
     pub sonar_unavailable_share: Option<f64>,
-    /// The greatest commanded speed of either wheel less the least one, rad/s, in the last supervisor's part.
+    /// Greatest commanded speed of either wheel minus the least, rad/s, in the last supervisor's
+    /// part.
     pub wheel_range_rad_s: Option<f64>,
     pub ticks: u64,
     pub restarts: BTreeMap<String, u32>,
-    /// How often each cause of the failsafe made a robot that had gone stand, and go at half speed, in the last supervisor's part.
+    /// Times that each failsafe cause stopped, or slowed to half speed, a robot that had gone, in
+    /// the last supervisor's part.
     #[serde(default)]
     pub stops: BTreeMap<String, u32>,
     #[serde(default)]
     pub slowed: BTreeMap<String, u32>,
-    /// Times another supervisor went on with the run. Clearance, solves and latencies are then those of its part; the path is the
-    /// believed one.
+    /// Times that another supervisor resumed the run. Clearance, solves and latencies are then
+    /// those of its part, and the path is the believed one.
     pub resumes: u32,
-    /// Generations of the planner started because the robot stalled.
+    /// Generations of the planner started because of stalls.
     pub replans: u32,
     pub resets: u64,
-    /// The targets, in the order in which the robot was sent to them.
+    /// Targets, in the order in which the robot is sent to them.
     #[serde(default)]
     pub targets: Vec<TargetResult>,
     /// Time from the datagram in to the datagram out.
@@ -102,13 +109,13 @@ pub struct Summary {
     pub full_solve_us: Quantiles,
 }
 
-/// The distance after which a robot has departed, metres.
+/// Distance after which a robot has departed, metres.
 const DEPARTED_M: f64 = 0.1;
-/// d_safe of MRPB, metres. The value is nominal, because MRPB leaves it to its user.
+/// Distance d_safe of MRPB, metres. The value is nominal, because MRPB leaves it to its user.
 pub const SAFE_M: f64 = 0.3;
 
 impl Summary {
-    /// The summary of a finished run. Samples after the end was decided do not count.
+    /// Summarises a finished run. Samples after the decisive end do not count.
     pub fn new(mission: &Mission, finished: &Finished, heard: &Hearer) -> Self {
         let Finished { ending, record, resumes, .. } = finished;
         let last_tick = finished.last_tick.or(record.newest_tick());
@@ -231,7 +238,7 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}: {}", self.outcome.as_str(), self.reason)?;
         write!(f, "{:.1} s, {:.2} m driven, ", self.mission_time_s, self.path_length_m)?;
-        // The straight distance to a target at the start is 0.
+        // A target at the start has a straight distance of 0.
         if self.straight_m > 0.0 {
             let ratio = self.path_length_m / self.straight_m;
             write!(f, "{ratio:.2} x the straight {:.2} m, ", self.straight_m)?;
@@ -244,7 +251,8 @@ impl fmt::Display for Summary {
     }
 }
 
-/// The length of the straight lines from the start to each target in turn, without those that were replaced, metres.
+/// Returns the length of the straight lines from the start to each target in turn, without replaced
+/// ones, metres.
 fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
     let mut here = mission.start.at.to_array();
     let counted = targets.iter().filter(|target| target.outcome != TargetOutcome::Replaced);
@@ -255,7 +263,7 @@ fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
     legs.sum()
 }
 
-/// By square roots, which are the same on every processor; `hypot` of the C library is not.
+/// Uses square roots, which are the same on every processor, unlike the C library's `hypot`.
 fn path_length(truth: &[GroundTruthTick]) -> f64 {
     let places =
         truth.windows(2).map(|pair| [&pair[0], &pair[1]].map(|tick| DVec2::new(tick.x, tick.y)));
@@ -291,7 +299,7 @@ fn velocity_smoothness(truth: &[GroundTruthTick]) -> Option<f64> {
     (truth.len() > 1).then(|| changes.sum::<f64>() / (truth.len() - 1) as f64)
 }
 
-/// Share of the ticks whose front sonar byte is no distance: 255, nothing in range, or 0, not valid.
+/// Returns the share of ticks whose front sonar byte is 255, nothing in range, or 0, not valid.
 fn sonar_unavailable_share(truth: &[GroundTruthTick]) -> Option<f64> {
     let unavailable = truth.iter().filter(|tick| matches!(tick.sonar_cm, 0 | 255));
     (!truth.is_empty()).then(|| unavailable.count() as f64 / truth.len() as f64)
@@ -320,7 +328,8 @@ mod tests {
 
     #[test]
     fn the_metrics_of_mrpb_are_those_of_its_definitions() {
-        // The robot drives one metre ahead, two more, and one to the left, at the times 0, 1, 2 and 4 s.
+        // The robot drives one metre ahead, two more, and one to the left, at the times 0, 1, 2 and
+        // 4 s.
         let tick = |time_s, x, y, v, clearance_m| GroundTruthTick {
             time_s,
             x,

@@ -1,11 +1,11 @@
-//! Totals of the wheels' commands and of the robot's looks, as of each of the newest ticks. Ticks after the end of the
-//! mission do not count, and may be read before the end is known.
+//! Totals of wheel commands and looks, as of each of the newest ticks. Ticks after the end of the
+//! mission do not count, but may be read before the end is known.
 
 use std::collections::VecDeque;
 
 use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus};
 
-/// The number of ticks whose totals are stored: that of the arrival must still be there when its command is read.
+/// Ticks whose totals are stored. The arrival's must still be there when its command is read.
 const MOST: usize = 1024;
 
 #[derive(Clone, Default)]
@@ -14,7 +14,7 @@ pub(crate) struct Totals<T> {
 }
 
 impl<T: Copy + Default> Totals<T> {
-    /// Add the totals of `tick`. A tick that is given again is counted once.
+    /// Adds the totals of `tick`. A repeated tick counts once.
     pub(crate) fn add(&mut self, tick: u64, add: impl FnOnce(T) -> T) {
         let (last, totals) = match self.newest.back() {
             Some(&(last, totals)) => (Some(last), totals),
@@ -35,14 +35,14 @@ impl<T: Copy + Default> Totals<T> {
     }
 }
 
-/// The extremes of both wheels' commanded speeds, rad/s.
+/// Extremes of both wheels' commanded speeds, rad/s.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct WheelTotals {
     extremes: Option<[f64; 2]>,
 }
 
 impl WheelTotals {
-    /// Add a command. Only driving commands count, because every mission begins and ends at rest.
+    /// Adds a command. Only driving commands count, because every mission begins and ends at rest.
     pub(crate) fn with(self, command: &CommandSample) -> Self {
         if CommandState::from_byte(command.state) != CommandState::Driving {
             return self;
@@ -52,7 +52,8 @@ impl WheelTotals {
         Self { extremes: Some([least.min(left).min(right), greatest.max(left).max(right)]) }
     }
 
-    /// Dynamic range of the wheel signals: greatest commanded speed of either wheel minus the least, rad/s.
+    /// Returns the dynamic range of the wheel signals: greatest commanded speed of either wheel
+    /// minus the least, rad/s.
     pub(crate) fn range_rad_s(self) -> Option<f64> {
         self.extremes.map(|[least, greatest]| greatest - least)
     }
@@ -66,7 +67,6 @@ pub(crate) struct LookTotals {
 }
 
 impl LookTotals {
-    /// These totals with one more tick.
     pub(crate) fn with(self, guidance: &GuidanceSample) -> Self {
         let looking = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Look;
         Self {

@@ -1,14 +1,18 @@
-//! The ways of what moved during a run. The movers of a sample have no names: each is joined to the way that leads to it.
+//! Tracks of things that moved during a run. The movers of a sample have no names, so each is
+//! joined to the track that leads to it.
 
 use common::samples::{GridHeader, Mover};
 use glam::DVec2;
 
-/// A mover goes on a way if it is this near to the place where the way leads at its time, metres, no later than so many seconds.
+/// Greatest distance between a mover and its track's extrapolation, metres, and longest gap,
+/// seconds.
 const NEAR_M: f64 = 0.6;
 const LOST_S: f64 = 2.0;
-/// A mover whose place is not known as well, metres, is foreseen out of sight: where it is then is no part of a way.
+/// Greatest uncertainty of a recorded place, metres. A less certain mover is extrapolated out of
+/// sight.
 const SURE_M: f64 = 0.2;
-/// Places are at first so many seconds apart. Of a way with more of them every second one is dropped; of more ways the oldest.
+/// First interval of places, seconds. Of a track with too many, every second place is dropped; of
+/// too many tracks, the oldest.
 const APART_S: f64 = 0.2;
 const MOST_PLACES: usize = 600;
 const MOST_WAYS: usize = 256;
@@ -29,7 +33,8 @@ impl Trail {
         Self { places, radius_m: mover.radius_m.into(), newest, apart_s: APART_S }
     }
 
-    /// How far from `mover` it leads at `at_s`; none if it ended before.
+    /// Returns the distance between `mover` and the track's extrapolation to `at_s`; `None` if the
+    /// track ended or is too far off.
     fn off_m(&self, at_s: f64, mover: &Mover) -> Option<f64> {
         let (then_s, at, velocity) = self.newest;
         let is_open = at_s > then_s && at_s <= then_s + LOST_S;
@@ -101,7 +106,7 @@ mod tests {
             it.places.last().unwrap().1.x > 9.0
         });
         assert_eq!(rows.collect::<Vec<_>>(), [true, true]);
-        // What comes back after a while, or elsewhere, is on a way of its own.
+        // A mover that returns later or elsewhere has its own track.
         trails.hear(&sample(30.0, &[[9.9, 0.0]], 1.0));
         assert_eq!(trails.0.len(), 3);
     }

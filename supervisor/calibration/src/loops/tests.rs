@@ -1,16 +1,14 @@
-//! Tests of the estimator, on loops that are drawn.
-
 use super::*;
 
 const TRACK_M: f64 = 0.26;
 const NORMAL_SD: f64 = 0.01;
 
-/// Standard normal numbers of a seed.
+/// Generator of standard normal numbers.
 struct Drawn(u64);
 
 impl Drawn {
     fn uniform(&mut self) -> f64 {
-        // This is SplitMix64.
+        // SplitMix64.
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -24,7 +22,6 @@ impl Drawn {
     }
 }
 
-/// Loops of a robot with this ratio, track and slip.
 fn drawn(seed: u64, count: u32, ratio: f64, track: f64, slip: f64) -> Vec<Loop> {
     let mut drawn = Drawn(seed);
     let e = (ratio - 1.0) / (ratio + 1.0);
@@ -38,7 +35,7 @@ fn drawn(seed: u64, count: u32, ratio: f64, track: f64, slip: f64) -> Vec<Loop> 
             let rolled_m = 2.0 * arc_m + turn_m;
             let before = std::mem::replace(&mut off, NORMAL_SD * drawn.normal());
             let by_slip = slip * rolled_m.sqrt() / TRACK_M * drawn.normal();
-            // The right side of the equation: the turn by the nominal wheels, for a turn that was whole.
+            // The equation solved for the nominal turn of a whole turn.
             let turned = TAU * turns * track - 2.0 * e * arc_m / TRACK_M + by_slip + off - before;
             Loop {
                 number,
@@ -65,7 +62,7 @@ fn ratio_and_track_are_found_within_their_stated_deviations() {
         for deviations in [ratios, tracks] {
             let square = deviations.iter().map(|it| it * it).sum::<f64>() / 60.0;
             assert!((0.4..1.8).contains(&square), "slip {slip}: {square}");
-            // The slip of a few loops is uncertain: the tails are longer than normal ones.
+            // The slip of a few loops is uncertain, so the tails are longer than normal ones.
             let beyond = deviations.iter().filter(|it| it.abs() > 3.0).count();
             assert!(beyond <= 3, "slip {slip}: {deviations:?}");
         }

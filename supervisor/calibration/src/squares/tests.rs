@@ -1,5 +1,3 @@
-//! Tests of the squares.
-
 use common::{mission::Procedure, samples::GuidanceStatus};
 
 use super::*;
@@ -11,7 +9,7 @@ use crate::{
     },
 };
 
-/// Drive a square with wheels of this ratio and track, which do not slip.
+/// Drives a square with wheels of this ratio and track, without slip.
 fn drive(ratio: f64, track: f64, to_the_left: bool) -> Driven {
     let wheels = Wheels { e: (ratio - 1.0) / (ratio + 1.0), track };
     let side = if to_the_left { Procedure::LeftSquare } else { Procedure::RightSquare };

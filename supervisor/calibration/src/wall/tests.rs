@@ -1,4 +1,4 @@
-//! Tests of the procedure, on a robot whose wheels and world are a few lines.
+//! Tests of the procedure on a minimal robot and world.
 
 use common::{checkpoint::Checkpoint, kinematics::Pose2};
 
@@ -15,7 +15,7 @@ pub(crate) fn counts_of(ways: [f64; 2]) -> [u16; 2] {
     ways.map(|way| ((way / body().metres_per_count()).round() as i64).rem_euclid(32_768) as u16)
 }
 
-/// Nominal ways of the wheels in the next tick of a robot that obeys.
+/// Returns the nominal wheel distances in the next tick of an obedient robot.
 pub(crate) fn obeyed(order: &Order) -> [f64; 2] {
     let aside = order.aside_rad;
     let (v, omega) = match order.status {
@@ -26,12 +26,11 @@ pub(crate) fn obeyed(order: &Order) -> [f64; 2] {
     [-1.0, 1.0].map(|side| (v + side * omega * body().track_m / 2.0) * DT)
 }
 
-/// A robot that follows its orders, before a wall that answers within 22 degrees of its normal.
+/// Obedient robot before a wall that answers within 22 degrees of its normal.
 struct Robot {
     pose: Pose2,
     ratio: f64,
     track: f64,
-    /// Nominal, metres.
     ways: [f64; 2],
     wall: bool,
 }
@@ -110,7 +109,7 @@ fn it_stops_after_the_most_loops_if_the_values_are_not_good_enough() {
 fn without_a_wall_it_fails_and_the_run_ends() {
     let mut robot = Robot::new(1.0, 1.0);
     robot.wall = false;
-    // Nothing is in the way of a robot without a wall.
+    // Free ground for a robot without a wall.
     robot.pose.position.x = -4.0;
     let wall = run(&mut robot, CalibrationPlan::default());
     assert_eq!(wall.state(), State::Failed(Fault::NoWall));

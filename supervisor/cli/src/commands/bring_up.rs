@@ -1,4 +1,5 @@
-//! `firsthand bring-up`: a new robot against its mission file, a verdict a line.
+//! `firsthand bring-up`: compares a new robot with its mission file and prints one verdict per
+//! line.
 
 mod written;
 
@@ -29,30 +30,37 @@ use serde_json::json;
 
 use super::calibrate::drive::{Carried, Setting};
 
-/// Compare a new robot with its mission file: wheels, gyro, laser, rangers, response. Says what to mend, and the keys to change.
+/// Compare a new robot with its mission file.
 ///
-/// Put the robot on a free floor, 1 to 2 m before a wall, with walls or things around it. It stands, turns one and a half times to each
-/// side, drives 0.3 m there and back, and turns to and fro: about a minute.
+/// Checks wheels, gyro, laser, rangers and response. Prints faults to fix and keys to change.
+///
+/// Put the robot on a free floor, 1 to 2 m in front of a wall, with objects around it. It stands,
+/// turns 1.5 times to each side, drives 0.3 m forward and back, and turns left and right: about a
+/// minute.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission file with the robot. By default the simulated X80.
+    /// Mission file with the robot.
+    ///
+    /// Default: the simulated X80.
     mission: Option<String>,
-    /// Write a mission for a new robot that speaks this protocol to --out: x80, json, arduino or ros2.
+    /// Write a mission for a new robot of this protocol to --out.
+    ///
+    /// Protocols: x80, json, arduino, ros2.
     #[arg(long, value_parser = protocol, conflicts_with = "mission", requires = "address")]
     protocol: Option<Protocol>,
-    /// The address of the robot, as robot.address has it.
+    /// Address of the robot, in the form of robot.address.
     #[arg(long, requires = "protocol")]
     address: Option<String>,
-    /// The mission that --protocol writes.
+    /// Mission file that --protocol writes.
     #[arg(long, value_name = "FILE", default_value = "robot.toml")]
     out: PathBuf,
-    /// The wheels are in the air: look at motors and encoders alone.
+    /// Check only motors and encoders, with the wheels in the air.
     #[arg(long)]
     lifted: bool,
-    /// Write the keys that were found into the mission file.
+    /// Write the measured keys into the mission file.
     #[arg(long, requires = "mission")]
     write: bool,
-    /// Let the robot move without asking.
+    /// Move without asking first.
     #[arg(long, short)]
     yes: bool,
     #[command(flatten)]

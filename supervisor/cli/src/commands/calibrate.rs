@@ -22,21 +22,28 @@ use console::{
     missions,
 };
 
-/// Measure the ratio of the wheels' diameters, the track and the slip of a robot, or how its base responds.
+/// Measure the ratio of wheel diameters, the track and the slip.
 ///
-/// Put the robot 0.5 to 2 m before the middle of a flat wall 3 m wide, facing it, with 3 m of free floor behind it. It drives loops until
-/// the values are good enough, and writes them into a file, which a mission names as robot.calibration.
+/// Put the robot 0.5 to 2 m in front of the middle of a flat wall 3 m wide. It faces the wall, with
+/// 3 m of free floor behind it. It drives loops until the values are precise enough, and writes
+/// them to a file. A mission names the file as robot.calibration.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission whose robot is calibrated. By default the simulated one with measured realism.
+    /// Mission whose robot is calibrated.
+    ///
+    /// Default: the simulated X80 with measured realism.
     mission: Option<String>,
     #[command(flatten)]
     setting: Setting,
-    /// Squares to both sides, whose ends are measured by tape, instead of loops before a wall. The ends of a simulated robot are known.
+    /// Drive squares to both sides, whose ends you measure by tape.
+    ///
+    /// No wall is needed. The ends of a simulated robot are known.
     #[arg(long)]
     squares: bool,
-    /// By the robot's gyro instead: a way ahead, a turn, the way back and a turn, in half a minute. Its scale is known with this standard
-    /// deviation, a share, which becomes that of the track.
+    /// Calibrate by the robot's gyro, in half a minute.
+    ///
+    /// The robot drives forward, turns, drives back and turns. SHARE is the relative standard
+    /// deviation of the gyro's scale, and becomes that of the track.
     #[arg(
         long,
         value_name = "SHARE",
@@ -47,32 +54,38 @@ pub struct Arguments {
         conflicts_with_all = ["squares", "response"]
     )]
     gyro: Option<f64>,
-    /// The delay and the acceleration of the base, by ten seconds of turns on the spot. Prints the keys of [robot.response].
+    /// Measure delay and acceleration of the base.
+    ///
+    /// The robot turns on the spot for ten seconds. Prints the keys of [robot.response].
     #[arg(long, conflicts_with = "squares")]
     response: bool,
     /// Squares to each side.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(3..=50))]
     count: u32,
-    /// Stop when the standard deviation of the ratio is no more than this, and that of the track no more than three times this.
+    /// Stop at this standard deviation of the ratio.
+    ///
+    /// That of the track may be three times as large.
     #[arg(long, value_name = "SHARE", default_value_t = CalibrationPlan::default().ratio_sd)]
     sd: f64,
-    /// Stop after so many loops, however good the values are; each takes about a minute.
+    /// Stop after N loops at the latest, each about a minute.
     #[arg(long, value_name = "N", default_value_t = CalibrationPlan::default().loops)]
     loops: u32,
-    /// The way from the wall, or for a gyro, or the side of a square, metres.
+    /// Distance to drive, metres.
+    ///
+    /// Away from the wall, with --gyro forward, or with --squares along a side.
     #[arg(long, value_name = "M", default_value_t = CalibrationPlan::default().drive_m)]
     drive: f64,
-    /// The file to write.
+    /// File to write.
     #[arg(long, value_name = "FILE", default_value = "calibration.toml")]
     out: PathBuf,
 }
 
-/// One loop or one square, with room for repeated sweeps.
+/// Time for one loop or one square, including repeated sweeps.
 const LOOP_S: f64 = 180.0;
 const SQUARE_S: f64 = 120.0;
 
 const SIMULATED: &str = "target = [3, 0]\nsimulation.realism = 'measured'";
-/// A metre before the robot.
+/// Wall one metre in front of the robot.
 const WALL: &str = "[[wall]]\npoints = [[1.0, -2.5], [1.0, 2.5]]";
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -100,7 +113,6 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 impl Arguments {
-    /// The robot of the named mission, and nothing else of it.
     fn mission(&self, plan: CalibrationPlan) -> Result<Mission> {
         let named = match &self.mission {
             Some(name) => missions::load(name, &self.setting.set)?,
@@ -155,7 +167,7 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
     Ok(Found { method: "wall", before, estimate, metres, seconds })
 }
 
-/// A square has noise of its own, and the wheels of all squares.
+/// Gives each square its own noise. All squares share the same wheels.
 fn noise_of_its_own(mission: &mut Mission, number: u32) {
     let errors = x80_sim::wheel_errors::WheelErrors::of(mission);
     let wheels = &mut mission.simulation.wheels;

@@ -7,25 +7,30 @@ use console::{
 use link::failsafe::stop_distance::{self, Stop};
 use mission_control::outcome::RIGHT_PLACE_M;
 
-/// A way among things is longer than the straight line by this.
+/// Length of a path around obstacles, relative to the straight line.
 const DETOUR: f64 = 1.25;
-/// A smaller share of missions is not told.
+/// Smallest share of missions that is reported.
 const LEAST_SHARE: f64 = 0.02;
-/// The distance before a sensor at which heights are compared, metres: what is seen farther away is remembered.
+/// Distance in front of a sensor at which heights are compared, metres. Farther objects are
+/// remembered.
 const AHEAD_M: f64 = 0.3;
-/// Sensors that look within this of straight ahead see what is ahead, degrees.
+/// Angle from straight ahead within which a sensor looks ahead, degrees.
 const BESIDE_AHEAD_DEG: f64 = 30.0;
-/// Heights that are told, metres.
+/// Smallest reported gap of heights, metres.
 const LEAST_UNSEEN_M: f64 = 0.01;
 
-/// Check a mission as `run` does. An error is reported with its line, its key and the remedy; of a mission without one, the way from each
-/// fault to rest is printed, how often it ends in a wrong place if its wheels alone hold its heading, and at which heights its body touches
-/// what its sensors do not see.
+/// Check a mission in the same way as `run`.
+///
+/// Prints line, key and remedy of an error. For a valid mission, prints the distance from each
+/// fault to rest. If only the wheels hold the heading, prints how often the mission ends in a wrong
+/// place. Prints the heights at which the body touches obstacles that its sensors do not see.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission file, or a shipped mission (`firsthand missions`).
+    /// Mission file, or shipped mission (`firsthand missions`).
     mission: String,
-    /// Set a key of the mission, as often as needed: `--set start.heading_deg=90`.
+    /// Set a key of the mission; may be repeated.
+    ///
+    /// Example: `--set start.heading_deg=90`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -62,8 +67,8 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(print_text(&text)?)
 }
 
-/// What stands or hangs ahead at heights that the body can touch, and no sensor sees at [`AHEAD_M`]: one remark. The heights are those that
-/// the simulator is told.
+/// Describes heights that the body can touch and no forward sensor sees at [`AHEAD_M`]. The heights
+/// are those of the simulator.
 fn unseen(mission: &Mission) -> Option<String> {
     let heights = mission.simulation.physics().heights;
     let looks_ahead = |sensor: &Sensor| {
@@ -101,9 +106,12 @@ fn unseen(mission: &Mission) -> Option<String> {
     })
 }
 
-/// The expected share of missions that end in a wrong place, because the robot turns by what the diameters of its wheels differ more than
-/// it knows: over a way d that turns it by d/W of that share, and takes it aside by half of d times the turn. None if something else
-/// holds its heading. Errors of the track cancel where turns do.
+/// Returns the expected share of missions that end in a wrong place, due to the uncertain ratio of
+/// wheel diameters.
+///
+/// Over a distance d with track W, a relative error e turns the robot by e d/W. It then ends aside
+/// by half of d times that turn. Errors of the track cancel with opposite turns. `None` if another
+/// sensor holds the heading.
 fn wrong_places(mission: &Mission) -> Option<f64> {
     let robot = &mission.robot;
     let is_held = robot.gyro() || robot.ros2.imu.is_some() || mission.used(SensorKind::Scan) > 0;
@@ -130,7 +138,7 @@ mod tests {
             wrong_places(&mission)
         };
         let six_m = share("target = [6, 0]").unwrap();
-        // 41 of 100 on the default course, and 40 of 100 in rooms.
+        // Measured: 41 of 100 on the default course, 40 of 100 in rooms.
         assert!((0.25..0.45).contains(&six_m), "{six_m}");
         assert!(share("target = [9, 0]").unwrap() > six_m + 0.2);
         assert!(share("target = [6, 0]\nrobot.track_m = 0.6").unwrap() < six_m - 0.2);

@@ -5,13 +5,15 @@ use recording::{Recording, replay::diff};
 
 use console::{failure::Result, output::print};
 
-/// Find the first tick, topic and field in which two recordings differ. Exits with 1 if they do.
+/// Find the first tick, topic and field in which two recordings differ.
+///
+/// Exits with 1 if they differ.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The first recording, or the directory of its run.
+    /// First recording, or the directory of its run.
     #[arg(value_name = "A|A.mcap")]
     first: PathBuf,
-    /// The second.
+    /// Second recording, or the directory of its run.
     #[arg(value_name = "B|B.mcap")]
     second: PathBuf,
     /// Print one line of JSON.

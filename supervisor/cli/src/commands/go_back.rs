@@ -4,7 +4,7 @@ use mission_control::operator;
 
 use console::failure::Result;
 
-/// Send a robot that drives back to its start.
+/// Send a driving robot back to its start.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot.

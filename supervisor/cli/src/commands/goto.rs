@@ -13,34 +13,41 @@ use console::{
     runs::{Results, Target},
 };
 
-/// Time between looks for the result of a target.
+/// Interval of checks for the result of a target.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
-/// Send a robot that drives to another target, or to several in turn; it goes on without a stop. Fails if the supervisor
-/// refuses: a place in a believed hazard or outside the perimeter, a robot that an operator stopped. With `--follow` a robot that stays
-/// follows a beacon until Ctrl-C, and stands while it does not hear it.
+/// Send a driving robot to one or more other targets.
+///
+/// It continues without a stop. Fails if the supervisor refuses: a place in a believed hazard or
+/// outside the perimeter, or a robot that an operator stopped. With `--follow`, a robot under
+/// `run --stay` follows a beacon until Ctrl-C, and stands while the beacon is silent.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// X and Y of each target, metres in the mission frame.
     #[arg(required_unless_present = "follow", value_names = ["X", "Y"], num_args = 2.., allow_negative_numbers = true)]
     places: Vec<f64>,
-    /// Turn to this heading at the last target, degrees counter-clockwise from x.
+    /// Heading at the last target, degrees counter-clockwise from x.
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     heading: Option<f64>,
-    /// After the targets that the robot has, instead of them.
+    /// Add the targets to those that the robot has.
     #[arg(long)]
     append: bool,
-    /// Follow what is published on topic `beacon`, or that robot of this machine.
+    /// Follow the topic `beacon`, or a robot of this machine.
     #[arg(long, value_name = "ROBOT", num_args = 0..=1, conflicts_with_all = ["places", "heading", "append"])]
     follow: Option<Option<RobotName>>,
-    /// Metres between the middles of the robot and of what it follows; by default they leave 0.5 m between the robot and a person.
+    /// Distance between the centres of both robots, metres.
+    ///
+    /// The default leaves 0.5 m between the robot and a person.
     #[arg(long, value_name = "M", requires = "follow")]
     distance: Option<f64>,
-    /// The pose of the followed robot's mission frame in this robot's: metres, and degrees counter-clockwise from x.
+    /// Pose of the followed robot's mission frame in this robot's.
+    ///
+    /// Metres, and degrees counter-clockwise from x.
     #[arg(long, value_names = ["X", "Y", "DEG"], num_args = 3, requires = "follow", allow_negative_numbers = true)]
     frame: Vec<f64>,
-    /// Wait for the result of the last of these targets and print it: 0 is reached, 3 unreachable, 4 too late, 9 a wrong place, 11 unsure,
-    /// 1 anything else.
+    /// Wait for the last target's result and print it.
+    ///
+    /// Exit codes: 0 reached, 3 unreachable, 4 too late, 9 wrong place, 11 unsure, 1 anything else.
     #[arg(long, conflicts_with = "follow")]
     wait: bool,
     /// Name of the robot.
@@ -68,7 +75,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     }
 }
 
-/// Wait for the result of `target` among the `results` of `run` that come.
+/// Waits for the result of `target` among the next `results` of `run`.
 fn await_result(
     robot: &RobotName,
     run: &Path,
@@ -80,7 +87,8 @@ fn await_result(
         let is_its = |it: &Target| (it.x_m, it.y_m) == (target.x_m, target.y_m);
         if let Some(result) = results.take().into_iter().find(is_its) {
             print_text(&format!("{}\n", result.outcome.replace('_', " ")))?;
-            // A target's outcome is called as a run's; others, such as `replaced`, are none.
+            // Outcomes of targets share the names of a run's. Others, such as `replaced`, have no
+            // exit code.
             let outcome = serde_json::from_value::<Outcome>(result.outcome.into());
             return Ok(outcome.map_or(ExitCode::FAILURE, |outcome| outcome.exit_code().into()));
         }

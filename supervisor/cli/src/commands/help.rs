@@ -7,21 +7,23 @@ use clap::{Args, Command, error::ErrorKind};
 
 use console::{failure::Result, item, output::print_text};
 
-/// Print a page of the guide, or the options of a subcommand; without a name, list both.
+/// Print a page of the guide, or the options of a subcommand.
+///
+/// Without a name, list both.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A page of the guide, or the words of a subcommand: `stage kill`.
+    /// Page of the guide, or the words of a subcommand: `stage kill`.
     page: Vec<String>,
 }
 
 struct Page {
-    /// A file in `supervisor/guide/`, without `.md`; in small letters, the page's name.
+    /// File in `supervisor/guide/` without `.md`. In lower case, the page's name.
     file: &'static str,
-    /// The first line is the title.
+    /// Markdown text, whose first line is the title.
     text: &'static str,
 }
 
-/// Pages that answer the same kind of question, as <https://diataxis.fr> divides them.
+/// Pages for one kind of question, as divided by <https://diataxis.fr>.
 struct Part {
     title: &'static str,
     pages: &'static [Page],
@@ -39,7 +41,7 @@ macro_rules! guide {
     };
 }
 
-/// The order is that of reading. No page has the name of a subcommand. `.ci/site` reads this table.
+/// Pages in reading order. No page has the name of a subcommand. `.ci/site` reads this table.
 static GUIDE: &[Part] = guide! {
     "Tutorial":
     "tutorial";
@@ -98,11 +100,11 @@ pub fn page_names() -> Vec<String> {
     all_pages().map(Page::name).collect()
 }
 
-/// Lists the pages for the help of the whole command line, one a line.
+/// Lists the pages for the top-level help, one per line.
 pub fn pages() -> String {
     let mut list = String::from("Guide (firsthand help PAGE):\n");
     for Part { title, pages } in GUIDE {
-        // Writing to a String cannot fail.
+        // Infallible for a String.
         let _ = writeln!(list, " {title}");
         for page in *pages {
             let _ = writeln!(list, "  {:<22} {}", page.name(), page.title());
@@ -118,7 +120,7 @@ pub fn main(arguments: &Arguments, mut whole: Command) -> Result {
         let text = terminal_width().map_or(page.text.to_owned(), |width| wrapped(page.text, width));
         return Ok(print_text(&text)?);
     }
-    // Usage lines name the whole command only once it is built.
+    // Usage lines are complete only after `build`.
     whole.build();
     match subcommand(&mut whole, &arguments.page) {
         Some(command) => print_text(&command.render_long_help().to_string())?,
@@ -133,14 +135,14 @@ pub fn main(arguments: &Arguments, mut whole: Command) -> Result {
     Ok(())
 }
 
-/// None where standard output is no terminal: another program gets the Markdown as it is.
+/// Returns `None` without a terminal: other programs get raw Markdown.
 fn terminal_width() -> Option<usize> {
     let stdout = io::stdout();
     let size = stdout.is_terminal().then(|| rustix::termios::tcgetwinsize(&stdout).ok())??;
     (size.ws_col > 0).then_some(size.ws_col.into())
 }
 
-/// Paragraphs are wrapped, tables are drawn, and code stays as it is.
+/// Wraps paragraphs, draws tables, and leaves code unchanged.
 fn wrapped(markdown: &str, width: usize) -> String {
     let mut all = Vec::new();
     let mut is_code = false;
@@ -173,7 +175,7 @@ fn wrapped(markdown: &str, width: usize) -> String {
     all.join("\n") + "\n"
 }
 
-/// Whether a line belongs to the paragraph or the item before it.
+/// Returns whether a line continues the paragraph or item before it.
 fn goes_on(line: &str) -> bool {
     let line = line.trim_start();
     !line.is_empty()
@@ -181,16 +183,16 @@ fn goes_on(line: &str) -> bool {
         && line.split_once(". ").is_none_or(|(number, _)| number.parse::<u32>().is_err())
 }
 
-/// No column becomes narrower, in letters.
+/// Least width of a column, in characters.
 const NARROWEST: usize = 8;
 
-/// The `rows` of a table in columns, which are as narrow as `width` asks for.
+/// Draws the `rows` of a table in columns that fit into `width`.
 fn drawn(rows: &[&str], width: usize) -> Vec<String> {
     let cells = |row: &&str| -> Vec<String> {
         let row = row.trim().trim_matches('|').replace("\\|", "\u{1}");
         row.split('|').map(|cell| cell.trim().replace('\u{1}', "|")).collect()
     };
-    // The second row only divides.
+    // The second row only separates the header.
     let rows = rows.iter().enumerate().filter(|(at, _)| *at != 1);
     let rows: Vec<Vec<String>> = rows.map(|(_, row)| cells(row)).collect();
     let columns = rows.iter().map(Vec::len).max().unwrap_or_default();

@@ -1,6 +1,5 @@
-//! The files that make a robot a service of this machine.
-//!
-//! The Debian package brings the same files (`[package.metadata.deb]`); this is for everyone else.
+//! Installs the files of a systemd service. The Debian package has the same ones
+//! (`[package.metadata.deb]`).
 
 use std::{
     fs, io,
@@ -17,9 +16,9 @@ use console::{
     output::print_text,
 };
 
-/// Make this executable a service of systemd: units, user, configuration.
+/// Make this executable a systemd service: units, user, configuration.
 ///
-/// Each file is named before it is written. Nothing is enabled or started.
+/// Names each file before writing it. Enables and starts nothing.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Only print every file, each after its path.
@@ -28,7 +27,7 @@ pub struct Arguments {
     /// Install below DIR instead of /.
     #[arg(long, value_name = "DIR", default_value = "/", conflicts_with = "print")]
     root: PathBuf,
-    /// Write without asking.
+    /// Write without asking first.
     #[arg(long, conflicts_with = "print")]
     yes: bool,
 }
@@ -36,7 +35,7 @@ pub struct Arguments {
 struct Part {
     path: &'static str,
     text: &'static str,
-    /// Users may change it; such a file is not overwritten.
+    /// Whether users may edit the file. An existing one is kept.
     configuration: bool,
 }
 

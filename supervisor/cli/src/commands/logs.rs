@@ -21,18 +21,20 @@ use console::{
 /// Print the logs of all processes of a run, merged by time.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Only the log of this process: a stage, `supervisor` or `x80-sim`.
+    /// Print only the log of a stage, `supervisor` or `x80-sim`.
     stage: Option<String>,
-    /// Print also what is logged from now on, in this run and the robot's next ones, until Ctrl-C.
+    /// Also print new lines, across runs, until Ctrl-C.
     #[arg(short, long, conflicts_with = "run")]
     follow: bool,
-    /// Name of the robot: the logs of its present run, or else of its newest run below --runs.
+    /// Name of the robot.
+    ///
+    /// Prints its current run, or its newest run below --runs.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// The directory in which the directories of runs are.
+    /// Directory that holds the directories of runs.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
-    /// The directory of the run.
+    /// Directory of the run.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["robot", "runs"])]
     run: Option<PathBuf>,
 }
@@ -75,7 +77,7 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs> {
 }
 
 fn follow(arguments: &Arguments, stream: &mut Stream) -> Result {
-    // The log of a stage may not be there yet.
+    // The log of a stage may not exist yet.
     if let Some(stage) = arguments.stage.as_deref()
         && !OTHERS.contains(&stage)
     {
@@ -86,7 +88,7 @@ fn follow(arguments: &Arguments, stream: &mut Stream) -> Result {
     while !stream.has_ended() {
         let goes_on = Robot::find(arguments.robot.clone()).run;
         if let Some((directory, logs)) = &mut followed {
-            // The end of the run was looked for first: its last lines are printed in this round.
+            // The run's end was checked before, so its last lines are printed in this round.
             match print_round(logs, stream) {
                 // The directory was removed.
                 Err(_) if !directory.exists() => followed = None,

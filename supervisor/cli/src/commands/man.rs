@@ -1,4 +1,4 @@
-//! The manual page, from the tables that the command line is parsed with.
+//! Manual page, generated from the parser's tables.
 
 use std::io;
 
@@ -7,18 +7,18 @@ use clap_mangen::Man;
 
 use console::{failure::Result, output::print_text};
 
-/// Print the manual page, with all subcommands: `firsthand man > ~/.local/share/man/man1/firsthand.1`.
+/// Print the manual page, with all subcommands.
+///
+/// Example: `firsthand man > ~/.local/share/man/man1/firsthand.1`.
 #[derive(Debug, Args)]
 pub struct Arguments {}
 
-/// `whole` is the command line of the executable.
 pub fn main(_: &Arguments, whole: Command) -> Result {
     Ok(print_text(&String::from_utf8_lossy(&page(whole)?))?)
 }
 
-/// The whole command line, and a section for each subcommand.
 fn page(mut whole: Command) -> io::Result<Vec<u8>> {
-    // Usage lines name the whole command only once it is built.
+    // Usage lines are complete only after `build`.
     whole.build();
     let man = Man::new(whole.clone());
     let mut page = Vec::new();
@@ -29,14 +29,14 @@ fn page(mut whole: Command) -> io::Result<Vec<u8>> {
     add_subcommands(&whole, "", &mut page)?;
     let mut extra = Vec::new();
     man.render_extra_section(&mut extra)?;
-    // `.nf` leaves the lines as they are.
+    // `.nf` keeps line breaks.
     let titled = ".SH \"PAGES OF THE GUIDE, EXIT CODES\"\n.nf";
     let extra = String::from_utf8_lossy(&extra).replace(".SH EXTRA", titled);
     page.extend_from_slice(extra.as_bytes());
     Ok(page)
 }
 
-/// Subcommands, and theirs; `names` are the words before them.
+/// Adds subcommands recursively, with `names` as the preceding words.
 fn add_subcommands(command: &Command, names: &str, page: &mut Vec<u8>) -> io::Result<()> {
     for subcommand in command.get_subcommands().filter(|it| !it.is_hide_set()) {
         let names = format!("{names}{}", subcommand.get_name().to_uppercase());
@@ -46,7 +46,7 @@ fn add_subcommands(command: &Command, names: &str, page: &mut Vec<u8>) -> io::Re
         man.render_synopsis_section(&mut sections)?;
         man.render_description_section(&mut sections)?;
         man.render_options_section(&mut sections)?;
-        // The sections of a subcommand are parts of this section.
+        // Sections of a subcommand become subsections.
         let sections = String::from_utf8_lossy(&sections).replace(".SH ", ".SS ");
         page.extend_from_slice(sections.as_bytes());
         add_subcommands(subcommand, &(names + " "), page)?;

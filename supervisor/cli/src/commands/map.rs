@@ -9,7 +9,9 @@ use console::{
     output::print_text,
 };
 
-/// Maps of the ROS map_server. A mission starts from one with `map = "office.yaml"`.
+/// Save maps in the format of the ROS map_server.
+///
+/// A mission starts from a map with `map = "office.yaml"`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -18,12 +20,14 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Write what the robot believed at the end of a run: its surfaces, the ground that was scanned, and the rest as unknown.
+    /// Write the believed map of a run's end.
+    ///
+    /// It has surfaces as occupied, scanned ground as free, and the rest as unknown.
     Save {
-        /// The directory of a run that was recorded, or a recording.
+        /// Directory of a recorded run, or a recording.
         #[arg(value_name = "RUN|F.mcap")]
         run: PathBuf,
-        /// The map's YAML file; its image gets the same name with `.pgm`.
+        /// YAML file of the map; its image ends in `.pgm`.
         #[arg(long, value_name = "FILE.yaml", default_value = "map.yaml")]
         out: PathBuf,
     },
@@ -32,7 +36,7 @@ enum Action {
 pub fn main(arguments: &Arguments) -> Result {
     let Action::Save { run, out } = &arguments.action;
     let mut grid = Replica::default();
-    // A run that was resumed has several recordings. The last has its last map.
+    // A resumed run has several recordings, of which the last has the last map.
     let parts = recording::parts(run);
     let recording = Recording::open(parts.last().unwrap_or(run))?;
     for sample in recording.slices(&topics::GRID)? {

@@ -6,10 +6,10 @@ use console::{
     output::print_text,
 };
 
-/// List the missions that ship with the program; with a name, print its file to start your own from.
+/// List the shipped missions, or print one as a template.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A shipped mission.
+    /// Shipped mission to print.
     #[arg(id = "mission", value_name = "NAME")]
     name: Option<String>,
 }

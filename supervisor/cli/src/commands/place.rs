@@ -4,8 +4,10 @@ use mission_control::operator;
 
 use console::failure::Result;
 
-/// Tell a robot that stands where it is: its pose becomes that, and what it sensed before is forgotten. Fails if the supervisor
-/// refuses: a robot that drives, a place outside the perimeter.
+/// Set the pose of a standing robot.
+///
+/// It forgets earlier sensor data. Fails if the supervisor refuses: a robot that drives, or a place
+/// outside the perimeter.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Metres in the mission frame.

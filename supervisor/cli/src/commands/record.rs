@@ -26,33 +26,42 @@ use console::{
     output::{print_text, write_stderr},
 };
 
-/// Record what a robot's processes publish, from run to run, until Ctrl-C. `run` starts one by itself.
+/// Record the topics of a robot until Ctrl-C, across runs.
+///
+/// `run` starts its own recorder.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Name of the robot; it need not run yet.
+    /// Name of the robot, which may start later.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// The file; the robot's next run goes into F-2.mcap beside it.
+    /// File of the recording.
+    ///
+    /// The robot's next run goes into F-2.mcap beside it.
     #[arg(long, value_name = "F.mcap", default_value = "recording.mcap")]
     out: PathBuf,
-    /// Only these topics, by their names and with commas between: `pose,ranges`. A replay needs `inputs`.
+    /// Record only these topics, separated by commas: `pose,ranges`.
+    ///
+    /// A replay needs `inputs`.
     #[arg(long, value_name = "TOPICS", value_delimiter = ',')]
     topics: Option<Vec<String>>,
-    /// Fields, too: they are larger than all else together.
+    /// Also record fields.
+    ///
+    /// They are larger than all other topics together.
     #[arg(long)]
     fields: bool,
-    /// Most bytes of all files: `500MB`, `2GB`. A file ends at a quarter of it or after an hour, and the oldest files are removed.
+    /// Largest size of all files: `500MB`, `2GB`.
+    ///
+    /// A file ends at a quarter of it or after an hour. The oldest files are removed.
     #[arg(long, value_name = "SIZE")]
     disk_budget: Option<DiskBudget>,
-    /// The directory of the one run to record.
+    /// Directory of the one run to record.
     #[arg(long, hide = true)]
     run_directory: Option<PathBuf>,
-    /// End when this process, the parent, ends.
+    /// End when this parent process ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
 }
 
-/// Bytes that all recordings together may take.
 #[derive(Clone, Copy, Debug)]
 pub struct DiskBudget(pub u64);
 
@@ -60,7 +69,7 @@ impl FromStr for DiskBudget {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        /// A file holds the definitions of all messages.
+        /// Smallest budget, because a file holds all message definitions.
         const LEAST: u64 = 500_000;
         let digits = text.trim_end_matches(|letter: char| !letter.is_ascii_digit());
         let unit: Option<u64> = match &text[digits.len()..] {
@@ -78,7 +87,7 @@ impl FromStr for DiskBudget {
     }
 }
 
-/// Makes and removes a file beside `out`: the recording itself begins with the robot's run, which may come late.
+/// Creates and removes a file beside `out`, because the recording itself may begin much later.
 fn refuse_unwritable(out: &Path) -> Result<(), FileError> {
     let probe = out.with_extension(format!("{}.tmp", std::process::id()));
     File::create_new(&probe)
@@ -88,7 +97,7 @@ fn refuse_unwritable(out: &Path) -> Result<(), FileError> {
 
 struct Asks {
     signals: Signals,
-    /// The supervisor writes a byte for each wish, and may end before its recorder.
+    /// Pipe with one byte per request of the supervisor, which may end before its recorder.
     supervisor: Option<File>,
 }
 

@@ -8,20 +8,22 @@ use recording::{
     replay::{self, Options},
 };
 
-/// Replay a recording: give each generation of each stage its recorded inputs, and compare its outputs with the recorded ones to
-/// the bit. Exits with 1 if something differs.
+/// Replay a recording and compare all outputs bit by bit.
+///
+/// Each generation of each stage gets its recorded inputs. Exits with 1 if an output differs from
+/// the recorded one.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The directory of a run that was recorded, or a recording.
+    /// Directory of a recorded run, or a recording.
     #[arg(value_name = "RUN|F.mcap")]
     recording: PathBuf,
-    /// Only these stages, with commas between.
+    /// Replay only these stages, separated by commas.
     #[arg(long, value_name = "STAGES", value_delimiter = ',')]
     stage: Vec<String>,
     /// Compare from this mission time on, seconds.
     #[arg(long, value_name = "S", default_value = "0")]
     from: f64,
-    /// Print one line of JSON at the end, and nothing else on standard output.
+    /// Print only one line of JSON on standard output, at the end.
     #[arg(long)]
     json: bool,
 }

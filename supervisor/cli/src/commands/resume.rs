@@ -5,7 +5,7 @@ use mission_control::operator;
 
 use console::failure::Result;
 
-/// Let a stopped robot go on.
+/// Resume a stopped robot.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot.

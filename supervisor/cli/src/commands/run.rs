@@ -41,64 +41,82 @@ use console::{
     words::age,
 };
 
-/// Carry out a mission: start a robot's stages, let it drive, summarise.
+/// Carry out a mission: start the stages, drive, summarise.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A shipped mission (`firsthand missions`) or a mission file.
+    /// Shipped mission (`firsthand missions`) or mission file.
     #[arg(default_value = "obstacle-course")]
     mission: String,
-    /// Name of the robot, which also names its shared memory.
+    /// Name of the robot and of its shared memory.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Mission time of a simulated robot: `max`, or R times wall-clock; of one that speaks ROS 2: R times.
+    /// Speed of mission time: `max`, or R times wall-clock time.
+    ///
+    /// Robots that speak ROS 2 accept R only. Other real robots run in real time.
     #[arg(long, default_value = "max")]
     pace: Pace,
-    /// Seed of everything random in the simulation, instead of the mission's.
+    /// Seed of the simulation, instead of the mission's.
     #[arg(long, allow_negative_numbers = true)]
     seed: Option<u64>,
-    /// The directory of logs, checkpoints, summary and picture; by default a new one below --runs.
+    /// Directory of logs, checkpoints, summary and picture.
+    ///
+    /// Default: a new one below --runs.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// The directory in which the directories of runs are.
+    /// Directory that holds the directories of runs.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
-    /// First remove all but the newest N runs of this robot below --runs that have ended.
+    /// First remove all but this robot's newest N ended runs.
+    ///
+    /// Applies to the directory of --runs.
     #[arg(long, value_name = "N", conflicts_with_all = ["resume", "out"])]
     keep: Option<usize>,
-    /// Go on with the run in DIR, whose supervisor was killed. The robot must still stand where it came to rest.
+    /// Continue the run in DIR, whose supervisor was killed.
+    ///
+    /// The robot must still stand where it stopped.
     #[arg(
         long,
         value_name = "DIR",
         conflicts_with_all = ["mission", "robot", "pace", "seed", "out", "timeout", "set"]
     )]
     resume: Option<PathBuf>,
-    /// Go on with this robot's newest run below --runs if it was cut off; the robot then stands until `firsthand resume`, unless the
-    /// mission says `resume = "automatic"`. A mission that stays begins where the run before ended. This is for services of systemd.
+    /// Continue this robot's newest run below --runs if cut off.
+    ///
+    /// The robot stands until `firsthand resume`, unless the mission says `resume = "automatic"`. A
+    /// mission that stays begins where the previous run ended. For systemd services.
     #[arg(long, conflicts_with_all = ["resume", "out"])]
     resume_last: bool,
-    /// Give up after S seconds of mission time, instead of the mission's timeout.
+    /// Give up after S seconds, instead of the mission's timeout.
     #[arg(long, value_name = "S")]
     timeout: Option<f64>,
-    /// Set a key of the mission, as often as needed: `--set start.heading_deg=90`.
+    /// Set a key of the mission; may be repeated.
+    ///
+    /// Example: `--set start.heading_deg=90`.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Go on when a target is reached or given up: the robot stands and waits for the next one, by `goto`, page or ROS 2, until Ctrl-C. The
+    /// Wait for further targets until Ctrl-C.
+    ///
+    /// After each target the robot stands, until `goto`, the page or ROS 2 sends the next. The
     /// mission needs no target.
     #[arg(long, conflicts_with = "resume")]
     stay: bool,
-    /// Start no stages: systemd does, or you do, with `firsthand stage NAME --robot R`.
+    /// Start no stages: use systemd or `firsthand stage NAME --robot R`.
     #[arg(long)]
     watch_only: bool,
-    /// Record nothing; by default everything but fields goes into recording.mcap in the run's directory.
+    /// Record nothing.
+    ///
+    /// Default: all topics except fields, in recording.mcap in the run's directory.
     #[arg(long)]
     no_record: bool,
-    /// Most bytes of the run's recordings: `500MB`, `2GB`. A file ends at a quarter of it or after an hour, and the oldest files are removed.
+    /// Largest size of the recordings: `500MB`, `2GB`.
+    ///
+    /// A file ends at a quarter of it or after an hour. The oldest files are removed.
     #[arg(long, value_name = "SIZE", default_value = "2GB")]
     disk_budget: Option<DiskBudget>,
-    /// Print one line of JSON at the end, and nothing else on standard output.
+    /// Print only one line of JSON on standard output, at the end.
     #[arg(long)]
     json: bool,
-    /// Stop the robot and end when this process, the parent, ends.
+    /// Stop the robot and end when this parent process ends.
     #[arg(long, hide = true)]
     parent: Option<u32>,
 }
@@ -166,7 +184,7 @@ fn options(arguments: &Arguments) -> Result<Options> {
     })
 }
 
-/// Tell where the robot of an earlier run believes it is, and since when.
+/// Prints where the robot of an earlier run believes it is, and since when.
 fn tell_place(place: Option<&(PlaceSample, f64)>, stands: bool) {
     let place = place.map(|(PlaceSample { x_m, y_m, heading_rad, sigma_m, .. }, age_s)| {
         let heading = wrap_angle(*heading_rad).to_degrees();
@@ -214,8 +232,7 @@ fn mission(arguments: &Arguments) -> Result<Mission> {
     Ok(mission)
 }
 
-/// The mission `name` with `set`, which can be carried out here: this executable speaks to its robot, and its devices and planner are
-/// there.
+/// Returns the mission `name` with `set`. Its protocol, devices and planner must be available here.
 pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
     let mut mission = missions::load(name, set)?;
     refuse_unspoken(&mission)?;
@@ -234,9 +251,9 @@ pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
     Ok(mission)
 }
 
-/// Refuses a grid for which this machine has no memory free, where it says how much it has.
+/// Refuses a grid that exceeds the free memory, if known.
 fn refuse_without_memory(mission: &Mission) -> Result<(), Refused> {
-    /// All processes together for a cell, bytes: 1.84 GiB at 4096 x 4096.
+    /// Memory of all processes per cell, bytes: 1.84 GiB at 4096 x 4096.
     const PER_CELL: u64 = 118;
     let memory = fs::read_to_string("/proc/meminfo").unwrap_or_default();
     let free = memory.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
@@ -252,7 +269,7 @@ fn refuse_without_memory(mission: &Mission) -> Result<(), Refused> {
     Err(Refused::new("mission", message))
 }
 
-/// Refuses a robot of ROS 2 if this executable does not speak it.
+/// Refuses a ROS 2 robot if this executable lacks ROS 2.
 fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
     if mission.robot.protocol() != Protocol::Ros2 || SPEAKS_ROS2 {
         return Ok(());
@@ -276,7 +293,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     };
     let summary_file = prepare(&options).inspect_err(|_| made_for_nothing())?;
     let (mut line, title) = (ProgressLine::new(LINE_EVERY), title(&options));
-    // The journal gets no progress, because the status of the service has it.
+    // The journal gets no progress, because the service status shows it.
     let may_stay = !logging::to_journal();
     let mut lock = None;
     let mut recorder = RunRecorder::new(&options, arguments.disk_budget);
@@ -333,7 +350,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             complain(print_removed(directory));
         }
     } else {
-        // Picture and report come last and have no effect on the result, so a signal leaves them out.
+        // Picture and report do not affect the result, so a signal skips them.
         let redraw = directory.display();
         let last_words = format!(
             "firsthand: picture and report are not drawn; `firsthand report {redraw}` draws the report\n{told}"
@@ -360,7 +377,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     Ok(code.into())
 }
 
-/// Begins the log in the run directory, reserves room for the summary, and reports the mission's remarks.
+/// Begins the log, reserves space for the summary, and reports the mission's remarks.
 fn prepare(options: &Options) -> Result<SummaryFile> {
     let log = options.directory.join(SUPERVISOR_LOG);
     logging::to_file(&log).map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
@@ -368,12 +385,12 @@ fn prepare(options: &Options) -> Result<SummaryFile> {
         tracing::warn!("{remark}");
         write_stderr(&format!("firsthand: {remark}\n"));
     }
-    // A resumed run has its files.
+    // A resumed run already has its files.
     let cells = options.recovered.is_none().then(|| options.mission.grid_frame().area());
     Ok(SummaryFile::reserve(&options.directory, cells.map_or(0, summary_file::room_of_run))?)
 }
 
-/// The exit code of the mission stays.
+/// Reports a problem and keeps the mission's exit code.
 fn complain(reported: Result<(), String>) {
     if let Err(problem) = reported {
         tracing::error!("{problem}");
@@ -381,7 +398,8 @@ fn complain(reported: Result<(), String>) {
     }
 }
 
-/// This start created the directory, and the user ended the run before the robot drove or a stage died. A failed run keeps its logs.
+/// Returns whether the run directory may be removed. This start made it, and the user ended the run
+/// before the robot drove or a stage died.
 fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished) -> bool {
     let made_here = arguments.out.is_none() && options.recovered.is_none();
     let is_placed = finished.resets > 0;
@@ -407,7 +425,7 @@ fn print_removed(directory: &Path) -> Result<(), String> {
 
 fn title(options: &Options) -> String {
     let mission = &options.mission;
-    // A real robot does not wait.
+    // A real robot is identified by its address, a simulated one by its pace.
     let pace = match &mission.robot.address {
         Some(address) => format!("at {address}"),
         None => format!("pace {}", options.pace),

@@ -1,4 +1,4 @@
-//! The picture and the report of a run.
+//! Picture and report of a run.
 
 use std::{fs, path::PathBuf, time::SystemTime};
 
@@ -14,7 +14,7 @@ use mission_control::{
 use picture::{Facts, Scene, Trail};
 use summary::{Hearer, Summary};
 
-/// Name and file, or why there is none.
+/// Name and file, or the error.
 pub type Written = Result<(&'static str, PathBuf), String>;
 
 pub fn report(options: &Options) -> Written {
@@ -31,7 +31,7 @@ pub fn picture(
     let picture = options.directory.join("picture.svg");
     let svg = svg(&options.mission, finished, heard, summary);
     if let Err(error) = fs::write(&picture, svg) {
-        // An incomplete picture is of no use.
+        // An incomplete picture is useless.
         let _ = fs::remove_file(&picture);
         return Err(format!("cannot write {}: {error}", picture.display()));
     }

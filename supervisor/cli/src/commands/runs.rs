@@ -18,7 +18,9 @@ use console::{
     words,
 };
 
-/// List runs, remove the oldest, find where two differ. Without a subcommand: `firsthand runs list`.
+/// List runs, remove the oldest, find where two differ.
+///
+/// Without a subcommand: `firsthand runs list`.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct Arguments {
@@ -32,29 +34,33 @@ pub struct Arguments {
 enum Command {
     List(List),
     Diff(diff::Arguments),
-    /// List the targets of a run, also of one that goes on: place, outcome, mission time, distance by the robot and by the ground truth.
+    /// List the targets of a run, even in progress.
+    ///
+    /// Prints place, outcome, mission time, and distance by robot and ground truth.
     Targets {
-        /// The directory of the run.
+        /// Directory of the run.
         run: PathBuf,
-        /// One JSON object a line.
+        /// Print one JSON object per line.
         #[arg(long)]
         json: bool,
     },
 }
 
-/// List the runs, the newest last, with outcome and size; or first remove the oldest.
+/// List runs with outcome and size, the newest last.
+///
+/// With --prune, first remove the oldest.
 #[derive(Debug, Args)]
 struct List {
-    /// The directory in which the directories of runs are.
+    /// Directory that holds the directories of runs.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
-    /// Only the runs of this robot.
+    /// List only the runs of this robot.
     #[arg(long)]
     robot: Option<RobotName>,
-    /// First remove all but the newest N runs of each robot that have ended.
+    /// First remove all but the newest N ended runs per robot.
     #[arg(long, value_name = "N")]
     prune: Option<usize>,
-    /// One JSON object a line.
+    /// Print one JSON object per line.
     #[arg(long)]
     json: bool,
 }
@@ -67,7 +73,7 @@ struct Listed<'a> {
     outcome: String,
     mission_time_s: Option<f64>,
     targets: Vec<Target>,
-    /// Since 1970, UTC.
+    /// Seconds since 1970, UTC.
     began_s: f64,
     size_bytes: u64,
 }

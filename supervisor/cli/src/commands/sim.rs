@@ -14,36 +14,40 @@ use console::{
     missions,
 };
 
-/// Be a simulated X80 in a mission's world, for `run` or for any other software that drives an X80.
+/// Simulate an X80 in a mission's world.
+///
+/// `run` and other software for the X80 can drive it.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A shipped mission or a mission file.
+    /// Shipped mission or mission file.
     mission: String,
-    /// Address to listen on; port 0 takes a free one.
+    /// Address to listen on; port 0 takes a free port.
     #[arg(long, default_value = "127.0.0.1:0")]
     listen: SocketAddr,
-    /// How to listen: datagrams, one connection at a time, or a pseudo-terminal in place of a serial port.
+    /// Transport: datagrams, one connection, or a pseudo-terminal as serial port.
     #[arg(long, value_enum, default_value_t)]
     transport: Transport,
-    /// Mission time: `max` waits for a command each tick, R runs R times wall-clock.
+    /// Speed of mission time: `max`, or R times wall-clock time.
+    ///
+    /// `max` waits for a command in each tick.
     #[arg(long, default_value = "1")]
     pace: Pace,
-    /// Seed of everything random, instead of the mission's.
+    /// Seed of the simulation, instead of the mission's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Set a key of the mission, as often as needed.
+    /// Set a key of the mission; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Checkpoint of the robot; if the file exists, go on from it.
+    /// Checkpoint of the robot, from which it continues if present.
     #[arg(long, value_name = "FILE")]
     keep: Option<PathBuf>,
-    /// Write the ground truth to standard output, a JSON object a line.
+    /// Write the ground truth to standard output as JSON lines.
     #[arg(long)]
     ground_truth: bool,
-    /// The name of this robot, by which another in its world finds it.
+    /// Name by which other robots in its world find it.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// End when this process, the parent, ends.
+    /// End when this parent process ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
 }

@@ -12,10 +12,10 @@ use rustix::process::Signal;
 use super::table;
 use console::{failure::Result, operator, output::print_text};
 
-/// List, kill, freeze, restart and break the stages of a robot; or be one of them.
+/// List, kill, freeze, restart and break the stages of a robot.
 ///
-/// `firsthand stage NAME [--robot R]` is the process of the stage NAME. The supervisor starts these, unless it was given
-/// --watch-only: then you do, or systemd. Without a subcommand: `firsthand stage list`.
+/// `firsthand stage NAME [--robot R]` is the process of the stage NAME. The supervisor starts it.
+/// With --watch-only, systemd or you do. Without a subcommand: `firsthand stage list`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -26,21 +26,23 @@ pub struct Arguments {
 enum Command {
     /// Print the table of stages.
     List,
-    /// Send a signal to the process of a stage: SIGKILL unless another one is named.
+    /// Send a signal to the process of a stage, by default SIGKILL.
     Kill {
         #[command(flatten)]
         process: StageProcess,
-        /// KILL, TERM, INT, ABRT, STOP or CONT.
+        /// Signal: KILL, TERM, INT, ABRT, STOP or CONT.
         #[arg(long, default_value = "KILL", value_parser = signal)]
         signal: Signal,
     },
-    /// Freeze the process of a stage, so that it hangs.
+    /// Freeze the process of a stage with SIGSTOP.
     Freeze(StageProcess),
-    /// Let the frozen process of a stage go on.
+    /// Continue the frozen process of a stage.
     Thaw(StageProcess),
-    /// Replace a stage by a new generation; a stage that is held because it died too often is released.
+    /// Replace a stage by a new generation.
+    ///
+    /// Releases a stage that is held because it died too often.
     Restart {
-        /// The stage (`firsthand stage list`).
+        /// Stage (`firsthand stage list`).
         stage: String,
         /// Name of the robot.
         #[arg(long, default_value = "x80")]
@@ -51,10 +53,10 @@ enum Command {
     Process(Vec<OsString>),
 }
 
-/// A process of a robot.
+/// Process of a robot.
 #[derive(Debug, Args)]
 struct StageProcess {
-    /// The stage (`firsthand stage list`), or `supervisor`.
+    /// Stage (`firsthand stage list`), or `supervisor`.
     stage: String,
     /// Name of the robot.
     #[arg(long, default_value = "x80")]

@@ -32,19 +32,25 @@ use console::{
     words::{age, order, seconds, state},
 };
 
-/// Show the stages of a robot that runs here: pid, generation, uptime, restarts, ages; its link and its batteries.
+/// Show the stages, link and batteries of a running robot.
+///
+/// Stages: pid, generation, uptime, restarts and ages.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// List all robots that run on this machine for this user instead.
+    /// List all of this user's robots on this machine instead.
     #[arg(long, conflicts_with = "robot")]
     all: bool,
-    /// Print a status after each change, at most fifty a second, from run to run of the robot, until Ctrl-C.
+    /// Print a status after each change, until Ctrl-C.
+    ///
+    /// At most fifty a second, across runs.
     #[arg(long, conflicts_with = "all")]
     follow: bool,
-    /// One line of JSON for each robot; an age of null is never.
+    /// Print one line of JSON per robot.
+    ///
+    /// An age of null means never.
     #[arg(long)]
     json: bool,
 }
@@ -56,17 +62,17 @@ struct Status<'a> {
     order: &'static str,
     tick: u64,
     mission_time_s: f64,
-    /// Where the robot runs, if a mirror answers for it.
+    /// Source machine and age, if the robot is a mirror.
     mirror: Option<MirrorStatus>,
-    /// The target; none if the robot waits for one, or none is published.
+    /// Target, if one is published.
     target: Option<TargetStatus>,
-    /// How the robot follows a beacon; none if it does not.
+    /// Beacon following, if active.
     following: Option<FollowingStatus>,
-    /// Where the robot believes it is; none if it is not published.
+    /// Believed pose, if published.
     pose: Option<PoseStatus>,
-    /// The link; none if no link publishes.
+    /// Link, if one publishes.
     link: Option<LinkStatus>,
-    /// The power; none if the robot does not report it.
+    /// Battery voltages, if reported.
     power: Option<PowerStatus>,
     /// The trouble of a stage; none if no stage has any.
     complaint: Option<ComplaintStatus>,
@@ -86,30 +92,30 @@ struct ComplaintStatus {
 #[derive(Serialize)]
 struct MirrorStatus {
     of: String,
-    /// The age of what is shown, at most.
+    /// Upper bound on the data's age.
     age_s: f64,
 }
 
 #[derive(Serialize)]
 struct TargetStatus {
     number: u64,
-    /// The number of the last target of the list.
+    /// Number of the list's last target.
     last: u64,
     x_m: f64,
     y_m: f64,
-    /// How far the robot is from it; none if no pose is published.
+    /// Distance to the target. `None` without a pose.
     to_go_m: Option<f64>,
 }
 
 #[derive(Serialize)]
 struct FollowingStatus {
     lost: bool,
-    /// How long ago the beacon was seen; none if it never was.
+    /// Time since the last beacon. `None` before the first.
     seen_ago_s: Option<f64>,
     distance_m: f64,
     used: u64,
     refused: u64,
-    /// The reason of the newest refusal; none without one.
+    /// Reason of the newest refusal.
     refusal: Option<&'static str>,
     result: String,
 }
@@ -127,13 +133,13 @@ struct PoseStatus {
 struct LinkStatus {
     connected: bool,
     stopped: bool,
-    /// The effect of the failsafe: the robot goes, stands or the like.
+    /// Effect of the failsafe, such as go or stand.
     robot: &'static str,
-    /// The cause of the effect; none while the robot goes.
+    /// Cause of the effect. `None` while the robot goes.
     cause: Option<&'static str>,
-    /// Whether no wheel turns by the encoders.
+    /// Whether all wheels are at rest by the encoders.
     at_rest: bool,
-    /// Time without an answer of the robot; none while it answers.
+    /// Time since the robot's last answer. `None` while it answers.
     lost_s: Option<f64>,
     attempts: u64,
     next_attempt_s: Option<f64>,
@@ -166,10 +172,11 @@ struct StageStatus<'a> {
     output_age_s: Option<f64>,
 }
 
-/// The link publishes ten times a second, and a robot reports its batteries several times a second.
+/// Wait for missing data. The link publishes at 10 Hz, and robots report batteries several times a
+/// second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
-/// The least time between two statuses that are followed.
+/// Least interval between two printed statuses.
 const SHOWN_EVERY: Duration = Duration::from_millis(20);
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -192,7 +199,8 @@ static WANTED: [&dyn AnyTopic; 8] = [
     &topics::POSE,
 ];
 
-/// Whether `robot` is complete after `waited`. A robot without a link, batteries or a pose is so after a while.
+/// Returns whether `robot` is complete after `waited`, or [`LINK_PATIENCE`] is over: link,
+/// batteries and pose may be absent.
 fn is_complete(robot: &RobotState, waited: Duration) -> bool {
     let lost = robot.link.is_some_and(|link| link.connected == 0);
     let heard = robot.power.is_some() && robot.pose.is_some();
@@ -232,7 +240,7 @@ fn print_one(arguments: &Arguments) -> Result {
     }
 }
 
-/// Prints what the stop guard of a robot without a run sees.
+/// Prints what the stop guard of a robot without a run observes.
 fn print_guarded(arguments: &Arguments) -> Result {
     let robot = &arguments.robot;
     let sees = operator::sees(robot);
@@ -253,7 +261,6 @@ fn print_guarded(arguments: &Arguments) -> Result {
     Ok(())
 }
 
-/// Print a status after each change, from run to run.
 fn follow(arguments: &Arguments) -> Result {
     let mut stream = Stream::with_usual_priority()?;
     let domain = Domain::of(arguments.robot.clone());
@@ -271,7 +278,7 @@ fn follow(arguments: &Arguments) -> Result {
                 feed.read(&mut |sample| {
                     robot.apply(&sample);
                 })?;
-                // In lockstep there may be thousands of ticks a second.
+                // Lockstep may run thousands of ticks per second.
                 if shown.is_none_or(|shown| shown.elapsed() >= SHOWN_EVERY)
                     && let Some(status) = status(arguments, &robot, began.elapsed())
                 {
@@ -285,7 +292,7 @@ fn follow(arguments: &Arguments) -> Result {
     Ok(())
 }
 
-/// The status of `robot`; none before it is complete.
+/// Returns the status of `robot`, or `None` before it is complete.
 fn status<'a>(
     arguments: &'a Arguments,
     robot: &'a RobotState,
@@ -293,7 +300,7 @@ fn status<'a>(
 ) -> Option<Status<'a>> {
     let header = robot.supervisor.filter(|_| is_complete(robot, waited))?;
     let mirrors = Domain::of(arguments.robot.clone()).mirrors();
-    // A status without its age would look like that of a robot of this machine.
+    // Without its age, a mirror's status would look local.
     if mirrors.is_some() && robot.mirror.is_none() {
         return None;
     }

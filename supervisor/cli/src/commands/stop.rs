@@ -3,22 +3,29 @@ use common::domain::{Domain, RobotName};
 
 use console::{failure::Result, operator};
 
-/// Let the robot stand until `firsthand resume`; the mission goes on then. Fails unless the encoders confirm that it rests.
+/// Stop the robot until `firsthand resume`, which continues the mission.
 ///
-/// The link obeys directly, whatever is wrong with the supervisor or with shared memory. Where no link is left, the robot's stop guard
-/// orders the stop until the encoders show rest; this command starts a guard that is missing.
+/// Fails unless the encoders confirm rest. The link obeys directly, even if supervisor or shared
+/// memory fail. Without a link, the robot's stop guard orders the stop until the encoders show
+/// rest. Starts a missing guard.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Sign the robot off: you saw that it rests, or it is off. Its stop guard then ends. Refused while a run lasts.
+    /// End the stop guard: you saw the robot at rest, or off.
+    ///
+    /// Refused during a run.
     #[arg(long, conflicts_with = "cut_off")]
     sign_off: bool,
-    /// Do nothing where no run was cut off. This is for services of systemd.
+    /// Do nothing unless a run was cut off.
+    ///
+    /// For systemd services.
     #[arg(long)]
     cut_off: bool,
-    /// Only tell the supervisor of a stop that was asked at this time of the monotonic clock, and do not wait for rest.
+    /// Only tell the supervisor of a stop at monotonic time NS.
+    ///
+    /// Does not wait for rest.
     #[arg(long, hide = true, value_name = "NS")]
     through_supervisor: Option<u64>,
 }

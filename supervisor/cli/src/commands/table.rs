@@ -22,15 +22,15 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Table {
-    /// Print what slows the robot, stops it or ends its mission.
+    /// Print the causes that slow or stop the robot or end its mission.
     Failsafe,
-    /// Print the faults that can be put into stages (`firsthand stage fault`).
+    /// Print the faults for `firsthand stage fault`.
     Faults,
-    /// Print what was measured.
+    /// Print the measured results.
     Results,
-    /// Print what is promised, and the tests of it.
+    /// Print the guarantees and their tests.
     Capabilities,
-    /// Print what becomes of files and robots of another version.
+    /// Print how other versions of files and robots are handled.
     Versions,
 }
 

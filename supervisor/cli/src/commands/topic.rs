@@ -10,7 +10,9 @@ pub use self::echo::readable;
 use super::table;
 use console::{failure::Result, output::print_text};
 
-/// List the topics, print their samples as they come, count their rates. Without a subcommand: `firsthand topic list`.
+/// List topics, print their samples, measure their rates.
+///
+/// Without a subcommand: `firsthand topic list`.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct Arguments {
@@ -30,7 +32,9 @@ enum Command {
 /// Print the table of topics.
 #[derive(Debug, Args)]
 struct List {
-    /// Print a module for consumers in Python instead: the structs of all topics, and a class that follows a robot.
+    /// Print a Python module for consumers instead.
+    ///
+    /// It has the structs of all topics, and a class that follows a robot.
     #[arg(long)]
     python: bool,
 }

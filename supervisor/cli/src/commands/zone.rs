@@ -5,14 +5,16 @@ use mission_control::operator;
 use super::goto::points;
 use console::failure::Result;
 
-/// Add a keep-out zone to a robot that runs: a polygon where its body may not go. Its sensors see nothing of it, and the mission
-/// file stays as it is. Fails if the robot stands there.
+/// Add a keep-out zone to a running robot, or remove zones.
+///
+/// A zone is a polygon that the body may not enter. Sensors do not see it, and the mission file
+/// does not change. Fails if the robot stands there.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// X and Y of each corner, metres in the mission frame.
     #[arg(required = true, value_names = ["X", "Y"], num_args = 2.., allow_negative_numbers = true)]
     places: Vec<f64>,
-    /// Remove the zones that hold the place X Y instead.
+    /// Remove the zones that contain the point X Y instead.
     #[arg(long)]
     remove: bool,
     /// Name of the robot.

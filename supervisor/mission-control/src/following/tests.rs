@@ -11,7 +11,6 @@ fn mission() -> Mission {
     Mission::parse(text, Path::new("m.toml")).unwrap()
 }
 
-/// A map with hazard where `is_hazard` says so.
 fn map(is_hazard: impl Fn(DVec2) -> bool) -> Replica<u8> {
     let frame = mission().grid_frame();
     let cells = frame.whole().cells();

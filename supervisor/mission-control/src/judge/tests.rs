@@ -1,7 +1,6 @@
 use super::*;
 use common::samples::Cause;
 
-/// A link that hears the robot.
 fn link(action: Action, cause: Cause) -> LinkSample {
     LinkSample { connected: 1, action: action.into(), cause: cause.into(), ..LinkSample::default() }
 }
@@ -35,7 +34,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
         Some(Arrival { distance_m, beside: None, since: start + Duration::from_secs(seconds) })
     };
     let beside = arrival(0.36, 0).map(|it| Arrival { beside: Some(DVec2::new(2.64, 0.0)), ..it });
-    // A simulated robot that drives; its last tick was made at the start.
+    // A simulated robot that drives; its last tick was at the start.
     let driving = || Snapshot {
         arrival: None,
         link: Some(&go),
@@ -56,7 +55,6 @@ fn every_rule_of_the_judgement_decides_its_row() {
     };
     let starting = || Snapshot { has_ticked: false, reason: HoldReason::Starting, ..driving() };
     let held = || Snapshot { reason: HoldReason::StageHeld, held: vec!["mapper"], ..driving() };
-    // These are times after the last tick.
     const MS: Duration = Duration::from_millis(1);
     let (early, late) = (NO_PROGRESS - MS, NO_PROGRESS);
     #[rustfmt::skip]

@@ -29,12 +29,10 @@ fn guidance(status: GuidanceStatus, epoch: u64) -> GuidanceSample {
     GuidanceSample { status: status.into(), epoch, ..GuidanceSample::default() }
 }
 
-/// Check a tick of a robot that nothing holds.
 fn step(watch: &mut StallWatch, pose: PoseSample, guidance: GuidanceSample) -> Option<StallSample> {
     watch.step(&pose, &guidance, false, false)
 }
 
-/// Cause, recovery step and epoch of a stall.
 fn parts(stall: &StallSample) -> (StallCause, RecoveryStep, u64) {
     (stall.cause(), stall.recovery(), stall.epoch)
 }
@@ -87,7 +85,7 @@ fn a_robot_that_waits_for_a_field_is_not_stalled_until_that_takes_too_long() {
     });
     let least = FIELD_WITHIN.as_secs() as i32;
     assert_eq!(first, Some(least + STALLED_AFTER.as_secs() as i32));
-    // The next recovery step comes after as long again.
+    // The next recovery step takes as long again.
     let second = pose(f64::from(least) + 10.0, 0.0);
     assert_eq!(step(&mut watch, second, waiting), None);
 }
@@ -156,7 +154,6 @@ fn an_answer_from_before_the_reset_does_not_reset_again() {
     assert_eq!(step(&mut watch, pose(2.5, 0.1), old), None);
 }
 
-/// Move to and fro at one place for `seconds`.
 fn rock(watch: &mut StallWatch, seconds: std::ops::Range<u32>) -> Vec<StallSample> {
     let along = guidance(Along, 0);
     let rocking = seconds.filter_map(|second| {
@@ -325,7 +322,7 @@ fn a_robot_with_a_laser_wanders_where_it_has_been_and_not_where_it_has_not() {
         })
     };
     assert_eq!(first(|metre| metre), None);
-    // The limit is 12 m, and 3 m for each of four squares.
+    // The limit is 12 m, plus 3 m for each of four squares.
     assert_eq!(first(|metre| metre % 4.0), Some(24));
 }
 
@@ -340,7 +337,7 @@ fn a_relocated_robot_forgets_all_of_its_map_each_time_and_gives_up_for_it_never(
         let pose = PoseSample { relocations, x_m: place, ..pose(place, place) };
         resets.extend(step(&mut watch, pose, along).map(|stall| parts(&stall)));
     }
-    // Only in an even epoch the mapper resets the evidence near the robot.
+    // The mapper resets the evidence near the robot only in even epochs.
     let want = [2, 4, 6, 8, 10, 12].map(|epoch| (Relocated, Reset, epoch));
     assert_eq!(resets, want);
     assert_eq!(watch.recoveries(None), (0, 6));
@@ -358,7 +355,7 @@ fn a_robot_that_stands_and_is_elsewhere_forgets_its_map_at_once_and_nothing_else
     let stands = |watch: &mut StallWatch, second: f64, relocations| {
         watch.stand(&PoseSample { relocations, ..pose(second, 0.0) }, 3)
     };
-    // What was before the first pose is known.
+    // Relocations before the first pose are known.
     assert_eq!(stands(&mut watch, 0.0, 5), None);
     assert_eq!(stands(&mut watch, 60.0, 5), None);
     let stall = stands(&mut watch, 61.0, 6).unwrap();

@@ -14,7 +14,7 @@ fn at(x: f64, y: f64) -> TargetPoint {
     TargetPoint::at(DVec2::new(x, y))
 }
 
-/// A command that says arrived, in tick `tick` at as many seconds.
+/// An arrival in tick `tick`, at as many seconds.
 fn arrival(tick: u64) -> CommandSample {
     let stamp = Stamp { tick, stamp_ns: tick * 1_000_000_000, ..Stamp::default() };
     CommandSample { stamp, distance_m: 0.1, ..CommandSample::default() }
@@ -47,7 +47,7 @@ fn a_list_goes_on_from_target_to_target_and_says_what_became_of_each() {
     assert_eq!(outcomes(&results), want);
     assert!((results[4].at_s.unwrap() - 30.0).abs() < 1e-9);
     assert_eq!(of_all(reached, &results).outcome, Outcome::ReachedUnsure);
-    // The robot touched something in tick 15, which was seen after its arrival in tick 20.
+    // The contact in tick 15 was seen after the arrival in tick 20.
     let touched = Ending::failed(Outcome::Collision, "");
     let results = list.results(&touched, Some(14), None, None);
     assert_eq!(outcomes(&results)[2..], [(3, Replaced), (4, Missed), (5, NotTried)]);
@@ -165,7 +165,7 @@ fn a_hands_target_has_no_result_and_ends_in_waiting_for_the_next_one() {
     hand(&mut list, 0.5);
     hand(&mut list, 0.6);
     assert_eq!((list.number(), list.waits(), list.has_target()), (3, false, false));
-    // It is reached, or no way leads there.
+    // The target is reached, or no way leads there.
     list.settle(Outcome::Reached, 6.0, Some((arrival(6), Reached)));
     assert!(list.waits() && !list.release());
     hand(&mut list, 0.7);

@@ -1,4 +1,4 @@
-//! Tests of the rules one by one, then of all against a plain model of one process, over every short history and many
+//! Tests of single rules, then of all rules against a plain model over every short history and many
 //! long ones.
 
 mod model;
@@ -10,7 +10,7 @@ const fn ms(count: u64) -> Duration {
     Duration::from_millis(count)
 }
 
-/// The link's deadlines: a beat every 750 ms, ready after 3 s.
+/// A policy with the link's deadlines: a beat every 750 ms, ready after 3 s.
 fn running() -> Policy {
     let mut policy = Policy::new(TABLE[0].deadlines);
     assert_eq!(policy.step(Event::Start, ms(0)), Some(Action::Start));
@@ -42,7 +42,7 @@ fn deaths_in_a_row_wait_longer_and_longer_up_to_a_second() {
     assert_eq!(waits, [2, 4, 8, 16, 32, 64, 128, 256, 512, 1000]);
 }
 
-/// Let the process exit as soon as it is started, until the stage is held. Returns the time of the hold.
+/// Ends each process at its start until the stage is held. Returns the time of the hold.
 fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
     for _ in 0..100 {
         policy.step(Event::Exited, now);
@@ -133,7 +133,8 @@ fn a_stage_that_stops_beating_is_aborted_then_killed() {
     assert_eq!(policy.step(Event::Exited, ms(861)), Some(Action::Start));
 }
 
-/// The time after its last beat at which a stage is aborted that spends each second like this; none if it never is.
+/// Returns the time after its last beat at which a stage is aborted that spends each second like
+/// this.
 fn aborted_after(ran: f64, starved: f64, state: State) -> Option<u64> {
     let mut policy = running();
     (1..60_000).find(|&age| {
@@ -195,7 +196,6 @@ fn a_bus_that_blocks_starts_is_recreated_once() {
             }
             let event = if refused { Event::Refused } else { Event::Exited };
             answers.push(policy.step(event, now));
-            // All stages are stopped and started.
             policy.step(Event::Stop, now);
             assert_eq!(policy.step(Event::Start, now), Some(Action::Start));
         }

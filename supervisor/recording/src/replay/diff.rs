@@ -1,4 +1,5 @@
-//! The difference of two recordings: the first tick in which a stage published other values, and its inputs by then.
+//! First tick in which a stage published different values in two recordings, and its inputs by
+//! then.
 
 use std::fmt;
 
@@ -12,11 +13,12 @@ use crate::{
 
 #[derive(Debug, Default, Serialize)]
 pub struct Parting {
-    /// Lines of the run file that differ: mission, seed, clock. Address and name of the robot are left out.
+    /// Differing lines of the run file: mission, seed, clock. Address and name of the robot are
+    /// left out.
     pub run: Vec<String>,
     pub builds: Option<[String; 2]>,
     pub first: Option<First>,
-    /// Ticks that both recordings have.
+    /// Ticks present in both recordings.
     pub ticks: u64,
 }
 
@@ -55,7 +57,7 @@ fn run_differences(first: &str, second: &str) -> Vec<String> {
 
 struct Ticks<I> {
     messages: I,
-    /// A sample of the next tick that was read already.
+    /// Sample of the next tick, already read.
     next: Option<Message>,
     slices: bool,
 }

@@ -1,4 +1,4 @@
-//! Replays a recording in one pass over the file, all generations side by side.
+//! Replay of a recording in one pass over the file, all generations side by side.
 
 use std::collections::BTreeMap;
 
@@ -23,10 +23,10 @@ use crate::{
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     pub stages: Vec<String>,
-    /// The mission time from which on outputs are compared. Earlier ticks are computed, too, because the state follows
-    /// from them.
+    /// Mission time from which outputs are compared. Earlier ticks are computed as well, because
+    /// the state depends on them.
     pub from: MissionTime,
-    /// A run to replay in place of the recorded one, to try another mission with the same inputs.
+    /// Run in place of the recorded one, to try another mission with the same inputs.
     pub run: Option<Run>,
 }
 
@@ -80,7 +80,7 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report> {
 
 struct Generations {
     chosen: Vec<&'static Stage>,
-    /// The generations, by the stage's place in the table and the number.
+    /// Generations by the stage's place in the table, its name and their number.
     all: BTreeMap<(usize, &'static str, u32), Generation>,
 }
 
@@ -92,7 +92,7 @@ impl Generations {
         Some(self.all.entry(key).or_insert_with(|| Generation::new(stage, number)))
     }
 
-    /// Take a message. The error names the topic that it does not match.
+    /// Takes a message. The error names the topic that it does not match.
     fn take(&mut self, setting: &Setting<'_>, message: Message) -> Result<(), &'static str> {
         let topic = &*message.topic;
         if topic == topics::INPUTS.spec().name {

@@ -1,5 +1,5 @@
-//! One generation, which is replayed while its inputs are read. A recorded output may come before the input from which it
-//! follows or after it; each waits for the other.
+//! One generation, replayed while its inputs are read. A recorded output and the input behind it
+//! may come in either order; each waits for the other.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -22,19 +22,18 @@ use crate::replay::{
     values,
 };
 
-/// Places of the stamp's generation and sequence in a message, behind the encoding's header.
+/// Places of the stamp's generation and sequence in a message, after the encoding's header.
 const GENERATION: usize = 20;
 const SEQUENCE: usize = 24;
 /// Inputs before an output that a difference shows.
 const SHOWN_INPUTS: usize = 4;
-/// The most characters of each input.
+/// Most characters of each input.
 const SHOWN_LENGTH: usize = 600;
 
-/// The data that all generations of a recording share.
 pub(crate) struct Setting<'a> {
     pub(crate) run: &'a Run,
     pub(crate) recorded: &'a dyn Fn(&str) -> bool,
-    /// Outputs before this time are computed but not compared.
+    /// Start of comparison; earlier outputs are only computed.
     pub(crate) from: MissionTime,
     pub(crate) cut: bool,
 }
@@ -163,7 +162,6 @@ impl Generation {
         }
     }
 
-    /// Compare the outputs on `topic` that have a partner.
     fn compare(&mut self, setting: &Setting<'_>, topic: &str) {
         while let Some(channel) = self.channels.get_mut(topic) {
             let (Some((sequence, _)), Some(computed)) =
@@ -224,7 +222,6 @@ impl Generation {
         self.reset();
     }
 
-    /// Drop the data of a generation that is over.
     fn reset(&mut self) {
         self.pieces = Pieces::default();
         self.replay = None;
@@ -274,7 +271,8 @@ impl Generation {
         }
     }
 
-    /// The reason why the generation was not replayed; none if it was, or if it ended before its first input.
+    /// Returns why the generation was not replayed; `None` if it was, or if it ended before its
+    /// first input.
     fn why_not_replayed(&self, setting: &Setting<'_>) -> Option<String> {
         if self.not_replayed.is_some() || self.pieces_came || !self.worked {
             return self.not_replayed.clone();

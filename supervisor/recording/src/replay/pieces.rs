@@ -1,4 +1,4 @@
-//! Joins the pieces of a generation's inputs to entries, see [`common::inputs`].
+//! Assembly of a generation's input entries from pieces, see [`common::inputs`].
 
 use common::inputs::LONGEST_ENTRY;
 use thiserror::Error;
@@ -7,11 +7,11 @@ use thiserror::Error;
 pub(crate) struct Pieces {
     next: u32,
     bytes: Vec<u8>,
-    /// Number of the bytes that are consumed.
+    /// Number of consumed bytes.
     given: usize,
 }
 
-/// Pieces that do not follow each other, or hold no valid entries.
+/// Pieces out of sequence or without valid entries.
 #[derive(Debug, PartialEq, Eq, Error)]
 pub(crate) enum Broken {
     #[error(

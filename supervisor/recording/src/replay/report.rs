@@ -1,4 +1,4 @@
-//! The result of a replay.
+//! Result of a replay.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -8,7 +8,8 @@ use serde::Serialize;
 pub struct Report {
     pub stages: BTreeMap<&'static str, StageReport>,
     pub difference: Option<Difference>,
-    /// The time at which the recording was cut off, seconds after its first message; none if it is complete.
+    /// Time at which the recording was cut off, seconds after its first message; `None` if it is
+    /// complete.
     pub cut_after_s: Option<f64>,
 }
 
@@ -33,11 +34,11 @@ pub struct Difference {
     pub generation: u32,
     pub tick: u64,
     pub topic: String,
-    /// The field, with its index if it is part of a slice.
+    /// Field name, with its index if it is part of a slice.
     pub field: String,
     pub recorded: String,
     pub computed: String,
-    /// The last inputs of the step.
+    /// Last inputs of the step.
     pub inputs: Vec<String>,
 }
 
@@ -51,7 +52,7 @@ impl Report {
         stages.map(|stage| stage.not_replayed.len()).sum()
     }
 
-    /// Store `difference`, if it is of an earlier tick than the stored one.
+    /// Stores `difference` if its tick precedes the stored one's.
     pub(crate) fn differs(&mut self, difference: Difference) {
         let later = |first: &Difference| first.tick > difference.tick;
         if self.difference.as_ref().is_none_or(later) {

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::replay::values;
 
-/// The topics of a tick that are compared, in causal order.
+/// Compared topics of a tick, in causal order.
 pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
     &topics::RANGES,
     &topics::WHEELS,
@@ -18,18 +18,18 @@ pub(crate) static COMPARED: [&dyn AnyTopic; 6] = [
     &topics::GUIDANCE,
     &topics::COMMAND,
 ];
-/// The fields that a process measures of itself, or that count its restarts, which differ in every run.
+/// Fields that differ in every run: a process's own measurements and counts of restarts.
 const OWN: [&str; 4] = ["stamp.generation", "stamp.sequence", "full_solve_ns", "full_solves"];
 
 #[derive(Debug, PartialEq, Serialize)]
 pub struct First {
     pub tick: u64,
     pub time_s: f64,
-    /// The first topic of that tick that differs.
+    /// First topic of that tick that differs.
     pub topic: &'static str,
     pub writer: &'static str,
     pub field: String,
-    /// The value in both recordings.
+    /// Values in both recordings.
     pub values: [String; 2],
 }
 
@@ -46,14 +46,16 @@ pub(crate) fn time_of(message: &[u8]) -> MissionTime {
     stamp_of(message).time()
 }
 
-/// Whether a grid's message is a keyframe: the field is behind stamp, version and five numbers.
+/// Returns whether a grid's message is a keyframe. The flag follows stamp, version and five
+/// numbers.
 pub(crate) fn is_keyframe(message: &[u8]) -> bool {
     message.get(4 + 24 + 8 + 20) == Some(&1)
 }
 
-/// The first field that differs between two samples of the same tick on `topic`, apart from a process's own measurements.
+/// Returns the first difference between two samples of a tick on `topic`, apart from a process's
+/// own measurements.
 pub(crate) fn difference(topic: &'static dyn AnyTopic, a: &[u8], b: &[u8]) -> Option<First> {
-    // Only the fields other than the stamp's generation and sequence count.
+    // The stamp's generation and sequence are left out.
     if a.get(..20) == b.get(..20) && a.get(28..) == b.get(28..) {
         return None;
     }

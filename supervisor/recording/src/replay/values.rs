@@ -1,8 +1,9 @@
-//! The fields of a message as text, to describe a difference.
+//! Fields of a message as text, to describe a difference.
 
 use common::{bus::Value, topics::AnyTopic};
 
-/// The first field in which two messages of `topic` differ, and both values. Fields with an end among `left_out` do not count.
+/// Returns the first field in which two messages of `topic` differ, with both values. Fields that
+/// end with one of `left_out` are skipped.
 pub(crate) fn first_difference(
     topic: &dyn AnyTopic,
     messages: [&[u8]; 2],
@@ -22,7 +23,6 @@ pub(crate) fn first_difference(
     }
 }
 
-/// The fields of a message of `topic`: names and values, in order.
 fn of(topic: &dyn AnyTopic, message: &[u8]) -> Vec<(String, String)> {
     let mut fields = Vec::new();
     if let Some((header, elements)) = topic.decoded(message) {
@@ -36,7 +36,7 @@ fn flatten(path: &str, value: &Value, fields: &mut Vec<(String, String)>) {
     let text = match value {
         Value::Unsigned(number) => number.to_string(),
         Value::Signed(number) => number.to_string(),
-        // The format has the digits that distinguish any two values.
+        // This format has enough digits to distinguish any two values.
         Value::Single(number) => format!("{number:?}"),
         Value::Double(number) => format!("{number:?}"),
         Value::Text(text) => text.clone(),

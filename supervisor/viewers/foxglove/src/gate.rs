@@ -1,7 +1,8 @@
-//! The gate before the server: it refuses web pages that are no viewers.
+//! Gate before the server, which refuses foreign web pages.
 //!
-//! A browser opens a websocket to any address for any page, and says the page's origin, which the SDK's server does not look at. So that
-//! server listens at an address of this machine that nobody can guess, and the gate passes on whom it admits.
+//! Browsers open websockets to any address for any page, and send the page's origin, which the
+//! SDK's server ignores. So that server listens on an unguessable loopback address, and the gate
+//! forwards admitted clients.
 
 use std::{
     fs::File,
@@ -12,33 +13,34 @@ use std::{
     time::Duration,
 };
 
-/// The origin of Foxglove's own page. Programs that are no browsers mostly say none.
+/// Origin of Foxglove's own page. Most other programs send none.
 pub const FOXGLOVE: &str = "https://app.foxglove.dev";
-/// Most clients at a time; more are closed at once.
+/// Most clients at a time. Further ones are closed at once.
 const MOST_CLIENTS: usize = 32;
 const SAID_WITHIN: Duration = Duration::from_secs(3);
 const MOST_REQUEST_BYTES: usize = 4 << 10;
 
-/// One of this machine's 16 million addresses.
+/// Returns one of 16 million loopback addresses.
 pub fn hidden_address() -> io::Result<Ipv4Addr> {
     let mut bytes = [0; 3];
     File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     let [one, two, three] = bytes;
-    // The last byte is neither that of a network nor that of a broadcast.
+    // The last byte excludes network and broadcast addresses.
     Ok(Ipv4Addr::new(127, one, two, three.clamp(1, 254)))
 }
 
-/// Pass on the clients of `listener` to `server`, apart from web pages of other than these origins, until this process ends.
+/// Forwards clients of `listener` to `server` until this process ends. Web pages need one of these
+/// origins.
 pub fn open(listener: TcpListener, server: SocketAddr, origins: Vec<String>) {
     let origins = Arc::new(origins);
     thread::spawn(move || {
         for client in listener.incoming() {
             let origins = origins.clone();
-            // Each client holds the origins, too.
+            // Each client holds a reference, so the count is the number of clients.
             if let Ok(client) = client
                 && Arc::strong_count(&origins) <= MOST_CLIENTS
             {
-                // The failure of a connection concerns only its client.
+                // A failed connection affects only its client.
                 let serve = move || drop(pass(&client, server, &origins));
                 let _ = thread::Builder::new().spawn(serve);
             }

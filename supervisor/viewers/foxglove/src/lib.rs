@@ -2,10 +2,10 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | `gate` | which web pages may open it |
-//! | `live` | the channels of a recording ([`recording::viewers`]), live |
+//! | `gate` | access of web pages |
+//! | `live` | live channels of a recording ([`recording::viewers`]) |
 
-// No other crate uses these modules: `pub` means another module; what none uses is reported.
+// `pub` marks use by another module; unused items are still reported.
 #![allow(unreachable_pub)]
 
 mod gate;
@@ -23,23 +23,28 @@ use common::{
 };
 use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
 
-/// Serve a robot to Foxglove or Lichtblick, live: what a recording has, by a websocket.
+/// Serve a robot live to Foxglove or Lichtblick.
 ///
-/// It prints the address to open there. Viewers only watch.
+/// Sends the channels of a recording by websocket, and prints the address to open. Viewers only
+/// watch.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-foxglove", version)]
 pub struct Arguments {
-    /// Name of the robot; it need not run yet.
+    /// Name of the robot, which may start later.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Where to listen. The protocol has no authentication: whoever reaches the address can watch the robot. Nobody can send it anything.
+    /// Address and port to listen on.
+    ///
+    /// Everyone who reaches the address can watch the robot without authentication. Clients cannot
+    /// send it anything.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8765")]
     listen: SocketAddr,
-    /// The origin of a viewer's web page, such as `https://lichtblick.example`. Pages of other origins are refused; programs that are no
-    /// browsers are not.
+    /// Allowed origin of a web page, such as `https://lichtblick.example`.
+    ///
+    /// Other origins are refused. Programs other than browsers are accepted.
     #[arg(long = "origin", value_name = "ORIGIN", default_value = gate::FOXGLOVE)]
     origins: Vec<String>,
-    /// Print a layout for Foxglove or Lichtblick, to be imported there, and nothing else: map, field, speeds, log.
+    /// Only print a layout to import there: map, field, speeds, log.
     #[arg(long)]
     layout: bool,
 }

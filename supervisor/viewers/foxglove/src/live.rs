@@ -1,7 +1,8 @@
-//! A websocket server for Foxglove and Lichtblick: the channels of a recording, live. It is a consumer, and its clients can only watch.
+//! Websocket server that sends a recording's channels live to Foxglove and Lichtblick. Clients can
+//! only watch.
 //!
-//! Each client has a queue of its own. Messages that do not fit are dropped for this client, so a slow one delays neither the robot nor
-//! others.
+//! Each client has its own queue, and messages that do not fit are dropped. A slow client delays
+//! neither robot nor others.
 
 use std::{
     collections::HashMap,
@@ -32,12 +33,12 @@ use robot_state::newest_run;
 
 use crate::gate;
 
-/// The interval at which a run that has ended or begun, or the end of this process, is noticed when nothing is published.
+/// Interval of checks for the end or start of a run, or its own end.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const LOGS_EVERY: Duration = Duration::from_millis(500);
-/// The time after which a bus that cannot be used is tried again.
+/// Delay before an unusable bus is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// The most messages that wait for a client: those of some ticks.
+/// Most queued messages of a client: those of some ticks.
 const MOST_WAITING: usize = 512;
 
 #[derive(Debug)]
@@ -48,7 +49,7 @@ pub struct Live {
 
 type Readers = Vec<(&'static str, Box<dyn AnyReader>)>;
 
-/// The topics that are served, which are those that are recorded by default.
+/// Returns the topics that are recorded by default.
 fn served() -> impl Iterator<Item = &'static dyn AnyTopic> {
     let all = topics::TABLE.iter().copied();
     all.filter(|topic| matches!(topic.spec().logged, Logged::Yes))
@@ -62,8 +63,7 @@ struct Serving {
 }
 
 impl Live {
-    /// Listen from now on, for web pages of these origins and for other programs. Returns the address, too, whose port the system may
-    /// choose.
+    /// Listens for web pages of these origins and other programs. Returns the actual address.
     pub fn open(
         robot: &RobotName,
         address: SocketAddr,
@@ -89,7 +89,7 @@ impl Live {
         Ok((Self { context, server }, listens))
     }
 
-    /// Serve the robot of `domain`, from run to run, until `ended` returns true.
+    /// Serves a robot across runs, until `ended` returns true.
     pub fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
         let open = |bus: &Bus| -> Result<Readers, BusError> {
             served().map(|topic| Ok((topic.spec().name, topic.recorder_reader(bus)?))).collect()
@@ -119,10 +119,10 @@ impl Live {
         }
     }
 
-    /// The run of `domain`; none if its run file cannot be read.
+    /// Begins a run if its run file is readable.
     fn begin(&self, domain: &Domain) -> Option<Serving> {
         let (directory, run) = newest_run(domain)?;
-        // Viewers forget the run before.
+        // Viewers forget the previous run.
         self.server.clear_session(None);
         Some(Serving {
             channels: self.channels(&run.mission),
@@ -132,7 +132,7 @@ impl Live {
         })
     }
 
-    /// The channels of a recording. A channel that the run before had, too, stays the same.
+    /// Returns the channels of a recording, and reuses those of the previous run.
     fn channels(&self, mission: &Mission) -> HashMap<String, Arc<RawChannel>> {
         let topics = served().map(|topic| {
             let schema::Schema { name, text } = schema::of(topic);

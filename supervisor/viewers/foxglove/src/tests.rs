@@ -27,14 +27,14 @@ use recording::viewers::{self, Drawn};
 
 use crate::{LAYOUT, live::Live};
 
-/// The topics of messages and the messages.
+/// Messages by topic.
 type Sent = BTreeMap<String, Vec<u8>>;
 
 fn mission() -> Mission {
     Mission::parse("target = [4, 0]", Path::new("m.toml")).unwrap()
 }
 
-/// What viewers are sent of a robot that stands at (1, 2) and sees something at 0.5 m.
+/// Returns the messages for a robot at (1, 2) that senses an obstacle at 0.5 m.
 fn sent() -> Sent {
     let mut sent = Sent::new();
     let mut sink = |topic: &str, message: &[u8]| {

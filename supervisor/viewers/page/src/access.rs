@@ -1,7 +1,5 @@
-//! The access to a page: the names that it answers to, and the two tokens.
-//!
-//! Other users of this machine reach a loopback address too, so nobody watches without a token. Orders besides the stop need the token
-//! to drive.
+//! Access to a page: accepted host names, and two tokens. Other users of this machine can reach
+//! loopback, so watching needs a token. Orders except the stop need the token to drive.
 
 use std::{
     fmt,
@@ -12,13 +10,13 @@ use std::{
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// The browser may watch and stop the robot.
+    /// May watch and stop the robot.
     Watch,
-    /// The browser may do everything.
+    /// May give all orders.
     Drive,
 }
 
-/// A secret that gives rights to its owner.
+/// Secret that grants rights to its owner.
 pub struct Token(String);
 
 impl Token {
@@ -28,7 +26,7 @@ impl Token {
         Ok(Self(bytes.iter().map(|byte| format!("{byte:02x}")).collect()))
     }
 
-    /// Whether `shown` is this token, in a time that does not depend on where they differ.
+    /// Compares in constant time for equal lengths.
     fn is(&self, shown: &str) -> bool {
         let pairs = self.0.bytes().zip(shown.bytes());
         let differing = pairs.fold(0, |differing, (one, other)| differing | (one ^ other));
@@ -41,7 +39,7 @@ impl Token {
     }
 }
 
-/// The debug format hides the token from logs.
+/// Hides the token from logs.
 impl fmt::Debug for Token {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         to.write_str("Token")
@@ -52,21 +50,21 @@ impl fmt::Debug for Token {
 pub struct Access {
     /// `http` or `https`.
     scheme: &'static str,
-    /// The hosts that a request may name.
+    /// Host names that a request may use.
     hosts: Vec<String>,
     pub watch: Token,
     pub drive: Token,
 }
 
 impl Access {
-    /// The rules at `address`, or behind the proxy that browsers know by the name `proxy`.
+    /// Makes the rules for `address`, or for a proxy that browsers know as `proxy`.
     ///
     /// # Errors
-    /// When the system gives no random bytes for tokens.
+    /// The system gives no random bytes for tokens.
     pub fn new(address: SocketAddr, proxy: Option<&str>) -> io::Result<Self> {
         let hosts = match (proxy, address.port()) {
             (Some(name), _) => vec![name.to_owned()],
-            // Browsers leave the usual port out.
+            // Browsers omit the default port.
             (None, 80) => vec![address.ip().to_string(), "localhost".to_owned()],
             (None, port) => vec![address.to_string(), format!("localhost:{port}")],
         };
@@ -74,7 +72,7 @@ impl Access {
         Ok(Self { scheme, hosts, watch: Token::new()?, drive: Token::new()? })
     }
 
-    /// The addresses of the page with their tokens, in lines, for the operator alone.
+    /// Returns the page's addresses and tokens, for the operator alone.
     pub fn addresses(&self) -> String {
         let host = self.hosts.first().map(String::as_str).unwrap_or_default();
         let line =
@@ -82,7 +80,7 @@ impl Access {
         line("watch", &self.watch) + &line("drive", &self.drive)
     }
 
-    /// The name of `host` as the rules have it; none if the page does not answer to it.
+    /// Returns `host` if the page answers to it.
     pub fn host(&self, host: &str) -> Option<&str> {
         self.hosts.iter().map(String::as_str).find(|known| *known == host)
     }
@@ -91,13 +89,12 @@ impl Access {
         origin.strip_prefix(self.scheme).and_then(|rest| rest.strip_prefix("://")) == Some(host)
     }
 
-    /// The addresses at which a page at `host` may open its websocket.
     pub fn websocket(&self, host: &str) -> String {
         let scheme = if self.scheme == "https" { "wss" } else { "ws" };
         format!("{scheme}://{host}")
     }
 
-    /// The rights of a browser that shows `token`; none if it has no rights at all.
+    /// Returns the rights of `token`, if any.
     pub fn role(&self, token: &str) -> Option<Role> {
         if self.drive.is(token) {
             Some(Role::Drive)
@@ -107,10 +104,10 @@ impl Access {
     }
 }
 
-/// A name in an address, with a port if it is not the usual one. It stands in headers, so it has no other letters.
+/// Parses a host name with an optional port. Letters are restricted, because it goes into headers.
 ///
 /// # Errors
-/// When `text` is something else.
+/// `text` is not a host name.
 pub fn host_name(text: &str) -> Result<String, String> {
     let is_letter = |letter: char| letter.is_ascii_alphanumeric() || "-.:[]".contains(letter);
     if !text.is_empty() && text.chars().all(is_letter) {

@@ -1,4 +1,4 @@
-//! The data that every connection needs.
+//! Data that every connection needs.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ pub struct Context {
     pub access: Arc<Access>,
     pub shared: Arc<Shared>,
     pub operator: Operator,
-    /// Places of browsers that may watch, and of those that may drive.
+    /// Places for browsers that watch, and for those that drive.
     pub watching: Places,
     pub driving: Places,
 }

@@ -1,23 +1,23 @@
-//! `firsthand page`: the robot in a browser. It is a consumer of one robot, and a small web server beside it.
+//! `firsthand page`: a consumer of one robot, and a small web server for browsers.
 //!
-//! One thread reads the bus and fills the data that browsers are shown; a second one runs the server. A browser takes the new data
-//! ten times a second, so a slow one delays nobody: it gets the newest maps, fields and states, and those rows and events that are
-//! still stored. What it gets and the page itself are in the crate [`page`].
+//! One thread reads the bus into shared data, and another runs the server. Browsers take new data
+//! at 10 Hz. A slow one delays no other: it gets the newest maps, fields and states, and the stored
+//! rows and events. The crate [`page`] has the messages and the page itself.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `serving` | a page that is served: its threads, its options, its errors |
-//! | `access` | who may: addresses, names, tokens |
-//! | `context` | what every connection needs |
-//! | `shared` | what browsers are shown |
-//! | `robot` | the thread that reads the bus |
+//! | `serving` | the served page: threads, options, errors |
+//! | `access` | addresses, names, tokens |
+//! | `context` | data for every connection |
+//! | `shared` | data for browsers |
+//! | `robot` | thread that reads the bus |
 //! | `server` | connections, requests, checks |
-//! | `places` | how many clients there are at a time |
-//! | `session` | one browser: authentication, messages, orders |
-//! | `orders` | what an operator may ask for |
-//! | `operator` | how that is done |
+//! | `places` | limits of clients |
+//! | `session` | a browser: authentication, messages, orders |
+//! | `orders` | orders of an operator |
+//! | `operator` | their execution |
 
-// No other crate uses these modules: `pub` means another module; what none uses is reported.
+// `pub` marks use by another module; unused items are still reported.
 #![allow(unreachable_pub)]
 
 mod access;
@@ -45,20 +45,25 @@ use self::{
     serving::{Options, Page},
 };
 
-/// Show a robot in a browser: map, field, charts, stages, events; orders for whoever has the token to drive.
+/// Show a robot in a browser: map, field, charts, stages, events.
 ///
-/// It prints two addresses, and keeps them in a file that only you can read. The part behind # is a token, without which the page shows
-/// nothing: keep it to those who may watch or drive.
+/// Prints two addresses, one to watch and one to drive, and stores them in a file that only you can
+/// read. The part after # is a token, without which the page shows nothing. Share it only with
+/// those who may watch or drive.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-page", version)]
 pub struct Arguments {
-    /// Name of the robot; it need not run yet.
+    /// Name of the robot, which may start later.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Where to listen, on this machine only. Others come through a tunnel of SSH, or a proxy.
+    /// Loopback address and port to listen on.
+    ///
+    /// Other machines connect through an SSH tunnel or a proxy.
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
-    /// A proxy on this machine encrypts for others, who know the page as https://NAME/. The page answers to no other name.
+    /// Host name of a local proxy, for https://NAME/.
+    ///
+    /// The proxy encrypts for other machines. The page answers to no other name.
     #[arg(long, value_name = "NAME", value_parser = host_name)]
     behind_proxy: Option<String>,
 }

@@ -1,5 +1,3 @@
-//! The executable `firsthand-page`; see the library.
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

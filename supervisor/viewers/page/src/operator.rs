@@ -1,4 +1,4 @@
-//! The subcommands of an operator, for the page.
+//! Subcommands of an operator, for the page.
 
 use common::{domain::RobotName, samples::TargetPoint};
 use console::{
@@ -13,7 +13,7 @@ use crate::orders::Order;
 
 const IS_SENT: &str = "the supervisor sends the robot there";
 
-/// Carry out `order`. Returns the confirmation, or the reason why it was not carried out.
+/// Carries out `order`. Returns the confirmation, or the reason for a failure.
 pub fn perform(robot: &RobotName, order: &Order) -> Result<String, String> {
     confirmed(robot, order).map_err(|error| error.to_string())
 }

@@ -1,4 +1,4 @@
-//! The orders that an operator may give in the browser, and who may.
+//! Orders from the browser, and the rights for them.
 
 use std::sync::Arc;
 
@@ -8,13 +8,14 @@ use crate::access::Role;
 
 const MOST_TARGETS: usize = 16;
 
-/// Carries out an order, and waits until it is confirmed. The result is the confirmation, or the reason why it was not carried out.
+/// Function that carries out an order and waits for its confirmation. Returns it, or the reason for
+/// a failure.
 pub type Operator = Arc<dyn Fn(&Order) -> Result<String, String> + Send + Sync>;
 
-/// A message of a browser that has shown its token.
+/// Message of an authenticated browser.
 #[derive(Clone, Deserialize)]
 pub struct Asked {
-    /// The number of the message, which the answer has, too.
+    /// Number of the message and of its answer.
     pub id: u64,
     #[serde(flatten)]
     pub order: Order,
@@ -39,7 +40,7 @@ pub enum Order {
         ahead: f64,
         left: f64,
     },
-    /// Show the field of a target, without going there.
+    /// Shows the field of a target without driving there.
     Preview {
         x: f64,
         y: f64,
@@ -47,7 +48,8 @@ pub enum Order {
 }
 
 impl Order {
-    /// The reason why a browser of `role` may not give this order to a robot that is `simulated` or not.
+    /// Returns why a browser of `role` may not give this order to a robot that is `simulated` or
+    /// not.
     pub fn refusal(&self, role: Role, simulated: bool) -> Option<&'static str> {
         match self {
             Self::Stop => None,

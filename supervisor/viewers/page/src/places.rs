@@ -1,5 +1,5 @@
-//! Places for clients, a bounded number of them. When all are taken, the next client gets the place of the one that has been there
-//! longest, so nobody keeps others out by staying.
+//! Bounded places for clients. A new client replaces the oldest when all are taken, so clients
+//! cannot lock others out.
 
 use std::{
     collections::VecDeque,
@@ -8,12 +8,12 @@ use std::{
 
 use tokio::sync::Semaphore;
 
-/// A place of a client, until it is dropped. It closes when another client gets it.
+/// Place of a client until dropped. It closes when another client takes it.
 pub type Place = Arc<Semaphore>;
 
 pub struct Places {
     most: usize,
-    /// The oldest is the first.
+    /// Oldest first.
     taken: Mutex<VecDeque<Weak<Semaphore>>>,
 }
 
@@ -36,7 +36,7 @@ impl Places {
     }
 }
 
-/// Wait until another client gets `place`.
+/// Waits until another client takes `place`.
 pub async fn lost(place: &Place) {
     let _ = place.acquire().await;
 }

@@ -1,4 +1,4 @@
-//! The thread that reads the bus. It waits as any consumer does, and goes on when runs end and begin.
+//! Thread that reads the bus across runs.
 
 use std::{
     path::PathBuf,
@@ -26,18 +26,18 @@ use robot_state::{Feed, TOPICS, failsafe_in_words, newest_run};
 
 use crate::shared::Shared;
 
-/// The interval at which a run that has ended or begun, or the end of this process, is noticed when nothing is published.
+/// Interval of checks for the end or start of a run, or its own end.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// The least interval at which maps and fields are packed.
+/// Least interval at which maps and fields are packed.
 const PACK_EVERY: Duration = Duration::from_millis(500);
 const LOGS_EVERY: Duration = Duration::from_millis(500);
-/// The time after which a bus that cannot be used is tried again.
+/// Delay before an unusable bus is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// Most bytes of the ground truth that are read at once; the bytes behind them are skipped.
+/// Most bytes of ground truth read at once. Further bytes are skipped.
 const TRUTH_AT_ONCE: u64 = 1 << 16;
-/// The most bytes of the results of a run that goes on when it is first shown.
+/// Most bytes of results loaded for a run in progress.
 const LARGEST_RESULTS: u64 = 1 << 20;
-/// The most cells of a map for which a field is computed to a target that is only looked at.
+/// Most map cells for a target preview.
 const PREVIEW_MOST_CELLS: usize = 512 * 512;
 
 struct Reading {
@@ -45,14 +45,14 @@ struct Reading {
     processes: Processes,
     logs: LogFiles,
     logs_read: Instant,
-    /// What a simulated robot writes about itself.
+    /// Ground truth file of a simulated robot.
     truth: (PathBuf, Tail),
     results: Results,
     packed: Option<Instant>,
 }
 
 impl Reading {
-    /// The run of `domain`; none if its run file cannot be read.
+    /// Begins a run if its run file is readable.
     fn begin(domain: &Domain, shared: &Shared) -> Option<Self> {
         let (directory, run) = newest_run(domain)?;
         shared.lock().begin(&about(&run), run.mission.robot.address.is_none());
@@ -116,7 +116,7 @@ impl Reading {
     }
 }
 
-/// The field to `target` on the map that the robot believes, as its planner computes it.
+/// Computes the field to `target` on the believed map, as the planner does.
 fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
     let (header, cells) = collector.belief()?;
     let frame = header.part.frame();
@@ -136,7 +136,7 @@ fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
     Some(blob::field(blob::Shown::Preview, frame, &cells, target, collector.state.now_s()))
 }
 
-/// Show the robot of `domain` in `shared`, from run to run, until `ended` returns true.
+/// Shows a robot in `shared` across runs, until `ended` returns true.
 pub fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool) {
     let open = |bus: &Bus| Feed::open(bus, TOPICS);
     let mut follower = Follower::new(domain.clone(), "page", &topics::LINK, open)

@@ -1,5 +1,4 @@
-//! Connections and requests. Each connection takes a bounded amount of memory for a bounded time, whatever its client
-//! does.
+//! Connections and requests, with bounded memory and time independent of the client.
 
 use std::{convert::Infallible, io, net::TcpListener, sync::Arc, time::Duration};
 
@@ -20,16 +19,16 @@ use crate::{
     session,
 };
 
-/// Most connections at a time whose clients have shown no token.
+/// Most connections without a token.
 const MOST_STRANGERS: usize = 64;
 const REQUEST_WITHIN: Duration = Duration::from_secs(3);
-/// The time within which a connection that does not become a websocket ends.
+/// Lifetime of a connection that does not become a websocket.
 const ANSWERED_WITHIN: Duration = Duration::from_secs(10);
 const MOST_HEADER_BYTES: usize = 16 << 10;
 const MOST_MESSAGE_BYTES: usize = 4 << 10;
 const LIVE: &str = "/live";
 
-/// Serve connections until the result is dropped.
+/// Serves connections until the future is dropped.
 pub async fn serve(context: Arc<Context>, listener: TcpListener) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
         tracing::error!("the system refuses to watch the socket of the page");
@@ -38,14 +37,14 @@ pub async fn serve(context: Arc<Context>, listener: TcpListener) {
     let strangers = Places::new(MOST_STRANGERS);
     loop {
         let Ok((stream, _)) = listener.accept().await else {
-            // There are too many open files.
+            // Too many files are open.
             tokio::time::sleep(Duration::from_millis(100)).await;
             continue;
         };
         let (context, place) = (context.clone(), strangers.take());
         tokio::spawn(async move {
             tokio::select! {
-                // The failure of a connection concerns only its client.
+                // A failed connection affects only its client.
                 _ = connection(&context, stream, &place) => {}
                 () = lost(&place) => {}
             }
@@ -113,7 +112,7 @@ async fn answer(context: &Arc<Context>, request: Request, place: Place) -> Respo
     answer
 }
 
-/// The host that `request` names, once and everywhere the same, if the page answers to that host.
+/// Returns the host of `request` if its mentions agree and the page answers to it.
 fn host(context: &Context, request: &Request) -> Option<String> {
     let host = context.access.host(single(request.headers(), &header::HOST)?)?;
     let absolute = request.uri().authority();
@@ -133,7 +132,7 @@ async fn session(context: &Arc<Context>, request: Request, place: Place) -> Resp
     })
 }
 
-/// The value of a header that a request has once.
+/// Returns the value of a header that occurs once.
 fn single<'a>(headers: &'a HeaderMap, name: &header::HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?;

@@ -1,4 +1,4 @@
-//! A page that is served: its threads, its options, its errors.
+//! Served page: threads, options and errors.
 
 use std::{
     fs,
@@ -24,18 +24,17 @@ use crate::{
     shared::Shared,
 };
 
-/// Most browsers at a time that may watch, and that may drive.
+/// Most browsers per role.
 const MOST_SESSIONS: usize = 16;
 
 #[derive(Clone)]
 pub struct Options {
     pub robot: RobotName,
     pub listen: SocketAddr,
-    /// The name by which browsers know the proxy before the page; none without a proxy.
+    /// Name by which browsers know the proxy, if there is one.
     pub proxy: Option<String>,
 }
 
-/// A page that cannot be served.
 #[derive(Debug, Error)]
 enum PageError {
     #[error("{0}; nobody could open the page without its addresses")]
@@ -49,7 +48,7 @@ pub struct Page {
     #[cfg_attr(not(test), allow(dead_code, reason = "tests connect to it"))]
     pub address: SocketAddr,
     pub access: Arc<Access>,
-    /// The file with the addresses, which is removed with the page.
+    /// File with the addresses, removed with the page.
     pub kept: PathBuf,
     domain: Domain,
     pub shared: Arc<Shared>,
@@ -57,10 +56,10 @@ pub struct Page {
 }
 
 impl Page {
-    /// Listen, and serve from now on.
+    /// Listens and starts to serve.
     ///
     /// # Errors
-    /// When the address is not one of this machine alone, or is taken.
+    /// The address is not loopback, or is taken.
     pub fn open(options: &Options, operator: Operator) -> Result<Self> {
         let address = options.listen;
         if !address.ip().is_loopback() {
@@ -113,18 +112,19 @@ impl Page {
         Ok(Self { address, access, kept, domain, shared, server: Some((end, thread)) })
     }
 
-    /// Show the robot, from run to run, until `ended` returns true.
+    /// Shows the robot across runs, until `ended` returns true.
     pub fn show(&self, ended: &mut dyn FnMut() -> bool) {
         robot::follow(&self.domain, &self.shared, ended);
     }
 }
 
-/// Keep the addresses of the page on `port` in a file that only its owner can read. No robot has its name, because that has a dot.
+/// Stores the addresses of the page on `port` in a file for its owner only. The dot separates it
+/// from robot names.
 fn keep(domain: &Domain, port: u16, addresses: &str) -> Result<PathBuf, FileError> {
     let directory = domain.directory().parent().unwrap_or(domain.directory());
     let file = directory.join(format!("{}.page-{port}", domain.robot));
     let written = make_own_directory(directory).map_err(io::Error::other).and_then(|()| {
-        // A page that was killed left its file.
+        // A killed page leaves its file.
         let _ = fs::remove_file(&file);
         let made = fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&file);
         made?.write_all(addresses.as_bytes())

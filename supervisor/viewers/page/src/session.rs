@@ -1,4 +1,4 @@
-//! One browser: it shows its token, then is sent the new data and may give orders.
+//! Session of one browser: it shows its token, receives new data, and may give orders.
 
 use std::{
     sync::Arc,
@@ -24,24 +24,24 @@ use crate::{
 };
 
 const TOKEN_WITHIN: Duration = Duration::from_secs(3);
-/// The interval at which new data are sent.
+/// Interval at which new data are sent.
 const SEND_EVERY: Duration = Duration::from_millis(100);
-/// The time without another message after which a message says that the server lives.
+/// Longest silence before a keep-alive message.
 const ALIVE_EVERY: Duration = Duration::from_millis(300);
-/// The time after which a browser that does not take a message is left.
+/// Longest time for a browser to take a message.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
-/// The time within which a robot that may go on does so.
+/// Longest time for a resumed robot to go on.
 const GOES_WITHIN: Duration = Duration::from_secs(3);
 const MOST_A_SECOND: u32 = 50;
-/// Most orders that are performed at a time, stops not counted, and most stops.
+/// Most simultaneous orders except stops, and most simultaneous stops.
 const MOST_ORDERS: usize = 1;
 const MOST_STOPS: usize = 3;
 static ORDERS: Semaphore = Semaphore::const_new(MOST_ORDERS);
 static STOPS: Semaphore = Semaphore::const_new(MOST_STOPS);
 
-/// Codes of websockets from 4000 are the application's.
+/// Websocket codes from 4000 belong to the application.
 const WRONG_TOKEN: u16 = 4401;
-/// Nothing was heard in time, or the place went to another client. The browser connects again.
+/// Close code after a timeout or the loss of the place. The browser reconnects.
 const LATE: u16 = 4408;
 const REPLACED: u16 = 4409;
 const TOO_MUCH: u16 = 4429;
@@ -54,7 +54,7 @@ struct Hello {
 
 type Sender = SplitSink<WebSocket, Message>;
 
-/// `stranger` is the place of a client that has shown no token.
+/// Serves a browser, with the place `stranger` before it shows a token.
 pub async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>) {
     let first = tokio::select! {
         first = timeout(TOKEN_WITHIN, socket.recv()) => first.ok().flatten(),
@@ -105,7 +105,7 @@ pub async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>)
         }
     }
     match code {
-        // The task that sends closes the socket when it ends.
+        // The sending task closes the socket when it ends.
         Some(code) => {
             let _ = answers.try_send(Told::Close(code));
         }
@@ -159,7 +159,7 @@ async fn close(mut sender: Sender, code: u16) {
     let _ = timeout(TAKEN_WITHIN, sender.send(Message::Close(Some(frame)))).await;
 }
 
-/// Have `asked` carried out, and send the confirmation to the browser.
+/// Carries out `asked` and sends the confirmation to the browser.
 async fn perform(asked: Asked, role: Role, context: Arc<Context>, answers: mpsc::Sender<Told>) {
     let Asked { id, order } = asked;
     let simulated = context.shared.lock().simulated;
@@ -172,7 +172,7 @@ async fn perform(asked: Asked, role: Role, context: Arc<Context>, answers: mpsc:
         Err(text) => (false, text),
     };
     let answer = json!({"answer": {"id": id, "ok": ok, "text": text}});
-    // A browser that has gone needs no answer.
+    // A disconnected browser needs no answer.
     let _ = answers.send(Told::Answer(answer.to_string())).await;
 }
 
@@ -193,7 +193,7 @@ async fn done(order: Order, context: &Arc<Context>) -> Result<String, String> {
     if resumes { resumed(context).await } else { Ok(told) }
 }
 
-/// The link's answer after the supervisor has taken a request to resume.
+/// Waits for the link after an accepted request to resume.
 async fn resumed(context: &Arc<Context>) -> Result<String, String> {
     let began = Instant::now();
     loop {

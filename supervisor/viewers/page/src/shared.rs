@@ -1,4 +1,4 @@
-//! The data for browsers, shared by the thread that reads the bus and those that serve.
+//! Data for browsers, shared by the bus thread and the sessions.
 
 use std::{
     collections::VecDeque,
@@ -12,12 +12,12 @@ use std::{
 use axum::body::Bytes;
 use serde_json::Value;
 
-/// The most items of a series: rows of ten minutes at 10 Hz.
+/// Most items of a series: rows of ten minutes at 10 Hz.
 const MOST: usize = 6000;
-/// The most items of a series in one message.
+/// Most items of a series per message.
 const AT_ONCE: usize = 500;
 
-/// A value and its number, which grows with each new one.
+/// Value with a number that grows with each new one.
 #[derive(Clone, Debug, Default)]
 pub struct Newest<T> {
     number: u64,
@@ -29,7 +29,7 @@ impl<T: Clone> Newest<T> {
         (self.number, self.value) = (self.number + 1, Some(value));
     }
 
-    /// The value, unless a browser at `cursor` has it.
+    /// Returns the value if it is new for a browser at `cursor`.
     fn after(&self, cursor: &mut u64) -> Option<T> {
         let is_new = std::mem::replace(cursor, self.number) != self.number;
         self.value.clone().filter(|_| is_new)
@@ -51,7 +51,7 @@ impl Ring {
         self.items.push_back(item.to_string().into());
     }
 
-    /// The items that a browser at `cursor` does not have, at most [`AT_ONCE`].
+    /// Returns at most [`AT_ONCE`] items that are new for a browser at `cursor`.
     fn after(&self, cursor: &mut u64) -> Vec<Arc<str>> {
         let from = cursor.saturating_sub(self.first) as usize;
         let found: Vec<_> = self.items.iter().skip(from).take(AT_ONCE).cloned().collect();
@@ -75,14 +75,14 @@ pub struct Shown {
     pub map: Newest<Bytes>,
     pub field: Newest<Bytes>,
     pub preview: Newest<Bytes>,
-    /// The target whose field is wanted; a new one replaces it.
+    /// Newest target for a preview.
     pub wanted: Option<[f64; 2]>,
-    /// The reason why the robot cannot be shown; empty if it can.
+    /// Reason why the robot cannot be shown, or empty.
     pub problem: String,
 }
 
 impl Shown {
-    /// Note that a run began, and drop the data of the last one.
+    /// Begins a run and drops the data of the last one.
     pub fn begin(&mut self, about: &Value, simulated: bool) {
         *self = Self {
             run: self.run + 1,
@@ -110,7 +110,7 @@ impl Shared {
     }
 }
 
-/// The data of a run that a browser has been sent.
+/// Data of a run that a browser has received.
 #[derive(Debug, Default)]
 struct Sent {
     run: Option<u64>,
@@ -125,7 +125,7 @@ struct Sent {
     preview: u64,
 }
 
-/// One browser that watches.
+/// One watching browser.
 pub struct Cursor {
     shared: Arc<Shared>,
     sent: Sent,
@@ -133,7 +133,7 @@ pub struct Cursor {
 
 #[derive(Debug, Default)]
 pub struct News {
-    /// JSON; empty if nothing in it is new.
+    /// JSON, or empty without news.
     pub text: String,
     pub blobs: Vec<Bytes>,
 }
@@ -165,7 +165,7 @@ impl Cursor {
             if !items.is_empty() {
                 let mut part = format!("\"{name}\":[");
                 for (at, item) in items.iter().enumerate() {
-                    // Writing to a String cannot fail.
+                    // Infallible for a String.
                     let _ = write!(part, "{}{item}", if at > 0 { "," } else { "" });
                 }
                 parts.push(part + "]");

@@ -1,4 +1,4 @@
-//! Tests of attacks on a page that is served, over real sockets, and of the operator's rights.
+//! Tests of the operator's rights, and of attacks on a served page over real sockets.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{
@@ -19,10 +19,10 @@ use crate::{
     serving::{Options, Page},
 };
 
-/// What an operator was asked for.
+/// Orders given to an operator.
 type Noted = Arc<Mutex<Vec<Order>>>;
 
-/// An operator that notes what it is asked for, and may not send the robot back.
+/// Returns an operator that records its orders, and refuses to send the robot back.
 fn noting(noted: &Noted) -> Operator {
     let noted = noted.clone();
     Arc::new(move |order| {
@@ -43,7 +43,7 @@ fn page() -> (Page, Noted) {
     (Page::open(&options("127.0.0.1:0"), noting(&noted)).unwrap(), noted)
 }
 
-/// The longest that a test waits for anything.
+/// Longest wait of a test.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 fn connect(page: &Page) -> TcpStream {
@@ -52,7 +52,7 @@ fn connect(page: &Page) -> TcpStream {
     stream
 }
 
-/// Whether the other end closes `stream`, without a further byte.
+/// Returns whether the other end closes `stream` without further bytes.
 fn is_closed(stream: &mut TcpStream) -> bool {
     match stream.read(&mut [0]) {
         Ok(count) => count == 0,
@@ -60,7 +60,6 @@ fn is_closed(stream: &mut TcpStream) -> bool {
     }
 }
 
-/// The answer to a request with these lines.
 fn ask(page: &Page, lines: &[&str]) -> String {
     let mut stream = connect(page);
     stream.write_all((lines.join("\r\n") + "\r\n\r\n").as_bytes()).unwrap();
@@ -88,7 +87,7 @@ const UPGRADE: [&str; 4] = [
     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
 ];
 
-/// A websocket's client with the features that these tests need.
+/// Minimal websocket client.
 struct Browser(TcpStream);
 
 #[derive(Debug, PartialEq)]
@@ -140,7 +139,7 @@ impl Browser {
         let _ = self.0.write_all(&frame);
     }
 
-    /// The next frame; closed without a code if the connection ends.
+    /// Returns the next frame, or a closure without a code.
     fn hear(&mut self) -> Frame {
         let mut head = [0; 2];
         if self.0.read_exact(&mut head).is_err() {
@@ -168,7 +167,6 @@ impl Browser {
         }
     }
 
-    /// The first message that has `key`.
     fn await_key(&mut self, key: &str) -> Value {
         loop {
             match self.hear() {
@@ -179,7 +177,6 @@ impl Browser {
         }
     }
 
-    /// The code with which the page closes.
     fn await_close(&mut self) -> u16 {
         loop {
             if let Frame::Closed(code) = self.hear() {
@@ -188,7 +185,7 @@ impl Browser {
         }
     }
 
-    /// Whether an order is done, and what is said about it.
+    /// Returns whether an order is done, and the answer's text.
     fn order(&mut self, order: &Value) -> (bool, String) {
         let mut asked = order.clone();
         asked["id"] = 7.into();
@@ -212,7 +209,7 @@ fn a_request_that_names_another_host_or_none_or_two_is_misdirected() {
         &["GET http://evil.example/ HTTP/1.1", &own],
     ] {
         let answer = ask(&page, lines);
-        // The HTTP library itself refuses requests that no server may accept.
+        // The HTTP library refuses requests that no server may accept.
         assert!(["421", "400"].contains(&status(&answer)), "{lines:?}: {answer}");
     }
     assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &own])), "200");
@@ -346,7 +343,7 @@ fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
     let mut watching = Browser::watching(&page);
     watching.await_key("role");
     let mut silent: Vec<_> = (0..300).map(|_| connect(&page)).collect();
-    // Half a request is sent, so that the header is never complete.
+    // Half a request never completes the header.
     for stream in &mut silent {
         let _ = stream.write_all(b"GET / HTTP/1.1\r\n");
     }
@@ -355,7 +352,7 @@ fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
     Browser::driving(&page).await_key("role");
     for stream in &mut silent {
         let mut answer = Vec::new();
-        // The connection ends with any answer.
+        // The connection may end with any answer.
         if let Err(error) = stream.read_to_end(&mut answer) {
             assert_eq!(error.kind(), ErrorKind::ConnectionReset);
         }

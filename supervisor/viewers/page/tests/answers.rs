@@ -1,4 +1,4 @@
-//! Cargo builds the executable for this test, so that the system tests find it beside `firsthand`.
+//! Makes Cargo build the executable beside `firsthand` for the system tests.
 
 use std::process::Command;
 

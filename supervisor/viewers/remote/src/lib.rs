@@ -1,21 +1,21 @@
 //! `firsthand remote`: a robot's topics on another machine, read-only.
 //!
-//! `serve` reads the robot's bus as any consumer does and puts each sample, as a recording has it, under
-//! `firsthand/ROBOT/topic/NAME` of a zenoh session. `show` makes a bus of its own with these samples, a mirror, to which viewers
-//! attach as to a robot.
+//! `serve` reads the robot's bus as a consumer, and puts each sample under
+//! `firsthand/ROBOT/topic/NAME` of a zenoh session, encoded as in recordings. `show` republishes
+//! these samples on its own bus, a mirror to which viewers attach.
 //!
 //! | file | holds |
 //! |---|---|
-//! | `session` | zenoh sessions: certificates, and what whoever connects may do |
-//! | `wire` | what goes with the samples; the clock of the other machine |
+//! | `session` | zenoh sessions: certificates and rights |
+//! | `wire` | metadata of samples; the other machine's clock |
 //! | `serve` | from the robot's bus to the session |
 //! | `show` | from the session to a mirror's writers |
-//! | `list` | the robots of several machines |
+//! | `list` | robots of several machines |
 //!
-//! Why this does not use iceoryx2's own tunnel over zenoh: the tunnel carries each service in both directions, so that the other machine
-//! writes on the robot's bus; its filter knows names and no directions.
+//! iceoryx2's own zenoh tunnel is unsuitable: it carries services in both directions, so the other
+//! machine could write on the robot's bus. Its filter knows names, but no directions.
 
-// No other crate uses these modules: `pub` means another module; what none uses is reported.
+// `pub` marks use by another module; unused items are still reported.
 #![allow(unreachable_pub)]
 
 mod list;
@@ -32,7 +32,9 @@ use clap::{Parser, Subcommand};
 
 use console::{executable, failure::Result};
 
-/// Show a robot of another machine on this one, to all viewers: `serve` on the robot's machine, `show` on the other.
+/// Show a robot of another machine to all local viewers.
+///
+/// Run `serve` on the robot's machine, and `show` on the other.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-remote", version)]
 pub struct Arguments {
@@ -42,9 +44,11 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// Let other machines read a robot of this one, from run to run, until Ctrl-C.
+    /// Let other machines read a local robot until Ctrl-C, across runs.
     Serve(serve::Arguments),
-    /// Show a robot of another machine here: `status`, `top`, `page` and consumers attach to it as to a robot, until Ctrl-C.
+    /// Show a robot of another machine here until Ctrl-C.
+    ///
+    /// `status`, `top`, `page` and consumers attach to it as to a local robot.
     Show(show::Arguments),
     /// List the robots that machines serve.
     List(list::Arguments),

@@ -1,4 +1,4 @@
-//! The robots that machines serve.
+//! Robots that machines serve.
 
 use std::{
     thread,
@@ -25,7 +25,7 @@ pub struct Arguments {
     hosts: Vec<String>,
     #[command(flatten)]
     connecting: Connecting,
-    /// One line of JSON for each robot.
+    /// Print one line of JSON per robot.
     #[arg(long)]
     json: bool,
 }
@@ -39,7 +39,7 @@ struct Listed {
 }
 
 const PATIENCE: Duration = Duration::from_secs(3);
-/// After the first answer of a machine, those of its other robots are awaited.
+/// Wait for a machine's other robots after its first answer.
 const OTHERS: Duration = Duration::from_millis(300);
 const AGAIN_AFTER: Duration = Duration::from_millis(50);
 
@@ -81,7 +81,7 @@ pub fn list(arguments: &Arguments) -> Result {
     Ok(print_text(&table.to_string())?)
 }
 
-/// The answers over `session`, which may not be connected yet.
+/// Collects the answers over `session`, which may not be connected yet.
 fn robots(session: &Session) -> Result<Vec<Hello>> {
     let began = Instant::now();
     let mut robots: Vec<Hello> = Vec::new();

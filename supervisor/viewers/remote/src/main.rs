@@ -1,5 +1,3 @@
-//! The executable `firsthand-remote`; see the library.
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -1,4 +1,4 @@
-//! From a robot's bus to a session, as a consumer that no stage waits for.
+//! From a robot's bus to a session, as a consumer that delays no stage.
 
 use std::{
     fs,
@@ -33,18 +33,24 @@ pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Where others connect: tls/ADDRESS:PORT, or tcp/ADDRESS:PORT on a network that you trust.
+    /// Address for connections: tls/ADDRESS:PORT or tcp/ADDRESS:PORT.
+    ///
+    /// Use tcp only on a trusted network.
     #[arg(long, required = true)]
     listen: Vec<String>,
     #[command(flatten)]
     own: Certificates,
-    /// The authority of the certificates of those who may read, a PEM file.
+    /// Authority of the readers' certificates, a PEM file.
     #[arg(long)]
     clients: Option<PathBuf>,
-    /// The common name in the certificate of one who may read; without it, all whom the authority knows.
+    /// Common name in the certificate of a permitted reader.
+    ///
+    /// Default: all whom the authority knows.
     #[arg(long, value_name = "NAME", requires = "clients")]
     allow: Vec<String>,
-    /// A topic to serve, for example `field`; without it, all but the largest and those that operators write.
+    /// Topic to serve, for example `field`.
+    ///
+    /// Default: all except the largest and those that operators write.
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
 }
@@ -55,7 +61,8 @@ struct Told {
     run: String,
 }
 
-/// One writer on the robot writes each of them. What operators write is not served, because the mirror must not look like one who asks.
+/// Returns whether a topic has one writer on the robot. Operators' topics are excluded, because the
+/// mirror must not act as one.
 pub fn may_serve(topic: &dyn AnyTopic) -> bool {
     let spec = topic.spec();
     ![OPERATOR, EVERY_STAGE].contains(&spec.writer) && spec.name != topics::MIRROR.spec().name
@@ -86,7 +93,7 @@ struct Readers {
 
 pub fn serve(arguments: &Arguments) -> Result {
     let topics = topics(&arguments.topic)?;
-    // The threads of the session get the lower priority of this one.
+    // The session's threads inherit the low priority of this one.
     let mut stream = Stream::open()?;
     let Arguments { listen, own, clients, allow, robot, .. } = arguments;
     let session = session::listen(listen, own, clients.as_deref(), allow)?;
@@ -127,12 +134,12 @@ pub fn serve(arguments: &Arguments) -> Result {
             }
         }
     }
-    // Closing it would wait for a link that may be cut.
+    // A close would wait for a link that may be cut.
     std::mem::forget(session);
     Ok(())
 }
 
-/// Bring `told` up to date. Returns the number of the run.
+/// Updates `told`. Returns the number of the run.
 fn tell(
     told: &mut Told,
     domain: &Domain,
@@ -144,7 +151,7 @@ fn tell(
             order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)).to_owned();
         told.hello.mission_time_s = header.stamp.time().seconds();
     }
-    // The run file comes after the bus.
+    // The run file appears after the bus.
     if told.hello.id == 0
         && let Ok(text) = fs::read_to_string(domain.run_directory().join(run::FILE_NAME))
     {
@@ -162,7 +169,7 @@ fn put(
 ) -> Result {
     while reader.next_message(message)?.is_some() {
         let sent = Sent { id, sent_ns: monotonic_ns() };
-        // What a slow link cannot take is dropped, and nothing waits for it.
+        // A slow link drops samples, and nothing waits for it.
         publisher.put(message.as_slice()).attachment(sent.encoded()).wait().map_err(failed)?;
     }
     Ok(())
@@ -181,7 +188,7 @@ fn answer(
     let (told, own) = (Arc::clone(told), key.clone());
     let queryable = session.declare_queryable(key).callback(move |query| {
         let bytes = bytes(&lock(&told));
-        // Whoever asked may have gone.
+        // The client may have disconnected.
         let _ = query.reply(own.as_str(), bytes).wait();
     });
     queryable.wait().map_err(failed)

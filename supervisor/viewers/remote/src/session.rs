@@ -1,4 +1,4 @@
-//! Sessions of zenoh, with certificates. Whoever connects may read and nothing else: what another session puts is not taken.
+//! Zenoh sessions with certificates. Clients may only read, and what other sessions put is ignored.
 
 use std::path::{Path, PathBuf};
 
@@ -12,23 +12,23 @@ use serde_json::{Value, json};
 use zenoh::{Session, Wait};
 
 const PORT: u16 = 7447;
-/// A link over which nothing came for so long is lost, and made again.
+/// Silence after which a link is lost and reconnected.
 const LEASE_MS: u64 = 2000;
-/// The longest message: a map of the most cells.
+/// Longest message: a map of the most cells.
 const LONGEST: usize = (MAX_CELLS as usize).pow(2) + (1 << 16);
 
 #[derive(Debug, Args)]
 pub struct Certificates {
-    /// This side's certificate, a PEM file.
+    /// Own certificate, a PEM file.
     #[arg(long, requires = "key")]
     cert: Option<PathBuf>,
-    /// The private key of the certificate.
+    /// Private key of the certificate.
     #[arg(long, requires = "cert")]
     key: Option<PathBuf>,
 }
 
-/// Listen at `endpoints`. With `clients` only those may read whose certificate is of that authority, and of them those in `names`, if
-/// there are any.
+/// Listens at `endpoints`. With `clients`, readers need a certificate of that authority, and one of
+/// `names` if there are any.
 pub fn listen(
     endpoints: &[String],
     own: &Certificates,
@@ -78,7 +78,9 @@ pub fn listen(
 
 #[derive(Debug, Args)]
 pub struct Connecting {
-    /// The authority of the robot's certificate, a PEM file. Without it the connection is over tcp, and nothing says whose robot it is.
+    /// Authority of the robot's certificate, a PEM file.
+    ///
+    /// Without it the connection is tcp, and the robot's identity is unknown.
     #[arg(long)]
     ca: Option<PathBuf>,
     #[command(flatten)]
@@ -90,7 +92,7 @@ impl Connecting {
         endpoint(at, self.ca.is_some())
     }
 
-    /// Connect to `at`, and again whenever the link is lost.
+    /// Connects to `at`, and reconnects after a lost link.
     pub fn connect(&self, at: &str) -> Result<Session> {
         let Self { ca, own } = self;
         open(&json!({
@@ -126,7 +128,7 @@ pub fn failed(error: zenoh::Error) -> Failure {
     error
 }
 
-/// `at` as zenoh writes it: `tls/HOST:PORT` or `tcp/HOST:PORT`, of which the first and the last part may be left out.
+/// Completes `at` to zenoh's `tls/HOST:PORT` or `tcp/HOST:PORT`.
 pub fn endpoint(at: &str, secured: bool) -> String {
     let (protocol, address) =
         at.split_once('/').unwrap_or((if secured { "tls" } else { "tcp" }, at));

@@ -1,4 +1,4 @@
-//! From a session to a mirror: a bus of this machine on which the samples of a robot of another machine are published again.
+//! From a session to a mirror: a local bus that republishes a remote robot's samples.
 
 use std::{
     collections::{BTreeMap, btree_map::Entry},
@@ -37,25 +37,25 @@ use crate::{
 
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
-    /// The robot's machine: HOST, HOST:PORT, tls/HOST:PORT or tcp/HOST:PORT.
+    /// Robot's machine: HOST, HOST:PORT, tls/HOST:PORT or tcp/HOST:PORT.
     host: String,
     /// Name of the robot there.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Its name here, if another robot has that name here.
+    /// Local name, if its own name is taken here.
     #[arg(long = "as", value_name = "NAME")]
     named: Option<RobotName>,
     #[command(flatten)]
     connecting: Connecting,
 }
 
-/// The interval of the questions for the robot's clock and run.
+/// Interval of requests for the robot's clock and run.
 const ASK_EVERY: Duration = Duration::from_millis(500);
-/// A question without an answer is asked again after this.
+/// Time before a request is repeated.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// When nothing came for so long, the newest samples are published again, for who joins later.
+/// Silence after which the newest samples are republished for late joiners.
 const SILENT: Duration = Duration::from_millis(400);
-/// Samples that wait for this process; more are dropped.
+/// Most samples that wait for this process. Further ones are dropped.
 const WAITING: usize = 256;
 
 const LONGEST_ROSTER: usize = 64;
@@ -66,7 +66,7 @@ pub fn show(arguments: &Arguments) -> Result {
     let session = connecting.connect(host)?;
     let key = format!("firsthand/{robot}/topic/");
     let (sender, samples) = sync_channel(WAITING);
-    // A thread of the session must not wait: answers and signs of life come through it, too.
+    // A session thread must not wait, because it also carries answers and keep-alives.
     let subscribed = session.declare_subscriber(format!("{key}*")).callback(move |sample| {
         let _ = sender.try_send(sample);
     });
@@ -75,7 +75,7 @@ pub fn show(arguments: &Arguments) -> Result {
     let place = connecting.endpoint(host);
     let mut asker = Asker::new(&session, robot);
     let mut mirror = None::<Mirror>;
-    // Until then nobody is told that nothing answers.
+    // Time before a missing answer is reported.
     let mut silent_until = Some(Instant::now() + PATIENCE);
     while !stream.has_ended() {
         let hello = asker.look()?;
@@ -89,7 +89,7 @@ pub fn show(arguments: &Arguments) -> Result {
         if let Some(hello) = hello
             && mirror.as_ref().is_none_or(|mirror| mirror.id != hello.id)
         {
-            // The last run's bus goes before the next one's comes.
+            // The last run's bus is removed before the next is created.
             if mirror.take().is_some() {
                 stream.write("the run has ended\n")?;
             }
@@ -119,7 +119,7 @@ pub fn show(arguments: &Arguments) -> Result {
         mirror.tell(&asker.clock)?;
     }
     drop(mirror);
-    // Closing it would wait for a link that may be cut.
+    // A close would wait for a link that may be cut.
     std::mem::forget(session);
     Ok(())
 }
@@ -128,7 +128,7 @@ fn sent(sample: &Sample) -> Option<Sent> {
     Sent::decoded(&sample.attachment()?.to_bytes())
 }
 
-/// Asks the robot's machine, one question at a time.
+/// Requests to the robot's machine, one at a time.
 struct Asker<'a> {
     session: &'a Session,
     robot: &'a RobotName,
@@ -148,7 +148,7 @@ impl<'a> Asker<'a> {
         asked.wait().map_err(failed)
     }
 
-    /// The newest answer, if one has come. Asks again when it is time.
+    /// Returns a new answer if there is one. Repeats the request when due.
     fn look(&mut self) -> Result<Option<Hello>> {
         let Some((asked_ns, replies)) = &self.asked else {
             if self.last.is_none_or(|last| last.elapsed() >= ASK_EVERY) {
@@ -160,7 +160,7 @@ impl<'a> Asker<'a> {
         let hello = match replies.try_recv() {
             Ok(None) => return Ok(None),
             Ok(Some(reply)) => payload(&reply).and_then(|bytes| Hello::decoded(&bytes)),
-            // There is no answer, and none will come.
+            // The channel closed without an answer.
             Err(_) => None,
         };
         if let Some(hello) = &hello {
@@ -170,7 +170,7 @@ impl<'a> Asker<'a> {
         Ok(hello)
     }
 
-    /// The run of the robot; none if it does not come, or is none that this program can show.
+    /// Returns the robot's run, if it arrives and is compatible.
     fn run(&self) -> Result<Option<Run>> {
         let reply = self.ask("run")?.recv().ok();
         let run = reply.and_then(|reply| checked(&String::from_utf8(payload(&reply)?).ok()?));
@@ -187,19 +187,20 @@ fn payload(reply: &Reply) -> Option<Vec<u8>> {
     Some(reply.result().ok()?.payload().to_bytes().into_owned())
 }
 
-/// The run in `text`, if its mission is a sane one: the size of the mirror's memory is in it.
+/// Parses a run and validates its mission, which sets the mirror's memory.
 pub fn checked(text: &str) -> Option<Run> {
     let run: Run = toml::from_str(text).ok()?;
     Mission::parse(&toml::to_string(&run.mission).ok()?, Path::new("the run file")).ok()?;
     Some(run)
 }
 
-/// A bus with the samples of another machine's robot. The fields are dropped in this order: the lock, which removes the bus, last.
+/// Bus with a remote robot's samples. Fields drop in declaration order, so the lock removes the bus
+/// after its users.
 pub struct Mirror {
     id: u64,
     writers: BTreeMap<&'static str, Box<dyn AnyWriter>>,
     ages: Writer<MirrorSample>,
-    /// The newest samples of the topics that say a state.
+    /// Newest samples of state topics.
     newest: BTreeMap<&'static str, Vec<u8>>,
     heard: Option<(Sent, Stamp)>,
     told: Option<Instant>,
@@ -210,7 +211,7 @@ pub struct Mirror {
     _run: RunDirectory,
 }
 
-/// The directory of the mirror's run file, removed with it.
+/// Directory of the mirror's run file, removed on drop.
 struct RunDirectory(PathBuf);
 
 impl Drop for RunDirectory {
@@ -220,12 +221,14 @@ impl Drop for RunDirectory {
 }
 
 impl Mirror {
+    /// Opens a mirror with the run file and the bus.
+    ///
     /// # Errors
-    /// If a robot of that name runs here, or shared memory is full.
+    /// A robot of that name runs here, or shared memory is full.
     pub fn open(domain: &Domain, mut run: Run, id: u64, place: &str) -> Result<Self> {
         let cells = run.mission.grid_frame().area();
         run.robot = domain.robot.clone();
-        // No robot's name has a point.
+        // Robot names contain no dot, so this name is free.
         let directory = domain.directory().with_extension("mirror");
         let mut lock = DomainLock::acquire(domain.clone(), cells)?;
         make_own_directory(&directory)?;
@@ -250,7 +253,7 @@ impl Mirror {
         })
     }
 
-    /// Publish a sample of the robot. What is no sample of a topic that is served is counted and left out.
+    /// Publishes a sample. Counts and drops messages that are not samples of a served topic.
     pub fn take(&mut self, topic: &str, sent: Sent, message: &[u8]) -> Result {
         let stamp = decode_sample::<Stamp>(message).filter(|_| sent.id == self.id);
         let mut served = topics::TABLE.iter().copied().filter(|topic| may_serve(*topic));
@@ -264,7 +267,7 @@ impl Mirror {
             false => Some(message.to_vec()),
         };
         let writer = self.writer(known)?;
-        // It is refused if it is of another type, or too long.
+        // Messages of another type, or too long, are refused.
         let Some(message) = message.filter(|it| writer.publish_message(it).unwrap_or(false)) else {
             self.refuse(topic);
             return Ok(());
@@ -278,7 +281,8 @@ impl Mirror {
         Ok(())
     }
 
-    /// The writer of `topic`, which is opened for its first sample: that of the field takes much memory.
+    /// Returns the writer of `topic`, opened at its first sample because the field's needs much
+    /// memory.
     fn writer(&mut self, topic: &'static dyn AnyTopic) -> Result<&mut dyn AnyWriter, BusError> {
         let spec = topic.spec();
         let longest = match spec.limits.longest {
@@ -303,7 +307,7 @@ impl Mirror {
         }
     }
 
-    /// Say how old what is shown is, and show the newest samples again while none come.
+    /// Publishes the data's age, and repeats the newest samples during silence.
     pub fn tell(&mut self, clock: &Clock) -> Result {
         let Some((sent, stamp)) = self.heard else { return Ok(()) };
         if self.told.is_some_and(|told| told.elapsed() < RESTATE) {
@@ -325,14 +329,14 @@ impl Mirror {
     }
 }
 
-/// Whether the newest sample of a topic says all that there is to say, in few bytes.
+/// Returns whether a topic's newest sample is its complete state, in few bytes.
 fn says_a_state(spec: &Spec) -> bool {
     let [field, pose, power] = [topics::FIELD.spec(), topics::POSE.spec(), topics::POWER.spec()];
     let restated = matches!(spec.rate, Rate::OnChange { .. }) && spec.name != field.name;
     restated || [pose.name, power.name].contains(&spec.name)
 }
 
-/// A roster whose processes are not those of this machine, so that nobody looks for them or signals them here.
+/// Clears the roster's remote pids, which must not be signalled here.
 fn without_processes(message: &[u8]) -> Option<Vec<u8>> {
     let (mut header, mut entries) = decode_slice::<RosterHeader, RosterEntry>(message)?;
     header.supervisor_pid = std::process::id();

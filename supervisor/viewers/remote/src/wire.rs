@@ -1,4 +1,4 @@
-//! What goes with the samples from machine to machine, and the clock of the other machine.
+//! Metadata of samples between machines, and the clock of the other machine.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,9 +6,9 @@ const LONGEST_HELLO: usize = 4096;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Hello {
-    /// Another for each run and each serving process; 0 while the robot does not run.
+    /// Number unique to each run and serving process, or 0 without a run.
     pub id: u64,
-    /// The monotonic clock of the machine at the time of the answer.
+    /// Monotonic clock of the machine at the time of the answer.
     pub clock_ns: u64,
     pub robot: String,
     pub order: String,
@@ -16,7 +16,6 @@ pub struct Hello {
 }
 
 impl Hello {
-    /// None if `bytes` are no such answer.
     pub fn decoded(bytes: &[u8]) -> Option<Self> {
         let bytes = bytes.get(..LONGEST_HELLO).map_or(Some(bytes), |_| None)?;
         serde_json::from_slice(bytes).ok()
@@ -26,7 +25,7 @@ impl Hello {
 #[derive(Clone, Copy, Debug)]
 pub struct Sent {
     pub id: u64,
-    /// The monotonic clock of the robot's machine when the sample was read there.
+    /// Monotonic clock of the robot's machine when it read the sample.
     pub sent_ns: u64,
 }
 
@@ -35,7 +34,6 @@ impl Sent {
         [self.id.to_le_bytes(), self.sent_ns.to_le_bytes()].concat()
     }
 
-    /// None if `bytes` are something else.
     pub fn decoded(bytes: &[u8]) -> Option<Self> {
         let (id, sent_ns) = bytes.split_first_chunk()?;
         let sent_ns = u64::from_le_bytes(sent_ns.try_into().ok()?);
@@ -43,20 +41,23 @@ impl Sent {
     }
 }
 
-/// Clocks of two machines go apart by less than this share of time.
+/// Inverse of the largest relative drift between two machines' clocks.
 const DRIFT: i64 = 10_000;
 
-/// The other machine's clock, by questions and answers. The answer was given after the question was asked, so every time of that machine
-/// was here no earlier than this says, and an age is never told too low, however slow the link is one way.
+/// Bound on the other machine's clock, from requests and answers.
+///
+/// An answer is given after its request, which bounds the offset of the clocks from below. Ages are
+/// thus upper bounds, even on an asymmetric link.
 #[derive(Default)]
 pub struct Clock {
     id: u64,
-    /// Our clock less theirs at least, and when that was known.
+    /// Lower bound of our clock minus theirs, and the time of that bound.
     known: Option<(i64, u64)>,
 }
 
 impl Clock {
-    /// Note that a question of `asked_ns`, by our clock, was answered with `hello`. In another run it may be another machine.
+    /// Records that a request of `asked_ns` (our clock) was answered with `hello`. Another run may
+    /// be on another machine.
     pub fn on_answer(&mut self, asked_ns: u64, hello: &Hello) {
         if hello.id != self.id {
             *self = Self { id: hello.id, known: None };
@@ -68,7 +69,8 @@ impl Clock {
         self.known = Some((before.max(now), asked_ns));
     }
 
-    /// The age at most, at `now_ns` by our clock, of what was sent at `sent_ns` by theirs; none before the first answer.
+    /// Returns the largest age at `now_ns` (ours) of a sample sent at `sent_ns` (theirs), once
+    /// known.
     pub fn age_ns(&self, now_ns: u64, sent_ns: u64) -> Option<u64> {
         let (least, _) = self.known?;
         let here_ns = i128::from(sent_ns) + i128::from(least);

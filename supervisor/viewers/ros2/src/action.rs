@@ -1,6 +1,7 @@
-//! The server of the action `navigate_to_pose`. Pure.
+//! Server of the action `navigate_to_pose`. Pure.
 //!
-//! A goal is reached when the controller reports the arrival at the target that the supervisor made of the goal.
+//! A goal succeeds when the controller reports the arrival at the goal's target from the
+//! supervisor.
 
 use common::samples::{
     CommandSample, CommandState, DirectiveSample, HoldReason, PoseSample, TargetPoint, TargetSample,
@@ -24,22 +25,23 @@ use crate::{
 #[derive(Default, Serialize, Deserialize)]
 pub struct Aim {
     point: TargetPoint,
-    /// The number of the goal's target, once the supervisor has published it.
+    /// Number of the goal's target, once the supervisor has published it.
     number: Option<u64>,
-    /// The robot waits although it did not arrive. Its arrival may still be read: it waits if it is told so again.
+    /// Whether the robot waits without a reported arrival. The arrival may be unread, so only a
+    /// second such directive counts.
     waits: bool,
-    /// The number of the newest target that is older than the goal.
+    /// Number of the newest target older than the goal.
     after: u64,
     why: Refusal,
-    /// How often the result of its target was awaited in vain.
+    /// Number of vain checks for the target's result.
     #[serde(skip)]
     awaited: u32,
 }
 
-/// The most times that the bridge looks for the result of a target, some 50 ms apart, before a goal is told without it.
+/// Most such checks, about 50 ms apart, before a goal is answered.
 const MOST_AWAITED: u32 = 20;
 
-/// Why a goal is not reached: an error code of `NavigateToPose`, or of its planner, which it passes on, and its words.
+/// Reason of a failed goal: an error code of `NavigateToPose` or of its planner, and a text.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
     pub code: u16,
@@ -55,7 +57,7 @@ impl<T: ToString> From<T> for Refusal {
 #[derive(Default, Serialize, Deserialize)]
 pub struct Server {
     pub goals: Goals<Aim>,
-    /// The number of the newest target, which the target of a goal that is sent now follows; another run counts from 1.
+    /// Number of the newest target, which the next goal follows. Each run counts from 1.
     #[serde(skip)]
     pub newest_target: u64,
 }
@@ -67,20 +69,20 @@ pub struct Sent {
 }
 
 impl Server {
-    /// The id of the goal that a client sends, and where to go or why not there. The error says why the payload is none.
+    /// Returns a goal's id, and its target or the refusal. Fails on a malformed payload.
     pub fn read_goal(payload: &[u8]) -> Result<(Uuid, Result<TargetPoint, Refusal>), Malformed> {
         let NavigateToPoseSendGoalRequest { goal_id, goal } = Cdr::decode(payload)?;
         Ok((goal_id.uuid, goal_of(&goal.pose.header, &goal.pose.pose)))
     }
 
-    /// Take a goal that the supervisor accepted; its target comes after the one with the number `after`.
+    /// Takes an accepted goal, whose target follows the one numbered `after`.
     pub fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
         self.abort("a newer goal took its place");
         let aim = Aim { point: sent.point, after, ..Aim::default() };
         self.goals.accept(sent.id, aim, now_ns);
     }
 
-    /// Take a goal that has ended before it began; another one goes on.
+    /// Takes a goal that failed before it began, beside the current one.
     pub fn refuse(&mut self, id: Uuid, why: &Refusal, now_ns: u64) {
         let aim = Aim { why: why.clone(), ..Aim::default() };
         self.goals.add(id, Status::Aborted, aim, now_ns);
@@ -119,7 +121,7 @@ impl Server {
         }
     }
 
-    /// A run that stays gives up a target, and then waits for the next one.
+    /// Aborts the goal if the run gives up its target.
     pub fn directive(&mut self, directive: &DirectiveSample) {
         let waits = HoldReason::from_byte(directive.reason) == HoldReason::Waiting;
         if let Some(goal) = self.goals.current().filter(|goal| goal.known.number.is_some())
@@ -130,7 +132,7 @@ impl Server {
         }
     }
 
-    /// Take the recorded result of a target: it says why a goal was given up, or how it ended while nobody looked.
+    /// Takes a target's recorded result, which explains a failure or an unobserved end.
     pub fn recorded(&mut self, number: u64, outcome: &str) {
         let is_of = |aim: &Aim| aim.number == Some(number);
         if self.goals.current().is_some_and(|goal| is_of(&goal.known)) {
@@ -155,7 +157,7 @@ impl Server {
         }
     }
 
-    /// No further results of the targets of earlier goals come.
+    /// Forgets targets of earlier goals, whose results cannot arrive any more.
     pub fn forget_targets(&mut self) {
         self.goals.aborted().for_each(|goal| goal.known.number = None);
     }
@@ -168,7 +170,7 @@ impl Server {
         })
     }
 
-    /// The result of a goal; none while it is not over.
+    /// Returns a goal's result after its end.
     pub fn result(&self, id: Uuid) -> Option<Vec<u8>> {
         let (status, aim) = self.goals.over(id)?;
         let Refusal { code, text } = aim.map(|aim| aim.why.clone()).unwrap_or_default();
@@ -176,12 +178,12 @@ impl Server {
         Some(NavigateToPoseGetResultResponse { status, result }.encode())
     }
 
-    /// The progress of the robot with its goal; none without a goal.
+    /// Returns the progress of the current goal.
     pub fn feedback(&mut self, pose: &PoseSample, recoveries: u64, now_ns: u64) -> Option<Vec<u8>> {
         let goal = self.goals.current()?;
         let at = pose.pose();
         let left_m = at.position.distance(goal.known.point.position());
-        // The time that remains is not estimated, and the errors of tracking are not measured here.
+        // Remaining time is not estimated, and tracking errors are not measured here.
         let feedback = NavigateToPoseFeedback {
             current_pose: Header::at(now_ns, MAP).with(plane(at)),
             navigation_time: now_ns.saturating_sub(goal.at_ns).into(),

@@ -1,5 +1,4 @@
-//! The requests of nodes by topics: messages in, their meaning out. Each message is taken, or refused as a whole with a
-//! reason.
+//! Requests of nodes by topic. Each message is accepted, or refused as a whole with a reason.
 
 use common::{mission::Mission, samples::TargetPoint};
 use glam::DVec2;
@@ -10,16 +9,15 @@ use ros2::{
 
 use crate::{action::Refusal, shown::MAP};
 
-/// The least deviations of a place, metres and radians, whatever its covariance says.
+/// Least deviations of a place, metres and radians.
 const LEAST_SIGMA: f64 = 0.05;
 
-/// The target of a `geometry_msgs/PoseStamped`.
+/// Returns the target of a `geometry_msgs/PoseStamped`.
 pub fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
     let PoseStamped { header, pose } = PoseStamped::decode(payload)?;
     goal_of(&header, &pose).map_err(|why| why.text)
 }
 
-/// The target of a pose in the mission's frame.
 pub fn goal_of(header: &Header, pose: &msg::Pose) -> Result<TargetPoint, Refusal> {
     let frame = &header.frame_id;
     if !(frame.is_empty() || frame.trim_start_matches('/') == MAP) {
@@ -34,7 +32,8 @@ pub fn goal_of(header: &Header, pose: &msg::Pose) -> Result<TargetPoint, Refusal
     Ok(TargetPoint { x_m, y_m, heading_rad, has_heading: 1 })
 }
 
-/// The place of a `geometry_msgs/PoseWithCovarianceStamped`, and its deviations, metres and radians.
+/// Returns the place of a `geometry_msgs/PoseWithCovarianceStamped`, with deviations in metres and
+/// radians.
 pub fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
     let PoseWithCovarianceStamped { header, pose } = PoseWithCovarianceStamped::decode(payload)?;
     let place = goal_of(&header, &pose.pose).map_err(|why| why.text)?;
@@ -43,7 +42,8 @@ pub fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
     Ok((place, variances.map(|variance| variance.sqrt().max(LEAST_SIGMA))))
 }
 
-/// Where a hand pushes by a `geometry_msgs/Twist`: ahead and to the left, in shares of the mission's speeds.
+/// Converts a `geometry_msgs/Twist` to forward and left deflections, as shares of the mission's
+/// speeds.
 pub fn stick(payload: &[u8], mission: &Mission) -> Result<DVec2, String> {
     let Twist { linear, angular } = Twist::decode(payload)?;
     let stick = DVec2::new(linear.x / mission.speed_m_s(), angular.z / mission.turn_rad_s());

@@ -1,4 +1,4 @@
-//! `firsthand ros2 bag`: a bag of rosbag2 from a recording, with the messages that the bridge publishes.
+//! `firsthand ros2 bag`: converts a recording to a rosbag2 bag with the bridge's messages.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -10,19 +10,19 @@ use robot_state::{Sample, TOPICS};
 
 use crate::{endpoints::published, shown::Shown};
 
-/// Make a bag of rosbag2 from a recording: for `ros2 bag play`, PlotJuggler and other readers of bags.
+/// Convert a recording to a rosbag2 bag.
 ///
-/// It has the topics that are published of a robot that runs, `path` and `field` only from a recording with `--fields`. Their stamps and
-/// the times of the bag are mission time.
+/// For `ros2 bag play`, PlotJuggler and others. The bag has the topics of a running robot; `path`
+/// and `field` need a recording with `--fields`. All times are mission time.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
-    /// A recorded run's directory, or one recording.
+    /// Directory of a recorded run, or one recording.
     recording: PathBuf,
-    /// The folder of the bag, which must not exist yet.
+    /// Folder of the new bag.
     out: PathBuf,
 }
 
-/// Make a bag with topics below `namespace`. Returns what is in it and what is not, in words.
+/// Makes a bag with topics below `namespace`. Returns a description of its content and gaps.
 pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { recording, out } = arguments;
     let files = recording::files(recording)?;
@@ -37,7 +37,7 @@ pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
         bag.add([&name, &kind, row.definition], row.is_latched)?;
         names.insert(id, name);
     }
-    // A bag begins with the first pose, so that readers know where the sensors are before any message of them.
+    // Begins at the first pose, so that sensor mountings precede sensor messages.
     let first = recordings[0].samples(&topics::POSE)?.next().transpose()?;
     let began_ns = first.map_or(0, |first| first.sample.stamp.stamp_ns);
     let mut messages = Vec::new();
@@ -52,7 +52,7 @@ pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
             };
             let at_ns = sample.time().0;
             shown.sample(&sample, at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
-            // Before the first pose mission time is not known.
+            // Mission time is unknown before the first pose.
             if let Some(pose) = shown.state.pose {
                 let at_ns = pose.stamp.stamp_ns;
                 shown.tick(at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
@@ -82,7 +82,7 @@ mod tests {
         let recording = PathBuf::from(golden).join("stall-and-kill.mcap");
         let poses = Recording::open(&recording).unwrap().counts["pose"];
         let folder = tempfile::tempdir().unwrap();
-        // A run's directory with two recordings.
+        // Run directory with two recordings.
         let run = folder.path().join("run");
         fs::create_dir(&run).unwrap();
         for part in ["recording.mcap", "recording-2.mcap"] {

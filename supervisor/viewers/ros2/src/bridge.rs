@@ -1,4 +1,5 @@
-//! The bridge: it follows one robot from run to run, publishes its samples, and has the permitted requests of nodes carried out.
+//! Bridge that follows a robot across runs, publishes its samples, and has permitted requests
+//! carried out.
 
 use std::{
     fs, io,
@@ -41,38 +42,37 @@ use crate::{
     topics::{Accept, Frames, Id},
 };
 
-/// The interval at which requests, a run that has ended or begun, or the end of this process is noticed when nothing is published.
+/// Interval of checks for requests, the end or start of a run, or its own end.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// The interval at which feedback of a goal is published.
+/// Interval of feedback for a goal.
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
-/// The time after which a bus that cannot be used is tried again.
+/// Delay before an unusable bus is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// Transforms of other nodes that are older are of no use.
+/// Age after which transforms of other nodes are useless.
 const OLD_AFTER: Duration = Duration::from_secs(1);
-/// The file of the robot that has the goals of the action with the directory of their run.
+/// File with the action's goals and the directory of their run.
 const GOALS: &str = "ros2-goals.json";
-/// The most bytes of results of targets that are read for goals of an earlier bridge.
+/// Most result bytes read for goals of an earlier bridge.
 const MOST_RECORDED: u64 = 1 << 20;
 const RUN_ENDED: &str = "the run ended before the robot arrived";
-/// The least interval between reports of refusals.
+/// Least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
 #[derive(Clone)]
 pub struct Options {
     pub robot: RobotName,
     pub domain: u16,
-    /// The address of the network interface; all of them without it.
+    /// Address of the network interface, or all of them.
     pub interface: Option<Ipv4Addr>,
     pub namespace: String,
-    /// The requests of others that are permitted.
+    /// Permitted requests of other nodes.
     pub accepted: Vec<Accept>,
     pub frames: Frames,
-    /// Stamps are mission time, which is published.
+    /// Whether stamps are mission time, which is published.
     pub clock: bool,
     pub parameters: Vec<Parameter>,
 }
 
-/// The bridge cannot be opened.
 #[derive(Debug, Error)]
 pub enum BridgeError {
     #[error(
@@ -94,18 +94,18 @@ struct Bridge {
     orders: Orders,
     shown: Option<Shown>,
     server: Server,
-    /// The directory of the run, with the results of its targets.
+    /// Directory of the run, with the results of its targets.
     run: Option<(PathBuf, Results)>,
     stored: String,
     goals_file: PathBuf,
     feedback_at: Instant,
-    /// The number of stops that were asked for since the robot was ordered to stand for a canceled goal, that order included. None if the
-    /// robot does not stand for one.
+    /// Number of stop requests since the stop for a canceled goal, including it. `None` without
+    /// such a stop.
     stands_for_cancel: Option<u32>,
     told_at: Option<Instant>,
 }
 
-/// Bridge a robot, from run to run, until `ended` returns true.
+/// Bridges a robot across runs, until `ended` returns true.
 pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
     let (robot, domain) = (&options.robot, options.domain);
     let join = || endpoints::open(options).map_err(|source| BridgeError::Join { domain, source });
@@ -131,15 +131,15 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
     let mut follower = follow();
     while !ended() {
         if continued.came() {
-            // The library's threads end when a call of theirs is interrupted, as happens when the process is stopped and continued. New
-            // readers of the bus get whole maps for the new writers.
+            // A continued process has interrupted system calls, which end the library's threads.
+            // New bus readers get whole maps for the new writers.
             (bridge.node, bridge.shown) = (join()?, None);
             follower = follow();
         }
         let taken = match follower.wait(LOOK_EVERY) {
             Ok(Event::Samples(bus)) => {
                 bridge.begin(&robot_domain)?;
-                // Transforms of the same tick have come by now.
+                // Transforms of the same tick have arrived by now.
                 bridge.hear();
                 bridge.take_samples(bus)
             }
@@ -165,10 +165,10 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
 }
 
 impl Bridge {
-    /// Show the run of `domain`, if it is not shown yet. The run's file may be missing when the first samples come.
+    /// Begins to show the run of `domain`. Its file may be missing at the first samples.
     ///
     /// # Errors
-    /// When the link of the run reads what would be published.
+    /// The run's link reads a topic that would be published.
     fn begin(&mut self, domain: &Domain) -> Result<(), BridgeError> {
         if self.shown.is_some() {
             return Ok(());
@@ -204,7 +204,7 @@ impl Bridge {
         Ok(())
     }
 
-    /// Go on with the goals of an earlier bridge: their clients still wait.
+    /// Restores the goals of an earlier bridge, whose clients still wait.
     fn restore(&mut self, domain: &Domain) {
         self.goals_file = domain.run_directory().with_file_name(GOALS);
         let text = fs::read_to_string(&self.goals_file).unwrap_or_default();
@@ -226,12 +226,12 @@ impl Bridge {
         }
     }
 
-    /// Store the goals for a later bridge if they have changed.
+    /// Stores changed goals for a later bridge.
     fn store(&mut self) {
         let Some((directory, _)) = self.run.as_ref().filter(|_| self.server.goals.are_any()) else {
             return;
         };
-        // JSON has everything that is in them.
+        // All fields are representable in JSON.
         let text = serde_json::to_string(&(directory, &self.server)).unwrap_or_default();
         if text != self.stored {
             if let Err(error) = file::replace(&self.goals_file, &text) {
@@ -241,7 +241,7 @@ impl Bridge {
         }
     }
 
-    /// Note that the run has ended: no goal is reached any more.
+    /// Ends the run and aborts its goal.
     fn end(&mut self) {
         self.server.abort(RUN_ENDED);
         self.server.newest_target = 0;
@@ -325,7 +325,7 @@ impl Bridge {
     }
 
     fn go(&self, to: TargetPoint, why: Why) {
-        // The next goal ends only a stop that was the cancelled goal's alone.
+        // The next goal ends only a stop that belongs to the canceled goal alone.
         let resumes = self.stands_for_cancel.is_some_and(|stops| stops <= 1);
         self.orders.give(Order::Go { to, resumes, why });
     }
@@ -363,7 +363,7 @@ impl Bridge {
         Ok(())
     }
 
-    /// Accept a goal and end it with the reason against it, as Nav2 does: a goal that is rejected has no result to say why.
+    /// Accepts a goal and aborts it with the reason, as Nav2 does. A rejected goal has no result.
     fn refuse(&mut self, request: &Request, id: Uuid, why: &Refusal) {
         let now_ns = self.now_ns();
         self.node.reply(0, Call::SendGoal, request, &Goals::<Aim>::reply(true, now_ns));
@@ -386,7 +386,7 @@ impl Bridge {
                             let reply = Goals::<Aim>::reply(true, now_ns);
                             self.node.reply(0, Call::SendGoal, &request, &reply);
                             self.server.accept(sent, after, now_ns);
-                            // Its target may have come before the supervisor's answer.
+                            // Its target may have preceded the supervisor's answer.
                             if let Some(target) = self.shown.as_ref().and_then(|it| it.state.target)
                             {
                                 self.server.target(&target);
@@ -399,7 +399,7 @@ impl Bridge {
             Order::Stand { is_cancel: true } if result.is_ok() => {
                 self.server.goals.end(Status::Canceled);
             }
-            // A robot that did not obey is not reported to stand.
+            // Only a robot that obeyed is reported as canceled.
             Order::Stand { is_cancel: true } => {
                 self.server.abort("the robot did not stand when it was canceled");
             }
@@ -436,7 +436,7 @@ impl Bridge {
         }
     }
 
-    /// Log why a request is not carried out, at most once a second: other nodes must not fill the log.
+    /// Logs a refusal, at most once a second against floods by other nodes.
     fn tell(&mut self, why: &str) {
         if self.told_at.is_none_or(|told| told.elapsed() >= TELL_EVERY) {
             self.told_at = Some(Instant::now());

@@ -1,4 +1,5 @@
-//! The errors of odometry and of its speeds, by the mission's `[robot.odometry]`: odometry has no fixes, so its error only grows. Pure.
+//! Covariances of odometry and speeds, from the mission's `[robot.odometry]`. Odometry has no
+//! fixes, so its error only grows. Pure.
 
 use common::{
     kinematics::Pose2,
@@ -7,13 +8,13 @@ use common::{
 };
 use glam::{DMat3, DVec3};
 
-/// The variance of what wheels do not measure.
+/// Variance of components that wheels do not measure.
 const UNKNOWN: f64 = 1e6;
 
 type Covariance = [f64; 36];
 
-/// The errors of x, y and heading in the frame of odometry since the bridge knows the run. The systematic ones are per share of error of
-/// the wheels' ratio, the track and the mean diameter, as in the covariance of dead reckoning.
+/// Errors of x, y and heading in the odometry frame since the bridge first saw the run. Systematic
+/// ones are per relative error of wheel ratio, track and mean diameter, as in dead reckoning.
 #[derive(Debug)]
 pub struct Drift {
     slipped: DMat3,
@@ -24,7 +25,8 @@ pub struct Drift {
 impl Drift {
     pub const NONE: Self = Self { slipped: DMat3::ZERO, systematic: [DVec3::ZERO; 3], at_s: None };
 
-    /// The covariances of the pose in odometry and of the speeds, for stamps that go `pace` times slower than mission time.
+    /// Returns the covariances of odometry pose and speeds, for stamps `pace` times slower than
+    /// mission time.
     pub fn after(&mut self, sample: &PoseSample, mission: &Mission, pace: f64) -> [Covariance; 2] {
         let (model, body) = (&mission.robot.odometry, mission.body());
         let period_s = 1.0 / mission.robot.rate_hz;
@@ -32,7 +34,7 @@ impl Drift {
         let gap_s = self.at_s.replace(now_s).map_or(0.0, |before| (now_s - before).max(0.0));
         let (v, omega, track_m) = (sample.v_m_s, sample.omega_rad_s, body.track_m);
         self.grow(model, track_m, sample.odometry(), [v * gap_s, omega * gap_s]);
-        // Each wheel slips by itself, and each reading of it is off by up to half a count.
+        // Each wheel slips independently, and each reading is off by up to half a count.
         let slip = model.slip.powi(2) * v.abs() / period_s;
         let counted = (body.metres_per_count() / period_s).powi(2) / 6.0;
         let ahead = (model.distance_scale_sd * v).powi(2) + (slip + counted) / 2.0;
@@ -52,7 +54,7 @@ impl Drift {
             let aside = 0.5 * arc * turn_error;
             DVec3::new(arc_error * x - aside * y, arc_error * y + aside * x, turn_error)
         };
-        // An error of the heading turns what comes after it.
+        // A heading error rotates subsequent motion.
         let carried = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(-arc * y, arc * x, 1.0));
         self.slipped = carried * self.slipped * carried.transpose();
         for side in [-1.0, 1.0] {

@@ -1,4 +1,4 @@
-//! The bridge's node, made from the table of topics.
+//! Node of the bridge, built from the table of topics.
 
 use std::io;
 
@@ -29,7 +29,7 @@ pub fn open(options: &Options) -> io::Result<Node<Id>> {
             }
             Some(by) if accepted.contains(&by) => {
                 let name = topic_name(namespace, row, "");
-                // A hand's old pushes are not sent again.
+                // Old deflections of a joystick are not resent.
                 let quality = if row.id == Id::Teleop { NEWEST } else { SURE };
                 node.read_from(row.id, [&name, row.type_name], quality)?;
             }
@@ -43,7 +43,7 @@ pub fn open(options: &Options) -> io::Result<Node<Id>> {
     Ok(node)
 }
 
-/// Whether the topic is opened for each robot: a robot that speaks ROS 2 may publish it itself.
+/// Returns whether the topic is opened per robot, because a ROS 2 robot may publish it itself.
 pub const fn is_of_robot(id: Id) -> bool {
     matches!(id, Id::Odom | Id::Battery | Id::Range(_) | Id::Scan(_))
 }
@@ -65,7 +65,7 @@ pub fn open_robot<'a>(
 fn write_to(node: &mut Node<Id>, id: Id, row: &Spec, sensor: &str) -> io::Result<()> {
     let name = topic_name(&node.namespace, row, sensor);
     let quality = match id {
-        // Who joins later is told what happened before, as by other nodes.
+        // Late readers get earlier events, as from other nodes.
         Id::Rosout => Quality { depth: 100, ..LATCHED },
         _ if row.is_latched => LATCHED,
         _ => SURE,
@@ -73,7 +73,7 @@ fn write_to(node: &mut Node<Id>, id: Id, row: &Spec, sensor: &str) -> io::Result
     node.write_to(id, [&name, row.type_name], quality)
 }
 
-/// The topics that are published of a robot with these of its sensors: row, content and name below `namespace`.
+/// Returns the published topics of a robot with these sensors: row, id and name below `namespace`.
 pub fn published<'a>(
     namespace: &str,
     sensors: impl Iterator<Item = (Id, &'a str)>,
@@ -97,7 +97,7 @@ pub fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
     }
 }
 
-/// `name` as a part of the name of a topic, which has letters, digits and `_`.
+/// Converts `name` to a topic name part of letters, digits and `_`.
 fn ros_name(name: &str) -> String {
     let letter = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
     name.chars().map(letter).collect()

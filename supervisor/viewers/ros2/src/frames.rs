@@ -1,4 +1,4 @@
-//! The frames of `/tf` and `/tf_static`, in the plane. Pure.
+//! Frames of `/tf` and `/tf_static`, in the plane. Pure.
 
 use std::{collections::BTreeMap, time::Instant};
 
@@ -8,14 +8,14 @@ use ros2::{
     msg::{TFMessage, TransformStamped},
 };
 
-/// The most frames that are known.
+/// Limit of known frames.
 const MOST_FRAMES: usize = 1024;
 
 #[derive(Debug)]
 struct Place {
     parent: String,
     pose: DAffine2,
-    /// None for a frame that stays.
+    /// Arrival time, or `None` for a static frame.
     heard: Option<Instant>,
 }
 
@@ -23,7 +23,8 @@ struct Place {
 pub struct Frames(BTreeMap<String, Place>);
 
 impl Frames {
-    /// Take a `tf2_msgs/TFMessage` that was `heard` then, or is of frames that stay. The error says why it is refused.
+    /// Takes a `tf2_msgs/TFMessage` that arrived at `heard`, or is static. Fails with the reason of
+    /// a refusal.
     pub fn take(&mut self, payload: &[u8], heard: Option<Instant>) -> Result<(), String> {
         for TransformStamped { header, child_frame_id, transform } in
             TFMessage::decode(payload)?.transforms
@@ -40,8 +41,8 @@ impl Frames {
         Ok(())
     }
 
-    /// Returns the pose of `frame` in `root`, by way of the frame that both are below, from transforms that are not older than `since`.
-    /// The error says what is missing.
+    /// Returns the pose of `frame` in `root` via their common ancestor, with transforms since
+    /// `since`. Fails with the missing part.
     pub fn find(
         &self,
         frame: &str,
@@ -59,7 +60,7 @@ impl Frames {
         })
     }
 
-    /// Returns `frame` and those above it, with the pose of `frame` in each, and why there are no more.
+    /// Returns `frame` and its ancestors with the pose of `frame` in each, and why the chain ends.
     fn climb<'a>(
         &'a self,
         frame: &'a str,
@@ -86,7 +87,7 @@ pub fn placed(at: [f64; 2], heading: f64) -> DAffine2 {
     DAffine2::from_angle_translation(heading, at.into())
 }
 
-/// Older nodes write a slash before the name.
+/// Strips the leading slash of older nodes.
 fn name(frame: &str) -> &str {
     frame.trim_start_matches('/')
 }

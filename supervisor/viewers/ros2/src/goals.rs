@@ -1,6 +1,5 @@
-//! The goals of a server of an action: their states, and the messages that all actions have. Pure.
-//!
-//! The server has one goal at a time: a newer one takes its place, as in Nav2.
+//! Goals of an action server: states, and messages common to all actions. Pure. A newer goal
+//! replaces the current one, as in Nav2.
 
 use std::collections::VecDeque;
 
@@ -14,14 +13,14 @@ use ros2::{
 };
 use serde::{Deserialize, Serialize};
 
-/// The id that a client gave its goal.
+/// Id that a client gave its goal.
 pub type Uuid = [u8; 16];
 
-/// The most goals that are remembered; older ones are forgotten.
+/// Limit of remembered goals. The oldest are forgotten.
 const MOST_GOALS: usize = 16;
 const MOST_RESULTS: usize = 32;
 
-/// A `action_msgs/GoalStatus`.
+/// Values of `action_msgs/GoalStatus`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Status {
     Executing = 2,
@@ -37,11 +36,11 @@ impl Status {
     }
 }
 
-/// A goal that was accepted, with what its action knows of it.
+/// Accepted goal, with data of its action.
 #[derive(Serialize, Deserialize)]
 pub struct Goal<T> {
     pub id: Uuid,
-    /// The time when the goal was accepted, nanoseconds since 1970.
+    /// Time of acceptance, nanoseconds since 1970.
     pub at_ns: u64,
     pub status: Status,
     pub known: T,
@@ -56,18 +55,17 @@ impl<T> Goal<T> {
 #[derive(Default, Serialize, Deserialize)]
 pub struct Goals<T> {
     goals: VecDeque<Goal<T>>,
-    /// Whether the states have changed since they were last published.
+    /// Whether states have changed since their last publication.
     is_changed: bool,
     waiting: Vec<(Request, Uuid)>,
 }
 
 impl<T> Goals<T> {
-    /// The reply to a goal, at `now_ns` since 1970.
+    /// Returns the reply to a goal, at `now_ns` since 1970.
     pub fn reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
         NavigateToPoseSendGoalResponse { accepted: is_accepted, stamp: now_ns.into() }.encode()
     }
 
-    /// Take a goal; it ends the one before.
     pub fn accept(&mut self, id: Uuid, known: T, now_ns: u64) {
         self.end(Status::Aborted);
         self.add(id, Status::Executing, known, now_ns);
@@ -85,7 +83,6 @@ impl<T> Goals<T> {
         !self.goals.is_empty()
     }
 
-    /// Let the goal that is not over end with `status`.
     pub fn end(&mut self, status: Status) {
         for goal in self.goals.iter_mut().filter(|goal| !goal.status.is_final()) {
             goal.status = status;
@@ -97,7 +94,7 @@ impl<T> Goals<T> {
         self.goals.iter_mut().rev().find(|goal| !goal.status.is_final())
     }
 
-    /// Take a request to cancel. Returns the reply, and whether a goal is canceled.
+    /// Takes a cancel request. Returns the reply, and whether a goal is canceled.
     pub fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), Malformed> {
         let GoalInfo { goal_id: UUID { uuid: id }, stamp } =
             CancelGoalRequest::decode(payload)?.goal_info;
@@ -132,7 +129,7 @@ impl<T> Goals<T> {
         Ok(())
     }
 
-    /// The state of a goal with what is known of it; none while it is not over. An unknown goal has the state 0.
+    /// Returns the state of an ended goal and its data. An unknown goal has state 0.
     pub fn over(&self, id: Uuid) -> Option<(i8, Option<&T>)> {
         match self.goals.iter().find(|goal| goal.id == id) {
             Some(goal) if !goal.status.is_final() => None,
@@ -145,7 +142,7 @@ impl<T> Goals<T> {
         self.goals.iter_mut().filter(|goal| goal.status == Status::Aborted)
     }
 
-    /// The requests whose goals are over and whose results `are_known`; the others still wait.
+    /// Returns the waiting requests for ended goals whose results `are_known`.
     pub fn answerable(
         &mut self,
         are_known: impl Fn(i8, Option<&T>) -> bool,

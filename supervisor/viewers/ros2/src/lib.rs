@@ -1,26 +1,26 @@
-//! `firsthand ros2`: the topics of a robot for RViz and other nodes of ROS 2, and the requests that nodes may make. It is a consumer,
-//! which anyone may kill.
+//! `firsthand ros2`: a robot's topics and requests for RViz and other ROS 2 nodes. It is a
+//! consumer, which may be killed.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `topics` | THE table of topics |
-//! | `shown` | samples of the robot's bus to messages, pure |
-//! | `asked` | messages that ask for something to what they ask, pure |
-//! | `drift` | the covariances of odometry, pure |
-//! | `frames` | the frames of `/tf`, pure |
-//! | `goals` | the goals of any action, pure |
-//! | `action` | the server of the action `navigate_to_pose`, pure |
-//! | `messages` | the messages that are written |
-//! | `bag` | a bag of rosbag2 from a recording |
+//! | `topics` | table of topics |
+//! | `shown` | from samples to messages, pure |
+//! | `asked` | from messages to requests, pure |
+//! | `drift` | covariances of odometry, pure |
+//! | `frames` | frames of `/tf`, pure |
+//! | `goals` | goals of any action, pure |
+//! | `action` | server of the action `navigate_to_pose`, pure |
+//! | `messages` | written messages |
+//! | `bag` | rosbag2 bag from a recording |
 //! | `bridge` | the bridge itself |
 //! | `endpoints` | its readers and writers |
-//! | `node` | readers, writers and servers of actions as a node that `ros2 node list` shows |
-//! | `planner` | Nav2's planner server, which is no bridge |
-//! | `parameters` | the options as parameters, for `ros2 param`, pure |
-//! | `overlap` | whether it would publish what the robot's own link reads |
-//! | `orders` | what was asked is done, without holding up the bridge |
+//! | `node` | node with readers, writers and action servers |
+//! | `planner` | Nav2's planner server, without the bridge |
+//! | `parameters` | options as parameters, pure |
+//! | `overlap` | topics that the robot's own link reads |
+//! | `orders` | execution of requests in threads |
 
-// No other crate uses these modules: `pub` means another module; what none uses is reported.
+// `pub` marks use by another module; unused items are still reported.
 #![allow(unreachable_pub)]
 
 mod action;
@@ -56,39 +56,42 @@ use self::{
     topics::{Accept, Frames, Spec, TABLE},
 };
 
-/// Show a robot in ROS 2: to RViz, to other nodes, to other machines. `--topics` lists its topics.
+/// Show a robot in ROS 2, to RViz and other nodes.
 ///
-/// It is a consumer: it may be killed, and started again. Nobody may ask anything of the robot unless --accept says what. DDS has
-/// no authentication here: whoever reaches the domain may do it. The robot's link is no part of it.
+/// `--topics` lists its topics. It is a consumer, which may be killed and restarted. Nodes may only
+/// request what --accept permits. DDS has no authentication here: everyone who reaches the domain
+/// may do so. The robot's link is outside the domain.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-ros2", version)]
 pub struct Arguments {
-    /// Name of the robot; it need not run yet.
+    /// Name of the robot, which may start later.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// The domain of ROS, 0 to 232, instead of that which `ROS_DOMAIN_ID` names.
+    /// ROS domain, 0 to 232. Default: `ROS_DOMAIN_ID`.
     #[arg(long, global = true, value_parser = clap::value_parser!(u16).range(0..=232))]
     domain: Option<u16>,
-    /// The address of the only network interface to use. Without it, this machine's own with `ROS_LOCALHOST_ONLY=1`, else all.
+    /// Address of the only network interface to use. Default: loopback with `ROS_LOCALHOST_ONLY=1`,
+    /// else all.
     #[arg(long, global = true, value_name = "ADDRESS")]
     interface: Option<Ipv4Addr>,
-    /// The namespace of all topics, `tf` too. A robot that speaks ROS 2 itself publishes `/tf` and `/odom`, so give it one.
+    /// Namespace of all topics, including `tf`. A robot that speaks ROS 2 publishes `/tf` and
+    /// `/odom`, so give it one.
     #[arg(long, global = true, default_value = "", value_parser = namespace)]
     namespace: String,
-    /// What `tf` has: all frames, or that of the map alone where another node publishes `odom` to `base_link`. Topics that the robot's
-    /// own link reads are then left to the robot.
+    /// Frames in `tf`. Choose `map` if another node publishes `odom` to `base_link`; the bridge
+    /// then omits topics that the robot's own link reads.
     #[arg(long, value_enum, default_value_t)]
     frames: Frames,
-    /// Stamp all messages with mission time, and publish it as `/clock`: for nodes with `use_sim_time` beside a simulated robot.
+    /// Stamp messages with mission time, and publish it as `/clock`. For nodes with `use_sim_time`.
     #[arg(long)]
     clock: bool,
-    /// Print the table of its topics, and nothing else.
+    /// Only print the table of topics.
     #[arg(long)]
     topics: bool,
-    /// Print a configuration for RViz, and nothing else; the topics there have no namespace.
+    /// Only print a configuration for RViz, without a namespace.
     #[arg(long)]
     rviz: bool,
-    /// What others may do.
+    /// Requests that other nodes may make, separated by commas.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     accept: Vec<Accept>,
     #[command(subcommand)]
@@ -103,7 +106,7 @@ enum Command {
     Bag(bag::Arguments),
 }
 
-/// A namespace of ROS: names of letters, digits and `_` between slashes.
+/// Parses a ROS namespace: names of letters, digits and `_` between slashes.
 fn namespace(text: &str) -> Result<String, String> {
     let is_letter = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     let is_name = |name: &str| !name.is_empty() && name.chars().all(is_letter);

@@ -1,5 +1,3 @@
-//! The executable `firsthand-ros2`; see the library.
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -1,5 +1,6 @@
-//! The messages that show a robot. Earlier releases of ROS read the beginning of a message to which later ones appended. Lengths are
-//! metres, angles radians.
+//! Messages that show a robot. Lengths are metres, angles radians.
+//!
+//! Earlier ROS releases read a prefix of messages that later releases extended.
 
 use glam::DVec2;
 use ros2::{
@@ -10,7 +11,7 @@ use ros2::{
     parts::Pose,
 };
 
-/// Frames and the frames in them.
+/// Encodes transforms of parent, child and pose.
 pub fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
     let transform = |&(parent, child, pose): &(&str, &str, Pose)| TransformStamped {
         header: Header::at(ns, parent),
@@ -29,7 +30,7 @@ pub fn disc((ns, id): (&str, i32), pose: Pose, across: f64, color: [f32; 4]) -> 
     Marker { r#type: Marker::CYLINDER, pose: pose.into(), scale, ..marker((ns, id), color) }
 }
 
-/// A line from each point with an even number to the next.
+/// Draws a line from each even-numbered point to the next.
 pub fn lines((ns, id): (&str, i32), points: &[DVec2], width: f64, color: [f32; 4]) -> Marker {
     let points = points.iter().map(|at| Point { x: at.x, y: at.y, z: 0.0 }).collect();
     let scale = Vector3 { x: width, ..Vector3::default() };
@@ -40,7 +41,7 @@ fn marker((ns, id): (&str, i32), [r, g, b, a]: [f32; 4]) -> Marker {
     Marker { ns: ns.to_owned(), id, color: ColorRGBA { r, g, b, a }, ..Marker::default() }
 }
 
-/// Markers that replace those before.
+/// Encodes markers that replace all earlier ones.
 pub fn markers(header: &Header, mut markers: Vec<Marker>) -> Vec<u8> {
     let (action, r#type) = (Marker::DELETEALL, Marker::CYLINDER);
     markers.insert(0, Marker { action, r#type, ..Marker::default() });
@@ -48,7 +49,8 @@ pub fn markers(header: &Header, mut markers: Vec<Marker>) -> Vec<u8> {
     MarkerArray { markers }.encode()
 }
 
-/// A range as REP 117 has it: nearer than `least` and farther than `most` are infinite, and no measurement is not a number.
+/// Limits a range by REP 117: below `least` is -infinity, above `most` +infinity. NaN means no
+/// measurement.
 pub fn within([least, most]: [f64; 2], range: f64) -> f64 {
     if range < least {
         f64::NEG_INFINITY

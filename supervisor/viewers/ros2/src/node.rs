@@ -1,4 +1,5 @@
-//! A node in DDS: readers and writers of topics, servers of actions, its parameters, and what `ros2 node list` shows of them.
+//! DDS node: topic readers and writers, action servers, parameters, and its entry in
+//! `ros2 node list`.
 
 use std::{
     collections::BTreeMap,
@@ -16,19 +17,19 @@ use ros2::{
 
 use crate::parameters::{self, Parameter, SERVICES, Service};
 
-/// The most messages of a topic that wait for a slow reader, or for the node.
+/// Most messages of a topic that wait for a slow reader or for the node.
 const DEPTH: u16 = 10;
-/// The time within which clients discover the writers of a node that joins. A reply to a client that does not know its writer is lost.
+/// Time for clients to discover a new node's writers. They lose earlier replies.
 const KNOWN_AFTER: Duration = Duration::from_secs(2);
-/// The most messages of a topic that are taken at a time.
+/// Most messages of a topic taken at a time.
 const AT_A_TIME: usize = 16;
 
-/// The quality that sends lost messages again, for messages that all count.
+/// Reliable quality, for messages that all count.
 pub const SURE: Quality = Quality { is_reliable: true, is_latched: false, depth: DEPTH };
-/// The quality that stores the newest message for readers that join later.
+/// Quality that stores the newest message for late readers.
 pub const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, depth: 1 };
 
-/// The quality of messages of which only the newest counts, from senders of either reliability.
+/// Quality for messages of which only the newest counts, from senders of either reliability.
 pub const NEWEST: Quality = Quality { is_reliable: false, is_latched: false, depth: 1 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,10 +46,10 @@ struct Action {
     status: Writer,
 }
 
-/// Topics are told apart by `Id`, actions by the order in which they were opened.
+/// Node whose topics are identified by `Id`, and actions by their opening order.
 pub struct Node<Id> {
     name: &'static str,
-    /// Empty, or with a slash before it.
+    /// Empty, or with a leading slash.
     pub namespace: String,
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
@@ -56,7 +57,7 @@ pub struct Node<Id> {
     actions: Vec<Action>,
     parameters: Vec<Parameter>,
     of_parameters: Vec<(Service, Reader, Writer)>,
-    /// The list of the participant's readers and writers, for other nodes.
+    /// List of the participant's readers and writers, for other nodes.
     entities: Writer,
     joined: Instant,
     pub participant: Participant,
@@ -96,12 +97,12 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(node)
     }
 
-    /// Whether clients that waited before the node joined have discovered its writers.
+    /// Returns whether earlier clients know the node's writers.
     pub fn is_known(&self) -> bool {
         self.joined.elapsed() >= KNOWN_AFTER
     }
 
-    /// The name from the root of one that is below the namespace unless it begins with a slash.
+    /// Returns the absolute name. Names without a leading slash are below the namespace.
     pub fn full_name(&self, name: &str) -> String {
         if name.starts_with('/') { name.to_owned() } else { format!("{}/{name}", self.namespace) }
     }
@@ -117,7 +118,7 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
-    /// Close the writers of other ids.
+    /// Closes the writers whose ids `keep` rejects.
     pub fn retain_writers(&mut self, keep: impl Fn(Id) -> bool) {
         self.writers.retain(|id, _| keep(*id));
     }
@@ -133,7 +134,7 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
-    /// Read a topic of which no message may be missed.
+    /// Reads a topic of which every message counts.
     pub fn read_late(&mut self, id: Id, [name, kind]: [&str; 2]) -> io::Result<()> {
         let topic = Topic::new(&self.full_name(name), kind);
         self.late_readers.push((id, self.participant.late_reader(topic, SURE)?));
@@ -167,7 +168,7 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
-    /// Tell other nodes which readers and writers are the node's.
+    /// Announces the node's readers and writers to other nodes.
     pub fn announce(&self) {
         let services = || {
             let actions = self.actions.iter().flat_map(|action| &action.services);
@@ -193,7 +194,7 @@ impl<Id: Copy + Ord> Node<Id> {
         self.entities.write(entities.encode());
     }
 
-    /// Send a message. If the library does not accept it now, it is lost, and a newer one follows.
+    /// Sends a message. A refused one is lost, and a newer one follows.
     pub fn publish(&self, id: Id, payload: Vec<u8>) {
         if let Some(writer) = self.writers.get(&id) {
             writer.write(payload);
@@ -226,7 +227,7 @@ impl<Id: Copy + Ord> Node<Id> {
         }
     }
 
-    /// The messages that have come. Fails if the library cannot open a reader.
+    /// Returns received messages.
     pub fn heard(&mut self) -> io::Result<Vec<(Id, Message)>> {
         let heard = self.readers.iter().flat_map(|(id, reader)| {
             reader.messages().take(AT_A_TIME).map(|message| (*id, message))

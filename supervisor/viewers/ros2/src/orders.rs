@@ -1,5 +1,5 @@
-//! Threads of their own carry out requests of nodes, so that publishing does not wait: an order waits for the supervisor, and a stop
-//! until the robot rests. Targets do not wait behind stops, nor stops behind targets.
+//! Threads that carry out requests of nodes without delaying publication. Orders wait for the
+//! supervisor, and stops until the robot is at rest. Targets and stops have separate threads.
 
 use std::{
     io,
@@ -25,27 +25,27 @@ const MOST_WAITING: usize = 16;
 
 #[derive(Clone, Debug)]
 pub enum Order {
-    /// Go to a target. If `resumes`, the robot stands for a goal that was canceled, and is resumed first.
+    /// Go to a target. With `resumes`, first resume a robot that stands for a canceled goal.
     Go {
         to: TargetPoint,
         resumes: bool,
         why: Why,
     },
-    /// Stand, for an operator or for a goal that is canceled.
+    /// Stand, for an operator or for a canceled goal.
     Stand {
         is_cancel: bool,
     },
     Resume,
-    /// The robot is there, with deviations in metres and radians.
+    /// Set the pose, with deviations in metres and radians.
     Place(TargetPoint, [f64; 2]),
-    /// A hand pushed so at this time.
+    /// Joystick deflection and its time.
     Hand(DVec2, Instant),
 }
 
 #[derive(Clone, Debug)]
 pub enum Why {
     Topic,
-    /// A client of the action. The goal's target comes after the one with the number `after`.
+    /// Action client. The goal's target follows the one numbered `after`.
     Action {
         request: Request,
         sent: Sent,
@@ -53,7 +53,7 @@ pub enum Why {
     },
 }
 
-/// An order, and the reason if it was not carried out.
+/// Order, and the reason of its failure.
 pub type Done = (Order, Result<(), Refusal>);
 
 pub struct Orders {
@@ -87,14 +87,14 @@ impl Orders {
     }
 
     pub fn give(&self, order: Order) {
-        // The order may wait behind an earlier stop, until the robot rests.
+        // The order may queue behind an earlier stop until the robot is at rest.
         if let Order::Stand { .. } = order {
             operator::stop_at_once(&self.robot);
         }
         let worker = match order {
             Order::Go { .. } | Order::Place(..) => &self.targets,
             Order::Stand { .. } | Order::Resume => &self.stops,
-            // A hand pushes again at once.
+            // The next deflection follows at once.
             Order::Hand(..) => return drop(self.hands.try_send(order)),
         };
         if let Err(TrySendError::Full(order) | TrySendError::Disconnected(order)) =
@@ -104,7 +104,7 @@ impl Orders {
         }
     }
 
-    /// An order that was carried out, or was not.
+    /// Returns a finished order.
     pub fn done(&self) -> Option<Done> {
         self.done.try_recv().ok()
     }

@@ -1,4 +1,4 @@
-//! Whether the bridge would publish a topic that the robot's own link reads: the link would take it for its robot's.
+//! Topics of the bridge that the robot's own link reads, and would take for its robot's.
 
 use common::{
     address::Address,
@@ -9,7 +9,7 @@ use ros2::topic::Topic;
 
 use crate::{endpoints::published, topics::Id};
 
-/// Those topics of a bridge in `domain` and `namespace` that the link of `run` reads, with the topics of these sensors.
+/// Returns the topics of a bridge in `domain` and `namespace` that the link of `run` reads.
 pub fn overlap<'a>(
     (domain, namespace): (u16, &str),
     run: &Run,

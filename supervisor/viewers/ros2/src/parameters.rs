@@ -1,4 +1,5 @@
-//! The options of this process as the parameters of its node, and the services by which `ros2 param` reads them. Pure.
+//! Options of this process as node parameters, and the services by which `ros2 param` reads them.
+//! Pure.
 
 use std::any::TypeId;
 
@@ -13,7 +14,7 @@ use ros2::{
     },
 };
 
-/// The options with which nothing is served.
+/// Options that end the process without serving.
 const OTHERS: [&str; 4] = ["help", "version", "topics", "rviz"];
 
 #[derive(Clone, Copy)]
@@ -59,7 +60,7 @@ pub fn of_options(mut command: &Command, mut matches: &ArgMatches) -> Vec<Parame
     options.filter_map(parameter).collect()
 }
 
-/// An option that takes no value is a flag. A text is what was written.
+/// Converts an option: one without values is a flag, a text is kept as written.
 fn value(option: &Arg, matches: &ArgMatches) -> Option<ParameterValue> {
     let id = option.get_id().as_str();
     let mut value = ParameterValue::default();
@@ -94,7 +95,7 @@ fn value(option: &Arg, matches: &ArgMatches) -> Option<ParameterValue> {
     Some(value)
 }
 
-/// The reply to a request. The error says why the payload is none.
+/// Returns the reply to a request. Fails on a malformed payload.
 pub fn reply(
     parameters: &[Parameter],
     service: Service,
@@ -102,7 +103,7 @@ pub fn reply(
 ) -> Result<Vec<u8>, Malformed> {
     let of = |name: &str| parameters.iter().find(|parameter| parameter.name == name);
     let value = |name: &String| of(name).map(|it| it.value.clone()).unwrap_or_default();
-    // Three requests are a list of names, and two a list of parameters.
+    // Three requests share a list of names, and two share a list of parameters.
     let names = || GetParametersRequest::decode(payload).map(|request| request.names);
     let refuse = |msg::Parameter { name, .. }: &msg::Parameter| SetParametersResult {
         successful: false,
@@ -123,7 +124,7 @@ pub fn reply(
             let asked = ListParametersRequest::decode(payload)?.prefixes;
             let names = parameters.iter().map(|parameter| parameter.name.clone());
             let names = names.filter(|name| asked.is_empty() || asked.contains(name)).collect();
-            // No name has a prefix.
+            // Parameter names have no prefixes.
             let result = ListParametersResult { names, prefixes: Vec::new() };
             ListParametersResponse { result }.encode()
         }

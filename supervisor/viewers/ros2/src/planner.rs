@@ -1,12 +1,12 @@
-//! `firsthand ros2 planner`: Nav2's planner server over the harmonic field. It needs no robot of ours.
+//! `firsthand ros2 planner`: Nav2's planner server over the harmonic field, for any robot.
 //!
 //! | module | holds |
 //! |---|---|
-//! | `costmap` | a map, and what of it is blocked, pure |
-//! | `planning` | map, start and goals to a path, pure |
-//! | `calls` | the messages of the actions, pure |
+//! | `costmap` | a map and its blocked cells, pure |
+//! | `planning` | from map, start and goals to a path, pure |
+//! | `calls` | messages of the actions, pure |
 //!
-//! A goal is accepted at once; a thread plans.
+//! A goal is accepted at once, and a thread plans.
 
 mod calls;
 mod costmap;
@@ -59,17 +59,17 @@ use crate::{
     shown::arrows,
 };
 
-/// The interval at which the end of this process, or that of the time for a path, is noticed.
+/// Interval of checks for the end of the process or of the planning time.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const MOST_WAITING: usize = 16;
-/// The most participants whose release of Nav2 is remembered.
+/// Most participants whose Nav2 release is remembered.
 const MOST_CLIENTS: usize = 256;
-/// The bytes of a GID that are those of its participant.
+/// Length of the participant prefix of a GID, bytes.
 const PARTICIPANT: usize = 12;
-/// `/tf_static` keeps the messages of all its publishers; messages of `/tf` are many.
+/// Queue depth, because `/tf_static` keeps the messages of all publishers and `/tf` has many.
 const DEPTH: u16 = 256;
 
-/// The actions, their types, and where Nav2's error codes of them begin.
+/// Actions, their types, and the first of Nav2's error codes for each.
 const ACTIONS: [(&str, &str, u16); 2] = [
     ("firsthand/compute_path_to_pose", "ComputePathToPose", ComputePathToPoseResult::UNKNOWN),
     (
@@ -90,56 +90,58 @@ enum Id {
     Field,
 }
 
-/// Plan paths for Nav2 along the harmonic field; `firsthand help nav2-planner` says how Nav2 asks for them.
+/// Plan paths for Nav2 along the harmonic field.
 ///
-/// Names without a slash at their beginning are below the namespace.
+/// See `firsthand help nav2-planner`. Names without a leading slash are below the namespace.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
-    /// The topic of the map, which is a costmap of Nav2 or the map itself; its updates are on that with `_updates`.
+    /// Topic of the map: a Nav2 costmap, or a static map. Updates come on the topic with
+    /// `_updates`.
     #[arg(long, value_name = "TOPIC", default_value = "global_costmap/costmap")]
     map: String,
-    /// The topic of transforms; those that stay are on that with `_static`.
+    /// Topic of transforms. Static ones come on the topic with `_static`.
     #[arg(long, value_name = "TOPIC", default_value = "tf")]
     tf: String,
-    /// The frame of the robot.
+    /// Frame of the robot.
     #[arg(long, value_name = "FRAME", default_value = "base_link")]
     base: String,
-    /// The robot's radius, metres; 0 on a costmap that Nav2 inflates.
+    /// Radius of the robot, metres; 0 for an inflated costmap.
     #[arg(long, value_name = "METRES", default_value = "0", value_parser = amount)]
     robot_radius: f64,
-    /// The robot's outline instead of its radius, metres, as `[[x, y], ...]` in its frame.
+    /// Outline in the robot's frame instead of its radius, metres: `[[x, y], ...]`.
     #[arg(long, value_name = "POINTS", conflicts_with = "robot_radius", value_parser = inscribed)]
     footprint: Option<f64>,
-    /// The distance that is kept from obstacles, beyond the radius, where that leaves a way or not, metres.
+    /// Distance from obstacles beyond the radius, metres, even if no path remains.
     #[arg(long, value_name = "METRES", default_value = "0", value_parser = amount)]
     inflation: f64,
-    /// Cells with this value or more are occupied.
+    /// Least value of an occupied cell.
     #[arg(long, value_name = "VALUE", default_value_t = 99, value_parser = value_parser!(u8).range(1..=100))]
     occupied: u8,
-    /// Do not lead through cells of which nothing is known.
+    /// Avoid cells of unknown occupancy.
     #[arg(long)]
     avoid_unknown: bool,
-    /// The field's screening length a metre from obstacles, metres: a shorter one keeps farther from them, on longer ways, and takes longer.
+    /// Screening length of the field a metre from obstacles, metres. A shorter one keeps farther
+    /// away, on longer paths, and takes longer.
     #[arg(long, value_name = "METRES", default_value = "2", value_parser = amount)]
     screening: f64,
-    /// The most time for a path, seconds.
+    /// Longest time for a path, seconds.
     #[arg(long, value_name = "SECONDS", default_value = "5", value_parser = amount)]
     max_planning_time: f64,
-    /// Transforms may be so old, seconds.
+    /// Largest age of transforms, seconds.
     #[arg(long, value_name = "SECONDS", default_value = "1", value_parser = amount)]
     transform_tolerance: f64,
-    /// Stamp paths with the time of `/clock`, as nodes with the parameter `use_sim_time` do.
+    /// Stamp paths with the time of `/clock`, like the parameter `use_sim_time`.
     #[arg(long)]
     use_sim_time: bool,
 }
 
-/// A number that is not negative, of less than a day's seconds.
+/// Parses a number from 0 to less than a day's seconds.
 fn amount(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|number| (0.0..86_400.0).contains(number));
     number.ok_or_else(|| "no amount; give a number from 0 on".to_owned())
 }
 
-/// The radius of the circle about the robot's centre in an outline.
+/// Returns the radius of the outline's largest circle around the robot's centre.
 fn inscribed(text: &str) -> Result<f64, String> {
     let words = text.split(['[', ']', ',', ' ']).filter(|word| !word.is_empty());
     let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
@@ -162,7 +164,7 @@ struct Job {
     cancellation: Cancellation,
 }
 
-/// A job's action, its goal and outcome, and the field as a message.
+/// Action, goal and outcome of a job, and the field as a message.
 type Done = (usize, Uuid, Outcome, Option<Vec<u8>>);
 
 #[derive(Default)]
@@ -170,7 +172,7 @@ struct Plan {
     began: Option<Instant>,
     cancellation: Cancellation,
     outcome: Outcome,
-    /// That of its client.
+    /// Release of its client.
     release: Release,
 }
 
@@ -188,7 +190,7 @@ pub fn serve(
     let mut server = open()?;
     while !ended() {
         if continued.came() {
-            // The library's threads end when a call of theirs is interrupted, as happens when the process is stopped and continued.
+            // A continued process has interrupted system calls, which end the library's threads.
             server = open()?;
         }
         is_readable(&server.node.participant, LOOK_EVERY).map_err(BridgeError::System)?;
@@ -233,9 +235,9 @@ struct Server<'a> {
     node: Node<Id>,
     frames: Frames,
     map: Option<Arc<Costmap>>,
-    /// The newest time of `/clock`, nanoseconds.
+    /// Newest time of `/clock`, nanoseconds.
     clock_ns: u64,
-    /// The releases that participants may be of, by their goals.
+    /// Possible releases of participants, from the layouts of their goals.
     clients: BTreeMap<[u8; PARTICIPANT], Vec<Release>>,
     goals: [Goals<Plan>; 2],
     jobs: SyncSender<Job>,
@@ -265,12 +267,13 @@ impl<'a> Server<'a> {
         })
     }
 
-    /// Returns the time of stamps, nanoseconds; 0 before the first message of a clock that is followed.
+    /// Returns the time of stamps, nanoseconds, or 0 before a followed clock's first message.
     fn now_ns(&self) -> u64 {
         if self.options.use_sim_time { self.clock_ns } else { now_ns() }
     }
 
-    /// Returns the release of a client: by its goals, and by the release of ROS in this environment if that is one of those.
+    /// Returns a client's release from its goals, and from the ROS release in this environment if
+    /// compatible.
     fn release(&mut self, from: Gid, asked: &[Release]) -> Release {
         let participant = *from.first_chunk().unwrap_or(&[0; PARTICIPANT]);
         if self.clients.len() >= MOST_CLIENTS {
@@ -370,7 +373,7 @@ impl<'a> Server<'a> {
         Ok(())
     }
 
-    /// Let nobody wait for the current goal of `action` any longer.
+    /// Cancels the planning of the current goal of `action`.
     fn interrupt(&mut self, action: usize) {
         if let Some(goal) = self.goals[action].current() {
             goal.known.cancellation.cancel();
@@ -398,7 +401,7 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// The job for a goal, with all poses in the frame of the map.
+    /// Makes the job for a goal, with all poses in the frame of the map.
     fn job(
         &self,
         action: usize,
@@ -424,7 +427,7 @@ impl<'a> Server<'a> {
         Ok(Job { action, id, at_ns, map: Arc::clone(map), start, goals, cancellation })
     }
 
-    /// Let a goal end with its outcome, unless it has ended already.
+    /// Ends a goal with its outcome, unless already ended.
     fn end(&mut self, action: usize, id: Uuid, outcome: Outcome) {
         let goals = &mut self.goals[action];
         if let Some(goal) = goals.current().filter(|goal| goal.id == id) {
@@ -439,7 +442,7 @@ impl<'a> Server<'a> {
     }
 }
 
-/// Start a thread that plans one path after the other and rings `bell`. It ends with the sender.
+/// Starts a thread that plans paths in turn and rings `bell`. It ends with the sender.
 fn start_planning(
     mut planner: Planner,
     bell: Waker,

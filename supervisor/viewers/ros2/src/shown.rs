@@ -1,4 +1,4 @@
-//! The messages that show a robot: samples of its bus in, messages out. Pure.
+//! Messages that show a robot: samples in, messages out. Pure.
 
 use std::f64::consts::TAU;
 
@@ -29,21 +29,21 @@ use crate::{
     topics::Id,
 };
 
-/// The mission's frame, that of odometry, and the robot's, whose x is ahead.
+/// Frames of the mission, of odometry, and of the robot, whose x is forward.
 pub const MAP: &str = "map";
 pub const ODOM: &str = "odom";
 pub const BASE: &str = "base_link";
 
-/// Wall-clock time between whole maps, and between diagnostics that have not changed, nanoseconds.
+/// Wall-clock interval of whole maps and of unchanged diagnostics, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
-/// The most directions of the field that are drawn along a side.
+/// Most field directions drawn along a side.
 const ARROWS: usize = 48;
-/// The most steps of a path, for each cell of a side.
+/// Most path steps per cell of a side.
 const STEPS_A_CELL: usize = 8;
-/// The number of steps of half a cell from one pose of a path to the next.
+/// Steps of half a cell between two poses of a path.
 const POSE_EVERY: usize = 4;
 
-/// Takes a message: its topic and its payload.
+/// Sink for a message: its topic and payload.
 pub type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
 
 #[derive(Debug)]
@@ -52,19 +52,20 @@ pub struct Shown {
     mission: Mission,
     sensors: Vec<Sensor>,
     pub state: RobotState,
-    /// The version of the last whole map that was published, and its time.
+    /// Version and time of the last published whole map.
     map: Option<(u64, u64)>,
     has_movers: bool,
     diagnosed: Option<(Vec<DiagnosticStatus>, u64)>,
     drift: Drift,
     /// Mission time over the time of stamps.
     pub pace: f64,
-    /// The frame `odom` by another node, which has the robot in it; none of these before it is heard.
+    /// Robot's pose in another node's `odom`: outer `None` if `odom` is our own, inner `None`
+    /// before the first transform.
     pub others_odom: Option<Option<DAffine2>>,
 }
 
 impl Shown {
-    /// A robot before any sample of it has been read.
+    /// Makes a robot without samples.
     pub fn new(robot: String, mission: Mission) -> Self {
         Self {
             robot,
@@ -105,7 +106,7 @@ impl Shown {
         self.state.pose.unwrap_or_default()
     }
 
-    /// Take a sample, and publish what is shown of it at once.
+    /// Applies a sample and publishes its messages.
     pub fn sample(&mut self, sample: &Sample, now_ns: u64, sink: Sink<'_>) {
         if !self.state.apply(sample) {
             return;
@@ -174,7 +175,7 @@ impl Shown {
                     min_range,
                     max_range,
                     range: within(limits, range) as f32,
-                    // The variance is not known.
+                    // The variance is unknown.
                     ..Range::default()
                 };
                 sink(Id::Range(row), message.encode());
@@ -186,7 +187,7 @@ impl Shown {
         let row = usize::try_from(header.sensor).unwrap_or(usize::MAX);
         if let Some(sensor) = self.sensors.get(row) {
             let period_s = sensor.every_ticks as f64 / self.mission.robot.rate_hz / self.pace;
-            // A message has its beams in the order in which they were measured, or does not tell their times.
+            // A message needs beams in the order of measurement. Otherwise it has no beam times.
             let mut sweep = header.sweep();
             if !sweep.is_plausible(beams.len()) {
                 sweep = Sweep::default();
@@ -220,7 +221,7 @@ impl Shown {
             sink(Id::MapUpdates, update.encode());
         }
         let movers: Vec<_> = (0..).zip(header.drawn_movers()).flat_map(mover).collect();
-        // Without movers an empty array is published once more, which deletes the last ones.
+        // After the last mover, an empty array deletes the markers.
         if std::mem::replace(&mut self.has_movers, !movers.is_empty()) || self.has_movers {
             sink(Id::Movers, markers(&Header::at(now_ns, MAP), movers));
         }
@@ -270,7 +271,7 @@ impl Shown {
         (0..).zip(self.state.targets()).map(target).collect()
     }
 
-    /// Publish the messages that depend on time: the map, what happened, and diagnostics if they have changed or are due.
+    /// Publishes the map, events, and diagnostics if changed or due.
     pub fn tick(&mut self, now_ns: u64, sink: Sink<'_>) {
         self.map(now_ns, sink);
         for event in self.state.take_events() {
@@ -368,13 +369,13 @@ impl Shown {
     }
 }
 
-/// The parts of diagnostics whose change publishes them at once.
+/// Returns the parts of diagnostics whose change causes publication.
 fn judged(statuses: &[DiagnosticStatus]) -> impl Iterator<Item = (u8, &str)> {
     statuses.iter().map(|status| (status.level, status.message.as_str()))
 }
 
-/// A cell's occupancy: -1 is unknown, and 99 is a cell that the robot's centre must not enter, as in a costmap of
-/// Nav2.
+/// Returns a cell's occupancy: -1 unknown, 99 forbidden for the robot's centre, as in a Nav2
+/// costmap.
 fn occupancy(cell: u8) -> i8 {
     match CellState::from_byte(cell) {
         CellState::Free => -1,
@@ -388,7 +389,7 @@ pub const fn plane(Pose2 { position, heading }: Pose2) -> Pose {
     [position.x, position.y, heading]
 }
 
-/// The frame in which `robot` is where `pose` says that it is.
+/// Returns the frame in which `robot` has the pose `pose`.
 fn origin_of(robot: DAffine2, pose: Pose2) -> Pose {
     let pose = DAffine2::from_angle_translation(pose.heading, pose.position);
     let origin = pose * robot.inverse();
@@ -396,7 +397,8 @@ fn origin_of(robot: DAffine2, pose: Pose2) -> Pose {
     [x, y, origin.matrix2.x_axis.to_angle()]
 }
 
-/// The way along the directions of `cells` from `from` to `to`, in steps of half a cell. It ends where there is no direction.
+/// Follows the directions of `cells` from `from` to `to`, in steps of half a cell. Ends where there
+/// is no direction.
 fn way(frame: GridFrame, cells: &[FieldCell], from: DVec2, to: DVec2) -> Vec<Pose> {
     let step_m = frame.resolution_m / 2.0;
     let (mut at, mut way) = (from, Vec::new());
@@ -434,7 +436,8 @@ fn directions(frame: GridFrame, cells: &[FieldCell]) -> Marker {
     })
 }
 
-/// A line at each cell, or at one among several, from the first of what `of` says of its column and row along the second.
+/// Draws a line per cell or group of cells, from the origin and along the direction that `of`
+/// returns.
 pub fn arrows(
     [columns, rows]: [usize; 2],
     cell_m: f64,

@@ -1,4 +1,4 @@
-//! The messages below were serialised by rclpy of ROS 2 Kilted with Fast DDS. The bytes that pad them are zeros here.
+//! Messages below were serialised by rclpy of ROS 2 Kilted with Fast DDS, with zeros as padding.
 
 use std::{
     f64::consts::{FRAC_PI_2, PI},
@@ -115,14 +115,12 @@ fn a_goal_is_taken_in_the_frame_of_the_map_only_and_never_in_part() {
     assert!(goal(&pose).unwrap_err().contains("rotation"));
 }
 
-/// The goal `id` to (1, 2) in `frame`.
 fn goal(id: u8, frame: &str) -> Vec<u8> {
     let mut request = NavigateToPoseSendGoalRequest::default();
     (request.goal_id.uuid, request.goal.pose) = ([id; 16], pose_in(frame));
     request.encode()
 }
 
-/// A request to cancel the goal `id`, of any time.
 fn cancel(id: u8) -> Vec<u8> {
     let goal_info = GoalInfo { goal_id: UUID { uuid: [id; 16] }, stamp: 0.into() };
     CancelGoalRequest { goal_info }.encode()
@@ -133,19 +131,18 @@ fn sent(id: u8) -> Sent {
     Sent { id, point: point.unwrap() }
 }
 
-/// The state of the goal `id`, its error code and the words of that.
+/// Returns the state of the goal `id`, its error code and its text.
 fn told(goals: &Server, id: u8) -> (i8, u16, String) {
     let result = goals.result([id; 16]).unwrap();
     let NavigateToPoseGetResultResponse { status, result } = Cdr::decode(&result).unwrap();
     (status, result.error_code, result.error_msg)
 }
 
-/// The state of the goal `id` by its result; none while it is not over.
 fn state(goals: &Server, id: u8) -> Option<i8> {
     goals.result([id; 16]).map(|_| told(goals, id).0)
 }
 
-/// A server with the goal 1, to (1, 2), which is the target with the number 5.
+/// Returns a server with goal 1 to (1, 2), as target number 5.
 fn with_a_goal() -> Server {
     let mut goals = Server::default();
     goals.target(&TargetSample { number: 4, ..TargetSample::default() });
@@ -287,7 +284,7 @@ fn goals_of_the_action_are_reached_one_after_the_other_in_a_run_that_stays() {
     for nth in 1..=20 {
         goals.accept(sent(nth), goals.newest_target, 7);
         goals.target(&target(nth.into()));
-        // The supervisor tells of the target before it orders the robot to drive.
+        // The supervisor publishes the target before it orders the robot to drive.
         for said in [waits, drives, drives, waits] {
             assert_eq!(state(&goals, nth), None);
             goals.directive(&said);
@@ -319,7 +316,6 @@ fn shown() -> Shown {
     Shown::new("x80".to_owned(), Mission::parse("target = [4, 0]", Path::new("m.toml")).unwrap())
 }
 
-/// The topics and payloads that `show` publishes.
 fn published(show: impl FnOnce(&mut dyn FnMut(Id, Vec<u8>))) -> Vec<(Id, Vec<u8>)> {
     let mut sent = Vec::new();
     show(&mut |id, payload| sent.push((id, payload)));
@@ -346,7 +342,7 @@ fn odometry_and_its_origin_make_up_the_pose() {
     assert!((pose.orientation.heading().unwrap() - 0.5).abs() < 1e-12);
 }
 
-/// The names of parent and frame of the only transform of a message, and its place and turn.
+/// Returns parent and frame of a message's only transform, with its translation and rotation.
 fn only_transform(payload: &[u8]) -> ([String; 2], ([f64; 2], f64)) {
     let [transform] = TFMessage::decode(payload).unwrap().transforms.try_into().unwrap();
     let Vector3 { x, y, .. } = transform.transform.translation;
@@ -375,7 +371,7 @@ fn where_another_node_has_the_robot_in_odom_the_map_alone_is_told_so_that_both_m
     }
 }
 
-/// The pose covariance, the speed and the turn rate and their covariance of an odometry.
+/// Returns an odometry's pose covariance, speed and turn rate, and twist covariance.
 fn read_odometry(payload: &[u8]) -> ([f64; 36], [f64; 2], [f64; 36]) {
     let Odometry { pose, twist, .. } = Odometry::decode(payload).unwrap();
     let Twist { linear, angular } = twist.twist;
@@ -395,9 +391,9 @@ fn the_covariance_of_odometry_grows_with_the_way_and_is_large_on_what_no_wheel_m
     assert_eq!((start[0], start[7], start[35]), (0.0, 0.0, 0.0));
     let (at_10_m, speeds, of_speeds) = (1..=1000).map(&mut drive).last().unwrap();
     assert_eq!((speeds[0], speeds[1]), (0.1, 0.0));
-    // 1 % of the way by the mean diameter, and slip of 1 mm per root of a metre of two wheels.
+    // 1 % of the distance by the mean diameter, and slip of 1 mm per root metre of two wheels.
     assert!((at_10_m[0].sqrt() - 0.1).abs() < 0.001, "{}", at_10_m[0].sqrt());
-    // Half the ratio's deviation times the way squared, over the track, aside.
+    // Lateral: half the ratio's deviation times the distance squared, over the track.
     assert!(at_10_m[7].sqrt() > 0.5 && at_10_m[35].sqrt() > 0.1, "{at_10_m:?}");
     assert!((at_10_m[11] - at_10_m[31]).abs() < 1e-12 && at_10_m[11] > 0.0);
     for covariance in [at_10_m, of_speeds] {
@@ -429,7 +425,7 @@ fn ranges_too_far_too_near_and_not_measured_are_those_of_rep_117() {
     assert_eq!(messages::within(limits, 0.05), f64::NEG_INFINITY);
     assert_eq!(messages::within(limits, 1.0), 1.0);
     assert!(messages::within(limits, f64::NAN).is_nan());
-    // The X80's sonars.
+    // X80's sonars.
     let mut shown = shown();
     for (status, is) in [
         (RangeStatus::AtContact, Some(f32::NEG_INFINITY)),
@@ -464,7 +460,7 @@ fn a_scan_is_stamped_when_its_first_beam_was_measured_and_says_the_time_between_
     };
     assert_eq!(told(1.0, 0, 250_000), (910_000_000, 0.00025));
     assert_eq!(told(2.0, 0, 250_000), (955_000_000, 0.000_125));
-    // One that turns clockwise has its beams in another order: the stamp is that of the middle.
+    // A clockwise laser has its beams in another order, so the stamp is that of the middle.
     assert_eq!(told(1.0, 0, -250_000), (955_000_000, 0.0));
 }
 
@@ -494,7 +490,7 @@ fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_fr
     let (names, (at, turned)) = only_transform(&sent[0].1);
     assert_eq!((names, at), (["base_link", "laser"].map(str::to_owned), [-0.04, 0.0]));
     assert!((turned - FRAC_PI_2).abs() < 1e-12);
-    // The first of 360 beams looks to the right of the robot, which is behind the laser.
+    // The first of 360 beams points to the robot's right, which is behind the laser.
     let header = ScanHeader::of(row, &laser);
     assert!((header.first_rad + FRAC_PI_2).abs() < 1e-12);
     let sent = published(|sink| shown.sample(&Sample::Scan(header, vec![1.0; 360]), 0, sink));

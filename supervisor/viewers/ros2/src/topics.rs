@@ -1,5 +1,4 @@
-//! THE table of the topics that the bridge publishes and takes. Writers and readers are made from it, and the guide's list is
-//! printed from it.
+//! Table of the bridge's topics. Writers, readers and the guide's list are made from it.
 
 use clap::ValueEnum;
 
@@ -14,9 +13,9 @@ pub enum Id {
     Path,
     Field,
     Movers,
-    /// The sensor in this row of the mission; in the table, any.
+    /// Scan of the sensor in this row of the mission. In the table, any row.
     Scan(usize),
-    /// Likewise.
+    /// Range of the sensor in this row, likewise.
     Range(usize),
     Battery,
     Diagnostics,
@@ -28,20 +27,20 @@ pub enum Id {
     Stop,
 }
 
-/// The requests of others, each of which the user must permit.
+/// Requests of other nodes that need the user's permission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Accept {
     /// Send the robot to targets: `goal_pose` and the action `navigate_to_pose`.
     Goals,
-    /// Say where it is: `initialpose`.
+    /// Set the robot's pose: `initialpose`.
     Pose,
-    /// Drive it by hand: `teleop`.
+    /// Drive the robot by hand: `teleop`.
     Hand,
-    /// Let it stand and go on: `stop`.
+    /// Stop and resume the robot: `stop`.
     Stop,
 }
 
-/// The transforms that are published.
+/// Published transforms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Frames {
     /// `map` to `odom` to `base_link`.
@@ -56,11 +55,11 @@ pub struct Spec {
     pub name: &'static str,
     pub message: [&'static str; 2],
     pub type_name: &'static str,
-    /// Of the message, as recordings have it.
+    /// Message definition, as in recordings.
     pub definition: &'static str,
-    /// Whether a reader that joins later gets the newest message.
+    /// Whether late readers get the newest message.
     pub is_latched: bool,
-    /// The permission for it; none for a topic that the bridge publishes.
+    /// Required permission, or `None` for a published topic.
     pub accepted_by: Option<Accept>,
     pub meaning: &'static str,
 }

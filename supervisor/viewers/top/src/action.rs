@@ -1,4 +1,4 @@
-//! Keys, and the actions that they start.
+//! Keys and their actions.
 
 use std::{
     sync::mpsc::{Receiver, TryRecvError, channel},
@@ -22,13 +22,13 @@ pub enum Action {
 }
 
 impl Action {
-    /// The name of the subcommand that does the same.
+    /// Returns the name of the equivalent subcommand.
     fn name(self) -> &'static str {
         let row = KEYS.iter().find(|(_, _, key)| *key == Key::Act(self));
         row.map_or("", |(_, name, _)| name)
     }
 
-    /// Whether the action concerns a stage rather than the robot.
+    /// Returns whether the action concerns a stage rather than the robot.
     const fn is_of_a_stage(self) -> bool {
         !matches!(self, Self::Stop | Self::Resume)
     }
@@ -54,7 +54,7 @@ pub enum Key {
     Quit,
 }
 
-/// The keys: the text for each in the last line of the screen, its effect, and its meaning.
+/// Keys: text in the last screen line, effect and meaning.
 pub const KEYS: [(&str, &str, Key); 8] = [
     ("↑↓", "choose", Key::Down),
     ("k", "kill", Key::Act(Action::Kill)),
@@ -66,13 +66,13 @@ pub const KEYS: [(&str, &str, Key); 8] = [
     ("q", "quit", Key::Quit),
 ];
 
-/// Take the keys out of `typed`, the bytes of a terminal in raw mode. The beginning of an incomplete key stays there.
+/// Takes keys out of `typed`, the bytes of a raw terminal. An incomplete key stays there.
 pub fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
     let mut keys = Vec::new();
     let mut rest = &typed[..];
     loop {
         rest = match rest {
-            // A sequence of bytes for one key ends with a letter or `~`.
+            // An escape sequence ends with a letter or `~`.
             [ESCAPE, b'[' | b'O', sequence @ ..] => {
                 let Some(last) = sequence.iter().position(|byte| (b'@'..=b'~').contains(byte))
                 else {
@@ -101,17 +101,17 @@ pub fn take_keys(typed: &mut Vec<u8>) -> Vec<Key> {
 }
 
 const ESCAPE: u8 = 0x1b;
-/// Ctrl-C, which a terminal in raw mode sends as a byte.
+/// Ctrl-C, which a raw terminal sends as a byte.
 const CONTROL_C: u8 = 0x03;
 const LONGEST_SEQUENCE: usize = 32;
 
-/// The meaning of a letter; none if it has none.
+/// Returns the key of a letter, if it has one.
 fn meaning(letter: u8) -> Option<Key> {
     let row = KEYS.iter().find(|(key, ..)| key.as_bytes() == [letter]);
     if letter == CONTROL_C { Some(Key::Quit) } else { row.map(|(.., key)| *key) }
 }
 
-/// Performs one action at a time in a thread, because a stop takes until the robot rests.
+/// Executor of one action at a time in a thread, because a stop lasts until the robot is at rest.
 pub struct Operator {
     robot: RobotName,
     under_way: Option<(JoinHandle<()>, Receiver<String>)>,
@@ -122,7 +122,7 @@ impl Operator {
         Self { robot: robot.clone(), under_way: None }
     }
 
-    /// Begin `action`. Returns the text to show meanwhile.
+    /// Begins `action`. Returns the text to show meanwhile.
     pub fn ask(&mut self, action: Action, stage: Option<&str>) -> String {
         if self.under_way.is_some() {
             return "the last action goes on".to_owned();
@@ -147,7 +147,7 @@ impl Operator {
         format!("{asked} ...")
     }
 
-    /// The result of the action. The next call gives none.
+    /// Returns the result of the action, once.
     pub fn answer(&mut self) -> Option<String> {
         let (_, receiver) = self.under_way.as_ref()?;
         let message = match receiver.try_recv() {
@@ -166,7 +166,7 @@ impl Operator {
     }
 }
 
-/// The destructor awaits an action under way, so that the action leaves the bus in order.
+/// Waits for an action under way, so that it leaves the bus in order.
 impl Drop for Operator {
     fn drop(&mut self) {
         self.end();

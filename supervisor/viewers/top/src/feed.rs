@@ -1,4 +1,4 @@
-//! The readers of the screen on the bus.
+//! Bus readers of the screen.
 
 use std::time::{Duration, Instant};
 

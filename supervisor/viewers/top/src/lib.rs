@@ -1,13 +1,14 @@
-//! `firsthand top`: stages, map, field and robot on the screen of a terminal, and keys for the actions of an operator.
+//! `firsthand top`: stages, map, field and robot on a terminal, with keys for an operator's
+//! actions.
 //!
 //! | file | holds |
 //! |---|---|
-//! | `view` | what the screen shows |
-//! | `feed` | brings it up to date from the bus |
-//! | `screen`, `map` | draw it |
-//! | `action` | what the keys do |
+//! | `view` | data of the screen |
+//! | `feed` | updates from the bus |
+//! | `screen`, `map` | drawing |
+//! | `action` | effects of keys |
 
-// No other crate uses these modules: `pub` means another module; what none uses is reported.
+// `pub` marks use by another module; unused items are still reported.
 #![allow(unreachable_pub)]
 
 mod action;
@@ -47,7 +48,9 @@ use console::{
     stream::let_stages_go_first,
 };
 
-/// Show a robot on the terminal: stages, believed map, field; keys kill, freeze, restart, stop, resume.
+/// Show a robot on the terminal: stages, believed map and field.
+///
+/// Keys kill, freeze, thaw, restart, stop and resume.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-top", version)]
 pub struct Arguments {
@@ -64,9 +67,9 @@ enum TopError {
     Terminal(#[from] io::Error),
 }
 
-/// The longest time until a key is noticed when nothing is published.
+/// Longest delay of a key when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// The interval at which the screen is drawn again.
+/// Interval at which the screen is redrawn.
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
 pub fn main() -> ExitCode {
@@ -83,13 +86,13 @@ fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode, Failure> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Show `robot` until q is pressed, a signal comes, or the terminal is closed.
+/// Shows `robot` until q is pressed, a signal comes, or the terminal is closed.
 fn show(robot: &RobotName) -> Result<(), TopError> {
     let mut signals = Signals::that_end()?;
     let mut terminal = ratatui::try_init()?;
     let shown = run(robot, &mut signals, &mut terminal);
     if terminal.show_cursor().is_err() {
-        // The destructor would report on standard error that it cannot show the cursor, and panic if that is closed too.
+        // The destructor would report an error on standard error, and panic if that is closed too.
         std::mem::forget(terminal);
     }
     let restored = ratatui::try_restore();
@@ -114,7 +117,7 @@ fn run(
     let mut view = View::new(robot.clone());
     let mut operator = Operator::new(robot);
     let mut drawn = None::<Instant>;
-    // Keys are read here, because the reader of the terminal's library never ends if the terminal was closed.
+    // Keys are read here: the terminal library's reader never ends after the terminal is closed.
     let mut typed = Vec::new();
     while !signals.came() && !is_closed() {
         match follower.wait(LOOK_EVERY)? {

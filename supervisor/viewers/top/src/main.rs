@@ -1,5 +1,3 @@
-//! The executable `firsthand-top`; see the library.
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -1,5 +1,5 @@
-//! The believed map, the field on it, the robot, its way and its target, in letters of a terminal. A letter is about twice as
-//! high as wide, so it shows two squares, one above the other.
+//! Draws the believed map, field, robot, path and target. A letter is about twice as high as wide,
+//! so it shows two squares.
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -12,12 +12,12 @@ use ratatui::{
 
 use robot_state::RobotState;
 
-/// Directions from east on, counter-clockwise, 45 degrees each.
+/// Directions from east, counter-clockwise, 45 degrees each.
 const FIELD: [char; 8] = ['→', '↗', '↑', '↖', '←', '↙', '↓', '↘'];
 const ROBOT: [char; 8] = ['▶', '◥', '▲', '◤', '◀', '◣', '▼', '◢'];
 pub const TARGET: char = 'X';
 pub const WAY: char = '·';
-/// The intervals at which the field is drawn, letters to the right and down.
+/// Intervals of field symbols, letters to the right and down.
 const FIELD_EVERY: (usize, usize) = (4, 2);
 
 const SCANNED: Color = Color::Indexed(236);
@@ -26,7 +26,7 @@ pub const WAY_STYLE: Style = Style::new().fg(Color::Magenta);
 pub const TARGET_STYLE: Style = Style::new().fg(Color::Green).add_modifier(Modifier::BOLD);
 pub const ROBOT_STYLE: Style = Style::new().fg(Color::White).add_modifier(Modifier::BOLD);
 
-/// A square shows the last of its cells' states in this order.
+/// Order of cell states. A square shows the last of its cells' states.
 const BY_IMPORTANCE: [CellState; 6] = [
     CellState::Free,
     CellState::Scanned,
@@ -40,7 +40,6 @@ fn importance(state: &CellState) -> Option<usize> {
     BY_IMPORTANCE.iter().position(|other| other == state)
 }
 
-/// The colour of a hazard; none for another square.
 const fn hazard(state: CellState) -> Option<Color> {
     match state {
         CellState::Free | CellState::Scanned => None,
@@ -69,14 +68,14 @@ struct Scale {
 }
 
 impl Scale {
-    /// The column and the row of the square of `point`, from above; none outside the map.
+    /// Returns column and row of a point's square, from above, inside the map.
     fn square(&self, point: DVec2) -> Option<(usize, usize)> {
         let at = (self.frame.to_cells(point) + DVec2::splat(0.5)) / self.step;
         let inside = at.cmpge(DVec2::ZERO).all() && at.cmplt(DVec2::splat(self.side as f64)).all();
         inside.then(|| (at.x as usize, self.side - 1 - at.y as usize))
     }
 
-    /// The range of cells of a square along one axis. Squares are counted in the direction of the axis.
+    /// Returns a square's cells along one axis, counted in its direction.
     fn cells(&self, square: usize) -> std::ops::Range<usize> {
         let all = self.frame.cells as usize;
         let first = ((square as f64 * self.step) as usize).min(all - 1);
@@ -85,7 +84,7 @@ impl Scale {
     }
 }
 
-/// The map of a robot in at most `width` by `height` letters; none before the first grid.
+/// Draws a map in at most `width` by `height` letters, from the first grid on.
 pub fn lines(state: &RobotState, width: u16, height: u16) -> Option<Vec<Line<'static>>> {
     let frame = state.map.frame()?;
     let side = usize::from(width).min(2 * usize::from(height)) & !1;
@@ -118,17 +117,16 @@ pub fn lines(state: &RobotState, width: u16, height: u16) -> Option<Vec<Line<'st
     Some(letters.into_iter().map(line).collect())
 }
 
-/// The letter of a robot with `heading`, radians.
 pub fn robot(heading: f64) -> char {
     ROBOT[octant(heading)]
 }
 
 fn octant(angle: f64) -> usize {
-    // The cast turns NaN into 0.
+    // The cast converts NaN to 0.
     ((angle / FRAC_PI_4).round() as i64).rem_euclid(8) as usize
 }
 
-/// Two squares of the map, one above the other, and the field there.
+/// Draws two squares of the map, one above the other, and the field there.
 fn letter(state: &RobotState, scale: &Scale, col: usize, line: usize) -> (char, Style) {
     let square = |row: usize| {
         let (cells, side) = (state.map.cells(), scale.frame.cells as usize);
@@ -160,7 +158,7 @@ fn letter(state: &RobotState, scale: &Scale, col: usize, line: usize) -> (char, 
     }
 }
 
-/// The field's direction in the middle of a letter; none if it is not drawn there, or the field has none.
+/// Returns the field's direction in the middle of a letter, if drawn.
 fn field(state: &RobotState, scale: &Scale, col: usize, line: usize) -> Option<char> {
     let (every_col, every_line) = FIELD_EVERY;
     let drawn = col % every_col == every_col / 2 && line % every_line == every_line / 2;

@@ -19,7 +19,7 @@ use console::{
 use robot_state::{RobotState, guidance_in_words};
 
 const TABLE_WIDTH: u16 = 80;
-/// The width from which on the map is beside the table instead of below it.
+/// Least width with the map beside the table instead of below it.
 const WIDE: u16 = TABLE_WIDTH + 50;
 
 const TITLE: Style = Style::new().add_modifier(Modifier::BOLD);
@@ -68,9 +68,9 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     frame.render_widget(Paragraph::new(keys_line()), keys);
 }
 
-/// The lines of `message` when it is wrapped between words.
+/// Returns the number of lines of `message`, wrapped between words.
 fn message_height(message: &str, width: u16) -> u16 {
-    // A fifth is added for lines that end early before a long word.
+    // Adds a fifth for lines that end early before a long word.
     let letters = message.chars().count() * 6 / 5;
     1 + (letters / usize::from(width).max(1)).min(4) as u16
 }
@@ -155,7 +155,7 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
     frame.render_stateful_widget(table, area, &mut state);
 }
 
-/// The usage of a process: of the stage in this row, or behind them of the supervisor.
+/// Returns the usage of the stage in this row. The row after the stages is the supervisor's.
 fn usage(view: &View, at: usize) -> Usage {
     view.usage.get(at).copied().unwrap_or_default()
 }
@@ -203,7 +203,7 @@ fn draw_map(view: &View, frame: &mut Frame<'_>, area: Rect) {
 fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let mut lines = numbers(&view.state);
     let legend = legend();
-    // The events get the room between the numbers and the legend at the foot.
+    // Events fill the space between the numbers and the legend at the bottom.
     let room = usize::from(area.height).saturating_sub(lines.len() + legend.len() + 1);
     lines.push(Line::default());
     let events = view.events.iter().take(room);
@@ -271,7 +271,7 @@ fn robot_words(link: &LinkSample) -> (String, Style) {
     }
 }
 
-/// The latency of the ticks since this process of the link began.
+/// Formats the latency of ticks since this process of the link began.
 fn latency(link: &LinkSample) -> String {
     let mut histogram = Histogram::default();
     histogram.add(&link.latency_histogram, link.latency_max_ns);

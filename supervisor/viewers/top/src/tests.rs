@@ -21,7 +21,8 @@ use super::{action::KEYS, screen, view::View};
 
 const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
 
-/// A robot in the middle of a mission: a wall to the east of it, the field to the north, where the target is.
+/// Returns a robot in mid-mission: a wall to the east, and the field to the north, where the target
+/// is.
 fn view() -> View {
     let mut view = View::new("robot-of-16-char".parse().unwrap());
     view.on_connected();
@@ -105,7 +106,6 @@ fn view() -> View {
     view
 }
 
-/// The text on a screen of that size.
 fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal.draw(|frame| screen::draw(view, frame)).unwrap();
@@ -120,7 +120,6 @@ fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
     lines
 }
 
-/// The columns in `line` that have one of `letters`.
 fn columns(line: &str, letters: &str) -> Vec<usize> {
     let columns = line.chars().enumerate();
     columns.filter(|(_, letter)| letters.contains(*letter)).map(|(at, _)| at).collect()

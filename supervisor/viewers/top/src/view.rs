@@ -1,4 +1,4 @@
-//! The data of the screen.
+//! Data of the screen.
 
 use std::collections::VecDeque;
 
@@ -11,13 +11,13 @@ pub struct View {
     pub robot: RobotName,
     pub connected: bool,
     pub state: RobotState,
-    /// The usage of each stage's process, and of the supervisor's behind them; empty before it was looked at.
+    /// Usage of each stage's process, then of the supervisor's. Empty before the first look.
     pub usage: Vec<Usage>,
-    /// Samples a second on the first output of each stage; none before they were counted.
+    /// Samples per second on each stage's first output. `None` before the first count.
     pub rates_hz: Vec<Option<f64>>,
-    /// The row of the stage that the keys concern.
+    /// Row of the stage that the keys address.
     pub chosen: usize,
-    /// Deaths and stalls, the newest first. What the failsafe does has a line of its own.
+    /// Deaths and stalls, newest first. Failsafe actions have a separate line.
     pub events: VecDeque<Event>,
     pub message: String,
 }
@@ -36,14 +36,14 @@ impl View {
         }
     }
 
-    /// Note that a run of the robot began, and drop the data of the last run.
+    /// Begins a run and drops the data of the last run.
     pub fn on_connected(&mut self) {
         let chosen = self.chosen;
         *self = Self::new(self.robot.clone());
         (self.connected, self.chosen) = (true, chosen);
     }
 
-    /// The name of the chosen stage; none before the first roster.
+    /// Returns the name of the chosen stage, or `None` before the first roster.
     pub fn chosen_stage(&self) -> Option<&str> {
         let stage = self.state.stages.get(self.chosen);
         stage.map(|entry| name_str(&entry.stage))

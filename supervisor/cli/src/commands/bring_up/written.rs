@@ -1,10 +1,9 @@
-//! Mission files for new robots, and keys in those of others, whose comments stay.
+//! Writes mission files for new robots, and edits keys of existing ones, whose comments stay.
 
 use common::mission::Protocol;
 use console::failure::Result;
 use toml_edit::{DocumentMut, Item, Table, value};
 
-/// The text of a mission for a robot that speaks `protocol` at `address`.
 pub fn new_robot(protocol: Protocol, address: &str) -> String {
     let (name, keys) = match protocol {
         Protocol::X80 => ("x80", ""),
@@ -40,10 +39,11 @@ pub fn new_robot(protocol: Protocol, address: &str) -> String {
     )
 }
 
-/// `text`, a mission file, with `keys`, paths with dots and values, in place. A row of `robot.sensor` is meant by its name.
+/// Sets `keys` in the mission file `text`: dotted paths and values. Rows of `robot.sensor` are
+/// addressed by name.
 ///
 /// # Errors
-/// The text is no TOML, or a key lies below something that is no table.
+/// The text is not TOML, or the parent of a key is not a table.
 pub fn with_keys(text: &str, keys: &[&(String, String)]) -> Result<String> {
     let mut document: DocumentMut = text.parse()?;
     for (path, new) in keys {

@@ -21,39 +21,39 @@ use console::{
 
 use crate::commands::run::recorder::RunRecorder;
 
-/// What every procedure of a robot is told.
+/// Options that every calibration procedure takes.
 #[derive(Debug, Args)]
 pub struct Setting {
-    /// Name of the robot, which also names its shared memory.
+    /// Name of the robot and of its shared memory.
     #[arg(long, default_value = "x80")]
     pub robot: RobotName,
-    /// Mission time of a simulated robot: `max`, or R times wall-clock.
+    /// Pace of a simulated robot: `max`, or R times wall-clock time.
     #[arg(long)]
     pace: Option<Pace>,
-    /// Seed of everything random in the simulation, instead of the mission's.
+    /// Seed of the simulation, instead of the mission's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Set a key of the mission, as often as needed.
+    /// Set a key of the mission; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// The directory in which the directories of runs are.
+    /// Directory that holds the directories of runs.
     #[arg(long, value_name = "DIR", default_value = "runs")]
     runs: PathBuf,
-    /// Print one line of JSON, and nothing else on standard output.
+    /// Print only one line of JSON on standard output.
     #[arg(long)]
     pub json: bool,
 }
 
 impl Setting {
-    /// One log for all runs of a command.
+    /// Opens one log for all runs of a command.
     pub fn log(&self, name: &str) -> Result {
         fs::create_dir_all(&self.runs)
             .map_err(|error| format!("cannot make {}: {error}", self.runs.display()))?;
         Ok(logging::to_file(&self.runs.join(name))?)
     }
 
-    /// The robot of `named`, and nothing else of it, in a procedure that alone ends the run. The controller drives it at `speed_m_s` or as
-    /// fast as it can.
+    /// Returns a mission with only the robot of `named`, ended only by the procedure. The body's
+    /// top speed limits `speed_m_s`.
     pub fn procedure(
         &self,
         named: &Mission,
@@ -73,21 +73,21 @@ impl Setting {
         mission.seed = self.seed.unwrap_or(named.seed);
         mission.sensors = Some(Sensors::Front);
         mission.arrival_tolerance_m = 0.05;
-        // Only before a wall does something answer for certain, so that sonars are judged.
+        // Sonars can only be judged in front of a wall, where echoes are certain.
         mission.sensing = plan.procedure == Procedure::Wall;
         mission.planner.executable = Some(calibration::PLANNER.into());
         mission.planner.calibration = Some(plan);
         mission.controller.speed_m_s = Some(speed_m_s.min(body.top_speed_m_s));
-        // The robot turns many times at one place, which is no stall.
+        // Repeated turns in one place must not count as a stall.
         mission.controller.turn_rad_s = Some(0.1);
         mission.controller.look_rad_s = Some(1.5);
         mission.controller.slow_radius_m = 0.01;
         Ok(mission)
     }
 
-    /// Fails if the procedure does not come to its end.
+    /// Drives the procedure. Fails if it does not complete.
     pub fn carry_out(&self, mission: &Mission, title: &str) -> Result<Carried> {
-        // It is checked like one that a person wrote.
+        // The mission passes the same checks as one written by hand.
         let mission = missions::parsed(&toml::to_string(mission)?, &mission.name, &[])?;
         let directory = runs::numbered(&self.runs, &mission.name)?;
         let real = mission.robot.address.is_some();
@@ -135,7 +135,8 @@ impl Setting {
         let truth = finished.truth.last().map(|truth| DVec2::new(truth.x, truth.y));
         let ending = &finished.ending;
         match ending.outcome {
-            // The end by wheels that are not calibrated does not matter. A planner that gave up says why in its checkpoint.
+            // Uncalibrated wheels may end anywhere. A failed planner stores its reason in its
+            // checkpoint.
             Outcome::Reached
             | Outcome::WrongPlace
             | Outcome::ReachedUnsure
@@ -160,7 +161,7 @@ pub struct Carried {
     pub directory: PathBuf,
     pub seconds: f64,
     pub counts: Vec<[u16; 2]>,
-    /// The end of a simulated robot, metres.
+    /// End position of a simulated robot, metres.
     pub truth: Option<DVec2>,
 }
 

@@ -1,4 +1,4 @@
-//! The ends of squares, typed by a person or from a file as standard input.
+//! Ends of squares, typed by a person or read from a file on standard input.
 
 use std::{
     io::{self, BufRead as _, IsTerminal as _, Read as _},
@@ -12,10 +12,10 @@ use console::{failure::Result, output::write_stderr};
 
 const LONGEST_LINE: u64 = 200;
 const FARTHEST_M: f64 = 10.0;
-/// The time between looks for a signal while somebody measures.
+/// Interval of checks for a signal while a person measures.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
-/// A person puts the robot on its mark. Who gives a file has nobody to wait for.
+/// Waits until a person has put the robot on its mark. Returns at once if standard input is a file.
 pub fn await_robot(title: &str, signals: &mut Signals) -> Result {
     if io::stdin().is_terminal() {
         write_stderr(&format!("{title}: put the robot on its mark, then press Enter\n"));
@@ -24,7 +24,7 @@ pub fn await_robot(title: &str, signals: &mut Signals) -> Result {
     Ok(())
 }
 
-/// A line that is no end is asked for again.
+/// Asks for an end, and repeats the question after an invalid line.
 pub fn next(title: &str, signals: &mut Signals) -> Result<DVec2> {
     loop {
         write_stderr(&format!("{title}: where is it? metres ahead and to the left of the mark: "));
@@ -48,7 +48,7 @@ fn line(signals: &mut Signals) -> Result<String> {
     Ok(line.trim().to_owned())
 }
 
-/// Two numbers, metres.
+/// Parses two numbers, metres.
 fn end(line: &str) -> Option<DVec2> {
     let separated = line.replace(',', " ");
     let mut words = separated.split_whitespace().map(str::parse::<f64>);

@@ -1,4 +1,4 @@
-//! Ratio and track by the robot's gyro, from the recording of two ways and two turns.
+//! Computes ratio and track from the gyro, in a recording of two straight drives and two turns.
 
 use bring_up::{Trace, trace::Told};
 use calibration::gyro::{Motion, checked};
@@ -8,7 +8,7 @@ use recording::Recording;
 use super::{Arguments, drive::Carried, refused, written::Found};
 use console::failure::Result;
 
-/// A robot that was told to stand for so long rests at the end, seconds.
+/// Time after which a robot with the command to stand is at rest, seconds.
 const RESTS_AFTER_S: f64 = 0.8;
 
 pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> Result<Found> {
@@ -20,7 +20,7 @@ pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> R
     let Carried { directory, seconds, .. } = carried;
     let recording = Recording::open(&directory.join("recording.mcap"))?;
     let before = std::mem::take(&mut mission.robot.odometry);
-    // Nominal ways are those of wheels that nobody calibrated.
+    // Nominal distances are those of uncalibrated wheels.
     mission.robot.odometry = Odometry::default();
     let trace = Trace::read(&mission, &recording)?;
     let (at_rest, motions) = motions(&mission, &trace).map_err(|why| refused(&why))?;
@@ -30,10 +30,10 @@ pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> R
     Ok(Found { method: "gyro", before, estimate, metres, seconds })
 }
 
-/// Seconds and turns, radians.
+/// Pairs of seconds and turned angle, radians.
 type Increments = Vec<(f64, f64)>;
 
-/// The gyro's increments in the longest rest, and the motions after it, from rest to rest.
+/// Returns the gyro's increments in the longest rest, and the motions after it, from rest to rest.
 fn motions(
     mission: &Mission,
     trace: &Trace,
@@ -60,7 +60,7 @@ fn motions(
             at_rest.push((seconds, turn));
             continue;
         }
-        // A leg begins with a command, which the tick before it led to.
+        // A leg begins with a command, which follows from the tick before it.
         if rests.iter().any(|rest| (then_s - near_s..at_s - near_s).contains(&rest.until_s)) {
             motions.push(std::mem::take(&mut motion));
         }

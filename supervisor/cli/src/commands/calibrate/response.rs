@@ -1,4 +1,4 @@
-//! The response of a base, from the recording of its turns.
+//! Computes the response of a base from the recording of its turns.
 
 use bring_up::Trace;
 use calibration::response::{By, Estimate, Measured, estimate, keys};

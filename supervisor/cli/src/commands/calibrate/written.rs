@@ -1,4 +1,4 @@
-//! A calibration's file and lines.
+//! Writes and prints a calibration.
 
 use calibration::loops::Estimate;
 use common::{
@@ -19,7 +19,8 @@ pub struct Found {
 }
 
 impl Found {
-    /// Writes the calibration, and prints it. A kill leaves the old file or the new one.
+    /// Writes the calibration, and prints it. After a kill the file is either the old or the new
+    /// one.
     pub fn write(&self, arguments: &Arguments) -> Result {
         let (file, setting) = (&arguments.out, &arguments.setting);
         let it = &self.estimate;

@@ -1,4 +1,4 @@
-//! Following a beacon in the foreground. The pose of another robot is published as the beacon as long as the command lives.
+//! Follows a beacon in the foreground. Another robot's pose is published as the beacon meanwhile.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use mission_control::operator;
 
 use super::Arguments;
 
-/// How soon a signal ends the following.
+/// Longest time until a signal ends the command.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 struct Own {
@@ -66,7 +66,7 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
             },
             None => None,
         };
-        // The other robot's pose wakes this loop, or else its own supervisor.
+        // This loop wakes on the other robot's pose, or else on the robot's own supervisor.
         let patience = if other.is_some() { Duration::ZERO } else { LOOK_EVERY };
         if matches!(own.wait(patience)?, Event::Disconnected) {
             break;
@@ -92,7 +92,8 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
     Ok(print_text(&format!("{result}\n"))?)
 }
 
-/// The beacon that follows from the pose `seen` of the other robot, for a robot at `own`: it was measured when that pose was.
+/// Returns the beacon for a robot at `own` from the pose `seen` of the other robot. It is stamped
+/// with the time of `own`.
 fn sample(own: &PoseSample, seen: &PoseSample, frame: Pose2) -> BeaconSample {
     let place = frame.position + frame.axis().rotate(seen.pose().position);
     BeaconSample {

@@ -1,4 +1,4 @@
-//! Tests of README and guide: their commands, files and tests exist.
+//! Tests that the commands, files and tests named in README and guide exist.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::{
@@ -22,7 +22,7 @@ fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
 
-/// A document: its path from the root, and its text.
+/// Document with its path from the root.
 struct Document {
     path: PathBuf,
     text: String,
@@ -37,7 +37,7 @@ fn documents() -> Vec<Document> {
 }
 
 impl Document {
-    /// Lines of the blocks that a shell would read, and the code spans elsewhere.
+    /// Returns the lines of shell blocks, and the code spans elsewhere.
     fn code(&self) -> Vec<String> {
         let mut code = Vec::new();
         let mut fence = None;
@@ -48,7 +48,7 @@ impl Document {
                 (None, Some("sh")) => code.push(line.to_owned()),
                 (None, Some(_)) => {}
                 (None, None) => {
-                    // A code span may hold backticks between longer rows of them.
+                    // A code span between longer rows of backticks may contain backticks.
                     let line = line.replace("``", "\u{1}");
                     let (odd, plain) = line
                         .split('\u{1}')
@@ -64,7 +64,7 @@ impl Document {
         code
     }
 
-    /// The targets of its links, as paths from the root.
+    /// Returns the link targets, as paths from the root.
     fn links(&self) -> Vec<PathBuf> {
         let targets = self.text.split("](").skip(1);
         targets
@@ -78,7 +78,7 @@ impl Document {
     }
 }
 
-/// The simple commands of a line of shell, in words, with placeholders filled in.
+/// Splits a shell line into commands and words, with placeholders filled in.
 fn commands(line: &str) -> Vec<Vec<String>> {
     let mut commands = vec![Vec::new()];
     let mut word = None::<String>;
@@ -104,7 +104,7 @@ fn commands(line: &str) -> Vec<Vec<String>> {
     commands
 }
 
-/// `word` with a value in place of its placeholder.
+/// Returns `word` with a value instead of its placeholder.
 fn filled_in(word: &str) -> String {
     let value = |word: &str| match word {
         "S" | "N" | "H" | "K" | "$s" => Some("256"),
@@ -121,7 +121,7 @@ fn filled_in(word: &str) -> String {
     value(last).map_or(word.to_owned(), |value| format!("{key}{value}"))
 }
 
-/// The arguments of `firsthand`, if this command runs it.
+/// Returns the arguments of a `firsthand` command.
 fn arguments(command: &[String]) -> Option<&[String]> {
     let words: Vec<&str> = command.iter().map(String::as_str).collect();
     let at = match words.as_slice() {
@@ -136,7 +136,7 @@ fn arguments(command: &[String]) -> Option<&[String]> {
     Some(&command[at..])
 }
 
-/// What `firsthand` understands of these words; none if a companion understands them.
+/// Parses words as `firsthand` does, with `None` for those of a companion.
 fn understood(words: &[String]) -> Result<Option<commands::Command>, clap::Error> {
     fn by<A: clap::Parser>(words: &[String]) -> Result<Option<commands::Command>, clap::Error> {
         let executable = "companion".to_owned();
@@ -155,7 +155,6 @@ fn understood(words: &[String]) -> Result<Option<commands::Command>, clap::Error
     }
 }
 
-/// Whether a command line lacks no more than arguments.
 fn is_incomplete(error: &clap::Error) -> bool {
     matches!(
         error.kind(),
@@ -175,7 +174,7 @@ fn every_command_line_in_readme_and_guide_is_understood() {
             let line = command.join(" ");
             let at = document.path.display();
             let parsed = match understood(command) {
-                // A subcommand alone is named rather than called.
+                // A subcommand without arguments is a name in the text.
                 Err(error) if is_incomplete(&error) && command.len() <= 2 => continue,
                 parsed => parsed.unwrap_or_else(|error| panic!("{at}: firsthand {line}: {error}")),
             };
@@ -229,7 +228,7 @@ fn every_link_and_path_in_readme_and_guide_exists() {
         let words = code.iter().flat_map(|code| code.split_whitespace());
         let paths = words.filter(|word| of_the_tree.iter().any(|top| word.starts_with(top)));
         for path in paths {
-            // The reader makes this crate.
+            // The reader creates this crate.
             if !path.contains("odometer") {
                 assert!(root().join(path).exists(), "{at}: {path}");
             }
@@ -273,7 +272,7 @@ fn every_page_is_listed_in_the_help_and_the_package_and_the_readme_leads_to_each
     let files = fs::read_dir(root().join("supervisor/guide")).unwrap();
     let written = files.filter(|file| {
         let path = file.as_ref().unwrap().path();
-        // The changelog is no page.
+        // The changelog is not a page.
         path.extension().is_some_and(|extension| extension == "md")
             && !path.ends_with("CHANGELOG.md")
     });

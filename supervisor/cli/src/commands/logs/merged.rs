@@ -1,4 +1,4 @@
-//! One file a process, merged by the time that begins each line.
+//! Merges the log files of all processes by the time at the start of each line.
 
 use std::{
     fs::{self, File},
@@ -7,14 +7,14 @@ use std::{
 };
 
 const LOG: &str = "log";
-/// A longer line is cut, because a process may write lines of any length.
+/// Bytes at which a line is cut: a process may write lines of any length.
 const LONGEST_LINE: u64 = 64 << 10;
-/// A time like 2026-11-21T06:04:22.729158Z.
+/// Length of a time such as 2026-11-21T06:04:22.729158Z.
 const TIME: usize = 27;
 
 pub struct Logs {
     directory: PathBuf,
-    /// `None` reads all.
+    /// Process to read, or `None` for all.
     process: Option<String>,
     logs: Vec<Log>,
 }
@@ -24,7 +24,7 @@ struct Log {
     file: BufReader<File>,
     end: u64,
     position: u64,
-    /// A line whose end is not written yet.
+    /// Line whose end is not written yet.
     unfinished: Vec<u8>,
     head: Option<Line>,
     time: String,
@@ -32,9 +32,9 @@ struct Log {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Line {
-    /// UTC, as the process wrote it. A line without a time has that of the line before.
+    /// UTC time, as written. A line without a time takes that of the previous line.
     pub time: String,
-    /// A stage, `supervisor`, `x80-sim`.
+    /// Stage, `supervisor` or `x80-sim`.
     pub process: String,
     pub text: String,
 }
@@ -70,7 +70,7 @@ impl Logs {
         Ok(processes)
     }
 
-    /// A round begins: [`Logs::next_line`] reads what the logs hold now. Later lines belong to the next round.
+    /// Begins a round, in which [`Logs::next_line`] reads to the current ends of the logs.
     pub fn look(&mut self) -> io::Result<()> {
         for process in Self::processes(&self.directory)? {
             let wanted = self.process.as_ref().is_none_or(|only| *only == process);
@@ -79,7 +79,7 @@ impl Logs {
                 self.logs.push(Log::new(process, file));
             }
         }
-        // All lengths are read before any line, so that no line is earlier than one of the round before.
+        // Reading all lengths first keeps the order across rounds.
         for log in &mut self.logs {
             log.end = log.file.get_ref().metadata()?.len();
         }

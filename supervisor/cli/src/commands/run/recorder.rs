@@ -1,4 +1,4 @@
-//! The recorder of a run: a consumer in a process of its own, without which the mission goes on.
+//! Recorder of a run, in its own process. The mission continues without it.
 
 use std::{
     io::{self, Read as _, Write as _},
@@ -15,14 +15,17 @@ use crate::commands::record::DiskBudget;
 
 /// Longest times that a run waits for its recorder.
 struct Patience {
-    /// One that attaches later misses the beginning.
+    /// A recorder that attaches later misses the beginning.
     attached: Duration,
     caught_up: Duration,
     ended: Duration,
 }
 
-/// Waiting for the recorder takes milliseconds, and seconds beside 30 busy processes a core. A real robot waits for its run, nobody for a
-/// simulated one. A calibration is nothing without its recording.
+/// Returns the wait times. The recorder needs milliseconds, or seconds beside 30 busy processes per
+/// core.
+///
+/// Short for a real robot, which waits for its run. Long for a simulated one, and for a
+/// calibration, which needs its recording.
 const fn patience(options: &Options) -> Patience {
     let mission = &options.mission;
     let [attached, caught_up, ended] = match (&mission.robot.address, &mission.planner.calibration)
@@ -42,7 +45,7 @@ pub struct RunRecorder<'a> {
     budget: Option<DiskBudget>,
     patience: Patience,
     process: Option<Process>,
-    /// The pipes for asking it to catch up; none once it has not answered.
+    /// Pipes for catch-up requests. `None` after a missing answer.
     pipes: Option<(ChildStdin, ChildStdout)>,
 }
 
@@ -55,7 +58,7 @@ impl<'a> RunRecorder<'a> {
         let Options { directory, robot, .. } = self.options;
         let log = append(directory.join("recorder.log"))?;
         let mut command = firsthand(&["record", "--robot", &robot.to_string()]);
-        // A resumed run may have a recording already.
+        // A resumed run may already have a recording.
         command.arg("--out").arg(recording::next_place(directory));
         if let Some(DiskBudget(bytes)) = self.budget {
             command.args(["--disk-budget", &bytes.to_string()]);
@@ -66,7 +69,7 @@ impl<'a> RunRecorder<'a> {
         Process::spawn(command)
     }
 
-    /// Wait until the recorder says something. Returns whether it did.
+    /// Waits for output of the recorder. Returns whether any came.
     fn hear(&mut self, within: Duration, signals: &Signals) -> io::Result<bool> {
         let Some((_, said)) = &mut self.pipes else {
             return Ok(false);
@@ -78,7 +81,7 @@ impl<'a> RunRecorder<'a> {
 }
 
 impl Consumer for RunRecorder<'_> {
-    /// If it cannot be started, that is logged.
+    /// Starts the recorder. A failure is only logged.
     fn attach(&mut self, signals: &Signals) {
         let attached = self.spawn().and_then(|mut process| {
             self.pipes = process.take_stdin().zip(process.take_stdout());
@@ -91,7 +94,7 @@ impl Consumer for RunRecorder<'_> {
                 tracing::warn!(
                     "the recorder is not attached yet; what is published now is not recorded"
                 );
-                // One that is stopped before it is attached has recorded nothing.
+                // A recorder that never attached has recorded nothing.
                 if signals.pending() {
                     self.patience.ended = Duration::ZERO;
                 }
@@ -113,7 +116,7 @@ impl Consumer for RunRecorder<'_> {
     }
 }
 
-/// It writes the rest at the end of the run.
+/// The recorder writes the rest at the end of the run.
 impl Drop for RunRecorder<'_> {
     fn drop(&mut self) {
         if let Some(process) = &mut self.process {

@@ -1,4 +1,4 @@
-//! A summary's room is reserved when the run starts, so that a full disk cannot prevent it.
+//! Reserves space for the summary at the start, in case the disk fills up.
 
 use std::{
     fs::{self, File},
@@ -14,16 +14,16 @@ use rustix::{
 
 use console::failure::Refused;
 
-/// [`SUMMARY`] is complete, and means that the run has ended.
+/// Name of an incomplete summary. [`SUMMARY`] means that the run has ended.
 const UNFINISHED: &str = "summary.json.unfinished";
-/// A summary takes 2 kB.
+/// Reserved bytes. A summary takes 2 kB.
 const ROOM: u64 = 16 << 10;
-/// Logs, checkpoints and the beginning of a recording.
+/// Bytes for logs, checkpoints and the beginning of a recording.
 const RUN_ROOM: u64 = 2 << 20;
-/// A cell in the mapper's checkpoint.
+/// Bytes per cell in the mapper's checkpoint.
 const CELL_ROOM: u64 = 16;
 
-/// A new run needs it, with a map of so many `cells`.
+/// Returns the bytes for a new run with a map of `cells`.
 pub const fn room_of_run(cells: usize) -> u64 {
     RUN_ROOM + CELL_ROOM * cells as u64
 }
@@ -34,14 +34,14 @@ pub struct SummaryFile {
 }
 
 impl SummaryFile {
-    /// Fails unless `needed` bytes more are free in `directory`.
+    /// Fails unless `needed` more bytes are free in `directory`.
     pub fn reserve(directory: &Path, needed: u64) -> Result<Self, Refused> {
         let path = directory.join(UNFINISHED);
-        // A resumed run has its room.
+        // A resumed run has its space.
         let opened = File::options().create(true).truncate(false).write(true).open(&path);
         let reserved = opened.and_then(|file| {
             match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, ROOM) {
-                // This file system cannot reserve.
+                // The file system cannot reserve.
                 Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(file),
                 Err(errno) => Err(errno.into()),
             }
@@ -51,7 +51,7 @@ impl SummaryFile {
             let code = if full { "disk-full" } else { "not-writable" };
             Refused::new(code, failed("reserve room for", &path)(error))
         })?;
-        // A file system that does not tell its free space is not full.
+        // Unknown free space counts as enough.
         let free = fstatvfs(&file).map_or(u64::MAX, |space| space.f_bavail * space.f_frsize);
         if free < needed {
             let _ = fs::remove_file(&path);
@@ -67,7 +67,7 @@ impl SummaryFile {
     pub fn write(mut self, text: &str) -> Result<(), String> {
         let (from, to) = (self.directory.join(UNFINISHED), self.directory.join(SUMMARY));
         let written = self.file.write_all(text.as_bytes());
-        // The rest of the reserved room is released.
+        // Releases the rest of the reserved space.
         let written = written.and_then(|()| self.file.set_len(text.len() as u64));
         written.map_err(failed("write", &from))?;
         fs::rename(&from, &to).map_err(failed("make", &to))

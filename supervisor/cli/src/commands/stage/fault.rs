@@ -19,23 +19,25 @@ use console::{
     operator::known,
 };
 
-/// Break something in a running stage on purpose, to see what the others do.
+/// Inject a fault into a running stage.
 #[derive(Debug, Args)]
 #[command(after_help = table())]
 pub struct Arguments {
-    /// The stage (`firsthand stage list`).
+    /// Stage (`firsthand stage list`).
     stage: String,
-    /// The fault; see below.
+    /// Fault; see below.
     fault: String,
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Do it although the robot is a real one, which may then drive anywhere: clear its surroundings first.
+    /// Break a real robot, which may then drive anywhere.
+    ///
+    /// Clear its surroundings first.
     #[arg(long)]
     break_a_real_robot: bool,
 }
 
-/// A fault of a real robot needs the operator's consent.
+/// Refuses a fault of a real robot, which needs the operator's consent.
 fn real_robot(robot: &RobotName) -> Refused {
     let message = format!(
         "robot {robot} is a real one, and a fault may drive it into things; to do it all the same, clear its surroundings \
@@ -84,12 +86,12 @@ pub fn main(arguments: &Arguments) -> Result {
     Err(refused.into())
 }
 
-/// The next heartbeats of the stage have the answer; none if it does not answer.
+/// Sends the request. Returns the answer from the stage's heartbeats, if any.
 fn request_fault(bus: &Bus, stage: &str, request: FaultSample) -> Result<Option<FaultAnswer>> {
     let mut health = bus.reader(&topics::HEALTH)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::HEALTH)?);
-    // The writer must outlive the answer: a request that was not read yet would end with its writer.
+    // The writer must outlive the answer: its end discards an unread request.
     let mut requests = bus.writer(&topics::FAULTS, 1)?;
     requests.publish(0, MissionTime::default(), request)?;
     let began = Instant::now();
@@ -111,7 +113,7 @@ fn table() -> String {
     let mut text = String::from("Faults:\n");
     for fault in &faults::TABLE {
         let stage = fault.stage.unwrap_or("any");
-        // Writing to a String cannot fail.
+        // Infallible for a String.
         let _ = writeln!(
             text,
             "  {stage:<8} {:<14} {}; until: {}",

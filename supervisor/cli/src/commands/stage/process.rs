@@ -1,4 +1,4 @@
-//! One stage's process, started by the supervisor, by systemd or by a person.
+//! Process of one stage, started by the supervisor, by systemd or by a person.
 
 use std::{ffi::OsString, os::unix::process::CommandExt as _, path::Path, process::Command};
 
@@ -23,7 +23,7 @@ use console::{
     operator,
 };
 
-/// Names that are more alike than this are probably meant for each other.
+/// Least similarity for a suggested name.
 const NEAR: f64 = 0.8;
 
 pub fn run(words: &[OsString]) -> Result {
@@ -41,7 +41,7 @@ pub fn run(words: &[OsString]) -> Result {
         return Ok(run_stage::<calibration::shell::Shell>(&start)?);
     }
     if OTHER_PLANNERS.contains(&&*name) {
-        // The other ones are in the laboratory.
+        // The laboratory has the other planners.
         let words = std::iter::once(SUBCOMMAND.into()).chain(words.iter().cloned());
         return Err(companions::become_executable(LABORATORY, words));
     }
@@ -59,7 +59,7 @@ pub fn run(words: &[OsString]) -> Result {
     Ok((stage.run)(&start)?)
 }
 
-/// In place of `firsthand`'s own planner: two to compare with, and the one of `firsthand calibrate`.
+/// Alternative planners: two for comparison, and that of `firsthand calibrate`.
 pub const OTHER_PLANNERS: &[&str] = &["wavefront", "bug", calibration::PLANNER];
 
 fn become_executable(stage: &Stage, mission: &Mission, options: &[OsString]) -> Result {

@@ -27,13 +27,13 @@ struct Listed {
     state: &'static str,
     mission_time_s: Option<f64>,
     simulated: Option<bool>,
-    /// The age of what a mirror shows of another machine, seconds.
+    /// Age of a mirror's data, seconds.
     age_s: Option<f64>,
     run: Option<PathBuf>,
 }
 
 pub fn print(json: bool) -> Result {
-    // A frozen supervisor delays nobody else.
+    // A frozen supervisor delays only its own row.
     let listed: Vec<_> = thread::scope(|scope| {
         let asked = robots::own().into_iter().map(|robot| scope.spawn(|| listed(robot)));
         let asked: Vec<_> = asked.collect();
@@ -80,7 +80,7 @@ fn listed(robot: Robot) -> Listed {
     }
 }
 
-/// The supervisor's order, mission time, whether the robot is simulated, and the age of what a mirror shows.
+/// Order, mission time, whether simulated, and age of a mirror's data.
 type RosterFacts = (&'static str, Option<f64>, Option<bool>, Option<f64>);
 
 fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {

@@ -1,6 +1,5 @@
-//! Results, capabilities, versions and keys, stored as CSV files beside the guide.
-//!
-//! The first column of each file is the section of the page that shows a row.
+//! Results, capabilities, versions and keys, as CSV files beside the guide. The first column is the
+//! section of the page.
 
 use std::fmt::Write as _;
 
@@ -34,7 +33,7 @@ static FILES: &[(&str, &str)] = stored! {
     "small-machine-processes" in "results/small_machine_processes.csv",
 };
 
-/// Rows of some sections (`a,b`) or of all; none where there is no such file or section.
+/// Returns rows of all or some sections (`a,b`), or `None` if there are none.
 pub fn markdown(name: &str, section: Option<&str>) -> Option<String> {
     let (_, text) = FILES.iter().find(|(file, _)| *file == name)?;
     let mut reader = csv::Reader::from_reader(text.as_bytes());
@@ -82,7 +81,7 @@ fn named(tests: &str) -> String {
     tests.split(' ').map(|test| format!("`{test}`")).collect::<Vec<_>>().join(" ")
 }
 
-/// What a program does with a file or robot of another version than its own; `STATES` stands for the version of states.
+/// Describes how another version of a file or robot is handled. `STATES` is the version of states.
 fn version(row: &[String]) -> String {
     let [what, version, another, tests] = row else {
         return String::new();
@@ -91,7 +90,7 @@ fn version(row: &[String]) -> String {
     item(&format!("{what} ({version}): {another}: {}", named(tests)))
 }
 
-/// Below it stands the command that prints it.
+/// Prints a figure above its command.
 fn figure(row: &[String]) -> String {
     let [what, realism, n, figure, command] = row else {
         return String::new();
@@ -107,7 +106,7 @@ fn table<'a>(header: impl Iterator<Item = &'a str>, rows: &[Vec<String>]) -> Str
     let header: Vec<&str> = header.collect();
     let mut table = format!("| {} |\n|{}\n", header.join(" | "), "---|".repeat(header.len()));
     for row in rows {
-        // Writing to a String cannot fail.
+        // Infallible for a String.
         let _ = writeln!(table, "| {} |", row.join(" | "));
     }
     table

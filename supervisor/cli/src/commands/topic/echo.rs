@@ -12,18 +12,20 @@ use console::{
     waiting::Waiting,
 };
 
-/// Print the samples of a topic as they come, from run to run of the robot, until Ctrl-C.
+/// Print the samples of a topic until Ctrl-C, across runs.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The topic (`firsthand topic list`).
+    /// Topic (`firsthand topic list`).
     topic: String,
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// One JSON object a line, with all elements of arrays; a number that is not finite is null.
+    /// Print one JSON object per line, with all array elements.
+    ///
+    /// A number that is not finite is null.
     #[arg(long)]
     json: bool,
-    /// Show all elements of arrays in text, not only the first 16.
+    /// Print all array elements in text, instead of the first 16.
     #[arg(long)]
     whole: bool,
     /// End after N samples.
@@ -35,7 +37,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let topic = readable(&arguments.topic)?;
     let mut stream = Stream::open()?;
     let domain = Domain::of(arguments.robot.clone());
-    // Some topics wake no reader. Their samples are read when the link ends the tick.
+    // Some topics wake no reader. They are read when the link ends the tick.
     let mut follower = Follower::new(domain, "echo", topic, |bus| topic.any_reader(bus))
         .also_on([&topics::LINK as &'static dyn AnyTopic]);
     let mut waiting = Waiting::default();
@@ -49,7 +51,7 @@ pub fn main(arguments: &Arguments) -> Result {
             && let Some(sample) = samples.next_sample()?
         {
             let fields = sample_text::fields(sample.value(), sample.elements());
-            // The writer may need the sample's place while a slow reader takes the text.
+            // A slow reader may block the output, while the writer needs the slot.
             drop(sample);
             let text = if arguments.json {
                 sample_text::json(fields)? + "\n"

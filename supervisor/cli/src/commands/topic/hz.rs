@@ -17,15 +17,17 @@ use console::{
     waiting::Waiting,
 };
 
-/// Print each second how often topics are published: rates, longest gaps and ages, against the table of topics.
+/// Print the rates of topics each second.
+///
+/// Also longest gaps and ages, compared with the table of topics.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Only this topic (`firsthand topic list`).
+    /// Print only this topic (`firsthand topic list`).
     topic: Option<String>,
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// One JSON object a line.
+    /// Print one JSON object per line.
     #[arg(long)]
     json: bool,
     /// End after N seconds with the robot.
@@ -73,7 +75,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let domain = Domain::of(arguments.robot.clone());
     let open = |bus: &Bus| Readers::open(bus, &topics);
     let others = topics.iter().skip(1).map(|&topic| topic as &'static dyn AnyTopic);
-    // Some topics wake no reader. Their samples are read when the link ends the tick.
+    // Some topics wake no reader. They are read when the link ends the tick.
     let others = others.chain([&topics::LINK as &'static dyn AnyTopic]);
     let mut follower = Follower::new(domain, "hz", topics[0], open).also_on(others);
     let mut waiting = Waiting::default();

@@ -10,7 +10,7 @@ use common::{
     topics,
 };
 
-/// The enums that are bytes of structs, whose comments name them.
+/// Lists byte enums that comments of structs name.
 macro_rules! enums {
     ($($name:ident)*) => {
         const ENUMS: &[(&str, &[(&str, u8)])] = &[$((stringify!($name), $name::VALUES)),*];
@@ -22,7 +22,7 @@ enums! {
     HoldReason NextStep Order RangeStatus RecoveryStep RequestAnswer RequestKind Rest StageState StallCause
 }
 
-/// The bytes of `grid`, which are no field.
+/// Bytes of `grid`, which belong to no field.
 const CELL_STATES: &[(&str, u8)] = &[
     ("Free", CellState::Free as u8),
     ("Sensed", CellState::Sensed as u8),
@@ -32,10 +32,10 @@ const CELL_STATES: &[(&str, u8)] = &[
     ("Margin", CellState::Margin as u8),
 ];
 
-/// Structs whose layouts are checked when the module is loaded, and a follower.
+/// Returns the module: structs with layouts checked on import, and a follower.
 pub fn module() -> String {
     let mut module = include_str!("topics.py").to_owned();
-    // Writing to a String cannot fail.
+    // Infallible for a String.
     for (name, values) in ENUMS.iter().chain(&[("CellState", CELL_STATES)]) {
         let _ = writeln!(module, "class {name}(enum.IntEnum):");
         for (value, byte) in *values {
@@ -62,7 +62,7 @@ pub fn module() -> String {
     module
 }
 
-/// The classes of its fields come before it, each once.
+/// Declares the class once, after the classes of its fields.
 fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String) {
     let structure = match kind {
         Kind::Number(_) => return,
@@ -102,7 +102,7 @@ fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String)
     module.push_str("\n\n");
 }
 
-/// A comment without the marks of its links.
+/// Returns a comment without link markup.
 fn plain(doc: &str) -> String {
     let mut parts = doc.split("](");
     let mut text = parts.next().unwrap_or_default().to_owned();
@@ -112,7 +112,7 @@ fn plain(doc: &str) -> String {
     text.replace(['[', ']', '`'], "").replace("super::", "").replace("crate::", "")
 }
 
-/// The class lacks the name of the project.
+/// Strips the project's name.
 fn class(structure: &Structure) -> &'static str {
     let name = structure.name;
     name.rsplit_once('.').map_or(name, |(_, name)| name)
@@ -140,7 +140,7 @@ fn python(kind: &Kind) -> String {
 mod tests {
     use super::*;
 
-    /// Size and alignment in C.
+    /// Returns size and alignment in C.
     fn in_c(kind: &Kind) -> (usize, usize) {
         match kind {
             Kind::Number(number) => {
@@ -183,7 +183,7 @@ mod tests {
             assert!(module.contains(&row), "{row}");
         }
         let ran = std::process::Command::new("python3").args(["-c", &module]).output();
-        // Without Python here, the layouts are checked only when a consumer loads the module.
+        // Without Python here, only imports check the layouts.
         if let Ok(output) = ran {
             let error = String::from_utf8_lossy(&output.stderr);
             assert!(output.status.success(), "{error}");

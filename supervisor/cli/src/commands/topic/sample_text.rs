@@ -1,16 +1,16 @@
-//! A sample of any topic as text, one field a line, or as JSON, one object a line, by the layouts alone.
+//! Formats samples of any topic by their layouts: text with one field per line, or one JSON object.
 
 use std::fmt::Write as _;
 
 use common::bus::Value;
 use serde::{Serialize, Serializer};
 
-/// The name stands beside the fields of the header.
+/// Key for the elements, beside the fields of the header.
 const ELEMENTS: &str = "elements";
-/// Elements of an array in text, unless all are asked for.
+/// Number of array elements in text, unless all are requested.
 const SHOWN: usize = 16;
 
-/// The fields of a struct stand below its name. Arrays of more than 16 elements are cut, unless `whole`.
+/// Formats fields, with those of a struct below its name.
 pub fn text(fields: &Fields, whole: bool) -> String {
     let most = if whole { usize::MAX } else { SHOWN };
     let mut text = String::new();
@@ -20,14 +20,14 @@ pub fn text(fields: &Fields, whole: bool) -> String {
     text
 }
 
-/// A whole sample. A number that is not finite is null.
+/// Formats a sample. Non-finite numbers are null.
 pub fn json(fields: Fields) -> serde_json::Result<String> {
     serde_json::to_string(&Json(&Value::Struct(fields)))
 }
 
 pub type Fields = Vec<(&'static str, Value)>;
 
-/// Header, and the elements of the slice if there is one.
+/// Returns the header's fields, and the slice's elements.
 pub fn fields(header: Value, elements: Option<Vec<Value>>) -> Fields {
     let mut fields = match header {
         Value::Struct(fields) => fields,
@@ -37,7 +37,7 @@ pub fn fields(header: Value, elements: Option<Vec<Value>>) -> Fields {
     fields
 }
 
-// Writing to a String cannot fail.
+// Infallible for a String.
 fn write_field(to: &mut String, indent: usize, name: &str, value: &Value, most: usize) {
     let _ = match value {
         Value::Struct(fields) => {

@@ -1,4 +1,4 @@
-//! Histories of random and of all short event sequences, compared with a model of the rules.
+//! Random and all short event sequences, compared with a model of the rules.
 
 use std::collections::HashSet;
 
@@ -6,17 +6,17 @@ use rand_pcg::{Pcg64, rand_core::Rng as _};
 
 use super::*;
 
-/// A process and its policy. The state of the process is described independently of the policy's phases.
+/// Process and its policy. The process's state is independent of the policy's phases.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Model {
     policy: Policy,
     now: Now,
-    /// The process, if there is one.
     generation: Option<Generation>,
     wanted: bool,
-    /// Whether the stage is held, until somebody starts it.
+    /// Whether the stage is held until a start request.
     held: bool,
-    /// Deaths and their times: those in a row, of no stable generation, and the last wait between them.
+    /// Times of deaths. `row` counts those in a row without a stable generation, `wait` is the last
+    /// pause.
     deaths: Vec<Now>,
     row: usize,
     wait: Duration,
@@ -26,16 +26,15 @@ struct Model {
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Generation {
     ready: Option<Now>,
-    /// The last sign of life; the start counts.
+    /// Last sign of life, including the start.
     sign: Now,
-    /// Whether the process was asked to stop, for a successor or for good: that is no death.
+    /// Whether the process was asked to stop, so that its end is no death.
     stopping: bool,
     aborted: bool,
-    /// The time when it must be killed.
     kill: Option<Now>,
 }
 
-/// What a process did since its last sign of life.
+/// Activities since the last sign of life.
 const SLEPT: Activity = Activity { ran: ms(0), starved: ms(0), state: State::Asleep };
 const RAN: Activity = Activity { ran: ms(3000), state: State::Ready, ..SLEPT };
 const STOPPED: Activity = Activity { state: State::Stopped, ..SLEPT };
@@ -81,11 +80,11 @@ impl Model {
         }
     }
 
-    /// Whether `event` can happen: only a process can beat or end.
+    /// Returns whether `event` can happen: only a process can beat or end.
     fn can(&self, event: Event) -> bool {
         match event {
             Event::Start => self.generation.is_none(),
-            // The failure is known in the moment of the start.
+            // A start fails at once.
             Event::StartFailed => self.generation.as_ref().is_some_and(|generation| {
                 generation.sign == self.now && generation.ready.is_none() && !generation.stopping
             }),
@@ -98,7 +97,6 @@ impl Model {
         }
     }
 
-    /// The time of the next deadline by the rules alone.
     fn due(&self) -> Option<Now> {
         match &self.generation {
             Some(generation) => {
@@ -111,13 +109,12 @@ impl Model {
         }
     }
 
-    /// The time at which a process that only sleeps is aborted, by the rules alone.
+    /// Returns the time when a sleeping process is aborted, by the rules alone.
     fn blocked(&self) -> Option<Now> {
         let generation = self.generation.as_ref()?;
         Some(generation.sign + generation.deadline() * 4)
     }
 
-    /// The action that the rules demand.
     fn expect(&mut self, event: Event) -> Option<Action> {
         let now = self.now;
         let due = self.due().is_some_and(|due| now >= due);
@@ -227,7 +224,7 @@ impl Model {
         self.wait.is_zero().then(|| self.begin())
     }
 
-    /// Let `event` happen, and compare.
+    /// Applies `event` to model and policy, and compares.
     fn step(&mut self, event: Event) {
         let expected = self.expect(event);
         let action = self.policy.step(event, self.now);
@@ -240,7 +237,7 @@ impl Model {
         assert_eq!(no_process, self.generation.is_none(), "{event:?}: {phase:?}");
     }
 
-    /// The moments at and around the due time, and one long after anything.
+    /// Returns pauses to and around the due times, and a very long one.
     fn moments(&self) -> Vec<Duration> {
         let mut pauses = vec![ms(0), ms(20), ms(11_000)];
         for then in [self.due(), self.blocked()].into_iter().flatten() {
@@ -250,9 +247,9 @@ impl Model {
         pauses
     }
 
-    /// This model with its clock set back: two models of equal ages are equal.
+    /// Returns this model with its clock set back, so that models of equal ages are equal.
     fn at_zero(&self) -> Self {
-        // All times have a common origin, so that past times stay in the past.
+        // A common origin keeps past times in the past.
         const ORIGIN: Duration = Duration::from_secs(100);
         let back = |then: &mut Now| *then = (*then + ORIGIN).saturating_sub(self.now);
         let mut same = self.clone();
@@ -316,13 +313,14 @@ fn two_million_steps_of_long_histories_keep_every_rule() {
     let mut actions = 0_u64;
     for history in 0..2_000 {
         let mut model = Model::new();
-        // The probability of each event differs from history to history.
+        // Each history has its own event probabilities.
         let weights: Vec<u64> = EVENTS.iter().map(|_| chance.next_u64() % 100).collect();
         let sum: u64 = weights.iter().sum::<u64>().max(1);
         for _ in 0..1_000 {
             let moments = model.moments();
             let pause = moments[chance.next_u64() as usize % moments.len()];
-            // Short pauses are more frequent: after a long pause earlier events no longer matter.
+            // Short pauses are more frequent, because after a long one earlier events no longer
+            // matter.
             if pause < ms(5_000) || chance.next_u64().is_multiple_of(50) {
                 model.now += pause;
             }
@@ -341,7 +339,6 @@ fn two_million_steps_of_long_histories_keep_every_rule() {
             assert!(model.policy.recent_deaths() <= 12, "history {history}");
         }
     }
-    // Every phase was visited.
     assert_eq!(phases.len(), 8);
     assert!(actions > 1_000_000, "{actions}");
 }

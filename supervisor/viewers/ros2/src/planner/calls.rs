@@ -1,4 +1,4 @@
-//! The calls of Nav2's two actions: a goal in, the result out. Pure.
+//! Calls of Nav2's two actions: goals in, results out. Pure.
 
 use ros2::{
     cdr::{Cdr, Malformed},
@@ -15,18 +15,19 @@ use crate::{goals::Uuid, messages::path};
 
 pub struct Asked {
     pub id: Uuid,
-    /// The viapoints of a single goal come before it.
+    /// Goals in order. The viapoints of a single goal precede it.
     pub goals: Vec<PoseStamped>,
-    /// None for the robot's own place.
+    /// Start, or `None` for the robot's own pose.
     pub start: Option<PoseStamped>,
-    /// Those whose clients ask so.
+    /// Releases whose clients send this layout.
     pub releases: Vec<Release>,
 }
 
-/// Reads the goal of `ComputePathToPose`, or of `ComputePathThroughPoses`, in the layout in which its bytes are a whole message.
+/// Reads the goal of `ComputePathToPose` or `ComputePathThroughPoses`, in the layout that consumes
+/// all bytes.
 ///
 /// # Errors
-/// When no layout, or more than one, fits.
+/// No layout fits, or several do.
 pub fn read(payload: &[u8], has_one: bool) -> Result<Asked, Malformed> {
     let (releases, goal_id, goals, start, uses_start) = if has_one {
         let (releases, asked) = ComputePathToPoseSendGoalRequest::decode_whole(payload)?;
@@ -50,8 +51,8 @@ pub struct Outcome {
     pub failure: Option<Failure>,
 }
 
-/// The reply to a client of `release` that waits for the result of a goal with this state; Nav2's error codes of the action begin at
-/// `codes`.
+/// Encodes the result of a goal for a client of `release`. `codes` is the action's first Nav2 error
+/// code.
 pub fn result(status: i8, outcome: &Outcome, codes: u16, release: Release) -> Vec<u8> {
     let path = path(Header::at(outcome.at_ns, &outcome.frame), &outcome.path);
     let planning_time = outcome.took_ns.into();

@@ -1,4 +1,4 @@
-//! A map as ROS has it, and the cells that the robot's centre must not enter. Pure.
+//! ROS map, and the cells that the robot's centre must not enter. Pure.
 
 use glam::{DAffine2, DVec2};
 use harmonic::{Cell, MAX_SIDE};
@@ -7,21 +7,22 @@ use ros2::{
     msg::{OccupancyGrid, OccupancyGridUpdate},
 };
 
-/// Obstacles farther away than this, in metres and in cells, make no difference.
+/// Distance beyond which obstacles have no effect, in metres and in cells.
 const REACH_M: f64 = 1.0;
 const MOST_REACH: f64 = 60.0;
-/// A cell with a value of 98 costs so many times as much as a free one as far from obstacles. With 5, as of NavFn, which has no other costs,
-/// long ways lead round gaps that are wide enough.
+/// Cost of a cell of value 98, relative to a free cell at the same distance from obstacles.
+///
+/// NavFn has no other costs and uses 5, with which long paths avoid gaps that are wide enough.
 const DEAREST: f32 = 3.0;
 
-/// What may not be entered, whichever the map.
+/// Rules for blocked cells of any map.
 #[derive(Clone, Copy, Debug)]
 pub struct Body {
-    /// The robot's centre stays so far from what is occupied, metres.
+    /// Least distance of the robot's centre from occupied cells, metres.
     pub radius_m: f64,
-    /// Cells of this value or more, up to 100, are occupied.
+    /// Least value of occupied cells, up to 100.
     pub occupied: u8,
-    /// Whether cells of which nothing is known are free.
+    /// Whether unknown cells are free.
     pub enters_unknown: bool,
 }
 
@@ -37,13 +38,13 @@ pub struct Costmap {
     pub width: usize,
     pub height: usize,
     pub resolution_m: f64,
-    /// From cells, whose centres are at the integers, to the map's frame.
+    /// Transform from cells, with centres at integers, to the map's frame.
     pub place: DAffine2,
     cells: Vec<i8>,
 }
 
 impl Costmap {
-    /// A `nav_msgs/OccupancyGrid`. Each error here says why the message is refused.
+    /// Reads a `nav_msgs/OccupancyGrid`. Errors give the reason of a refusal.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let OccupancyGrid { header, info, data: cells } = OccupancyGrid::decode(payload)?;
         let resolution_m = f64::from(info.resolution);
@@ -69,7 +70,7 @@ impl Costmap {
         })
     }
 
-    /// Take a `map_msgs/OccupancyGridUpdate`, whole or not at all.
+    /// Applies a `map_msgs/OccupancyGridUpdate`, completely or not at all.
     pub fn update(&mut self, payload: &[u8]) -> Result<(), String> {
         let OccupancyGridUpdate { x, y, width, height, data, .. } = Cdr::decode(payload)?;
         let [col, row, width, height] = [x as u32, y as u32, width, height].map(|it| it as usize);
@@ -97,13 +98,16 @@ impl Costmap {
         body.is_occupied(self.cells[cell.row * self.width + cell.col])
     }
 
-    /// The cells with centres no farther than the body's radius from that of an occupied one, and the cost of each cell. A free cell a metre
-    /// from obstacles costs 1. The cost goes with the inverse square of the distance from obstacles, up to [`REACH_M`]; the cell's own value
-    /// makes it up to [`DEAREST`] times as great. No cost is greater than `most`.
+    /// Returns the blocked cells and the cost of each cell.
+    ///
+    /// A cell is blocked if it is occupied, or if its centre is within the body's radius of an
+    /// occupied one. The cost is the inverse square of the distance from obstacles in metres, up to
+    /// [`REACH_M`]. The cell's value scales it by up to [`DEAREST`]. `most` limits it.
     pub fn blocked_and_costs(&self, body: &Body, most: f32) -> (Vec<bool>, Vec<f32>) {
         let cells = |metres: f64| (metres / self.resolution_m).clamp(0.0, MAX_SIDE as f64);
         let (radius, reach) = (cells(body.radius_m), cells(REACH_M).min(MOST_REACH));
-        // In a costmap that is inflated 99 is a cell in which an obstacle touches the robot, and no obstacle itself.
+        // In an inflated costmap, 99 means that a robot at this cell touches an obstacle. The cell
+        // itself is free.
         let touches = |value| radius == 0.0 && value == 99;
         let obstacle = |value| body.is_occupied(value) && !touches(value);
         let squares = self.squares(radius.max(reach) as usize, obstacle);
@@ -118,12 +122,14 @@ impl Costmap {
             .unzip()
     }
 
-    /// The square of each cell's distance, in cells, from the nearest whose value is a source; out of reach that of `reach` and one more.
-    /// The squares are `f32`, because every processor has the minimum of several of these in one instruction.
+    /// Returns the squared distance in cells to the nearest source cell, or (`reach` + 1)² out of
+    /// reach.
+    ///
+    /// `f32`, because every processor has a vector minimum for it.
     fn squares(&self, reach: usize, is_source: impl Fn(i8) -> bool) -> Vec<f32> {
         let beyond = reach as u16 + 1;
         let square = |cells: u16| f32::from(cells).powi(2);
-        // How far each cell is from a source in its row.
+        // Distance of each cell from a source in its row.
         let mut gaps = vec![0; self.width];
         let mut along = Vec::with_capacity(self.cells.len());
         for cells in self.cells.chunks_exact(self.width) {
@@ -148,7 +154,7 @@ impl Costmap {
     }
 }
 
-/// Each number is at most one more than that before it.
+/// Limits each number to its predecessor plus one.
 fn spread<'a>(numbers: impl Iterator<Item = &'a mut u16>) {
     let mut before = u16::MAX;
     for number in numbers {

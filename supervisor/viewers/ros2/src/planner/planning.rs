@@ -8,21 +8,22 @@ use ros2::parts::Pose;
 
 use super::costmap::{Body, Costmap};
 
-/// The most cells of the fields that are kept, those of the newest goals.
+/// Most cells of stored fields, those of the newest goals.
 const MOST_CELLS: usize = 1 << 24;
-/// A path follows the field in such steps, in cells: at a wall the field leads away from it or along it.
+/// Step along the field, in cells. Near a wall the field points away from it or along it.
 const STEP: f64 = 0.25;
-/// No cell has a shorter screening length, in cells: u falls to a third or so from cell to cell.
+/// Shortest screening length, in cells. u then falls to about a third from cell to cell.
 const SHORTEST: f64 = 0.5;
-/// A path has no more bytes: DDS does not divide an answer of over 64 kB here. Its header and the rest of the answer have the others.
+/// Largest path, bytes. DDS here does not fragment answers above 64 kB. The difference holds the
+/// rest of the answer.
 const MOST_BYTES: usize = 64_000;
-/// A pose without the name of its frame: stamp, length of the name, padding, position and orientation.
+/// Bytes of a pose without its frame name: stamp, name length, padding, position and orientation.
 const POSE_BYTES: usize = 76;
-/// A chord of a path is looked at in such steps, in cells.
+/// Step of the checks along a chord, in cells.
 const LOOK: f64 = 0.0625;
 const MOST_GOALS: usize = 100;
 
-/// Why there is no path: Nav2's error codes, less 200 for one goal and 300 for several.
+/// Failure reasons: Nav2's error codes minus 200 for one goal, and minus 300 for several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
     Unknown = 0,
@@ -36,7 +37,7 @@ pub enum Reason {
     NoGoal,
 }
 
-/// There is no path, for a reason with its words.
+/// Reason of a missing path, and its text.
 pub type Failure = (Reason, String);
 
 #[derive(Debug)]
@@ -47,7 +48,7 @@ pub struct Planner {
     map: Option<Arc<Costmap>>,
     blocked: Vec<bool>,
     costs: Vec<f32>,
-    /// Fields with what they are of, that of the newest path last.
+    /// Fields and their domains, the newest path's last.
     fields: VecDeque<(Domain, Field)>,
 }
 
@@ -65,7 +66,8 @@ impl Planner {
         }
     }
 
-    /// Poses about a cell apart, farther on a long way, in the frame of `map`, from `start` by way of all `goals`, each of which has its own heading.
+    /// Returns poses from `start` through all `goals` in the frame of `map`, about a cell apart,
+    /// farther on long paths. Goals keep their headings.
     pub fn plan(
         &mut self,
         map: &Arc<Costmap>,
@@ -89,7 +91,7 @@ impl Planner {
         for goal in goals {
             let to = goal.translation;
             let leg = self.leg(map, [from, to], cancellation)?;
-            // The last position is somewhere in the goal's cell.
+            // The last position may be anywhere in the goal's cell.
             let next = leg.iter().skip(1).take(leg.len().saturating_sub(2)).chain([&to]);
             let ahead = leg.iter().zip(next).map(|(at, to)| [at.x, at.y, (to - at).to_angle()]);
             path.extend(ahead);
@@ -100,10 +102,11 @@ impl Planner {
         self.thinned(map, &path, &ends)
     }
 
-    /// Returns as many poses as an answer carries, those at `ends` among them, whose chords enter no cell that is blocked.
+    /// Returns as many poses as an answer holds, including those at `ends`, with chords clear of
+    /// blocked cells.
     ///
     /// # Errors
-    /// When an answer carries too few for that.
+    /// An answer holds too few poses.
     fn thinned(&self, map: &Costmap, path: &[Pose], ends: &[usize]) -> Result<Vec<Pose>, Failure> {
         let most = MOST_BYTES / (POSE_BYTES + map.frame.len());
         let mut stride = path.len().div_ceil(most);
@@ -118,7 +121,7 @@ impl Planner {
         Err((Reason::Unknown, text))
     }
 
-    /// Returns poses at most `stride` apart, nearer where the chord would enter a blocked cell.
+    /// Returns poses at most `stride` apart, closer where a chord would enter a blocked cell.
     fn strided(&self, map: &Costmap, path: &[Pose], ends: &[usize], stride: usize) -> Vec<Pose> {
         let cells = map.place.inverse();
         let place = |at: usize| cells.transform_point2(DVec2::new(path[at][0], path[at][1]));
@@ -149,7 +152,7 @@ impl Planner {
         self.fields.back().map(|(_, field)| field)
     }
 
-    /// Positions in the frame of `map`, from the first of `ends` to the cell of the other.
+    /// Returns positions in the frame of `map`, from the first of `ends` to the cell of the second.
     fn leg(
         &mut self,
         map: &Costmap,
@@ -183,7 +186,7 @@ impl Planner {
         Ok(way.into_iter().map(|at| map.place.transform_point2(at)).collect())
     }
 
-    /// The field of a goal. One of an earlier map is what the solve starts from.
+    /// Returns the field of a goal, solved from an earlier map's field if there is one.
     fn field(
         &mut self,
         map: &Costmap,
@@ -205,12 +208,11 @@ impl Planner {
     }
 }
 
-/// Positions about a cell apart along `field`; none if it does not lead from `from` to its target, or only through what cannot be
-/// entered.
+/// Returns positions about a cell apart along `field`, if a permitted path leads to its target.
 fn way(field: &Field, from: DVec2, enters: impl Fn(DVec2) -> bool) -> Option<Vec<DVec2>> {
     let mut at = from;
     let mut way = vec![from];
-    // No way that leads from cell to cell is longer.
+    // Upper bound on the steps of a path over all cells.
     for _ in 0..field.width() * field.height() * (2.0 / STEP) as usize {
         let ahead = match field.guidance(at.x, at.y) {
             Guidance::AtTarget => {

@@ -37,7 +37,7 @@ fn map(grid: &Grid) -> Arc<Costmap> {
     Arc::new(Costmap::read(&grid.message()).unwrap())
 }
 
-/// Two rooms of 5 m x 5 m with a door of 1.5 m at the top, and a closed box in the left one.
+/// Makes two rooms of 5 m x 5 m with a door of 1.5 m at the top, and a closed box in the left one.
 fn rooms() -> Grid {
     let mut grid = Grid::new(200, 100);
     grid.fill([100, 0], [2, 100], true);
@@ -56,14 +56,13 @@ fn plan(
     planner.plan(map, from, to, &Cancellation::default())
 }
 
-/// An update of a map: the value of a window.
 fn update([col, row]: [u32; 2], [width, height]: [u32; 2], value: i8) -> Vec<u8> {
     let [x, y] = [col, row].map(|at| at as i32);
     let data = vec![value; (width * height) as usize];
     OccupancyGridUpdate { header: Header::at(0, "map"), x, y, width, height, data }.encode()
 }
 
-/// The points at every half cell of the path's chords that lie on blocked cells.
+/// Counts the points on blocked cells, at every half cell of the path's chords.
 fn lethal(map: &Costmap, path: &[Pose]) -> usize {
     let blocked = map.blocked_and_costs(&BODY, 1.0).0;
     let chords = path.windows(2).flat_map(|pair| {
@@ -110,7 +109,7 @@ fn a_long_path_has_as_many_poses_as_an_answer_carries_and_all_of_its_goals() {
     let map = map(&Grid::new(1000, 20));
     let goals = [at(25.0, 0.5), at(49.0, 0.5)];
     let path = plan(&mut planner(), &map, at(1.0, 0.5), &goals).unwrap();
-    // Every second one of some 960 cells.
+    // Every second of some 960 cells.
     assert!((400..=810).contains(&path.len()), "{}", path.len());
     assert!(path.contains(&[25.0, 0.5, 0.5]) && path.ends_with(&[[49.0, 0.5, 0.5]]), "{path:?}");
     let many = vec![at(2.0, 0.5); 101];
@@ -187,7 +186,7 @@ fn a_robot_that_touches_what_is_inflated_is_led_out_and_not_through_a_wall() {
 
 #[test]
 fn a_path_leads_round_a_zone_that_costs_more() {
-    // A wall with two doors, of which the lower one is nearer.
+    // Wall with two doors, of which the lower one is nearer.
     let mut grid = Grid::new(200, 100);
     grid.fill([100, 0], [2, 100], true);
     grid.fill([100, 20], [2, 16], false);
@@ -275,7 +274,6 @@ fn a_map_or_update_that_is_cut_or_false_is_refused_whole() {
     assert!(map.blocked_and_costs(&BODY, 1.0).0.iter().all(|blocked| !blocked));
 }
 
-/// A message of transforms: parent, frame, pose.
 fn transforms(of: &[(&str, &str, Pose)]) -> Vec<u8> {
     crate::messages::transforms(0, of)
 }
@@ -309,7 +307,8 @@ fn bytes(hex: &str) -> Vec<u8> {
     digits.map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
 }
 
-/// Goals to (1, 2) with the start (7, 8), all but the first by way of (5, 6), as Cyclone DDS serialises the types of each release.
+/// Goals to (1, 2) from (7, 8), all but the first via (5, 6), as Cyclone DDS serialises each
+/// release's types.
 const GOALS: [(bool, Release, &str); 4] = [
     (
         true,
@@ -332,7 +331,8 @@ const GOALS: [(bool, Release, &str); 4] = [
         "00010000030303030303030303030303030303030c0000000065cd1d040000006d617000020000000c0000000065cd1d040000006d61700000000000000000000000144000000000000018400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0c0000000065cd1d040000006d617000000000000000f03f00000000000000400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0c0000000065cd1d040000006d6170000000000000001c4000000000000020400000000000000000000000000000000000000000000000000000000000000000000000000000f03f0a0000004772696442617365640001",
     ),
 ];
-/// Results of a path from (1, 2), and of none: Nav2's first code, and the oldest and the newest release that have it.
+/// Results with a path from (1, 2) and without: Nav2's first code, and the oldest and newest
+/// release with it.
 const RESULTS: [(u16, [Release; 2], [&str; 2]); 3] = [
     (
         200,

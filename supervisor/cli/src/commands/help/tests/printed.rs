@@ -1,4 +1,4 @@
-//! Tables that README and guide print from the code, from stored files and from manifests.
+//! Tables that README and guide print from code, stored files and manifests.
 
 use std::{
     collections::BTreeSet,
@@ -11,7 +11,6 @@ use console::missions;
 use super::{documents, root};
 use crate::commands::table;
 
-/// Test functions of the whole tree.
 fn test_functions() -> BTreeSet<String> {
     let mut functions = BTreeSet::new();
     let mut folders = vec![root().to_owned()];
@@ -23,7 +22,7 @@ fn test_functions() -> BTreeSet<String> {
                 folders.push(path);
             } else if name.ends_with(".rs") {
                 let text = fs::read_to_string(&path).unwrap();
-                // A macro of tests is called with their names, each before its row.
+                // A macro of tests takes names, each before its row.
                 if text.contains("fn $promise()") {
                     let promises = text.lines().filter_map(|line| line.trim().strip_suffix(':'));
                     functions.extend(promises.map(str::to_owned));
@@ -31,7 +30,7 @@ fn test_functions() -> BTreeSet<String> {
                 functions.extend(text.split("#[test]").skip(1).filter_map(|after| {
                     let (attributes, function) = after.split_once("fn ")?;
                     let name = function.split_once('(')?.0;
-                    // A test that runs on demand only guards nothing.
+                    // Ignored tests guard nothing.
                     (!attributes.contains("#[ignore")).then(|| name.to_owned())
                 }));
             }
@@ -40,7 +39,7 @@ fn test_functions() -> BTreeSet<String> {
     functions
 }
 
-/// The error in a row of the capabilities.
+/// Returns the error in a row of capabilities.
 fn flaw(row: &[String; 3], functions: &BTreeSet<String>) -> Option<String> {
     let [text, verdict, tests] = row;
     let mut tests = tests.split_whitespace();
@@ -58,7 +57,7 @@ fn flaw(row: &[String; 3], functions: &BTreeSet<String>) -> Option<String> {
     }
 }
 
-/// The rows of a stored file of the guide; their first column is a section.
+/// Returns the rows of a stored file of the guide. The first column is a section.
 fn rows(name: &str) -> impl Iterator<Item = csv::StringRecord> {
     let file = root().join(format!("supervisor/guide/{name}.csv"));
     csv::Reader::from_path(file).unwrap().into_records().map(Result::unwrap)
@@ -129,7 +128,7 @@ fn a_contract_without_a_test_or_with_one_that_does_not_exist_is_found() {
     }
 }
 
-/// `text` with the tables after each `<!-- table NAME SECTION -->` printed anew.
+/// Returns `text` with each table after `<!-- table NAME SECTION -->` reprinted.
 fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
     let mut renewed = String::new();
     let mut lines = text.lines().peekable();
@@ -152,12 +151,12 @@ fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
     renewed
 }
 
-/// Whether a line can stand in a printed table or list.
+/// Returns whether a line can be part of a printed table or list.
 fn is_of_a_table(line: &str) -> bool {
     ["- ", "  ", "|"].iter().any(|start| line.starts_with(start))
 }
 
-/// A page of the guide shows it behind `<!-- table NAME SECTION -->`; none of an unknown name.
+/// Returns the table for `<!-- table NAME SECTION -->`.
 fn shown(name: &str, section: Option<&str>) -> Option<String> {
     match name {
         "topics" => Some(table::topics()),
@@ -200,7 +199,7 @@ fn a_table_behind_its_marker_is_renewed_and_nothing_else() {
     assert_eq!(renewed(&text, print), text);
 }
 
-/// The crates of the workspace and their descriptions, by their manifests.
+/// Lists the crates of the workspace with the descriptions from their manifests.
 fn crates() -> String {
     let manifest = |folder: &Path| -> toml::Table {
         let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();

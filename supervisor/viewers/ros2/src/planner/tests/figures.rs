@@ -1,7 +1,8 @@
-//! The figures of the guide's page: paths on random maps, held against NavFn's.
+//! Figures of the guide's page: paths on random maps, compared with NavFn's.
 //!
-//! `.ci/nav2-planners` prints them, with Nav2's own code in the program that NAV2_PLANNERS names. Without it a wavefront with NavFn's costs
-//! stands for NavFn. MAPS may be a folder of maps of map_server; BOUND=1 searches the clearest ways there are, SCREENING is the option.
+//! `.ci/nav2-planners` prints them, with Nav2's code in the program NAV2_PLANNERS, else with a
+//! wavefront of NavFn's costs. MAPS may be a folder of map_server maps. BOUND=1 searches the
+//! clearest paths, SCREENING is the option.
 
 use std::{
     cmp::Reverse,
@@ -26,7 +27,7 @@ use super::super::{
 
 pub const RESOLUTION_M: f64 = 0.05;
 const RADIUS_M: f64 = 0.22;
-/// Nav2's defaults, as its parameter file has them.
+/// Defaults of Nav2's parameter file.
 const INFLATION_M: f64 = 0.7;
 const SCALING: f64 = 3.0;
 
@@ -59,7 +60,7 @@ impl Grid {
         }
     }
 
-    /// Drums, boxes, rooms with doors, or corridors.
+    /// Makes drums, boxes, rooms with doors, or corridors.
     fn random(seed: u64) -> Self {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
         let side = 120 + random.below(280);
@@ -98,7 +99,8 @@ impl Grid {
         grid
     }
 
-    /// A maze with one way between any two of its rooms, which are a metre wide, without the wall between them.
+    /// Makes a maze with exactly one path between any two of its rooms, which are 1 m wide
+    /// including the wall.
     pub fn maze(seed: u64, side: usize) -> Self {
         const ROOM: usize = 20;
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
@@ -135,7 +137,6 @@ impl Grid {
         self.message_of(self.occupied.iter().map(|&it| 100 * i8::from(it)).collect())
     }
 
-    /// A map of this size with these values.
     fn message_of(&self, data: Vec<i8>) -> Vec<u8> {
         let info = MapMetaData {
             resolution: RESOLUTION_M as f32,
@@ -146,7 +147,8 @@ impl Grid {
         OccupancyGrid { header: Header::at(0, "map"), info, data }.encode()
     }
 
-    /// Costs of the cheapest way from `sources` to every cell, in cells; `cost` is that of a cell.
+    /// Returns the least path cost from `sources` to every cell, in cells, given the `cost` per
+    /// cell.
     fn front(&self, sources: &[usize], cost: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut found = vec![f64::INFINITY; self.occupied.len()];
         let mut waiting: BinaryHeap<_> =
@@ -193,7 +195,8 @@ impl Grid {
         ]
     }
 
-    /// Down a front from `from`, as NavFn's path: along bilinear gradients, and from cell to cell beside what is blocked.
+    /// Descends a front from `from` as NavFn does: along bilinear gradients, and cell by cell
+    /// beside blocked cells.
     fn descend(&self, front: &[f64], from: usize) -> Vec<DVec2> {
         let place =
             |cell: usize| DVec2::new((cell % self.width) as f64, (cell / self.width) as f64);
@@ -242,7 +245,8 @@ fn length(way: &[DVec2]) -> f64 {
     way.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
 }
 
-/// Length of a way, and its mean and least distance from what is occupied at places a quarter of a cell apart, all in cells.
+/// Returns a path's length, and its mean and least clearance at points a quarter of a cell apart,
+/// all in cells.
 fn judge(grid: &Grid, distances: &[f64], way: &[DVec2]) -> [f64; 3] {
     let (mut sum, mut count, mut least, mut next) = (0.0, 0.0, f64::INFINITY, 0.0);
     for pair in way.windows(2) {
@@ -258,14 +262,13 @@ fn judge(grid: &Grid, distances: &[f64], way: &[DVec2]) -> [f64; 3] {
     [length(way), sum / count, least]
 }
 
-/// The value below which these shares of the numbers are: 5 %, the median, 95 %, and the largest.
+/// Returns the 5 % quantile, the median, the 95 % quantile and the maximum.
 fn shares(numbers: &[f64]) -> [f64; 4] {
     let mut numbers = numbers.to_vec();
     numbers.sort_by(f64::total_cmp);
     [0.05, 0.5, 0.95, 1.0].map(|share| numbers[((numbers.len() - 1) as f64 * share) as usize])
 }
 
-/// Distances of all cells from the nearest occupied one, in cells.
 fn distances(grid: &Grid) -> Vec<f64> {
     let sources = (0..grid.occupied.len()).filter(|&cell| grid.occupied[cell]);
     let mut nearest: Vec<Option<usize>> = vec![None; grid.occupied.len()];
@@ -285,7 +288,7 @@ fn distances(grid: &Grid) -> Vec<f64> {
     each.map(|(cell, near)| near.map_or(1e3, |near| place(cell).distance(place(near)))).collect()
 }
 
-/// The costs of Nav2's inflation layer, `computeCost`.
+/// Returns the costs of Nav2's inflation layer, `computeCost`.
 fn inflated(distances: &[f64]) -> Vec<u8> {
     let cost = |&cells: &f64| match cells * RESOLUTION_M {
         _ if cells == 0.0 => 254,
@@ -296,7 +299,7 @@ fn inflated(distances: &[f64]) -> Vec<u8> {
     distances.iter().map(cost).collect()
 }
 
-/// Nav2's planners in a process of their own.
+/// Nav2's planners in another process.
 struct Nav2 {
     child: Child,
     from: BufReader<ChildStdout>,
@@ -311,7 +314,7 @@ impl Nav2 {
         Some(Self { child, from })
     }
 
-    /// Ways and milliseconds of NavFn, Theta* and Smac 2D.
+    /// Returns the paths and milliseconds of NavFn, Theta* and Smac 2D.
     fn plan(&mut self, grid: &Grid, costs: &[u8], ends: [usize; 2]) -> [(Vec<DVec2>, f64); 3] {
         let [from, to] = ends.map(|cell| [cell % grid.width, cell / grid.width]);
         let input = self.child.stdin.as_mut().unwrap();
@@ -368,13 +371,13 @@ fn maps() -> Vec<Grid> {
 
 impl Drop for Nav2 {
     fn drop(&mut self) {
-        // It ends with its input.
+        // The process ends with its input.
         drop(self.child.stdin.take());
         self.child.wait().unwrap();
     }
 }
 
-/// What this thread has taken of a processor: other work beside it does not count.
+/// CPU time of this thread, independent of other load.
 struct Processor(Duration);
 
 impl Processor {
@@ -383,7 +386,6 @@ impl Processor {
         Self(Duration::new(now.tv_sec as u64, now.tv_nsec as u32))
     }
 
-    /// Milliseconds since then.
     fn elapsed(&self) -> f64 {
         (Self::now().0 - self.0).as_secs_f64() * 1e3
     }
@@ -393,11 +395,11 @@ fn named(name: &str) -> Option<f64> {
     std::env::var(name).ok().map(|text| text.parse().unwrap())
 }
 
-/// A planner's ways, each held against the reference's: length, mean and least clearance, processor time.
+/// Paths of a planner relative to the reference: length, mean and least clearance, CPU time.
 #[derive(Default)]
 struct Judged {
     ratios: [Vec<f64>; 4],
-    /// Pairs of places between which no way was found though there is one, and the reverse.
+    /// Pairs of places without a found path although one exists, and the reverse.
     false_no: usize,
     false_yes: usize,
 }
@@ -411,8 +413,8 @@ impl Judged {
     }
 }
 
-/// The clearest way of any here that is at most 1.15 times as long as the reference: those of wavefronts with costs that fall with the
-/// distance from obstacles in several ways.
+/// Returns the clearest path at most 1.15 times as long as the reference, over wavefronts with
+/// several distance-dependent costs.
 fn clearest(
     grid: &Grid,
     distances: &[f64],
@@ -459,7 +461,7 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
     for (seed, grid) in (0_u64..).zip(maps()) {
         let map = Arc::new(Costmap::read(&grid.message()).unwrap());
         let (blocked, _) = map.blocked_and_costs(&alone, 1.0);
-        // NavFn takes the outermost cells of a map for blocked.
+        // NavFn treats the outermost cells of a map as blocked.
         let inside = |cell: &usize| grid.beside(*cell).iter().all(Option::is_some);
         let free = (0..blocked.len()).filter(|&cell| !blocked[cell]);
         let free: Vec<usize> = free.filter(inside).collect();
@@ -496,7 +498,7 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
                 ways.push(("NavFn", way, began.elapsed()));
             }
         }
-        // As a costmap is published.
+        // Values of a published costmap.
         let published = |&cost: &u8| match cost {
             254 => 100,
             253 => 99,
