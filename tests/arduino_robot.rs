@@ -1,4 +1,4 @@
-//! Robots whose Arduino speaks the protocol of ROSArduinoBridge, simulated: the mission of the guide over each wire.
+//! Simulated robots with ROSArduinoBridge: the guide's mission over each wire.
 
 use std::sync::{
     Arc,
@@ -18,7 +18,7 @@ const TARGET_M: f64 = 4.0;
 const WITH_LASER: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-arduino/laser.toml");
 
-/// Assert that `run` arrives with its robot, and that its recording replays to the bit.
+/// Asserts that `run` arrives with its robot, and that its recording replays bit by bit.
 #[track_caller]
 fn assert_arrives(run: Run, robot: Robot) {
     let name = run.robot.clone();
@@ -30,7 +30,6 @@ fn assert_arrives(run: Run, robot: Robot) {
     assert_nothing_left(&name);
 }
 
-/// A run of the robot that listens by `transport`.
 fn over(transport: &str, name: &str) -> (Robot, Run) {
     let robot = Robot::start(MISSION, transport, "127.0.0.1:0");
     let scheme = if transport == "pty" { "serial" } else { transport };
@@ -42,7 +41,7 @@ fn over(transport: &str, name: &str) -> (Robot, Run) {
 fn a_robot_with_an_arduino_arrives_in_lockstep_on_the_same_way_each_time() {
     let [first, second] = ["arduino-max", "arduino-again"].map(|name| {
         let summary = Run::start(name, MISSION, &["--pace", "max"]).arrives();
-        // The mission ends with the tick of the arrival, and not when the robot stands.
+        // The mission ends with the tick of the arrival, before the robot stands.
         let last_tick = summary["ticks"].as_f64().unwrap() - 1.0;
         assert_eq!(summary["mission_time_s"], last_tick / 10.0, "{summary}");
         let keys = ["ticks", "mission_time_s", "path_length_m", "pose_error_m"];

@@ -1,4 +1,5 @@
-//! Bad input is answered with the code of the error, the input's name and a remedy, a non-zero exit, and nothing left running.
+//! Tests that bad input gives an error code, the input's name, a remedy and a non-zero exit, and
+//! leaves no process.
 
 use std::net::UdpSocket;
 
@@ -85,7 +86,7 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
     for (arguments, code, names) in cases {
         refused(arguments, code, names);
     }
-    // The assignment is cited, and no line of the file.
+    // The message cites the assignment, and no line of the file.
     let output = output(&["run", "trap", "--set", "perimeter.cells=3"]);
     assert_refused(&output, "mission", &["--set perimeter.cells=3"]);
     let said = String::from_utf8(output.stderr).unwrap();

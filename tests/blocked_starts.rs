@@ -1,5 +1,5 @@
-//! The states of the middleware's files in which it lets no process join any more, each made by a test in the middle of a
-//! mission, which goes on by itself.
+//! Tests of middleware file states that block further processes from joining. Each test creates one
+//! during a mission, which recovers.
 
 use std::{
     fs,
@@ -19,15 +19,13 @@ use common::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-/// Mission time runs this many times as fast as the wall clock.
+/// Mission time relative to the wall clock.
 const PACE: [&str; 2] = ["--pace", "4"];
 
-/// The process in a port's or a node's number.
 fn process_of(number: u128) -> u32 {
     (number >> 64) as u32
 }
 
-/// The directories of the node files of process `pid`.
 fn nodes_of(bus: &BusInstance, pid: u32) -> Vec<PathBuf> {
     let nodes = fs::read_dir(bus.root().join("nodes")).unwrap();
     let nodes = nodes.map(|entry| entry.unwrap().path()).filter(|path| {
@@ -37,30 +35,28 @@ fn nodes_of(bus: &BusInstance, pid: u32) -> Vec<PathBuf> {
     nodes.collect()
 }
 
-/// The files in shared memory of a bus instance that end with `suffix`.
 fn shared(bus: &BusInstance, suffix: &str) -> Vec<String> {
     let paths = shared_memory(&bus.shared_memory_prefix()).into_iter();
     let names = paths.map(|path| path.file_name().unwrap().to_str().unwrap().to_owned());
     names.filter(|name| name.ends_with(suffix)).collect()
 }
 
-/// Make half of a connection of port `port` to another.
 fn half_make_connection(bus: &BusInstance, port: u128) {
     let made = shared(bus, ".connection");
-    // The start has the prefix and the hash of the type, up to the first port's number.
+    // The common part is the prefix and the type's hash, before the first port's number.
     let start = made[0].rsplitn(3, '_').last().unwrap();
     half_make(Path::new(&format!("/dev/shm/{start}_{port}_{port}.connection")));
 }
 
-/// Assert that the mission is finished as if nothing had happened, and leaves nothing.
+/// Asserts that the mission ends undisturbed and leaves nothing.
 fn assert_arrives(run: Run) -> Value {
     let summary = run.arrives();
-    // The error of a lost pose is metres.
+    // A lost pose would have an error of metres.
     assert!(summary["pose_error_m"].as_f64() < Some(0.05), "{summary}");
     summary
 }
 
-/// Assert that the bus was recreated, which starts every stage again.
+/// A recreated bus restarts every stage.
 fn assert_bus_was_recreated(summary: &Value) {
     for stage in STAGES {
         let restarts = summary["restarts"][stage].as_u64();
@@ -82,7 +78,7 @@ fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
     half_make_connection(&bus, port.unwrap());
     run.kill_and_await("mapper", Signal::KILL, &status);
     let summary = assert_arrives(run);
-    // A blocked start would have been aborted, and another one made.
+    // A blocked start would have been aborted and repeated.
     assert_eq!(summary["restarts"]["mapper"], 1, "{summary}");
     assert_eq!(summary["restarts"]["planner"], 0, "{summary}");
 }
@@ -92,7 +88,7 @@ fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
     let mut run = Run::start("block-other", "open-room", &PACE);
     let status = run.wait_until_under_way(1.0);
     let bus = bus_instance("block-other");
-    // The port belongs to the mapper by its tags, but its id has another process number.
+    // By its tags the port belongs to the mapper, but its id has another process number.
     let port = 7;
     let node = nodes_of(&bus, pid(&status, "mapper")).remove(0);
     let tag = format!("{}{port}.port_tag", bus.shared_memory_prefix());
@@ -141,7 +137,8 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
             }
         };
         let all_but_one = take_all();
-        // The last place is taken, too: the supervisor that would start a successor is held until then.
+        // The supervisor is frozen until the last place is taken, so that it cannot start a
+        // successor.
         run.signal(Signal::STOP);
         signal_process(pid(&status, "dead-reckoning"), Signal::KILL);
         let began = Instant::now();
@@ -150,7 +147,7 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
             joined.clear_up(&[]).unwrap();
         }
         run.signal(Signal::CONT);
-        // The places are never given back, as if their owners were killed while they held them.
+        // The places are leaked, as if their owners had been killed.
         std::mem::forget((places, joined));
         assert_bus_was_recreated(&assert_arrives(run));
     });
@@ -163,7 +160,8 @@ fn node_files_of_processes_that_ended_are_removed() {
     let bus = bus_instance("block-nodes");
     let mapper = pid(&status, "mapper");
     let nodes = bus.root().join("nodes");
-    // Hundreds of processes that were killed while they joined leave such files. Only the process in an id matters.
+    // Hundreds of processes killed while joining leave such files. Only the process in an id
+    // matters.
     for counter in 1_000..1_300_u128 {
         let id = (counter << 96) | (u128::from(mapper) << 64);
         fs::create_dir(nodes.join(id.to_string())).unwrap();
@@ -191,7 +189,8 @@ fn what_a_stage_killed_in_its_start_left_on_the_bus_is_removed() {
     let bus = bus_instance("block-cut-off");
     let node = nodes_of(&bus, pid(&status, "mapper")).remove(0);
     let id: u128 = node.file_name().unwrap().to_str().unwrap().parse().unwrap();
-    // The generation was killed after it created its node's directory and before it registered the node.
+    // State of a generation killed after it created its node's directory and before it registered
+    // the node.
     let cut_off = bus.root().join("nodes").join((id + (1 << 96)).to_string());
     fs::create_dir(&cut_off).unwrap();
     let details = format!("{}node.details", bus.shared_memory_prefix());

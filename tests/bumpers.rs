@@ -1,4 +1,4 @@
-//! Robots whose bumpers and cliff sensors feel what their lasers do not see.
+//! Robots whose bumpers and cliff sensors detect obstacles below their lasers.
 
 use crate::support::{Run, assert_ended, replayed_in, wire::Robot};
 
@@ -10,13 +10,13 @@ const KOBUKI: [&str; 6] = [
     "--set",
     "controller.speed_m_s=0.4",
 ];
-/// The laser looks over it.
+/// Board below the laser's plane.
 const BOARD: &str = "world.box=[{at=[2,0],size_m=[0.3,0.8],top_m=0.1}]";
 
 #[test]
 fn a_robot_that_bumps_into_a_low_board_or_comes_to_a_hole_marks_it_and_goes_around() {
     let hole = "simulation.hole=[{at=[2,0],size_m=[0.4,0.8]}]";
-    // The cliff sensors are not far ahead of the wheels.
+    // The cliff sensors are only slightly ahead of the wheels.
     let slow = "controller.speed_m_s=0.2";
     for (name, world) in [("bumps-board", BOARD), ("bumps-hole", hole)] {
         let goes_on = "simulation.goes_on_after_contact=true";

@@ -8,8 +8,10 @@ use tempfile::TempDir;
 
 use crate::support::{assert_nothing_left, assert_refused, directory_of, output, printed};
 
-/// Calibrate wheels that only the simulator knows: a larger right wheel on a narrower track, on a floor as measured. Returns what the
-/// command printed, and the file that it is to write.
+/// Calibrates wheels that only the simulator knows: a larger right wheel, a narrower track, and a
+/// measured floor.
+///
+/// Returns the command's output, and the file that it should write.
 fn calibrated(robot: &str, more: &[&str]) -> (Output, PathBuf, TempDir) {
     let folder = directory_of(robot);
     let out = folder.path().join("calibration.toml");

@@ -1,4 +1,5 @@
-//! Tests of `firsthand bench chaos` through real processes: its table of signals, and consumers that are hit.
+//! Tests of `firsthand bench chaos` through real processes: its table of signals, and its effect on
+//! consumers.
 
 use std::fs;
 
@@ -9,7 +10,7 @@ use crate::support::{
     self, assert_nothing_left, firsthand, json_of, output, refused, start_quietly,
 };
 
-/// The report of chaos on a mission that also a machine with other work completes.
+/// Returns the report of chaos on a mission that completes on a loaded machine too.
 fn chaos(robot: &str, arguments: &[&str]) -> Value {
     let slow = ["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"];
     let open_room = ["bench", "chaos", "open-room", "--json", "--robot", robot];
@@ -23,14 +24,14 @@ fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_default()
 }
 
-/// The sum of all numbers in an object of objects.
+/// Sums all numbers in an object of objects.
 fn sum(of: &Value) -> u64 {
     let objects = of.as_object().unwrap().values();
     let counts = objects.flat_map(|counts| counts.as_object().unwrap().values());
     counts.map(number).sum()
 }
 
-/// Command lines of this suite's processes that contain `mark`.
+/// Returns the command lines of this suite's processes that contain `mark`.
 fn processes(mark: &str) -> Vec<String> {
     let own = format!("{SUITE_VARIABLE}={}", support::suite());
     let is_own = |pid: &u32| {
@@ -64,7 +65,7 @@ fn each_signal_of_chaos_is_a_row_of_its_table() {
         let cells = rows.iter().filter_map(|row| row[column(name)].parse::<f64>().ok());
         cells.count()
     };
-    // A signal has no mission time if it was sent before the first pose.
+    // A signal before the first pose has no mission time.
     let timed = rows.iter().skip_while(|row| row[column("time_s")].is_empty());
     assert_eq!(timed.count(), measured("time_s"), "{table}");
     assert!(measured("time_s") >= rows.len() / 2, "{table}");
@@ -83,7 +84,7 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
     let consumers = &report["consumers"];
     for name in ["record", "logs -f", &given] {
         let counts = &consumers[name];
-        // The consumer was started again after each kill.
+        // The consumer was restarted after each kill.
         assert!(number(&counts["started"]) > number(&counts["killed"]), "{name}: {report}");
     }
     let hit = |counts: &Value| number(&counts["killed"]) + number(&counts["frozen"]);

@@ -1,5 +1,5 @@
-//! Commands at the prompt: echo, hz, list, runs, logs, completions, the manual page. They are consumers like any other, and end
-//! quietly when their reader has gone.
+//! Tests of commands at the prompt: echo, hz, list, runs, logs, completions, the manual page. They
+//! end quietly when their reader is closed.
 
 use std::{
     collections::BTreeSet,
@@ -18,7 +18,7 @@ use crate::support::{
     output, refused, run, signal_process, start_quietly, wait_for_status,
 };
 
-/// A command whose lines are read as they come. It is ended when the test ends.
+/// Command whose lines are read as they arrive. It ends with the test.
 struct Reading {
     child: Child,
     lines: BufReader<ChildStdout>,
@@ -47,7 +47,7 @@ impl Reading {
         serde_json::from_str(&line).unwrap_or_else(|error| panic!("{line:?}: {error}"))
     }
 
-    /// Close the pipe. Returns the exit code of the command, which ends by that, and its messages.
+    /// Closes the pipe, which ends the command. Returns its exit code and messages.
     fn close(self) -> (Option<i32>, String) {
         let Self { mut child, lines, mut said } = self;
         drop(lines);
@@ -57,7 +57,7 @@ impl Reading {
     }
 }
 
-/// The output of a command that must end by itself, and succeed.
+/// Returns the output of a command that must end successfully within [`PATIENCE`].
 fn printed(arguments: &[&str]) -> String {
     let patience = PATIENCE.as_secs().to_string();
     let limited = ["timeout", "--signal", "KILL", &patience];
@@ -69,7 +69,7 @@ fn printed(arguments: &[&str]) -> String {
 #[test]
 fn echo_prints_every_topic_with_the_fields_of_its_layout() {
     let robot = "con-echo";
-    // The robot is slow enough that all is printed before it arrives.
+    // The robot arrives only after all output.
     let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.05"];
     let run = Run::under_way(robot, "open-room", &slow, 0.2);
     let poses = printed(&["topic", "echo", "pose", "--robot", robot, "--json", "-n", "3"]);
@@ -84,7 +84,7 @@ fn echo_prints_every_topic_with_the_fields_of_its_layout() {
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "{ticks:?}");
     for topic in topics::TABLE {
         let name = topic.spec().name;
-        // These topics come when something happens, from a laser, or from a robot without counters; those of lockstep and of a mirror are not this run's.
+        // These topics need an event, a laser, a robot without counters, lockstep or a mirror.
         if [
             "counts",
             "base_response",
@@ -152,7 +152,7 @@ fn echo_follows_its_robot_from_run_to_run_and_ends_on_a_signal() {
     signal_process(echo.child.id(), Signal::TERM);
     let (code, said) = echo.close();
     assert_eq!(code, Some(0));
-    // The message came once, when the first run ended.
+    // The message came once, at the end of the first run.
     assert_eq!(said.lines().filter(|line| line.contains(robot)).count(), 1, "{said}");
     second.arrives();
 }
@@ -172,7 +172,7 @@ fn whatever_prints_without_end_ends_quietly_when_its_reader_closes_the_pipe() {
         assert!(!reading.line().is_empty(), "{command:?}");
         assert_eq!(reading.close(), (Some(0), String::new()), "{command:?}");
     }
-    // This command never prints anything, so its output cannot show that the reader has gone.
+    // This command prints nothing, so a failed write cannot reveal the closed reader.
     let silent = Reading::start(&["topic", "echo", "stalls", "--robot", robot]);
     assert_eq!(silent.close(), (Some(0), String::new()));
     for command in [
@@ -225,7 +225,7 @@ fn hz_counts_every_topic_and_finds_one_that_is_not_published_as_the_table_says()
 #[test]
 fn list_shows_the_robots_that_run_and_where() {
     let [one, two] = ["con-list-1", "con-list-2"];
-    // They are still there when a frozen robot of another test has kept the list waiting.
+    // The robots still run if another test's frozen robot delays the list.
     let slowly = ["--pace", "1", "--set", "controller.speed_m_s=0.05"];
     let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &slowly));
     runs.iter_mut().for_each(|run| drop(run.wait_until_under_way(0.5)));
@@ -243,7 +243,7 @@ fn list_shows_the_robots_that_run_and_where() {
         assert!(robot["mission_time_s"].as_f64() > Some(0.4), "{robot}");
     }
     assert!(printed(&["status", "--all"]).contains("con-list-2 "));
-    // A supervisor that was killed leaves its bus.
+    // A killed supervisor leaves its bus.
     let [mut killed, ended] = runs;
     killed.signal(Signal::KILL);
     killed.reap();

@@ -1,4 +1,4 @@
-//! Tests that a consumer that comes late gets everything, and that its leaving changes nothing.
+//! Tests that a late consumer gets everything, and that its exit changes nothing.
 
 use std::{
     io::{BufRead as _, BufReader},
@@ -20,7 +20,7 @@ use common::{
     waiter::Waiter,
 };
 
-/// The samples that a consumer has received, put together.
+/// Combined samples of a consumer.
 #[derive(Default)]
 struct Heard {
     poses: Vec<(u64, f64)>,
@@ -30,7 +30,6 @@ struct Heard {
     field_changes: usize,
 }
 
-/// Receive samples until `enough`.
 fn listen(robot: &str, enough: impl Fn(&Heard) -> bool) -> Heard {
     let bus = Bus::join(&support::domain(robot), "dashboard").unwrap();
     let mut pose = bus.reader(&topics::POSE).unwrap();
@@ -93,10 +92,9 @@ fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothin
     });
 }
 
-/// Poses heard in each run.
+/// Number of poses in each run.
 type HeardPoses = Mutex<Vec<usize>>;
 
-/// Follow `robot` through so many runs, and count the poses that come in each.
 fn follow(robot: &str, runs: usize, heard: &HeardPoses) {
     let domain = support::domain(robot);
     let mut follower = Follower::new(domain, "logger", &topics::POSE, |bus| {
@@ -145,7 +143,8 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
             let (code, summary) = started.finish();
             assert_eq!(code, Some(0), "{summary}");
             support::assert_no_restart(&summary);
-            // The pause lets the consumer notice the end of the run; a robot is not started twice within a second.
+            // The pause lets the consumer notice the end of the run. Robots are not restarted
+            // within a second.
             std::thread::park_timeout(Duration::from_secs(1));
         }
         logger.join().unwrap();
@@ -157,7 +156,7 @@ fn a_logger_follows_its_robot_through_five_runs_one_of_them_killed_and_harms_non
 #[test]
 fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_notices() {
     in_own_process(|| {
-        // Slow enough not to arrive before its stages run again, on a busy machine either.
+        // The robot arrives only after its stages run again, on a busy machine too.
         let slowly = ["--pace", "2", "--set", "controller.speed_m_s=0.02"];
         let mut run = Run::under_way("greedy", "open-room", &slowly, 0.5);
         let bus = Bus::join(&support::domain("greedy"), "greedy").unwrap();
@@ -192,7 +191,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
         drop(shown);
         readers
             .push(bus.reader(&topics::POSE).expect("the place of a killed process is waited for"));
-        // Whoever asks for the status needs a place, too.
+        // The status command needs a place, too.
         readers.pop();
         // A stage that needs a place gets one.
         for stage in ["mapper", "planner"] {
@@ -210,7 +209,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
     });
 }
 
-/// A consumer's process, which is killed in the end.
+/// Process of a consumer, killed on drop.
 struct Staying(Child);
 
 impl Drop for Staying {
@@ -220,8 +219,8 @@ impl Drop for Staying {
     }
 }
 
-/// Join the bus of `robot`, read grid and field and leave, again and again until `over`. Returns how often there was a
-/// place.
+/// Joins the bus of `robot`, reads grid and field, and leaves, repeatedly until `over`. Returns the
+/// number of successes.
 fn join_again_and_again(robot: &str, over: &AtomicBool) -> usize {
     let domain = support::domain(robot);
     let mut joined = 0;
@@ -261,7 +260,7 @@ fn ten_consumers_that_stay_and_three_that_join_again_and_again_harm_no_stage_and
             let bus = Bus::join(&support::domain(robot), robot).unwrap();
             let all_that_there_are: Vec<_> =
                 std::iter::from_fn(|| bus.reader(&topics::GRID).ok()).collect();
-            // A stage that ends gets its place, even if consumers wait for one.
+            // The restarted stage gets its place before waiting consumers.
             run.kill_and_await_successor("planner", rustix::process::Signal::KILL);
             run.wait_until_under_way(8.0);
             over.store(true, Ordering::Relaxed);

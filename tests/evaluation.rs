@@ -4,13 +4,11 @@ use serde_json::Value;
 
 use crate::support::{messages, printed, refused};
 
-/// The command that evaluates two rooms in `out`.
 fn two_rooms<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let rooms = ["evaluate", "--worlds", "rooms", "--count", "2", "--out"];
     [&rooms[..], &[out, "--json"], more].concat()
 }
 
-/// The object with which the evaluation ends.
 fn evaluate(out: &str, more: &[&str]) -> Value {
     serde_json::from_str(&printed(&two_rooms(out, more))).unwrap()
 }
@@ -29,7 +27,7 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
 
     let rows = std::fs::read_to_string(out.join("rows.csv")).unwrap();
     let (first, _) = rows.trim_end().rsplit_once('\n').unwrap();
-    // The evaluation was killed while it wrote the last row.
+    // State of an evaluation killed while it wrote the last row.
     std::fs::write(out.join("rows.csv"), format!("{first}\nrooms-5-0001,6,evid")).unwrap();
     let resumed = evaluate(name, &["--seed", "5", "--resume"]);
     assert_eq!(resumed["count"], 2, "{resumed}");
@@ -62,7 +60,7 @@ fn two_robots_that_meet_have_a_row_each_and_the_same_rows_twice() {
     assert_eq!(first.matches(",success,").count(), 4, "{first}");
     assert_eq!(first, rows("second", &[]));
 
-    // The row of one robot was lost: both drive again.
+    // One robot's row is lost, so both drive again.
     let kept = first.lines().filter(|row| !row.contains("0001-oncoming"));
     let kept: String = kept.map(|row| format!("{row}\n")).collect();
     std::fs::write(directory.path().join("first/rows.csv"), kept).unwrap();
@@ -105,7 +103,7 @@ fn with_infrared_the_same_seed_gives_the_same_rows_twice_and_their_setting_names
 #[test]
 fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
     let folder = tempfile::tempdir().unwrap();
-    // The map is a hall of 6 m by 3 m with a wall across its lower half, its corner at (-10, 20).
+    // Hall of 6 m by 3 m with a wall across its lower half, and its corner at (-10, 20).
     let (cols, rows) = (60, 30);
     let grey = |at: usize| {
         let (col, row) = (at % cols, at / cols);

@@ -1,4 +1,4 @@
-//! Tests of the paper's experiments: their rows, and the continuation of those that were cut off.
+//! Tests of the paper's experiments: rows, and continuation after an interruption.
 
 use std::{fs, path::Path};
 
@@ -6,14 +6,12 @@ use serde_json::Value;
 
 use crate::support::{printed, refused};
 
-/// The command that carries out three experiments with so many seeds in `out`.
 fn three_of_them<'a>(out: &'a Path, seeds: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let only = ["experiments", "--only", "1a,3,5-constant", "--realism"];
     let into = ["laboratory", "--json", "--out", out.to_str().unwrap()];
     [&only[..], &into, &["--seeds", seeds], more].concat()
 }
 
-/// The objects with which the experiments end.
 fn experiments(out: &Path, more: &[&str]) -> Vec<Value> {
     let lines = printed(&three_of_them(out, "1", more));
     let objects = lines.lines().map(|line| serde_json::from_str(line).unwrap());
@@ -44,7 +42,7 @@ fn experiments_give_a_row_each_and_the_same_ones_again_when_they_were_cut_off() 
     let rows = fs::read_to_string(out.join("rows.csv")).unwrap();
     assert_eq!(rows.lines().count(), 6, "{rows}");
     let (first, last) = rows.trim_end().rsplit_once('\n').unwrap();
-    // The experiments were killed while they wrote the last row.
+    // State of experiments killed while they wrote the last row.
     fs::write(out.join("rows.csv"), format!("{first}\n{}", &last[..9])).unwrap();
     let resumed = experiments(&out, &["--resume"]);
     assert_eq!(resumed, whole);

@@ -1,4 +1,5 @@
-//! The stops of the robot as seen on the wire. Every datagram between link and robot passes through this test.
+//! Tests of the robot's stops, seen on the wire. Every datagram between link and robot passes
+//! through the test.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},
@@ -13,12 +14,12 @@ use common::wire::{Command, Decoder};
 use rustix::process::Signal;
 use serde_json::Value;
 
-/// The time for which a command moves the robot: `robot.command_limit_s`.
+/// Duration of a command: `robot.command_limit_s`.
 const LIMIT: Duration = Duration::from_millis(250);
-/// The time from tick to tick at 7 Hz.
+/// Tick period at 7 Hz.
 const PERIOD: Duration = Duration::from_millis(143);
 
-/// A motion command that the link has sent to the robot.
+/// Motion command from the link to the robot.
 #[derive(Clone, Copy, Debug)]
 struct Heard {
     at: Instant,
@@ -27,13 +28,13 @@ struct Heard {
 }
 
 impl Heard {
-    /// Whether this is the command of a tick: a repetition has less time left.
+    /// Returns whether this is a tick's command. A repetition has less time left.
     fn valid(&self) -> bool {
         self.moving && self.limit == LIMIT
     }
 }
 
-/// Hears every command on its way to the robot.
+/// Tap on every command to the robot.
 pub(crate) struct Tap {
     pub(crate) proxy: Proxy,
     heard: Receiver<Heard>,
@@ -56,7 +57,6 @@ impl Tap {
         self.heard.recv_timeout(PATIENCE).unwrap()
     }
 
-    /// Wait for a command for which `is_so` is true.
     fn next_that(&self, is_so: impl Fn(&Heard) -> bool) -> Heard {
         let began = Instant::now();
         loop {
@@ -68,15 +68,17 @@ impl Tap {
         }
     }
 
-    /// Assert, once nobody sends any more, that the last command does not move the robot.
+    /// Asserts that the last command is zero. All senders must have ended.
     #[track_caller]
     pub(crate) fn assert_last_is_zero(&self) {
         let last = self.heard.try_iter().last().unwrap();
         assert!(!last.moving, "{last:?}");
     }
 
-    /// The longest time that the robot was left with a valid command, among all commands heard by now: until the next
-    /// valid one or a zero, or until now; if the link was down, also until the end of the time limit of commands.
+    /// Returns the longest time without a new command after a valid one, among all commands so far.
+    ///
+    /// The gap ends at the next valid command, at a zero, or now. With `link_down` it also ends at
+    /// the command's time limit.
     fn longest_uncommanded(&self, first: Heard, link_down: bool) -> Duration {
         let mut longest = Duration::ZERO;
         let (mut valid, mut ends) = (Some(first.at), first.at + first.limit);
@@ -117,7 +119,7 @@ fn listen(decoder: &mut Decoder, at: Instant, tell: &Sender<Heard>) {
     }
 }
 
-/// A run of the default mission whose every command is heard here.
+/// Starts a run of the default mission whose commands are tapped.
 fn tapped(robot: &str) -> (Robot, Tap, Run) {
     let body = Robot::on_the_course();
     let tap = Tap::before(&body);
@@ -147,7 +149,7 @@ fn a_frozen_supervisor_leads_to_a_robot_at_rest_and_a_thawed_one_lets_it_go_on()
     run.wait_until_under_way(0.5);
     tap.next_that(|heard| heard.moving);
     run.signal(Signal::STOP);
-    // Until then it may stand for a moment, and go on.
+    // Until then it may stand briefly and go on.
     let is_silent = Instant::now() + Duration::from_secs(2);
     let at_rest = tap.next_that(|heard| !heard.moving && heard.at > is_silent);
     println!("at rest {} ms after the supervisor is silent", (at_rest.at - is_silent).as_millis());
@@ -164,7 +166,7 @@ fn a_frozen_supervisor_leads_to_a_robot_at_rest_and_a_thawed_one_lets_it_go_on()
     }
 }
 
-/// Whether this process ignores `signal`, and so do the processes that it starts: under `nohup` they ignore SIGHUP.
+/// Returns whether this process and its children ignore `signal`. Under `nohup` they ignore SIGHUP.
 fn ignores(signal: Signal) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -197,7 +199,7 @@ fn stages_end_with_their_supervisor_that_is_killed_and_the_last_command_is_zero(
     run.kill();
     support::wait_until_all_ended("tap-orphan");
     tap.assert_last_is_zero();
-    // The files that the run left do not hinder the next run, and are removed with it.
+    // The files of the run do not hinder the next run, and are removed with it.
     Run::start("tap-orphan", "open-room", &[]).arrives();
 }
 

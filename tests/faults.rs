@@ -1,5 +1,5 @@
-//! Tests of robots that make no progress because of a fault that was put into a running stage: each recovery step frees one, and the
-//! last says that it could not.
+//! Tests of robots without progress due to an injected stage fault. Each recovery step frees one,
+//! and the last reports failure.
 
 use crate::support::{
     self, Run, STAGES, all_run, assert_ended, assert_nothing_left, find, generation,
@@ -14,9 +14,9 @@ use common::{
 };
 use serde_json::Value;
 
-/// At this speed the mission has thousands of ticks, which take seconds in lockstep: time enough for a fault, even on a loaded
-/// machine. The odometry is told that the wheels are those of the laboratory, because a hundred looks, and the turns under a broken
-/// field until the supervisor notices, would make the arrival unsure.
+/// Options that give the mission thousands of ticks, or seconds in lockstep, time enough for a
+/// fault on a loaded machine. Laboratory odometry keeps the arrival sure after a hundred looks and
+/// the turns under a broken field.
 const SLOW: [&str; 6] = [
     "--set",
     "controller.speed_m_s=0.012",
@@ -27,17 +27,15 @@ const SLOW: [&str; 6] = [
 ];
 const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
 
-/// Run `firsthand stage fault`, which must succeed.
 fn inject(robot: &str, stage: &str, fault: &str) {
     operate(robot, &["stage", "fault", stage, fault]);
 }
 
-/// The number of stalls with this `recovery`.
 fn count(stalls: &[Value], recovery: &str) -> usize {
     stalls.iter().filter(|stall| stall["recovery"] == recovery).count()
 }
 
-/// The stalls of a mission of open-room in which `stage` is broken on the way, and which arrives all the same.
+/// Breaks `stage` in a mission of open-room, which must still arrive. Returns its stalls.
 fn broken(robot: &str, stage: &str, fault: &str, arguments: &[&str]) -> Vec<Value> {
     let mut run = Run::start(robot, "open-room", &[&SLOW[..], arguments].concat());
     run.wait_until("the robot drives", |status| {
@@ -78,7 +76,7 @@ fn a_robot_inside_a_margin_that_no_plan_leaves_comes_free_by_a_reset_map_by_eith
     for (robot, method) in [("inside", &[][..]), ("inside-p", &PAPER[..])] {
         let stalls = broken(robot, "mapper", "hazard-around-robot", method);
         let first = stalls.iter().find(|stall| stall["recovery"] == "reset");
-        // A slow robot may be pinned before it has driven far inside.
+        // A slow robot may be pinned before it is far inside.
         let cause = &first.unwrap()["cause"];
         assert!(cause == "inside_hazard" || cause == "pinned", "{stalls:?}");
     }
@@ -122,7 +120,7 @@ fn a_stage_that_spins_is_aborted_as_hung() {
 fn a_stage_that_beats_and_answers_nothing_is_replaced_and_nobody_behind_it() {
     let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02", "--timeout", "2000"];
     let mut run = Run::under_way("mutes", "open-room", &slow, 1.0);
-    // The link owes no answer to the output of another stage.
+    // The link owes no answer to other stages' outputs.
     for stage in STAGES.into_iter().skip(1) {
         let status = run.wait_until("all run and it drives", |status| {
             status["order"] == "driving" && all_run(status)
@@ -142,13 +140,13 @@ fn a_stage_that_beats_and_answers_nothing_is_replaced_and_nobody_behind_it() {
         let death = run.records("deaths.jsonl").pop().unwrap();
         assert_eq!(death["stage"], stage, "{death}");
         assert_eq!(death["hung"], true, "{death}");
-        // The stage still beat when it was found hung.
+        // The stage still sent heartbeats when it was found hung.
         assert!(death["noticed_after_s"].as_f64().unwrap() < 0.5, "{death}");
     }
     run.stop();
 }
 
-/// Ask the planner for a fault without the command line. Returns its answer.
+/// Requests a fault on the bus. Returns the planner's answer.
 fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
     let bus = Bus::join(&support::domain(robot), "careless").unwrap();
     let mut health = bus.reader(&topics::HEALTH).unwrap();
@@ -178,7 +176,7 @@ fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
 #[test]
 fn a_real_robot_is_not_broken_unless_it_is_meant_neither_by_the_command_line_nor_by_the_stage() {
     in_own_process(|| {
-        // An address makes the robot a real one. Nobody answers there, so it never moves.
+        // An address makes the robot a real one. It never moves, because the address is unused.
         let address = ["--set", "robot.address=\"127.0.0.1:9\"", "--pace", "1"];
         let mut run = Run::start("metal", "open-room", &address);
         run.wait_until("its stages run", |status| find(status, "planner")["state"] == "running");

@@ -1,11 +1,12 @@
-//! Tests of `firsthand field`: the field of a map, and refusals of files that are no maps.
+//! Tests of `firsthand field`: the field of a map, and refusals of invalid maps.
 
 use std::path::{Path, PathBuf};
 
 use crate::support::{printed, refused};
 use serde_json::Value;
 
-/// A room of 24 x 16 cells in its rim, a wall across it with one doorway, and a closed closet.
+/// Returns a room of 24 x 16 cells with a rim, a wall across it with one doorway, and a closed
+/// closet.
 fn rooms() -> Vec<String> {
     (0..16)
         .map(|row| {
@@ -30,7 +31,7 @@ fn write_map(directory: &Path) -> PathBuf {
     file
 }
 
-/// Write the rooms as an image in which free cells are light.
+/// Writes the rooms as an image with light free cells.
 fn write_image(directory: &Path) -> PathBuf {
     let file = directory.join("rooms.pgm");
     let pixels: Vec<u8> =
@@ -39,20 +40,18 @@ fn write_image(directory: &Path) -> PathBuf {
     file
 }
 
-/// The JSON of a solve that must succeed.
 fn report(map: &Path, arguments: &[&str]) -> Value {
     let field = ["field", map.to_str().unwrap(), "--json"];
     serde_json::from_str(&printed(&[&field, arguments].concat())).unwrap()
 }
 
-/// Assert that a solve fails with `code`, and names each of `names`.
 #[track_caller]
 fn assert_refuses(map: &Path, arguments: &[&str], code: &str, names: &[&str]) {
     let field = ["field", map.to_str().unwrap()];
     refused(&[&field, arguments].concat(), code, names);
 }
 
-/// The values of a field that was written for NumPy: mantissa and exponent of u, ex and ey of each of 24 x 16 cells.
+/// Reads a NumPy field: mantissa and exponent of u, ex and ey of each of 24 x 16 cells.
 fn values(file: &Path) -> Vec<(f64, i32, f32, f32)> {
     let bytes = std::fs::read(file).unwrap();
     assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"));
@@ -78,7 +77,7 @@ fn values(file: &Path) -> Vec<(f64, i32, f32, f32)> {
         .collect()
 }
 
-/// u and guidance of the rooms in the file, (u, ex, ey) a cell.
+/// Solves the rooms and returns (u, ex, ey) per cell from the file.
 fn solved(screening: &[&str]) -> Vec<(f64, f64, f64)> {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("rooms.npy");

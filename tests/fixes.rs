@@ -1,4 +1,4 @@
-//! Tests of sources outside a robot that publish its place, by real processes on its bus.
+//! Tests of external pose sources as real processes on the robot's bus.
 
 use std::process::{Child, Stdio};
 
@@ -11,13 +11,13 @@ use tempfile::TempDir;
 
 use crate::support::{Run, assert_nothing_left, firsthand, replayed};
 
-/// The right wheel is 1 % larger than the left one, so 6 m lead 0.7 m past the target. Nobody calibrated them.
+/// An uncalibrated right wheel, 1 % larger than the left, leads 0.7 m past the target after 6 m.
 const UNEQUAL: [&str; 12] = [
     "--set",
     "simulation.realism='laboratory'",
     "--set",
     "controller.speed_m_s=0.4",
-    // A source must not stand still for 2 s of mission time while the supervisor replaces a stage on a loaded machine.
+    // A source must not stall for 2 s of mission time while a loaded machine replaces a stage.
     "--pace",
     "2",
     "--set",
@@ -27,18 +27,16 @@ const UNEQUAL: [&str; 12] = [
     "--set",
     "robot.odometry.track_scale_sd=0.015",
 ];
-/// The error within which an arrival is in the right place.
+/// Pose error within which an arrival is sure.
 const SURE: [&str; 2] = ["--set", "sure_within_m=0.5"];
 
-/// Simulated sources for `run`.
 fn sources(run: &Run, arguments: &[&str]) -> Child {
     let directory = run.directory();
     let mut command = firsthand(&["bench", "sources", "--robot", &run.robot]);
     command.arg(directory).args(arguments).stdout(Stdio::null()).spawn().unwrap()
 }
 
-/// A run with unequal wheels and `sources`, which `meanwhile` sees drive. Returns its summary, and the recording in its
-/// directory.
+/// Drives with unequal wheels, `sources` and `meanwhile`. Returns summary, recording and directory.
 fn driven(
     robot: &str,
     arguments: &[&str],
@@ -82,7 +80,8 @@ fn a_robot_with_unequal_wheels_arrives_with_fixes_and_not_without() {
 fn a_gyro_keeps_the_heading_of_a_robot_with_unequal_wheels() {
     let gyro = ["--fixes", "0", "--gyro", "0.015"];
     let (summary, ..) = driven("fix-gyro", &gyro, |_| {});
-    // The robot drives before the gyro speaks, so it may be less sure of where it is than the mission asks.
+    // The robot drives before the first gyro sample, so its pose may be less sure than the mission
+    // demands.
     assert_near(&summary);
 }
 

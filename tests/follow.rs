@@ -1,4 +1,4 @@
-//! Tests of a robot that follows a beacon, or another robot.
+//! Tests of a robot that follows a beacon or another robot.
 
 use std::{
     process::{Child, Stdio},
@@ -23,11 +23,11 @@ use crate::support::{
     signal_process,
 };
 
-/// The speed of whoever walks with the beacon, m/s.
+/// Speed of the walker with the beacon, m/s.
 const WALKS_M_S: f64 = 0.3;
 /// Mission time at which the walk begins, seconds.
 const WALKS_AT_S: f64 = 6.0;
-/// Between the drums of the obstacle course, and back on the other side of two of them.
+/// Path between the drums of the obstacle course, and back on the other side of two of them.
 const ROUND: [[f64; 2]; 9] = [
     [0.9, 0.0],
     [1.0, -0.7],
@@ -40,7 +40,7 @@ const ROUND: [[f64; 2]; 9] = [
     [3.0, -0.6],
 ];
 
-/// The times at which the walker is at the places of [`ROUND`], mission time in seconds.
+/// Returns the walker's times at the places of [`ROUND`], mission time in seconds.
 fn times() -> Vec<f64> {
     let legs = ROUND.windows(2).scan(WALKS_AT_S, |at, leg| {
         *at += (leg[1][0] - leg[0][0]).hypot(leg[1][1] - leg[0][1]) / WALKS_M_S;
@@ -49,7 +49,6 @@ fn times() -> Vec<f64> {
     std::iter::once(WALKS_AT_S).chain(legs).collect()
 }
 
-/// Where the walker is at a mission time.
 fn place(at_s: f64) -> [f64; 2] {
     let times = times();
     let next = times.partition_point(|time| *time <= at_s);
@@ -60,7 +59,7 @@ fn place(at_s: f64) -> [f64; 2] {
     [0, 1].map(|axis| ROUND[next - 1][axis] + share * (ROUND[next][axis] - ROUND[next - 1][axis]))
 }
 
-/// The mission with the walker as a thing that the sensors see.
+/// Writes the mission with the walker as an obstacle for the sensors.
 fn mission() -> (TempDir, String) {
     let [[x, y], ..] = ROUND;
     let moves: Vec<_> = std::iter::zip(times(), ROUND)
@@ -80,7 +79,7 @@ fn mission() -> (TempDir, String) {
     (directory, file)
 }
 
-/// A source that publishes a sample for each pose of `robot`, and one before the first, until `ends`.
+/// Publishes a sample per pose of `robot`, and one before the first, until `ends`.
 fn publish(
     robot: &str,
     ends: &AtomicBool,
@@ -113,7 +112,7 @@ fn beacon(pose: &PoseSample, [x_m, y_m]: [f64; 2]) -> BeaconSample {
     }
 }
 
-/// Ends a source also when a test fails.
+/// Guard that ends a source on drop, also when a test fails.
 struct Ends<'a>(&'a AtomicBool);
 
 impl Drop for Ends<'_> {
@@ -122,13 +121,13 @@ impl Drop for Ends<'_> {
     }
 }
 
-/// `firsthand goto --follow`, which ends the following when it is interrupted.
+/// Starts `firsthand goto --follow`, which ends on an interrupt.
 fn follow(robot: &str, arguments: &[&str]) -> Child {
     let mut command = firsthand(&[&["goto", "--robot", robot, "--follow"], arguments].concat());
     command.stdout(Stdio::piped()).spawn().unwrap()
 }
 
-/// Interrupt a `firsthand goto --follow`. Returns what it says.
+/// Returns the output of an interrupted `firsthand goto --follow`.
 fn interrupt(follow: Child) -> String {
     signal_process(follow.id(), Signal::INT);
     let output = follow.wait_with_output().unwrap();
@@ -140,8 +139,8 @@ const WAITS: &str = "waiting for a target";
 
 const LOST: &str = "lost what it follows";
 
-/// A run in lockstep in which the robot follows the walker for the whole round. Returns the ground truth by the end of the walk, the
-/// summary, and the directory above the run's.
+/// Follows the walker for the whole round in lockstep. Returns the ground truth to the end of the
+/// walk, the summary, and the directory.
 fn follows_round(robot: &str) -> (Vec<GroundTruthTick>, Value, TempDir) {
     let (_mission, file) = mission();
     let mut run = Run::at_own_speed(robot, &file, &["--seed", "3"]);
@@ -187,7 +186,8 @@ fn a_robot_follows_a_walker_round_the_obstacle_course_without_a_touch_and_repeat
     assert_eq!((&result["outcome"], &result["followed"]["lost"]), (&"followed".into(), &0.into()));
     assert!(result["followed"]["way_m"].as_f64() > Some(5.0), "{result}");
     replayed_in(&directory);
-    // A robot that waits in lockstep sends frames as long as the machine takes to ask it: walks after equally many are the same.
+    // A waiting robot in lockstep sends frames until it is ordered. Only walks after equally many
+    // frames are the same.
     let frames = |walk: &[GroundTruthTick]| walk.iter().filter(|tick| tick.tick == 0).count();
     let mut walks = vec![walk];
     let (walk, again) = loop {
@@ -273,7 +273,7 @@ fn a_robot_follows_the_pose_of_another_robot_until_that_ends() {
     let mut follows = Run::start(second, "open-room", &mission);
     leads.wait_until_driving();
     follows.wait_until_driving();
-    // The first robot's mission begins 1 m ahead of the second's, and looks to its left.
+    // The first robot's mission frame is 1 m ahead of the second's, turned to its left.
     operate(first, &["goto", "1.2", "0"]);
     let command = follow(second, &[first, "--frame", "1", "0", "90", "--distance", "0.8"]);
     let off_m = |status: &Value| {

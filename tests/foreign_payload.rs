@@ -1,4 +1,5 @@
-//! A consumer built against other payload types is refused with the reason, and does no harm.
+//! Test that a consumer built with other payload types is refused with the reason, and does no
+//! harm.
 
 use std::fs;
 

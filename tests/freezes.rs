@@ -1,4 +1,4 @@
-//! Tests that stages which are frozen again and again are noticed soon.
+//! Tests that repeated freezes of stages are noticed soon.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod support;
@@ -7,13 +7,13 @@ use processes::stages::find as find_stage;
 use rustix::process::Signal;
 use support::{Run, STAGES};
 
-/// The longest time after its deadline in which a freeze is noticed, seconds.
+/// Longest time after its deadline until a freeze is noticed, seconds.
 const SLACK: f64 = 0.020;
 
-/// Freeze each stage `times` times in a mission at the pace of the wall clock, and print how late each freeze was
-/// noticed.
+/// Freezes each stage `times` times in a mission at wall-clock pace, and prints the delay of each
+/// detection.
 fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
-    // At this speed the mission outlasts every freeze.
+    // The mission outlasts every freeze.
     let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
     let mut run = Run::under_way(robot, "open-room", &slow, 0.5);
     for _ in 0..times {
@@ -21,7 +21,7 @@ fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
     }
     let deaths = run.records("deaths.jsonl");
     run.stop();
-    // If the machine stands still for a moment, other stages may be late too.
+    // A brief stall of the machine may make other stages late, too.
     assert!(deaths.len() >= times * STAGES.len(), "{deaths:?}");
     let mut late: Vec<f64> = deaths
         .iter()
@@ -47,12 +47,12 @@ fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
 #[test]
 fn frozen_stages_are_noticed_when_their_beat_is_due() {
     let late = freeze_each("freezes", 2);
-    // The processors are shared with other tests, so only the median counts.
+    // Other tests share the processors, so only the median counts.
     let median = late[late.len() / 2];
     assert!(late[0] >= 0.0 && median < SLACK, "{late:?}");
 }
 
-/// This takes ten minutes, on a machine that does nothing else:
+/// Takes ten minutes on an otherwise idle machine:
 /// `cargo test --release -p firsthand --test freezes -- --ignored --nocapture`.
 #[test]
 #[ignore = "takes ten minutes and a quiet machine"]

@@ -1,4 +1,4 @@
-//! Tests of a robot that is sent elsewhere while it drives.
+//! Tests of a robot that gets other targets while it drives.
 
 use std::{path::Path, time::Duration};
 
@@ -18,16 +18,14 @@ use serde_json::Value;
 
 use crate::support::{self, Run, json_of, operate, output, records, refused};
 
-/// Mission time runs this many times as fast as the wall clock.
+/// Mission time relative to the wall clock.
 const PACE: [&str; 2] = ["--pace", "2"];
 
-/// The outcomes of the targets in a summary.
 fn outcomes(summary: &Value) -> Vec<&str> {
     let targets = summary["targets"].as_array().unwrap();
     targets.iter().map(|target| target["outcome"].as_str().unwrap()).collect()
 }
 
-/// Read the commands of a robot until `is_enough` returns true for one.
 fn follow(robot: &str, mut is_enough: impl FnMut(&CommandSample) -> bool) {
     let bus = Bus::join(&support::domain(robot), "follower").unwrap();
     let mut commands = bus.reader(&topics::COMMAND).unwrap();
@@ -45,7 +43,6 @@ fn follow(robot: &str, mut is_enough: impl FnMut(&CommandSample) -> bool) {
     }
 }
 
-/// Assert that every generation of a recorded run is replayed to the bit.
 #[track_caller]
 fn assert_replays(run: &Path) {
     let mut files: Vec<_> =
@@ -100,7 +97,7 @@ fn a_list_is_driven_to_its_end_although_planner_and_supervisor_are_killed_in_bet
     assert_replays(&directory);
 }
 
-/// The heading of the last recorded pose of a run, radians in (-pi, pi].
+/// Returns the heading of a run's last recorded pose, radians in (-pi, pi].
 fn records_of_pose(run: &Path) -> f64 {
     let mut newest = None;
     for file in std::fs::read_dir(run).unwrap().map(|file| file.unwrap().path()) {
@@ -200,7 +197,7 @@ fn each_of_fifty_commands_in_a_row_finds_a_place_on_the_bus() {
     }
 }
 
-/// No target, and a place with a wall all around it.
+/// Mission without a target, with a place enclosed by walls.
 const STAYS: &str = "
 timeout_s = 1000.0
 perimeter.width_m = 8.0
@@ -282,7 +279,7 @@ fn a_standing_robot_is_told_where_it_is_goes_on_from_there_and_replays_to_the_bi
     run.wait_until("it waits at its start", |status| is_at(status, -2.0, 0.5));
     let place = |numbers: [&'static str; 3]| [&["place", "--robot", robot], &numbers[..]].concat();
     refused(&place(["9", "0", "0"]), "target-outside", &["perimeter"]);
-    // It stands there, and is believed one metre farther.
+    // It stands there, and believes it is one metre farther.
     operate(robot, &["place", "-1", "0.5", "90", "--sigma", "0.1"]);
     run.wait_until("it believes so", |status| is_at(status, -1.0, 0.5));
     let mut stalls = Vec::new();
@@ -329,11 +326,11 @@ fn zones_that_an_operator_adds_and_removes_hold_for_the_robot_alone_and_replay_t
     zone(&["-1", "-1", "1", "-1", "1", "1", "-1", "1"], "zone-here");
     zone(&["2", "2", "3", "3"], "no-zone");
     zone(&["3", "3", "--remove"], "not-in-zone");
-    // The way leads around the zone.
+    // The path leads around the zone.
     operate(robot, &["goto", "2.2", "0"]);
     run.wait_until("it drives", |status| status["order"] == "driving");
     run.wait_until("it is there", waits);
-    // The zone moves to the other side; where it was the ground is free.
+    // The zone moves to the other side, which frees its old place.
     operate(robot, &["zone", "1", "-1", "1.4", "-1", "1.4", "3.9", "1", "3.9"]);
     operate(robot, &["zone", "1.2", "-2", "--remove"]);
     refused(&["goto", "--robot", robot, "1.2", "2"], "target-in-hazard", &["hazard"]);
@@ -360,7 +357,7 @@ fn zones_that_an_operator_adds_and_removes_hold_for_the_robot_alone_and_replay_t
     support::assert_nothing_left(robot);
 }
 
-/// Requests of a hand that pushes the stick `[ahead, left]`, ten a second, until `is_enough` returns true.
+/// Pushes the joystick to `[ahead, left]` at 10 Hz, until `is_enough` returns true.
 fn push(robot: &str, stick: [f64; 2], mut is_enough: impl FnMut() -> bool) {
     let bus = Bus::join(&support::domain(robot), "hand").unwrap();
     let mut requests = bus.writer(&topics::REQUESTS, 1).unwrap();
@@ -400,7 +397,7 @@ fn a_hand_drives_a_robot_that_stays_past_no_hazard_and_it_stands_when_the_hand_g
         waits(status) && status["link"]["at_rest"] == true
     });
     push(robot, [0.0, -1.0], || at(&status(), "heading_deg").abs() < 20.0);
-    // The hand would drive it into the wall, and does not.
+    // The joystick points at the wall, and the robot stops before it.
     let began = std::time::Instant::now();
     push(robot, [1.0, 0.0], || {
         at(&status(), "x_m") > 0.5 && began.elapsed() > Duration::from_secs(8)

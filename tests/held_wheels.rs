@@ -1,20 +1,19 @@
-//! Tests of robots whose wheels are held by a thing that no sensor notices, or by something in the wheels.
+//! Tests of robots whose wheels are blocked by an undetected obstacle, or by an object in the
+//! wheels.
 
 use serde_json::Value;
 
 use crate::support::{Run, assert_ended, assert_nothing_left, records, wire::Robot};
 
-/// The pace of the wall clock, at which the link judges the robot's frames.
+/// Wall-clock pace, at which the link judges the robot's frames.
 const ON_THE_WALL: [&str; 2] = ["--pace", "2"];
 
-/// The causes and recovery steps of the stalls.
 fn stalls(directory: &std::path::Path) -> Vec<(String, String)> {
     let text = |value: &Value| value.as_str().unwrap().to_owned();
     let stalls = records(&directory.join("run").join("stalls.jsonl"));
     stalls.iter().map(|stall| (text(&stall["cause"]), text(&stall["recovery"]))).collect()
 }
 
-/// Drive the open room with these blocked wheels. Returns code, summary and stalls.
 fn blocked(
     robot: &str,
     blocks: &str,
@@ -48,7 +47,7 @@ fn a_robot_whose_wheels_are_held_for_ever_is_unreachable_and_its_odometry_is_not
 
 #[test]
 fn a_robot_that_is_held_by_a_thing_that_no_sensor_notices_maps_it_and_goes_another_way() {
-    // The box stands there, or appears before the robot.
+    // The box is there from the start, or appears before the robot.
     let shape = "[{at=[2,0],size_m=[0.3,0.8],top_m=0.1,echo=0}]";
     let things = [
         ("unheard", format!("world.box={shape}")),

@@ -1,4 +1,4 @@
-//! Robots that speak lines of JSON: the example of the guide in Python, which shares no code with this project, and the simulated one.
+//! Robots that speak JSON lines: the simulated one, and the guide's independent example in Python.
 
 use std::{
     fs,
@@ -15,10 +15,11 @@ use crate::support::{Run, assert_ended, assert_no_restart, assert_reached, repla
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
-/// The guide's robot, as a process.
+/// Process of the guide's robot.
 struct PythonRobot {
     process: Child,
-    /// A thread that reads the robot's lines about itself, so that the robot never waits, and returns the last.
+    /// Thread that drains the robot's own lines, so that the robot never waits, and returns the
+    /// last.
     last: JoinHandle<String>,
     port: u64,
 }
@@ -28,7 +29,8 @@ impl PythonRobot {
         Self::start_with(&[])
     }
 
-    /// `options` are the acceleration of its wheels, m/s^2, and their delay, seconds.
+    /// Starts a robot. `options` are the acceleration of its wheels, m/s^2, and their delay,
+    /// seconds.
     fn start_with(options: &[&str]) -> Self {
         let mut process = Command::new("setpriv")
             .args(["--pdeathsig", "KILL", "--", "python3"])
@@ -57,7 +59,7 @@ impl PythonRobot {
         Run::start(robot, &format!("{EXAMPLE}/robot.toml"), &set)
     }
 
-    /// End the robot. Returns its last line about itself.
+    /// Ends the robot. Returns its last line about itself.
     fn end(mut self) -> Value {
         self.process.kill().unwrap();
         self.process.wait().unwrap();
@@ -103,7 +105,7 @@ fn a_run_whose_robot_names_a_sensor_otherwise_ends_with_both_names_and_blames_no
     assert_no_restart(&summary);
 }
 
-/// Whether the link of a run says that the base answers otherwise than stated.
+/// Returns whether the link of a run reports that the base responds otherwise than stated.
 fn names_the_response(run: &Path) -> bool {
     let log = fs::read_to_string(run.join("link.log")).unwrap();
     assert!(!log.contains("counts do not follow"), "{log}");

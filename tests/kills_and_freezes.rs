@@ -1,7 +1,7 @@
-//! The matrix of kills and freezes: the process that gets a signal, the signal, and the phase of the mission.
+//! Matrix of kills and freezes: process, signal, and phase of the mission.
 //!
-//! The rows of stages are in [`rows`]. The tests after it are the rows of the supervisor and of all processes at once. `failsafe`
-//! tests the commands to the wheels meanwhile, and `freezes` the time until a freeze is noticed.
+//! [`rows`] are for stages. The tests after it are for the supervisor and all processes at once.
+//! `failsafe` tests commands to the wheels meanwhile, `freezes` the detection times.
 
 use std::{path::Path, process::Stdio};
 
@@ -14,19 +14,19 @@ use crate::support::{
     generation, operate, output, pid, pids_of, processes, records, replayed_in, signal_process,
 };
 
-/// The phase in which stages get a signal.
+/// Phase in which stages get a signal.
 enum Phase {
     /// Each stage gets the signal as soon as its first process runs.
     StartUp,
-    /// The stages get the signal one after the other while the robot drives.
+    /// The stages get the signal in turn while the robot drives.
     Driving,
-    /// The stages get the signal one after the other while the robot waits for an operator.
+    /// The stages get the signal in turn while the robot waits for an operator.
     Waiting,
     /// All stages get the signal at once after the supervisor was told to end.
     Stopping,
 }
 
-/// Every stage gets each of `signals` in `phase` of a mission.
+/// Row in which every stage gets each of `signals` in `phase` of a mission.
 struct Row {
     phase: Phase,
     signals: &'static [Signal],
@@ -38,19 +38,21 @@ const KILL: &[Signal] = &[Signal::KILL];
 const FREEZE: &[Signal] = &[Signal::STOP];
 const KILL_AND_FREEZE: &[Signal] = &[Signal::KILL, Signal::STOP];
 
-/// Mission time runs four times as fast as the wall clock: a mission takes ten seconds.
+/// Options for mission time at four times the wall clock: a mission takes ten seconds.
 const FAST: &[&str] = &["--pace", "4"];
-/// At this speed the robot is under way for longer than the signals take.
+/// Speed at which the robot drives for longer than the signals take.
 const LONG: &[&str] = &["--pace", "4", "--set", "controller.speed_m_s=0.1"];
-/// Among drums a car touches one in some 3 of 100 missions, killed or not: it cannot look around. So it drives in an empty room.
+/// Empty room for a car. It cannot look around, so among drums it touches one in some 3 of 100
+/// missions, killed or not.
 const CAR: &[&str] =
     &["--pace", "4", "--set", "robot.model=\"car\"", "--set", "controller.speed_m_s=0.05"];
-/// At this speed a mission in lockstep has thousands of ticks, which take a second or two. That is time enough for one signal.
+/// Speed at which a mission in lockstep has thousands of ticks, or a second or two: enough for one
+/// signal.
 const SLOW: &[&str] = &["--set", "controller.speed_m_s=0.02", "--timeout", "8000"];
-/// Here they take more seconds, for many signals.
+/// Speed at which a lockstep mission lasts long enough for many signals.
 const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.006", "--timeout", "80000"];
 
-/// A test for each row, named by the promise that it guards.
+/// Makes a test per row, named by its guarantee.
 macro_rules! rows {
     ($($promise:ident: $robot:literal $phase:ident $signals:ident $mission:literal $arguments:ident;)*) => {
         $(#[test]
@@ -145,7 +147,6 @@ fn waits(status: &Value) -> bool {
     status["order"] == "stopped by an operator"
 }
 
-/// The first process of `stage` in `run`, as soon as it exists.
 fn first_process(run: &Run, stage: &str) -> u32 {
     let directory = run.directory();
     let directory = directory.to_str().unwrap();
@@ -164,21 +165,21 @@ fn assert_at_least_one_restart(summary: &Value) {
     }
 }
 
-/// Assert that the pose was not lost, which would be metres. Another way reads the wheels at other fractions of a count, which is
-/// 9 mm across at a target 6 m away, and a car's tyres slip by some centimetres. Wheels slip more if the robot looks around for
-/// long, as on a loaded machine: three standard deviations of the covariance.
+/// Asserts that the pose was not lost, which would be metres. A different path reads the wheels at
+/// other fractions of a count, which is 9 mm laterally at 6 m. A car's tyres slip by centimetres.
+/// Long looks on a loaded machine add wheel slip: three standard deviations of the covariance.
 fn assert_pose_was_not_lost(summary: &Value) {
     let metres = |key: &str| summary[key].as_f64().unwrap();
     let allowed_m = (1.5 * metres("pose_within_m")).clamp(0.15, 0.5);
     assert!(metres("pose_error_m") < allowed_m, "{summary}");
 }
 
-/// Assert that every generation of every stage is bit-equal, or ended before it took anything.
+/// Asserts that every generation is bit-equal, or ended before its first input.
 fn assert_every_generation_replays(directory: &TempDir, row: &Row) {
     let deaths = records(&directory.path().join("run/deaths.jsonl"));
     let hit: Vec<_> = deaths.iter().map(|death| &death["stage"]).collect();
     assert_eq!(hit[..5], STAGES);
-    // In lockstep no stage waits for the recorder, so it may lose samples.
+    // In lockstep the recorder may lose samples, because no stage waits for it.
     if row.arguments == LOCKSTEP {
         return;
     }
@@ -193,7 +194,8 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
         let controller = find(status, "controller");
         controller["state"] == "running" && controller["beat_age_s"].as_f64() < Some(0.1)
     };
-    // On a busy machine the controller may be replaced before the second command. Both are then sent again.
+    // On a busy machine the controller may be replaced before the second command. Both are then
+    // sent again.
     let goes_on = || {
         let before = run.wait_until("the controller beats", beats);
         operate("kf-thaw", &["stage", "freeze", "controller"]);
@@ -220,14 +222,14 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
     run.stop();
 }
 
-/// The command that goes on with the run in `directory`.
 fn resume(directory: &Path) -> std::process::Command {
     let mut command = firsthand(&["run", "--json", "--resume"]);
     command.arg(directory).stderr(Stdio::inherit());
     command
 }
 
-/// Go on with a run to its end. Assert that the robot arrives and knows its place, and that the run was resumed `resumes` times.
+/// Resumes a run to its end. Asserts that the robot arrives with a known pose, after `resumes`
+/// resumes.
 fn assert_resumed_run_arrives(robot: &str, directory: &Path, resumes: u32) {
     let output = resume(directory).output().unwrap();
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();

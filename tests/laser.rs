@@ -17,7 +17,7 @@ use crate::support::{
 #[test]
 fn a_robot_with_a_laser_arrives_though_each_stage_is_killed_and_replays_to_the_bit() {
     let robot = ["--pace", "1", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=20"];
-    // The robot is slow enough not to arrive between two kills.
+    // The robot arrives only after the last kill.
     let slow = ["--set", "controller.speed_m_s=0.35"];
     let mut run =
         Run::under_way("laser-kills", "obstacle-course", &[&robot[..], &slow].concat(), 0.3);
@@ -113,7 +113,7 @@ fn a_laser_that_is_late_and_turns_slowly_and_says_so_places_the_robot_like_a_pro
     }
 }
 
-/// The run of a robot of 0.9 by 0.4 m with a laser in a room of 8 m, with these targets and walls.
+/// Runs a robot of 0.9 by 0.4 m with a laser in a room of 8 m, with these targets and walls.
 fn long_robot(robot: &str, targets: &str, walls: &str) -> (Option<i32>, serde_json::Value) {
     let text = format!(
         "targets = {targets}\nperimeter = {{ width_m = 8, centre = [1.5, 0] }}\nworld.wall = {walls}\n\

@@ -1,4 +1,4 @@
-//! Tests of the machine around a run: it stands still, its disk is full, its terminal is closed, it was suspended.
+//! Tests of the machine around a run: a stall, a full disk, a closed terminal, a suspension.
 
 use std::{
     fs::{self, File},
@@ -18,7 +18,7 @@ use crate::support::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-/// At this speed a mission takes longer than its test, which stops it.
+/// Speed at which a mission outlasts its test, which stops it.
 const SLOW: [&str; 6] =
     ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
 
@@ -32,7 +32,7 @@ fn stages_are_not_taken_for_hung_when_the_supervisor_stood_still_with_them() {
         for &process in &all {
             signal_process(process, Signal::STOP);
         }
-        // The duration is what is tested: it is longer than a stage may go without a beat.
+        // Longer than a stage may go without a heartbeat.
         thread::sleep(Duration::from_millis(800));
         for &process in all.iter().rev() {
             signal_process(process, Signal::CONT);
@@ -49,7 +49,7 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
     on_small_disk(8, |disk| {
         let robot = "mach-full";
         let out = disk.path().join("run");
-        // The robot is slow enough not to arrive between two looks at its stages.
+        // The robot arrives only after the second look at its stages.
         let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.25"];
         let run = firsthand(&["run", "obstacle-course", "--robot", robot, "--json"])
             .args(slow)
@@ -91,7 +91,7 @@ fn a_disk_without_room_for_the_result_is_told_before_the_start_and_names_the_fil
         let run = ["run", "open-room", "--robot", robot, "--out", out];
         assert_eq!(refused(&run, "disk-full", &["summary.json"]), Some(1));
         disk.empty();
-        // The disk has room for the summary, and not for the other files of a run.
+        // The disk has space for the summary, but not for the other files of a run.
         assert_eq!(refused(&run, "disk-full", &[out, "KiB"]), Some(1));
         assert_eq!(fs::read_dir(out).unwrap().filter(is_summary).count(), 0);
         assert_nothing_left(robot);
@@ -157,7 +157,7 @@ fn a_robot_that_is_off_leaves_no_directory_start_by_start() {
     let runs = directory_of("mach-off");
     for _ in 0..2 {
         let mut run = firsthand(&["run", "open-room", "--robot", "mach-off", "--runs"]);
-        // Nobody answers at this address.
+        // This address is unused.
         let address = ["--set", "robot.address='127.0.0.1:9'"];
         let mut run = start_quietly(run.arg(runs.path()).args(address));
         support::wait_for_status("mach-off", all_run);
@@ -170,7 +170,7 @@ fn a_robot_that_is_off_leaves_no_directory_start_by_start() {
 
 #[test]
 fn the_robot_of_another_user_is_named_and_not_said_to_be_missing() {
-    // The file has the name of this user's bus, except for the user's number.
+    // File with the name of this user's bus, except for the user's number.
     let bus = Path::new("/dev/shm/fh54321_mach-whose_bus");
     fs::create_dir_all(bus).unwrap();
     let status = output(&["status", "--robot", "mach-whose"]);
@@ -178,7 +178,7 @@ fn the_robot_of_another_user_is_named_and_not_said_to_be_missing() {
     assert_refused(&status, "not-running", &["54321"]);
 }
 
-/// The exit code of a command whose standard output nobody reads; a panic would be 101.
+/// Returns the exit code of a command with a closed standard output. A panic would be 101.
 fn unread(arguments: &[&str]) -> Option<i32> {
     let (reader, writer) = io::pipe().unwrap();
     drop(reader);
@@ -212,7 +212,6 @@ fn a_closed_standard_output_is_no_failure_of_any_command() {
     run.stop();
 }
 
-/// The number of descriptors of a process.
 fn descriptors(process: u32) -> usize {
     fs::read_dir(format!("/proc/{process}/fd")).unwrap().count()
 }
@@ -220,10 +219,10 @@ fn descriptors(process: u32) -> usize {
 #[test]
 fn a_stage_inherits_no_descriptor_of_its_supervisor() {
     let mut run = Run::under_way("mach-fds", "open-room", &SLOW, 0.3);
-    // The stage was started when its supervisor had everything open.
+    // The stage started when its supervisor had all its files open.
     let status = run.kill_and_await_successor("planner", Signal::KILL);
     let (own, supervisors) = (descriptors(pid(&status, "planner")), descriptors(run.pid()));
-    // A stage has 61 descriptors of its own and its supervisor some 200, of which a stage would inherit 86.
+    // A stage has 61 descriptors of its own. It would inherit 86 of its supervisor's some 200.
     assert!(2 * own < supervisors, "{own} of {supervisors}");
     run.stop();
 }
@@ -277,7 +276,7 @@ fn a_supervisor_waits_for_one_that_was_killed_a_moment_ago() {
     let out = runs.path().join("run");
     let mut run = firsthand(&["run", "open-room", "--robot", "mach-gone", "--out"]);
     let mut run = start_quietly(run.arg(&out));
-    // The supervisor logs before it locks, and tries again for a second.
+    // The supervisor logs before it locks, and retries for a second.
     support::wait_until("it logs", || out.join("supervisor.log").exists());
     thread::sleep(Duration::from_millis(100));
     drop(held);
@@ -288,7 +287,7 @@ fn a_supervisor_waits_for_one_that_was_killed_a_moment_ago() {
 #[test]
 fn a_latency_measurement_removes_no_directory_but_its_own() {
     let user = rustix::process::geteuid().as_raw();
-    // This is another robot of this user, whose directory is below the removed one.
+    // Another robot of this user, with its directory below the removed one.
     let run = Run::under_way("mach-lat", "open-room", &SLOW, 0.3);
     let tick = ["bench", "tick", "--robot", support::suite(), "--rounds", "1", "--json"];
     support::printed(&[&tick[..], &["--rate", "max"]].concat());

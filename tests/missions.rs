@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::support::{self, Run, assert_ended, assert_nothing_left, printed, run};
 
-/// Assert that the robot reaches its target and touches nothing.
+/// Asserts that the robot reaches its target and touches nothing.
 #[track_caller]
 fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) -> Value {
     println!("{arguments:?}");
@@ -13,13 +13,12 @@ fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) -> Value {
     summary
 }
 
-/// The length of the robot's way, in lengths of the straight line.
+/// Returns the path length relative to the straight line.
 fn detour(summary: &Value) -> f64 {
     let metres = |key: &str| summary[key].as_f64().unwrap();
     metres("path_length_m") / metres("straight_m")
 }
 
-/// Assert that a whole run ends with that exit code and outcome.
 #[track_caller]
 fn ends(robot: &str, mission: &str, arguments: &[&str], code: i32, outcome: &str) -> Value {
     let (found, summary) = run(robot, mission, arguments);
@@ -29,7 +28,7 @@ fn ends(robot: &str, mission: &str, arguments: &[&str], code: i32, outcome: &str
 }
 
 const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
-/// Faster, a robot by the paper's method or a car touches something with some seeds.
+/// Speed below which a car, or a robot by the paper's method, touches nothing with any seed.
 const SLOW: [&str; 2] = ["--set", "controller.speed_m_s=0.2"];
 const MEASURED: [&str; 2] = ["--set", "simulation.realism=\"measured\""];
 
@@ -49,7 +48,8 @@ fn a_hall_that_five_people_cross_is_crossed_untouched_for_seeds_1_to_10() {
 
 #[test]
 fn by_the_papers_method_it_does_for_seeds_1_to_8() {
-    // The way is twice as long, so with measured wheels the arrival would be unsure. Those of the laboratory are better.
+    // The path is twice as long, so with measured wheels the arrival would be unsure. Laboratory
+    // wheels are better.
     let wheels =
         ["--set", "robot.odometry.diameter_ratio_sd=0", "--set", "robot.odometry.slip=0.001"];
     for seed in 1..=8 {
@@ -72,7 +72,7 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
         let arguments = [&MEASURED[..], &fading, &["--seed", &seed]].concat();
         let (_, summary) = run("faded", "obstacle-course", &arguments);
         let outcome = summary["outcome"].as_str().unwrap();
-        // Measured wheels drift, and this test is not about the place where the robot takes the target to be.
+        // Measured wheels drift, and this test ignores the error of the believed target.
         let arrived = ["reached", "reached_unsure", "wrong_place"].contains(&outcome);
         assert!(arrived, "{arguments:?}: {summary}");
         assert_eq!(summary["collisions"], 0, "{arguments:?}");
@@ -81,7 +81,7 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
 
 #[test]
 fn a_robot_with_a_gyro_and_wheels_that_nobody_calibrated_knows_its_place() {
-    // One by one these are given after the mission's own, which are those of calibrated wheels.
+    // These options follow and replace the mission's own, which are for calibrated wheels.
     let wheels = [
         "--set=robot.odometry={}",
         "--set=simulation.wheels={}",
@@ -242,7 +242,8 @@ fn every_run_leaves_a_picture_a_summary_and_logs() {
     }
 }
 
-/// The reports of `bench tick` with these arguments, one for each regime. The mission is over after a few seconds.
+/// Returns the reports of `bench tick` with these arguments, one per regime. The mission lasts a
+/// few seconds.
 fn latency(robot: &str, arguments: &[&str]) -> Vec<Value> {
     let short = ["bench", "tick", "--rounds", "1", "--set", "timeout_s=5", "--json"];
     let printed = printed(&[&short[..], &["--robot", robot], arguments].concat());

@@ -1,5 +1,5 @@
-//! Tests of other processes and users beside a robot: they neither drive it nor keep it from starting, and the processes that they
-//! break end.
+//! Tests of other processes and users beside a robot. They can neither drive it nor block its
+//! start, and processes that they break end.
 
 use std::{
     fs,
@@ -36,11 +36,10 @@ use rustix::{
     thread::{Uid, set_thread_res_uid},
 };
 
-/// The longest time from a signal to the end of a run whose bus is damaged, which takes 3 s: the rest is the load of the machine, for
-/// which its supervisor is not blamed.
+/// Longest time from a signal to the end of a run with a damaged bus. The run needs 3 s, the rest
+/// allows for machine load.
 const ENDS_WITHIN: Duration = Duration::from_secs(20);
 
-/// The files of a robot in shared memory.
 fn shared(robot: &str) -> Vec<std::path::PathBuf> {
     support::shared_memory(&domain(robot).shared_memory_prefix())
 }
@@ -167,11 +166,11 @@ fn another_user_who_waits_for_the_files_of_a_new_bus_opens_none() {
     });
 }
 
-/// As another user, open each file of that prefix for writing when it is made or its permissions change. Returns how many files were
-/// tried, and how many opened.
+/// Opens each file of that prefix for writing, as another user, on creation or change of
+/// permissions. Returns tries and successes.
 fn race(prefix: &str, over: &AtomicBool) -> (usize, usize) {
     let nobody = Uid::from_raw(65534);
-    // This sets the user of this thread alone.
+    // Sets the user of this thread alone.
     set_thread_res_uid(nobody, nobody, nobody).unwrap();
     let watched = inotify::init(inotify::CreateFlags::NONBLOCK).unwrap();
     let events = inotify::WatchFlags::CREATE | inotify::WatchFlags::ATTRIB;
@@ -213,7 +212,7 @@ fn a_directory_of_another_user_with_the_name_of_this_users_blocks_no_start() {
     };
     let slowly = ["run", "open-room", "--robot", "squatted", "--pace", "1", "--json"];
     let mut run = start(&slowly).stdout(Stdio::piped()).spawn().unwrap();
-    // Another process of the user finds the robot, and stops it.
+    // Another process of the user finds the robot and stops it.
     support::wait_until("it is found", || {
         let status = start(&["status", "--robot", "squatted", "--json"]).output().unwrap();
         status.status.success() && home.path().join(".firsthand/squatted/lock").exists()
@@ -257,7 +256,7 @@ fn no_file_of_a_run_is_open_to_other_users() {
     let run = Run::under_way("closed", "open-room", &["--pace", "1"], 0.3);
     let robot = domain("closed");
     for path in shared("closed").into_iter().chain([robot.directory().to_owned()]) {
-        // A file that was just removed is not open to others.
+        // A removed file cannot be opened by others.
         if let Ok(found) = fs::symlink_metadata(&path) {
             assert_eq!(found.mode() & 0o077, 0, "{}", path.display());
         }
@@ -334,7 +333,7 @@ fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_second
         if remove {
             fs::remove_dir_all(root).unwrap();
         }
-        // A stage that has to join finds these files.
+        // A stage that joins finds these files.
         signal_process(pid(&status, "mapper"), Signal::KILL);
         std::thread::park_timeout(Duration::from_millis(500));
         if Path::new(&format!("/proc/{supervisor}")).exists() {
@@ -345,7 +344,7 @@ fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_second
         let took = began.elapsed();
         println!("{robot}: ended {took:?} after SIGTERM");
         assert!(took < ENDS_WITHIN, "{robot}: {took:?}");
-        // The next start is a normal one.
+        // The next start is normal.
         Run::start(robot, "open-room", &[]).arrives();
     }
 }

@@ -1,10 +1,10 @@
-//! Tests of an operator's actions on a robot that runs: stop and resume, kill, hold and release.
+//! Tests of an operator's actions on a running robot: stop and resume, kill, hold and release.
 
 use common::clock::monotonic_ns;
 
 use crate::support::{Run, find, operate};
 
-/// Mission time runs this many times as fast as the wall clock.
+/// Mission time relative to the wall clock.
 const PACE: [&str; 2] = ["--pace", "4"];
 
 #[test]
@@ -13,7 +13,7 @@ fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
     operate("halt", &["stop"]);
     let stopped =
         run.wait_until("it is stopped", |status| status["order"] == "stopped by an operator");
-    // The ticks of a stopped robot go on, because it may be carried.
+    // A stopped robot continues its ticks, because it may be carried.
     let tick = stopped["tick"].as_u64().unwrap();
     let later = run.wait_until("some ticks have passed", |status| {
         status["tick"].as_u64().unwrap() > tick + 10
@@ -35,7 +35,7 @@ fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot
 
 #[test]
 fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
-    // Within this time a busy machine starts the stages.
+    // Time in which a busy machine starts the stages.
     let (pace, timeout_s) = (4.0, 100.0);
     let set = format!("timeout_s={timeout_s}");
     let arguments = ["--pace", "4", "--set", &set, "--set", "controller.speed_m_s=0.5"];
@@ -52,7 +52,7 @@ fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
 #[test]
 fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
     let mut run = Run::under_way("held", "open-room", &PACE, 1.0);
-    // The next generation fails when it starts.
+    // The next generation fails at its start.
     let checkpoint = run.directory().join("mapper.checkpoint");
     std::fs::remove_file(&checkpoint).unwrap();
     std::fs::create_dir(&checkpoint).unwrap();

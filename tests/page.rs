@@ -16,7 +16,7 @@ use crate::support::{
 /// `firsthand page` for a robot.
 struct Page {
     child: Child,
-    /// The addresses to watch and to drive.
+    /// Addresses to watch and to drive.
     watch: String,
     drive: String,
 }
@@ -36,7 +36,6 @@ impl Page {
         Self { child, watch, drive }
     }
 
-    /// The address on which the page listens.
     fn listen(&self) -> &str {
         self.watch.strip_prefix("http://").unwrap().split('/').next().unwrap()
     }
@@ -82,14 +81,14 @@ fn says(id: &str, text: &str) -> String {
     format!("document.getElementById('{id}').textContent.includes('{text}')")
 }
 
-/// Watch a live run in a window of that width, and act as an operator.
+/// Watches a live run in a window of that width, and acts as an operator.
 fn operate(robot: &str, width: u32) {
     let page = Page::start(robot, "127.0.0.1:0");
     let browser = Browser::open(width);
     browser.go(&page.drive);
     browser.wait_until(&says("status", "no robot runs"));
     assert_eq!(browser.run("return location.hash"), "", "the token is not shown");
-    // The robot is so slow that it does not arrive while it is watched, on a busy machine either.
+    // The robot arrives only after the test, on a busy machine too.
     let slow = ["--pace", "1", "--set", "timeout_s=600", "--set", "controller.speed_m_s=0.02"];
     let mut run = Run::start(robot, "open-room", &slow);
     run.wait_until_driving();
@@ -121,7 +120,7 @@ fn operate(robot: &str, width: u32) {
     browser.tap("resume", 0, 0);
     browser.wait_until(GOES);
 
-    // The browser scrubs back: the header stays that of now.
+    // The browser scrubs back, while the header stays live.
     browser.run("const time = document.getElementById('time'); time.value = time.min; time.dispatchEvent(new Event('input'))");
     browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'false'");
     browser.wait_until("!document.getElementById('past').hidden");
@@ -145,7 +144,7 @@ fn operate(robot: &str, width: u32) {
     let listen = page.listen().to_owned();
     page.end(Signal::KILL);
     browser.wait_until(IS_LOST);
-    // The next page has other tokens. An attempt follows half a second after the one before, and here none does.
+    // The next page has other tokens. Attempts follow every half second, and here none may.
     let page = Page::start(robot, &listen);
     browser.wait_until(&says("notice", "wrong or expired: open an address that `firsthand page`"));
     browser.run("window.since = performance.now()");
@@ -169,7 +168,7 @@ fn a_robot_is_watched_stopped_and_resumed_in_a_browser_that_loses_and_regains_it
     operate("page-desk", 1280);
 }
 
-/// Whether the middle of each of these elements is seen: in the window, and under nothing else.
+/// Script that lists elements whose middle is outside the window or covered.
 const SEEN: &str = "const hidden = ids.filter((id) => {
   const box = document.getElementById(id).getBoundingClientRect();
   const top = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);

@@ -1,4 +1,5 @@
-//! Tests of planners that are executables of their own: a mission names them, and they are treated like every stage.
+//! Tests of planners as separate executables: a mission names them, and they are supervised like
+//! every stage.
 
 use std::{fs, os::unix::fs::PermissionsExt as _, path::Path, process::Stdio};
 
@@ -9,9 +10,9 @@ use crate::support::{
     printed, refused, signal_process, start_quietly,
 };
 
-/// The planners to compare with.
+/// Planners for comparison.
 const BASELINES: [&str; 2] = ["wavefront", "bug"];
-/// A drum in the way that is known beforehand, so the way around it is the same in every run.
+/// Drum known beforehand, so the path around it is the same in every run.
 const DRUM: [&str; 6] = [
     "--set",
     "known.drum=[{at=[1.8, 0.1], radius_m=0.3}]",
@@ -21,7 +22,7 @@ const DRUM: [&str; 6] = [
     "mapper.clearance_m=0.1",
 ];
 
-/// Make an executable at `path` that becomes a baseline.
+/// Makes an executable at `path` that becomes a baseline.
 fn own_planner(path: &Path) {
     let text = format!(
         "#!/bin/sh\nshift 2\nexec {} stage wavefront \"$@\"\n",
@@ -31,7 +32,6 @@ fn own_planner(path: &Path) {
     fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
 }
 
-/// The assignment that makes `executable` the planner.
 fn planner(executable: &str) -> String {
     format!("planner.executable='{executable}'")
 }
@@ -42,9 +42,9 @@ fn a_mission_with_a_planner_of_its_own_arrives_though_the_planner_is_killed_on_t
         let set = planner(name);
         let arguments = [&DRUM[..], &["--pace", "4", "--set", &set]].concat();
         let mut run = Run::start(name, "open-room", &arguments);
-        // At 0.25 m/s the robot is on the way around the drum by then.
+        // At 0.25 m/s the robot is then on its way around the drum.
         let status = run.wait_until_under_way(6.0);
-        // The restart is counted in the summary, however soon the run ends.
+        // The summary counts the restart even if the run ends early.
         signal_process(pid(&status, "planner"), Signal::KILL);
         let summary = run.arrives();
         assert_eq!(summary["restarts"]["planner"], 1, "{name}: {summary}");

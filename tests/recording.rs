@@ -1,4 +1,4 @@
-//! Tests of runs that real processes record, and that are opened and replayed to the bit; and of killed recorders.
+//! Tests of recorded runs of real processes, which replay bit by bit, and of killed recorders.
 
 use std::{
     fs,
@@ -66,7 +66,7 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
 
 #[test]
 fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_has_ended() {
-    // A busy machine takes minutes for these commands, and the robot must not be there by then.
+    // These commands take minutes on a busy machine, and the robot must arrive later.
     let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.006"];
     let mut run = Run::start("rec-orders", "open-room", &slow);
     run.wait_until_driving();
@@ -81,7 +81,7 @@ fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_
         for (words, kind) in words {
             let said = output(&[words, &["--robot", "rec-orders"]].concat());
             assert!(said.status.success(), "{said:?}");
-            // A stop of which its supervisor was not told says so, and holds.
+            // A stop that could not reach the supervisor says so, and still holds.
             if said.stderr.is_empty() {
                 asked.push((kind, RequestAnswer::Taken));
             }
@@ -98,7 +98,8 @@ fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_
         .iter()
         .map(|order| (RequestKind::from_byte(order.kind), RequestAnswer::from_byte(order.answer)))
         .collect();
-    // On a busy machine an order is made again until it is taken, and a supervisor takes one for which nobody waits any more.
+    // On a busy machine an order is repeated until it is taken, and a supervisor may take one after
+    // its sender has ended.
     let mut rest = answered.iter();
     assert!(asked.iter().all(|order| rest.any(|it| it == order)), "{answered:?}");
     let times = orders.windows(2).map(|pair| pair[1].stamp.stamp_ns - pair[0].stamp.stamp_ns);
@@ -170,7 +171,7 @@ fn a_run_that_is_ended_waits_for_its_recorder_and_is_not_taken_for_one_that_hang
     let recorder = recorder_of(&run);
     signal_process(recorder, Signal::STOP);
     run.signal(Signal::TERM);
-    // The duration is what is tested: it is longer than a loop that hangs may stand still.
+    // Longer than a hung loop may stand still.
     thread::sleep(Duration::from_secs(4));
     signal_process(recorder, Signal::CONT);
     let (code, summary, directory) = run.finish_in();
@@ -178,7 +179,7 @@ fn a_run_that_is_ended_waits_for_its_recorder_and_is_not_taken_for_one_that_hang
     assert_eq!(open(directory.path()).end, End::Complete);
 }
 
-/// Kill a recorder of `robot` whose file has grown `growths` times. Returns its file.
+/// Kills a recorder of `robot` after `growths` growths of its file. Returns its file.
 fn killed_recorder(run: &Run, file: PathBuf, growths: usize) -> PathBuf {
     let mut recorder = firsthand(&["record", "--robot", &run.robot, "--out"])
         .arg(&file)
@@ -222,7 +223,7 @@ fn a_recorder_that_waits_for_a_robot_records_its_run_so_that_it_can_be_read() {
 #[test]
 fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was() {
     let run = Run::under_way("rec-shot", "obstacle-course", &["--pace", "4"], 1.0);
-    // A robot that stands does not arrive before its recorders are killed, however busy the machine is.
+    // A standing robot cannot arrive before its recorders are killed.
     operate("rec-shot", &["stop"]);
     let directory = tempfile::tempdir().unwrap();
     let mut read = 0;
@@ -249,7 +250,8 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
 
 #[test]
 fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_be_read_alone() {
-    // The run is long enough for eight files, and the budget has room for one that is a chunk longer than its share.
+    // The run is long enough for eight files. The budget allows one that exceeds its share by a
+    // chunk.
     let slow = "controller.speed_m_s=0.15";
     let budget = ["--pace", "4", "--disk-budget", "1500kB", "--set", slow];
     let (code, summary, directory) =

@@ -1,4 +1,4 @@
-//! Tests that a run in lockstep is the same each time, whatever the machine does meanwhile.
+//! Tests that runs in lockstep are identical, independent of machine load.
 
 use std::{collections::BTreeMap, fmt::Debug, time::Duration};
 
@@ -14,24 +14,24 @@ use serde_json::Value;
 
 use crate::support::{self, Run, assert_nothing_left, in_own_process};
 
-/// The summary without the values that are measured on the wall clock.
+/// Returns the summary without wall-clock measurements.
 fn numbers(mut summary: Value) -> Value {
     for wall_clock in ["tick_latency_us", "full_solve_us"] {
         summary.as_object_mut().unwrap().remove(wall_clock);
     }
-    // A machine may leave the supervisor no turn for 2 s. The robot stands, and mission time with it.
+    // A machine may not schedule the supervisor for 2 s. Robot and mission time then stand.
     summary["stops"].as_object_mut().unwrap().remove("supervisor silent");
     summary
 }
 
-/// The samples that a consumer receives of a run, and the run's summary.
+/// Samples that a consumer receives of a run, and the run's summary.
 #[derive(Debug)]
 struct Recording {
-    /// Each sample, by topic and tick.
+    /// Samples by topic and tick.
     samples: BTreeMap<(&'static str, u64), String>,
-    /// The cells of each version of the grid that was put together. A late reader has missed some.
+    /// Cells of each completed version of the grid. A late reader misses some.
     grids: BTreeMap<u64, Vec<u8>>,
-    /// The version of the grid from which the last guidance was computed.
+    /// Grid version of the last guidance.
     last_grid: u64,
     summary: Value,
 }
@@ -51,7 +51,8 @@ impl Recording {
         self.samples.insert(("ranges", tick), format!("{readings:?}"));
     }
 
-    /// Whether a sample of each of `topics` topics was received for each tick, and the grid to the last.
+    /// Returns whether each of `topics` topics has a sample for each tick, and the last grid is
+    /// present.
     fn is_whole(&self, topics: usize) -> bool {
         let ticks = self.summary["ticks"].as_u64().unwrap();
         self.samples.len() as u64 == topics as u64 * ticks
@@ -59,7 +60,6 @@ impl Recording {
     }
 }
 
-/// Run the default mission, and receive all of it.
 fn record(robot: &str) -> Recording {
     let domain = support::domain(robot);
     let mut run = Run::start(robot, "obstacle-course", &["--seed", "7"]);
@@ -85,7 +85,7 @@ fn record(robot: &str) -> Recording {
     };
     let mut grid = Replica::default();
     loop {
-        // This is asked first, so that all samples published until then are received below.
+        // Checked first, so that the reads below get all samples published until then.
         let over = !run.is_running();
         while let Ok(Some(part)) = grids.next_slice() {
             grid.apply(&part.header().part, &part);
@@ -104,7 +104,7 @@ fn record(robot: &str) -> Recording {
             received.add("pose", sample);
         }
         while let Ok(Some(mut sample)) = guidances.next_sample() {
-            // This value is measured on the wall clock.
+            // Wall-clock measurement.
             sample.full_solve_ns = 0;
             received.last_grid = sample.grid_version;
             received.add("guidance", sample);
@@ -125,7 +125,7 @@ fn record(robot: &str) -> Recording {
 #[test]
 fn the_same_seed_gives_the_same_samples_and_grids_to_the_bit() {
     in_own_process(|| {
-        // A consumer that the machine did not schedule in time has lost some samples.
+        // A consumer that was not scheduled in time has lost samples.
         let whole = || {
             let mut records = (0..20).map(|_| record("recorded"));
             records.find(|recording| recording.is_whole(5)).expect("a recording without a gap")
@@ -187,7 +187,7 @@ fn a_mission_whose_robot_stalls_gives_the_same_summary_to_the_bit() {
 
 #[test]
 fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
-    // At this speed the mission has thousands of ticks, which take a second or two. That is time enough to stop it.
+    // Thousands of ticks take a second or two, which leaves time to stop the mission.
     let slow = ["--set", "controller.speed_m_s=0.02", "--timeout", "8000"];
     let (_, undisturbed) = support::run("tick-calm", "open-room", &slow);
     let mut run = Run::start("tick-held", "open-room", &slow);
@@ -207,7 +207,8 @@ fn a_robot_with_a_laser_goes_the_same_way_though_a_slow_stage_makes_the_link_rep
         let (_, undisturbed) = support::run("laser-calm", "open-room", &slow);
         let mut run = Run::start("laser-slow", "open-room", &slow);
         let planner = support::pid(&run.wait_until_under_way(1.0), "planner");
-        // The bus tells of a repeated tick at once: a planner that is frozen for long is replaced, and its successor's map is another.
+        // The bus reports a repeated tick at once. A planner frozen for long would be replaced, and
+        // its successor's map differs.
         let bus = Bus::join(&support::domain("laser-slow"), "watcher").unwrap();
         let mut link = bus.reader(&topics::LINK).unwrap();
         let mut waiter = Waiter::default();

@@ -1,4 +1,5 @@
-//! Tests that a consumer that joined before the bus was recreated can tell, joins again, and does no harm when it leaves.
+//! Tests that a consumer of a recreated bus notices, joins again, and leaves the old bus without
+//! harm.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +12,7 @@ use rustix::process::Signal;
 
 const ROBOT: &str = "recreated";
 
-/// The next pose on `bus`, received in the way of the guide's consumer.
+/// Returns the next pose on `bus`, received as the guide's consumer does.
 fn next_pose(bus: &Bus) -> PoseSample {
     let mut poses = bus.reader(&topics::POSE).unwrap();
     let mut waiter = Waiter::default();
@@ -29,7 +30,7 @@ fn next_pose(bus: &Bus) -> PoseSample {
 #[test]
 fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_without_harm() {
     in_own_process(|| {
-        // The robot is slow enough not to arrive while a busy machine starts its stages again.
+        // The robot arrives only after a busy machine has restarted its stages.
         let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02"];
         let mut run = Run::start(ROBOT, "open-room", &slow);
         let status = run.wait_until_under_way(1.0);
@@ -43,7 +44,8 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         for service in std::fs::read_dir(services).unwrap() {
             half_make(&service.unwrap().path());
         }
-        // The link neither reads nor writes poses. A killed process still counts as a user of its topics.
+        // The link neither reads nor writes poses. A killed process still counts as a user of its
+        // topics.
         signal_process(pid(&status, "link"), Signal::KILL);
         let began = Instant::now();
         while !old.is_replaced() {
@@ -51,7 +53,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
             run.status();
         }
         let new = loop {
-            // There may be no bus for a moment between the two.
+            // There may be no bus between the two.
             match Bus::join(&domain, "logger") {
                 Ok(new) => break new,
                 Err(error) => assert!(began.elapsed() < PATIENCE, "{error}"),
@@ -60,11 +62,11 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         assert!(!new.is_replaced());
         assert!(next_pose(&new).stamp.tick > heard.stamp.tick);
 
-        // This consumer is the last to leave the old bus, because all others use the new one.
+        // This consumer is the last to leave the old bus.
         drop((old_poses, old));
         let before = run.wait_until("all work", |status| status["order"] == "driving");
         let after = run.kill_and_await_successor("dead-reckoning", Signal::KILL);
-        // The stage must start once. If its start was refused twice, the bus would have been recreated once more.
+        // The stage must start once. Two refused starts would recreate the bus again.
         let generation = |status, stage| find(status, stage)["generation"].as_u64().unwrap();
         for (stage, more) in [("dead-reckoning", 1), ("planner", 0)] {
             assert_eq!(generation(&after, stage), generation(&before, stage) + more, "{stage}");

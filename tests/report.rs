@@ -1,4 +1,4 @@
-//! Tests of reports of runs through real processes.
+//! Tests of run reports through real processes.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::support::{Run, assert_nothing_left, messages, printed, refused};
 
-/// The events of a page, each with the part that it is about, and the last message.
+/// Returns the events of a page with their subjects, and the last message.
 fn events(page: &str) -> (Vec<String>, Value) {
     let (messages, _) = messages(page);
     let all = messages.iter().filter_map(|message| message["events"].as_array()).flatten();
@@ -34,7 +34,7 @@ fn a_run_ends_with_a_report_that_tells_of_a_planner_that_was_killed() {
     let rows = messages.iter().filter_map(|message| message["rows"].as_array()).flatten();
     assert!(rows.filter(|row| row[at].is_number()).count() > 10, "it has the ground truth");
 
-    // The report must be the same from the file alone, without a summary beside it.
+    // The recording alone, without a summary, gives the same report.
     let alone = tempfile::tempdir().unwrap();
     let file = alone.path().join("drive.mcap");
     fs::copy(directory.path().join("run/recording.mcap"), &file).unwrap();
@@ -58,7 +58,7 @@ fn a_run_that_was_not_recorded_has_no_report_and_the_command_says_why() {
 #[test]
 fn a_report_that_cannot_be_written_does_not_end_the_mission() {
     let run = Run::under_way("report-full", "open-room", &["--pace", "4"], 0.2);
-    // A file stands in the place of the directory.
+    // A file takes the directory's place.
     fs::write(run.directory().join("report"), "").unwrap();
     let (code, summary, _directory) = run.finish_in();
     assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");

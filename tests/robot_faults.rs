@@ -1,11 +1,11 @@
-//! Tests of robots with a fault that their link has to notice, through real processes (`firsthand bench chaos
-//! --robot-faults`).
+//! Tests of robot faults that their link must notice, through real processes
+//! (`firsthand bench chaos --robot-faults`).
 
 use serde_json::Value;
 
 use crate::support::{Run, assert_nothing_left, json_of, output};
 
-/// The exit code, and the entry of the stop-time table for a robot with `fault`.
+/// Returns the exit code, and the entry of the stop-time table for a robot with `fault`.
 fn stop_time(robot: &str, fault: &str) -> (Option<i32>, Value) {
     let fault = format!("--robot-faults={fault}");
     let arguments = ["bench", "chaos", "open-room", &fault, "--json", "--robot", robot];
@@ -37,7 +37,7 @@ fn a_robot_that_rests_has_a_reason_although_a_killed_mission_left_its_bus() {
 
 #[test]
 fn a_robot_that_does_not_stop_is_told_as_long_as_it_moves() {
-    // The exit code and the table agree whether the robot is brought to rest or not.
+    // Exit code and table agree whether the robot stops or not.
     let (code, entry) = stop_time("rf-moves", "does-not-stop");
     let in_time = entry["rest_s"].as_f64() <= entry["promised_s"].as_f64();
     assert_eq!(code, Some(if in_time { 0 } else { 8 }), "{entry}");

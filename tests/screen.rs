@@ -20,15 +20,15 @@ use crate::support::{PATIENCE, Run, find, firsthand_under, refused, signal_proce
 /// Lines and columns of the terminal.
 const SIZE: (usize, usize) = (24, 80);
 
-/// `firsthand top` on a terminal of its own.
+/// `firsthand top` on its own terminal.
 struct Screen {
     child: Child,
     terminal: Option<File>,
-    /// The bytes that were written to it.
+    /// Bytes written to the terminal.
     written: Vec<u8>,
 }
 
-/// The text on a screen to which `written` was written: each letter at the position of the cursor, without colours.
+/// Renders `written` on a screen: each letter at the cursor position, without colours.
 fn shown(written: &[u8]) -> String {
     let mut letters = vec![vec![' '; SIZE.1]; SIZE.0];
     let (mut row, mut col) = (0, 0);
@@ -49,7 +49,7 @@ fn shown(written: &[u8]) -> String {
             numbers.push(*letter);
             letter.is_ascii_alphabetic()
         });
-        // This sequence moves the cursor; the others are colours and modes.
+        // This sequence moves the cursor. The others are colours and modes.
         if end == Some('H')
             && let Some((line, column)) = numbers.trim_end_matches('H').split_once(';')
         {
@@ -82,7 +82,7 @@ impl Screen {
         Self { child, terminal: Some(terminal.into()), written: Vec::new() }
     }
 
-    /// Read what is written, until the screen shows `text`.
+    /// Reads output until the screen shows `text`.
     fn wait_for(&mut self, text: &str) {
         let began = Instant::now();
         while !shown(&self.written).contains(text) {
@@ -92,7 +92,7 @@ impl Screen {
         }
     }
 
-    /// Read some of the written bytes. Returns whether there were any. A terminal that nobody has open any more gives an
+    /// Reads some output. Returns whether there was any. A terminal without open handles gives an
     /// error.
     fn read(&mut self) -> bool {
         let mut some = [0; 4096];
@@ -108,7 +108,7 @@ impl Screen {
         terminal.write_all(keys.as_bytes()).unwrap();
     }
 
-    /// The exit code, once the command has ended, and all that it wrote.
+    /// Waits for the end. Returns exit code and all output.
     fn end(&mut self) -> (Option<i32>, String) {
         while self.read() {}
         let code = self.child.wait().unwrap().code();
@@ -128,7 +128,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     let robot = "con-top";
     let mut screen = Screen::start(robot);
     screen.wait_for("is not running here");
-    // The robot stands while the other keys are pressed, so it does not arrive before.
+    // The robot stands while the other keys are pressed, so it cannot arrive earlier.
     let slow = ["--pace", "2", "--timeout", "600", "--set", "controller.speed_m_s=0.2"];
     let mut run = Run::start(robot, "obstacle-course", &slow);
     screen.wait_for("driving");
@@ -165,7 +165,7 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     screen.press("q");
     let (code, written) = screen.end();
     assert_eq!(code, Some(0), "{written:?}");
-    // The terminal is restored to its first screen and cursor.
+    // The terminal returns to its first screen and cursor.
     for restored in ["\x1b[?1049l", "\x1b[?25h"] {
         assert!(written.contains(restored), "{written:?}");
     }

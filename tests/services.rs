@@ -23,10 +23,10 @@ use crate::{
 use rustix::process::Signal;
 use tempfile::TempDir;
 
-/// The value of WatchdogSec in a unit.
+/// WatchdogSec of a unit.
 const WATCHDOG: Duration = Duration::from_secs(2);
 
-/// The socket where a service reports its state.
+/// Socket on which a service reports its state.
 struct Manager {
     socket: UnixDatagram,
     directory: TempDir,
@@ -40,14 +40,14 @@ impl Manager {
         Self { socket, directory }
     }
 
-    /// `command` as systemd would start it.
+    /// Sets the environment that systemd would give `command`.
     fn adopt(&self, command: &mut Command) {
         command
             .env("NOTIFY_SOCKET", self.directory.path().join("notify"))
             .env("WATCHDOG_USEC", WATCHDOG.as_micros().to_string());
     }
 
-    /// The lines of the next message.
+    /// Returns the lines of the next message.
     fn hear(&self) -> Vec<String> {
         let mut message = [0; 4096];
         let length = self.socket.recv(&mut message).unwrap();
@@ -55,7 +55,7 @@ impl Manager {
         text.lines().map(str::to_owned).collect()
     }
 
-    /// All lines up to the message with `line`.
+    /// Returns all lines up to the message with `line`.
     fn hear_until(&self, line: &str) -> Vec<String> {
         let began = Instant::now();
         let mut heard = Vec::new();
@@ -86,7 +86,7 @@ fn systemd_hears_ready_a_status_the_watchdog_at_half_its_time_and_stopping() {
     manager.adopt(&mut command);
     let mut run = command.spawn().unwrap();
     manager.hear_until("READY=1");
-    // A loop that is late by half of the time limit would be killed, so that much must be left.
+    // A loop that is late by half of the limit would be killed, so that much must be left.
     let mut fed = Instant::now();
     for _ in 0..3 {
         manager.hear_until("WATCHDOG=1");
@@ -102,7 +102,7 @@ fn systemd_hears_ready_a_status_the_watchdog_at_half_its_time_and_stopping() {
 }
 
 impl Manager {
-    /// The status line of a robot that drives.
+    /// Returns the status line of a driving robot.
     fn hear_until_status(&self) -> String {
         let began = Instant::now();
         loop {
@@ -125,14 +125,14 @@ fn a_frozen_supervisor_does_not_feed_the_watchdog() {
     let mut run = command.spawn().unwrap();
     manager.hear_until("READY=1");
     signal_process(run.id(), Signal::STOP);
-    // These messages were sent before the supervisor froze.
+    // Messages from before the freeze.
     manager.socket.set_nonblocking(true).unwrap();
     let mut message = [0; 4096];
     while manager.socket.recv(&mut message).is_ok() {}
     manager.socket.set_nonblocking(false).unwrap();
     manager.socket.set_read_timeout(Some(WATCHDOG)).unwrap();
     assert!(manager.socket.recv(&mut message).is_err(), "it speaks");
-    // Systemd would kill it; then the stages end, too, and nothing hinders the next run.
+    // systemd would kill it. The stages then end, too, and the next run is not hindered.
     signal_process(run.id(), Signal::KILL);
     run.wait().unwrap();
     Run::start("hang", "open-room", &[]).arrives();
@@ -162,21 +162,21 @@ fn in_a_journal_a_stages_death_has_its_priority() {
     let is_death = |line: &&str| line.contains("stage=\"mapper\"") && line.contains("cause=");
     let death = text.lines().find(is_death).unwrap();
     assert!(death.starts_with("<4>"), "{text}");
-    // The only line without a priority is the mission's title.
+    // Only the mission's title has no priority.
     let bare = text.lines().filter(|line| !line.starts_with('<'));
     assert_eq!(bare.count(), 1, "{text}");
-    // The death is in the run directory, too, and stages, which log to files, put no priorities there.
+    // The run directory also records the death. Stages log to files, without priorities.
     let run = directory.path().join("run");
     let death = ["WARN", "stage=\"mapper\"", "cause="];
     assert_eq!(support::logged(&run, "supervisor", &death), 1);
     assert_eq!(support::logged(&run, "mapper", &["<6>"]), 0);
 }
 
-/// Stages that this test starts and starts again, as systemd would with `Restart=always`.
+/// Stages that this test starts and restarts, like systemd with `Restart=always`.
 struct Units {
     keepers: Vec<(&'static str, JoinHandle<Option<i32>>)>,
     over: Arc<AtomicBool>,
-    // The directory of the stages' logs.
+    // Directory of the stages' logs.
     directory: TempDir,
 }
 
@@ -192,8 +192,8 @@ impl Units {
         Self { keepers: support::STAGES.map(keep).into(), over, directory }
     }
 
-    /// Wait until all stages have ended by themselves, each in order. On a busy machine the supervisor may kill one that has stopped, and
-    /// whose process has not ended yet.
+    /// Waits until all stages have ended in order. A busy supervisor may kill a stopped one before
+    /// its process ends.
     fn assert_all_leave(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for (stage, keeper) in std::mem::take(&mut self.keepers) {
@@ -205,8 +205,8 @@ impl Units {
     }
 }
 
-/// Start one process of a stage after another until one ends in order with its run, or `over` is set. Returns the exit code of the
-/// last one that was not refused for want of a supervisor.
+/// Restarts a stage until it ends in order with its run, or `over` is set. Returns the last exit
+/// code except refusals without a supervisor.
 fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i32> {
     let mut last = None;
     loop {
@@ -217,7 +217,7 @@ fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i3
         if code != Some(1) {
             last = code;
         }
-        // The supervisor of a stalled robot replaces the planner, which ends in order, too.
+        // The supervisor of a stalled robot replaces the planner, which also ends in order.
         let is_replaced =
             || support::status_of(robot).is_some_and(|status| status["order"] == "driving");
         if code == Some(0) && !is_replaced() || over.load(Ordering::Relaxed) {
@@ -227,7 +227,7 @@ fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i3
 }
 
 impl Drop for Units {
-    /// The destructor waits for the stages to end with their supervisor. A test that fails shows their logs.
+    /// Waits for the stages to end with their supervisor. A failed test prints their logs.
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
         for stage in support::STAGES.iter().filter(|_| thread::panicking()) {
@@ -237,7 +237,6 @@ impl Drop for Units {
     }
 }
 
-/// A supervisor that only watches, with a bus to join.
 fn watching(robot: &'static str) -> (Run, Units) {
     // The mission is long enough for several kills on a busy machine.
     watching_with(robot, &["--pace", "4", "--set", "controller.speed_m_s=0.2"])
@@ -280,7 +279,7 @@ fn external_stages_that_systemd_stops_before_their_supervisor_are_no_deaths() {
     let (mut run, mut units) = watching("unit-order");
     let status = run.wait_until_under_way(1.0);
     let status = run.kill_and_await("planner", Signal::KILL, &status);
-    // A unit that systemd stops is not started again.
+    // systemd does not restart a unit that it stops.
     units.over.store(true, Ordering::Relaxed);
     for stage in support::STAGES.iter().rev() {
         signal_process(support::pid(&status, stage), Signal::TERM);
@@ -314,7 +313,8 @@ fn external_stages_stop_the_robot_and_end_when_the_supervisor_is_killed() {
 
 #[test]
 fn a_frozen_external_stage_that_outlives_its_supervisor_does_not_hinder_the_next() {
-    // A stage that the supervisor started is woken by the kernel when its parent ends; an external one stays frozen.
+    // The kernel wakes a stage of the supervisor when its parent ends, but an external one stays
+    // frozen.
     let robot = "frozen-orphan";
     let mut watching = Run::start(robot, "obstacle-course", &["--watch-only"]);
     watching.wait_until("there is a bus", |_| true);
@@ -352,7 +352,8 @@ fn a_stage_without_a_place_is_refused_with_the_remedy() {
     drop(units);
 }
 
-/// The command that starts a service with `--resume-last`, each time in the same directory of runs.
+/// Returns the command that starts a service with `--resume-last`, each time in the same directory
+/// of runs.
 fn service(robot: &'static str, more: &'static [&'static str]) -> (TempDir, impl Fn() -> Command) {
     let directory = support::directory_of(robot);
     let runs = directory.path().to_path_buf();
@@ -364,7 +365,6 @@ fn service(robot: &'static str, more: &'static [&'static str]) -> (TempDir, impl
     (directory, service)
 }
 
-/// Let a service drive, and kill it.
 fn kill_while_it_drives(robot: &str, service: &mut Command) {
     let mut cut = support::start_quietly(service.args(["--pace", "1"]));
     support::wait_for_status(robot, |status| {

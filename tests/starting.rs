@@ -1,4 +1,4 @@
-//! Tests of signals that come while a run starts: the run ends with a summary, and leaves nothing.
+//! Tests of signals during the start of a run: it ends with a summary, and leaves nothing.
 
 use std::{fs, path::Path, process::Stdio};
 
@@ -9,7 +9,7 @@ use crate::support::{
     wait_until,
 };
 
-/// End a run of `robot` as soon as `is_there` says so of its directory of runs.
+/// Ends a run when `is_there` is true for its directory of runs.
 fn ends(robot: &str, is_there: impl Fn(&Path) -> bool) {
     let runs = directory_of(robot);
     let mut run = firsthand(&["run", "open-room", "--robot", robot, "--pace", "1", "--runs"]);
@@ -27,7 +27,6 @@ fn ends(robot: &str, is_there: impl Fn(&Path) -> bool) {
     assert!(left.is_empty(), "{left:?}");
 }
 
-/// The process of `robot` whose command line contains `word`.
 fn process(robot: &str, word: &str) -> Option<u32> {
     let lines = processes_of(robot);
     let line = lines.iter().find(|line| line.contains(word))?;

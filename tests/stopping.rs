@@ -1,5 +1,5 @@
-//! Tests that a robot stands whatever happens to the processes that drive it. The robots are processes of their own, and
-//! ignore the time limit of commands: without a stop they go on for ever.
+//! Tests that a robot stops after any failure of its driving processes. The robots are separate
+//! processes without command time limits, so they drive on unless stopped.
 
 use std::{
     fs,
@@ -19,7 +19,7 @@ use crate::support::{
     wire::{Pass, Proxy, Robot},
 };
 
-/// A mission of a robot that ignores the time limit of commands, with its target at `target_m` ahead.
+/// Writes a mission of a robot that ignores command time limits, with its target `target_m` ahead.
 fn mission(target_m: f64) -> (TempDir, PathBuf) {
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("straight.toml");
@@ -28,7 +28,7 @@ fn mission(target_m: f64) -> (TempDir, PathBuf) {
     (directory, file)
 }
 
-/// A robot under way on a wire, and its run.
+/// Starts a robot on a wire and a run, and waits until it is under way.
 fn under_way(name: &str, transport: &str) -> (TempDir, Robot, Run) {
     let (directory, mission) = mission(5.0);
     let mission = mission.to_str().unwrap();
@@ -45,7 +45,6 @@ fn under_way(name: &str, transport: &str) -> (TempDir, Robot, Run) {
     (directory, robot, run)
 }
 
-/// The processes of the stop guards of a run.
 fn guards(run: &Run) -> Vec<u32> {
     let directory = run.directory();
     let is_guard = |id: &u32| {
@@ -63,19 +62,19 @@ fn stages(status: &Value) -> Vec<u32> {
 }
 
 fn stands_after_kills(transport: &str) {
-    // The supervisor cannot start another link.
+    // The frozen supervisor cannot start another link.
     let (_directory, mut robot, run) = under_way(&format!("sl-{transport}"), transport);
     let status = run.status().unwrap();
     run.signal(Signal::STOP);
     signal_process(pid(&status, "link"), Signal::KILL);
     robot.wait_until_at_rest();
 
-    // Each stage ends with its parent, and so does the link.
+    // Each stage ends with its parent, including the link.
     let (_directory, mut robot, mut run) = under_way(&format!("ss-{transport}"), transport);
     run.kill();
     robot.wait_until_at_rest();
 
-    // This is what systemd does with a unit: it ends every process at once, and then runs ExecStopPost.
+    // systemd does this with a unit: it kills all processes at once, then runs ExecStopPost.
     let (_directory, mut robot, mut run) = under_way(&format!("sa-{transport}"), transport);
     let status = run.status().unwrap();
     let mut all = guards(&run);
@@ -106,7 +105,7 @@ fn a_robot_on_a_serial_line_stands_after_kills_of_its_link_its_supervisor_or_all
     stands_after_kills("pty");
 }
 
-/// Passes on the bytes of the host, without the commands that `ignored` names.
+/// Forwards the host's bytes without the commands that `ignored` selects.
 fn without(ignored: fn(&Command) -> bool) -> Box<Pass> {
     let mut decoder = Decoder::default();
     Box::new(move |bytes| {
@@ -134,7 +133,7 @@ fn is_any_stop(command: &Command) -> bool {
     slows || is_velocity_0(command) || matches!(command, Command::Enable { on: false, .. })
 }
 
-/// A run of a robot that ignores some commands, to a target close by.
+/// Starts a run to a close target with a robot that ignores some commands.
 fn disobedient(name: &str, ignored: fn(&Command) -> bool) -> (TempDir, Robot, Proxy, Run) {
     let (directory, mission) = mission(0.6);
     let mission = mission.to_str().unwrap();
@@ -202,7 +201,7 @@ fn an_operator_stops_a_robot_whose_supervisor_is_frozen() {
 }
 
 fn remove_directory_of(robot: &str) {
-    // Its processes may make a part of it again meanwhile.
+    // Its processes may recreate a part meanwhile.
     wait_until("it is removed", || fs::remove_dir_all(domain(robot).directory()).is_ok());
 }
 
@@ -228,7 +227,7 @@ fn a_robot_whose_directory_is_removed_again_and_again_is_stopped_resumed_sent_an
         }
     }
     remove_directory_of(robot);
-    // The name of the robot stays taken, although no file says so.
+    // The robot's name stays taken, although its file is removed.
     refused(&["run", "open-room", "--robot", robot], "supervised", &[robot]);
     run.wait_until("it is found", |_| domain.lock_file().exists());
     assert!(logged(&run.directory(), "supervisor", &["files of the robot were removed"]) > 0);
@@ -281,7 +280,7 @@ fn an_operator_stops_a_robot_whose_bus_is_damaged() {
 #[test]
 fn a_second_ctrl_c_ends_a_run_that_draws_its_picture() {
     let mut run = Run::under_way("drawing", "open-room", &["--pace", "1"], 0.5);
-    // Writing into a pipe that nobody reads takes for ever.
+    // A write into a pipe without a reader blocks forever.
     let picture = run.directory().join("picture.svg");
     assert!(std::process::Command::new("mkfifo").arg(&picture).status().unwrap().success());
     run.signal(Signal::INT);

@@ -1,4 +1,4 @@
-//! The permitted dependencies between crates. Who may use what inside a crate is the compiler's privacy.
+//! Permitted dependencies between crates. Privacy inside a crate is checked by the compiler.
 
 use std::{
     collections::BTreeSet,
@@ -11,7 +11,7 @@ fn root() -> PathBuf {
     fs::canonicalize(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap()
 }
 
-/// The crates that `arguments` of `cargo tree` select, with all that is linked into them.
+/// Returns the crates that `arguments` of `cargo tree` select, with all linked crates.
 fn linked(arguments: &[&str]) -> BTreeSet<String> {
     let fixed = ["tree", "--offline", "--locked", "--edges", "normal", "--prefix", "none"];
     let output = Command::new(env!("CARGO"))
@@ -30,14 +30,12 @@ fn manifest(folder: &Path) -> toml::Table {
     fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap()
 }
 
-/// The names under `[dependencies]` of the manifest in `folder`.
 fn dependencies(folder: &Path) -> Vec<String> {
     let manifest = manifest(folder);
     let named = manifest.get("dependencies").and_then(toml::Value::as_table);
     named.into_iter().flat_map(toml::Table::keys).cloned().collect()
 }
 
-/// The members of the workspace, each a name and its folder.
 fn members() -> Vec<(String, PathBuf)> {
     let arguments = ["metadata", "--offline", "--locked", "--no-deps", "--format-version", "1"];
     let output = Command::new(env!("CARGO")).args(arguments).current_dir(root()).output().unwrap();
@@ -45,7 +43,7 @@ fn members() -> Vec<(String, PathBuf)> {
     let packages = metadata["packages"].as_array().unwrap().iter();
     let member = |package: &serde_json::Value| {
         let manifest = Path::new(package["manifest_path"].as_str().unwrap());
-        // Others depend on it by the name of its library, which is another where the package can be published.
+        // Dependents use the library's name, which differs for publishable packages.
         let mut targets = package["targets"].as_array().unwrap().iter();
         let library = targets.find(|target| target["kind"][0] == "lib").map(|it| &it["name"]);
         let name = library.unwrap_or(&package["name"]).as_str().unwrap().replace('_', "-");
@@ -71,7 +69,7 @@ fn no_stage_knows_another_nor_the_supervisor() {
     };
     for (stage, folder) in members.iter().filter(|(_, folder)| folder.starts_with(&services)) {
         for name in dependencies(folder) {
-            // The link has its drivers, the planner its solver.
+            // The link has its drivers, and the planner its solver.
             let own = stage == "link" && name.ends_with("-driver") || below(folder, &name);
             let foreign = below(&services, &name) && !own
                 || ["supervisor", "tests"].iter().any(|top| below(&root().join(top), &name));

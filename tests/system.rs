@@ -1,7 +1,7 @@
-//! The system tests: whole runs through real processes. Nothing here reaches inside a stage.
+//! System tests: whole runs through real processes, without access to a stage's internals.
 //!
-//! They are one executable, because each takes long to link. `freezes` is an executable of its own that runs alone, because it
-//! measures time.
+//! They are one executable, because each takes long to link. `freezes` is separate and runs alone,
+//! because it measures time.
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
 mod support;

@@ -1,5 +1,4 @@
-//! Tests that infrared ranges, power and surroundings, which the robot measures besides wheels and front sonar, reach a
-//! consumer.
+//! Tests that infrared ranges, power and surroundings reach a consumer.
 
 use std::time::Instant;
 

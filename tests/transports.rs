@@ -1,11 +1,12 @@
-//! Tests of missions over every wire, by robots that are not the run's own children: they come and go by themselves.
+//! Tests of missions over every wire, with robots that are independent of the run's processes and
+//! may leave and return.
 
 use std::path::{Path, PathBuf};
 
 use crate::support::{Run, assert_nothing_left, assert_reached, wire::Robot};
 use tempfile::TempDir;
 
-/// The way of a few seconds straight ahead, metres.
+/// Distance of a few seconds straight ahead, metres.
 const TARGET_M: f64 = 0.6;
 const TOLERANCE_M: f64 = 0.1;
 
@@ -17,7 +18,6 @@ fn mission() -> (TempDir, PathBuf) {
     (directory, file)
 }
 
-/// Start a run of `mission` with the robot at `address`.
 fn drive(name: &str, mission: &Path, address: &str) -> Run {
     let assignment = format!("robot.address=\"{address}\"");
     Run::start(name, mission.to_str().unwrap(), &["--set", &assignment])
@@ -50,11 +50,11 @@ fn a_mission_arrives_over_a_serial_line() {
     arrives_over("pty", "serial://");
 }
 
-/// The longest way of a robot after its last tick that the link received, metres.
+/// Longest distance of a robot after its last received tick, metres.
 const UNRECEIVED_M: f64 = 0.12;
 
-/// Kill the robot halfway and start it again at the same address, like a robot that was switched off and on. Its counts begin at
-/// zero, and the simulation puts it at its start again.
+/// Kills the robot halfway and restarts it at the same address, like a power cycle. Its counts
+/// restart at zero, and the simulation puts it at its start.
 fn goes_away_and_comes_back(transport: &str) {
     let (_directory, mission) = mission();
     let mut robot = Robot::start(mission.to_str().unwrap(), transport, "127.0.0.1:0");
@@ -80,17 +80,18 @@ fn goes_away_and_comes_back(transport: &str) {
     });
     assert_eq!(back["link"]["losses"], 1, "{back}");
     let (code, summary) = run.finish();
-    // Nobody knows how far its wheels rolled while the robot was away: the longer that took, the less sure the pose is.
+    // The distance rolled during the absence is unknown: a longer absence makes the pose less sure.
     let outcome = summary["outcome"].as_str().unwrap();
     assert!(
         [("reached", Some(0)), ("reached_unsure", Some(11))].contains(&(outcome, code)),
         "{summary}"
     );
     assert_eq!(summary["restarts"]["link"], 0, "{summary}");
-    // Each robot counts from its own start, so the run's path length is the sum of both ways.
+    // Each robot counts from its own start, so the run's path length is the sum of both.
     let went = first_part + robot.kill();
     let path_m = summary["path_length_m"].as_f64().unwrap();
-    // The way of the first robot after its last received tick is missing: up to two ticks at 0.5 m/s.
+    // The first robot's distance after its last received tick is missing: up to two ticks at 0.5
+    // m/s.
     assert!((went - path_m).abs() < UNRECEIVED_M, "{went} m: {summary}");
     assert!((went - TARGET_M).abs() < TOLERANCE_M + UNRECEIVED_M, "{went} m");
     assert_nothing_left(&name);

@@ -1,5 +1,5 @@
-//! Tests of robots whose frames cannot be true, or do not come: every datagram between link and simulated robot passes
-//! through a fault injector here.
+//! Tests of robots with implausible or missing frames. Every datagram between link and simulated
+//! robot passes through a fault injector.
 
 use std::{
     fs,
@@ -17,46 +17,46 @@ use common::wire::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-/// The longest time from the first motion that shows a fault to the last command that moves the robot.
+/// Longest time from the first motion that shows a fault to the last moving command.
 const BOUND: Duration = Duration::from_millis(1500);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     None,
-    /// No motor frame comes.
+    /// No motor frames arrive.
     NoFrame,
-    /// Every motor frame is the same.
+    /// All motor frames are the same.
     SameFrame,
     /// The right encoder stays at 0.
     DeadEncoder,
     /// The counts of both wheels have the wrong sign.
     Reversed,
-    /// Every frame has other counts.
+    /// Counts jump in each frame.
     Random,
-    /// The counts of both wheels go on elsewhere.
+    /// The counts of both wheels jump and continue.
     Elsewhere,
-    /// The encoders roll on by 560 counts/s.
+    /// The right encoder rolls on by 560 counts/s.
     RollsOn,
-    /// The front sonar says 0.
+    /// The front sonar reports 0.
     NoSonar,
-    /// The front sonar says that nothing is in range.
+    /// The front sonar reports nothing in range.
     DeafSonar,
-    /// An infrared ranger that looks into the front sonar's cone says 0, which is not valid.
+    /// An infrared ranger that looks into the front sonar's cone reports the invalid value 0.
     DeadRanger,
-    /// Neither velocity 0 nor the time limit of commands reaches the robot.
+    /// The robot receives neither velocity 0 nor command time limits.
     IgnoresZero,
 }
 
-/// The state of a fault injector: its fault, and the traffic that it has seen.
+/// State of a fault injector: its fault, and observed traffic.
 #[derive(Debug)]
 struct Shared {
     fault: Fault,
     frames: u16,
     first_motion: Option<Instant>,
     last_motion: Option<Instant>,
-    /// Whether the link asked for streams since they were stopped.
+    /// Whether the link has requested streams since they were stopped.
     asked_for_streams: bool,
-    /// Commands to send to the robot as if the link had sent them.
+    /// Commands to send to the robot on behalf of the link.
     inject: Vec<Command>,
 }
 
@@ -87,7 +87,7 @@ impl FaultInjector {
         Self { proxy, shared }
     }
 
-    /// Stop the robot's streams as if the link had asked for that.
+    /// Stops the robot's streams on behalf of the link.
     fn stop_streams(&self) {
         let mut shared = self.shared.lock().unwrap();
         shared.asked_for_streams = false;
@@ -98,12 +98,12 @@ impl FaultInjector {
         self.shared.lock().unwrap().fault = fault;
     }
 
-    /// Wait until the robot has been told to move for `span`.
+    /// Waits until the robot has been told to move for `span`.
     fn wait_until_moving(&self, run: &mut Run, span: Duration) {
         run.wait_until("it moves", |_| self.moved_for() > span);
     }
 
-    /// The time from the first command that moved the robot to the last.
+    /// Returns the time from the first moving command to the last.
     fn moved_for(&self) -> Duration {
         let shared = self.shared.lock().unwrap();
         match (shared.first_motion, shared.last_motion) {
@@ -193,7 +193,7 @@ impl Shared {
                 left.position = frames.wrapping_mul(9973) % 32_768;
                 right.position = frames.wrapping_mul(20_011) % 32_768;
             }
-            // These are the counts at 7 frames a second.
+            // Counts at 7 frames a second.
             Fault::RollsOn => right.position = frames.wrapping_mul(80) % 32_768,
         }
     }
@@ -204,7 +204,7 @@ fn moves(motion: &Motion) -> bool {
     motion.quantity == Quantity::Velocity && (turns(0) || turns(1))
 }
 
-/// A run of the default mission on the wall clock with that fault from the beginning.
+/// Starts the default mission on the wall clock with this fault from the beginning.
 fn faulty(robot: &str, fault: Fault) -> (Robot, FaultInjector, Run) {
     let body = Robot::on_the_course();
     let faults = FaultInjector::before(&body, fault);
@@ -273,7 +273,7 @@ fn an_operators_stop_fails_until_the_encoders_say_that_the_robot_rests() {
     run.stop();
 }
 
-/// The longest time from a signal to the end of a run whose robot says nothing of its wheels: some of it is the load of the machine.
+/// Longest time from a signal to the end of a run without wheel reports, including machine load.
 const ENDS_WITHIN: Duration = Duration::from_secs(15);
 
 #[test]
@@ -288,7 +288,7 @@ fn a_robot_without_usable_motor_frames_is_said_to_be_unknown_and_the_first_signa
             let link = &status["link"];
             link["connected"] == true && link["stopped"] == true && link["at_rest"] == false
         });
-        // An operator is told the same.
+        // The operator gets the same message.
         refused(&["stop", "--robot", robot], "not-at-rest", &["whether it rests is not known"]);
         run.signal(Signal::INT);
         let began = Instant::now();
@@ -315,7 +315,7 @@ fn a_robot_that_ignores_velocity_0_is_made_to_stand_by_other_means() {
     // Commands without their time limit have passed.
     let moved = faults.moved_for();
     faults.wait_until_moving(&mut run, moved + Duration::from_millis(200));
-    // The command fails unless the robot rests.
+    // The command fails unless the robot is at rest.
     operate("fi-zero", &["stop"]);
     assert!(run.link_logged(&["by=\"disable\""]));
     faults.set(Fault::None);

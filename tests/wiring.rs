@@ -1,4 +1,4 @@
-//! Tests that every process opens on the bus what the table of stages says, by the bus itself.
+//! Tests that the topics that each process opens on the bus match the table of stages.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! A headless Chromium, by the W3C WebDriver protocol.
+//! Headless Chromium through the W3C WebDriver protocol.
 
 use std::{
     io::{self, BufRead as _, BufReader, Read as _, Write as _},
@@ -11,14 +11,14 @@ use serde_json::{Value, json};
 
 use super::{PATIENCE, commands::with_parent};
 
-/// A session of a browser, whose driver ends with it.
+/// Browser session that ends its driver on drop.
 pub struct Browser {
     driver: Child,
     port: u16,
     session: String,
 }
 
-/// Whether Chromium and its driver are installed.
+/// Returns whether Chromium and its driver are installed.
 pub fn has_browser() -> bool {
     ["chromium", "chromedriver"].into_iter().all(|name| {
         let found = Command::new(name).arg("--version").stdout(Stdio::null()).status();
@@ -27,7 +27,7 @@ pub fn has_browser() -> bool {
 }
 
 impl Browser {
-    /// A window of that width; one of a phone's width is touched rather than clicked.
+    /// Opens a window of that width. A window of a phone's width has touch input.
     pub fn open(width: u32) -> Self {
         let mut driver = with_parent(&["chromedriver", "--port=0"])
             .stdout(Stdio::piped())
@@ -53,14 +53,12 @@ impl Browser {
         browser
     }
 
-    /// The value in the driver's answer.
     fn ask(&self, method: &str, path: &str, body: &Value) -> Value {
         let (head, value) = self.answer(method, path, body).unwrap();
         assert!(head.starts_with("HTTP/1.1 200"), "{path}: {value}");
         value["value"].clone()
     }
 
-    /// The head and the body of the driver's answer.
     fn answer(&self, method: &str, path: &str, body: &Value) -> io::Result<(String, Value)> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
         stream.set_read_timeout(Some(PATIENCE))?;
@@ -91,19 +89,18 @@ impl Browser {
         self.ask("POST", &format!("{}/url", self.session), &json!({"url": url}));
     }
 
-    /// The value of a script that returns one.
     pub fn run(&self, script: &str) -> Value {
         let asked = json!({"script": script, "args": []});
         self.ask("POST", &format!("{}/execute/sync", self.session), &asked)
     }
 
-    /// A command of Chromium's own protocol.
+    /// Sends a command of Chromium's own protocol.
     pub fn command(&self, name: &str, parameters: &Value) -> Value {
         let asked = json!({"cmd": name, "params": parameters});
         self.ask("POST", &format!("{}/goog/cdp/execute", self.session), &asked)
     }
 
-    /// Assert that each text of the page can be read, in light and in dark colours.
+    /// Asserts that each text of the page is legible, in light and dark colours.
     #[track_caller]
     pub fn assert_legible(&self) {
         for scheme in ["light", "dark"] {
@@ -114,13 +111,12 @@ impl Browser {
         self.command("Emulation.setEmulatedMedia", &json!({"features": []}));
     }
 
-    /// The text of the element `id`.
     pub fn text(&self, id: &str) -> String {
         let text = self.run(&format!("return document.getElementById('{id}').textContent"));
         text.as_str().unwrap().to_owned()
     }
 
-    /// Wait until a script returns true.
+    /// Waits until a script returns true.
     #[track_caller]
     pub fn wait_until(&self, script: &str) {
         let began = Instant::now();
@@ -130,7 +126,7 @@ impl Browser {
         }
     }
 
-    /// Press and release at a point of the element `id`, from its centre, CSS pixels.
+    /// Taps the element `id` at an offset from its centre, CSS pixels.
     pub fn tap(&self, id: &str, x: i32, y: i32) {
         let found = json!({"using": "css selector", "value": format!("#{id}")});
         let element = self.ask("POST", &format!("{}/element", self.session), &found);
@@ -148,7 +144,6 @@ impl Browser {
         self.ask("POST", &format!("{}/actions", self.session), &actions);
     }
 
-    /// Press and release a key.
     pub fn press(&self, key: &str) {
         let actions = json!({"actions": [{
             "type": "key",
@@ -161,7 +156,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // The driver ends its browser when its session ends, and a browser that a failed test opened stays without that.
+        // Only the end of the session ends the browser with the driver, also after a failed test.
         if !self.session.is_empty() {
             let _ = self.answer("DELETE", &self.session, &json!({}));
         }

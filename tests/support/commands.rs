@@ -7,19 +7,18 @@ use serde_json::Value;
 
 use super::robot::suite;
 
-/// A command that gets SIGKILL when the thread that starts it ends.
+/// Returns a command that gets SIGKILL when the thread that starts it ends.
 pub(super) fn with_parent(line: &[&str]) -> Command {
     let mut command = Command::new("setpriv");
     command.args(["--pdeathsig", "KILL", "--"]).args(line).env(SUITE_VARIABLE, suite());
     command
 }
 
-/// A command that runs `firsthand` with these arguments.
 pub fn firsthand(arguments: &[&str]) -> Command {
     firsthand_under(&[], arguments)
 }
 
-/// A command that runs `firsthand` with these arguments by way of the command line `wrapper`.
+/// Returns a command that runs `firsthand` through the command line `wrapper`.
 pub fn firsthand_under(wrapper: &[&str], arguments: &[&str]) -> Command {
     let mut command = with_parent(wrapper);
     command.arg(env!("CARGO_BIN_EXE_firsthand"));
@@ -27,25 +26,23 @@ pub fn firsthand_under(wrapper: &[&str], arguments: &[&str]) -> Command {
     command
 }
 
-/// Start `command` without output.
 pub fn start_quietly(command: &mut Command) -> Child {
     let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
     quiet.spawn().unwrap()
 }
 
-/// Run `firsthand` with these arguments to its end.
 pub fn output(arguments: &[&str]) -> Output {
     firsthand(arguments).output().unwrap()
 }
 
-/// The output of `firsthand` with these arguments, which must succeed.
+/// Returns the output of `firsthand`, which must succeed.
 pub fn printed(arguments: &[&str]) -> String {
     let output = output(arguments);
     assert!(output.status.success(), "{arguments:?}: {output:?}");
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The exit status of a command, and the JSON values that it printed, one a line.
+/// Returns a command's exit status and its JSON lines.
 pub fn json_of(output: &Output) -> (ExitStatus, Vec<Value>) {
     let text = String::from_utf8_lossy(&output.stdout);
     let values: Result<_, _> = text.lines().map(serde_json::from_str).collect();
@@ -53,19 +50,21 @@ pub fn json_of(output: &Output) -> (ExitStatus, Vec<Value>) {
     (output.status, values)
 }
 
-/// Run `firsthand` with these arguments for `robot`, which must succeed.
+/// Asserts success.
 pub fn operate(robot: &str, arguments: &[&str]) {
     printed(&[arguments, &["--robot", robot]].concat());
 }
 
-/// Run `firsthand`, and assert that it fails with the error `code` ("usage" if the command line is wrong, "" if there is none) and
-/// that its message contains all `names`, which are the wrong input or the remedy. Returns the exit code.
+/// Runs `firsthand`, and asserts that it fails with the error `code` and mentions all `names`, the
+/// wrong input or the remedy.
+///
+/// `code` is "usage" for a wrong command line, and "" for none. Returns the exit code.
 #[track_caller]
 pub fn refused(arguments: &[&str], code: &str, names: &[&str]) -> Option<i32> {
     assert_refused(&output(arguments), code, names)
 }
 
-/// [`refused`] for a command that has ended.
+/// [`refused`] for a finished command.
 #[track_caller]
 pub fn assert_refused(output: &Output, code: &str, names: &[&str]) -> Option<i32> {
     let said = String::from_utf8_lossy(&output.stderr);

@@ -1,4 +1,4 @@
-// The texts of a page that are hard to read: with too little contrast (WCAG 2.2, 1.4.3), or over one another.
+// Texts of a page that are hard to read: with low contrast (WCAG 2.2, 1.4.3), or overlapping.
 
 const problems = [];
 const rgba = (text) => {
@@ -14,7 +14,7 @@ const ancestors = (element) => (element ? [element, ...ancestors(element.parentE
 const isDark = matchMedia("(prefers-color-scheme: dark)").matches;
 const ground = (element) => ancestors(element).reverse().reduce((under, it) => over(rgba(getComputedStyle(it).backgroundColor), under), isDark ? [18, 18, 18] : [255, 255, 255]);
 
-/// The part of a rectangle that scrolled ancestors show.
+/// Returns the part of a rectangle that scrolled ancestors show.
 function shown({ left, top, right, bottom }, element) {
   for (const it of ancestors(element)) {
     if (it === document.body || getComputedStyle(it).overflow === "visible") continue;
@@ -47,7 +47,7 @@ for (const { text, element } of texts) {
   const contrast = (light + 0.05) / (dark + 0.05);
   if (contrast < (isLarge ? 3 : 4.5)) problems.push(`"${text}" has a contrast of ${contrast.toFixed(2)}`);
 }
-// The header and the footer stay in place, and the rest is scrolled below them.
+// Header and footer are fixed, and the rest scrolls below them.
 const layer = (element) => element.closest("header, footer")?.tagName;
 texts.forEach((one, at) => {
   for (const other of texts.slice(at + 1)) {

@@ -1,7 +1,7 @@
-//! The shared code of the system tests: commands of the real executable, runs, and the state of robots.
+//! Shared code of the system tests: commands of the real executable, runs, and the state of robots.
 //!
-//! Every test names its own robots. Each process that a test starts gets SIGKILL when the test ends, however it ends. So a suite
-//! that was killed leaves nothing behind that hinders the next.
+//! Every test names its own robots. Each process gets SIGKILL when its test ends in any way, so a
+//! killed suite does not hinder the next.
 #![allow(
     dead_code,
     unused_imports,

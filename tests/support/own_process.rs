@@ -1,4 +1,4 @@
-//! Tests in processes of their own.
+//! Tests in their own processes.
 
 use std::{
     fs,
@@ -12,16 +12,18 @@ use rustix::process::{getegid, geteuid};
 
 use super::commands::with_parent;
 
-/// The environment variable that names the test which a process runs.
+/// Variable that names the test of a process.
 const OWN_PROCESS: &str = "FIRSTHAND_TEST";
 
-/// Run `test` in a process of its own, so that its connections to buses end with it.
+/// Isolates `test`, so that its bus connections end with it.
 pub fn in_own_process<T: FnOnce()>(test: T) {
     in_process_under(&[], name_of::<T>(), test);
 }
 
-/// Run `test` in a process of its own with a file system of `mebibytes` MiB. An ordinary user may mount it in a user namespace with
-/// mounts of its own. If the system allows no such namespace, the test does not run and says so.
+/// Runs `test` in its own process with a file system of `mebibytes` MiB.
+///
+/// An ordinary user mounts it in a user namespace. If the system forbids that, the test is skipped
+/// with a message.
 pub fn on_small_disk<T: FnOnce(SmallDisk)>(mebibytes: u32, test: T) {
     let directory = tempfile::tempdir().unwrap();
     on_small_file_system(directory.path(), mebibytes, test);
@@ -37,7 +39,7 @@ fn on_small_file_system<T: FnOnce(SmallDisk)>(mount: &Path, mebibytes: u32, test
     if !can_run(&namespaces) {
         return not_run(name_of::<T>(), "no user namespace with mounts can be had here");
     }
-    // The inner namespace gives the test its own user back, because files of the robot have that user's number in their names.
+    // The inner namespace restores the test's user, whose number is part of the robot's file names.
     let script = format!(
         "mount -t tmpfs -o size={mebibytes}m tmpfs {disk} && exec unshare --user --map-user={user} --map-group={group} \
          -- env {DISK}={disk} \"$@\"",
@@ -51,10 +53,10 @@ fn on_small_file_system<T: FnOnce(SmallDisk)>(mount: &Path, mebibytes: u32, test
     });
 }
 
-/// The environment variable that names the directory where the small disk of a test is mounted.
+/// Variable that names the mount directory of a test's small disk.
 const DISK: &str = "FIRSTHAND_TEST_DISK";
 
-/// A small file system, which exists until the process of its test ends.
+/// Small file system, which exists until the process of its test ends.
 pub struct SmallDisk(PathBuf);
 
 impl SmallDisk {
@@ -62,12 +64,12 @@ impl SmallDisk {
         &self.0
     }
 
-    /// Free the space that [`SmallDisk::fill`] used up.
+    /// Frees the space that [`SmallDisk::fill`] used up.
     pub fn empty(&self) {
         fs::remove_file(self.0.join("filler")).unwrap();
     }
 
-    /// Use up the free space.
+    /// Uses up the free space.
     pub fn fill(&self) {
         let mut file = fs::File::create(self.0.join("filler")).unwrap();
         let refused = std::iter::repeat_with(|| file.write_all(&[1; 4096])).find_map(Result::err);
@@ -75,24 +77,25 @@ impl SmallDisk {
     }
 }
 
-/// Whether this user may start a process by way of the command line `wrapper`.
 pub fn can_run(wrapper: &[&str]) -> bool {
     let mut command = Command::new(wrapper[0]);
     let output = command.args(&wrapper[1..]).arg("true").output();
     output.is_ok_and(|output| output.status.success())
 }
 
-/// The number of tests of this executable that did not run.
+/// Number of skipped tests of this executable.
 static NOT_RUN: AtomicUsize = AtomicUsize::new(0);
 
-/// Print that `test` did not run, and count it. The message bypasses the harness, which hides the output of tests that pass.
+/// Reports and counts a skipped `test`. Writes past the harness, which hides the output of passing
+/// tests.
 pub fn not_run(test: &str, why: &str) {
     let count = NOT_RUN.fetch_add(1, Ordering::Relaxed) + 1;
     let said = format!("\nNOT RUN ({count}): {test}: {why}\n");
     std::io::stderr().write_all(said.as_bytes()).unwrap();
 }
 
-/// The name of the test that contains the closure type `T`, whose own name is CRATE::MODULE::TEST::{{closure}}.
+/// Returns the name of the test with the closure type `T`, which is named
+/// CRATE::MODULE::TEST::{{closure}}.
 fn name_of<T>() -> &'static str {
     let (_, name) = std::any::type_name::<T>().split_once("::").unwrap();
     name.split("::{{closure}}").next().unwrap()

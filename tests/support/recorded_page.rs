@@ -1,11 +1,11 @@
-//! The messages of a recorded page, read from its file.
+//! Messages of a recorded page, read from its file.
 
 use std::io::Read as _;
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::Value;
 
-/// The text messages of the page `html`, and how many maps and fields it has.
+/// Returns the text messages of the page `html`, and the number of maps and fields.
 pub fn messages(html: &str) -> (Vec<Value>, usize) {
     let data = html.split_once("<script id=\"data\" type=\"text/plain\">").unwrap().1;
     let packed = BASE64_STANDARD.decode(data.split_once('<').unwrap().0).unwrap();

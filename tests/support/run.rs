@@ -23,26 +23,29 @@ use super::{
     },
 };
 
-/// A run of a mission by a robot that no other test uses.
+/// Run of a mission by a robot that no other test uses.
 pub struct Run {
     pub robot: String,
     child: Option<Child>,
-    // The directory is removed when the test ends.
+    // Removed when the test ends.
     directory: TempDir,
-    /// Whether the stop guard goes on after the run; otherwise the test's end signs the robot off.
+    /// Whether the stop guard continues after the run. Otherwise the end of the test signs the
+    /// robot off.
     pub keeps_guard: bool,
 }
 
 impl Run {
-    /// Start `firsthand run MISSION --robot ROBOT --json` with further arguments. Unless an argument says otherwise, wheels that nobody
-    /// calibrated do not make its arrival unsure, mission time does not run out while a busy machine starts processes, and the robot is
-    /// slow, so that a test can act while it drives.
+    /// Starts `firsthand run MISSION --robot ROBOT --json` with further arguments.
+    ///
+    /// Its defaults suit tests. Uncalibrated wheels do not make the arrival unsure. The timeout
+    /// allows for slow process starts on a busy machine. The robot is slow, so that a test can act
+    /// while it drives.
     pub fn start(robot: &str, mission: &str, arguments: &[&str]) -> Self {
         let slow = ["--set", "controller.speed_m_s=0.2"];
         Self::at_own_speed(robot, mission, &[&slow[..], arguments].concat())
     }
 
-    /// [`Self::start`] with the speed that the mission itself has.
+    /// Starts like [`Self::start`], at the mission's own speed.
     pub fn at_own_speed(robot: &str, mission: &str, arguments: &[&str]) -> Self {
         let directory = directory_of(robot);
         let out = directory.path().join("run");
@@ -57,7 +60,7 @@ impl Run {
         Self { robot: robot.to_owned(), child: Some(child), directory, keeps_guard: false }
     }
 
-    /// [`Self::start`], and wait until the robot has been under way for `seconds` of mission time.
+    /// Starts, and waits until the robot has been under way for `seconds` of mission time.
     pub fn under_way(robot: &str, mission: &str, arguments: &[&str], seconds: f64) -> Self {
         let mut run = Self::start(robot, mission, arguments);
         run.wait_until_under_way(seconds);
@@ -68,12 +71,11 @@ impl Run {
         self.directory.path().join("run")
     }
 
-    /// The lines of a file of records in the run directory.
     pub fn records(&self, file: &str) -> Vec<Value> {
         records(&self.directory().join(file))
     }
 
-    /// Whether a line of the link's log contains all `parts`, which are a level and fields.
+    /// Returns whether a line of the link's log contains all `parts`, a level and fields.
     pub fn link_logged(&self, parts: &[&str]) -> bool {
         logged(&self.directory(), "link", parts) > 0
     }
@@ -91,7 +93,6 @@ impl Run {
         status_of(&self.robot)
     }
 
-    /// Follow the status until `is_so` returns true.
     pub fn wait_until(&mut self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
         let child = self.child.as_mut().unwrap();
         follow_status(&self.robot, is_so, || {
@@ -103,7 +104,8 @@ impl Run {
         })
     }
 
-    /// Wait until the robot has been under way for `seconds` of mission time, and every stage runs.
+    /// Waits until the robot has been under way for `seconds` of mission time, and every stage
+    /// runs.
     pub fn wait_until_under_way(&mut self, seconds: f64) -> Value {
         self.wait_until("the robot is under way", |status| {
             status["mission_time_s"].as_f64().unwrap() >= seconds && all_run(status)
@@ -114,17 +116,15 @@ impl Run {
         self.wait_until("the robot drives", |status| status["order"] == "driving")
     }
 
-    /// Wait until all stages run.
     pub fn wait_until_all_run(&mut self) -> Value {
         self.wait_until("every stage runs", all_run)
     }
 
-    /// Wait until the supervisor's process has ended.
+    /// Waits until the supervisor's process has ended.
     pub fn reap(&mut self) {
         self.child.as_mut().unwrap().wait().unwrap();
     }
 
-    /// Kill the supervisor.
     pub fn kill(&mut self) {
         self.signal(Signal::KILL);
         self.reap();
@@ -134,14 +134,15 @@ impl Run {
         signal_process(self.pid(), signal);
     }
 
-    /// Kill a stage, or freeze it (`Signal::STOP`), and wait until its successor and all others run. Returns the status then.
+    /// Kills a stage, or freezes it (`Signal::STOP`). Returns the status once its successor and all
+    /// other stages run.
     pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) -> Value {
         let status = self.wait_until_all_run();
         self.kill_and_await(stage, signal, &status)
     }
 
-    /// [`Self::kill_and_await_successor`] for a stage that runs in `status`. The robot drives on while a new status is asked for, which
-    /// takes seconds on a busy machine.
+    /// [`Self::kill_and_await_successor`] from a known `status`. A new one would take seconds on a
+    /// busy machine.
     pub fn kill_and_await(&mut self, stage: &str, signal: Signal, status: &Value) -> Value {
         signal_process(pid(status, stage), signal);
         let before = generation(status, stage);
@@ -150,7 +151,7 @@ impl Run {
         })
     }
 
-    /// Kill or freeze each stage, as soon as the successor of the one before runs.
+    /// Kills or freezes each stage, as soon as its predecessor's successor runs.
     pub fn kill_each(&mut self, signal: Signal) {
         let mut status = self.wait_until_all_run();
         for stage in STAGES {
@@ -158,7 +159,7 @@ impl Run {
         }
     }
 
-    /// Wait for the end. Returns the exit code, and the JSON of the last line.
+    /// Waits for the end. Returns the exit code, and the JSON of the last line.
     pub fn finish(self) -> (Option<i32>, Value) {
         let (code, summary, _) = self.finish_in();
         (code, summary)
@@ -174,7 +175,8 @@ impl Run {
         (output.status.code(), summary, directory)
     }
 
-    /// Wait for the end, and assert that the robot has reached its target, touched nothing, and left nothing behind.
+    /// Waits for the end. Asserts that the robot reached its target, touched nothing, and left
+    /// nothing.
     #[track_caller]
     pub fn arrives(self) -> Value {
         self.arrives_in().0
@@ -190,7 +192,7 @@ impl Run {
         (summary, directory)
     }
 
-    /// Stop the run with SIGTERM, and assert that it ends in order and leaves nothing behind.
+    /// Stops the run with SIGTERM. Asserts that it ends in order and leaves nothing.
     #[track_caller]
     pub fn stop(self) -> Value {
         self.signal(Signal::TERM);
@@ -202,7 +204,7 @@ impl Run {
     }
 }
 
-/// The destructor of a test that fails leaves no process behind, because the stages end with their supervisor.
+/// Leaves no process after a failed test, because stages end with their supervisor.
 impl Drop for Run {
     fn drop(&mut self) {
         if let Some(child) = &mut self.child {
@@ -216,48 +218,47 @@ impl Drop for Run {
     }
 }
 
-/// Assert that the robot has reached its target and touched nothing.
+/// Asserts that the robot has reached its target and touched nothing.
 #[track_caller]
 pub fn assert_reached(code: Option<i32>, summary: &Value) {
     assert_ended(code, summary, 0, "reached");
     assert_eq!(summary["collisions"].as_u64().unwrap_or(0), 0, "{summary}");
 }
 
-/// Assert that a run ended with that exit code and outcome.
 #[track_caller]
 pub fn assert_ended(code: Option<i32>, summary: &Value, expected: i32, outcome: &str) {
     let ended = (code, &summary["outcome"]);
     assert_eq!(ended, (Some(expected), &outcome.into()), "{summary}");
 }
 
-/// Assert that no stage was started again.
 #[track_caller]
 pub fn assert_no_restart(summary: &Value) {
     let mut restarts = summary["restarts"].as_object().unwrap().values();
     assert!(restarts.all(|times| times == 0), "{summary}");
 }
 
-/// The lines of a file of records, each a JSON value. A file that does not exist has none.
+/// Reads a file of records, one JSON value per line. A missing file has none.
 pub fn records(file: &Path) -> Vec<Value> {
     let text = fs::read_to_string(file).unwrap_or_default();
     let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
     lines.collect()
 }
 
-/// The number of lines in a process's log in a run's directory that contain all `parts`, which are a level and fields.
+/// Counts the lines of a process's log in a run's directory that contain all `parts`, a level and
+/// fields.
 pub fn logged(directory: &Path, process: &str, parts: &[&str]) -> usize {
     let log = fs::read_to_string(directory.join(format!("{process}.log"))).unwrap_or_default();
     let has_all = |line: &&str| parts.iter().all(|part| line.contains(part));
     log.lines().filter(has_all).count()
 }
 
-/// Run a mission at its own speed to its end.
 pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Value) {
     Run::at_own_speed(robot, mission, arguments).finish()
 }
 
-/// Open the recording of a run in the directory above the run's, and replay it. Assert that every generation of every stage is
-/// bit-equal, or ended before it took anything.
+/// Replays the recording of a run, given the directory above the run's.
+///
+/// Asserts that every generation of every stage is bit-equal, or ended before its first input.
 #[track_caller]
 pub fn replayed_in(directory: &TempDir) -> Report {
     replayed(&Recording::open(&directory.path().join("run/recording.mcap")).unwrap())
@@ -272,12 +273,11 @@ pub fn replayed(recording: &Recording) -> Report {
     report
 }
 
-/// The committed recording of the first seconds of a mission.
+/// Opens the committed recording of the first seconds of a mission.
 pub fn golden() -> Recording {
     golden_of("open-room")
 }
 
-/// The committed recording of that name.
 pub fn golden_of(name: &str) -> Recording {
     let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden");
     Recording::open(&Path::new(directory).join(name).with_extension("mcap")).unwrap()

@@ -1,4 +1,4 @@
-//! A simulated robot that is a process of its own, and a proxy for the datagrams between it and its link.
+//! Simulated robot as a separate process, and a proxy for the datagrams between it and its link.
 
 use std::{
     io::{BufRead as _, BufReader, ErrorKind},
@@ -17,20 +17,20 @@ use serde_json::Value;
 
 use super::{PATIENCE, firsthand};
 
-/// A simulated robot, which runs until this value is dropped.
+/// Simulated robot, which runs until dropped.
 pub struct Robot {
     process: Child,
     pub listening: String,
-    /// The wire of its laser, if that has one of its own.
+    /// Wire of its laser, if separate.
     pub laser: Option<String>,
-    /// The records of ground truth. They are received at once, because the robot waits for a slow reader.
+    /// Ground truth records, received at once because the robot waits for a slow reader.
     truth: Receiver<Value>,
-    /// The last known distance of the robot from its start, metres.
+    /// Last known distance of the robot from its start, metres.
     went: f64,
 }
 
 impl Robot {
-    /// Start a simulated robot in the world of the default mission, on a port of its own.
+    /// Starts a simulated robot in the world of the default mission, on a free port.
     pub fn on_the_course() -> Self {
         Self::start("obstacle-course", "udp", "127.0.0.1:0")
     }
@@ -39,7 +39,7 @@ impl Robot {
         Self::start_with(mission, &["--transport", transport, "--listen", listen])
     }
 
-    /// Start a simulated robot with further arguments of `firsthand sim`.
+    /// Starts a simulated robot with further arguments of `firsthand sim`.
     pub fn start_with(mission: &str, arguments: &[&str]) -> Self {
         let mut process = firsthand(&["sim", mission, "--ground-truth"])
             .args(arguments)
@@ -64,19 +64,17 @@ impl Robot {
         }
     }
 
-    /// Wait until the robot is `metres` from its start.
     pub fn wait_until_driven(&mut self, metres: f64) {
         while self.went < metres {
             self.went = from_start(&self.truth.recv_timeout(PATIENCE).unwrap());
         }
     }
 
-    /// Wait for the next record of its ground truth. Returns whether both wheels rest.
+    /// Waits for the next ground truth record. Returns whether both wheels are at rest.
     pub fn wait_for_a_tick(&mut self) -> bool {
         rests(&self.truth.recv_timeout(PATIENCE).unwrap())
     }
 
-    /// Wait until both wheels rest.
     pub fn wait_until_at_rest(&mut self) {
         let began = Instant::now();
         while !self.wait_for_a_tick() {
@@ -84,13 +82,13 @@ impl Robot {
         }
     }
 
-    /// Whether both wheels rest by the newest record.
+    /// Returns whether both wheels are at rest in the newest record.
     pub fn is_at_rest(&mut self) -> bool {
         let newest = self.truth.try_iter().last();
         newest.map_or_else(|| self.wait_for_a_tick(), |truth| rests(&truth))
     }
 
-    /// Kill the robot. Returns its distance from its start by then.
+    /// Kills the robot. Returns its final distance from its start.
     pub fn kill(mut self) -> f64 {
         self.process.kill().unwrap();
         self.process.wait().unwrap();
@@ -116,7 +114,7 @@ impl Drop for Robot {
     }
 }
 
-/// Passes datagrams on between link and robot until it is dropped.
+/// Forwarder of datagrams between link and robot, until dropped.
 #[derive(Debug)]
 pub struct Proxy {
     address: SocketAddr,
@@ -124,7 +122,7 @@ pub struct Proxy {
     threads: Vec<JoinHandle<()>>,
 }
 
-/// Converts the bytes that arrive to the bytes that are passed on.
+/// Function from received bytes to forwarded bytes.
 pub type Pass = dyn FnMut(&[u8]) -> Vec<u8> + Send;
 
 impl Proxy {
@@ -156,7 +154,7 @@ impl Proxy {
         Self { address, over, threads }
     }
 
-    /// The assignment of a mission file that makes the proxy the mission's robot.
+    /// Returns the mission assignment that makes the proxy the robot.
     pub fn as_robot(&self) -> String {
         format!("robot.address=\"udp://{}\"", self.address)
     }
@@ -171,7 +169,6 @@ impl Drop for Proxy {
     }
 }
 
-/// Take the datagrams of `socket` until `over` is set.
 fn receive(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], SocketAddr)) {
     let often = Some(Duration::from_millis(50));
     socket.set_read_timeout(often).unwrap();
@@ -179,7 +176,7 @@ fn receive(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], So
     while !over.load(Ordering::Relaxed) {
         match socket.recv_from(&mut buffer) {
             Ok((length, from)) => take(&buffer[..length], from),
-            // No datagram came, or nobody listens at the other end now.
+            // No datagram arrived, or the other end does not listen now.
             Err(error) => assert!(
                 matches!(
                     error.kind(),

@@ -1,4 +1,4 @@
-//! Threads beside a measurement: between a simulated robot and its host, and consumers.
+//! Threads beside a measurement: proxies of simulated robots, and consumers.
 
 use std::{
     io,
@@ -10,15 +10,17 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-/// A thread that works turn by turn until this is dropped.
+/// Thread that works turn by turn until dropped.
 pub struct Turns {
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Turns {
-    /// The thread gets its work from `begin`. Each turn waits for a short time at most, and may fail: a datagram that it cannot send, for
-    /// example before the other end listens, is lost, as on a radio.
+    /// Starts a thread that runs the turns created by `begin`.
+    ///
+    /// Each turn returns soon and may fail: a datagram sent before the other end listens is lost,
+    /// as on a radio.
     pub fn start<E, Turn: FnMut() -> Result<(), E>>(
         begin: impl FnOnce() -> Turn + Send + 'static,
     ) -> Self {
@@ -43,7 +45,7 @@ impl Drop for Turns {
     }
 }
 
-/// A socket of this machine that does not block.
+/// Opens a non-blocking loopback socket.
 pub fn socket() -> io::Result<UdpSocket> {
     let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
     socket.set_nonblocking(true)?;

@@ -1,15 +1,16 @@
-//! Baselines: planner stages to compare the harmonic planner with, on the same map, with the same sonar and controller.
+//! Baselines: planner stages for comparison, on the same map, sonar and controller as the harmonic
+//! planner.
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
-//! | [`belief`] | a planner's copy of the map: free cells, lines of sight |
-//! | [`planner`] | a planner to compare with, and the guidance along its way |
-//! | [`wavefront`] | the shortest path over the map, planned anew in every tick; pure |
+//! | [`belief`] | a planner's copy of the map |
+//! | [`planner`] | a planner for comparison, and guidance along its path |
+//! | [`wavefront`] | the shortest path, replanned each tick; pure |
 //! | [`bug`] | Bug2: straight to the target, and around hazards; pure |
-//! | [`process`] | the process of either of them, and the command that it is started by |
+//! | [`process`] | the process and start command |
 //!
-//! Both take unknown cells for free, like the harmonic planner. Neither looks around before it drives: that is the harmonic
-//! planner's active sensing, with the evidential method.
+//! Both treat unknown cells as free, like the harmonic planner. Unlike it with the evidential
+//! method, neither looks around before driving.
 
 pub mod belief;
 pub mod bug;

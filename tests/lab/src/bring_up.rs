@@ -1,4 +1,4 @@
-//! `firsthand bring-up` of simulated robots that were assembled with faults: what it names, and what it names of right ones.
+//! `firsthand bring-up` of simulated robots, correct and misassembled: which faults it names.
 
 use std::{
     collections::BTreeSet,
@@ -23,7 +23,7 @@ use crate::{
     ros2_robot::Ros2Robot,
 };
 
-/// Bring up simulated robots with faults of assembly, and count what is found and what is invented.
+/// Bring up simulated robots with assembly faults, and count found and invented faults.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Robots with one or two faults.
@@ -34,20 +34,20 @@ pub struct Arguments {
     right: u64,
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// The robots in turn: x80, kobuki (JSON), arduino and sonars by default; ros2 and burger speak ROS 2, which a firsthand that was built
-    /// with --features ros2 alone speaks.
+    /// Robots in turn: by default x80, kobuki (JSON), arduino and sonars. ros2 and burger speak ROS
+    /// 2, which requires a firsthand built with --features ros2.
     #[arg(long, value_delimiter = ',', default_value = "x80,kobuki,arduino,sonars", value_parser = PossibleValuesParser::new(ROBOTS.map(|it| it.0)))]
     robots: Vec<String>,
     /// Robots at once; each takes about a minute of wall-clock time.
     #[arg(long, default_value_t = 6)]
     jobs: usize,
-    /// The directory of the runs.
+    /// Directory of the runs.
     #[arg(long, value_name = "DIR", default_value = "bring-up")]
     out: PathBuf,
 }
 
-/// A fault of the table `faults.csv`: the parts of which one must be found wrong, and the keys that the robot has instead of the
-/// stated ones, in which VALUE is a number from one of two ranges.
+/// Row of `faults.csv`: parts of which one must be found wrong, and the robot's true keys. VALUE is
+/// a number from one of two ranges.
 #[derive(Deserialize)]
 struct Fault {
     robot: String,
@@ -76,9 +76,10 @@ impl Fault {
 }
 
 const ROOM: &str = "target = [0.8, 0]\nsensors = 'all'\nsimulation.realism = 'measured'\n[perimeter]\nwidth_m = 8.0\ncentre = [0.0, 0.0]\n";
-/// In its place the address of the simulator is stated, unless the robot speaks ROS 2; the simulated ones of these speak JSON.
+/// Placeholder for the simulator's address. Robots that speak ROS 2 lack it; their simulators speak
+/// JSON.
 const ADDRESS: &str = "#ADDRESS";
-/// The robots by the names of the table of faults.
+/// Robots by their names in the fault table.
 static ROBOTS: [(&str, &str); 6] = [
     ("x80", "[robot]\n#ADDRESS\nmodel = 'x80'\n"),
     (
@@ -102,15 +103,14 @@ static ROBOTS: [(&str, &str); 6] = [
         "[robot]\nmodel = 'turtlebot3-burger'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'lds-02'\nforward_m = -0.032\nbearing_deg = 0.0\n[simulation.laser]\nsweep_s = 0.1\n",
     ),
 ];
-/// Instead of a key of a mission: how far such a robot turns by its odometry, over how far its wheels do.
+/// Pseudo-key: ratio of the turn by odometry to the turn of the wheels.
 const ODOMETRY_TURNS: &str = "odometry.turns=";
-/// Draws of a second fault, one of which is another than the first.
+/// Number of draws for a second fault that differs from the first.
 const DRAWS: u32 = 20;
-/// Longer than a bring-up on a loaded machine.
+/// Upper bound for a bring-up on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(400);
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Walls around the robot, a little otherwise for each.
 fn walls(random: &mut Random) -> String {
     let corners = [(1.4, -1.8), (1.4, 1.6), (-0.4, 2.0), (-1.8, 0.5), (-1.6, -1.9), (1.4, -1.8)];
     let shift = random.within(-0.15, 0.15);
@@ -140,7 +140,7 @@ pub fn main(arguments: &Arguments) -> Result {
     (right == all).then_some(()).ok_or_else(|| "a fault was missed or invented".into())
 }
 
-/// Whether the bring-up of a robot named its faults and no other, and what it said.
+/// Returns whether a bring-up named exactly its robot's faults, and its findings.
 fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, String)> {
     let mut random = Random::of_world(arguments.seed, 0, number);
     let robot = &*arguments.robots[number as usize % arguments.robots.len()];
@@ -148,7 +148,7 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     let text = format!("seed = {}\n{ROOM}{body}{}", number + 1, walls(&mut random));
     let most = match (number < arguments.faulty, robot) {
         (false, _) => 0,
-        // Sonars alone do not tell two faults of wheels apart.
+        // Sonars alone cannot distinguish two wheel faults.
         (true, "x80" | "sonars") => 1,
         (true, _) => 1 + random.below(2),
     };
@@ -156,7 +156,7 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     let mut faults: Vec<&Fault> = Vec::new();
     for _ in 0..DRAWS {
         let fault = table[random.below(table.len())];
-        // While a motor turns backwards nothing else can be told.
+        // A motor that turns backwards hides other faults.
         let hides = |it: &&Fault| [&it.parts, &fault.parts].iter().any(|it| it.contains("motors"));
         let is_other = !faults.iter().any(|it| it.parts == fault.parts || hides(it));
         if faults.len() < most && is_other {
@@ -193,7 +193,7 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     let mut child = Process::spawn(command).or_cannot("start firsthand bring-up")?;
     let began = Instant::now();
     while child.try_reap()?.is_none() && began.elapsed() < PATIENCE {
-        // A simulator whose ground truth nobody reads stops.
+        // A simulator stops if its ground truth is unread.
         simulator.poll()?;
         std::thread::sleep(LOOK);
     }

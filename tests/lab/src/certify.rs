@@ -1,6 +1,7 @@
-//! The certificate: what was tried on real processes, what was lost, and how often at most it may be lost by that. Each part runs on two
-//! robots at once. `rows.csv` has a row for each robot of each run and is added to, so that a large number may take many nights;
-//! `certificate.md` is written again from all rows.
+//! Certificate of trials on real processes: attempts, losses, and upper bounds of the loss rate.
+//!
+//! Each part runs on two robots at once. `rows.csv` gets a row per robot and run, so a large number
+//! may take many nights. `certificate.md` is rewritten from all rows.
 
 mod fuzz;
 
@@ -16,19 +17,19 @@ use crate::{
     missions::{results::Table, runner::in_parallel, statistics::most_by_95_percent},
 };
 
-/// Try robots with signals and faults, and write what was lost to a page, with bounds at 95 %.
+/// Try robots with signals and faults, and write the losses to a page, with bounds at 95 %.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The directory of `rows.csv`, which is added to, and of the page.
+    /// Directory of the page and of `rows.csv`, which is appended to.
     #[arg(long, default_value = "certificate")]
     out: PathBuf,
-    /// The share of the whole certificate that is tried now.
+    /// Share of the whole certificate to try now.
     #[arg(long, default_value_t = 0.001)]
     share: f64,
-    /// The parts, with commas; by default all.
+    /// Parts, with commas; by default all.
     #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(PARTS.iter().map(|part| part.name)))]
     parts: Vec<String>,
-    /// Inputs of the part fuzz, in place of its share.
+    /// Inputs of the part fuzz, instead of its share.
     #[arg(long, value_name = "N")]
     inputs: Option<u32>,
 }
@@ -36,9 +37,9 @@ pub struct Arguments {
 struct Part {
     name: &'static str,
     what: &'static str,
-    /// Of the whole certificate, over both robots.
+    /// Number in the whole certificate, over both robots.
     whole: u32,
-    /// Options of `firsthand bench chaos`, without numbers; none of what it does not try.
+    /// Options of `firsthand bench chaos`, without numbers; none if it does not apply.
     options: Option<&'static str>,
 }
 
@@ -106,7 +107,7 @@ pub fn main(arguments: &Arguments) -> Result {
         write_stderr(&format!("{}: {}\n", part.name, part.what));
         let inputs = arguments.inputs.filter(|_| part.name == FUZZ);
         let share = inputs.map_or(*share, |inputs| f64::from(inputs) / f64::from(part.whole));
-        // A row's number is its seed's, so that no seed is tried twice.
+        // The row number determines the seed, so that each is tried once.
         let number = rows.rows.len() as u64;
         let tried =
             |number: &u64, _| one(part, share / 2.0, *number).map_err(|error| error.to_string());
@@ -142,7 +143,6 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
                 true => format!("--missions {}", (many / faults).ceil()),
                 false => format!("--kills {many}"),
             };
-            // Another certificate that is made at the same time has other robots.
             let robot = format!("cert{}-{}", std::process::id(), number % 10);
             let words = format!("chaos {options} {count} --seed {seed} --robot {robot}");
             let asked = Chaos::try_parse_from(words.split(' ')).or_cannot("try")?.asked;

@@ -1,22 +1,24 @@
-//! `firsthand bench chaos`: signals to random stages at random times, and the results of the missions: a test of the supervisor through real processes.
+//! `firsthand bench chaos`: random signals to stages at random times, as a test of the supervisor
+//! through real processes.
 //!
-//! Each mission is run twice with one seed: undisturbed, then attacked. It must reach its target without touching
-//! anything, know its pose about as well as the undisturbed one, and leave nothing on the machine.
+//! Each mission runs twice with one seed: undisturbed, then attacked. It must reach its target
+//! without contact, with about the pose error of the undisturbed run, and leave nothing on the
+//! machine.
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
-//! | [`Options`] | the mission that is attacked, and the kinds of attack |
-//! | `schedule` | the seeded schedule of signals, and their kinds |
+//! | [`Options`] | the attacked mission, and the kinds of attack |
+//! | `schedule` | the seeded schedule of signals |
 //! | `mission` | one mission, undisturbed and attacked |
-//! | `attack` | the attacker of one mission, and its readers on the bus |
-//! | [`consumers`] | consumers that are hit and restarted, and end with chaos |
-//! | `changes` | targets that change meanwhile |
-//! | `replays` | replays of the missions' recordings |
+//! | `attack` | the attacker and its readers on the bus |
+//! | [`consumers`] | consumers that are hit and restarted |
+//! | `changes` | changing targets |
+//! | `replays` | replays of recordings |
 //! | `leftovers` | files and processes that outlived a mission |
-//! | `report` | the result of all missions, and the table of signals |
-//! | `robot_fault` | THE table of robot faults |
+//! | `report` | the overall result, and the table of signals |
+//! | `robot_fault` | the table of robot faults |
 //! | `robot_faults`, `proxy`, `fault_injector` | missions of faulty robots; the proxy before the robot; the changes of its bytes |
-//! | `stop_time_table` | how long each moved after its fault |
+//! | `stop_time_table` | stop times after faults |
 
 mod attack;
 mod changes;
@@ -44,11 +46,11 @@ use serde::Serialize;
 use crate::error::Result;
 use report::Series;
 
-/// The exit code if a mission did not arrive, touched something, lost its pose, aborted a healthy stage, or left something
-/// behind; or if a robot with a fault did not come to rest in time.
+/// Exit code if a mission missed its target, touched something, lost its pose, aborted a healthy
+/// stage or left something behind. It also marks a faulty robot that stopped late.
 const NOT_CLEAN: u8 = 8;
 
-/// What a chaos tried, what went wrong, the worst case in words, and the whole result as text.
+/// Attempts, losses, the worst case in words, and the whole result as text.
 pub struct Judged {
     pub tried: u64,
     pub lost: u64,
@@ -66,7 +68,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     Ok(ExitCode::from(if judged.lost == 0 { 0 } else { NOT_CLEAN }))
 }
 
-/// Run and judge without printing. The missions' directory stays if something went wrong.
+/// Runs and judges without printing. Keeps the missions' directory after a failure.
 pub fn judge(arguments: &Arguments) -> Result<Judged> {
     let options = Options::of(arguments)?;
     let directory = options.directory.display();
@@ -85,13 +87,12 @@ pub fn judge(arguments: &Arguments) -> Result<Judged> {
             ));
             Ok(judged)
         }
-        // An empty directory is of no use.
         Err(error) if fs::remove_dir(&options.directory).is_ok() => Err(error),
         Err(error) => Err(format!("{error}; see {directory}").into()),
     }
 }
 
-/// Attack missions, one after the other, until enough signals are sent.
+/// Attacks missions in sequence until enough signals are sent.
 fn run(options: &Options) -> Result<report::Report> {
     let began = Instant::now();
     let mut series = Series::new(options)?;

@@ -1,4 +1,4 @@
-//! `firsthand evaluate`: how often a robot arrives, on many worlds, judged by the ground truth.
+//! `firsthand evaluate`: success rates on many worlds, judged by the ground truth.
 
 mod report;
 
@@ -28,69 +28,75 @@ use crate::{
     },
 };
 
-/// Run missions on many worlds and count successes by the ground truth, with 95 % intervals, a picture and a page of every failure.
-/// Worlds and noise follow from the seed.
+/// Run missions on many worlds and count successes by the ground truth, with 95 % intervals, and a
+/// picture and page of every failure. The seed determines worlds and noise.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors, furnished, glazed, moving-cylinders, people, meeting; a mission file, a ROS map (.yaml), a BARN .world or
-    /// cylinders.csv; a folder of such files.
+    /// Worlds: rooms, doors, rotated-rooms, rotated-doors, traps, corridors, straight-corridors,
+    /// furnished, glazed, moving-cylinders, people, meeting; a mission file, a ROS map (.yaml), a
+    /// BARN .world or cylinders.csv; or a folder of such files.
     #[arg(long, default_value = "rooms")]
     worlds: Worlds,
-    /// Number of worlds; by default 100 if they are drawn, all if they are read, ten starts and targets on a map without any.
+    /// Number of worlds; by default 100 if drawn, all if read, and ten starts and targets on a map
+    /// without any.
     #[arg(long)]
     count: Option<usize>,
-    /// On a ROS map: start and heading of the robot, metres and degrees of the map.
+    /// Start and heading of the robot on a ROS map, in the map's metres and degrees.
     #[arg(long, value_name = "X,Y,DEG", requires = "target", allow_hyphen_values = true, value_parser = numbers::<3>)]
     start: Option<[f64; 3]>,
-    /// On a ROS map: the target, metres of the map.
+    /// Target on a ROS map, in the map's metres.
     #[arg(long, value_name = "X,Y", requires = "start", allow_hyphen_values = true, value_parser = numbers::<2>)]
     target: Option<[f64; 2]>,
-    /// Seed of the worlds and of the noise in them.
+    /// Seed of the worlds and their noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Missions on each world, each with noise of its own.
+    /// Missions on each world, each with its own noise.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     repeats: u64,
     /// evidential or paper; several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = "evidential")]
     method: Vec<String>,
-    /// harmonic; the baselines wavefront (shortest paths) and bug (Bug2); any executable of a planner. Several, with
-    /// commas, are compared on the same worlds.
+    /// harmonic; the baselines wavefront (shortest paths) and bug (Bug2); or any planner
+    /// executable. Several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = HARMONIC)]
     planner: Vec<String>,
-    /// front (the front sonar alone), front+infrared, three-front (the front sonar and the two beside it), laser or all, the default: what the
-    /// evidential method senses; the paper's has the front sonar alone. Several, with commas, are compared on the same worlds.
+    /// Sensors of the evidential method: front (the front sonar), front+infrared, three-front (the
+    /// front sonar and its two neighbours), laser or all, the default. The paper's method only has
+    /// the front sonar. Several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',')]
     sensors: Vec<String>,
     /// laboratory, measured or harsh.
     #[arg(long, default_value = "measured")]
     realism: String,
-    /// Calibrate the robot of each mission before it, by `firsthand calibrate`. Where that fails, standard error says why, and the mission runs as it is.
+    /// Calibrate each mission's robot first, by `firsthand calibrate`. If that fails, standard
+    /// error says why, and the mission runs uncalibrated.
     #[arg(long)]
     calibrate: bool,
-    /// The robot's model.
+    /// Robot model.
     #[arg(long, default_value = "x80")]
     robot: String,
-    /// Set a key of every mission, as often as needed.
+    /// Set a key of every mission; repeatable.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// A further setting to compare with the first on the same worlds: KEY=VALUE over it, several with commas.
+    /// Further setting to compare with the first on the same worlds: KEY=VALUE over it, several
+    /// with commas.
     #[arg(long, value_name = "KEY=VALUE,...")]
     versus: Vec<String>,
-    /// Drive on a wall clock, R times as fast: causes that only it has may stop the robot. Such missions do not repeat to the bit.
+    /// Drive on a wall clock, R times as fast, where more causes may stop the robot. Such missions
+    /// do not repeat bit for bit.
     #[arg(long, value_name = "R", default_value = "max")]
     pace: Pace,
-    /// Missions at once; by default one for each processor.
+    /// Missions at once; by default one per processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
-    /// The directory of rows, worlds, pictures and the page.
+    /// Directory of rows, worlds, pictures and the page.
     #[arg(long, value_name = "DIR", default_value = "evaluation")]
     out: PathBuf,
-    /// Go on with the evaluation in the directory of --out, which the same command must have begun.
+    /// Resume the evaluation in the directory of --out, which the same command must have begun.
     #[arg(long)]
     resume: bool,
-    /// Print one line of JSON at the end, and nothing else on standard output. It is about the first setting; `versus` has the
-    /// others.
+    /// Print only one line of JSON, at the end, on standard output. It describes the first setting;
+    /// `versus` has the others.
     #[arg(long)]
     json: bool,
 }
@@ -104,16 +110,15 @@ pub fn main(arguments: &Arguments) -> Result {
         heading: heading_deg.to_radians(),
         target: target.into(),
     });
-    // What no mission takes is refused before the first of them.
+    // Invalid keys are refused before the first mission.
     let robots: Vec<Mission> = settings
         .iter()
         .map(|setting| missions::parsed("target = [1, 0]", "its missions", &setting.set))
         .collect::<Result<_, _>>()?;
     let swept_m = swept_m(&robots[0]);
     let asked = Asked { count: arguments.count, seed, ends, swept_m };
-    // A world that is damaged is no error of the mission on the command line.
+    // A damaged world is no error of the mission on the command line.
     let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
-    // A refused world leaves no directory behind.
     let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
     write_stderr(&format!(
         "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
@@ -138,15 +143,15 @@ pub fn main(arguments: &Arguments) -> Result {
     crate::print(&report, arguments.json)
 }
 
-/// `N` numbers between commas, none beyond 1000 km.
+/// Parses `N` comma-separated numbers up to 1000 km.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let parsed: Option<Vec<f64>> = text.split(',').map(ends::number).collect();
     let numbers = parsed.and_then(|it| it.try_into().ok());
     numbers.ok_or_else(|| format!("give {N} numbers with commas between them"))
 }
 
-/// The methods to compare, each as a name and its assignments: each method with each of the sensors, but the paper's method
-/// once, because it has only the sonar.
+/// Returns names and assignments: each method with each sensor set. The paper's method counts once,
+/// because it only has the sonar.
 fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
     let with_sensors = |method: &String| -> Vec<(String, Vec<String>)> {
         let set = format!("method='{method}'");
@@ -161,7 +166,7 @@ fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
     arguments.method.iter().flat_map(with_sensors).collect()
 }
 
-/// The settings to compare, each planner by each method; the others are compared with the first.
+/// Returns each planner with each method. All are compared with the first.
 fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
     let Arguments { realism, robot, planner: planners, .. } = arguments;
     let common = [format!("simulation.realism='{realism}'"), format!("robot.model='{robot}'")];

@@ -1,9 +1,9 @@
-//! `firsthand experiments`: the experiments of the paper, repeated with many seeds through the real processes, beside the paper's
-//! values.
+//! `firsthand experiments`: the paper's experiments, repeated with many seeds through the real
+//! processes, beside the paper's values.
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
-//! | `table` | the tables `table.csv`, experiments with their missions and the paper's report of each, and `claims.csv`, the paper's claims |
+//! | `table` | `table.csv`, experiments with missions and the paper's reports, and `claims.csv`, the paper's claims |
 //! | `report` | the results as JSON objects and a page |
 
 mod report;
@@ -25,38 +25,41 @@ use crate::{
 };
 use table::METHODS;
 
-/// Repeat the paper's experiments with its method and with the default one, and compare the results with those of the paper.
+/// Repeat the paper's experiments with its method and the default one, and compare the results with
+/// the paper's.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Missions of each experiment and method, with noise seeds from 1 on.
+    /// Missions per experiment and method, with noise seeds from 1.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
-    /// Some of the experiments, with commas: 1a, 1b, 2, 3, 4-180, 4-90, 4-0, 5-constant, 5-modulated.
+    /// Experiments to run, with commas: 1a, 1b, 2, 3, 4-180, 4-90, 4-0, 5-constant, 5-modulated.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
-    /// measured or harsh: the errors of real robots, and the radio out 20 % of the time; or laboratory.
+    /// measured or harsh: the errors of real robots, and the radio out 20 % of the time; or
+    /// laboratory.
     #[arg(long, default_value = "measured", value_parser = ["measured", "harsh", LABORATORY])]
     realism: String,
-    /// Missions at once; by default one for each processor.
+    /// Missions at once; by default one per processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
-    /// The directory of rows, missions, pictures and the page.
+    /// Directory of rows, missions, pictures and the page.
     #[arg(long, value_name = "DIR", default_value = "experiments")]
     out: PathBuf,
-    /// Go on with the experiments in the directory of --out, which the same command must have begun.
+    /// Resume the experiments in the directory of --out, which the same command must have begun.
     #[arg(long)]
     resume: bool,
-    /// Print one line of JSON for each experiment, and nothing else on standard output.
+    /// Print only one line of JSON per experiment on standard output.
     #[arg(long)]
     json: bool,
 }
 
 const LABORATORY: &str = "laboratory";
 const FIRST_SEED: u64 = 1;
-/// The radio's outage except with laboratory realism. The paper's link fades; the paper gives no number.
+/// Radio outage except with laboratory realism. The paper's link fades by an unstated amount.
 const OUTAGE: &str = "simulation.radio.outage_share=0.2";
 
-/// Mission files of the paper state ideal wheels; nobody has measured those of another realism.
+/// Returns the odometry deviations of unmeasured wheels. The paper's mission files state ideal
+/// ones, which other realism makes false.
 fn uncalibrated() -> [String; 3] {
     let Odometry { diameter_ratio_sd, track_scale_sd, distance_scale_sd, .. } = Odometry::default();
     [

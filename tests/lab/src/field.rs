@@ -17,26 +17,26 @@ use serde_json::{Value, json};
 
 use console::failure::Refused;
 
-/// Solve the harmonic field of a map: numbers for NumPy, a picture, how long it took.
+/// Solve the harmonic field of a map: numbers for NumPy, a picture, the solving time.
 ///
-/// Cells that are not free count as blocked, and so does the rim of the map.
+/// Cells that are not free, and the map's rim, count as blocked.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// A ROS map_server YAML, a PGM or PNG image (light is free), or a MovingAI .map.
     map: PathBuf,
-    /// The target's column and row, from 0; row 0 is the top of the map.
+    /// Column and row of the target, from 0; row 0 is the top of the map.
     #[arg(long, value_name = "COL,ROW", value_parser = cell)]
     target_cell: Cell,
-    /// The screening length, in cells: in it u falls by a further factor of e. Without it there is no screening.
+    /// Screening length in cells, over which u falls by a further factor of e; without it, none.
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
     screening_cells: Option<f64>,
-    /// Write an array for NumPy, whose fields are those of u (mantissa, exponent) and the guidance (ex, ey).
+    /// Write a NumPy array with the fields of u (mantissa, exponent) and the guidance (ex, ey).
     #[arg(long, value_name = "F.npy")]
     out: Option<PathBuf>,
     /// Draw level sets of log u and lines of the guidance.
     #[arg(long, value_name = "F.svg")]
     picture: Option<PathBuf>,
-    /// Print one line of JSON at the end, and nothing else on standard output.
+    /// Print only one line of JSON, at the end, on standard output.
     #[arg(long)]
     json: bool,
 }
@@ -103,7 +103,7 @@ fn report(arguments: &Arguments, field: &Field, took: Duration) -> Value {
     if let Some(length) = arguments.screening_cells {
         report["screening_cells"] = length.into();
     }
-    // Memory of the process when the field is solved: map, solver and field, not the output files.
+    // Memory after solving, without output files.
     if let Some(peak) = kibibytes("self", "VmHWM") {
         report["peak_memory_bytes"] = (peak * 1024).into();
     }
@@ -120,7 +120,7 @@ fn write(
         .map_err(|cause| format!("cannot write {}: {cause}; give another file", file.display()))
 }
 
-/// u and guidance of every cell as a structured array of NumPy, of shape (rows, cols), in version 1.0 of its format.
+/// Writes u and guidance as a structured NumPy array of shape (rows, cols), format version 1.0.
 fn write_array(to: &mut impl Write, field: &Field) -> io::Result<()> {
     let header = format!(
         "{{'descr': [('mantissa', '<f8'), ('exponent', '<i4'), ('ex', '<f4'), ('ey', '<f4')], \
@@ -128,7 +128,6 @@ fn write_array(to: &mut impl Write, field: &Field) -> io::Result<()> {
         field.height(),
         field.width()
     );
-    // The values begin at a multiple of 64 bytes.
     const BEFORE: usize = 10;
     let length = (BEFORE + header.len() + 1).next_multiple_of(64) - BEFORE;
     to.write_all(b"\x93NUMPY\x01\x00")?;
@@ -149,9 +148,9 @@ fn cells(field: &Field) -> impl Iterator<Item = Cell> {
     (0..field.height()).flat_map(move |row| (0..width).map(move |col| Cell::new(col, row)))
 }
 
-/// The direction at a cell's centre, (0, 0) where there is none.
+/// Returns a cell's direction, (0, 0) without one.
 fn guidance(field: &Field, cell: Cell) -> [f32; 2] {
-    // A blocked cell gets no direction; the field would give its way out of the wall.
+    // The field would give a blocked cell its way out of the wall.
     let direction = field.direction(cell).filter(|_| field.is_reachable(cell));
     direction.unwrap_or_default().map(|component| component as f32)
 }

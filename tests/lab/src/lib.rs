@@ -1,26 +1,28 @@
-//! The laboratory: what measures robots. It is a consumer like any other, starts `firsthand` from beside itself, and contains the
-//! planners to compare with. No robot contains it.
+//! Laboratory: measures robots.
 //!
-//! | module | holds |
+//! It is an ordinary bus consumer that starts `firsthand` from its own directory and contains the
+//! planners for comparison. Robots run without it.
+//!
+//! | module | contents |
 //! |---|---|
 //! | [`missions`] | missions on many worlds, judged by the ground truth |
-//! | [`worlds`] | worlds, drawn from a seed or read from files |
-//! | `evaluate` | the command that compares settings on worlds |
+//! | [`worlds`] | worlds, drawn or read from files |
+//! | `evaluate` | comparison of settings on worlds |
 //! | `experiments` | the paper's experiments with many seeds |
-//! | [`baselines`] | planners to compare with: shortest paths, Bug2 |
-//! | [`chaos`] | signals to random processes at random times; faults of the robot |
-//! | [`tick`] | the latency of a tick, compared with five bare hops on the bus |
-//! | `certify` | the certificate: what was tried, what was lost, and bounds |
-//! | `bring_up` | bring-ups of robots with faults of assembly |
-//! | [`sources`] | simulated sources of fixes and turns |
+//! | [`baselines`] | planners for comparison: shortest paths, Bug2 |
+//! | [`chaos`] | random signals to processes; robot faults |
+//! | [`tick`] | tick latency, compared with five bare hops on the bus |
+//! | `certify` | attempts, losses, and bounds |
+//! | `bring_up` | bring-ups of misassembled robots |
+//! | [`sources`] | simulated fixes and turns |
 //! | `field` | the field of a map |
 //! | `background` | threads beside a measurement |
 //! | `random` | random numbers |
-//! | `robot` | the executable `firsthand`, its runs, and simulated robots |
-//! | `ros2_robot` | a simulated robot as one of ROS 2 |
-//! | `error` | why a bench ended early |
+//! | `robot` | `firsthand`, its runs, and simulated robots |
+//! | `ros2_robot` | a simulated ROS 2 robot |
+//! | `error` | failures |
 
-// No other crate uses these modules: `pub` means another module; what none uses is reported.
+// Private modules: `pub` marks use by another module, and unused items are reported.
 #![allow(unreachable_pub)]
 
 mod background;
@@ -59,7 +61,8 @@ enum Command {
     Experiments(experiments::Arguments),
     Field(field::Arguments),
     Certify(certify::Arguments),
-    /// Measure ticks and fields; send random signals to a robot's processes; publish fixes of a simulated robot.
+    /// Measure ticks and fields; send random signals to a robot's processes; publish fixes of a
+    /// simulated robot.
     #[command(subcommand)]
     Bench(Bench),
     #[command(hide = true)]
@@ -76,7 +79,7 @@ enum Bench {
     Sources(sources::Arguments),
 }
 
-/// The keys and values of a report's JSON as TOML, for people.
+/// Formats a report as TOML for people.
 fn text(report: &impl Serialize) -> String {
     toml::to_string(report).unwrap_or_else(|error| error.to_string())
 }

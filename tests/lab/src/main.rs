@@ -1,4 +1,4 @@
-//! The executable `firsthand-lab`; see the library.
+//! Executable `firsthand-lab`; see the library.
 
 use std::process::ExitCode;
 

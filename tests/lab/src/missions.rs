@@ -1,15 +1,15 @@
 //! Missions on many worlds, each through the real processes, judged by the ground truth.
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
-//! | [`trial`] | a mission in a world, and the rules it is judged by |
-//! | [`row`] | one mission's result, and its latencies |
-//! | [`results`] | the directory of an evaluation, and its two CSV files |
+//! | [`trial`] | a mission in a world, and its rules |
+//! | [`row`] | one mission's result and latencies |
+//! | [`results`] | the directory of an evaluation, and its CSV files |
 //! | [`runner`] | the missions, several at a time |
-//! | [`statistics`] | shares with their intervals, differences, medians |
+//! | [`statistics`] | shares with intervals, differences, medians |
 //! | [`page`] | a page of results |
 //!
-//! Every setting runs on the same worlds with the same noise, so that results differ only by the setting.
+//! Every setting runs on the same worlds and noise, so that only the setting changes the results.
 
 pub mod page;
 pub mod results;
@@ -18,14 +18,13 @@ pub mod runner;
 pub mod statistics;
 pub mod trial;
 
-/// The name of `firsthand`'s own planner.
 pub const HARMONIC: &str = "harmonic";
 
-/// Mission keys that are compared on the same worlds.
+/// Mission keys to compare on the same worlds.
 #[derive(Clone)]
 pub struct Setting {
     pub name: String,
-    /// The planner: [`HARMONIC`], or the executable in its place.
+    /// [`HARMONIC`], or the executable of another planner.
     pub planner: String,
     pub set: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! Random numbers: a seed and a stream always give the same ones.
+//! Random numbers, determined by a seed and a stream.
 
 use glam::DVec2;
 use rand_pcg::{Pcg64, rand_core::Rng as _};
@@ -18,24 +18,23 @@ impl Random {
         self.0.next_u64()
     }
 
-    /// A number that is uniform in [0, 1).
+    /// Returns a uniform number in [0, 1).
     pub fn share(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// A number that is uniform in [`from`, `to`).
+    /// Returns a uniform number in [`from`, `to`).
     pub fn within(&mut self, from: f64, to: f64) -> f64 {
         from + (to - from) * self.share()
     }
 
-    /// A point that is uniform over the square of half side `half` around `centre`.
+    /// Returns a uniform point in the rectangle of half size `half` around `centre`.
     pub fn point(&mut self, centre: DVec2, half: DVec2) -> DVec2 {
         let x = self.within(-half.x, half.x);
         let y = self.within(-half.y, half.y);
         centre + DVec2::new(x, y)
     }
 
-    /// One of 0 to `n` - 1.
     pub fn below(&mut self, n: usize) -> usize {
         ((self.share() * n as f64) as usize).min(n.saturating_sub(1))
     }

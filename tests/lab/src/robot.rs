@@ -1,4 +1,5 @@
-//! The executable `firsthand`, which the laboratory starts, its runs and simulated robots, and the processes of this machine.
+//! Executable `firsthand`, as started by the laboratory, its runs and simulated robots, and the
+//! processes of this machine.
 
 use std::{
     ffi::OsStr,
@@ -20,10 +21,10 @@ use summary::Summary;
 
 use crate::error::{OrCannot as _, Refused, Result};
 
-/// The path of `firsthand`, beside this executable or on `PATH`.
+/// Returns the path of `firsthand`, beside this executable or on `PATH`.
 ///
 /// # Errors
-/// It is at neither place.
+/// Returns an error if it is at neither place.
 pub fn path() -> Result<PathBuf, Refused> {
     executable::find(Path::new("firsthand")).map_err(|problem| {
         let build = "build it with `cargo build --release`";
@@ -31,15 +32,15 @@ pub fn path() -> Result<PathBuf, Refused> {
     })
 }
 
-/// A subcommand of `firsthand` in a process of its own. It does not start if there is no `firsthand`, see [`path`].
+/// Returns a subcommand of `firsthand`, which fails to start without [`path`].
 pub fn firsthand(arguments: &[&str]) -> Command {
     let mut command = process::child(path().unwrap_or_default());
-    // The robots of ROS 2 stay on this machine.
+    // ROS 2 robots stay on this machine.
     command.args(arguments).env("ROS_LOCALHOST_ONLY", "1");
     command
 }
 
-/// `firsthand run` or `firsthand calibrate` of `robot` in `mission`, with assignments, which prints its result as JSON.
+/// Returns a subcommand for `robot` in `mission` with assignments and a JSON result.
 pub fn mission(
     subcommand: &str,
     mission: impl AsRef<OsStr>,
@@ -51,7 +52,7 @@ pub fn mission(
     command
 }
 
-/// A simulated robot in the world of `mission`, which does not end with its supervisor. Its files are in `directory`.
+/// Starts a simulated robot that outlives its supervisor, with files in `directory`.
 pub fn simulated(directory: &Path, mission: &Mission, pace: Pace) -> Result<Simulator> {
     fs::create_dir_all(directory).or_cannot_file("make", directory)?;
     Ok(Simulator::start(firsthand(&[]), None, directory, mission, pace, None)?)
@@ -63,7 +64,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// Start `command`, a run with its files in `directory`. What it says goes to a file beside that.
+    /// Starts a run with files in `directory` and its standard error beside it.
     pub fn start(mut command: Command, directory: &Path, records: bool) -> Result<Self> {
         let said = append(said(directory));
         command.args((!records).then_some("--no-record"));
@@ -73,7 +74,7 @@ impl Run {
         Ok(Self { process, directory: directory.to_owned() })
     }
 
-    /// Wait until the run ends, and `look` every so often meanwhile.
+    /// Waits until the run ends, and calls `look` at intervals.
     pub fn wait(mut self, every: Duration, mut look: impl FnMut()) -> Result<Self> {
         while self.process.try_reap().or_cannot("reap")?.is_none() {
             look();
@@ -82,10 +83,10 @@ impl Run {
         Ok(self)
     }
 
-    /// The summary of the run, which it has at its end.
+    /// Returns the summary that the run leaves at its end.
     ///
     /// # Errors
-    /// There is none; the last line that the run said is the error.
+    /// Returns the last line of the run's standard error if there is no summary.
     pub fn summary(&self) -> Result<Summary> {
         let summary = fs::read(self.directory.join(SUMMARY)).ok();
         summary.and_then(|summary| serde_json::from_slice(&summary).ok()).ok_or_else(|| {
@@ -106,11 +107,10 @@ pub fn processes() -> impl Iterator<Item = u32> {
     entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok())
 }
 
-/// The other processes and their command lines, a space after each word.
+/// Returns other processes and their command lines, a space after each word.
 pub fn command_lines() -> impl Iterator<Item = (u32, String)> {
     let others = processes().filter(|process| *process != std::process::id());
     others.map(|process| {
-        // It is empty if the process has ended.
         let line = fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default();
         (process, String::from_utf8_lossy(&line).replace('\0', " "))
     })

@@ -1,8 +1,9 @@
-//! A simulated robot that speaks lines of JSON, as a robot of ROS 2: a thread is the simulated robot's host and publishes and subscribes
-//! for it. Its traffic stays on this machine.
+//! Simulated robot that speaks JSON lines, presented as a ROS 2 robot.
 //!
-//! It computes odometry as a robot's own program does: from the wheels' angles, by the sizes that the mission states, whatever those of
-//! the simulated robot are. A robot that is told nothing stands after [`WATCHDOG_S`], which the simulated robot sees to.
+//! A thread is the simulated robot's host, and publishes and subscribes for it, on this machine
+//! only. Like a robot's own program, it computes odometry from wheel angles by the mission's stated
+//! sizes, independent of the true ones. Without commands, the simulated robot stops after
+//! [`WATCHDOG_S`].
 
 use std::{
     collections::BTreeMap,
@@ -40,25 +41,25 @@ use crate::{
 };
 
 const WATCHDOG_S: f64 = 0.25;
-/// The part of a delay that the time of a report follows.
+/// Share of a delay, as a divisor, by which report times catch up.
 const CATCHES_UP: u64 = 8;
-/// Longest wait until the thread sees that it ends.
+/// Maximum delay until the thread notices its end.
 const LOOK: Duration = Duration::from_millis(50);
-/// A simulated robot that said nothing for so long is greeted, again if need be.
+/// Silence after which the simulated robot is greeted again.
 const SILENT: Duration = Duration::from_secs(1);
 const MOST_COMMANDS: usize = 16;
 const RELIABLE: Quality = Quality { is_reliable: true, is_latched: false, depth: 10 };
 
-/// Simulate a robot that speaks ROS 2 in the world of a mission, until this ends. Prints the keys of its mission, as options of `firsthand
-/// run`.
+/// Simulate a robot that speaks ROS 2 in a mission's world, until this ends. Prints its mission
+/// keys as options of `firsthand run`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission of a robot that speaks lines of JSON when it is simulated.
+    /// A mission of a robot that is simulated with JSON lines.
     mission: String,
-    /// Set a key of the simulated robot, of which its program and its mission know nothing.
+    /// Set a key of the simulated robot, unknown to its program and mission.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// The directory of the ground truth.
+    /// Directory of the ground truth.
     #[arg(long, value_name = "DIR", default_value = "ros2-robot")]
     out: PathBuf,
 }
@@ -76,25 +77,27 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 pub struct Ros2Robot {
-    /// What a mission of the robot states beside its other keys.
+    /// Additional keys of a mission with this robot.
     pub keys: Vec<String>,
     _thread: Turns,
 }
 
 impl Ros2Robot {
-    /// Speak for the simulated robot at `robot`, the `number`th of this process, by the sizes of the mission that is `stated` with the
-    /// robot's keys. Its odometry turns `turns` times as far as the wheels do.
+    /// Speaks for the simulated robot at `robot`, the `number`th of this process, by the sizes of
+    /// the mission `stated` with the robot's keys.
+    ///
+    /// Its odometry turns `turns` times as far as the wheels do.
     ///
     /// # Errors
-    /// There is no such mission, or DDS does not start.
+    /// Returns an error if there is no such mission, or DDS does not start.
     pub fn start(
         robot: SocketAddr,
         number: u64,
         turns: f64,
         stated: impl Fn(&[String]) -> Result<Mission, LookupError>,
     ) -> Result<Self> {
-        // The topics of two robots differ, because others on this machine may have its domain; the ports of greater domains are those of
-        // other sockets, too.
+        // Topics differ between robots, because others on this machine may share a domain. The
+        // ports of higher domains overlap those of other sockets.
         let process = std::process::id();
         let domain = 1 + (u64::from(process) + number) % 99;
         let topics = ["odom", "scan", "cmd_vel", "battery", "hazards"];
@@ -108,7 +111,7 @@ impl Ros2Robot {
     }
 }
 
-/// What moves messages between the simulated robot and the domain.
+/// Bridge between simulated robot and domain.
 struct Node {
     wire: UdpSocket,
     lines: Lines,
@@ -167,7 +170,7 @@ impl Node {
     }
 }
 
-/// The robot's own program. Pure: times and lines in, messages out.
+/// Robot's own program. Pure: times and lines in, messages out.
 struct Program {
     stated: Mission,
     drive: DifferentialDrive,
@@ -189,7 +192,7 @@ impl Program {
         }
     }
 
-    /// What a `geometry_msgs/Twist` tells the wheels. Fails if `payload` is none.
+    /// Converts a `geometry_msgs/Twist` to a wheel order. Fails for other payloads.
     fn order(&self, payload: &[u8]) -> Result<Order, Malformed> {
         let twist = msg::Twist::decode(payload)?;
         let [v, omega] = [twist.linear.x, twist.angular.z];
@@ -206,8 +209,10 @@ impl Program {
         }
     }
 
-    /// When a report that came at `now_ns` was made. On a busy machine reports wait and come together, though the robot made one after
-    /// the other: the time of one is a period after that of the one before, and follows slowly where that is late.
+    /// Returns when a report that came at `now_ns` was made.
+    ///
+    /// On a busy machine, reports queue and come together. A report's time is one period after the
+    /// previous one's, and catches up slowly if that is late.
     fn taken_ns(&mut self, report: &Report, now_ns: u64) -> u64 {
         if report.wheels.is_none() {
             return now_ns;
@@ -218,7 +223,7 @@ impl Program {
         *self.taken_ns.insert(taken_ns)
     }
 
-    /// What a topic says of a `report` that was made at `now_ns`; none if `report` says nothing of it.
+    /// Returns a topic's message of a `report` made at `now_ns`; none without content.
     fn message(&self, content: Content, report: &Report, now_ns: u64) -> Option<Vec<u8>> {
         match content {
             Content::Odometry => {
@@ -270,7 +275,8 @@ impl Program {
     }
 }
 
-/// An `irobot_create_msgs/HazardDetectionVector` of what bumpers and cliff sensors feel, by the names of their rows.
+/// Encodes active bumpers and cliff sensors, by row names, as
+/// `irobot_create_msgs/HazardDetectionVector`.
 fn hazards(touched: &BTreeMap<String, bool>, now_ns: u64) -> Vec<u8> {
     let hazard = |(name, _): (&String, _)| HazardDetection {
         header: Header::at(now_ns, &name.replace('-', "_")),

@@ -1,4 +1,5 @@
-//! Simulated sources of fixes and turns: a camera and a gyro that see a simulated robot by the ground truth of its run.
+//! Simulated sources of fixes and turns: a camera and a gyro that observe a simulated robot by its
+//! run's ground truth.
 
 use std::{
     fs::File,
@@ -25,24 +26,25 @@ use crate::{
     random::Random,
 };
 
-/// Publish what a camera and a gyro would measure of a simulated robot, until its run ends.
+/// Publish the measurements of a camera and a gyro of a simulated robot, until its run ends.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The directory of the run, with the ground truth.
+    /// Directory of the run, with the ground truth.
     run: PathBuf,
-    /// The robot.
+    /// Robot name.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Fixes a second of mission time; 0 for none.
+    /// Fixes per second of mission time; 0 for none.
     #[arg(long, value_name = "HZ", default_value_t = 1.0)]
     fixes: f64,
     /// Standard deviation of a fix in x and in y, metres.
     #[arg(long, value_name = "M", default_value_t = 0.05)]
     fix_error: f64,
-    /// Share of the fixes that are off by one metre.
+    /// Share of fixes that are off by one metre.
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     jumps: f64,
-    /// A gyro with this noise, degrees per square root of a second. It has a bias of 0.02 degrees a second and a scale of 1.005.
+    /// Noise of a gyro, degrees per square root of a second. The gyro has a bias of 0.02 degrees
+    /// per second and a scale of 1.005.
     #[arg(long, value_name = "NOISE")]
     gyro: Option<f64>,
     /// Seed of the noise.
@@ -52,7 +54,7 @@ pub struct Arguments {
 
 const GYRO_BIAS_DEG_S: f64 = 0.02;
 const GYRO_SCALE: f64 = 1.005;
-/// Poses and ticks of the ground truth that wait for each other, at most.
+/// Maximum poses and ground-truth ticks that wait for each other.
 const WAITING: usize = 64;
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -111,7 +113,7 @@ impl<'a> Source<'a> {
             self.poses.push(pose);
         }
         self.read_truth().or_cannot("read the ground truth of the run")?;
-        // A pose tells the mission time of the ground truth with the same counts.
+        // Equal counts match a pose with the ground truth's mission time.
         for pose in std::mem::take(&mut self.poses) {
             let Some(at) = self.truth.iter().position(|truth| truth.is_of(&pose)) else {
                 self.poses.push(pose);
@@ -128,7 +130,7 @@ impl<'a> Source<'a> {
 
     fn read_truth(&mut self) -> io::Result<()> {
         if self.file.is_none() {
-            // The simulated robot may not have written it yet.
+            // The file may not exist yet.
             let file = File::open(self.arguments.run.join(GROUND_TRUTH));
             self.file = file.ok().map(BufReader::new);
         }
@@ -187,7 +189,7 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// A number that is nearly normally distributed with the deviation 1: the sum of twelve uniform ones.
+    /// Returns a nearly normal number of deviation 1.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.chance.share()).sum::<f64>() - 6.0
     }

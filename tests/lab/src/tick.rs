@@ -1,11 +1,11 @@
-//! The latency of a tick, datagram in to datagram out, compared with what the bus alone takes.
+//! Latency of a tick, datagram in to datagram out, compared with the bus alone.
 //!
-//! | module | holds |
+//! | module | contents |
 //! |---|---|
 //! | [`Arguments`] | missions and bare hops, in turn |
 //! | `hops` | five bare hops between processes |
-//! | `busy` | threads that compute meanwhile |
-//! | `mission` | a mission whose ticks are measured, and its consumers |
+//! | `busy` | computing threads |
+//! | `mission` | the measured mission, and its consumers |
 //! | `process_set` | resources of a process and its descendants |
 
 mod busy;
@@ -27,45 +27,45 @@ use crate::{
     missions::statistics::{median, rounded},
 };
 
-/// Measure a tick, datagram in to datagram out, and five bare hops between processes, back to back and at the robot's rate.
+/// Measure a tick, datagram in to datagram out, and five bare hops between processes, back to back
+/// and at the robot's rate.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The mission whose ticks are measured.
+    /// Mission whose ticks are measured.
     #[arg(default_value = "obstacle-course")]
     mission: String,
-    /// Measure only at so many ticks a second, or back to back: max.
+    /// Measure only at this many ticks per second, or back to back: max.
     #[arg(long, value_name = "HZ", value_parser = parse_hz)]
     rate: Option<Regime>,
-    /// Number of rounds, each of which measures both, because a shared machine has good and bad moments.
+    /// Number of rounds. Each measures both, because the load of a shared machine varies.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
-    /// Set a key of the mission, as often as needed.
+    /// Set a mission key; repeatable.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Do not record the missions meanwhile; `run` does.
+    /// Run the missions without recording; `run` records.
     #[arg(long)]
     no_record: bool,
-    /// Number of consumers that read grid and field of the missions meanwhile.
+    /// Number of consumers that read the missions' grid and field meanwhile.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=16))]
     consumers: u32,
-    /// Number of threads of ordinary priority that compute meanwhile, without end.
+    /// Number of threads of ordinary priority that compute meanwhile.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
     busy: u32,
-    /// One line of JSON.
+    /// Print one line of JSON.
     #[arg(long)]
     json: bool,
-    /// Name of the robot, which also names its shared memory.
+    /// Name of the robot and of its shared memory.
     #[arg(long)]
     robot: Option<RobotName>,
     /// Be the forwarder that stands for this stage.
     #[arg(long, hide = true, requires = "supervisor", requires = "robot")]
     forwarder: Option<String>,
-    /// The parent process: this one stops when it ends.
+    /// Parent process: this one stops when it ends.
     #[arg(long, hide = true)]
     supervisor: Option<u32>,
 }
 
-/// Measure, or be one of the processes that a measurement starts.
 pub fn main(arguments: &Arguments) -> Result {
     let robot = match &arguments.robot {
         Some(robot) => robot.clone(),
@@ -84,7 +84,7 @@ pub fn main(arguments: &Arguments) -> Result {
     reports.iter().try_for_each(|report| crate::print(report, arguments.json))
 }
 
-/// Measure missions of `robot` and hops, in turn. The mission has `rate_hz` ticks in a mission second.
+/// Measures missions and hops, in turn, at `rate_hz` ticks per mission second.
 fn measure(
     regime: Regime,
     arguments: &Arguments,
@@ -104,22 +104,22 @@ fn measure(
     Report::new(regime, &hops, &rounds, used)
 }
 
-/// Ticks a second; none if they follow each other at once. Their cost depends on it: caches are warm or cold, cores awake or asleep.
+/// Ticks per second; none if they are back to back. Their cost depends on it: caches are warm or
+/// cold, cores awake or asleep.
 #[derive(Clone, Copy, Debug)]
 struct Regime(Option<f64>);
 
-/// Trips of a round that follow each other without a pause.
+/// Back-to-back trips per round.
 const TRIPS: u64 = 2000;
-/// Trips of a round with the pause of a tick between them.
+/// Trips per round at tick intervals.
 const PACED_TRIPS: u64 = 50;
 
 impl Regime {
-    /// The pace that gives a mission with `rate_hz` ticks in a mission second this regime.
+    /// Returns the pace of this regime for a mission of `rate_hz`.
     fn pace(self, rate_hz: f64) -> Pace {
         self.0.map_or(Pace::Max, |hz| Pace::Rate(hz / rate_hz))
     }
 
-    /// Time from tick to tick; none if they follow at once.
     fn period(self) -> Option<Duration> {
         Some(Duration::from_secs_f64(1.0 / self.0?))
     }
@@ -135,7 +135,7 @@ impl fmt::Display for Regime {
 }
 
 const SLOWEST_HZ: f64 = 0.1;
-/// A tick takes up to a millisecond, so faster is back to back.
+/// A tick takes up to a millisecond, so faster rates are back to back.
 const FASTEST_HZ: f64 = 1000.0;
 
 fn parse_hz(text: &str) -> Result<Regime, String> {
@@ -148,7 +148,7 @@ fn parse_hz(text: &str) -> Result<Regime, String> {
     }
 }
 
-/// What was measured beside each other, microseconds.
+/// Quantiles in microseconds.
 #[derive(Debug, Serialize)]
 struct Times {
     of: &'static str,
@@ -159,7 +159,7 @@ struct Times {
 }
 
 impl Times {
-    /// None if nothing was measured.
+    /// Fails if nothing was measured.
     fn new(of: &'static str, count: u64, quantiles: Quantiles) -> Result<Self> {
         match quantiles {
             Quantiles { p50: Some(p50), p99: Some(p99), max: Some(max) } => {
@@ -177,14 +177,15 @@ struct Report {
     /// Ratio of the medians, tick to bare hops.
     ratio: f64,
     ratio_p99: f64,
-    /// Resources of all processes of the last mission and its simulated robot; none for a mission of a second or two.
+    /// Resources of the last mission's processes and simulated robot; none for a mission of a
+    /// second or two.
     #[serde(flatten)]
     used: Option<Used>,
     times: [Times; 2],
 }
 
 impl Report {
-    /// The medians of the rounds' quantiles count, because the load of a shared machine changes.
+    /// Reports medians of the rounds' quantiles, because the load of a shared machine changes.
     fn new(regime: Regime, hops: &Histogram, rounds: &[Times], used: Option<Used>) -> Result<Self> {
         let hops = Times::new("five bare hops on the bus", hops.total(), hops.into())?;
         let quantiles = Quantiles {

@@ -1,4 +1,5 @@
-//! Worlds for an evaluation, drawn from a seed or read from files. Each is checked to be solvable for the body.
+//! Worlds for an evaluation, drawn from a seed or read from files, and checked to be solvable for
+//! the body.
 
 mod barn;
 mod corridors;
@@ -22,7 +23,7 @@ use crate::{
     random::Random,
 };
 
-/// Failed draws in a row after which a kind of world is taken for unsolvable.
+/// Failed draws in a row after which a kind of world counts as unsolvable.
 const MOST_FAILURES: u64 = 10_000;
 const NO_MAP: &str =
     "--start and --target are for ROS maps; give one to --worlds, or leave them out";
@@ -30,13 +31,13 @@ const NO_MAP: &str =
 #[derive(Clone, Debug)]
 pub enum Worlds {
     Drawn(&'static Kind),
-    /// A file or a folder: a mission, a ROS map, a BARN `.world` or table of cylinders.
+    /// File or folder: a mission, a ROS map, a BARN `.world` or table of cylinders.
     Path(PathBuf),
 }
 
 #[derive(Debug)]
 pub struct Kind {
-    /// The stream of random numbers.
+    /// Stream of random numbers.
     stream: u64,
     name: &'static str,
     draw: fn(&mut Random, usize) -> Scene,
@@ -72,7 +73,7 @@ impl FromStr for Worlds {
     }
 }
 
-/// Trials, and the number of worlds that the body could not cross.
+/// Trials, and the number of worlds that the body cannot cross.
 #[derive(Debug, Default)]
 pub struct Found {
     pub trials: Vec<Trial>,
@@ -80,7 +81,6 @@ pub struct Found {
 }
 
 impl Found {
-    /// Add a trial, or count that there is none.
     fn add(&mut self, trial: Option<Trial>) {
         self.unsolvable += usize::from(trial.is_none());
         self.trials.extend(trial);
@@ -89,12 +89,12 @@ impl Found {
 
 #[derive(Clone, Copy)]
 pub struct Asked {
-    /// Number of worlds; without it a hundred that are drawn, all files, and ten on each map without tests.
+    /// By default a hundred drawn worlds, all files, and ten on each map without tests.
     pub count: Option<usize>,
     pub seed: u64,
     /// Start and target, for maps only.
     pub ends: Option<Ends>,
-    /// Half the width of the narrowest way, metres.
+    /// Half the width of the narrowest passage.
     pub swept_m: f64,
 }
 

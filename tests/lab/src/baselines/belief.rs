@@ -1,4 +1,4 @@
-//! A planner's copy of the map: free cells and lines of sight.
+//! Planner's copy of the map: free cells and lines of sight.
 
 use common::{
     grid::{Applied, Cell, CellState, GridFrame, Replica},
@@ -6,7 +6,7 @@ use common::{
 };
 use glam::DVec2;
 
-/// Step along a line of sight, as a share of a cell.
+/// Step along a line of sight, in cells.
 const SIGHT_STEP: f64 = 0.1;
 
 #[derive(Clone, Default)]
@@ -15,7 +15,7 @@ pub struct Belief {
     pub header: GridHeader,
 }
 
-/// A complete map. Hazard cells include the margin of the body.
+/// Complete map whose hazard cells include the body's margin.
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
     pub frame: GridFrame,
@@ -24,7 +24,8 @@ pub struct Map<'a> {
 }
 
 impl Belief {
-    /// Apply one sample of `grid`. Returns false if a version is missing; then there is no map until a keyframe comes.
+    /// Applies one `grid` sample. Returns false if a version is missing; the map is then absent
+    /// until a keyframe.
     pub fn follow(&mut self, header: &GridHeader, cells: &[u8]) -> bool {
         let followed = self.grid.apply(&header.part, cells) != Applied::Missed;
         if followed {
@@ -33,7 +34,7 @@ impl Belief {
         followed
     }
 
-    /// The map; none before the first keyframe.
+    /// Returns `None` before the first keyframe.
     pub fn map(&self) -> Option<Map<'_>> {
         let frame = self.grid.frame()?;
         Some(Map { frame, epoch: self.header.epoch, cells: self.grid.cells() })
@@ -41,7 +42,7 @@ impl Belief {
 }
 
 impl Map<'_> {
-    /// Whether `cell` is in the map and not a hazard. It may be unknown.
+    /// Returns whether `cell` is in the map and free or unknown.
     pub fn is_free(&self, cell: Cell) -> bool {
         let inside = cell.col < self.frame.cells && cell.row < self.frame.cells;
         let byte = self.cells.get(self.frame.index(cell)).filter(|_| inside);
@@ -52,7 +53,7 @@ impl Map<'_> {
         self.frame.cell_at(point).filter(|&cell| self.is_free(cell))
     }
 
-    /// The neighbour of `cell` by so many columns and rows, if it is free and no corner of a hazard is cut on the way.
+    /// Returns the neighbour at this offset if the step is free and cuts no hazard corner.
     pub fn neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
         self.free_neighbour(cell, [cols, 0])?;
         self.free_neighbour(cell, [0, rows])?;
@@ -65,7 +66,7 @@ impl Map<'_> {
         Some(Cell { col, row }).filter(|&next| self.is_free(next))
     }
 
-    /// The last free point before a hazard on the straight line between two points (metres); none if the line is free.
+    /// Returns the last free point before a hazard on a line, metres; none if the line is free.
     pub fn last_free(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
         let steps = (from.distance(to) / (SIGHT_STEP * self.frame.resolution_m)).ceil();
         let steps = steps.clamp(1.0, f64::from(u32::MAX)) as u32;
@@ -74,12 +75,10 @@ impl Map<'_> {
         Some(at(hazard.saturating_sub(1)))
     }
 
-    /// Whether the straight line between two points (metres) crosses free cells only.
     pub fn sees(&self, from: DVec2, to: DVec2) -> bool {
         self.last_free(from, to).is_none()
     }
 
-    /// The middle of the free cell nearest to `point` (metres); none without a free cell.
     pub fn nearest_free(&self, point: DVec2) -> Option<DVec2> {
         let free = self.frame.whole().cells().filter(|&cell| self.is_free(cell));
         let centres = free.map(|cell| self.frame.centre_of(cell));

@@ -1,9 +1,12 @@
-//! Bug2 (V. J. Lumelsky and A. A. Stepanov, Path-planning strategies for a point mobile automaton, Algorithmica 2, 1987):
-//! straight to the target; where a hazard is in the way, around it with the hazard on the right, until the robot is on
-//! the line from start to target again, nearer to the target than where it met the hazard, and the way is free.
+//! Bug2 planner (V. J. Lumelsky and A. A. Stepanov, Path-planning strategies for a point mobile
+//! automaton, Algorithmica 2, 1987).
 //!
-//! The point of the algorithm is the robot's centre: the map's hazards have the margin of the body. It sees no farther than
-//! [`AHEAD_M`]. A robot that comes back to the place where it met the hazard has no way.
+//! The robot drives straight to the target. It follows a hazard in its way, on its right, until it
+//! is back on the line from start to target. There it must be nearer to the target than at the hit
+//! point, with a free way ahead.
+//!
+//! The algorithm's point is the robot's centre, because the map's hazards include the body's
+//! margin. It sees up to [`AHEAD_M`]. A robot that returns to the hit point has no path.
 
 mod boundary;
 
@@ -17,33 +20,31 @@ use crate::baselines::{
 };
 use boundary::Place;
 
-/// Distance at which a hazard ahead counts as met, and to the point of the boundary that the robot heads for, metres.
+/// Distance to a hit, and to the boundary point that the robot heads for.
 const AHEAD_M: f64 = 0.3;
-/// Distance at which the robot has left the place where it met a hazard, metres.
+/// Distance at which the robot has left the hit point.
 const AWAY_M: f64 = 0.5;
-/// Distance within which the robot is on the line from start to target, in cells, and at least in metres.
+/// Tolerance of the line from start to target, in cells, and its minimum in metres.
 const ON_LINE_CELLS: f64 = 0.75;
 const ON_LINE_M: f64 = 0.05;
-/// The most cells of a boundary that are searched ahead.
+/// Maximum cells of a boundary searched ahead.
 const MOST_CELLS: usize = 256;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Bug {
-    /// The epoch of the map. With a new epoch all state is reset.
+    /// Map epoch; a new epoch resets all state.
     epoch: u64,
     /// Start of the line to the target, metres; none before the first pose.
     line_from: Option<DVec2>,
     following: Option<Following>,
-    /// Whether the robot came back to the place where it met the hazard.
     enclosed: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Following {
-    /// The place where the robot met the hazard, metres.
+    /// Hit point, metres.
     hit: DVec2,
     place: Place,
-    /// Whether the robot has left the place where it met the hazard.
     was_away: bool,
 }
 
@@ -84,18 +85,17 @@ struct Straight<'a> {
 }
 
 impl Straight<'_> {
-    /// The last free point before the hazard that is near ahead of `here`; none if the way is free.
+    /// Returns the last free point before a near hazard ahead of `here`.
     fn blocked(&self, here: DVec2) -> Option<DVec2> {
         let ahead = here + (self.target - here).clamp_length_max(AHEAD_M);
         self.map.last_free(here, ahead)
     }
 
-    /// The unit vector to the left of the way from `here`.
     fn left(&self, here: DVec2) -> DVec2 {
         (self.target - here).normalize_or(DVec2::X).perp()
     }
 
-    /// The hazard that is near ahead of `here`, to be gone around to the left; none if the way is free.
+    /// Returns the near hazard ahead of `here`, to be passed on its left.
     fn hit(&self, here: DVec2) -> Option<Following> {
         let hit = self.blocked(here)?;
         let cell = self.map.free_cell_at(hit)?;
@@ -114,8 +114,11 @@ impl Straight<'_> {
 }
 
 impl Following {
-    /// Advance along the boundary to the place nearest to `here`. Returns whether there still is a boundary. If the map has
-    /// changed, the boundary is followed from near the robot, most nearly to the `left` of the line to the target.
+    /// Advances along the boundary to the place nearest to `here`. Returns whether a boundary
+    /// remains.
+    ///
+    /// If the map has changed, it follows the boundary near the robot, preferably to the `left` of
+    /// the line to the target.
     fn is_led_on(&mut self, map: &Map<'_>, here: DVec2, left: DVec2) -> bool {
         if !self.place.is_on(map) {
             let cells = [Some(self.place.cell), map.free_cell_at(here)];
@@ -144,13 +147,12 @@ impl Following {
         std::iter::successors(Some(from), |place| place.next(map)).take(cells.min(MOST_CELLS) + 1)
     }
 
-    /// Whether the robot has come back to the place where it met the hazard.
     fn is_back(&self, map: &Map<'_>) -> bool {
         let here = map.frame.centre_of(self.place.cell);
         self.was_away && here.distance(self.hit) <= map.frame.resolution_m
     }
 
-    /// The farthest point of the boundary, along it, that a robot at `here` (metres) sees near by.
+    /// Returns the farthest nearby boundary point that a robot at `here`, metres, sees.
     fn aim(&self, map: &Map<'_>, here: DVec2) -> DVec2 {
         let centre = |cell: Cell| map.frame.centre_of(cell);
         let mut aim = centre(self.place.cell);

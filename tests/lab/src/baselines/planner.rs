@@ -1,4 +1,4 @@
-//! A planner to compare with, and the parts that all of them share: the map, and the guidance along a way.
+//! Planner for comparison, with the shared map and path guidance.
 
 use std::fmt::Debug;
 
@@ -11,12 +11,12 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use crate::baselines::belief::{Belief, Map};
 
-/// Speed of a robot that leaves a hazard, m/s: that of the harmonic planner with the evidential method.
+/// Speed of a robot that leaves a hazard, m/s, as of the harmonic planner with the evidential
+/// method.
 const WAY_OUT_M_S: f64 = 0.08;
 
-/// A planner to compare with. It is saved whenever it has answered.
+/// Planner for comparison, saved after each answer.
 pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
-    /// The way from `here` to `target` (metres) on `map`.
     fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way;
 }
 
@@ -24,20 +24,19 @@ pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
 pub enum Way {
     Unknown,
     To(DVec2),
-    /// The robot stands in a hazard: go slowly and straight to this point, metres.
+    /// Slow, straight way to a point, metres, out of a hazard.
     Out(DVec2),
     None,
 }
 
 impl Way {
-    /// The way out of the hazard for a robot at `point` (metres).
     pub fn out(map: &Map<'_>, point: DVec2) -> Self {
         map.nearest_free(point).map_or(Self::None, Self::Out)
     }
 }
 
 pub struct Baseline<P> {
-    /// The target of the robot; none before the supervisor has published one.
+    /// Robot's target; none until the supervisor publishes one.
     target: Option<TargetSample>,
     looks_around: bool,
     pub belief: Belief,
@@ -45,7 +44,6 @@ pub struct Baseline<P> {
 }
 
 impl<P: Planner> Baseline<P> {
-    /// The baseline for the robot of `mission`, without a map.
     pub fn new(mission: &Mission) -> Self {
         Self {
             target: None,
@@ -55,7 +53,7 @@ impl<P: Planner> Baseline<P> {
         }
     }
 
-    /// Note that the robot is sent to `target`. On the way to another target the planner begins anew.
+    /// Sets the target. A changed target restarts the planner.
     pub fn send_to(&mut self, target: TargetSample) {
         if self.target.replace(target).is_some() {
             self.planner = P::default();
@@ -74,14 +72,13 @@ impl<P: Planner> Baseline<P> {
     fn along(&self, way: Way, sample: &PoseSample) -> GuidanceSample {
         let belief = &self.belief.header;
         let pose = sample.pose();
-        // A robot that stands on the point keeps its heading.
         let toward = |point: DVec2| (point - pose.position).normalize_or(pose.axis());
         let (status, direction, limit) = match way {
             Way::Unknown => (GuidanceStatus::Waiting, DVec2::ZERO, 0.0),
             Way::To(point) => (GuidanceStatus::Along, toward(point), f64::INFINITY),
             Way::Out(point) => (GuidanceStatus::WayOut, toward(point), WAY_OUT_M_S),
             Way::None => {
-                // An echo may have been false: the robot looks around once before the map is reset, as with the harmonic planner.
+                // An echo may be false: the robot looks around once before the map is reset.
                 let turn = if self.looks_around { pose.axis().perp() } else { DVec2::ZERO };
                 (GuidanceStatus::Unreachable, turn, 0.0)
             }

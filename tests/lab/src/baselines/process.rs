@@ -1,5 +1,7 @@
-//! `firsthand-lab stage NAME`: a planner to compare with, as the process of a stage, which `firsthand stage NAME` becomes: `grid` and
-//! `pose` in, `guidance` out, the state saved before the guidance is published.
+//! `firsthand-lab stage NAME`: a planner for comparison as a stage process, which `firsthand stage
+//! NAME` becomes.
+//!
+//! Reads `grid` and `pose`, and publishes `guidance` after saving its state.
 
 use std::ffi::OsString;
 
@@ -26,7 +28,7 @@ use crate::error::{Refused, Result};
 
 pub const BASELINES: &[&str] = &["wavefront", "bug"];
 
-/// Be a planner to compare with: wavefront or bug.
+/// Be a planner for comparison: wavefront or bug.
 #[derive(Debug, Args)]
 pub struct Arguments {
     name: String,
@@ -46,7 +48,7 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(run(&stage_command::start_with(PLANNER, arguments.options.iter().cloned())?)?)
 }
 
-/// Room for the encoded state, bytes: Bug2's is under 150.
+/// Space for the encoded state, bytes: Bug2's is under 150.
 const STATE_BYTES: usize = 256;
 
 readers! {
@@ -92,7 +94,8 @@ impl<P: Planner> Process for Shell<P> {
             }
             self.out.at = Progress::of(&header.stamp);
             let tick = header.stamp.tick;
-            // The pose of a tick is published before its grid. A grid for new readers may be of a tick that is answered.
+            // A tick's pose precedes its grid. A grid for new readers may belong to an answered
+            // tick.
             self.latest = self.inputs.pose.newest()?.or(self.latest);
             if let Some(target) = self.inputs.target.next(tick)? {
                 self.baseline.send_to(target);

@@ -12,8 +12,8 @@ use glam::DVec2;
 
 use super::planner::{Baseline, Planner};
 
-/// The header and the cells of a map drawn row by row, the first one with the greatest y: `#` is hazard. Cells of
-/// 0.1 m, the middle one at (0, 0).
+/// Returns the header and cells of a drawn map: `#` is hazard, the first row has the greatest y.
+/// Cells are 0.1 m wide, the middle one at (0, 0).
 pub fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
     let frame = GridFrame { cells: rows.len() as u32, resolution_m: 0.1, centre: DVec2::ZERO };
     let letters = rows.iter().rev().flat_map(|row| row.bytes());
@@ -37,7 +37,7 @@ pub fn sent<P: Planner>(target: [f64; 2]) -> Baseline<P> {
     baseline
 }
 
-/// A robot at (x, y) metres that faces along x.
+/// Returns a robot at (x, y) metres facing along x.
 pub fn pose([x_m, y_m]: [f64; 2]) -> PoseSample {
     PoseSample { x_m, y_m, ..PoseSample::default() }
 }

@@ -1,5 +1,7 @@
-//! The shortest path over the map, planned anew in every tick, like the global planners NavFn or A*: A* over eight neighbours
-//! that cuts no corner, and guidance to the farthest point of the path that is near and in sight.
+//! Shortest-path planner, replanned each tick, like the global planners NavFn or A*.
+//!
+//! Searches by A* over eight neighbours without cutting corners. Guides to the farthest near point
+//! of the path in sight.
 
 use common::grid::Cell;
 use glam::DVec2;
@@ -11,10 +13,10 @@ use crate::baselines::{
     planner::{Planner, Way},
 };
 
-/// The greatest distance to the point of its path for which the robot heads, metres.
+/// Maximum distance to the path point that the robot heads for.
 const AIM_M: f64 = 0.6;
 
-/// The planner of shortest paths. It plans from the map alone.
+/// Stateless planner of shortest paths.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Wavefront;
 
@@ -29,7 +31,7 @@ impl Planner for Wavefront {
     }
 }
 
-/// The farthest point of `path` within [`AIM_M`] that a robot at `here` (metres) sees; the next one if it sees none.
+/// Returns the farthest visible point of `path` within [`AIM_M`]; otherwise the next one.
 fn aim(map: &Map<'_>, here: DVec2, target: DVec2, path: &[Cell]) -> DVec2 {
     let last = path.len() - 1;
     let point = |index: usize| match path.get(index) {
@@ -43,7 +45,7 @@ fn aim(map: &Map<'_>, here: DVec2, target: DVec2, path: &[Cell]) -> DVec2 {
     near.unwrap_or_else(|| point(1))
 }
 
-/// The cells of the shortest path between two free cells, both of them included.
+/// Returns the cells between two free ones, inclusive.
 fn shortest_path(map: &Map<'_>, start: Cell, goal: Cell) -> Option<Vec<Cell>> {
     let apart = |cell: Cell| [cell.col.abs_diff(goal.col), cell.row.abs_diff(goal.row)];
     over_neighbours(start, goal, apart, |cell, step| map.neighbour(cell, step))

@@ -1,5 +1,5 @@
-//! Inputs from outside, random and changed from whole messages, for everything that decodes them. A panic is a loss; where a panic
-//! aborts (in a release build) the first one ends the command.
+//! External inputs for all decoders: random, and mutated from valid messages. A panic is a loss;
+//! where panics abort (release builds), the first ends the command.
 
 use std::{
     ffi::OsStr,
@@ -24,7 +24,7 @@ use crate::{
     random::Random,
 };
 
-/// Inputs that fuzzing with coverage found, and a recording's first bytes.
+/// Inputs from coverage-guided fuzzing, and a recording's first bytes.
 const X80: &str = include_str!("../../../../common/x80-protocol/fuzz/decoder-corpus.hex");
 const RECORDING: &[u8] = include_bytes!("../../../golden/open-room.mcap");
 const PGM: &str = "P5\n4 4\n255\n0123456789abcdef";
@@ -33,7 +33,7 @@ const ARDUINO: &str = "e 100 -100\r\n123 456\r\nOK\r\n";
 const ROS_MAP: &str = "image: map.pgm\nresolution: 0.05\norigin: [0.0, -1.5, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n";
 const MOVING_AI: &str = "type octile\nheight 2\nwidth 3\nmap\n.@.\n..T\n";
 const RPLIDAR: &[u8] = b"\xa5Z\x03\x00\x00\x00\x06\x00\x00\x00\xa5Z\x05\x00\x00@\x81=\x01\x00\x10\x10>\x81\x00\x10\x10";
-/// Bytes that mean something in the formats.
+/// Bytes with a meaning in the formats.
 const TELLING: &[u8] = b"\0\xff\x7f\x80 -.9e[{\"\n";
 const STATE_BYTES: usize = 4096;
 const PERIOD_NS: u64 = 20_000_000;
@@ -44,7 +44,7 @@ const BOARD: &str = "robot.protocol = 'arduino'\nrobot.counts_per_turn = 1200\n"
 const NODE: &str = "robot.protocol = 'ros2'\nrobot.address = 'ros2:0'\n";
 const LASER: &str = "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0\nbearing_deg = 0";
 
-/// Bytes are given to a link, or written to the file and opened.
+/// Decoder under test: bytes go to a link, or to a file that is opened.
 struct Target {
     name: &'static str,
     seed: Vec<u8>,
@@ -94,7 +94,7 @@ fn open(file: &Path) {
     }
 }
 
-/// A checkpoint, or the journal beside it.
+/// Opens a checkpoint, or the journal beside it.
 fn open_state(file: &Path) -> Result<Journal> {
     let state = file.with_extension("");
     let opened = Journal::open::<Persisted, Persisted>(&state, STATE_BYTES, STATE_BYTES);
@@ -130,7 +130,7 @@ fn targets(directory: &Path) -> Result<Vec<Target>> {
     Ok(targets)
 }
 
-/// `seed` with up to seven changes; every eighth time random bytes.
+/// Mutates `seed` up to seven times; one in eight inputs starts from random bytes.
 fn input(seed: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = match random.below(8) {
         0 => (0..random.below(300)).map(|_| random.bits() as u8).collect(),

@@ -1,4 +1,4 @@
-//! The attacker of one mission: sends signals, and waits for the successors to work.
+//! Attacker of one mission: sends signals, and waits until the successors work.
 
 use std::time::{Duration, Instant};
 
@@ -32,8 +32,9 @@ use crate::error::{OrCannot as _, Result};
 
 /// Wait for the bus between checks of the processes.
 const POLL: Duration = Duration::from_millis(50);
-/// Signals to one stage within the window of the hold rule. A stage that dies more often is held until an operator releases
-/// it, and chaos has no operator. A second signal may follow in the start-up, and each may be counted late.
+/// Maximum signals to a stage within the hold rule's window: a stage that dies more often is held
+/// until an operator releases it. A second signal may follow at start-up, and each may be counted
+/// late.
 const MOST_HITS: usize = HOLD_AFTER - 4;
 
 #[derive(Default)]
@@ -44,11 +45,11 @@ pub struct Attack {
     entries: Vec<RosterEntry>,
     entries_read: Option<Instant>,
     supervisor: u32,
-    /// Whether the supervisor was hit. Later samples of it and its stages are no sign of its successor.
+    /// Whether later samples of the supervisor and its stages are no sign of its successor.
     supervisor_hit: bool,
     driving: bool,
     sent: Vec<Sent>,
-    /// The number of signals at the front of `sent` whose rows are kept.
+    /// Number of signals at the front of `sent` with stored rows.
     kept: usize,
     pose: Option<PoseSample>,
 }
@@ -56,9 +57,9 @@ pub struct Attack {
 struct Sent {
     row: Row,
     at: Instant,
-    /// Whether its stage, or the supervisor, has no working successor yet.
+    /// Whether a working successor is still missing.
     pending: bool,
-    /// The time after its start at which the successor is to be hit too.
+    /// Time after its start at which to hit the successor, too.
     startup_hit: Option<Duration>,
 }
 
@@ -67,7 +68,7 @@ impl Attack {
         Self { seed, consumers, ..Self::default() }
     }
 
-    /// Attack one generation of the supervisor, `child`, until it ends, for at most `patience`.
+    /// Attacks one generation of the supervisor, `child`, until it ends, for at most `patience`.
     pub fn run(
         &mut self,
         series: &mut Series<'_>,
@@ -78,7 +79,7 @@ impl Attack {
         let began = Instant::now();
         (self.supervisor_hit, self.driving) = (false, false);
         self.entries.clear();
-        // The stages of a supervisor that was hit end with it.
+        // A hit supervisor's stages end with it.
         for sent in &mut self.sent {
             sent.pending &= sent.row.stage == SUPERVISOR;
         }
@@ -94,7 +95,7 @@ impl Attack {
                 continue;
             };
             let next = next.get_or_insert_with(|| Instant::now() + series.schedule.pause());
-            // An overdue hit waits for the robot to drive.
+            // An overdue hit waits until the robot drives.
             let due = next.checked_duration_since(Instant::now());
             let startup_hit = self.next_startup_hit();
             let startup_hit =
@@ -116,7 +117,7 @@ impl Attack {
         Ok(())
     }
 
-    /// Keep the rows of the signals up to the first whose measurement is not complete.
+    /// Stores signal rows up to the first incomplete measurement.
     fn keep_rows(&mut self, series: &mut Series<'_>) -> Result {
         let left = self.sent.iter().skip(self.kept);
         for sent in left.take_while(|sent| !sent.pending) {
@@ -126,14 +127,13 @@ impl Attack {
         Ok(())
     }
 
-    /// Note that the mission is over, and end all measurements.
     pub fn end(&mut self, series: &mut Series<'_>) -> Result {
         self.consumers.end();
         self.sent.iter_mut().for_each(|sent| sent.pending = false);
         self.keep_rows(series)
     }
 
-    /// Note a signal of `kind` to a generation of `stage` that was sent now; `pending` if a successor is to come.
+    /// Records a signal sent now; `pending` if a successor follows.
     fn note(
         &mut self,
         series: &mut Series<'_>,
@@ -154,7 +154,6 @@ impl Attack {
         self.sent.push(Sent { row, at: Instant::now(), pending, startup_hit: None });
     }
 
-    /// Whether the supervisor was hit and has no working successor yet.
     pub fn supervisor_is_down(&self) -> bool {
         self.is_recovering(SUPERVISOR)
     }
@@ -163,7 +162,7 @@ impl Attack {
         self.sent.iter().any(|sent| sent.pending && sent.row.stage == stage)
     }
 
-    /// Whether a generation of `stage` was frozen alone, which the supervisor may abort as hung.
+    /// Returns whether a generation was frozen alone, and may be aborted as hung.
     fn was_frozen(&self, stage: &str, generation: u32) -> bool {
         let frozen = self.sent.iter().filter(|sent| sent.row.kind == Kind::Freeze);
         frozen
@@ -171,7 +170,7 @@ impl Attack {
             .any(|it| it.stage == stage && it.generation == Some(generation))
     }
 
-    /// Stages that the supervisor aborted as hung, by the `deaths` of the run, although they were not frozen alone.
+    /// Returns stages aborted as hung, by the run's `deaths`, that were not frozen alone.
     pub fn healthy_aborted(&self, deaths: &[Value]) -> Vec<String> {
         let hung = deaths.iter().filter(|death| death["hung"] == true);
         let named = hung.filter_map(|death| {
@@ -181,14 +180,13 @@ impl Attack {
         healthy.map(|(stage, generation)| format!("{stage} generation {generation}")).collect()
     }
 
-    /// Distance from the last published pose to the ground truth of its tick, metres; none without both.
+    /// Returns the last published pose's distance to the ground truth of its tick, metres.
     pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
         let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
         Some(tick.pose_error_m(&pose))
     }
 
-    /// Read new samples, which show the stages that run, beat and publish.
     fn read(&mut self, subscriptions: &mut Subscriptions) -> Result {
         while let Some(death) = subscriptions.deaths.next_sample()? {
             for Sent { row, at, .. } in self.sent.iter_mut().filter(|sent| sent.pending) {
@@ -230,12 +228,12 @@ impl Attack {
 
     fn on_supervisor_sign(&mut self, beat: bool) {
         if !self.supervisor_hit {
-            // Its successor has a bus of its own.
+            // The successor has its own bus.
             self.on_sign(SUPERVISOR, 0, beat);
         }
     }
 
-    /// Note a sign of work of a generation of `stage`: a ready beat, or a sample of a tick.
+    /// Records a sign of work: a ready beat, or a tick's sample.
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool) {
         let pending = self.sent.iter_mut().filter(|sent| sent.pending);
         for Sent { row, at, pending, .. } in pending {
@@ -247,31 +245,30 @@ impl Attack {
         }
     }
 
-    /// Freeze supervisor and stages together, and thaw them after `pause`.
+    /// Freezes supervisor and stages together for `pause`.
     fn freeze_all(&mut self, pause: Duration, series: &mut Series<'_>) {
-        // A stage that is frozen alone stays frozen.
+        // A stage frozen alone stays frozen.
         let hangs =
             |entry: &&RosterEntry| self.was_frozen(name_str(&entry.stage), entry.generation);
         let stages = self.entries.iter().filter(|entry| !hangs(entry));
-        // The supervisor is frozen first: it must not see frozen stages.
+        // The supervisor freezes first and thaws last, so that it never sees frozen stages.
         let all = std::iter::once(self.supervisor).chain(stages.map(|entry| entry.pid));
         let all: Vec<u32> = all.filter(|&process| send(process, Signal::STOP)).collect();
         let began = Instant::now();
         while let Some(left) = pause.checked_sub(began.elapsed()) {
             std::thread::park_timeout(left);
         }
-        // The supervisor is thawed last.
         for process in all.into_iter().rev() {
             send(process, Signal::CONT);
         }
-        // The pause does not count as time of recovery.
+        // The pause is excluded from recovery times.
         for sent in self.sent.iter_mut().filter(|sent| sent.pending) {
             sent.at += began.elapsed();
         }
         self.note(series, (EVERYTHING, None), Kind::FreezeAll, false);
     }
 
-    /// Hit a consumer, the supervisor, or a running stage without a pending recovery.
+    /// Hits a consumer, the supervisor, or a running stage without a pending recovery.
     fn hit(&mut self, series: &mut Series<'_>) -> Result {
         let Series { options, schedule, report, .. } = series;
         let asked = &options.asked;
@@ -316,7 +313,7 @@ impl Attack {
         Ok(())
     }
 
-    /// The next hit of a successor in its start-up: its time, its place among the signals, and the process.
+    /// Returns the next start-up hit: its time, its index among the signals, and the process.
     fn next_startup_hit(&self) -> Option<(Instant, usize, RosterEntry)> {
         let read = self.entries_read?;
         let pending = self.sent.iter().enumerate().filter(|(_, sent)| sent.pending);
@@ -350,18 +347,19 @@ pub fn send(pid: u32, signal: Signal) -> bool {
     Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, signal).is_ok())
 }
 
-/// The attacker's readers on the bus of one generation of the supervisor.
+/// Readers on the bus of one generation of the supervisor.
 struct Subscriptions {
     roster: Roster,
     deaths: Reader<DeathSample>,
     health: Reader<HealthSample>,
     pose: Reader<PoseSample>,
-    /// The other outputs of a tick, each with its writer.
+    /// Other outputs of a tick, with their writers.
     outputs: Vec<(&'static str, Box<dyn AnyReader>)>,
 }
 
 impl Subscriptions {
-    /// Join the bus. None if the bus is not of `supervisor`: a killed supervisor leaves its bus, and its successor removes it.
+    /// Joins the bus of `supervisor`; none for another's. A killed supervisor leaves its bus until
+    /// its successor removes it.
     fn join(options: &Options, supervisor: u32) -> Result<Option<Self>> {
         let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos")?;
         let mut roster = Roster::open(&bus)?;

@@ -1,5 +1,5 @@
-//! Targets that change every few seconds while a mission is attacked, as an operator sends them; and whether the run reported the
-//! outcome of each.
+//! Targets that change every few seconds during an attacked mission, as an operator sends them, and
+//! the check that each outcome is reported.
 
 use std::{
     collections::BTreeMap,
@@ -18,25 +18,26 @@ use summary::Summary;
 use crate::{random::Random, robot::firsthand};
 
 const MOST_CHANGES: usize = 6;
-/// Wall-clock time from one change to the next, seconds.
+/// Wall-clock time between changes.
 const PAUSE_S: [f64; 2] = [0.8, 3.0];
-/// The greatest distance of a target from the start, metres.
+/// Maximum distance of a target from the start.
 const WITHIN_M: f64 = 2.5;
-/// The free ground around a target beside the body, metres.
+/// Free ground between a target and obstacles, beside the body.
 const CLEARANCE_M: f64 = 0.45;
-/// The greatest distance by the ground truth of a robot from a target that it reached, metres.
+/// Maximum true distance from a reached target.
 const REACHED_WITHIN_M: f64 = 0.5;
 
 #[derive(Default, Serialize)]
 pub struct Changes {
-    /// Requests: taken (the supervisor confirmed them), refused, unanswered (the supervisor was hit). Targets: reached, replaced.
+    /// Requests: taken (the supervisor confirmed them), refused, unanswered (the supervisor was
+    /// hit). Targets: reached, replaced.
     #[serde(flatten)]
     counts: Counts,
 }
 
 type Counts = BTreeMap<&'static str, u64>;
 
-/// Sends a robot elsewhere until it is told to stop.
+/// Thread that redirects a robot until stopped.
 pub struct Operator {
     stop: Sender<()>,
     thread: JoinHandle<Sent>,
@@ -100,7 +101,7 @@ fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>)
     sent
 }
 
-/// A random place at which the robot can stand, in whole centimetres.
+/// Draws a place where the robot fits, in whole centimetres.
 fn place(mission: &Mission, random: &mut Random) -> [f64; 2] {
     let (world, frame) = (mission.obstacles(), mission.grid_frame());
     let clear_m = mission.body().radius_m + CLEARANCE_M;
@@ -118,8 +119,8 @@ fn place(mission: &Mission, random: &mut Random) -> [f64; 2] {
 }
 
 impl Changes {
-    /// Count a mission with the changes of `operator`. Adds to `wrong` targets that were accepted and not reported, or not reached in
-    /// truth.
+    /// Counts a mission's changes. Adds accepted targets that were unreported, or not reached in
+    /// truth, to `wrong`.
     pub fn add(
         &mut self,
         operator: Operator,

@@ -1,4 +1,4 @@
-//! The consumers of one mission: processes that are hit and restarted, and end with chaos.
+//! Consumers of one mission: processes that are hit and restarted, and end with chaos.
 
 use std::{
     ffi::OsString,
@@ -25,7 +25,8 @@ use crate::{
     robot,
 };
 
-/// The time for a consumer to end. A recorder writes its last chunk within milliseconds; a user's program may take longer.
+/// Time for a consumer to end. A recorder writes its last chunk within milliseconds; user programs
+/// may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
 #[derive(Default)]
@@ -37,7 +38,7 @@ pub struct Consumers {
 
 struct Running {
     consumer: Consumer,
-    /// None if it ended by itself.
+    /// Process; none after it ended by itself.
     process: Option<Process>,
     starts: u32,
     frozen_until: Option<Instant>,
@@ -45,7 +46,6 @@ struct Running {
 }
 
 impl Consumers {
-    /// Start all. Their files go into the new `directory`.
     pub fn start(options: &Options, directory: PathBuf, report: &mut Report) -> Result<Self> {
         fs::create_dir(&directory).or_cannot("make a directory")?;
         let mut all = Vec::new();
@@ -63,7 +63,6 @@ impl Consumers {
         self.all.len()
     }
 
-    /// Thaw the frozen consumers whose pause is over; count those that ended by themselves.
     pub fn maintain(&mut self, report: &mut Report) -> Result {
         for running in &mut self.all {
             if running.frozen_until.is_some_and(|until| Instant::now() >= until) {
@@ -83,8 +82,10 @@ impl Consumers {
         Ok(())
     }
 
-    /// Hit the consumer at `index`: kill and restart it, or freeze it for `pause`. Returns its name and the number of its starts in this
-    /// mission, or none if no signal was sent, because it is frozen already, or had ended by itself and is restarted.
+    /// Kills and restarts the consumer at `index`, or freezes it for `pause`.
+    ///
+    /// Returns its name and number of starts. Returns `None` without a signal: it is already
+    /// frozen, or had ended by itself and is restarted.
     pub fn hit(
         &mut self,
         index: usize,
@@ -106,7 +107,6 @@ impl Consumers {
         if freezes {
             running.frozen_until = Some(Instant::now() + pause);
         } else {
-            // Dropping the process reaps it.
             running.process = None;
             running.frozen_until = None;
             running.start(&self.directory, report)?;
@@ -114,7 +114,7 @@ impl Consumers {
         Ok(Some(hit))
     }
 
-    /// Note that the mission is over, and let all consumers write their files and end.
+    /// Ends all consumers at the end of the mission, after they write their files.
     pub fn end(&mut self) {
         for running in &mut self.all {
             running.thaw();
@@ -141,11 +141,11 @@ impl Running {
         Ok(())
     }
 
-    /// Signal the process, if it is not reaped yet, and those that it started.
+    /// Signals the unreaped process and its descendants.
     fn signal(&self, signal: Signal) {
         let process = self.process.as_ref();
         if let Some(pid) = process.and_then(|it| Pid::from_raw(it.id().cast_signed())) {
-            // A process that has ended needs no signal.
+            // An ended process needs no signal.
             let _ = kill_process_group(pid, signal);
         }
     }
@@ -159,7 +159,7 @@ impl Running {
 
 const RECORD: &str = "record";
 
-/// A program that reads from the bus: a subcommand of `firsthand`, or a user's command without a shell.
+/// Program that reads from the bus: a subcommand of `firsthand`, or a user's command.
 #[derive(Clone, Debug)]
 pub struct Consumer {
     name: String,
@@ -172,7 +172,6 @@ impl FromStr for Consumer {
 
     fn from_str(command: &str) -> Result<Self, String> {
         let found = || {
-            // No program takes such a word.
             if command.contains('\0') {
                 return Err("it contains a zero byte".to_owned());
             }
@@ -205,7 +204,7 @@ impl Consumer {
         Ok([(RECORD, "record"), ("hz", "topic hz"), ("logs -f", "logs --follow")].map(own))
     }
 
-    /// The command that starts the consumer, which ends with this process.
+    /// Returns a command that ends with this process.
     fn command(&self) -> Command {
         let own = std::process::id().to_string();
         let mut command = process::firsthand(&["bench", "consumer", &own]);
@@ -218,15 +217,15 @@ impl Consumer {
 #[derive(Debug, Args)]
 #[command(hide = true)]
 pub struct Arguments {
-    /// The parent.
+    /// Parent process.
     parent: u32,
-    /// The program and its arguments.
+    /// Program and its arguments.
     #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]
     words: Vec<OsString>,
 }
 
 pub fn main(arguments: &Arguments) -> Result {
-    // The kernel signals the end of the parent to this process also after it executes another program.
+    // The kernel's signal at the parent's end survives exec.
     become_child("consumer", arguments.parent)?;
     let Some((program, words)) = arguments.words.split_first() else {
         return Err("give a program".into());

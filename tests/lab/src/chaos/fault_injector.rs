@@ -1,4 +1,4 @@
-//! Changes the bytes between robot and link as a robot fault demands. Pure: bytes and times in, bytes and times out.
+//! Injector of robot faults into the bytes between robot and link. Pure.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -10,27 +10,27 @@ use crate::{chaos::robot_fault::RobotFault, random::Random};
 mod words;
 
 pub(super) const LATE: Duration = Duration::from_secs(2);
-/// Of frames that are late and not lost, seconds; each mission draws from such a range.
+/// Delays of late but received frames, seconds; each mission draws one from such a range.
 const A_LITTLE_LATE_S: [f64; 2] = [0.25, 1.0];
 const RANGE_LATE_S: [f64; 2] = [0.3, 2.0];
 const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
-/// Period of slow messages: three a second.
+/// Period of slow messages: three per second.
 const SLOW: Duration = Duration::from_millis(333);
-/// The share of its counts that an encoder counts.
+/// Share of its counts that an encoder reports.
 const LOW: [f64; 2] = [0.97, 0.90];
 const LOWER: [f64; 2] = [0.90, 0.65];
 const RUNS_COUNTS_S: [f64; 2] = [50.0, 300.0];
-/// The noise of readings near a frozen one, metres; of beams it is this share of a tenth.
+/// Noise of readings near a frozen one. A tenth of it is the relative noise of beams.
 const NEAR_M: [f64; 2] = [0.005, 0.05];
-/// The greatest of random speeds, counts/s.
+/// Maximum random speed, counts/s.
 const RANDOM_COUNTS_S: f64 = 1000.0;
-/// The greatest of random readings, metres.
+/// Maximum random reading.
 const RANDOM_M: f64 = 2.5;
 const NO_READING: f64 = -1.0;
-/// The frozen range of a sensor that has measured nothing yet, metres.
+/// Frozen range of a sensor without earlier readings.
 const FROZEN_M: f64 = 1.5;
-/// Messages that are stored: as many as come in [`OLD`] at ten times the usual rate.
+/// Maximum stored messages: those of [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
 #[derive(Debug)]
@@ -40,27 +40,27 @@ pub struct Late {
     pub bytes: Vec<u8>,
 }
 
-/// Passes bytes unchanged until its fault begins.
+/// Injector that passes bytes unchanged until its fault begins.
 pub struct FaultInjector {
     fault: RobotFault,
     faulty: bool,
-    /// Of the first message with wheels that the fault changed.
+    /// Time of the first wheel message that the fault changed.
     began: Option<Duration>,
     chance: Random,
     channel: usize,
-    /// How great the fault of this mission is, from 0 to 1.
+    /// Severity of this mission's fault, from 0 to 1.
     size: f64,
     words: Words,
     base: Option<Said>,
-    /// The newest readings before the fault that are distances.
     newest: Report,
-    /// Messages with wheels or readings of the last seconds, oldest first.
+    /// Recent messages with wheels or readings, oldest first.
     kept: VecDeque<(Duration, Said)>,
     next_again: Duration,
     next_slow: [Duration; 4],
-    /// The newest command that moves the wheels; none once the link stopped the robot by other means than speed 0.
+    /// Newest command that moves the wheels; none once the link stopped the robot other than by
+    /// speed 0.
     moving: Option<Vec<u8>>,
-    /// Whether the newest command of a speed moves the wheels.
+    /// Whether the newest speed command moves the wheels.
     pushes: bool,
 }
 
@@ -91,7 +91,7 @@ impl FaultInjector {
         self.faulty = true;
     }
 
-    /// Convert bytes that the robot sent at `now` into those for the host.
+    /// Converts the robot's bytes into those for the host.
     pub fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
         let mut out = Vec::new();
         for said in self.words.said(bytes) {
@@ -125,7 +125,7 @@ impl FaultInjector {
         passed
     }
 
-    /// The size of this mission's fault between that of the least and the greatest.
+    /// Returns a value in the range by this mission's severity.
     fn drawn(&self, [least, greatest]: [f64; 2]) -> f64 {
         least + self.size * (greatest - least)
     }
@@ -135,7 +135,8 @@ impl FaultInjector {
         old.map(|(_, said)| said)
     }
 
-    /// Convert bytes of the host into those for the robot. `moves` is called for each command that moves the wheels.
+    /// Converts the host's bytes into those for the robot. Calls `moves` for each command that
+    /// moves wheels.
     pub fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
         let is_faulty = |fault| self.faulty && self.fault == fault;
         let holds_wheels = is_faulty(RobotFault::HeldWheels);
@@ -221,7 +222,6 @@ impl FaultInjector {
         said.bytes()
     }
 
-    /// Whether the newest message with speeds says that a wheel turns.
     fn turns(&self) -> bool {
         let speeds = self.kept.iter().rev().find_map(|(_, said)| said.report.speeds);
         speeds.is_some_and(|speeds| speeds != [0.0; 2])
@@ -260,7 +260,7 @@ impl FaultInjector {
         }
     }
 
-    /// Change the wheels of `said`, if it has any, from those before the fault on.
+    /// Changes the wheels of `said`, relative to those before the fault.
     fn miscount(&mut self, said: &mut Said, now: Duration) {
         use RobotFault as F;
         let Some(mut angles) = said.report.wheels else { return };

@@ -12,11 +12,11 @@ use common::domain::{Domain, RobotName, SHARED_MEMORY};
 
 use crate::robot::command_lines;
 
-/// Longest time that a stop guard goes on after a mission.
+/// Maximum time that a stop guard runs after a mission.
 const GUARDS_END: Duration = Duration::from_secs(10);
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Files and shared memory of `robot`, and processes with files in `directory`, that still exist: paths and command lines.
+/// Returns remaining files, shared memory and processes: paths and command lines.
 pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let domain = Domain::of(robot.clone());
     let prefix = domain.shared_memory_prefix();
@@ -25,7 +25,7 @@ pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let shared = names.filter(|name| name.starts_with(&prefix));
     let mut found: Vec<String> = shared.map(|name| format!("{SHARED_MEMORY}/{name}")).collect();
     let directory = directory.to_string_lossy();
-    // A stop guard ends after its link, when its robot rests or is gone.
+    // A stop guard outlives its link until its robot rests.
     let began = Instant::now();
     while began.elapsed() < GUARDS_END && lines(&directory).any(|line| line.contains(STOP_GUARD)) {
         thread::park_timeout(LOOK);

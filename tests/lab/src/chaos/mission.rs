@@ -25,7 +25,7 @@ use mission_control::{outcome::Outcome, simulator::Simulator};
 use processes::DEATHS;
 use summary::Summary;
 
-/// The time after which a mission is stopped. In wall-clock time a mission takes half a minute.
+/// Timeout of a mission, which takes half a minute of wall-clock time.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 pub fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Command {
@@ -35,7 +35,6 @@ pub fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Command 
     command
 }
 
-/// The summary of the mission without an attack, to compare with.
 pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     let directory = options.directory.join("undisturbed");
     let command = command(options, seed, &Pace::Max.to_string(), &directory);
@@ -44,7 +43,7 @@ pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     Ok(summary)
 }
 
-/// Attack the mission, and report. Its files stay if something was wrong.
+/// Attacks the mission and reports. Keeps its files after a failure.
 pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Result {
     let options = series.options;
     let asked = &options.asked;
@@ -71,7 +70,7 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
         run.process.end(Duration::from_secs(2));
         attacked?;
         let summary = run.summary();
-        // A supervisor that was hit leaves no summary, unless the run had just ended.
+        // A hit supervisor leaves a summary only if the run had just ended.
         if !attack.supervisor_is_down() || summary.is_ok() || began.elapsed() >= PATIENCE {
             break summary?;
         }
@@ -105,7 +104,7 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     let aborted = attack.healthy_aborted(&deaths(&directory));
     wrong.extend(aborted.iter().map(|stage| format!("aborted although healthy: {stage}")));
     let allowance_m = pose_allowance_m(&options.loaded, kills, &summary);
-    // An undisturbed robot whose target does not change takes another way.
+    // The undisturbed run keeps its target, so it takes another path.
     if excess_m > allowance_m && !asked.targets {
         wrong.push(format!(
             "pose off by {excess_m:.4} m more than undisturbed, of {allowance_m:.4} m allowed"
@@ -131,11 +130,13 @@ fn deaths(directory: &Path) -> Vec<Value> {
     lines.filter_map(Result::ok).collect()
 }
 
-/// Allowed pose error at the end beyond that of the undisturbed run, metres. Each signal may cost one wheel count of travel.
-/// Besides, a run that was hit takes another path, so its wheels are read at other fractions of a count: one count between the
-/// wheels turns the heading by `count / track`, which displaces the robot by that fraction of the distance to the target. Slip
-/// differs in each run, too: by three standard deviations of the robot's stated pose error, because a hundred missions include a
-/// few beyond two.
+/// Returns the allowed final pose error beyond that of the undisturbed run, metres.
+///
+/// Each signal may cost one wheel count of travel. A hit run also takes another path, so its wheels
+/// are read at other fractions of a count. One count between the wheels turns the heading by `count
+/// / track` and displaces the robot by that fraction of the distance to the target. Slip may add
+/// three standard deviations of the stated pose error, because a hundred missions include a few
+/// beyond two.
 fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
     let body = mission.body();
     let target = mission.start_pose().position.distance(mission.target);

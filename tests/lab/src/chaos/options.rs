@@ -1,4 +1,4 @@
-//! The mission that is attacked, and the kinds of attack.
+//! Attacked mission, and kinds of attack.
 
 use std::{env, fs, path::PathBuf, process};
 
@@ -19,7 +19,7 @@ pub struct Arguments {
     /// A shipped mission or a mission file.
     #[arg(default_value = "obstacle-course")]
     pub mission: String,
-    /// Number of signals; after the last one the mission goes on to its end.
+    /// Number of signals; after the last one the mission continues to its end.
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
     pub kills: u32,
     /// Seed of the schedule; the missions' own seeds count up from it.
@@ -28,74 +28,79 @@ pub struct Arguments {
     /// Hit some successors again within their first 12 ms: about a fifth of all signals.
     #[arg(long)]
     pub include_startup: bool,
-    /// Hit the supervisor too, one in twenty signals, and go on with its run each time. The robot is then a process
-    /// of its own, and mission time is wall-clock.
+    /// Hit the supervisor too, one in twenty signals, and resume its run each time. The robot then
+    /// has its own process, and mission time is wall-clock.
     #[arg(long, conflicts_with = "pace")]
     pub include_supervisor: bool,
-    /// Kill and freeze consumers too, one in two signals: a recorder beside the run's own, `topic hz` and `logs -f`.
+    /// Kill and freeze consumers too, one in two signals: a recorder beside the run's own, `topic
+    /// hz` and `logs -f`.
     #[arg(long, conflicts_with = "robot_faults")]
     pub include_consumers: bool,
-    /// Kill and freeze a consumer of yours: a program and its arguments, without a shell. As often as needed.
+    /// Kill and freeze your own consumer: a program and its arguments, without a shell. Repeatable.
     #[arg(long, value_name = "COMMAND", conflicts_with = "robot_faults")]
     pub consumer: Vec<Consumer>,
-    /// Freeze supervisor and stages together too, for 0.3 to 1.5 s, one in two signals, as if the machine stood still.
+    /// Also freeze supervisor and stages together for 0.3 to 1.5 s, one in two signals, as if the
+    /// machine stood still.
     #[arg(long)]
     pub freeze_all: bool,
-    /// Send the robot elsewhere every few seconds. Each target must be reached by the ground truth, or told to be replaced.
+    /// Redirect the robot every few seconds. Each target must be reached by the ground truth, or
+    /// reported as replaced.
     #[arg(long, conflicts_with = "robot_faults")]
     pub targets: bool,
-    /// Record the missions, and replay every generation of every stage, which must be equal to the bit.
+    /// Record the missions, and replay every generation of every stage, which must be bit-equal.
     #[arg(long)]
     pub replay: bool,
     /// Mission time, R times wall-clock.
     #[arg(long, default_value = "4")]
     pub pace: Pace,
-    /// Set a key of the mission, as often as needed.
+    /// Set a mission key; repeatable.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Write a row for each signal to DIR/signals.csv.
+    /// Write a row per signal to DIR/signals.csv.
     #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
     pub out: Option<PathBuf>,
-    /// Name of the robot, which also names its shared memory.
+    /// Name of the robot and of its shared memory.
     #[arg(long, default_value = "chaos")]
     pub robot: RobotName,
-    /// Instead of signals, put a fault into the robot's frames from a random moment on, mission after mission: all faults, or
-    /// those named. The stop-time table at the end has the time from each fault to the last moving command and to wheels at rest.
+    /// Instead of signals, put a fault into the robot's frames from a random moment on: all faults
+    /// in turn, or those named. The final stop-time table has the time from each fault to the last
+    /// moving command and to wheels at rest.
     #[arg(
         long, value_name = "FAULT,...", num_args = 0.., require_equals = true, value_delimiter = ',',
         conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
     )]
     pub robot_faults: Option<Vec<RobotFault>>,
-    /// Missions for each fault.
+    /// Missions per fault.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
     pub missions: u32,
-    /// The robot of the mission, which speaks lines of JSON, speaks ROS 2 to its link; the faults are in what its program hears of it.
+    /// Let the mission's robot, which speaks JSON lines, speak ROS 2 to its link; the faults are in
+    /// the input of its program.
     #[arg(long, requires = "robot_faults")]
     pub ros2: bool,
-    /// One line of JSON.
+    /// Print one line of JSON.
     #[arg(long)]
     pub json: bool,
 }
 
-/// The mission that is attacked, and the kinds of attack.
 pub struct Options {
     pub asked: Arguments,
     pub loaded: Mission,
-    /// Parent of the run directories. It is emptied after each mission.
+    /// Parent of the run directories, emptied after each mission.
     pub directory: PathBuf,
 }
 
 const LONG_TIMEOUT: &str = "timeout_s=1800";
 
 impl Options {
-    /// The options of missions, which run in a new directory.
+    /// Creates the options and a new directory for the missions.
     ///
     /// # Errors
-    /// The mission cannot be loaded, or is none for chaos; options contradict each other.
+    /// Returns an error if the mission cannot be loaded or is unsuitable for chaos, or if options
+    /// conflict.
     pub fn of(asked: &Arguments) -> Result<Self> {
         let mut asked = asked.clone();
         if asked.freeze_all {
-            // The robot's clock goes on while its processes are frozen. A --set of the user comes later and wins.
+            // The robot's clock continues during a freeze. A user's --set comes later and wins.
             asked.set.insert(0, LONG_TIMEOUT.to_owned());
         }
         let loaded = missions::load(&asked.mission, &asked.set)?;

@@ -1,4 +1,4 @@
-//! A UDP proxy between link and simulated robot, in a thread, with a [`FaultInjector`].
+//! UDP proxy between link and simulated robot, in a thread, with a [`FaultInjector`].
 
 use std::{
     io,
@@ -19,15 +19,15 @@ use super::{
 };
 use crate::background::{Turns, socket, to_robot};
 
-/// Longest wait until the thread sees that the fault begins or the proxy ends.
+/// Maximum delay until the thread notices the fault or the proxy's end.
 const LOOK: Duration = Duration::from_millis(10);
-/// Most datagrams that are held: those of two seconds at a hundred times the usual rate.
+/// Maximum held datagrams: two seconds at a hundred times the usual rate.
 const MOST_HELD: usize = 16_384;
 
 #[derive(Debug, Default)]
 struct Shared {
     faulty: AtomicBool,
-    /// The time from the proxy's start to the host's newest order that turns a wheel.
+    /// Time of the host's newest moving order after the proxy's start.
     last_moving_ns: AtomicU64,
 }
 
@@ -39,7 +39,7 @@ pub struct Proxy {
 }
 
 impl Proxy {
-    /// Start a proxy between the robot at `robot` and the host that sends first.
+    /// Starts a proxy between the robot at `robot` and the host that sends first.
     pub fn start(
         robot: SocketAddr,
         fault: RobotFault,
@@ -59,7 +59,7 @@ impl Proxy {
         self.shared.faulty.store(true, Relaxed);
     }
 
-    /// The time when the host last ordered a wheel to turn; that of the proxy's start if it did not.
+    /// Returns when the host last ordered motion, or the proxy's start.
     pub fn last_moving(&self) -> Instant {
         self.began + Duration::from_nanos(self.shared.last_moving_ns.load(Relaxed))
     }
@@ -76,7 +76,7 @@ struct Wire {
 }
 
 impl Wire {
-    /// Wait for a datagram, and pass on those that are due.
+    /// Waits for a datagram and passes on due ones.
     fn turn(&mut self) -> io::Result<()> {
         let now = self.began.elapsed();
         let due = self.held.iter().map(|late| late.at.saturating_sub(now));

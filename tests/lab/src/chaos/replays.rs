@@ -1,4 +1,4 @@
-//! Replays of the missions' recordings: whether every generation of every stage is bit-equal.
+//! Replays of the missions' recordings: every generation of every stage must be bit-equal.
 
 use std::{
     fs,
@@ -16,15 +16,15 @@ use crate::chaos::consumers::Consumers;
 #[derive(Debug, Default, Serialize)]
 struct Counts {
     recordings: u64,
-    /// Generations whose outputs are equal to the bit, and those that ended before their first step.
+    /// Generations with bit-equal outputs, and those that ended before their first step.
     equal: u64,
     without_step: u64,
     compared: u64,
-    /// Recordings that end before their recorder did.
+    /// Recordings cut off before their recorder ended.
     cut: u64,
-    /// Recordings that do not name their run, because the recorder was killed before it had written that.
+    /// Recordings without their run's name, because the recorder was killed before writing it.
     not_begun: u64,
-    /// Generations that were recorded in part, so that their state cannot be computed.
+    /// Partly recorded generations, whose state cannot be computed.
     not_replayed: u64,
 }
 
@@ -32,12 +32,12 @@ struct Counts {
 pub struct Replays {
     #[serde(flatten)]
     whole: Counts,
-    /// Results of recordings whose recorders were hit, attached late or during a mission, or competed with those that are started again.
+    /// Results of recorders that were hit, attached late, or competed with restarted ones.
     partial: Counts,
 }
 
 impl Counts {
-    /// Replay `file`, as far as it goes if it may be `partial`. Add what is wrong.
+    /// Replays `file`, a `partial` one as far as possible, and adds problems to `wrong`.
     fn add(
         &mut self,
         file: &Path,
@@ -68,8 +68,8 @@ impl Counts {
 }
 
 impl Replays {
-    /// Replay the recordings of the mission in `directory` and of its `consumers`. Adds to `wrong` generations that differ or could not
-    /// be replayed, and recordings that could not be read, with reasons.
+    /// Replays the recordings of the mission and of its `consumers`. Adds different, failed and
+    /// unreadable ones to `wrong`.
     pub fn add(
         &mut self,
         directory: &Path,
@@ -92,7 +92,8 @@ impl Replays {
     }
 }
 
-/// Whether the run says that it went on before its recorder was attached: on a wall clock a robot does not wait long for one.
+/// Returns whether the run began before its recorder attached: on a wall clock it waits only
+/// briefly.
 fn began_late(directory: &Path) -> bool {
     let log = fs::read_to_string(directory.join("supervisor.log")).unwrap_or_default();
     log.contains("the recorder is not attached yet")

@@ -1,5 +1,7 @@
-//! The result of all missions under attack, and its table `signals.csv`: a row for each signal, written when it and those before it are
-//! measured. A chaos that is killed leaves the rows that are known by then.
+//! Result of all missions under attack, and its table `signals.csv`.
+//!
+//! A row is written once its signal and all earlier ones are measured, so a killed chaos leaves the
+//! rows known by then.
 
 use std::{collections::BTreeMap, fmt, fs, path::Path, time::Instant};
 
@@ -19,7 +21,7 @@ use crate::{
 };
 
 const FILE_NAME: &str = "signals.csv";
-/// The name for supervisor and stages together.
+/// Name for supervisor and stages together.
 pub const EVERYTHING: &str = "everything";
 
 #[derive(Default, Serialize)]
@@ -27,20 +29,19 @@ pub struct Report {
     pub missions: u64,
     pub reached: u64,
     pub collisions: u64,
-    /// Missions that did not reach the target, touched something, lost the pose, did not tell of a target or were not replayed to the
-    /// bit: seeds and reasons.
+    /// Failed missions with seeds and reasons: target missed, contact, lost pose, unreported
+    /// target, or unequal replay.
     pub wrong: Vec<String>,
-    /// Signals that were sent, to consumers too.
+    /// Number of signals sent, including those to consumers.
     #[serde(skip)]
     pub signals: u32,
-    /// Signals of each kind to each stage and the supervisor.
+    /// Signals by kind to each stage and the supervisor.
     kills: BTreeMap<String, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
     recovery_ms: BTreeMap<String, Recovery>,
-    /// Largest pose error at the end beyond the same seed's undisturbed run, metres.
+    /// Maximum final pose error beyond the same seed's undisturbed run.
     pub worst_pose_excess_m: f64,
-    /// Files, shared memory and processes that outlived a mission.
     pub leftovers: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replays: Option<Replays>,
@@ -54,27 +55,26 @@ pub struct ConsumerCounts {
     pub killed: u32,
     pub frozen: u32,
     pub started: u32,
-    /// Times the consumer ended without a signal of chaos.
     pub ended_by_itself: u32,
-    /// The last such end, and the last line of its standard error.
+    /// Last such end, and the last line of its standard error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_end: Option<String>,
 }
 
 #[derive(Default, Serialize)]
 pub struct Recovery {
-    /// The time to the first ready beat, after kills: a death is noticed at once.
+    /// Time to the first ready beat after kills, which are noticed at once.
     #[serde(serialize_with = "quantiles")]
     pub ready: Histogram,
-    /// The time to the first ready beat, after freezes, which are noticed by missing beats.
+    /// Time to the first ready beat after freezes, which are noticed by missing beats.
     #[serde(rename = "ready_when_frozen", serialize_with = "quantiles")]
     pub after_freeze: Histogram,
-    /// The time to the first sample of a tick, which may come up to a tick later.
+    /// Time to the first sample of a tick, which may come up to a tick later.
     #[serde(serialize_with = "quantiles")]
     pub output: Histogram,
 }
 
-/// The state that the missions of one chaos share.
+/// State shared by the missions of one chaos.
 pub struct Series<'a> {
     pub options: &'a Options,
     pub schedule: Schedule,
@@ -107,7 +107,7 @@ impl Report {
         self.consumers.entry(name.to_owned()).or_default()
     }
 
-    /// Signals to stages and the supervisor whose measurement is complete.
+    /// Returns the completely measured signals to stages and the supervisor.
     pub fn kills(&self) -> u32 {
         self.kills.values().flat_map(BTreeMap::values).sum()
     }
@@ -142,7 +142,7 @@ impl Report {
     }
 }
 
-/// Median, 99 % quantile and maximum in milliseconds; nothing if nothing was measured.
+/// Serializes median, 99 % quantile and maximum in milliseconds; empty without measurements.
 fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Error> {
     let us = [0.5, 0.99, 1.0].into_iter().filter_map(|share| histogram.quantile_us(share));
     us.map(|us| rounded(us / 1e3)).collect::<Vec<_>>().serialize(to)
@@ -154,28 +154,30 @@ impl fmt::Display for Report {
     }
 }
 
-/// A signal. A value that was not measured is an empty cell.
+/// Signal; unmeasured values are empty cells.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub mission: u64,
-    /// Mission time of the newest wheel sample that was read before the signal, seconds.
+    /// Mission time of the newest wheel sample read before the signal.
     pub time_s: Option<f64>,
     pub stage: String,
     pub kind: Kind,
-    /// The generation; for a consumer the number of its starts in that mission. None for the supervisor, for everything and for the
-    /// run's own recorder.
+    /// Generation; for a consumer, its number of starts in that mission. None for the supervisor,
+    /// everything, and the run's own recorder.
     pub generation: Option<u32>,
-    /// Whether the process was to be hit in its first milliseconds.
+    /// Whether the hit was due in the process's first milliseconds.
     pub start_up: bool,
-    /// The time from the signal until the supervisor's record of the death was read, milliseconds. Only for stages.
+    /// Time from the signal until the supervisor's record of the death was read, milliseconds. Only
+    /// for stages.
     pub noticed_ms: Option<f64>,
-    /// The time from the signal until the successor's first sign of work was read, milliseconds. For stages and the supervisor.
+    /// Time from the signal until the successor's first sign of work was read, milliseconds. For
+    /// stages and the supervisor.
     pub ready_ms: Option<f64>,
-    /// The time from the signal until the successor's first sample of a tick was read, milliseconds. For stages and the supervisor.
+    /// Time from the signal until the successor's first sample of a tick was read, milliseconds.
+    /// For stages and the supervisor.
     pub first_output_ms: Option<f64>,
 }
 
-/// Milliseconds since `at`, to the microsecond.
 pub fn ms_since(at: Instant) -> f64 {
     (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
 }
@@ -221,7 +223,6 @@ mod tests {
         for row in [&plain, &odd] {
             file.add(row.clone()).unwrap();
         }
-        // Another process reads the file like this while it is written.
         assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);
         let text = fs::read_to_string(directory.join(FILE_NAME)).unwrap();
         let columns = "mission,time_s,stage,kind,generation,start_up,noticed_ms,";

@@ -1,4 +1,5 @@
-//! THE table of robot faults: wrong data that a robot sends to its link, and the promise under each.
+//! The table of robot faults: wrong data that a robot sends to its link, and the promise under
+//! each.
 
 use std::sync::LazyLock;
 
@@ -9,20 +10,23 @@ use serde::{Deserialize, Serialize};
 
 use super::fault_injector::LATE;
 
-/// The time until some faults show, seconds: counts of 0 first look like a restart of the robot, swapped encoders show in turns, a robot
-/// that believes in stuck ranges goes slowly, and slow frames leave pauses.
+/// Time until some faults show. Counts of 0 first look like a restart of the robot, and swapped
+/// encoders show in turns. A robot that believes stuck ranges drives slowly, and slow frames leave
+/// pauses.
 const SHOWS_AFTER_S: f64 = 2.0;
 
 #[derive(Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Promise {
-    /// The robot is at rest as soon as its base can be, stays so, and touches nothing.
+    /// The robot rests as soon as its base can, stays at rest, and touches nothing.
     RestsAtOnce,
-    /// Likewise, with a reason and as soon as the failsafe's rule of the cause lets it.
+    /// As [`Promise::RestsAtOnce`], with a reason, and as soon as the failsafe's rule for the cause
+    /// allows.
     Rests,
-    /// Likewise [`SHOWS_AFTER_S`] later.
+    /// As [`Promise::Rests`], but [`SHOWS_AFTER_S`] later.
     RestsLater,
-    /// The robot touches nothing, and does not report its arrival in a wrong place: its data are poor, but not false.
+    /// The robot touches nothing and never reports arrival in a wrong place: its data are poor, but
+    /// true.
     Unharmed,
     /// As [`Promise::Unharmed`], and the robot rests when its mission ends.
     EndsAtRest,
@@ -32,17 +36,17 @@ pub enum Promise {
 pub struct Row {
     pub name: String,
     pub promise: Promise,
-    /// The name of the failsafe's cause by which the robot rests.
+    /// Failsafe cause by which the robot rests.
     cause: Option<String>,
-    /// The effect on an X80; [`NOTHING`] if the fault has no meaning there.
+    /// Effect on an X80; [`NOTHING`] if the fault has no meaning there.
     x80: String,
-    /// The effect on a robot that speaks lines of JSON.
+    /// Effect on a robot that speaks JSON lines.
     json: String,
 }
 
 const NOTHING: &str = "-";
 
-/// A fault of a robot's data. [`TABLE`] says what each does, in the same order.
+/// Fault of a robot's data, described by [`TABLE`] in the same order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RobotFault {
@@ -88,7 +92,8 @@ static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
 });
 
 impl Row {
-    /// The greatest time from the fault to rest, seconds; none if the robot may go on. A fault begins between two frames.
+    /// Returns the maximum seconds from the fault to rest; none if the robot may go on. A fault
+    /// begins between two frames.
     pub fn rest_within_s(&self, mission: &Mission) -> Option<f64> {
         let by_cause = || {
             let mut causes = from_faults(mission).into_iter();
@@ -105,7 +110,7 @@ impl Row {
 }
 
 impl RobotFault {
-    /// Whether processes are killed, while a robot that ignores time limits is under way.
+    /// Returns whether processes are killed while a robot that ignores time limits drives.
     pub const fn is_kill(self) -> bool {
         matches!(self, Self::LinkKilled | Self::SupervisorKilled | Self::AllKilled)
     }
@@ -114,26 +119,26 @@ impl RobotFault {
         &TABLE[self as usize]
     }
 
-    /// Whether a robot that speaks `protocol` can have the fault.
     pub fn has_meaning(self, protocol: Protocol) -> bool {
         let row = self.row();
         match protocol {
             Protocol::X80 => row.x80 != NOTHING,
-            // ROS 2 has no other word than speed 0 that stops a robot.
+            // In ROS 2, only speed 0 stops a robot.
             Protocol::Ros2 if matches!(self, Self::DoesNotStop | Self::IgnoresZero) => false,
             Protocol::Json | Protocol::Ros2 => row.json != NOTHING,
             Protocol::Arduino => false,
         }
     }
 
-    /// The greatest time from the fault to rest for good of a robot that speaks `protocol`, seconds; none if the robot may go on.
+    /// Returns the maximum seconds from the fault to lasting rest; none if the robot may go on.
     pub fn rest_within_s(self, mission: &Mission, protocol: Protocol) -> Option<f64> {
         let promised_s = self.row().rest_within_s(mission)?;
         if (self, protocol) != (Self::FramesLate, Protocol::Ros2) {
             return Some(promised_s);
         }
-        // What comes late has fresh stamps there: the robot rests while nothing comes and goes on when frames come. They show that it
-        // came to rest, and then that its wheels do not follow its commands, as those of a dead encoder.
+        // Late messages have fresh stamps in ROS 2. The robot rests while none come, and goes on
+        // when they do. They then show that it stopped, and that its wheels ignore its commands, as
+        // with a dead encoder.
         let follows_not_s = Self::EncoderDead.row().rest_within_s(mission)?;
         Some(promised_s + LATE.as_secs_f64() + follows_not_s)
     }

@@ -1,4 +1,4 @@
-//! Missions of a robot that has a fault from some moment on, and the robot's behaviour after it.
+//! Missions of a robot that becomes faulty, and its behaviour afterwards.
 
 use std::{
     fs,
@@ -35,12 +35,12 @@ use crate::{
     ros2_robot::Ros2Robot,
 };
 
-/// Time from the robot's departure to its fault, seconds: the least, and the width of the random range.
+/// Time from departure to the fault: minimum, and width of the random range.
 const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
 const DEPARTED_M: f64 = 0.1;
-/// The time for which a faulty robot is watched: several times as long as it may move.
+/// Watch time of a faulty robot: several times as long as it may move.
 const WATCHED: Duration = Duration::from_secs(10);
-/// The time for a faulty robot that may go on: until it has arrived, because only then it can report a wrong place.
+/// Watch time of a faulty robot that may go on: until arrival, when it can report a wrong place.
 const WATCHED_ON_ITS_WAY: Duration = Duration::from_secs(90);
 const DEPARTS_WITHIN: Duration = Duration::from_secs(60);
 const END_GRACE: Duration = Duration::from_secs(5);
@@ -98,15 +98,14 @@ fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<
     start.args(keys.iter().flat_map(|key| ["--set", key]));
     let mut run = Run::start(start, &directory, false)?;
     let entry = watch(options, fault, seed, &mut run, &mut robot, &proxy);
-    // A frozen supervisor does not end in order.
+    // A frozen supervisor cannot end cleanly.
     run.process.signal(Signal::CONT);
     run.process.end(END_GRACE);
-    // The robot ends here, so nobody will see it at rest.
+    // The robot ends here, so its rest will be unobserved.
     sign_off(&asked.robot).or_cannot("sign the robot off")?;
     entry
 }
 
-/// Watch the robot until the mission ends, or for as long as the fault needs.
 fn watch(
     options: &Options,
     fault: RobotFault,
@@ -124,13 +123,13 @@ fn watch(
         _ => WATCHED,
     };
     let began = Instant::now();
-    // The beginning of the fault, and the ticks of the ground truth by then.
+    // Start of the fault, and the ground-truth ticks then.
     let mut fault_began = None;
     let (mut departed_s, mut stop, mut link) = (None, None, None);
-    // The process leaves the bus of the mission before, which that mission may have left behind.
+    // A mission may leave its bus behind.
     let domain = Domain::of(asked.robot.clone());
     let mut links = Follower::new(domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
-    // The ground truth counts to the end of the watch: the end of the run stops the robot.
+    // The ground truth counts until the watch ends: the end of the run stops the robot.
     let (ended, moving, is_over) = loop {
         let (now, moving) = (Instant::now(), proxy.last_moving());
         robot.poll()?;
@@ -147,7 +146,7 @@ fn watch(
         let newest = robot.truth().last();
         let gone = newest.filter(|tick| tick.x.hypot(tick.y) >= DEPARTED_M);
         departed_s = departed_s.or(gone.map(|tick| tick.time_s));
-        // It begins as a tick comes, so that times may count from that tick.
+        // The fault begins at a tick, from which times count.
         let due = newest
             .zip(departed_s)
             .is_some_and(|(tick, departed_s): (_, f64)| tick.time_s >= departed_s + fault_after_s);
@@ -183,7 +182,7 @@ fn watch(
     }
     let (began, first) = fault_began.unwrap_or((ended, truth.len()));
     let since_fault = |time: Instant| time.saturating_duration_since(began).as_secs_f64();
-    // The tick before is the newest when the fault began.
+    // The previous tick is the newest at the start of the fault.
     let watched = &truth[first.saturating_sub(1).min(truth.len())..];
     let ways = watched.windows(2).map(|two| (two[1].x - two[0].x).hypot(two[1].y - two[0].y));
     let began_s = watched.first().map_or(0.0, |tick| tick.time_s);

@@ -1,4 +1,4 @@
-//! The kinds of hits on a process, and their schedule: seeded, so that it can be repeated.
+//! Kinds of hits on a process, and their repeatable, seeded schedule.
 
 use std::{ops::Range, time::Duration};
 
@@ -15,13 +15,13 @@ pub enum Kind {
     Kill,
     /// SIGKILL in the first milliseconds of a generation.
     KillAtStart,
-    /// SIGABRT, as after a panic that cannot unwind. SIGSEGV would not serve: Rust's runtime takes the first one for an overflow
-    /// of the stack, finds none, and goes on.
+    /// SIGABRT, as after a panic that cannot unwind. SIGSEGV is unsuitable: Rust's runtime takes
+    /// the first one for a stack overflow, finds none, and continues.
     Crash,
     Terminate,
     /// SIGSTOP.
     Freeze,
-    /// SIGSTOP to supervisor and stages together, SIGCONT a moment later.
+    /// SIGSTOP to supervisor and stages together, then SIGCONT.
     FreezeAll,
 }
 
@@ -36,24 +36,24 @@ impl Kind {
     }
 }
 
-/// Mean time between two signals. Each stage gets one every two to three seconds, and is stable before.
+/// Mean time between signals. Each stage gets one every two to three seconds, and is stable before.
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
-/// A hit in the start-up falls within this time of the start, in which the stage joins the bus.
+/// Maximum time of a start-up hit after the start, in which the stage joins the bus.
 const STARTUP: Duration = Duration::from_millis(12);
-/// Share of the signals that are followed by one to the successor in its start-up, with `--include-startup`. A fifth of all
-/// signals are such; the others are not sent, because there was no successor, or it was ready too soon.
+/// Share of signals followed by one to the starting successor, with `--include-startup`. A fifth of
+/// all signals are such; the rest find no successor, or one that was ready too soon.
 const STARTUP_SHARE: f64 = 0.3;
 
-/// Share of the signals that hit the supervisor, with `--include-supervisor`.
+/// Share of signals to the supervisor, with `--include-supervisor`.
 const SUPERVISOR_SHARE: f64 = 0.05;
 
-/// Share of the signals that hit a consumer, if there are any.
+/// Share of signals to consumers, if any.
 const CONSUMER_SHARE: f64 = 0.5;
 
-/// Share of the hits that freeze everything, with `--freeze-all`.
+/// Share of hits that freeze everything, with `--freeze-all`.
 const FREEZE_ALL_SHARE: f64 = 0.5;
-/// Range of the time for which everything, or a consumer, is frozen, seconds: from less than a stage's deadline to three times as
-/// long.
+/// Range of freeze times of everything or a consumer: from below a stage's deadline to three times
+/// as long.
 const FREEZE_S: Range<f64> = 0.3..1.5;
 
 pub struct Schedule(Random);
@@ -63,7 +63,7 @@ impl Schedule {
         Self(Random::new(seed, 7))
     }
 
-    /// Time to the next signal, exponentially distributed.
+    /// Draws an exponentially distributed time.
     pub fn pause(&mut self) -> Duration {
         MEAN_PAUSE.mul_f64(-(1.0 - self.0.share()).ln())
     }
@@ -76,7 +76,8 @@ impl Schedule {
         self.0.share() < SUPERVISOR_SHARE
     }
 
-    /// The hit of the supervisor. SIGTERM would end the run, and only systemd notices a frozen supervisor.
+    /// Draws the supervisor's hit. SIGTERM would end the run, and only systemd notices a frozen
+    /// supervisor.
     pub fn supervisor_kind(&mut self) -> Kind {
         match self.0.share() {
             ..0.8 => Kind::Kill,
@@ -84,21 +85,21 @@ impl Schedule {
         }
     }
 
-    /// The time to freeze everything, if it is to be frozen instead of a stage.
+    /// Draws the freeze time, if everything is hit instead of a stage.
     pub fn freeze_all(&mut self) -> Option<Duration> {
         let frozen = self.0.share() < FREEZE_ALL_SHARE;
         frozen.then(|| self.freeze())
     }
 
-    /// The time for which everything or a consumer is frozen.
     fn freeze(&mut self) -> Duration {
         let Range { start, end } = FREEZE_S;
         Duration::from_secs_f64(self.0.within(start, end))
     }
 
-    /// The consumer to hit instead of a stage or the supervisor; and the time for which it is frozen, or none to kill it.
+    /// Draws the consumer to hit instead of a stage or the supervisor, the kind, and the freeze
+    /// time.
     pub fn consumer(&mut self, count: usize) -> Option<(usize, Kind, Duration)> {
-        // Without consumers the sequence of decisions is the same as before there were any.
+        // Without consumers, this leaves the sequence of decisions unchanged.
         if count == 0 || self.0.share() >= CONSUMER_SHARE {
             return None;
         }
@@ -119,9 +120,9 @@ impl Schedule {
         }
     }
 
-    /// The time after its start at which to hit the successor too, if it is to be hit.
+    /// Draws the time after its start at which to hit the successor.
     pub fn startup_hit(&mut self) -> Option<Duration> {
-        // This converts the share of all signals to a share of those that can be followed by one.
+        // Converts the share of all signals to a share of those that can be followed by one.
         let hit = self.0.share() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
         hit.then(|| STARTUP.mul_f64(self.0.share()))
     }

@@ -1,4 +1,4 @@
-//! The stop-time table: how long robots moved after their fault.
+//! Stop-time table: how long robots moved after their fault.
 
 use std::fmt;
 
@@ -11,29 +11,32 @@ use super::{
 };
 use crate::error::Result;
 
-/// The least time from the last tick in which a wheel turned to the end of a mission that ends at rest, seconds.
+/// Minimum time between the last tick with a turning wheel and the end of a mission that ends at
+/// rest.
 const AT_REST_BEFORE_S: f64 = 0.15;
 
 #[derive(Debug, Serialize)]
 pub struct Entry {
     pub fault: RobotFault,
     pub seed: u64,
-    /// The greatest time from the fault to the last command that moves a wheel and to rest, seconds; none if the robot may go on.
+    /// Maximum time from the fault to the last moving command and to rest, seconds; none if the
+    /// robot may go on.
     pub promised_s: Option<f64>,
-    /// Whether the fault began: a mission may end before.
+    /// Whether the fault began: the mission may end earlier.
     pub fault_began: bool,
-    /// The time from the fault to the link's last command that moves a wheel, seconds.
+    /// Time from the fault to the link's last command that moves a wheel.
     pub last_moving_s: Option<f64>,
-    /// The time from the fault to the last tick in which a wheel turned, by the ground truth, seconds.
+    /// Time from the fault to the last tick with a turning wheel, by the ground truth.
     pub rest_s: Option<f64>,
-    /// The way from the fault to the end of the watch, metres.
+    /// Travel from the fault to the end of the watch.
     pub way_m: f64,
-    /// Time from the fault to the end of the watch, seconds.
+    /// Time from the fault to the end of the watch.
     pub watched_s: f64,
     pub collisions: u64,
-    /// The outcome of the mission; `goes on` if it had none when the watch ended.
+    /// Mission outcome; `goes on` if still open at the end of the watch.
     pub outcome: String,
-    /// The reason of the outcome; for a mission that goes on, why the link lets no command pass, empty if commands pass.
+    /// Reason of the outcome. For an open mission, why the link blocks commands; empty if they
+    /// pass.
     pub reason: String,
 }
 
@@ -87,7 +90,6 @@ impl fmt::Display for StopTimeTable {
         for entries in self.entries.chunk_by(|one, next| one.fault == next.fault) {
             let kept = entries.iter().filter(|entry| entry.is_kept()).count();
             let way = entries.iter().map(|entry| entry.way_m).fold(0.0, f64::max);
-            // The worst mission is shown.
             let told = entries.iter().find(|entry| !entry.is_kept()).unwrap_or(&entries[0]);
             let reason = if told.reason.is_empty() { "no reason" } else { &told.reason };
             table.row([
@@ -105,9 +107,9 @@ impl fmt::Display for StopTimeTable {
     }
 }
 
-/// The longest time of all; marked as a lower bound if the robot still moved at the end of the watch.
+/// Returns the maximum, marked as a lower bound if the robot still moved at the end of the watch.
 fn longest(entries: &[Entry], time: impl Fn(&Entry) -> Option<f64>) -> String {
-    /// A robot that moves until the end of the watch was last seen to move a tick or two before.
+    /// Margin before the end of the watch in which a moving robot was last seen to move.
     const STILL_S: f64 = 0.5;
     let times = entries.iter().filter_map(|entry| Some((time(entry)?, entry.watched_s)));
     let longest = times.max_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,5 +1,4 @@
-//! The result of each setting over all its missions, the differences of two settings on the same missions, and the page with every
-//! failure, its picture and its own page.
+//! Results per setting, paired differences of settings, and the page of failures.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -17,14 +16,15 @@ use crate::{
     },
 };
 
-/// The share of collisions in which the robot was in motion; in the others it was run into at rest.
+/// Share of collisions in motion; in the others the robot was run into at rest.
 const AT_FAULT: &str = "at_fault_collision";
-/// The shares of missions in which the failsafe made the robot stand, or go at half speed, once it had gone.
+/// Shares of missions in which the failsafe stopped, or slowed to half speed, a robot that had
+/// departed.
 const STOPPED: &str = "stopped_by_failsafe";
 const SLOWED: &str = "slowed_by_failsafe";
 
-/// Metrics beside the shares. With `median_` the key is of the median of a column over the successes, otherwise of the mean over all
-/// missions.
+/// Metrics beside the shares. `median_` keys are medians of a column over the successes, others
+/// means over all missions.
 const METRICS: [&str; 9] = [
     "median_time_s",
     "median_k",
@@ -37,7 +37,7 @@ const METRICS: [&str; 9] = [
     "median_look_share",
 ];
 
-/// The first setting; `versus` has the others, each with its differences from the first.
+/// Reports the first setting; `versus` has the others with their differences from it.
 pub fn report(settings: &[Setting], rows: &[Row]) -> Value {
     let mut report = totals(&settings[0].name, rows);
     let others = settings.iter().skip(1);
@@ -49,7 +49,7 @@ pub fn report(settings: &[Setting], rows: &[Row]) -> Value {
     report
 }
 
-/// Shares of all missions with their 95 % intervals, and the metrics that are known.
+/// Returns shares with 95 % intervals, and the known metrics.
 fn totals(setting: &str, rows: &[Row]) -> Value {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.setting == setting).collect();
     let mut totals = json!({ "setting": setting, "count": rows.len() });
@@ -81,7 +81,7 @@ fn interval(of: Estimate) -> Vec<f64> {
     [of.low, of.high].map(rounded).to_vec()
 }
 
-/// The differences of the setting `to` from the setting `from` on the same worlds with the same noise.
+/// Returns the differences from setting `from` to setting `to` on the same worlds and noise.
 fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
     let of = |setting| -> BTreeMap<_, &Row> {
         let its = rows.iter().filter(|row| row.setting == setting);
@@ -104,14 +104,14 @@ fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
         "collision_change": change(&|row| row.outcome == Outcome::Collision),
         "at_fault_change": change(&Row::is_at_fault),
     });
-    // The median ratio of the times, over missions in which both succeeded.
+    // Median ratio of times over missions in which both succeeded.
     if let Some(ratio) = median(both.map(|(a, b)| b.time_s / a.time_s.max(1e-9))) {
         versus["time_ratio"] = ratio.into();
     }
     versus
 }
 
-/// Write the page; pictures are beside it, as [`runner::picture`] says. `command` reproduces the results.
+/// Writes the page beside its pictures. `command` reproduces the results.
 pub fn save_page(results: &Results, report: &Value, command: &str) -> Result<PathBuf> {
     let Results { directory, rows, .. } = results;
     let mut page = Page::new("Evaluation", command);

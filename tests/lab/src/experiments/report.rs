@@ -1,4 +1,4 @@
-//! The results of the experiments as JSON objects, and their page.
+//! Results of the experiments as JSON objects, and their page.
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,8 @@ const FIGURES: [&str; 7] = [
     "wheel_range_rad_s",
 ];
 
-/// An object for each experiment: the paper's values, those of each method, and the claims that hold.
+/// Returns per experiment the paper's values, those of each method, and its claims with whether
+/// they hold.
 pub fn report(experiments: &[Experiment], rows: &[Row]) -> Result<Vec<Value>> {
     let claims = claims()?;
     let its = |experiment: &str, method: &str| -> Vec<&Row> {
@@ -83,13 +84,13 @@ fn count(rows: &[&Row], outcome: Outcome) -> usize {
     rows.iter().filter(|row| row.outcome == outcome).count()
 }
 
-/// The quartiles of a figure over the missions that arrived; none if none did.
+/// Returns the quartiles of missions that arrived.
 fn spread(rows: &[&Row], figure: &str) -> Option<Spread> {
     let arrived = rows.iter().filter(|row| row.is_success());
     Spread::of(arrived.filter_map(|row| row.number(figure)))
 }
 
-/// The median of a figure, or the share that `arrived`.
+/// Returns the median of a figure, or the share that `arrived`.
 fn value(rows: &[&Row], figure: &str) -> Option<f64> {
     if figure == "arrived" {
         return Some(count(rows, Outcome::Success) as f64 / rows.len() as f64)
@@ -98,7 +99,7 @@ fn value(rows: &[&Row], figure: &str) -> Option<f64> {
     Some(spread(rows, figure)?.median)
 }
 
-/// Write the page of the `report` into `directory`; pictures are beside it. `command` reproduces the results.
+/// Writes the page beside its pictures. `command` reproduces the results.
 pub fn save_page(
     directory: &Path,
     experiments: &[Experiment],

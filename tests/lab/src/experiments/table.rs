@@ -1,4 +1,5 @@
-//! The tables of experiments and claims. The paper gives no dimensions of its worlds; the shipped missions choose them.
+//! Tables of experiments and claims. The paper omits its worlds' dimensions; the shipped missions
+//! choose them.
 
 use console::missions;
 use serde::{Deserialize, de::DeserializeOwned};
@@ -8,11 +9,11 @@ use crate::{
     missions::trial::{Trial, swept_m},
 };
 
-/// Without sensing the drum at this place is not known, metres. A robot without sensing touches unknown things on its path; the
-/// field of the other drums does not lead past this one.
+/// Place of the drum that is unknown without sensing. A robot without sensing touches unknown
+/// objects on its path; the other drums' field leads away from this one.
 const UNKNOWN_AT_M: [f64; 2] = [2.3, -1.7];
 
-/// The methods by which experiments are carried out, with their assignments: the paper's with its dead reckoning, (21).
+/// Methods of the experiments, with assignments: the paper's with its dead reckoning (21).
 pub const METHODS: [(&str, &[&str]); 2] = [
     (PAPER, &["method='paper'", "dead_reckoning.integration='euler'"]),
     ("evidential", &["method='evidential'"]),
@@ -21,25 +22,27 @@ const PAPER: &str = "paper";
 
 #[derive(Debug, Deserialize)]
 pub struct Experiment {
-    /// The number in the paper, and the variant.
+    /// Number in the paper, and variant.
     pub name: String,
     pub title: String,
     pub reported: String,
     pub reported_time_s: Option<f64>,
     mission: String,
     change: Option<String>,
-    /// Whether only the paper's method can do it: the default method has no constant speed.
+    /// Whether only the paper's method can run it: the default method has no constant speed.
     paper_only: bool,
 }
 
-/// A claim of the paper about the median of a figure, or about the share that `arrived`. "About half" is 0.4 to 0.6, "about 0.7"
-/// is 0.6 to 0.8; a deviation is minor up to a fifth of the path.
+/// Claim of the paper about the median of a figure, or the share that `arrived`.
+///
+/// "About half" is 0.4 to 0.6, "about 0.7" is 0.6 to 0.8. A minor deviation is up to a fifth of the
+/// path.
 #[derive(Deserialize)]
 pub struct Claim {
     pub experiment: String,
     pub claim: String,
     pub figure: String,
-    /// The experiment whose figure divides this one.
+    /// Experiment whose figure divides this one.
     pub over: Option<String>,
     pub least: f64,
     pub most: f64,
@@ -55,7 +58,7 @@ pub fn claims() -> Result<Vec<Claim>> {
     rows(include_str!("claims.csv"))
 }
 
-/// The experiments of these names in the order of the table; all without names.
+/// Returns the named experiments in table order; all without names.
 pub fn named(names: &[String]) -> Result<Vec<Experiment>> {
     let mut table: Vec<Experiment> = rows(include_str!("table.csv"))?;
     if let Some(name) = names.iter().find(|name| !table.iter().any(|it| it.name == **name)) {
@@ -73,7 +76,6 @@ impl Experiment {
         method == PAPER || !self.paper_only
     }
 
-    /// The experiment as a trial of the evaluation, without the method.
     pub fn trial(&self) -> Result<Trial> {
         let mut mission = missions::load(&self.mission, self.change.as_slice())?;
         mission.name = self.name.clone();

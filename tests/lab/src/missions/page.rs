@@ -1,4 +1,4 @@
-//! A page of results.
+//! Page of results.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ code{overflow-wrap:anywhere}figure{display:inline-block;width:min(100%,570px);ma
 pub struct Page(String);
 
 impl Page {
-    /// The page with its title and the `command` that reproduces the results.
+    /// Starts a page; `command` reproduces its results.
     pub fn new(title: &str, command: &str) -> Self {
         let command = escaped(command);
         Self(format!(
@@ -30,13 +30,13 @@ impl Page {
         self.0 += &format!("<p>{}</p>\n", escaped(text));
     }
 
-    /// Text whose lines and columns stay as they are.
+    /// Adds preformatted text.
     pub fn table(&mut self, text: &str) {
         let lines: Vec<_> = text.lines().map(escaped).collect();
         self.0 += &format!("<pre>{}</pre>\n", lines.join("\n"));
     }
 
-    /// A picture and a link to the page of its run, in so far as there are these files of `directory`, in which the page will be.
+    /// Adds a picture and a link to its run's page, if they exist in `directory`, the page's own.
     pub fn figure(&mut self, caption: &str, directory: &Path, picture: &Path) {
         let shown = |file: &Path, show: fn(String) -> String| {
             let there = Some(file).filter(|file| directory.join(file).exists());

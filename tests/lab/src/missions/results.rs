@@ -1,5 +1,5 @@
-//! The directory of an evaluation: the command that gives its rows, and two CSV files with a row for each mission, appended as
-//! missions end, sorted when all have ended.
+//! Directory of an evaluation: its command, and two CSV files, appended as missions end and finally
+//! sorted.
 
 use std::{
     env,
@@ -15,7 +15,7 @@ use crate::error::{OrCannot as _, Refused, Result};
 
 const PLAN_FILE: &str = "plan.txt";
 
-/// The command of this process, which gives the rows, without what does not change them.
+/// Returns this process's command without options that leave the rows unchanged.
 pub fn command() -> Result<String> {
     let mut words = vec!["firsthand".to_owned()];
     let mut given = env::args().skip(1);
@@ -33,12 +33,12 @@ pub fn command() -> Result<String> {
 pub struct Results {
     pub directory: PathBuf,
     pub rows: Table<Row>,
-    /// Latencies differ in every run; the rows do not.
+    /// Latencies, which differ in every run, unlike rows.
     pub latencies: Table<Latency>,
 }
 
 impl Results {
-    /// Make `directory` for the rows of `command`, or resume those of the same command.
+    /// Creates `directory`, or resumes it if the command is the same.
     pub fn open(directory: &Path, command: &str, resume: bool) -> Result<Self> {
         let file = directory.join(PLAN_FILE);
         let named = directory.display();
@@ -75,7 +75,7 @@ impl Results {
     }
 }
 
-/// World, noise seed and setting, which identify a mission.
+/// Mission identity: world, noise seed and setting.
 pub type Key = (String, u64, String);
 
 pub trait Record: Serialize + DeserializeOwned {
@@ -93,7 +93,7 @@ impl<R: Serialize + DeserializeOwned> Table<R> {
         let mut rows = Vec::new();
         if file.exists() {
             let mut reader = csv::Reader::from_path(&file).or_cannot_file("read", &file)?;
-            // A mission whose row was cut off is run again.
+            // A mission with a truncated row is run again.
             rows.extend(reader.deserialize().map_while(Result::<R, _>::ok));
         }
         let table = Self { file, rows };
@@ -121,7 +121,8 @@ impl<R: Serialize + DeserializeOwned> Table<R> {
 }
 
 impl<R: Record> Table<R> {
-    /// Sort the rows by world, seed and setting, and rewrite the file. If a mission has two rows, the later one stays.
+    /// Sorts by world, seed and setting, and rewrites the file. Of a mission's two rows, the later
+    /// stays.
     pub fn sort(&mut self) -> Result {
         self.rows.reverse();
         self.rows.sort_by_key(R::key);

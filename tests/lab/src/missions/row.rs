@@ -1,4 +1,4 @@
-//! One mission's result: a row of the table.
+//! Result of one mission: a row of the table.
 
 use std::collections::BTreeMap;
 
@@ -12,11 +12,10 @@ use super::{
     trial::Trial,
 };
 
-/// The outcome of a mission by the ground truth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The robot is at the target and has touched nothing.
+    /// The robot is at the target without contact.
     Success,
     Collision,
     Timeout,
@@ -26,11 +25,11 @@ pub enum Outcome {
     Aborted,
 }
 
-/// The names of all outcomes, in the order of the reports.
+/// Outcome names in report order.
 pub const OUTCOMES: [&str; 6] =
     ["success", "collision", "timeout", "wrong_place", "unreachable", "aborted"];
 
-/// One mission's result, in metres and mission seconds. Latencies differ in every run and have a table of their own, see
+/// Result of one mission, in metres and mission seconds. Latencies differ in every run and are in
 /// [`Latency`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
@@ -51,44 +50,46 @@ pub struct Row {
     /// BARN score; none without an optimal time.
     pub barn_score: Option<f64>,
     pub min_clearance_m: Option<f64>,
-    /// MRPB's metrics, see [`Summary`]: share of the time near something, path smoothness, velocity smoothness.
+    /// MRPB's metrics, see [`Summary`]: share of time near obstacles, path smoothness, velocity
+    /// smoothness.
     pub p_o: Option<f64>,
     pub f_ps_m2: Option<f64>,
     pub f_vs_m_s2: Option<f64>,
-    /// Distance from the estimated to the true position at the end.
+    /// Final distance from the estimated to the true position.
     pub pose_error_m: Option<f64>,
-    /// The expected root mean square of that error, by the covariance of the last pose.
+    /// Expected RMS of that error, by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
     pub true_distance_m: Option<f64>,
     pub safety_events: u64,
-    /// Share of the ticks in which the sonar gave no distance.
+    /// Share of ticks without a sonar distance.
     pub sonar_unavailable_share: Option<f64>,
-    /// Dynamic range of the wheel signals: the greatest commanded speed of either wheel less the least one, rad/s.
+    /// Dynamic range of the wheel signals: maximum minus minimum commanded speed of either wheel.
     pub wheel_range_rad_s: Option<f64>,
     pub looks: u64,
     pub look_s: f64,
     pub replans: u64,
     pub resets: u64,
     pub full_solves: u64,
-    /// The speed of the faster wheel in the tick before the contact, m/s.
+    /// Speed of the faster wheel in the tick before the contact.
     pub contact_speed_m_s: Option<f64>,
-    /// The causes by which the failsafe made a robot that had gone stand, and go at half speed, each with how often.
+    /// Causes and counts by which the failsafe stopped a departed robot, or slowed it to half
+    /// speed.
     #[serde(default)]
     pub stops: String,
     #[serde(default)]
     pub slowed: String,
 }
 
-/// A robot that is faster at a contact, by its faster wheel, is at fault, m/s; a slower one was run into.
+/// Speed of the faster wheel at a contact above which the robot is at fault; otherwise it was run
+/// into.
 const AT_FAULT_M_S: f64 = 0.05;
 
-/// The multiples of the optimal time up to which a robot gets the best score, and from which on the worst.
+/// Multiples of the optimal time for the best and the worst score.
 const BARN_CLIP: [f64; 2] = [2.0, 8.0];
-/// The speed of the challenge's optimal times, m/s.
+/// Speed of the challenge's optimal times.
 const BARN_SPEED_M_S: f64 = 2.0;
 
 impl Row {
-    /// The row of `trial`, run with noise `seed` under `setting`, that ended with `summary`.
     pub fn new(trial: &Trial, seed: u64, setting: &Setting, summary: &Summary) -> Self {
         let Trial { rules, shortest_m, .. } = *trial;
         let straight_m = trial.mission.straight_m();
@@ -144,7 +145,7 @@ impl Row {
         }
     }
 
-    /// Whether the robot was in motion when it touched something. A contact of unknown speed counts.
+    /// Returns whether the robot moved at its contact. A contact of unknown speed counts.
     pub fn is_at_fault(&self) -> bool {
         let moved = self.contact_speed_m_s.is_none_or(|speed| speed > AT_FAULT_M_S);
         self.outcome == Outcome::Collision && moved
@@ -158,7 +159,7 @@ impl Row {
         OUTCOMES[self.outcome as usize]
     }
 
-    /// The number in a column, or one that follows from several.
+    /// Returns a column's number, or one derived from several.
     pub fn number(&self, column: &str) -> Option<f64> {
         match column {
             "clearance_m" => self.min_clearance_m,
@@ -180,13 +181,13 @@ impl Record for Row {
     }
 }
 
-/// The latencies of one mission's ticks and solves, microseconds.
+/// Latencies of a mission, microseconds.
 #[derive(Serialize, Deserialize)]
 pub struct Latency {
     pub world: String,
     pub seed: u64,
     pub setting: String,
-    /// A tick, from the datagram in to the datagram out.
+    /// Tick latency, datagram in to datagram out.
     pub tick_p50_us: Option<f64>,
     pub tick_p99_us: Option<f64>,
     pub tick_max_us: Option<f64>,
@@ -296,7 +297,6 @@ mod tests {
         let row = Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1));
         Table::open(file.path().to_path_buf()).unwrap().add(row.clone()).unwrap();
         let written = fs::read_to_string(file.path()).unwrap();
-        // The three columns and their neighbours are empty.
         let former = written.replacen(",p_o,f_ps_m2,f_vs_m_s2", "", 1).replacen(",,,", "", 1);
         assert_eq!(written.len() - former.len(), ",p_o,f_ps_m2,f_vs_m_s2,,,".len());
         fs::write(file.path(), former).unwrap();
@@ -324,7 +324,7 @@ mod tests {
         };
         let time_s = row(None).time_s;
         assert_eq!(row(Some(time_s)).outcome, Outcome::Success);
-        // The shortest path of 4 m takes 2 s at 2 m/s; the best score is half of that share, the least an eighth.
+        // The shortest path of 4 m takes 2 s at 2 m/s.
         assert!(row(None).barn_score >= Some(0.125));
         assert_eq!(row(Some(time_s - 1.0)).outcome, Outcome::Timeout);
         assert_eq!(row(Some(time_s - 1.0)).barn_score, Some(0.0));

@@ -1,4 +1,4 @@
-//! The missions of an evaluation: each a `firsthand run` of its own, several at a time.
+//! Missions of an evaluation, each its own `firsthand run`, several at a time.
 
 use std::{
     collections::BTreeSet,
@@ -28,7 +28,7 @@ use crate::{
 
 const PICTURE: &str = "picture.svg";
 const PAGE: &str = "report/report.html";
-/// Time between lines of progress that cannot be rewritten.
+/// Interval of progress lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 pub struct Plan {
@@ -37,20 +37,21 @@ pub struct Plan {
     /// Missions on each world for each setting, with different noise.
     pub repeats: u64,
     pub noise: NoiseSeeds,
-    /// The noise seed whose missions get pictures even if they did not fail.
+    /// Noise seed whose missions get pictures even without failure.
     pub pictured_seed: Option<u64>,
-    /// Missions at once; by default one for each processor.
+    /// Missions at once; by default one per processor.
     pub jobs: Option<NonZero<usize>>,
     pub pace: Pace,
-    /// Whether the robot of each mission is calibrated before, as its owner would do it. If that fails, that is said and the mission runs without.
+    /// Whether to calibrate each mission's robot first, as its owner would. After a reported
+    /// failure the mission runs uncalibrated.
     pub calibrates: bool,
 }
 
 #[derive(Clone, Copy)]
 pub enum NoiseSeeds {
-    /// Every world has the same seeds: this seed and the following ones.
+    /// Same seeds for every world: this one and the following.
     Counted(u64),
-    /// Every mission has a seed of its own, derived from the seed of the set.
+    /// Own seed for every mission, derived from the seed of the set.
     Derived(u64),
 }
 
@@ -67,14 +68,16 @@ impl NoiseSeeds {
     }
 }
 
-/// An invertible hash of `bits`: multiplications by odd numbers and shifts, as in the finaliser of MurmurHash3 (A. Appleby, 2011).
+/// Hashes `bits` invertibly: odd multiplications and shifts, as in MurmurHash3's finaliser (A.
+/// Appleby, 2011).
 const fn mixed(bits: u32) -> u32 {
     let bits = (bits ^ (bits >> 16)).wrapping_mul(0x85eb_ca6b);
     let bits = (bits ^ (bits >> 13)).wrapping_mul(0xc2b2_ae35);
     bits ^ (bits >> 16)
 }
 
-/// The path of a mission's picture in the directory of its plan; the page of a failure is beside it, with the extension `html`.
+/// Returns the path of a mission's picture; a failure's page is beside it, with the extension
+/// `html`.
 pub fn picture(row: &Row) -> PathBuf {
     let folder = if row.is_success() { "pictures" } else { "failures" };
     let name = format!("{}-{}-{}.svg", row.world, row.seed, row.setting);
@@ -82,10 +85,11 @@ pub fn picture(row: &Row) -> PathBuf {
         .join(name.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_"))
 }
 
-/// Run all missions of `plan` whose rows are not in `results` yet. Lines on standard error below `title` show how far.
+/// Runs all missions of `plan` without rows in `results`. Shows progress on standard error below
+/// `title`.
 ///
 /// # Errors
-/// A file cannot be written, or `firsthand` does not start.
+/// Returns an error if a file cannot be written or `firsthand` does not start.
 pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     let directory = results.directory.clone();
     let pictures = plan.pictured_seed.map(|_| "pictures");
@@ -93,7 +97,7 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
         let folder = directory.join(folder);
         fs::create_dir_all(&folder).or_cannot_file("make", &folder)?;
     }
-    // An aborted mission says nothing about navigation, only about the machine, so it is run again.
+    // An aborted mission reflects the machine rather than navigation, so it is run again.
     let settled = results.rows.rows.iter().filter(|row| row.outcome != Outcome::Aborted);
     let done: BTreeSet<_> = settled.map(Row::key).collect();
     let (mut all, mut left) = (0, Vec::new());
@@ -130,7 +134,7 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     };
     let kept = in_parallel(left, threads, run, |given| {
         for (row, latency) in given? {
-            // Latencies are written first, so that a mission with a row has both.
+            // Latencies come first, so that a mission with a row has both.
             latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
             results.rows.add(row)?;
         }
@@ -155,10 +159,10 @@ fn world_file(directory: &Path, world: &str) -> PathBuf {
     directory.join("worlds").join(format!("{world}.toml"))
 }
 
-/// Do `jobs` by so many numbered threads, and take their results as they come.
+/// Runs `jobs` on numbered threads, and takes their results as they come.
 ///
 /// # Errors
-/// A result cannot be taken; then no other job begins.
+/// Returns the first error of `take`; no further job begins.
 pub fn in_parallel<Job: Send, Done: Send>(
     jobs: Vec<Job>,
     threads: usize,
@@ -188,7 +192,6 @@ struct Job<'a> {
     directory: &'a Path,
 }
 
-/// A robot of a mission, whose run has processes of its own.
 struct Robot<'a> {
     job: &'a Job<'a>,
     trial: &'a Trial,
@@ -240,11 +243,11 @@ impl Robot<'_> {
 }
 
 impl Job<'_> {
-    /// Run the mission of each robot, all at once. A robot without a summary has no latencies.
+    /// Runs the mission of each robot, all at once. A robot without a summary has no latencies.
     fn run(&self, worker: usize) -> Result<Vec<(Row, Option<Latency>)>> {
         let Self { plan, trial, setting, seed, directory: all } = *self;
         let files = all.join(format!("run-{worker}"));
-        // A worker that was killed left its files.
+        // A killed worker leaves files.
         let _ = fs::remove_dir_all(&files);
         fs::create_dir(&files).or_cannot_file("make", &files)?;
         let names =
@@ -279,14 +282,13 @@ impl Job<'_> {
             let row = Row::new(robot.trial, robot.seed, setting, &summary);
             let latency = has_summary.then(|| Latency::new(&row, &summary));
             if !row.is_success() || plan.pictured_seed == Some(seed) {
-                // A mission that could not start has no picture.
                 let _ = fs::rename(robot.directory.join(PICTURE), all.join(picture(&row)));
             }
             rows.push((row, latency));
         }
         let has_page = |row: &Row| !matches!(row.outcome, Outcome::Success | Outcome::Aborted);
         if rows.iter().any(|(row, _)| has_page(row)) {
-            // In lockstep the mission can be run again, to the bit, and recordings of all missions would take too much room.
+            // Recording every mission would take too much space; in lockstep a rerun is bit-equal.
             if plan.pace == Pace::Max {
                 for robot in &robots {
                     let _ = fs::remove_dir_all(&robot.directory);

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Quantile of the normal distribution for 95 %.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// A value with its 95 % interval.
+/// Value with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
     pub value: f64,
@@ -13,7 +13,7 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// The share of `hits` in `n`, with Wilson's interval (Wilson 1927).
+/// Returns the share with Wilson's interval (Wilson 1927).
 pub fn share(hits: usize, n: usize) -> Estimate {
     if n == 0 {
         return Estimate { value: f64::NAN, low: 0.0, high: 1.0 };
@@ -26,12 +26,12 @@ pub fn share(hits: usize, n: usize) -> Estimate {
     Estimate { value, low: (middle - half).max(0.0), high: (middle + half).min(1.0) }
 }
 
-/// The share that is lost at most, if `lost` of `tried` were: the bound of 95 % (Clopper and Pearson 1934).
+/// Returns the 95 % upper bound of the loss rate (Clopper and Pearson 1934).
 pub fn most_by_95_percent(lost: u64, tried: u64) -> f64 {
     if lost >= tried {
         return 1.0;
     }
-    // The probability of at most `lost`, of which the bound makes 5 %.
+    // Probability of at most `lost`, 5 % at the bound.
     let at_most = |share: f64| {
         let mut term = tried as f64 * (-share).ln_1p();
         let terms = (0..=lost).map(|k| {
@@ -49,8 +49,9 @@ pub fn most_by_95_percent(lost: u64, tried: u64) -> f64 {
     high
 }
 
-/// The difference of two shares on the same `n` worlds: `gained` worlds count only in the second setting, `lost` only in the
-/// first. Wald's interval with half a pair added to each cell (Agresti and Min 2005).
+/// Returns the difference of two shares on the same `n` worlds. `gained` worlds count only in the
+/// second setting, `lost` only in the first. Uses Wald's interval with half a pair added to each
+/// cell (Agresti and Min 2005).
 pub fn paired_difference(gained: usize, lost: usize, n: usize) -> Estimate {
     let (gained, lost, n) = (gained as f64, lost as f64, n as f64);
     let value = if n > 0.0 { (gained - lost) / n } else { f64::NAN };
@@ -72,7 +73,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// The quartiles, linear between neighbours; none without values.
+    /// Returns the linearly interpolated quartiles; none without values.
     pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.collect();
         values.sort_by(f64::total_cmp);
@@ -86,7 +87,7 @@ impl Spread {
     }
 }
 
-/// To a thousandth, for people.
+/// Rounds to a thousandth, for people.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }

@@ -1,4 +1,4 @@
-//! A trial: a mission in a solvable world, and the rules of its judgement.
+//! Trial: a mission in a solvable world, and its rules of judgement.
 
 use common::{
     geometry::Shapes,
@@ -11,31 +11,32 @@ use std::path::Path;
 use crate::error::Result;
 use report::shortest_path::shortest_path;
 
-/// The perimeter's width is a multiple of this, metres: a whole number of cells by both methods.
+/// Step of the perimeter's width: a whole number of cells by both methods.
 const WIDTH_STEP_M: f64 = 0.1;
-/// Free ground between the things of a world and the perimeter, metres.
+/// Free ground between a world's objects and the perimeter.
 const RIM_M: f64 = 0.6;
-/// Free ground on both sides of the body in the narrowest way of a world, metres.
+/// Free ground on each side of the body in a world's narrowest passage.
 const MARGIN_M: f64 = 0.05;
-/// Mission seconds allowed beside those of [`Rules::most_s`], to turn before the clock starts.
+/// Mission time allowed beside [`Rules::most_s`], for turning before the clock starts.
 const BEFORE_CLOCK_S: f64 = 20.0;
 
-/// Half the width of the narrowest passage for the robot of `mission`, metres.
+/// Returns half the width of the narrowest passage for the robot of `mission`, metres.
 pub fn swept_m(mission: &Mission) -> f64 {
     mission.body().radius_m + MARGIN_M
 }
 
-/// The rules by which the ground truth judges a mission.
+/// Rules by which the ground truth judges a mission.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
-    /// Distance from the target beyond which an arrival is in the wrong place, metres.
+    /// Distance from the target beyond which an arrival is in the wrong place.
     pub success_within_m: f64,
-    /// Whether the clock starts once the robot has moved 0.1 m, as BARN's does, or with the mission.
+    /// Whether the clock starts once the robot has moved 0.1 m, as in BARN, or with the mission.
     pub clock_after_departure: bool,
-    /// Time after the clock's start within which an arrival is a success, seconds; none if the mission's timeout limits it.
+    /// Time limit of a success after the clock's start; none if the mission's timeout limits it.
     pub most_s: Option<f64>,
     pub scored: bool,
-    /// Time of the reference path at 2 m/s, seconds, for the score; none if the shortest path of the body takes its place.
+    /// Time of the reference path at 2 m/s, for the score; none if the body's shortest path
+    /// replaces it.
     pub optimal_time_s: Option<f64>,
 }
 
@@ -49,42 +50,42 @@ impl Rules {
     };
 }
 
-/// A world with a start and a target, in the frame of the world it comes from.
+/// World with a start and a target, in the frame of its source.
 #[derive(Debug, Default)]
 pub struct Scene {
     pub shapes: Shapes,
-    /// The things that move in the world; the shortest path does not regard them.
+    /// Moving objects, which the shortest path ignores.
     pub things: Vec<Thing>,
-    /// Likewise.
+    /// People, which the shortest path ignores.
     pub people: Vec<Person>,
     pub start: DVec2,
-    /// Heading at the start, radians counter-clockwise from x.
+    /// Start heading, radians counter-clockwise from x.
     pub heading: f64,
     pub target: DVec2,
-    /// Heading at the start of another robot, which goes from the target to the start.
+    /// Start heading of another robot that drives from target to start.
     pub oncoming: Option<f64>,
 }
 
 #[derive(Clone, Debug)]
 pub struct Trial {
     pub world: String,
-    /// The mission, its origin at the start of the robot.
+    /// Mission, with its origin at the robot's start.
     pub mission: Mission,
-    /// Length of the body's shortest path, metres.
+    /// Length of the body's shortest path.
     pub shortest_m: f64,
     pub rules: Rules,
     pub oncoming: Option<Box<Self>>,
 }
 
 impl Trial {
-    /// The trial `world` in `scene`, if the body can get from start to target with `swept_m` around its centre.
+    /// Returns a trial, if the body can reach the target with `swept_m` around its centre.
     pub fn new(world: String, scene: &Scene, rules: Rules, swept_m: f64) -> Result<Option<Self>> {
         let touched = Heights::preset(Realism::default()).touched(&scene.shapes);
         let Some(shortest_m) = shortest_path(&touched, scene.start, scene.target, swept_m) else {
             return Ok(None);
         };
         let mut mission = mission(&world, scene)?;
-        // Four times the time of a robot at 0.25 m/s, and half a minute.
+        // Four times the time at 0.25 m/s, plus half a minute.
         let timeout_s = (30.0 + 16.0 * shortest_m).round();
         mission.timeout_s = rules.most_s.map_or(timeout_s, |it| it + BEFORE_CLOCK_S);
         let mut trial = Self { world, mission, shortest_m, rules, oncoming: None };
@@ -92,7 +93,7 @@ impl Trial {
         Ok(Some(trial))
     }
 
-    /// The trial `world` of an unchanged `mission`, if a body can get from start to target in its world.
+    /// Returns a trial of an unchanged `mission`, if the body can reach its target.
     pub fn of_mission(world: String, mission: Mission, swept_m: f64) -> Option<Self> {
         let start = mission.start_pose().position;
         let shortest_m = shortest_path(&mission.obstacles(), start, mission.target, swept_m)?;
@@ -103,7 +104,6 @@ impl Trial {
         std::iter::once(self).chain(self.oncoming.as_deref())
     }
 
-    /// The trial of a robot that goes the other way.
     fn reversed(&self, heading: f64) -> Self {
         let mut trial = self.clone();
         trial.world = format!("{}-oncoming", self.world);
@@ -115,11 +115,10 @@ impl Trial {
     }
 }
 
-/// The mission of `scene`: origin at the start, x along the x of the scene's own frame.
+/// Places the origin at the start, with the scene's x axis.
 fn mission(world: &str, scene: &Scene) -> Result<Mission> {
     let target = scene.target - scene.start;
     let shapes = moved(&scene.shapes, -scene.start);
-    // The bounding box of shapes, origin and target.
     let (least, greatest) = shapes.pieces().map(|piece| piece.bounds()).fold(
         (DVec2::ZERO.min(target), DVec2::ZERO.max(target)),
         |(least, greatest), (from, to)| (least.min(from), greatest.max(to)),
@@ -145,7 +144,6 @@ fn mission(world: &str, scene: &Scene) -> Result<Mission> {
     Ok(mission)
 }
 
-/// `shapes` moved by `by`, metres.
 fn moved(shapes: &Shapes, by: DVec2) -> Shapes {
     let mut shapes = shapes.clone();
     points(&mut shapes).for_each(|point| *point += by);

@@ -1,19 +1,19 @@
-//! Threads that take the processor from a mission whose ticks are measured.
+//! Threads that compete with a measured mission for processors.
 
 use thread_priority::{
     NormalThreadSchedulePolicy as Normal, ThreadPriority, ThreadPriorityValue,
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
-/// Niceness 0 on the scale of [`ThreadPriority::Crossplatform`], which 99 gives the most.
+/// Niceness 0 on the scale of [`ThreadPriority::Crossplatform`], where 99 is the maximum priority.
 const NICENESS_0: u8 = 48;
 
-/// Compute without end, with the ordinary priority, whatever this process has.
+/// Computes endlessly with ordinary priority, regardless of this process's.
 pub fn run() {
     if let Ok(value) = ThreadPriorityValue::try_from(NICENESS_0) {
         let policy = ThreadSchedulePolicy::Normal(Normal::Other);
         let priority = ThreadPriority::Crossplatform(value);
-        // A thread that may not take a priority has the ordinary one.
+        // Without permission, a thread keeps ordinary priority.
         let _ = set_thread_priority_and_policy(thread_native_id(), priority, policy);
     }
     loop {

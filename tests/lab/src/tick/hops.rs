@@ -1,7 +1,7 @@
-//! The latency of five hops between processes that do no work: the cost of the bus alone.
+//! Latency of five hops between idle processes: the cost of the bus alone.
 //!
-//! Topics, payloads, wakeups and waits are those of a tick, and each sample is forwarded at once: wheels, pose, grid,
-//! guidance, command. The rest of a tick's time is the stages' work.
+//! Topics, payloads, wakeups and waits are those of a tick: wheels, pose, grid, guidance, command.
+//! The rest of a tick's time is the stages' work.
 
 use std::time::{Duration, Instant};
 
@@ -23,21 +23,22 @@ use processes::{
 
 use crate::error::{OrCannot as _, Result};
 
-/// The time after which a sample is lost: a trip takes microseconds, the forwarders' start some milliseconds.
+/// Time after which a sample is lost: a trip takes microseconds, the forwarders' start some
+/// milliseconds.
 const LOST: Duration = Duration::from_secs(5);
 const LOST_SAMPLE: &str = "no sample came back within 5 s; is the machine overloaded?";
 
-/// Cells of the smallest map. No forwarder reads it.
+/// Cells of the smallest map. Forwarders never read it.
 const CELLS: usize = 64;
-/// The forwarders, by the stage that each stands for.
+/// Forwarders, by their stages.
 const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
-/// Pause between samples to forwarders that may not have started yet.
+/// Interval of samples to forwarders that may not have started yet.
 const SEND_AGAIN: Duration = Duration::from_millis(20);
 /// Trips before the measurement, which map all memory.
 const WARM_UP: u64 = 200;
 
-/// Send `trips` samples around the forwarders, one every `period`, or back to back; those that warm up are always back to
-/// back.
+/// Sends `trips` samples around the forwarders, one every `period` or back to back, as in the
+/// warm-up.
 pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Result<Histogram> {
     let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
     let bus = lock.bus().ok_or(LOST_SAMPLE)?;
@@ -66,7 +67,7 @@ pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Resul
             if began.elapsed() >= LOST {
                 return Err(LOST_SAMPLE.into());
             }
-            // During the warm-up a forwarder may be missing; then the sample is sent again.
+            // A forwarder may be missing during the warm-up, so the sample is sent again.
             if sent_ns == 0 || trip < WARM_UP {
                 sent_ns = monotonic_ns();
                 start.publish(trip, MissionTime::default(), WheelSample::default())?;
@@ -118,7 +119,7 @@ fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward> {
     }
 }
 
-/// Wake `waiter` on samples of `from`, for each of which the result publishes one of `to`, in the same tick.
+/// Wakes `waiter` on samples of `from`; the result publishes one of `to` for each.
 fn forward<H: Stamped, E: Payload, To: Stamped + Default, ToE: Payload>(
     bus: &Bus,
     waiter: &mut Waiter,

@@ -1,4 +1,5 @@
-//! A mission whose ticks are measured, and its consumers: each a thread that reads every sample of grid and field.
+//! Mission with measured ticks, and its consumers: threads that read every sample of grid and
+//! field.
 
 use std::time::Duration;
 
@@ -21,10 +22,10 @@ use crate::{
 };
 
 const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// How often a consumer looks whether it is asked to stop.
+/// Interval at which a consumer checks for its end.
 const STOPS_WITHIN: Duration = Duration::from_millis(100);
 
-/// The times of a mission's ticks, and the resources of its processes; none for a short mission.
+/// Returns a mission's tick times and its processes' resources; none of these for a short mission.
 pub fn measure(
     arguments: &Arguments,
     robot: &RobotName,
@@ -35,7 +36,7 @@ pub fn measure(
     let mut command = robot::mission("run", &arguments.mission, robot, &arguments.set);
     let files = directory.path().join("run");
     command.args(["--pace", &pace.to_string(), "--out"]).arg(&files);
-    // The consumers wait for the bus, and follow it. They do not belong to the mission's processes.
+    // Consumers follow the bus, outside the mission's processes.
     let _consumers: Vec<_> = (0..arguments.consumers).map(|_| consumer(robot)).collect();
     let run = Run::start(command, &files, !arguments.no_record)?;
     let mut processes = ProcessSet::of(run.process.id());

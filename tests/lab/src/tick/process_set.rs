@@ -13,11 +13,11 @@ use crate::{missions::statistics::rounded, robot::processes};
 
 #[derive(Debug, PartialEq, Serialize)]
 pub struct Used {
-    /// Voluntary context switches of all threads in a second: each wait ends with a wakeup.
+    /// Voluntary context switches of all threads per second: each wait ends with a wakeup.
     pub wakeups_per_s: f64,
-    /// Share of one core, 1 for all of it.
+    /// Share of one core.
     pub cpu_share: f64,
-    /// Proportional memory, MiB: each shared page is divided among the processes that map it.
+    /// Proportional memory: each shared page is divided among the processes that map it.
     pub pss_mib: f64,
 }
 
@@ -41,14 +41,14 @@ impl ProcessSet {
         Self { root, first: None, last: None, pss_kib: 0 }
     }
 
-    /// Count now. Counting begins anew whenever a process has started, and stops when the first has ended.
+    /// Counts now. A started process restarts the count, and the first ended one stops it.
     pub fn look(&mut self) {
         let now = Counts::of(self.root);
         match &self.first {
             Some(first) if now.processes == first.processes => self.last = Some(now),
             Some(first) if now.processes.is_subset(&first.processes) => {}
             _ => {
-                // Memory is read only once, because that takes a process some of its time.
+                // Reading memory delays the process, so it happens once.
                 self.pss_kib = now.processes.iter().filter_map(|&process| pss_kib(process)).sum();
                 self.first = Some(now);
                 self.last = None;
@@ -56,7 +56,7 @@ impl ProcessSet {
         }
     }
 
-    /// The resources between the first look and the last; none without two looks.
+    /// Returns the resources between the first and last look; none without two looks.
     pub fn used(&self) -> Option<Used> {
         let (first, last) = (self.first.as_ref()?, self.last.as_ref()?);
         let over = (last.at - first.at).as_secs_f64();
@@ -69,7 +69,6 @@ impl ProcessSet {
 }
 
 impl Counts {
-    /// The counts of `root` and of every process that descends from it.
     fn of(root: u32) -> Self {
         let mut counts =
             Self { at: Instant::now(), processes: BTreeSet::new(), waits: 0, cpu: Duration::ZERO };
@@ -116,7 +115,6 @@ mod tests {
 
     #[test]
     fn a_process_and_its_child_are_counted_until_one_ends() {
-        // A shell and its child, which ends with its input.
         let mut shell = Command::new("sh")
             .args(["-c", "exec 3<&0; cat <&3 & echo started; wait"])
             .stdin(Stdio::piped())

@@ -1,8 +1,10 @@
-//! The cylinder worlds of the BARN challenge: from its Gazebo `.world` files, or from a table of cylinders
-//! (`world,x_m,y_m,radius_m`, plain or gzip) beside an optional `index.csv` with each world's optimal time.
+//! Cylinder worlds of the BARN challenge, from its Gazebo `.world` files or a table of cylinders.
 //!
-//! Start, goal and rules are those of the challenge: from (-2.25, 3) with heading +y to (-2.25, 13), success within 1 m, the
-//! clock starts after 0.1 m, 100 s at most. Without an index the optimal time is that of the body's shortest path at 2 m/s.
+//! The table (`world,x_m,y_m,radius_m`, plain or gzip) may have an `index.csv` beside it with each
+//! world's optimal time. Otherwise the optimal time is that of the body's shortest path at 2 m/s.
+//!
+//! Start, goal and rules are the challenge's: from (-2.25, 3) with heading +y to (-2.25, 13).
+//! Success is within 1 m and 100 s of a clock that starts after 0.1 m.
 
 use std::{collections::BTreeMap, f64::consts::FRAC_PI_2, fs::File, io::Read, path::Path};
 
@@ -21,11 +23,12 @@ use crate::{
 
 const START: DVec2 = DVec2::new(-2.25, 3.0);
 const GOAL: DVec2 = DVec2::new(-2.25, 13.0);
-/// The walls left and right and the wall behind the start, metres; the far side is open.
+/// Walls left, right and behind the start; the far side is open.
 const SIDES_M: [f64; 2] = [-4.425, -0.075];
 const BEHIND_M: f64 = 0.075;
 const SIDES_END_M: f64 = 9.6;
-/// Most bytes of a file. A world file has some hundred kilobytes, the table of all worlds one megabyte.
+/// Maximum file size, bytes. A world file has some hundred kilobytes, the table of all worlds one
+/// megabyte.
 const LONGEST: u64 = 64 << 20;
 #[derive(Deserialize)]
 struct Cylinder {
@@ -43,7 +46,7 @@ struct IndexRow {
 
 pub type World = (String, Scene, Rules);
 
-/// Every world of a table of cylinders, in the order of their numbers.
+/// Returns every world of a table of cylinders, ordered by number.
 pub fn table(file: &Path) -> Result<Vec<World>> {
     let mut cylinders: BTreeMap<u32, Vec<Drum>> = BTreeMap::new();
     for Cylinder { world, x_m, y_m, radius_m } in rows(file)? {
@@ -69,7 +72,8 @@ pub fn gazebo(file: &Path) -> Result<World> {
     Ok((format!("barn-{name}"), scene(drums), RULES))
 }
 
-/// The cylinders of a world's models: each stands at the first `<pose>` of its model. None without cylinders.
+/// Returns the cylinders of a world's models, each at its model's first `<pose>`; none without
+/// cylinders.
 fn cylinders(text: &str) -> Option<Vec<Drum>> {
     let world = roxmltree::Document::parse(text).ok()?;
     let mut drums = Vec::new();

@@ -9,9 +9,9 @@ use crate::{missions::trial::Scene, random::Random};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bends {
-    /// The corridor is straight, along x, and empty.
+    /// Straight, along x, and empty.
     None,
-    /// The corridor has two to four legs, each at an angle of up to 50 degrees with the one before.
+    /// Two to four legs with bends of up to 50 degrees.
     Oblique,
 }
 
@@ -50,7 +50,7 @@ fn oblique(random: &mut Random) -> Vec<DVec2> {
     axis
 }
 
-/// The line beside `axis` at the distance `by` to its left, metres, mitred at its corners.
+/// Returns the line at distance `by` to the left of `axis`, metres, mitred at its corners.
 fn beside(axis: &[DVec2], by: f64) -> Vec<DVec2> {
     let normal = |from: usize| (axis[from + 1] - axis[from]).perp().normalize_or_zero();
     (0..axis.len())

@@ -1,10 +1,12 @@
-//! Starts and targets on a map: as given, or from the file `config.txt` of an MRPB map, which has three tests:
+//! Starts and targets on a map: given, or from the file `config.txt` of an MRPB map, which has
+//! three tests:
 //!
 //! ```text
 //! <arg name="initial_pose_x" default="-12.5"/>
 //! ```
 //!
-//! and `initial_pose_y`, `initial_pose_a` (radians), `goal_pose_x`, `goal_pose_y`. The heading at the goal is not used.
+//! and `initial_pose_y`, `initial_pose_a` (radians), `goal_pose_x`, `goal_pose_y`. The goal's
+//! heading is unused.
 
 use std::{fs::File, io::Read as _, path::Path};
 
@@ -13,23 +15,23 @@ use glam::DVec2;
 use super::files::{malformed, unreadable};
 use crate::error::Result;
 
-/// Most bytes of such a file, which has some twenty short lines.
+/// Maximum size of such a file of some twenty short lines, bytes.
 const LONGEST: u64 = 64 << 10;
 const KEYS: [&str; 5] =
     ["initial_pose_x", "initial_pose_y", "initial_pose_a", "goal_pose_x", "goal_pose_y"];
 
-/// Start and target of a mission, in the frame of its map.
+/// Start and target of a mission, in its map's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
     pub start: DVec2,
-    /// Heading at the start, radians counter-clockwise from x.
+    /// Start heading, radians counter-clockwise from x.
     pub heading: f64,
     pub target: DVec2,
 }
 
-/// The tests of a `config.txt`, in its order.
+/// Reads the tests of a `config.txt`, in order.
 pub fn read(file: &Path) -> Result<Vec<Ends>> {
-    // The check comes before opening, because opening a pipe waits for its other end.
+    // Opening a pipe would wait for its other end, so the check comes first.
     if !file.is_file() {
         return Err(malformed(file, "not a regular file; give MRPB's tests"));
     }
@@ -40,7 +42,7 @@ pub fn read(file: &Path) -> Result<Vec<Ends>> {
     parse(&text).map_err(|problem| malformed(file, problem))
 }
 
-/// A number of metres or radians, none beyond 1000 km.
+/// Parses metres or radians up to 1000 km.
 pub fn number(text: &str) -> Option<f64> {
     text.trim().parse().ok().filter(|number: &f64| number.abs() <= 1e6)
 }

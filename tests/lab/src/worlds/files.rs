@@ -20,9 +20,9 @@ use crate::{
     random::Random,
 };
 
-/// Starts and targets drawn on a map without any, if no number is asked for.
+/// Default number of drawn starts and targets on a map without any.
 const DRAWN: usize = 10;
-/// The stream of random numbers of these starts and targets.
+/// Their stream of random numbers.
 const DRAWN_KIND: u64 = 7;
 /// Name of a map's file of tests, as in MRPB.
 const TESTS_FILE: &str = "config.txt";
@@ -38,8 +38,8 @@ pub fn malformed(file: &Path, problem: impl Display) -> Failure {
     format!("{}: {problem}", file.display()).into()
 }
 
-/// The worlds of a file, or of all world files in a folder and its subfolders, sorted by name; the requested number, evenly
-/// spread.
+/// Reads the worlds of a file, or of a folder and its subfolders, sorted by name. A requested
+/// number is spread evenly over them.
 pub fn read(path: &Path, asked: Asked) -> Result<Found> {
     let mut found = Found::default();
     if path.is_dir() {
@@ -52,7 +52,6 @@ pub fn read(path: &Path, asked: Asked) -> Result<Found> {
             "not a world; give a mission (.toml), a ROS map (.yaml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
         ));
     }
-    // In the results a world has the name of its file.
     let mut names = BTreeSet::new();
     if let Some(twice) = found.trials.iter().find(|trial| !names.insert(&trial.world)) {
         let world = &twice.world;
@@ -70,7 +69,6 @@ pub fn read(path: &Path, asked: Asked) -> Result<Found> {
     Ok(found)
 }
 
-/// The files in a folder and its subfolders, sorted by name.
 fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let entries = |folder: &Path| -> io::Result<Vec<PathBuf>> {
         fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
@@ -88,7 +86,7 @@ fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Add the worlds of a file, by the end of its name. Returns whether it is one of worlds.
+/// Adds the worlds of a file, by the end of its name. Returns whether it contains worlds.
 fn add(found: &mut Found, file: &Path, asked: Asked) -> Result<bool> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let ends = |ends: &[&str]| ends.iter().any(|end| name.ends_with(end));
@@ -116,10 +114,10 @@ fn add(found: &mut Found, file: &Path, asked: Asked) -> Result<bool> {
     Ok(true)
 }
 
-/// A ROS map as worlds: with the given ends, or its tests, or drawn ones.
+/// Adds a ROS map as worlds: with given ends, its tests, or drawn ends.
 fn add_map(found: &mut Found, file: &Path, asked: Asked) -> Result {
     let floor = Floor::load(file)?;
-    // The name is that of the file, or of its folder if the file is called `map`, as in MRPB.
+    // A file called `map` gives its folder's name, as in MRPB.
     let mut name = file.file_stem().unwrap_or_default();
     if name == "map" {
         name = file.parent().and_then(Path::file_name).unwrap_or(name);
@@ -136,7 +134,7 @@ fn add_map(found: &mut Found, file: &Path, asked: Asked) -> Result {
     };
     for (number, Ends { start, heading, target }) in (1..).zip(ends) {
         let shapes = floor.shapes(file, start)?;
-        // A start outside the free ground is not connected to anything.
+        // A start outside the free ground is unconnected.
         if shapes.is_empty() {
             found.unsolvable += 1;
             continue;
@@ -160,7 +158,7 @@ mod tests {
         found.trials.iter().map(|trial| &*trial.world).collect()
     }
 
-    /// A folder with the map of a hall of 6 m by 3 m at (10, 20), its walls 10 cm thick.
+    /// Returns the map of a hall of 6 m by 3 m at (10, 20), its walls 10 cm thick.
     fn hall() -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
         let (cols, rows) = (60, 30);

@@ -1,6 +1,7 @@
-//! A ROS map as a world: every cell that is not known to be free is solid.
+//! ROS map as a world, in which every cell not known to be free is solid.
 //!
-//! Only solid cells beside ground that is connected to the start matter. They become as few boxes as runs of cells allow.
+//! Only solid cells beside ground connected to the start matter. They are merged into boxes along
+//! runs of cells.
 
 use std::{collections::VecDeque, f64::consts::PI, path::Path};
 
@@ -11,11 +12,11 @@ use maps::{MOST_BOXES, MapError, PlacedMap};
 use super::{ends::Ends, files::malformed, shapes::boxes};
 use crate::{error::Result, random::Random};
 
-/// Longest side of a map, metres: that of the check whether it can be crossed.
+/// Maximum side of a map: that of the check whether it can be crossed.
 const LARGEST_M: f64 = 95.0;
-/// Range of the straight distance to a drawn target, metres.
+/// Range of the straight distance to a drawn target.
 const DRAWN_M: [f64; 2] = [3.0, 15.0];
-/// Starts that are drawn before the search for a target is given up.
+/// Number of starts drawn before giving up the search for a target.
 const MOST_STARTS: usize = 50;
 
 #[derive(Debug)]
@@ -36,7 +37,6 @@ impl Floor {
         Ok(Self { map })
     }
 
-    /// The shapes around the ground that is connected to `start`, metres.
     pub fn shapes(&self, file: &Path, start: DVec2) -> Result<Shapes> {
         let map = &self.map.map;
         let mut wanted = vec![false; map.blocked.len()];
@@ -54,16 +54,14 @@ impl Floor {
         self.map.map.blocked.iter().map(|it| !it).collect()
     }
 
-    /// For each stream of random numbers a start, and a target 3 to 15 m away that a body which needs `swept_m` around
-    /// its centre can reach; fewer if there is hardly any.
+    /// Draws a start per stream, and a target 3 to 15 m away, reachable with `swept_m` around the
+    /// body's centre. Returns fewer if there are hardly any.
     pub fn draw(&self, streams: impl Iterator<Item = Random>, swept_m: f64) -> Vec<Ends> {
         let roomy = self.roomy(swept_m);
         let places: Vec<usize> = (0..roomy.len()).filter(|&at| roomy[at]).collect();
-        // If one draw finds nothing, the next hardly would.
         streams.map_while(|mut random| self.draw_one(&mut random, &roomy, &places)).collect()
     }
 
-    /// One start and target on the cells `roomy`, which are those of `places`.
     fn draw_one(&self, random: &mut Random, roomy: &[bool], places: &[usize]) -> Option<Ends> {
         for _ in 0..MOST_STARTS {
             let start = *places.get(random.below(places.len()))?;
@@ -99,7 +97,7 @@ impl Floor {
         self.map.place(col as f64 + 0.5, row as f64 + 0.5)
     }
 
-    /// The cells of `open` that are connected to `from`, itself included. The rim of a map is never open.
+    /// Returns the cells of `open` connected to `from`, inclusive. A map's rim is never open.
     fn connected(&self, open: &[bool], from: Option<usize>) -> Vec<bool> {
         let cols = self.map.map.cols;
         let mut connected = vec![false; open.len()];
@@ -113,7 +111,7 @@ impl Floor {
         connected
     }
 
-    /// The free cells at least `swept_m` away from the middle of any other.
+    /// Returns the free cells at least `swept_m` from the middle of any solid cell.
     fn roomy(&self, swept_m: f64) -> Vec<bool> {
         let reach = (swept_m / self.map.cell_m + 0.5).ceil() as usize;
         let mut roomy = self.free();
@@ -125,7 +123,6 @@ impl Floor {
         roomy
     }
 
-    /// The cells within `reach` columns and rows of `cell`, and how far away each is.
     fn around(&self, cell: usize, reach: usize) -> impl Iterator<Item = (usize, [usize; 2])> {
         let (cols, rows) = (self.map.map.cols, self.map.map.rows);
         let (col, row) = (cell % cols, cell / cols);
@@ -136,7 +133,6 @@ impl Floor {
         })
     }
 
-    /// The solid cells that touch one of `ground`, by an edge or a corner.
     fn beside(&self, ground: &[bool]) -> Vec<usize> {
         let blocked = &self.map.map.blocked;
         let touches = |cell: usize| self.around(cell, 1).any(|(cell, _)| ground[cell]);
@@ -148,7 +144,8 @@ impl Floor {
 mod tests {
     use super::*;
 
-    /// The floor of a drawing: `#` is solid, cells of half a metre, the lower left corner at (-1, 2).
+    /// Returns the floor of a drawing: `#` is solid, cells of half a metre, the lower left corner
+    /// at (-1, 2).
     fn floor(rows: &[&str]) -> Floor {
         let folder = tempfile::tempdir().unwrap();
         let (cols, number) = (rows[0].len(), rows.len());
@@ -207,7 +204,6 @@ mod tests {
         for seed in 0..20 {
             let Ends { start, target, .. } = draw(seed);
             assert!((3.0..=15.0).contains(&start.distance(target)));
-            // The row in the middle of the upper corridor has this y.
             let middle = 4.25;
             assert_eq!((start.y, target.y), (middle, middle), "the lower one is too narrow");
         }

@@ -1,5 +1,5 @@
-//! Rooms with furniture: tables and chairs on legs 2 to 3 cm thick, low platforms, overhanging shelves, soft sofas and
-//! curtains. Heights and echoes decide what the sonar detects and what the body touches.
+//! Rooms with furniture: tables and chairs on legs 2 to 3 cm thick, low platforms, overhanging
+//! shelves, soft sofas and curtains. Heights and echoes determine sonar detections and contacts.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -9,16 +9,16 @@ use glam::DVec2;
 use super::shapes::{Room, block, boxes, heading, walls};
 use crate::{missions::trial::Scene, random::Random};
 
-/// Things per square metre of floor: sparse, usual, dense.
+/// Objects per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.16, 0.22];
-/// Free distance around start and target, metres.
+/// Free distance around start and target.
 const KEPT_FREE_M: f64 = 0.5;
-/// Amplitude of an echo from cloth, relative to a hard surface.
+/// Echo amplitude of cloth, relative to a hard surface.
 const SOFT: f64 = 0.1;
-/// Distance from a curtain to the wall behind it, metres.
+/// Distance from a curtain to the wall behind it.
 const BEHIND_CURTAIN_M: f64 = 0.12;
 
-/// Room `number`. The number selects the density.
+/// Draws room `number`, which selects the density.
 pub fn draw(random: &mut Random, number: usize) -> Scene {
     let room = Room::draw(random, 7.0, [2.0, 3.0]);
     let Room { target, least, greatest } = room;
@@ -34,7 +34,7 @@ pub fn draw(random: &mut Random, number: usize) -> Scene {
         // Corners may be in a wall, because furniture stands against it.
         let (from, to) = (at - 0.7 * reach, at + 0.7 * reach);
         let inside = from.cmpge(least).all() && to.cmple(greatest).all();
-        // Furniture may touch other furniture, and chairs stand partly below tables; walls limit it.
+        // Furniture may touch, and chairs may stand below tables; walls limit it.
         let meets = |other: &(DVec2, f64)| at.distance(other.0) < 0.8 * (reach + other.1);
         if ends_free && inside && !taken.iter().any(meets) {
             taken.push((at, reach));
@@ -45,9 +45,8 @@ pub fn draw(random: &mut Random, number: usize) -> Scene {
     Scene { shapes, heading: heading(random, 3, 0.0), target, ..Scene::default() }
 }
 
-/// A thing at `at`, and the radius of its floor space, metres.
+/// Returns an object, and the radius of its floor space, metres.
 fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
-    // Most furniture stands along the walls.
     let angle = match random.below(3) {
         0 => random.within(0.0, PI),
         _ => [0.0, FRAC_PI_2][random.below(2)],
@@ -62,27 +61,26 @@ fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
     };
     let block = block(at, size_m, angle.to_degrees());
     let shapes = match kind {
-        // These are above the robot: the seat of a chair and the top of a table.
+        // Seats and table tops are above the robot.
         0..=3 => on_legs(random, &block, 0.42, 0.47),
         4..=5 => on_legs(random, &block, 0.70, 0.74),
-        // The shelf of a low table is above the sonar and lower than the robot.
+        // The shelf of a low table is above the sonar and below the robot's top.
         6 => {
             let bottom = random.within(0.20, 0.24);
             on_legs(random, &block, bottom, bottom + 0.02)
         }
-        // A step or the foot of a lamp is lower than the sonar.
+        // A step or lamp foot is below the sonar.
         7..=8 => boxes([Box2 { top_m: Some(random.within(0.05, 0.10)), ..block }]),
         _ => boxes([Box2 { top_m: Some(0.8), echo: Some(SOFT), ..block }]),
     };
     (shapes, size_m.length() / 2.0)
 }
 
-/// `top` between two heights, metres, on four legs 2 to 3 cm thick at its corners.
+/// Puts `top` between two heights, metres, on four corner legs 2 to 3 cm thick.
 fn on_legs(random: &mut Random, top: &Box2, bottom_m: f64, top_m: f64) -> Shapes {
     let radius_m = random.within(0.010, 0.015);
     let middle = top.at;
     let legs = top.corners().map(|corner| Drum {
-        // The legs are below the top.
         at: corner + (middle - corner).normalize_or_zero() * 2.0 * radius_m,
         radius_m,
         top_m: Some(bottom_m),
@@ -94,7 +92,6 @@ fn on_legs(random: &mut Random, top: &Box2, bottom_m: f64, top_m: f64) -> Shapes
     }
 }
 
-/// A curtain along a part of one of the long walls.
 fn curtain(random: &mut Random, least: DVec2, greatest: DVec2) -> Wall {
     let y = match random.below(2) {
         0 => least.y + BEHIND_CURTAIN_M,

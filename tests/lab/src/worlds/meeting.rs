@@ -1,4 +1,5 @@
-//! Two rooms with a doorway between them, through which two robots go in opposite directions: the one starts where the other has its target.
+//! Two rooms joined by a doorway for two robots in opposite directions, each starting at the
+//! other's target.
 
 use std::f64::consts::PI;
 
@@ -7,11 +8,11 @@ use glam::DVec2;
 use super::shapes::{Room, heading, wall};
 use crate::{missions::trial::Scene, random::Random};
 
-/// Widths of the doorway, metres: through a narrow one robots go one after the other.
+/// Doorway widths: through a narrow one robots pass one after the other.
 const DOORS_M: [f64; 2] = [0.8, 1.8];
 /// Drums per square metre of floor.
 const DENSITY: f64 = 0.06;
-/// Free distance of drums around start and target, and of the doorway from them, metres.
+/// Free distance of drums around start and target, and of the doorway from them.
 const KEPT_FREE_M: f64 = 0.6;
 const DOOR_FROM_ENDS_M: f64 = 1.5;
 

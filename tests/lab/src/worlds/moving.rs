@@ -1,15 +1,16 @@
-//! A hall with cylinders that move, after DynaBARN (A. Nair et al., "DynaBARN: Benchmarking Metric Ground Navigation in Dynamic
-//! Environments", SSRR 2022).
+//! Hall with moving cylinders, after DynaBARN (A. Nair et al., "DynaBARN: Benchmarking Metric
+//! Ground Navigation in Dynamic Environments", SSRR 2022).
 //!
-//! Its public generator (`github.com/aninair1905/DynaBARN`) and the BARN challenge, which ships its 60 worlds, give the hall,
-//! start, goal and rules; the cylinders' radius and numbers; polynomials through points on whole metres, with ten further
-//! stations; and a speed for each leg, from a normal distribution that ends at the least and greatest speed. The speeds are those
-//! of the trajectories in these worlds, the orders are inferred from their stations, and the standard deviations of the speed are
-//! nominal.
+//! Hall, start, goal, rules, and the cylinders' radius and numbers follow its public generator
+//! (`github.com/aninair1905/DynaBARN`) and the BARN challenge, which ships its 60 worlds. A path is
+//! a polynomial through points on whole metres, with ten further stations. Each leg's speed is
+//! drawn from a normal distribution truncated at the minimum and maximum speed. Speeds are those of
+//! the shipped trajectories, orders are inferred from their stations, and the speeds' standard
+//! deviations are nominal.
 //!
-//! These are the differences: a cylinder goes back at the end of its path, where DynaBARN's jumps to the beginning; it goes
-//! straight between stations, where DynaBARN's follows a spline; and a path that leaves the hall ends at the last station inside,
-//! not at the wall.
+//! There are three differences. A cylinder returns at the end of its path, where DynaBARN's jumps
+//! to the beginning. It moves straight between stations, where DynaBARN's follows a spline. A path
+//! that leaves the hall ends at the last station inside instead of at the wall.
 
 use std::f64::consts::PI;
 
@@ -27,16 +28,16 @@ use crate::{
 
 const START: DVec2 = DVec2::new(11.0, 0.0);
 const GOAL: DVec2 = DVec2::new(-9.0, 0.0);
-/// Half the side of the hall, metres.
+/// Half the side of the hall.
 const HALF_M: f64 = 10.0;
 const WALL_M: f64 = 0.5;
 const RADIUS_M: f64 = 0.5;
-/// Stations of a path beside the points that its polynomial is drawn through, evenly spread along x.
+/// Stations of a path beside its polynomial's points, evenly spaced along x.
 const STATIONS: usize = 10;
-/// The least time for which cylinders move, seconds: longer than a mission by the challenge's rules.
+/// Minimum time for which cylinders move: longer than a mission by the challenge's rules.
 const MOVES_S: f64 = 130.0;
 
-/// The difficulty of a world: cylinders, orders, speeds (m/s) and their deviations; each range includes its ends.
+/// Difficulty of a world: inclusive ranges of cylinders, orders, speeds (m/s) and their deviations.
 type Difficulty = ([usize; 2], [usize; 2], [f64; 2], [f64; 2]);
 
 /// DynaBARN's easy, medium and hard worlds.
@@ -46,10 +47,10 @@ const DIFFICULTIES: [Difficulty; 3] = [
     ([20, 24], [3, 5], [1.5, 1.9], [0.1, 0.2]),
 ];
 
-/// The rules of the challenge. Its score is left out, because it has no reference path for these worlds.
+/// Challenge rules without the score, because these worlds have no reference path.
 pub const RULES: Rules = Rules { scored: false, ..barn::RULES };
 
-/// Hall `number`. The number selects the difficulty.
+/// Draws hall `number`, which selects the difficulty.
 pub fn draw(random: &mut Random, number: usize) -> Scene {
     let difficulty = &DIFFICULTIES[number % DIFFICULTIES.len()];
     let along = DVec2::new(2.0 * HALF_M, WALL_M);
@@ -83,7 +84,6 @@ fn cylinder(random: &mut Random, &(_, orders, [least, most], deviations): &Diffi
         if at_s > MOVES_S {
             break;
         }
-        // The speed is drawn by rejection.
         let speed = loop {
             let speed = random.within(least, most);
             if random.share() < (-0.5 * ((speed - mean) / deviation).powi(2)).exp() {
@@ -98,7 +98,7 @@ fn cylinder(random: &mut Random, &(_, orders, [least, most], deviations): &Diffi
     Thing { shape, from_s: 0.0, until_s: None, moves }
 }
 
-/// The stations of a path along a polynomial, in either direction; at least the points that the polynomial is drawn through.
+/// Draws the stations of a path along a polynomial, in either direction, including its points.
 fn path(random: &mut Random, orders: [usize; 2]) -> Vec<DVec2> {
     let order = one_of(random, orders);
     let mut points: Vec<DVec2> = Vec::new();
@@ -123,7 +123,7 @@ fn path(random: &mut Random, orders: [usize; 2]) -> Vec<DVec2> {
     path
 }
 
-/// The value at `x` of the polynomial through `points`, by Lagrange's formula.
+/// Returns the polynomial through `points` at `x`, by Lagrange's formula.
 fn polynomial(points: &[DVec2], x: f64) -> f64 {
     let share = |own: &DVec2| -> f64 {
         let others = points.iter().filter(|other| other.x != own.x);

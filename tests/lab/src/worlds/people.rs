@@ -1,4 +1,4 @@
-//! A room in which three to ten people walk to and fro, among a few drums.
+//! Room in which three to ten people walk to and fro among a few drums.
 
 use common::mission::Person;
 use glam::DVec2;
@@ -6,7 +6,7 @@ use glam::DVec2;
 use super::shapes::{Room, heading};
 use crate::{missions::trial::Scene, random::Random};
 
-/// Fewest and most people, and the speeds that they want, m/s.
+/// Range of the number of people, and of their wanted speeds.
 const PEOPLE: [usize; 2] = [3, 10];
 const SPEEDS_M_S: [f64; 2] = [0.5, 1.5];
 /// Nominal.
@@ -14,12 +14,13 @@ const RADIUS_M: f64 = 0.25;
 const GOALS: usize = 6;
 /// Drums per square metre of floor.
 const DENSITY: f64 = 0.04;
-/// Free distance of drums around start and target, and of people and their goals from all that stands, metres.
+/// Free distance of drums around start and target, and of people and their goals from static
+/// objects.
 const KEPT_FREE_M: f64 = 0.6;
-/// Nobody begins nearer to the robot, metres.
+/// Minimum distance of people from the robot at the start.
 const BEGINS_M: f64 = 1.5;
 
-/// Room `number`, which selects how many people walk.
+/// Draws room `number`, which selects the number of people.
 pub fn draw(random: &mut Random, number: usize) -> Scene {
     let room = Room::draw(random, 8.0, [2.0, 3.0]);
     let target = room.target;
@@ -36,7 +37,6 @@ pub fn draw(random: &mut Random, number: usize) -> Scene {
         let begins = |at: DVec2| {
             at.length() > BEGINS_M && people.iter().all(|it| it.at.distance(at) > KEPT_FREE_M)
         };
-        // A full room leaves no place for one more.
         let Some(at) = (0..1000).map(|_| free(random)).find(|at| begins(*at)) else {
             break;
         };

@@ -1,6 +1,8 @@
-//! Rooms: four walls, drums, boxes and loose walls at any angle, at three densities; in one of three a partition with
-//! a door of 0.8 to 1.2 m. Rotated rooms lie at any angle to the grid, and their partitions at an angle to the walls.
-//! Glazed rooms have partitions and cabinets of glass, and black things.
+//! Rooms with four walls, and drums, boxes and loose walls at any angle, at three densities. One in
+//! three has a partition with a door of 0.8 to 1.2 m.
+//!
+//! Rotated rooms are at any angle to the grid, and their partitions at an angle to the walls.
+//! Glazed rooms have partitions and cabinets of glass, and black objects.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -13,28 +15,28 @@ use crate::{
     random::Random,
 };
 
-/// Things per square metre of floor: sparse, usual, dense.
+/// Objects per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.18, 0.26];
-/// Free distance around start and target, metres.
+/// Free distance around start and target.
 const KEPT_FREE_M: f64 = 0.5;
 const DOOR_SHARE: f64 = 1.0 / 3.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doors {
-    /// One room in three has a partition with a door.
+    /// Partition with a door in one of three rooms.
     Some,
     All,
 }
 
-/// Greatest angle between an oblique partition and the walls that it would be parallel to, degrees.
+/// Maximum angle between an oblique partition and the straight one.
 const MOST_OBLIQUE_DEG: f64 = 35.0;
 
-/// Room `number`. The number selects the density.
+/// Draws room `number`, which selects the density.
 pub fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
     room(random, number, doors, false)
 }
 
-/// Room `number` with an oblique partition, rotated against the grid.
+/// Draws room `number` with an oblique partition, rotated against the grid.
 pub fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene {
     let mut scene = room(random, number, doors, true);
     let angle = random.within(-PI, PI);
@@ -49,8 +51,8 @@ pub fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene {
     scene
 }
 
-/// Room `number` with a partition. It and the loose walls are of glass; one box in three is of glass, a display cabinet, and one is black;
-/// one drum in three is black.
+/// Draws room `number` with a partition. Partition and loose walls are glass. One box in three is
+/// glass, a display cabinet, and one black; one drum in three is black.
 pub fn glazed(random: &mut Random, number: usize) -> Scene {
     let mut scene = room(random, number, Doors::All, false);
     let Shapes { drums, boxes, walls } = &mut scene.shapes;
@@ -73,13 +75,12 @@ fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scen
         let middle = random.within(-reach, reach);
         let mut slant = 0.0;
         if oblique {
-            // The thing stays clear of start and target.
             let most = (0.7 * (at.min(target.x - at) - KEPT_FREE_M) / half_width).atan();
             let most = MOST_OBLIQUE_DEG.min(most.to_degrees());
             slant = random.within(-most, most).to_radians().tan();
         }
-        // A wall across the room through (`at`, 0), which leads `slant` metres along x for each along y, with a door around
-        // y = `middle`.
+        // The wall crosses the room through (`at`, 0) with `slant` metres in x per metre in y, and
+        // a door around y = `middle`.
         let half_gap = gap / 2.0 / slant.hypot(1.0);
         for ends in [[-half_width, middle - half_gap], [middle + half_gap, half_width]] {
             shapes.walls.push(wall(ends.map(|y| DVec2::new(at + slant * y, y))));
@@ -98,7 +99,7 @@ fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scen
     Scene { shapes, heading, target, ..Scene::default() }
 }
 
-/// Add a drum, a box or a loose wall at `at`, or nothing if start or target would not be free.
+/// Adds an object at `at`, unless it would obstruct start or target.
 fn add_thing(shapes: &mut Shapes, random: &mut Random, at: DVec2, target: DVec2) {
     let nearest_m = at.length().min(at.distance(target));
     let is_free = |reach: f64| nearest_m > reach + KEPT_FREE_M;

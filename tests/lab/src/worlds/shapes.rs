@@ -31,7 +31,7 @@ pub fn drums(drums: impl Into<Vec<Drum>>) -> Shapes {
     Shapes { drums: drums.into(), ..Shapes::default() }
 }
 
-/// A closed room around a start at the origin and a target, and the middle and half extent of its floor.
+/// Closed room around a start at the origin and a target, with the corners of its floor.
 pub struct Room {
     pub target: DVec2,
     pub least: DVec2,
@@ -39,7 +39,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// A room with a target at a distance along x between 4 m and `farthest_m`, half as wide as one of `half_width_m`.
+    /// Draws a room with a target 4 m to `farthest_m` along x, and half its width from a range.
     pub fn draw(random: &mut Random, farthest_m: f64, [least, most]: [f64; 2]) -> Self {
         let distance = random.within(4.0, farthest_m);
         let half_width = random.within(least, most);
@@ -56,12 +56,11 @@ impl Room {
         wall([least, corners[0], greatest, corners[1], least])
     }
 
-    /// The number of things on the floor at so many per square metre.
     pub fn things(&self, density: f64) -> usize {
         ((self.greatest - self.least).element_product() * density).round() as usize
     }
 
-    /// Its wall, with drums on the floor, so many per square metre, and `free_m` around start and target.
+    /// Returns the wall and drums, with `free_m` around start and target.
     pub fn with_drums(&self, random: &mut Random, density: f64, free_m: f64) -> Shapes {
         let mut shapes = walls([self.closed()]);
         for _ in 0..self.things(density) {
@@ -72,13 +71,12 @@ impl Room {
         shapes
     }
 
-    /// A place that is uniform over the floor.
     pub fn place(&self, random: &mut Random) -> DVec2 {
         random.point((self.least + self.greatest) / 2.0, (self.greatest - self.least) / 2.0)
     }
 }
 
-/// In one of `n` cases any heading, otherwise `usual`, radians.
+/// Returns a random heading in one of `n` cases, otherwise `usual`.
 pub fn heading(random: &mut Random, n: usize, usual: f64) -> f64 {
     match random.below(n) {
         0 => random.within(-PI, PI),

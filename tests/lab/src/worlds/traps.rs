@@ -1,17 +1,18 @@
-//! U traps across the straight path: of walls and of drums, of several depths and widths, with any heading of the robot.
+//! U traps across the straight path: walls or drums, varying in depth, width and robot heading.
 
 use glam::DVec2;
 
 use super::shapes::{drum, drums, wall, walls};
 use crate::{missions::trial::Scene, random::Random};
 
-/// Distance from the start to the bottom of the U, metres.
+/// Distance from the start to the bottom of the U.
 const BOTTOM_M: f64 = 2.4;
-/// Gap between drums, metres, which a body does not pass.
+/// Gap between drums, too narrow for a body.
 const DRUM_SPACING_M: f64 = 0.36;
 const DRUM_RADIUS_M: f64 = 0.17;
 
-/// Trap `number`. The number selects walls or drums, and the robot's heading, in steps of 45 degrees.
+/// Draws trap `number`, which selects walls or drums, and the robot's heading in steps of 45
+/// degrees.
 pub fn draw(random: &mut Random, number: usize) -> Scene {
     let heading_deg = 45.0 * (number / 2 % 8) as f64;
     let depth = random.within(0.8, 1.6);

@@ -1,4 +1,4 @@
-//! The boundary of a hazard, cell by cell: along it with the hazard on the right.
+//! Boundary of a hazard, followed cell by cell with the hazard on the right.
 
 use common::grid::Cell;
 use glam::DVec2;
@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::baselines::belief::Map;
 
-/// The four directions, counter-clockwise from x: columns and rows.
+/// Directions counter-clockwise from x: columns and rows.
 const DIRECTIONS: [[i32; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
-/// Quarters of a turn counter-clockwise.
+/// Quarter turns counter-clockwise.
 const LEFT: usize = 1;
 const BACK: usize = 2;
 const RIGHT: usize = 3;
@@ -16,14 +16,14 @@ const RIGHT: usize = 3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Place {
     pub cell: Cell,
-    /// The direction in which the cell was entered: a number of quarters of a turn from x. The hazard is on the right of
-    /// it, or behind on the right.
+    /// Direction in which the cell was entered, in quarter turns from x. The hazard is to its
+    /// right, or behind on the right.
     heading: u8,
 }
 
 impl Place {
-    /// The place at `cell` from which the boundary is followed most nearly in `direction`; none where no hazard is beside
-    /// the cell.
+    /// Returns the place at `cell` whose boundary leads closest to `direction`; none without a
+    /// hazard beside the cell.
     pub fn at(map: &Map<'_>, cell: Cell, direction: DVec2) -> Option<Self> {
         let along = |place: &Self| {
             let [cols, rows] = place.turned(0);
@@ -35,7 +35,6 @@ impl Place {
             .max_by(|a, b| along(a).total_cmp(&along(b)))
     }
 
-    /// Whether the place still is a free cell with the hazard where it should be.
     pub fn is_on(&self, map: &Map<'_>) -> bool {
         let [[cols, rows], back] = [RIGHT, BACK].map(|turn| self.turned(turn));
         let behind = [cols + back[0], rows + back[1]];
@@ -43,7 +42,7 @@ impl Place {
         map.is_free(self.cell) && (is_hazard([cols, rows]) || is_hazard(behind))
     }
 
-    /// The next place: the cell on the right if that is free, else ahead, on the left, behind; none in a closed cell.
+    /// Returns the next free cell: right, ahead, left or behind; none in a closed cell.
     pub fn next(&self, map: &Map<'_>) -> Option<Self> {
         [RIGHT, 0, LEFT, BACK].into_iter().find_map(|turn| {
             let cell = map.neighbour(self.cell, self.turned(turn))?;

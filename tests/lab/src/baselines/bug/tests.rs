@@ -5,7 +5,7 @@ use crate::baselines::{
 };
 use common::samples::{GridHeader, GuidanceSample, GuidanceStatus};
 
-/// Cells of 0.1 m with (0, 0) in the middle: a wall across the line, its ends 0.5 m off.
+/// Draws a wall across the line whose ends are 0.5 m off; cells of 0.1 m, (0, 0) in the middle.
 fn wall() -> Vec<String> {
     let row = |row: i32| {
         let column = |col: i32| {
@@ -54,7 +54,7 @@ impl Drive {
         self.bug.guidance(&pose(self.at.into()))
     }
 
-    /// Drive along the guidance until it has another status or `is_over`. Returns the guidance then.
+    /// Drives along the guidance until its status changes or `is_over`. Returns that guidance.
     fn until(&mut self, is_over: impl Fn(&Self) -> bool) -> GuidanceSample {
         for _ in 0..1000 {
             let guidance = self.guidance();

@@ -17,7 +17,6 @@ const WALL: [&str; 9] = [
     "....#....",
 ];
 
-/// The answer of a planner with target (0.3, 0) on the map `rows` to a robot at (x, y).
 fn guidance(rows: &[&str], at: [f64; 2]) -> GuidanceSample {
     let mut planner = sent::<Wavefront>([0.3, 0.0]);
     let (header, cells) = drawn(rows);
@@ -40,7 +39,8 @@ fn the_way_leads_around_a_wall_and_cuts_no_corner() {
         assert!(belief.map().unwrap().free_cell_at(at).is_some(), "in the wall at {at}");
         assert!(driven < 2.0, "no end of it, at {at}");
     }
-    // The path leads around the end of the wall: two legs of 0.3 by 0.3 m, 0.85 m in all; whole cells make it longer.
+    // The path rounds the wall's end in two legs of 0.3 m by 0.3 m, 0.85 m in all; whole cells
+    // lengthen it.
     assert!((0.8..1.1).contains(&driven), "{driven}");
 }
 

@@ -12,7 +12,6 @@ const fn encoder(position: u16) -> Encoder {
     Encoder { position, speed: 300, positive: true }
 }
 
-/// The bytes that a robot with these counts sends in a tick.
 fn tick(counts: [u16; 2]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let motor = MotorSensors { encoders: counts.map(encoder), ..MotorSensors::default() };
@@ -30,7 +29,7 @@ fn at(seconds: f64) -> Duration {
     Duration::from_secs_f64(seconds)
 }
 
-/// The reports in the bytes that were passed on. All must be valid.
+/// Returns the passed reports, which must all be valid.
 fn reports(passed: &[Late]) -> Vec<Report> {
     let mut decoder = Decoder::default();
     let mut reports = Vec::new();
@@ -46,7 +45,7 @@ fn reports(passed: &[Late]) -> Vec<Report> {
     reports
 }
 
-/// The bytes for the host of a tick with `counts`, from a robot that stood at (100, 200) when its fault began.
+/// Returns the host's bytes of a tick from a robot at counts (100, 200) when its fault began.
 fn faulted(fault: RobotFault, counts: [u16; 2]) -> (FaultInjector, Vec<Late>) {
     let mut injector = FaultInjector::new(fault, Protocol::X80, 1);
     injector.report(&tick([100, 200]), at(1.0));
@@ -82,7 +81,6 @@ fn bytes_pass_unchanged_until_the_fault_begins_and_every_frame_of_a_fault_is_val
         for number in 0..50 {
             let now = at(1.1 + 0.1 * f64::from(number));
             let passed = injector.report(&tick([110, 210]), now);
-            // The call panics if a frame is invalid.
             let reports = reports(&passed);
             let acknowledged = reports.contains(&Report::System(SystemSignal::Ack));
             assert_eq!(acknowledged, fault != RobotFault::Silence, "{fault:?}");
@@ -118,7 +116,6 @@ fn the_sonar_is_wrong_as_the_table_says() {
     assert_eq!(told(RobotFault::RangeStuck), Some(8));
     assert_eq!(told(RobotFault::EncoderDead), Some(90));
     assert_eq!(told(RobotFault::RangeSilent), Some(255));
-    // Messages that the robot hears after the fault began change nothing.
     let mut injector = FaultInjector::new(RobotFault::RangeFrozen, Protocol::X80, 1);
     injector.report(&tick([100, 200]), at(1.0));
     injector.begin();
@@ -179,7 +176,7 @@ fn a_robot_that_does_not_stop_keeps_its_speed_until_it_is_disabled() {
     assert_eq!(moved, 1, "what the host ordered, not what the robot was told");
 }
 
-/// A line of a robot that has turned its wheels so far and sees `beam`, and an answer.
+/// Returns a robot's report line, and an answer.
 fn said(wheels: [f64; 2], beam: f32) -> Vec<u8> {
     let report = json_wire::Report {
         wheels: Some(wheels),
@@ -192,7 +189,8 @@ fn said(wheels: [f64; 2], beam: f32) -> Vec<u8> {
     [json_wire::line(&report), json_wire::line(&answer)].concat()
 }
 
-/// The lines for the host from a robot that had turned its wheels by 1 and 2 rad when its fault began, and by 4 and 3 now.
+/// Returns the host's lines from a robot whose wheels had turned by 1 and 2 rad at the fault, and
+/// by 4 and 3 now.
 fn lines(fault: RobotFault) -> Vec<json_wire::Report> {
     let mut injector = FaultInjector::new(fault, Protocol::Json, 1);
     let before = said([1.0, 2.0], 0.5);

@@ -1,4 +1,4 @@
-//! The messages of robot and host in either protocol, as far as faults change them.
+//! Messages of robot and host, as far as faults change them.
 
 use std::f64::consts::TAU;
 
@@ -11,19 +11,19 @@ use common::{
     },
 };
 
-/// The current of a held motor, as that of the simulated robot, AD counts.
+/// Current of a held motor, as in the simulated robot, AD counts.
 const HELD_AD: u16 = 1520;
-/// The longest echo of a sonar that heard something, metres.
+/// Maximum echo of a sonar that heard something.
 const LONGEST_ECHO_M: f64 = 2.54;
 const MOTOR_BYTES: usize = 33;
-/// The angle of a count of an X80, radians.
+/// Angle of an X80 count.
 pub const COUNT_RAD: f64 = TAU / 1200.0;
 
 pub enum Words {
     X80 {
         robot: Decoder,
         host: Decoder,
-        /// The newest encoders, and the counts without a cycle.
+        /// Newest encoders, and unwrapped counts.
         encoders: [Encoder; 2],
         counts: [f64; 2],
     },
@@ -41,7 +41,7 @@ impl Words {
                 let (robot, host) = Default::default();
                 Self::X80 { robot, host, encoders, counts }
             }
-            // Robots of ROS 2 are simulated with JSON, and those with an Arduino have no fault on a wire.
+            // ROS 2 robots are simulated with JSON; Arduinos have no wire faults.
             Protocol::Json | Protocol::Arduino | Protocol::Ros2 => {
                 Self::Json { robot: Lines::default(), host: Lines::default() }
             }
@@ -85,16 +85,16 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], mut of: impl FnMut(&Frame<'_>)
     all
 }
 
-/// A message of the robot, in the words of JSON whatever it speaks.
+/// Message of the robot, in JSON terms for every protocol.
 #[derive(Clone)]
 pub struct Said {
-    /// Of an X80 the wheels are its channels, and the ranges those of its sonars, by their numbers.
+    /// Report; an X80's wheels are its channels, its ranges those of its sonars by number.
     pub report: json_wire::Report,
     frame: Option<(Addressing, Report)>,
 }
 
 impl Said {
-    /// Counts go on from `counts` at the `encoders` before. None if nobody knows such a frame.
+    /// Continues `counts` from the previous `encoders`. Returns `None` for an unknown frame.
     fn of_frame(
         frame: &Frame<'_>,
         encoders: &mut [Encoder; 2],
@@ -162,7 +162,7 @@ impl Said {
         self.frame.is_some()
     }
 
-    /// The stuck range of the robot's sensors, and the least of their random ones, metres.
+    /// Returns the stuck range, and the minimum random one, metres.
     pub const fn stuck_and_least_m(&self) -> [f64; 2] {
         if self.is_frame() { [0.08, 0.04] } else { [0.3, 0.2] }
     }
@@ -173,20 +173,19 @@ impl Said {
         [!ranges.is_empty(), scan.is_some() || !scans.is_empty(), has_further]
     }
 
-    /// The number of the sensor stream to which the message belongs; none for an answer.
+    /// Returns the index of the message's sensor stream; none for an answer.
     pub fn stream(&self) -> Option<usize> {
         let has_wheels = self.report.wheels.is_some();
         std::iter::once(has_wheels).chain(self.readings()).position(|has| has)
     }
 
-    /// The message with the readings of `other`, of the same kind.
     pub fn with_readings_of(self, other: Self) -> Self {
         let json_wire::Report { ranges, scan, scans, .. } = other.report;
         let report = json_wire::Report { ranges, scan, scans, ..self.report };
         Self { report, frame: other.frame }
     }
 
-    /// The message with data that are all `byte`, if it has wheels; in lines of JSON the wheels are 0.
+    /// Sets every data byte of a wheel message to `byte`; in JSON, the wheels become 0.
     pub fn with_data(mut self, byte: u8) -> Vec<u8> {
         if self.report.wheels.is_some() {
             if let Some((addressing, _)) = self.frame {
@@ -202,11 +201,11 @@ impl Said {
 }
 
 pub enum Effect {
-    /// The wheels turn; these bytes in place of the order make them stand.
+    /// Turning wheels; the bytes make them stand instead.
     Moves {
         stand: Vec<u8>,
     },
-    /// The wheels stand by a speed of 0.
+    /// Stop by a speed of 0.
     Stands,
     Disables,
     Other,
