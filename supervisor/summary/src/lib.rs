@@ -279,7 +279,8 @@ fn contact_speed_m_s(truth: &[GroundTruthTick], track_m: f64) -> Option<f64> {
 fn near_share(truth: &[GroundTruthTick]) -> Option<f64> {
     let [first, .., last] = truth else { return None };
     let near = truth.windows(2).filter(|pair| pair[1].clearance_m <= SAFE_M);
-    let near_s: f64 = near.map(|pair| pair[1].time_s - pair[0].time_s).sum();
+    // The sum of no numbers is -0.
+    let near_s = near.fold(0.0, |sum, pair| sum + (pair[1].time_s - pair[0].time_s));
     Some(near_s / (last.time_s - first.time_s))
 }
 
