@@ -25,18 +25,18 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum CheckpointError {
     #[error(
-        "cannot {action} checkpoint {file}: {source}; is the run directory writable and not full?"
+        "cannot {action} checkpoint {file}: {source}; check that the run directory is writable and has space"
     )]
     File { action: &'static str, file: PathBuf, source: io::Error },
     #[error(
-        "checkpoint {file} holds at most {capacity} bytes, not {length}; this is a fault in the stage"
+        "checkpoint {file} holds at most {capacity} bytes, and the state has {length}; report this fault of the stage"
     )]
     TooLarge { file: PathBuf, capacity: usize, length: usize },
     #[error(
-        "checkpoint {file} was written by another version of this program ({problem}); go on with that version, which `run.toml` beside it names, or start a new run"
+        "checkpoint {file} was written by another version of this program ({problem}); use that version, which `run.toml` beside it names, or start a new run"
     )]
     Foreign { file: PathBuf, problem: String },
-    #[error("cannot encode checkpoint {file}: {source}; this is a fault in the stage")]
+    #[error("cannot encode checkpoint {file}: {source}; report this fault of the stage")]
     Encode { file: PathBuf, source: postcard::Error },
 }
 
@@ -100,7 +100,7 @@ impl Checkpoint {
             .map_err(|problem| CheckpointError::Foreign { file: self.path.clone(), problem })
     }
 
-    /// Saves `state` over the older one. Fails if it is too long or cannot be encoded or written.
+    /// Saves `state` over the older one.
     pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), CheckpointError> {
         let sequence = self.sequence + 1;
         let mut bytes = std::mem::take(&mut self.buffer);
@@ -196,7 +196,7 @@ pub(crate) fn open_reserved(path: &Path, length: u64) -> Result<File, Checkpoint
         .map_err(failed("open", path))?;
     match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length) {
         Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(file),
-        Err(errno) => Err(failed("reserve room for", path)(errno.into())),
+        Err(errno) => Err(failed("reserve space for", path)(errno.into())),
     }
 }
 

@@ -105,7 +105,6 @@ pub struct WireTally {
 }
 
 impl Heard {
-    /// Records the voltage of a single battery for the whole robot.
     pub fn take_battery(&mut self, volts: f64) {
         let (board_v, motor_v, servo_v) = (volts, volts, volts);
         self.power = Some(PowerSample { board_v, motor_v, servo_v, ..PowerSample::default() });

@@ -38,7 +38,7 @@ fn enter_run(domain: &Domain) -> Result<(PathBuf, File)> {
     let robot = &domain.robot;
     if !domain.directory().exists() {
         return Err(StageError::Other(format!(
-            "robot {:?} has no supervisor here; start one first, with `firsthand run --watch-only`",
+            "robot {:?} has no supervisor here; start one with `firsthand run --watch-only`",
             robot.to_string()
         )));
     }
@@ -46,7 +46,7 @@ fn enter_run(domain: &Domain) -> Result<(PathBuf, File)> {
     let stage_lock = enter(domain)?;
     let directory = fs::read_link(domain.run_link()).map_err(|_| {
         StageError::Other(format!(
-            "the supervisor of robot {:?} starts its stages itself; to start them yourself, give `firsthand run` --watch-only",
+            "the supervisor of robot {:?} starts its stages itself; to start them yourself, use `firsthand run --watch-only`",
             robot.to_string()
         ))
     })?;
@@ -58,7 +58,7 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined> {
     let domain = Domain::of(robot.clone());
     let (directory, stage_lock) = enter_run(&domain)?;
     let run = Run::load(&directory)?;
-    let supervisor = domain.supervisor().map_err(system("see who supervises"))?;
+    let supervisor = domain.supervisor().map_err(system("find the supervisor"))?;
     let supervisor = supervisor.ok_or_else(gone)?;
     let bus = Bus::join_as_stage(&domain, stage, supervisor)?;
     let place = wait_for_place(&bus, stage)?;
@@ -90,8 +90,10 @@ fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place> {
     })?;
     place.unwrap_or_else(|| {
         Err(StageError::Other(match holder {
-            Some(pid) => format!("{stage} runs already, as process {pid}; end that one first"),
-            None => "no supervisor publishes on the robot's bus; is it frozen?".to_owned(),
+            Some(pid) => format!("{stage} already runs as process {pid}; end that process first"),
+            None => {
+                "no supervisor publishes on the robot's bus; check whether it is frozen".to_owned()
+            }
         }))
     })
 }

@@ -26,8 +26,7 @@ impl FileError {
     }
 }
 
-/// Replaces `file` so that a kill leaves the old or the new content. Fails if the directory cannot
-/// be written.
+/// Replaces `file` so that a kill leaves the old or the new content.
 pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     let mut new = file.as_os_str().to_owned();
     new.push(".new");
@@ -35,12 +34,11 @@ pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     fs::rename(&new, file)
 }
 
-/// Opens or creates the file for appending.
 pub fn append(file: impl AsRef<Path>) -> io::Result<fs::File> {
     fs::File::options().create(true).append(true).open(file)
 }
 
-/// Returns the first `most` bytes of a text file; `None` if it cannot be read.
+/// Returns the first `most` bytes of a text file.
 pub fn text(file: &Path, most: u64) -> Option<String> {
     let mut text = String::new();
     fs::File::open(file).ok()?.take(most).read_to_string(&mut text).ok()?;

@@ -140,7 +140,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     }
 
     /// Reopens the readers, which then get whole maps. Returns the earlier ones, with their last
-    /// samples; `None` while the robot is away. Fails if the bus is unusable.
+    /// samples; `None` while the robot is away.
     pub fn reopen(&mut self) -> Result<Option<Topics>, BusError> {
         let Some(joined) = &mut self.joined else {
             return Ok(None);

@@ -1,6 +1,6 @@
 //! Large state that survives a SIGKILL: occasional snapshots, and the entries since.
 //!
-//! The state is the fold of its entries. Appending one is a small write whatever the state's size;
+//! The state is the fold of its entries. Appending one is a small write at any size of the state;
 //! a new process folds those after the snapshot.
 //!
 //! An entry is `number | length | version | crc32 | body`, little-endian. Like a [`Checkpoint`],
@@ -64,7 +64,6 @@ struct Snapshot<S> {
 impl Journal {
     /// Opens or creates the snapshot at `path`, for encoded states of at most `capacity` bytes, and
     /// the journal beside it. It has space for entries of `entry_bytes` until the next snapshot.
-    /// Fails like [`Checkpoint::open`].
     pub fn open<S: DeserializeOwned, E: DeserializeOwned>(
         path: &Path,
         capacity: usize,
@@ -140,8 +139,7 @@ impl Journal {
         self.number - self.first >= self.snapshot_after
     }
 
-    /// Saves `state`, the fold of all entries, and empties the journal. Fails if either cannot be
-    /// written.
+    /// Saves `state`, the fold of all entries, and empties the journal.
     pub fn snapshot<S: Serialize>(&mut self, state: &S) -> Result<(), CheckpointError> {
         self.snapshots.save(&Snapshot { next: self.number, state })?;
         self.first = self.number;
@@ -155,8 +153,7 @@ fn snapshot_after(capacity: usize) -> u64 {
     (capacity as u64 / BYTES_FOR_AN_ENTRY).clamp(soonest, latest)
 }
 
-/// Returns the first entry's number, version and body, and the bytes after it; `None` if
-/// incomplete.
+/// Returns the first entry's number, version and body, and the bytes after it.
 fn entry(bytes: &[u8]) -> Option<(u64, u8, &[u8], &[u8])> {
     let number = u64::from_le_bytes(bytes.get(..8)?.try_into().ok()?);
     let &[low, middle, high, version] = bytes.get(8..12)? else { return None };

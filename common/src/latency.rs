@@ -47,8 +47,7 @@ impl Histogram {
         self.max_ns = self.max_ns.max(max_ns);
     }
 
-    /// Returns the upper end of the bucket of the `share` quantile, at most the longest latency;
-    /// `None` if empty.
+    /// Returns the upper end of the bucket of the `share` quantile, at most the longest latency.
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
         let total = self.total();
         if total == 0 {

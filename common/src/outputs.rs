@@ -105,7 +105,6 @@ impl Outputs {
         self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.note(input, self.at))
     }
 
-    /// Publishes the noted inputs, before effects other than samples.
     pub fn publish_inputs(&mut self) -> Result<(), BusError> {
         self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.publish(self.at))
     }
@@ -165,7 +164,6 @@ impl Outputs {
         }
     }
 
-    /// Returns whether a snapshot, which empties the stage's journal, is due.
     pub const fn is_journal_long(&self) -> bool {
         matches!(&self.saved, Saved::Journal(journal) if journal.is_long())
     }

@@ -9,9 +9,9 @@ use crate::process_status::{kibibytes, processor_time};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Usage {
-    /// Share of one processor since the last look, 0 to 1; `None` at the first.
+    /// Share of one processor since the last look, 0 to 1.
     pub cpu: Option<f64>,
-    /// Resident memory including shared memory; `None` if the process has ended.
+    /// Resident memory including shared memory.
     pub memory_bytes: Option<u64>,
 }
 

@@ -35,7 +35,9 @@ impl Output {
 
 #[derive(Debug, Error)]
 pub enum ReplayError {
-    #[error("not an entry of this version of the stage ({0}); replay with the version that ran")]
+    #[error(
+        "the entry belongs to another version of the stage ({0}); replay with the version that ran"
+    )]
     Foreign(#[from] postcard::Error),
     #[error("the stage cannot take an entry: {0}")]
     Stage(String),

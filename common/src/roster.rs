@@ -31,7 +31,7 @@ pub fn named(entries: &[RosterEntry]) -> impl Iterator<Item = (String, Author)> 
 }
 
 /// Joins a robot's bus as a consumer, which reads only samples of the supervisor and of processes
-/// in rosters. Fails if the bus is missing or unusable.
+/// in rosters.
 pub fn join(domain: &Domain, name: &str) -> Result<Bus, BusError> {
     let bus = Bus::join_as_consumer(domain, name)?;
     if let Some(writers) = bus.writers() {
@@ -73,14 +73,15 @@ impl Roster {
         })?;
         match first {
             Some(stages) => writers.name(stages),
-            None => tracing::warn!("the supervisor does not name this process; is it frozen?"),
+            None => tracing::warn!(
+                "the supervisor's roster lacks this process; check whether the supervisor is frozen"
+            ),
         }
         writers.read_from(names(self.samples));
         Ok(())
     }
 
-    /// Returns the first result of `find` in a roster; `None` after `patience`. Fails if the topic
-    /// cannot be read.
+    /// Returns the first result of `find` in a roster; `None` after `patience`.
     pub fn find<T>(
         &mut self,
         patience: Duration,

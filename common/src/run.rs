@@ -31,12 +31,14 @@ pub struct Run {
 
 #[derive(Debug, Error)]
 pub enum RunError {
-    #[error("cannot {action} {file}: {source}; is the run directory there and writable?")]
+    #[error(
+        "cannot {action} {file}: {source}; check that the run directory exists and is writable"
+    )]
     File { action: &'static str, file: PathBuf, source: io::Error },
     #[error("{file} is not a run file: {problem}; start the stage through `firsthand run`")]
     Content { file: PathBuf, problem: String },
     #[error(
-        "firsthand {by} wrote {file}, which this firsthand {VERSION} cannot read ({problem}); go on with that version, or start a new run"
+        "firsthand {by} wrote {file}, which this firsthand {VERSION} cannot read ({problem}); use that version, or start a new run"
     )]
     OtherVersion { file: PathBuf, by: String, problem: String },
 }
@@ -86,14 +88,13 @@ impl Run {
 /// because readers drop older generations.
 ///
 /// Each generation appends a line, which is atomic and faster on a slow disk than replacing a file.
-/// Fails if the file cannot be read or written.
 pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     let file = directory.join(format!("{stage}.generations"));
     let count = || {
         let mut lines = append(&file)?;
         lines.write_all(b"\n")?;
         let count = lines.metadata()?.len();
-        u32::try_from(count).map_err(|_| io::Error::other(format!("{count} generations")))
+        u32::try_from(count).map_err(|_| io::Error::other(format!("too many generations: {count}")))
     };
     count().map_err(|source| RunError::File {
         action: "count a generation in",

@@ -293,7 +293,7 @@ fn work(
             let ignored = context.bus.writers().map(Writers::ignored).unwrap_or_default();
             if ignored.process != foreign {
                 foreign = ignored.process;
-                let what = "samples are ignored of a process that the supervisor does not name";
+                let what = "its samples are ignored, because the supervisor's roster lacks it";
                 let (input, remedy) = (format!("process {foreign}"), "end it".to_owned());
                 let trouble = Refusal { input, what: what.to_owned(), remedy };
                 tracing::warn!("{trouble}");
@@ -301,13 +301,13 @@ fn work(
             }
             if context.bus.lost() > 2 * lost {
                 lost = context.bus.lost();
-                let trouble = "/dev/shm is full and samples are lost; remove what fills it".into();
+                let trouble = "/dev/shm is full and samples are lost; remove files from it".into();
                 tracing::warn!(lost, "{trouble}");
                 heartbeat.complain(&trouble, progress)?;
             }
             while let Some(Asked { id, fault }) = faults.take()? {
                 let answer = inject(process, fault)?;
-                tracing::warn!(?fault, ?answer, "asked for a fault");
+                tracing::warn!(?fault, ?answer, "a fault was requested");
                 heartbeat.answer(id, answer, progress)?;
                 while fault == Ok(FaultKind::Spin) && !stop.came() {
                     std::hint::spin_loop();
@@ -339,7 +339,7 @@ fn inject(
 struct Heartbeat {
     writer: Writer<HealthSample>,
     sample: HealthSample,
-    /// It is open before there is trouble: readers need time to connect, and a process that ends takes samples that nobody awaits along.
+    /// It is open before there is trouble: readers need time to connect, and the unread samples of a process end with it.
     complaints: Writer<ComplaintSample>,
     /// The longest time from beat to beat, by the table of topics. The stage waits no longer for input either.
     period: Duration,

@@ -21,8 +21,7 @@ pub struct Signals {
 }
 
 impl Signals {
-    /// Catches `signals`, except an already ignored SIGHUP, as under `nohup`. Fails if the system
-    /// refuses a handler.
+    /// Catches `signals`, except an already ignored SIGHUP, as under `nohup`.
     pub fn catch(signals: &[c_int]) -> io::Result<Self> {
         let (pipe, written_by_handler) = UnixStream::pair()?;
         pipe.set_nonblocking(true)?;
@@ -43,7 +42,7 @@ impl Signals {
         Ok(())
     }
 
-    /// Catches the signals that ask a process to end. Fails as [`Self::catch`].
+    /// Catches the signals that ask a process to end.
     pub fn that_end() -> io::Result<Self> {
         Self::catch(&[SIGINT, SIGTERM, SIGHUP])
     }
@@ -57,7 +56,6 @@ impl Signals {
         matches!(self.pipe.read(&mut [0; 16]), Ok(read) if read > 0)
     }
 
-    /// Waits for a signal. Fails if the system cannot wait.
     pub fn wait(&mut self) -> io::Result<()> {
         while !self.came() {
             poll::readable(&[self.as_fd()], None)?;
@@ -66,7 +64,6 @@ impl Signals {
     }
 }
 
-/// Returns whether the parent process had `signal` ignored.
 fn is_ignored(signal: c_int) -> bool {
     let mask = process_status::field("self", "SigIgn")
         .and_then(|mask| u64::from_str_radix(&mask, 16).ok());

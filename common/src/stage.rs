@@ -87,7 +87,7 @@ pub trait Stage: Sized + 'static {
 }
 
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-#[error("the saved state is of another mission; the stage starts without it")]
+#[error("the saved state belongs to another mission; the stage starts without it")]
 pub struct ForeignState;
 
 /// Running stage, in its process or in a replay.

@@ -19,7 +19,7 @@ const DEFAULT_ROBOT: &str = "x80";
 
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
-    "{problem}; the supervisor starts stages (`firsthand run`), or, where it only watches, `stage {stage} --robot NAME`"
+    "{problem}; let `firsthand run` start the stage, or, with --watch-only, start it by `stage {stage} --robot NAME`"
 )]
 pub struct StageCommandError {
     stage: &'static str,
@@ -53,7 +53,7 @@ pub fn start(
     let named = [arguments.next(), arguments.next()];
     if named != [Some(SUBCOMMAND.into()), Some(stage.into())] {
         let named: Vec<_> = named.into_iter().flatten().collect();
-        let problem = format!("this executable is the stage {stage}, and was given {named:?}");
+        let problem = format!("this executable is the stage {stage}, but was given {named:?}");
         return Err(StageCommandError { stage, problem });
     }
     start_with(stage, arguments)
@@ -76,7 +76,7 @@ pub fn start_with(
             Some(name @ "--first-tick") => first_tick = Some(parsed(stage, name, &value)?),
             Some(name @ "--supervisor") => supervisor = Some(parsed(stage, name, &value)?),
             Some(name @ "--robot") => robot = Some(parsed(stage, name, &value)?),
-            _ => return Err(failed(format!("{} is no option", option.display()))),
+            _ => return Err(failed(format!("{} is an unknown option", option.display()))),
         }
     }
     match (run, supervisor, robot) {
@@ -111,7 +111,7 @@ fn parsed<T: FromStr>(
     let parsed = value.to_str().and_then(|value| value.parse().ok());
     parsed.ok_or_else(|| StageCommandError {
         stage,
-        problem: format!("{option} {} is no value for it", value.display()),
+        problem: format!("{option} {} has an invalid value", value.display()),
     })
 }
 
@@ -157,7 +157,7 @@ mod tests {
             ("stage planner --run", "--run has no value"),
             ("stage planner --supervisor x", "--supervisor x"),
             ("stage planner --robot a/b", "--robot a/b"),
-            ("stage planner --warp 9", "--warp is no option"),
+            ("stage planner --warp 9", "--warp is an unknown option"),
             ("stage planner --run /tmp", "go together"),
             ("stage planner --run /tmp --supervisor 1 --robot a", "go together"),
         ] {

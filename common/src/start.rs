@@ -53,7 +53,7 @@ pub enum StageError {
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     /// Publication on a topic outside the stage's outputs.
-    #[error("topic {0} is not among the outputs of the stage; list it there")]
+    #[error("the stage's outputs lack topic {0}; add it to them")]
     NoOutput(&'static str),
     #[error("{0}")]
     Other(String),
@@ -65,7 +65,6 @@ pub enum StageError {
 pub const REFUSED: u8 = 8;
 
 impl StageError {
-    /// Returns the exit code of a stage's process that ends with this error.
     pub const fn exit_code(&self) -> u8 {
         match self {
             Self::Bus(_) => REFUSED,

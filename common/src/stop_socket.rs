@@ -63,7 +63,7 @@ pub struct StopSocket {
 }
 
 impl StopSocket {
-    /// Binds `path` in place of an earlier process's socket. Fails if the system refuses.
+    /// Binds `path` in place of an earlier process's socket.
     pub fn bind(path: PathBuf) -> io::Result<Self> {
         remove(&path)?;
         Ok(Self { socket: bind(&path)?, path, asking: Vec::new(), looking: Vec::new() })
@@ -106,7 +106,6 @@ impl StopSocket {
         }
     }
 
-    /// Answers all waiting observers: `silent_s` are the seconds without a motor frame.
     pub fn tell(&mut self, rest: Rest, silent_s: u8) {
         for operator in std::mem::take(&mut self.looking) {
             self.answer(&operator, &[rest as u8, silent_s]);
@@ -141,7 +140,7 @@ pub struct Operator {
 }
 
 impl Operator {
-    /// Returns `None` if no process answers at `path`. Fails if the system refuses a socket.
+    /// Returns `None` if no process answers at `path`.
     pub fn connect(path: &Path) -> io::Result<Option<Self>> {
         // An abstract name leaves no file.
         let name = format!("firsthand-operator-{}-{}", std::process::id(), monotonic_ns());

@@ -49,7 +49,6 @@ pub trait Readers: Sized {
     const INPUTS: Topics = &[];
     const FEEDBACK: Topics = &[];
 
-    /// Opens a reader of each topic of both lists.
     fn open_readers(bus: &Bus) -> Result<Self, BusError>;
 }
 

@@ -16,15 +16,13 @@ use super::{
 };
 use crate::domain::Domain;
 
-/// Row of the table.
 pub trait AnyTopic: Sync {
     fn spec(&self) -> &'static Spec;
     /// Returns the payload's name in all languages.
     fn payload(&self) -> String;
     /// Returns the kinds of the header and of the slice's elements.
     fn layout(&self) -> (Kind, Option<Kind>);
-    /// Decodes a message of the topic into the values of an [`AnySample`]; `None` for other
-    /// messages.
+    /// Decodes a message of the topic into the values of an [`AnySample`].
     fn decoded(&self, message: &[u8]) -> Option<(Value, Option<Vec<Value>>)>;
     /// Returns the sample types for the middleware; the result is private to this crate.
     #[doc(hidden)]
@@ -33,8 +31,7 @@ pub trait AnyTopic: Sync {
     /// Opens a reader of all generations with a recorder's buffer.
     fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>>;
     fn any_writer(&self, bus: &Bus, generation: u32, longest: usize) -> Result<Box<dyn AnyWriter>>;
-    /// Returns the processes that have the topic open. Fails for a missing topic or another
-    /// payload.
+    /// Returns the processes that have the topic open.
     fn opened_by(&self, bus: &Bus) -> Result<OpenedBy> {
         ports::opened_by(&bus.node, self.spec(), &self.carried())
     }
@@ -149,7 +146,7 @@ impl Bus {
         Self::make_services(domain, name, table.iter().map(|topic| (topic.spec(), topic.carried())))
     }
 
-    /// Opens a wakeup for publications on `topic`. Fails if the topic is missing or full.
+    /// Opens a wakeup for publications on `topic`.
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup> {
         Wakeup::open(self, topic.spec())
     }

@@ -287,7 +287,7 @@ mod tests {
         let writers = Writers::of(1);
         let mut admitted = Admitted::of(&SPEC, Some(&writers));
         let mut admits = |author| admitted.admits(author).unwrap();
-        assert!(!admits(author(7, 1)), "nobody is named");
+        assert!(!admits(author(7, 1)), "no author is named");
         writers.name([("stage".to_owned(), author(7, 1))]);
         assert!(admits(author(7, 1)));
         assert!(!admits(author(66, u32::MAX)), "a forged generation");

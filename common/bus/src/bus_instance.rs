@@ -51,7 +51,7 @@ impl BusInstance {
         });
         let name = name.ok_or_else(|| {
             let (link, config) = (link.display(), config.display());
-            let text = format!("{link} leads to {config}, which is no configuration of a bus");
+            let text = format!("{link} points to {config}, whose name is invalid for a bus configuration; start the robot again");
             io::Error::new(io::ErrorKind::InvalidData, text)
         })?;
         Ok(Self { domain: domain.clone(), name: name.to_owned() })
@@ -80,11 +80,10 @@ impl BusInstance {
     pub(crate) fn made_by_another(&self) -> io::Result<Option<String>> {
         let config = fs::read_to_string(self.config())?;
         let made_by = config.lines().next().and_then(|line| line.strip_prefix(MADE_BY));
-        let made_by = made_by.unwrap_or("of before 0.1.0");
+        let made_by = made_by.unwrap_or("from before 0.1.0");
         Ok((series(made_by) != series(VERSION)).then(|| made_by.to_owned()))
     }
 
-    /// Returns the prefix of this instance's files in [`SHARED_MEMORY`].
     pub fn shared_memory_prefix(&self) -> String {
         format!("{}{}_", self.domain.shared_memory_prefix(), self.name)
     }

@@ -38,9 +38,7 @@ pub enum Pace {
 }
 
 #[derive(Debug, Error)]
-#[error(
-    "pace {0:?} is neither `max` nor a rate between 0.05 and 100; give `max`, or 1 for wall-clock"
-)]
+#[error("pace {0:?} is invalid; give `max`, or a rate from 0.05 to 100 (1 for wall-clock)")]
 pub struct PaceError(String);
 
 impl FromStr for Pace {

@@ -26,7 +26,7 @@ use crate::{claim, lock_holders::has_open};
 pub struct RobotName(String);
 
 #[derive(Debug, Error)]
-#[error("{0:?} cannot name a robot; use 1 to 16 of a-z, 0-9 and '-'")]
+#[error("{0:?} cannot name a robot; use 1 to 16 characters of a-z, 0-9 and '-'")]
 pub struct RobotNameError(String);
 
 impl FromStr for RobotName {
@@ -153,7 +153,7 @@ impl Domain {
     }
 
     /// Keeps the supervisor from creating or removing a bus until the result is dropped; hold it
-    /// only briefly. Fails without a domain.
+    /// only briefly.
     pub fn joining(&self) -> io::Result<File> {
         let lock = File::open(self.made_again(self.joining_lock_file()))?;
         lock.lock_shared()?;
@@ -166,7 +166,7 @@ impl Domain {
         self.directory.join("stages.lock")
     }
 
-    /// Shares the stages' lock until the result is dropped. Fails without a domain.
+    /// Shares the stages' lock until the result is dropped.
     pub fn enter(&self) -> io::Result<File> {
         let lock = File::open(self.stages_lock_file())?;
         lock.lock_shared()?;

@@ -20,15 +20,15 @@ pub enum BusError {
     )]
     NotRunning { robot: String, detail: String },
     #[error(
-        "robot {robot} runs firsthand {runs}, and this is {VERSION}: use the commands of that version; `firsthand stop` works all the same"
+        "robot {robot} runs firsthand {runs}, but this is {VERSION}; use the commands of that version (`firsthand stop` works with all versions)"
     )]
     OtherVersion { robot: String, runs: String },
     #[error(
-        "topic {topic:?} carries another payload than this program was built for; build it against the firsthand that runs (`firsthand --version`)"
+        "topic {topic:?} carries another payload than this program expects; build the program against the running firsthand (`firsthand --version`)"
     )]
     Incompatible { topic: &'static str },
     #[error(
-        "topic {topic:?} has places for {places} readers, and those for consumers are taken; end one that reads it, or read it once and share it"
+        "topic {topic:?} has places for {places} readers, and all places for consumers are taken; end another reader, or share one reader"
     )]
     NoPlace {
         topic: &'static str,
@@ -36,16 +36,16 @@ pub enum BusError {
         places: usize,
     },
     #[error(
-        "this reader holds {most} samples of topic {topic:?}, as many as one may; drop one before the next is taken (nobody waits for it: the oldest that is not taken is lost)"
+        "this reader holds {most} samples of topic {topic:?}, its limit; drop one before you take the next (the writer does not wait: it overwrites the oldest sample that you have not taken)"
     )]
     HoldsTooMany { topic: &'static str, most: usize },
     #[error(
-        "{SHARED_MEMORY} has no memory left for a sample of topic {topic:?}; remove what fills it, or end the reader that is stopped and holds samples"
+        "{SHARED_MEMORY} has no memory left for a sample of topic {topic:?}; remove files from it, or end the frozen reader that holds samples"
     )]
     NoMemory { topic: &'static str },
-    #[error("cannot {action} topic {topic:?}: {detail}; is {shm} full, `ulimit -n` reached, or the topic's last place taken?", shm = SHARED_MEMORY)]
+    #[error("cannot {action} topic {topic:?}: {detail}; check whether {shm} is full, `ulimit -n` is reached, or the topic's last place is taken", shm = SHARED_MEMORY)]
     Refused { action: &'static str, topic: &'static str, detail: String },
-    #[error("cannot join the bus of robot {robot:?}: {detail}; if it runs, is it this user's, and is {shm} writable and not full?", shm = SHARED_MEMORY)]
+    #[error("cannot join the bus of robot {robot:?}: {detail}; check that this user started the robot, and that {shm} is writable and has space", shm = SHARED_MEMORY)]
     Join { robot: String, detail: String },
     #[error("cannot wait for samples: {0}")]
     Wait(#[source] std::io::Error),

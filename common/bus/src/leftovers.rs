@@ -70,7 +70,6 @@ pub(super) fn remove_nodes(nodes: &Path, ended: u32) -> io::Result<()> {
     Ok(())
 }
 
-/// Hard-links each file in `services` into the new directory `backup`.
 pub(super) fn back_up(services: &Path, backup: &Path) -> io::Result<()> {
     fs::create_dir(backup)?;
     for entry in fs::read_dir(services)? {

@@ -24,13 +24,11 @@ pub fn holders(file: &File) -> io::Result<Vec<u32>> {
         .collect())
 }
 
-/// Returns whether `pid` has `file` open; false for ended processes and other users'.
 pub(crate) fn has_open(pid: u32, file: &File) -> bool {
     let opened = file.metadata().and_then(|file| Ok(descriptors(pid, &file)?.next().is_some()));
     opened.unwrap_or(false)
 }
 
-/// Returns the `/proc` entries of descriptors of `pid` that are open on `file`.
 fn descriptors(pid: u32, file: &Metadata) -> io::Result<impl Iterator<Item = PathBuf>> {
     let opened = fs::read_dir(format!("/proc/{pid}/fd"))?.flatten().map(|entry| entry.path());
     Ok(opened.filter(|path| {

@@ -19,11 +19,10 @@ const COUNT_OF_NODES: &str = ".global_mgmt";
 /// Middleware's name of the count's type: the SHA-1 of
 /// `iceoryx2::node::global_management_segment::State`.
 const TYPE_OF_COUNT: &str = "9204dd183d1c4d8e1ff592a30766ffa6765aa8b5";
-/// Mode bits of all users except the owner.
 const OTHERS: u32 = 0o077;
 
 /// Checks that the first files for joining are complete and private to this user. The middleware
-/// would wait for incomplete ones. The error names the file.
+/// would wait for incomplete ones.
 pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
     let directory = instance.domain.directory();
     let directories = [directory, &instance.root()];
@@ -34,7 +33,7 @@ pub(super) fn check(instance: &BusInstance) -> io::Result<()> {
     let counts = counts_of_nodes(instance)?;
     if counts.is_empty() {
         let missing = Path::new(SHARED_MEMORY).join(instance.shared_memory_prefix());
-        return Err(wrong(&missing, "has lost its count of nodes; start the robot again"));
+        return Err(wrong(&missing, "lacks its count of nodes; start the robot again"));
     }
     for count in counts {
         check_one(&count, false)?;
@@ -86,7 +85,7 @@ fn check_one(path: &Path, directory: bool) -> io::Result<()> {
     }
     let kind = found.file_type();
     if kind.is_symlink() || kind.is_dir() != directory {
-        return Err(wrong(path, "is of another kind than a bus has there"));
+        return Err(wrong(path, "has the wrong file type"));
     }
     // The configuration's mode may let others read, because its directory is closed to them.
     if found.mode() & 0o022 != 0 || directory && found.mode() & OTHERS != 0 {

@@ -17,11 +17,9 @@ use crate::{
     layouts,
 };
 
-/// Type for shared memory.
 pub trait Payload: ZeroCopySend + Layout + Debug + Default + 'static {}
 impl<P: ZeroCopySend + Layout + Debug + Default + 'static> Payload for P {}
 
-/// Returns whether a sample of elements `E` has a slice; `()` means none.
 pub(super) const fn has_slice<E>() -> bool {
     size_of::<E>() > 0
 }
@@ -54,7 +52,6 @@ pub trait Stamped: Payload {
     fn stamp_mut(&mut self) -> &mut Stamp;
 }
 
-/// Encodes `header` and `slice` as a message (see [`super::cdr`]).
 pub fn encode_slice<H: Layout, E: Layout>(header: &H, slice: &[E], bytes: &mut Vec<u8>) {
     let mut to = Encoder::new(bytes);
     header.encode(&mut to);
@@ -68,7 +65,7 @@ pub fn encode_sample<H: Layout>(sample: &H, bytes: &mut Vec<u8>) {
     encode_slice::<H, ()>(sample, &[], bytes);
 }
 
-/// Decodes a header and slice; `None` for others.
+/// Decodes a header and slice.
 pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H, Vec<E>)> {
     let mut from = Decoder::new(message)?;
     let header = H::decode(&mut from)?;
@@ -85,7 +82,7 @@ pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H
     Some((header, slice))
 }
 
-/// Decodes a header; `None` for another.
+/// Decodes a header.
 pub fn decode_sample<H: Layout>(message: &[u8]) -> Option<H> {
     Some(decode_slice::<H, ()>(message)?.0)
 }

@@ -45,7 +45,6 @@ impl<H: Payload, E: Payload> Service<H, E> {
         Ok(Publisher { raw: self.raw.publisher(self.spec, longest)?, carries: PhantomData })
     }
 
-    /// Opens a subscriber that buffers the newest `buffer` samples.
     pub(super) fn subscriber(&self, buffer: usize) -> Result<Subscriber<H, E>> {
         Ok(Subscriber {
             raw: self.raw.subscriber(self.spec, buffer)?,

@@ -22,8 +22,7 @@ const PLACES_FREED_WITHIN: Duration = Duration::from_secs(4);
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 impl Bus {
-    /// Opens a reader of `topic`. Fails if the topic is missing, has another payload, or stays
-    /// full.
+    /// Opens a reader of `topic`.
     pub fn reader<H: Stamped, E: Payload>(&self, topic: &Topic<H, E>) -> Result<Reader<H, E>> {
         self.reader_that_keeps(topic, topic.spec.limits.buffer)
     }
@@ -110,7 +109,7 @@ impl<H: Stamped> Reader<H> {
         Ok(self.next_slice()?.map(|sample| *sample.header()))
     }
 
-    /// Takes all samples and returns the newest. Fails as [`Self::next_slice`] does.
+    /// Takes all samples and returns the newest.
     pub fn newest(&mut self) -> Result<Option<H>> {
         let mut newest = None;
         while let Some(sample) = self.next_sample()? {

@@ -23,16 +23,14 @@ impl Waiter {
         self.wakeups.push(wakeup);
     }
 
-    /// Adds `descriptor`, from which the caller reads. An error means that the process is out of
-    /// descriptors.
+    /// Adds `descriptor`, from which the caller reads.
     pub fn on_readable(&mut self, descriptor: impl AsFd) -> Result {
         let own = descriptor.as_fd().try_clone_to_owned().map_err(BusError::Wait)?;
         self.descriptors.push(own);
         Ok(())
     }
 
-    /// Waits until an input is readable or `timeout` has passed, and drains the wakeups. Returns
-    /// whether any was readable.
+    /// Waits until an input is readable or `timeout` has passed, and drains the wakeups.
     pub fn wait(&self, timeout: Duration) -> Result<bool> {
         self.wait_also_for(&[], timeout)
     }

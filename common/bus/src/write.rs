@@ -15,8 +15,7 @@ use super::{
 const MOST_UNNOTICED: u32 = 128;
 
 impl Bus {
-    /// Opens a writer for the `generation`-th process of a stage. Fails if the topic is missing,
-    /// has another payload, or is full.
+    /// Opens a writer for the `generation`-th process of a stage.
     pub fn writer<H: Stamped>(&self, topic: &Topic<H>, generation: u32) -> Result<Writer<H>> {
         self.slice_writer(topic, generation, 0)
     }
@@ -63,8 +62,7 @@ impl<H: Stamped> Writer<H> {
 }
 
 impl<H: Stamped, E: Payload> Writer<H, E> {
-    /// Publishes a header and its `slice` like [`Writer::publish`]. Fails for a slice longer than
-    /// opened for.
+    /// Publishes a header and its `slice` like [`Writer::publish`].
     pub fn publish_slice(
         &mut self,
         tick: u64,

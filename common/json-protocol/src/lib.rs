@@ -152,7 +152,6 @@ impl Lines {
         complete
     }
 
-    /// Discards an incomplete line.
     pub fn reset(&mut self) {
         self.dropped += self.held.len() as u64;
         self.held.clear();

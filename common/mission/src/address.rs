@@ -36,7 +36,7 @@ pub enum AddressError {
     #[error("{address:?} {problem}; {FORMS}")]
     Form { address: String, problem: &'static str },
     #[error(
-        "the host of {address:?} cannot be found: {source}; give its number, or a name that resolves on this machine"
+        "cannot resolve the host of {address:?}: {source}; give its IP address, or a name that this machine resolves"
     )]
     Host { address: String, source: std::io::Error },
 }
@@ -63,7 +63,7 @@ impl FromStr for Address<String> {
         }
         if let Some(text) = address.strip_prefix("ros2:") {
             let domain = domain(text.strip_prefix("//").unwrap_or(text));
-            let domain = domain.ok_or_else(|| refused("has no domain of ROS from 0 to 232"))?;
+            let domain = domain.ok_or_else(|| refused("has no ROS domain from 0 to 232"))?;
             return Ok(Self::Ros2(Some(domain)));
         }
         let (over, rest) = address.split_once("://").unwrap_or(("udp", address));
@@ -71,7 +71,7 @@ impl FromStr for Address<String> {
             return if rest.starts_with('/') {
                 Ok(Self::Serial(rest.into()))
             } else {
-                Err(refused("names no device by its absolute path"))
+                Err(refused("lacks the absolute path of a device"))
             };
         }
         let (host, port) = rest.rsplit_once(':').ok_or_else(|| refused("has no port"))?;
@@ -87,7 +87,7 @@ impl FromStr for Address<String> {
         match over {
             "udp" => Ok(Self::Udp(rest.to_owned())),
             "tcp" => Ok(Self::Tcp(rest.to_owned())),
-            _ => Err(refused("begins with no known transport")),
+            _ => Err(refused("has an unknown transport")),
         }
     }
 }
@@ -99,7 +99,10 @@ impl Address<String> {
             let unknown = |source| AddressError::Host { address: self.to_string(), source };
             let mut found = host.to_socket_addrs().map_err(unknown)?;
             found.next().ok_or_else(|| {
-                unknown(std::io::Error::new(std::io::ErrorKind::NotFound, "it has no number"))
+                unknown(std::io::Error::new(
+                    std::io::ErrorKind::NotFound,
+                    "the name has no IP address",
+                ))
             })
         };
         Ok(match self {
@@ -119,7 +122,7 @@ pub fn domain_of_environment() -> Result<u16, AddressError> {
     };
     text.to_str().and_then(domain).ok_or_else(|| AddressError::Form {
         address: format!("ROS_DOMAIN_ID={}", text.display()),
-        problem: "has no domain of ROS from 0 to 232",
+        problem: "has no ROS domain from 0 to 232",
     })
 }
 

@@ -34,11 +34,11 @@ fn read_bounded(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     // Opening a pipe would block until it has a writer.
     if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("it is no regular file"));
+        return Err(io::Error::other("it is not a regular file"));
     }
     let read = File::open(path)?.take(MAX_BYTES).read_to_string(&mut text)?;
     if read as u64 == MAX_BYTES {
-        return Err(io::Error::other(format!("it is {MAX_BYTES} bytes or more")));
+        return Err(io::Error::other(format!("its size is {MAX_BYTES} bytes or more")));
     }
     Ok(text)
 }
@@ -63,7 +63,7 @@ impl Mission {
                 line: line_of(text, start),
                 key,
                 problem,
-                remedy: "leave the others out".to_owned(),
+                remedy: "remove the others".to_owned(),
             });
         }
         if !tree.get_ref().contains_key("target") {
@@ -120,7 +120,7 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
     let looks = mission.method == Method::Evidential && mission.sensing;
     let car = mission.body().ackermann().filter(|_| looks).map(|car| {
         let radius = car.least_turning_radius();
-        let text = format!("a car turns in no less than {radius:.2} m, so it does not turn on the spot to look before it drives");
+        let text = format!("a car's turning radius is at least {radius:.2} m, so the robot starts driving without a turn on the spot to look around");
         remark("robot.model", text)
     });
     let robot = tree.get("robot").and_then(|value| value.get_ref().as_table());
@@ -131,19 +131,19 @@ fn remarks(text: &str, origin: &Path, tree: &DeTable<'_>, mission: &Mission) -> 
     });
     let sight = mission.sight_speed_m_s();
     let blind = mission.controller.speed_m_s.filter(|asked| *asked > sight).map(|asked| {
-        let text = format!("{asked} is more than the robot's sight allows: it drives at {sight:.2} m/s at most, from which it rests on ground that it has seen though its sensors fall silent");
+        let text = format!("{asked} is more than the sensors' reach allows; the robot drives at {sight:.2} m/s at most, so that it stops on seen ground even if its sensors fall silent");
         remark("controller.speed_m_s", text)
     });
     let shut = mission.waypoints().into_iter().find(|to| reach::is_cut_off(mission, to.at)).map(|to| {
         let (at, radius) = (to.at, mission.body().radius_m);
         let key = if mission.targets.is_empty() { "target" } else { "targets" };
-        let text = format!("known shapes and zones leave a body of {radius} m radius no way to {at}; move the target, or what is around it");
+        let text = format!("known shapes and zones block every path to {at} for a body of {radius} m radius; move the target, or the shapes around it");
         remark(key, text)
     });
     let reversed = thresholds(mission).into_iter().filter(|(_, low, _, high)| low > high);
     let reversed = reversed.map(|(key, low, other, high)| {
         let text = format!(
-            "{low} is more than {other} = {high}, which is passed first; swap them, or change one"
+            "{low} is more than {other} = {high}, its upper limit; swap the two, or change one"
         );
         remark(key, text)
     });
@@ -199,7 +199,7 @@ fn dropped_of(
         (DeValue::Table(file), read) => dropped(key, file, read),
         (DeValue::Array(file), toml::Value::Array(read)) if file.len() > read.len() => {
             let (has, takes) = (file.len(), read.len());
-            Some((start, key.to_owned(), format!("{has} values are given, and {takes} are read")))
+            Some((start, key.to_owned(), format!("the list has {has} values instead of {takes}")))
         }
         (DeValue::Array(file), toml::Value::Array(read)) => file
             .iter()
@@ -242,13 +242,13 @@ impl Checker {
         refuse_if(
             mission.name.starts_with('.') || !mission.name.chars().all(plain),
             "name",
-            format!("{:?} would not do as the name of a directory", mission.name),
+            format!("{:?} is invalid as a directory name", mission.name),
             "use letters, digits, '-' and '_'",
         )?;
         refuse_if(
             mission.method == Method::Paper && mission.sensor_set() != Sensors::Front,
             "sensors",
-            "the paper's method has the front sonar alone",
+            "the paper's method uses only the front sonar",
             "give \"front\", or method = \"evidential\"",
         )?;
         perimeter(mission)?;
@@ -282,7 +282,7 @@ fn perimeter(mission: &Mission) -> Result {
     refuse_if(
         !(MIN_CELLS..=MOST_DRIVEN_CELLS).contains(&cells),
         "perimeter.cells",
-        format!("a grid of {cells} x {cells} cells is not solved in time"),
+        format!("a grid of {cells} x {cells} cells is too small or too slow to solve"),
         format!("give {MIN_CELLS} to {MOST_DRIVEN_CELLS}"),
     )?;
     point("perimeter.centre", perimeter.centre)?;
@@ -291,7 +291,7 @@ fn perimeter(mission: &Mission) -> Result {
     refuse_if(
         !mission.contains(start),
         "perimeter.centre",
-        format!("the robot's start {start} is not inside the perimeter"),
+        format!("the robot's start {start} is outside the perimeter"),
         "move the centre or widen perimeter.width_m",
     )
 }
@@ -304,14 +304,14 @@ fn target(mission: &Mission) -> Result {
         refuse_if(
             !mission.contains(at),
             key,
-            format!("{at} is not inside the perimeter of {width_m} m around {centre}"),
+            format!("{at} is outside the perimeter of {width_m} m around {centre}"),
             "move the target in, or widen perimeter.width_m",
         )?;
         within(key, heading_deg.unwrap_or_default(), -360.0..=360.0, "degrees of heading")?;
         refuse_if(
             heading_deg.is_some() && mission.body().steering.is_some(),
             key,
-            "a car does not turn on the spot, so its targets have no heading",
+            "a car cannot turn on the spot to a target's heading",
             "give [x, y]",
         )?;
     }
@@ -328,8 +328,8 @@ fn target(mission: &Mission) -> Result {
 }
 
 fn point(key: &'static str, point: DVec2) -> Result {
-    let problem = format!("{point} is not a place");
-    refuse_if(!point.is_finite(), key, problem, "give two finite numbers, metres")
+    let problem = format!("{point} is not a position");
+    refuse_if(!point.is_finite(), key, problem, "give two finite numbers in metres")
 }
 
 fn stages(mission: &Mission) -> Result {
@@ -357,13 +357,13 @@ fn stages(mission: &Mission) -> Result {
     refuse_if(
         mapper.forget_after_s.is_some() && mission.method == Method::Paper,
         "mapper.forget_after_s",
-        "the paper's map only grows",
+        "the map of the paper's method only grows",
         "leave the key out, or give method = \"evidential\"",
     )?;
     refuse_if(
         planner.executable.as_ref().is_some_and(|executable| executable.as_os_str().is_empty()),
         "planner.executable",
-        "it is empty",
+        "the path is empty",
         "name an executable, or leave the key out",
     )?;
     let plan = planner.calibration.clone().unwrap_or_default();
@@ -380,7 +380,7 @@ fn stages(mission: &Mission) -> Result {
 fn zones(mission: &Mission) -> Result {
     let zones = &mission.zones;
     let problem = format!("{} zones are too many", zones.len());
-    refuse_if(zones.len() > MOST_ZONES, "zone", problem, format!("give {MOST_ZONES} at most"))?;
+    refuse_if(zones.len() > MOST_ZONES, "zone", problem, format!("give at most {MOST_ZONES}"))?;
     for zone @ Zone { points } in zones {
         let count = points.len();
         refuse_if(
@@ -406,14 +406,14 @@ fn start_is_free(mission: &Mission) -> Result {
     refuse_if(
         radius > MOST_TRACKS * track,
         "robot.radius_m",
-        format!("a body of {radius} m radius on a track of {track} m"),
-        format!("give metres, at most {MOST_TRACKS} tracks"),
+        format!("a radius of {radius} m is too large for a track of {track} m"),
+        format!("give metres, at most {MOST_TRACKS} times the track"),
     )?;
     let start = mission.start.at;
     for (key, shapes) in [("world", &mission.obstacles()), ("known", &mission.known)] {
         let clearance = shapes.clearance(start);
         let problem = format!(
-            "something stands {clearance:.2} m from the start, and the robot's radius is {radius} m"
+            "a shape stands {clearance:.2} m from the start, but the robot's radius is {radius} m"
         );
         refuse_if(clearance <= radius, key, problem, format!("move it away from {start}"))?;
         for Waypoint { at, .. } in mission.waypoints() {
@@ -423,7 +423,7 @@ fn start_is_free(mission: &Mission) -> Result {
         }
     }
     for zone in &mission.zones {
-        let problem = "the robot starts in a zone, or reaches into it";
+        let problem = "the robot starts in a zone, or overlaps one";
         refuse_if(zone.clearance(start) <= radius, "zone", problem, "move one of them")?;
         for Waypoint { at, .. } in mission.waypoints() {
             let problem = format!("the target {at} lies inside a zone");

@@ -17,7 +17,7 @@ pub enum MissionError {
         problem: String,
     },
     #[error(
-        "robot.calibration: {file}: {problem}; give a file that `firsthand calibrate` wrote, or leave the key out"
+        "robot.calibration: {file}: {problem}; give a file that `firsthand calibrate` wrote, or remove the key"
     )]
     Calibration { file: PathBuf, problem: String },
     #[error("{file}:{line}: {key}: {problem}; {remedy}")]

@@ -18,10 +18,10 @@ impl Footprint {
     /// If the corners do not form a convex polygon around the origin in order; the error says why.
     pub fn new(corners: &[DVec2]) -> Result<Self, &'static str> {
         if !(3..=MOST_CORNERS).contains(&corners.len()) {
-            return Err("it has 3 to 16 corners");
+            return Err("it needs 3 to 16 corners");
         }
         if !corners.iter().all(|corner| corner.abs().max_element() <= 5.0) {
-            return Err("its corners are within 5 m");
+            return Err("its corners must lie within 5 m");
         }
         let mut footprint = Self { corners: [DVec2::ZERO; MOST_CORNERS], count: corners.len() };
         footprint.corners[..corners.len()].copy_from_slice(corners);
@@ -39,12 +39,10 @@ impl Footprint {
         let around: f64 = footprint.edges().map(|(from, to)| from.angle_to(to)).sum();
         if !(0..all.len()).all(|index| turns(index) > 1e-9) || around > 1.5 * std::f64::consts::TAU
         {
-            return Err(
-                "it is convex, its corners in the order of its outline, no three in a line",
-            );
+            return Err("it must be convex, with its corners in order and no three in a line");
         }
         if footprint.inscribed_m() < 0.01 {
-            return Err("the robot's origin, between its wheels, is at least 0.01 m inside");
+            return Err("the robot's origin, between its wheels, must lie at least 0.01 m inside");
         }
         Ok(footprint)
     }

@@ -127,7 +127,7 @@ impl GridFrame {
         (point - self.centre) / self.resolution_m + DVec2::splat(f64::from(self.centre_index()))
     }
 
-    /// Returns [x / Delta] of (19); `None` outside the map.
+    /// Returns [x / Delta] of (19).
     pub fn cell_at(&self, point: DVec2) -> Option<Cell> {
         let index = self.to_cells(point).round();
         let last = f64::from(self.cells) - 1.0;

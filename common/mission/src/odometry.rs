@@ -120,11 +120,11 @@ impl Calibration {
         for (key, value, range) in odometry.ranges() {
             if !range.contains(&value) {
                 let (least, most) = (range.start(), range.end());
-                return Err(format!("{key} = {value} is not between {least} and {most}"));
+                return Err(format!("{key} = {value} is outside {least} to {most}"));
             }
         }
         if odometry.calibrated.is_none() {
-            return Err("it has no table [robot.odometry.calibrated]".to_owned());
+            return Err("the table [robot.odometry.calibrated] is missing".to_owned());
         }
         Ok(odometry)
     }

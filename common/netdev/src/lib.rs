@@ -54,7 +54,6 @@ impl Interface {
     }
 }
 
-/// Returns the interfaces; empty if the system does not list them.
 pub fn get_interfaces() -> Vec<Interface> {
     let ipv4 = |at: SockaddrStorage| at.as_sockaddr_in().map(|at| at.ip());
     let ipv6 = |at: SockaddrStorage| at.as_sockaddr_in6().map(|at| at.ip());

@@ -12,21 +12,22 @@ pub(crate) const ENCAPSULATION: usize = 4;
 
 #[derive(Debug, PartialEq, Eq, Error)]
 pub enum Malformed {
-    #[error("encoding {0:#06x} instead of plain CDR; set the robot's middleware to XCDR1")]
+    #[error("its encoding is {0:#06x} instead of plain CDR; set the robot's middleware to XCDR1")]
     Encoding(u16),
-    #[error("it ends early; is the topic of this type?")]
+    #[error("it ends early; check the type of the topic")]
     Short,
-    #[error("{0} elements in a list, and {1} are the most; is the topic of this type?")]
+    #[error("a list has {0} elements, and the limit is {1}; check the type of the topic")]
     Long(usize, usize),
-    #[error("{0} for a flag, and 0 and 1 are all; is the topic of this type?")]
+    #[error("a flag has the value {0} instead of 0 or 1; check the type of the topic")]
     Bool(u8),
-    #[error("a text without its end; is the topic of this type?")]
+    #[error("a string lacks its terminator; check the type of the topic")]
     Text,
-    #[error("a message in {0} layouts of releases of ROS; is the other node of another release?")]
+    #[error(
+        "the message fits {0} layouts of ROS releases instead of one; check the other node's ROS release"
+    )]
     Layouts(usize),
 }
 
-/// Converts for callers that report the reason as text.
 impl From<Malformed> for String {
     fn from(error: Malformed) -> Self {
         error.to_string()
@@ -142,7 +143,6 @@ impl Pass for Reader<'_> {
     }
 }
 
-/// Writer in little-endian order.
 struct Writer {
     bytes: Vec<u8>,
     release: Release,

@@ -19,7 +19,6 @@ pub fn twist([v, omega]: [f64; 2]) -> Twist {
     }
 }
 
-/// Encodes odometry with the covariances of pose and speeds.
 pub fn odometry(
     header: Header,
     child: &str,

@@ -139,7 +139,7 @@ pub struct Participant {
 
 impl Participant {
     /// Joins by the interface with the address `only`, else by all, or only on this machine if the
-    /// ROS environment says so. Fails if DDS cannot start.
+    /// ROS environment says so.
     pub fn join(domain: u16, only: Option<Ipv4Addr>) -> io::Result<Self> {
         let inner = joined(domain, only)?;
         let rung = eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?;
@@ -147,8 +147,7 @@ impl Participant {
         Ok(Self { inner, only, rung, bell })
     }
 
-    /// Rejoins with the same descriptor; earlier readers and writers become useless. Fails if DDS
-    /// cannot start.
+    /// Rejoins with the same descriptor; earlier readers and writers become useless.
     ///
     /// The library's threads end silently if a call is interrupted, as when the process is stopped
     /// and continued.
@@ -168,7 +167,7 @@ impl Participant {
         Ok(Reader { inner: reader, bell: self.bell.clone() })
     }
 
-    /// Returns a [`LateReader`], which joins the same domain. Fails if DDS cannot start.
+    /// Returns a [`LateReader`], which joins the same domain.
     pub fn late_reader(&self, topic: Topic, quality: Quality) -> io::Result<LateReader> {
         let participant = Self::join(self.inner.domain_id(), self.only)?;
         Ok(LateReader { participant, topic, quality, writers: Writers::default(), reader: None })
@@ -315,7 +314,7 @@ pub struct LateReader {
 }
 
 impl LateReader {
-    /// Opens or closes the reader, and returns at most `most` messages. Fails if DDS cannot start.
+    /// Opens or closes the reader, and returns at most `most` messages.
     pub fn take(&mut self, most: usize) -> io::Result<Vec<Message>> {
         let listener = self.participant.inner.status_listener();
         while let Some(status) = listener.try_recv_status() {

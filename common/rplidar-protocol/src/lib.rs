@@ -47,7 +47,6 @@ impl Request {
     }
 }
 
-/// Request reader of a sensor.
 #[derive(Clone, Debug, Default)]
 pub struct Requests {
     held: Vec<u8>,
@@ -197,7 +196,6 @@ pub enum Said {
     Noise,
 }
 
-/// Reader of a host.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     held: Vec<u8>,
@@ -233,8 +231,7 @@ impl Decoder {
         said
     }
 
-    /// Returns the length of the next piece of `rest` and its meaning, if any; `None` while bytes
-    /// are missing.
+    /// Returns the length of the next piece of `rest` and its meaning, if any.
     fn next_piece(&mut self, rest: &[u8]) -> Option<(usize, Option<Said>)> {
         if let State::Answers(kind) = self.state {
             let (length, answer) = kind.answer(rest)?;

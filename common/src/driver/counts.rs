@@ -29,7 +29,6 @@ impl WheelCounts {
         }
     }
 
-    /// Wraps the counts into the cycle.
     pub fn cyclic(self) -> [u16; 2] {
         match self {
             Self::Cyclic(counts) => counts,

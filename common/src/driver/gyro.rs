@@ -70,7 +70,7 @@ impl Compared {
         (self.since_ns, self.turned) = (now_ns, [0.0; 2]);
         self.agrees = (1.0 / AGREES_WITHIN..=AGREES_WITHIN).contains(&(gyro / odometry));
         (!self.agrees).then(|| {
-            format!("a turn of {gyro:.2} rad where odometry has {odometry:.2}, so it is not used")
+            format!("a turn of {gyro:.2} rad contradicts odometry's {odometry:.2} rad, so the gyro is ignored")
         })
     }
 }
@@ -112,7 +112,7 @@ impl Angle {
         let rolled = (right - right_before) - (left - left_before);
         let by_wheels = rolled * body.wheel_radius_m / body.track_m;
         let why = self.compared.take(self.now_ns as i64, [by_wheels, turned])?;
-        Some(format!("gyro: {why}; say its angle counter-clockwise, in the unit of the protocol"))
+        Some(format!("gyro: {why}; send its angle counter-clockwise, in the unit of the protocol"))
     }
 
     /// Returns the turn of a tick. After a gap it only marks where the next one begins.

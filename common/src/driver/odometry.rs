@@ -37,7 +37,7 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// Returns the newest pose and the wheel angles there; `None` before the first.
+    /// Returns the newest pose and the wheel angles there.
     pub fn memory(&self) -> Option<Memory> {
         let Pose2 { position, heading } = self.last?;
         let [left, right] = self.turned;

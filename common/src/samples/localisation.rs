@@ -95,6 +95,6 @@ wire_enum! {
         Far = 5 "a fix is refused: it contradicts the pose",
         TooMany = 6 "a fix is refused: too many came in 2 s; publish fewer",
         /// Fixes have moved the robot as often as permitted.
-        Contradicts = 7 "a fix is refused: fixes have moved the robot twice, and contradict the pose again; look at their source",
+        Contradicts = 7 "a fix is refused: fixes have moved the robot twice and contradict the pose again; check their source",
     }
 }

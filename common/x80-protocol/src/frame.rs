@@ -34,7 +34,6 @@ impl Addressing {
         }
     }
 
-    /// Returns `None` if `rid` is not a robot's.
     pub const fn of_robot(rid: u8) -> Option<Self> {
         match rid {
             0x01 | 0x08 => Some(Self::Numbered),
@@ -48,7 +47,6 @@ impl Addressing {
         rid == 0x08
     }
 
-    /// Returns `None` if `rid` is not a host's.
     pub const fn of_host(rid: u8) -> Option<Self> {
         match rid {
             0x00 => Some(Self::Numbered),
@@ -109,9 +107,7 @@ impl SystemSignal {
 
 /// Well-formed frame without a message of this length or these values. A receiver can continue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error(
-    "DID {did}: no message of it has these data; pass the frame over, or add the DID to the wire module"
-)]
+#[error("DID {did} has unknown data; skip the frame, or add the DID to the wire module")]
 pub struct MessageError {
     pub did: u8,
 }

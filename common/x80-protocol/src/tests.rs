@@ -57,7 +57,6 @@ fn the_worked_acknowledgement_of_the_robot_is_written_and_read() {
     assert_eq!(Report::parse(&decoder.next_frame().unwrap()), Ok(ack));
 }
 
-/// Parses a command's data in a frame of `did`.
 fn parsed(did: u8, data: &[u8]) -> Result<Command, MessageError> {
     Command::parse(&Frame { rid: 1, sn: 0, did, data })
 }

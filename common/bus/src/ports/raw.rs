@@ -88,7 +88,6 @@ dropped_here! {
     BusNode(Node<ipc::Service>);
     /// Wakes the readers of a topic.
     Notifier(notifier::Notifier<ipc::Service>);
-    /// Becomes readable after a publication on a topic.
     Listener(listener::Listener<ipc::Service>);
     RawService(PortFactory<ipc::Service, Bytes, CustomHeaderMarker>);
     PublisherPort(publisher::Publisher<ipc::Service, Bytes, CustomHeaderMarker>);

@@ -76,7 +76,6 @@ static STRUCTS: Topic<Test> = Topic::new(&spec("structs"));
 static SLICES: Topic<Test, Cell> = Topic::new(&spec("slices"));
 static BYTES: Topic<Test, u8> = Topic::new(&spec("bytes"));
 
-/// Runs `test` on a bus of these topics and removes the bus.
 fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
     let domain = Domain::of(format!("{robot}-{}", std::process::id()).parse().unwrap());
     fs::DirBuilder::new().recursive(true).mode(0o700).create(domain.directory()).unwrap();

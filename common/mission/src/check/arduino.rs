@@ -9,50 +9,51 @@ pub(super) fn check(mission: &Mission) -> Result {
     let robot = &mission.robot;
     let board = &robot.arduino;
     if robot.protocol() != Protocol::Arduino {
-        let remedy = "give robot.protocol = \"arduino\" too, or remove it";
-        let problem = "the robot has no Arduino by its protocol";
+        let remedy = "set robot.protocol = \"arduino\", or remove it";
+        let problem = "it applies only to the protocol arduino";
         return refuse_if(!board.is_default(), "robot.arduino", problem, remedy);
     }
     let baud = f64::from(LEAST_BAUD)..=2_000_000.0;
     all_within([
-        ("robot.arduino.baud", f64::from(board.baud), baud, "bits a second"),
+        ("robot.arduino.baud", f64::from(board.baud), baud, "bit/s"),
         ("robot.arduino.pid_rate_hz", board.pid_rate_hz, 1.0..=1000.0, "Hz"),
     ])?;
     refuse_if(
         robot.counts_per_turn.is_none(),
         "robot.counts_per_turn",
-        "nobody says how many counts a turn of a wheel has, and the board says counts",
-        "give robot.counts_per_turn: turn a wheel once by hand and ask the board for `e`",
+        "the board reports counts, but the counts per turn of a wheel are missing",
+        "measure robot.counts_per_turn: turn a wheel once by hand, and ask the board for `e`",
     )?;
     let step_m_s = board.pid_rate_hz * mission.body().metres_per_count();
     refuse_if(
         step_m_s > GREATEST_STEP_M_S,
         "robot.counts_per_turn",
         format!(
-            "one count in each run of the speed loop is {step_m_s:.2} m/s, and the board takes whole counts"
+            "the smallest speed step is {step_m_s:.2} m/s: one count in each run of the firmware's speed loop"
         ),
-        "give the wheels encoders of more counts, or lower the rate of the firmware's loop and robot.arduino.pid_rate_hz",
+        "use encoders with more counts, or lower the rate of the firmware's loop and robot.arduino.pid_rate_hz",
     )?;
     let mut table = mission.sensor_table();
     table.retain(|sensor| sensor.model.rplidar().is_none());
     if let Some(other) = table.iter().find(|sensor| sensor.kind != SensorKind::Cone) {
-        let problem = format!("{:?} is no sonar, and the board has no other sensor", other.name);
-        let remedy = "give rows of robot.sensor that are of kind cone, or RPLIDARs";
+        let problem =
+            format!("{:?} is not a sonar, the only kind of sensor on the board", other.name);
+        let remedy = "give only rows of kind cone, or RPLIDARs, in robot.sensor";
         return Err(objection("robot.sensor", problem, remedy));
     }
     const PINS: &str = "robot.arduino.sonars";
     if let Some(silent) = table.iter().find(|sensor| !board.sonars.contains_key(&sensor.name)) {
-        let problem = format!("no pin is that of the sonar {:?}", silent.name);
+        let problem = format!("the sonar {:?} has no pin", silent.name);
         let remedy = format!("add it: robot.arduino.sonars = {{ {} = 4 }}", silent.name);
         return Err(objection(PINS, problem, remedy));
     }
     for (name, pin) in &board.sonars {
         let is_other = !table.iter().any(|sensor| sensor.name == *name);
-        let problem = format!("it names {name:?}, and no sonar is called so");
+        let problem = format!("no sonar is named {name:?}");
         refuse_if(is_other, PINS, problem, "give the name of a row of robot.sensor")?;
         let uses = board.sonars.values().filter(|its_pin| *its_pin == pin).count();
-        let problem = format!("pin {pin} is that of two sonars");
-        refuse_if(uses > 1, PINS, problem, "give each a pin of its own")?;
+        let problem = format!("two sonars share pin {pin}");
+        refuse_if(uses > 1, PINS, problem, "give each its own pin")?;
     }
     Ok(())
 }
@@ -82,16 +83,16 @@ mod tests {
         let second = FRONT.replace("'front'", "'left'").replace("= 1\n", "= 2\n");
         let scan = "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nforward_m = 0\nbearing_deg = 0\n";
         for (text, problem) in [
-            (ROBOT.to_owned(), "\"infrared-0\" is no sonar"),
-            (with("") + scan, "\"laser\" is no sonar"),
-            (with("robot.model = 'car'"), "a car's steering"),
+            (ROBOT.to_owned(), "\"infrared-0\" is not a sonar"),
+            (with("") + scan, "\"laser\" is not a sonar"),
+            (with("robot.model = 'car'"), "can steer a car"),
             (without("robot.counts_per_turn = 1320\n"), "ask the board for `e`"),
             (with("").replace("1320", "20"), "one count in each run"),
             (without("robot.arduino.sonars = { front = 4 }\n"), "sonars = { front = 4 }"),
             (with("").replace("front = 4", "front = 4, nose = 5"), "\"nose\""),
             (
                 with("").replace("front = 4", "front = 4, left = 4") + &second,
-                "pin 4 is that of two",
+                "two sonars share pin 4",
             ),
             (with("").replace("front = 4", "front = 256"), "256"),
             (with("robot.arduino.baud = 9600"), "19200"),

@@ -25,7 +25,7 @@ pub(super) fn check(mission: &Mission) -> Result {
     refuse_if(
         robot.protocol() != Protocol::X80 && body.steering.is_some(),
         "robot.protocol",
-        "a car's steering has no word in lines of JSON, topics of ROS or requests to an Arduino",
+        "only the x80 protocol can steer a car",
         "give \"x80\", or another robot.model",
     )?;
     steering(mission)?;
@@ -33,9 +33,10 @@ pub(super) fn check(mission: &Mission) -> Result {
         within(key, value, range, "")?;
     }
     if !robot.footprint.is_empty() {
-        let remedy = "list it as [[x, y], ...] in metres of the robot's frame";
-        let footprint = Footprint::new(&robot.footprint)
-            .map_err(|rule| objection("robot.footprint", format!("no outline: {rule}"), remedy))?;
+        let remedy = "list it as [[x, y], ...] in metres, in the robot's frame";
+        let footprint = Footprint::new(&robot.footprint).map_err(|rule| {
+            objection("robot.footprint", format!("the outline is invalid: {rule}"), remedy)
+        })?;
         let covers_m = footprint.circumscribed_m();
         refuse_if(
             body.radius_m < covers_m - 1e-6,
@@ -64,20 +65,20 @@ pub(super) fn check(mission: &Mission) -> Result {
     refuse_if(
         limit_s * rate_hz <= 1.0,
         "robot.command_limit_s",
-        format!("a command would go stale before the next tick: {limit_s} s at {rate_hz} Hz"),
+        format!("a command expires before the next tick: {limit_s} s at {rate_hz} Hz"),
         "raise robot.command_limit_s or robot.rate_hz",
     )?;
     refuse_if(
         robot.gyro() && !matches!(robot.protocol(), Protocol::Json | Protocol::Arduino),
         "robot.gyro",
-        "only the lines of JSON and of an Arduino have a word for a gyro",
-        "give robot.ros2.imu to a robot of ROS 2, or remove it",
+        "only the protocols json and arduino report a gyro through this key",
+        "set robot.ros2.imu for a ROS 2 robot, or remove it",
     )?;
     let (left, right) = (robot.left.channel, robot.right.channel);
     refuse_if(
         left > 1 || right > 1 || left == right,
         "robot.left",
-        format!("wheels on channels {left} and {right}"),
+        format!("the wheels have channels {left} and {right}"),
         "put one on channel 0 and one on channel 1",
     )?;
     // At most a third of the counter's half cycle per tick keeps wraparound unambiguous with a tick
@@ -88,7 +89,7 @@ pub(super) fn check(mission: &Mission) -> Result {
         has_counter && counts > 32_768.0 / 6.0,
         "robot.rate_hz",
         format!(
-            "at top speed a wheel makes {counts:.0} counts a tick, and the counter wraps at 32768"
+            "at top speed a wheel makes {counts:.0} counts per tick, and the counter wraps at 32768"
         ),
         "raise robot.rate_hz or lower robot.top_speed_m_s",
     )
@@ -112,7 +113,7 @@ fn steering(mission: &Mission) -> Result {
     refuse_if(
         !mission.simulation.blocks.is_empty(),
         "simulation.block",
-        "wheels of a car are not blocked",
+        "the simulation cannot block the wheels of a car",
         "remove it, or choose another robot.model",
     )?;
     let [limit, rate] = [steering.limit_rad, steering.rate_rad_s].map(f64::to_degrees);

@@ -11,14 +11,14 @@ pub(super) fn check(mission: &Mission) -> Result {
     refuse_if(
         is_domain && !speaks,
         "robot.address",
-        "a ROS domain, and the robot speaks no ROS 2",
-        "give robot.protocol = \"ros2\" too, or another address",
+        "the address is a ROS domain, but robot.protocol is not \"ros2\"",
+        "set robot.protocol = \"ros2\", or give another address",
     )?;
     refuse_if(
         !speaks && !robot.ros2.is_default(),
         "robot.ros2",
-        "the robot speaks no ROS 2",
-        "give robot.protocol = \"ros2\" too, or remove it",
+        "it applies only to the protocol ros2",
+        "set robot.protocol = \"ros2\", or remove it",
     )?;
     if !speaks {
         return Ok(());
@@ -26,8 +26,8 @@ pub(super) fn check(mission: &Mission) -> Result {
     refuse_if(
         !is_domain,
         "robot.address",
-        "a robot that speaks ROS 2 has a domain",
-        "give \"ros2\" for the domain that ROS_DOMAIN_ID names, or \"ros2:0\"",
+        "a ROS 2 robot needs a domain as its address",
+        "give \"ros2\" for the domain in ROS_DOMAIN_ID, or \"ros2:0\"",
     )?;
     let topics = &robot.ros2;
     let named = [&topics.odom, &topics.scan, &topics.cmd_vel, &topics.battery];
@@ -35,7 +35,12 @@ pub(super) fn check(mission: &Mission) -> Result {
         named.into_iter().chain(&topics.imu).chain(&topics.hazards).chain(topics.ranges.values())
     {
         let remedy = "use letters, digits and '_' between slashes, as in \"/robot/odom\"";
-        refuse_if(!is_topic(name), "robot.ros2", format!("{name:?} is no topic of ROS"), remedy)?;
+        refuse_if(
+            !is_topic(name),
+            "robot.ros2",
+            format!("{name:?} is not a ROS topic name"),
+            remedy,
+        )?;
     }
     let table = mission.sensor_table();
     let lasers = mission.lasers_of_base();
@@ -44,15 +49,15 @@ pub(super) fn check(mission: &Mission) -> Result {
     let lasers = lasers.iter().map(|(_, laser)| laser).filter(|_| lasers.len() > 1);
     let mut rangers = table.iter().filter(|sensor| sensor.kind != SensorKind::Scan).chain(lasers);
     if let Some(silent) = rangers.find(|sensor| !is_named(sensor)) {
-        let problem = format!("no topic is that of the sensor {:?}", silent.name);
-        let remedy = "name it in robot.ros2.ranges, or give other rows of robot.sensor";
+        let problem = format!("no topic is set for the sensor {:?}", silent.name);
+        let remedy = "name its topic in robot.ros2.ranges, or remove its row from robot.sensor";
         return Err(objection("robot.ros2", problem, remedy));
     }
     for name in topics.ranges.keys() {
         let touches = mission.touches();
         let is_other = !table.iter().any(|row| row.name == *name)
             && !touches.iter().any(|row| row.name == *name);
-        let problem = format!("robot.ros2.ranges names {name:?}, and no sensor is called so");
+        let problem = format!("robot.ros2.ranges names {name:?}, but no sensor has that name");
         refuse_if(is_other, "robot.ros2", problem, "give the name of a row of robot.sensor")?;
     }
     Ok(())
@@ -92,9 +97,9 @@ mod tests {
         let at = format!("{ROBOT}robot.address = 'ros2:3'\n");
         for bad in ["", "/", "/a//b", "/odom/", "/7", "/a b", &"x".repeat(201)] {
             let refusal = refusal(&format!("{at}robot.ros2.odom = '{bad}'"));
-            assert!(refusal.contains("no topic of ROS"), "{refusal}");
+            assert!(refusal.contains("not a ROS topic name"), "{refusal}");
             let refusal = self::refusal(&format!("{at}robot.ros2.imu = '{bad}'"));
-            assert!(refusal.contains("no topic of ROS"), "{refusal}");
+            assert!(refusal.contains("not a ROS topic name"), "{refusal}");
         }
         let named = refusal(&format!("{at}robot.ros2.ranges = {{ nose = '/nose' }}"));
         assert!(named.contains("\"nose\""), "{named}");
@@ -108,6 +113,6 @@ mod tests {
         let named = two("robot.ros2.ranges = { front = '/f', back = '/b' }");
         Mission::parse(&named, Path::new("m.toml")).unwrap();
         let x80 = at.replace("turtlebot3-burger", "x80");
-        assert!(refusal(&x80).contains("no topic is that of the sensor \"front\""));
+        assert!(refusal(&x80).contains("no topic is set for the sensor \"front\""));
     }
 }

@@ -15,7 +15,7 @@ pub(super) fn check(mission: &Mission) -> Result {
         ("sonar.bearing_deg", sonar.bearing_deg, -180.0..=180.0, "degrees"),
     ])?;
     let rows = &mission.robot.sensors;
-    let problem = format!("{} rows, and a sample holds {MOST_SENSORS}", rows.len());
+    let problem = format!("{} rows exceed the limit of {MOST_SENSORS}", rows.len());
     refuse_if(rows.len() > MOST_SENSORS, KEY, problem, "remove some")?;
     let speaks_x80 = mission.robot.protocol() == Protocol::X80;
     for (index, row) in rows.iter().enumerate() {
@@ -26,23 +26,23 @@ pub(super) fn check(mission: &Mission) -> Result {
         }
         let mut earlier = rows[..index].iter();
         let is_called_so = earlier.clone().any(|other| other.name == *name);
-        refuse_if(is_called_so, KEY, format!("two are called {name:?}"), "rename one")?;
+        refuse_if(is_called_so, KEY, format!("two rows are named {name:?}"), "rename one")?;
         let is_shared =
             speaks_x80 && earlier.any(|it| (it.kind, it.channel) == (*kind, row.channel));
-        let problem = format!("{name:?} has the channel of another {kind:?}");
-        refuse_if(is_shared, KEY, problem, "give each a channel of its own")?;
+        let problem = format!("{name:?} shares its channel with another {kind:?}");
+        refuse_if(is_shared, KEY, problem, "give each its own channel")?;
     }
     let written = |kind| rows.iter().filter(|row| row.kind == kind).count();
     let lasers = written(SensorKind::Scan);
-    let problem = format!("{lasers} rows are lasers, and a robot has at most {MOST_LASERS}");
+    let problem = format!("{lasers} lasers exceed the limit of {MOST_LASERS}");
     refuse_if(lasers > MOST_LASERS, KEY, problem, "remove some")?;
     let beams: usize = mission.lasers().iter().map(|(_, laser)| laser.beams).sum();
-    let problem = format!("the lasers have {beams} beams, and together {MOST_BEAMS} are the most");
+    let problem = format!("the lasers have {beams} beams in total, and the limit is {MOST_BEAMS}");
     refuse_if(beams > MOST_BEAMS, KEY, problem, "give some of them fewer beams")?;
     refuse_if(
         speaks_x80 && !mission.lasers_of_base().is_empty(),
         KEY,
-        "the boards of an X80 have no laser",
+        "an X80 supports only RPLIDARs as lasers",
         "remove it, give it the model rplidar-a1 or rplidar-c1, or give robot.protocol = \"json\" or \"ros2\"",
     )?;
     wire(mission)?;
@@ -51,8 +51,8 @@ pub(super) fn check(mission: &Mission) -> Result {
     refuse_if(
         !rows.is_empty() && *sonar != SonarConfig::default(),
         "sonar",
-        "it is written beside robot.sensor",
-        "remove it: the rows of robot.sensor say where the front sonar is",
+        "it conflicts with robot.sensor",
+        "remove it: the rows of robot.sensor place the front sonar",
     )?;
     let used = |kind| mission.used(kind);
     let lacks = match mission.sensors {
@@ -70,8 +70,8 @@ pub(super) fn name(key: &'static str, name: &str) -> Result {
     refuse_if(
         name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(plain),
         key,
-        format!("{name:?} is no name of a sensor"),
-        format!("use letters, digits and '-', at most {LONGEST_NAME}"),
+        format!("{name:?} is invalid as a sensor name"),
+        format!("use at most {LONGEST_NAME} letters, digits and '-'"),
     )
 }
 
@@ -87,20 +87,20 @@ fn row(row: &SensorRow, rate_hz: f64) -> Result {
     refuse_if(
         row.turned_deg != 0.0 && !is_scan,
         KEY,
-        "only a laser may look elsewhere than outward",
+        "turned_deg applies only to a laser",
         "remove turned_deg",
     )?;
     refuse_if(
         *roll_deg != 0.0 && (*roll_deg != 180.0 || !is_scan),
         KEY,
-        format!("roll_deg is {roll_deg} of {name:?}"),
-        "give 180 for a laser that is mounted upside down, and nothing for other sensors",
+        format!("{name:?} has roll_deg = {roll_deg}"),
+        "give 180 for a laser that is mounted upside down, and remove the key for other sensors",
     )?;
     all_within([(KEY, row.height_m.unwrap_or_default(), 0.0..=5.0, "m of height_m")])?;
     let has_height = row.height_m.is_some();
-    refuse_if(has_height && !is_scan, KEY, "only a laser has a height_m", "remove it")?;
+    refuse_if(has_height && !is_scan, KEY, "height_m applies only to a laser", "remove it")?;
     if let Some(model) = row.model {
-        let problem = format!("{model:?} is no {kind:?}");
+        let problem = format!("model {model:?} is not of kind {kind:?}");
         let is_other = model.product().kind != *kind;
         refuse_if(is_other, KEY, problem, "remove model, or change kind")?;
     }
@@ -130,8 +130,11 @@ fn wire(mission: &Mission) -> Result {
     refuse_if(
         rplidars.len() > 1 && !is_real,
         KEY,
-        format!("{} lasers have lines of their own, and a simulated robot has one", rplidars.len()),
-        "keep one, or give robot.protocol = \"json\", whose robot has the others",
+        format!(
+            "{} lasers have their own wires, and a simulated robot supports one",
+            rplidars.len()
+        ),
+        "keep one, or set robot.protocol = \"json\", with which the robot sends the others",
     )?;
     for row in &mission.robot.sensors {
         let own = rplidars.iter().find(|(_, sensor, _)| sensor.name == row.name);
@@ -139,25 +142,30 @@ fn wire(mission: &Mission) -> Result {
         refuse_if(
             has_address && own.is_none(),
             KEY,
-            format!("{name:?} has an address, and only RPLIDARs have wires of their own"),
+            format!("{name:?} has an address, but only RPLIDARs have their own wires"),
             "remove it, or give model = \"rplidar-a1\" or \"rplidar-c1\"",
         )?;
         if let Some(address) = &row.address {
             let parsed = address.parse::<Address<String>>();
             let is_wire = parsed.is_ok_and(|address| !matches!(address, Address::Ros2(_)));
-            let problem = format!("{address:?} is no address of a laser");
-            refuse_if(!is_wire, KEY, problem, "give \"serial:///dev/ttyUSB1\"")?;
+            let problem = format!("{address:?} is invalid as the address of a laser");
+            refuse_if(
+                !is_wire,
+                KEY,
+                problem,
+                "give a serial line such as \"serial:///dev/ttyUSB1\"",
+            )?;
         }
         refuse_if(
             own.is_some() && is_real != has_address,
             KEY,
-            format!("of {name:?} and the robot one is real, the other simulated"),
+            format!("of the laser {name:?} and the robot, one is real and the other simulated"),
             "give both address and robot.address, or neither",
         )?;
         refuse_if(
             own.is_some_and(|(_, sensor, _)| sensor.field_of_view_deg < 360.0),
             KEY,
-            format!("{name:?} sees all around"),
+            format!("{name:?} always has a field of view of 360 degrees"),
             "remove field_of_view_deg",
         )?;
     }
@@ -166,7 +174,8 @@ fn wire(mission: &Mission) -> Result {
 
 fn its_channel(row: &SensorRow) -> Result {
     let number = row.channel.ok_or_else(|| {
-        let problem = format!("{:?} has no channel, by which an X80 sends its readings", row.name);
+        let problem =
+            format!("{:?} has no channel, and an X80 sends readings by channel", row.name);
         let remedy = "give channel: 0 to 5 for a sonar, 0 to 6 for an infrared ranger";
         objection(KEY, problem, remedy)
     })?;
@@ -201,19 +210,19 @@ mod tests {
             (FRONT.replace("= 1", "= 6"), "channel 6"),
             (FRONT.replace("cone", "ray").replace("= 1", "= 7"), "channel 7"),
             (FRONT.replace("cone", "ray"), "no row is a cone"),
-            (FRONT.replace("'front'", "'a b'"), "no name"),
+            (FRONT.replace("'front'", "'a b'"), "invalid as a sensor name"),
             (FRONT.replace("bearing_deg = 0", "bearing_deg = 200"), "bearing_deg"),
             (FRONT.replace("0.19", "nan"), "forward_m"),
             (FRONT.replace("channel = 1\n", ""), "\"front\" has no channel"),
-            (format!("{FRONT}roll_deg = 180"), "roll_deg is 180 of \"front\""),
+            (format!("{FRONT}roll_deg = 180"), "\"front\" has roll_deg = 180"),
             (format!("{FRONT}reach_m = 3"), "reach_m"),
             (format!("{FRONT}field_of_view_deg = 90"), "field_of_view_deg"),
             (format!("{FRONT}rate_hz = 100"), "rate_hz"),
-            (format!("{FRONT}turned_deg = 90"), "only a laser"),
+            (format!("{FRONT}turned_deg = 90"), "only to a laser"),
             (format!("{FRONT}turned_deg = 200"), "turned_deg"),
             (format!("{FRONT}model = 'x80-infrared'"), "X80Infrared"),
-            (second("").replace("'second'", "'front'"), "two are called"),
-            (second(""), "channel of another"),
+            (second("").replace("'second'", "'front'"), "two rows are named"),
+            (second(""), "shares its channel"),
             (many, "17 rows"),
         ] {
             let refusal = refusal(&text);
@@ -255,9 +264,9 @@ mod tests {
             crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
         }
         for (text, problem) in [
-            (many(5, "json", ""), "5 rows are lasers"),
+            (many(5, "json", ""), "5 lasers exceed"),
             (many(2, "json", "beams = 9000"), "18000 beams"),
-            (many(2, "arduino", "model = 'rplidar-a1'"), "2 lasers have lines of their own"),
+            (many(2, "arduino", "model = 'rplidar-a1'"), "2 lasers have their own wires"),
             (many(1, "json", "height_m = -1"), "height_m"),
         ] {
             let refusal = refusal(&text);
@@ -290,12 +299,12 @@ mod tests {
             assert_eq!(!mission.rplidars().is_empty(), own, "{text}");
         }
         for (robot, row, problem) in [
-            ("'x80'", "", "no laser"),
+            ("'x80'", "", "only RPLIDARs"),
             (real, a1, "one is real"),
             ("'arduino'", &*at("serial:///dev/b"), "one is real"),
-            (real, &*at("ros2"), "no address of a laser"),
-            (real, &*at("dev"), "no address of a laser"),
-            ("'arduino'", "model = 'rplidar-a1'\nfield_of_view_deg = 90", "sees all around"),
+            (real, &*at("ros2"), "invalid as the address"),
+            (real, &*at("dev"), "invalid as the address"),
+            ("'arduino'", "model = 'rplidar-a1'\nfield_of_view_deg = 90", "view of 360 degrees"),
             ("'json'", "address = 'serial:///dev/b'", "only RPLIDARs"),
         ] {
             let text = mission(robot, row).replace("target = [3, 0]\n", "");

@@ -27,7 +27,12 @@ impl Checker {
             let allowed = |byte: u8| matches!(byte, b'a'..=b'z' | b'0'..=b'9' | b'-');
             let is_name = (1..=16).contains(&name.len()) && name.bytes().all(allowed);
             let problem = format!("{name:?} cannot name a robot");
-            refuse_if(!is_name, "simulation.other", problem, "use 1 to 16 of a-z, 0-9 and '-'")?;
+            refuse_if(
+                !is_name,
+                "simulation.other",
+                problem,
+                "use 1 to 16 characters of a-z, 0-9 and '-'",
+            )?;
         }
         at_most("simulation.hole", simulation.holes.len(), MAX_THINGS, "holes")?;
         for hole in &simulation.holes {
@@ -45,7 +50,7 @@ impl Checker {
         at_most(KEY, thing.moves.len(), MAX_MOVES, "moves of one thing")?;
         let mut earliest = 0.0;
         for station in &thing.moves {
-            within(KEY, station.at_s, earliest..=MAX_TIMEOUT_S, "s of at_s, in order,")?;
+            within(KEY, station.at_s, earliest..=MAX_TIMEOUT_S, "s of at_s (ascending)")?;
             point(KEY, station.by)?;
             earliest = station.at_s;
         }

@@ -86,7 +86,7 @@ fn a_zone_is_a_polygon_without_the_start_and_the_targets() {
         ("[[1, 1], [2, 1]]", "a zone has 2 corners"),
         ("[[-1, -1], [1, -1], [0, 1]]", "the robot starts in a zone"),
         ("[[2, 0], [4, 0], [4, 1], [2, 1]]", "the target [3, 0.5] lies inside a zone"),
-        ("[[1, 1], [2, nan], [2, 2]]", "is not a place"),
+        ("[[1, 1], [2, nan], [2, 2]]", "is not a position"),
     ] {
         let said = refusal(&zone(points));
         assert!(said.starts_with("m.toml:2: zone: ") && said.contains(problem), "{said}");
@@ -119,7 +119,7 @@ fn every_refusal_names_line_and_key() {
         ("target = [3, 0", "m.toml:1: "),
         (
             "target = [3, 0]\n[[world.drum]]\nat = [0.3, 0]\nradius_m = 0.2",
-            "m.toml:2: world: something stands 0.10 m from the start",
+            "m.toml:2: world: a shape stands 0.10 m from the start",
         ),
         (
             "target = [3, 0]\n[robot]\nleft = { channel = 1, reversed = true }",
@@ -177,7 +177,7 @@ fn a_car_that_is_to_look_first_is_remarked_on_with_its_turning_radius() {
     let remarks = |text: &str| Mission::parse(text, Path::new("m.toml")).unwrap().remarks;
     let remark = &remarks(car)[0];
     assert!(
-        remark.starts_with("m.toml:2: robot.model: a car turns in no less than 0.31 m"),
+        remark.starts_with("m.toml:2: robot.model: a car's turning radius is at least 0.31 m"),
         "{remark}"
     );
     assert!(remarks(&format!("{car}\nmethod = 'paper'")).is_empty());
@@ -239,7 +239,7 @@ fn no_number_of_a_list_that_is_too_long_is_dropped_in_silence() {
     ] {
         let refused = Mission::parse(text, Path::new("m.toml")).unwrap_err().to_string();
         assert!(
-            refused.contains(&format!("{key}: 3 values are given, and 2 are read")),
+            refused.contains(&format!("{key}: the list has 3 values instead of 2")),
             "{refused}"
         );
     }

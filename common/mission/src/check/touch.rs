@@ -6,12 +6,12 @@ const KEY: &str = "robot.touch";
 pub(super) fn check(mission: &Mission) -> Result {
     let robot = &mission.robot;
     let rows = &robot.touches;
-    let problem = format!("{} rows, and {MOST_TOUCHES} are the most", rows.len());
+    let problem = format!("{} rows exceed the limit of {MOST_TOUCHES}", rows.len());
     refuse_if(rows.len() > MOST_TOUCHES, KEY, problem, "remove some")?;
     refuse_if(
         !rows.is_empty() && !robot.protocol().has_scans(),
         KEY,
-        "the robot's protocol has no word for them",
+        "the robot's protocol does not carry touch sensors",
         "remove them, or give robot.protocol = \"json\" or \"ros2\"",
     )?;
     let sensors = mission.sensor_table();
@@ -25,13 +25,13 @@ pub(super) fn check(mission: &Mission) -> Result {
         ])?;
         let is_taken = rows[..index].iter().any(|other| other.name == *name)
             || sensors.iter().any(|sensor| sensor.name == *name);
-        refuse_if(is_taken, KEY, format!("two are called {name:?}"), "rename one")?;
+        refuse_if(is_taken, KEY, format!("two rows are named {name:?}"), "rename one")?;
         let is_heard = robot.ros2.hazards.is_some() || robot.ros2.ranges.contains_key(name);
         refuse_if(
             robot.protocol() == Protocol::Ros2 && !is_heard,
             KEY,
-            format!("no topic says what {name:?} feels"),
-            "name one of std_msgs/Bool in robot.ros2.ranges, or give robot.ros2.hazards",
+            format!("no topic is set for {name:?}"),
+            "name a std_msgs/Bool topic in robot.ros2.ranges, or set robot.ros2.hazards",
         )?;
     }
     Ok(())
@@ -49,11 +49,11 @@ mod tests {
         let good = format!("{ros2}robot.ros2.ranges = {{ nose = '/bump' }}\n{row}");
         crate::Mission::parse(&good, std::path::Path::new("m.toml")).unwrap();
         for (text, problem) in [
-            (format!("target = [3, 0]\n{row}"), "no word for them"),
-            (format!("{ros2}{row}"), "no topic says"),
-            (format!("{robot}{row}{row}"), "two are called"),
-            (format!("{robot}{}", row.replace("nose", "laser")), "two are called"),
-            (format!("{robot}{}", row.replace("nose", "a b")), "no name"),
+            (format!("target = [3, 0]\n{row}"), "does not carry touch sensors"),
+            (format!("{ros2}{row}"), "no topic is set"),
+            (format!("{robot}{row}{row}"), "two rows are named"),
+            (format!("{robot}{}", row.replace("nose", "laser")), "two rows are named"),
+            (format!("{robot}{}", row.replace("nose", "a b")), "invalid as a sensor name"),
             (format!("{robot}{row}wide_deg = 190"), "wide_deg"),
             (format!("{robot}{}", row.repeat(17)), "17 rows"),
         ] {

@@ -28,7 +28,6 @@ impl Pass for Random {
     }
 }
 
-/// Writer in big-endian order.
 struct Big(Vec<u8>, Release);
 
 impl Pass for Big {

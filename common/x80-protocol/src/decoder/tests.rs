@@ -171,7 +171,6 @@ fn every_byte_is_accounted_for() {
     assert_eq!((tally.frames, tally.bad_crc, tally.noise_bytes), (1, 1, 13));
 }
 
-/// Piece of a stream under test.
 #[derive(Clone, Debug)]
 enum Piece {
     Untouched { did: u8, data: Vec<u8> },
@@ -180,7 +179,6 @@ enum Piece {
     Noise(Vec<u8>),
 }
 
-/// Generates bytes with more headers and ends than by chance.
 fn tricky_bytes(most: usize) -> impl Strategy<Value = Vec<u8>> {
     let byte = prop_oneof![
         3 => any::<u8>(),
