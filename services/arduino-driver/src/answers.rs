@@ -19,7 +19,7 @@ pub(crate) enum Answer {
 impl Answer {
     /// Parses a line without line feed; the error says why it is no answer.
     pub(crate) fn parse(line: &[u8]) -> Result<Self, String> {
-        let none = || format!("{:?} is no answer of the board", String::from_utf8_lossy(line));
+        let none = || format!("{:?} is an unknown answer", String::from_utf8_lossy(line));
         let line = line.strip_suffix(b"\r").unwrap_or(line);
         // A carriage return within marks a lost line feed, after the end of another answer.
         let text = std::str::from_utf8(line).map_err(|_| none())?.trim_matches(' ');
@@ -79,7 +79,10 @@ mod tests {
             "",
             "\r\r",
         ] {
-            assert!(Answer::parse(line.as_bytes()).unwrap_err().contains("no answer"), "{line:?}");
+            assert!(
+                Answer::parse(line.as_bytes()).unwrap_err().contains("unknown answer"),
+                "{line:?}"
+            );
         }
         assert!(Answer::parse(b"\xff\xfe 1").is_err());
     }

@@ -133,9 +133,9 @@ impl Arduino {
                 heard.motion = Some(self.motion(counts, since));
             }
             (Answer::Invalid, _) => {
-                return Err("the board says that a request was none: it arrived garbled".to_owned());
+                return Err("the board reports an invalid request; it arrived garbled".to_owned());
             }
-            (_, _) => return Err(format!("{:?} answers no request", text(line))),
+            (_, _) => return Err(format!("{:?} is an unexpected answer", text(line))),
         }
         Ok(())
     }
@@ -188,7 +188,7 @@ impl Driver for Arduino {
         if lines.len() > MOST_AT_ONCE {
             let dropped = lines.drain(MOST_AT_ONCE..).map(|line| line.len()).sum::<usize>();
             self.tally.bytes_dropped += dropped as u64;
-            heard.refused = Some("more lines than were asked for".into());
+            heard.refused = Some("the board sends more lines than requested".into());
             self.begin_anew();
         }
         for line in lines {
@@ -228,7 +228,7 @@ impl Base for Arduino {
             let asked = self.sonars.get(ranges.len());
             let asked = asked.map_or_else(|| "e".to_owned(), |(pin, ..)| format!("p {pin}"));
             self.dropped = Some(format!(
-                "the answer to `{asked}` is overdue by robot.command_limit_s: is that sonar connected, are all bytes carried?"
+                "the answer to `{asked}` is overdue by robot.command_limit_s; check that the sonar is connected and that the line loses no bytes"
             ));
             self.begin_anew();
         }

@@ -19,7 +19,6 @@ fn mission(set: &str) -> Mission {
     Mission::parse(&text, Path::new("m.toml")).unwrap()
 }
 
-/// Returns a driver that got its baud rate.
 fn driver() -> Arduino {
     let mut driver = Arduino::new(&mission(""));
     assert_eq!(polled(&mut driver), "\rb\r");
@@ -88,12 +87,12 @@ fn nothing_is_asked_while_a_round_is_unanswered() {
 fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
     for (bad, why) in [
         // A lost answer: pin 5's stands in for pin 4's.
-        ("34\r\n1 2\r\n", "\"1 2\" answers no request"),
-        ("12\r\n34\r\n56\r\n1 2\r\n", "\"56\" answers no request"),
+        ("34\r\n1 2\r\n", "\"1 2\" is an unexpected answer"),
+        ("12\r\n34\r\n56\r\n1 2\r\n", "\"56\" is an unexpected answer"),
         ("Invalid Command\r\n", "garbled"),
-        ("1#\r\n34\r\n1 2\r\n", "\"1#\\r\" is no answer"),
-        ("12\r34\r\n1 2\r\n", "is no answer"),
-        ("57600\r\n", "answers no request"),
+        ("1#\r\n34\r\n1 2\r\n", "\"1#\\r\" is an unknown answer"),
+        ("12\r34\r\n1 2\r\n", "is an unknown answer"),
+        ("57600\r\n", "is an unexpected answer"),
     ] {
         let mut driver = driver();
         let said = round(&mut driver, bad);

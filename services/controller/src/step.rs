@@ -261,7 +261,7 @@ impl Controller {
                 let v = self.tangential(alignment, omega, distance);
                 Some(Twist { v, omega })
             }
-            // Backs straight. A body that is no disc may lack room to turn, and an approaching
+            // Backs straight. A non-circular body may lack room to turn, and an approaching
             // obstacle leaves no time.
             (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential)
                 if limit < 0.0 =>

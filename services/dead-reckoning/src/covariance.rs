@@ -177,7 +177,6 @@ mod tests {
 
     const AHEAD: Twist = Twist { v: 0.002, omega: 0.0 };
 
-    /// Returns the covariance after `steps` equal motions.
     fn drive(model: &ErrorModel, steps: usize, moved: Twist) -> [f64; 6] {
         let (mut pose, mut covariance) = (Pose2::default(), model.start());
         for _ in 0..steps {

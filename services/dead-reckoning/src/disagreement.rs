@@ -65,25 +65,27 @@ pub(crate) enum Cause {
 impl Cause {
     pub(crate) fn words(self) -> String {
         let cause = match self {
-            Self::Mirrored => "its beams are mirrored: is roll_deg of its row right?".to_owned(),
+            Self::Mirrored => {
+                "the laser's beams are mirrored; check roll_deg of its row".to_owned()
+            }
             Self::Late(by_s) => format!(
-                "its scans are {by_s:.2} s later than their stamps say: mend the stamps, or the clocks"
+                "the laser's scans are {by_s:.2} s later than their stamps; correct the stamps, or synchronise the clocks"
             ),
             Self::Turned(left) => format!(
-                "it looks {:.0} degrees further to the left than its row says: correct turned_deg",
+                "the laser looks {:.0} degrees further to the left than its row states; correct turned_deg",
                 left.to_degrees()
             ),
             Self::Way(factor) => format!(
-                "the robot goes {factor:.2} of the way that its wheels say: correct robot.counts_per_turn or wheel_radius_m"
+                "the robot travels {factor:.2} of the distance that its wheels report; correct robot.counts_per_turn or wheel_radius_m"
             ),
             Self::Uneven(ratio) => format!(
-                "the right wheel goes {ratio:.2} of the left one's way for the same counts: check encoders and wheels, or `firsthand calibrate`"
+                "the right wheel travels {ratio:.2} of the left wheel's distance for the same counts; check encoders and wheels, or run `firsthand calibrate`"
             ),
             Self::Turn(factor) => format!(
-                "the robot turns {factor:.2} of what its wheels say: correct robot.track_m, or `firsthand calibrate`"
+                "the robot turns {factor:.2} of the angle that its wheels report; correct robot.track_m, or run `firsthand calibrate`"
             ),
         };
-        format!("laser and wheels disagree on every motion, so the pose is unsure: {cause}")
+        format!("laser and wheels disagree on every motion, so the pose is uncertain: {cause}")
     }
 }
 
@@ -108,7 +110,6 @@ impl Disagreement {
     }
 
     /// Compares the two fixes before `newest` with the last 2 s of ticks, which reach beyond them.
-    /// Returns a new cause.
     pub(crate) fn compare(
         &mut self,
         newest: &Fix,
@@ -198,7 +199,6 @@ impl Disagreement {
         way.or(turn.map(|turns| Cause::Turn(turns.a[0])))
     }
 
-    /// Returns the delay, seconds, if turns agree far better with it.
     fn late(&self) -> Option<f64> {
         let unshifted = self.shifted[(-FIRST_SHIFT_S / SHIFT_STEP_S).round() as usize];
         let best = (1..SHIFTS - 1)

@@ -62,7 +62,7 @@ impl Doubt {
         }
         self.is_told = true;
         Some(format!(
-            "the right wheel counts {told_ratio:.2} times the share of its commanded way that the left one counts: either may be wrong, so the pose is unsure by {:.1} m and more: check encoders and wheels",
+            "relative to the commands, the right wheel counts {told_ratio:.2} times as much as the left, so the pose is uncertain by {:.1} m or more; check encoders and wheels",
             place.sqrt()
         ))
     }

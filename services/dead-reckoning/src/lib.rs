@@ -45,7 +45,6 @@ use step::{STATE_BYTES, State};
 pub use sources::Sources;
 pub use step::DeadReckoning;
 
-/// Returns the run's last estimated place; none before its first tick.
 pub fn saved_place(
     directory: &Path,
     mission: &Mission,
@@ -53,7 +52,6 @@ pub fn saved_place(
     Ok(saved_state(directory)?.map(|state| DeadReckoning::place_of(mission, state)))
 }
 
-/// Returns the run's saved state; none before its first tick.
 pub fn saved_state(directory: &Path) -> Result<Option<State>, CheckpointError> {
     let file = run::checkpoint_file(directory, DeadReckoning::NAME);
     Ok(Checkpoint::open(&file, STATE_BYTES)?.1)

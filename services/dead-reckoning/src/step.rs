@@ -76,7 +76,6 @@ pub struct State {
 }
 
 impl State {
-    /// Returns the newest wheel sample's tick and time; none before the first.
     pub fn newest(&self) -> Option<(u64, MissionTime)> {
         self.last.map(|last| (last.tick, last.time))
     }
@@ -198,10 +197,12 @@ impl Answering for DeadReckoning {
         let warning = match (disagree, refused) {
             (Some(cause), _) => Some(cause.words().into()),
             _ if doubted.is_some() => doubted.map(Into::into),
-            _ if placed => Some("an operator says where the robot is: the pose is set".into()),
-            _ if rejected => Some("the encoder counts restarted or jumped; the pose stays".into()),
+            _ if placed => Some("an operator set the pose".into()),
+            _ if rejected => {
+                Some("the encoder counts restarted or jumped; the pose stays unchanged".into())
+            }
             _ if relocated => {
-                Some("fixes that agree contradict the pose; the pose is theirs now".into())
+                Some("consistent fixes contradict the pose; the pose moves to them".into())
             }
             (None, refused) => refused.map(|why| why.words().into()),
         };

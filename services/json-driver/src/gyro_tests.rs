@@ -45,5 +45,5 @@ fn a_gyro_in_degrees_or_clockwise_is_not_used_and_named() {
     let mission =
         Mission::parse("target = [3, 0]\nrobot.protocol = 'json'", Path::new("m")).unwrap();
     let heard = Json::new(&mission).hear(b"{\"gyro\":1}\n");
-    assert!(heard.refused.unwrap().to_string().contains("say both"));
+    assert!(heard.refused.unwrap().to_string().contains("send both"));
 }

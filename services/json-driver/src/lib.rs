@@ -61,7 +61,7 @@ impl Json {
     fn take(&mut self, report: &Report, heard: &mut Heard) -> Result<(), Refusal> {
         let readings = self.readings_of(&report.ranges)?;
         if report.clock_s.is_some_and(|clock| clock.abs() > MOST_CLOCK_S) {
-            return Err("a clock_s that no clock says: say seconds".into());
+            return Err("clock_s is out of range; send seconds".into());
         }
         let stamp_ns = report.clock_s.map(|clock| (clock * 1e9).round() as i64);
         let mut scans = self.scans_of(report)?;
@@ -70,23 +70,25 @@ impl Json {
         }
         let touched = report.touched.iter().map(|(name, feels)| {
             let row = self.touches.iter().position(|row| row.name == *name);
-            Ok((row.ok_or_else(|| format!("no row of robot.touch is called {name:?}"))?, *feels))
+            Ok((row.ok_or_else(|| format!("no row of robot.touch is named {name:?}"))?, *feels))
         });
         let touched = touched.collect::<Result<Vec<_>, String>>()?;
         let turned = match (report.wheels, report.odometry) {
-            (Some(_), Some(_)) => return Err("wheels and odometry: say one of them".into()),
+            (Some(_), Some(_)) => {
+                return Err("wheels and odometry are both given; send one of them".into());
+            }
             (Some(turned), None) => Some(turned),
             (None, Some(odometry)) => {
                 let turned = self.odometry.turned(odometry, &self.body);
-                Some(turned.ok_or("odometry that no robot can have: say metres and radians")?)
+                Some(turned.ok_or("odometry is out of range; send metres and radians")?)
             }
             (None, None) => None,
         };
         if turned.is_some() && report.speeds.is_none() {
-            return Err("wheels or odometry without speeds: say both".into());
+            return Err("wheels or odometry lack speeds; send both".into());
         }
         if report.gyro.is_some() && turned.is_none() {
-            return Err("gyro without wheels or odometry: say both".into());
+            return Err("gyro lacks wheels or odometry; send both".into());
         }
         heard.readings.extend(readings);
         if let (Some(turned), Some(speeds)) = (turned, report.speeds) {
@@ -126,9 +128,9 @@ impl Json {
                 let names: Vec<_> = self.table.iter().map(|sensor| sensor.name.as_str()).collect();
                 Refusal {
                     input: format!("ranges.{name}"),
-                    what: format!("no sensor is called {name:?}"),
+                    what: format!("no sensor is named {name:?}"),
                     remedy: format!(
-                        "{} are; rename it there, or in robot.sensor",
+                        "rename it to one of {}, or rename the row in robot.sensor",
                         names.join(", ")
                     ),
                 }
@@ -142,7 +144,7 @@ impl Json {
         let only = report.scan.as_ref().map(|beams| {
             let [laser] = &self.lasers[..] else {
                 return Err(format!(
-                    "a scan, and the mission has {} lasers: add a row of kind scan, or say scans by the names of rows",
+                    "a scan came without a name, and the mission has {} lasers; add a row of kind scan, or send scans by the names of rows",
                     self.lasers.len()
                 )
                 .into());
@@ -151,7 +153,7 @@ impl Json {
         });
         let named = report.scans.iter().map(|(name, Scan { ranges, age_s, time_s })| {
             let laser = self.lasers.iter().find(|(_, sensor)| sensor.name == *name);
-            let laser = laser.ok_or_else(|| format!("no laser is called {name:?}"))?;
+            let laser = laser.ok_or_else(|| format!("no laser is named {name:?}"))?;
             scan_of(laser, ranges, [*age_s, *time_s])
         });
         only.into_iter().chain(named).collect()
@@ -167,7 +169,7 @@ fn scan_of(
         let (came, name, want) = (beams.len(), &sensor.name, sensor.beams);
         return Err(Refusal {
             input: "scan".to_owned(),
-            what: format!("a scan of {came} beams, and {name:?} has {want}"),
+            what: format!("the scan has {came} beams, and {name:?} has {want}"),
             remedy: format!("send {want}, or set beams = {came} in its row of robot.sensor"),
         });
     }
@@ -175,7 +177,7 @@ fn scan_of(
         let ns = seconds.unwrap_or_default() * 1e9;
         match (0.0..=LONGEST_SWEEP_NS as f64).contains(&ns) {
             true => Ok(ns.round() as i64),
-            false => Err(format!("the {word} of a scan is not 0 to 2 s: say seconds")),
+            false => Err(format!("the {word} of a scan is outside 0 to 2 s; send seconds")),
         }
     };
     let beam_ns = nanoseconds("time", time_s)? / beams.len().max(1) as i64;
@@ -294,10 +296,10 @@ mod tests {
     #[test]
     fn a_range_of_no_sensor_and_a_motion_without_speeds_are_refused_with_the_remedy() {
         for (said, why) in [
-            (r#"{"ranges":{"nose":1}}"#, "no sensor is called \"nose\"; front,"),
-            (r#"{"wheels":[0,0]}"#, "without speeds"),
-            (r#"{"wheels":[0,0],"odometry":[0,0,0],"speeds":[0,0]}"#, "say one of them"),
-            (r#"{"odometry":[1e300,0,0],"speeds":[0,0]}"#, "no robot can have"),
+            (r#"{"ranges":{"nose":1}}"#, "no sensor is named \"nose\"; rename it to one of front,"),
+            (r#"{"wheels":[0,0]}"#, "lack speeds"),
+            (r#"{"wheels":[0,0],"odometry":[0,0,0],"speeds":[0,0]}"#, "send one of them"),
+            (r#"{"odometry":[1e300,0,0],"speeds":[0,0]}"#, "odometry is out of range"),
             (r#"{"wheel":[0,0]}"#, "unknown field `wheel`"),
         ] {
             let heard = heard(&mut driver(), said);
@@ -438,7 +440,7 @@ mod tests {
         );
         for (said, why) in [
             (r#"{"scan":[1,2,3]}"#, "by the names of rows"),
-            (r#"{"scans":{"left":{"ranges":[1,2,3]}}}"#, "no laser is called \"left\""),
+            (r#"{"scans":{"left":{"ranges":[1,2,3]}}}"#, "no laser is named \"left\""),
             (r#"{"scans":{"back":{"ranges":[1,2]}}}"#, "\"back\" has 3"),
         ] {
             let refused = heard(&mut driver, said).refused.unwrap().to_string();
@@ -454,7 +456,7 @@ mod tests {
         assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
         let refused =
             heard(&mut driver, r#"{"touched":{"nose":true}}"#).refused.unwrap().to_string();
-        assert!(refused.contains("no row of robot.touch is called \"nose\""), "{refused}");
+        assert!(refused.contains("no row of robot.touch is named \"nose\""), "{refused}");
     }
 
     #[test]

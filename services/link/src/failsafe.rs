@@ -115,53 +115,53 @@ rules! {
     MissionOver, End, orders, WithCondition, None,
         "the supervisor ends the mission";
     BatteryEmpty, End, battery, OnNewMission, Some(|_| battery::EMPTY_AFTER.as_secs_f64()),
-        "the boards' or the motors' battery has given less than 10/11 of its `robot.low_battery_v` for 2 s";
+        "the boards' or the motors' battery has been below 10/11 of its `robot.low_battery_v` for 2 s";
     OdometryGivenUp, End, odometry, OnNewMission, None,
-        "commands and encoders have disagreed for 10 s; `link.log` says how";
+        "commands and encoders have disagreed for 10 s; `link.log` describes it";
     AnotherCommander, Stop, commander, WithCondition, None,
-        "another node has published on `robot.ros2.cmd_vel` within 1 s: that the robot moves, or for 2 s that it stands; or the robot has acknowledged 6 commands within 2 s that the link did not send, or an X80 for 4 s those that it did while a fifth of its motor frames went elsewhere; `link.log` says which. It is told to stand after each command of the other";
+        "one of three signs; `link.log` says which. Another node has published motion on `robot.ros2.cmd_vel` within 1 s, or rest for 2 s. The robot has acknowledged 6 commands within 2 s that the link did not send. An X80 has acknowledged all commands for 4 s while a fifth of its motor frames went elsewhere. The link commands a stop after each command of the other";
     RobotDoesNotStop, Stop, stop, After(Duration::from_millis(500)), Some(stop_monitor::known_within_s),
-        "it was told to stand, and when it should rest by its `robot.response` (an X80 after 0.6 s) its encoders say for 0.5 s that it moves; its other methods are tried in turn";
+        "after a commanded stop, the encoders still report motion 0.5 s beyond the stopping time by `robot.response` (X80: 0.6 s); the link tries the robot's other stop methods in turn";
     OperatorStop, Stop, orders, WithCondition, None,
         "`firsthand stop`, until `firsthand resume`";
     StageHeld, Stop, orders, WithCondition, None,
-        "a stage died again and again, until `firsthand stage restart NAME`";
+        "a stage failed repeatedly, until `firsthand stage restart NAME`";
     NotOrdered, Stop, orders, WithCondition, None,
-        "the supervisor has not said drive: the stages start, or the robot waits for a target";
+        "the supervisor has not ordered driving: the stages are starting, or the robot waits for a target";
     SupervisorSilent, Stop, orders, WithCondition, Some(|_| orders::SUPERVISOR_SILENT.as_secs_f64()),
-        "it has said nothing for 2 s, which it does five times a second";
+        "the supervisor, which publishes five times a second, has been silent for 2 s";
     RobotLost, Stop, presence, WithCondition, LIMIT,
-        "it has said nothing for three times `robot.command_limit_s`, or the wire is down";
+        "the robot has been silent for three times `robot.command_limit_s`, or the wire is down";
     RobotLate, Stop, latency, WithCondition, None,
-        "it was lost and has just been found, or it acknowledges later than `robot.command_limit_s` what it is sent; every 2 s it is sent nothing for that time and 0.4 s, to see whether it still does";
+        "the robot has just answered again, or it acknowledges messages later than `robot.command_limit_s`. Every 2 s the link pauses for that time plus 0.4 s to test whether the delay lasts";
     FramesSilent, Stop, streams, WithCondition, LIMIT,
-        "it answers, and no motor frame has come for three times `robot.command_limit_s`; they are asked for";
+        "the robot answers, but has sent no motor frame for three times `robot.command_limit_s`; the link requests them";
     FramesSlow, Stop, streams, WithCondition, Some(|mission| mission.robot.command_limit_s * (streams::INTERVALS - streams::SHORT_ONES) as f64),
-        "they come less often than every `robot.command_limit_s`, which commands last for: let the robot send faster, or raise it";
+        "motor frames come less often than every `robot.command_limit_s`, the lifetime of a command; let the robot send faster, or raise the limit";
     OdometryImplausible, Stop, odometry, OnResume { or_after: Some(odometry::CALM) }, Some(|mission| mission.trusted_response().dead_time_s() + odometry::STILL_AFTER.as_secs_f64()),
-        "0.55 s of motion that was commanded and due by `robot.response` with less than a quarter of it in the encoders, or 1 s of motion that was not commanded, and no other response explains what they say, until the robot restarts, or 3 jumps within 2 s; `link.log` says which";
+        "one of three signs; `link.log` says which. The encoders show less than a quarter of 0.55 s of commanded motion, due by `robot.response`. They show 1 s of motion that was not commanded, and no other response explains it. The counts make 3 jumps within 2 s. A restart of the robot also ends the first two";
     WheelsHeld, Stop, odometry, WithCondition, Some(|mission| mission.trusted_response().dead_time_s() + contact::HELD_AFTER.as_secs_f64()),
-        "0.4 s of commanded motion with less than a quarter of it in the encoders, and a motor current of `robot.held_current_ad` or more; the robot stands for 0.5 s, `contact` says where it is touched, and the supervisor takes it for a stall";
+        "the encoders show less than a quarter of 0.4 s of commanded motion, at a motor current of `robot.held_current_ad` or more. The robot stands for 0.5 s, `contact` gives the place of contact, and the supervisor treats it as a stall";
     Felt, Stop, touch, WithCondition, None,
-        "a bumper of `robot.touch` is pressed, or a cliff sensor sees no floor; the robot stands for 0.5 s, or as long as it needs by its `robot.response`, then `contact` says where, and it goes no nearer while that lasts; `link.log` names the row";
+        "a bumper of `robot.touch` is pressed, or a cliff sensor sees no floor; `link.log` names the row. The robot stands for 0.5 s, or for its stopping time by `robot.response`. Then `contact` gives the place, and the robot goes no nearer while the contact lasts";
     RangeSilent, Stop, streams, WithCondition, Some(|mission| mission.robot.silent_after_s()),
-        "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`, and it is not a single infrared ranger without which the robot goes on; `link.log` names it. Nothing in range is a reading";
+        "a sensor that the mission uses has given no valid reading for three times `robot.command_limit_s`; `link.log` names it. A single infrared ranger may only slow the robot. \"Nothing in range\" is a valid reading";
     RangeImplausible, Stop, range, OnResume { or_after: Some(range::CHANGES) }, Some(range::known_within_s),
-        "the front sonar says the same within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees, another sensor while it turns by 90 degrees on the spot, or within 7 cm for 1.8 times as much; two of three readings do not follow from those before; scans, or readings of sonars and infrared rangers, change as if they were 0.3 s late or more, scans also as if the robot stood; or the front sonar hears nothing more than 4 times in a row of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square; or no sensor reads anything while readings at the end of the infrared rangers' scale are due; `link.log` names the sensor";
+        "one of five signs; `link.log` names the sensor. The front sonar stays within 1 cm to either side while the robot drives 0.4 m or turns by 90 degrees. Another sensor does so while the robot turns by 90 degrees on the spot. For a band of 7 cm, 1.8 times that motion is needed. Two of three readings do not follow from those before. Scans, or readings of sonars and infrared rangers, change as if they were 0.3 s late or more, or scans as if the robot stood. More than 4 times in a row, the front sonar hears nothing of a surface nearer than 0.45 m that the two infrared rangers beside it see within 12 degrees of square. No sensor reads anything while readings at the end of the infrared rangers' scale are due";
     CommandStale, Stop, staleness, WithCondition, LIMIT,
-        "the newest command's tick began more than `robot.command_limit_s` ago, or there is none";
+        "the newest command's tick began more than `robot.command_limit_s` ago, or no command exists";
     PoseStale, Stop, staleness, WithCondition, LIMIT,
-        "the command or its guidance was computed from a pose older than that";
+        "the command or its guidance was computed from a pose older than `robot.command_limit_s`";
     GuidanceStale, Stop, staleness, WithCondition, LIMIT,
-        "the command follows a guidance older than that";
+        "the command follows guidance older than `robot.command_limit_s`";
     RangeDoubtful, Slow, range, After(range::CHANGES), None,
-        "half of what makes a ranging sensor implausible, or no reading of any for as far as they reach; a robot that goes slowly shows whether it is; `link.log` names the sensor";
+        "half the evidence that makes a ranging sensor implausible, or no sensor reads anything over a drive as long as their reach; `link.log` names the sensor. Slow driving shows whether the sensor is faulty";
     InfraredSilent, Slow, streams, WithCondition, None,
-        "one infrared ranger has given no valid reading for so long, and it looks aside or back, or into the cone of a sonar that the mission uses; `link.log` names it";
+        "one infrared ranger has given no valid reading for three times `robot.command_limit_s`; `link.log` names it. It looks to the side or back, or into the cone of a sonar that the mission uses";
     BaseSlow, Slow, base, WithCondition, None,
-        "its wheels have shown that it answers later or accelerates more slowly than `robot.response` says, until planner and controller go by what was found; by the paper's method and with a planner of another executable until the next mission; `link.log` says how";
+        "the wheels show that the base answers later or accelerates more slowly than `robot.response` states; `link.log` gives the values. This ends when planner and controller use the found response. With the paper's method or an external planner it ends with the next mission";
     BatteryLow, Slow, battery, WithCondition, None,
-        "the boards' or the motors' battery gives less than its `robot.low_battery_v`, and then less than 0.3 V more";
+        "the boards' or the motors' battery falls below its `robot.low_battery_v`, until it exceeds that by 0.3 V";
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,10 +171,8 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// Decision while no cause applies.
     pub const GO: Self = Self { action: Action::Go, cause: Cause::None };
 
-    /// Returns whether the link withholds all commands.
     pub fn stops(self) -> bool {
         self.action >= Action::Stop
     }
@@ -195,7 +193,6 @@ impl Decision {
     }
 }
 
-/// Returns the row of a cause; none for [`Cause::None`].
 pub fn rule(cause: Cause) -> Option<&'static Rule> {
     TABLE.iter().find(|rule| rule.cause == cause)
 }
@@ -254,7 +251,6 @@ impl Failsafe {
         rules.any(|(rule, applied)| rule.cause == cause && applied)
     }
 
-    /// Explains `cause` and its remedy.
     pub(crate) fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         (rule(cause)?.monitor)(&self.monitors).explain(cause, now)
     }

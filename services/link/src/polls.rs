@@ -11,7 +11,6 @@ pub(crate) struct Polls {
 }
 
 impl Polls {
-    /// Schedules the first poll at once.
     pub(crate) fn new(mission: &Mission) -> Self {
         Self { period_ns: (1e9 / mission.robot.rate_hz) as u64, next: MissionTime::default() }
     }

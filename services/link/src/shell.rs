@@ -304,12 +304,12 @@ fn log_battery(change: &BatteryChange) {
     let pack = pack.as_str();
     match charge {
         Charge::Empty => {
-            tracing::error!(pack, volts, "battery empty: charge it, or set robot.low_battery_v");
+            tracing::error!(pack, volts, "battery empty; charge it, or set robot.low_battery_v");
         }
         Charge::Low => {
-            tracing::warn!(pack, volts, "battery low: charge it, or set robot.low_battery_v");
+            tracing::warn!(pack, volts, "battery low; charge it, or set robot.low_battery_v");
         }
-        Charge::Enough => tracing::info!(pack, volts, "the battery gives enough again"),
+        Charge::Enough => tracing::info!(pack, volts, "battery voltage recovered"),
     }
 }
 
@@ -328,7 +328,7 @@ impl Shell {
     fn take_operators_requests(&mut self) -> Result<(), StageError> {
         while let Some(request) = self.stop_socket.as_mut().and_then(StopSocket::take) {
             if matches!(request, Request::Stop | Request::Resume) {
-                tracing::warn!(?request, "an operator asks the link itself");
+                tracing::warn!(?request, "an operator sent a request to the link directly");
                 self.take(Event::Operator(request), monotonic_ns())?;
             }
         }
@@ -348,7 +348,7 @@ impl Shell {
         if stopped != self.marked {
             self.marked = stopped;
             if let Err(error) = self.stop_mark.set(stopped) {
-                tracing::error!(%error, "cannot mark the operator's stop: a link that is started again will not know of it");
+                tracing::error!(%error, "cannot mark the operator's stop, so a restarted link will not know of it");
             }
         }
     }
@@ -364,7 +364,7 @@ impl Shell {
 
     fn set_owed_mark(&self) {
         if let Err(error) = self.owed_mark.set(self.owes_stop, &self.directory) {
-            tracing::error!(%error, "cannot mark that the robot may move: no stop guard will order its stop");
+            tracing::error!(%error, "cannot mark that the robot may move, so no stop guard will order its stop");
         }
     }
 
@@ -374,7 +374,7 @@ impl Shell {
             self.set_owed_mark();
         }
         if self.guard.as_mut().is_some_and(StopGuard::has_ended) {
-            tracing::warn!("the stop guard ended; another is started");
+            tracing::warn!("the stop guard ended; the link starts another");
             self.guard = start_guard(&self.directory, &self.identity);
         }
     }
@@ -440,7 +440,7 @@ impl Shell {
                     self.state()?;
                 }
                 Effect::Connected(false) => {
-                    tracing::warn!("robot lost; it is pinged until it answers");
+                    tracing::warn!("robot lost; the link pings it until it answers");
                     self.state()?;
                 }
                 Effect::Restarted => {
@@ -448,17 +448,17 @@ impl Shell {
                     tracing::warn!(restarts, "the robot has restarted");
                 }
                 Effect::CountsElsewhere => tracing::warn!(
-                    "the encoder counts or the odometry jumped farther than wheels turn and continue from there; the pose stays"
+                    "the encoder counts or the odometry jumped farther than the wheels can turn, and continue from there; the pose stays unchanged"
                 ),
                 Effect::StopBy(method) => {
                     tracing::warn!(
                         by = method,
-                        "the robot does not stop; it is stopped by the next method"
+                        "the robot does not stop; the link uses the next stop method"
                     );
                 }
                 Effect::FoundResponse(words) => tracing::warn!("{words}"),
                 Effect::Refused(why) => {
-                    tracing::warn!("the robot says what is not in its protocol: {why}");
+                    tracing::warn!("the robot's message is not in its protocol: {why}");
                     self.refused = Some((why, monotonic_ns()));
                 }
                 Effect::ClockRate(rate) => {
@@ -467,11 +467,11 @@ impl Shell {
                         MissionClock::Ticks { .. } => rate,
                     };
                     tracing::warn!(
-                        "the robot's clock goes {rate:.2} times as fast as mission time: let its simulator run in real time, or give `run --pace {pace:.2}`"
+                        "the robot's clock runs {rate:.2} times as fast as mission time; let its simulator run in real time, or give `run --pace {pace:.2}`"
                     );
                 }
                 Effect::AskedForStreams => {
-                    tracing::info!("the robot is asked for its streams again");
+                    tracing::info!("the link requests the robot's streams again");
                 }
                 Effect::Battery(change) => log_battery(&change),
                 // Published by the stage.

@@ -50,7 +50,6 @@ impl SpeedTrim {
         }
     }
 
-    /// Returns the share, at most 1.
     pub(crate) const fn share(&self) -> f64 {
         self.share
     }
@@ -106,7 +105,6 @@ mod tests {
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
-    /// Returns the share found after `ticks` of wheels that reach `reached`.
     fn found(reached: f64, ticks: usize, command: impl Fn(usize) -> [f64; 2]) -> f64 {
         let mut trim =
             SpeedTrim::new(&Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap());

@@ -36,7 +36,6 @@ impl LinkStage {
         self.infrared.is_some() || self.power.is_some() || self.surroundings.is_some()
     }
 
-    /// Returns the longest published slice.
     pub(crate) fn longest(&self) -> usize {
         self.lasers.iter().map(|(_, beams)| *beams).fold(WIRE_PIECE, usize::max)
     }

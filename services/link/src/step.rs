@@ -148,12 +148,10 @@ impl Link {
         }
     }
 
-    /// Returns the pace and the next tick's number.
     pub const fn state(&self) -> &State {
         &self.state
     }
 
-    /// Resumes from `state`.
     pub fn restore(&mut self, state: State) {
         self.state = state;
         self.observe(Observation::Pace(state.pace), 0);

@@ -50,7 +50,7 @@ pub(crate) struct StopGuard {
 }
 
 impl StopGuard {
-    /// Starts the guard. Fails when its process cannot be started.
+    /// Starts the guard.
     pub(crate) fn start(directory: &Path, link: &Identity) -> io::Result<Self> {
         let (ended, pipe) = io::pipe()?;
         let process = spawn("/proc/self/exe".into(), directory, link, ended.into())?;
@@ -62,7 +62,7 @@ impl StopGuard {
     }
 }
 
-/// Starts a guard; `ended` closes with the link. Fails when the process cannot be started.
+/// Starts a guard; `ended` closes with the link.
 pub fn spawn(
     program: PathBuf,
     directory: &Path,
@@ -81,8 +81,7 @@ pub fn spawn(
         .spawn()
 }
 
-/// Guards the robot of the link with this socket; standard input closes with the link. Fails on an
-/// unusable run file.
+/// Guards the robot of the link with this socket; standard input closes with the link.
 pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     // The link's session may end with it or its terminal.
     let _ = setsid();
@@ -98,9 +97,9 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     if !mark.is_set() || link.is_succeeded(&domain.stop_socket()) {
         return Ok(());
     }
-    tracing::warn!("the link ended, and nobody saw the robot at rest: it is ordered to stop");
+    tracing::warn!("the link ended before it saw the robot at rest; the stop guard orders a stop");
     let socket = StopSocket::bind(domain.guard_socket())
-        .inspect_err(|error| tracing::error!(%error, "no operator reaches this stop guard"))
+        .inspect_err(|error| tracing::error!(%error, "operators cannot reach this stop guard"))
         .ok();
     let own = Identity::now(&domain.guard_socket());
     let is_succeeded =

@@ -26,7 +26,7 @@ use crate::drivers;
 
 #[derive(Debug, Error)]
 #[error(
-    "no wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start it again"
+    "cannot open the wire to the robot at {address}: {source}; raise the limit of open files (`ulimit -n`) or free ports, then start again"
 )]
 pub struct TransportError {
     pub address: Address,
@@ -90,7 +90,7 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// Opens the base's wire. Fails as [`Transport::open`].
+    /// Opens the base's wire.
     pub fn of_base(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
         match address {
             Address::Ros2(domain) => Self::new(address, ros2(domain.unwrap_or_default(), mission)),
@@ -98,13 +98,15 @@ impl Transport {
         }
     }
 
-    /// Creates a wire, which [`Transport::maintain`] opens. Fails when this machine cannot.
+    /// Creates a wire, which [`Transport::maintain`] opens.
     pub fn open(address: &Address, line: Line) -> Result<Self, TransportError> {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(|udp| Box::new(udp) as Box<dyn Wire>),
             Address::Tcp(robot) => Stream::boxed(Tcp::to(*robot)),
             Address::Serial(path) => Stream::boxed(Serial::new(path, line)),
-            Address::Ros2(_) => Err(io::Error::other("only a robot's base speaks ROS 2")),
+            Address::Ros2(_) => {
+                Err(io::Error::other("a sensor's own address cannot be a ROS 2 domain"))
+            }
         };
         Self::new(address, wire)
     }
@@ -120,7 +122,7 @@ impl Transport {
     }
 
     /// Maintains the wire. Returns whether it is open if that changed since the last report. A
-    /// close and a reopening come separately. Fails when this machine is the cause.
+    /// close and a reopening come separately.
     pub fn maintain(&mut self, now_ns: u64) -> Result<Option<bool>, TransportError> {
         let closed_unreported = self.reported == Some(true) && !self.is_open();
         if !closed_unreported {
@@ -138,7 +140,7 @@ impl Transport {
         self.wire.is_open()
     }
 
-    /// Returns the next bytes; none when all were taken. Fails when this machine is the cause.
+    /// Returns the next bytes; none when all were taken.
     pub fn receive(&mut self, now_ns: u64) -> Result<Option<&[u8]>, TransportError> {
         match self.wire.receive(&mut self.buffer, now_ns) {
             Ok(length) => Ok(length.and_then(|length| self.buffer.get(..length))),
@@ -146,7 +148,7 @@ impl Transport {
         }
     }
 
-    /// Sends whole frames; skips an empty message. Fails when this machine is the cause.
+    /// Sends whole frames; skips an empty message.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), TransportError> {
         if bytes.is_empty() {
             return Ok(());
@@ -158,7 +160,6 @@ impl Transport {
         self.wire.tally()
     }
 
-    /// Returns None while the wire is open.
     pub fn attempts(&self, now_ns: u64) -> Option<Attempts> {
         self.wire.attempts(now_ns)
     }
@@ -181,7 +182,7 @@ fn ros2(domain: u16, mission: &Mission) -> io::Result<Box<dyn Wire>> {
 
 #[cfg(not(feature = "ros2"))]
 fn ros2(_: u16, _: &Mission) -> io::Result<Box<dyn Wire>> {
-    Err(io::Error::other("this executable speaks no ROS 2: build it with `--features ros2`"))
+    Err(io::Error::other("this executable lacks ROS 2 support; build it with `--features ros2`"))
 }
 
 /// Readable when the wire needs attention, also after a reopening.

@@ -27,7 +27,7 @@ impl Inflation {
         self.count[index] > 0
     }
 
-    /// Applies a flip. Returns the grid's window within reach.
+    /// Applies a flip.
     pub(crate) fn follow(&mut self, geometry: &Geometry, flip: Flip) -> Window {
         let Geometry { lattice, grid, reach } = *geometry;
         let centre = lattice.centre_of(flip.cell);

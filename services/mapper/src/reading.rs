@@ -85,7 +85,6 @@ impl Rows {
         usize::try_from(row).is_ok_and(|row| self.rows.get(row).is_some_and(Option::is_some))
     }
 
-    /// Returns `None` without beams.
     pub(crate) fn scan<'a>(&self, row: usize, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
         let Row { mount, reach_m, fan: (first, step_rad), noise, clears_from_m, .. } =
             self.laser(row).filter(|_| !beams.is_empty())?;

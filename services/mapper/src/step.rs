@@ -116,8 +116,7 @@ impl Belief {
     }
 }
 
-/// Sets cells of `window` to the result of `state`, which gets the old one. Returns the changed
-/// window.
+/// Sets cells of `window` to the result of `state`, which gets the old one.
 fn paint(
     cells: &mut [u8],
     frame: &GridFrame,
@@ -339,8 +338,7 @@ impl Mapper {
         self.belief.version += 1;
     }
 
-    /// Frees the new target's cell; the old one may become hazard again. Returns the changed
-    /// window.
+    /// Frees the new target's cell; the old one may become hazard again.
     fn move_target(&mut self, target: DVec2) -> Window {
         self.belief.target = target;
         let cell = self.frame.cell_at(target).filter(|cell| !self.frame.is_rim(*cell));
@@ -370,7 +368,7 @@ impl Mapper {
         }
     }
 
-    /// Maps a tick once, even if repeated. Returns the changed window.
+    /// Maps a tick once, even if repeated.
     fn tick(
         &mut self,
         Tick { pose, ranges, scans, contact, target }: Tick,
@@ -537,7 +535,7 @@ impl Mapper {
         true
     }
 
-    /// Marks an injected fault's hazard. Returns the changed window.
+    /// Marks an injected fault's hazard.
     fn falsify(&mut self) -> Window {
         let Self { frame, target, belief, .. } = self;
         let Some(area) = fault::hazard(belief.fault, belief.robot, belief.target) else {

@@ -95,7 +95,6 @@ impl Planned {
         }
     }
 
-    /// Returns whether the robot is outside the tolerance of this step.
     fn is_elsewhere(&self, pose: &Pose2) -> bool {
         let off = self.pose.position - pose.position;
         let turned = wrap_angle(self.pose.heading - pose.heading).abs();

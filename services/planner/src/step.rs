@@ -141,7 +141,6 @@ impl Planner {
         Work::None
     }
 
-    /// Returns whether answers depend on previous commands.
     pub const fn foresees(&self) -> bool {
         self.lead.is_some()
     }
@@ -295,7 +294,7 @@ impl Planner {
         Some(job)
     }
 
-    /// Takes the result of a job; a result that is no longer awaited is ignored.
+    /// Takes the result of a job. Ignores a stale result.
     pub fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
         let awaited = self.live.as_mut().filter(|it| it.awaits(solved.number));
         let Some(live) = awaited else {
@@ -338,7 +337,6 @@ impl Planner {
         Ok((work, self.guide(sample, Moving { pose: acts_at, twist }, followed)))
     }
 
-    /// Returns `None` where the field is not valid.
     fn follow_field(&self, pose: &Pose2) -> Option<(GuidanceStatus, DVec2)> {
         let (live, target) = (self.live.as_ref()?, self.place()?);
         live.guide(&self.robot, pose, target, self.grid.cells())
@@ -467,7 +465,6 @@ impl Planner {
         }
     }
 
-    /// Returns `None` before the first solve.
     pub fn snapshot(&self) -> Option<Snapshot> {
         let (live, target) = (self.live.as_ref()?, self.place()?);
         let verification = live.field.verification();

@@ -83,7 +83,7 @@ impl Gyro {
             let is_new = !std::mem::replace(&mut self.is_missed, true);
             let apart_s = since_ns as f64 / 1e9;
             return is_new.then(|| {
-                format!("the newest message is {apart_s:.2} s older than odometry; publish it at 20 Hz or more, stamped by the same clock")
+                format!("the newest message is {apart_s:.2} s older than odometry; publish it at 20 Hz or more with stamps of the same clock")
             });
         }
         self.is_missed = false;

@@ -94,14 +94,14 @@ impl Ros2 {
             let odometry =
                 self.topics.heard.iter().find(|(content, _)| *content == Content::Odometry);
             let words = odometry.and_then(|(_, topic)| publishers::words(&topic.name, gids));
-            let words = words.ok_or("numbers of publishers that are none")?;
+            let words = words.ok_or("the publisher GIDs are invalid")?;
             heard.two_publishers = Some(words.clone());
             return Err(words);
         }
         let row_of =
             |(row, payload): (&u8, _)| Some((self.topics.heard.get(usize::from(*row))?, payload));
         let Some(((content, topic), payload)) = piece.split_first().and_then(row_of) else {
-            return Err("a message of no topic that is subscribed to".to_owned());
+            return Err("the message belongs to an unknown topic".to_owned());
         };
         let (content, name) = (*content, topic.name.clone());
         self.take_payload(content, payload, heard).map_err(|why| format!("{name}: {why}"))?;
@@ -154,7 +154,7 @@ impl Ros2 {
             }
             Content::Command => {
                 let (&number, payload) =
-                    payload.split_first_chunk().ok_or("a command without its writer")?;
+                    payload.split_first_chunk().ok_or("the command lacks its writer")?;
                 let moves = read_moves(payload, self.stamped)?;
                 heard.commander = Some(Commander { number, moves });
                 Ok(())
@@ -177,12 +177,12 @@ impl Ros2 {
             self.heading = None;
             let [x, y, heading] = odometry.pose;
             heard.refused = Some(format!(
-                "odometry that jumps to ({x:.2}, {y:.2}) m and {:.0} degrees, which counts as no motion",
+                "odometry jumps to ({x:.2}, {y:.2}) m and {:.0} degrees; the link ignores the jump",
                 heading.to_degrees()
             ).into());
         }
         let turned = self.odometry.turned(odometry.pose, &self.body);
-        let turned = turned.ok_or("a pose that no robot can have; say metres")?;
+        let turned = turned.ok_or("the pose is out of range; publish metres")?;
         // If odometry is faster than ticks, the message nearest to a tick's time begins it.
         let slack_ns = (stamp_ns - newest_ns) / 2;
         let is_tick = stamp_ns - tick_ns >= self.period_ns - slack_ns;
@@ -211,7 +211,7 @@ impl Ros2 {
         let (beams, most_s) = (scan.ranges.len(), LONGEST_SWEEP_NS as f64 / 1e9);
         let beam_s = f64::from(scan.beam_s);
         if !(0.0..=most_s).contains(&(beam_s * beams as f64)) {
-            return Err(format!("a time_increment of {beam_s}; fill it in seconds, or give 0"));
+            return Err(format!("time_increment is {beam_s}; give seconds, or 0"));
         }
         let range = |range: &f32| match *range {
             range if range < scan.least_m => Some(f32::NAN),
@@ -233,7 +233,7 @@ impl Ros2 {
         let is_stated = scan.stamp_ns != 0 && self.stamps_ns.is_none_or(|[ns, _]| is_near(ns));
         if !is_stated && !std::mem::replace(&mut self.told_of_scan_stamp, true) {
             heard.refused = Some(format!(
-                "the stamp of a scan, {} s, which then counts as taken when odometry came; stamp both by one clock",
+                "a scan's stamp, {} s, is far from odometry's, so the arrival of odometry replaces it; stamp both by one clock",
                 scan.stamp_ns as f64 / 1e9
             ).into());
         }
@@ -301,7 +301,7 @@ fn other_fan(scan: &Scan, sensor: &Sensor) -> String {
         format!("{beams} beams from {first:.1} degrees in steps of {step:.3}")
     };
     format!(
-        "{}, and the mission's laser has {}; set beams and field_of_view_deg of its row",
+        "the scan has {}, and the mission's laser has {}; correct beams and field_of_view_deg of its row",
         fan(scan.fan, scan.ranges.len()),
         fan(sensor.fan(), sensor.beams)
     )

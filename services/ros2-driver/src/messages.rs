@@ -13,7 +13,7 @@ const FASTEST_TURN: f64 = 50.0;
 /// Largest backward step of a stamp on a clock that was not reset.
 const SET_ANEW_NS: i64 = 1_000_000_000;
 pub const NO_GROWTH: &str =
-    "a stamp that does not grow; let one node alone publish it, and stamp each";
+    "the stamp does not increase; let only one node publish it, and stamp each message";
 
 /// Returns whether a stamp does not grow, unless a clock was set.
 pub fn is_repeated(newest_ns: i64, stamp_ns: i64) -> bool {
@@ -36,10 +36,10 @@ impl Odometry {
         let msg::Odometry { header, pose, twist, .. } = msg::Odometry::decode(payload)?;
         let heading = pose.pose.orientation.heading();
         let heading =
-            heading.ok_or("an orientation that is no rotation; fill pose.pose.orientation")?;
+            heading.ok_or("the orientation is not a rotation; set pose.pose.orientation")?;
         let ([x, y], twist) = (pose.pose.at(), [twist.twist.linear.x, twist.twist.angular.z]);
         if !twist.iter().all(|speed| speed.is_finite()) {
-            return Err("a speed that is no number; fill twist.twist".to_owned());
+            return Err("a speed is not finite; set twist.twist".to_owned());
         }
         Ok(Self { stamp_ns: header.stamp.ns(), pose: [x, y, heading], twist })
     }
@@ -66,12 +66,12 @@ impl Imu {
         let rate = imu.angular_velocity.z;
         let turn = match (imu.angular_velocity_covariance, imu.orientation_covariance) {
             ([NOT_STATED, ..], [NOT_STATED, ..]) => {
-                let why = "neither a turn rate nor an orientation is stated; publish one, or remove robot.ros2.imu";
+                let why = "turn rate and orientation are both missing; publish one, or remove robot.ros2.imu";
                 return Err(why.to_owned());
             }
             ([NOT_STATED, ..], _) => {
                 let heading = imu.orientation.heading();
-                let why = "an orientation that is no rotation; fill orientation";
+                let why = "the orientation is not a rotation; set orientation";
                 ImuTurn::Heading(heading.ok_or(why)?)
             }
             ([.., variance], _) if rate.abs() <= FASTEST_TURN => {
@@ -79,7 +79,7 @@ impl Imu {
                 let most = FASTEST_TURN * FASTEST_TURN;
                 ImuTurn::Rate(rate, Some(variance.min(most)).filter(|_| variance > 0.0))
             }
-            _ => return Err(format!("a turn rate of {rate}; fill angular_velocity in rad/s")),
+            _ => return Err(format!("the turn rate is {rate}; set angular_velocity in rad/s")),
         };
         Ok(Self { stamp_ns: imu.header.stamp.ns(), turn })
     }

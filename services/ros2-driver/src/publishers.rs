@@ -33,12 +33,11 @@ impl Publishers {
     }
 }
 
-/// Describes the publishers by the bytes after [`TWO`].
 pub(crate) fn words(topic: &str, gids: &[u8]) -> Option<String> {
     let (one, other) = gids.split_first_chunk()?;
     let [one, other] = [*one, other.try_into().ok()?].map(gid_text);
     Some(format!(
-        "two nodes publish {topic}: end one, or give it a namespace; their GIDs are {one} and {other}"
+        "two nodes publish {topic}, with the GIDs {one} and {other}; end one, or give it a namespace"
     ))
 }
 

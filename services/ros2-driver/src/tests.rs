@@ -141,15 +141,15 @@ fn a_refusal_names_the_topic_what_was_wrong_and_the_remedy() {
     let mut nowhere = odometry();
     nowhere[44..52].copy_from_slice(&f64::NAN.to_le_bytes());
     for (row, payload, words) in [
-        (ODOM, xcdr2, "/odom: encoding 0x0007 instead of plain CDR; set"),
-        (ODOM, lying, "/odom: an orientation that is no rotation; fill"),
-        (ODOM, nowhere, "/odom: a pose that no robot can have; say metres"),
+        (ODOM, xcdr2, "/odom: its encoding is 0x0007 instead of plain CDR; set"),
+        (ODOM, lying, "/odom: the orientation is not a rotation; set"),
+        (ODOM, nowhere, "/odom: the pose is out of range; publish metres"),
         (
             LASER,
             bytes(SCAN),
-            "/scan: 4 beams from 0.0 degrees in steps of 85.944, and the mission's laser has 360 beams from -180.0 degrees in steps of 1.000; set",
+            "/scan: the scan has 4 beams from 0.0 degrees in steps of 85.944, and the mission's laser has 360 beams from -180.0 degrees in steps of 1.000; correct",
         ),
-        (9, odometry(), "no topic that is subscribed to"),
+        (9, odometry(), "belongs to an unknown topic"),
     ] {
         let heard = said(&mut driver, row, &payload);
         assert!(!heard.anything && heard.motion.is_none() && heard.scans.is_empty());
@@ -191,7 +191,7 @@ fn odometry_that_is_repeated_or_old_is_refused_until_it_goes_on() {
     let mut driver = driver("robot.rate_hz = 10");
     let mut refused = |stamp_ms| said(&mut driver, ODOM, &odometry_at(stamp_ms, 1.0)).refused;
     assert_eq!(refused(5000), None);
-    assert!(refused(5000).is_some_and(|why| why.to_string().contains("does not grow")));
+    assert!(refused(5000).is_some_and(|why| why.to_string().contains("does not increase")));
     assert!(refused(4900).is_some());
     assert_eq!(refused(5100), None);
     // The clock was set.
@@ -222,7 +222,6 @@ fn beams_of(driver: &mut Ros2, scan: &[u8]) -> Vec<f32> {
     heard.scans.remove(0).beams
 }
 
-/// Returns [`scan_of`] with this stamp and beam time.
 fn scan_at(stamp_ms: u32, beam_s: f32, first: f32, step: f32) -> Vec<u8> {
     let mut payload = scan_of(first, step, &[1.0; 360]);
     payload[4..8].copy_from_slice(&(stamp_ms / 1000).to_le_bytes());
@@ -462,7 +461,7 @@ fn jump(after_ms: u32, pose: [f64; 3]) -> (bool, [i32; 2]) {
     let before = counts(&said(&mut driver, ODOM, &odometry_of(1000, [1.0, 0.5, 0.3])));
     let heard = said(&mut driver, ODOM, &odometry_of(1000 + after_ms, pose));
     let refused =
-        heard.refused.clone().is_some_and(|why| why.to_string().contains("odometry that jumps to"));
+        heard.refused.clone().is_some_and(|why| why.to_string().contains("odometry jumps to"));
     assert_eq!((heard.anything, refused), (true, heard.jumped), "{heard:?}");
     let after = counts(&heard);
     // The next pose continues from this one.

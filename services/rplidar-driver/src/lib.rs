@@ -102,7 +102,7 @@ impl Driver for Rplidar {
                 Said::Node(node) => heard.scans.extend(self.take_node(node)),
                 Said::Answer(Answer::Health { status: HEALTH_ERROR, code }) => {
                     heard.refused = Some(format!(
-                        "the laser {:?} reports the error {code:#06x} of its health and does not scan: cut its power for a moment",
+                        "the laser {:?} reports the health error {code:#06x} and does not scan; cut its power for a moment",
                         self.sensor.name
                     ).into());
                 }

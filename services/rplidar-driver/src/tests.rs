@@ -29,12 +29,10 @@ fn turn(range: impl Fn(u16) -> f32) -> Vec<u8> {
     (0..NODES as u16).flat_map(|beam| node(10 * beam, range(10 * beam))).collect()
 }
 
-/// Returns a turn's beginning, which completes the one before.
 fn next() -> Vec<u8> {
     [node(0, 1.0), node(10, 1.0)].concat()
 }
 
-/// Returns a beam; the first looks back.
 fn at(scan: &LaserScan, degrees: usize) -> f32 {
     scan.beams[(degrees / 10 + 18) % NODES]
 }
@@ -156,7 +154,6 @@ proptest! {
     }
 }
 
-/// Returns arbitrary and nearly valid bytes.
 fn hostile() -> impl Strategy<Value = Vec<u8>> {
     let near = (0..200_usize).prop_map(|cut| turn(|_| 1.0)[cut % 180..].to_vec());
     let any = proptest::collection::vec(any::<u8>(), 0..300);

@@ -58,7 +58,6 @@ impl Drive {
         }
     }
 
-    /// Returns left and right currents, AD counts.
     pub fn currents(&self, sensors: &MotorSensors) -> [u16; 2] {
         let channels = [self.robot.left, self.robot.right];
         channels.map(|wheel| sensors.currents[usize::from(wheel.channel.min(1))])

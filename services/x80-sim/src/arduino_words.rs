@@ -111,7 +111,6 @@ impl ArduinoWords {
         true
     }
 
-    /// Returns the answer, and the resulting command.
     pub(crate) fn answer(
         &mut self,
         request: Request,
@@ -147,7 +146,6 @@ impl ArduinoWords {
         (text + "\r\n", command)
     }
 
-    /// Returns the board's counts.
     pub(crate) fn counts(&self, motors: &[Motor; 6]) -> [i32; 2] {
         let turned = self.turned(motors);
         [0, 1].map(|wheel| (turned[wheel] - self.zero[wheel]).round() as i64 as i32)

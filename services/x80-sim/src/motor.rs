@@ -95,7 +95,6 @@ impl Motor {
         self.load
     }
 
-    /// Restores an earlier process's counts.
     pub(crate) fn restore(&mut self, turned: f64) {
         self.turned = turned;
     }

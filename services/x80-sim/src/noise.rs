@@ -19,7 +19,6 @@ pub enum Source {
 pub struct Noise(Pcg64);
 
 impl Noise {
-    /// Creates equal streams for equal seeds.
     pub fn new(seed: u64, source: Source) -> Self {
         Self::of_nth(seed, source, 0)
     }

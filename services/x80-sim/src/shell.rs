@@ -85,7 +85,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
             let robot = match saved {
                 None => Robot::new(&mission),
                 Some(saved) => {
-                    tracing::info!(?saved, "the robot starts where the last process left it");
+                    tracing::info!(?saved, "the robot starts at the last process's pose");
                     Robot::restored(&mission, &saved)
                 }
             };

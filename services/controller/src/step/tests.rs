@@ -30,7 +30,6 @@ fn state(command: &CommandSample) -> CommandState {
     CommandState::from_byte(command.state)
 }
 
-/// Returns the paper's first command at the origin, with guidance along x.
 fn first(heading: f64) -> CommandSample {
     controller("").at(facing(heading), &ahead())
 }
@@ -43,7 +42,6 @@ fn facing(heading: f64) -> Pose2 {
     Pose2 { position: DVec2::ZERO, heading }
 }
 
-/// Returns guidance along x.
 fn ahead() -> GuidanceSample {
     GuidanceSample {
         ex: 1.0,
@@ -315,7 +313,6 @@ fn a_controller_goes_by_the_response_that_the_link_found_as_if_it_were_stated() 
     assert_eq!(told.response, before);
 }
 
-/// Returns a body that is no disc.
 fn jackal() -> Controller {
     let text = "target = [3, 0]\nrobot.model = 'jackal'";
     Controller::new(&Mission::parse(text, Path::new("test.toml")).unwrap())

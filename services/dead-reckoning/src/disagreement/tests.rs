@@ -31,7 +31,6 @@ const RIGHT: Robot = Robot {
     slips: false,
 };
 
-/// Returns the cause and time, within `for_s` of driving to both sides.
 fn named(robot: Robot, seed: u64, for_s: f64) -> Option<(f64, Cause)> {
     let mut state = seed;
     let mut random = || {

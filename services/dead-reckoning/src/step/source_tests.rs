@@ -7,7 +7,6 @@ use glam::dvec2;
 const TICK_NS: u64 = 100_000_000;
 const FIVE_CM: [f64; 6] = [25e-4, 0.0, 0.0, 25e-4, 0.0, 4e-4];
 
-/// Robot with a larger right wheel, at ten ticks per second.
 struct Robot {
     truth: Pose2,
     larger: f64,
@@ -35,13 +34,11 @@ impl Robot {
         WheelSample { stamp, left_counts, right_counts, ..WheelSample::default() }
     }
 
-    /// Drives a tick of a winding curve.
     fn wind(&mut self) -> WheelSample {
         let turn = 0.06 * (self.tick as f64 / 15.0).sin();
         self.drive(0.04, turn)
     }
 
-    /// Returns nearly normal noise: twelve uniform numbers.
     fn noise(&mut self) -> f64 {
         let mut even = || {
             self.seed = self.seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

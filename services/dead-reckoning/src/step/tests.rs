@@ -47,7 +47,6 @@ impl DeadReckoning {
     }
 }
 
-/// Starts with these counts.
 fn begun(extra: &str, left: u16, right: u16) -> DeadReckoning {
     let mut reckoning = reckoning(extra);
     reckoning.take(0, left, right);

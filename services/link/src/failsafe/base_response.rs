@@ -54,7 +54,6 @@ impl BaseResponse {
         })
     }
 
-    /// Describes the found response and its remedy.
     pub(crate) fn words(&self) -> Option<String> {
         let found = self.found?;
         let Response { delay_s, acceleration_m_s2, .. } = found;
@@ -64,16 +63,16 @@ impl BaseResponse {
         );
         if !self.is_stated {
             return Some(format!(
-                "{answers}, or stops sooner, and nobody stated it: run `firsthand calibrate --response`, and write what it finds in [robot.response]; until then each run finds it out anew"
+                "{answers}, or stops sooner, but robot.response is not stated; run `firsthand calibrate --response` and copy its result to [robot.response] (until then each run measures it again)"
             ));
         }
         let stated = self.stated;
         let until_then = match self.brakes_by_response {
-            true => "until then each run finds it out anew",
+            true => "until then each run measures it again",
             false => "until then it drives at half speed, because it stops later than stated",
         };
         Some(format!(
-            "{answers}, and {:.2} s and {} m/s^2 are stated: look for what delays commands or frames, or give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2:.2} in [robot.response]; {until_then}",
+            "{answers}, but {:.2} s and {} m/s^2 are stated; find what delays commands or frames, or give delay_s = {delay_s:.2} and acceleration_m_s2 = {acceleration_m_s2:.2} in [robot.response] ({until_then})",
             stated.dead_time_s(),
             stated.acceleration_m_s2,
         ))

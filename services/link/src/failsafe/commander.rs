@@ -49,7 +49,7 @@ struct Window {
 
 impl Window {
     fn shows(&self) -> Option<&'static str> {
-        (self.unowed >= UNOWED).then_some("acknowledges commands that it was not sent")
+        (self.unowed >= UNOWED).then_some("acknowledges commands that the link did not send")
     }
 }
 
@@ -184,12 +184,12 @@ impl Monitor for OtherCommander {
         let topic = &self.topic;
         if let Some(shows) = self.shows() {
             return Some(format!(
-                "the robot {shows}: another host commands it over its network or serial server; end that host's program"
+                "the robot {shows}, so another host commands it over its network or serial server; end that host's program"
             ));
         }
         let number = gid_text(self.told?.newest.number);
         Some(format!(
-            "another node publishes {topic}, its GID is {number}: `ros2 topic info --verbose {topic}` names it; end it"
+            "another node publishes {topic} (GID {number}); find it with `ros2 topic info --verbose {topic}` and end it"
         ))
     }
 

@@ -108,7 +108,9 @@ impl Contacts {
             [false, true] => "the right wheel is",
             _ => "the wheels are",
         };
-        Some(format!("{wheels} held: the robot touches something, or something blocks a wheel"))
+        Some(format!(
+            "{wheels} held, because the robot touches an obstacle or a wheel is blocked; free the robot"
+        ))
     }
 }
 

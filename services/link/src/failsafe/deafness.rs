@@ -119,7 +119,7 @@ impl Deafness {
             false => format!("has heard anything in {frames} frames and {way_m:.1} m"),
         };
         Some(format!(
-            "no ranging sensor {when}: this is open ground, or they are deaf; check their supply and cable, then `firsthand stop` and `resume`"
+            "no ranging sensor {when}: the ground is open, or the sensors are deaf; check their supply and cable, then run `firsthand stop` and `resume`"
         ))
     }
 }

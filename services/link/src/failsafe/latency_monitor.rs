@@ -104,7 +104,7 @@ impl Monitor for LatencyMonitor {
     }
 
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
-        let text = "what it sends may be old: look at the network and the radio between, which hold it back";
+        let text = "the robot's messages may be old; check the network and the radio for delays";
         Some(text.to_owned())
     }
 }

@@ -167,7 +167,6 @@ impl LostEcho {
         }
     }
 
-    /// Explains doubtful, or surely deaf, sonars.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let it = usize::from(sure);
         let deaf = self.sonars.iter().find(|(.., missing)| missing.is(ONE[it]));
@@ -177,7 +176,7 @@ impl LostEcho {
             None => return None,
         };
         Some(format!(
-            "{who} what was heard before: it was taken away, or they are deaf; check their supply and cable, then `firsthand stop` and `resume`"
+            "{who} an obstacle heard before: the obstacle is gone, or the sonar is deaf; check its supply and cable, then run `firsthand stop` and `resume`"
         ))
     }
 }

@@ -93,17 +93,17 @@ impl Suspicion {
     pub const fn words(self) -> &'static str {
         match self {
             Self::Left => {
-                "the left wheel was told to turn and its counts do not follow: check its encoder, its motor, and robot.left"
+                "the left wheel was told to turn and its counts do not follow; check its encoder, its motor, and robot.left"
             }
             Self::Right => {
-                "the right wheel was told to turn and its counts do not follow: check its encoder, its motor, and robot.right"
+                "the right wheel was told to turn and its counts do not follow; check its encoder, its motor, and robot.right"
             }
             Self::Turn => {
-                "the robot was told to turn and its counts do not follow: are robot.left and robot.right swapped?"
+                "the robot was told to turn and its counts do not follow; check whether robot.left and robot.right are swapped"
             }
-            Self::Jumps => "the counts jump farther than wheels turn",
+            Self::Jumps => "the counts jump farther than the wheels can turn; check the encoders",
             Self::Untold => {
-                "the wheels turn as they were not told to: another host may command the robot, or something pushes it"
+                "the wheels turn without a command; check whether another host commands the robot, or something pushes it"
             }
         }
     }
@@ -272,7 +272,6 @@ impl Odometry {
         self.shares.ratio()
     }
 
-    /// Returns whether it identifies the response while driving.
     pub(crate) const fn searches(&self) -> bool {
         self.searches
     }

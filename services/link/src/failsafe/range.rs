@@ -176,7 +176,7 @@ impl Row {
         let [spread_m, way_m, turn_rad] = [0, 1, 2].map(|it| near.most[it] - near.least[it]);
         let said = if near.motion(READINGS) >= 1.0 {
             format!(
-                "says {:.2} m within {:.0} cm in {} frames although the robot drove {way_m:.2} m and turned {:.0} degrees",
+                "reads {:.2} m within {:.0} cm in {} frames although the robot drove {way_m:.2} m and turned {:.0} degrees",
                 near.least[0],
                 spread_m * 100.0,
                 near.readings,
@@ -184,11 +184,11 @@ impl Row {
             )
         } else {
             format!(
-                "gives readings of which {:.0} % do not follow from those before",
+                "gives inconsistent readings: {:.0} % do not follow from those before",
                 odd_share * 100.0
             )
         };
-        format!("the sensor {} {said}: check it, then `firsthand stop` and `resume`", self.name)
+        format!("the sensor {} {said}; check it, then run `firsthand stop` and `resume`", self.name)
     }
 
     fn condition(&self, sure: bool, now: Moment) -> Condition {
@@ -242,7 +242,6 @@ impl Range {
         self.motion.poses.robot_is(self.pose, now);
     }
 
-    /// Returns the first explanation by a judge of several readings.
     fn judged(&self, sure: bool) -> Option<String> {
         let front = self.rows.iter().find(|row| row.looks_ahead);
         let surface = self.undetected.as_ref().filter(|it| sure && it.is_implausible());
@@ -453,7 +452,7 @@ mod tests {
         }
         let explain = |cause| monitor.explain(cause, now).unwrap();
         assert_eq!(explain(Cause::RangeImplausible), "sensor 0");
-        assert!(explain(Cause::RangeDoubtful).contains("they are deaf"));
+        assert!(explain(Cause::RangeDoubtful).contains("the sensors are deaf"));
     }
 
     #[test]

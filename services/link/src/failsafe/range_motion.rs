@@ -135,11 +135,10 @@ impl RangeMotion {
         }
     }
 
-    /// Explains doubtful, or surely late, readings.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let likely_s = best(&DELAYS_S, &self.better, BETTER[usize::from(sure)])?;
         Some(format!(
-            "what sonars and infrared rangers see fits together if they are {likely_s} s later than they say: look for what holds their readings back, then `firsthand stop` and `resume`"
+            "the readings of sonars and infrared rangers are consistent only if they are {likely_s} s late; find what delays them, then run `firsthand stop` and `resume`"
         ))
     }
 }

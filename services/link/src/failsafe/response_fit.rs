@@ -152,7 +152,6 @@ impl ResponseFit {
             && channels(limits.axes(speeds)).into_iter().enumerate().take(judged).any(is_beyond)
     }
 
-    /// Returns how many channels drive.
     fn judged(&self) -> usize {
         self.axle.track_m.map_or(1, |_| CHANNELS)
     }

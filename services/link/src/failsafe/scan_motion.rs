@@ -143,16 +143,15 @@ impl ScanMotion {
         if beams < LEAST_BEAMS { f64::NAN } else { sum / beams }
     }
 
-    /// Explains doubtful, or surely late, scans.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let likely_s = best(&DELAYS_S, &self.better, BETTER[usize::from(sure)])?;
         let name = &self.sensor.name;
         Some(match likely_s {
             f64::INFINITY => format!(
-                "the scans of {name} do not change although the wheels turn: check the laser, and whether the wheels slip, then `firsthand stop` and `resume`"
+                "the scans of {name} do not change although the wheels turn; check the laser, and whether the wheels slip, then run `firsthand stop` and `resume`"
             ),
             delay_s => format!(
-                "the scans of {name} are {delay_s} s later than they say, by what the wheels did: look for what holds them back, or let them say their age, then `firsthand stop` and `resume`"
+                "the scans of {name} are {delay_s} s later than stated, by the wheels' motion; find what delays them, or send their age, then run `firsthand stop` and `resume`"
             ),
         })
     }
@@ -166,7 +165,6 @@ mod tests {
 
     use super::*;
 
-    /// Returns the range in a room of 6 m by 4 m.
     fn range(at: DVec2, bearing: f64) -> f64 {
         let axis = DVec2::from_angle(bearing);
         let walls = [3.0, 2.0].into_iter().zip([(at.x, axis.x), (at.y, axis.y)]);

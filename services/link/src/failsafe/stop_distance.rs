@@ -15,7 +15,6 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// Returns the stop for a fault known after `known_s`.
     pub fn known_after(known_s: f64, mission: &Mission) -> Self {
         let (response, speed) = (mission.trusted_response(), mission.speed_m_s());
         let turns_s = mission.turn_rad_s() / response.turn_acceleration_rad_s2;

@@ -199,7 +199,7 @@ impl Monitor for StopMonitor {
     }
 
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
-        let text = "it was told to stand and its encoders say that it moves; every method of the robot is tried in turn; another host may command it";
+        let text = "the robot was told to stand and its encoders report motion; the link tries every stop method in turn; check whether another host commands the robot";
         Some(text.to_owned())
     }
 }

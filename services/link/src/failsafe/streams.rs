@@ -194,19 +194,19 @@ impl Monitor for Streams {
                 let silent = self.silent_sensors(now.machine_ns).into_iter();
                 let names: Vec<_> = silent.map(|sensor| &*sensor.name).collect();
                 let goes_on = match cause {
-                    Cause::InfraredSilent => "the robot goes on without it; ",
+                    Cause::InfraredSilent => "the robot continues without it; ",
                     _ => "",
                 };
                 Some(format!(
-                    "no valid reading from {}: {goes_on}check the sensor, or leave it out of robot.sensor or of sensors",
+                    "no valid reading from {}; {goes_on}check the sensor, or remove it from robot.sensor or from sensors",
                     names.join(", ")
                 ))
             }
             (Cause::FramesSilent, _) => {
-                Some("the robot answers and sends no motor frames; they are asked for. A robot that answers datagrams sends them to the last host that commanded it, which may be another".to_owned())
+                Some("the robot answers but sends no motor frames; the link requests them. Over UDP a robot sends frames to the last host that commanded it; check for another host".to_owned())
             }
             (_, Motor::Slow(hz)) => Some(format!(
-                "the robot sends {hz:.1} motor frames a second, one in {:.2} s, and a command lasts {:.2} s: let it send faster, or raise robot.command_limit_s; if it sends datagrams, another host may take the others",
+                "the robot sends {hz:.1} motor frames a second, one in {:.2} s, but a command lasts {:.2} s; let it send faster, raise robot.command_limit_s, or check whether another host takes frames over UDP",
                 1.0 / hz,
                 self.limit.as_secs_f64()
             )),

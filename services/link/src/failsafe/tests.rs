@@ -86,7 +86,6 @@ fn jumps(failsafe: &mut Failsafe, when: Moment) {
     }
 }
 
-/// Takes frames with both wheels' counts every 100 ms.
 fn frames(failsafe: &mut Failsafe, counts: impl IntoIterator<Item = u16>, first_ago_ms: u64) {
     for (frame, counts) in (0..).zip(counts) {
         let when = ago((first_ago_ms - 100 * frame) * MS);

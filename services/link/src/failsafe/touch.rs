@@ -107,7 +107,9 @@ impl Monitor for Touches {
     fn explain(&self, _: Cause, _: Moment) -> Option<String> {
         let (row, _) = self.newest?;
         let name = &self.rows[row].name;
-        Some(format!("{name} feels something: the robot stands, and then goes around it"))
+        Some(format!(
+            "{name} detects a contact or a cliff; the robot stands, and then drives around it"
+        ))
     }
 }
 

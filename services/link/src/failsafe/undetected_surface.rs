@@ -102,7 +102,7 @@ impl UndetectedSurface {
     pub(super) fn explain(&self, front: &str) -> String {
         let [left, right] = &self.beside;
         format!(
-            "{front} has heard nothing {} times, and {} and {} see a surface square ahead at {:.2} m: check the sensor",
+            "{front} has heard nothing {} times, but {} and {} see a surface square ahead at {:.2} m; check the sensor",
             self.silences,
             left.name,
             right.name,

@@ -42,7 +42,6 @@ pub struct Entry<'a> {
 
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub enum Event<'a> {
-    /// Bytes from the robot.
     Datagram(#[serde(with = "serde_bytes")] &'a [u8]),
     /// Whether the wire is open, as it is until the first such event. Datagram wires always are.
     Wire(bool),
@@ -50,12 +49,14 @@ pub enum Event<'a> {
     Sensor(u8, #[serde(with = "serde_bytes")] &'a [u8]),
     /// Whether a sensor's wire is open.
     SensorWire(u8, bool),
-    /// Command from the controller.
     Command(#[serde(with = "inputs::sample")] CommandSample),
     /// Supervisor's order, and why not to drive.
     Order(Order, HoldReason),
     /// Supervisor's limit in lockstep: last tick allowed, and current target.
-    TickLimit { last_tick: u64, target_number: u64 },
+    TickLimit {
+        last_tick: u64,
+        target_number: u64,
+    },
     /// Time passed without input.
     Quiet,
     /// Operator's request at the link.
@@ -64,7 +65,6 @@ pub enum Event<'a> {
     Remember(Memory),
     /// Time to publish the newest telemetry.
     Telemetry,
-    /// End of the process.
     End,
 }
 
@@ -106,9 +106,7 @@ pub enum Effect {
     CountsElsewhere,
     /// Next stop method, because the robot did not stop.
     StopBy(&'static str),
-    /// Description of a response that differs from the stated one.
     FoundResponse(String),
-    /// Why a message violates the protocol.
     Refused(Refusal),
     /// Robot clock relative to mission time.
     ClockRate(f64),

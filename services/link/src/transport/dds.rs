@@ -44,7 +44,6 @@ pub(super) struct Dds {
 }
 
 impl Dds {
-    /// Opens the topics. Fails when the library gives no participant.
     pub(super) fn open(domain: u16, topics: Topics) -> io::Result<Self> {
         let participant = Participant::join(domain, None)?;
         let (readers, writer) = endpoints(&participant, &topics)?;
@@ -76,7 +75,7 @@ impl Wire for Dds {
         let (since_ns, most_ns) =
             self.heard_ns.map_or((joined_ns, UNDISCOVERED_NS), |heard_ns| (heard_ns, DEAF_NS));
         if now_ns.saturating_sub(since_ns) >= most_ns {
-            tracing::info!("nothing was received in the domain; the domain is joined anew");
+            tracing::info!("the ROS domain is silent; the link joins it again");
             self.participant.rejoin()?;
             (self.readers, self.writer) = endpoints(&self.participant, &self.topics)?;
             (self.joined_ns, self.heard_ns) = (Some(now_ns), None);

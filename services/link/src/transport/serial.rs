@@ -44,7 +44,7 @@ fn lower_dtr(line: &OwnedFd) {
     // writes nothing.
     let lowered = unsafe { ioctl(line, Setter::<TIOCMBIC, _>::new(TIOCM_DTR)) };
     if let Err(error) = lowered {
-        tracing::debug!(%error, "DTR stays as it is");
+        tracing::debug!(%error, "cannot lower DTR, so it stays unchanged");
     }
 }
 

@@ -34,10 +34,10 @@ pub(super) trait Dial: fmt::Display + fmt::Debug {
     /// Silence of a dead stream; none if the system reports that.
     const SILENCE: Option<Duration>;
 
-    /// Starts opening without waiting. Fails when the system refuses.
+    /// Starts opening without waiting.
     fn dial(&self) -> io::Result<OwnedFd>;
 
-    /// Checks that a writable `descriptor` is connected. Fails otherwise.
+    /// Checks that a writable `descriptor` is connected.
     fn finish(&self, descriptor: &OwnedFd) -> io::Result<()>;
 
     /// Discards unsent bytes, so that closing does not wait.
@@ -239,7 +239,7 @@ impl<D: Dial> Stream<D> {
         let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
         if self.down.replace(errno) != Some(errno) {
             let remedy = remedy(errno);
-            tracing::warn!(robot = %self.dial, %error, "the wire is down: {remedy}; it is tried for ever");
+            tracing::warn!(robot = %self.dial, %error, "the wire is down; {remedy} (the link retries without end)");
         }
     }
 }

@@ -18,7 +18,7 @@ pub(super) struct Udp {
 }
 
 impl Udp {
-    /// Binds any free port. Fails when the system refuses.
+    /// Binds any free port.
     pub(super) fn open(robot: SocketAddr) -> io::Result<Self> {
         let any = match robot.ip() {
             // Loopback sockets receive nothing from other machines.
@@ -46,7 +46,7 @@ impl Wire for Udp {
                         tracing::warn!(
                             port,
                             expected,
-                            "the robot's host answers from another port; is robot.address right?"
+                            "the robot's host answers from another port; check robot.address"
                         );
                         self.tally.other_port = port;
                     }

@@ -45,7 +45,6 @@ struct World {
 }
 
 impl World {
-    /// Applies an event. Of the supervisor only starting a link matters.
     fn happen(&mut self, what: Happens) {
         match what {
             Drives if self.link => {

@@ -242,7 +242,6 @@ fn a_contact_is_hazard_where_the_body_touches_by_the_papers_method() {
     assert!(!mapper.is_hazard(0.0, -0.3) && !mapper.is_hazard(0.0, 0.0));
 }
 
-/// Sends the robot to (x, 0). Returns the number of changed cells.
 fn send(mapper: &mut Mapper, tick: u64, x: f64) -> usize {
     let (pose, target) = (at(tick, 0.0, 0.0, 0.0), Some(DVec2::new(x, 0.0)));
     mapper.give(Tick { pose, target, ..Tick::default() }).area()

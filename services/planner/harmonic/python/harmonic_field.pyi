@@ -14,7 +14,7 @@ _Cell = tuple[int, int]
 """(row, column), both from 0."""
 
 class SolveError(ValueError):
-    """A map is invalid, or a solve has no field: the message says why and what to do."""
+    """A map is invalid, or its solve failed: the message says why and what to do."""
 
 @final
 class Verification:

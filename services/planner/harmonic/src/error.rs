@@ -9,7 +9,7 @@ use crate::{Cell, MAX_SIDE, MIN_SCREENING_CELLS};
 #[non_exhaustive]
 pub enum SolveError {
     /// Map without cells.
-    #[error("the map is empty ({width} x {height} cells): give it at least one cell")]
+    #[error("the map is empty ({width} x {height} cells); give it at least one cell")]
     MapEmpty {
         /// Columns of the map.
         width: usize,
@@ -18,7 +18,7 @@ pub enum SolveError {
     },
     /// Map wider or higher than [`MAX_SIDE`] cells.
     #[error(
-        "the map is too large ({width} x {height} cells): at most {MAX_SIDE} a side; use larger cells"
+        "the map is too large ({width} x {height} cells, at most {MAX_SIDE} a side); use larger cells"
     )]
     MapTooLarge {
         /// Columns of the map.
@@ -28,7 +28,7 @@ pub enum SolveError {
     },
     /// Mask or cost array whose length differs from the number of cells.
     #[error(
-        "the blocked mask has {found} values, the map {expected} cells: give one value a cell, row by row"
+        "the blocked mask has {found} values, but the map has {expected} cells; give one value per cell, row by row"
     )]
     WrongLength {
         /// Values found.
@@ -49,14 +49,14 @@ pub enum SolveError {
         height: usize,
     },
     /// Target on a blocked cell.
-    #[error("the target (column {}, row {}) is blocked: choose a free cell or free that one", target.col, target.row)]
+    #[error("the target (column {}, row {}) is blocked; choose a free cell, or free that one", target.col, target.row)]
     TargetBlocked {
         /// Target given.
         target: Cell,
     },
     /// Screening length that is NaN or shorter than [`MIN_SCREENING_CELLS`].
     #[error(
-        "a screening length of {cells} cells: it must be at least {MIN_SCREENING_CELLS}; an infinite length is no screening"
+        "the screening length of {cells} cells is too short; give at least {MIN_SCREENING_CELLS}, or infinity to disable screening"
     )]
     ScreeningLength {
         /// Length found, in cells.
@@ -70,8 +70,8 @@ pub enum SolveError {
     /// Every iterative method failed, and the multifrontal factorisation needs more memory than
     /// allowed.
     #[error(
-        "no iterative method converged on the map of {width} x {height} cells and the multifrontal factorisation would need \
-         at least {needed} bytes, {allowed} are allowed: raise `Settings::memory_limit` or use larger cells"
+        "no iterative method converged on the map of {width} x {height} cells and the multifrontal factorisation needs \
+         at least {needed} of {allowed} allowed bytes; raise `Settings::memory_limit` or use larger cells"
     )]
     TooCostly {
         /// Least memory that the factorisation needs, in bytes.
@@ -86,7 +86,7 @@ pub enum SolveError {
     /// Field of the last method failed verification; the solver discards it.
     #[error(
         "the field failed verification (worst relative residual {worst_residual:e}, {local_maxima} cells without a better \
-         neighbour): report this map"
+         neighbour); report this map"
     )]
     Unverified {
         /// Largest residual found, relative to u of its cell.

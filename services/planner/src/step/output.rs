@@ -53,7 +53,6 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Returns the cells, row-major.
     pub fn cells(&self) -> Vec<FieldCell> {
         self.cells_with(|_| ())
     }

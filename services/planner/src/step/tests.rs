@@ -18,7 +18,6 @@ fn mission_of(cells: u32) -> Mission {
 }
 
 impl Planner {
-    /// Returns the guidance a minute later, when the robot has detected what moves.
     fn ask(&mut self, pose: &PoseSample) -> GuidanceSample {
         let stamp_ns = pose.stamp.stamp_ns + 60_000_000_000;
         let pose = PoseSample { stamp: Stamp { stamp_ns, ..pose.stamp }, ..*pose };

@@ -19,7 +19,6 @@ fn imu() -> Vec<u8> {
     [begin, zeros(8), zeros(2), rate, diagonal, zeros(3), zeros(9)].concat()
 }
 
-/// Returns a message with this stamp, microseconds.
 fn imu_at(stamp_us: u64, rate: f64) -> Vec<u8> {
     let mut payload = imu();
     payload[4..8].copy_from_slice(&((stamp_us / 1_000_000) as u32).to_le_bytes());
@@ -76,7 +75,7 @@ fn an_imu_is_read_as_rclpy_serialises_it_and_what_it_does_not_state_is_not_used(
     // Without a rate the orientation gives the turn.
     assert!(set(148, -1.0).unwrap_err().contains("remove robot.ros2.imu"));
     assert!(matches!(set(52, 0.0), Ok(ImuTurn::Heading(at)) if (at - 0.5).abs() < 1e-12));
-    assert!(set(44, 7.0).unwrap_err().contains("no rotation"));
+    assert!(set(44, 7.0).unwrap_err().contains("not a rotation"));
     assert_eq!(set(148, 0.0), Ok(ImuTurn::Rate(0.75, Some(0.0004))));
     for unknown in [0.0, -1.0, f64::NAN] {
         assert_eq!(set(212, unknown), Ok(ImuTurn::Rate(0.75, None)), "{unknown}");

@@ -10,7 +10,6 @@ fn radio(change: impl Fn(&mut mission::Radio)) -> Radio<u8> {
     Radio::new(settings, 5)
 }
 
-/// Returns arriving datagrams with their times, if sent at `times`.
 fn arrivals(radio: &mut Radio<u8>, times: &[f64]) -> Vec<(f64, Vec<u8>)> {
     let mut arrived = Vec::new();
     for (number, &time) in times.iter().enumerate() {

@@ -168,7 +168,7 @@ impl Meeting {
             }
             if began.elapsed() > PATIENCE {
                 self.is_missed = true;
-                tracing::warn!(other = %self.other.display(), last = ?self.newest, "the other robot does not say where it is; it stays at its last place, and this one goes on");
+                tracing::warn!(other = %self.other.display(), last = ?self.newest, "the other robot no longer sends its pose; it stays at its last pose, and this robot continues");
                 break;
             }
             let came = poll::readable(&[self.socket.as_fd(), self.stop.as_fd()], Some(AGAIN));
@@ -192,7 +192,7 @@ impl Meeting {
         {
             let Some(mut place) = bytes.get(..length).and_then(Place::parse) else {
                 self.refused += 1;
-                tracing::warn!(refused = self.refused, "a datagram is not the place of a robot");
+                tracing::warn!(refused = self.refused, "a datagram is not the pose of a robot");
                 continue;
             };
             // On a wall clock the two missions began at different times.

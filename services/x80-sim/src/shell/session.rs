@@ -335,7 +335,7 @@ impl Session {
                 for line in lines.push(bytes) {
                     match parse(&line) {
                         Ok(order) => self.on_said(source, Said::Order(&order))?,
-                        Err(why) => tracing::debug!("the host's message is no order: {why}"),
+                        Err(why) => tracing::debug!("the host's message is not a command: {why}"),
                     }
                 }
             }
@@ -419,7 +419,7 @@ impl Session {
         } else {
             self.strangers += 1;
             if self.strangers == 1 {
-                tracing::warn!(stranger = ?source, served = ?self.peer, "another host speaks to the robot; it is ignored until the first is silent for 2 s");
+                tracing::warn!(stranger = ?source, served = ?self.peer, "another host sends to the robot; the robot ignores it until the first is silent for 2 s");
             }
         }
         serves
@@ -465,7 +465,7 @@ impl Session {
             })
             .and_then(|()| ground_truth.flush());
         if let Err(error) = written {
-            tracing::warn!(%error, "the ground truth has no reader any more; the robot goes on without one");
+            tracing::warn!(%error, "the ground truth has lost its reader; the robot continues without one");
             self.ground_truth = None;
         }
     }

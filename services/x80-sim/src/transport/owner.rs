@@ -34,7 +34,7 @@ impl OwnUser {
         self.senders.push_front((sender, asked, own));
         if !own && !self.told {
             self.told = true;
-            tracing::warn!(%sender, "another user sends to the simulated robot of this run; its datagrams are ignored");
+            tracing::warn!(%sender, "another user sends datagrams to this run's simulated robot; the robot ignores them");
         }
         own
     }
@@ -81,6 +81,6 @@ mod tests {
         drop(socket);
         own.senders[0].1 -= 2 * ASKED_AGAIN;
         assert!(own.admits(sender));
-        assert!(!OwnUser::default().admits(sender), "it was nobody's");
+        assert!(!OwnUser::default().admits(sender), "it had no owner");
     }
 }

@@ -10,7 +10,6 @@ fn batteries(limits: BatteryLimits) -> Batteries {
 }
 
 impl Batteries {
-    /// Returns which batteries are low, and the changes.
     fn at(&mut self, seconds: f64, volts: [f64; 3]) -> ([bool; 3], Vec<(Pack, Charge)>) {
         self.read(volts, MissionTime::from_seconds(seconds));
         let changes = self.take_changes().into_iter();

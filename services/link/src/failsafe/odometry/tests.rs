@@ -220,7 +220,7 @@ fn a_robot_that_is_suspected_is_given_up_after_10_s_or_plausible_again_when_an_o
         odometry.plausible([5, 5], at(f64::from(tick) * PERIOD));
     }
     assert!(!given_up(&odometry, 10.8));
-    assert!(!given_up(&odometry, 11.0), "nobody waits for it");
+    assert!(!given_up(&odometry, 11.0), "no stage waits for it");
     let drive = Observation::Directive(Order::Drive, HoldReason::None);
     odometry.observe(&drive, Moment::default());
     assert!(!given_up(&odometry, 10.8));
@@ -364,7 +364,6 @@ fn one_held_wheel_is_a_contact_at_its_side_and_behind_a_robot_that_backs() {
     assert_eq!(at([true, true], [-TURN, TURN]).half_width_rad, 0.0);
 }
 
-/// Drives a robot by `tells`, while another host commands `other` at `hertz`.
 fn beside_another(tells: [i16; 2], other: [i16; 2], hertz: f64) -> Option<(f64, Suspicion)> {
     let mut odometry = odometry();
     let mut wheels = Wheels::default();
@@ -401,5 +400,5 @@ fn a_robot_that_another_host_turns_or_speeds_is_suspected_and_the_words_name_tha
     }
     let pushed = beside_another([TURN / 3, TURN / 3], [TURN, TURN], 20.0);
     assert!(matches!(pushed, Some((_, Suspicion::Untold))), "{pushed:?}");
-    assert!(Suspicion::Untold.words().contains("another host may command"));
+    assert!(Suspicion::Untold.words().contains("another host commands"));
 }

@@ -15,7 +15,6 @@ struct Watch {
     does_not_stop: bool,
 }
 
-/// Returns the time of the last frame from [`told_to_stand`].
 fn last() -> MissionTime {
     MissionTime::from_seconds(41.0 * PERIOD)
 }

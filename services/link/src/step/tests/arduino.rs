@@ -113,7 +113,6 @@ impl Scene {
         }
     }
 
-    /// Returns the times of polls.
     fn rounds(&self) -> Vec<u64> {
         let rounds = self.sent.iter().filter(|(_, said)| said == ROUND);
         rounds.map(|(at, _)| *at).collect()

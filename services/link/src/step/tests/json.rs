@@ -10,7 +10,6 @@ fn link() -> Link {
     link
 }
 
-/// Returns the counts of a tick at `x` metres of odometry.
 fn counts_at(link: &mut Link, x: f64, machine_ns: u64) -> WheelSample {
     let line = format!("{{\"odometry\":[{x},0,0],\"speeds\":[0,0]}}\n");
     ticks(&link.at(Event::Datagram(line.as_bytes()), machine_ns))[0].2

@@ -291,7 +291,6 @@ impl World {
         }
     }
 
-    /// Returns whether the event can happen.
     fn happen(&mut self, what: Happens) -> bool {
         self.history.push(what);
         match what {
@@ -366,7 +365,6 @@ impl World {
         }
     }
 
-    /// Identifies the state.
     fn key(&self) -> String {
         let moment = Moment { time: MissionTime(self.now_ns), machine_ns: self.now_ns };
         let (link, supervisor) = (&self.link, &self.supervisor);
@@ -418,7 +416,6 @@ impl World {
     }
 }
 
-/// Returns the numbers of states and of commands to move.
 fn explore(cause: (Cause, u64)) -> (usize, u64) {
     let first = World::new(cause);
     let mut seen = HashSet::from([first.key()]);

@@ -11,13 +11,11 @@ fn mapper(extra: &str) -> Mapper {
 }
 
 impl Mapper {
-    /// Maps an echo or silence at (x, 0).
     fn hear(&mut self, tick: u64, x: f64, heading: f64, heard: Option<f64>) {
         let heard = heard.map_or(reading(RangeStatus::Nothing, 0.0), echo);
         self.sense(at(tick, x, 0.0, heading), &[heard]);
     }
 
-    /// Maps infrared counts at the origin, facing along x, without sonar reading.
     fn see(&mut self, tick: u64, infrared_ad: [u16; 7]) {
         self.sense(at(tick, 0.0, 0.0, 0.0), &rays(infrared_ad));
     }
@@ -47,7 +45,6 @@ fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
     assert!(!mapper.is_hazard(2.2, 0.0));
 }
 
-/// Returns the link's readings of these counts.
 fn rays(infrared_ad: [u16; 7]) -> Vec<RangeReading> {
     let of = |(sensor, ad)| {
         let status = match ad {

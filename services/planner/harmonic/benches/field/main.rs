@@ -43,7 +43,6 @@ fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
     best
 }
 
-/// Returns the number of runs; small maps get more.
 fn runs(cells: usize) -> usize {
     (4_000_000 / cells).clamp(3, 50)
 }

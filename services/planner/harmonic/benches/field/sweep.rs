@@ -12,7 +12,6 @@ const SIDE: usize = 512;
 /// Runs per solve; the fastest counts.
 const RUNS: usize = 3;
 
-/// Returns names, kinds and screening lengths of the maps.
 fn kinds() -> Vec<(String, Kind, f64)> {
     const NONE: f64 = f64::INFINITY;
     let mut kinds = vec![(Kind::Empty, NONE), (Kind::Drums, NONE), (Kind::Office, NONE)];

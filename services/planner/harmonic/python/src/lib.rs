@@ -19,7 +19,7 @@ create_exception!(
     harmonic_field,
     SolveError,
     PyValueError,
-    "A map is invalid, or a solve has no field."
+    "A map is invalid, or its solve failed."
 );
 
 fn refused(error: harmonic::SolveError) -> PyErr {
@@ -43,9 +43,7 @@ fn solve(
     memory_limit: u64,
 ) -> PyResult<Field> {
     let free: PyReadonlyArray2<'_, bool> = free.extract().map_err(|_| {
-        PyTypeError::new_err(
-            "free must be a NumPy array of bool with two dimensions, (rows, columns)",
-        )
+        PyTypeError::new_err("free must be a two-dimensional NumPy array of bool, (rows, columns)")
     })?;
     let [height, width] = [free.shape()[0], free.shape()[1]];
     let blocked = free.as_array().iter().map(|free| !free).collect();

@@ -91,7 +91,7 @@ class Fields(unittest.TestCase):
         with self.assertRaisesRegex(SolveError, "screening length"):
             solve(free, (2, 17), screening=0)
         for other in [free.astype(np.int8), free[0], free.tolist()]:
-            with self.assertRaisesRegex(TypeError, "NumPy array of bool with two dimensions"):
+            with self.assertRaisesRegex(TypeError, "two-dimensional NumPy array of bool"):
                 solve(other, (2, 17))
 
     def test_the_example_of_the_readme_says_what_its_comment_says(self):

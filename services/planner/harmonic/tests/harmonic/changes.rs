@@ -3,7 +3,6 @@
 use crate::support::{Angles, Kind, Map, Random, follow};
 use harmonic::{Cancellation, Cell, Change, Domain, Field, Solver, solve_exactly};
 
-/// Map with a field that is solved again after every change.
 struct Case {
     solver: Solver,
     domain: Domain,
@@ -26,7 +25,6 @@ impl Case {
             .expect("the map has a field");
     }
 
-    /// Returns changes that block a rectangle inside the rim, except the target.
     fn block(&self, (col, row): (usize, usize), (width, height): (usize, usize)) -> Vec<Change> {
         let (right, bottom) = (self.domain.width() - 1, self.domain.height() - 1);
         (row.max(1)..(row + height).min(bottom))

@@ -76,7 +76,6 @@ impl Map {
         Domain::new(self.width, self.height, self.blocked.clone(), self.target)
     }
 
-    /// Sets a rectangle, clipped to the map.
     pub(crate) fn fill(
         &mut self,
         cols: std::ops::Range<usize>,
