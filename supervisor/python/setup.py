@@ -18,7 +18,7 @@ TARGET = Path(__file__).resolve().parents[2] / "target"
 FOUND = [os.environ.get("FIRSTHAND"), TARGET / "release/firsthand", TARGET / "debug/firsthand", shutil.which("firsthand")]
 EXECUTABLE = next((path for path in FOUND if path and Path(path).is_file()), None)
 if EXECUTABLE is None:
-    raise SystemExit("no executable of firsthand: run `cargo build -p firsthand`, or name one with FIRSTHAND=")
+    raise SystemExit("no firsthand executable; run `cargo build -p firsthand`, or name one with FIRSTHAND=")
 
 
 def said(*arguments):

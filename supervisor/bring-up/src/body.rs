@@ -1,5 +1,5 @@
-//! Body motion against wheel counts, as the laser or else the sonars see it: motors, and the sizes
-//! of wheels and track.
+//! Body motion seen by the laser, or else the sonars, against wheel counts: motors, sizes of wheels
+//! and track.
 
 use common::mission::{Mission, Protocol};
 use nalgebra::{Matrix2, Vector2};
@@ -8,19 +8,19 @@ use crate::Finding;
 
 /// Motion of the body relative to its wheels.
 pub(crate) struct Moves {
-    /// Whether it turns, or drives, the other way; `None` if undetermined.
+    /// Whether it turns, or drives, in reverse; `None` if undetermined.
     pub(crate) turns_back: Option<bool>,
     pub(crate) drives_back: Option<bool>,
-    /// Whether it drives where the wheels turn, and turns where they drive.
+    /// Whether turning and driving are exchanged.
     pub(crate) exchanged: bool,
-    /// True turn and distance over the wheels'; `None` if undetermined.
+    /// True turn and distance, relative to the wheels'; `None` if undetermined.
     pub(crate) turn: Option<f64>,
     pub(crate) way: Option<f64>,
     /// True turn per metre, radians.
     pub(crate) curl: f64,
 }
 
-/// Least deviations of motion and diameters that are reported, shares.
+/// Minimum reported deviations of motion and diameters, shares.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SizesTold {
     pub(crate) sizes: f64,
@@ -29,11 +29,10 @@ pub(crate) struct SizesTold {
 
 pub(crate) const MOTOR: &str = "motor turns";
 
-/// Returns the motors that explain such a motion. Each row, a wheel's, has 1 or -1 in the column of
-/// the wheel that it acts as.
+/// Returns the motors that explain a motion. Each row, a wheel's, has 1 or -1 in the column of the
+/// wheel whose command it follows.
 pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Matrix2<f64> {
-    // Turn and drive are the difference and the sum of the rims' motions. Applied twice, this
-    // doubles them.
+    // Turn and drive are difference and sum of the rims' motions; applied twice, this doubles them.
     let sums = Matrix2::new(-1.0, 1.0, 1.0, 1.0);
     let sign = |back| if back { -1.0 } else { 1.0 };
     let signs = Matrix2::from_diagonal(&Vector2::new(sign(turns_back), sign(drives_back)));
@@ -41,8 +40,7 @@ pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Ma
     sums * goes * sums / 2.0
 }
 
-/// Describes the faults of motors or encoders: one `part` for each row that differs from the
-/// identity.
+/// Describes motor or encoder faults: one `part` for each row that differs from the identity.
 pub(crate) fn words(parts: Matrix2<f64>, part: &str) -> String {
     let sides = ["left", "right"].into_iter().enumerate();
     let wrong = sides.filter_map(|(row, side)| {
@@ -71,16 +69,16 @@ impl Moves {
         possible.first().copied().filter(|_| possible.len() == 1)
     }
 
-    /// Returns the finding about swapped or reversed motors; `None` if they may be right. Keys mend
-    /// them if the encoders are connected `alike`.
+    /// Returns the finding about swapped or reversed motors; `None` if they may be right. It has
+    /// keys if the encoders are connected `alike`.
     pub(crate) fn finding(&self, mission: &Mission, alike: bool) -> Option<Finding> {
         let possible = self.possible();
         if possible.contains(&Matrix2::identity()) {
             return None;
         }
         let all: Vec<_> = possible.iter().map(|it| words(it.transpose(), MOTOR)).collect();
-        let which = if all.len() > 1 { ": look which way it turns and drives" } else { "" };
-        let told = if self.exchanged { "told to drive, the body turns: " } else { "" };
+        let which = if all.len() > 1 { ": check which way the robot turns and drives" } else { "" };
+        let told = if self.exchanged { "the body turns on a command to drive: " } else { "" };
         let text = format!("{told}{}{which}", all.join("; or "));
         let mut finding = Finding::wrong("motors", text);
         if let [motors] = possible[..]
@@ -109,14 +107,13 @@ impl Moves {
         let (body, odometry) = (mission.body(), &mission.robot.odometry);
         // Sizes do not affect a robot's own odometry.
         let is_own = mission.robot.protocol() == Protocol::Ros2;
-        let said = if is_own { "its odometry says" } else { "the wheels count" };
+        let said = if is_own { "its odometry reports" } else { "the wheels count" };
         let is_told = |share: &f64| (share - 1.0).abs() > told.sizes;
-        // A turn alone does not separate wheel size from track; large errors are those of the
-        // wheels.
+        // A turn alone cannot separate wheel size from track; large errors count as the wheels'.
         let way = self.way.or(self.turn);
         let other = way.filter(is_told);
         if let Some(way) = other {
-            let text = format!("the body drives {:.0} % of what {said}", 100.0 * way);
+            let text = format!("the body drives {:.0} % of the distance that {said}", 100.0 * way);
             let (key, value) = match mission.robot.protocol() {
                 Protocol::X80 | Protocol::Arduino => {
                     ("robot.counts_per_turn", format!("{:.0}", body.counts_per_turn / way))
@@ -131,10 +128,10 @@ impl Moves {
             };
             found.push(Finding::wrong("wheel size", text).with_key(key, value));
         }
-        // The stated wheels hold where their error is undetermined.
+        // Undetermined wheel errors count as none.
         let track = self.turn.map(|turn| other.unwrap_or(1.0) / turn);
         if let Some(track) = track.filter(is_told) {
-            let text = format!("the body turns {:.0} % of what {said}", 100.0 / track);
+            let text = format!("the body turns {:.0} % of the angle that {said}", 100.0 / track);
             let (key, stated) = match is_own {
                 true => ("robot.odometry.track_scale", odometry.track_scale),
                 false => ("robot.track_m", body.track_m),
@@ -150,7 +147,7 @@ impl Moves {
             );
             let key = "robot.odometry.diameter_ratio";
             let finding = Finding::wrong("wheel ratio", text);
-            // The side is unknown if a laser upside down may have seen it.
+            // A laser mounted upside down may have seen it, so the side is unknown.
             found.push(match self.turns_back {
                 None => finding,
                 Some(_) => finding.with_key(key, format!("{:.3}", odometry.diameter_ratio * ratio)),

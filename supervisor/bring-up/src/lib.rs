@@ -1,12 +1,12 @@
 //! Bring-up: a comparison of a new robot's behaviour with its mission.
 //!
 //! The planner stage of [`calibration`] lets the robot stand, turn on the spot to both sides, drive
-//! a short distance there and back, and turn to and fro. A [`Trace`] holds the recording.
-//! [`findings`] compares it with the mission. Each [`Finding`] is a verdict about one part, with
-//! the mission keys to change or the part to mend.
+//! a short distance there and back, and turn to and fro. [`findings`] compares its recorded
+//! [`Trace`] with the mission. Each [`Finding`] is a verdict about one part, with the mission keys
+//! to change or the part to repair.
 //!
-//! Comparing counts with commands finds encoders. Lasers, rangers and the gyro observe the body,
-//! which finds motors, mountings and sizes.
+//! Counts and commands show encoder faults. Lasers, rangers and the gyro observe the body, which
+//! shows faults of motors, mountings and sizes.
 //!
 //! | module | holds |
 //! |---|---|
@@ -79,14 +79,14 @@ impl Finding {
 }
 
 /// Returns the findings about the robot of `mission`, and the ends of laser beams, or else of
-/// ranger echoes.
+/// echoes.
 ///
 /// The ends are in metres from the robot's first place, x ahead. With `lifted` wheels the body is
-/// left out.
+/// ignored.
 pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>, Vec<DVec2>) {
     let mut found = vec![wheels::rate(mission, trace)];
     if !trace.begins_at_rest() {
-        let text = "what it did was recorded from too late on: repeat this, on a machine that has less to do";
+        let text = "the recording began too late; repeat this on a machine with less load";
         found.push(Finding::unknown("recording", text));
         return (found, Vec::new());
     }

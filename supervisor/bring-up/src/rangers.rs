@@ -17,7 +17,7 @@ use crate::{
     wheels::Motion,
 };
 
-/// Least share of ticks with a reading, for a sensor that measures in each.
+/// Minimum share of ticks with a reading, for a sensor that measures in each.
 const LIVES: f64 = 0.5;
 /// Least range noise at rest that is reported, metres.
 const NOISE_M: f64 = 0.1;
@@ -25,25 +25,25 @@ const NOISE_M: f64 = 0.1;
 const BINS: usize = 72;
 /// Cap of a range difference, metres.
 const DIFFERENT_M: f64 = 0.5;
-/// Share of the stated bearing's difference that a reported bearing must undercut, and the least
-/// difference of the stated one, metres.
+/// Maximum ratio of a reported bearing's difference to the stated one's, and the minimum of the
+/// latter, metres.
 const EXPLAINS: f64 = 0.55;
 const LEAST_DIFFERENCE_M: f64 = 0.12;
 const LEAST_SAMPLES: usize = 30;
 /// Least reported deviation of a bearing, bins.
 const BESIDE_BINS: usize = 3;
-/// Least deviations that sonars report, because a sonar is wider than a beam.
+/// Minimum deviations by sonars, which are wider than beams.
 const SIZES_TOLD: SizesTold = SizesTold { sizes: 0.15, ratio: f64::INFINITY };
-/// Scales of the turn that are tried: half to double, by equal factors.
+/// Step of the tried turn scales, half to double.
 const SCALE_RATIO: f64 = 1.02;
 const SCALES: i32 = 35;
-/// Multiple of the least disagreement within which scales count as equally good.
+/// Multiple of the minimum disagreement within which scales are equally good.
 const ALIKE: f64 = 1.5;
-/// Shares of distance that wheels of another size may have. An echo that changes by another share
-/// is not from ahead.
+/// Plausible distance shares of wheels of another size. An echo with another share is not from
+/// ahead.
 const SHARES: std::ops::Range<f64> = 0.3..3.0;
 const GYRO_TOLD: f64 = 0.05;
-/// Least turn for a comparison with the gyro, radians.
+/// Minimum turn for a comparison with the gyro, radians.
 const LEAST_TURN: f64 = 2.0;
 
 fn range_m(reading: &RangeReading) -> Option<f64> {
@@ -59,8 +59,8 @@ fn readings(trace: &Trace, row: usize) -> impl Iterator<Item = (f64, &RangeReadi
     trace.ranges.iter().filter_map(move |(at, all)| Some((*at, all.iter().find(of)?)))
 }
 
-/// Returns a finding for each sensor: whether it reports, and its noise at rest. `turned` says
-/// whether the robot turned around.
+/// Returns a finding for each sensor about its reports and its noise at rest. `turned` says whether
+/// the robot turned around.
 pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<Finding> {
     let until = trace.rest_until_s();
     let ticks = trace.rolled.len().max(1) as f64;
@@ -77,7 +77,7 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
             |it: &RangeReading| !matches!(it.status(), RangeStatus::Absent | RangeStatus::Invalid);
         let said = readings(trace, row).filter(|(_, it)| valid(it)).count() as f64;
         if said * (sensor.every_ticks as f64) < LIVES * ticks {
-            let text = "it says nothing in most ticks: check its plug, its name and its row";
+            let text = "it reports nothing in most ticks; check its plug, its name and its row";
             found.push(Finding::wrong(name, text));
             continue;
         }
@@ -89,12 +89,12 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
             })
         };
         if sees(row) == 0 && turned && sensor.kind == SensorKind::Cone && seen_by_others() {
-            let text = "it sees nothing all around, where others do: check its plug, its pin and its transmitter";
+            let text = "it sees nothing all around, although others do; check its plug, its pin and its transmitter";
             found.push(Finding::wrong(name, text));
             continue;
         }
         if sees(row) == 0 {
-            let text = "it sees nothing all around: is something within its reach? A ranger whose transmitter is dead does so too";
+            let text = "it sees nothing all around; put something within its reach, or check its transmitter";
             found.push(Finding::unknown(name, text));
             continue;
         }
@@ -103,14 +103,14 @@ pub(crate) fn liveliness(mission: &Mission, trace: &Trace, turned: bool) -> Vec<
             .filter_map(|it| range_m(it.1))
             .collect();
         ranges.sort_by(f64::total_cmp);
-        // Half of the readings lie between the quartiles: 1.35 deviations of a normal distribution.
+        // The quartiles lie 1.35 deviations of a normal distribution apart.
         let noise = match ranges.len() {
             0..4 => 0.0,
             many => (ranges[3 * many / 4] - ranges[many / 4]) / 1.35,
         };
         found.push(match noise > NOISE_M {
-            true => Finding::wrong(name, format!("its ranges vary by {noise:.2} m although the robot stands: check its supply and its mounting")),
-            false => Finding::right(name, format!("it lives; noise at rest {noise:.3} m")),
+            true => Finding::wrong(name, format!("its ranges vary by {noise:.2} m although the robot stands; check its supply and its mounting")),
+            false => Finding::right(name, format!("it works; noise at rest {noise:.3} m")),
         });
     }
     found
@@ -122,7 +122,7 @@ fn laser_lives(trace: &Trace, row: usize, sensor: &Sensor) -> Finding {
     let (Some(first), Some(last)) = (scans.first(), scans.last()) else {
         return Finding::wrong(
             name,
-            "no scan came: check its cable, its topic, and the number of its beams",
+            "no scan arrived; check its cable, its topic and its number of beams",
         );
     };
     let hz = (scans.len() - 1) as f64 / (last.0 - first.0).max(1e-3);
@@ -131,13 +131,12 @@ fn laser_lives(trace: &Trace, row: usize, sensor: &Sensor) -> Finding {
         scans.iter().map(|it| it.2.iter().filter(|range| range.is_finite()).count()).sum();
     let share = ended as f64 / beams.max(1) as f64;
     let text =
-        format!("{hz:.1} scans a second, {:.0} % of the beams end at something", 100.0 * share);
+        format!("{hz:.1} scans per second, {:.0} % of the beams hit something", 100.0 * share);
     match share > 0.1 {
         true => Finding::right(name, text),
-        false => Finding::wrong(
-            name,
-            format!("{text}: does anything stand around it, and is its window clean?"),
-        ),
+        false => {
+            Finding::wrong(name, format!("{text}; put something around it, and clean its window"))
+        }
     }
 }
 
@@ -165,7 +164,6 @@ impl Gyro {
         (wheels > LEAST_TURN).then(|| Self { scale: products / squares })
     }
 
-    /// Returns whether the gyro turns in the wheels' direction.
     pub(crate) const fn agrees(&self) -> bool {
         self.scale > 0.0
     }
@@ -205,8 +203,8 @@ impl Profile {
     }
 }
 
-/// Returns a ranger's echoes while the robot turned: bearing from the first heading, and distance
-/// from the robot's centre.
+/// Returns a ranger's echoes during turns: bearing from the first heading, and distance from the
+/// robot's centre.
 fn seen_turning(
     trace: &Trace,
     row: usize,
@@ -223,7 +221,7 @@ fn seen_turning(
         .collect()
 }
 
-/// Returns the turns before the robot leaves its first place.
+/// Returns the turns at the robot's first place.
 fn turning_legs(trace: &Trace) -> Vec<Leg> {
     let legs = trace.legs().into_iter().take_while(|leg| leg.told != Told::Drive);
     legs.filter(|leg| leg.told != Told::Stand).collect()
@@ -246,23 +244,24 @@ pub(crate) fn findings(
         found.extend(match moves.way {
             Some(way) if (way - 1.0).abs() <= SIZES_TOLD.sizes => {
                 let text = format!(
-                    "the front sonar sees {:.0} % of the way that the wheels count",
+                    "the front sonar measures {:.0} % of the distance that the wheels count",
                     100.0 * way
                 );
                 Some(Finding::right("way", text))
             }
             Some(_) => None,
             None => {
-                let text = "its way was not seen: let it stand 0.8 to 2 m before a wall, facing it";
+                let text =
+                    "its drive was not measured; place it 0.8 to 2 m in front of a wall, facing it";
                 Some(Finding::unknown("way", text))
             }
         });
         if moves.turns_back.is_none() {
-            let text = "the sonars do not tell which way it turned: look, when it turns first it should turn to the left";
+            let text = "the sonars cannot tell which way it turned; check that its first turn is to the left";
             found.push(Finding::unknown("turn", text));
         }
         let sizes = moves.sizes(mission, SIZES_TOLD);
-        // With wheels of another size no bearing is known well.
+        // Wrong wheel sizes spoil all bearings.
         if !sizes.is_empty() {
             found.extend(sizes);
             return found;
@@ -272,7 +271,7 @@ pub(crate) fn findings(
         placed.map_or_else(|| turned(motion, at), |placed| placed.pose(at).heading)
     });
     for (place, (sensor, seen)) in all.iter().enumerate() {
-        // Each is compared with all others, or with the laser.
+        // Compares each with all others, or with the laser.
         let reference = match placed {
             Some(placed) => {
                 Profile::of(placed.points.iter().map(|it| (it.to_angle(), it.length())))
@@ -307,27 +306,26 @@ fn others(all: &[Seen<'_>], place: usize) -> Profile {
     Profile::of(others.flat_map(|(_, (_, seen))| seen.iter().copied()))
 }
 
-/// Returns the mean disagreement of sonars at the same bearings, metres; `None` for fewer than
-/// three, or with few echoes.
+/// Returns the mean disagreement of sonars at the same bearings, metres; `None` with fewer than
+/// three sonars or few echoes.
 fn disagreement(all: &[Seen<'_>]) -> Option<f64> {
     let each =
         all.iter().enumerate().map(|(place, (_, seen))| others(all, place).difference(seen, 0));
     mean(&each.flatten().collect::<Vec<f64>>(), 2).filter(|_| all.len() > 2)
 }
 
-/// Ratio of true and wheel turns at which the sonars agree best.
+/// Ratio of true and wheel turns with the best agreement of the sonars.
 #[derive(Clone, Copy, Debug)]
 struct Turn {
     /// `None` if both directions agree equally.
     turns_back: Option<bool>,
-    /// `None` if the sonars agree at the wheels' turns, or at no scale.
+    /// `None` if the sonars agree without a scale, or at no scale.
     scale: Option<f64>,
     agrees: bool,
 }
 
 impl Turn {
-    /// Finds the best scale; `differs` returns the disagreement of the sonars at a scale of the
-    /// wheels' turns.
+    /// Finds the best scale; `differs` returns the disagreement at a scale of the wheels' turns.
     fn best(differs: impl Fn(f64) -> Option<f64>) -> Option<Self> {
         let scales = (-SCALES..=SCALES).map(|power| SCALE_RATIO.powi(power));
         let each = scales.flat_map(|scale| [scale, -scale]);
@@ -357,15 +355,14 @@ pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves 
     });
     let rims_m = mission.body().track_m / 2.0;
     let turned_m = |[angle, _]: [f64; 2]| angle * rims_m;
-    // A reversed wheel makes the body drive when commanded to turn. Sonars that agree on a turn saw
-    // one.
+    // A reversed wheel makes the body drive on a turn command. Sonars that agree on a turn saw one.
     let mut driven = [Told::TurnLeft, Told::TurnRight].into_iter().filter_map(|told| {
         let share = share_of_way(mission, trace, motion, told, turned_m)?;
         (0.5..2.0).contains(&share.abs()).then_some(share)
     });
     let driven = driven.find(|_| turn.is_none_or(|turn| !turn.agrees));
     let share = share_of_way(mission, trace, motion, Told::Drive, |[_, way]| way);
-    // A front sonar that looks elsewhere disagrees with the others.
+    // A front sonar that points elsewhere disagrees with the others.
     let is_ahead = driven.is_some() || turn.is_none_or(|turn| turn.agrees);
     let share = share.filter(|share| is_ahead && SHARES.contains(&share.abs()));
     Moves {
@@ -385,21 +382,21 @@ pub(crate) fn gyro_finding(
     moves: &Moves,
 ) -> Option<Finding> {
     let Some(gyro) = gyro else {
-        let text = "no turn of it was used: link.log says whether it is silent, or turns otherwise than odometry, as one does whose z axis points down";
+        let text = "none of its turns was used: it is silent, or contradicts odometry, for example because its z axis points down; see link.log";
         return mission.robot.ros2.imu.is_some().then(|| Finding::wrong("gyro", text));
     };
     let (truth, by) = match moves.turn.filter(|_| placed.is_some()) {
-        Some(turn) => (turn, "laser sees: mend its scale"),
-        None => (1.0, "wheels say: its scale or robot.track_m is wrong"),
+        Some(turn) => (turn, "laser sees; correct its scale"),
+        None => (1.0, "wheels count; correct its scale or robot.track_m"),
     };
     let scale = gyro.scale.abs() / truth;
-    let text = format!("it says {:.1} % of the turn", 100.0 * scale);
+    let text = format!("it reports {:.1} % of the turn", 100.0 * scale);
     Some(match (gyro.agrees(), moves.turns_back) {
         _ if moves.exchanged => return None,
         (false, None) => return None,
         (false, Some(false)) => Finding::wrong(
             "gyro",
-            "it says turns to the left as turns to the right: its z axis points down, or its sign is wrong",
+            "it reports left turns as right turns: its z axis points down, or its sign is wrong",
         ),
         _ if (scale - 1.0).abs() <= GYRO_TOLD => Finding::right("gyro", text),
         _ => Finding::wrong("gyro", format!("{text} that the {by}")),
@@ -419,7 +416,7 @@ fn bearing(reference: &Profile, sensor: &Sensor, seen: &[(f64, f64)]) -> Option<
     let off = wrap_angle(TAU * bins as f64 / BINS as f64);
     let deg = wrap_angle(sensor.mount.bearing_rad + off).to_degrees();
     let text = format!(
-        "it sees what lies {:.0} degrees beside its stated bearing: it looks elsewhere, or two plugs are swapped",
+        "its readings fit a bearing {:.0} degrees from the stated one: it points elsewhere, or two plugs are swapped",
         off.to_degrees()
     );
     Some(
@@ -428,7 +425,7 @@ fn bearing(reference: &Profile, sensor: &Sensor, seen: &[(f64, f64)]) -> Option<
     )
 }
 
-/// Returns the ends of echoes by the wheels' motion, metres from the first place.
+/// Returns the echo ends by the wheels' motion, metres from the first place.
 pub(crate) fn echoes(mission: &Mission, trace: &Trace, motion: &Motion) -> Vec<DVec2> {
     let table = mission.sensor_table();
     let (mut at, mut before_m) = (DVec2::ZERO, 0.0);
@@ -446,8 +443,8 @@ pub(crate) fn echoes(mission: &Mission, trace: &Trace, motion: &Motion) -> Vec<D
     points
 }
 
-/// Returns the motion by the front sonar over `way` by the wheels, in legs of this command;
-/// negative for a reversed one.
+/// Returns the front sonar's motion over `way` by the wheels, in legs of this command; negative if
+/// reversed.
 ///
 /// Returns `None` if the echo shows no motion.
 fn share_of_way(
@@ -465,7 +462,7 @@ fn share_of_way(
             |(at, it): &(f64, &RangeReading)| Some([way(between(motion, *at)?), range_m(it)?]);
         let points: Vec<_> = in_leg.iter().filter_map(point).collect();
         let [xx, xy, yy] = spread(&points);
-        // Another wall behind the first, or a slanted one, gives no straight line.
+        // Another wall behind the first, or a slanted one, gives a bent line.
         let mostly = 2 * points.len() > in_leg.len();
         if points.len() >= 6 && mostly && xx > 1e-3 && xy * xy > 0.95 * xx * yy {
             shares.push(-xy / xx);

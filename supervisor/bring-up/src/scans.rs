@@ -1,13 +1,12 @@
 //! Body motion and laser mounting that align all scans with the first one.
 //!
-//! The scans at rest form a reference, a range for each bearing. The end of each later beam follows
-//! from the wheels' motion and the unknowns below. Seen from the laser's first place it should
+//! The scans at rest form a reference, a range for each bearing. The wheels' motion and the
+//! unknowns below give the end of each later beam. Seen from the laser's first place it should
 //! match the reference.
 //!
-//! Gauss-Newton minimises the differences. Its weights fall for points off the reference. It takes
-//! the scans near the beginning first, then all. It starts from eight directions of the laser, with
-//! turns as counted and reversed. It also starts with turning and driving exchanged, as one
-//! reversed wheel does.
+//! Gauss-Newton minimises the differences, with weights that fall for points off the reference,
+//! first for the early scans, then for all. It starts from eight laser directions, with turns as
+//! counted and reversed, and with turning and driving exchanged, as one reversed wheel does.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -37,27 +36,27 @@ const WAY: usize = 5;
 const CURL: usize = 6;
 /// Steps of the numerical derivatives.
 const STEPS: [f64; UNKNOWNS] = [1e-3, 1e-3, 1e-3, 2e-3, 1e-3, 5e-3, 5e-3];
-/// Stages: greatest wheel turn of the scans, radians; distance at which a point counts half,
-/// metres; rounds.
+/// Stages: maximum wheel turn of the scans, radians; distance at which a point counts half, metres;
+/// rounds.
 const STAGES: [(f64, f64, usize); 4] =
     [(0.7, 0.4, 6), (2.5, 0.2, 6), (f64::INFINITY, 0.1, 8), (f64::INFINITY, 0.04, 8)];
 const STARTS: usize = 8;
-/// Sampling during the search: all scans up to this turn, radians, about so many others, and so
-/// many beams of each. The refinement takes all scans with `BEAMS` beams.
+/// Search samples: all scans up to this turn, radians, about so many others, and so many beams of
+/// each. The refinement takes all scans with `BEAMS` beams.
 const EARLY: f64 = 2.5;
 const SCANS: usize = 60;
 const FEW_BEAMS: usize = 30;
 const BEAMS: usize = 90;
-/// Distance from the reference within which a point counts as placed, metres.
+/// Distance from the reference of a placed point, metres.
 const PLACED_M: f64 = 0.08;
 const LEAST_PLACED: f64 = 0.6;
 /// Share of placed points that ends the search, and its loss per logarithm of turn or distance over
-/// the wheels'. Without the loss, a longer turn the other way round could end at the same heading.
+/// the wheels'. Without the loss, a longer reverse turn could end at the same heading.
 const CERTAIN: f64 = 0.93;
 const UNLIKELY: f64 = 0.25;
-/// Least reported deviations: an angle, radians, a distance, metres, a time, seconds, and shares.
+/// Minimum reported deviations: angle, radians, distance, metres, time, seconds, shares.
 const YAW_TOLD: f64 = 4.0 * PI / 180.0;
-/// Angle within which a laser that looks back may also be on a robot that drives back.
+/// Maximum deviation from backwards of a laser that may look back, or whose robot may drive back.
 const BACK_RAD: f64 = 10.0 * PI / 180.0;
 const PLACE_TOLD_M: f64 = 0.05;
 const AGE_TOLD_S: f64 = 0.06;
@@ -67,9 +66,9 @@ type Unknowns = SVector<f64, UNKNOWNS>;
 
 #[derive(Clone, Copy)]
 struct Hypothesis {
-    /// Whether it seems to the laser to turn against the wheels.
+    /// Whether the laser sees turns against the wheels'.
     turns_back: bool,
-    /// Whether it drives where the wheels turn, and turns where they drive.
+    /// Whether turning and driving are exchanged.
     exchanged: bool,
 }
 
@@ -89,15 +88,15 @@ impl Placed {
         self.share >= LEAST_PLACED
     }
 
-    /// Returns whether the body seems to the laser to drive back.
+    /// Returns whether the laser sees the body drive back.
     fn seems_back(&self) -> bool {
         PI - self.unknowns[YAW].abs() < BACK_RAD
     }
 
     /// Returns the body's motion.
     ///
-    /// A laser upside down or looking back sees the same as swapped or reversed motors, except for
-    /// turns that drive. A gyro that turns with the wheels decides.
+    /// A laser upside down or looking back resembles swapped or reversed motors, except for turns
+    /// that drive. A gyro that turns with the wheels decides.
     pub(crate) fn moves(&self, gyro: Option<&Gyro>) -> Moves {
         let Hypothesis { turns_back, exchanged } = self.hypothesis;
         let scale = |it: usize| Some(self.unknowns[it].exp());
@@ -196,8 +195,8 @@ impl<'a> Problem<'a> {
         DVec2::new(self.header.x_m + unknowns[X], self.header.y_m + unknowns[Y])
     }
 
-    /// Returns the beam ends in the frame of the first pose; `None` for beams without an end. The
-    /// order is independent of the unknowns.
+    /// Returns the beam ends in the frame of the first pose; `None` without an end. The order is
+    /// independent of the unknowns.
     fn ends(
         &self,
         hypothesis: Hypothesis,
@@ -231,8 +230,7 @@ impl<'a> Problem<'a> {
         ends
     }
 
-    /// Returns the distance of a point beyond the reference, seen from the laser's first place,
-    /// metres.
+    /// Returns a point's distance beyond the reference, from the laser's first place, metres.
     fn beyond(&self, end: DVec2, unknowns: &Unknowns) -> Option<f64> {
         let seen = end - self.laser(unknowns);
         let along = seen.to_angle() - unknowns[YAW] - self.header.first_rad;
@@ -256,7 +254,7 @@ impl<'a> Problem<'a> {
         ends.into_iter().map(|end| self.beyond(end?, unknowns)).collect()
     }
 
-    /// Does a round of Gauss-Newton; points at `half_m` count half.
+    /// Performs a Gauss-Newton iteration; points at `half_m` count half.
     fn improve(
         &self,
         hypothesis: Hypothesis,
@@ -279,7 +277,7 @@ impl<'a> Problem<'a> {
             let mut slope = Unknowns::zeros();
             for it in 0..UNKNOWNS {
                 let Some(there) = shifted[it][point] else { continue };
-                // At an edge of the reference the difference is no slope.
+                // At an edge of the reference the difference is meaningless as a slope.
                 let difference = there - residual;
                 if difference.abs() < 0.1 {
                     slope[it] = difference / STEPS[it];
@@ -290,7 +288,7 @@ impl<'a> Problem<'a> {
         }
         for it in 0..UNKNOWNS {
             normal[(it, it)] += PRIOR[it].powi(-2);
-            // The yaw may start anywhere, so its prior exerts no pull.
+            // The yaw may start anywhere, so its prior is flat.
             right[it] -= if it == YAW { 0.0 } else { unknowns[it] * PRIOR[it].powi(-2) };
         }
         if let Some(change) = normal.cholesky().map(|it| it.solve(&right)) {
@@ -299,12 +297,12 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns the share of points on the reference, among those that it shows.
+    /// Returns the share of visible points that lie on the reference.
     fn placed(&self, hypothesis: Hypothesis, unknowns: &Unknowns) -> f64 {
         let residuals = self.residuals(hypothesis, unknowns, f64::INFINITY);
         let shown = residuals.iter().flatten().count();
         let placed = residuals.iter().flatten().filter(|it| it.abs() <= PLACED_M).count();
-        // Solutions that turn most points away from the reference do not count.
+        // Penalises solutions that turn most points away from the reference.
         placed as f64 / shown.max(residuals.len() / 3).max(1) as f64
     }
 }
@@ -318,7 +316,7 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
         .into_iter()
         .flat_map(|exchanged| both.map(|turns_back| Hypothesis { turns_back, exchanged }));
     let mut starts = hypotheses.flat_map(|it| (0..STARTS).map(move |start| (it, start)));
-    // A solution that places nearly all points ends the search.
+    // A nearly perfect solution ends the search.
     while best.as_ref().is_none_or(|(likely, ..)| *likely < CERTAIN)
         && let Some((hypothesis, start)) = starts.next()
     {
@@ -331,7 +329,7 @@ pub(crate) fn place(mission: &Mission, trace: &Trace, motion: &Motion) -> Option
         }
         let share = problem.placed(hypothesis, &unknowns);
         let likely = share - UNLIKELY * (unknowns[TURN].abs() + unknowns[WAY].abs());
-        // Another solution must be better, so that the stated robot wins ties.
+        // The stated robot wins ties.
         if best.as_ref().is_none_or(|(most, ..)| likely > most + 0.03) {
             best = Some((likely, hypothesis, unknowns));
         }
@@ -371,7 +369,7 @@ pub(crate) fn findings(
     let name = &sensor.name;
     if !placed.is_sure() {
         let text = format!(
-            "{:.0} % of its beams agree on a motion: put the robot where walls and things stand around it, and repeat",
+            "only {:.0} % of its beams agree on a motion; place the robot among walls and objects, and repeat",
             100.0 * placed.share
         );
         return vec![Finding::unknown(name, text)];
@@ -382,11 +380,11 @@ pub(crate) fn findings(
     if moves.exchanged {
         return found;
     }
-    // The laser is not blamed for what the motors explain.
+    // Motor faults take precedence over laser faults.
     let seen_back = placed.hypothesis.turns_back && moves.turns_back != Some(true);
     let looks_back = placed.seems_back() && moves.drives_back != Some(true);
     let or_motors = format!(
-        "or {}; look which way it turns and drives",
+        "or {}; check which way the robot turns and drives",
         words(motors(seen_back, looks_back, false).transpose(), MOTOR)
     );
     if seen_back {
@@ -401,13 +399,13 @@ pub(crate) fn findings(
         });
     } else if looks_back {
         let key = key("turned_deg");
-        let text = "sees it drive backwards: it looks back, so that";
+        let text = "sees it drive backwards: it points back, so that";
         found.push(Finding::wrong(name, format!("{text} {key} = 180, {or_motors}")));
     }
     let mount = sensor.mount;
     let off = DVec2::new(it[X], it[Y]);
     let yaw = it[YAW];
-    // If the laser may be upside down or look back, its place and direction are unknown.
+    // The place and direction of a laser that may be upside down or look back are unknown.
     let is_known = (!seen_back || gyro.is_some()) && !placed.seems_back();
     let (turns, stands) =
         (is_known && yaw.abs() > YAW_TOLD, is_known && off.length() > PLACE_TOLD_M);
@@ -415,12 +413,11 @@ pub(crate) fn findings(
     if stands {
         let at = DVec2::from_angle(bearing_rad) * mount.forward_m + off;
         let aside = wrap_angle(at.to_angle() - bearing_rad);
-        // A place behind the centre gets a negative `forward_m`, so that the bearing hardly
-        // changes.
+        // A negative `forward_m` keeps the bearing of a place behind the centre.
         let behind = aside.abs() > FRAC_PI_2;
         bearing_rad = wrap_angle(at.to_angle() + if behind { PI } else { 0.0 });
         let forward_m = if behind { -at.length() } else { at.length() };
-        let text = format!("stands {:.2} m beside its stated place", off.length());
+        let text = format!("is mounted {:.2} m from its stated place", off.length());
         found.push(
             Finding::wrong(name, text)
                 .with_key(key("forward_m"), format!("{forward_m:.3}"))
@@ -436,14 +433,14 @@ pub(crate) fn findings(
         if turns {
             let yaw_deg = it[YAW].to_degrees();
             let text =
-                format!("looks {yaw_deg:.1} degrees beside what is stated, counter-clockwise");
+                format!("points {yaw_deg:.1} degrees counter-clockwise from its stated direction");
             found.push(Finding::wrong(name, text));
         }
         found.last_mut().into_iter().for_each(|it| it.keys.push(turned.clone()));
     }
     if it[AGE].abs() > AGE_TOLD_S {
         let text = format!(
-            "its scans are {:.2} s {} than they say: stamp them when they are taken",
+            "its scans are {:.2} s {} than their stamps; stamp them when they are taken",
             it[AGE].abs(),
             if it[AGE] > 0.0 { "older" } else { "younger" }
         );

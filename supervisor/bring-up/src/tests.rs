@@ -23,9 +23,7 @@ struct Robot {
     late_s: f64,
     track: f64,
     wheel: f64,
-    /// Diameter of the right wheel over the left one's.
     ratio: f64,
-    /// Wheel that each encoder follows, and its direction of count.
     encoders: Wires,
     /// Command that each motor follows, and its direction.
     motors: Wires,
@@ -58,7 +56,6 @@ fn mission() -> Mission {
     Mission::parse(text, Path::new("m.toml")).unwrap()
 }
 
-/// A robot with three sonars, and counts that only a driver knows.
 fn with_sonars() -> Mission {
     let mut text = "target = [1, 0]\n[robot]\nmodel = 'x80'\nrate_hz = 10.0\n".to_owned();
     for (channel, bearing) in [(0, 0), (1, 40), (2, -40)] {
@@ -69,8 +66,8 @@ fn with_sonars() -> Mission {
     Mission::parse(&text, Path::new("m.toml")).unwrap()
 }
 
-/// Range from `at` along `along` in a room with walls 1.4 m ahead, 1.9 m behind, 1.6 m to the left
-/// and 1.2 m to the right.
+/// Range from `at` along `along` to the nearest wall: 1.4 m ahead, 1.9 m behind, 1.6 m left, 1.2 m
+/// right.
 fn range(at: DVec2, along: DVec2) -> f64 {
     let walls = [
         (1.4, at.x, along.x),
@@ -233,7 +230,6 @@ fn an_encoder_that_counts_nothing_is_named() {
     assert_eq!(wrong(Robot { encoders: [(0, 0.0), (1, 1.0)], ..RIGHT })[0], "wheels");
 }
 
-/// Both wires straight or swapped, each in one of two directions.
 fn all_wires() -> impl Iterator<Item = Wires> {
     (0..8).map(|bits: usize| {
         let sign = |bit: usize| if bits & bit == 0 { 1.0 } else { -1.0 };
@@ -242,8 +238,8 @@ fn all_wires() -> impl Iterator<Item = Wires> {
     })
 }
 
-/// Returns the parts wrong with `robot`, whose motors are determined if `is_told`, and the keys
-/// that mend an X80.
+/// Returns the faulty parts of `robot`, whose motors are determined if `is_told`, and the keys that
+/// repair an X80.
 fn expected(robot: Robot, mission: &Mission, is_told: bool) -> (Vec<&'static str>, Vec<Channel>) {
     let probe = [1.0, 2.0];
     let as_told = through(robot.encoders, through(robot.motors, probe)) == probe;
@@ -260,7 +256,6 @@ fn expected(robot: Robot, mission: &Mission, is_told: bool) -> (Vec<&'static str
     (parts, if as_told && is_told { mended.to_vec() } else { stated.to_vec() })
 }
 
-/// Returns the channels of `mission` with the keys of `found`.
 fn with_keys(mission: &Mission, found: &[Finding]) -> Vec<Channel> {
     let keys: Vec<_> = found.iter().flat_map(|it| &it.keys).collect();
     let of = |side: &str, stated: Channel| {
@@ -280,7 +275,7 @@ fn wrong_parts(found: &[Finding]) -> Vec<&str> {
     found.iter().filter(|it| it.verdict == Verdict::Wrong).map(|it| it.part.as_str()).collect()
 }
 
-/// Returns whether a single wheel turns backwards, so that the body drives when commanded to turn.
+/// Returns whether a single wheel turns backwards, so that turning drives the body.
 fn exchanges(motors: Wires) -> bool {
     motors[0].1 != motors[1].1
 }
@@ -301,7 +296,6 @@ fn sonars_tell_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecide
 fn a_laser_tells_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecided() {
     let mission = mission();
     for motors in all_wires() {
-        // The encoders are wired like the motors, correctly, or otherwise.
         for encoders in [motors.map(|(_, sign)| sign), [1.0, 1.0], [-1.0, 1.0]] {
             let encoders = [0, 1].map(|it| (motors[it].0, encoders[it]));
             let robot = Robot { motors, encoders, ..RIGHT };

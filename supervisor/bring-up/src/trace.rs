@@ -10,7 +10,6 @@ use common::{
 };
 use recording::{Recording, RecordingError};
 
-/// Command by which the parts of the procedure differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
     Stand,
@@ -22,8 +21,7 @@ pub enum Told {
 /// Recorded data. Times are mission time, seconds.
 #[derive(Debug, Default)]
 pub struct Trace {
-    /// Distances of the left and the right rim since the beginning by the counts, metres, with
-    /// nominal wheels.
+    /// Rim distances left and right since the beginning by the counts, metres, with nominal wheels.
     pub rolled: Vec<(f64, [f64; 2])>,
     /// Commanded speeds of the rims, m/s.
     pub told: Vec<(f64, [f64; 2])>,
@@ -122,7 +120,7 @@ impl Trace {
         let mut before = None;
         for turn in recording.samples(&IMU_TURN)? {
             let turn = turn?.sample;
-            // A gap in the sequence numbers marks an unknown turn.
+            // A gap in the sequence numbers means an unknown turn.
             if before.replace(turn.sequence) == turn.sequence.checked_sub(1) {
                 trace.gyro.push((turn.stamp.time().seconds(), turn.turn_rad));
             }
@@ -138,8 +136,7 @@ impl Trace {
         Ok(trace)
     }
 
-    /// Returns the legs in order. The first begins with the trace, because no command comes before
-    /// the robot moves.
+    /// Returns the legs in order. The first begins with the trace.
     pub fn legs(&self) -> Vec<Leg> {
         let begins = self.rolled.first().map_or(0.0, |(at, _)| *at);
         let ends = self.rolled.last().map_or(0.0, |(at, _)| *at);
@@ -156,7 +153,7 @@ impl Trace {
         legs
     }
 
-    /// Returns whether the trace begins at rest. One that lacks the beginning begins in a turn.
+    /// Returns whether the trace begins at rest.
     pub fn begins_at_rest(&self) -> bool {
         let until = self.rest_until_s();
         let (first, last) = (self.rolled.first(), self.rolled.iter().rfind(|it| it.0 < until));
@@ -164,13 +161,12 @@ impl Trace {
         went.is_none_or(|went| went.iter().all(|it| it.abs() < RESTS_M))
     }
 
-    /// Returns the time of the first command to move.
     pub fn rest_until_s(&self) -> f64 {
         self.legs().first().map_or(0.0, |rest| rest.until_s)
     }
 }
 
-/// Interpolates at `at_s`, or takes the nearest value; `None` without values.
+/// Interpolates at `at_s`, or takes the nearest value.
 pub(crate) fn between<const N: usize>(values: &[(f64, [f64; N])], at_s: f64) -> Option<[f64; N]> {
     let after = values.partition_point(|(at, _)| *at < at_s);
     let (later, earlier) = (values.get(after).or(values.last())?, values.get(after.max(1) - 1)?);

@@ -12,8 +12,7 @@ use crate::{
 
 /// Time for a base of any response to follow a command, seconds.
 const SETTLED_S: f64 = 1.0;
-/// Least share of a command that counts. A wheel below it counts nothing; another wheel's share
-/// below it is noise.
+/// Minimum share of a command. A wheel below it is dead; another wheel's share below it is noise.
 const LEAST_SHARE: f64 = 0.15;
 /// Greatest difference of the two wheels' shares.
 const ALIKE: f64 = 0.1;
@@ -23,10 +22,10 @@ const RATE_SHARE: f64 = 0.2;
 pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
     let stated = mission.robot.rate_hz;
     let (Some(first), Some(last)) = (trace.rolled.first(), trace.rolled.last()) else {
-        return Finding::wrong("robot", "it said nothing: check robot.address and its power");
+        return Finding::wrong("robot", "it reports nothing; check robot.address and its power");
     };
     let hz = (trace.rolled.len() - 1) as f64 / (last.0 - first.0).max(1e-3);
-    let text = format!("it reports its wheels {hz:.1} times a second, {stated:.1} stated");
+    let text = format!("it reports its wheels {hz:.1} times per second, {stated:.1} stated");
     match (hz / stated - 1.0).abs() <= RATE_SHARE {
         true => Finding::right("robot", text),
         false => Finding::wrong("robot", text).with_key("robot.rate_hz", format!("{hz:.0}")),
@@ -42,12 +41,11 @@ pub(crate) struct Wheels {
     is_told: bool,
 }
 
-/// Body motion by the wheels, as if they counted their commands: angle, radians, and distance,
-/// metres.
+/// Body motion by the wheels under their commands: angle, radians, and distance, metres.
 pub(crate) type Motion = Vec<(f64, [f64; 2])>;
 
 impl Wheels {
-    /// Fits by least squares over all moments at which the base had time to answer.
+    /// Fits by least squares over all times at which the base has settled.
     pub(crate) fn of(trace: &Trace) -> Self {
         let (mut squares, mut products) = (Matrix2::zeros(), Matrix2::zeros());
         let legs = trace.legs();
@@ -59,7 +57,7 @@ impl Wheels {
                 if let Some(before) = before
                     && let Some(told) = between(&trace.sent, before.0)
                 {
-                    // Late frames close together, as on a busy machine, weigh less.
+                    // Closely spaced late frames, as on a busy machine, weigh less.
                     let told = Vector2::from(told);
                     squares += told * told.transpose() * (now.0 - before.0);
                     products += (Vector2::from(now.1) - Vector2::from(before.1)) * told.transpose();
@@ -84,15 +82,15 @@ impl Wheels {
         })
     }
 
-    /// Returns the finding; `motors` has the wheels that follow each command, if observed.
+    /// Returns the finding; `motors` has the wheels behind each command, if observed.
     pub(crate) fn finding(&self, motors: Option<Matrix2<f64>>) -> Finding {
         if !self.is_told {
-            let text = "it moved for too short a time: was something within 0.2 m of its front, or what stopped it? Look at the logs of the run, and give it more room";
+            let text = "it moved too briefly, perhaps with something within 0.2 m of its front; see the logs of the run, and give it more room";
             return Finding::unknown("wheels", text);
         }
         let [left, right] = [0, 1].map(|row| self.counted.row(row).amax());
         let follows = self.follows();
-        // Encoders that count their commands are as right or wrong as the motors.
+        // Encoders that agree with commands are wired like the motors.
         let (encoders, or_motors) = match motors {
             _ if self.is_as_told() => (follows, ""),
             Some(motors) => (follows * motors.transpose(), ""),
@@ -101,13 +99,10 @@ impl Wheels {
         let wrong = words(encoders, "encoder counts");
         if !wrong.is_empty() {
             let by = "check motors, plugs and wires, or the robot's own program";
-            return Finding::wrong("wheels", format!("{wrong}{or_motors}: {by}"));
+            return Finding::wrong("wheels", format!("{wrong}{or_motors}; {by}"));
         }
-        let text = format!(
-            "they count {:.0} and {:.0} % of what they are told",
-            100.0 * left,
-            100.0 * right
-        );
+        let text =
+            format!("they count {:.0} and {:.0} % of their commands", 100.0 * left, 100.0 * right);
         if (left / right - 1.0).abs() <= ALIKE {
             return Finding::right("wheels", text);
         }
@@ -143,12 +138,12 @@ pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Fin
     let stated = body.response;
     let (delay, limit) = (found.delay_s, found.acceleration_m_s2);
     let text = format!(
-        "the base answers after {:.2} s ({:.2} stated) and gains {} m/s a second",
+        "the base answers after {:.2} s ({:.2} stated); acceleration limit: {}",
         delay.value,
         stated.delay_s,
-        limit.map_or_else(|| "any".to_owned(), |it| format!("{:.2}", it.value)),
+        limit.map_or_else(|| "none found".to_owned(), |it| format!("{:.2} m/s²", it.value)),
     );
-    // A lag of the stated length hides in the delay.
+    // A stated lag hides in the delay.
     let least_s = DELAY_FRAMES / mission.robot.rate_hz;
     let late = delay.value - stated.delay_s > least_s.max(4.0 * delay.sd);
     let turning = stated.turn_acceleration_rad_s2 * body.track_m / 2.0;
@@ -168,10 +163,9 @@ pub(crate) fn response(mission: &Mission, trace: &Trace, motion: &Motion) -> Fin
     finding
 }
 
-/// Least excess of the delay that is reported, in periods of motor frames. A busy machine adds half
-/// of one.
+/// Minimum reported excess of the delay, in motor-frame periods. A busy machine adds half of one.
 const DELAY_FRAMES: f64 = 0.75;
-/// Share of the stated acceleration below which an acceleration under [`STRONG_M_S2`] is reported.
+/// Share of the stated acceleration below which one under [`STRONG_M_S2`] is reported.
 const WEAKER: f64 = 0.8;
 /// Acceleration beyond which turns on the spot show no limit.
 const STRONG_M_S2: f64 = 3.0;

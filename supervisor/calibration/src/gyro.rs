@@ -1,11 +1,11 @@
 //! Ratio and track from distances and turns between two rests, by a gyro. Pure.
 //!
 //! The equation is that of [`crate::loops`] with the gyro's turn, less its bias, in place of whole
-//! turns. The rest before gives the bias (mean) and the noise (scatter).
+//! turns. The first rest gives bias (mean) and noise (scatter).
 //!
-//! An error of the gyro's scale is common to all motions. It does not affect the ratio, which
-//! follows from drives with hardly any turn. No number of turns separates it from an error of the
-//! track, so the track's deviation includes it.
+//! A scale error of the gyro is common to all motions. The ratio follows from drives with hardly
+//! any turn, so it is unaffected. Turns cannot separate the scale error from a track error, so the
+//! track's deviation includes it.
 
 use nalgebra::DMatrix;
 
@@ -24,7 +24,7 @@ pub struct Motion {
     pub seconds: f64,
 }
 
-/// Least total distance, metres, and turn, radians. Less hardly determines the ratio or the track.
+/// Minimum total distance, metres, and turn, radians, to determine ratio and track.
 const LEAST_M: f64 = 1.5;
 const LEAST_RAD: f64 = 3.0;
 /// Least time at rest, seconds.
@@ -55,7 +55,7 @@ impl Rest {
 /// Estimates ratio and track.
 ///
 /// `at_rest` has the seconds and turns of the gyro's increments before the first motion. `scale_sd`
-/// is the deviation of the gyro's scale, a share. `track_m` is nominal.
+/// is the gyro's scale deviation, a share. `track_m` is nominal.
 ///
 /// # Errors
 /// Returns why nothing may be written.

@@ -37,13 +37,11 @@ pub const HELD_OUT: usize = 2;
 pub const FEWEST_LOOPS: usize = 6;
 /// Deviations within which held-out loops must lie.
 const AGREES: f64 = 3.0;
-/// Deviations beyond which a residual is an accident. Two accidents are a fault of the floor or the
-/// robot.
+/// Deviations beyond which a residual is an accident. Two are a fault of floor or robot.
 const ACCIDENT: f64 = 5.0;
 /// Limit per degree of freedom.
 const MOST_CHI2: f64 = 4.0;
 
-/// Loop from one visit to the wall to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Loop {
     /// Number among all loops; neighbours share a normal.
@@ -57,13 +55,12 @@ pub struct Loop {
     pub rolled_m: f64,
 }
 
-/// Returns the deviation of a normal, radians, from the differences between both directions of each
+/// Returns a normal's deviation, radians, from the differences between both directions of each
 /// sweep.
 pub fn normal_sd(differences: &[f64]) -> f64 {
     let n = differences.len() as f64;
     let mean = differences.iter().sum::<f64>() / n.max(1.0);
-    // The normal is the mean of both directions, so it has a quarter of their difference's
-    // variance.
+    // The mean of both directions has a quarter of their difference's variance.
     let sum = differences.iter().map(|it| (it - mean).powi(2) / 4.0).sum::<f64>();
     let freedom = (n - 1.0).max(0.0);
     ((sum + PRIOR_NORMALS * PRIOR_NORMAL_RAD.powi(2)) / (freedom + PRIOR_NORMALS)).sqrt()
@@ -86,7 +83,7 @@ impl Wheels {
     }
 }
 
-/// Returns mean and standard deviation of the slip, given the logarithm of the likelihood.
+/// Returns mean and standard deviation of the slip, given the log-likelihood.
 fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
     let step = (MOST_SLIP / LEAST_SLIP).ln() / f64::from(SLIPS - 1);
     let slips = (0..SLIPS).map(|index| LEAST_SLIP * (step * f64::from(index)).exp());
@@ -120,29 +117,29 @@ pub struct Estimate {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Refusal {
     #[error(
-        "{found} loops are too few, of {FEWEST_LOOPS} that are needed; let it finish, or clear the floor before the wall"
+        "{found} loops are too few, {FEWEST_LOOPS} are needed; let the calibration finish, or clear the floor before the wall"
     )]
     TooFew { found: usize },
     #[error("{found} squares are too few; drive at least three to the left and three to the right")]
     TooFewSquares { found: usize },
     #[error(
-        "the residuals of {loops} loops are over {ACCIDENT} deviations; look at floor and wheels, then repeat it"
+        "the residuals of {loops} loops exceed {ACCIDENT} standard deviations; check floor and wheels, then repeat the calibration"
     )]
     Accidents { loops: usize },
     #[error(
-        "chi^2 is {chi2_per_dof:.1} per degree of freedom, over {MOST_CHI2}: the floor is too slippery; repeat it on another"
+        "chi^2 is {chi2_per_dof:.1} per degree of freedom, over {MOST_CHI2}: the floor is too slippery; repeat the calibration on another floor"
     )]
     Scattered { chi2_per_dof: f64 },
     #[error(
-        "what was held out contradicts the others by {deviations:.1} deviations, over {AGREES}; repeat the calibration"
+        "the held-out data differs from the fit by {deviations:.1} standard deviations, over {AGREES}; repeat the calibration"
     )]
     Contradicted { deviations: f64 },
     #[error(
-        "the robot stood for {seconds:.1} s before it moved, too short for the gyro's bias; repeat it on a machine that has less to do"
+        "the robot stood for {seconds:.1} s before it moved, too short for the gyro's bias; repeat the calibration on a machine with less load"
     )]
     NoRest { seconds: f64 },
     #[error(
-        "the robot drove {driven_m:.1} m and turned by {turned_deg:.0} degrees, too little; clear 2.5 m of floor ahead of it and 0.5 m around it"
+        "the robot drove only {driven_m:.1} m and turned only {turned_deg:.0} degrees; clear 2.5 m of floor ahead of it and 0.5 m around it"
     )]
     Short { driven_m: f64, turned_deg: f64 },
     #[error("the loops cannot be fitted; repeat the calibration")]
@@ -264,8 +261,7 @@ impl Estimate {
         Wheels { e: self.values.x, track: self.values.y }
     }
 
-    /// Returns the root mean square error of the prediction of held-out values, in standard
-    /// deviations.
+    /// Returns the RMS prediction error of held-out values, in standard deviations.
     fn deviations(&self, held_out: &Rows) -> f64 {
         let off = &held_out.values - &held_out.design * self.values;
         let by_values = &held_out.design * self.covariance * held_out.design.transpose();
@@ -284,8 +280,8 @@ impl Estimate {
         (deviations <= AGREES).then_some(()).ok_or(Refusal::Contradicted { deviations })
     }
 
-    /// Returns values for `[robot.odometry]`, without provenance. Loops do not determine the
-    /// distance scale, so it stays.
+    /// Returns values for `[robot.odometry]`, without provenance. Loops leave the distance scale
+    /// undetermined.
     pub fn odometry(&self, before: &Odometry) -> Odometry {
         Odometry {
             diameter_ratio: self.ratio(),
@@ -303,7 +299,7 @@ impl Estimate {
 
 /// Returns the estimate and the loops used.
 ///
-/// At most one accident is left out. The two held-out loops must lie where the others predict.
+/// Drops at most one accident. The two held-out loops must lie where the others predict.
 ///
 /// # Errors
 /// Returns why nothing may be written.

@@ -2,17 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Distances from the median range within which an echo belongs to the wall. A rough wall answers
-/// over the whole sweep; then the next limit leaves its ends out.
+/// Distances from the median range within which an echo belongs to the wall. If a rough wall
+/// answers over the whole sweep, the next limit omits its ends.
 const WITHIN_M: [f64; 3] = [0.12, 0.06, 0.03];
-/// Readings off the wall required at either end of a leg, to show that the arc is whole.
+/// Readings off the wall required at either end of a leg, so that the arc is whole.
 const MARGIN: usize = 2;
 const FEWEST: usize = 5;
-/// Most readings of a leg, three times those of the slowest sweep at 7 Hz. Further ones are
-/// dropped.
+/// Maximum readings of a leg, three times those of the slowest sweep at 7 Hz.
 const MOST: usize = 200;
-/// Greatest difference of both legs' arcs. Beyond it, silence or an object beside the wall cut one
-/// short.
+/// Maximum difference of both legs' arcs. Beyond it, silence or an object cut one short.
 const UNEQUAL_RAD: f64 = 0.12;
 
 /// Turn to one side, in order of time: heading and range, metres, NaN without an echo.
@@ -64,8 +62,8 @@ impl Leg {
 #[derive(Debug, PartialEq)]
 pub(crate) struct Normal {
     pub(crate) heading: f64,
-    /// Middle of the first turn's arc less that of the second. The age of the ranges shifts every
-    /// sweep equally, so the scatter is that of the normals.
+    /// Middle of the first turn's arc less that of the second. The age of the ranges shifts all
+    /// sweeps equally, so the scatter is the normals'.
     pub(crate) difference: f64,
     /// Distance of the wall from the sonar.
     pub(crate) range_m: f64,
@@ -98,7 +96,7 @@ pub(crate) fn normal(legs: &[Leg; 2]) -> Result<Normal, NoNormal> {
 mod tests {
     use super::*;
 
-    /// Returns a turn past a wall at heading `wall`, which answers within `half` to either side,
+    /// Returns a turn past a wall at heading `wall` that answers within `half` to either side,
     /// `late` radians behind.
     fn leg(from: f64, to: f64, wall: f64, half: f64, late: f64) -> Leg {
         let mut leg = Leg::default();

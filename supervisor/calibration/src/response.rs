@@ -1,8 +1,8 @@
 //! Delay and acceleration of a base, from turns on the spot to and fro.
 //!
-//! The commanded turn rates pass through a model of the response. The base's own parameters
-//! minimise the remainder between its turns and the model's. Each turn with its return gives an
-//! estimate; their spread is the deviation.
+//! A model of the response receives the commanded turn rates. The best parameters minimise the
+//! residual between measured and modelled turns. Each turn with its return gives an estimate; their
+//! spread is the deviation.
 
 use std::ops::Range;
 
@@ -32,8 +32,7 @@ const MOST_STEPS: f64 = 100.0;
 /// Quantity by which model and base are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {
-    /// Turns between frames, which separate delay and acceleration best. Late frames on a busy
-    /// machine disturb them.
+    /// Turns between frames, which separate delay and acceleration best. Late frames disturb them.
     Turns,
     /// Headings, which late frames hardly disturb.
     Headings,
@@ -66,10 +65,10 @@ pub struct Estimate {
 
 /// Estimates the response of this body with its stated lag.
 ///
-/// `commands` are times and turn rates. `headings` are times and headings, which may be wrapped.
+/// `commands` are times and turn rates, `headings` times and headings, possibly wrapped.
 ///
 /// # Errors
-/// Fails if the motion is not that of an obedient base; the text says where to look.
+/// Fails if the motion does not follow the commands; the text says where to look.
 pub fn estimate(
     commands: &[(f64, f64)],
     headings: &[(f64, f64)],
@@ -78,16 +77,16 @@ pub fn estimate(
 ) -> Result<Estimate, String> {
     let changes = commands.windows(2).filter(|pair| pair[0].1 * pair[1].1 < 0.0);
     let turns: Vec<f64> = changes.map(|pair| pair[1].0).collect();
-    // The first turn starts from rest; each window is a turn and its return.
+    // Each window is a turn and its return; the first starts from rest.
     let windows = turns.windows(3).map(|ends| (ends[0], ends[2]));
     let fits = windows.filter_map(|window| Fit::best(commands, headings, (body, by), window));
     let mut fits: Vec<Fit> = fits.filter(|fit| fit.explained >= EXPLAINED).collect();
-    // On a busy machine the robot stands for a moment in some windows.
+    // On a busy machine the robot stands still in some windows.
     fits.sort_by(|one, other| other.explained.total_cmp(&one.explained));
     fits.truncate(FEWEST.max(fits.len().div_ceil(2)));
     if fits.len() < FEWEST {
         return Err(format!(
-            "no delay and acceleration explain {FEWEST} of its turns: does it stand, are its wheels swapped or reversed, or does it slip? Look at the logs of the run"
+            "no delay and acceleration explain {FEWEST} of its turns: it may stand still or slip, or its wheels are swapped or reversed; see the logs of the run"
         ));
     }
     let delay = measured(fits.iter().map(|fit| fit.delay_s));
@@ -104,8 +103,8 @@ pub fn estimate(
     })
 }
 
-/// Returns the median of non-empty `values` and its standard deviation, from their median distance
-/// to it.
+/// Returns the median of non-empty `values` and its standard deviation, from their median
+/// deviation.
 fn measured(values: impl Iterator<Item = f64>) -> Measured {
     let median = |mut values: Vec<f64>| {
         values.sort_by(f64::total_cmp);
@@ -147,7 +146,7 @@ impl Fit {
             };
             let better = |one: &Self, other: &Self| one.explained.total_cmp(&other.explained);
             let limited = delays.clone().flat_map(limited).max_by(better)?;
-            // No limit, or for headings the stated one, is preferred if it explains as much.
+            // No limit, or for headings the stated one, wins if it explains as much.
             let stated = (by == By::Headings).then_some(stated);
             let simple = stated.into_iter().chain([f64::INFINITY]);
             let mut simple = simple.filter_map(|acceleration| {
@@ -161,7 +160,7 @@ impl Fit {
     }
 }
 
-/// Model of a base, like the simulated one: a delay, and a lag of limited acceleration.
+/// Model of a base: a delay, and a lag of limited acceleration.
 #[derive(Clone, Copy)]
 struct Model {
     delay_s: f64,
@@ -170,8 +169,8 @@ struct Model {
 }
 
 impl Model {
-    /// Returns the squared correlation of the base's turns with the model's within `window`, and
-    /// their ratio. Link or base may turn slower than commanded.
+    /// Returns the squared correlation and ratio of measured and modelled turns within `window`.
+    /// Link or base may turn slower than commanded.
     fn explains(
         self,
         commands: &[(f64, f64)],
@@ -179,7 +178,7 @@ impl Model {
         window: (f64, f64),
         by: By,
     ) -> Option<(f64, f64)> {
-        // The model starts at rest, and needs earlier time to forget that.
+        // The model starts at rest, and needs time to forget that.
         let begins = window.0 - self.delay_s - 2.0 * LEG_S;
         let mut waiting = commands.iter().skip_while(|(at, _)| *at < begins).peekable();
         let share = if self.lag_s > 0.0 { 1.0 - (-STEP_S / self.lag_s).exp() } else { 1.0 };
@@ -225,7 +224,7 @@ pub fn keys(estimate: &Estimate, stated: Response) -> String {
         Some(Measured { value, sd }) => {
             format!("acceleration_m_s2 = {value:.2}  # +- {sd:.2}\n")
         }
-        None => "# no limit of its acceleration shows\n".to_owned(),
+        None => "# no acceleration limit was measured\n".to_owned(),
     };
     format!(
         "[robot.response]\ndelay_s = {value:.3}  # +- {sd:.3}\nlag_s = {:.2}  # as stated\n{acceleration}",
@@ -241,7 +240,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns commands to and fro at 10 Hz, and the headings of a base without a lag that obeys by
+    /// Returns commands to and fro at 10 Hz, and the headings of a base without lag that follows
     /// `model`.
     fn turned(mut model: ModelledSpeed, factor: f64) -> [Vec<(f64, f64)>; 2] {
         let (mut commands, mut headings, mut heading) = (Vec::new(), Vec::new(), 0.0);

@@ -1,9 +1,8 @@
-//! Procedures that are a list of legs: a bring-up, turns to and fro, squares, drives and turns for
-//! a gyro.
+//! Procedures as lists of legs: a bring-up, turns to and fro, squares, drives and turns for a gyro.
 //!
-//! In a bring-up the robot stands, turns on the spot to both sides, drives a short distance and
-//! back, and turns to and fro. A leg ends after a time, or when the wheels have counted its
-//! distance in either direction. A wheel of a new robot may count backwards.
+//! In a bring-up the robot stands, turns to both sides, drives a short distance and back, and turns
+//! to and fro. A leg ends after a time, or when the wheels have counted its distance in either
+//! direction. A new robot's wheel may count backwards.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -19,16 +18,14 @@ use crate::{
     ways::Ways,
 };
 
-/// Duration of a turn to one side, seconds. A base that answers after 0.5 s and gains 1 rad/s in a
-/// second turns by then.
+/// Duration of a turn to one side, seconds. A base with 0.5 s delay and 1 rad/s^2 turns by then.
 pub(crate) const LEG_S: f64 = 1.6;
 const LEGS: u32 = 8;
 /// Direction that makes the robot turn as fast as it may.
 const ASIDE_RAD: f64 = 1.2;
 const SLOWLY_M_S: f64 = 0.15;
 const WAY_M: f64 = 0.3;
-/// Range ahead that ends a leg, metres. It is longer for a robot that drives metres away from its
-/// start.
+/// Range ahead that ends a leg, metres; longer for a robot that drives metres from its start.
 const NEAR_M: f64 = 0.2;
 const AHEAD_M: f64 = 0.5;
 /// One and a half turns: the first third is seen twice.
@@ -38,8 +35,7 @@ const LONGEST_TURN_S: f64 = 20.0;
 /// Remaining angle at which a square's corner counts as turned.
 const TURNED_RAD: f64 = 0.03;
 
-/// Order to the robot, with its end in seconds, radians or metres by the counts; positive to the
-/// left.
+/// Order with its end in seconds, radians or metres by the counts; positive to the left.
 #[derive(Clone, Copy, Debug)]
 enum Leg {
     Stand(f64),
@@ -66,8 +62,8 @@ const PARTS: [Leg; 12] = [
     Leg::Turn(-PI),
 ];
 
-/// The link uses a gyro once it has agreed with the wheels in a turn. The longest rest shows its
-/// bias, the drives the ratio of the wheels, the turns the track.
+/// The link uses a gyro after it agreed with the wheels in a turn. The longest rest shows its bias,
+/// the drives the wheel ratio, the turns the track.
 const WITH_GYRO: [Leg; 13] = [
     STILL,
     Leg::Turn(FRAC_PI_2),
@@ -97,8 +93,8 @@ pub struct Script {
 }
 
 impl Script {
-    /// Creates any procedure but the one before a wall. `side_m` is the side of squares, and the
-    /// length of drives for a gyro.
+    /// Creates any procedure except the wall's. `side_m` is the side of squares, and the drive
+    /// length for a gyro.
     pub fn new(procedure: Procedure, side_m: f64, rate_hz: f64) -> Self {
         let (from, ways) = (Ways::default(), Ways::default());
         Self { procedure, side_m, rate_hz, leg: 0, ticks: 0, from, ways }
@@ -127,8 +123,8 @@ impl Script {
 
     /// Advances by a tick.
     ///
-    /// `echo_m` is the front sonar's, or a laser's for a gyro. A robot that drives although it is
-    /// told to turn ends its leg before an obstacle.
+    /// `echo_m` is the front sonar's, or a laser's for a gyro. A robot that drives on a turn
+    /// command ends its leg before an obstacle.
     pub fn step(&mut self, counts: [u16; 2], echo_m: Option<f64>, body: &Body) -> Order {
         self.ways.step(counts, body);
         let (from, ways) = (self.from, self.ways);
@@ -164,7 +160,6 @@ impl Script {
         }
         let left = left(self.leg);
         let (status, aside_rad, speed_limit_m_s) = match self.leg() {
-            // A robot that faces ahead with a speed limit of zero stands.
             Some(Leg::Stand(_)) => (GuidanceStatus::Along, 0.0, 0.0),
             Some(Leg::Turn(side) | Leg::ToAndFro(side)) => {
                 (GuidanceStatus::Look, ASIDE_RAD.copysign(side), 0.0)

@@ -38,7 +38,7 @@ pub enum Drive {
 
 impl Drive {
     /// Reads the procedure that the run in `directory` saved in its last tick. A recording may lack
-    /// ticks, because no stage waits for a recorder.
+    /// ticks.
     ///
     /// # Errors
     /// Fails if the checkpoint cannot be read.
@@ -195,8 +195,8 @@ impl Shell {
             distance_m: self.target.target.position().distance(DVec2::new(order.x_m, 0.0)),
             speed_limit_m_s: order.speed_limit_m_s,
             status: order.status.into(),
-            // The place before the wall: dead reckoning with uncalibrated wheels would be metres
-            // off after some loops.
+            // The place before the wall: uncalibrated dead reckoning would be metres off after some
+            // loops.
             x_m: order.x_m,
             y_m: 0.0,
             heading_rad,

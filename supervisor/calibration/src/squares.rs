@@ -2,8 +2,8 @@
 //!
 //! The squares follow J. Borenstein and L. Feng, "Measurement and correction of systematic odometry
 //! errors in mobile robots", IEEE Trans. Robotics and Automation 12(6), 1996: equally many to the
-//! left and to the right, each from the same mark. Instead of their formulae, the wheel distances
-//! are integrated with other values until the ends match the tape.
+//! left and to the right, each from the same mark. Instead of their formulae, a fit integrates the
+//! wheel distances until the ends match the tape.
 
 use common::{kinematics::Pose2, mission::Body};
 use glam::DVec2;
@@ -33,8 +33,7 @@ pub fn nominal_ways(counts: &[[u16; 2]], body: &Body) -> Vec<[f64; 2]> {
     counts.iter().map(step).collect()
 }
 
-/// Nominal distances of both wheels in each tick, metres, and the end by tape, in the frame of its
-/// start.
+/// Nominal distances of both wheels per tick, metres, and the taped end, in the frame of its start.
 #[derive(Debug)]
 pub struct Driven {
     pub ways: Vec<[f64; 2]>,
@@ -42,8 +41,8 @@ pub struct Driven {
 }
 
 impl Driven {
-    /// Returns the end, and the variance of a coordinate for a slip of 1 m per square root of a
-    /// metre, m^2.
+    /// Returns the end, and a coordinate's variance for a slip of 1 m per square root of a metre,
+    /// m^2.
     fn by(&self, wheels: Wheels, track_m: f64) -> (DVec2, f64) {
         let mut pose = Pose2::default();
         let mut poses = Vec::with_capacity(self.ways.len());
@@ -61,8 +60,7 @@ impl Driven {
     }
 }
 
-/// Returns the ends by tape as equations in e and tau, linear near `wheels`: x and y of each
-/// square.
+/// Returns the taped ends as equations in e and tau, linear near `wheels`: x and y of each square.
 fn rows(squares: &[Driven], wheels: Wheels, track_m: f64) -> Rows {
     let Wheels { e, track } = wheels;
     let rows = squares.iter().flat_map(|square| {

@@ -1,8 +1,8 @@
 //! Procedure before a wall: sweep, turn, drive away, turn, come back, sweep again. Pure.
 //!
-//! Headings are measured from the last normal, with the wheels as the loops so far estimate them.
-//! The first two loops have a single turn, because the track is still unknown. Later ones have as
-//! many turns as still let the robot find the wall.
+//! Headings are relative to the last normal, by the current estimate of the wheels. The first two
+//! loops have a single turn, because the track is unknown. Later ones have as many turns as still
+//! let the robot find the wall.
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -26,30 +26,29 @@ const AHEAD_M: f64 = 0.5;
 /// Longest first drive to the wall, and the readings without an echo that end it earlier.
 const APPROACH_M: f64 = 2.0;
 const SILENT: u32 = 7;
-/// Near echoes in a row; a single one may be false.
+/// Near echoes in a row; one may be false.
 const NEAR: u32 = 2;
-/// Shortest drive away from which a loop gains knowledge.
+/// Minimum useful drive away from the wall.
 const SHORTEST_M: f64 = 0.5;
 /// Excess of a drive back that has missed the wall's echo.
 const BEYOND_M: f64 = 0.15;
-/// Half a sweep. If that was too narrow, because the robot mistook its turn, the next is wider by a
-/// third, up to the greatest share.
+/// Half a sweep. If the robot mistook its turn, the next is wider by a third, up to the maximum
+/// share.
 const SWEEP_RAD: f64 = FRAC_PI_4;
 const WIDER: f64 = 1.0 / 3.0;
 const MOST_WIDER: u32 = 2;
 const SWEEPS: u32 = 5;
-/// Whole turns of a loop before the half one: the first number after which the heading is known to
-/// [`HEADING_SD_RAD`].
+/// Whole turns of a loop before the half one; the heading must be known to [`HEADING_SD_RAD`].
 const TURNS: [f64; 2] = [3.0, 1.0];
 const HEADING_SD_RAD: f64 = 0.13;
-/// Least and greatest angle of the ordered direction ahead of the robot, in a sweep and in another
+/// Minimum and maximum angle of the ordered direction ahead of the robot, in a sweep and in another
 /// turn. The controller's turn rate is proportional to the remaining angle, at least 0.25 rad/s.
 const SLOW_RAD: f64 = 0.08;
 pub(crate) const FAST_RAD: f64 = 0.5;
 const TURNED_RAD: f64 = 0.04;
 pub(crate) const SPEED_M_S: f64 = 0.35;
 const NEAR_M_S: f64 = 0.12;
-/// Deviation of the track that is good enough, relative to that of the ratio.
+/// Sufficient deviation of the track, relative to that of the ratio.
 const TRACK_OVER_RATIO: f64 = 3.0;
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -58,18 +57,18 @@ pub struct Wall {
     ways: Ways,
     wheels: Wheels,
     visit: Ways,
-    /// Whether a measured normal faced the wall. Initially the robot's start stands in for it.
+    /// Whether a normal was measured; the start stands in for the first one.
     is_measured: bool,
     facing: f64,
     phase: Phase,
-    /// Distance of the midpoint between the wheels at the start of this phase.
+    /// Midpoint distance at the start of this phase.
     phase_from_m: f64,
-    /// Midpoint distance at the start of the drive away, the drive's length, and the range of the
-    /// sweep before it.
+    /// Midpoint distance at the start of the drive away, its length, and the previous sweep's
+    /// range.
     away_from_m: f64,
     away_m: f64,
     swept_m: f64,
-    /// Readings in a row at the limit of this phase, and without an echo.
+    /// Consecutive readings at this phase's limit, and without an echo.
     near: u32,
     silent: u32,
     sweeps: u32,
@@ -96,10 +95,12 @@ enum Phase {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 pub enum Fault {
     #[error(
-        "no flat wall was found ahead; put the robot 0.5 to 2 m before one, facing it, with 1 m of it free to either side"
+        "no flat wall was found ahead; place the robot 0.5 to 2 m in front of one, facing it, with 1 m of free wall on either side"
     )]
     NoWall,
-    #[error("something stands less than half a metre behind; clear the floor before the wall")]
+    #[error(
+        "an obstacle is less than half a metre behind the robot; clear the floor before the wall"
+    )]
     NoRoom,
 }
 
@@ -109,8 +110,7 @@ pub struct Order {
     /// Angle from the robot's axis to the direction, counter-clockwise.
     pub aside_rad: f64,
     pub speed_limit_m_s: f64,
-    /// Place and heading of the robot. The origin is where it faces the wall, which is ahead on the
-    /// x-axis.
+    /// Place and heading. At the origin the robot faces the wall, along the x-axis.
     pub x_m: f64,
     pub heading_rad: f64,
 }
@@ -248,7 +248,6 @@ impl Wall {
             }
             Phase::Back => {
                 if (self.facing - heading) * self.facing.signum() <= TURNED_RAD {
-                    // The robot rolled on for a while after the drive.
                     self.away_m = (self.ways.arc_m() - self.away_from_m).abs();
                     self.enter(Phase::Approach);
                 }
@@ -257,7 +256,7 @@ impl Wall {
         }
     }
 
-    /// Ends the sweep at the `nominal` heading. The loop is complete if the wall was found.
+    /// Ends the sweep at the `nominal` heading; a wall found completes the loop.
     fn end_sweep(&mut self, nominal: f64, body: &Body) {
         self.sweeps += 1;
         let normal = match normal(&self.legs) {
@@ -271,7 +270,7 @@ impl Wall {
                 return;
             }
         };
-        // Wheel distances as if the robot had turned on the spot from here to the normal.
+        // Wheel distances of an ideal turn on the spot from here to the normal.
         let aside_m = (normal.heading - nominal) * body.track_m / 2.0;
         let mut faced = self.ways;
         faced.left_m -= aside_m;
@@ -342,8 +341,7 @@ impl Wall {
         };
         let is_near = echo_m.is_some_and(|echo| echo <= NEAR_M);
         let speed = if is_near { NEAR_M_S } else { SPEED_M_S };
-        // The ordered direction lies beyond the end of a leg, so that the robot is still turning
-        // there.
+        // The ordered direction lies beyond a leg's end, so the robot still turns there.
         let beyond = self.half_rad() + SLOW_RAD;
         let (status, aside_rad, speed_limit_m_s) = match self.phase {
             Phase::Approach => along(self.facing, speed),

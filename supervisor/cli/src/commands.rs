@@ -1,4 +1,4 @@
-//! List of subcommands, from which the parser, the dispatch and the groups of `--help` follow.
+//! Subcommands, source of the parser, the dispatch and the groups of `--help`.
 
 mod bring_up;
 mod calibrate;
@@ -136,13 +136,12 @@ const EXIT_CODES: &str = "Exit codes of run:
   5  collision (simulated robot)
   6  aborted by a fault
   9  in the wrong place: by the ground truth (simulated robot), or where it came to rest
- 10  could not be stopped: told to stand by every method, it moves
+ 10  could not be stopped: the robot still moves after every stop method
  11  reached, unsure: the robot's pose may be farther off than the mission allows
  78  invalid mission file; do not retry
 
 An error message ends with a code in brackets, which scripts can match.";
 
-/// Returns the command line for help, completions and the manual page.
 pub fn command_line() -> clap::Command {
     Arguments::command().subcommands(companions::TABLE.iter().map(companions::Companion::command))
 }
@@ -166,7 +165,6 @@ impl Command {
     }
 }
 
-/// Lists the groups of subcommands, each with the beginning of its help.
 fn listed() -> String {
     let all = Command::augment_subcommands(clap::Command::new(""));
     let all = all.subcommands(companions::TABLE.iter().map(companions::Companion::command));

@@ -44,7 +44,7 @@ pub static TABLE: [Companion; 9] = [
     viewer(
         "page",
         "firsthand-page",
-        "Show a robot in a browser, with orders for whoever has the token to drive",
+        "Show a robot in a browser, with orders for holders of the drive token",
     ),
     viewer("ros2", "firsthand-ros2", "Show a robot in ROS 2, to RViz and to other nodes"),
     viewer("foxglove", "firsthand-foxglove", "Serve a robot to Foxglove or Lichtblick, live"),
@@ -55,15 +55,15 @@ pub static TABLE: [Companion; 9] = [
         "Repeat the paper's experiments and compare the results with those of the paper",
     ),
     laboratory("field", "Solve the harmonic field of a map, without a robot"),
-    laboratory("bench", "Measure ticks; send random signals to a robot's processes"),
+    laboratory("bench", "Measure tick latency; test a robot with random signals and faults"),
 ];
 
 pub fn find(named: &OsStr) -> Option<&'static Companion> {
     TABLE.iter().find(|companion| named == companion.name)
 }
 
-/// Starts the companion that `words` (after `firsthand`) name, or its help. Returns an error if it
-/// does not start.
+/// Starts the companion named by `words` (after `firsthand`), or its help. Returns an error on
+/// failure.
 pub fn execute(words: &[OsString]) -> Option<Result<ExitCode>> {
     let (first, rest) = words.split_first()?;
     let (companion, options) = match find(first) {
@@ -77,8 +77,7 @@ pub fn execute(words: &[OsString]) -> Option<Result<ExitCode>> {
     Some(Err(companion.become_executable(options)))
 }
 
-/// Passes a completion request on to the companion. `words` are the executable, `--`, and the line
-/// to complete.
+/// Forwards a completion request. `words` are the executable, `--`, and the line to complete.
 pub fn answer_shell(words: &[OsString]) {
     let Some(companion) = words.get(3).and_then(|word| find(word)) else { return };
     if env::var_os(VARIABLE).is_none() || words.len() < 5 {
@@ -110,7 +109,7 @@ impl Companion {
     }
 }
 
-/// Executes `named` from beside this executable or from PATH. Returns only on failure.
+/// Executes `named` from beside this executable or from PATH. Returns on failure.
 pub fn become_executable(named: &str, words: impl Iterator<Item = OsString>) -> Failure {
     match executable::find(Path::new(named)) {
         Ok(found) => {

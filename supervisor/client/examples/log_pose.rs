@@ -17,8 +17,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     });
     loop {
         match robot.wait(Duration::from_secs(1))? {
-            Event::Connected => println!("the robot is here"),
-            Event::Disconnected => println!("the robot is gone"),
+            Event::Connected => println!("the robot runs"),
+            Event::Disconnected => println!("the robot has ended"),
             Event::Nothing => {}
             Event::Samples(poses) => {
                 while let Some(pose) = poses.next_sample()? {

@@ -1,5 +1,5 @@
-//! Shell completions. The script asks the executable at each tab, which also completes robots,
-//! stages, topics, missions and pages.
+//! Shell completions. The script asks the executable, which also completes robots, stages, topics,
+//! missions and pages.
 
 use std::ffi::OsStr;
 
@@ -42,7 +42,7 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(print_text(&String::from_utf8_lossy(&script))?)
 }
 
-/// Answers a shell's request and ends. `whole` is the command line, `pages` are guide pages.
+/// Answers a shell's request and ends. `whole` is the command line, `pages` the guide.
 pub fn answer_shell(whole: fn() -> Command, pages: fn() -> Vec<String>) {
     CompleteEnv::with_factory(|| with_candidates(whole(), pages)).var(VARIABLE).complete();
 }
@@ -58,7 +58,6 @@ fn with_candidates(command: Command, pages: fn() -> Vec<String>) -> Command {
         .mut_subcommands(|subcommand| with_candidates(subcommand, pages))
 }
 
-/// Completes a robot, stage, topic, mission or page of the guide.
 fn completer(argument: &Arg, pages: fn() -> Vec<String>) -> Option<ArgValueCompleter> {
     let robot = ValueParser::new(|name: &str| name.parse::<RobotName>()).type_id();
     if argument.get_value_parser().type_id() == robot {

@@ -1,7 +1,7 @@
 //! Failures: a sentence, a code for scripts, an exit code, and sometimes a remark.
 //!
-//! `firsthand` prints the code in brackets at the end, such as `[not-running]`. Scripts match the
-//! code, and the sentence may change.
+//! `firsthand` prints the code in brackets at the end, such as `[not-running]`. Only the code is
+//! stable.
 
 use std::{error::Error, path::Path, process::ExitCode};
 
@@ -135,7 +135,7 @@ pub fn code(error: &(dyn Error + 'static)) -> Option<&'static str> {
     }
 }
 
-/// Explains a robot that is not running: it may be another user's, or misspelt.
+/// Explains an absent robot: another user's, or misspelt.
 fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
     let operator = error.downcast_ref().and_then(|error| match error {
         OperatorError::Bus(error) => Some(error),
@@ -154,8 +154,7 @@ fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
     (!names.is_empty()).then(|| format!("{error}; these run here: {}", names.join(", ")))
 }
 
-/// Returns the users with files of `robot` in `shared` memory. The user's number begins a file
-/// name.
+/// Returns the users with files of `robot` in `shared` memory, by file name prefix.
 fn users<'a>(shared: &Path, robot: &'a str) -> impl Iterator<Item = u32> + use<'a> {
     robots::entries(shared).filter_map(move |entry| {
         let name = entry.file_name();

@@ -8,8 +8,7 @@ pub fn item(text: &str) -> String {
     format!("- {}\n", wrapped(text, WIDTH - "- ".len(), true).join("\n  "))
 }
 
-/// Wraps `text` at `width` letters. Longer words get their own line. With `whole_code`, a code span
-/// is one word.
+/// Wraps `text` at `width` letters. Longer words, and code spans if `whole_code`, stay whole.
 pub fn wrapped(text: &str, width: usize, whole_code: bool) -> Vec<String> {
     let mut in_code = false;
     let words = text.split_inclusive(|letter| {

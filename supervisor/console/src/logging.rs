@@ -1,10 +1,9 @@
 //! Log of this process.
 //!
-//! The journal reads standard error, with priorities in a leading `<N>` (sd-daemon(3)). This needs
-//! no library.
+//! The journal reads standard error, with priorities in a leading `<N>` (sd-daemon(3)).
 //!
-//! Lines that cannot be written, due to a full disk or a closed terminal, are dropped. Otherwise
-//! tracing would report them on standard error, and panic if that fails too.
+//! Unwritable lines, due to a full disk or a closed terminal, are dropped. Otherwise tracing would
+//! report them on standard error, and panic if that fails too.
 
 use std::{
     fs::File,
@@ -31,8 +30,8 @@ use tracing_subscriber::{
 
 type AnyLayer = Box<dyn Layer<Registry> + Send + Sync>;
 
-/// Returns whether the journal reads standard error. Children inherit `JOURNAL_STREAM` even if
-/// redirected, so the file is compared.
+/// Returns whether the journal reads standard error. Redirected children inherit `JOURNAL_STREAM`,
+/// so the file is compared.
 pub fn to_journal() -> bool {
     let Some(journal) = std::env::var_os("JOURNAL_STREAM") else {
         return false;
@@ -80,7 +79,7 @@ fn stderr_layer() -> AnyLayer {
 }
 
 fn start(layers: Vec<AnyLayer>, default: &str) {
-    // The ROS 2 library logs each of its sockets and each message to itself.
+    // The ROS 2 library is too verbose.
     let wanted = std::env::var("FIRSTHAND_LOG").ok().and_then(|wanted| wanted.parse().ok());
     let filter: Targets = wanted
         .or_else(|| format!("rustdds=error,{default}").parse().ok())
@@ -114,8 +113,7 @@ fn priority(level: Level) -> &'static str {
 }
 
 impl Write for Journal {
-    /// Prefixes each line with the priority, because each is a journal entry. A single write keeps
-    /// processes apart.
+    /// Prefixes each line, a journal entry, with the priority, in a single write.
     fn write(&mut self, event: &[u8]) -> io::Result<usize> {
         let mut entry = Vec::with_capacity(event.len() + self.0.len());
         for line in event.split_inclusive(|&byte| byte == b'\n') {

@@ -24,7 +24,7 @@ pub enum LookupError {
     Assigned(String),
     #[error(transparent)]
     Mission(#[from] MissionError),
-    #[error("{name} with what stands on its map: {problem}")]
+    #[error("{name} with the obstacles of its map: {problem}")]
     OnMap { name: String, problem: String },
     #[error("map: {0}")]
     Map(#[from] maps::MapError),
@@ -51,7 +51,7 @@ pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> 
     }
 }
 
-/// Inlines the files that the mission names. Fails if one cannot be read.
+/// Inlines the mission's files. Fails if one cannot be read.
 pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
     let mission = mission.with_calibration()?;
     let has_map = mission.map.is_some();
@@ -69,7 +69,7 @@ pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
 /// Parses `text`, which is named `origin`.
 pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     let as_written = Mission::parse(text, Path::new(origin));
-    // Validation follows all assignments, because one may correct another.
+    // Validation follows all assignments, which may depend on each other.
     let table = text.parse::<toml::Table>();
     let (false, Ok(table)) = (assignments.is_empty(), table) else {
         return complete(as_written?);

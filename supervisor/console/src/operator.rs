@@ -20,7 +20,9 @@ use super::{
 /// Stops the robot and waits until it is at rest.
 pub fn stand(robot: &RobotName) -> Result {
     if let Some(why) = operator::stand(robot)? {
-        write_stderr(&format!("firsthand: the robot rests; its supervisor was not told: {why}\n"));
+        write_stderr(&format!(
+            "firsthand: the robot is at rest, but its supervisor was not told: {why}\n"
+        ));
     }
     Ok(())
 }
@@ -33,8 +35,8 @@ pub fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
     stages::find(stage).ok_or_else(|| Refused::new("unknown-stage", stages::unknown(stage)))
 }
 
-/// Signals only the named process that holds the lock of its robot. Waits for a successor if the
-/// roster, published at 5 Hz, still names an ended process.
+/// Signals the named process if it holds the robot's lock. Waits if the roster, published at 5 Hz,
+/// still names an ended process.
 pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result {
     let domain = Domain::of(robot.clone());
     operator::refuse_mirror(&domain)?;

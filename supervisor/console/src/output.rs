@@ -22,7 +22,7 @@ pub fn json_lines<T: Serialize>(values: &[T]) -> serde_json::Result<String> {
     lines.map(|line| Ok(line? + "\n")).collect()
 }
 
-/// Ignores errors: a closed reader must not end the work under way.
+/// Ignores errors, such as a closed reader.
 pub fn write_stderr(text: &str) {
     let mut stderr = io::stderr();
     let _ = stderr.write_all(text.as_bytes()).and_then(|()| stderr.flush());

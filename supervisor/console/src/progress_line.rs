@@ -22,8 +22,7 @@ impl ProgressLine {
         Self { rewrites: io::stderr().is_terminal(), every, shown: None }
     }
 
-    /// Shows a line if one is due, and `title` before the first. Without a terminal, shows it only
-    /// if it `may_stay`.
+    /// Shows a due line, and `title` before the first. Without a terminal, only if it `may_stay`.
     pub fn update(&mut self, title: &str, line: impl FnOnce() -> String, may_stay: bool) {
         let waits = |shown: Instant| !self.rewrites && shown.elapsed() < self.every;
         if self.shown.is_some_and(waits) {
@@ -53,8 +52,7 @@ fn columns() -> usize {
     size.map_or(0, |size| size.ws_col.into())
 }
 
-/// Cuts a line before the last column, because a wrapped line cannot be rewritten. 0 columns mean
-/// no limit.
+/// Cuts a line before the last column, because a wrapped line cannot be rewritten; 0: no limit.
 fn cut(line: &str, columns: usize) -> &str {
     let shown = columns.checked_sub(1).unwrap_or(usize::MAX);
     let end = line.char_indices().nth(shown);

@@ -13,13 +13,13 @@ use serde::Serialize;
 
 use super::{table::Table, words::age};
 
-/// Intervals after which a topic is late. Writers check the clock only once per loop iteration.
+/// Intervals after which a topic is late; writers check the clock once per loop iteration.
 const LATE: u32 = 2;
 
 #[derive(Debug)]
 pub struct TopicRates {
     spec: &'static Spec,
-    /// Newest sample and arrival per process, because topics may have many writers.
+    /// Newest sample and arrival per process; topics may have many writers.
     writers: BTreeMap<u32, (Instant, Stamp)>,
     at: Option<Instant>,
     since: Instant,
@@ -60,7 +60,7 @@ impl TopicRates {
         Self { spec, writers: BTreeMap::new(), at: None, since: now, counts: Counts::default() }
     }
 
-    /// Ignores each process's first sample, which may be a stored old one.
+    /// Ignores each process's first sample, possibly an old stored one.
     pub fn add(&mut self, author: Author, stamp: Stamp, now: Instant) {
         self.at = Some(now);
         let Some((at, last)) = self.writers.insert(author.process, (now, stamp)) else { return };
@@ -76,7 +76,7 @@ impl TopicRates {
         counts.ticks += ticks;
         counts.missing_ticks += ticks.saturating_sub(1);
         let gap = now.saturating_duration_since(at);
-        // Rates may be in mission time, which may differ from the clock.
+        // Rates may be in mission time.
         let mission = stamp.stamp_ns.saturating_sub(last.stamp_ns);
         counts.late |= is_late(self.spec.rate, gap.min(Duration::from_nanos(mission)));
         counts.longest_gap = counts.longest_gap.max(gap);

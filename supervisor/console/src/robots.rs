@@ -65,7 +65,6 @@ fn users_in(directory: &Path, own: u32) -> Vec<u32> {
     users
 }
 
-/// Finds the directory of the log that the process `supervisor` has open.
 fn run_directory(supervisor: u32) -> Option<PathBuf> {
     let opened = fs::read_dir(format!("/proc/{supervisor}/fd")).ok()?;
     let files = opened.flatten().filter_map(|entry| fs::read_link(entry.path()).ok());

@@ -36,7 +36,7 @@ pub struct RunDirectory {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     Running,
-    /// Run whose supervisor was killed, or whose machine was switched off.
+    /// Run ended by a kill of its supervisor or machine.
     CutOff,
     Ended(Ended),
 }
@@ -182,7 +182,7 @@ pub fn own(directory: &Path) -> Result<PathBuf> {
 /// Makes `NAME-NNN` after the highest existing number.
 pub fn numbered(runs: &Path, name: &str) -> Result<PathBuf> {
     fs::create_dir_all(runs).map_err(|error| {
-        format!("cannot make {}: {error}; say where with --out", runs.display())
+        format!("cannot make {}: {error}; name another directory with --out", runs.display())
     })?;
     let mut number = highest_number(runs, name) + 1;
     loop {
@@ -206,7 +206,7 @@ fn highest_number(runs: &Path, name: &str) -> u64 {
     entries(runs).filter_map(number).max().unwrap_or_default()
 }
 
-/// Removes all but the newest `keep` ended runs of `robot`. A failure does not prevent the mission.
+/// Removes all but the newest `keep` ended runs of `robot`; ignores failures.
 pub fn prune(runs: &Path, robot: &RobotName, keep: usize) {
     let mut ended = runs_of(robot, runs);
     ended.retain(RunDirectory::has_ended);

@@ -27,7 +27,7 @@ impl MapError {
 
     pub fn too_many_boxes(file: &Path) -> Self {
         let problem = format!(
-            "its walls are more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
+            "its walls need more than {MOST_BOXES} boxes; give a map with larger cells or straighter walls"
         );
         Self::of(file, problem)
     }

@@ -10,9 +10,9 @@ use harmonic::MAX_SIDE;
 
 use crate::error::MapError;
 
-/// Refuses files that are not regular, because they may never end.
+/// Refuses special files, which may never end.
 pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
-    // The check precedes opening: opening a pipe waits for its other end.
+    // Checked before opening, because opening a pipe waits for its other end.
     let metadata = fs::metadata(file).map_err(MapError::unreadable(file))?;
     if !metadata.is_file() {
         // Directory, pipe or device.
@@ -21,7 +21,7 @@ pub(crate) fn open(file: &Path, most: u64) -> Result<File, MapError> {
     let bytes = metadata.len();
     if bytes > most {
         let problem =
-            format!("{bytes} bytes, a file of this kind has at most {most}; check that it is one");
+            format!("{bytes} bytes, but a file of this kind has at most {most}; check its type");
         return Err(MapError::of(file, problem));
     }
     File::open(file).map_err(MapError::unreadable(file))

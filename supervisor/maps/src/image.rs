@@ -77,7 +77,7 @@ pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError
         Ok(size) => *size,
         Err(cause) => MapError::of(
             file,
-            format!("a damaged or unusual image ({cause}); save it anew as an 8-bit PGM or PNG"),
+            format!("a damaged or unusual image ({cause}); save it again as an 8-bit PGM or PNG"),
         ),
     })
 }
@@ -92,7 +92,7 @@ fn netpbm(
     let mut bytes = reader.bytes();
     let mut header = || number(&mut bytes);
     let (cols, rows, most) = (header()?, header()?, header()?);
-    // The size is checked first, because decoding allocates what the header claims.
+    // Checked first, because decoding allocates by the header.
     check_size(file, cols.into(), rows.into())?;
     if !(1..=0xffff).contains(&most) {
         return Err(format!("its brightest is {most}").into());
@@ -135,7 +135,7 @@ fn number(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u32, Cause
             (b'#', None) => while !matches!(bytes.next().transpose()?, Some(b'\n') | None) {},
             (_, Some(number)) if byte.is_ascii_whitespace() => return Ok(number),
             (_, None) if byte.is_ascii_whitespace() => {}
-            _ => return Err("a number has another character".into()),
+            _ => return Err("a number contains an invalid character".into()),
         }
     }
 }

@@ -57,7 +57,7 @@ impl PlacedMap {
     }
 
     /// Returns boxes over the `wanted` cells within `solid` ones, lazily. Each grows right, then
-    /// down while that covers more.
+    /// down.
     pub fn boxes(&self, solid: &[bool], mut wanted: Vec<bool>) -> impl Iterator<Item = Box2> {
         let Map { cols, rows, .. } = self.map;
         (0..wanted.len()).filter_map(move |first| {

@@ -33,8 +33,7 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
             return Err(MapError::of(
                 file,
                 format!(
-                    "row {row} has {} cells, the header says {cols} and {rows} rows; the file is cut short or its \
-                     header is wrong",
+                    "row {row} has {} cells, but the header states {cols} and {rows} rows; complete the file or correct its header",
                     line.len()
                 ),
             ));
@@ -44,7 +43,7 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
                 MapError::of(
                     file,
                     format!(
-                        "'{}' in row {row}, column {col} is no cell; use . G S (free) and @ O T W (blocked)",
+                        "'{}' in row {row}, column {col} is not a cell; use . G S (free) and @ O T W (blocked)",
                         cell.escape_ascii()
                     ),
                 )

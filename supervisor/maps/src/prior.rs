@@ -17,7 +17,7 @@ const OCCUPIED: u8 = 0;
 const UNKNOWN: u8 = 205;
 const FREE: u8 = 254;
 
-/// Adds the map's occupied cells to the known shapes, so that the run no longer needs the file.
+/// Adds the map's occupied cells to the known shapes, which makes the run independent of the file.
 ///
 /// # Errors
 /// The file is not a map, or needs too many boxes.
@@ -46,8 +46,8 @@ fn known(file: &Path, placed: &PlacedMap, frame: &GridFrame) -> Result<Vec<Box2>
 
 /// Writes `cells`, one [`CellState`] byte each, to the YAML `file` and an image beside it.
 ///
-/// Grid hazards surround a surface by the body's reach. The map has only surfaces: cells with
-/// nothing but hazard within that reach. A mission from the map then has the same hazards.
+/// Grid hazards extend a surface by the body's reach. The map has only surfaces: cells with only
+/// hazard within that reach. A mission from the map then has the same hazards.
 ///
 /// # Errors
 /// A file cannot be written.

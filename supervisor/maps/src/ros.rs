@@ -61,7 +61,7 @@ fn placed(
     let cell_m = keys.number("resolution")?.ok_or_else(|| keys.missing("resolution: METRES"))?;
     if !CELL_M.contains(&cell_m) {
         let problem = format!(
-            "resolution: {cell_m} is not the side of a cell; set it to {} to {} m",
+            "resolution: {cell_m} is not a cell size; set it to {} to {} m",
             CELL_M.start(),
             CELL_M.end()
         );
@@ -76,7 +76,7 @@ fn placed(
         _ => Err(MapError::of(
             file,
             format!(
-                "origin: {:?} is not read here; set it to [x, y, 0] in metres, the image not turned",
+                "origin: {:?} is not supported; set it to [x, y, 0] in metres, without rotation",
                 origin.get(..3).unwrap_or(origin)
             ),
         )),
@@ -175,7 +175,7 @@ impl<'a> Keys<'a> {
         match self.values.get(key).map(Vec::as_slice) {
             None => Ok(None),
             Some([scalar]) => Ok(Some(scalar)),
-            Some(_) => Err(MapError::of(self.file, format!("{key}: is no single value"))),
+            Some(_) => Err(MapError::of(self.file, format!("{key}: is not a single value"))),
         }
     }
 
@@ -190,7 +190,7 @@ impl<'a> Keys<'a> {
     fn lightness(&self) -> Result<Lightness, MapError> {
         let malformed = |problem| MapError::of(self.file, problem);
         if let Some(mode) = self.scalar("mode")?.filter(|mode| *mode != "trinary") {
-            let problem = format!("mode: {mode:?} is not read here; set it to trinary");
+            let problem = format!("mode: {mode:?} is not supported; set it to trinary");
             return Err(malformed(problem));
         }
         // The map_server writes 0 and 1, people write false and true.
@@ -206,8 +206,9 @@ impl<'a> Keys<'a> {
         let share = |key: &str, usual: f64| match self.number(key)?.unwrap_or(usual) {
             value if (0.0..=1.0).contains(&value) => Ok(value),
             value => {
-                let problem =
-                    format!("{key}: {value} is not a share of darkness; set it to 0 to 1");
+                let problem = format!(
+                    "{key}: {value} is not a share of darkness; set it to a value from 0 to 1"
+                );
                 Err(malformed(problem))
             }
         };

@@ -85,7 +85,7 @@ impl BusEndpoints {
         })
     }
 
-    /// Replaces the bus. After an error, these remain endpoints of the old, abandoned bus.
+    /// Replaces the bus. After an error, these endpoints belong to the abandoned bus.
     pub(crate) fn recreate(&mut self, lock: &mut DomainLock) -> Result {
         lock.recreate_bus()?;
         let mut record = std::mem::take(&mut self.observer.record);
@@ -95,7 +95,7 @@ impl BusEndpoints {
         Ok(())
     }
 
-    /// Returns whether the last publication is a `period` old, or a consumer waits for its first
+    /// Returns whether the last publication is a `period` old, or a new consumer waits for a
     /// roster.
     pub(crate) fn is_due(&mut self, period: Duration) -> bool {
         self.roster.has_new_reader() || self.published.is_none_or(|last| last.elapsed() >= period)
@@ -116,7 +116,7 @@ impl BusEndpoints {
         self.roster.publish_slice(tick, time, header, entries)
     }
 
-    /// Publishes a death; a failure only logs a warning.
+    /// Publishes a death; logs a failure.
     pub(crate) fn publish_death(&mut self, death: DeathSample) {
         let stamp = self.observer.record.pose.unwrap_or_default().stamp;
         warn_if_failed(self.deaths.publish(stamp.tick, stamp.time(), death));

@@ -1,7 +1,7 @@
 //! Event that ended a mission first, and the part of the run that counts. Pure.
 //!
-//! After an event, the stages go on until the supervisor has stopped the robot. How far they get
-//! depends on the machine; the order of events does not.
+//! After an event, the stages run until the supervisor has stopped the robot. Their progress until
+//! then depends on the machine; the order of events is deterministic.
 
 use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 
@@ -17,17 +17,16 @@ pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTic
 
 pub(crate) struct Decided {
     pub ending: Ending,
-    /// Last complete tick; `None` if no tick decided. The tick of a contact, timeout or stall may
-    /// be incomplete.
+    /// Last complete tick; `None` if no tick decided. The tick of an event may be incomplete.
     pub last_tick: Option<u64>,
-    /// Ground-truth ticks that count: up to the contact, or up to the last tick.
+    /// Ground-truth ticks that count, up to the contact or last tick.
     pub truth_ticks: usize,
 }
 
 #[derive(Clone, Copy)]
 pub(crate) struct Timeout {
     pub deadline: Deadline,
-    /// Whether the simulated robot's clock decides. In lockstep it also counts lost ticks.
+    /// Whether the simulated robot's clock decides; it also counts lost ticks.
     pub by_robot: bool,
 }
 
@@ -45,7 +44,7 @@ impl Timeout {
 
 /// Returns the first event of a run that the supervisor saw end with `ending`.
 ///
-/// `stall` holds the tick and the ending of the stall at which no recovery step was left.
+/// `stall` holds the tick and ending of a stall without a remaining recovery step.
 pub(crate) fn first(
     ending: Ending,
     record: &Record,
@@ -67,7 +66,7 @@ pub(crate) fn first(
     let arrived_in = arrival.as_ref().map(|(tick, _)| *tick);
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
-    // If two events have the same tick, the first of the list counts.
+    // Of two events in one tick, the first in the list counts.
     let events = [contact, arrival, late, stall];
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
         return undecided(ending);
@@ -90,13 +89,13 @@ pub(crate) fn first(
     Decided { ending, last_tick: Some(last_tick), truth_ticks }
 }
 
-/// Returns the ground-truth index of the tick behind `pose`: same counts, nearest number.
+/// Returns the ground-truth index of `pose`: same counts, nearest number.
 pub(crate) fn truth_of(pose: &PoseSample, truth: &[GroundTruthTick]) -> Option<usize> {
     let shown = truth.iter().enumerate().filter(|(_, it)| it.is_of(pose));
     shown.min_by_key(|(_, it)| it.heard_tick().abs_diff(pose.stamp.tick)).map(|(index, _)| index)
 }
 
-/// Returns the tick of the pose computed from `truth`, or else the number it would have.
+/// Returns the tick of the pose computed from `truth`, or the number it would have.
 fn tick_of(truth: &GroundTruthTick, poses: &[PoseSample]) -> u64 {
     poses
         .iter()

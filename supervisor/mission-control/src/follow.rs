@@ -16,13 +16,12 @@ use common::{
 /// State of the beacon beside the saved [`Following`].
 #[derive(Default)]
 pub(crate) struct Beacon {
-    /// Newest sample before following begins. In lockstep, a sample that waits until all stages
-    /// have answered the tick of its capture.
+    /// Newest sample before following begins, or in lockstep one that waits for the answers to its
+    /// tick.
     waiting: Option<BeaconSample>,
-    /// Last tick before the next sample, in lockstep. It makes the same samples lead to the same
-    /// run.
+    /// Last tick before the next sample, in lockstep; makes runs repeatable.
     last_tick: u64,
-    /// Published state of the current or the last following.
+    /// Published state of the newest following.
     pub told: Option<FollowingSample>,
 }
 
@@ -95,14 +94,14 @@ impl Supervisor<'_> {
         if let Some(following) = &mut self.state_file.state.following
             && following.loses(now)
         {
-            tracing::warn!("the robot lost what it follows, and stands");
+            tracing::warn!("the robot lost its beacon and stops");
             changed = true;
         }
         self.tell_following();
         Ok(changed)
     }
 
-    /// Returns the mission time. In lockstep it is the newest pose's, independent of the machine.
+    /// Returns the mission time; in lockstep the newest pose's.
     fn beacon_time(&self) -> MissionTime {
         match self.clock.in_ticks() {
             true => self.clock.pose_time(self.bus.observer.record.pose.as_ref()),
@@ -141,7 +140,7 @@ impl Supervisor<'_> {
             return false;
         }
         if was_lost {
-            tracing::info!("the robot hears what it follows");
+            tracing::info!("the robot hears its beacon");
         }
         let here = record.pose.map_or(mission.start.at, |pose| {
             let rolls_m = pose.v_m_s * mission.trusted_response().dead_time_s();
@@ -160,10 +159,10 @@ impl Supervisor<'_> {
 
     fn log_refusal(&mut self, refusal: BeaconRefusal, beacon: [f64; 3]) {
         let [x_m, y_m, deviation_m] = beacon;
-        // A source may send thousands of them, so a repeated reason is logged once.
+        // A source may send thousands, so a repeated reason is logged once.
         if self.beacon.told.is_none_or(|told| told.refusal != u8::from(refusal)) {
             let why = refusal.words();
-            tracing::warn!(x_m, y_m, deviation_m, "a sample of the beacon is refused: {why}");
+            tracing::warn!(x_m, y_m, deviation_m, "a beacon sample is refused: {why}");
         }
         self.tell_following();
     }
@@ -175,7 +174,6 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Returns the last tick before the next beacon sample in lockstep; `None` without a following.
     pub(crate) fn beacon_limit(&self) -> Option<u64> {
         self.state_file.state.following.map(|_| self.beacon.last_tick)
     }

@@ -1,8 +1,8 @@
 //! Followed beacon, and the robot's place beside it. Pure.
 //!
 //! The sensors see the followed body as a hazard, so the robot goes to a free place beside it.
-//! Candidates lie within the distance to keep and see the beacon. The one with the shortest way
-//! from the robot wins. The field leads there as to any other target.
+//! Candidates lie within the distance to keep and see the beacon. The one with the shortest path
+//! wins. The field leads there as to any target.
 
 use std::{cmp::Reverse, collections::BinaryHeap, time::Duration};
 
@@ -19,8 +19,8 @@ use crate::target_list::Followed;
 
 /// Silence of the beacon after which the robot stands.
 ///
-/// A person walks 1 m meanwhile, the distance that the robot keeps. A source of ten samples a
-/// second may lose several in a row.
+/// A person walks 1 m meanwhile, the distance to keep. A source at 10 Hz may lose several samples
+/// in a row.
 pub(crate) const SILENT: Duration = Duration::from_secs(1);
 /// Greatest deviation of a used sample, metres. Two deviations make up [`ROOM_M`].
 const MOST_DEVIATION_M: f64 = 0.25;
@@ -32,7 +32,6 @@ const ROOM_M: f64 = 0.5;
 const SPREAD_M: f64 = 0.15;
 const MOST_DISTANCE_M: f64 = 10.0;
 
-/// Returns the distance of the centres at which the bodies touch, metres.
 fn least_m(mission: &Mission) -> f64 {
     BODY_M + mission.body().radius_m
 }
@@ -143,7 +142,7 @@ impl Following {
         loses
     }
 
-    /// Marks the beacon as lost after a change of supervisor, so that it must be heard again.
+    /// Marks the beacon as lost after a change of supervisor.
     pub(crate) const fn resumed(&mut self) {
         self.is_lost = true;
     }
@@ -219,7 +218,7 @@ impl Around<'_> {
         byte.is_some_and(|byte| !CellState::from_byte(byte).is_hazard())
     }
 
-    /// Returns whether the line from `at` to the followed body is free.
+    /// Returns whether the followed body is in line of sight from `at`.
     fn sees(&self, at: DVec2) -> bool {
         let way_m = at.distance(self.beacon) - self.least_m - SPREAD_M;
         let steps = (way_m / self.frame.resolution_m).ceil().max(0.0) as u32;
@@ -230,13 +229,13 @@ impl Around<'_> {
         })
     }
 
-    /// Returns the place within `distance_m` that sees the beacon, with the shortest way over free
-    /// cells from `from`. If there is none, returns the reachable place nearest to the beacon.
+    /// Returns the place within `distance_m` that sees the beacon, with the shortest path from
+    /// `from`. Without one, returns the reachable place nearest to the beacon.
     fn nearest(&self, from: DVec2, distance_m: f64) -> Option<DVec2> {
         let start = self.start(from)?;
         let side = self.frame.cells as usize;
         let mut costs = vec![u32::MAX; self.frame.area()];
-        // A* heuristic: no way to the circle around the beacon costs less.
+        // A* heuristic: a lower bound to the circle around the beacon.
         let least_cost = |at: DVec2| {
             let way_m = (at.distance(self.beacon) - distance_m).max(0.0);
             (way_m / self.frame.resolution_m * 9.8) as u32
@@ -278,7 +277,7 @@ impl Around<'_> {
         best.map(|(_, at)| at)
     }
 
-    /// Returns the nearest free cell, because the robot may stand in the margin of a hazard.
+    /// Returns the nearest free cell; the robot may stand in a hazard's margin.
     fn start(&self, from: DVec2) -> Option<Cell> {
         let own = self.frame.cell_at(from).filter(|cell| self.is_free_cell(*cell));
         own.or_else(|| {

@@ -1,4 +1,4 @@
-//! Decision whether the mission is over, and how it ended. Pure.
+//! Decision whether the mission is over, and its outcome. Pure.
 
 use std::time::Duration;
 
@@ -14,17 +14,17 @@ use processes::{policy::Now, records};
 
 use crate::outcome::{Ending, Outcome};
 
-/// Observed time without a tick after which an unheld pipeline is stuck. In lockstep mission time
-/// stands still, so the mission's timeout cannot end such a run.
+/// Time without a tick after which an unheld pipeline is stuck. In lockstep mission time then
+/// stands still, so the mission's timeout cannot end the run.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 
-/// Time for the robot to come to rest. The link tries each method of the protocol twice in it.
+/// Time for the robot to come to rest. The link tries each stop method twice in it.
 pub(crate) const RESTS_WITHIN: Duration = Duration::from_secs(5);
 
 pub(crate) struct Snapshot<'a> {
     pub arrival: Option<Arrival>,
     pub link: Option<&'a LinkSample>,
-    /// Whether the robot may be out of reach for any time: a real robot outside a procedure.
+    /// Whether the robot may be out of reach: a real robot outside a procedure.
     pub may_be_away: bool,
     pub simulator_ended: bool,
     /// Contact of a simulated robot, metres.
@@ -61,7 +61,7 @@ pub(crate) fn arrived(distance_m: f64, beside: Option<DVec2>) -> Ending {
         return Ending::asked_for(Outcome::Reached, reason);
     };
     let reason = format!(
-        "{reason}, at {place:.2}: as near as the robot gets beside a hazard, and more than arrival_tolerance_m"
+        "{reason}, at {place:.2}: the nearest point that a hazard allows, outside arrival_tolerance_m"
     );
     Ending::failed(Outcome::Unreachable, reason)
 }
@@ -89,9 +89,9 @@ impl Deadline {
 
     pub(crate) fn timed_out(self) -> Ending {
         let Self { timeout_s, stopped_s, .. } = self;
-        let mut reason = format!("not there after {timeout_s} s");
+        let mut reason = format!("target not reached within {timeout_s} s");
         if stopped_s > 0.0 {
-            reason += &format!(", {stopped_s:.0} s of an operator's stop not counted");
+            reason += &format!(", {stopped_s:.0} s of operator stops excluded");
         }
         Ending::failed(Outcome::Timeout, reason)
     }
@@ -123,7 +123,7 @@ impl Snapshot<'_> {
         }
         let arrived = format!("arrived {distance_m:.2} m from the target");
         (now.saturating_sub(since) >= RESTS_WITHIN).then(|| {
-            Ending::failed(Outcome::Aborted, format!("{arrived}, and was not seen at rest"))
+            Ending::failed(Outcome::Aborted, format!("{arrived}, but was not seen at rest"))
         })
     }
 
@@ -152,7 +152,6 @@ impl Snapshot<'_> {
 
     fn stuck(&self, now: Now) -> Option<Ending> {
         let may_wait = match self.reason {
-            // A robot that answers and cannot be used is here.
             HoldReason::None => {
                 self.may_be_away && !(self.robot_answers() && self.complaint.is_some())
             }
@@ -170,14 +169,14 @@ impl Snapshot<'_> {
         } else if !self.held.is_empty() {
             let (held, file) = (self.held.join(", "), records::DEATHS);
             let why = self.complaint.as_ref().map_or(String::new(), |why| format!(" ({why})"));
-            format!("{held} died again and again{why} and is held; see {file} in the run directory")
+            format!("{held} died repeatedly{why} and is held; see {file} in the run directory")
         } else if let Some(complaint) = &self.complaint {
             complaint.clone()
         } else if !self.has_ticked && !self.robot_answers() {
             let address = self.address;
             format!("no robot answers at {address}: switch the robot on, or correct robot.address")
         } else if !self.has_ticked {
-            "the robot answers and no tick begins: it may not send all that a tick needs, wheels and every sensor of its mission; see link.log"
+            "the robot answers, but no tick begins: its wheel counts or a sensor of its mission may be missing; see link.log"
                 .to_owned()
         } else {
             "the pipeline makes no progress; see the stages' logs".to_owned()
@@ -193,8 +192,7 @@ pub(crate) struct StopClock {
 }
 
 impl StopClock {
-    /// Returns the seconds of stop since the last call. `stopped` says whether a stop holds at
-    /// `now`.
+    /// Returns the seconds of stop since the last call; `stopped` is the state at `now`.
     pub(crate) fn passed_s(&mut self, stopped: bool, now: MissionTime) -> f64 {
         let before = std::mem::replace(&mut self.stopped_at, stopped.then_some(now));
         before.map_or(0.0, |before| now.since(before).as_secs_f64())

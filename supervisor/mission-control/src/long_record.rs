@@ -2,8 +2,8 @@
 
 use common::{ground_truth::GroundTruthTick, samples::PoseSample};
 
-/// Greatest length: 10 minutes at 7 Hz, 0.7 MB. The picture draws no more points. The newest half
-/// stays complete and holds the tick that ends a run.
+/// Maximum length: 10 minutes at 7 Hz, 0.7 MB. The newest half stays complete and holds the tick
+/// that ends a run.
 const MOST_TICKS: usize = 4096;
 
 pub(crate) trait Recorded: Copy {
@@ -24,7 +24,7 @@ impl Recorded for GroundTruthTick {
     }
 }
 
-/// Appends `tick`. In a full record, pairs of older ticks are merged first.
+/// Appends `tick`; a full record first merges pairs of older ticks.
 pub(crate) fn push<T: Recorded>(record: &mut Vec<T>, tick: T) {
     if record.len() >= MOST_TICKS {
         let (older, newer) = record.split_at(MOST_TICKS / 2);

@@ -23,19 +23,19 @@ use processes::stage_processes::StageProcesses;
 
 use crate::{long_record, target_list::TargetOutcome};
 
-/// Guidance history. It still holds the arrival's guidance when the arrival's command is read.
+/// Guidance history, long enough for the guidance of an arrival.
 const MOST_GUIDANCE: usize = 1024;
 /// Contact history, longer than the contacts between two stall checks.
 const MOST_CONTACTS: usize = 64;
 
-/// A stage repeats its trouble several times a second, and may wait seconds for a processor.
+/// Stages repeat a complaint several times a second, and may be starved for seconds.
 const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Published {
     pub tick: Option<u64>,
     pub commands: u64,
-    /// Generation of the planner's newest heartbeat, and the tick of the newest grid that it used.
+    /// Generation of the planner's newest heartbeat, and its newest grid tick.
     pub planner: (u32, u64),
     pub epoch: u64,
     pub grid_epoch: u64,
@@ -43,7 +43,7 @@ pub(crate) struct Published {
     pub grid_changed: bool,
 }
 
-/// Sample read by a run, for code that computes numbers or draws.
+/// Sample of a run, for metrics and drawings.
 pub enum Heard<'a> {
     Command(&'a CommandSample),
     Guidance(&'a GuidanceSample),
@@ -71,20 +71,19 @@ pub(crate) struct Observer {
 
 #[derive(Default)]
 pub struct Record {
-    /// Pose of every tick; in a long run older ticks are thinned out.
+    /// Pose of every tick, thinned out in a long run.
     pub poses: Vec<PoseSample>,
     pub pose: Option<PoseSample>,
     pub(crate) guidance: VecDeque<GuidanceSample>,
     pub command: Option<CommandSample>,
     pub(crate) published: Published,
-    /// Newest ticks at which something held the wheels, oldest first.
+    /// Newest ticks with held wheels, oldest first.
     contacts: VecDeque<u64>,
-    /// Number of the current target. `arrival` is the first command that reports it reached.
+    /// Current target, whose first arrival command is in `arrival`.
     pub(crate) target_number: u64,
     pub arrival: Option<CommandSample>,
     pub link: Option<LinkSample>,
     complaint: Option<(ComplaintSample, Instant)>,
-    /// Time of reading the newest link sample with a known encoder state.
     pub(crate) rest_read: Option<Instant>,
     pub grid: Replica<u8>,
     pub field_known: bool,
@@ -93,13 +92,13 @@ pub struct Record {
 impl Observer {
     /// Opens all readers on `bus`, to complete `record`.
     ///
-    /// `waiter` wakes for heartbeats, fields and link samples, which end a tick. During a tick the
-    /// processor belongs to the stages.
+    /// `waiter` wakes for heartbeats, fields and link samples, which end a tick, and leaves the
+    /// processor to the stages during a tick.
     pub(crate) fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::LINK)?);
         waiter.on(bus.wakeup(&topics::FIELD)?);
-        // What judges an arrival is read whole, however long this process waits for a processor.
+        // Samples that judge an arrival are read completely, even by a starved supervisor.
         Ok(Self {
             health: bus.reader(&topics::HEALTH)?,
             link: bus.reader(&topics::LINK)?,
@@ -131,8 +130,8 @@ impl Observer {
             }
         }
         let record = &mut self.record;
-        // The command is read before the samples it was computed from. The record then holds those
-        // samples whenever it holds the command.
+        // The command is read before the samples behind it, so a record with the command holds them
+        // too.
         while let Some(command) = self.command.next_sample()? {
             stages.on_output(topics::COMMAND.spec().writer, command.stamp.tick);
             record.command = Some(command);
@@ -201,7 +200,6 @@ fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
 }
 
 impl Record {
-    /// The complaint of a stage that still lasts, in words.
     pub fn complaint(&self) -> Option<String> {
         let (complaint, _) = self.complaint.filter(|(_, read)| read.elapsed() < COMPLAINT_LASTS)?;
         Some(complaint.to_string())
@@ -228,8 +226,8 @@ impl Record {
         Some((command, outcome))
     }
 
-    /// Returns the robot's place if it arrived outside the tolerance, as near as the planner gets
-    /// it to a target in or beside a hazard.
+    /// Returns the robot's place if it arrived outside the tolerance, at the planner's nearest
+    /// point to a target in or beside a hazard.
     pub(crate) fn beside(&self, arrival: &CommandSample, tolerance_m: f64) -> Option<DVec2> {
         let guidance = self.guidance_at(arrival.stamp.tick)?;
         let is_near = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
@@ -241,14 +239,14 @@ impl Record {
         self.guidance.iter().rev().find(|guidance| guidance.stamp.tick <= tick)
     }
 
-    /// Returns whether something held the wheels after tick `last`, up to `tick`. A slow planner
-    /// may skip the tick of a contact.
+    /// Returns whether something held the wheels in the ticks (`last`, `tick`]. A slow planner may
+    /// skip a tick.
     pub(crate) fn has_contact(&self, last: Option<u64>, tick: u64) -> bool {
         let is_new = |contact: &u64| *contact <= tick && last.is_none_or(|last| *contact > last);
         self.contacts.iter().any(is_new)
     }
 
-    /// Iterates over the pose and guidance of every tick after `last` that has both, oldest first.
+    /// Iterates over the ticks after `last` with both pose and guidance, oldest first.
     pub(crate) fn ticks_since(
         &self,
         last: Option<u64>,

@@ -1,7 +1,6 @@
-//! An operator's requests to a robot, from any process.
+//! Operator requests to a robot, from any process.
 //!
-//! Each function returns once link or supervisor has confirmed the request, or with the reason why
-//! not.
+//! Each function returns once link or supervisor confirms the request, or with the refusal.
 
 use std::{
     env, fs,
@@ -34,15 +33,14 @@ use link::stop_guard;
 use processes::{executable, process};
 use thiserror::Error;
 
-/// Timeout for a supervisor, whose roster comes five times a second. Beside 25 busy processes per
-/// core, one took over 4 s.
+/// Timeout for a supervisor, whose roster comes at 5 Hz. With 25 busy processes per core, one took
+/// over 4 s.
 pub const PATIENCE: Duration = Duration::from_secs(10);
 /// Interval for repeating a request that a starting run refused.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
 #[derive(Debug, Error)]
 pub enum OperatorError {
-    /// The robot does not run, or its bus cannot be used.
     #[error(transparent)]
     Bus(#[from] BusError),
     /// The robot, its link or its supervisor refuses; `code` is for scripts.
@@ -82,24 +80,23 @@ const fn code(answer: RequestAnswer) -> &'static str {
     }
 }
 
-/// Reason why the supervisor was not told of a stop, which holds anyway.
+/// Reason why the supervisor does not know of a stop, which holds anyway.
 pub type Untold = Option<String>;
 
-/// Time for a process to start and tell the supervisor.
 const TOLD_WITHIN: Duration = PATIENCE.saturating_add(Duration::from_secs(2));
 
-/// Timeout for a stop; the link changes its method after a second.
+/// Timeout for a stop; the link changes its method after 1 s.
 const REST_PATIENCE: Duration = Duration::from_secs(5);
 
-/// Timeout for a link, which answers within milliseconds if it is scheduled.
+/// Timeout for a link, which answers within milliseconds when scheduled.
 const LINK_ANSWERS: Duration = Duration::from_millis(200);
 
 const GUARD_STARTS: Duration = Duration::from_millis(20);
 
 /// Stops the robot and waits until it rests.
 ///
-/// The request reaches the link without the middleware. The supervisor is told too, so that the
-/// stop holds for its successors. If no link answers, a stop guard tells the robot itself.
+/// The request reaches the link without the middleware. The supervisor hears it too, so that its
+/// successors keep the stop. If no link answers, a stop guard stops the robot.
 pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let asked_ns = monotonic_ns();
     let domain = Domain::of(robot.clone());
@@ -115,7 +112,10 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     if link.is_none() && run.is_err() && owes_stop(robot) {
         return match rests_by(&guard(&domain)?) {
             true => Ok(None),
-            false => Err(not_at_rest(robot, &sees(robot).map_or("nobody knows".into(), |it| it.0))),
+            false => Err(not_at_rest(
+                robot,
+                &sees(robot).map_or("its state is unknown".into(), |it| it.0),
+            )),
         };
     }
     if link.is_none() && run.is_err() {
@@ -125,9 +125,9 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     let supervisor = tell_supervisor(robot, asked_ns)?;
     let rests = match (link, run) {
         (Some(link), _) => rests_by(&link),
-        // A link that does not answer does not command the robot either.
+        // An unresponsive link sends no commands.
         (None, Ok(_)) if owes_stop(robot) => rests_by(&guard(&domain)?),
-        // The robot was seen at rest, and has had no order to move since.
+        // The robot was seen at rest, without a later order to move.
         (None, Ok(_)) => true,
         (None, Err(_)) => false,
     };
@@ -141,7 +141,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
     }
 }
 
-/// Tells the robot's link to stop it, without waiting. [`stand`] does the rest.
+/// Tells the link to stop the robot, without waiting. [`stand`] does the rest.
 pub fn stop_at_once(robot: &RobotName) {
     let link = stop_socket::Operator::connect(&Domain::of(robot.clone()).stop_socket());
     if let Ok(Some(link)) = link {
@@ -154,7 +154,7 @@ pub fn owes_stop(robot: &RobotName) -> bool {
     OwedStop::of(Domain::of(robot.clone())).is_set()
 }
 
-/// Connects to the robot's stop guard, and starts one if none answers.
+/// Connects to the robot's stop guard; starts one if none answers.
 fn guard(domain: &Domain) -> Result<stop_socket::Operator, OperatorError> {
     let system = |error| OperatorError::System("reach the stop guard", error);
     let told = || -> Result<_, OperatorError> {
@@ -182,7 +182,7 @@ fn guard(domain: &Domain) -> Result<stop_socket::Operator, OperatorError> {
     }
 }
 
-/// Returns the stop guard's observation, in words and seconds of silence; `None` without a guard.
+/// Returns the stop guard's observation and its seconds of silence.
 pub fn sees(robot: &RobotName) -> Option<(String, u8)> {
     let guard = stop_socket::Operator::connect(&Domain::of(robot.clone()).guard_socket());
     let guard = guard.ok().flatten()?;
@@ -199,7 +199,7 @@ pub fn sees(robot: &RobotName) -> Option<(String, u8)> {
     }
 }
 
-/// Ends the orders of the stop guard after a person saw that the robot rests or is off.
+/// Ends the stop guard's orders after a person saw the robot at rest or off.
 ///
 /// # Errors
 /// Fails while a link runs.
@@ -231,7 +231,7 @@ fn rests_by(link: &stop_socket::Operator) -> bool {
     }
 }
 
-/// Returns this program, even if its file was replaced meanwhile, or the one beside a viewer.
+/// Returns this program, even if its file was replaced, or the one beside a viewer.
 fn robot_executable() -> PathBuf {
     let own = env::current_exe().unwrap_or_default();
     let is_viewer =
@@ -240,8 +240,8 @@ fn robot_executable() -> PathBuf {
     beside.unwrap_or_else(|| PathBuf::from("/proc/self/exe"))
 }
 
-/// Tells the supervisor of a stop in a separate process. Files of a damaged bus can kill the
-/// process that opens them.
+/// Tells the supervisor of a stop in a separate process, because files of a damaged bus can kill a
+/// process.
 fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorError> {
     let (robot, asked) = (robot.to_string(), asked_ns.to_string());
     let child = process::child(robot_executable())
@@ -294,26 +294,25 @@ fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result<
         waiter.wait(topics::LINK.spec().restated_every())?;
     }
     let seen = match newest {
-        None => "its link publishes nothing; the robot's timed command has ended".to_owned(),
+        None => "its link publishes nothing; the robot's timed command has expired".to_owned(),
         Some(link) if link.connected == 0 => {
-            "it does not answer; it is ordered to stand when it does".to_owned()
+            "it does not answer; it receives the stop order as soon as it does".to_owned()
         }
         Some(link) if link.rest() == Rest::Moving => format!("{}: it moves", link.cause().name()),
-        Some(_) => "whether it rests is not known: no usable motor frames come".to_owned(),
+        Some(_) => "whether it rests is unknown: no usable motor frames arrive".to_owned(),
     };
     Err(not_at_rest(robot, &seen))
 }
 
 fn not_at_rest(robot: &RobotName, seen: &str) -> OperatorError {
     let message = format!(
-        "robot {robot} is ordered to stand and was not seen at rest within {} s: {seen}; see `firsthand status`",
+        "robot {robot} has the order to stop but was not seen at rest within {} s: {seen}; see `firsthand status`",
         REST_PATIENCE.as_secs()
     );
     OperatorError::refused("not-at-rest", message)
 }
 
-/// Returns whether the link stops the robot for the operator or the mission's end, and the robot
-/// rests.
+/// Returns whether the robot rests, stopped for the operator or the mission's end.
 fn stopped_for_good(link: &LinkSample) -> bool {
     let stopped = link.cause() == Cause::OperatorStop || link.action() == Action::End;
     stopped && link.at_rest == 1
@@ -331,8 +330,8 @@ pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
     ask(robot, request(RequestKind::Resume))
 }
 
-/// Tells only the supervisor of a stop asked at `asked_ns` of the monotonic clock. A later resume
-/// ends it.
+/// Tells the supervisor of a stop asked at `asked_ns` of the monotonic clock. A later resume ends
+/// it.
 pub fn request_stop(robot: &RobotName, asked_ns: u64) -> Result<(), OperatorError> {
     ask(robot, RequestSample { asked_ns, ..request(RequestKind::Stop) })
 }
@@ -414,14 +413,14 @@ fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
     OperatorError::refused(code(answer), message)
 }
 
-/// Refuses an order to a mirror, whose robot is on another machine.
+/// Refuses an order to a mirror.
 ///
 /// # Errors
-/// Fails if `domain` is a mirror; the order must be given on the robot's machine.
+/// Fails if `domain` is a mirror; the order belongs on the robot's machine.
 pub fn refuse_mirror(domain: &Domain) -> Result<(), OperatorError> {
     let Some(at) = domain.mirrors() else { return Ok(()) };
     let message = format!(
-        "this is a mirror of robot {} at {at}, and orders are not let in; give them on its machine",
+        "this is a mirror of robot {} at {at}, which accepts no orders; give them on its machine",
         domain.robot
     );
     Err(OperatorError::refused("mirror", message))
@@ -439,8 +438,8 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
         RequestKind::Goto | RequestKind::Append | RequestKind::Follow
     );
     if goes {
-        // A starting supervisor does not read yet. Hand requests come too often to wait for a
-        // roster each time.
+        // A starting supervisor does not read yet. Hand requests are too frequent to wait for a
+        // roster.
         roster.find(PATIENCE, |_, _| Some(()))?;
     }
     let began = Instant::now();
@@ -452,8 +451,7 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
         })?;
         match answer {
             RequestAnswer::Taken => return Ok(()),
-            // Answer of a run that starts, or whose supervisor missed a part of the map and waits
-            // for the next whole one.
+            // A starting run, or a supervisor that waits for a whole map.
             RequestAnswer::NotRunning if goes && began.elapsed() < PATIENCE => {
                 roster.find(AGAIN_AFTER, |_, _| None::<()>)?;
             }
@@ -462,7 +460,6 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
     }
 }
 
-/// Returns a unique request id, mixed from time and process id.
 pub fn new_id() -> u64 {
     monotonic_ns() ^ u64::from(std::process::id()) << 40 | 1
 }

@@ -1,4 +1,4 @@
-//! Decision whether the robot may drive, and the reason if not. Pure.
+//! Decision whether the robot may drive, and the hold reason. Pure.
 
 use common::samples::{HoldReason, Order};
 
@@ -8,19 +8,18 @@ pub(crate) struct Snapshot {
     pub all_running: bool,
     /// Whether the link receives data from the robot.
     pub robot_answers: bool,
-    /// Whether the planner has published a field, so that the first tick does not wait for one.
+    /// Whether the planner has published a field, so that the first tick has one.
     pub field_known: bool,
     pub operator_stop: bool,
     pub stage_held: bool,
     /// Whether the robot has no target left.
     pub waits: bool,
-    /// Whether the robot follows a beacon that it does not hear.
     pub lost: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Decision {
-    /// Whether the robot was ever ready. From then on the link stops it when a stage is down.
+    /// Whether the robot was ever ready. Since then the link stops it when a stage is down.
     pub ready: bool,
     pub reason: HoldReason,
 }

@@ -4,11 +4,10 @@ use common::{ground_truth::GroundTruthTick, mission::Mission, samples::PoseSampl
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// Greatest true distance from its target of an arrived simulated robot, metres, as in other
-/// benchmarks. A wider tolerance of the mission replaces it.
+/// Maximum true distance from the target after an arrival in simulation, metres, as in other
+/// benchmarks. A wider mission tolerance replaces it.
 pub const RIGHT_PLACE_M: f64 = 0.5;
 
-/// Returns the greatest allowed distance between an arrived robot and its target, metres.
 pub(crate) const fn allowed_m(mission: &Mission) -> f64 {
     RIGHT_PLACE_M.max(mission.arrival_tolerance_m)
 }
@@ -16,12 +15,11 @@ pub(crate) const fn allowed_m(mission: &Mission) -> f64 {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
-    /// The robot is within the tolerance of the target by its own pose, and in simulation also by
-    /// the ground truth.
+    /// Within the tolerance of the target by its own pose, and in simulation by the ground truth.
     Reached,
     /// The ground truth contradicts the reported arrival.
     WrongPlace,
-    /// The robot reports its arrival, but its pose covariance exceeds what the mission allows.
+    /// The pose covariance on arrival exceeds what the mission allows.
     ReachedUnsure,
     /// The robot stalled, and no recovery step was left.
     Unreachable,
@@ -29,13 +27,13 @@ pub enum Outcome {
     #[serde(alias = "timed_out")]
     Timeout,
     Collision,
-    /// The run was ended while the robot waited before its first target, or followed a beacon, or
-    /// was driven by hand.
+    /// The run ended while the robot waited for its first target, followed a beacon, or was driven
+    /// by hand.
     Waited,
     /// The run was stopped by hand, or something failed.
     #[default]
     Aborted,
-    /// The encoders report motion although every method of the protocol told the robot to stand.
+    /// The encoders report motion after every stop method of the protocol.
     CouldNotBeStopped,
 }
 
@@ -80,9 +78,9 @@ pub(crate) enum Wheels {
 pub struct Ending {
     pub outcome: Outcome,
     pub reason: String,
-    /// Name of the failsafe-table row that ended the mission.
+    /// Failsafe-table row that ended the mission.
     pub cause: Option<&'static str>,
-    /// Whether the run ended as asked: at the target, or by a stop by hand.
+    /// Whether the run ended as requested: at the target, or by hand.
     pub asked_for: bool,
 }
 
@@ -93,8 +91,8 @@ impl Ending {
 
     /// Checks an arrival against the ground truth `ended` and the own pose `at_rest`.
     ///
-    /// The result is the wrong place if either contradicts it, or unsure if the pose error may
-    /// exceed the mission's tolerance.
+    /// A contradiction gives the wrong place; a pose error that may exceed the tolerance gives
+    /// unsure.
     pub(crate) fn checked(
         self,
         mission: &Mission,
@@ -112,18 +110,18 @@ impl Ending {
         let said = &self.reason;
         let (outcome, contradicted) = if let Some(distance_m) = by_truth_m.filter(too_far) {
             let by_truth = format!(
-                "{said} by its own pose; it is {distance_m:.2} m from the target by the ground truth: more than {allowed_m} m"
+                "{said} by its own pose; by the ground truth it is {distance_m:.2} m from the target, more than {allowed_m} m"
             );
             (Outcome::WrongPlace, by_truth)
         } else if let Some(distance_m) = at_rest_m.filter(too_far) {
             let rest = format!(
-                "{said}; it came to rest {distance_m:.2} m from the target: more than {allowed_m} m"
+                "{said}; it came to rest {distance_m:.2} m from the target, more than {allowed_m} m"
             );
             (Outcome::WrongPlace, rest)
         } else if let Some(pose) = at_rest.filter(|pose| !pose.is_sure(mission)) {
             let (within_m, sure_m) = (pose.position_within_m(), mission.sure_within_m);
             let unsure = format!(
-                "{said}; its pose is known to within {within_m:.2} m (2 standard deviations): more than {sure_m} m"
+                "{said}; its pose is known to within {within_m:.2} m (2 standard deviations), more than {sure_m} m"
             );
             (Outcome::ReachedUnsure, unsure)
         } else {
@@ -132,16 +130,17 @@ impl Ending {
         Self::failed(outcome, contradicted)
     }
 
-    /// Adds the encoder state at the stop of the stages.
+    /// Adds the encoder state at the stages' stop.
     pub(crate) fn with(self, wheels: Wheels) -> Self {
         match wheels {
             Wheels::AtRest => self,
             Wheels::Unknown(why) => {
-                let reason = format!("{}; whether it rests is not known: {why}", self.reason);
+                let reason = format!("{}; whether it rests is unknown: {why}", self.reason);
                 Self { reason, ..self }
             }
             Wheels::Turning => {
-                let reason = format!("{}; told to stand by every method, it moves", self.reason);
+                let reason =
+                    format!("{}; the robot still moves after every stop method", self.reason);
                 Self { cause: self.cause, ..Self::failed(Outcome::CouldNotBeStopped, reason) }
             }
         }

@@ -1,7 +1,7 @@
 //! State from which another supervisor resumes a run.
 //!
-//! The stages and the simulated robot have their own checkpoints. Without a supervisor, mission
-//! time and robot stand still.
+//! Stages and simulated robot have their own checkpoints. Without a supervisor, mission time and
+//! robot stand still.
 
 use std::{fs, path::Path};
 
@@ -19,8 +19,8 @@ use thiserror::Error;
 
 use crate::{following::Following, target_list::TargetList};
 
-/// Room for the encoded [`SupervisorState`], bytes. Targets and results take under 10,000, zones
-/// 5,000.
+/// Capacity for the encoded [`SupervisorState`], bytes. Targets and results take under 10,000,
+/// zones 5,000.
 const CAPACITY: usize = 18 << 10;
 /// Summary of a finished run, in its run directory.
 pub const SUMMARY: &str = "summary.json";
@@ -29,14 +29,14 @@ const SIMULATOR: &str = "x80-sim";
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct SupervisorState {
     pub operator_stop: bool,
-    /// Mission time of operators' stops on the way to the current target, seconds.
+    /// Mission time of operator stops since the current target's start, seconds.
     pub operator_stopped_s: f64,
     pub resumes: u32,
     pub(crate) targets: Option<TargetList>,
     pub(crate) following: Option<Following>,
     /// Newest place set by an operator; number 0 for none.
     pub(crate) place: PlaceSample,
-    /// Zones left by operators, and the number of changes; `None` for the mission's zones.
+    /// Operators' zones and the number of changes; `None` for the mission's zones.
     pub(crate) zones: Option<(u64, Vec<Zone>)>,
 }
 
@@ -58,8 +58,7 @@ impl StateFile {
     }
 }
 
-/// Returns the last believed place of the robot of the run in `directory`, and its age, seconds;
-/// `None` if it never knew.
+/// Returns the last known place of the robot of the run in `directory`, and its age, seconds.
 pub fn last_place(directory: &Path, mission: &Mission) -> Option<(PlaceSample, f64)> {
     let place = saved_place(directory, mission).ok().flatten()?;
     let saved =
@@ -76,7 +75,7 @@ pub struct RecoveredRun {
 
 #[derive(Debug, Error)]
 pub enum ResumeError {
-    #[error("the run in {directory} came to its end, see {SUMMARY} there; start a new one")]
+    #[error("the run in {directory} has ended, see {SUMMARY} there; start a new one")]
     Ended { directory: String },
     #[error("the simulated robot of the run in {directory} left no checkpoint; start a new run")]
     NoRobot { directory: String },

@@ -1,10 +1,10 @@
-//! Recovery step under way after a stall, and the tick from which checks continue. Pure.
+//! Recovery step in progress after a stall, and the tick from which checks continue. Pure.
 //!
-//! In wall-clock time a step is carried out at once. In lockstep its result must be independent of
-//! the machine. So the newest [`TickLimitSample`] names the last tick that the link may begin,
-//! [`AHEAD`] ticks after the last checked one. A stall at tick T leaves the pipeline at rest after
-//! tick T + [`AHEAD`], where the step is carried out. The limit rises once the planner and, after a
-//! reset, the controller have answered.
+//! In wall-clock time a step is immediate. In lockstep its result must be independent of the
+//! machine. So the newest [`TickLimitSample`] names the last tick that the link may begin,
+//! [`AHEAD`] ticks after the last checked one. A stall at tick T stops the pipeline after tick T +
+//! [`AHEAD`], where the step is carried out. The limit rises once the planner and, after a reset,
+//! the controller have answered.
 
 use std::time::{Duration, Instant};
 
@@ -12,16 +12,15 @@ use common::samples::{RecoveryStep, StallSample, TickLimitSample};
 
 use crate::observer::Published;
 
-/// Ticks that the link may be ahead: few enough for a stalled robot to lose little time, enough
-/// that the link seldom waits.
+/// Ticks that the link may be ahead: a stalled robot loses little time, and the link seldom waits.
 const AHEAD: u64 = 4;
-/// Timeout for the answer to a recovery step. It is shorter than the link waits for the limit, and
-/// as long as a planner may take to start.
+/// Timeout for the answer to a recovery step: a planner's longest start, shorter than the link
+/// waits for the limit.
 const ANSWERED: Duration = Duration::from_secs(3);
 
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// No recovery step is under way, so checks go on.
+    /// No step in progress; checks continue.
     Check,
     Wait,
     Begin(RecoveryStep),
@@ -30,7 +29,7 @@ pub(crate) enum Next {
 #[derive(Clone, Copy)]
 struct Step {
     stall: StallSample,
-    /// Time when the step was carried out, and the samples published by then.
+    /// Time of the step, and the samples published by then.
     begun: Option<(Instant, Published)>,
 }
 
@@ -60,13 +59,13 @@ impl RecoverySteps {
         }
     }
 
-    /// Records a stall. Later ticks stay unchecked until the recovery step is in force.
+    /// Records a stall. Later ticks stay unchecked until the step takes effect.
     pub(crate) fn on_stall(&mut self, stall: StallSample) {
         self.on_checked(stall.stamp.tick);
         self.step = Some(Step { stall, begun: None });
     }
 
-    /// Returns whether `epoch`, that of the newest stall, must not be published yet.
+    /// Returns whether `epoch`, the newest stall's, must be withheld.
     pub(crate) fn withholds(&self, epoch: u64) -> bool {
         self.step.is_some_and(|step| {
             let forgets = step.stall.recovery() == RecoveryStep::Reset;
@@ -104,7 +103,7 @@ impl RecoverySteps {
 fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool {
     let commanded = now.commands > before.commands;
     match stall.recovery() {
-        // Before the next tick there is no pose to guide, so a field is a new planner's answer.
+        // Before the next tick there is no pose, so a field is a new planner's answer.
         RecoveryStep::Replan => {
             now.planner.0 > before.planner.0 && now.planner.1 >= stall.stamp.tick + AHEAD
         }

@@ -1,4 +1,4 @@
-//! Part of the loop that takes operators' requests and sends the robot to its next target.
+//! Part of the loop that handles operators' requests and the next target.
 
 use std::time::Instant;
 
@@ -23,7 +23,7 @@ use crate::{
     target_list::{self, TargetOutcome},
 };
 
-/// Distance of a hand's target beyond the slow-down radius, metres. The target moves on with each
+/// Distance of a hand-driven target beyond the slow-down radius, metres; it moves with each
 /// request.
 const HAND_AHEAD_M: f64 = 0.3;
 
@@ -40,7 +40,7 @@ impl Supervisor<'_> {
             }
             self.bus.last_request = (request.id, answer);
             self.bus.publish_order(self.mission_time(), request, answer);
-            // The roster has room for one answer, so each is published by itself.
+            // The roster holds one answer, so each is published separately.
             self.publish_state()?;
         }
         Ok(asked)
@@ -58,17 +58,16 @@ impl Supervisor<'_> {
                 tracing::warn!(stage, "an operator asks for a new generation");
                 self.stages.replace(stage, first_tick);
             }
-            // The process that told of this stop was slow: the link obeyed at once, and an operator
-            // has resumed since.
+            // This stop came late: the link obeyed at once, and an operator has resumed since.
             RequestKind::Stop if request.asked_ns < self.resumed_ns => {
-                tracing::warn!("an operator's stop is over, because the robot was resumed since");
+                tracing::warn!("an operator's stop ends, because the robot was resumed since");
             }
             RequestKind::Stop => {
                 tracing::warn!("an operator stops the robot");
                 self.state_file.state.operator_stop = true;
             }
             RequestKind::Resume => {
-                tracing::warn!("an operator lets the robot go on");
+                tracing::warn!("an operator resumes the robot");
                 self.state_file.state.operator_stop = false;
                 // A future time would void all stops until then.
                 self.resumed_ns = request.asked_ns.min(monotonic_ns());
@@ -87,8 +86,7 @@ impl Supervisor<'_> {
         RequestAnswer::Taken
     }
 
-    /// Sets the place of the robot. Dead reckoning takes it with the next tick, which resets the
-    /// map.
+    /// Sets the robot's place. Dead reckoning takes it with the next tick, which resets the map.
     fn place_robot(&mut self, request: &RequestSample) -> RequestAnswer {
         let Some([point]) = request.targets() else { return RequestAnswer::Malformed };
         let [sigma_m, sigma_rad] = request.deviations;
@@ -109,7 +107,7 @@ impl Supervisor<'_> {
         }
         let number = self.state_file.state.place.number + 1;
         let (x_m, y_m, heading_rad) = (point.x_m, point.y_m, point.heading_rad);
-        tracing::warn!(x_m, y_m, heading_rad, "an operator says where the robot is");
+        tracing::warn!(x_m, y_m, heading_rad, "an operator places the robot");
         let stamp = Default::default();
         self.state_file.state.place =
             PlaceSample { stamp, number, x_m, y_m, heading_rad, sigma_m, sigma_rad };
@@ -178,8 +176,7 @@ impl Supervisor<'_> {
         self.on_new_target();
     }
 
-    /// Moves the target ahead of the robot, as far as the ground is free. The planner leads there
-    /// as to any other.
+    /// Moves the target ahead over free ground. The planner leads there as to any target.
     fn drive_by_hand(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
         let mission = &self.options.mission;
         if !mission.stay {
@@ -189,7 +186,7 @@ impl Supervisor<'_> {
         let (Some([stick]), Some(pose)) = (request.targets(), record.pose) else {
             return RequestAnswer::Malformed;
         };
-        // At full speed the robot does not slow down for this target.
+        // This target is too far for a slow-down at full speed.
         let reach_m = HAND_AHEAD_M + mission.controller.slow_radius_m;
         let here = pose.pose().position;
         let way = pose.pose().axis().rotate(stick.position().clamp_length_max(1.0)) * reach_m;
@@ -207,7 +204,7 @@ impl Supervisor<'_> {
         RequestAnswer::Taken
     }
 
-    /// Lets the robot stand if its hand has gone. Returns whether it has.
+    /// Stops a hand-driven robot without recent requests. Returns whether it did.
     pub(crate) fn miss_hand(&mut self) -> bool {
         let is_gone = self.hand_until.take_if(|until| *until <= Instant::now()).is_some();
         let released = is_gone && self.targets.release();
@@ -217,7 +214,7 @@ impl Supervisor<'_> {
         released
     }
 
-    /// Returns the reason of a hold. The link may obey an operator before the supervisor does.
+    /// Returns the hold reason. The link may obey an operator before the supervisor does.
     pub(crate) fn why_held(&self) -> HoldReason {
         let link = self.bus.observer.record.link;
         let stopped = self.state_file.state.operator_stop
@@ -256,7 +253,6 @@ impl Supervisor<'_> {
         self.arrived = None;
     }
 
-    /// Sends the robot on after an arrival. Returns whether there was one.
     pub(crate) fn take_arrival(&mut self) -> bool {
         let mission = &self.options.mission;
         let record = &self.bus.observer.record;

@@ -21,11 +21,10 @@ use crate::{
 
 pub struct Finished {
     pub ending: Ending,
-    /// Last complete tick before the deciding event, after which no tick counts; `None` if no tick
-    /// decided.
+    /// Last complete tick before the deciding event; `None` if no tick decided.
     pub last_tick: Option<u64>,
-    /// Seconds of the robot's clock from the first motion order to the end. A resumed run on a wall
-    /// clock counts from its own start.
+    /// Seconds of the robot's clock from the first motion order to the end. A resumed wall-clock
+    /// run counts from its own start.
     pub duration_s: f64,
     pub record: Record,
     pub truth: Vec<GroundTruthTick>,
@@ -35,19 +34,17 @@ pub struct Finished {
     /// Generations of the planner started because of stalls.
     pub replans: u32,
     pub resets: u64,
-    /// Targets, in the order in which the robot is sent to them.
     pub targets: Vec<TargetResult>,
 }
 
-/// Robot that could not be stopped. Its link tries each method of the protocol in turn.
+/// Robot in motion after every stop method. Its link keeps trying each in turn.
 pub struct StillMoving<'a> {
     supervisor: Supervisor<'a>,
     signals: Signals,
 }
 
 impl StillMoving<'_> {
-    /// Waits until the robot rests or a signal tells this process to leave it. Returns the robot's
-    /// last state.
+    /// Waits until the robot rests or a signal ends the wait. Returns the robot's last state.
     pub fn watch(mut self) -> Result<&'static str> {
         let supervisor = &mut self.supervisor;
         let did = loop {
@@ -70,28 +67,25 @@ impl StillMoving<'_> {
     }
 }
 
-/// Signals that end a run, for its loop and for the last resort, which acts if the loop does not.
+/// End signals of a run, for its loop and for the last resort.
 pub type EndSignals = [Signals; 2];
 
-/// Catches the signals from now on. Called before the first file of a run is made, so that a signal
-/// leaves none.
+/// Catches the signals from now on, before the run's first file, so that a signal leaves no files.
 pub fn end_signals() -> Result<EndSignals> {
     let catch = || Signals::that_end().map_err(system("catch signals"));
     Ok([catch()?, catch()?])
 }
 
-/// Process that should miss no sample of a run.
+/// Process that should receive every sample of a run, which waits for it.
 ///
-/// The run waits for it. Both calls return at the latest on a signal or after a timeout of their
-/// own.
+/// Both calls return on a signal or after their own timeout.
 pub trait Consumer {
-    /// Starts the consumer. The bus exists, and no stage has started.
+    /// Starts the consumer, after the bus and before the stages.
     fn attach(&mut self, signals: &Signals);
-    /// Waits until the consumer has taken all samples.
+    /// Waits until the consumer has read all samples.
     ///
-    /// In lockstep this is called every [`CAUGHT_UP_EVERY`] ticks, fewer than the bus keeps. It is
-    /// always called before the stages end, because an unread writer's samples vanish with the
-    /// writer.
+    /// Called in lockstep every [`CAUGHT_UP_EVERY`] ticks, fewer than the bus keeps, and always
+    /// before the stages end: a writer's unread samples vanish with it.
     fn catch_up(&mut self, signals: &Signals);
 }
 
@@ -105,8 +99,8 @@ pub(crate) const CAUGHT_UP_EVERY: u64 = 32;
 
 /// Carries out a run.
 ///
-/// `listener` hears the samples that the run reads. `show` is called a few times a second. The
-/// robot's files stay until `lock` is dropped, after the consumers have ended.
+/// `listener` receives the samples that the run reads. `show` is called a few times a second. The
+/// robot's files stay until `lock` is dropped, after the consumers.
 pub fn run<'a>(
     options: &'a Options,
     [mut signals, for_last_resort]: EndSignals,
@@ -133,7 +127,6 @@ pub fn run<'a>(
             Err(error) => break Ending::failed(Outcome::Aborted, error.to_string()),
         }
     };
-    // After an error, too, the robot stops before the stages.
     let stopped = supervisor.end_mission(&mut || {
         turns.rest(true);
         consumer.catch_up(&signals);

@@ -21,8 +21,8 @@ impl RunClock {
         Self { clock: run.clock(), first_tick: run.first_tick, start: run.time }
     }
 
-    /// Starts the clock of a new run. The pace applies to `simulated` robots, and to ROS 2 robots,
-    /// which may be simulated elsewhere.
+    /// Starts the clock of a new run. The pace applies to `simulated` and to ROS 2 robots, which
+    /// may be simulated elsewhere.
     pub(crate) fn begin(pace: Pace, robot: &RobotConfig, simulated: bool) -> Self {
         let has_pace = simulated || robot.protocol() == Protocol::Ros2;
         let clock = match pace {
@@ -40,7 +40,6 @@ impl RunClock {
         Self { clock, first_tick: 0, start: MissionTime::default() }
     }
 
-    /// Returns whether mission time advances with ticks instead of the wall clock.
     pub(crate) const fn in_ticks(&self) -> bool {
         matches!(self.clock, MissionClock::Ticks { .. })
     }
@@ -66,8 +65,7 @@ impl RunClock {
 
     /// Returns the seconds from the first motion order to `last_tick`, or to the newest tick.
     ///
-    /// In lockstep the ground `truth` decides, because its time also passes while the link receives
-    /// no frames.
+    /// In lockstep the ground `truth` decides; its time also passes without frames.
     pub(crate) fn duration_s(
         &self,
         last_tick: Option<u64>,
@@ -96,7 +94,6 @@ impl RunClock {
                 || self.pose_time(pose),
                 |truth| MissionTime::from_seconds(truth.time_s),
             ),
-            // Wall-clock time passes even without a robot or a pose.
             MissionClock::Wall { .. } => self.clock.at(0, monotonic_ns()),
         }
     }

@@ -1,4 +1,4 @@
-//! Shutdown: the robot stops, then the stages, at the end or before the bus is recreated.
+//! Shutdown: stops the robot, then the stages, at the end or before a new bus.
 
 use std::time::Duration;
 
@@ -16,18 +16,17 @@ use crate::{
     supervisor::Supervisor,
 };
 
-/// Time for the link to confirm the order to stand, before the link is stopped.
+/// Time for the link to confirm the stop order.
 const STAND_CONFIRMED: Duration = Duration::from_millis(100);
-/// Timeout for a robot with silent encoders: its link may be starting, or has not obeyed.
+/// Timeout for silent encoders: the link may be starting, or has not obeyed.
 const HEARD_WITHIN: Duration = Duration::from_secs(2);
-/// Greatest age of a usable encoder report; the link sends ten a second.
+/// Maximum age of an encoder report; the link sends ten a second.
 const NEW: Duration = Duration::from_secs(1);
 
 impl Supervisor<'_> {
     /// Brings the robot to rest and stops the stages. `catch_up` waits for consumers.
     ///
-    /// The link goes on while wheels turn. If it ends before the robot was seen at rest, its stop
-    /// guard takes over.
+    /// The link runs while wheels turn. If it ends first, its stop guard takes over.
     pub(crate) fn end_mission(&mut self, catch_up: &mut dyn FnMut()) -> Result<Wheels> {
         self.service.stopping();
         self.decision = Decision::ENDING;
@@ -50,10 +49,10 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Recreates a bus whose files block the start of a stage, and restarts all stages from their
+    /// Recreates a bus whose files block a stage's start, and restarts all stages from their
     /// checkpoints.
     ///
-    /// Consumers of the old bus ask [`Bus::is_replaced`](common::bus::Bus::is_replaced).
+    /// Consumers ask [`Bus::is_replaced`](common::bus::Bus::is_replaced).
     pub(crate) fn recreate_bus(&mut self, lock: &mut DomainLock) -> Result {
         tracing::error!("the bus is recreated; consumers must join it again");
         self.decision = Decision::STARTING;
@@ -68,7 +67,7 @@ impl Supervisor<'_> {
         Ok(())
     }
 
-    /// Orders the robot to stand, and waits briefly for the link's confirmation.
+    /// Orders the robot to stand; waits briefly for the link's confirmation.
     fn stand(&mut self) -> Result {
         self.publish_state()?;
         let began = self.stages.now();
@@ -82,8 +81,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Orders the end of the mission, and waits until the encoders report rest or stay silent for
-    /// too long.
+    /// Orders the mission's end; waits until the encoders report rest or stay silent for too long.
     fn come_to_rest(&mut self) -> Result<Wheels> {
         self.publish_state()?;
         let began = self.stages.now();
@@ -110,7 +108,7 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Returns the encoder state since the end of the mission was ordered.
+    /// Returns the encoder state since the order to end.
     pub(crate) fn wheels(&self) -> Wheels {
         let Some(link) = self.connected_link() else {
             return Wheels::Unknown("it does not answer".to_owned());
@@ -142,7 +140,7 @@ impl Supervisor<'_> {
         self.service.feed();
         self.bus.observer.read_all(&mut self.stages, &mut self.listener)?;
         self.poll_processes(self.first_tick())?;
-        // The simulated robot's pipe must not fill, or the robot could not answer the link.
+        // A full pipe would block the simulated robot, and its answers to the link.
         self.robot.poll()?;
         if self.bus.is_due(topics::RESTATE) {
             self.publish_state()?;
@@ -155,7 +153,7 @@ impl Supervisor<'_> {
         self.stop_stages(0)
     }
 
-    /// Stops the stages from the `first` of the start order on, all at once.
+    /// Stops the stages from the `first` of the start order on, concurrently.
     fn stop_stages(&mut self, first: usize) -> Result {
         while self.stages.stop_from(first) {
             self.wait()?;

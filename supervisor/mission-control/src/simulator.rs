@@ -24,12 +24,12 @@ use thiserror::Error;
 
 use crate::long_record;
 
-/// Timeout for the start, which takes seconds beside 30 busy processes per core.
+/// Start timeout; a start takes seconds with 30 busy processes per core.
 const STARTUP: Duration = Duration::from_secs(30);
-/// Timeout for the end. The simulator comes to rest and tells the other robot of its world each
-/// tick, which takes seconds on a busy machine.
+/// End timeout. The simulator comes to rest and informs its world's other robot each tick, seconds
+/// on a busy machine.
 const REST: Duration = Duration::from_secs(5);
-/// Greatest accepted length of a ground-truth line, bytes; real lines stay under 300.
+/// Maximum length of a ground-truth line, bytes; real lines stay under 300.
 const LONGEST_LINE: usize = 64 * 1024;
 
 #[derive(Debug, Error)]
@@ -38,7 +38,7 @@ pub enum SimulatorError {
     System { action: String, source: io::Error },
     #[error("the simulated robot did not start: {0}")]
     Startup(String),
-    #[error("the start of the simulated robot was given up")]
+    #[error("the start of the simulated robot was cancelled")]
     GivenUp,
 }
 
@@ -138,8 +138,8 @@ impl Simulator {
         self.address
     }
 
-    /// Returns a descriptor that becomes readable when the process ends. Ground truth wakes no
-    /// reader; it is read at the end of a tick.
+    /// Returns a descriptor that becomes readable when the process ends. Ground truth is read at
+    /// the end of a tick.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.process.as_fd()
     }
@@ -179,13 +179,12 @@ impl GroundTruth {
     fn take_lines(&mut self) -> Result<(), SimulatorError> {
         let Some(end) = self.unfinished.iter().rposition(|&byte| byte == b'\n') else {
             if self.unfinished.len() > LONGEST_LINE {
-                return Err(SimulatorError::Startup("it writes a line without end".into()));
+                return Err(SimulatorError::Startup("it writes a line that is too long".into()));
             }
             return Ok(());
         };
         let rest = self.unfinished.split_off(end + 1);
         if self.listening.is_some() {
-            // The file only reports, so the mission goes on without it.
             self.file.take_if(|file| file.write_all(&self.unfinished).is_err());
         }
         for line in self.unfinished.split(|&byte| byte == b'\n') {

@@ -22,15 +22,15 @@ use common::{
 };
 use glam::{DVec2, IVec2};
 
-/// Mission time without motion that is a stall. The slowest turn on the spot starts sooner.
+/// Motionless mission time of a stall. The slowest turn on the spot starts sooner.
 const STALLED_AFTER: Duration = Duration::from_secs(3);
-/// Mission time without a way to the target that is a stall. A false echo vanishes sooner.
+/// Mission time of a stall without a path to the target. A false echo vanishes sooner.
 const CUT_OFF_AFTER: Duration = Duration::from_secs(1);
-/// Mission time allowed for a field; the largest takes several seconds.
+/// Time for a field; the largest takes several seconds.
 const FIELD_WITHIN: Duration = Duration::from_secs(60);
-/// Turns on the spot of a cut-off robot with the evidential method, at half the ordered speed.
+/// Turns of a cut-off robot with the evidential method, at half the ordered speed.
 const SCAN_TURNS: f64 = 1.2;
-/// Turns at one place, at the slower of the robot's two rates, beyond which it makes no progress.
+/// Turns at one place, at the slower of two rates, beyond which it makes no progress.
 const TURNS_AT_A_PLACE: f64 = 2.0;
 /// Radius of a place, metres; less for a slow robot.
 const PLACE_M: f64 = 0.2;
@@ -40,22 +40,21 @@ const CIRCLES: f64 = 1.2;
 const MOVED_M: f64 = 0.02;
 /// Angle below which a robot does not turn, radians; less for a slow robot.
 const TURNED_RAD: f64 = 0.1;
-/// Share of full-speed motion that counts as motion, because a robot crawls near its target.
+/// Share of full-speed motion that counts; a robot crawls near its target.
 const SHARE: f64 = 0.05;
-/// Distance that leads out of any margin, even of several overlapping ones, metres.
+/// Distance out of any margin, even of several overlapping ones, metres.
 const WAY_OUT_M: f64 = 1.0;
-/// Distance within which contacts share a place, metres, because a robot turns about a blocked
-/// wheel.
+/// Distance within which contacts share a place, metres; a robot turns about a blocked wheel.
 const HELD_WITHIN_M: f64 = 0.5;
-/// Multiple of the target distance after which a robot wanders. The way around a trap is two to
-/// three times as long.
+/// Multiple of the target distance after which a robot wanders. The way around a trap takes two to
+/// three.
 const WANDERS: f64 = 3.0;
 /// Least distance after which a robot wanders, metres.
 const WANDERS_LEAST_M: f64 = 12.0;
 /// Side of a map square, metres.
 ///
-/// A laser's map is trustworthy, and the way through a building may be long. So each new square
-/// lets a robot with a laser drive [`WANDERS`] squares farther.
+/// A laser's map is trustworthy, and a way through a building long. So each new square lets a robot
+/// with a laser drive [`WANDERS`] squares farther.
 const SQUARE_M: f64 = 1.0;
 const MOST_SQUARES: usize = 10_000;
 const MOST_REPLANS: u32 = 2;
@@ -64,20 +63,20 @@ const MOST_RESETS: u64 = 3;
 
 pub(crate) fn words(cause: StallCause, body: &Body) -> String {
     let cause = match cause {
-        StallCause::Still => "the robot neither drives nor turns, whatever is planned",
-        StallCause::Pinned => "the robot moves and does not get away, whatever is planned",
+        StallCause::Still => "the robot stands still after every replan",
+        StallCause::Pinned => "the robot moves but stays in place after every replan",
         StallCause::Wandering => {
-            "the robot drives around and does not get nearer, whatever is forgotten"
+            "the robot drives around without getting nearer, even after map resets"
         }
-        StallCause::Held => "the wheels are held fast, whatever is planned",
-        StallCause::Relocated => "the robot is elsewhere by fixes that agree",
-        StallCause::InsideHazard => "the belief puts the robot inside hazard, again and again",
-        StallCause::CutOff => "the belief isolates the robot from the target, again and again",
+        StallCause::Held => "the wheels are held fast after every replan",
+        StallCause::Relocated => "position fixes agree that the robot is elsewhere",
+        StallCause::InsideHazard => "the map repeatedly shows the robot inside a hazard",
+        StallCause::CutOff => "the map repeatedly cuts the robot off from the target",
     };
     match body.ackermann().map(|car| car.least_turning_radius()) {
         None => cause.to_owned(),
         Some(radius) => format!(
-            "{cause}; this car turns in no less than {radius:.2} m and does not reverse: it needs more room"
+            "{cause}; this car cannot reverse and has a least turning radius of {radius:.2} m; give it more room"
         ),
     }
 }
@@ -86,7 +85,7 @@ pub(crate) fn log(stall: &StallSample) {
     let (cause, recovery) = (stall.cause(), stall.recovery());
     let StallSample { stamp, x_m, y_m, epoch, replans, resets, .. } = stall;
     let what = match cause {
-        StallCause::Relocated => "the robot is elsewhere, so the map is reset",
+        StallCause::Relocated => "the robot is elsewhere; the map is reset",
         _ => "the robot stalls",
     };
     tracing::warn!(
@@ -113,18 +112,17 @@ pub(crate) struct StallWatch {
     place: Option<Place>,
     cut_off_since: Option<MissionTime>,
     waits_since: Option<MissionTime>,
-    /// Distance travelled when the robot was first seen in a hazard, metres.
     inside_hazard_since: Option<f64>,
     /// Whether long ways reset the map. The paper's method has no such rule.
     forgets: bool,
-    /// Distance travelled at which the robot wanders, metres; `None` before the first tick and
-    /// after a reset.
+    /// Distance travelled at which the robot wanders, metres; `None` until the first tick after a
+    /// start or reset.
     wanders_at: Option<f64>,
     /// Squares visited on the way to the target; `None` without a laser.
     been: Option<HashSet<IVec2>>,
     replans_here: u32,
     replans: u32,
-    /// Place where the wheels were held, and the replans there since the last reset.
+    /// Place of held wheels, and its replans since the last reset.
     held_at: Option<(DVec2, u32)>,
     epoch: u64,
     /// Epochs skipped beside resets, and resets by relocations.
@@ -136,7 +134,7 @@ pub(crate) struct StallWatch {
     relocations: u64,
     tick: Option<u64>,
     stalls: Vec<StallSample>,
-    /// Stalls up to the newest target that was given up while the run went on.
+    /// Stalls up to the newest target given up in the run.
     settled: usize,
 }
 
@@ -180,7 +178,7 @@ impl StallWatch {
             } else {
                 CUT_OFF_AFTER
             },
-            // A calibration drives to and fro, so its long way is no stall.
+            // A calibration drives to and fro, so its long way is intended.
             forgets: mission.method == Method::Evidential && mission.planner.calibration.is_none(),
             been: (mission.used(SensorKind::Scan) > 0).then(HashSet::new),
             ..Self::default()
@@ -222,7 +220,7 @@ impl StallWatch {
         self.tick
     }
 
-    /// Checks a tick of a robot that is ordered to drive; each tick counts once.
+    /// Checks a tick of a robot with the order to drive; each tick counts once.
     ///
     /// `held`: the link's failsafe or a missing stage holds the robot. `contact`: something holds
     /// its wheels.
@@ -268,9 +266,9 @@ impl StallWatch {
         Some(self.recover(cause, pose))
     }
 
-    /// Records that the robot is not ordered to drive at `pose`, with a map of `epoch`.
+    /// Records a tick without an order to drive, at `pose` with a map of `epoch`.
     ///
-    /// Only a relocation since the pose before counts as a stall.
+    /// Only a relocation since the last pose is a stall.
     pub(crate) fn stand(&mut self, pose: &PoseSample, epoch: u64) -> Option<StallSample> {
         let is_first = self.tick.is_none();
         self.hold(pose.stamp.tick);
@@ -298,7 +296,6 @@ impl StallWatch {
         } else {
             RecoveryStep::GiveUp
         };
-        // The recovery step gets as much time as the robot had.
         let now = pose.stamp.time();
         if let (Some(anchor), Some(place)) = (&mut self.anchor, &mut self.place) {
             (anchor.time, place.since) = (now, now);
@@ -338,7 +335,6 @@ impl StallWatch {
         may
     }
 
-    /// Clears stalls on the way to the old target.
     fn on_new_target(&mut self, tick: u64) {
         self.hold(tick);
         (self.inside_hazard_since, self.wanders_at, self.held_at) = (None, None, None);
@@ -347,14 +343,13 @@ impl StallWatch {
         self.resets_before = self.resets() - self.relocated;
     }
 
-    /// Records that the robot was not ordered to drive until `tick`, so it cannot have stalled by
-    /// then.
+    /// Records that the robot had no order to drive until `tick`.
     pub(crate) fn hold(&mut self, tick: u64) {
         self.tick = Some(tick);
         self.forget_motion();
     }
 
-    /// Clears motion while something held the robot, perhaps without a tick.
+    /// Clears motion after something held the robot, perhaps without a tick.
     pub(crate) const fn forget_motion(&mut self) {
         (self.anchor, self.place) = (None, None);
         (self.cut_off_since, self.waits_since) = (None, None);
@@ -370,7 +365,7 @@ impl StallWatch {
         now.since(*self.waits_since.get_or_insert(now)) < FIELD_WITHIN
     }
 
-    /// Detects u = 0 at the robot, in the field of the current map, for longer than it needs to get
+    /// Detects u = 0 at the robot, in the current map's field, for longer than it needs to get
     /// away.
     fn without_policy(
         &mut self,
@@ -393,7 +388,7 @@ impl StallWatch {
         None
     }
 
-    /// Detects a drive so long, since the start or the last reset, that the map must be wrong.
+    /// Detects a drive since the start or last reset that is too long for a correct map.
     fn without_end(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> Option<StallCause> {
         let most_m = (WANDERS * guidance.distance_m).max(WANDERS_LEAST_M);
         let wanders_at = self.wanders_at.get_or_insert(pose.travelled_m + most_m);
@@ -405,7 +400,7 @@ impl StallWatch {
         (self.forgets && pose.travelled_m >= *wanders_at).then_some(StallCause::Wandering)
     }
 
-    /// Detects a robot that has not moved for a while, or has moved for longer at one place.
+    /// Detects a robot that stands still, or moves at one place for longer.
     fn without_motion(
         &mut self,
         pose: &PoseSample,
@@ -426,7 +421,7 @@ impl StallWatch {
             *place = arrived;
             self.replans_here = 0;
         } else if nearest_m <= place.nearest_m - self.moved_m {
-            // A robot that crawls to its target makes progress, too.
+            // A robot that crawls to its target makes progress.
             *place = Place { middle: place.middle, ..arrived };
         }
         let since = place.since;

@@ -14,7 +14,7 @@ use crate::{
 };
 
 impl Supervisor<'_> {
-    /// Looks for stalls, and takes the next recovery step. The last one ends the mission.
+    /// Detects stalls and takes the next recovery step. The last one ends the mission.
     pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>> {
         if self.decision.order() != Order::Drive {
             // In lockstep mission time stands still meanwhile.
@@ -103,9 +103,10 @@ impl Supervisor<'_> {
         Some(Ending::failed(Outcome::Unreachable, reason))
     }
 
-    /// Returns the tick and ending of the stall without a recovery step left.
+    /// Returns the tick and ending of the stall without a remaining recovery step.
     ///
-    /// In lockstep the number of unchecked ticks depends on the machine, so they are checked now.
+    /// In lockstep, checks the ticks that the loop left unchecked; their number depends on the
+    /// machine.
     pub(crate) fn end_by_stall(&mut self) -> Option<(u64, Ending)> {
         while self.clock.in_ticks()
             && self.stall_watch.gave_up().is_none()

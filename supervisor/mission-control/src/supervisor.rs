@@ -1,5 +1,4 @@
-//! Loop of the supervisor: reads events, asks the pure functions for decisions, and carries them
-//! out.
+//! Loop of the supervisor: reads events, calls the pure decisions, carries them out.
 
 use std::{net::Ipv4Addr, os::fd::AsFd as _, path::PathBuf, time::Instant};
 
@@ -50,7 +49,7 @@ use crate::{
 pub struct Options {
     pub mission: Mission,
     pub robot: RobotName,
-    /// Speed of mission time. A real robot always uses the wall clock, unless it speaks ROS 2.
+    /// Pace of mission time. Real robots, except with ROS 2, use the wall clock.
     pub pace: Pace,
     /// Directory of logs, checkpoints and results; it must exist.
     pub directory: PathBuf,
@@ -58,7 +57,7 @@ pub struct Options {
     pub recovered: Option<RecoveredRun>,
     /// Whether the robot stands until an operator resumes it.
     pub stands: bool,
-    /// Believed place of a new run's robot; by default the mission's start.
+    /// Place of a new run's robot; default: the mission's start.
     pub place: Option<PlaceSample>,
 }
 
@@ -95,7 +94,6 @@ impl Robot {
         self.simulator.as_ref().map_or(&[], Simulator::truth)
     }
 
-    /// Reads the ground truth. Returns whether a simulated robot still runs.
     pub(crate) fn poll(&mut self) -> Result<bool> {
         Ok(self.simulator.as_mut().map(Simulator::poll).transpose()?.unwrap_or(true))
     }
@@ -103,7 +101,7 @@ impl Robot {
 
 pub(crate) struct Supervisor<'a> {
     pub options: &'a Options,
-    // Fields are dropped in this order: the stages end before the robot.
+    // Drop order: the stages end before the robot.
     pub stages: StageProcesses,
     pub robot: Robot,
     pub bus: BusEndpoints,
@@ -131,8 +129,7 @@ pub(crate) struct Supervisor<'a> {
 }
 
 impl<'a> Supervisor<'a> {
-    /// Starts the robot, writes the run file, starts the stages. After one of `signals` no stage
-    /// starts.
+    /// Starts the robot, writes the run file, starts the stages, unless one of `signals` came.
     pub(crate) fn start(
         options: &'a Options,
         lock: &mut DomainLock,
@@ -165,7 +162,7 @@ impl<'a> Supervisor<'a> {
         let unchecked = clock.in_ticks().then(|| clock.first_tick(None));
         let targets = state_file.state.targets.take();
         let mut targets = targets.unwrap_or_else(|| TargetList::of(mission));
-        // A hand that drove the robot before must push again.
+        // A hand-driven robot needs a new request.
         targets.release();
         state_file.state.following.iter_mut().for_each(Following::resumed);
         let mut supervisor = Self {
@@ -214,7 +211,7 @@ impl<'a> Supervisor<'a> {
         Ok(supervisor)
     }
 
-    /// Iterates until the mission ends. Returns `None` if the bus must be recreated.
+    /// Iterates until the mission ends. Returns `None` if the bus needs recreation.
     pub(crate) fn drive(
         &mut self,
         signals: &mut Signals,
@@ -283,7 +280,7 @@ impl<'a> Supervisor<'a> {
         })
     }
 
-    /// Reaps and restarts stages, and reports each death. Returns whether there was one.
+    /// Reaps and restarts stages, and reports deaths. Returns whether there were any.
     pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool> {
         let deaths = self.stages.poll(&self.bus.bus, first_tick)?;
         for death in &deaths {
@@ -385,19 +382,18 @@ impl<'a> Supervisor<'a> {
     }
 
     pub(crate) fn published_as_of(&self) -> (u64, MissionTime) {
-        // An external stage takes its first tick from this sample, so the tick must be new.
+        // An external stage takes its first tick from this sample.
         let tick = self.first_tick().saturating_sub(1);
         let time = self.clock.pose_time(self.bus.observer.record.pose.as_ref());
         (tick, time)
     }
 
-    /// Saves the state, then publishes order and roster. The roster confirms requests, so saving
-    /// comes first.
+    /// Saves the state, then publishes order and roster, because the roster confirms requests.
     pub(crate) fn publish_state(&mut self) -> Result {
         self.state_file.state.targets = Some(self.targets.clone());
         if let Err(error) = self.state_file.save() {
-            // Only a supervisor that resumes this run needs the state, so the mission goes on.
-            tracing::error!(%error, "cannot save the state; a supervisor that resumes this run will not know the last requests");
+            // Only a resuming supervisor needs the state, so the mission goes on.
+            tracing::error!(%error, "cannot save the state; a supervisor that resumes this run misses the last requests");
         }
         let (tick, time) = self.published_as_of();
         // A stage must know the target before it is told to drive.

@@ -1,4 +1,4 @@
-//! Targets of a run, past, present and future, with their outcomes. Pure.
+//! Targets of a run with their outcomes. Pure.
 
 use common::{
     ground_truth::GroundTruthTick,
@@ -14,7 +14,7 @@ use crate::{
     outcome::{Ending, Outcome},
 };
 
-/// Most results stored. Older ones remain only in the file of records.
+/// Maximum number of stored results. Older ones are only in the records file.
 const MOST_RESULTS: usize = 128;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,7 +25,7 @@ pub enum TargetOutcome {
     WrongPlace,
     /// The robot is unsure of its reported arrival, as in [`Outcome::ReachedUnsure`].
     ReachedUnsure,
-    /// An operator named another target before this one was reached.
+    /// An operator named another target first.
     Replaced,
     /// The robot stalled, and no recovery step was left.
     Unreachable,
@@ -54,7 +54,7 @@ pub struct TargetResult {
     pub outcome: TargetOutcome,
     /// Mission time of the outcome; `None` for an untried target.
     pub at_s: Option<f64>,
-    /// Distance from the target on arrival, by the robot's own pose.
+    /// Distance from the target on arrival by the own pose.
     pub distance_m: Option<f64>,
     /// Distance by a simulated robot's ground truth.
     pub truth_m: Option<f64>,
@@ -74,16 +74,16 @@ pub struct TargetList {
     number: u64,
     current: TargetPoint,
     since_tick: u64,
-    /// Mission time at which this target became the current one, seconds.
+    /// Mission time of this target's start, seconds.
     began_s: f64,
     ahead: Vec<TargetPoint>,
     results: Vec<Stored>,
-    /// Number of results, oldest first, that are in the file of records.
+    /// Results in the records file, oldest first.
     recorded: usize,
-    /// Whether the current target has its result, and the robot waits for the next.
+    /// Whether the current target is finished, and the robot waits.
     waits: bool,
     by_hand: bool,
-    /// Whether the current target moves with a beacon; one result covers all its places.
+    /// Whether the target moves with a beacon; one result covers all places.
     follows: bool,
 }
 
@@ -136,7 +136,7 @@ impl TargetList {
         self.follows
     }
 
-    /// Follows a beacon from now on. There is no target before the first sample.
+    /// Follows a beacon. The first sample gives the first target.
     pub(crate) fn follow(&mut self, now_s: f64, arrival: Option<(CommandSample, TargetOutcome)>) {
         self.replace(&[], (0, now_s), arrival);
         (self.waits, self.by_hand, self.follows) = (true, false, true);
@@ -148,7 +148,7 @@ impl TargetList {
         self.waits = false;
     }
 
-    /// Ends the following at `now_s`, with the beacon last seen at `place`. The robot waits.
+    /// Ends the following at `now_s`, with the beacon last seen at `place`.
     pub(crate) fn end_following(
         &mut self,
         (outcome, followed): (TargetOutcome, Followed),
@@ -173,7 +173,7 @@ impl TargetList {
         was
     }
 
-    /// Returns the outcome of a run that ends while the robot waits: that of the newest target.
+    /// Returns the outcome of a run that ends while the robot waits: the newest target's.
     pub(crate) fn outcome_while_waiting(&self) -> Option<Outcome> {
         let tried = |it: &&Stored| it.result.outcome != TargetOutcome::NotTried;
         // A hand's target is the current one and has no result.
@@ -213,7 +213,7 @@ impl TargetList {
         fits
     }
 
-    /// Sends the robot to `points` instead, from `since_tick` at `now_s` on. `arrival` is that at
+    /// Sends the robot to `points` instead, from `since_tick` at `now_s` on. `arrival` belongs to
     /// the current target.
     pub(crate) fn replace(
         &mut self,
@@ -233,8 +233,8 @@ impl TargetList {
         }
     }
 
-    /// Ends the current target with `outcome` at `now_s`, and drops those after it as not tried.
-    /// The robot stays and waits.
+    /// Ends the current target with `outcome` at `now_s`; later ones are not tried. The robot
+    /// waits.
     pub(crate) fn settle(
         &mut self,
         outcome: Outcome,
@@ -323,8 +323,7 @@ impl TargetList {
         known
     }
 
-    /// Completes the results of arrivals by the known ground truth; `allowed_m` is the greatest
-    /// error.
+    /// Completes arrivals' results by the ground truth; `allowed_m` is the maximum error.
     pub(crate) fn compare(&mut self, record: &Record, truth: &[GroundTruthTick], allowed_m: f64) {
         for Stored { result, tick } in &mut self.results {
             let Some(tick) = tick.filter(|_| result.truth_m.is_none()) else {
@@ -343,8 +342,8 @@ impl TargetList {
         }
     }
 
-    /// Returns the results of all targets of a run that ended with `ending` after `last_tick`.
-    /// `ended` is the final ground truth.
+    /// Returns all results of a run that ended with `ending` after `last_tick`, with the final
+    /// ground truth `ended`.
     pub(crate) fn results(
         &self,
         ending: &Ending,
@@ -353,7 +352,6 @@ impl TargetList {
         ended: Option<&GroundTruthTick>,
     ) -> Vec<TargetResult> {
         let mut results: Vec<_> = self.results.iter().map(|stored| stored.result).collect();
-        // An event before an arrival may be seen after it.
         let over = self.results.iter().position(|stored| {
             stored.tick.zip(last_tick).is_some_and(|(arrived, last)| arrived > last)
         });
@@ -390,16 +388,20 @@ fn apart_m(truth: &GroundTruthTick, target: &TargetResult) -> f64 {
     (truth.x - target.x_m).hypot(truth.y - target.y_m)
 }
 
-/// Returns the ending of a run whose last target ended with `ending`. A worse earlier arrival takes
-/// its place.
+/// Returns the ending of a run whose last target ended with `ending`, or of a worse earlier
+/// arrival.
 pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
     if ending.outcome != Outcome::Reached {
         return ending;
     }
     let worse = [
         (TargetOutcome::WrongPlace, Outcome::WrongPlace, "was in the wrong place"),
-        (TargetOutcome::Unreachable, Outcome::Unreachable, "was beside a hazard, and too far off"),
-        (TargetOutcome::ReachedUnsure, Outcome::ReachedUnsure, "was not sure"),
+        (
+            TargetOutcome::Unreachable,
+            Outcome::Unreachable,
+            "was beside a hazard, outside the tolerance",
+        ),
+        (TargetOutcome::ReachedUnsure, Outcome::ReachedUnsure, "was unsure"),
     ];
     let first = worse.into_iter().find_map(|(of_target, outcome, words)| {
         let is_so = |it: &&TargetResult| it.outcome == of_target && it.distance_m.is_some();
@@ -410,7 +412,6 @@ pub(crate) fn of_all(ending: Ending, results: &[TargetResult]) -> Ending {
     first.unwrap_or(ending)
 }
 
-/// Returns the refusal of orders to a robot held for `reason`, if any.
 pub(crate) const fn held_refusal(reason: HoldReason) -> Option<RequestAnswer> {
     match reason {
         HoldReason::Starting | HoldReason::Ending => Some(RequestAnswer::NotRunning),

@@ -16,9 +16,9 @@ pub fn result(target: &Value) -> Value {
     };
     let [x, y] = ["x_m", "y_m"].map(|key| target[key].as_f64().unwrap_or(f64::NAN));
     let off = |key: &str, by: &str| {
-        target[key].as_f64().map_or(String::new(), |off_m| format!(", {off_m:.2} m off by {by}"))
+        target[key].as_f64().map_or(String::new(), |off_m| format!(", {off_m:.2} m off ({by})"))
     };
-    let (pose, truth) = (off("distance_m", "its pose"), off("truth_m", "the ground truth"));
+    let (pose, truth) = (off("distance_m", "pose"), off("truth_m", "ground truth"));
     json!(Event {
         t: target["at_s"].as_f64().unwrap_or_default(),
         of: format!("target {}", target["number"]),
@@ -27,7 +27,6 @@ pub fn result(target: &Value) -> Value {
     })
 }
 
-/// Builds the first message of a page, which describes `run`.
 pub fn about(run: &Run) -> Value {
     let mission = &run.mission;
     let simulated = mission.robot.address.is_none();

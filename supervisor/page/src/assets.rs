@@ -1,6 +1,3 @@
-//! Embedded files of the page.
-
-/// Served file: path, type and text.
 pub type Asset = (&'static str, &'static str, &'static str);
 
 const HTML: &str = "text/html; charset=utf-8";

@@ -103,7 +103,6 @@ impl Header {
             message.extend((value as f32).to_le_bytes());
         }
         let mut deflated = DeflateEncoder::new(message, Compression::fast());
-        // Infallible for a Vec.
         let _ = deflated.write_all(cells);
         deflated.finish().unwrap_or_default()
     }

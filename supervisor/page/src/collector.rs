@@ -1,5 +1,4 @@
-//! Converts a robot's samples to chart rows, states, maps and fields for the live and the recorded
-//! page.
+//! Converts samples to chart rows, states, maps and fields.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -18,7 +17,6 @@ use serde_json::{Value, json};
 
 use crate::blob;
 
-/// Columns of a row before those of the sensors.
 pub(crate) const COLUMNS: [&str; 24] = [
     "t",
     "x",
@@ -47,12 +45,11 @@ pub(crate) const COLUMNS: [&str; 24] = [
 ];
 /// Interval of states that differ only in ages, mission time in seconds.
 const STATE_AGAIN_S: f64 = 1.0;
-/// Most ticks whose samples arrive at a time.
 const MOST_TICKS: usize = 4096;
 /// Most ground truth ticks that wait for their pose.
 const MOST_TRUTHS: usize = 4096;
 
-/// Samples of a tick. A recording yields them by topic, several ticks at a time.
+/// Samples of a tick. A recording yields several ticks at a time.
 #[derive(Clone, Debug, Default)]
 struct Tick {
     pose: Option<PoseSample>,
@@ -74,9 +71,7 @@ pub struct Collector {
     newest: Tick,
     pub state: RobotState,
     usage: Vec<Usage>,
-    /// Ground truth from the newest row's tick on.
     truths: VecDeque<GroundTruthTick>,
-    /// Key and time of the newest state.
     state_of: Option<(Vec<u64>, f64)>,
     map_of: Option<u64>,
     field_of: Option<u64>,
@@ -206,8 +201,8 @@ impl Collector {
         Some(values.into_iter().map(rounded).chain(ranges).chain(movers).collect())
     }
 
-    /// Takes a line of ground truth, written before its tick's pose is published. Returns whether
-    /// to read on before the next pose.
+    /// Takes a line of ground truth, written before its tick's pose. Returns whether to read on
+    /// before the next pose.
     pub fn truth(&mut self, line: &str) -> bool {
         if let Ok(truth) = serde_json::from_str(line) {
             if self.truths.len() == MOST_TRUTHS {
@@ -247,7 +242,6 @@ impl Collector {
         self.state.link.unwrap_or_default()
     }
 
-    /// Returns a changed map as a message.
     pub fn take_map(&mut self) -> Option<Vec<u8>> {
         let map = &self.state.map;
         let changed = self.map_of.replace(map.version()) != Some(map.version());
@@ -255,7 +249,6 @@ impl Collector {
         Some(blob::map(frame, map.cells(), self.state.now_s()))
     }
 
-    /// Returns a changed field as a message.
     pub fn take_field(&mut self) -> Option<Vec<u8>> {
         let (field, header) = (&self.state.field, &self.state.field_header);
         let changed = self.field_of.replace(field.version()) != Some(field.version());
@@ -279,7 +272,7 @@ impl Collector {
         &self.mission
     }
 
-    /// Returns a changed state of the processes. If only ages differ, once a second.
+    /// Returns a changed state of the processes, once a second if only ages differ.
     pub fn take_state(&mut self) -> Option<Value> {
         if self.state.stages.is_empty() {
             return None;
@@ -341,8 +334,7 @@ impl Collector {
     }
 }
 
-/// Formats place, velocity, radius and the 95 % radius of the surface, rounded to a centimetre to
-/// save space.
+/// Formats place, velocity, radius and the surface's 95 % radius, rounded to save space.
 fn mover(mover: &Mover) -> Value {
     let (at, velocity) = (mover.place(), mover.velocity());
     let values = [at.x, at.y, velocity.x, velocity.y, mover.radius_m.into(), mover.reach_m()];
@@ -354,7 +346,6 @@ fn rounded(value: f64) -> Value {
     Value::from((value * 1e4).round() / 1e4)
 }
 
-/// Converts an age to seconds, or null if it is unknown.
 fn seconds(ns: u64) -> Value {
     if ns == u64::MAX { Value::Null } else { Value::from((ns / 1_000_000) as f64 / 1e3) }
 }

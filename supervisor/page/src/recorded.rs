@@ -40,13 +40,11 @@ impl Recorded {
     /// Adds a message with its length, and a byte that is 0 for text.
     fn add(&mut self, kind: u8, message: &[u8]) {
         let length = message.len() as u32;
-        // Infallible for a Vec.
         let _ = self.packed.write_all(&length.to_le_bytes());
         let _ = self.packed.write_all(&[kind]);
         let _ = self.packed.write_all(message);
     }
 
-    /// Returns the file. `title` may be any text.
     pub fn html(self, title: &str) -> String {
         let data = BASE64_STANDARD.encode(self.packed.finish().unwrap_or_default());
         let title = title.replace('&', "&amp;").replace('<', "&lt;");
@@ -87,7 +85,7 @@ fn asset(file: &str) -> &'static str {
     found.map_or("", |(_, _, text)| text)
 }
 
-/// Bundles the modules in one script, each as a scope that returns its exports.
+/// Bundles the modules in one script, each in its own scope.
 fn bundle() -> String {
     let mut bundle = String::new();
     for module in MODULES {

@@ -53,7 +53,7 @@ const [{ id }] = newest().orders();
 assert.deepEqual(newest().orders(), [{ id, order: "stop" }]);
 const resume = net.ask({ order: "resume" });
 ends(1006);
-assert.equal((await resume).ok, false, "nobody knows what became of it");
+assert.equal((await resume).ok, false, "its outcome is unknown");
 newest().opens();
 assert.deepEqual(newest().orders(), [{ id, order: "stop" }]);
 newest().says({ answer: { id, ok: true, text: "it stands" } });

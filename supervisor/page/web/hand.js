@@ -14,7 +14,7 @@ export class Hand {
     const pad = document.createElement("div");
     pad.id = "hand";
     pad.tabIndex = 0;
-    pad.textContent = "hold to drive, or the arrow keys here";
+    pad.textContent = "Hold to drive, or use the arrow keys";
     parent.append(pad);
     const move = (event) => {
       const { left, top, width, height } = pad.getBoundingClientRect();

@@ -10,7 +10,7 @@ const GRAB = 26;
 const ACTIONS = 70;
 // Colour names of cell states.
 const CELLS = [null, "sensed", "known", "rim", "scanned", "margin"];
-const LEGEND = [["sensed", "believed hazard"], ["margin", "its margin"], ["known", "known before"], ["scanned", "scanned"], ["way", "way"], ["beam", "beams"], ["target", "target"], ["mover", "moving: arrow to its place in 1 s, ring of doubt"]];
+const LEGEND = [["sensed", "believed hazard"], ["margin", "its margin"], ["known", "known hazard"], ["scanned", "scanned"], ["way", "path"], ["beam", "beams"], ["target", "target"], ["mover", "moving: arrow to its place in 1 s, uncertainty ring"]];
 
 const colours = new Map();
 
@@ -491,7 +491,7 @@ export class MapView {
 
   /// Lists the colours and their meanings.
   legend(list) {
-    const rows = this.store.about?.world ? [...LEGEND, ["truth", "true way"], ["shape", "what is really there"]] : LEGEND;
+    const rows = this.store.about?.world ? [...LEGEND, ["truth", "true path"], ["shape", "true obstacle"]] : LEGEND;
     list.replaceChildren(...rows.map(([name, text]) => {
       const item = document.createElement("li");
       const sample = document.createElement("i");

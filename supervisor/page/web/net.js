@@ -6,8 +6,8 @@ const LOST_AFTER_MS = 900;
 const AGAIN_AFTER_MS = 500;
 // A new attempt after these codes would fail again, so the notice stays.
 const FINAL = {
-  4401: "this page has no token, or one that is wrong or expired: open an address that `firsthand page` printed when it started, or an address in the file that it named",
-  4409: "another browser has taken the place of this page; reload it to take a place again",
+  4401: "the token of this page is missing, wrong or expired: open an address that `firsthand page` printed at its start, or one from the file that it named",
+  4409: "another browser replaced this page; reload it to connect again",
 };
 
 /// Returns the token of the address's fragment. The tab stores it, and the address bar hides it.
@@ -58,14 +58,14 @@ export class Net {
     };
     socket.onclose = ({ code }) => {
       if (socket !== this.socket) return;
-      this.lose(FINAL[code] ?? "the page has lost its server; it tries again", code in FINAL);
+      this.lose(FINAL[code] ?? "this page lost its server and tries again", code in FINAL);
     };
   }
 
   watch() {
     if (this.isOpen && performance.now() - this.heard > LOST_AFTER_MS) {
       const socket = this.socket;
-      this.lose("the server does not answer; the page tries again");
+      this.lose("the server does not answer; this page tries again");
       socket.close();
     }
   }
@@ -75,7 +75,7 @@ export class Net {
     this.isOpen = false;
     this.isRefused = isFinal;
     for (const [id, { order }] of this.asked) {
-      if (isFinal || !isStop(order)) this.answered({ id, ok: false, text: "the server was lost; look at the state" });
+      if (isFinal || !isStop(order)) this.answered({ id, ok: false, text: "the connection ended before the answer; check the state of the robot" });
     }
     this.on.lost(why);
     if (!isFinal) this.again = setTimeout(() => this.connect(), AGAIN_AFTER_MS);
@@ -89,7 +89,7 @@ export class Net {
   /// Sends an order. The answer is the confirmation, or the reason of a failure. A stop is resent
   /// after each loss of the server until it is answered.
   ask(order) {
-    if (!this.isOpen && (this.isRefused || !isStop(order))) return Promise.resolve({ ok: false, text: "there is no server to ask" });
+    if (!this.isOpen && (this.isRefused || !isStop(order))) return Promise.resolve({ ok: false, text: "this page has no connection to its server" });
     const id = this.next++;
     if (this.isOpen) this.send(id, order);
     return new Promise((answer) => this.asked.set(id, { order, answer }));

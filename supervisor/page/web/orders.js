@@ -41,9 +41,9 @@ export class Orders {
   }
 
   async ask(name, order) {
-    this.say(`${name} is asked for`, "");
+    this.say(`${name}: sent`, "");
     const { ok, text } = await this.net.ask(order);
-    this.say(ok ? `${name}: ${text}` : `${name} is not done: ${text}`, ok ? "good" : "bad");
+    this.say(ok ? `${name}: ${text}` : `${name} failed: ${text}`, ok ? "good" : "bad");
   }
 
   say(text, kind) {

@@ -49,9 +49,9 @@ function draw(now) {
 function newest() {
   const state = store.stateAt(recording ? timeline.t : Infinity);
   if (recording && store.summary?.kind && timeline.t >= store.end) return [store.summary.kind, store.summary.outcome];
-  if (!store.about) return ["warn", "no robot runs; the page waits for it"];
+  if (!store.about) return ["warn", "no robot runs; waiting for one"];
   if (store.problem) return ["bad", store.problem];
-  if (!store.running && !recording) return ["warn", `the run has ended at ${store.end.toFixed(1)} s; the page waits for the next`];
+  if (!store.running && !recording) return ["warn", `the run ended at ${store.end.toFixed(1)} s; waiting for the next run`];
   if (!state) return ["warn", "the robot starts"];
   return [state.kind, [state.does, state.to_go].filter(Boolean).join("; ")];
 }
@@ -62,11 +62,11 @@ function drawStatus() {
     text += ` (${store.age.toFixed(0)} s ago)`;
     if (kind === "good") kind = "warn";
   }
-  if (isLost) [kind, text] = ["bad", `not known now; the last was: ${text}`];
+  if (isLost) [kind, text] = ["bad", `unknown; last known: ${text}`];
   byId("status").textContent = text;
   byId("status").className = document.querySelector("header").className = kind;
   byId("past").hidden = timeline.follows;
-  byId("past").textContent = `You look at ${timeline.t.toFixed(1)} s, ${(store.end - timeline.t).toFixed(1)} s ago.`;
+  byId("past").textContent = `Shown: ${timeline.t.toFixed(1)} s, ${(store.end - timeline.t).toFixed(1)} s ago.`;
 }
 
 /// Shows a run from its beginning.

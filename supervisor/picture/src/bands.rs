@@ -9,7 +9,7 @@ use super::{
 };
 
 pub(super) struct Style {
-    /// Size limit of this layer, bytes; an irregular field is drawn coarser.
+    /// Size limit of this layer, bytes; an irregular field gets coarser.
     pub(super) budget: usize,
     /// Most samples along the longer side, enough for the width of the bands.
     pub(super) finest: usize,
@@ -34,7 +34,7 @@ pub(super) const MISSION: Style = Style {
     stroke: "stroke=\"#fff\" stroke-width=\"0.9\" stroke-opacity=\"0.75\"",
 };
 
-/// Share of the map that may lie below the last level, because u has no floor close to hazards.
+/// Share of the map allowed below the last level; u has no floor close to hazards.
 const BELOW: f64 = 0.02;
 
 /// Levels at -step, -2 step, ..., -count step of log2 u.
@@ -51,7 +51,6 @@ impl Levels {
         ((-f64::from(log2_u) / self.step) as u32).min(self.count)
     }
 
-    /// Returns the colour of a band, from 0 around the target to `count`.
     pub(super) fn colour(&self, nth: u32) -> String {
         let along = f64::from(nth) / f64::from(self.count.max(1)) * (self.ramp.len() - 1) as f64;
         let from = (along as usize).min(self.ramp.len() - 2);
@@ -72,7 +71,6 @@ pub(super) struct Bands<'a> {
 }
 
 impl<'a> Bands<'a> {
-    /// Returns `None` if the target is unreachable from everywhere.
     pub(super) fn of(
         lattice: &Lattice,
         cells: &'a [FieldCell],
@@ -113,8 +111,7 @@ impl<'a> Bands<'a> {
         }
     }
 
-    /// Returns the areas above each level, the lowest level first, with at most `finest` samples a
-    /// side.
+    /// Returns the areas above each level, lowest first, at most `finest` samples a side.
     fn areas(&self, finest: usize) -> Vec<Path> {
         let samples = Samples::of(&self.lattice, self.cells, finest, self.levels);
         (1..=self.levels.count + 1)
@@ -123,7 +120,6 @@ impl<'a> Bands<'a> {
             .collect()
     }
 
-    /// Draws each area over the one that contains it.
     fn paint(&self, areas: &[Path]) -> String {
         let painted: String = (0..=self.levels.count)
             .rev()
@@ -137,8 +133,8 @@ impl<'a> Bands<'a> {
     }
 }
 
-/// Rings of samples around the map. The inner one continues the bands to the edge of the plot. The
-/// outer one has no value, so that every level set closes.
+/// Rings of samples around the map. The inner one continues the bands to the plot's edge. The outer
+/// one is empty, so that every level set closes.
 const AROUND: usize = 2;
 
 /// Samples of log2 u at the middles of square blocks of cells, and [`AROUND`] them.
@@ -175,7 +171,7 @@ impl Samples {
                 }
             }
         }
-        // Values far below the last level look alike, and a floor keeps the level sets smooth.
+        // Values far below the last level look alike; a floor keeps the level sets smooth.
         let last = -levels.step * f64::from(levels.count);
         let floor = last - 0.5 * levels.step;
         let nowhere = last - 2.0 * levels.step;
@@ -196,7 +192,7 @@ impl Samples {
     }
 
     fn above(&self, lattice: &Lattice, level: f64) -> Path {
-        // Marching squares: each crossing leads to the next, with the area on the left.
+        // Marching squares: crossings form chains with the area on the left.
         let mut next = vec![usize::MAX; 2 * self.values.len()];
         for row in 0..self.down - 1 {
             for col in 0..self.across - 1 {
@@ -220,7 +216,7 @@ impl Samples {
         path
     }
 
-    /// Returns the passages of the square whose lower left sample is (col, row).
+    /// Returns the passages of the square with lower left sample (col, row).
     fn passages(&self, col: usize, row: usize, level: f64) -> &'static [(Side, Side)] {
         use Side::{Above, Below, Left, Right};
         let at = row * self.across + col;
@@ -279,8 +275,8 @@ impl Samples {
     }
 }
 
-/// Sums the neighbours of a sample without a value. The bands then continue below the hazard cells
-/// drawn over them, instead of following their outline.
+/// Sums the neighbours of an empty sample, so that the bands continue below hazard cells instead of
+/// following their outline.
 fn sum_around(sums: &[(f64, u32)], across: usize, at: usize) -> (f64, u32) {
     let (col, row) = (at % across, at / across);
     (row - 1..=row + 1)

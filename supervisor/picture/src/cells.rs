@@ -10,14 +10,13 @@ use super::{
     page::{Path, ink},
 };
 
-/// Size limit of this layer, bytes; an irregular belief is drawn coarser.
+/// Size limit of this layer, bytes; an irregular belief gets coarser.
 const BUDGET: usize = 90_000;
 
-/// Areas with their colours and names in the legend, the lowest first.
+/// Areas with colours and legend names, lowest first.
 pub(super) struct BelievedHazard(pub(super) [(&'static str, &'static str, Path); 3]);
 
 impl BelievedHazard {
-    /// Creates the areas; `cells` has one byte a cell, row-major.
     pub(super) fn of(lattice: &Lattice, cells: &[u8]) -> Self {
         let mut block = 1;
         loop {
@@ -51,7 +50,7 @@ pub(super) struct Blocks<'a, Kind> {
     pub(super) kinds: Vec<Kind>,
 }
 
-/// Coarsens to blocks. A block with a hazard cell gets the most frequent kind of hazard.
+/// Coarsens to blocks. A block with hazard cells gets their most frequent kind.
 fn coarsened(lattice: &Lattice, cells: &[u8], block: usize) -> Vec<CellState> {
     let across = lattice.cols.div_ceil(block);
     let mut tally = vec![[0_u32; 6]; across * lattice.rows.div_ceil(block)];
@@ -97,7 +96,6 @@ impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
     }
 
     fn draw(&self, path: &mut Path, runs: BTreeMap<(usize, usize), usize>, end_row: usize) {
-        // The map's edge may cut the last block of a row or column.
         let edge = |block: usize, cells: usize| (block * self.side).min(cells) as f64 - 0.5;
         let corner = |col: usize, row: usize| {
             let (col, row) = (edge(col, self.lattice.cols), edge(row, self.lattice.rows));
@@ -105,7 +103,7 @@ impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
         };
         for ((from, until), since) in runs {
             let (one, other) = (corner(from, since), corner(until, end_row));
-            // The first row may lie at the top of the sheet or at its bottom.
+            // The first row may lie at the top or the bottom.
             let low = one.min(other);
             path.rectangle(low, one.max(other) - low);
         }

@@ -9,7 +9,7 @@ pub(super) struct Lattice {
     pub(super) rows: usize,
     pub(super) width: f64,
     pub(super) height: f64,
-    /// Outer corner of the first cell, and the step from cell to cell in both directions.
+    /// Outer corner of the first cell, and the cell steps in both directions.
     corner: DVec2,
     step: DVec2,
 }
@@ -28,8 +28,7 @@ impl Lattice {
         }
     }
 
-    /// Creates a lattice like an image, from `corner` of the sheet, with the first row at the top
-    /// and cells `cell` units wide.
+    /// Creates an image lattice from `corner`, first row at the top, cells `cell` units wide.
     pub(super) fn of_image((cols, rows): (usize, usize), corner: DVec2, cell: f64) -> Self {
         Self {
             cols,
@@ -45,7 +44,6 @@ impl Lattice {
         self.cols.max(self.rows)
     }
 
-    /// Returns the place of cell coordinates, whose centres are whole numbers.
     pub(super) fn place(&self, cells: DVec2) -> DVec2 {
         self.corner + (cells + 0.5) * self.step
     }

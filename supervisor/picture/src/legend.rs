@@ -27,7 +27,7 @@ pub(super) struct Legend<'a> {
 
 const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;
 const ROW: f64 = 25.0;
-/// Middle of the symbols and start of their text, from the left edge of a column.
+/// Middle of the symbols and start of their text in a column.
 const SYMBOL: f64 = 19.0;
 const WORDS: f64 = 50.0;
 
@@ -48,7 +48,7 @@ impl Legend<'_> {
         if self.isolated {
             let style =
                 format!("fill=\"{}\" stroke=\"{}\" stroke-width=\"0.6\"", ink::NOWHERE, ink::QUIET);
-            column.row("no way to the target", |at| patch(at, &style));
+            column.row("no path to the target", |at| patch(at, &style));
         }
         if let Some(levels) = self.levels {
             column.text += &colour_bar(levels, column.x, column.y);
@@ -86,7 +86,7 @@ impl Legend<'_> {
             });
         }
         if !self.movers.is_empty() {
-            column.row("way of what moves", line(movers::line()));
+            column.row("path of what moves", line(movers::line()));
         }
         if let Some(seconds) = self.movers.period_s() {
             column.row(&format!("it and the robot at {seconds} s"), |at: DVec2| {
@@ -117,7 +117,7 @@ impl Legend<'_> {
         }
     }
 
-    /// Draws a round length, a sixth to a third of the plot, in the lower corner.
+    /// Draws a round length, a sixth to a third of the plot.
     fn scale_bar(&self) -> String {
         let length = round_up(self.view.side_m / 8.0);
         let (y, right) = (PLOT_TOP + PLOT_SIDE - 4.0, COLUMN + self.view.px(length));
@@ -147,7 +147,7 @@ impl Column {
     }
 
     fn heading(&mut self, words: &str) {
-        // The first group stands at the top of the plot, the others apart from the group above.
+        // The first group starts at the plot's top, the others below a gap.
         if !self.text.is_empty() {
             self.y += 14.0;
         }

@@ -56,7 +56,6 @@ use self::{
     page::{PLOT_LEFT, PLOT_SIDE, PLOT_TOP, View, ink},
 };
 
-/// Returns whether the target is unreachable from a free cell of the map.
 fn has_isolated_cells(
     grid: Option<(GridFrame, &[u8])>,
     field: Option<(GridFrame, &[FieldCell])>,
@@ -64,7 +63,7 @@ fn has_isolated_cells(
     let (Some((grid_frame, states)), Some((field_frame, policy))) = (grid, field) else {
         return false;
     };
-    // The field follows the grid: at the end of a run it may lag by one version, in the same frame.
+    // At the end of a run the field may lag by one grid version, in the same frame.
     grid_frame == field_frame
         && states.iter().zip(policy).any(|(&state, policy)| {
             !CellState::from_byte(state).is_hazard() && policy.log2_u == f32::NEG_INFINITY

@@ -1,7 +1,5 @@
-//! Field of a bare map.
-//!
-//! This picture is meant for conversion to pixels: large, without text. Cells become squares of
-//! whole pixels if there is room.
+//! Field of a bare map, for conversion to pixels: large, without text, cells as squares of whole
+//! pixels if they fit.
 
 use common::samples::FieldCell;
 use glam::DVec2;
@@ -16,8 +14,7 @@ use super::{
 
 /// Longest side, pixels.
 const LARGEST: usize = 2368;
-/// Cells per side below which a map is drawn smaller, because its lines would be lost on a large
-/// sheet.
+/// Cells per side below which a map is drawn smaller, to keep its lines visible.
 const SMALL: usize = 100;
 const SMALL_SIDE: usize = 1200;
 const FRAME: f64 = 16.0;
@@ -101,7 +98,6 @@ pub fn map_svg(map: &FieldOnMap<'_>) -> String {
     )
 }
 
-/// Pattern of cells without a path to the target.
 const HATCH: &str = "<pattern id=\"hatch\" width=\"8\" height=\"8\" patternUnits=\"userSpaceOnUse\" \
      patternTransform=\"rotate(45)\"><path d=\"M0 0V8\" stroke=\"#8b9199\" stroke-width=\"3\"/></pattern>";
 
@@ -124,10 +120,9 @@ fn kinds(map: &FieldOnMap<'_>) -> Vec<Kind> {
         .collect()
 }
 
-/// Draws cells beside a thin wall in the single colour of their centre. The level sets of the other
-/// side would show through.
+/// Draws cells beside a thin wall in a single colour; the other side's level sets would show
+/// through.
 fn flat_cells(map: &FieldOnMap<'_>, lattice: &Lattice, levels: Levels) -> String {
-    // A wall of at most a pixel hides nothing.
     if cell_size(map.size) < 2.0 {
         return String::new();
     }
@@ -161,7 +156,6 @@ fn is_beside_thin_wall(map: &FieldOnMap<'_>, at: usize, step: f64) -> bool {
             .any(|across| across.is_finite() && f64::from((across - own).abs()) > apart)
 }
 
-/// Iterates over the 3 x 3 cells that lie on the map.
 fn around((cols, rows): (usize, usize), at: usize) -> impl Iterator<Item = usize> {
     let (col, row) = (at % cols, at / cols);
     let columns = col.saturating_sub(1)..(col + 2).min(cols);
@@ -193,7 +187,7 @@ mod tests {
 
     #[test]
     fn what_lies_beyond_a_thin_wall_does_not_shine_through() {
-        // Two corridors of 100 cells, one cell of wall between them, 600 powers of two apart.
+        // Two corridors of 100 cells, a wall of one cell between them, 600 powers of two apart.
         let log2_u = [0.0, f32::NEG_INFINITY, -600.0];
         let cells: Vec<FieldCell> = (0..300)
             .map(|at| FieldCell { log2_u: log2_u[at / 100], ..FieldCell::default() })
@@ -211,8 +205,8 @@ mod tests {
 
     #[test]
     fn a_wide_map_is_drawn_with_its_first_row_at_the_top() {
-        // A map of 90 x 10 cells of 13 pixels: target at the left, wall in the first row, a cell
-        // cut off in the last.
+        // A map of 90 x 10 cells of 13 pixels: target left, wall in the first row, a cut-off cell
+        // in the last.
         let size = (90, 10);
         let mut blocked = vec![false; 900];
         blocked[7] = true;

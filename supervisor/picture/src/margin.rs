@@ -10,7 +10,7 @@ use super::{
     world,
 };
 
-/// Font of all text, without a font file; its digits have equal widths where available.
+/// Font of all text, where available with digits of equal width.
 const FONT: &str = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, \
      'DejaVu Sans', sans-serif";
 /// Characters of 12 px that fit across the sheet.

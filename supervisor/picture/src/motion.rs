@@ -8,7 +8,7 @@ use super::{
     scene::Scene,
 };
 
-/// Most poses of a drawn trajectory; a day at 7 Hz still makes a small file.
+/// Maximum poses of a drawn trajectory, for a small file even after a day at 7 Hz.
 const MOST_POSES: usize = 4000;
 /// Approximate number of bodies along the trajectory.
 const BODIES: f64 = 16.0;
@@ -33,7 +33,6 @@ impl<'a> Motion<'a> {
         motion
     }
 
-    /// Returns the true trajectory, or else the estimated one.
     fn way(&self) -> &'a [Pose2] {
         if self.scene.truth.is_empty() { self.scene.believed } else { self.scene.truth }
     }
@@ -54,7 +53,7 @@ impl<'a> Motion<'a> {
         self.every.map(|(seconds, _)| seconds)
     }
 
-    /// Iterates over the times at which the robot's body is drawn, about [`BODIES`], and its poses.
+    /// Iterates over about [`BODIES`] times and poses of drawn bodies.
     pub(super) fn instants(&self) -> impl Iterator<Item = (f64, &'a Pose2)> {
         (0..).map(f64::from).map_while(|nth| {
             let (seconds, stride) = self.every?;
@@ -94,14 +93,13 @@ impl<'a> Motion<'a> {
         outlines.element(BODY)
     }
 
-    /// Adds the outline of a body that is no disc, inside the disc that covers it.
     fn add_footprint(&self, path: &mut Path, view: &View, pose: &Pose2) {
         if let Some(footprint) = self.scene.mission.body().footprint {
             path.polygon(footprint.corners_at(*pose).map(|corner| view.place(corner)));
         }
     }
 
-    /// Draws the ellipse that contains the robot's centre with 95 %.
+    /// Draws the 95 % ellipse of the robot's centre.
     fn region(&self, view: &View) -> String {
         let (Some(covariance), Some(end)) = (self.scene.covariance, self.scene.believed.last())
         else {
@@ -126,7 +124,6 @@ impl<'a> Motion<'a> {
         )
     }
 
-    /// Draws the true body filled, the estimated one dashed.
     fn end(&self, view: &View, radius: f64) -> String {
         let body = |pose: Option<&Pose2>, style: &str| {
             let mut path = Path::default();
@@ -181,7 +178,7 @@ fn line_style(colour: &str, width: &str, dashes: &str) -> String {
     )
 }
 
-/// Draws a white line below, which separates a line from field and hatch.
+/// Draws a white line below, to separate a line from field and hatch.
 fn halo(line: &Path) -> String {
     line.element(
         "fill=\"none\" stroke=\"#fff\" stroke-width=\"5.5\" stroke-opacity=\"0.75\" \
@@ -196,11 +193,9 @@ fn trajectory(view: &View, poses: &[Pose2]) -> Path {
 }
 
 fn is_shown(view: &View, pose: &Pose2) -> bool {
-    // A body beside the plot would be cut off.
     view.shows(pose.position, 0.0) && pose.heading.is_finite()
 }
 
-/// Adds a disc with a tick along the heading.
 pub(super) fn add_body(path: &mut Path, at: DVec2, radius: f64, heading: f64) {
     path.circle(at, radius);
     // The sheet's y axis points down.

@@ -1,4 +1,4 @@
-//! Tracks of moving things. Equal numbers mark places of things and robot at the same time.
+//! Tracks of movers. Equal numbers mark simultaneous places of mover and robot.
 
 use common::kinematics::Pose2;
 use glam::DVec2;
@@ -16,7 +16,7 @@ const MOST_WAYS: usize = 24;
 
 pub(super) struct Movers<'a> {
     trails: Vec<&'a Trail<'a>>,
-    /// Times of the discs, every second one of the body's, and the robot at each.
+    /// Disc times, every second one of the body's, and the robot's poses.
     instants: Vec<(f64, &'a Pose2)>,
     body_m: f64,
 }
@@ -89,7 +89,6 @@ pub(super) fn disc() -> String {
     format!("fill=\"{0}\" fill-opacity=\"0.18\" stroke=\"{0}\" stroke-width=\"1.2\"", ink::MOVER)
 }
 
-/// Draws the time in a white outline, which separates it from lines.
 pub(super) fn number(at: DVec2, at_s: f64) -> String {
     let style = " text-anchor=\"middle\" font-size=\"12\" font-weight=\"700\" stroke=\"#fff\" \
          stroke-width=\"3\" paint-order=\"stroke\"";

@@ -12,7 +12,7 @@ pub(super) const PLOT_TOP: f64 = 92.0;
 /// Side of the plot, a square like a mission's perimeter.
 pub(super) const PLOT_SIDE: f64 = 800.0;
 
-/// Distance outside the plot at which lines are cut, so that a far pose gives no far coordinates.
+/// Distance outside the plot at which lines are cut.
 const OVERHANG: f64 = 20.0;
 /// Shortest visible step of a line.
 const FINEST: f64 = 0.6;
@@ -43,18 +43,16 @@ pub(super) struct View {
 }
 
 impl View {
-    /// Creates a view of all cells, including the rim.
     pub(super) fn of(frame: &GridFrame) -> Self {
         let side_m = f64::from(frame.cells) * frame.resolution_m;
         let low = metres(frame, DVec2::splat(-0.5));
         if side_m.is_finite() && side_m > 0.0 && low.is_finite() {
             return Self { low, side_m };
         }
-        // Valid missions never get here, but a picture is made all the same.
+        // Unreachable for valid missions.
         Self { low: DVec2::splat(-0.5), side_m: 1.0 }
     }
 
-    /// Creates a view of the origin, all finite `points`, and a rim.
     pub(super) fn around(points: &[DVec2]) -> Self {
         let (low, high) = points
             .iter()
@@ -72,14 +70,13 @@ impl View {
         metres * PLOT_SIDE / self.side_m
     }
 
-    /// Returns whether any part of a disc (metres) is on the plot; false for NaN.
     pub(super) fn shows(&self, centre: DVec2, radius_m: f64) -> bool {
         let reach = radius_m + self.side_m / 2.0;
         let from_middle = (centre - self.low - DVec2::splat(self.side_m / 2.0)).abs();
         from_middle.cmple(DVec2::splat(reach)).all()
     }
 
-    /// Draws a line through metres, cut at the plot and broken at points that are not finite.
+    /// Draws a line in metres, cut at the plot and broken at non-finite points.
     pub(super) fn line(&self, points: impl IntoIterator<Item = DVec2>) -> Path {
         let mut path = Path::default();
         let mut last: Option<DVec2> = None;
@@ -106,7 +103,6 @@ impl View {
     }
 }
 
-/// Returns the place of cell coordinates, whose centres are whole numbers, in metres.
 pub(super) fn metres(frame: &GridFrame, cells: DVec2) -> DVec2 {
     let centre = DVec2::splat(f64::from(frame.centre_index()));
     frame.centre + (cells - centre) * frame.resolution_m
@@ -131,11 +127,11 @@ fn cut(from: DVec2, to: DVec2) -> Option<(DVec2, DVec2)> {
         leave = leave.min(a.max(b));
     }
     let ends = (from + along * enter, from + along * leave);
-    // An overflow in `along` ends here, as a line that is not drawn.
+    // Drops lines with an overflow in `along`.
     (enter <= leave && ends.0.is_finite() && ends.1.is_finite()).then_some(ends)
 }
 
-/// Number on the sheet in tenths, finer than any screen; a value that is not finite becomes 0.
+/// Number in tenths, finer than any screen; non-finite values become 0.
 pub(super) struct Px(pub(super) f64);
 
 impl Display for Px {
@@ -215,7 +211,6 @@ impl Path {
         let _ = self.data.write_fmt(text);
     }
 
-    /// Returns the element with the attributes `style`, or nothing for an empty path.
     pub(super) fn element(&self, style: &str) -> String {
         if self.is_empty() {
             return String::new();
@@ -224,12 +219,11 @@ impl Path {
     }
 }
 
-/// Returns a text element. `words` are XML, `style` further attributes, each after a space.
+/// Returns a text element. `words` are XML, `style` further attributes.
 pub(super) fn text(at: DVec2, style: &str, words: &str) -> String {
     format!("<text x=\"{}\" y=\"{}\"{style}>{words}</text>\n", Px(at.x), Px(at.y))
 }
 
-/// Returns XML character data of at most `limit` characters.
 pub fn escape(text: &str, limit: usize) -> String {
     let mut escaped = String::new();
     for (nth, character) in text.chars().enumerate() {
@@ -251,12 +245,11 @@ pub fn escape(text: &str, limit: usize) -> String {
     escaped
 }
 
-/// Iterates over the multiples of `step` from `low` to `high`, and their texts.
 pub(super) fn ticks(low: f64, high: f64, step: f64) -> impl Iterator<Item = (f64, String)> {
     let digits = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
     let first = (low / step - 1e-6).ceil();
-    // About a dozen ticks fit; the bound ends the loop for numbers at any distance from 0. Adding 0
-    // turns -0 into 0.
+    // About a dozen ticks fit; the bound ends the loop at any distance from 0. Adding 0 turns -0
+    // into 0.
     (0..40)
         .map(move |nth| (first + f64::from(nth)) * step + 0.0)
         .take_while(move |value| *value <= high + step * 1e-6)
@@ -272,7 +265,7 @@ pub(super) fn round_up(least: f64) -> f64 {
     [1.0, 2.0, 5.0]
         .into_iter()
         .map(|digit| digit * decade)
-        // The slack keeps 0.2 from being rounded up to 0.5 by the last bit.
+        // The slack keeps 0.2 from rounding up to 0.5.
         .find(|candidate| *candidate >= least * (1.0 - 1e-9))
         .unwrap_or(10.0 * decade)
 }

@@ -7,7 +7,7 @@ use super::{
     page::{PLOT_LEFT, Path, View, escape, ink, text},
 };
 
-/// Distance limit of points, metres; farther ones would hide the others.
+/// Distance limit of points, metres, to keep the others visible.
 const FARTHEST_M: f64 = 1e4;
 
 /// Draws `points`, metres, around the robot's first place.

@@ -10,9 +10,9 @@ use super::{
 };
 
 pub(super) struct Style {
-    /// Size limit of the lines, bytes; an irregular field is drawn sparser.
+    /// Size limit of the lines, bytes; an irregular field gets sparser.
     pub(super) budget: usize,
-    /// Distance from a line to the beginning of the next one, on the sheet.
+    /// Spacing of lines on the sheet.
     pub(super) spacing: f64,
     /// Least spacing in cells; the field has no detail within a cell.
     pub(super) least_cells: f64,
@@ -106,7 +106,6 @@ pub(super) fn arrowhead(at: DVec2, heading: DVec2) -> [DVec2; 3] {
     [at + ahead, at - ahead + aside, at - ahead - aside]
 }
 
-/// Returns lines along E in cell coordinates (centres at whole numbers).
 fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Vec<DVec2>> {
     let bins = [lattice.width, lattice.height].map(|side| (side / spacing) as usize + 2);
     let mut tracer = Tracer {
@@ -118,7 +117,7 @@ fn evenly_spaced(lattice: &Lattice, cells: &[FieldCell], spacing: f64) -> Vec<Ve
     };
 
     let mut lines: Vec<Vec<DVec2>> = Vec::new();
-    // Seeds all over the map serve regions that no line has reached.
+    // Seeds all over the map serve unreached regions.
     for at in 0..bins[0] * bins[1] {
         let (col, row) = (at % bins[0], at / bins[0]);
         let seed = DVec2::new(col as f64, row as f64) * tracer.spacing;
@@ -172,7 +171,7 @@ impl Tracer<'_> {
         below.lerp(above, part.y).try_normalize()
     }
 
-    /// Adds and returns the line through `seed`; `None` without room for a long enough one.
+    /// Adds and returns the line through `seed`; `None` without room.
     fn line_through(&mut self, seed: DVec2) -> Option<Vec<DVec2>> {
         if self.is_crowded(seed, 0.98) || self.direction(seed).is_none() {
             return None;
@@ -185,7 +184,7 @@ impl Tracer<'_> {
         if length < SHORTEST * self.spacing {
             return None;
         }
-        // Points a tenth of the spacing apart suffice to keep other lines away.
+        // Points a tenth of the spacing apart suffice.
         let mut kept: Option<DVec2> = None;
         for &point in &line {
             if kept.is_some_and(|kept| kept.distance(point) < 0.1 * self.spacing) {
@@ -202,7 +201,7 @@ impl Tracer<'_> {
 
     /// Follows E, or its reverse, until guidance ends or another line is near.
     fn followed(&self, seed: DVec2, sense: f64) -> Vec<DVec2> {
-        // A step is shorter than a cell, so that it cannot skip a wall of one cell.
+        // A step shorter than a cell cannot skip a wall.
         let step = (0.2 * self.spacing).min(0.9) * sense;
         let most = (3.0 * self.lattice.longest() as f64 / step.abs()) as usize;
         let mut points = Vec::new();
@@ -213,7 +212,7 @@ impl Tracer<'_> {
                 .and_then(|here| self.direction(at + here * (step / 2.0)))
                 .map(|half_way| at + half_way * step);
             match next {
-                // A turn by more than a right angle within a step means the target, or a ridge.
+                // A sharper turn than a right angle means the target, or a ridge.
                 Some(next) if self.turns_back(at, next) => break,
                 Some(next) if !self.is_crowded(next, MERGED) => points.push(next),
                 _ => break,
@@ -239,12 +238,10 @@ impl Tracer<'_> {
     }
 
     fn bin(&self, at: DVec2) -> (usize, usize) {
-        // A negative coordinate, half a cell at most, saturates to the first bin.
         let bin = at / self.spacing;
         (bin.x as usize, bin.y as usize)
     }
 
-    /// Returns whether a line lies nearer than `share` of the spacing.
     fn is_crowded(&self, at: DVec2, share: f64) -> bool {
         let (col, row) = self.bin(at);
         let limit = share * self.spacing;

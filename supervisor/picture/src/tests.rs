@@ -82,7 +82,6 @@ fn mission(cells: u32) -> Mission {
     Mission::parse(&text, Path::new("three-drums.toml")).unwrap()
 }
 
-/// A robot that goes straight to the target, on a field that leads there.
 fn three_drums() -> Run {
     let mission = mission(120);
     let frame = mission.grid_frame();
@@ -124,7 +123,6 @@ impl Dice {
         self.0 >> 33
     }
 
-    /// Returns a mostly ordinary number, at times an extreme one.
     fn number(&mut self) -> f64 {
         match self.next() % 12 {
             0 => f64::NAN,
@@ -227,7 +225,6 @@ fn far_poses_leave_no_far_coordinates() {
         })
         .filter_map(|number| number.parse::<f64>().ok())
         .filter(|number| *number > 1200.0);
-    // The year in the address of the SVG namespace is the only other large number.
     assert_eq!(far.collect::<Vec<_>>(), [2000.0]);
 }
 
@@ -281,20 +278,19 @@ fn what_moved_is_on_its_way_where_it_was_at_the_numbered_places_of_the_robot() {
     let mut scene = run.scene();
     let without = svg(&scene);
     assert!(!without.contains("what moves"), "there is no clutter without movers");
-    // It crosses in front of the robot, which takes 14 s, and a glimpse of something else is left
-    // out.
+    // It crosses in front of the robot, which takes 14 s; a glimpse of another mover is omitted.
     let at = |nth: u32| (f64::from(nth) * 0.5, DVec2::new(2.0, 2.0 - 0.2 * f64::from(nth)));
     let places: Vec<_> = (0..16).map(at).collect();
     let trails = [&places[..], &places[..2]].map(|places| Trail { places, radius_m: 0.25 });
     scene.trails = &trails;
     let picture = svg(&scene);
     assert_well_formed(&picture);
-    assert!(picture.contains("way of what moves"));
+    assert!(picture.contains("path of what moves"));
     let numbers =
         |picture: &str, number: &str| picture.matches(&format!(">{number}</text>")).count();
     let drawn = |number: &str| numbers(&picture, number) - numbers(&without, number);
-    // Bodies are 1 s apart, and every second one is numbered. The number stands twice while the
-    // mover is there, and in the legend, then only on the robot.
+    // Bodies are 1 s apart, every second one numbered. The number appears twice while the mover is
+    // there, and in the legend, then only on the robot.
     assert_eq!(["2", "4", "6", "8"].map(drawn), [3, 2, 2, 1]);
     // At 4 s it is at (2, 0.4).
     let view = super::View::of(&run.mission.grid_frame());

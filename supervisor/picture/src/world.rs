@@ -1,7 +1,7 @@
-//! Real shapes over the robot's map, in dark outlines and a hatch that keep both visible.
+//! Real shapes over the robot's map, in dark outlines and a hatch.
 //!
-//! Outlines of shapes that do not reach from the floor to above the robot are dashed. Glass has
-//! dash-dotted outlines, sound absorbers dotted ones.
+//! Shapes that do not span the robot's height have dashed outlines, glass dash-dotted ones, sound
+//! absorbers dotted ones.
 
 use common::geometry::{Light, Profile, Shapes};
 

@@ -1,15 +1,14 @@
-//! Activity of a process as the kernel counts it, which tells a starved process from a hung one.
+//! Process activity by the kernel's counts; distinguishes a starved process from a hung one.
 //!
-//! The leading thread beats, so its processor time counts. It may wait for any other thread, so
-//! starvation of all threads counts. The kernel adds a wait for a processor only when it ends;
-//! until then the thread's state shows it.
+//! The leading thread sends the heartbeats, so its processor time counts. It may wait for any
+//! thread, so starvation of all threads counts. The kernel adds a wait for a processor when it
+//! ends; until then the thread state shows it.
 
 use std::{fs, time::Duration};
 
 use common::process_status::{field, scheduled};
 
-/// Deadlines that a process may sleep before it counts as blocked. A slow disk delays a healthy one
-/// by more than one.
+/// Deadlines that a process may sleep before it counts as blocked. A slow disk takes more than one.
 pub(crate) const BLOCKED_DEADLINES: u32 = 4;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +30,7 @@ pub struct Activity {
 }
 
 impl Activity {
-    /// Returns whether a process without a sign of life for `age` is stopped, has run for the
+    /// Returns whether a process without a sign of life for `age` is stopped, has run for
     /// `deadline`, or sleeps.
     pub(crate) fn is_hung(&self, age: Duration, deadline: Duration) -> bool {
         let slept = age.saturating_sub(self.ran + self.starved);
@@ -48,8 +47,7 @@ pub(crate) struct Times {
 }
 
 impl Times {
-    /// Returns the times of process `pid`; `None` if it has ended or the kernel does not count
-    /// them.
+    /// Returns the times of process `pid`; `None` if it has ended or is not counted.
     pub(crate) fn of(pid: u32) -> Option<Self> {
         let [ran, _] = scheduled(&pid.to_string())?;
         let threads = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();

@@ -1,4 +1,4 @@
-//! Cleanup of ended processes' resources on the bus: places on topics, shared memory, node files.
+//! Cleanup of ended processes' places on topics, shared memory and node files on the bus.
 
 use std::time::{Duration, Instant};
 
@@ -6,12 +6,12 @@ use common::bus::Bus;
 
 use crate::{death::Death, stages};
 
-/// Longest interval between cleanups, because a consumer's end is not notified.
+/// Maximum interval between cleanups; a consumer's end is not notified.
 const PERIOD: Duration = Duration::from_secs(1);
 /// Delay after a stage's death.
 ///
-/// Another death often follows within it. A starved recorder meanwhile reads the stage's last
-/// samples; beside 13 busy processes per core 250 ms were too short.
+/// Another death often follows. A starved recorder meanwhile reads the stage's last samples; with
+/// 13 busy processes per core 250 ms were too short.
 const DELAY: Duration = Duration::from_secs(1);
 
 pub struct Cleanup {
@@ -30,7 +30,7 @@ impl Default for Cleanup {
 }
 
 impl Cleanup {
-    /// Records deaths of stages. Their successors have already started.
+    /// Records deaths of stages, whose successors have already started.
     pub fn on_deaths(&mut self, deaths: &[Death], bus: &Bus) {
         if deaths.is_empty() {
             return;
@@ -38,13 +38,13 @@ impl Cleanup {
         self.pending.extend(deaths.iter().map(|death| death.pid));
         self.deaths = (self.deaths.0 + deaths.len(), Instant::now());
         if deaths.iter().any(Death::was_refused) {
-            // An ended process may still hold the place that the successor needs.
+            // An ended process may hold the place that the successor needs.
             self.run(bus);
         }
     }
 
-    /// Cleans up if that is due: after deaths, once no stage is starting, because a starting stage
-    /// would wait. Many deaths hasten it, before places on the bus run out.
+    /// Cleans up after deaths once no stage is starting, because a starting stage would wait. Many
+    /// deaths hasten it, before places on the bus run out.
     pub fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
         let due = deaths > 0 && !any_starting || self.done.elapsed() >= PERIOD;

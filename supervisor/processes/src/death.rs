@@ -1,5 +1,4 @@
-//! Record of a stage's death. [`Death`] is a line of `deaths.jsonl`; the bus sample and the log
-//! line derive from it.
+//! Record of a stage's death, source of the `deaths.jsonl` line, the bus sample and the log line.
 
 use std::{
     fs::File,
@@ -24,7 +23,7 @@ pub struct Death {
     pub pid: u32,
     pub generation: u32,
     pub cause: ExitCause,
-    /// Whether the supervisor ended the process because it hung or was never ready.
+    /// Whether the supervisor ended the process as hung or never ready.
     pub hung: bool,
     pub noticed_after_s: Option<f64>,
     /// Age of the last beat; `None` if the process never beat.

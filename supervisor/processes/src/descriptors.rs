@@ -4,20 +4,20 @@ use std::fs;
 
 use rustix::process::{Resource, Rlimit, setrlimit};
 
-/// Descriptors that a supervisor needs: four per topic, 355 in all, and up to 14 per consumer of
-/// all topics. This leaves room for a dozen consumers.
+/// Descriptors of a supervisor: four per topic, 355 in all, and up to 14 per consumer of all
+/// topics, for a dozen consumers.
 pub(crate) const NEEDED: u64 = 512;
 
 /// Raises the soft limit of descriptors to the hard limit.
 ///
 /// # Errors
-/// Returns the limit if it is too low, because the middleware would report only some failure.
+/// Returns a limit that is too low, which the middleware would report vaguely.
 pub(crate) fn raise_limit() -> Result<(), u64> {
     let Some([_, hard]) = limits() else {
         return Ok(());
     };
     let limit = Rlimit { current: Some(hard), maximum: Some(hard) };
-    // Where raising fails, as under the service's unit, the present limit stays.
+    // Where raising fails, as under the service's unit, the soft limit stays.
     let _ = setrlimit(Resource::Nofile, limit);
     match limits() {
         Some([soft, _]) if soft < NEEDED => Err(soft),
@@ -25,8 +25,7 @@ pub(crate) fn raise_limit() -> Result<(), u64> {
     }
 }
 
-/// Returns the soft and the hard limit, if known. A service may be denied the system call, so the
-/// text in /proc is read.
+/// Returns the soft and hard limits from /proc; a service may lack the system call.
 fn limits() -> Option<[u64; 2]> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let line = limits.lines().find_map(|line| line.strip_prefix("Max open files"))?;

@@ -25,23 +25,23 @@ use crate::{
 };
 
 /// Shared memory for small topics: twice the measured size. The second term covers samples held by
-/// a frozen recorder: grids, and a page or more for each piece of `inputs` of five stages.
+/// a frozen recorder: grids, and at least a page per piece of `inputs` of five stages.
 const SMALL_TOPICS_BYTES: u64 = (16 << 20) + (32 << 20);
 /// Shared memory per map cell, bytes: one in `grid` and twelve in `field`, for eight samples under
 /// way at once.
 const CELL_BYTES: u64 = 8 * 13;
 
-/// Longest time that a killed supervisor holds its lock, even on a loaded machine.
+/// Maximum time that a killed supervisor holds its lock on a loaded machine.
 const LAST_HOLDER_ENDS: Duration = Duration::from_secs(1);
 
-/// Domain locked by this process. Dropping it removes all its files.
+/// Domain locked by this process. A drop removes all its files.
 pub struct DomainLock {
     domain: Domain,
     // The bus is dropped before the files are removed.
     bus: Option<(Services, Rc<Bus>)>,
-    // Held while the bus is made and removed, so that no stage joins meanwhile.
+    // Held while the bus changes, so that no stage joins.
     stages_lock: Option<File>,
-    // Held while the bus is made and removed, so that no consumer joins, except a stuck one.
+    // Held while the bus changes, so that no consumer joins, except a stuck one.
     joining_lock: Option<File>,
     cells: usize,
     /// Links to the run's directory, with their destinations.
@@ -49,13 +49,12 @@ pub struct DomainLock {
     /// Whether restoring failed, which is logged once.
     stays_missing: bool,
     lock: File,
-    // `None` if another user took the name. The claim is given up last.
+    // `None` if another user took the name. Dropped last.
     claim: Option<Claim>,
 }
 
 impl DomainLock {
-    /// Locks `domain`, removes an earlier supervisor's files, creates services for a map of `cells`
-    /// cells.
+    /// Locks `domain`, removes old files, creates services for a map of `cells` cells.
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
         descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
         // A robot whose directory was removed is still claimed.
@@ -80,7 +79,6 @@ impl DomainLock {
         Ok(acquired)
     }
 
-    /// Makes the bus, in place of an old, unused one.
     pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
         self.clear()?;
         check_shared_memory(SHARED_MEMORY, SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64)?;
@@ -90,7 +88,7 @@ impl DomainLock {
         Ok(())
     }
 
-    /// Removes the bus. No stage can join until there is a new one.
+    /// Removes the bus. Stages can join again once there is a new one.
     fn clear(&mut self) -> Result<(), DomainError> {
         self.bus = None;
         // A cleaner of temporary files may have removed the directory.
@@ -119,8 +117,7 @@ impl DomainLock {
 
     /// Restores missing files of the domain's directory; called a few times a second.
     ///
-    /// A cleaner of temporary files may remove them while the robot drives, and then no process
-    /// finds the robot.
+    /// A cleaner of temporary files may remove them while the robot drives, which hides the robot.
     pub fn restore(&mut self) {
         if let Some(claim) = &self.claim {
             claim.forget_askers();
@@ -141,7 +138,7 @@ impl DomainLock {
         if again.is_ok() || !self.stays_missing {
             tracing::warn!(
                 ?again,
-                "files of the robot were removed while it ran, and are made again"
+                "files of the robot were removed while it ran and are recreated"
             );
         }
         self.stays_missing = again.is_err();
@@ -160,7 +157,7 @@ impl DomainLock {
             remove_file(at)?;
             symlink(run, at).map_err(failed("make", at))?;
         }
-        // These come last: a consumer that waits for one finds all others.
+        // Last, because a consumer that waits for one expects all others.
         for file in [domain.stages_lock_file(), domain.joining_lock_file()] {
             let made = append(&file);
             made.map_err(failed("make", &file))?;
@@ -171,13 +168,13 @@ impl DomainLock {
 
 impl Drop for DomainLock {
     fn drop(&mut self) {
-        // The lock goes last, with its directory. A process that waits for it then makes its own.
+        // The lock goes last, with its directory. A waiting process then makes its own.
         let _ = self.clear();
         remove_directory_of(&self.domain);
     }
 }
 
-/// Removes all files of a domain whose stages have ended, for a supervisor that hangs.
+/// Removes all files of a domain without running stages, for a hung supervisor.
 pub(crate) fn remove_all(domain: &Domain) {
     let _ = wipe(domain);
     remove_directory_of(domain);
@@ -191,7 +188,7 @@ fn remove_directory_of(domain: &Domain) {
     let _ = fs::remove_dir(domain.directory());
 }
 
-/// Claims the robot. A killed supervisor holds its claim until the kernel has removed the process.
+/// Claims the robot. The kernel holds a killed supervisor's claim until it removes the process.
 fn claim(domain: &Domain) -> Result<Option<Claim>, DomainError> {
     let began = Instant::now();
     loop {
@@ -203,7 +200,7 @@ fn claim(domain: &Domain) -> Result<Option<Claim>, DomainError> {
     }
     let Ok(Some(process)) = domain.supervisor() else {
         tracing::warn!(
-            "another user has the name of the robot's claim: without its directory the robot is not found"
+            "another user holds the name of the robot's claim; if the robot's directory is removed, commands cannot find the robot"
         );
         return Ok(None);
     };
@@ -216,7 +213,7 @@ fn make_directory(domain: &Domain) -> Result<(), DomainError> {
     both.try_for_each(make_own_directory)
 }
 
-/// Makes a directory for its owner only, where another user may have made one before.
+/// Makes a directory for its owner only, in a place that other users can write.
 pub fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     match DirBuilder::new().mode(0o700).create(path) {
         Ok(()) => {}
@@ -234,7 +231,7 @@ pub fn make_own_directory(path: &Path) -> Result<(), DomainError> {
     Ok(())
 }
 
-/// Locks the domain. The file names the holder, for the error message of another supervisor.
+/// Locks the domain. The file names the holder for another supervisor's error message.
 fn lock(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.lock_file();
     let began = Instant::now();
@@ -248,7 +245,6 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
             Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
             Err(error) => return Err(failed("open", &path)(error)),
         };
-        // The kernel may still be removing a killed holder.
         let left = LAST_HOLDER_ENDS.saturating_sub(began.elapsed());
         if !orphans::locked_within(&file, left).map_err(failed("lock", &path))? {
             let holder = fs::read_to_string(&path).unwrap_or_default();
@@ -257,7 +253,7 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
                 holder: holder.trim().to_owned(),
             });
         }
-        // The previous holder may have removed the file between its opening and its locking here.
+        // The previous holder may have removed the file before this lock.
         let (ours, there) = (file.metadata(), fs::metadata(&path));
         if let (Ok(ours), Ok(there)) = (ours, there)
             && ours.ino() == there.ino()
@@ -275,10 +271,9 @@ fn remove_run(domain: &Domain) -> Result<(), DomainError> {
     files.iter().try_for_each(|file| remove_file(file))
 }
 
-/// Removes the user's own middleware files in this domain. Names of other users' files do not
-/// collide, because a new bus has random names.
+/// Removes the user's middleware files in this domain. A new bus has random names, without
+/// collisions with other users' files.
 fn wipe(domain: &Domain) -> Result<(), DomainError> {
-    // No process can join a bus without a configuration.
     remove_file(&domain.middleware_config())?;
     let directory = domain.directory();
     let configs = fs::read_dir(directory).map_err(failed("read", directory))?;
@@ -301,12 +296,12 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
             continue;
         }
         let path = entry.path();
-        // A consumer that leaves now removes its own files.
+        // A leaving consumer removes its own files.
         let Ok(found) = entry.metadata() else {
             continue;
         };
         if found.uid() != user {
-            tracing::warn!(file = %path.display(), owner = found.uid(), "a file of another user has a name of this robot; it is left alone");
+            tracing::warn!(file = %path.display(), owner = found.uid(), "a file of another user has a name reserved for this robot; it is kept");
         } else if found.is_dir() {
             remove_root(&path)?;
         } else {
@@ -316,8 +311,7 @@ fn wipe(domain: &Domain) -> Result<(), DomainError> {
     Ok(())
 }
 
-/// Removes the directory of a bus. It is renamed first, because a joining consumer would add files
-/// meanwhile.
+/// Removes a bus's directory, renamed first, because a joining consumer would add files.
 fn remove_root(root: &Path) -> Result<(), DomainError> {
     let aside = root.with_extension("old");
     remove_directory(&aside)?;
@@ -328,7 +322,7 @@ fn remove_root(root: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// Removes a file if it exists; a leaving consumer removes its own.
+/// Removes a file, which a leaving consumer may have removed.
 fn remove_file(path: &Path) -> Result<(), DomainError> {
     removed(fs::remove_file(path), path)
 }
@@ -344,7 +338,7 @@ fn removed(result: io::Result<()>, path: &Path) -> Result<(), DomainError> {
     }
 }
 
-/// Checks for space: use of a segment in a full file system raises SIGBUS.
+/// Checks for space: writing to a segment in a full file system raises SIGBUS.
 fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
     let space = rustix::fs::statvfs(mount).map_err(|error| DomainError::SharedMemory {
         problem: format!("cannot be examined: {error}"),
@@ -354,7 +348,7 @@ fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
     if free < needed {
         return Err(DomainError::SharedMemory {
             problem: format!("has {} MiB free of the {} MiB needed", free >> 20, needed >> 20),
-            remedy: "remove what fills it, enlarge it (docker: --shm-size), or lower perimeter.cells",
+            remedy: "free space in it, enlarge it (docker: --shm-size), or lower perimeter.cells",
         });
     }
     Ok(())
@@ -371,7 +365,7 @@ mod tests {
 
     use super::*;
 
-    /// Returns a domain unique to this process, so that a killed test does not affect the next.
+    /// Returns a domain unique to this process, independent of killed tests.
     fn domain(name: &str) -> Domain {
         Domain::of(format!("{name}-{}", std::process::id()).parse().unwrap())
     }

@@ -11,23 +11,23 @@ use crate::descriptors::NEEDED;
 #[derive(Debug, Error)]
 pub enum DomainError {
     #[error(
-        "robot {robot:?} is already supervised by process {holder}; stop that first, or give this one another name with --robot"
+        "robot {robot:?} is already supervised by process {holder}; stop that process first, or choose another name with --robot"
     )]
     Supervised { robot: String, holder: String },
     /// Killed stages of an earlier supervisor still run.
     #[error(
-        "robot {robot:?} is held by stages that do not end even when killed: {holders}; give this one another name with --robot, or restart the machine"
+        "robot {robot:?} is held by stages that survive a kill: {holders}; choose another name with --robot, or restart the machine"
     )]
     Orphans { robot: String, holders: String },
     #[error("{SHARED_MEMORY} {problem}; {remedy}")]
     SharedMemory { problem: String, remedy: &'static str },
     #[error(
-        "a process may have {limit} descriptors here, and a supervisor needs {NEEDED}; raise the limit (`ulimit -Hn`, systemd: LimitNOFILE=)"
+        "a process may have {limit} descriptors here, but a supervisor needs {NEEDED}; raise the limit (`ulimit -Hn`, systemd: LimitNOFILE=)"
     )]
     Descriptors { limit: u64 },
     #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
     Foreign { path: PathBuf },
-    #[error("cannot {action} {path}: {source}; is it writable and not full?", path = path.display())]
+    #[error("cannot {action} {path}: {source}; check that it is writable and has free space", path = path.display())]
     File { action: &'static str, path: PathBuf, source: io::Error },
     #[error(transparent)]
     Bus(#[from] BusError),

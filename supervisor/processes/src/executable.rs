@@ -6,8 +6,8 @@ use std::{
 };
 
 use rustix::fs::{Access, access};
-/// Returns the absolute path of `named`: a path from the current directory, or a plain name beside
-/// this executable or on `PATH`.
+/// Returns the absolute path of `named`: a path, or a plain name beside this executable or on
+/// `PATH`.
 pub fn find(named: &Path) -> io::Result<PathBuf> {
     let is_name = named.components().count() == 1 && !named.is_absolute();
     let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');

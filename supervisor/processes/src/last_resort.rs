@@ -1,9 +1,8 @@
-//! End of a run whose supervisor hangs. The middleware may wait forever for a file that another
-//! process truncated; then the loop ignores signals.
+//! End of a run whose supervisor hangs: the middleware may wait forever for a truncated file.
 //!
-//! A separate thread receives the signals too. If the loop makes no iteration for [`STUCK`] after a
-//! signal, the thread ends the stages and the process, and removes their files. The robot stands by
-//! then: its link stops it when the supervisor is silent, and an unrenewed command expires.
+//! A separate thread also receives the signals. If the loop makes no iteration for [`STUCK`] after
+//! a signal, the thread ends the stages and the process, and removes their files. The robot stands
+//! by then: its link stops it when the supervisor is silent, and an unrenewed command expires.
 
 use std::{
     fs,
@@ -33,7 +32,8 @@ const STUCK: Duration = Duration::from_secs(2);
 /// Exit code, as of any failed run.
 const FAILED: u8 = 1;
 
-const HANGS: &str = "the supervisor hangs, perhaps in a file of the bus that was changed; the stages and the run are ended";
+const HANGS: &str =
+    "the supervisor hangs, perhaps in a changed file of the bus; the run and its stages are ended";
 
 const LOOK_EVERY: Duration = Duration::from_millis(100);
 
@@ -49,8 +49,7 @@ impl Turns {
         self.count.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Sets whether the loop may pause: it waits with a time limit, or the stages have ended in
-    /// order.
+    /// Sets whether the loop may pause, in a timed wait or after the stages' end.
     pub fn rest(&self, rests: bool) {
         self.rests.store(rests, Ordering::Relaxed);
     }
@@ -62,21 +61,20 @@ impl Turns {
             if now != seen || self.rests.load(Ordering::Relaxed) {
                 (seen, stuck, waited) = (now, Duration::ZERO, processor_awaited(thread));
             }
-            // A loop that waits for a processor does not hang.
+            // A starved loop is alive.
             let waits = processor_awaited(thread).saturating_sub(waited);
             if stuck.saturating_sub(waits) >= STUCK {
                 return;
             }
             let began = Instant::now();
             thread::park_timeout(LOOK_EVERY);
-            // If this thread has to wait, the machine delays the loop, too.
+            // If this thread has to wait, so does the loop.
             stuck += began.elapsed().min(2 * LOOK_EVERY);
         }
     }
 }
 
-/// Returns the time for which `thread` was ready while others ran; zero if the kernel does not
-/// count it.
+/// Returns the time that `thread` waited for a processor; zero if uncounted.
 fn processor_awaited(thread: Pid) -> Duration {
     scheduled(&format!("self/task/{thread}")).map_or(Duration::ZERO, |[_, awaited]| awaited)
 }
@@ -98,7 +96,7 @@ pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
     });
 }
 
-/// Signals all children. They stay unreaped, so their ids are not reused.
+/// Signals all children. Unreaped, their ids are not reused.
 fn end_children(signal: Signal) {
     let Ok(threads) = fs::read_dir("/proc/self/task") else {
         return;

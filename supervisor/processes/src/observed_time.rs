@@ -1,12 +1,12 @@
-//! Time in which the supervisor ran. Only that counts for deadlines: a stage is not late because
-//! the machine or this process stood still.
+//! Time in which the supervisor ran, the only time for deadlines: a standstill of the machine or of
+//! this process makes no stage late.
 
 use std::time::{Duration, Instant};
 
 use crate::policy::Now;
 
-/// Excess over its plan beyond which a wait, or the work between two, does not count. Usually a
-/// wait is late by at most a hundredth of this.
+/// Excess of a wait, or of the work between two, beyond which it does not count. A wait is usually
+/// late by at most a hundredth of this.
 const TOLERANCE: Duration = Duration::from_millis(20);
 
 pub(crate) struct ObservedTime {
@@ -25,8 +25,8 @@ impl ObservedTime {
 
     /// Records that a wait planned to take at most `planned` ended at `now`.
     ///
-    /// Of a longer wait only [`TOLERANCE`] counts, because the standstill may have been anywhere in
-    /// it. It must count something, or a supervisor that is always late would miss everything.
+    /// Of a longer wait [`TOLERANCE`] counts, so that a supervisor that is always late still misses
+    /// deadlines.
     pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
         let took = self.since(now);
         self.observed += if took <= planned + TOLERANCE { took } else { TOLERANCE };
@@ -60,7 +60,6 @@ mod tests {
         let mut time = ObservedTime::new(began);
         // The work between two waits stalls.
         assert_eq!(time.at(began + 600 * MS), TOLERANCE);
-        // Several waits stall, so that the stages cannot beat between them.
         for stall in 1..=5 {
             time.on_waited(200 * MS, began + stall * 600 * MS);
             assert_eq!(time.at(began + stall * 600 * MS), stall * TOLERANCE);

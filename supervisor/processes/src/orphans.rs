@@ -1,8 +1,8 @@
-//! Stages that still run in a domain that a new supervisor has locked. It waits for them, and kills
-//! those that stay.
+//! Stages that still run in a domain that a new supervisor has locked. It waits for them, then
+//! kills them.
 //!
-//! Each stage holds a shared lock on one file of the domain while it runs, and stops when its
-//! supervisor ends. A frozen stage cannot stop, and is of no use.
+//! A running stage holds a shared lock on one file of the domain, and stops when its supervisor
+//! ends. A frozen stage cannot.
 
 use std::{
     fs::{self, File},
@@ -26,8 +26,8 @@ const JOINED_WITHIN: Duration = Duration::from_millis(300);
 /// Interval of lock attempts; a file lock has no descriptor to wait on.
 pub(crate) const RETRY: Duration = Duration::from_millis(10);
 
-/// Waits until no stage runs in the domain, before its files are removed. No stage can join while
-/// the result is held.
+/// Waits until no stage runs in the domain, before its files are removed. The result blocks joining
+/// stages.
 pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.stages_lock_file();
     let lock = File::create(&path).map_err(failed("make", &path))?;
@@ -38,7 +38,6 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     let holders = holders(&lock).map_err(failed("look for who locks", &path))?;
     for &pid in &holders {
         tracing::warn!(pid, "a stage has outlived its supervisor and is killed");
-        // A stage that has just ended needs no signal.
         let _ = signal(pid, &lock, Signal::KILL);
     }
     if locked_within(&lock, KILLED).map_err(system)? {
@@ -48,8 +47,8 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     Err(DomainError::Orphans { robot: domain.robot.to_string(), holders: holders.join(", ") })
 }
 
-/// Waits up to [`JOINED_WITHIN`] for joining consumers, because one may be frozen. None can begin
-/// to join while the result is held.
+/// Waits up to [`JOINED_WITHIN`] for joining consumers, which may be frozen. The result blocks
+/// further ones.
 pub(crate) fn wait_for_consumers(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.joining_lock_file();
     let lock = File::create(&path).map_err(failed("make", &path))?;

@@ -1,8 +1,7 @@
-//! A watchdog for unanswered inputs, because a stage may beat without publishing. Pure.
+//! Watchdog for unanswered inputs, because a stage may send heartbeats without publishing. Pure.
 //!
-//! A stage must publish an output for each tick that all its inputs have reached. So a stage
-//! without input is never late. If the pipeline stands still, the blame falls on the stage that
-//! stopped it: later stages have no input.
+//! A stage must publish an output for each tick that all its inputs have reached. If the pipeline
+//! stands still, the first stage with an unanswered input is to blame; later stages have none.
 
 use std::time::Duration;
 
@@ -53,7 +52,7 @@ impl OutputWatchdog {
         }
     }
 
-    /// Records the start of a generation of `stage`. Ticks under way belong to an earlier one.
+    /// Records a new generation of `stage`; ticks in progress belong to an earlier one.
     pub(crate) fn on_start(&mut self, stage: &str) {
         let newest = self.0.iter().filter_map(|output| output.published).max();
         if let Some(output) = self.find(stage) {
@@ -61,7 +60,7 @@ impl OutputWatchdog {
         }
     }
 
-    /// Clears unanswered inputs: the robot stands, so ticks may end within the pipeline.
+    /// Clears unanswered inputs, because ticks of a standing robot may end within the pipeline.
     pub(crate) fn clear_unanswered(&mut self) {
         for output in &mut self.0 {
             output.unanswered_since = None;
@@ -70,7 +69,7 @@ impl OutputWatchdog {
 
     /// Returns the first stage in pipeline order with an overdue answer.
     ///
-    /// Each stage has its own `now`, because waiting for a processor does not count.
+    /// Each stage's `now` excludes its waits for a processor.
     pub(crate) fn stale(&mut self, now: impl Fn(&str) -> Now) -> Option<&'static str> {
         let published: Vec<_> = self.0.iter().map(|it| (it.stage.name, it.published)).collect();
         let published = |writer: &str| published.iter().find(|(name, _)| *name == writer)?.1;
@@ -131,7 +130,6 @@ mod tests {
     #[test]
     fn a_stage_without_input_is_never_blamed() {
         assert_eq!(blamed(&mut published(&[])), None);
-        // The pose has reached the planner, the map has not.
         let mut watchdog = published(&[("dead-reckoning", 9), ("planner", 0), ("controller", 0)]);
         let blamed = blamed(&mut watchdog);
         for stage in ["mapper", "planner", "controller"] {

@@ -14,7 +14,7 @@ use crate::executable;
 /// The mission's planner executable cannot be started.
 #[derive(Debug, Error)]
 #[error(
-    "planner.executable {}: {problem}; give {}a path to an executable of a planner, a name on PATH, or leave the key out", named.display(),
+    "planner.executable {}: {problem}; give {}the path of a planner executable or a name on PATH, or omit the key", named.display(),
     others.iter().map(|other| format!("`{other}`, ")).collect::<String>()
 )]
 pub struct PlannerExecutableError {
@@ -37,8 +37,7 @@ pub fn resolve(
     Ok(())
 }
 
-/// Returns the planner of `firsthand stage NAME` among `others` that is `named`, or the
-/// executable's absolute path.
+/// Returns the planner among `others` that is `named`, or the executable's absolute path.
 ///
 /// # Errors
 /// Fails if it cannot be executed.

@@ -18,27 +18,25 @@ use std::{collections::VecDeque, time::Duration};
 
 use crate::{activity::Activity, stages::Deadlines};
 
-/// Time for which a generation must be ready to be stable, which resets the count of deaths in a
-/// row.
+/// Ready time after which a generation is stable, which resets the count of deaths in a row.
 pub const STABLE_AFTER: Duration = Duration::from_millis(500);
-/// Wait before the second start in a row; it doubles with each further one. Deaths during start-up
-/// are mostly chance, so it is shorter than a start.
+/// Wait before the second start in a row, doubled for each further one. Deaths at start-up are
+/// mostly chance, so it is shorter than a start.
 const FIRST_BACKOFF: Duration = Duration::from_millis(2);
-/// Longest wait between starts, short for a person who has repaired the cause.
+/// Maximum wait between starts, short for a person who has repaired the cause.
 const LONGEST_BACKOFF: Duration = Duration::from_secs(1);
 /// Deaths within [`HOLD_WINDOW`], or in a row without a stable generation, after which a stage is
 /// held.
 ///
-/// A stage that cannot run at all is held after two seconds. No person or test kills one stage that
-/// fast.
+/// A stage that cannot run is held after two seconds. People and tests kill a stage less often.
 pub const HOLD_AFTER: usize = 12;
 /// Window in which deaths are counted.
 pub const HOLD_WINDOW: Duration = Duration::from_secs(10);
 /// Starts in a row that the bus may have blocked before it is recreated. A single one may have met
-/// incomplete files of the previous generation, which are removed when that ends.
+/// incomplete files of the previous generation.
 const BLOCKED_STARTS: u32 = 2;
 const ABORT_GRACE: Duration = Duration::from_millis(100);
-/// Time for a terminated stage to stop in order. The link sends three datagrams in it.
+/// Time for a terminated stage to stop. The link sends three datagrams in it.
 pub const STOP_GRACE: Duration = Duration::from_millis(300);
 
 pub type Now = Duration;
@@ -53,13 +51,13 @@ pub enum Event {
     /// The process beats, but does not answer its inputs.
     OutputStale,
     Exited,
-    /// The process is reaped; its exit code says that the bus refused it.
+    /// The process is reaped; by its exit code the bus refused it.
     Refused,
     /// Request for a new generation, which releases a held stage.
     Replace,
     /// Request to stop without a successor.
     Stop,
-    /// Passage of time. Without the process's activity, all of it counts.
+    /// Passage of time; all of it counts without the process's activity.
     Time(Option<Activity>),
 }
 
@@ -81,7 +79,7 @@ pub enum Phase {
     BackingOff {
         until: Now,
     },
-    /// No process; after too many deaths only an operator starts it again.
+    /// No process until an operator starts the stage.
     Held,
     Starting {
         since: Now,
@@ -95,7 +93,7 @@ pub enum Phase {
         stability: Stability,
         kill: Now,
     },
-    /// Process asked to stop for its successor. Its end is no death.
+    /// Process asked to stop for its successor.
     Replaced {
         kill: Now,
     },
@@ -132,7 +130,6 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// Creates the policy of a stage that has never run.
     pub fn new(deadlines: Deadlines) -> Self {
         Self {
             deadlines,
@@ -152,7 +149,7 @@ impl Policy {
         self.phase
     }
 
-    /// Returns the time from which [`Event::Time`] is due; `None` if only other events matter.
+    /// Returns the time of the next [`Event::Time`]; `None` if only other events matter.
     pub fn deadline(&self) -> Option<Now> {
         match self.phase {
             Phase::Down | Phase::Held => None,
@@ -178,7 +175,7 @@ impl Policy {
                 Some(self.start(now))
             }
             (Phase::Starting { .. }, Event::StartFailed) => {
-                // Some resource is used up, so the next start waits.
+                // A resource is used up, so the next start waits.
                 self.deaths = self.deaths.max(1);
                 self.record_death(Stability::NeverReady, now)
             }
@@ -279,8 +276,8 @@ impl Policy {
         }
     }
 
-    /// Records the end of a generation that the bus may have blocked. The bus is recreated once
-    /// until a generation becomes ready.
+    /// Records the end of a generation that the bus may have blocked. The bus is recreated once per
+    /// ready generation.
     fn record_blocked_start(&mut self, now: Now) -> Option<Action> {
         self.blocked_starts = self.blocked_starts.saturating_add(1);
         let next = self.record_death(Stability::NeverReady, now);

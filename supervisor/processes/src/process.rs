@@ -1,5 +1,5 @@
-//! A process: a child started from this executable, or an external one. It is watched through a
-//! pidfd, signalled, and reaped if it is a child.
+//! A child process or an external one, watched through a pidfd, signalled, and reaped if it is a
+//! child.
 
 use std::{
     ffi::OsStr,
@@ -17,7 +17,7 @@ use common::{bus::close_all_on_exec, poll, stage_command, start::Generation};
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 
-/// Time in which the kernel ends a killed process, unless that hangs in the kernel itself.
+/// Time for a killed process to end, unless it hangs in the kernel.
 const KILLED_WITHIN: Duration = Duration::from_millis(50);
 
 /// This program, even if a rebuild has replaced its file.
@@ -42,7 +42,7 @@ pub fn stage(executable: Option<&Path>, generation: &Generation) -> Command {
 
 /// Returns the program of `stage`, and the stage's name there.
 ///
-/// An absolute `executable` is the program. Any other names a planner of this program.
+/// An absolute `executable` is the program; any other names a planner of this one.
 pub fn program_of<'a>(executable: Option<&'a Path>, stage: &'a str) -> (&'a Path, &'a str) {
     match executable {
         Some(path) if path.is_absolute() => (path, stage),
@@ -50,8 +50,7 @@ pub fn program_of<'a>(executable: Option<&'a Path>, stage: &'a str) -> (&'a Path
     }
 }
 
-/// Returns a command in its own process group, so that a terminal's Ctrl-C reaches only the
-/// supervisor.
+/// Returns a command in its own process group, out of reach of a terminal's Ctrl-C.
 pub fn child(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command
@@ -124,12 +123,12 @@ impl Process {
         }
     }
 
-    /// Watches the external process `id`, called `name`, which published a moment ago.
+    /// Watches the external process `id`, called `name`, which has just published.
     pub fn adopt(id: u32, name: &str) -> io::Result<Self> {
         let pid = i32::try_from(id).ok().and_then(Pid::from_raw);
         let pid = pid.ok_or(io::ErrorKind::NotFound)?;
         let pidfd = pidfd_open(pid, PidfdFlags::empty())?;
-        // The id may meanwhile belong to another process, which must not be signalled.
+        // The id may belong to another process by now.
         let called = fs::read_to_string(format!("/proc/{id}/comm"))?;
         if called.trim_end() != name {
             return Err(io::ErrorKind::NotFound.into());

@@ -1,5 +1,4 @@
-//! Files of records in the run directory, one JSON object a line. A failed write logs a warning,
-//! and the mission goes on.
+//! Record files in the run directory, one JSON object a line. A failed write only logs a warning.
 
 use std::{
     io::{self, Write as _},

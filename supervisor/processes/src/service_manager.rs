@@ -8,7 +8,7 @@ use sd_notify::NotifyState;
 const STATUS_EVERY: Duration = Duration::from_secs(1);
 
 pub struct ServiceManager {
-    /// Time without a notification after which systemd kills the process.
+    /// Silence after which systemd kills the process.
     watchdog: Option<Duration>,
     fed: Option<Instant>,
     shown: Option<Instant>,
@@ -39,8 +39,7 @@ impl ServiceManager {
         }
     }
 
-    /// Feeds the watchdog if that is due. Only the loop may call this: another thread would feed it
-    /// while the loop hangs.
+    /// Feeds the watchdog if due. Only the loop may call this, so that a hung loop is noticed.
     pub fn feed(&mut self) {
         if self.time_to_feed().is_some_and(|left| left.is_zero()) {
             self.fed = Some(Instant::now());

@@ -40,8 +40,7 @@ pub(crate) struct StageProcess {
     generation: u32,
     started: Now,
     beat: Option<Now>,
-    /// Times of the process at its start or last ready beat; `None` if the kernel does not count
-    /// them.
+    /// Process times at its start or last ready beat; `None` if uncounted.
     times: Option<Times>,
     pub output: Option<Now>,
     log_start: u64,
@@ -88,7 +87,7 @@ impl StageProcess {
         self.generation.saturating_sub(1)
     }
 
-    /// Watches the external process that published `health`, if it is a successor. Returns whether
+    /// Watches the external process that published `health`, if it is a successor; returns whether
     /// it is.
     pub(crate) fn adopt(&mut self, health: &HealthSample, now: Now) -> bool {
         // Beats of an ended process may still arrive.
@@ -137,9 +136,9 @@ impl StageProcess {
         });
         match spawned {
             Ok(process) => self.process = Some(process),
-            // The start is tried again with growing pauses, and the other stages go on.
+            // The start is retried with growing pauses; other stages go on.
             Err(error) => {
-                tracing::error!(stage, %error, "the stage cannot be started; are processes, descriptors or disk used up?");
+                tracing::error!(stage, %error, "the stage cannot be started; check the limits of processes and descriptors and the free disk space");
                 self.policy.step(Event::StartFailed, now);
             }
         }
@@ -181,15 +180,15 @@ impl StageProcess {
         self.times?.activity(self.pid())
     }
 
-    /// Returns `now` without the process's wait for a processor, as of its last beat.
+    /// Returns `now` without the process's waits for a processor.
     pub(crate) fn unstarved(&self, now: Now) -> Now {
         now.saturating_sub(self.times.unwrap_or_default().starved)
     }
 
     /// Returns the cause if the process has ended.
     ///
-    /// An unannounced end of an external process is reported one iteration later, because a last
-    /// beat may be unread.
+    /// An unannounced end of an external process is reported one iteration later, after a possible
+    /// last beat.
     pub(crate) fn try_reap(&mut self) -> Result<Option<ExitCause>, StageProcessError> {
         let Some(process) = &mut self.process else {
             return Ok(None);

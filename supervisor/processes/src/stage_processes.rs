@@ -1,5 +1,4 @@
-//! Stages of a run, each under its own policy, which turns beats, deaths and deadlines into
-//! actions.
+//! Stages of a run, each with a policy from beats, deaths and deadlines to actions.
 
 use std::{
     os::fd::{AsFd, BorrowedFd},
@@ -26,7 +25,7 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Starter {
     Supervisor,
-    /// Systemd or a person starts the stages, which are known once they beat.
+    /// Systemd or a person starts the stages; their beats make them known.
     External,
 }
 
@@ -63,8 +62,7 @@ impl StageProcesses {
         self.clock.at(Instant::now())
     }
 
-    /// Records the end of a wait planned to take at most `planned`. Excess time does not count
-    /// against the stages.
+    /// Records the end of a wait planned to take at most `planned`; excess time is ignored.
     pub fn on_waited(&mut self, planned: Duration) {
         self.clock.on_waited(planned, Instant::now());
     }
@@ -73,7 +71,7 @@ impl StageProcesses {
         self.stages.iter().position(|it| it.stage.name == stage)
     }
 
-    /// Starts every stage that is down, in order, from `first_tick` on. External stages start by
+    /// Starts every down stage, in order, from `first_tick` on. External stages start by
     /// themselves.
     pub fn start_all(&mut self, first_tick: u64) {
         self.ending = false;
@@ -120,7 +118,8 @@ impl StageProcesses {
         }
     }
 
-    /// Aborts a stage that beats without answering, while the robot drives and all stages run.
+    /// Aborts a stage that sends heartbeats without answering, while the robot drives and all
+    /// stages run.
     pub fn check_outputs(&mut self, driving: bool, first_tick: u64) {
         if !driving || !self.all_running() {
             self.watchdog.clear_unanswered();
@@ -133,7 +132,7 @@ impl StageProcesses {
             stage.map_or(now, |stage| stage.unstarved(now))
         };
         if let Some(stage) = self.watchdog.stale(unstarved) {
-            tracing::warn!(stage, "the stage beats but does not answer its inputs");
+            tracing::warn!(stage, "the stage sends heartbeats but does not answer its inputs");
             if let Some(index) = self.position(stage) {
                 self.apply(index, Event::OutputStale, now, first_tick);
             }
@@ -144,8 +143,7 @@ impl StageProcesses {
     /// Returns the deaths.
     pub fn poll(&mut self, bus: &Bus, first_tick: u64) -> Result<Vec<Death>, StageProcessError> {
         let mut deaths = Vec::new();
-        // Heartbeats were read until now. Later work may wait for the disk, which must not make a
-        // stage late.
+        // Heartbeats were read until now; later disk work must not make a stage late.
         let taken = self.now();
         for index in 0..self.stages.len() {
             if let Some(cause) = self.stages[index].try_reap()? {
@@ -163,7 +161,6 @@ impl StageProcesses {
                 let event = if death.was_refused() { Event::Refused } else { Event::Exited };
                 self.apply(index, event, self.now(), first_tick);
                 self.stages[index].record_next(&mut death, self.now());
-                // A stage that stopped on request did not die.
                 if asked {
                     tracing::info!(stage = death.stage, cause = %death.cause, "stage ended");
                 } else {
@@ -186,15 +183,15 @@ impl StageProcesses {
         self.ending = true;
     }
 
-    /// Replaces `stage` by a new generation from `first_tick` on. This releases a held stage.
+    /// Replaces `stage`, even if held, by a new generation from `first_tick` on.
     pub fn replace(&mut self, stage: &str, first_tick: u64) {
         if let Some(index) = self.position(stage) {
             self.apply(index, Event::Replace, self.now(), first_tick);
         }
     }
 
-    /// Stops all stages from the `first` of the start order on. Returns whether one of them still
-    /// has or awaits a process.
+    /// Stops all stages from the `first` of the start order on. Returns whether one has or awaits a
+    /// process.
     pub fn stop_from(&mut self, first: usize) -> bool {
         let mut any = false;
         for index in first..self.stages.len() {
@@ -281,7 +278,7 @@ impl StageProcesses {
     }
 }
 
-/// Stops the stages in reverse order, after an error too. The link comes last and stops the robot.
+/// Stops the stages in reverse order. The link comes last and stops the robot.
 impl Drop for StageProcesses {
     fn drop(&mut self) {
         while let Some(mut stage) = self.stages.pop() {

@@ -1,8 +1,8 @@
-//! Single table of a robot's stages and their deadlines. Each stage's crate declares the topics
-//! that it opens and the state that it persists.
+//! Single table of a robot's stages and deadlines. Each stage's crate declares its topics and
+//! persisted state.
 //!
 //! Start order, deadlines, `firsthand stage`, `firsthand stage list` and the documentation's tables
-//! come from this table.
+//! derive from it.
 
 use std::{path::Path, time::Duration};
 
@@ -31,12 +31,12 @@ pub struct Stage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Deadlines {
     pub startup: Duration,
-    /// Longest time between beats, which come every 150 ms or with a tick.
+    /// Maximum time between beats, which come every 150 ms or with a tick.
     ///
-    /// Waiting for a processor does not count, and a sleeping stage has four times as long: see
+    /// Waiting for a processor does not count; a sleeping stage has four times as long: see
     /// [`Activity`](crate::activity::Activity).
     pub heartbeat: Duration,
-    /// Longest time from a tick on the inputs to the output of that tick or a later one.
+    /// Maximum time from a tick on the inputs to the output of that tick or a later one.
     pub answers: Duration,
 }
 
@@ -57,7 +57,7 @@ impl Stage {
         Self::new::<Answers<A>>(replay::<A>, while_down)
     }
 
-    /// Returns the executable that `mission` names for this stage; `None` for `firsthand`'s own.
+    /// Returns the executable of this stage in `mission`; `None` for `firsthand`'s own.
     pub fn executable<'mission>(&self, mission: &'mission Mission) -> Option<&'mission Path> {
         let named = mission.planner.executable.as_deref();
         named.filter(|_| self.name == PLANNER)
@@ -73,14 +73,14 @@ impl Stage {
     }
 }
 
-/// Time for a stage to open its topics. Incomplete services, for example, block it. On a loaded
-/// machine of two cores the slowest start took a tenth of it.
+/// Time for a stage to open its topics, which incomplete services block. On a loaded machine of two
+/// cores the slowest start took a tenth of it.
 const STARTUP: Duration = Duration::from_secs(3);
 /// Five beats.
 ///
-/// A loaded machine with more stages than cores sometimes delays a beat by 200 ms. With 500 ms and
-/// a build on the same machine, three healthy stages were aborted in 70 missions. The robot's stop
-/// is independent of this: the link stops the robot when the command is stale.
+/// A loaded machine with more stages than cores sometimes delays a beat by 200 ms. With 500 ms
+/// during a build, three healthy stages were aborted in 70 missions. The link's stop on a stale
+/// command is independent of this.
 const HEARTBEAT: Duration = Duration::from_millis(750);
 /// Time for an answer; the slowest take a hundredth of it.
 const ANSWERS: Duration = Duration::from_secs(1);
@@ -92,15 +92,15 @@ const PLANNER_DEADLINES: Deadlines = Deadlines {
     answers: Duration::from_secs(4),
 };
 /// The mapper restores and publishes its whole map in one iteration. At 16.8 million cells no beat
-/// was late even without this allowance.
+/// was late even without this.
 const MAPPER_MILLION_CELLS: Duration = Duration::from_millis(100);
 /// A full solve, a keyframe of the field and the backlog may fall into one planner iteration.
 ///
-/// At 16.8 million cells its beats paused for more than 2 s forty times in a mission. With this
-/// allowance it was never late in a run of 97 s.
+/// At 16.8 million cells its beats paused for more than 2 s forty times in a mission; with this
+/// allowance, never in a run of 97 s.
 const PLANNER_MILLION_CELLS: Duration = Duration::from_millis(400);
 
-/// Name of the stage that gives guidance, for which a mission may name an executable.
+/// Stage that gives guidance, for which a mission may name an executable.
 pub const PLANNER: &str = "planner";
 
 const STOPPED: &str = "stopped by the link when the command is stale";
@@ -150,7 +150,7 @@ pub fn start_order() -> Vec<&'static Stage> {
                 !waiting.iter().any(|other| other.name == writer)
             })
         });
-        // If the inputs form a circle, the remaining stages start in the table's order.
+        // In a circle of inputs, the remaining stages start in the table's order.
         order.extend(next.or(waiting.first()));
     }
     order
@@ -168,7 +168,7 @@ mod tests {
                 let writer = input.spec().writer;
                 assert!(
                     [SUPERVISOR, OPERATOR].contains(&writer) || find(writer).is_some(),
-                    "{} reads {}, which nobody writes",
+                    "{} reads {}, which no stage writes",
                     stage.name,
                     input.spec().name
                 );

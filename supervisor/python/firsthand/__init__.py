@@ -1,9 +1,9 @@
-"""Robots that firsthand drives, for Python: their samples as they come, what they do, their recordings, and fixes for them.
+"""Python access to robots that firsthand drives: live samples, states, recordings and fixes.
 
     for pose in firsthand.follow("x80", "pose"):
         print(pose.x_m, pose.y_m)
 
-`firsthand.topics` has the structs of all topics; `help(firsthand.topics.Pose)` says what each field means. Names end with units.
+`firsthand.topics` has the structs of all topics, and `help(firsthand.topics.Pose)` explains the fields. Names end with units.
 """
 
 from .live import NotRunning, RobotState, Stage, fix, follow, publish, robot_state, robots, turn

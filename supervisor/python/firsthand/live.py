@@ -1,4 +1,4 @@
-"""Robots that run: what they publish, what they do, and what others publish for them."""
+"""Running robots: their samples, their state, and samples that programs publish for them."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ PATIENCE_S = 2.0
 
 
 class NotRunning(RuntimeError):
-    """The robot does not run here; `robots` are those that do."""
+    """The robot does not run on this machine. `robots` names those that do."""
 
     def __init__(self, robot: str) -> None:
         self.robots = robots()
-        others = f"these do: {', '.join(self.robots)}" if self.robots else "no other robot of this user does"
-        super().__init__(f"robot {robot!r} is not running here; {others}")
+        others = f"running: {', '.join(self.robots)}" if self.robots else "you run no robot on this machine"
+        super().__init__(f"robot {robot!r} is not running on this machine; {others}")
 
 
 def robots() -> list[str]:
-    """The names of the robots of this user that run on this machine."""
+    """Names of the robots that you run on this machine."""
     names = {name for place in topics.places() if os.path.isdir(place) for name in os.listdir(place)}
     return sorted(name for name in names if Follower(name)._supervised())
 
@@ -54,17 +54,16 @@ if TYPE_CHECKING:
 else:
 
     def follow(robot, *topics, events=False, name="python"):
-        """The samples of a robot as they come, from run to run; waits for a robot that does not run.
+        """Yield the samples of a robot over all its runs. Wait for a robot that does not run.
 
-        `for pose in follow("x80", "pose")` yields structs, whose fields' names end with their units; `follow("x80", "grid")` yields
-        `Sliced`. Of several topics it yields (topic, sample). With `events` it yields these also of one topic, and the events
-        ("here", None), ("gone", None) and, after a second without a sample, ("nothing", None). `name` is that of this program on the
-        robot's bus.
+        `follow("x80", "pose")` yields structs; the names of their fields end with the unit. `follow("x80", "grid")` yields `Sliced`.
+        For several topics, or with `events`, it yields (topic, sample). `events` adds ("here", None), ("gone", None) and, after a
+        second without a sample, ("nothing", None). `name` names this program on the robot's bus.
         """
         for topic in topics or [""]:
             if topic not in TOPICS:
                 meant = difflib.get_close_matches(topic, TOPICS, 1)
-                raise ValueError(f"no topic {topic!r}; " + (f"did you mean {meant[0]!r}?" if meant else f"there are {', '.join(TOPICS)}"))
+                raise ValueError(f"no topic {topic!r}; " + (f"did you mean {meant[0]!r}?" if meant else f"the topics are {', '.join(TOPICS)}"))
         return _follow(Follower(robot, topics, name), len(topics) == 1 and not events, events)
 
 
@@ -97,7 +96,7 @@ class _Joined:
         return self.follower._instance() == self.instance and self.follower._supervised()
 
     def read(self) -> dict[str, Any]:
-        """The newest sample of each topic; waits for the first ones."""
+        """Return the newest sample of each topic. Wait for the first ones."""
         until = time.monotonic() + PATIENCE_S
         while True:
             for topic, sample in self.follower._take(self.subscribers):
@@ -123,12 +122,12 @@ def _joined(robot: str) -> _Joined:
 def _now_ns(joined: _Joined) -> int:
     newest = joined.read()
     if "pose" not in newest:
-        raise TimeoutError(f"robot {joined.follower.robot!r} has no pose yet, which says what time of the mission it is; give capture_ns")
+        raise TimeoutError(f"robot {joined.follower.robot!r} has no pose yet, so the mission time is unknown; give capture_ns")
     return int(newest["pose"].stamp.stamp_ns)
 
 
 def publish(robot: str, topic: str, sample: topics.Struct) -> None:
-    """Publish a sample on a topic that consumers may write, as `beacon`. Raises NotRunning."""
+    """Publish a sample on a topic that consumers may write, such as `beacon`. Raises NotRunning."""
     _joined(robot).follower.publish(topic, sample)
 
 
@@ -144,14 +143,15 @@ def fix(
     capture_ns: int | None = None,
     source: str = "python",
 ) -> None:
-    """Tell a robot where a source outside, for example a camera, saw it: metres in the mission's frame, radians counter-clockwise from x.
+    """Publish a fix: the pose of a robot from an external source such as a camera. Metres in the mission's frame, radians
+    counter-clockwise from x.
 
-    `sd_m` is the standard deviation of x as of y, `sd_rad` that of the heading, `shared_sd_m` the part of `sd_m` that all fixes of
-    the source share. `capture_ns` is the mission time of the measurement, at most 2 s ago; without it that of the newest pose. Whether
-    the fix is used, `pose.fixes`, `pose.fixes_refused` and `pose.refusal` say. Raises NotRunning.
+    `sd_m` is the standard deviation of x and of y, `sd_rad` that of the heading. `shared_sd_m` is the part of `sd_m` that all fixes
+    of the source share. `capture_ns` is the mission time of the measurement, at most 2 s ago; the default is that of the newest pose.
+    `pose.fixes`, `pose.fixes_refused` and `pose.refusal` show whether the robot uses the fix. Raises NotRunning.
     """
     if (heading_rad is None) != (sd_rad is None):
-        raise ValueError("heading_rad and sd_rad go together: give both or neither")
+        raise ValueError("one of heading_rad and sd_rad is missing; give both or neither")
     joined = _joined(robot)
     sample = topics.Fix(x_m=x_m, y_m=y_m, heading_rad=math.nan if heading_rad is None else heading_rad, source=source.encode()[:24])
     sample.capture_ns = _now_ns(joined) if capture_ns is None else capture_ns
@@ -162,9 +162,9 @@ def fix(
 
 
 def turn(robot: str, turn_rad: float, *, sd_rad: float, capture_ns: int | None = None) -> None:
-    """Tell a robot how far its gyro turned since the turn before: radians counter-clockwise, with their standard deviation.
+    """Publish the turn of a robot's gyro since the previous call: radians counter-clockwise, with their standard deviation.
 
-    `capture_ns` is the mission time at which the increment ends; without it that of the newest pose. Call it from one thread. Raises
+    `capture_ns` is the mission time at which the turn ends; the default is that of the newest pose. Call it from one thread. Raises
     NotRunning.
     """
     joined = _joined(robot)
@@ -180,24 +180,24 @@ class Stage:
     generation: int
     restarts: int
     pid: int
-    """0 for none."""
+    """0 without a process."""
 
 
 @dataclass
 class RobotState:
-    """What a robot is doing; None for what it has not published."""
+    """State of a robot. None stands for a value that it has not published."""
 
     robot: str
     t_s: float = math.nan
     """Mission time."""
     pose: topics.Pose | None = None
     order: Order | int | None = None
-    """The supervisor's."""
+    """Order of the supervisor."""
     reason: HoldReason | int | None = None
-    """Why the robot is not ordered to drive."""
+    """Reason why the supervisor does not order the robot to drive."""
     target: topics.Target | None = None
     action: Action | int | None = None
-    """What the link's failsafe does."""
+    """Action of the link's failsafe."""
     cause: Cause | int | None = None
     stages: dict[str, Stage] = field(default_factory=dict)
 
@@ -223,7 +223,7 @@ def _named(kind: type[Byte], byte: int) -> Byte | int:
 
 
 def robot_state(robot: str = "x80") -> RobotState:
-    """What a robot is doing now. Raises NotRunning, which names the robots that run."""
+    """Return the current state of a robot. Raises NotRunning, which names the running robots."""
     newest = _Joined(robot, ["pose", "target", "roster", "link"]).read()
     state = RobotState(robot, pose=newest.get("pose"), target=newest.get("target"))
     if "link" in newest:

@@ -17,20 +17,20 @@ from .samples import Sliced
 
 Bytes = NDArray[np.uint8]
 Run = tuple[int, int, int]
-"""Bytes of a message, their place in a struct, their number."""
+"""Offset in a message, offset in a struct, number of bytes."""
 
 NUMBERS = {"uint8": "u1", "uint16": "u2", "uint32": "u4", "uint64": "u8", "int32": "i4", "int64": "i8", "float32": "f4", "float64": "f8"}
 
 
 def _dtype(name: str, structs: dict[str, list[str]]) -> np.dtype[Any]:
-    """The struct of a message in C, by the definition in the recording: of the version that wrote it."""
+    """Return the C struct of a message, by the definition in the recording, thus of the version that wrote it."""
     if name in NUMBERS:
         return np.dtype(NUMBERS[name])
     fields: list[Any] = []
     for line in structs[name]:
         match = re.fullmatch(r"([\w/]+?)(?:\[(\d*)\])? (\w+)", line)
         if match is None:
-            raise ValueError(f"the recording has a field {line!r}")
+            raise ValueError(f"the recording has an unknown field: {line!r}")
         kind, length, field = match.groups()
         if kind == "uint8" and length:
             fields.append((field, f"S{length}"))
@@ -41,7 +41,7 @@ def _dtype(name: str, structs: dict[str, list[str]]) -> np.dtype[Any]:
 
 
 def _runs(dtype: np.dtype[Any], at: int, into: int, runs: list[Run]) -> int:
-    """Add where the bytes of a struct are in a message, whose numbers are aligned to their size. Returns the end."""
+    """Append the places of a struct's bytes in a message, whose numbers are aligned to their size. Return the end."""
     if dtype.subdtype is not None:
         element, count = dtype.subdtype[0], int(np.prod(dtype.shape))
         first: list[Run] = []
@@ -74,7 +74,7 @@ def _add(run: Run, runs: list[Run]) -> None:
 
 
 def _decoded(messages: Bytes, dtype: np.dtype[Any], at: int = 0) -> Bytes:
-    """The bytes of a struct of each row."""
+    """Return the bytes of each row's struct."""
     runs: list[Run] = []
     if _runs(dtype, at, 0, runs) > messages.shape[1]:
         raise ValueError("a message of the recording is shorter than its definition")
@@ -85,7 +85,7 @@ def _decoded(messages: Bytes, dtype: np.dtype[Any], at: int = 0) -> Bytes:
 
 
 class Slices(Sequence["Sliced[Any]"]):
-    """The samples of a topic with slices: `headers`, a structured array, and `slices[i]`, a header with its array."""
+    """Samples of a topic with slices: `headers`, a structured array, and `slices[i]`, a header with its array."""
 
     def __init__(self, headers: NDArray[Any], element: np.dtype[Any], begin: int, messages: list[bytes]) -> None:
         self.headers = headers
@@ -111,7 +111,7 @@ class Slices(Sequence["Sliced[Any]"]):
 
 
 class Recording(Mapping[str, Any]):
-    """The topics of a recording: `recording["pose"]["x_m"]`.
+    """Topics of a recording: `recording["pose"]["x_m"]`.
 
     A topic is a structured array, whose first column `t_s` is mission time; one with slices is `Slices`. A topic is read when it is
     asked for, and then kept.
@@ -127,7 +127,7 @@ class Recording(Mapping[str, Any]):
         self.run: dict[str, str] = {}
         """Robot, mission, seed, build, machine and run file."""
         self.is_complete = True
-        """False if the recorder was killed, or its disk was full: the recording ends in the middle."""
+        """False if the recording is cut off, because the recorder was killed or its disk was full."""
         self._counts: dict[str, int] = {}
         for channel, schema, _ in self._messages():
             if schema.encoding == "ros2msg" and schema.name.startswith("firsthand/"):
@@ -202,5 +202,5 @@ class Recording(Mapping[str, Any]):
 
 
 def recording(path: str | os.PathLike[str]) -> Recording:
-    """The recording in a file, or all of those in the directory of a run."""
+    """Open the recording in a file, or all recordings in the directory of a run."""
     return Recording(path)

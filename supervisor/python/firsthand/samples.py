@@ -15,7 +15,7 @@ Header = TypeVar("Header")
 
 @cache
 def dtype_of(kind: Any) -> np.dtype[Any]:
-    """The type of ctypes for NumPy; arrays of characters are texts."""
+    """Return the NumPy type of a ctypes type. Arrays of characters become texts."""
     if issubclass(kind, ctypes.Array):
         length: int = kind._length_
         if kind._type_ is ctypes.c_char:
@@ -30,7 +30,7 @@ def dtype_of(kind: Any) -> np.dtype[Any]:
 
 
 class Sliced(Generic[Header]):
-    """A header and an array, as `header, elements = sample` too.
+    """Header and array, which also unpack: `header, elements = sample`.
 
     The array of `grid` and `field` is (rows, columns) of the window `sample.window` of the map, whose row 0 is the least y and column
     0 the least x. A live sample's array is a view of memory shared with the robot, and read-only. One may be kept while the next
@@ -57,7 +57,7 @@ class Sliced(Generic[Header]):
 
     @property
     def window(self) -> tuple[slice, slice]:
-        """The place of a part of a map: `whole[sample.window] = sample.elements`."""
+        """Place of a part in the whole map: `whole[sample.window] = sample.elements`."""
         part = self.header.part  # type: ignore[attr-defined]
         return np.s_[int(part.row) : int(part.row) + int(part.height), int(part.col) : int(part.col) + int(part.width)]
 
@@ -66,17 +66,17 @@ class Sliced(Generic[Header]):
 
 
 class Map:
-    """The whole map from its parts, live or recorded: keyframes and changed windows."""
+    """Whole map, built from live or recorded parts: keyframes and changed windows."""
 
     def __init__(self) -> None:
         self.cells: NDArray[Any] | None = None
-        """(rows, columns); None before the first keyframe, and after a part that was missed until the next keyframe."""
+        """(rows, columns). None before the first keyframe, and from a missed part to the next keyframe."""
         self.version = 0
         self.header: Any = None
-        """That of the newest part."""
+        """Header of the newest part."""
 
     def apply(self, sample: Sliced[Any]) -> bool:
-        """Take a part; returns whether there is a map now."""
+        """Apply a part. Return whether the map is known now."""
         part = sample.header.part
         version, side, empty = int(part.version), int(part.cells), sample.elements.size == 0
         if part.keyframe == 1 and sample.elements.shape == (side, side):

@@ -113,7 +113,7 @@ class Live(unittest.TestCase):
         self.assertEqual(state.target.target.x_m, 4)
         self.assertIsInstance(state.action, topics.Action)
         self.assertRegex(repr(state), r"^<robot ci-wheels at [\d.]+ s; (drive|hold) .*; target 1 of 1: \(4.000, 0.000\) m; link running in generation 1;")
-        with self.assertRaisesRegex(firsthand.NotRunning, "'nobody' is not running here; these do: .*ci-wheels") as raised:
+        with self.assertRaisesRegex(firsthand.NotRunning, "'nobody' is not running on this machine; running: .*ci-wheels") as raised:
             firsthand.robot_state("nobody")
         self.assertIn(ROBOT, raised.exception.robots)
         self.assertRaises(firsthand.NotRunning, firsthand.fix, "nobody", 0, 0, sd_m=0.1)

@@ -1,4 +1,4 @@
-//! Writer of a rosbag2 bag: a folder with `metadata.yaml` and an MCAP file of ROS 2 messages.
+//! Writer of a rosbag2 bag: a folder with `metadata.yaml` and an MCAP file.
 
 use std::{
     collections::BTreeMap,
@@ -38,8 +38,8 @@ impl Bag {
         Ok(Self { output, folder: folder.to_path_buf() })
     }
 
-    /// Adds a topic with the name and the definition of its type. Late joiners get its newest
-    /// message if it `is_latched`.
+    /// Adds a topic with the name and definition of its type. Late joiners get its newest message
+    /// if it `is_latched`.
     ///
     /// # Errors
     /// Fails if the file cannot be written.
@@ -49,7 +49,7 @@ impl Bag {
         self.output.add(topic, kind, "ros2msg", definition.as_bytes(), "cdr", &about)
     }
 
-    /// Adds a message in CDR, with its encapsulation.
+    /// Adds a CDR message with its encapsulation.
     ///
     /// # Errors
     /// Fails if the file cannot be written.

@@ -1,11 +1,10 @@
-//! Disk budget of a recorder. It limits each file to a share and an hour, and removes the oldest
-//! files.
+//! Disk budget of a recorder. Limits each file to a share and an hour; removes the oldest files.
 
 use std::{collections::VecDeque, fs, path::PathBuf, time::Duration};
 
 /// Files per budget, so that at least three quarters of it hold the newest samples.
 const FILES: u64 = 4;
-/// Longest time in one file. After days of waiting, a user opens only the hour in question.
+/// Maximum time in one file, so that a user opens only the hour in question.
 const LONGEST: Duration = Duration::from_secs(3600);
 
 pub(crate) struct Budget {

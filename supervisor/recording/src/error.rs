@@ -14,7 +14,7 @@ pub enum RecordingError {
     #[error("{0} holds no recording.mcap; give a recorded run or a recording")]
     NoRecording(PathBuf),
     #[error(
-        "{directory} contains several recordings, because the run was resumed or has a disk budget; give one of them, up to {last}"
+        "{directory} contains several recordings, because the run was resumed or has a disk budget; give one of them; the newest is {last}"
     )]
     Several { directory: PathBuf, last: PathBuf },
     #[error("{file} is not a recording of firsthand: {problem}; `firsthand record` makes one")]
@@ -24,7 +24,7 @@ pub enum RecordingError {
     )]
     Message { file: PathBuf, topic: String },
     #[error(
-        "{file} contains samples {schema:?} with other fields than those of this version; use the version that wrote it, which its record `run` names"
+        "{file} contains samples {schema:?} whose fields differ from those of this version; use the version that its record `run` names"
     )]
     Schema { file: PathBuf, schema: String },
     #[error(transparent)]

@@ -26,7 +26,7 @@ use crate::{
 
 /// Size at which a chunk is written before [`CHUNK_EVERY`], bytes.
 const CHUNK_BYTES: u64 = 1 << 19;
-/// Longest interval of chunks, the most that a killed recorder loses.
+/// Maximum interval of chunks, the loss of a killed recorder.
 const CHUNK_EVERY: Duration = Duration::from_secs(1);
 pub(crate) const RUN: &str = "run";
 pub(crate) const LOST: &str = "recorder";
@@ -48,10 +48,9 @@ pub fn now_ns() -> u64 {
 }
 
 impl RecordingFile {
-    /// Makes a file `about` a `run`, with channels for `topics` and for drawings in viewers.
+    /// Makes a file `about` a `run`, with channels for `topics` and viewers' drawings.
     ///
-    /// The file gets its name once all of that is written, so a file of this name is always
-    /// readable.
+    /// The file gets its name once these are written, so a named file is readable.
     pub(crate) fn create(
         path: &Path,
         topics: &[&'static dyn AnyTopic],
@@ -123,7 +122,7 @@ impl RecordingFile {
     /// Adds a topic's sample. Returns its log time.
     pub(crate) fn sample(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> Result<u64> {
         let mut times = [self.now_ns(); 2];
-        // An operator knows no mission time, and a heartbeat has that of the previous tick.
+        // An operator has no mission time; a heartbeat has the previous tick's.
         if ![OPERATOR, EVERY_STAGE].contains(&spec.writer) {
             self.newest = self.newest.max(stamp.time());
             times[1] = self.began_ns.saturating_add(stamp.stamp_ns);
@@ -157,7 +156,7 @@ impl RecordingFile {
         writer.flush().map_err(failed(path))
     }
 
-    /// Writes the rest, and the summary that serves as an index.
+    /// Writes the rest, and the summary, an index.
     pub(crate) fn finish(self) -> Result {
         self.output.finish().map(drop)
     }
@@ -178,7 +177,7 @@ impl Output {
             .compression(Some(Compression::Zstd))
             .compression_threads(0)
             .chunk_size(Some(CHUNK_BYTES))
-            // A complete chunk is written in one piece and never changed.
+            // A complete chunk is written at once and never changed.
             .disable_seeking(true);
         let writer = options.create(BufWriter::new(file)).map_err(failed(path))?;
         Ok(Self { writer, path: path.to_path_buf(), channels: HashMap::new() })

@@ -1,4 +1,4 @@
-//! New lines in the logs of a run's processes, in the run directory.
+//! New lines in the logs of a run's processes.
 
 use std::{
     collections::HashMap,
@@ -18,7 +18,7 @@ pub struct Tail {
 }
 
 impl Tail {
-    /// Returns the new whole lines of `file`, at most 64 KiB at once; none without the file.
+    /// Returns the new whole lines of `file`, at most 64 KiB at once.
     pub fn lines(&mut self, file: &Path) -> String {
         let mut bytes = vec![0; AT_ONCE];
         let read = File::open(file).and_then(|file| file.read_at(&mut bytes, self.read));
@@ -66,8 +66,7 @@ impl LogFiles {
         files.filter(|file| file.extension().is_some_and(|extension| extension == "log")).collect()
     }
 
-    /// Calls `each` with the process and the text of every new line. An unreadable log is retried
-    /// later.
+    /// Calls `each` with process and text of every new line. An unreadable log is retried later.
     pub fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
         for file in self.files() {
             let process = file.file_stem().map(|name| name.to_string_lossy().into_owned());

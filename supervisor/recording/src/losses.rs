@@ -1,4 +1,4 @@
-//! Detection of missing and repeated samples by their writers' numbers.
+//! Detection of missing and repeated samples by sequence number.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -20,7 +20,7 @@ struct Last {
 
 #[derive(Default)]
 pub(crate) struct Losses {
-    /// Whether the recorder preceded all writers, so that missing first samples count as lost.
+    /// Whether the recorder preceded all writers, so that missing first samples are losses.
     whole: bool,
     /// Last sample by topic, stage (if every stage writes the topic) and generation.
     last: HashMap<(&'static str, Name, u32), Last>,
@@ -34,8 +34,7 @@ impl Losses {
         Self { whole, ..Self::default() }
     }
 
-    /// Takes a sample. Returns whether it is new: a consumer that rejoins a bus receives each
-    /// writer's last sample again.
+    /// Takes a sample. Returns whether it is new: a rejoined bus repeats each writer's last sample.
     pub(crate) fn came(&mut self, spec: &Spec, stamp: &Stamp, message: &[u8]) -> bool {
         // Each request has its own writer.
         if spec.writer == OPERATOR {
@@ -58,8 +57,8 @@ impl Losses {
         last.is_none_or(|last| (now.sequence, now.crc32) != (last.sequence, last.crc32))
     }
 
-    /// Records that a bus was joined, perhaps the same again. Writers may have restarted, so
-    /// samples published meanwhile cannot be counted.
+    /// Records that a bus was joined, perhaps the same again. Samples of restarted writers cannot
+    /// be counted.
     pub(crate) const fn joined_again(&mut self) {
         self.bus += 1;
     }

@@ -15,8 +15,8 @@ pub(crate) fn numbered(out: &Path, number: u32) -> PathBuf {
     out.with_file_name(format!("{stem}-{number}.mcap"))
 }
 
-/// Returns the entries with recordings' names in a run's directory, by number. A resumed run begins
-/// another file, and so does a full one.
+/// Returns the recordings in a run's directory by number. A resumed run or a full file begins
+/// another.
 fn taken(run: &Path) -> BTreeMap<u32, PathBuf> {
     let first = run.join("recording.mcap");
     let paths = fs::read_dir(run).into_iter().flatten().flatten().map(|entry| entry.path());
@@ -34,8 +34,7 @@ pub fn next_place(run: &Path) -> PathBuf {
     numbered(&run.join("recording.mcap"), last.saturating_add(1))
 }
 
-/// Returns the recordings in a run's directory, in order. A recorder with a disk budget removes the
-/// oldest.
+/// Returns the recordings in a run's directory, in order; a disk budget removes the oldest.
 pub fn parts(run: &Path) -> Vec<PathBuf> {
     taken(run).into_values().filter(|file| file.is_file()).collect()
 }

@@ -6,7 +6,7 @@ const FIXED_64: u64 = 1;
 const BYTES: u64 = 2;
 const FIXED_32: u64 = 5;
 
-/// Message written field by field. As the encoding prescribes, zero numbers are left out.
+/// Message written field by field; zero numbers are omitted, as the encoding prescribes.
 #[derive(Default)]
 pub(crate) struct Message(Vec<u8>);
 

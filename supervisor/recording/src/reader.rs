@@ -1,4 +1,4 @@
-//! Reader of the file. It distrusts the content, and holds only one chunk in memory.
+//! Reader of the file. It validates all content, and holds one chunk in memory.
 
 use std::{
     collections::BTreeMap,
@@ -33,7 +33,7 @@ const LONGEST_RECORD: usize = 1 << 28;
 #[derive(Debug, PartialEq, Eq)]
 pub enum End {
     Complete,
-    /// The recorder was killed, or the disk was full: the file ends after the last whole chunk.
+    /// The recorder was killed, or the disk was full: the file ends after a whole chunk.
     Cut {
         after: Duration,
         problem: String,
@@ -48,7 +48,7 @@ pub struct Recording {
     pub run: Run,
     pub build: String,
     pub machine: String,
-    /// Time when the recorder was attached; empty in a recording of an earlier version.
+    /// Attach time of the recorder; empty in older recordings.
     pub began: String,
     pub end: End,
     pub counts: BTreeMap<String, u64>,
@@ -81,8 +81,8 @@ pub struct SliceSample<H, T> {
 }
 
 impl Recording {
-    /// Reads the run, the counts and the end of the recording at `path`, a file or a run's
-    /// directory. The file is read once and streamed.
+    /// Reads run, counts and end of the recording at `path`, a file or a run's directory. Streams
+    /// the file once.
     pub fn open(path: &Path) -> Result<Self> {
         if path.is_dir() {
             return match &parts(path)[..] {
@@ -123,14 +123,15 @@ impl Recording {
         let foreign =
             |problem: String| RecordingError::Foreign { file: path.to_path_buf(), problem };
         let Some(mut about) = about else {
-            let problem =
-                problem.unwrap_or_else(|| "it does not say of which run it is".to_owned());
+            let problem = problem.unwrap_or_else(|| "it names no run".to_owned());
             return Err(foreign(problem));
         };
         let mut about = |key| about.remove(key).unwrap_or_default();
         let run_text: String = about("run_toml");
         let run = Run::parse(&run_text, path).map_err(|error| match error {
-            RunError::Content { problem, .. } => foreign(format!("its run is unknown: {problem}")),
+            RunError::Content { problem, .. } => {
+                foreign(format!("its run cannot be read: {problem}"))
+            }
             other => other.into(),
         })?;
         let after = bounds.map_or(0, |(from, to)| to - from);
@@ -157,7 +158,7 @@ impl Recording {
         if let End::Cut { after, problem } = &self.end {
             let after_s = after.as_secs_f64();
             gaps.push(format!(
-                "{name} is cut off after {after_s:.1} s: {problem}. What came later is missing."
+                "{name} is cut off after {after_s:.1} s: {problem}. Later data is missing."
             ));
         }
         let lost: u64 = self.lost.values().sum();
@@ -167,8 +168,8 @@ impl Recording {
         gaps
     }
 
-    /// Returns the messages of the topics in `wanted`, or of all if that is empty, in file order.
-    /// They end where the file is cut.
+    /// Returns the messages of the topics in `wanted`, or of all if empty, in file order up to a
+    /// cut.
     pub fn messages(&self, wanted: &[&str]) -> Result<Messages> {
         Ok(Messages {
             records: Some(Records::open(&self.path)?),
@@ -231,7 +232,7 @@ pub struct Messages {
 }
 
 impl Messages {
-    /// Returns the next message; `None` at the end of the file, or where it is cut.
+    /// Returns the next message; `None` at the end or cut.
     fn read(&mut self) -> Result<Option<Message>> {
         let Some(records) = &mut self.records else {
             return Ok(None);
@@ -380,7 +381,6 @@ mod tests {
         let own = schema::of(&topics::POSE).text;
         let other = refused(&own.replacen("float64 x_m", "float32 x_m", 1), "");
         assert!(matches!(other, RecordingError::Schema { .. }), "{other}");
-        // Extra comments in the schema are accepted; the run file's unknown keys are refused.
         let other = refused(&format!("# More.\n{own}"), "firsthand = '99.0.0'\nrobots = 2");
         assert!(matches!(other, RecordingError::Run(RunError::OtherVersion { .. })), "{other}");
         assert!(other.to_string().contains("99.0.0"), "{other}");

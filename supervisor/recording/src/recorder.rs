@@ -1,9 +1,9 @@
 //! Recorder: a consumer that attaches to a robot at any time, records all topics, and follows the
 //! robot from run to run.
 //!
-//! It holds only the chunk to be written next. On a slow disk or a busy machine, samples that
-//! overflow the bus's buffers are lost and counted. No stage waits for it. A run waits for its own
-//! recorder at its end, and in lockstep from time to time.
+//! It holds only the next chunk. On a slow disk or a busy machine, samples that overflow the bus's
+//! buffers are lost and counted. No stage waits for it. A run waits for its own recorder at its
+//! end, and in lockstep from time to time.
 
 use std::{
     collections::BTreeMap,
@@ -36,9 +36,9 @@ use crate::{
     viewers::{self, Drawn},
 };
 
-/// Longest interval of checks for a run. A late recorder misses its first samples.
+/// Maximum interval of checks for a run. A late recorder misses the first samples.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
-/// Longest interval of bus reads. Events wake the recorder before a buffer is full, except for
+/// Maximum interval of bus reads. Events wake the recorder before a buffer is full, except for
 /// scans. The scan buffer lasts 0.4 s with a laser at 40 Hz at four times its pace.
 const READ_EVERY: Duration = Duration::from_millis(100);
 const LOGS_EVERY: Duration = Duration::from_millis(250);
@@ -55,9 +55,9 @@ pub struct Options {
     pub topics: Option<Vec<&'static dyn AnyTopic>>,
     /// Whether to record topics that the table logs only with fields.
     pub fields: bool,
-    /// Directory of the only run to record; `None` to find it and follow the robot from run to run.
+    /// Directory of the only run to record; `None` to follow the robot from run to run.
     pub run: Option<PathBuf>,
-    /// Most bytes of all files, enforced by removing the oldest; `None` for no limit.
+    /// Maximum bytes of all files; the oldest are removed.
     pub budget: Option<u64>,
 }
 
@@ -78,9 +78,9 @@ impl Options {
 /// Events for the caller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Happened<'a> {
-    /// The recorder is attached, and records into this file from now on.
+    /// The recorder is attached, and records into this file.
     Attached(&'a Path),
-    /// All samples published before the caller's request are taken.
+    /// All samples before the caller's request are taken.
     CaughtUp,
     /// A file is complete, with this number of lost samples.
     Complete(&'a Path, u64),
@@ -98,7 +98,7 @@ pub enum Wish {
 pub trait Wishes {
     fn next_wish(&mut self) -> Wish;
 
-    /// Returns descriptors that are readable when another request may be there.
+    /// Returns descriptors that become readable on another request.
     fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
         Vec::new()
     }
@@ -114,7 +114,7 @@ type TopicReader = (&'static dyn AnyTopic, Box<dyn AnyReader>);
 /// The readers of one bus.
 type Readers = Vec<TopicReader>;
 
-/// Records until the caller requests a stop, or a single run until its end.
+/// Records until the caller requests a stop, or a single run ends.
 pub fn record(
     options: &Options,
     wishes: &mut dyn Wishes,
@@ -128,9 +128,9 @@ pub fn record(
         chosen.iter().map(read).collect()
     };
     let domain = options.domain.clone();
-    // Besides LINK, which ends a tick, three more topics wake the recorder. INPUTS marks the start
-    // of a generation, which may be killed soon. The others prevent losses at the end of their
-    // processes and overflow of buffers without events.
+    // LINK ends a tick; three more topics wake the recorder. INPUTS marks the start of a
+    // generation, which may be killed soon. The others prevent losses at their processes' ends and
+    // overflow of buffers without events.
     let mut follower = Follower::new(domain, "recorder", &topics::LINK, open).also_on([
         &topics::INPUTS as &'static dyn AnyTopic,
         &topics::WIRE,
@@ -161,7 +161,6 @@ pub fn record(
         if joins && let Some(run) = find_run(options) {
             joins = false;
             let holder = options.domain.supervisor().ok().flatten();
-            // Another supervisor resumes the run, and starts its own recorder.
             if options.run.is_some() && supervisor.is_some() && supervisor != holder {
                 if let Some(ended) = current.take() {
                     ended.finish(tell)?;
@@ -169,7 +168,7 @@ pub fn record(
                 return Ok(());
             }
             supervisor = holder;
-            // Samples of a bus that was recreated within the run go into the same file.
+            // A bus recreated within the run continues the file.
             if let Some(ended) = current.take_if(|current| !current.is_of(&run)) {
                 let file = ended.finish(tell)?;
                 if let Some(budget) = &mut budget {
@@ -226,12 +225,12 @@ pub fn record(
     }
 }
 
-/// Yields to stages that answer a robot, once the recorder is attached; until then it misses
-/// samples. In lockstep no robot waits, and a slow recorder would lose samples.
+/// Yields to stages that answer a robot, once attached. In lockstep no robot waits, and a slow
+/// recorder would lose samples.
 fn give_way(run: Option<&Run>) {
     let in_lockstep = run.is_some_and(|run| matches!(run.clock, MissionClock::Ticks { .. }));
     if !in_lockstep && rustix::process::getpriority_process(None).is_ok_and(|nice| nice < NICE) {
-        // If the kernel refuses, the recorder competes with the stages.
+        // Otherwise the recorder competes with the stages.
         let _ = rustix::process::setpriority_process(None, NICE);
     }
 }
@@ -309,8 +308,9 @@ impl CurrentRun {
         self.directory == run
     }
 
-    /// Takes all samples there are. A process that ends before a reader was connected to it takes its samples along, so the first reader,
-    /// that of the inputs, is connected again before each other one: outputs are recorded only after what they follow from.
+    /// Takes all samples. A process that ends takes unread samples along, so the first reader, that
+    /// of the inputs, is reconnected before each other one: outputs are recorded only after their
+    /// causes.
     fn take(&mut self, readers: &mut Readers) -> Result {
         let Some((first, others)) = readers.split_first_mut() else { return Ok(()) };
         for other in others {
@@ -368,7 +368,6 @@ impl CurrentRun {
     }
 }
 
-/// Returns the build: version and checksum of this executable.
 fn build() -> String {
     let crc = File::open("/proc/self/exe").and_then(checksum).unwrap_or_default();
     format!("{}, executable crc32 {crc:08x}", env!("CARGO_PKG_VERSION"))
@@ -440,8 +439,8 @@ mod tests {
                 let began = Instant::now();
                 let mut wish = || {
                     rounds.fetch_add(1, Ordering::Relaxed);
-                    // A stopped recorder completes its file too, so it is stopped only after the
-                    // test has failed.
+                    // A stopped recorder also completes its file, so it is stopped only after a
+                    // failure.
                     let failed = began.elapsed() > PATIENCE * 4;
                     let over = failed || complete.load(Ordering::Relaxed) > 0;
                     if over { Wish::Stop } else { Wish::Record }
@@ -456,7 +455,6 @@ mod tests {
             });
             assert!(until(&|| attached.load(Ordering::Relaxed) > 0));
             fs::remove_file(domain.middleware_config()).unwrap();
-            // By then the recorder knows that the bus is gone.
             let known = rounds.load(Ordering::Relaxed) + 5;
             assert!(until(&|| rounds.load(Ordering::Relaxed) >= known));
             assert_eq!(complete.load(Ordering::Relaxed), 0, "the supervisor has not ended");

@@ -26,14 +26,13 @@ const MOVERS: &str = "foxglove/movers";
 pub const LOG: &str = "log";
 
 const MAP: &str = "map";
-/// Frame of the robot: its centre, x ahead. Each sensor has a frame of its name.
+/// Frame of the robot: its centre, x ahead. Each sensor's frame has its name.
 const BASE: &str = "base_link";
 /// Mission time between scenes and between maps, nanoseconds.
 const EVERY_NS: u64 = 1_000_000_000;
-/// Most cells per side of a drawn map; in a larger one a drawn cell covers several.
+/// Maximum cells per side of a drawn map; in a larger one a drawn cell covers several.
 const MOST_A_SIDE: usize = 1024;
-/// Names of a drawn cell's bytes. `state` is a [`CellState`]; viewers use the other four as its
-/// default colour.
+/// Names of a drawn cell's bytes: `state` is a [`CellState`], the others its default colour.
 const CELL: [&str; 5] = ["state", "red", "green", "blue", "alpha"];
 
 static DRAWN: [&dyn AnyTopic; 5] =
@@ -101,10 +100,9 @@ impl Drawn {
         }
     }
 
-    /// Passes the drawings of a `message` of `topic` to `sink`.
+    /// Passes the drawings of a `message` of `topic` to `sink`, at `now_ns` since 1970.
     ///
-    /// Viewers play it at `now_ns`, nanoseconds since 1970. Unknown topics and malformed messages
-    /// are ignored.
+    /// Ignores unknown topics and malformed messages.
     pub fn message(&mut self, topic: &str, message: &[u8], now_ns: u64, sink: Sink<'_>) {
         let is_drawn = DRAWN.iter().any(|drawn| drawn.spec().name == topic);
         let Some(sample) = is_drawn.then(|| Sample::decoded(topic, message)).flatten() else {
@@ -136,7 +134,7 @@ impl Drawn {
             sink(GRID, grid(frame, map.cells(), time).bytes());
         }
         let movers: Vec<_> = header.drawn_movers().collect();
-        // Without movers the entity is sent once more, empty, to replace the last ones.
+        // Without movers an empty entity replaces the last ones.
         if std::mem::replace(&mut self.has_movers, !movers.is_empty()) || self.has_movers {
             sink(MOVERS, Message::default().part(2, &drawn_movers(&movers, time)).bytes());
         }
@@ -204,8 +202,7 @@ fn entity(time: &Message, id: &str, frame: &str) -> Message {
     framed(time, frame).text(3, id).integer(5, true.into())
 }
 
-/// Returns a `SceneEntity` of movers: discs, arrows to their places in 1 s, discs that bound their
-/// surfaces, and speeds.
+/// Returns a `SceneEntity` of movers: discs, arrows to their places in 1 s, bounding discs, speeds.
 fn drawn_movers(movers: &[&Mover], time: &Message) -> Message {
     let at =
         |mover: &Mover| Pose2 { position: mover.place(), heading: mover.velocity().to_angle() };
@@ -296,8 +293,8 @@ const fn paint(state: CellState) -> [u8; 4] {
     }
 }
 
-/// Returns a `LaserScan`. A sonar's echo covers the whole arc, a ray's only its end. A reading
-/// without an echo has no points.
+/// Returns a `LaserScan`. A sonar's echo covers the whole arc, a ray's its end. A reading without
+/// an echo has no points.
 fn scan(sensor: &Sensor, reading: &RangeReading, time: &Message) -> Message {
     let half = sensor.field_of_view_deg.to_radians() / 2.0;
     // Viewers divide by the number of angles between points, so a ray has two points.
@@ -342,8 +339,8 @@ pub fn log(process: &str, line: &str, now_ns: u64, sink: Sink<'_>) {
 const LOG_MESSAGE: u64 = 3;
 const LOG_NAME: u64 = 4;
 
-/// Returns a line's level in Foxglove's schema. Lines without a level explain the end of a process,
-/// so they are errors.
+/// Returns a line's level in Foxglove's schema. Lines without a level explain a process's end, so
+/// they are errors.
 fn level(line: &str) -> u64 {
     let levels = ["DEBUG", "INFO", "WARN", "ERROR"];
     let named = (1..)
@@ -352,7 +349,7 @@ fn level(line: &str) -> u64 {
     named.map_or(4, |(number, _)| number)
 }
 
-/// Returns process and text of a message of the channel `log`. Older recordings have JSON.
+/// Returns process and text of a `log` message, JSON in older recordings.
 pub fn log_line(message: &[u8]) -> Option<(String, String)> {
     if message.first() == Some(&b'{') {
         let mut fields: BTreeMap<String, serde_json::Value> =

@@ -1,5 +1,4 @@
-//! Map and its field at a few moments of a run. Fields are computed, because recordings contain
-//! none by default.
+//! Map and field at a few moments of a run. The field is computed; recordings omit it by default.
 
 use common::{
     mission::Mission,
@@ -10,7 +9,7 @@ use page::blob;
 use planner::step::Planner;
 use robot_state::drop_every_second;
 
-/// Most maps. Beyond it, every second one is dropped, and half as many are taken from then on.
+/// Maximum maps. Beyond it, every second one is dropped, and sampling halves.
 const MOST: usize = 8;
 /// First period of maps, seconds of mission time.
 const FIRST_APART_S: f64 = 2.0;
@@ -27,7 +26,7 @@ struct Belief {
 }
 
 impl Belief {
-    /// Returns the map's field as a message of the page, as the planner computes it, if it exists.
+    /// Returns the map's field as a message of the page, as the planner computes it.
     fn field(&self, mission: &Mission) -> Option<Vec<u8>> {
         let mut planner = Planner::new(mission);
         let target = TargetPoint::at(self.target);
@@ -52,7 +51,6 @@ impl Default for Beliefs {
 }
 
 impl Beliefs {
-    /// Takes the map `cells` at `time_s`, with the robot's present `target`.
     pub(crate) fn push(&mut self, time_s: f64, target: DVec2, header: &GridHeader, cells: &[u8]) {
         if self.held.last().is_some_and(|last| time_s < last.time_s + self.apart_s) {
             return;

@@ -25,12 +25,11 @@ use crate::{
 };
 
 const LOG: &str = "log";
-/// Most bytes of the ground truth: an hour at 10 Hz takes 10 MB.
+/// Maximum bytes of ground truth: an hour at 10 Hz takes 10 MB.
 const LARGEST_TRUTH: u64 = 1 << 28;
 /// Least mission time between two maps, seconds.
 const MAP_EVERY_S: f64 = 0.5;
-/// Most rows, states and events of a page. The page shows the beginning of a longer run; metrics
-/// count all.
+/// Maximum rows, states and events of a page, from the beginning of a run; metrics count all.
 const MOST: usize = 60_000;
 const MOST_MAPS: usize = 2400;
 
@@ -41,7 +40,6 @@ pub(crate) struct Content {
     about: Vec<(&'static str, String)>,
     pub(crate) remarks: Vec<String>,
     pub(crate) summary: Map<String, Value>,
-    /// Row of the front sonar; `None` for a robot without sonars.
     front: Option<usize>,
     pub(crate) measured: Measured,
     pub(crate) heard: Hearer,
@@ -107,7 +105,6 @@ impl Content {
         Ok(())
     }
 
-    /// Takes a message. Returns `None` if it does not match its topic.
     fn take(&mut self, message: &Message) -> Option<()> {
         if *message.topic == *LOG {
             let (process, line) = recording::log_line(&message.data)?;
@@ -115,7 +112,6 @@ impl Content {
             return Some(());
         }
         let sample = Sample::decoded(&message.topic, &message.data)?;
-        // Ground truth of another tick waits in the collector.
         if let Sample::Pose(_) = sample {
             while let Some(Ok(line)) = self.truth.as_mut().and_then(Iterator::next) {
                 if !self.collector.truth(&line) {
@@ -214,7 +210,7 @@ impl Content {
         match (self.outcome(), reason) {
             (Some(outcome), Some(reason)) => format!("{outcome}: {reason}"),
             (Some(outcome), None) => outcome.to_owned(),
-            (None, _) => "No summary of this run lies beside the recording: how it ended is not known here, and metrics are those of the recording.".to_owned(),
+            (None, _) => "The recording has no summary beside it: the run's end is unknown, and the metrics are those of the recording.".to_owned(),
         }
     }
 

@@ -39,11 +39,10 @@ use self::{content::Content, source::Source};
 
 pub const PAGE: &str = "report.html";
 
-/// Writes the report of `run`, a run's directory or a recording, into `out`. Returns the path of
-/// the page.
+/// Writes the report of `run`, a run's directory or a recording, into `out`. Returns the page's
+/// path.
 ///
-/// By default `out` is `report` in the run's directory, or `F-report` beside the recording
-/// `F.mcap`.
+/// Default of `out`: `report` in the run's directory, or `F-report` beside the recording `F.mcap`.
 pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, RecordingError> {
     let source = Source::find(run)?;
     let out = out.map_or_else(|| source.default_out(), Path::to_path_buf);

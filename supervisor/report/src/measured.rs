@@ -12,7 +12,6 @@ pub(crate) struct Measured {
     pub(crate) time_s: f64,
     pub(crate) path_m: f64,
     pub(crate) last_pose: Option<PoseSample>,
-    /// Speed v of the newest pose with valid speeds.
     last_speed: Option<f64>,
     speed_change: f64,
     changes: u64,
@@ -24,8 +23,7 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// Takes a pose. If a late machine receives two ticks together, the speed is invalid: a
-    /// distance divided by almost no time.
+    /// Takes a pose. Two ticks received together by a late machine make its speed invalid.
     pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) {
         self.ticks += 1;
         self.time_s = self.time_s.max(pose.stamp.time().seconds());
@@ -61,12 +59,12 @@ impl Measured {
         share(self.speed_change, self.changes)
     }
 
-    /// Returns the share of ticks without a distance from the sonar.
+    /// Returns the share of ticks without a sonar distance.
     pub(crate) fn unavailable(&self) -> Option<f64> {
         share(self.unavailable as f64, self.ranges)
     }
 
-    /// Returns the share of ticks with a reading below the range in which hits are mapped.
+    /// Returns the share of ticks with a reading below the mapping range.
     pub(crate) fn near(&self) -> Option<f64> {
         share(self.near as f64, self.ranges)
     }

@@ -1,5 +1,5 @@
-//! Table of metrics, under their field names. Values come from the run's summary, which knows a
-//! simulated robot's ground truth, or else from the recording, which knows the robot's estimate.
+//! Table of metrics, under their field names, from the run's summary with a simulated robot's
+//! ground truth, or else from the recording with the robot's estimate.
 
 use common::samples::PoseSample;
 use serde_json::{Value, json};
@@ -14,8 +14,7 @@ fn shown(value: Option<f64>, digits: usize, unit: &str) -> String {
     }
 }
 
-/// Returns the success weighted by path length: 1 for the shortest path, 0 if the target was not
-/// reached.
+/// Returns the success weighted by path length; 0 without success.
 fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     if !content.outcome()?.starts_with("reached") {
         return Some(0.0);
@@ -27,8 +26,8 @@ fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
     Some(shortest / path?.max(shortest))
 }
 
-/// Returns the rows of the page's table: the name in the literature, the value with its unit or a
-/// dash, and the field in `summary.json` or the formula.
+/// Returns the page's rows: name in the literature, value with unit or a dash, and field in
+/// `summary.json` or formula.
 pub(crate) fn rows(content: &Content) -> Vec<Value> {
     let measured = &content.measured;
     let has_poses = measured.ticks > 0;
@@ -110,8 +109,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
     ]
 }
 
-/// Returns the range of the wheel speeds; `None` for a car, which has one wheel speed and a
-/// steering angle.
+/// Returns the wheel speeds' range; `None` for a car, with one wheel speed and a steering angle.
 fn wheel_range(content: &Content) -> Option<f64> {
     if content.mission.body().steering.is_some() {
         return None;

@@ -1,9 +1,8 @@
-//! Shortest path of a body from start to target, if there is one.
+//! Shortest path of a body from start to target.
 //!
 //! The body is a disc on a grid of 5 cm. Cells nearer to an obstacle than its radius are blocked.
 //! A* over eight neighbours finds a path, and straight lines shorten it. The result is at most some
-//! percent longer than the shortest path. A gap counts as open if it is wider than the body by a
-//! cell.
+//! percent too long. A gap is open if it is wider than the body by a cell.
 
 use std::hash::Hash;
 
@@ -12,7 +11,7 @@ use glam::{DVec2, IVec2};
 use pathfinding::prelude::astar;
 
 const CELL_M: f64 = 0.05;
-/// Margin around start, target and obstacles that the path may use, metres.
+/// Margin around start, target and obstacles, metres.
 const RIM_M: f64 = 0.5;
 /// Most cells of a world: 100 m by 100 m.
 const MOST_CELLS: f64 = 4e6;
@@ -20,10 +19,10 @@ const MOST_CELLS: f64 = 4e6;
 const STRAIGHT: u32 = 1000;
 const DIAGONAL: u32 = 1414;
 
-/// Returns the length of the shortest path of a disc of `radius` metres from `start` to `target`
-/// among `shapes`, metres.
+/// Returns the shortest path length of a disc of `radius` metres from `start` to `target` among
+/// `shapes`, metres.
 ///
-/// Returns `None` if there is no path or the world is too large.
+/// Returns `None` without a path or in a too large world.
 pub fn shortest_path(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) -> Option<f64> {
     let grid = Grid::new(shapes, start, target, radius)?;
     let (from, to) = (grid.cell(start), grid.cell(target));
@@ -123,15 +122,14 @@ impl Grid {
         inside && !self.blocked[self.index(cell)]
     }
 
-    /// Returns the free cell at this step from `cell`. A diagonal step must not cut the corner of a
-    /// blocked cell.
+    /// Returns the free cell at this step from `cell`. A diagonal step must not cut a blocked
+    /// corner.
     fn neighbour(&self, cell: IVec2, [cols, rows]: [i32; 2]) -> Option<IVec2> {
         let next = cell + IVec2::new(cols, rows);
         let through = [next, cell + IVec2::new(cols, 0), cell + IVec2::new(0, rows)];
         through.into_iter().all(|cell| self.is_free(cell)).then_some(next)
     }
 
-    /// Returns the length of the path over `cells`, shortened by straight lines, metres.
     fn straightened(&self, cells: &[IVec2], start: DVec2, target: DVec2) -> f64 {
         let mut points: Vec<DVec2> = cells.iter().map(|&cell| self.centre(cell)).collect();
         if let Some(first) = points.first_mut() {

@@ -36,9 +36,8 @@ pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
     serde_json::from_str(&file::text(&file, LARGEST_SUMMARY)?).ok()
 }
 
-/// Returns the run's directory if `recording` lies in it.
 pub(crate) fn run_directory(recording: &Recording) -> Option<&Path> {
     let directory = recording.path.parent()?;
-    // The directory may belong to another run, or to none.
+    // The directory may belong to another run.
     (Run::load(directory).ok()? == recording.run).then_some(directory)
 }

@@ -110,7 +110,6 @@ fn metrics_count_every_generation_and_every_sample() {
             ..CommandSample::default()
         }));
     }
-    // This pose came a microsecond after the last one.
     let mut late = PoseSample { stamp: stamp(2, 1), v_m_s: 900.0, ..PoseSample::default() };
     late.stamp.stamp_ns += 1000;
     content.measured.pose(&late, &content.mission);

@@ -29,7 +29,7 @@ pub struct Event {
 }
 
 impl Event {
-    /// Returns whether a process died or the robot stalled, from which a supervisor recovers.
+    /// Returns whether a process died or the robot stalled.
     pub fn is_recovery(&self) -> bool {
         self.kind == Kind::Bad && self.of != FAILSAFE
     }
@@ -40,7 +40,7 @@ impl Event {
 pub enum Kind {
     /// Death, stall or stop.
     Bad,
-    /// Problem that a person must solve before the robot is of use.
+    /// Problem that a person must solve.
     Warn,
     Good,
     Note,
@@ -56,14 +56,14 @@ pub(crate) struct Events {
     directive: Option<(u8, u8)>,
     /// Newest complaint; only changes are events.
     complaint: String,
-    /// Numbers of the current target, the last of the list, and the one reached.
+    /// Numbers of the current, last and reached targets.
     target: u64,
     last: u64,
     arrived: u64,
     follows: bool,
     /// Generation of each stage seen to run.
     running: Vec<(String, u32)>,
-    /// Mission time of the newest pose, seconds; a process that has just started knows none.
+    /// Mission time of the newest pose, seconds, for new processes.
     pub(crate) now_s: f64,
     at_s: f64,
 }
@@ -90,7 +90,7 @@ impl Events {
             self.now_s = self.now_s.max(pose.stamp.time().seconds());
         }
         self.at_s = match sample {
-            // A process that has just started reads earlier single events late.
+            // A new process reads earlier single events late.
             Sample::Death(_) | Sample::Stall(_) | Sample::Order(_) | Sample::Fault(_) => {
                 sample.time().seconds()
             }

@@ -1,11 +1,10 @@
-//! The state of a robot as one value, from which dashboards, bridges and reports draw. Each lists
-//! the topics it reads here, and reads no others.
+//! State of a robot as one value, for dashboards, bridges and reports. Each lists the topics that
+//! it reads.
 //!
 //! A [`Feed`] reads [`Sample`]s from a robot's bus; [`Sample::decoded`] reads them from a
 //! recording. [`RobotState::apply`] takes either.
 //!
-//! The guide's page `attach.md` has a dashboard, which is compiled with the doc tests of this
-//! crate.
+//! The guide's page `attach.md` has a dashboard, compiled with this crate's doc tests.
 //!
 //! | file | holds |
 //! |---|---|
@@ -30,10 +29,9 @@ pub use self::{
     words::{death_in_words, failsafe_in_words, guidance_in_words, words},
 };
 
-/// Returns the newest run of the robot of `domain` and its directory; `None` without a run file, as
-/// before the first samples.
+/// Returns the newest run of the robot of `domain` and its directory, if any.
 pub fn newest_run(domain: &Domain) -> Option<(PathBuf, Run)> {
-    // The link leads to another directory when the next run begins.
+    // The link changes when the next run begins.
     let directory = domain.run_directory().canonicalize().ok()?;
     let run = Run::load(&directory).ok()?;
     Some((directory, run))

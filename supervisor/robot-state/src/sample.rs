@@ -1,4 +1,4 @@
-//! Single table of the topics read of a robot, and its readers.
+//! Single table of the topics read, and its readers.
 
 use common::{
     bus::{AnyReader, Bus, BusError, decode_sample, decode_slice},
@@ -14,17 +14,16 @@ use common::{
 
 macro_rules! samples {
     ($($name:ident($($part:ty),+): $topic:ident by $decode:ident,)*) => {
-        /// Sample of one of [`TOPICS`]: a struct, or a header and its slice.
+        /// Sample of one of [`TOPICS`].
         #[allow(clippy::large_enum_variant, reason = "one at a time is held")]
         #[derive(Clone, Debug, PartialEq)]
         pub enum Sample { $($name($($part),+)),* }
 
-        /// Topics to read. A sample of the link ends a tick, so it is read last.
+        /// Topics to read. A link sample ends a tick, so the link comes last.
         pub static TOPICS: &[&dyn AnyTopic] = &[$(&topics::$topic),*];
 
         impl Sample {
-            /// Returns the sample of `topic` recorded as `message`; `None` if the topic is not
-            /// read, or does not match the message.
+            /// Returns the sample of `topic` recorded as `message`; `None` if unread or malformed.
             pub fn decoded(topic: &str, message: &[u8]) -> Option<Self> {
                 $(if topic == topics::$topic.spec().name {
                     return samples!(@$decode $name, message);
@@ -90,14 +89,14 @@ impl Feed {
         Ok(Self { readers, message: Vec::new() })
     }
 
-    /// Passes all samples published since the last call to `each`.
+    /// Passes all new samples to `each`.
     ///
     /// # Errors
     /// Fails if the connection to a writer breaks.
     pub fn read(&mut self, each: &mut dyn FnMut(Sample)) -> Result<(), BusError> {
         for OneTopic { spec, reader, generation } in &mut self.readers {
             while let Some(stamp) = reader.next_message(&mut self.message)? {
-                // A sample of an older generation may come after those of the next one.
+                // An older generation's sample may come after the next one's.
                 if spec.writer != OPERATOR && stamp.generation < *generation {
                     continue;
                 }

@@ -24,10 +24,9 @@ const MOST_POINTS: usize = 2000;
 /// Least distance between two points of the path, metres.
 const POINT_EVERY_M: f64 = 0.05;
 
-/// Age from which a mirror's picture is outdated, seconds. A robot's state comes several times a
-/// second.
+/// Age from which a mirror is outdated, seconds. States come several times a second.
 const OLD_S: f64 = 1.0;
-/// A stage repeats its trouble several times a second, and may wait seconds for a processor.
+/// Stages repeat a complaint several times a second, and may be starved for seconds.
 const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
 
 /// State of a robot. Missing samples are `None`, lists start empty. Lengths are metres in the
@@ -37,9 +36,8 @@ pub struct RobotState {
     pub supervisor: Option<RosterHeader>,
     pub stages: Vec<RosterEntry>,
     pub pose: Option<PoseSample>,
-    /// Believed path of the robot, at about equal distances.
+    /// Believed path at about equal distances.
     pub way: Vec<DVec2>,
-    /// Distance between two points of the path; 0 before the first.
     way_every_m: f64,
     /// Safety map, a [`common::grid::CellState`] a cell.
     pub map: Replica<u8>,
@@ -47,15 +45,15 @@ pub struct RobotState {
     pub field: Replica<FieldCell>,
     pub field_header: FieldHeader,
     pub target: Option<TargetSample>,
-    /// State of the present or the last following of a beacon.
+    /// State of the newest following.
     pub following: Option<FollowingSample>,
     pub guidance: Option<GuidanceSample>,
     pub command: Option<CommandSample>,
     pub link: Option<LinkSample>,
-    /// The newest complaint of a stage. Its stage repeats it while it lasts.
+    /// Newest complaint, repeated by its stage while it lasts.
     complaint: Option<ComplaintSample>,
     pub power: Option<PowerSample>,
-    /// Age of the data, if a mirror shows a robot of another machine.
+    /// Age of the data of a mirrored robot.
     pub mirror: Option<MirrorSample>,
     pub deaths: BTreeMap<String, DeathSample>,
     pub stalls: u64,
@@ -67,8 +65,7 @@ impl RobotState {
         Self { target: Some(TargetSample::first(mission)), ..Self::default() }
     }
 
-    /// Takes a sample. Returns false for a part of a map that does not follow the previous parts;
-    /// then the next whole map is awaited.
+    /// Takes a sample. Returns false for a map part that does not follow the previous ones.
     pub fn apply(&mut self, sample: &Sample) -> bool {
         self.events.sample(sample);
         match sample {
@@ -130,7 +127,7 @@ impl RobotState {
         self.events.log(process, line);
     }
 
-    /// Returns the events since the last call, the oldest first. Only the newest are held.
+    /// Returns the newest events since the last call, oldest first.
     pub fn take_events(&mut self) -> Vec<Event> {
         self.events.drain()
     }
@@ -144,7 +141,7 @@ impl RobotState {
         self.target().into_iter().flat_map(|sent| [&sent.target].into_iter().chain(sent.ahead()))
     }
 
-    /// Returns the robot's activity in a sentence, and its importance. A mirror adds the age.
+    /// Returns the robot's activity in a sentence, with a mirror's age, and its importance.
     pub fn doing(&self) -> (Kind, String) {
         let (kind, mut text) = self.does();
         if let Some(complaint) = self.complaint() {
@@ -158,8 +155,7 @@ impl RobotState {
         }
     }
 
-    /// Returns the age of a mirror's data, and whether it is outdated; `None` on the robot's
-    /// machine.
+    /// Returns the age of a mirror's data, and whether it is outdated.
     pub fn age_in_words(&self) -> Option<(bool, String)> {
         let age_s = self.mirror?.age_s();
         let is_old = age_s >= OLD_S;
@@ -168,7 +164,6 @@ impl RobotState {
         Some((is_old, format!("another machine, {how} {age_s:.1} s{ago}")))
     }
 
-    /// The trouble of a stage, while the stage repeats it.
     pub fn complaint(&self) -> Option<&ComplaintSample> {
         let now = self.link?.stamp.time();
         self.complaint.as_ref().filter(|said| now.since(said.stamp.time()) < COMPLAINT_LASTS)
@@ -199,7 +194,7 @@ impl RobotState {
         (kind, format!("{text}; {}", guidance_in_words(status)))
     }
 
-    /// Returns the target to which the robot is sent; `None` while it waits for one.
+    /// Returns the current target; `None` while the robot waits for one.
     pub fn target(&self) -> Option<&TargetSample> {
         let waits = |it: RosterHeader| {
             matches!(HoldReason::from_byte(it.reason), HoldReason::Waiting | HoldReason::Lost)
@@ -207,7 +202,6 @@ impl RobotState {
         self.target.as_ref().filter(|_| !self.supervisor.is_some_and(waits))
     }
 
-    /// Returns the state of the following of a beacon, if any.
     pub fn following(&self) -> Option<&FollowingSample> {
         self.following.as_ref().filter(|following| following.state() != FollowState::Ended)
     }
@@ -215,19 +209,17 @@ impl RobotState {
     fn lost(&self) -> String {
         let ago_s = self.following().and_then(|it| it.heard_ago_s(self.now_s()));
         match ago_s {
-            Some(ago_s) => format!("the robot lost what it follows, last seen {ago_s:.0} s ago"),
-            None => "the robot has not seen yet what it follows".to_owned(),
+            Some(ago_s) => format!("the robot lost its beacon, last seen {ago_s:.0} s ago"),
+            None => "the robot has not seen its beacon yet".to_owned(),
         }
     }
 
-    /// Returns the distance to the target by the robot's own pose, metres.
     pub fn to_go_m(&self) -> Option<f64> {
         let at = self.target()?.target.position();
         Some(self.pose?.pose().position.distance(at))
     }
 
-    /// Returns the remaining distance in words, with the number of the target; `None` without a
-    /// target.
+    /// Returns the remaining distance and target number in words.
     pub fn way_to_go(&self) -> Option<String> {
         let TargetSample { number, last, .. } = self.target()?;
         if let Some(following) = self.following() {

@@ -18,11 +18,11 @@ pub fn words(variant: impl Debug) -> String {
 
 pub const fn guidance_in_words(status: u8) -> &'static str {
     match GuidanceStatus::from_byte(status) {
-        GuidanceStatus::Waiting => "waits for the way",
+        GuidanceStatus::Waiting => "waits for a path",
         GuidanceStatus::Along => "on its way",
         GuidanceStatus::AtTarget => "beside the target",
         GuidanceStatus::WayOut => "drives out of a hazard",
-        GuidanceStatus::Unreachable => "no way to the target",
+        GuidanceStatus::Unreachable => "no path to the target",
         GuidanceStatus::Look => "turns and looks",
     }
 }

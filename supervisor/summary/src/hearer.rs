@@ -27,7 +27,7 @@ pub struct Hearer {
     trails: Trails,
 }
 
-/// Times that each failsafe cause stopped, or slowed to half speed, a robot that had gone.
+/// Stops, or slow-downs to half speed, of a moving robot by failsafe cause.
 #[derive(Default)]
 pub(crate) struct Interruptions {
     has_gone: bool,
@@ -41,7 +41,7 @@ impl Interruptions {
         let (action, cause) = (link.action(), link.cause());
         self.has_gone |= action == Action::Go;
         let began = self.newest.replace((action, cause)) != Some((action, cause));
-        // A robot that waits, has arrived or stands for its operator is not interrupted.
+        // A robot that waits, has arrived or stands for its operator is uninterrupted.
         let of_mission = matches!(
             cause,
             Cause::None | Cause::NotOrdered | Cause::MissionOver | Cause::OperatorStop
@@ -85,7 +85,7 @@ impl Hearer {
     fn hear_guidance(&mut self, guidance: &GuidanceSample) {
         let GuidanceSample { stamp, full_solves, .. } = *guidance;
         let before = self.solves.insert(stamp.generation, full_solves);
-        // If a sample covers several solves, only the time of the last one is known.
+        // Of several solves in a sample, only the last one's time is known.
         if full_solves > before.unwrap_or_default() {
             self.full_solves.record(guidance.full_solve_ns);
         }
@@ -96,8 +96,8 @@ impl Hearer {
         &self.trails.0
     }
 
-    /// Returns the full solves of all planners until the newest answer, or until the `last` one
-    /// that counts.
+    /// Returns all planners' full solves until the newest answer, or until the `last` one that
+    /// counts.
     pub fn solves_until(&self, last: Option<&GuidanceSample>) -> u64 {
         let (newest, its) =
             last.map_or((u32::MAX, None), |last| (last.stamp.generation, Some(last.full_solves)));
@@ -105,7 +105,7 @@ impl Hearer {
         before + its.or(self.solves.get(&newest).copied()).unwrap_or_default()
     }
 
-    /// Returns the greatest commanded speed of either wheel minus the least, until `tick`, rad/s.
+    /// Returns the range of both wheels' commanded speeds until `tick`, rad/s.
     pub fn wheel_range_rad_s(&self, tick: u64) -> Option<f64> {
         self.wheels.at(tick).range_rad_s()
     }

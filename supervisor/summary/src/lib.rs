@@ -1,5 +1,4 @@
-//! Summary of a run: its outcome and its numbers, from the ground truth and from a [`Hearer`]'s
-//! samples.
+//! Summary of a run: outcome and numbers, from the ground truth and a [`Hearer`]'s samples.
 
 mod hearer;
 mod totals;
@@ -40,15 +39,15 @@ impl From<&Histogram> for Quantiles {
     }
 }
 
-/// Last line of `run --json`. Distances are in metres. An unknown value, such as a real robot's
-/// ground truth, is `None` (null).
+/// Last line of `run --json`. Distances are in metres. Unknown values, such as a real robot's
+/// ground truth, are `None` (null).
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Summary {
     pub outcome: Outcome,
     pub reason: String,
-    /// Name of the failsafe-table row that ended the mission (`firsthand table failsafe`).
+    /// Failsafe-table row that ended the mission (`firsthand table failsafe`).
     pub cause: Option<String>,
-    /// Time from the first motion order to the end by the robot's clock, including lost links.
+    /// Robot time from the first motion order to the end, including lost links.
     pub mission_time_s: f64,
     pub path_length_m: f64,
     pub straight_m: f64,
@@ -56,25 +55,25 @@ pub struct Summary {
     /// Share of the time with the body's surface within [`SAFE_M`] of an obstacle: p_o of MRPB (J.
     /// Wen et al., ICRA 2021), (2).
     pub p_o: Option<f64>,
-    /// Sum of the squared changes of displacement between ticks: f_ps of MRPB, (5). It depends on
-    /// the tick rate.
+    /// Sum of the squared displacement changes between ticks: f_ps of MRPB, (5). Depends on the
+    /// tick rate.
     pub f_ps_m2: Option<f64>,
     /// Mean |dv/dt|: f_vs of MRPB, (6).
     pub f_vs_m_s2: Option<f64>,
     pub collisions: Option<u64>,
-    /// Rim speed of the faster wheel in the tick before the first contact, m/s. It is 0 if a robot
-    /// at rest was run into.
+    /// Rim speed of the faster wheel in the tick before the first contact, m/s; 0 if a robot at
+    /// rest was hit.
     #[serde(default)]
     pub contact_speed_m_s: Option<f64>,
     pub pose_error_m: Option<f64>,
-    /// Root mean square pose error by the covariance of the last pose.
+    /// RMS pose error by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
-    /// Two standard deviations of that pose's position along the worst axis. An arrival is sure
-    /// within the mission's `sure_within_m`.
+    /// Two standard deviations of that position along the worst axis. An arrival is sure within
+    /// `sure_within_m`.
     #[serde(default)]
     pub pose_within_m: Option<f64>,
     pub true_distance_m: Option<f64>,
-    /// Time at which the robot had moved 0.1 m, by the ground truth.
+    /// True time at which the robot had moved 0.1 m.
     pub departed_s: Option<f64>,
     /// Longest time that a wheel turned after the last received command.
     pub stopping_time_s: Option<f64>,
@@ -82,26 +81,24 @@ pub struct Summary {
     pub full_solves: u64,
     pub looks: u64,
     pub look_s: f64,
-    /// Share of ticks without a distance from the front sonar, by the ground truth.
+    /// Share of ticks without a front sonar distance, by the ground truth.
     pub sonar_unavailable_share: Option<f64>,
-    /// Greatest commanded speed of either wheel minus the least, rad/s, in the last supervisor's
-    /// part.
+    /// Range of both wheels' commanded speeds, rad/s, under the last supervisor.
     pub wheel_range_rad_s: Option<f64>,
     pub ticks: u64,
     pub restarts: BTreeMap<String, u32>,
-    /// Times that each failsafe cause stopped, or slowed to half speed, a robot that had gone, in
-    /// the last supervisor's part.
+    /// Stops, or slow-downs to half speed, of a moving robot by failsafe cause, under the last
+    /// supervisor.
     #[serde(default)]
     pub stops: BTreeMap<String, u32>,
     #[serde(default)]
     pub slowed: BTreeMap<String, u32>,
-    /// Times that another supervisor resumed the run. Clearance, solves and latencies are then
-    /// those of its part, and the path is the believed one.
+    /// Resumes of the run. Clearance, solves and latencies are then those of the last part, and the
+    /// path is the believed one.
     pub resumes: u32,
     /// Generations of the planner started because of stalls.
     pub replans: u32,
     pub resets: u64,
-    /// Targets, in the order in which the robot is sent to them.
     #[serde(default)]
     pub targets: Vec<TargetResult>,
     /// Time from the datagram in to the datagram out.
@@ -111,11 +108,11 @@ pub struct Summary {
 
 /// Distance after which a robot has departed, metres.
 const DEPARTED_M: f64 = 0.1;
-/// Distance d_safe of MRPB, metres. The value is nominal, because MRPB leaves it to its user.
+/// Distance d_safe of MRPB, metres; nominal, because MRPB leaves it to its user.
 pub const SAFE_M: f64 = 0.3;
 
 impl Summary {
-    /// Summarises a finished run. Samples after the decisive end do not count.
+    /// Summarises a finished run up to its decisive end.
     pub fn new(mission: &Mission, finished: &Finished, heard: &Hearer) -> Self {
         let Finished { ending, record, resumes, .. } = finished;
         let last_tick = finished.last_tick.or(record.newest_tick());
@@ -251,8 +248,8 @@ impl fmt::Display for Summary {
     }
 }
 
-/// Returns the length of the straight lines from the start to each target in turn, without replaced
-/// ones, metres.
+/// Returns the length of the straight lines from the start over the targets, without replaced ones,
+/// metres.
 fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
     let mut here = mission.start.at.to_array();
     let counted = targets.iter().filter(|target| target.outcome != TargetOutcome::Replaced);
@@ -263,7 +260,7 @@ fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
     legs.sum()
 }
 
-/// Uses square roots, which are the same on every processor, unlike the C library's `hypot`.
+/// Uses square roots, identical on every processor, unlike the C library's `hypot`.
 fn path_length(truth: &[GroundTruthTick]) -> f64 {
     let places =
         truth.windows(2).map(|pair| [&pair[0], &pair[1]].map(|tick| DVec2::new(tick.x, tick.y)));
@@ -300,7 +297,7 @@ fn velocity_smoothness(truth: &[GroundTruthTick]) -> Option<f64> {
     (truth.len() > 1).then(|| changes.sum::<f64>() / (truth.len() - 1) as f64)
 }
 
-/// Returns the share of ticks whose front sonar byte is 255, nothing in range, or 0, not valid.
+/// Returns the share of ticks whose front sonar byte is 255 (nothing in range) or 0 (invalid).
 fn sonar_unavailable_share(truth: &[GroundTruthTick]) -> Option<f64> {
     let unavailable = truth.iter().filter(|tick| matches!(tick.sonar_cm, 0 | 255));
     (!truth.is_empty()).then(|| unavailable.count() as f64 / truth.len() as f64)

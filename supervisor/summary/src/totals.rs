@@ -1,11 +1,11 @@
-//! Totals of wheel commands and looks, as of each of the newest ticks. Ticks after the end of the
-//! mission do not count, but may be read before the end is known.
+//! Totals of wheel commands and looks at each of the newest ticks, because ticks after the
+//! mission's end may be read before the end is known.
 
 use std::collections::VecDeque;
 
 use common::samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus};
 
-/// Ticks whose totals are stored. The arrival's must still be there when its command is read.
+/// Stored ticks, enough for the arrival's when its command is read.
 const MOST: usize = 1024;
 
 #[derive(Clone, Default)]
@@ -42,7 +42,7 @@ pub(crate) struct WheelTotals {
 }
 
 impl WheelTotals {
-    /// Adds a command. Only driving commands count, because every mission begins and ends at rest.
+    /// Adds a driving command; every mission begins and ends at rest.
     pub(crate) fn with(self, command: &CommandSample) -> Self {
         if CommandState::from_byte(command.state) != CommandState::Driving {
             return self;
@@ -52,8 +52,7 @@ impl WheelTotals {
         Self { extremes: Some([least.min(left).min(right), greatest.max(left).max(right)]) }
     }
 
-    /// Returns the dynamic range of the wheel signals: greatest commanded speed of either wheel
-    /// minus the least, rad/s.
+    /// Returns the range of both wheels' commanded speeds, rad/s.
     pub(crate) fn range_rad_s(self) -> Option<f64> {
         self.extremes.map(|[least, greatest]| greatest - least)
     }

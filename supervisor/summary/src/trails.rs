@@ -1,5 +1,5 @@
-//! Tracks of things that moved during a run. The movers of a sample have no names, so each is
-//! joined to the track that leads to it.
+//! Tracks of movers in a run. Movers are anonymous, so each is joined to the track that leads to
+//! it.
 
 use common::samples::{GridHeader, Mover};
 use glam::DVec2;
@@ -8,11 +8,10 @@ use glam::DVec2;
 /// seconds.
 const NEAR_M: f64 = 0.6;
 const LOST_S: f64 = 2.0;
-/// Greatest uncertainty of a recorded place, metres. A less certain mover is extrapolated out of
-/// sight.
+/// Maximum uncertainty of a recorded place, metres; a less certain mover is out of sight.
 const SURE_M: f64 = 0.2;
-/// First interval of places, seconds. Of a track with too many, every second place is dropped; of
-/// too many tracks, the oldest.
+/// First interval of places, seconds. Too long tracks drop every second place; too many tracks, the
+/// oldest.
 const APART_S: f64 = 0.2;
 const MOST_PLACES: usize = 600;
 const MOST_WAYS: usize = 256;
@@ -33,7 +32,7 @@ impl Trail {
         Self { places, radius_m: mover.radius_m.into(), newest, apart_s: APART_S }
     }
 
-    /// Returns the distance between `mover` and the track's extrapolation to `at_s`; `None` if the
+    /// Returns the distance of `mover` from the track's extrapolation to `at_s`; `None` if the
     /// track ended or is too far off.
     fn off_m(&self, at_s: f64, mover: &Mover) -> Option<f64> {
         let (then_s, at, velocity) = self.newest;
@@ -106,7 +105,6 @@ mod tests {
             it.places.last().unwrap().1.x > 9.0
         });
         assert_eq!(rows.collect::<Vec<_>>(), [true, true]);
-        // A mover that returns later or elsewhere has its own track.
         trails.hear(&sample(30.0, &[[9.9, 0.0]], 1.0));
         assert_eq!(trails.0.len(), 3);
     }

@@ -62,7 +62,7 @@ fn ratio_and_track_are_found_within_their_stated_deviations() {
         for deviations in [ratios, tracks] {
             let square = deviations.iter().map(|it| it * it).sum::<f64>() / 60.0;
             assert!((0.4..1.8).contains(&square), "slip {slip}: {square}");
-            // The slip of a few loops is uncertain, so the tails are longer than normal ones.
+            // The slip of a few loops is uncertain, so the tails are longer than normal.
             let beyond = deviations.iter().filter(|it| it.abs() > 3.0).count();
             assert!(beyond <= 3, "slip {slip}: {deviations:?}");
         }
@@ -89,7 +89,7 @@ fn loops_that_agree_pass_and_a_held_out_pair_that_contradicts_is_refused() {
     let (estimate, used) = checked(&loops, NORMAL_SD, TRACK_M).unwrap();
     assert_eq!(used, loops);
     assert!((estimate.ratio() - 1.004).abs() <= 3.0 * estimate.ratio_sd());
-    // The last loops are those of a robot whose wheel has lost its tyre.
+    // The last loops have a wheel without its tyre.
     let mut other = loops;
     other[6] = drawn(4, 8, 1.03, 1.01, 0.001)[6];
     other[7] = drawn(4, 8, 1.03, 1.01, 0.001)[7];

@@ -128,6 +128,5 @@ fn the_state_of_a_whole_calibration_fits_into_its_checkpoint_and_comes_back() {
     let file = folder.path().join("planner.checkpoint");
     let open = || Checkpoint::open::<Wall>(&file, crate::shell::STATE_BYTES).unwrap();
     open().0.save(&wall).unwrap();
-    // Ranges without an echo are NaN, which equals nothing.
     assert_eq!(format!("{:?}", open().1), format!("{:?}", Some(wall)));
 }

@@ -74,7 +74,7 @@ fn protocol(word: &str) -> Result<Protocol, ValueError> {
 const SIMULATED: &str = "target = [1.5, 0]\nsimulation.realism = 'measured'\nsensors = 'all'\n[perimeter]\nwidth_m = 6.0\ncentre = [0.0, 0.0]\n[[world.wall]]\npoints = [[1.3, -1.6], [1.3, 1.2], [-0.4, 1.6], [-1.5, 0.4], [-1.2, -1.6], [1.3, -1.6]]\n";
 
 const TITLE: &str = "What the robot saw, placed by the motion that was found";
-const DESCRIPTION: &str = "Where beams and echoes ended, x ahead of the robot's first place, y to its left: one sharp outline if everything is as found.";
+const DESCRIPTION: &str = "Ends of beams and echoes; x points ahead of the robot's first place, y to its left. A sharp outline confirms the findings.";
 
 pub fn main(arguments: &Arguments) -> Result {
     arguments.setting.log("bring-up.log")?;
@@ -130,7 +130,7 @@ pub fn main(arguments: &Arguments) -> Result {
 
 fn judged(found: &[Finding]) -> Result {
     if found.iter().all(|finding| finding.verdict == Verdict::Unknown) {
-        let message = "nothing was measured: the robot did not move, or its sensors said nothing; see the link's log in the run directory";
+        let message = "nothing was measured: the robot did not move, or its sensors reported nothing; see the link's log in the run directory";
         return Err(Refused::new("nothing-measured", message).into());
     }
     let wrong = found.iter().filter(|finding| finding.verdict == Verdict::Wrong).count();
@@ -138,7 +138,7 @@ fn judged(found: &[Finding]) -> Result {
         0 => Ok(()),
         _ => Err(Refused::new(
             "not-as-stated",
-            format!("of what was looked at, {wrong} is not as the mission states; mend it or change the keys, then repeat"),
+            format!("findings that contradict the mission: {wrong}; correct the robot or change the keys, then repeat"),
         )
         .into()),
     }
@@ -193,7 +193,9 @@ mod tests {
         assert!(
             code(&[Unknown, Unknown]).is_some_and(|said| said.contains("nothing was measured"))
         );
-        assert!(code(&[Right, Wrong]).is_some_and(|said| said.contains("1 is not as")));
+        assert!(
+            code(&[Right, Wrong]).is_some_and(|said| said.contains("contradict the mission: 1;"))
+        );
         assert_eq!(code(&[Right, Unknown]), None);
     }
 }

@@ -120,7 +120,7 @@ impl Arguments {
         };
         let is_wall = plan.procedure == Procedure::Wall;
         if is_wall && named.front_sonar().kind != SensorKind::Cone {
-            return Err("the wall is measured by a front sonar, and this robot has none: calibrate along squares, or with --gyro if it has a gyro".into());
+            return Err("the wall procedure needs a front sonar, and this robot has none; calibrate along squares, or with --gyro if it has a gyro".into());
         }
         let (loops, drive_m) = (f64::from(plan.loops), plan.drive_m);
         let mut mission = self.setting.procedure(&named, plan, 0.35)?;
@@ -151,14 +151,16 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
     let place = directory.display();
     let Some(Drive::Wall(wall)) = Drive::of_run(&directory)? else {
         return Err(refused(&format!(
-            "the planner of the run in {place} saved nothing; repeat it"
+            "the planner of the run in {place} saved nothing; repeat the calibration"
         )));
     };
     match wall.state() {
         State::Finished => {}
         State::Failed(fault) => return Err(refused(&fault.to_string())),
         State::Running => {
-            return Err(refused(&format!("the run in {place} ended too early; repeat it")));
+            return Err(refused(&format!(
+                "the run in {place} ended too early; repeat the calibration"
+            )));
         }
     }
     let (estimate, _) = loops::checked(wall.loops(), wall.normal_sd(), body.track_m)
@@ -167,7 +169,7 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
     Ok(Found { method: "wall", before, estimate, metres, seconds })
 }
 
-/// Gives each square its own noise. All squares share the same wheels.
+/// Gives each square its own noise, but the same wheels.
 fn noise_of_its_own(mission: &mut Mission, number: u32) {
     let errors = x80_sim::wheel_errors::WheelErrors::of(mission);
     let wheels = &mut mission.simulation.wheels;

@@ -7,14 +7,13 @@ use console::{
 use link::failsafe::stop_distance::{self, Stop};
 use mission_control::outcome::RIGHT_PLACE_M;
 
-/// Length of a path around obstacles, relative to the straight line.
+/// Length of a path around obstacles, relative to a straight one.
 const DETOUR: f64 = 1.25;
 /// Smallest share of missions that is reported.
 const LEAST_SHARE: f64 = 0.02;
-/// Distance in front of a sensor at which heights are compared, metres. Farther objects are
-/// remembered.
+/// Distance of compared heights in front of a sensor, metres. Farther objects are remembered.
 const AHEAD_M: f64 = 0.3;
-/// Angle from straight ahead within which a sensor looks ahead, degrees.
+/// Maximum angle off straight ahead of a forward sensor, degrees.
 const BESIDE_AHEAD_DEG: f64 = 30.0;
 /// Smallest reported gap of heights, metres.
 const LEAST_UNSEEN_M: f64 = 0.01;
@@ -58,7 +57,7 @@ pub fn main(arguments: &Arguments) -> Result {
     }
     if let Some(share) = wrong_places(&mission).filter(|share| *share >= LEAST_SHARE) {
         text += &format!(
-            "Its wheels alone hold its heading, and are known to {} %: of 100 such missions about {:.0} end more than {RIGHT_PLACE_M} m from the target. Run `firsthand calibrate`, or give the robot a gyro.\n",
+            "Its heading depends on its wheels alone, which are known to {} %. Of 100 such missions, about {:.0} end more than {RIGHT_PLACE_M} m from the target. Run `firsthand calibrate`, or give the robot a gyro.\n",
             100.0 * mission.robot.odometry.diameter_ratio_sd,
             100.0 * share
         );
@@ -67,8 +66,8 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(print_text(&text)?)
 }
 
-/// Describes heights that the body can touch and no forward sensor sees at [`AHEAD_M`]. The heights
-/// are those of the simulator.
+/// Describes heights that the body can touch and no forward sensor sees at [`AHEAD_M`], as in the
+/// simulator.
 fn unseen(mission: &Mission) -> Option<String> {
     let heights = mission.simulation.physics().heights;
     let looks_ahead = |sensor: &Sensor| {
@@ -100,18 +99,17 @@ fn unseen(mission: &Mission) -> Option<String> {
     }
     (!unseen.is_empty()).then(|| {
         format!(
-            "What stands or hangs {} above the floor is not seen {AHEAD_M} m ahead of its sensors, but touched: a low board, a shelf. A depth camera (model = \"d435\") sees it, bumpers feel it, and a lower controller.speed_m_s makes the touch softer.\n",
+            "Its sensors miss what stands or hangs {} above the floor, {AHEAD_M} m ahead, such as a low board or a shelf. A depth camera (model = \"d435\") sees it, bumpers detect the touch, and a lower controller.speed_m_s softens it.\n",
             unseen.join(" and ")
         )
     })
 }
 
-/// Returns the expected share of missions that end in a wrong place, due to the uncertain ratio of
-/// wheel diameters.
+/// Returns the expected share of missions that end in a wrong place, due to the uncertain
+/// wheel-diameter ratio; `None` if another sensor holds the heading.
 ///
-/// Over a distance d with track W, a relative error e turns the robot by e d/W. It then ends aside
-/// by half of d times that turn. Errors of the track cancel with opposite turns. `None` if another
-/// sensor holds the heading.
+/// Over a distance d with track W, a relative error e turns the robot by e d/W, which puts it aside
+/// by half of d times that turn. Errors of the track cancel with opposite turns.
 fn wrong_places(mission: &Mission) -> Option<f64> {
     let robot = &mission.robot;
     let is_held = robot.gyro() || robot.ros2.imu.is_some() || mission.used(SensorKind::Scan) > 0;

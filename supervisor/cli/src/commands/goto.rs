@@ -87,8 +87,7 @@ fn await_result(
         let is_its = |it: &Target| (it.x_m, it.y_m) == (target.x_m, target.y_m);
         if let Some(result) = results.take().into_iter().find(is_its) {
             print_text(&format!("{}\n", result.outcome.replace('_', " ")))?;
-            // Outcomes of targets share the names of a run's. Others, such as `replaced`, have no
-            // exit code.
+            // Target outcomes share a run's names; others, such as `replaced`, have no exit code.
             let outcome = serde_json::from_value::<Outcome>(result.outcome.into());
             return Ok(outcome.map_or(ExitCode::FAILURE, |outcome| outcome.exit_code().into()));
         }

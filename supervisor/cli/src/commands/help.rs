@@ -100,7 +100,6 @@ pub fn page_names() -> Vec<String> {
     all_pages().map(Page::name).collect()
 }
 
-/// Lists the pages for the top-level help, one per line.
 pub fn pages() -> String {
     let mut list = String::from("Guide (firsthand help PAGE):\n");
     for Part { title, pages } in GUIDE {
@@ -186,7 +185,7 @@ fn goes_on(line: &str) -> bool {
 /// Least width of a column, in characters.
 const NARROWEST: usize = 8;
 
-/// Draws the `rows` of a table in columns that fit into `width`.
+/// Draws table `rows` in columns that fit into `width`.
 fn drawn(rows: &[&str], width: usize) -> Vec<String> {
     let cells = |row: &&str| -> Vec<String> {
         let row = row.trim().trim_matches('|').replace("\\|", "\u{1}");

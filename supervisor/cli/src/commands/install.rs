@@ -1,5 +1,4 @@
-//! Installs the files of a systemd service. The Debian package has the same ones
-//! (`[package.metadata.deb]`).
+//! Installs a systemd service. The Debian package has the same files (`[package.metadata.deb]`).
 
 use std::{
     fs, io,

@@ -77,7 +77,6 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs> {
 }
 
 fn follow(arguments: &Arguments, stream: &mut Stream) -> Result {
-    // The log of a stage may not exist yet.
     if let Some(stage) = arguments.stage.as_deref()
         && !OTHERS.contains(&stage)
     {
@@ -88,7 +87,7 @@ fn follow(arguments: &Arguments, stream: &mut Stream) -> Result {
     while !stream.has_ended() {
         let goes_on = Robot::find(arguments.robot.clone()).run;
         if let Some((directory, logs)) = &mut followed {
-            // The run's end was checked before, so its last lines are printed in this round.
+            // Checked before, so this round prints the last lines.
             match print_round(logs, stream) {
                 // The directory was removed.
                 Err(_) if !directory.exists() => followed = None,

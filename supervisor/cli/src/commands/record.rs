@@ -82,12 +82,12 @@ impl FromStr for DiskBudget {
         let bytes = unit.and_then(|unit| digits.parse::<u64>().ok()?.checked_mul(unit));
         let bytes = bytes.filter(|bytes| *bytes >= LEAST);
         bytes.map(Self).ok_or_else(|| {
-            format!("{text:?} is no size from 500kB on; give one such as 500MB or 2GB")
+            format!("{text:?} is not a size of 500kB or more; give one such as 500MB or 2GB")
         })
     }
 }
 
-/// Creates and removes a file beside `out`, because the recording itself may begin much later.
+/// Creates and removes a file beside `out`; the recording may begin much later.
 fn refuse_unwritable(out: &Path) -> Result<(), FileError> {
     let probe = out.with_extension(format!("{}.tmp", std::process::id()));
     File::create_new(&probe)
@@ -151,7 +151,7 @@ pub fn main(arguments: &Arguments) -> Result {
             }
         };
         if let Err(error) = printed {
-            write_stderr(&format!("firsthand: cannot say so: {error}\n"));
+            write_stderr(&format!("firsthand: cannot print the state of the recording: {error}\n"));
         }
     };
     let supervisor = match arguments.supervisor {

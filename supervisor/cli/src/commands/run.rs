@@ -184,14 +184,13 @@ fn options(arguments: &Arguments) -> Result<Options> {
     })
 }
 
-/// Prints where the robot of an earlier run believes it is, and since when.
 fn tell_place(place: Option<&(PlaceSample, f64)>, stands: bool) {
     let place = place.map(|(PlaceSample { x_m, y_m, heading_rad, sigma_m, .. }, age_s)| {
         let heading = wrap_angle(*heading_rad).to_degrees();
         let (within_m, ago) = (2.0 * sigma_m, age(Some(*age_s)));
         format!("the robot believes it is where it stood {ago} ago: at ({x_m:.2}, {y_m:.2}) within {within_m:.2} m, heading {heading:.0} degrees")
     });
-    let place = place.unwrap_or("where the robot stands is not known".to_owned());
+    let place = place.unwrap_or("the pose of the robot is unknown".to_owned());
     let until = if stands { "; it stands until `firsthand resume`" } else { "" };
     write_stderr(&format!("firsthand: {place}; `firsthand place` corrects it{until}\n"));
 }
@@ -225,14 +224,13 @@ fn mission(arguments: &Arguments) -> Result<Mission> {
     }
     if let Some(timeout) = arguments.timeout {
         if !(timeout > 0.0 && timeout.is_finite()) {
-            return Err(format!("--timeout {timeout} is no time; give seconds above 0").into());
+            return Err(format!("--timeout {timeout} is not a time; give seconds above 0").into());
         }
         mission.timeout_s = timeout;
     }
     Ok(mission)
 }
 
-/// Returns the mission `name` with `set`. Its protocol, devices and planner must be available here.
 pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
     let mut mission = missions::load(name, set)?;
     refuse_unspoken(&mission)?;
@@ -242,7 +240,7 @@ pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
     {
         let device = device.display();
         let message = format!(
-            "robot.address: {device} is not there; plug its adapter in, or name another (`ls -l /dev/serial/by-id`)"
+            "robot.address: {device} does not exist; plug in its adapter, or name another (`ls -l /dev/serial/by-id`)"
         );
         return Err(Refused::new("no-device", message).into());
     }
@@ -251,7 +249,6 @@ pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
     Ok(mission)
 }
 
-/// Refuses a grid that exceeds the free memory, if known.
 fn refuse_without_memory(mission: &Mission) -> Result<(), Refused> {
     /// Memory of all processes per cell, bytes: 1.84 GiB at 4096 x 4096.
     const PER_CELL: u64 = 118;
@@ -269,12 +266,11 @@ fn refuse_without_memory(mission: &Mission) -> Result<(), Refused> {
     Err(Refused::new("mission", message))
 }
 
-/// Refuses a ROS 2 robot if this executable lacks ROS 2.
 fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
     if mission.robot.protocol() != Protocol::Ros2 || SPEAKS_ROS2 {
         return Ok(());
     }
-    let message = "robot.protocol: this executable speaks no ROS 2; build it with `cargo build --release --features ros2`";
+    let message = "robot.protocol: this executable is built without ROS 2; build it with `cargo build --release --features ros2`";
     Err(Refused::new("mission", message))
 }
 
@@ -286,14 +282,13 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let options = options(arguments)?;
     let directory = &options.directory;
     let made_for_nothing = || {
-        // The run did not begin, so its new directory is removed.
         if arguments.out.is_none() && !directory.join(common::run::FILE_NAME).exists() {
             let _ = fs::remove_dir_all(directory);
         }
     };
     let summary_file = prepare(&options).inspect_err(|_| made_for_nothing())?;
     let (mut line, title) = (ProgressLine::new(LINE_EVERY), title(&options));
-    // The journal gets no progress, because the service status shows it.
+    // The service status shows progress instead of the journal.
     let may_stay = !logging::to_journal();
     let mut lock = None;
     let mut recorder = RunRecorder::new(&options, arguments.disk_budget);
@@ -323,18 +318,18 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     }
     if let Some(robot) = still_moving {
         write_stderr(
-            "firsthand: THE ROBOT MOVES although it was told to stand by every method; its link goes on telling it; Ctrl-C leaves that to its stop guard\n",
+            "firsthand: THE ROBOT MOVES although every stop method was tried; its link keeps ordering the stop; Ctrl-C hands that over to its stop guard\n",
         );
         let did = robot.watch()?;
         write_stderr(&format!("firsthand: the robot {did}\n"));
     }
-    // On a busy machine the recorder may need seconds for its last chunks.
+    // A starved recorder may need seconds for its last chunks.
     drop(recorder);
     drop(lock);
     if mission_control::operator::owes_stop(&options.robot) {
         let robot = &options.robot;
         write_stderr(&format!(
-            "firsthand: THE ROBOT WAS NOT SEEN AT REST; its stop guard goes on ordering the stop: `firsthand status --robot {robot}` shows what it sees, `firsthand stop --sign-off --robot {robot}` ends it\n"
+            "firsthand: THE ROBOT WAS NOT SEEN AT REST; its stop guard keeps ordering the stop: `firsthand status --robot {robot}` shows what it sees, `firsthand stop --sign-off --robot {robot}` ends it\n"
         ));
     }
     let ending = &finished.ending;
@@ -377,7 +372,6 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     Ok(code.into())
 }
 
-/// Begins the log, reserves space for the summary, and reports the mission's remarks.
 fn prepare(options: &Options) -> Result<SummaryFile> {
     let log = options.directory.join(SUPERVISOR_LOG);
     logging::to_file(&log).map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
@@ -390,7 +384,6 @@ fn prepare(options: &Options) -> Result<SummaryFile> {
     Ok(SummaryFile::reserve(&options.directory, cells.map_or(0, summary_file::room_of_run))?)
 }
 
-/// Reports a problem and keeps the mission's exit code.
 fn complain(reported: Result<(), String>) {
     if let Err(problem) = reported {
         tracing::error!("{problem}");
@@ -398,8 +391,8 @@ fn complain(reported: Result<(), String>) {
     }
 }
 
-/// Returns whether the run directory may be removed. This start made it, and the user ended the run
-/// before the robot drove or a stage died.
+/// Returns whether the run directory may be removed: this start made it, and the user ended the run
+/// before a drive or a stage's death.
 fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished) -> bool {
     let made_here = arguments.out.is_none() && options.recovered.is_none();
     let is_placed = finished.resets > 0;

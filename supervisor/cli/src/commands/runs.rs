@@ -114,9 +114,11 @@ fn targets(run: &Path, json: bool) -> Result<ExitCode> {
 fn list(arguments: &List) -> Result<ExitCode> {
     let runs = &arguments.runs;
     if !runs.is_dir() {
-        return Err(
-            format!("there is no directory {}; say where with --runs", runs.display()).into()
-        );
+        return Err(format!(
+            "directory {} does not exist; name another with --runs",
+            runs.display()
+        )
+        .into());
     }
     let chosen = || {
         let wanted =

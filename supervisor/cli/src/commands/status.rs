@@ -172,8 +172,7 @@ struct StageStatus<'a> {
     output_age_s: Option<f64>,
 }
 
-/// Wait for missing data. The link publishes at 10 Hz, and robots report batteries several times a
-/// second.
+/// Wait for missing data: the link at 10 Hz, batteries several times a second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
 /// Least interval between two printed statuses.
@@ -187,7 +186,7 @@ pub fn main(arguments: &Arguments) -> Result {
     }
 }
 
-/// The topics of a status. The supervisor publishes the target before its roster.
+/// Topics of a status. The target precedes the roster.
 static WANTED: [&dyn AnyTopic; 8] = [
     &topics::ROSTER,
     &topics::LINK,
@@ -199,8 +198,8 @@ static WANTED: [&dyn AnyTopic; 8] = [
     &topics::POSE,
 ];
 
-/// Returns whether `robot` is complete after `waited`, or [`LINK_PATIENCE`] is over: link,
-/// batteries and pose may be absent.
+/// Returns whether `robot` is complete, or [`LINK_PATIENCE`] is over; link, batteries and pose may
+/// be absent.
 fn is_complete(robot: &RobotState, waited: Duration) -> bool {
     let lost = robot.link.is_some_and(|link| link.connected == 0);
     let heard = robot.power.is_some() && robot.pose.is_some();
@@ -240,7 +239,6 @@ fn print_one(arguments: &Arguments) -> Result {
     }
 }
 
-/// Prints what the stop guard of a robot without a run observes.
 fn print_guarded(arguments: &Arguments) -> Result {
     let robot = &arguments.robot;
     let sees = operator::sees(robot);
@@ -292,7 +290,7 @@ fn follow(arguments: &Arguments) -> Result {
     Ok(())
 }
 
-/// Returns the status of `robot`, or `None` before it is complete.
+/// Returns the status of `robot`; `None` if incomplete.
 fn status<'a>(
     arguments: &'a Arguments,
     robot: &'a RobotState,
@@ -401,7 +399,7 @@ impl fmt::Display for Status<'_> {
             self.robot, self.supervisor_pid, self.order, self.mission_time_s
         )?;
         if let Some(MirrorStatus { of, age_s }) = &self.mirror {
-            writeln!(f, "a mirror of the robot at {of}; this is {age_s:.1} s old, or less")?;
+            writeln!(f, "a mirror of the robot at {of}; this is at most {age_s:.1} s old")?;
         }
         if let Some(TargetStatus { number, last, x_m, y_m, to_go_m }) = &self.target {
             write!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;

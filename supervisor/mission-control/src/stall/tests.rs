@@ -254,8 +254,8 @@ fn a_car_that_circles_on_its_tightest_circle_is_pinned_and_the_reason_names_the_
     let cause = stall.map(|stall| stall.cause());
     assert_eq!(cause, Some(Pinned));
     let reason = words(Pinned, &car.body());
-    assert!(reason.contains("turns in no less than 0.31 m"), "{reason}");
-    assert!(!words(Pinned, &mission("").body()).contains("turns in no less"));
+    assert!(reason.contains("least turning radius of 0.31 m"), "{reason}");
+    assert!(!words(Pinned, &mission("").body()).contains("turning radius"));
 }
 
 #[test]

@@ -14,7 +14,6 @@ fn at(x: f64, y: f64) -> TargetPoint {
     TargetPoint::at(DVec2::new(x, y))
 }
 
-/// An arrival in tick `tick`, at as many seconds.
 fn arrival(tick: u64) -> CommandSample {
     let stamp = Stamp { tick, stamp_ns: tick * 1_000_000_000, ..Stamp::default() };
     CommandSample { stamp, distance_m: 0.1, ..CommandSample::default() }
@@ -165,7 +164,6 @@ fn a_hands_target_has_no_result_and_ends_in_waiting_for_the_next_one() {
     hand(&mut list, 0.5);
     hand(&mut list, 0.6);
     assert_eq!((list.number(), list.waits(), list.has_target()), (3, false, false));
-    // The target is reached, or no way leads there.
     list.settle(Outcome::Reached, 6.0, Some((arrival(6), Reached)));
     assert!(list.waits() && !list.release());
     hand(&mut list, 0.7);

@@ -1,5 +1,5 @@
-//! Tests of single rules, then of all rules against a plain model over every short history and many
-//! long ones.
+//! Tests of single rules, then of all rules against a model over every short history and many long
+//! ones.
 
 mod model;
 
@@ -10,7 +10,6 @@ const fn ms(count: u64) -> Duration {
     Duration::from_millis(count)
 }
 
-/// A policy with the link's deadlines: a beat every 750 ms, ready after 3 s.
 fn running() -> Policy {
     let mut policy = Policy::new(TABLE[0].deadlines);
     assert_eq!(policy.step(Event::Start, ms(0)), Some(Action::Start));
@@ -42,7 +41,7 @@ fn deaths_in_a_row_wait_longer_and_longer_up_to_a_second() {
     assert_eq!(waits, [2, 4, 8, 16, 32, 64, 128, 256, 512, 1000]);
 }
 
-/// Ends each process at its start until the stage is held. Returns the time of the hold.
+/// Ends each process at its start until the stage is held; returns the time.
 fn crash_until_held(policy: &mut Policy, mut now: Duration) -> Duration {
     for _ in 0..100 {
         policy.step(Event::Exited, now);
@@ -133,8 +132,7 @@ fn a_stage_that_stops_beating_is_aborted_then_killed() {
     assert_eq!(policy.step(Event::Exited, ms(861)), Some(Action::Start));
 }
 
-/// Returns the time after its last beat at which a stage is aborted that spends each second like
-/// this.
+/// Returns the silent time until the abort of a stage that spends each second like this.
 fn aborted_after(ran: f64, starved: f64, state: State) -> Option<u64> {
     let mut policy = running();
     (1..60_000).find(|&age| {

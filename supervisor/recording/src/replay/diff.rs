@@ -1,5 +1,4 @@
-//! First tick in which a stage published different values in two recordings, and its inputs by
-//! then.
+//! First tick in which a stage published different values in two recordings, and its inputs so far.
 
 use std::fmt;
 
@@ -13,8 +12,7 @@ use crate::{
 
 #[derive(Debug, Default, Serialize)]
 pub struct Parting {
-    /// Differing lines of the run file: mission, seed, clock. Address and name of the robot are
-    /// left out.
+    /// Differing lines of the run file: mission, seed, clock, without the robot's name and address.
     pub run: Vec<String>,
     pub builds: Option<[String; 2]>,
     pub first: Option<First>,
@@ -100,7 +98,6 @@ fn first_in(
     let (mut left, mut right) = (one.tick()?, other.tick()?);
     let mut both = 0;
     while let (Some(a), Some(b)) = (&left, &right) {
-        // A sample that a recorder lost is no difference.
         match tick_of(&a.data).cmp(&tick_of(&b.data)) {
             std::cmp::Ordering::Less => left = one.tick()?,
             std::cmp::Ordering::Greater => right = other.tick()?,
@@ -125,12 +122,12 @@ impl fmt::Display for Parting {
             writeln!(to, "builds: {first}; {second}")?;
         }
         let Some(first) = &self.first else {
-            return writeln!(to, "equal in the {} ticks that both have", self.ticks);
+            return writeln!(to, "equal in all {} common ticks", self.ticks);
         };
         let [one, other] = &first.values;
         writeln!(
             to,
-            "they part at tick {}, {:.3} s: {} of {}, field {}\n  first  {one}\n  second {other}",
+            "they differ first at tick {}, {:.3} s: {} of {}, field {}\n  first  {one}\n  second {other}",
             first.tick, first.time_s, first.topic, first.writer, first.field
         )?;
         let before: Vec<_> = COMPARED

@@ -23,14 +23,13 @@ use crate::{
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     pub stages: Vec<String>,
-    /// Mission time from which outputs are compared. Earlier ticks are computed as well, because
-    /// the state depends on them.
+    /// Mission time of the first comparison. Earlier ticks are computed for the state.
     pub from: MissionTime,
-    /// Run in place of the recorded one, to try another mission with the same inputs.
+    /// Run in place of the recorded one, to try another mission.
     pub run: Option<Run>,
 }
 
-/// Topics that the link's process computes outside its step. They are not compared.
+/// Topics computed outside the link's step, which are not compared.
 const NOT_COMPUTED: [&str; 1] = ["link"];
 
 pub fn replay(recording: &Recording, options: &Options) -> Result<Report> {
@@ -80,7 +79,7 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report> {
 
 struct Generations {
     chosen: Vec<&'static Stage>,
-    /// Generations by the stage's place in the table, its name and their number.
+    /// Generations by stage index, stage name and number.
     all: BTreeMap<(usize, &'static str, u32), Generation>,
 }
 
@@ -92,7 +91,7 @@ impl Generations {
         Some(self.all.entry(key).or_insert_with(|| Generation::new(stage, number)))
     }
 
-    /// Takes a message. The error names the topic that it does not match.
+    /// Takes a message. The error names the mismatched topic.
     fn take(&mut self, setting: &Setting<'_>, message: Message) -> Result<(), &'static str> {
         let topic = &*message.topic;
         if topic == topics::INPUTS.spec().name {

@@ -1,5 +1,5 @@
-//! One generation, replayed while its inputs are read. A recorded output and the input behind it
-//! may come in either order; each waits for the other.
+//! One generation, replayed while its inputs are read. A recorded output and its input may come in
+//! either order.
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -66,7 +66,7 @@ pub(crate) struct Generation {
     compared: u64,
     unrecorded: u64,
     pieces_came: bool,
-    /// Whether the generation published an output, so that it must have taken an input.
+    /// Whether the generation published an output, hence took an input.
     worked: bool,
 }
 
@@ -281,7 +281,7 @@ impl Generation {
             Some(executable) => {
                 format!("it was {}, which publishes no `inputs`", executable.display())
             }
-            None => "none of its `inputs` is recorded".to_owned(),
+            None => "its `inputs` are not recorded".to_owned(),
         })
     }
 }

@@ -15,14 +15,14 @@ pub(crate) struct Pieces {
 #[derive(Debug, PartialEq, Eq, Error)]
 pub(crate) enum Broken {
     #[error(
-        "its first {0} pieces of `inputs` are not recorded; was the recorder attached when it started?"
+        "its first {0} pieces of `inputs` are not recorded; attach the recorder before the stage starts"
     )]
     NoBeginning(u32),
     #[error("{1} pieces of `inputs` are missing after piece {0}: the recorder lost them")]
     Missing(u32, u32),
-    #[error("piece {0} of its `inputs` stands after piece {1}: no recorder wrote it so")]
+    #[error("piece {0} of its `inputs` follows piece {1}; the recording is damaged")]
     OutOfOrder(u32, u32),
-    #[error("its `inputs` hold an entry of {0} bytes")]
+    #[error("its `inputs` contain an invalid entry of {0} bytes")]
     NoEntry(usize),
 }
 

@@ -8,8 +8,7 @@ use serde::Serialize;
 pub struct Report {
     pub stages: BTreeMap<&'static str, StageReport>,
     pub difference: Option<Difference>,
-    /// Time at which the recording was cut off, seconds after its first message; `None` if it is
-    /// complete.
+    /// Time of the cut, seconds after the first message; `None` if complete.
     pub cut_after_s: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Recorded samples of a tick: their tick and time, and the difference of two of them.
+//! Recorded samples of a tick: tick, time, and difference of two.
 
 use common::{
     bus::{Layout as _, Stamp, cdr::Decoder},
@@ -46,14 +46,14 @@ pub(crate) fn time_of(message: &[u8]) -> MissionTime {
     stamp_of(message).time()
 }
 
-/// Returns whether a grid's message is a keyframe. The flag follows stamp, version and five
+/// Returns whether a grid's message is a keyframe; the flag follows stamp, version and five
 /// numbers.
 pub(crate) fn is_keyframe(message: &[u8]) -> bool {
     message.get(4 + 24 + 8 + 20) == Some(&1)
 }
 
-/// Returns the first difference between two samples of a tick on `topic`, apart from a process's
-/// own measurements.
+/// Returns the first difference of two samples of a tick on `topic`, apart from process-specific
+/// fields.
 pub(crate) fn difference(topic: &'static dyn AnyTopic, a: &[u8], b: &[u8]) -> Option<First> {
     // The stamp's generation and sequence are left out.
     if a.get(..20) == b.get(..20) && a.get(28..) == b.get(28..) {

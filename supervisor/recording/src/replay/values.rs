@@ -2,8 +2,8 @@
 
 use common::{bus::Value, topics::AnyTopic};
 
-/// Returns the first field in which two messages of `topic` differ, with both values. Fields that
-/// end with one of `left_out` are skipped.
+/// Returns the first field in which two messages of `topic` differ, with both values, except fields
+/// that end with one of `left_out`.
 pub(crate) fn first_difference(
     topic: &dyn AnyTopic,
     messages: [&[u8]; 2],
@@ -36,7 +36,7 @@ fn flatten(path: &str, value: &Value, fields: &mut Vec<(String, String)>) {
     let text = match value {
         Value::Unsigned(number) => number.to_string(),
         Value::Signed(number) => number.to_string(),
-        // This format has enough digits to distinguish any two values.
+        // This format distinguishes any two values.
         Value::Single(number) => format!("{number:?}"),
         Value::Double(number) => format!("{number:?}"),
         Value::Text(text) => text.clone(),

@@ -15,7 +15,7 @@ use std::{
 
 /// Origin of Foxglove's own page. Most other programs send none.
 pub const FOXGLOVE: &str = "https://app.foxglove.dev";
-/// Most clients at a time. Further ones are closed at once.
+/// Most clients; further ones are closed at once.
 const MOST_CLIENTS: usize = 32;
 const SAID_WITHIN: Duration = Duration::from_secs(3);
 const MOST_REQUEST_BYTES: usize = 4 << 10;
@@ -36,11 +36,10 @@ pub fn open(listener: TcpListener, server: SocketAddr, origins: Vec<String>) {
     thread::spawn(move || {
         for client in listener.incoming() {
             let origins = origins.clone();
-            // Each client holds a reference, so the count is the number of clients.
+            // Each client holds a reference.
             if let Ok(client) = client
                 && Arc::strong_count(&origins) <= MOST_CLIENTS
             {
-                // A failed connection affects only its client.
                 let serve = move || drop(pass(&client, server, &origins));
                 let _ = thread::Builder::new().spawn(serve);
             }

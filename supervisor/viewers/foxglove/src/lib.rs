@@ -5,7 +5,7 @@
 //! | `gate` | access of web pages |
 //! | `live` | live channels of a recording ([`recording::viewers`]) |
 
-// `pub` marks use by another module; unused items are still reported.
+// `pub` marks use by another module.
 #![allow(unreachable_pub)]
 
 mod gate;
@@ -66,7 +66,7 @@ fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let listen = arguments.listen;
     let (live, address) = Live::open(&arguments.robot, listen, &arguments.origins)?;
     if !listen.ip().is_loopback() {
-        tracing::warn!(%listen, "the protocol has no authentication: whoever reaches this address can watch the robot");
+        tracing::warn!(%listen, "the protocol has no authentication: every client that reaches this address can watch the robot");
     }
     print_text(&format!("ws://{address}\n"))?;
     live.serve(&Domain::of(arguments.robot.clone()), &mut || signals.came());

@@ -1,8 +1,7 @@
-//! Websocket server that sends a recording's channels live to Foxglove and Lichtblick. Clients can
-//! only watch.
+//! Read-only websocket server with a recording's channels for Foxglove and Lichtblick.
 //!
-//! Each client has its own queue, and messages that do not fit are dropped. A slow client delays
-//! neither robot nor others.
+//! Each client has its own queue, which drops messages on overflow, so a slow client delays no
+//! other.
 
 use std::{
     collections::HashMap,
@@ -33,10 +32,9 @@ use robot_state::newest_run;
 
 use crate::gate;
 
-/// Interval of checks for the end or start of a run, or its own end.
+/// Interval of checks for the start or end of a run.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const LOGS_EVERY: Duration = Duration::from_millis(500);
-/// Delay before an unusable bus is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// Most queued messages of a client: those of some ticks.
 const MOST_WAITING: usize = 512;
@@ -63,7 +61,7 @@ struct Serving {
 }
 
 impl Live {
-    /// Listens for web pages of these origins and other programs. Returns the actual address.
+    /// Listens for pages of these origins and other programs. Returns the actual address.
     pub fn open(
         robot: &RobotName,
         address: SocketAddr,
@@ -89,7 +87,6 @@ impl Live {
         Ok((Self { context, server }, listens))
     }
 
-    /// Serves a robot across runs, until `ended` returns true.
     pub fn serve(&self, domain: &Domain, ended: &mut dyn FnMut() -> bool) {
         let open = |bus: &Bus| -> Result<Readers, BusError> {
             served().map(|topic| Ok((topic.spec().name, topic.recorder_reader(bus)?))).collect()
@@ -113,13 +110,12 @@ impl Live {
                 serving.take_logs();
             }
             if let Err(error) = taken {
-                tracing::error!(%error, "the robot cannot be shown; it is tried again");
+                tracing::error!(%error, "the robot cannot be shown; the viewer tries again");
                 thread::park_timeout(AGAIN_AFTER);
             }
         }
     }
 
-    /// Begins a run if its run file is readable.
     fn begin(&self, domain: &Domain) -> Option<Serving> {
         let (directory, run) = newest_run(domain)?;
         // Viewers forget the previous run.
@@ -132,7 +128,6 @@ impl Live {
         })
     }
 
-    /// Returns the channels of a recording, and reuses those of the previous run.
     fn channels(&self, mission: &Mission) -> HashMap<String, Arc<RawChannel>> {
         let topics = served().map(|topic| {
             let schema::Schema { name, text } = schema::of(topic);

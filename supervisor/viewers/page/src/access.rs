@@ -10,9 +10,7 @@ use std::{
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Role {
-    /// May watch and stop the robot.
     Watch,
-    /// May give all orders.
     Drive,
 }
 
@@ -48,7 +46,6 @@ impl fmt::Debug for Token {
 
 #[derive(Debug)]
 pub struct Access {
-    /// `http` or `https`.
     scheme: &'static str,
     /// Host names that a request may use.
     hosts: Vec<String>,
@@ -57,8 +54,6 @@ pub struct Access {
 }
 
 impl Access {
-    /// Makes the rules for `address`, or for a proxy that browsers know as `proxy`.
-    ///
     /// # Errors
     /// The system gives no random bytes for tokens.
     pub fn new(address: SocketAddr, proxy: Option<&str>) -> io::Result<Self> {
@@ -80,7 +75,6 @@ impl Access {
         line("watch", &self.watch) + &line("drive", &self.drive)
     }
 
-    /// Returns `host` if the page answers to it.
     pub fn host(&self, host: &str) -> Option<&str> {
         self.hosts.iter().map(String::as_str).find(|known| *known == host)
     }
@@ -94,7 +88,6 @@ impl Access {
         format!("{scheme}://{host}")
     }
 
-    /// Returns the rights of `token`, if any.
     pub fn role(&self, token: &str) -> Option<Role> {
         if self.drive.is(token) {
             Some(Role::Drive)
@@ -104,7 +97,7 @@ impl Access {
     }
 }
 
-/// Parses a host name with an optional port. Letters are restricted, because it goes into headers.
+/// Parses a host name with an optional port. Restricts its letters for headers.
 ///
 /// # Errors
 /// `text` is not a host name.
@@ -113,7 +106,7 @@ pub fn host_name(text: &str) -> Result<String, String> {
     if !text.is_empty() && text.chars().all(is_letter) {
         Ok(text.to_ascii_lowercase())
     } else {
-        Err("no name of a host; give it as in robot.example or robot.example:8443".to_owned())
+        Err("not a host name; give one such as robot.example or robot.example:8443".to_owned())
     }
 }
 

@@ -1,5 +1,3 @@
-//! Data that every connection needs.
-
 use std::sync::Arc;
 
 use crate::{access::Access, orders::Operator, places::Places, shared::Shared};

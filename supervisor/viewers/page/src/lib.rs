@@ -1,8 +1,8 @@
 //! `firsthand page`: a consumer of one robot, and a small web server for browsers.
 //!
-//! One thread reads the bus into shared data, and another runs the server. Browsers take new data
-//! at 10 Hz. A slow one delays no other: it gets the newest maps, fields and states, and the stored
-//! rows and events. The crate [`page`] has the messages and the page itself.
+//! One thread reads the bus, and another runs the server. Browsers take new data at 10 Hz. A slow
+//! one gets only the newest maps, fields and states, and the stored rows and events. The crate
+//! [`page`] has the messages and the page.
 //!
 //! | module | holds |
 //! |---|---|
@@ -17,7 +17,7 @@
 //! | `orders` | orders of an operator |
 //! | `operator` | their execution |
 
-// `pub` marks use by another module; unused items are still reported.
+// `pub` marks use by another module.
 #![allow(unreachable_pub)]
 
 mod access;

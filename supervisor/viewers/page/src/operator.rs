@@ -1,5 +1,3 @@
-//! Subcommands of an operator, for the page.
-
 use common::{domain::RobotName, samples::TargetPoint};
 use console::{
     failure::Result,
@@ -23,12 +21,14 @@ fn confirmed(robot: &RobotName, order: &Order) -> Result<String> {
         Order::Stop => match operator::stand(robot)? {
             None => "the robot rests",
             Some(why) => {
-                return Ok(format!("the robot rests; its supervisor was not told: {why}"));
+                return Ok(format!(
+                    "the robot rests, but the order did not reach its supervisor: {why}"
+                ));
             }
         },
         Order::Resume => {
             operator::resume(robot)?;
-            "the supervisor lets the robot go on"
+            "the supervisor lets the robot continue"
         }
         Order::Restart { stage } => {
             operator::restart(robot, known(stage)?)?;

@@ -53,11 +53,11 @@ impl Order {
     pub fn refusal(&self, role: Role, simulated: bool) -> Option<&'static str> {
         match self {
             Self::Stop => None,
-            _ if role < Role::Drive => {
-                Some("this page may watch and stop; open it with the address for driving")
-            }
+            _ if role < Role::Drive => Some(
+                "this page may only watch and stop; to drive, open it with the `drive` address",
+            ),
             Self::Restart { .. } | Self::Kill { .. } if !simulated => {
-                Some("stages are killed and restarted here only in simulation")
+                Some("the page kills and restarts stages only in simulation")
             }
             Self::GoTo { targets } if targets.is_empty() || targets.len() > MOST_TARGETS => {
                 Some("an order has 1 to 16 targets")

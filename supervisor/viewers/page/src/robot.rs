@@ -1,5 +1,3 @@
-//! Thread that reads the bus across runs.
-
 use std::{
     path::PathBuf,
     thread,
@@ -26,12 +24,10 @@ use robot_state::{Feed, TOPICS, failsafe_in_words, newest_run};
 
 use crate::shared::Shared;
 
-/// Interval of checks for the end or start of a run, or its own end.
+/// Interval of checks for the start or end of a run.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Least interval at which maps and fields are packed.
 const PACK_EVERY: Duration = Duration::from_millis(500);
 const LOGS_EVERY: Duration = Duration::from_millis(500);
-/// Delay before an unusable bus is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 /// Most bytes of ground truth read at once. Further bytes are skipped.
 const TRUTH_AT_ONCE: u64 = 1 << 16;
@@ -52,7 +48,6 @@ struct Reading {
 }
 
 impl Reading {
-    /// Begins a run if its run file is readable.
     fn begin(domain: &Domain, shared: &Shared) -> Option<Self> {
         let (directory, run) = newest_run(domain)?;
         shared.lock().begin(&about(&run), run.mission.robot.address.is_none());
@@ -116,7 +111,7 @@ impl Reading {
     }
 }
 
-/// Computes the field to `target` on the believed map, as the planner does.
+/// Solves the field to `target` on the believed map.
 fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
     let (header, cells) = collector.belief()?;
     let frame = header.part.frame();
@@ -136,7 +131,6 @@ fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
     Some(blob::field(blob::Shown::Preview, frame, &cells, target, collector.state.now_s()))
 }
 
-/// Shows a robot in `shared` across runs, until `ended` returns true.
 pub fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool) {
     let open = |bus: &Bus| Feed::open(bus, TOPICS);
     let mut follower = Follower::new(domain.clone(), "page", &topics::LINK, open)
@@ -172,7 +166,7 @@ pub fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool)
         let problem = taken.err().map(|error| error.to_string()).unwrap_or_default();
         if problem != shared.lock().problem {
             if !problem.is_empty() {
-                tracing::error!(problem, "the robot cannot be shown; it is tried again");
+                tracing::error!(problem, "the robot cannot be shown; the viewer tries again");
             }
             shared.lock().problem.clone_from(&problem);
         }

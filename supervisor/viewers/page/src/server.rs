@@ -19,7 +19,6 @@ use crate::{
     session,
 };
 
-/// Most connections without a token.
 const MOST_STRANGERS: usize = 64;
 const REQUEST_WITHIN: Duration = Duration::from_secs(3);
 /// Lifetime of a connection that does not become a websocket.
@@ -28,23 +27,20 @@ const MOST_HEADER_BYTES: usize = 16 << 10;
 const MOST_MESSAGE_BYTES: usize = 4 << 10;
 const LIVE: &str = "/live";
 
-/// Serves connections until the future is dropped.
 pub async fn serve(context: Arc<Context>, listener: TcpListener) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
-        tracing::error!("the system refuses to watch the socket of the page");
+        tracing::error!("the system refuses to watch the page's socket");
         return;
     };
     let strangers = Places::new(MOST_STRANGERS);
     loop {
         let Ok((stream, _)) = listener.accept().await else {
-            // Too many files are open.
             tokio::time::sleep(Duration::from_millis(100)).await;
             continue;
         };
         let (context, place) = (context.clone(), strangers.take());
         tokio::spawn(async move {
             tokio::select! {
-                // A failed connection affects only its client.
                 _ = connection(&context, stream, &place) => {}
                 () = lost(&place) => {}
             }
@@ -112,7 +108,7 @@ async fn answer(context: &Arc<Context>, request: Request, place: Place) -> Respo
     answer
 }
 
-/// Returns the host of `request` if its mentions agree and the page answers to it.
+/// Returns the host of `request` if its headers agree and the page answers to it.
 fn host(context: &Context, request: &Request) -> Option<String> {
     let host = context.access.host(single(request.headers(), &header::HOST)?)?;
     let absolute = request.uri().authority();

@@ -1,5 +1,3 @@
-//! Served page: threads, options and errors.
-
 use std::{
     fs,
     io::{self, Write as _},
@@ -24,7 +22,6 @@ use crate::{
     shared::Shared,
 };
 
-/// Most browsers per role.
 const MOST_SESSIONS: usize = 16;
 
 #[derive(Clone)]
@@ -37,7 +34,7 @@ pub struct Options {
 
 #[derive(Debug, Error)]
 enum PageError {
-    #[error("{0}; nobody could open the page without its addresses")]
+    #[error("cannot write the page's addresses, which browsers need: {0}")]
     Keep(#[from] FileError),
     #[error("cannot start the page: {0}")]
     System(#[from] io::Error),
@@ -64,7 +61,7 @@ impl Page {
         let address = options.listen;
         if !address.ip().is_loopback() {
             let message = format!(
-                "{address} is no loopback address, and the page does not encrypt; listen on 127.0.0.1 and use a tunnel, or a proxy with --behind-proxy"
+                "{address} is not a loopback address, and the page does not encrypt; listen on 127.0.0.1 and use a tunnel, or a proxy with --behind-proxy"
             );
             return Err(Refused::new("not-loopback", message).into());
         }
@@ -112,14 +109,13 @@ impl Page {
         Ok(Self { address, access, kept, domain, shared, server: Some((end, thread)) })
     }
 
-    /// Shows the robot across runs, until `ended` returns true.
     pub fn show(&self, ended: &mut dyn FnMut() -> bool) {
         robot::follow(&self.domain, &self.shared, ended);
     }
 }
 
-/// Stores the addresses of the page on `port` in a file for its owner only. The dot separates it
-/// from robot names.
+/// Stores the page's addresses in a file for its owner. The dot separates its name from robot
+/// names.
 fn keep(domain: &Domain, port: u16, addresses: &str) -> Result<PathBuf, FileError> {
     let directory = domain.directory().parent().unwrap_or(domain.directory());
     let file = directory.join(format!("{}.page-{port}", domain.robot));

@@ -1,4 +1,4 @@
-//! Session of one browser: it shows its token, receives new data, and may give orders.
+//! Session of one browser: token, new data, orders.
 
 use std::{
     sync::Arc,
@@ -24,11 +24,8 @@ use crate::{
 };
 
 const TOKEN_WITHIN: Duration = Duration::from_secs(3);
-/// Interval at which new data are sent.
 const SEND_EVERY: Duration = Duration::from_millis(100);
-/// Longest silence before a keep-alive message.
 const ALIVE_EVERY: Duration = Duration::from_millis(300);
-/// Longest time for a browser to take a message.
 const TAKEN_WITHIN: Duration = Duration::from_secs(10);
 /// Longest time for a resumed robot to go on.
 const GOES_WITHIN: Duration = Duration::from_secs(3);
@@ -41,7 +38,7 @@ static STOPS: Semaphore = Semaphore::const_new(MOST_STOPS);
 
 /// Websocket codes from 4000 belong to the application.
 const WRONG_TOKEN: u16 = 4401;
-/// Close code after a timeout or the loss of the place. The browser reconnects.
+/// Timeout or lost place. The browser reconnects.
 const LATE: u16 = 4408;
 const REPLACED: u16 = 4409;
 const TOO_MUCH: u16 = 4429;
@@ -159,7 +156,6 @@ async fn close(mut sender: Sender, code: u16) {
     let _ = timeout(TAKEN_WITHIN, sender.send(Message::Close(Some(frame)))).await;
 }
 
-/// Carries out `asked` and sends the confirmation to the browser.
 async fn perform(asked: Asked, role: Role, context: Arc<Context>, answers: mpsc::Sender<Told>) {
     let Asked { id, order } = asked;
     let simulated = context.shared.lock().simulated;
@@ -172,7 +168,6 @@ async fn perform(asked: Asked, role: Role, context: Arc<Context>, answers: mpsc:
         Err(text) => (false, text),
     };
     let answer = json!({"answer": {"id": id, "ok": ok, "text": text}});
-    // A disconnected browser needs no answer.
     let _ = answers.send(Told::Answer(answer.to_string())).await;
 }
 
@@ -183,7 +178,7 @@ async fn done(order: Order, context: &Arc<Context>) -> Result<String, String> {
     }
     let permits = if order == Order::Stop { &STOPS } else { &ORDERS };
     let Ok(permit) = permits.try_acquire() else {
-        return Err("the order before is still under way".to_owned());
+        return Err("the previous order is still under way".to_owned());
     };
     let operator = context.operator.clone();
     let resumes = order == Order::Resume;
@@ -193,7 +188,7 @@ async fn done(order: Order, context: &Arc<Context>) -> Result<String, String> {
     if resumes { resumed(context).await } else { Ok(told) }
 }
 
-/// Waits for the link after an accepted request to resume.
+/// Waits until the link resumes.
 async fn resumed(context: &Arc<Context>) -> Result<String, String> {
     let began = Instant::now();
     loop {

@@ -14,7 +14,6 @@ use serde_json::Value;
 
 /// Most items of a series: rows of ten minutes at 10 Hz.
 const MOST: usize = 6000;
-/// Most items of a series per message.
 const AT_ONCE: usize = 500;
 
 /// Value with a number that grows with each new one.
@@ -66,7 +65,7 @@ pub struct Shown {
     about: Option<Arc<str>>,
     pub connected: bool,
     pub simulated: bool,
-    /// Whether the link stops the robot for an operator, and the link's action in words.
+    /// Whether an operator stopped the robot, and the link's action in words.
     pub link: (bool, String),
     pub rows: Ring,
     pub events: Ring,
@@ -75,7 +74,6 @@ pub struct Shown {
     pub map: Newest<Bytes>,
     pub field: Newest<Bytes>,
     pub preview: Newest<Bytes>,
-    /// Newest target for a preview.
     pub wanted: Option<[f64; 2]>,
     /// Reason why the robot cannot be shown, or empty.
     pub problem: String,
@@ -125,7 +123,6 @@ struct Sent {
     preview: u64,
 }
 
-/// One watching browser.
 pub struct Cursor {
     shared: Arc<Shared>,
     sent: Sent,
@@ -165,7 +162,6 @@ impl Cursor {
             if !items.is_empty() {
                 let mut part = format!("\"{name}\":[");
                 for (at, item) in items.iter().enumerate() {
-                    // Infallible for a String.
                     let _ = write!(part, "{}{item}", if at > 0 { "," } else { "" });
                 }
                 parts.push(part + "]");

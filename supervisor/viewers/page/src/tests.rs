@@ -27,7 +27,7 @@ fn noting(noted: &Noted) -> Operator {
     let noted = noted.clone();
     Arc::new(move |order| {
         if *order == Order::GoBack {
-            return Err("the robot is supervised by nobody".to_owned());
+            return Err("the robot has no supervisor".to_owned());
         }
         noted.lock().unwrap().push(order.clone());
         Ok("confirmed".to_owned())
@@ -308,7 +308,7 @@ fn who_drives_is_told_what_was_confirmed_or_why_it_was_not_done() {
     assert!(browser.order(&json!({"order": "go_to", "targets": [[1.0, 2.0]]})).0);
     assert!(!browser.order(&json!({"order": "go_to", "targets": vec![[0.0, 0.0]; 17]})).0);
     let (done, why) = browser.order(&json!({"order": "go_back"}));
-    assert_eq!((done, &*why), (false, "the robot is supervised by nobody"));
+    assert_eq!((done, &*why), (false, "the robot has no supervisor"));
     assert!(browser.order(&json!({"order": "hand", "ahead": 1.0, "left": -0.5})).0);
     assert!(browser.order(&json!({"order": "preview", "x": 1.5, "y": 0.0})).0);
     assert_eq!(page.shared.lock().wanted, Some([1.5, 0.0]));

@@ -15,7 +15,7 @@
 //! iceoryx2's own zenoh tunnel is unsuitable: it carries services in both directions, so the other
 //! machine could write on the robot's bus. Its filter knows names, but no directions.
 
-// `pub` marks use by another module; unused items are still reported.
+// `pub` marks use by another module.
 #![allow(unreachable_pub)]
 
 mod list;

@@ -1,5 +1,3 @@
-//! Robots that machines serve.
-
 use std::{
     thread,
     time::{Duration, Instant},
@@ -66,7 +64,7 @@ pub fn list(arguments: &Arguments) -> Result {
         write_stderr(&format!("firsthand: no answer from {at} within {} s\n", PATIENCE.as_secs()));
     }
     if listed.is_empty() {
-        let message = "no machine answers; does `firsthand remote serve` run there, and may this machine read?";
+        let message = "no machine answers; check that `firsthand remote serve` runs there and that this machine may read";
         return Err(Refused::new("no-answer", message).into());
     }
     if arguments.json {

@@ -61,8 +61,8 @@ struct Told {
     run: String,
 }
 
-/// Returns whether a topic has one writer on the robot. Operators' topics are excluded, because the
-/// mirror must not act as one.
+/// Returns whether a topic has one writer. Excludes operators' topics, because the mirror must not
+/// act as one.
 pub fn may_serve(topic: &dyn AnyTopic) -> bool {
     let spec = topic.spec();
     ![OPERATOR, EVERY_STAGE].contains(&spec.writer) && spec.name != topics::MIRROR.spec().name
@@ -80,7 +80,11 @@ fn topics(named: &[String]) -> Result<Vec<&'static dyn AnyTopic>> {
     let find = |name: &String| {
         let found = all.clone().find(|topic| topic.spec().name == name);
         found.ok_or_else(|| {
-            Refused::new("unknown-topic", format!("topic {name:?} is not served")).into()
+            Refused::new(
+                "unknown-topic",
+                format!("topic {name:?} cannot be served; `firsthand topic list` names the topics"),
+            )
+            .into()
         })
     };
     named.iter().map(find).collect()
@@ -169,7 +173,7 @@ fn put(
 ) -> Result {
     while reader.next_message(message)?.is_some() {
         let sent = Sent { id, sent_ns: monotonic_ns() };
-        // A slow link drops samples, and nothing waits for it.
+        // A slow link drops samples.
         publisher.put(message.as_slice()).attachment(sent.encoded()).wait().map_err(failed)?;
     }
     Ok(())
@@ -188,7 +192,6 @@ fn answer(
     let (told, own) = (Arc::clone(told), key.clone());
     let queryable = session.declare_queryable(key).callback(move |query| {
         let bytes = bytes(&lock(&told));
-        // The client may have disconnected.
         let _ = query.reply(own.as_str(), bytes).wait();
     });
     queryable.wait().map_err(failed)

@@ -38,13 +38,12 @@ pub fn listen(
     let endpoints: Vec<_> = endpoints.iter().map(|at| endpoint(at, own.cert.is_some())).collect();
     let secured = endpoints.iter().all(|at| at.starts_with("tls/"));
     if !secured && clients.is_some() {
-        let message =
-            "over tcp nobody has a certificate; with --clients each --listen is tls/ADDRESS:PORT";
+        let message = "--clients checks certificates, and tcp has none; give each --listen as tls/ADDRESS:PORT";
         return Err(Refused::new("no-tls", message).into());
     }
     if !secured {
         write_stderr(
-            "firsthand: over tcp whoever reaches the port reads the robot; tls with --clients says who may\n",
+            "firsthand: over tcp every machine that reaches the port can read the robot; to restrict readers, use tls with --clients\n",
         );
     }
     let mut reader = json!({ "id": "readers" });

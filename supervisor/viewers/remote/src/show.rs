@@ -66,7 +66,7 @@ pub fn show(arguments: &Arguments) -> Result {
     let session = connecting.connect(host)?;
     let key = format!("firsthand/{robot}/topic/");
     let (sender, samples) = sync_channel(WAITING);
-    // A session thread must not wait, because it also carries answers and keep-alives.
+    // The session thread must not block: it also carries answers and keep-alives.
     let subscribed = session.declare_subscriber(format!("{key}*")).callback(move |sample| {
         let _ = sender.try_send(sample);
     });
@@ -75,7 +75,6 @@ pub fn show(arguments: &Arguments) -> Result {
     let place = connecting.endpoint(host);
     let mut asker = Asker::new(&session, robot);
     let mut mirror = None::<Mirror>;
-    // Time before a missing answer is reported.
     let mut silent_until = Some(Instant::now() + PATIENCE);
     while !stream.has_ended() {
         let hello = asker.look()?;
@@ -83,7 +82,7 @@ pub fn show(arguments: &Arguments) -> Result {
             silent_until = None;
         } else if silent_until.take_if(|until| *until <= Instant::now()).is_some() {
             write_stderr(&format!(
-                "firsthand: no robot {robot} answers at {host}; is its name right (--robot), does `firsthand remote serve` run there? It is asked again\n"
+                "firsthand: no robot {robot} answers at {host}, and the mirror asks again; check its name (--robot) and that `firsthand remote serve` runs there\n"
             ));
         }
         if let Some(hello) = hello
@@ -148,7 +147,7 @@ impl<'a> Asker<'a> {
         asked.wait().map_err(failed)
     }
 
-    /// Returns a new answer if there is one. Repeats the request when due.
+    /// Returns a new answer, if any. Repeats the request when due.
     fn look(&mut self) -> Result<Option<Hello>> {
         let Some((asked_ns, replies)) = &self.asked else {
             if self.last.is_none_or(|last| last.elapsed() >= ASK_EVERY) {
@@ -160,7 +159,6 @@ impl<'a> Asker<'a> {
         let hello = match replies.try_recv() {
             Ok(None) => return Ok(None),
             Ok(Some(reply)) => payload(&reply).and_then(|bytes| Hello::decoded(&bytes)),
-            // The channel closed without an answer.
             Err(_) => None,
         };
         if let Some(hello) = &hello {
@@ -175,9 +173,7 @@ impl<'a> Asker<'a> {
         let reply = self.ask("run")?.recv().ok();
         let run = reply.and_then(|reply| checked(&String::from_utf8(payload(&reply)?).ok()?));
         if run.is_none() {
-            write_stderr(
-                "firsthand: the run file of the robot does not come, or is of another version\n",
-            );
+            write_stderr("firsthand: the robot's run file is missing or of another version\n");
         }
         Ok(run)
     }
@@ -194,13 +190,11 @@ pub fn checked(text: &str) -> Option<Run> {
     Some(run)
 }
 
-/// Bus with a remote robot's samples. Fields drop in declaration order, so the lock removes the bus
-/// after its users.
+/// Bus with a remote robot's samples. The lock drops last and removes the bus after its users.
 pub struct Mirror {
     id: u64,
     writers: BTreeMap<&'static str, Box<dyn AnyWriter>>,
     ages: Writer<MirrorSample>,
-    /// Newest samples of state topics.
     newest: BTreeMap<&'static str, Vec<u8>>,
     heard: Option<(Sent, Stamp)>,
     told: Option<Instant>,
@@ -253,7 +247,7 @@ impl Mirror {
         })
     }
 
-    /// Publishes a sample. Counts and drops messages that are not samples of a served topic.
+    /// Publishes a sample. Counts and drops other messages.
     pub fn take(&mut self, topic: &str, sent: Sent, message: &[u8]) -> Result {
         let stamp = decode_sample::<Stamp>(message).filter(|_| sent.id == self.id);
         let mut served = topics::TABLE.iter().copied().filter(|topic| may_serve(*topic));
@@ -267,7 +261,6 @@ impl Mirror {
             false => Some(message.to_vec()),
         };
         let writer = self.writer(known)?;
-        // Messages of another type, or too long, are refused.
         let Some(message) = message.filter(|it| writer.publish_message(it).unwrap_or(false)) else {
             self.refuse(topic);
             return Ok(());
@@ -281,8 +274,7 @@ impl Mirror {
         Ok(())
     }
 
-    /// Returns the writer of `topic`, opened at its first sample because the field's needs much
-    /// memory.
+    /// Returns the writer of `topic`, opened at its first sample to save memory.
     fn writer(&mut self, topic: &'static dyn AnyTopic) -> Result<&mut dyn AnyWriter, BusError> {
         let spec = topic.spec();
         let longest = match spec.limits.longest {
@@ -301,7 +293,7 @@ impl Mirror {
         self.refused += 1;
         if self.refused == 1 {
             let text = format!(
-                "firsthand: a sample of {topic:?} that came is none of this run and version; such are left out\n"
+                "firsthand: the mirror drops samples of {topic:?} that are from another run or version\n"
             );
             write_stderr(&text);
         }

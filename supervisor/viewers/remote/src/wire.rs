@@ -46,8 +46,8 @@ const DRIFT: i64 = 10_000;
 
 /// Bound on the other machine's clock, from requests and answers.
 ///
-/// An answer is given after its request, which bounds the offset of the clocks from below. Ages are
-/// thus upper bounds, even on an asymmetric link.
+/// An answer follows its request, which bounds the clock offset from below. Ages are thus upper
+/// bounds, even on an asymmetric link.
 #[derive(Default)]
 pub struct Clock {
     id: u64,
@@ -56,8 +56,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Records that a request of `asked_ns` (our clock) was answered with `hello`. Another run may
-    /// be on another machine.
+    /// Applies the answer `hello` to a request of `asked_ns` (our clock).
     pub fn on_answer(&mut self, asked_ns: u64, hello: &Hello) {
         if hello.id != self.id {
             *self = Self { id: hello.id, known: None };
@@ -69,8 +68,7 @@ impl Clock {
         self.known = Some((before.max(now), asked_ns));
     }
 
-    /// Returns the largest age at `now_ns` (ours) of a sample sent at `sent_ns` (theirs), once
-    /// known.
+    /// Bounds the age at `now_ns` (ours) of a sample sent at `sent_ns` (theirs).
     pub fn age_ns(&self, now_ns: u64, sent_ns: u64) -> Option<u64> {
         let (least, _) = self.known?;
         let here_ns = i128::from(sent_ns) + i128::from(least);

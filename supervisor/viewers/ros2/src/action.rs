@@ -25,10 +25,9 @@ use crate::{
 #[derive(Default, Serialize, Deserialize)]
 pub struct Aim {
     point: TargetPoint,
-    /// Number of the goal's target, once the supervisor has published it.
     number: Option<u64>,
-    /// Whether the robot waits without a reported arrival. The arrival may be unread, so only a
-    /// second such directive counts.
+    /// Whether the robot waits without a reported arrival. The arrival may be unread, so a second
+    /// such directive decides.
     waits: bool,
     /// Number of the newest target older than the goal.
     after: u64,
@@ -77,7 +76,7 @@ impl Server {
 
     /// Takes an accepted goal, whose target follows the one numbered `after`.
     pub fn accept(&mut self, sent: Sent, after: u64, now_ns: u64) {
-        self.abort("a newer goal took its place");
+        self.abort("a newer goal replaced it");
         let aim = Aim { point: sent.point, after, ..Aim::default() };
         self.goals.accept(sent.id, aim, now_ns);
     }
@@ -128,11 +127,11 @@ impl Server {
             && std::mem::replace(&mut goal.known.waits, waits)
             && waits
         {
-            self.abort("the robot gave it up");
+            self.abort("the robot gave up the goal");
         }
     }
 
-    /// Takes a target's recorded result, which explains a failure or an unobserved end.
+    /// Applies a target's recorded result, which explains a failure or an unobserved end.
     pub fn recorded(&mut self, number: u64, outcome: &str) {
         let is_of = |aim: &Aim| aim.number == Some(number);
         if self.goals.current().is_some_and(|goal| is_of(&goal.known)) {
@@ -141,11 +140,12 @@ impl Server {
         for goal in self.goals.aborted().filter(|goal| is_of(&goal.known)) {
             let (code, text) = match outcome {
                 "unreachable" => {
-                    (ComputePathToPoseResult::NO_VALID_PATH, "the robot found no way to it")
+                    (ComputePathToPoseResult::NO_VALID_PATH, "the robot found no path to the goal")
                 }
-                "timed_out" => {
-                    (NavigateToPoseResult::TIMEOUT, "the robot was not there in the mission's time")
-                }
+                "timed_out" => (
+                    NavigateToPoseResult::TIMEOUT,
+                    "the robot did not arrive within the mission's time limit",
+                ),
                 "reached" | "reached_unsure" | "wrong_place" => {
                     (goal.status, goal.known.why) = (Status::Succeeded, Refusal::default());
                     continue;
@@ -170,7 +170,6 @@ impl Server {
         })
     }
 
-    /// Returns a goal's result after its end.
     pub fn result(&self, id: Uuid) -> Option<Vec<u8>> {
         let (status, aim) = self.goals.over(id)?;
         let Refusal { code, text } = aim.map(|aim| aim.why.clone()).unwrap_or_default();
@@ -178,7 +177,6 @@ impl Server {
         Some(NavigateToPoseGetResultResponse { status, result }.encode())
     }
 
-    /// Returns the progress of the current goal.
     pub fn feedback(&mut self, pose: &PoseSample, recoveries: u64, now_ns: u64) -> Option<Vec<u8>> {
         let goal = self.goals.current()?;
         let at = pose.pose();

@@ -1,4 +1,4 @@
-//! Requests of nodes by topic. Each message is accepted, or refused as a whole with a reason.
+//! Requests of nodes by topic. A refusal has a reason.
 
 use common::{mission::Mission, samples::TargetPoint};
 use glam::DVec2;
@@ -21,13 +21,13 @@ pub fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
 pub fn goal_of(header: &Header, pose: &msg::Pose) -> Result<TargetPoint, Refusal> {
     let frame = &header.frame_id;
     if !(frame.is_empty() || frame.trim_start_matches('/') == MAP) {
-        let text = format!("a pose in the frame {frame:?}; give it in {MAP:?}");
+        let text = format!("the pose is in frame {frame:?}; give it in {MAP:?}");
         return Err(Refusal { code: NavigateToPoseResult::TF_ERROR, text });
     }
     let ([x_m, y_m], heading) = (pose.at(), pose.orientation.heading());
-    let heading_rad = heading.ok_or("an orientation that is no rotation; fill orientation.w")?;
+    let heading_rad = heading.ok_or("the orientation is not a rotation; set orientation.w")?;
     if !(x_m.is_finite() && y_m.is_finite()) {
-        return Err("a position that is no number; give metres".into());
+        return Err("the position is not finite; give metres".into());
     }
     Ok(TargetPoint { x_m, y_m, heading_rad, has_heading: 1 })
 }
@@ -49,6 +49,6 @@ pub fn stick(payload: &[u8], mission: &Mission) -> Result<DVec2, String> {
     let stick = DVec2::new(linear.x / mission.speed_m_s(), angular.z / mission.turn_rad_s());
     match stick.is_finite() {
         true => Ok(stick.clamp(DVec2::NEG_ONE, DVec2::ONE)),
-        false => Err("a speed that is no number; give m/s and rad/s".to_owned()),
+        false => Err("a speed is not finite; give m/s and rad/s".to_owned()),
     }
 }

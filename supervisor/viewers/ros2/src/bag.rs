@@ -22,7 +22,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// Makes a bag with topics below `namespace`. Returns a description of its content and gaps.
+/// Makes a bag. Returns a description of its content and gaps.
 pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
     let Arguments { recording, out } = arguments;
     let files = recording::files(recording)?;
@@ -82,7 +82,6 @@ mod tests {
         let recording = PathBuf::from(golden).join("stall-and-kill.mcap");
         let poses = Recording::open(&recording).unwrap().counts["pose"];
         let folder = tempfile::tempdir().unwrap();
-        // Run directory with two recordings.
         let run = folder.path().join("run");
         fs::create_dir(&run).unwrap();
         for part in ["recording.mcap", "recording-2.mcap"] {

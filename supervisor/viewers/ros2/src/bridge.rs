@@ -1,5 +1,4 @@
-//! Bridge that follows a robot across runs, publishes its samples, and has permitted requests
-//! carried out.
+//! Bridge: follows a robot across runs, publishes its samples and carries out permitted requests.
 
 use std::{
     fs, io,
@@ -42,20 +41,16 @@ use crate::{
     topics::{Accept, Frames, Id},
 };
 
-/// Interval of checks for requests, the end or start of a run, or its own end.
+/// Interval of checks for requests and for the start or end of a run.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Interval of feedback for a goal.
 const FEEDBACK_EVERY: Duration = Duration::from_millis(100);
-/// Delay before an unusable bus is tried again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// Age after which transforms of other nodes are useless.
 const OLD_AFTER: Duration = Duration::from_secs(1);
 /// File with the action's goals and the directory of their run.
 const GOALS: &str = "ros2-goals.json";
 /// Most result bytes read for goals of an earlier bridge.
 const MOST_RECORDED: u64 = 1 << 20;
 const RUN_ENDED: &str = "the run ended before the robot arrived";
-/// Least interval between reports of refusals.
 const TELL_EVERY: Duration = Duration::from_secs(1);
 
 #[derive(Clone)]
@@ -65,7 +60,6 @@ pub struct Options {
     /// Address of the network interface, or all of them.
     pub interface: Option<Ipv4Addr>,
     pub namespace: String,
-    /// Permitted requests of other nodes.
     pub accepted: Vec<Accept>,
     pub frames: Frames,
     /// Whether stamps are mission time, which is published.
@@ -76,11 +70,11 @@ pub struct Options {
 #[derive(Debug, Error)]
 pub enum BridgeError {
     #[error(
-        "cannot join domain {domain} of ROS 2: {source}; is the address of --interface one of this machine?"
+        "cannot join ROS 2 domain {domain}: {source}; check that the address of --interface belongs to this machine"
     )]
     Join { domain: u16, source: io::Error },
     #[error(
-        "the robot's own link reads {topic} in domain {domain} as its robot's, so the bridge does not publish it; give a namespace, such as --namespace firsthand, or leave the robot its topics with --frames map"
+        "the robot's link reads {topic} in domain {domain} from the robot, so the bridge must not publish it; give a namespace, such as --namespace firsthand, or give --frames map"
     )]
     Overlap { topic: String, domain: u16 },
     #[error("cannot start a thread or catch a signal: {0}")]
@@ -99,13 +93,11 @@ struct Bridge {
     stored: String,
     goals_file: PathBuf,
     feedback_at: Instant,
-    /// Number of stop requests since the stop for a canceled goal, including it. `None` without
-    /// such a stop.
+    /// Stop requests since the stop for a canceled goal, including it.
     stands_for_cancel: Option<u32>,
     told_at: Option<Instant>,
 }
 
-/// Bridges a robot across runs, until `ended` returns true.
 pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
     let (robot, domain) = (&options.robot, options.domain);
     let join = || endpoints::open(options).map_err(|source| BridgeError::Join { domain, source });
@@ -157,7 +149,7 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
         bridge.publish();
         bridge.store();
         if let Err(error) = taken {
-            tracing::error!(%error, "the robot cannot be shown; it is tried again");
+            tracing::error!(%error, "the robot cannot be shown; the viewer tries again");
             std::thread::park_timeout(AGAIN_AFTER);
         }
     }
@@ -165,7 +157,7 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
 }
 
 impl Bridge {
-    /// Begins to show the run of `domain`. Its file may be missing at the first samples.
+    /// Begins a run. Its file may appear after the first samples.
     ///
     /// # Errors
     /// The run's link reads a topic that would be published.
@@ -192,7 +184,7 @@ impl Bridge {
         let at_ns = if *clock { 0 } else { now_ns() };
         shown.mounting(at_ns, &mut |id, payload| self.node.publish(id, payload));
         if let Err(error) = opened {
-            self.tell(&format!("the topics of the robot cannot be opened: {error}"));
+            self.tell(&format!("cannot open the robot's topics: {error}"));
         }
         self.shown = Some(shown);
         if self.run.as_ref().is_none_or(|(before, _)| *before != directory) {
@@ -226,22 +218,19 @@ impl Bridge {
         }
     }
 
-    /// Stores changed goals for a later bridge.
     fn store(&mut self) {
         let Some((directory, _)) = self.run.as_ref().filter(|_| self.server.goals.are_any()) else {
             return;
         };
-        // All fields are representable in JSON.
         let text = serde_json::to_string(&(directory, &self.server)).unwrap_or_default();
         if text != self.stored {
             if let Err(error) = file::replace(&self.goals_file, &text) {
-                tracing::warn!(%error, "the goals of the action cannot be stored");
+                tracing::warn!(%error, "cannot store the action's goals");
             }
             self.stored = text;
         }
     }
 
-    /// Ends the run and aborts its goal.
     fn end(&mut self) {
         self.server.abort(RUN_ENDED);
         self.server.newest_target = 0;
@@ -285,17 +274,17 @@ impl Bridge {
     fn hear(&mut self) {
         self.node.answer();
         let heard = self.node.heard().unwrap_or_else(|error| {
-            self.tell(&format!("a topic cannot be read: {error}"));
+            self.tell(&format!("cannot read a topic: {error}"));
             Vec::new()
         });
         for (id, message) in heard {
             if let Err(why) = self.hear_topic(id, &message) {
-                self.tell(&format!("a message is refused: {why}"));
+                self.tell(&format!("refused a message: {why}"));
             }
         }
         for (_, call, message) in self.node.called() {
             if let Err(why) = self.hear_call(call, &message) {
-                self.tell(&format!("a call of the action is refused: {why}"));
+                self.tell(&format!("refused a call of the action: {why}"));
             }
         }
     }
@@ -325,7 +314,7 @@ impl Bridge {
     }
 
     fn go(&self, to: TargetPoint, why: Why) {
-        // The next goal ends only a stop that belongs to the canceled goal alone.
+        // The next goal ends only the stop of the canceled goal.
         let resumes = self.stands_for_cancel.is_some_and(|stops| stops <= 1);
         self.orders.give(Order::Go { to, resumes, why });
     }
@@ -372,7 +361,7 @@ impl Bridge {
 
     fn done(&mut self, (order, result): Done) {
         if let Err(why) = &result {
-            self.tell(&format!("what was asked is not done: {}", why.text));
+            self.tell(&format!("a request failed: {}", why.text));
         }
         match order {
             Order::Go { why, resumes, .. } => {
@@ -401,7 +390,7 @@ impl Bridge {
             }
             // Only a robot that obeyed is reported as canceled.
             Order::Stand { is_cancel: true } => {
-                self.server.abort("the robot did not stand when it was canceled");
+                self.server.abort("the robot did not stop after the cancellation");
             }
             Order::Stand { is_cancel: false }
             | Order::Resume

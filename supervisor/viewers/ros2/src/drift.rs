@@ -25,8 +25,8 @@ pub struct Drift {
 impl Drift {
     pub const NONE: Self = Self { slipped: DMat3::ZERO, systematic: [DVec3::ZERO; 3], at_s: None };
 
-    /// Returns the covariances of odometry pose and speeds, for stamps `pace` times slower than
-    /// mission time.
+    /// Returns the covariances of pose and speeds, for stamps `pace` times slower than mission
+    /// time.
     pub fn after(&mut self, sample: &PoseSample, mission: &Mission, pace: f64) -> [Covariance; 2] {
         let (model, body) = (&mission.robot.odometry, mission.body());
         let period_s = 1.0 / mission.robot.rate_hz;

@@ -43,7 +43,7 @@ pub fn open(options: &Options) -> io::Result<Node<Id>> {
     Ok(node)
 }
 
-/// Returns whether the topic is opened per robot, because a ROS 2 robot may publish it itself.
+/// Returns whether a ROS 2 robot may publish the topic itself.
 pub const fn is_of_robot(id: Id) -> bool {
     matches!(id, Id::Odom | Id::Battery | Id::Range(_) | Id::Scan(_))
 }

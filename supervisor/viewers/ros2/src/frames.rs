@@ -8,7 +8,6 @@ use ros2::{
     msg::{TFMessage, TransformStamped},
 };
 
-/// Limit of known frames.
 const MOST_FRAMES: usize = 1024;
 
 #[derive(Debug)]
@@ -23,8 +22,7 @@ struct Place {
 pub struct Frames(BTreeMap<String, Place>);
 
 impl Frames {
-    /// Takes a `tf2_msgs/TFMessage` that arrived at `heard`, or is static. Fails with the reason of
-    /// a refusal.
+    /// Takes a `tf2_msgs/TFMessage` that arrived at `heard`, or is static.
     pub fn take(&mut self, payload: &[u8], heard: Option<Instant>) -> Result<(), String> {
         for TransformStamped { header, child_frame_id, transform } in
             TFMessage::decode(payload)?.transforms
@@ -41,8 +39,8 @@ impl Frames {
         Ok(())
     }
 
-    /// Returns the pose of `frame` in `root` via their common ancestor, with transforms since
-    /// `since`. Fails with the missing part.
+    /// Returns the pose of `frame` in `root` via their common ancestor, from transforms since
+    /// `since`.
     pub fn find(
         &self,
         frame: &str,
@@ -60,7 +58,7 @@ impl Frames {
         })
     }
 
-    /// Returns `frame` and its ancestors with the pose of `frame` in each, and why the chain ends.
+    /// Returns the pose of `frame` in each ancestor, and why the chain ends.
     fn climb<'a>(
         &'a self,
         frame: &'a str,
@@ -71,15 +69,18 @@ impl Frames {
         while let Some(place) = self.0.get(last.0) {
             let Place { parent, pose, heard } = place;
             if heard.is_some_and(|heard| Some(heard) < since) {
-                return (format!("that from {:?} to {parent:?} is old", last.0), passed);
+                return (
+                    format!("the transform from {:?} to {parent:?} is outdated", last.0),
+                    passed,
+                );
             }
             if passed.len() > MOST_FRAMES {
-                return (format!("those from {frame:?} lead in a circle"), passed);
+                return (format!("the transforms from {frame:?} form a loop"), passed);
             }
             last = (parent, *pose * last.1);
             passed.push(last);
         }
-        (format!("none leads on from {:?}", last.0), passed)
+        (format!("{:?} has no parent", last.0), passed)
     }
 }
 

@@ -13,14 +13,12 @@ use ros2::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Id that a client gave its goal.
 pub type Uuid = [u8; 16];
 
 /// Limit of remembered goals. The oldest are forgotten.
 const MOST_GOALS: usize = 16;
 const MOST_RESULTS: usize = 32;
 
-/// Values of `action_msgs/GoalStatus`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Status {
     Executing = 2,

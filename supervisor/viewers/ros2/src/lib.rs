@@ -20,7 +20,7 @@
 //! | `overlap` | topics that the robot's own link reads |
 //! | `orders` | execution of requests in threads |
 
-// `pub` marks use by another module; unused items are still reported.
+// `pub` marks use by another module.
 #![allow(unreachable_pub)]
 
 mod action;
@@ -114,7 +114,7 @@ fn namespace(text: &str) -> Result<String, String> {
     if path.is_empty() || path.split('/').all(is_name) {
         Ok(path.to_owned())
     } else {
-        Err("no namespace of ROS; give letters, digits and _, such as robots/one".to_owned())
+        Err("not a ROS namespace; give letters, digits and _, such as robots/one".to_owned())
     }
 }
 

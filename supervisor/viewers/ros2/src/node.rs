@@ -19,9 +19,8 @@ use crate::parameters::{self, Parameter, SERVICES, Service};
 
 /// Most messages of a topic that wait for a slow reader or for the node.
 const DEPTH: u16 = 10;
-/// Time for clients to discover a new node's writers. They lose earlier replies.
+/// Time for clients to discover a new node's writers. Earlier replies are lost.
 const KNOWN_AFTER: Duration = Duration::from_secs(2);
-/// Most messages of a topic taken at a time.
 const AT_A_TIME: usize = 16;
 
 /// Reliable quality, for messages that all count.
@@ -46,10 +45,9 @@ struct Action {
     status: Writer,
 }
 
-/// Node whose topics are identified by `Id`, and actions by their opening order.
+/// Node: topics by `Id`, actions by their opening order.
 pub struct Node<Id> {
     name: &'static str,
-    /// Empty, or with a leading slash.
     pub namespace: String,
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
@@ -118,7 +116,6 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
-    /// Closes the writers whose ids `keep` rejects.
     pub fn retain_writers(&mut self, keep: impl Fn(Id) -> bool) {
         self.writers.retain(|id, _| keep(*id));
     }
@@ -168,7 +165,6 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(())
     }
 
-    /// Announces the node's readers and writers to other nodes.
     pub fn announce(&self) {
         let services = || {
             let actions = self.actions.iter().flat_map(|action| &action.services);
@@ -194,7 +190,6 @@ impl<Id: Copy + Ord> Node<Id> {
         self.entities.write(entities.encode());
     }
 
-    /// Sends a message. A refused one is lost, and a newer one follows.
     pub fn publish(&self, id: Id, payload: Vec<u8>) {
         if let Some(writer) = self.writers.get(&id) {
             writer.write(payload);
@@ -221,13 +216,12 @@ impl<Id: Copy + Ord> Node<Id> {
                     Ok(reply) => {
                         replies.reply(&request, &reply);
                     }
-                    Err(why) => tracing::warn!("a request for parameters is refused: {why}"),
+                    Err(why) => tracing::warn!("refused a request for parameters: {why}"),
                 }
             }
         }
     }
 
-    /// Returns received messages.
     pub fn heard(&mut self) -> io::Result<Vec<(Id, Message)>> {
         let heard = self.readers.iter().flat_map(|(id, reader)| {
             reader.messages().take(AT_A_TIME).map(|message| (*id, message))

@@ -1,5 +1,5 @@
-//! Threads that carry out requests of nodes without delaying publication. Orders wait for the
-//! supervisor, and stops until the robot is at rest. Targets and stops have separate threads.
+//! Threads that carry out requests without delaying publication. Targets wait for the supervisor
+//! and stops for rest, in separate threads.
 
 use std::{
     io,
@@ -53,7 +53,6 @@ pub enum Why {
     },
 }
 
-/// Order, and the reason of its failure.
 pub type Done = (Order, Result<(), Refusal>);
 
 pub struct Orders {
@@ -104,7 +103,6 @@ impl Orders {
         }
     }
 
-    /// Returns a finished order.
     pub fn done(&self) -> Option<Done> {
         self.done.try_recv().ok()
     }

@@ -1,5 +1,4 @@
-//! Options of this process as node parameters, and the services by which `ros2 param` reads them.
-//! Pure.
+//! Options as node parameters, and the services for `ros2 param`. Pure.
 
 use std::any::TypeId;
 
@@ -14,7 +13,6 @@ use ros2::{
     },
 };
 
-/// Options that end the process without serving.
 const OTHERS: [&str; 4] = ["help", "version", "topics", "rviz"];
 
 #[derive(Clone, Copy)]
@@ -60,7 +58,7 @@ pub fn of_options(mut command: &Command, mut matches: &ArgMatches) -> Vec<Parame
     options.filter_map(parameter).collect()
 }
 
-/// Converts an option: one without values is a flag, a text is kept as written.
+/// Converts an option; one without values is a flag.
 fn value(option: &Arg, matches: &ArgMatches) -> Option<ParameterValue> {
     let id = option.get_id().as_str();
     let mut value = ParameterValue::default();
@@ -103,13 +101,12 @@ pub fn reply(
 ) -> Result<Vec<u8>, Malformed> {
     let of = |name: &str| parameters.iter().find(|parameter| parameter.name == name);
     let value = |name: &String| of(name).map(|it| it.value.clone()).unwrap_or_default();
-    // Three requests share a list of names, and two share a list of parameters.
     let names = || GetParametersRequest::decode(payload).map(|request| request.names);
     let refuse = |msg::Parameter { name, .. }: &msg::Parameter| SetParametersResult {
         successful: false,
         reason: match of(name) {
             Some(_) => format!(
-                "no parameter changes while the node runs; start it with --{}",
+                "parameters are fixed while the node runs; start it with --{}",
                 name.replace('_', "-")
             ),
             None => "the node has no such parameter".to_owned(),
@@ -124,7 +121,6 @@ pub fn reply(
             let asked = ListParametersRequest::decode(payload)?.prefixes;
             let names = parameters.iter().map(|parameter| parameter.name.clone());
             let names = names.filter(|name| asked.is_empty() || asked.contains(name)).collect();
-            // Parameter names have no prefixes.
             let result = ListParametersResult { names, prefixes: Vec::new() };
             ListParametersResponse { result }.encode()
         }

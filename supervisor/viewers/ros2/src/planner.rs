@@ -59,14 +59,13 @@ use crate::{
     shown::arrows,
 };
 
-/// Interval of checks for the end of the process or of the planning time.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const MOST_WAITING: usize = 16;
 /// Most participants whose Nav2 release is remembered.
 const MOST_CLIENTS: usize = 256;
 /// Length of the participant prefix of a GID, bytes.
 const PARTICIPANT: usize = 12;
-/// Queue depth, because `/tf_static` keeps the messages of all publishers and `/tf` has many.
+/// Queue depth for the messages of all publishers of `/tf_static`.
 const DEPTH: u16 = 256;
 
 /// Actions, their types, and the first of Nav2's error codes for each.
@@ -138,7 +137,7 @@ pub struct Arguments {
 /// Parses a number from 0 to less than a day's seconds.
 fn amount(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|number| (0.0..86_400.0).contains(number));
-    number.ok_or_else(|| "no amount; give a number from 0 on".to_owned())
+    number.ok_or_else(|| "not an amount; give a number from 0 to below 86400".to_owned())
 }
 
 /// Returns the radius of the outline's largest circle around the robot's centre.
@@ -147,7 +146,7 @@ fn inscribed(text: &str) -> Result<f64, String> {
     let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
     let corners: Vec<_> = numbers.chunks_exact(2).map(DVec2::from_slice).collect();
     if corners.len() < 3 || text.matches(',').count() + 1 != numbers.len() {
-        return Err("no outline; give three corners or more, as [[x, y], ...]".to_owned());
+        return Err("not an outline; give three or more corners as [[x, y], ...]".to_owned());
     }
     let sides = corners.iter().zip(corners.iter().cycle().skip(1));
     let distance = |(from, to): (&DVec2, &DVec2)| distance_to_segment(DVec2::ZERO, *from, *to);
@@ -172,7 +171,6 @@ struct Plan {
     began: Option<Instant>,
     cancellation: Cancellation,
     outcome: Outcome,
-    /// Release of its client.
     release: Release,
 }
 
@@ -267,13 +265,12 @@ impl<'a> Server<'a> {
         })
     }
 
-    /// Returns the time of stamps, nanoseconds, or 0 before a followed clock's first message.
+    /// Returns the stamp time, nanoseconds, or 0 before the first `/clock`.
     fn now_ns(&self) -> u64 {
         if self.options.use_sim_time { self.clock_ns } else { now_ns() }
     }
 
-    /// Returns a client's release from its goals, and from the ROS release in this environment if
-    /// compatible.
+    /// Returns a client's release from its goals, preferring that of this environment.
     fn release(&mut self, from: Gid, asked: &[Release]) -> Release {
         let participant = *from.first_chunk().unwrap_or(&[0; PARTICIPANT]);
         if self.clients.len() >= MOST_CLIENTS {
@@ -294,12 +291,12 @@ impl<'a> Server<'a> {
         self.node.answer();
         for (id, message) in self.node.heard().unwrap_or_default() {
             if let Err(why) = self.hear(id, &message.payload) {
-                tracing::warn!("a message of {id:?} is refused: {why}");
+                tracing::warn!("refused a message of {id:?}: {why}");
             }
         }
         for (action, call, message) in self.node.called() {
             if let Err(why) = self.hear_call(action, call, &message) {
-                tracing::warn!("a call of {} is refused: {why}", ACTIONS[action].0);
+                tracing::warn!("refused a call of {}: {why}", ACTIONS[action].0);
             }
         }
         while let Ok((action, id, outcome, field)) = self.done.try_recv() {
@@ -373,7 +370,6 @@ impl<'a> Server<'a> {
         Ok(())
     }
 
-    /// Cancels the planning of the current goal of `action`.
     fn interrupt(&mut self, action: usize) {
         if let Some(goal) = self.goals[action].current() {
             goal.known.cancellation.cancel();
@@ -401,7 +397,6 @@ impl<'a> Server<'a> {
         }
     }
 
-    /// Makes the job for a goal, with all poses in the frame of the map.
     fn job(
         &self,
         action: usize,
@@ -410,7 +405,7 @@ impl<'a> Server<'a> {
     ) -> Result<Job, Failure> {
         let Some(map) = &self.map else {
             let topic = self.node.full_name(&self.options.map);
-            return Err((Reason::Timeout, format!("no map has come on {topic}")));
+            return Err((Reason::Timeout, format!("no map has arrived on {topic}")));
         };
         let tolerance = Duration::from_secs_f64(self.options.transform_tolerance);
         let since = Instant::now().checked_sub(tolerance);
@@ -427,7 +422,6 @@ impl<'a> Server<'a> {
         Ok(Job { action, id, at_ns, map: Arc::clone(map), start, goals, cancellation })
     }
 
-    /// Ends a goal with its outcome, unless already ended.
     fn end(&mut self, action: usize, id: Uuid, outcome: Outcome) {
         let goals = &mut self.goals[action];
         if let Some(goal) = goals.current().filter(|goal| goal.id == id) {
@@ -442,7 +436,6 @@ impl<'a> Server<'a> {
     }
 }
 
-/// Starts a thread that plans paths in turn and rings `bell`. It ends with the sender.
 fn start_planning(
     mut planner: Planner,
     bell: Waker,

@@ -43,7 +43,6 @@ const STEPS_A_CELL: usize = 8;
 /// Steps of half a cell between two poses of a path.
 const POSE_EVERY: usize = 4;
 
-/// Sink for a message: its topic and payload.
 pub type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
 
 #[derive(Debug)]
@@ -59,13 +58,12 @@ pub struct Shown {
     drift: Drift,
     /// Mission time over the time of stamps.
     pub pace: f64,
-    /// Robot's pose in another node's `odom`: outer `None` if `odom` is our own, inner `None`
-    /// before the first transform.
+    /// Pose in another node's `odom`: outer `None` if `odom` is ours, inner `None` before its first
+    /// transform.
     pub others_odom: Option<Option<DAffine2>>,
 }
 
 impl Shown {
-    /// Makes a robot without samples.
     pub fn new(robot: String, mission: Mission) -> Self {
         Self {
             robot,
@@ -175,7 +173,6 @@ impl Shown {
                     min_range,
                     max_range,
                     range: within(limits, range) as f32,
-                    // The variance is unknown.
                     ..Range::default()
                 };
                 sink(Id::Range(row), message.encode());
@@ -187,7 +184,7 @@ impl Shown {
         let row = usize::try_from(header.sensor).unwrap_or(usize::MAX);
         if let Some(sensor) = self.sensors.get(row) {
             let period_s = sensor.every_ticks as f64 / self.mission.robot.rate_hz / self.pace;
-            // A message needs beams in the order of measurement. Otherwise it has no beam times.
+            // Only beams in the order of measurement have beam times.
             let mut sweep = header.sweep();
             if !sweep.is_plausible(beams.len()) {
                 sweep = Sweep::default();
@@ -354,10 +351,10 @@ impl Shown {
             StageState::Starting => (DiagnosticStatus::WARN, "starts"),
             StageState::Stopping => (DiagnosticStatus::WARN, "stops"),
             StageState::BackingOff => {
-                (DiagnosticStatus::ERROR, "died often, waits before it is started again")
+                (DiagnosticStatus::ERROR, "died often and waits for its restart")
             }
             StageState::Down => (DiagnosticStatus::ERROR, "is down"),
-            StageState::Held => (DiagnosticStatus::ERROR, "died far too often, is held"),
+            StageState::Held => (DiagnosticStatus::ERROR, "died too often and is held"),
         };
         let values = vec![
             ("generation", entry.generation.to_string()),
@@ -436,8 +433,7 @@ fn directions(frame: GridFrame, cells: &[FieldCell]) -> Marker {
     })
 }
 
-/// Draws a line per cell or group of cells, from the origin and along the direction that `of`
-/// returns.
+/// Draws a line per group of cells along the direction that `of` returns.
 pub fn arrows(
     [columns, rows]: [usize; 2],
     cell_m: f64,

@@ -224,16 +224,16 @@ fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target() {
     let waits =
         DirectiveSample { reason: HoldReason::Waiting.into(), ..DirectiveSample::default() };
     for (outcome, status, code, words) in [
-        ("unreachable", Status::Aborted, 208, "no way"),
-        ("timed_out", Status::Aborted, 9003, "not there"),
-        ("missed", Status::Aborted, 9000, "gave it up"),
+        ("unreachable", Status::Aborted, 208, "no path"),
+        ("timed_out", Status::Aborted, 9003, "did not arrive"),
+        ("missed", Status::Aborted, 9000, "gave up"),
         ("reached", Status::Succeeded, 0, ""),
     ] {
         let mut goals = with_a_goal();
         goals.directive(&waits);
         goals.directive(&waits);
         goals.recorded(4, "unreachable");
-        assert!(told(&goals, 1).2.contains("gave it up"), "the record is another target's");
+        assert!(told(&goals, 1).2.contains("gave up"), "the record is another target's");
         goals.recorded(5, outcome);
         let (is, was, text) = told(&goals, 1);
         assert_eq!((is, was), (status as i8, code), "{outcome}");
@@ -241,7 +241,7 @@ fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target() {
     }
     let mut goals = with_a_goal();
     goals.accept(sent(2), goals.newest_target, 8);
-    assert_eq!(told(&goals, 1).2, "a newer goal took its place");
+    assert_eq!(told(&goals, 1).2, "a newer goal replaced it");
 }
 
 #[test]

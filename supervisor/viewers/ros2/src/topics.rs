@@ -1,4 +1,4 @@
-//! Table of the bridge's topics. Writers, readers and the guide's list are made from it.
+//! Table of the bridge's topics, from which writers, readers and the guide's list are made.
 
 use clap::ValueEnum;
 
@@ -15,7 +15,7 @@ pub enum Id {
     Movers,
     /// Scan of the sensor in this row of the mission. In the table, any row.
     Scan(usize),
-    /// Range of the sensor in this row, likewise.
+    /// Range of the sensor in this row.
     Range(usize),
     Battery,
     Diagnostics,
@@ -55,7 +55,6 @@ pub struct Spec {
     pub name: &'static str,
     pub message: [&'static str; 2],
     pub type_name: &'static str,
-    /// Message definition, as in recordings.
     pub definition: &'static str,
     /// Whether late readers get the newest message.
     pub is_latched: bool,
@@ -81,43 +80,43 @@ macro_rules! table {
 
 table! {
     Id::Tf => "tf", tf2_msgs / TFMessage, false, None,
-        "`map` to `odom` to `base_link`, as REP 105 has them; with `--frames map` the first alone, by the robot's place in the second";
+        "transforms from `map` to `odom` to `base_link` (REP 105); with `--frames map` only `map` to `odom`, computed from the robot's pose in `odom`";
     Id::TfStatic => "tf_static", tf2_msgs / TFMessage, true, None,
-        "`base_link` to a frame of each sensor's name";
+        "transform from `base_link` to each sensor's frame, which has the sensor's name";
     Id::Pose => "pose", geometry_msgs / PoseWithCovarianceStamped, false, None,
-        "where the robot believes it is";
+        "estimated pose of the robot";
     Id::Odom => "odom", nav_msgs / Odometry, false, None,
-        "the pose without what fixes corrected, and the speeds, with covariances by the mission's `[robot.odometry]`";
+        "pose without the corrections of fixes, and speeds; covariances from the mission's `[robot.odometry]`";
     Id::Map => "map", nav_msgs / OccupancyGrid, true, None,
-        "the safety map, at most once a second: 100 a hazard, 99 its margin, 0 seen free, -1 not looked at";
+        "safety map, at most once a second: 100 hazard, 99 its margin, 0 seen free, -1 unobserved";
     Id::MapUpdates => "map_updates", map_msgs / OccupancyGridUpdate, false, None,
-        "windows of it as they change";
+        "changed windows of `map`";
     Id::Path => "path", nav_msgs / Path, false, None,
-        "the way along the field from the robot to its target";
+        "path along the field from the robot to its target";
     Id::Field => "field", visualization_msgs / MarkerArray, false, None,
-        "the field's directions, one for several cells, and the targets";
+        "directions of the field, one for several cells, and targets";
     Id::Movers => "movers", visualization_msgs / MarkerArray, false, None,
-        "what moves, by the laser: its disc and its way of the next second; paler, where it is within two deviations";
+        "moving objects seen by the laser: a disc and the path of the next second; paler, the area within two standard deviations";
     Id::Scan(0) => "scan/SENSOR", sensor_msgs / LaserScan, false, None,
-        "the beams of each laser that the mission uses; `scan` of one alone";
+        "beams of each laser that the mission uses; `scan` if there is only one";
     Id::Range(0) => "range/SENSOR", sensor_msgs / Range, false, None,
-        "each sonar and infrared ranger that the mission uses; as in scans, too far and too near are infinite (REP 117)";
+        "each sonar and infrared ranger that the mission uses; too far and too near are infinite, as in scans (REP 117)";
     Id::Battery => "battery_state", sensor_msgs / BatteryState, false, None,
-        "the voltage of the battery that the motors drive on";
+        "voltage of the motors' battery";
     Id::Diagnostics => "diagnostics", diagnostic_msgs / DiagnosticArray, false, None,
-        "the failsafe, each stage with its generation and its last death, the battery";
+        "failsafe, battery, and each stage with its generation and last death";
     Id::Rosout => "/rosout", rcl_interfaces / Log, true, None,
-        "what happens: deaths and stalls are errors, orders and arrivals are information";
+        "events: deaths and stalls as errors, orders and arrivals as information";
     Id::Clock => "/clock", rosgraph_msgs / Clock, false, None,
-        "with `--clock`: mission time, which the stamps of all messages are then";
+        "with `--clock`: mission time, which is then also the stamp of every message";
     Id::GoalPose => "goal_pose", geometry_msgs / PoseStamped, false, Some(Accept::Goals),
-        "where to go, as RViz's button sends it; the action `navigate_to_pose` (`nav2_msgs/NavigateToPose`) is taken too";
+        "goal, as RViz sends it; also enables the action `navigate_to_pose` (`nav2_msgs/NavigateToPose`)";
     Id::InitialPose => "initialpose", geometry_msgs / PoseWithCovarianceStamped, false, Some(Accept::Pose),
-        "where the robot, which stands, is, as RViz's button sends it: its pose is set, and its map reset";
+        "pose of a standing robot, as RViz sends it: sets the pose and resets the map";
     Id::Teleop => "teleop", geometry_msgs / Twist, false, Some(Accept::Hand),
-        "drive by hand a robot that stays, into no hazard that is believed, until 0.3 s pass without a message; it turns around to go back";
+        "drives a staying robot by hand and keeps it out of believed hazards; ends 0.3 s after the last message; to go back, the robot turns around";
     Id::Stop => "stop", std_msgs / Bool, false, Some(Accept::Stop),
-        "true: the robot stands; false: it goes on";
+        "true: stops the robot; false: lets it continue";
 }
 
 pub fn spec(id: Id) -> Option<&'static Spec> {

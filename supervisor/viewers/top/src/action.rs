@@ -1,5 +1,3 @@
-//! Keys and their actions.
-
 use std::{
     sync::mpsc::{Receiver, TryRecvError, channel},
     thread::{self, JoinHandle},
@@ -22,13 +20,11 @@ pub enum Action {
 }
 
 impl Action {
-    /// Returns the name of the equivalent subcommand.
     fn name(self) -> &'static str {
         let row = KEYS.iter().find(|(_, _, key)| *key == Key::Act(self));
         row.map_or("", |(_, name, _)| name)
     }
 
-    /// Returns whether the action concerns a stage rather than the robot.
     const fn is_of_a_stage(self) -> bool {
         !matches!(self, Self::Stop | Self::Resume)
     }
@@ -105,13 +101,12 @@ const ESCAPE: u8 = 0x1b;
 const CONTROL_C: u8 = 0x03;
 const LONGEST_SEQUENCE: usize = 32;
 
-/// Returns the key of a letter, if it has one.
 fn meaning(letter: u8) -> Option<Key> {
     let row = KEYS.iter().find(|(key, ..)| key.as_bytes() == [letter]);
     if letter == CONTROL_C { Some(Key::Quit) } else { row.map(|(.., key)| *key) }
 }
 
-/// Executor of one action at a time in a thread, because a stop lasts until the robot is at rest.
+/// Executor of one action at a time. A thread waits, because a stop lasts until rest.
 pub struct Operator {
     robot: RobotName,
     under_way: Option<(JoinHandle<()>, Receiver<String>)>,
@@ -125,7 +120,7 @@ impl Operator {
     /// Begins `action`. Returns the text to show meanwhile.
     pub fn ask(&mut self, action: Action, stage: Option<&str>) -> String {
         if self.under_way.is_some() {
-            return "the last action goes on".to_owned();
+            return "the last action is still under way".to_owned();
         }
         let stage = match stage {
             _ if !action.is_of_a_stage() => String::new(),
@@ -140,14 +135,12 @@ impl Operator {
                 Ok(()) => format!("{name}: done"),
                 Err(problem) => format!("{name}: {problem}"),
             };
-            // The screen may have ended.
             let _ = sender.send(message);
         });
         self.under_way = Some((thread, receiver));
         format!("{asked} ...")
     }
 
-    /// Returns the result of the action, once.
     pub fn answer(&mut self) -> Option<String> {
         let (_, receiver) = self.under_way.as_ref()?;
         let message = match receiver.try_recv() {

@@ -1,5 +1,3 @@
-//! Bus readers of the screen.
-
 use std::time::{Duration, Instant};
 
 use common::{

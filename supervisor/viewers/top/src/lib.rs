@@ -8,7 +8,7 @@
 //! | `screen`, `map` | drawing |
 //! | `action` | effects of keys |
 
-// `pub` marks use by another module; unused items are still reported.
+// `pub` marks use by another module.
 #![allow(unreachable_pub)]
 
 mod action;
@@ -63,13 +63,12 @@ pub struct Arguments {
 enum TopError {
     #[error(transparent)]
     Bus(#[from] BusError),
-    #[error("cannot draw on this terminal: {0}; `firsthand status` needs none")]
+    #[error("cannot draw on this terminal: {0}; use `firsthand status` instead")]
     Terminal(#[from] io::Error),
 }
 
 /// Longest delay of a key when nothing is published.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Interval at which the screen is redrawn.
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
 pub fn main() -> ExitCode {
@@ -78,7 +77,8 @@ pub fn main() -> ExitCode {
 
 fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
-        let message = "top draws on a terminal; elsewhere there are `firsthand status` and `firsthand topic hz`";
+        let message =
+            "top needs a terminal; elsewhere use `firsthand status` and `firsthand topic hz`";
         return Err(Refused::new("no-terminal", message).into());
     }
     let_stages_go_first();
@@ -117,7 +117,7 @@ fn run(
     let mut view = View::new(robot.clone());
     let mut operator = Operator::new(robot);
     let mut drawn = None::<Instant>;
-    // Keys are read here: the terminal library's reader never ends after the terminal is closed.
+    // The terminal library's reader never ends after the terminal is closed.
     let mut typed = Vec::new();
     while !signals.came() && !is_closed() {
         match follower.wait(LOOK_EVERY)? {
@@ -131,7 +131,6 @@ fn run(
             let mut bytes = [0; 64];
             let read = rustix::io::read(io::stdin(), &mut bytes).map_err(io::Error::from)?;
             if read == 0 {
-                // The terminal was closed.
                 return Ok(());
             }
             typed.extend_from_slice(&bytes[..read]);

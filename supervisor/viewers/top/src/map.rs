@@ -1,5 +1,5 @@
-//! Draws the believed map, field, robot, path and target. A letter is about twice as high as wide,
-//! so it shows two squares.
+//! Draws map, field, robot, path and target. A letter is twice as high as wide, so it shows two
+//! squares.
 
 use std::f64::consts::FRAC_PI_4;
 

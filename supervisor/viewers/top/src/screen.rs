@@ -19,7 +19,6 @@ use console::{
 use robot_state::{RobotState, guidance_in_words};
 
 const TABLE_WIDTH: u16 = 80;
-/// Least width with the map beside the table instead of below it.
 const WIDE: u16 = TABLE_WIDTH + 50;
 
 const TITLE: Style = Style::new().add_modifier(Modifier::BOLD);
@@ -155,7 +154,7 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
     frame.render_stateful_widget(table, area, &mut state);
 }
 
-/// Returns the usage of the stage in this row. The row after the stages is the supervisor's.
+/// Returns the usage of a row's stage, or of the supervisor after the last one.
 fn usage(view: &View, at: usize) -> Usage {
     view.usage.get(at).copied().unwrap_or_default()
 }
@@ -203,7 +202,6 @@ fn draw_map(view: &View, frame: &mut Frame<'_>, area: Rect) {
 fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let mut lines = numbers(&view.state);
     let legend = legend();
-    // Events fill the space between the numbers and the legend at the bottom.
     let room = usize::from(area.height).saturating_sub(lines.len() + legend.len() + 1);
     lines.push(Line::default());
     let events = view.events.iter().take(room);

@@ -153,7 +153,7 @@ fn every_stage_with_all_its_columns_is_on_the_smallest_and_on_a_large_screen() {
             "0.00, -0.10 ±0.12 m, 90°",
             "4.1 m to target 0 of 0",
             "123.45 m",
-            "no way to the target, at most 0.50 m/s",
+            "no path to the target, at most 0.50 m/s",
             "0 hazards found; 1000 solves",
             "stands: odometry implausible",
             "dead-reckoning: generation 59 died (hung, signal 9)",

@@ -1,5 +1,3 @@
-//! Data of the screen.
-
 use std::collections::VecDeque;
 
 use common::{domain::RobotName, process_usage::Usage, samples::name_str};
@@ -15,9 +13,8 @@ pub struct View {
     pub usage: Vec<Usage>,
     /// Samples per second on each stage's first output. `None` before the first count.
     pub rates_hz: Vec<Option<f64>>,
-    /// Row of the stage that the keys address.
     pub chosen: usize,
-    /// Deaths and stalls, newest first. Failsafe actions have a separate line.
+    /// Deaths and stalls, newest first.
     pub events: VecDeque<Event>,
     pub message: String,
 }
@@ -36,14 +33,12 @@ impl View {
         }
     }
 
-    /// Begins a run and drops the data of the last run.
     pub fn on_connected(&mut self) {
         let chosen = self.chosen;
         *self = Self::new(self.robot.clone());
         (self.connected, self.chosen) = (true, chosen);
     }
 
-    /// Returns the name of the chosen stage, or `None` before the first roster.
     pub fn chosen_stage(&self) -> Option<&str> {
         let stage = self.state.stages.get(self.chosen);
         stage.map(|entry| name_str(&entry.stage))

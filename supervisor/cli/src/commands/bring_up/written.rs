@@ -39,8 +39,8 @@ pub fn new_robot(protocol: Protocol, address: &str) -> String {
     )
 }
 
-/// Sets `keys` in the mission file `text`: dotted paths and values. Rows of `robot.sensor` are
-/// addressed by name.
+/// Sets `keys`, dotted paths and values, in the mission file `text`. Rows of `robot.sensor` go by
+/// name.
 ///
 /// # Errors
 /// The text is not TOML, or the parent of a key is not a table.
@@ -49,8 +49,7 @@ pub fn with_keys(text: &str, keys: &[&(String, String)]) -> Result<String> {
     for (path, new) in keys {
         let words: Vec<&str> = path.split('.').collect();
         let Some((last, tables)) = words.split_last() else { continue };
-        let refused =
-            || format!("{path} cannot be written: it lies below something that is no table");
+        let refused = || format!("cannot write {path}: its parent is not a table");
         let mut table = document.as_table_mut() as &mut dyn toml_edit::TableLike;
         let mut words = tables.iter();
         while let Some(word) = words.next() {

@@ -45,15 +45,14 @@ pub struct Setting {
 }
 
 impl Setting {
-    /// Opens one log for all runs of a command.
     pub fn log(&self, name: &str) -> Result {
         fs::create_dir_all(&self.runs)
             .map_err(|error| format!("cannot make {}: {error}", self.runs.display()))?;
         Ok(logging::to_file(&self.runs.join(name))?)
     }
 
-    /// Returns a mission with only the robot of `named`, ended only by the procedure. The body's
-    /// top speed limits `speed_m_s`.
+    /// Returns a mission with only the robot of `named`, ended only by the procedure, at most at
+    /// the body's top speed.
     pub fn procedure(
         &self,
         named: &Mission,
@@ -62,10 +61,9 @@ impl Setting {
     ) -> Result<Mission> {
         let body = named.body();
         if body.steering.is_some() {
-            return Err("a car does not turn on the spot, which the procedure is made of".into());
+            return Err("the procedure turns on the spot, which a car cannot do".into());
         }
         let name = if plan.procedure == Procedure::BringUp { "bring-up" } else { "calibration" };
-        // The target is beside the place where the robot turns.
         let mut mission = missions::parsed("target = [0.3, 0]", name, &[])?;
         mission.robot = named.robot.clone();
         mission.sonar = named.sonar.clone();
@@ -78,7 +76,7 @@ impl Setting {
         mission.planner.executable = Some(calibration::PLANNER.into());
         mission.planner.calibration = Some(plan);
         mission.controller.speed_m_s = Some(speed_m_s.min(body.top_speed_m_s));
-        // Repeated turns in one place must not count as a stall.
+        // Repeated turns in one place are no stall.
         mission.controller.turn_rad_s = Some(0.1);
         mission.controller.look_rad_s = Some(1.5);
         mission.controller.slow_radius_m = 0.01;
@@ -87,7 +85,7 @@ impl Setting {
 
     /// Drives the procedure. Fails if it does not complete.
     pub fn carry_out(&self, mission: &Mission, title: &str) -> Result<Carried> {
-        // The mission passes the same checks as one written by hand.
+        // Applies the checks of a handwritten mission.
         let mission = missions::parsed(&toml::to_string(mission)?, &mission.name, &[])?;
         let directory = runs::numbered(&self.runs, &mission.name)?;
         let real = mission.robot.address.is_some();
@@ -130,12 +128,12 @@ impl Setting {
         line.end();
         let (finished, still_moving) = ran?;
         if still_moving.is_some() {
-            return Err("THE ROBOT MOVES although it was told to stand by every method".into());
+            return Err("THE ROBOT MOVES although every stop method was tried".into());
         }
         let truth = finished.truth.last().map(|truth| DVec2::new(truth.x, truth.y));
         let ending = &finished.ending;
         match ending.outcome {
-            // Uncalibrated wheels may end anywhere. A failed planner stores its reason in its
+            // Uncalibrated wheels may end anywhere. A failed planner stores the reason in its
             // checkpoint.
             Outcome::Reached
             | Outcome::WrongPlace

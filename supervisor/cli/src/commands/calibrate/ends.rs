@@ -15,7 +15,7 @@ const FARTHEST_M: f64 = 10.0;
 /// Interval of checks for a signal while a person measures.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
-/// Waits until a person has put the robot on its mark. Returns at once if standard input is a file.
+/// Waits until a person has put the robot on its mark, unless standard input is a file.
 pub fn await_robot(title: &str, signals: &mut Signals) -> Result {
     if io::stdin().is_terminal() {
         write_stderr(&format!("{title}: put the robot on its mark, then press Enter\n"));
@@ -24,10 +24,12 @@ pub fn await_robot(title: &str, signals: &mut Signals) -> Result {
     Ok(())
 }
 
-/// Asks for an end, and repeats the question after an invalid line.
+/// Asks for an end until the answer is valid.
 pub fn next(title: &str, signals: &mut Signals) -> Result<DVec2> {
     loop {
-        write_stderr(&format!("{title}: where is it? metres ahead and to the left of the mark: "));
+        write_stderr(&format!(
+            "{title}: where is the robot? metres ahead and to the left of the mark: "
+        ));
         if let Some(end) = end(&line(signals)?) {
             return Ok(end);
         }

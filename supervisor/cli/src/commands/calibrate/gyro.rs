@@ -8,13 +8,13 @@ use recording::Recording;
 use super::{Arguments, drive::Carried, refused, written::Found};
 use console::failure::Result;
 
-/// Time after which a robot with the command to stand is at rest, seconds.
+/// Time for a robot to come to rest, seconds.
 const RESTS_AFTER_S: f64 = 0.8;
 
 pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> Result<Found> {
     let mut mission = arguments.mission(plan)?;
     if !(mission.robot.gyro() || mission.robot.ros2.imu.is_some()) {
-        return Err("this robot has no gyro: write `gyro = true` below [robot] if its lines of JSON say the angle of one, or name its topic as robot.ros2.imu; or calibrate before a wall or along squares".into());
+        return Err("this robot has no gyro; if its JSON lines report a gyro angle, set `gyro = true` below [robot]; if a ROS 2 topic carries the angle, name the topic as robot.ros2.imu; or calibrate before a wall or along squares".into());
     }
     let carried = arguments.setting.carry_out(&mission, "calibration")?;
     let Carried { directory, seconds, .. } = carried;
@@ -42,7 +42,7 @@ fn motions(
     rests.retain(|leg| leg.told == Told::Stand && leg.seconds() >= RESTS_AFTER_S);
     let longest = rests.iter().max_by(|one, other| one.seconds().total_cmp(&other.seconds()));
     let Some(longest) = longest.copied() else {
-        return Err("the robot never stood; look at the logs of the run".to_owned());
+        return Err("the robot never stood still; see the logs of the run".to_owned());
     };
     let from_s = longest.from_s + RESTS_AFTER_S;
     let near_s = 0.25 / mission.robot.rate_hz;
@@ -75,7 +75,7 @@ fn motions(
     motions.retain(|motion| motion.rolled_m > 0.0);
     match silent > 0 {
         true => Err(format!(
-            "the gyro says nothing in {silent} of {ticks} ticks: look at it with `firsthand bring-up`, or repeat this on a machine that has less to do"
+            "the gyro reports nothing in {silent} of {ticks} ticks; check it with `firsthand bring-up`, or repeat this on a machine with less load"
         )),
         false => Ok((at_rest, motions)),
     }

@@ -19,8 +19,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// Writes the calibration, and prints it. After a kill the file is either the old or the new
-    /// one.
+    /// Prints the calibration and replaces the file atomically.
     pub fn write(&self, arguments: &Arguments) -> Result {
         let (file, setting) = (&arguments.out, &arguments.setting);
         let it = &self.estimate;

@@ -1,4 +1,4 @@
-//! Follows a beacon in the foreground. Another robot's pose is published as the beacon meanwhile.
+//! Follows a beacon in the foreground, which may be another robot's published pose.
 
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
     let frame = frame(&arguments.frame)?;
     let distance_m = arguments.distance.unwrap_or(0.0);
     if !(distance_m > 0.0 || arguments.distance.is_none()) {
-        let message = format!("--distance {distance_m} is none; give metres, more than 0");
+        let message = format!("--distance {distance_m} is not a distance; give metres above 0");
         return Err(Refused::new("too-near", message).into());
     }
     if followed == Some(robot) {
@@ -66,7 +66,7 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
             },
             None => None,
         };
-        // This loop wakes on the other robot's pose, or else on the robot's own supervisor.
+        // Wakes on the other robot's pose, or else on the own supervisor.
         let patience = if other.is_some() { Duration::ZERO } else { LOOK_EVERY };
         if matches!(own.wait(patience)?, Event::Disconnected) {
             break;
@@ -92,8 +92,8 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
     Ok(print_text(&format!("{result}\n"))?)
 }
 
-/// Returns the beacon for a robot at `own` from the pose `seen` of the other robot. It is stamped
-/// with the time of `own`.
+/// Returns the beacon for a robot at `own` from the other's pose `seen`, stamped with the time of
+/// `own`.
 fn sample(own: &PoseSample, seen: &PoseSample, frame: Pose2) -> BeaconSample {
     let place = frame.position + frame.axis().rotate(seen.pose().position);
     BeaconSample {
@@ -112,6 +112,6 @@ fn frame(numbers: &[f64]) -> Result<Pose2, Refused> {
         [x, y, heading] if [x, y, heading].iter().all(|number| number.is_finite()) => {
             Ok(Pose2 { position: DVec2::new(x, y), heading: heading.to_radians() })
         }
-        _ => Err(Refused::new("no-frame", "--frame is no pose; give three finite numbers")),
+        _ => Err(Refused::new("no-frame", "--frame is not a pose; give three finite numbers")),
     }
 }

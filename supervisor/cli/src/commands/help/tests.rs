@@ -78,7 +78,6 @@ impl Document {
     }
 }
 
-/// Splits a shell line into commands and words, with placeholders filled in.
 fn commands(line: &str) -> Vec<Vec<String>> {
     let mut commands = vec![Vec::new()];
     let mut word = None::<String>;
@@ -104,7 +103,6 @@ fn commands(line: &str) -> Vec<Vec<String>> {
     commands
 }
 
-/// Returns `word` with a value instead of its placeholder.
 fn filled_in(word: &str) -> String {
     let value = |word: &str| match word {
         "S" | "N" | "H" | "K" | "$s" => Some("256"),

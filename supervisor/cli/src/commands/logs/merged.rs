@@ -1,4 +1,4 @@
-//! Merges the log files of all processes by the time at the start of each line.
+//! Merges log files by the time at the start of each line.
 
 use std::{
     fs::{self, File},
@@ -7,7 +7,7 @@ use std::{
 };
 
 const LOG: &str = "log";
-/// Bytes at which a line is cut: a process may write lines of any length.
+/// Bytes at which a line of any length is cut.
 const LONGEST_LINE: u64 = 64 << 10;
 /// Length of a time such as 2026-11-21T06:04:22.729158Z.
 const TIME: usize = 27;
@@ -32,7 +32,7 @@ struct Log {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Line {
-    /// UTC time, as written. A line without a time takes that of the previous line.
+    /// UTC time, as written, or that of the previous line.
     pub time: String,
     /// Stage, `supervisor` or `x80-sim`.
     pub process: String,
@@ -70,7 +70,7 @@ impl Logs {
         Ok(processes)
     }
 
-    /// Begins a round, in which [`Logs::next_line`] reads to the current ends of the logs.
+    /// Begins a round up to the current ends of the logs, read by [`Logs::next_line`].
     pub fn look(&mut self) -> io::Result<()> {
         for process in Self::processes(&self.directory)? {
             let wanted = self.process.as_ref().is_none_or(|only| *only == process);

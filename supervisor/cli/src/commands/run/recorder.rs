@@ -1,4 +1,4 @@
-//! Recorder of a run, in its own process. The mission continues without it.
+//! Recorder of a run in its own process, optional for the mission.
 
 use std::{
     io::{self, Read as _, Write as _},
@@ -24,8 +24,8 @@ struct Patience {
 /// Returns the wait times. The recorder needs milliseconds, or seconds beside 30 busy processes per
 /// core.
 ///
-/// Short for a real robot, which waits for its run. Long for a simulated one, and for a
-/// calibration, which needs its recording.
+/// Short for a real robot, long for a simulated one, and for a calibration, which needs its
+/// recording.
 const fn patience(options: &Options) -> Patience {
     let mission = &options.mission;
     let [attached, caught_up, ended] = match (&mission.robot.address, &mission.planner.calibration)
@@ -75,7 +75,7 @@ impl<'a> RunRecorder<'a> {
             return Ok(false);
         };
         let heard = poll::readable(&[said.as_fd(), signals.as_fd()], Some(within))?;
-        // A recorder that has ended leaves nothing to read.
+        // An ended recorder leaves nothing to read.
         Ok(heard.first() == Some(&true) && said.read(&mut [0; 4096])? > 0)
     }
 }
@@ -110,7 +110,7 @@ impl Consumer for RunRecorder<'_> {
         };
         let answered = asked.and_then(|()| self.hear(self.patience.caught_up, signals));
         if !matches!(answered, Ok(true)) && !signals.pending() {
-            tracing::warn!("the recorder does not answer; what it misses is counted in its file");
+            tracing::warn!("the recorder does not answer; its file counts what it misses");
             self.pipes = None;
         }
     }

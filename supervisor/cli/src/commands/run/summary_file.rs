@@ -1,4 +1,4 @@
-//! Reserves space for the summary at the start, in case the disk fills up.
+//! Reserves disk space for the summary at the start.
 
 use std::{
     fs::{self, File},
@@ -14,7 +14,7 @@ use rustix::{
 
 use console::failure::Refused;
 
-/// Name of an incomplete summary. [`SUMMARY`] means that the run has ended.
+/// Incomplete summary. [`SUMMARY`] means that the run has ended.
 const UNFINISHED: &str = "summary.json.unfinished";
 /// Reserved bytes. A summary takes 2 kB.
 const ROOM: u64 = 16 << 10;

@@ -37,11 +37,9 @@ pub struct Arguments {
     break_a_real_robot: bool,
 }
 
-/// Refuses a fault of a real robot, which needs the operator's consent.
 fn real_robot(robot: &RobotName) -> Refused {
     let message = format!(
-        "robot {robot} is a real one, and a fault may drive it into things; to do it all the same, clear its surroundings \
-         and add --break-a-real-robot"
+        "robot {robot} is real, and a fault may drive it into obstacles; to inject it anyway, clear its surroundings and add --break-a-real-robot"
     );
     Refused::new("real-robot", message)
 }
@@ -86,7 +84,7 @@ pub fn main(arguments: &Arguments) -> Result {
     Err(refused.into())
 }
 
-/// Sends the request. Returns the answer from the stage's heartbeats, if any.
+/// Sends the request. Returns the answer in the stage's heartbeats.
 fn request_fault(bus: &Bus, stage: &str, request: FaultSample) -> Result<Option<FaultAnswer>> {
     let mut health = bus.reader(&topics::HEALTH)?;
     let mut waiter = Waiter::default();

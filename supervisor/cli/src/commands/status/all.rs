@@ -80,7 +80,7 @@ fn listed(robot: Robot) -> Listed {
     }
 }
 
-/// Order, mission time, whether simulated, and age of a mirror's data.
+/// Order, mission time, whether simulated, age of a mirror.
 type RosterFacts = (&'static str, Option<f64>, Option<bool>, Option<f64>);
 
 fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {

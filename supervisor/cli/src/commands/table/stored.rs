@@ -1,5 +1,5 @@
-//! Results, capabilities, versions and keys, as CSV files beside the guide. The first column is the
-//! section of the page.
+//! Results, capabilities, versions and keys, as CSV files beside the guide, with page sections in
+//! the first column.
 
 use std::fmt::Write as _;
 

@@ -37,7 +37,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let topic = readable(&arguments.topic)?;
     let mut stream = Stream::open()?;
     let domain = Domain::of(arguments.robot.clone());
-    // Some topics wake no reader. They are read when the link ends the tick.
+    // Topics that wake no reader are read when the link ends the tick.
     let mut follower = Follower::new(domain, "echo", topic, |bus| topic.any_reader(bus))
         .also_on([&topics::LINK as &'static dyn AnyTopic]);
     let mut waiting = Waiting::default();

@@ -75,7 +75,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let domain = Domain::of(arguments.robot.clone());
     let open = |bus: &Bus| Readers::open(bus, &topics);
     let others = topics.iter().skip(1).map(|&topic| topic as &'static dyn AnyTopic);
-    // Some topics wake no reader. They are read when the link ends the tick.
+    // Topics that wake no reader are read when the link ends the tick.
     let others = others.chain([&topics::LINK as &'static dyn AnyTopic]);
     let mut follower = Follower::new(domain, "hz", topics[0], open).also_on(others);
     let mut waiting = Waiting::default();

@@ -1,4 +1,4 @@
-//! Formats samples of any topic by their layouts: text with one field per line, or one JSON object.
+//! Formats samples by their layouts: text with one field per line, or one JSON object.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,6 @@ const ELEMENTS: &str = "elements";
 /// Number of array elements in text, unless all are requested.
 const SHOWN: usize = 16;
 
-/// Formats fields, with those of a struct below its name.
 pub fn text(fields: &Fields, whole: bool) -> String {
     let most = if whole { usize::MAX } else { SHOWN };
     let mut text = String::new();

@@ -6,7 +6,7 @@ use rand_pcg::{Pcg64, rand_core::Rng as _};
 
 use super::*;
 
-/// Process and its policy. The process's state is independent of the policy's phases.
+/// Process, with a state independent of the policy's phases, and its policy.
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct Model {
     policy: Policy,
@@ -15,8 +15,7 @@ struct Model {
     wanted: bool,
     /// Whether the stage is held until a start request.
     held: bool,
-    /// Times of deaths. `row` counts those in a row without a stable generation, `wait` is the last
-    /// pause.
+    /// Times of deaths. `row` counts those without a stable generation, `wait` is the last pause.
     deaths: Vec<Now>,
     row: usize,
     wait: Duration,
@@ -28,7 +27,7 @@ struct Generation {
     ready: Option<Now>,
     /// Last sign of life, including the start.
     sign: Now,
-    /// Whether the process was asked to stop, so that its end is no death.
+    /// Whether the process was asked to stop.
     stopping: bool,
     aborted: bool,
     kill: Option<Now>,
@@ -80,7 +79,6 @@ impl Model {
         }
     }
 
-    /// Returns whether `event` can happen: only a process can beat or end.
     fn can(&self, event: Event) -> bool {
         match event {
             Event::Start => self.generation.is_none(),
@@ -109,7 +107,7 @@ impl Model {
         }
     }
 
-    /// Returns the time when a sleeping process is aborted, by the rules alone.
+    /// Returns the abort time of a sleeping process by the rules alone.
     fn blocked(&self) -> Option<Now> {
         let generation = self.generation.as_ref()?;
         Some(generation.sign + generation.deadline() * 4)
@@ -247,7 +245,7 @@ impl Model {
         pauses
     }
 
-    /// Returns this model with its clock set back, so that models of equal ages are equal.
+    /// Returns this model with its clock set back, to compare models of equal ages.
     fn at_zero(&self) -> Self {
         // A common origin keeps past times in the past.
         const ORIGIN: Duration = Duration::from_secs(100);
@@ -319,8 +317,7 @@ fn two_million_steps_of_long_histories_keep_every_rule() {
         for _ in 0..1_000 {
             let moments = model.moments();
             let pause = moments[chance.next_u64() as usize % moments.len()];
-            // Short pauses are more frequent, because after a long one earlier events no longer
-            // matter.
+            // Short pauses are more frequent, because a long one makes earlier events irrelevant.
             if pause < ms(5_000) || chance.next_u64().is_multiple_of(50) {
                 model.now += pause;
             }

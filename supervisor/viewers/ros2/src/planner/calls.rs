@@ -15,7 +15,6 @@ use crate::{goals::Uuid, messages::path};
 
 pub struct Asked {
     pub id: Uuid,
-    /// Goals in order. The viapoints of a single goal precede it.
     pub goals: Vec<PoseStamped>,
     /// Start, or `None` for the robot's own pose.
     pub start: Option<PoseStamped>,
@@ -51,8 +50,7 @@ pub struct Outcome {
     pub failure: Option<Failure>,
 }
 
-/// Encodes the result of a goal for a client of `release`. `codes` is the action's first Nav2 error
-/// code.
+/// Encodes a goal's result. `codes` is the action's first Nav2 error code.
 pub fn result(status: i8, outcome: &Outcome, codes: u16, release: Release) -> Vec<u8> {
     let path = path(Header::at(outcome.at_ns, &outcome.frame), &outcome.path);
     let planning_time = outcome.took_ns.into();

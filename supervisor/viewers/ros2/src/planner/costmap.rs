@@ -50,15 +50,17 @@ impl Costmap {
         let resolution_m = f64::from(info.resolution);
         let [width, height] = [info.width, info.height].map(|side| side as usize);
         let (origin, heading) = (info.origin.at(), info.origin.orientation.heading());
-        let heading = heading.ok_or("an origin whose orientation is no rotation")?;
+        let heading = heading.ok_or("the origin's orientation is not a rotation")?;
         let scale = DVec2::splat(resolution_m);
         let corner = DAffine2::from_scale_angle_translation(scale, heading, origin.into());
         let fits = |side| (1..=MAX_SIDE).contains(&side);
         if !(resolution_m > 0.0 && corner.is_finite() && fits(width) && fits(height)) {
-            return Err(format!("{width} x {height} cells of {resolution_m} m at {origin:?}"));
+            return Err(format!(
+                "the size, resolution or origin is invalid: {width} x {height} cells of {resolution_m} m at {origin:?}"
+            ));
         }
         if cells.len() != width * height {
-            return Err(format!("{} cells instead of {width} x {height}", cells.len()));
+            return Err(format!("the map has {} cells instead of {width} x {height}", cells.len()));
         }
         Ok(Self {
             frame: header.frame_id,
@@ -77,7 +79,7 @@ impl Costmap {
         let is_inside = col + width <= self.width && row + height <= self.height;
         if !is_inside || data.len() != width * height {
             return Err(format!(
-                "{width} x {height} cells at ({col}, {row}), which the map has not"
+                "the update does not fit the map: {width} x {height} cells at ({col}, {row})"
             ));
         }
         for (from, row) in data.chunks_exact(width.max(1)).zip(row..) {

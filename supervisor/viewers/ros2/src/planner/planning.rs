@@ -14,8 +14,7 @@ const MOST_CELLS: usize = 1 << 24;
 const STEP: f64 = 0.25;
 /// Shortest screening length, in cells. u then falls to about a third from cell to cell.
 const SHORTEST: f64 = 0.5;
-/// Largest path, bytes. DDS here does not fragment answers above 64 kB. The difference holds the
-/// rest of the answer.
+/// Largest path, bytes. DDS here does not fragment answers above 64 kB, path and rest.
 const MOST_BYTES: usize = 64_000;
 /// Bytes of a pose without its frame name: stamp, name length, padding, position and orientation.
 const POSE_BYTES: usize = 76;
@@ -37,7 +36,6 @@ pub enum Reason {
     NoGoal,
 }
 
-/// Reason of a missing path, and its text.
 pub type Failure = (Reason, String);
 
 #[derive(Debug)]
@@ -66,8 +64,8 @@ impl Planner {
         }
     }
 
-    /// Returns poses from `start` through all `goals` in the frame of `map`, about a cell apart,
-    /// farther on long paths. Goals keep their headings.
+    /// Returns poses through all `goals`, about a cell apart, farther on long paths. Goals keep
+    /// their headings.
     pub fn plan(
         &mut self,
         map: &Arc<Costmap>,
@@ -102,8 +100,7 @@ impl Planner {
         self.thinned(map, &path, &ends)
     }
 
-    /// Returns as many poses as an answer holds, including those at `ends`, with chords clear of
-    /// blocked cells.
+    /// Thins a path to one answer. Keeps `ends`, and chords clear of blocked cells.
     ///
     /// # Errors
     /// An answer holds too few poses.
@@ -117,11 +114,11 @@ impl Planner {
             }
             stride += stride.div_ceil(4);
         }
-        let text = format!("the path has more than {most} bends, which one answer cannot carry");
+        let text = format!("the path has more than {most} bends, the limit of one answer");
         Err((Reason::Unknown, text))
     }
 
-    /// Returns poses at most `stride` apart, closer where a chord would enter a blocked cell.
+    /// Returns poses at most `stride` apart, closer beside blocked cells.
     fn strided(&self, map: &Costmap, path: &[Pose], ends: &[usize], stride: usize) -> Vec<Pose> {
         let cells = map.place.inverse();
         let place = |at: usize| cells.transform_point2(DVec2::new(path[at][0], path[at][1]));
@@ -162,8 +159,8 @@ impl Planner {
         let [start, goal] = ends.map(|end| format!("({:.2}, {:.2})", end.x, end.y));
         let [from, to] = ends.map(|end| map.place.inverse().transform_point2(end));
         let fails = |reason, text: String| move || (reason, text);
-        let of_start = format!("the start {start} is outside of the map");
-        let of_goal = format!("the goal {goal} is outside of the map");
+        let of_start = format!("the start {start} is outside the map");
+        let of_goal = format!("the goal {goal} is outside the map");
         let first = map.cell_at(from).ok_or_else(fails(Reason::StartOutside, of_start))?;
         let last = map.cell_at(to).ok_or_else(fails(Reason::GoalOutside, of_goal))?;
         if map.is_occupied(first, &self.body) {
@@ -182,11 +179,11 @@ impl Planner {
         })?;
         let enters = |at: DVec2| map.cell_at(at).is_some_and(|cell| !map.is_occupied(cell, &body));
         let way = way(field, from, enters)
-            .ok_or_else(|| (Reason::NoPath, format!("no way leads from {start} to {goal}")))?;
+            .ok_or_else(|| (Reason::NoPath, format!("no path leads from {start} to {goal}")))?;
         Ok(way.into_iter().map(|at| map.place.transform_point2(at)).collect())
     }
 
-    /// Returns the field of a goal, solved from an earlier map's field if there is one.
+    /// Returns a goal's field, warm-started from an earlier map's.
     fn field(
         &mut self,
         map: &Costmap,
@@ -208,7 +205,7 @@ impl Planner {
     }
 }
 
-/// Returns positions about a cell apart along `field`, if a permitted path leads to its target.
+/// Returns positions about a cell apart along `field`, if it leads to its target.
 fn way(field: &Field, from: DVec2, enters: impl Fn(DVec2) -> bool) -> Option<Vec<DVec2>> {
     let mut at = from;
     let mut way = vec![from];

@@ -160,8 +160,8 @@ fn each_reason_against_a_path_has_nav2s_error_code_and_says_where() {
         (occupied, free, 205, "the start (0.60, 1.50) is occupied"),
         (free, occupied, 206, "the goal (0.60, 1.50) is occupied"),
         (free, at(4.9, 1.0), 206, "does not fit"),
-        (free, closed, 208, "no way leads from (4.00, 4.00) to (1.50, 1.50)"),
-        (closed, free, 208, "no way"),
+        (free, closed, 208, "no path leads from (4.00, 4.00) to (1.50, 1.50)"),
+        (closed, free, 208, "no path"),
     ] {
         let (reason, words) = plan(&mut planner(), &map, from, &[to]).unwrap_err();
         assert_eq!((reason as u16 + 200, words.contains(says)), (code, true), "{words}");
@@ -389,7 +389,7 @@ fn results_are_those_of_the_clients_release_with_the_error_code_of_their_action(
     };
     for (codes, releases, [found, none]) in RESULTS {
         let failure = match codes {
-            200 => (Reason::NoPath, "no way"),
+            200 => (Reason::NoPath, "no path"),
             _ => (Reason::NoGoal, "no goal"),
         };
         let failure = Some((failure.0, failure.1.to_owned()));

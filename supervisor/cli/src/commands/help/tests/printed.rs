@@ -57,7 +57,7 @@ fn flaw(row: &[String; 3], functions: &BTreeSet<String>) -> Option<String> {
     }
 }
 
-/// Returns the rows of a stored file of the guide. The first column is a section.
+/// Returns a stored file's rows, with a section in the first column.
 fn rows(name: &str) -> impl Iterator<Item = csv::StringRecord> {
     let file = root().join(format!("supervisor/guide/{name}.csv"));
     csv::Reader::from_path(file).unwrap().into_records().map(Result::unwrap)
@@ -199,7 +199,7 @@ fn a_table_behind_its_marker_is_renewed_and_nothing_else() {
     assert_eq!(renewed(&text, print), text);
 }
 
-/// Lists the crates of the workspace with the descriptions from their manifests.
+/// Lists the workspace's crates with their descriptions.
 fn crates() -> String {
     let manifest = |folder: &Path| -> toml::Table {
         let text = fs::read_to_string(folder.join("Cargo.toml")).unwrap();
