@@ -1,5 +1,4 @@
-//! Tests of middleware file states that block further processes from joining. Each test creates one
-//! during a mission, which recovers.
+//! Tests of recovery from middleware file states that block further processes from joining.
 
 use std::{
     fs,
@@ -19,7 +18,6 @@ use common::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-/// Mission time relative to the wall clock.
 const PACE: [&str; 2] = ["--pace", "4"];
 
 fn process_of(number: u128) -> u32 {
@@ -48,7 +46,6 @@ fn half_make_connection(bus: &BusInstance, port: u128) {
     half_make(Path::new(&format!("/dev/shm/{start}_{port}_{port}.connection")));
 }
 
-/// Asserts that the mission ends undisturbed and leaves nothing.
 fn assert_arrives(run: Run) -> Value {
     let summary = run.arrives();
     // A lost pose would have an error of metres.
@@ -143,7 +140,7 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
         signal_process(pid(&status, "dead-reckoning"), Signal::KILL);
         let began = Instant::now();
         while take_all() == all_but_one {
-            assert!(began.elapsed() < PATIENCE, "the place of the killed stage is not given back");
+            assert!(began.elapsed() < PATIENCE, "the bus keeps the place of the killed stage");
             joined.clear_up(&[]).unwrap();
         }
         run.signal(Signal::CONT);

@@ -41,5 +41,5 @@ fn on_a_wall_clock_the_link_stops_a_robot_at_a_bump_names_the_bumper_and_lets_it
     let (code, summary, directory) = run.finish_in();
     assert_ended(code, &summary, 0, "reached");
     let log = std::fs::read_to_string(directory.path().join("run/link.log")).unwrap();
-    assert!(log.contains("feels something"), "{log}");
+    assert!(log.contains("detects a contact or a cliff"), "{log}");
 }

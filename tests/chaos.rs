@@ -24,7 +24,6 @@ fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_default()
 }
 
-/// Sums all numbers in an object of objects.
 fn sum(of: &Value) -> u64 {
     let objects = of.as_object().unwrap().values();
     let counts = objects.flat_map(|counts| counts.as_object().unwrap().values());

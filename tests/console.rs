@@ -1,5 +1,4 @@
-//! Tests of commands at the prompt: echo, hz, list, runs, logs, completions, the manual page. They
-//! end quietly when their reader is closed.
+//! Tests of commands at the prompt. They end quietly when their reader is closed.
 
 use std::{
     collections::BTreeSet,
@@ -243,7 +242,6 @@ fn list_shows_the_robots_that_run_and_where() {
         assert!(robot["mission_time_s"].as_f64() > Some(0.4), "{robot}");
     }
     assert!(printed(&["status", "--all"]).contains("con-list-2 "));
-    // A killed supervisor leaves its bus.
     let [mut killed, ended] = runs;
     killed.signal(Signal::KILL);
     killed.reap();
@@ -297,7 +295,7 @@ fn runs_are_listed_with_their_outcomes_and_pruned() {
     assert_eq!(list(&["--robot", "con-other"]), []);
     let table = printed(&["runs", "--runs", below]);
     assert!(table.contains("3 runs, ") && table.contains(" reached "), "{table}");
-    assert_eq!(list(&["--prune", "0"]), all[2..], "what goes on is not removed");
+    assert_eq!(list(&["--prune", "0"]), all[2..], "an active run is not removed");
     goes_on.kill().unwrap();
     goes_on.wait().unwrap();
     assert_eq!(list(&[]), [run("open-room-003", "cut off")]);

@@ -20,7 +20,6 @@ use common::{
     waiter::Waiter,
 };
 
-/// Combined samples of a consumer.
 #[derive(Default)]
 struct Heard {
     poses: Vec<(u64, f64)>,
@@ -76,7 +75,7 @@ fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothin
             heard.grid.cells().iter().filter(|&&cell| cell == state as u8).count()
         };
         assert_eq!(count(CellState::Perimeter), 4 * (frame.cells as usize - 1), "the whole rim");
-        assert!(count(CellState::Sensed) > 0, "what was sensed before the consumer came");
+        assert!(count(CellState::Sensed) > 0, "cells sensed before the consumer attached");
 
         assert_eq!(heard.field.frame(), Some(frame));
         let directed =
@@ -92,7 +91,6 @@ fn a_late_consumer_gets_pose_grid_and_field_whole_and_its_leaving_changes_nothin
     });
 }
 
-/// Number of poses in each run.
 type HeardPoses = Mutex<Vec<usize>>;
 
 fn follow(robot: &str, runs: usize, heard: &HeardPoses) {
@@ -190,7 +188,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
         assert!(matches!(refused, BusError::NoPlace { .. }), "{refused}");
         drop(shown);
         readers
-            .push(bus.reader(&topics::POSE).expect("the place of a killed process is waited for"));
+            .push(bus.reader(&topics::POSE).expect("a reader gets the place of a killed process"));
         // The status command needs a place, too.
         readers.pop();
         // A stage that needs a place gets one.
@@ -209,7 +207,6 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
     });
 }
 
-/// Process of a consumer, killed on drop.
 struct Staying(Child);
 
 impl Drop for Staying {

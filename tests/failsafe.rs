@@ -1,5 +1,4 @@
-//! Tests of the robot's stops, seen on the wire. Every datagram between link and robot passes
-//! through the test.
+//! Tests of the robot's stops, tapped on the wire.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},
@@ -16,7 +15,6 @@ use serde_json::Value;
 
 /// Duration of a command: `robot.command_limit_s`.
 const LIMIT: Duration = Duration::from_millis(250);
-/// Tick period at 7 Hz.
 const PERIOD: Duration = Duration::from_millis(143);
 
 /// Motion command from the link to the robot.
@@ -34,7 +32,6 @@ impl Heard {
     }
 }
 
-/// Tap on every command to the robot.
 pub(crate) struct Tap {
     pub(crate) proxy: Proxy,
     heard: Receiver<Heard>,
@@ -119,7 +116,6 @@ fn listen(decoder: &mut Decoder, at: Instant, tell: &Sender<Heard>) {
     }
 }
 
-/// Starts a run of the default mission whose commands are tapped.
 fn tapped(robot: &str) -> (Robot, Tap, Run) {
     let body = Robot::on_the_course();
     let tap = Tap::before(&body);

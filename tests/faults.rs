@@ -1,5 +1,4 @@
-//! Tests of robots without progress due to an injected stage fault. Each recovery step frees one,
-//! and the last reports failure.
+//! Tests of recovery from injected stage faults.
 
 use crate::support::{
     self, Run, STAGES, all_run, assert_ended, assert_nothing_left, find, generation,
@@ -14,9 +13,8 @@ use common::{
 };
 use serde_json::Value;
 
-/// Options that give the mission thousands of ticks, or seconds in lockstep, time enough for a
-/// fault on a loaded machine. Laboratory odometry keeps the arrival sure after a hundred looks and
-/// the turns under a broken field.
+/// Options that give a loaded machine time for a fault. Laboratory odometry keeps the arrival sure
+/// after a hundred looks and turns.
 const SLOW: [&str; 6] = [
     "--set",
     "controller.speed_m_s=0.012",

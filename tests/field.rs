@@ -31,7 +31,6 @@ fn write_map(directory: &Path) -> PathBuf {
     file
 }
 
-/// Writes the rooms as an image with light free cells.
 fn write_image(directory: &Path) -> PathBuf {
     let file = directory.join("rooms.pgm");
     let pixels: Vec<u8> =

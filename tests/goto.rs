@@ -18,7 +18,6 @@ use serde_json::Value;
 
 use crate::support::{self, Run, json_of, operate, output, records, refused};
 
-/// Mission time relative to the wall clock.
 const PACE: [&str; 2] = ["--pace", "2"];
 
 fn outcomes(summary: &Value) -> Vec<&str> {
@@ -38,7 +37,7 @@ fn follow(robot: &str, mut is_enough: impl FnMut(&CommandSample) -> bool) {
                 return;
             }
         }
-        assert!(began.elapsed() < support::PATIENCE, "no command came that was waited for");
+        assert!(began.elapsed() < support::PATIENCE, "the awaited command did not arrive");
         waiter.wait(Duration::from_millis(100)).unwrap();
     }
 }
@@ -326,7 +325,6 @@ fn zones_that_an_operator_adds_and_removes_hold_for_the_robot_alone_and_replay_t
     zone(&["-1", "-1", "1", "-1", "1", "1", "-1", "1"], "zone-here");
     zone(&["2", "2", "3", "3"], "no-zone");
     zone(&["3", "3", "--remove"], "not-in-zone");
-    // The path leads around the zone.
     operate(robot, &["goto", "2.2", "0"]);
     run.wait_until("it drives", |status| status["order"] == "driving");
     run.wait_until("it is there", waits);
@@ -374,7 +372,7 @@ fn push(robot: &str, stick: [f64; 2], mut is_enough: impl FnMut() -> bool) {
         if is_enough() {
             return;
         }
-        assert!(began.elapsed() < support::PATIENCE, "the hand waits in vain");
+        assert!(began.elapsed() < support::PATIENCE, "the hand-driven robot is late");
         std::thread::sleep(Duration::from_millis(100));
     }
 }

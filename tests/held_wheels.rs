@@ -5,7 +5,6 @@ use serde_json::Value;
 
 use crate::support::{Run, assert_ended, assert_nothing_left, records, wire::Robot};
 
-/// Wall-clock pace, at which the link judges the robot's frames.
 const ON_THE_WALL: [&str; 2] = ["--pace", "2"];
 
 fn stalls(directory: &std::path::Path) -> Vec<(String, String)> {

@@ -15,7 +15,6 @@ use crate::support::{Run, assert_ended, assert_no_restart, assert_reached, repla
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
-/// Process of the guide's robot.
 struct PythonRobot {
     process: Child,
     /// Thread that drains the robot's own lines, so that the robot never waits, and returns the
@@ -101,7 +100,7 @@ fn a_run_whose_robot_names_a_sensor_otherwise_ends_with_both_names_and_blames_no
     let (code, summary) = robot.run_with("json-nose", &["--set", nose]).finish();
     assert_ended(code, &summary, 6, "aborted");
     let reason = summary["reason"].as_str().unwrap();
-    assert!(reason.contains("no sensor is called \"front\"; nose"), "{summary}");
+    assert!(reason.contains("no sensor is named \"front\"; rename it to one of nose"), "{summary}");
     assert_no_restart(&summary);
 }
 

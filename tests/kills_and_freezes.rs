@@ -42,12 +42,10 @@ const KILL_AND_FREEZE: &[Signal] = &[Signal::KILL, Signal::STOP];
 const FAST: &[&str] = &["--pace", "4"];
 /// Speed at which the robot drives for longer than the signals take.
 const LONG: &[&str] = &["--pace", "4", "--set", "controller.speed_m_s=0.1"];
-/// Empty room for a car. It cannot look around, so among drums it touches one in some 3 of 100
-/// missions, killed or not.
+/// Empty room for a car. Among drums it touches one in 3 of 100 missions, killed or not.
 const CAR: &[&str] =
     &["--pace", "4", "--set", "robot.model=\"car\"", "--set", "controller.speed_m_s=0.05"];
-/// Speed at which a mission in lockstep has thousands of ticks, or a second or two: enough for one
-/// signal.
+/// Speed at which a lockstep mission lasts long enough for one signal.
 const SLOW: &[&str] = &["--set", "controller.speed_m_s=0.02", "--timeout", "8000"];
 /// Speed at which a lockstep mission lasts long enough for many signals.
 const LOCKSTEP: &[&str] = &["--set", "controller.speed_m_s=0.006", "--timeout", "80000"];
@@ -165,9 +163,9 @@ fn assert_at_least_one_restart(summary: &Value) {
     }
 }
 
-/// Asserts that the pose was not lost, which would be metres. A different path reads the wheels at
-/// other fractions of a count, which is 9 mm laterally at 6 m. A car's tyres slip by centimetres.
-/// Long looks on a loaded machine add wheel slip: three standard deviations of the covariance.
+/// Asserts that the pose was not lost by metres. Another path reads other fractions of a count: 9
+/// mm laterally at 6 m. A car's tyres slip by centimetres. Long looks add slip: three standard
+/// deviations.
 fn assert_pose_was_not_lost(summary: &Value) {
     let metres = |key: &str| summary[key].as_f64().unwrap();
     let allowed_m = (1.5 * metres("pose_within_m")).clamp(0.15, 0.5);
@@ -194,8 +192,7 @@ fn a_frozen_stage_is_recorded_as_hung_and_a_thawed_one_goes_on() {
         let controller = find(status, "controller");
         controller["state"] == "running" && controller["beat_age_s"].as_f64() < Some(0.1)
     };
-    // On a busy machine the controller may be replaced before the second command. Both are then
-    // sent again.
+    // The controller may be replaced before the second command; both are then sent again.
     let goes_on = || {
         let before = run.wait_until("the controller beats", beats);
         operate("kf-thaw", &["stage", "freeze", "controller"]);

@@ -81,7 +81,7 @@ fn a_robot_of_json_one_of_whose_two_lasers_dies_stands_by_its_name_and_goes_on_w
     let mut run = Run::under_way("laser-dies", "obstacle-course", &arguments, 1.0);
     dead.store(true, Ordering::Relaxed);
     run.wait_until("it stands", |status| status["link"]["cause"] == "ranging sensor silent");
-    assert!(run.link_logged(&["WARN", "no valid reading from back:"]));
+    assert!(run.link_logged(&["WARN", "no valid reading from back;"]));
     dead.store(false, Ordering::Relaxed);
     run.arrives();
 }
@@ -158,7 +158,6 @@ fn a_long_robot_refuses_to_turn_to_its_heading_in_a_corridor_and_touches_nothing
     let (_, summary) = long_robot("long-corridor", "[[2.2, 0, 90]]", walls);
     assert_eq!(summary["outcome"], "unreachable", "{summary}");
     assert_eq!(summary["collisions"], 0, "{summary}");
-    // It drives in, backs out and turns outside.
     let (code, summary) = long_robot("long-return", "[[2.2, 0], [-0.5, 0, 180]]", walls);
     assert_eq!((code, &summary["collisions"]), (Some(0), &0.into()), "{summary}");
 }

@@ -32,7 +32,6 @@ fn stages_are_not_taken_for_hung_when_the_supervisor_stood_still_with_them() {
         for &process in &all {
             signal_process(process, Signal::STOP);
         }
-        // Longer than a stage may go without a heartbeat.
         thread::sleep(Duration::from_millis(800));
         for &process in all.iter().rev() {
             signal_process(process, Signal::CONT);

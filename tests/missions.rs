@@ -1,10 +1,7 @@
-//! Tests of whole missions through real processes.
-
 use serde_json::Value;
 
 use crate::support::{self, Run, assert_ended, assert_nothing_left, printed, run};
 
-/// Asserts that the robot reaches its target and touches nothing.
 #[track_caller]
 fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) -> Value {
     println!("{arguments:?}");
@@ -13,7 +10,6 @@ fn arrives_untouched(robot: &str, mission: &str, arguments: &[&str]) -> Value {
     summary
 }
 
-/// Returns the path length relative to the straight line.
 fn detour(summary: &Value) -> f64 {
     let metres = |key: &str| summary[key].as_f64().unwrap();
     metres("path_length_m") / metres("straight_m")

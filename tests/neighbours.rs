@@ -1,5 +1,4 @@
-//! Tests of other processes and users beside a robot. They can neither drive it nor block its
-//! start, and processes that they break end.
+//! Tests that other processes and users can neither drive a robot nor block its start.
 
 use std::{
     fs,
@@ -36,8 +35,7 @@ use rustix::{
     thread::{Uid, set_thread_res_uid},
 };
 
-/// Longest time from a signal to the end of a run with a damaged bus. The run needs 3 s, the rest
-/// allows for machine load.
+/// Longest time from a signal to the end of a run with a damaged bus: 3 s, and machine load.
 const ENDS_WITHIN: Duration = Duration::from_secs(20);
 
 fn shared(robot: &str) -> Vec<std::path::PathBuf> {
@@ -122,11 +120,11 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_what
         let own = format!("pid={}", std::process::id());
         for reader in ["dead-reckoning", "mapper", "planner", "controller"] {
             let told = || support::logged(&run.directory(), reader, &["WARN", &own]) == 1;
-            support::wait_until("the forger is told", told);
+            support::wait_until("a warning names the forger", told);
         }
         for echo in echoes {
             let ended = pidfd_open(Pid::from_child(&echo), PidfdFlags::empty()).unwrap();
-            assert!(poll::is_readable(&ended, PATIENCE).unwrap(), "it shows no more");
+            assert!(poll::is_readable(&ended, PATIENCE).unwrap(), "the echo ends");
             let (status, shown) = json_of(&echo.wait_with_output().unwrap());
             let forged = shown.iter().filter(|sample| sample["stamp"]["generation"] != 1);
             assert_eq!((status.code(), shown.len(), forged.count()), (Some(0), 40, 0));
@@ -280,7 +278,7 @@ fn a_file_of_another_user_with_a_name_of_the_robots_blocks_no_start() {
     let there = planted.exists();
     let _ = fs::remove_file(planted);
     assert_eq!(code, Some(0), "{summary}");
-    assert!(there, "it is not the robot's to remove");
+    assert!(there, "the robot keeps a file of another user");
     assert_nothing_left("planted");
 }
 
@@ -344,7 +342,6 @@ fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_second
         let took = began.elapsed();
         println!("{robot}: ended {took:?} after SIGTERM");
         assert!(took < ENDS_WITHIN, "{robot}: {took:?}");
-        // The next start is normal.
         Run::start(robot, "open-room", &[]).arrives();
     }
 }

@@ -4,7 +4,6 @@ use common::clock::monotonic_ns;
 
 use crate::support::{Run, find, operate};
 
-/// Mission time relative to the wall clock.
 const PACE: [&str; 2] = ["--pace", "4"];
 
 #[test]
@@ -42,7 +41,7 @@ fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
     let mut run = Run::under_way("stop-time", "open-room", &arguments, 2.0);
     operate("stop-time", &["stop"]);
     let stopped = std::time::Instant::now();
-    run.wait_until("the stop has lasted as long as the mission may", |_| {
+    run.wait_until("the stop has lasted for the mission's time limit", |_| {
         stopped.elapsed().as_secs_f64() * pace > timeout_s
     });
     operate("stop-time", &["resume"]);

@@ -13,10 +13,8 @@ use crate::support::{
     printed, refused, signal_process,
 };
 
-/// `firsthand page` for a robot.
 struct Page {
     child: Child,
-    /// Addresses to watch and to drive.
     watch: String,
     drive: String,
 }
@@ -124,7 +122,7 @@ fn operate(robot: &str, width: u32) {
     browser.run("const time = document.getElementById('time'); time.value = time.min; time.dispatchEvent(new Event('input'))");
     browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'false'");
     browser.wait_until("!document.getElementById('past').hidden");
-    browser.wait_until(&says("past", "You look at"));
+    browser.wait_until(&says("past", "Shown: "));
     operate_robot(robot, &["stop"]);
     browser.wait_until(RESTS);
     browser.wait_until("document.querySelector('header').className === 'bad'");
@@ -136,7 +134,7 @@ fn operate(robot: &str, width: u32) {
 
     page.signal(Signal::STOP);
     browser.wait_until(IS_LOST);
-    browser.wait_until(&says("status", "not known now"));
+    browser.wait_until(&says("status", "unknown; last known"));
     browser.wait_until("document.querySelector('header').className === 'bad'");
     page.signal(Signal::CONT);
     browser.wait_until(IS_THERE);
@@ -155,7 +153,7 @@ fn operate(robot: &str, width: u32) {
     browser.wait_until("!document.body.classList.contains('drive')");
     browser.wait_until(GOES);
     run.stop();
-    browser.wait_until(&says("status", "the run has ended"));
+    browser.wait_until(&says("status", "the run ended at"));
     page.end(Signal::TERM);
     assert_nothing_left(robot);
 }
@@ -245,7 +243,7 @@ fn a_recorded_run_is_scrubbed_and_played_in_windows_of_both_widths() {
         let scrub = "const time = document.getElementById('time'); time.value = 1; time.dispatchEvent(new Event('input'))";
         browser.run(scrub);
         browser.wait_until("document.getElementById('now').textContent === '1.0 s'");
-        assert_ne!(browser.run(picture), at_the_end, "the map is that of another time");
+        assert_ne!(browser.run(picture), at_the_end, "the map shows another time");
         browser.run("document.getElementById('speed').value = '10'");
         browser.tap("play", 0, 0);
         browser.wait_until(
@@ -254,7 +252,7 @@ fn a_recorded_run_is_scrubbed_and_played_in_windows_of_both_widths() {
         browser.wait_until(&says("play", "Play"));
         let there =
             browser.run("return getComputedStyle(document.getElementById('urgent')).display");
-        assert_eq!(there, "none", "there is nobody to stop");
+        assert_eq!(there, "none", "a recording has no stop button");
     }
 }
 

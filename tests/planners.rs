@@ -10,7 +10,6 @@ use crate::support::{
     printed, refused, signal_process, start_quietly,
 };
 
-/// Planners for comparison.
 const BASELINES: [&str; 2] = ["wavefront", "bug"];
 /// Drum known beforehand, so the path around it is the same in every run.
 const DRUM: [&str; 6] = [
@@ -127,7 +126,7 @@ fn a_planner_that_cannot_be_started_is_refused_by_name_before_anything_starts() 
         }
     }
     let left = fs::read_dir(directory.path()).unwrap();
-    assert_eq!(left.count(), 1, "the plain file alone");
+    assert_eq!(left.count(), 1, "only the plain file is left");
     assert_nothing_left("no-plan");
 }
 

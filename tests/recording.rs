@@ -98,8 +98,7 @@ fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_
         .iter()
         .map(|order| (RequestKind::from_byte(order.kind), RequestAnswer::from_byte(order.answer)))
         .collect();
-    // On a busy machine an order is repeated until it is taken, and a supervisor may take one after
-    // its sender has ended.
+    // An order is repeated until it is taken, possibly after its sender has ended.
     let mut rest = answered.iter();
     assert!(asked.iter().all(|order| rest.any(|it| it == order)), "{answered:?}");
     let times = orders.windows(2).map(|pair| pair[1].stamp.stamp_ns - pair[0].stamp.stamp_ns);
@@ -238,12 +237,11 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
         assert_eq!(messages.len() as u64, counted);
         read += messages.len();
     }
-    assert!(read > 0, "none of them lived to its first chunk");
+    assert!(read > 0, "every recorder died before its first chunk");
     operate("rec-shot", &["resume"]);
     let (code, summary, directory) = run.finish_in();
     assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
     support::assert_no_restart(&summary);
-    // The run's own recorder was not affected.
     assert_eq!(replayed_in(&directory).equal(), 5);
     assert_nothing_left("rec-shot");
 }
@@ -270,7 +268,6 @@ fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_b
         assert_eq!(recording.end, End::Complete);
         assert_eq!(replay(&recording, &all).unwrap().difference, None);
     }
-    // The last file may have just begun.
     let largest = Recording::open(files.iter().max_by_key(|file| size(file)).unwrap()).unwrap();
     let mut grids = largest.slices(&topics::GRID).unwrap().map(Result::unwrap);
     assert!(grids.any(|grid| grid.header.part.is_keyframe()), "{files:?}");

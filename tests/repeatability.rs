@@ -27,11 +27,9 @@ fn numbers(mut summary: Value) -> Value {
 /// Samples that a consumer receives of a run, and the run's summary.
 #[derive(Debug)]
 struct Recording {
-    /// Samples by topic and tick.
     samples: BTreeMap<(&'static str, u64), String>,
     /// Cells of each completed version of the grid. A late reader misses some.
     grids: BTreeMap<u64, Vec<u8>>,
-    /// Grid version of the last guidance.
     last_grid: u64,
     summary: Value,
 }

@@ -41,7 +41,7 @@ fn a_run_ends_with_a_report_that_tells_of_a_planner_that_was_killed() {
     let page = printed(&["report", file.to_str().unwrap()]);
     let (alone, last) = events(&fs::read_to_string(page.trim_end()).unwrap());
     assert_eq!(alone, told);
-    assert!(last["outcome"].as_str().unwrap().contains("not known here"));
+    assert!(last["outcome"].as_str().unwrap().contains("end is unknown"));
     assert_nothing_left("report-kill");
 }
 

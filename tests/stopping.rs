@@ -164,7 +164,7 @@ fn a_robot_that_gets_no_stop_has_an_outcome_of_its_own_and_a_guard_that_stops_it
     let directory = run.directory();
     let began = Instant::now();
     while !fs::metadata(directory.join("summary.json")).is_ok_and(|file| file.len() > 2) {
-        assert!(run.is_running(), "the run left a robot that moves");
+        assert!(run.is_running(), "the run ended while its robot moves");
         assert!(began.elapsed() < PATIENCE, "no summary");
         robot.wait_for_a_tick();
     }

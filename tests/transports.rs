@@ -1,5 +1,4 @@
-//! Tests of missions over every wire, with robots that are independent of the run's processes and
-//! may leave and return.
+//! Tests of missions over every wire, with robots that may leave and return.
 
 use std::path::{Path, PathBuf};
 
@@ -53,8 +52,7 @@ fn a_mission_arrives_over_a_serial_line() {
 /// Longest distance of a robot after its last received tick, metres.
 const UNRECEIVED_M: f64 = 0.12;
 
-/// Kills the robot halfway and restarts it at the same address, like a power cycle. Its counts
-/// restart at zero, and the simulation puts it at its start.
+/// Power-cycles the robot halfway. Its counts and place restart.
 fn goes_away_and_comes_back(transport: &str) {
     let (_directory, mission) = mission();
     let mut robot = Robot::start(mission.to_str().unwrap(), transport, "127.0.0.1:0");

@@ -1,5 +1,4 @@
-//! Tests of robots with implausible or missing frames. Every datagram between link and simulated
-//! robot passes through a fault injector.
+//! Tests of robots with implausible or missing frames, through a fault injector.
 
 use std::{
     fs,
@@ -23,21 +22,16 @@ const BOUND: Duration = Duration::from_millis(1500);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
     None,
-    /// No motor frames arrive.
     NoFrame,
-    /// All motor frames are the same.
     SameFrame,
-    /// The right encoder stays at 0.
     DeadEncoder,
     /// The counts of both wheels have the wrong sign.
     Reversed,
-    /// Counts jump in each frame.
     Random,
     /// The counts of both wheels jump and continue.
     Elsewhere,
     /// The right encoder rolls on by 560 counts/s.
     RollsOn,
-    /// The front sonar reports 0.
     NoSonar,
     /// The front sonar reports nothing in range.
     DeafSonar,
@@ -56,7 +50,6 @@ struct Shared {
     last_motion: Option<Instant>,
     /// Whether the link has requested streams since they were stopped.
     asked_for_streams: bool,
-    /// Commands to send to the robot on behalf of the link.
     inject: Vec<Command>,
 }
 
@@ -87,7 +80,6 @@ impl FaultInjector {
         Self { proxy, shared }
     }
 
-    /// Stops the robot's streams on behalf of the link.
     fn stop_streams(&self) {
         let mut shared = self.shared.lock().unwrap();
         shared.asked_for_streams = false;
@@ -193,7 +185,6 @@ impl Shared {
                 left.position = frames.wrapping_mul(9973) % 32_768;
                 right.position = frames.wrapping_mul(20_011) % 32_768;
             }
-            // Counts at 7 frames a second.
             Fault::RollsOn => right.position = frames.wrapping_mul(80) % 32_768,
         }
     }
@@ -289,7 +280,7 @@ fn a_robot_without_usable_motor_frames_is_said_to_be_unknown_and_the_first_signa
             link["connected"] == true && link["stopped"] == true && link["at_rest"] == false
         });
         // The operator gets the same message.
-        refused(&["stop", "--robot", robot], "not-at-rest", &["whether it rests is not known"]);
+        refused(&["stop", "--robot", robot], "not-at-rest", &["whether it rests is unknown"]);
         run.signal(Signal::INT);
         let began = Instant::now();
         let (code, summary) = run.finish();
@@ -297,7 +288,7 @@ fn a_robot_without_usable_motor_frames_is_said_to_be_unknown_and_the_first_signa
         assert!(began.elapsed() < ENDS_WITHIN, "{:?}", began.elapsed());
         assert_ended(code, &summary, 0, "aborted");
         let reason = summary["reason"].as_str().unwrap();
-        assert!(reason.contains("whether it rests is not known: no usable motor fr"), "{reason}");
+        assert!(reason.contains("whether it rests is unknown: no usable motor fr"), "{reason}");
         assert_nothing_left(robot);
     };
     std::thread::scope(|scope| {

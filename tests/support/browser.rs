@@ -122,7 +122,7 @@ impl Browser {
         let began = Instant::now();
         while self.run(&format!("return Boolean({script})")) != true {
             let texts = ["status", "answer", "notice"].map(|id| self.text(id));
-            assert!(began.elapsed() < PATIENCE, "waited too long for {script}: {texts:?}");
+            assert!(began.elapsed() < PATIENCE, "timeout: {script}: {texts:?}");
         }
     }
 

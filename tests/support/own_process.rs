@@ -1,5 +1,3 @@
-//! Tests in their own processes.
-
 use std::{
     fs,
     io::Write as _,
@@ -69,7 +67,6 @@ impl SmallDisk {
         fs::remove_file(self.0.join("filler")).unwrap();
     }
 
-    /// Uses up the free space.
     pub fn fill(&self) {
         let mut file = fs::File::create(self.0.join("filler")).unwrap();
         let refused = std::iter::repeat_with(|| file.write_all(&[1; 4096])).find_map(Result::err);

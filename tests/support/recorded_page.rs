@@ -1,5 +1,3 @@
-//! Messages of a recorded page, read from its file.
-
 use std::io::Read as _;
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};

@@ -24,7 +24,6 @@ use tempfile::TempDir;
 
 use super::commands::{firsthand, output};
 
-/// Stages in the order of the pipeline.
 pub const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
 
 /// Time limit of a wait, far above the duration of any awaited event.
@@ -34,8 +33,7 @@ pub const PATIENCE: Duration = Duration::from_secs(60);
 pub fn wait_until(what: &str, mut is_so: impl FnMut() -> bool) {
     let began = Instant::now();
     while !is_so() {
-        assert!(began.elapsed() < PATIENCE, "waited too long until {what}");
-        // The awaited processes need the processor.
+        assert!(began.elapsed() < PATIENCE, "timeout before {what}");
         thread::sleep(Duration::from_millis(5));
     }
 }
@@ -76,8 +74,7 @@ pub fn domain(robot: &str) -> Domain {
     Domain::of(robot.parse().unwrap())
 }
 
-/// Returns the letters that separate the robots of this process and its children from all others on
-/// the machine.
+/// Returns the letters that mark the robots of this process and its children.
 pub fn suite() -> &'static str {
     static SUITE: LazyLock<String> = LazyLock::new(|| {
         let suite = std::env::var(SUITE_VARIABLE).unwrap_or_else(|_| {
@@ -96,7 +93,6 @@ fn suite_of(process: u32) -> String {
     std::iter::once('t').chain([3, 2, 1, 0].map(place)).collect()
 }
 
-/// Removes the files of killed suites.
 fn remove_ended_suites() {
     let run = processes("").into_iter().map(|(pid, _)| suite_of(pid)).collect::<Vec<_>>();
     let left = |name: &str| {
@@ -138,8 +134,7 @@ pub fn wait_for_status(robot: &str, is_so: impl Fn(&Value) -> bool) -> Value {
     follow_status(robot, is_so, || {})
 }
 
-/// Follows a robot's status until `is_so` returns true. Meanwhile it calls `check`, which may
-/// panic.
+/// Follows a robot's status until `is_so` returns true, and calls `check`, which may panic.
 pub fn follow_status(
     robot: &str,
     is_so: impl Fn(&Value) -> bool,
@@ -163,7 +158,7 @@ pub fn follow_status(
             }
         }
         check();
-        assert!(began.elapsed() < PATIENCE, "waited too long for robot {robot}");
+        assert!(began.elapsed() < PATIENCE, "timeout of robot {robot}");
     }
 }
 
@@ -178,7 +173,6 @@ fn start_follower(robot: &str) -> (Killed, Receiver<String>) {
     (follower, received)
 }
 
-/// Process that is killed on drop.
 struct Killed(Child);
 
 impl Drop for Killed {
@@ -220,13 +214,11 @@ fn mark(robot: &str) -> String {
     format!("firsthand-{}_{robot}_", suite())
 }
 
-/// Returns the command lines of the processes of `robot`: supervisor, stages, simulator.
 pub fn processes_of(robot: &str) -> Vec<String> {
     let found = processes(&mark(robot)).into_iter();
     found.map(|(_, line)| line).collect()
 }
 
-/// Returns the process numbers of `robot`.
 pub fn pids_of(robot: &str) -> Vec<u32> {
     let found = processes(&mark(robot)).into_iter();
     found.map(|(pid, _)| pid).collect()

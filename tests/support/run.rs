@@ -1,5 +1,3 @@
-//! Runs of missions, and their records.
-
 use std::{
     fs,
     io::Read as _,
@@ -27,7 +25,6 @@ use super::{
 pub struct Run {
     pub robot: String,
     child: Option<Child>,
-    // Removed when the test ends.
     directory: TempDir,
     /// Whether the stop guard continues after the run. Otherwise the end of the test signs the
     /// robot off.
@@ -60,7 +57,7 @@ impl Run {
         Self { robot: robot.to_owned(), child: Some(child), directory, keeps_guard: false }
     }
 
-    /// Starts, and waits until the robot has been under way for `seconds` of mission time.
+    /// Starts, and waits for `seconds` of mission time.
     pub fn under_way(robot: &str, mission: &str, arguments: &[&str], seconds: f64) -> Self {
         let mut run = Self::start(robot, mission, arguments);
         run.wait_until_under_way(seconds);
@@ -104,8 +101,7 @@ impl Run {
         })
     }
 
-    /// Waits until the robot has been under way for `seconds` of mission time, and every stage
-    /// runs.
+    /// Waits for `seconds` of mission time, and until every stage runs.
     pub fn wait_until_under_way(&mut self, seconds: f64) -> Value {
         self.wait_until("the robot is under way", |status| {
             status["mission_time_s"].as_f64().unwrap() >= seconds && all_run(status)
@@ -120,7 +116,6 @@ impl Run {
         self.wait_until("every stage runs", all_run)
     }
 
-    /// Waits until the supervisor's process has ended.
     pub fn reap(&mut self) {
         self.child.as_mut().unwrap().wait().unwrap();
     }
@@ -134,15 +129,13 @@ impl Run {
         signal_process(self.pid(), signal);
     }
 
-    /// Kills a stage, or freezes it (`Signal::STOP`). Returns the status once its successor and all
-    /// other stages run.
+    /// Kills or freezes a stage. Returns the status once all stages run again.
     pub fn kill_and_await_successor(&mut self, stage: &str, signal: Signal) -> Value {
         let status = self.wait_until_all_run();
         self.kill_and_await(stage, signal, &status)
     }
 
-    /// [`Self::kill_and_await_successor`] from a known `status`. A new one would take seconds on a
-    /// busy machine.
+    /// [`Self::kill_and_await_successor`] from a known `status`, which saves seconds.
     pub fn kill_and_await(&mut self, stage: &str, signal: Signal, status: &Value) -> Value {
         signal_process(pid(status, stage), signal);
         let before = generation(status, stage);

@@ -1,4 +1,4 @@
-//! Simulated robot as a separate process, and a proxy for the datagrams between it and its link.
+//! Simulated robot as a process, and a proxy between it and its link.
 
 use std::{
     io::{BufRead as _, BufReader, ErrorKind},
@@ -21,11 +21,9 @@ use super::{PATIENCE, firsthand};
 pub struct Robot {
     process: Child,
     pub listening: String,
-    /// Wire of its laser, if separate.
     pub laser: Option<String>,
     /// Ground truth records, received at once because the robot waits for a slow reader.
     truth: Receiver<Value>,
-    /// Last known distance of the robot from its start, metres.
     went: f64,
 }
 
@@ -88,7 +86,6 @@ impl Robot {
         newest.map_or_else(|| self.wait_for_a_tick(), |truth| rests(&truth))
     }
 
-    /// Kills the robot. Returns its final distance from its start.
     pub fn kill(mut self) -> f64 {
         self.process.kill().unwrap();
         self.process.wait().unwrap();

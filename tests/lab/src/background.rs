@@ -10,7 +10,6 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-/// Thread that works turn by turn until dropped.
 pub struct Turns {
     ends: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -45,7 +44,6 @@ impl Drop for Turns {
     }
 }
 
-/// Opens a non-blocking loopback socket.
 pub fn socket() -> io::Result<UdpSocket> {
     let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
     socket.set_nonblocking(true)?;

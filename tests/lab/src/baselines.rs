@@ -1,5 +1,4 @@
-//! Baselines: planner stages for comparison, on the same map, sonar and controller as the harmonic
-//! planner.
+//! Baselines: planner stages for comparison, with the harmonic planner's map, sonar and controller.
 //!
 //! | module | contents |
 //! |---|---|

@@ -46,8 +46,8 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// Row of `faults.csv`: parts of which one must be found wrong, and the robot's true keys. VALUE is
-/// a number from one of two ranges.
+/// Row of `faults.csv`: parts of which one must be found wrong, and true keys, with VALUE from one
+/// of two ranges.
 #[derive(Deserialize)]
 struct Fault {
     robot: String,
@@ -79,7 +79,6 @@ const ROOM: &str = "target = [0.8, 0]\nsensors = 'all'\nsimulation.realism = 'me
 /// Placeholder for the simulator's address. Robots that speak ROS 2 lack it; their simulators speak
 /// JSON.
 const ADDRESS: &str = "#ADDRESS";
-/// Robots by their names in the fault table.
 static ROBOTS: [(&str, &str); 6] = [
     ("x80", "[robot]\n#ADDRESS\nmodel = 'x80'\n"),
     (
@@ -107,7 +106,6 @@ static ROBOTS: [(&str, &str); 6] = [
 const ODOMETRY_TURNS: &str = "odometry.turns=";
 /// Number of draws for a second fault that differs from the first.
 const DRAWS: u32 = 20;
-/// Upper bound for a bring-up on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(400);
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -136,8 +134,10 @@ pub fn main(arguments: &Arguments) -> Result {
         }
         Ok(())
     })?;
-    print_text(&format!("{right} of {all} robots were told right\n"))?;
-    (right == all).then_some(()).ok_or_else(|| "a fault was missed or invented".into())
+    print_text(&format!("findings of {right} of {all} robots are right\n"))?;
+    (right == all)
+        .then_some(())
+        .ok_or_else(|| "the findings missed a fault or named one that does not exist".into())
 }
 
 /// Returns whether a bring-up named exactly its robot's faults, and its findings.
@@ -199,7 +199,7 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
     }
     drop(child);
     let said: Value = serde_json::from_slice(&fs::read(&found)?).map_err(|_| {
-        format!("robot {number}, of {robot}, gave no findings; see {}", directory.display())
+        format!("robot {number} ({robot}) gave no findings; see {}", directory.display())
     })?;
     let findings = said["findings"].as_array().into_iter().flatten();
     let wrong = findings.filter(|it| it["verdict"] == "WRONG");

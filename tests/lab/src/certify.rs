@@ -1,7 +1,7 @@
-//! Certificate of trials on real processes: attempts, losses, and upper bounds of the loss rate.
+//! Certificate of trials on real processes: attempts, losses, bounds.
 //!
-//! Each part runs on two robots at once. `rows.csv` gets a row per robot and run, so a large number
-//! may take many nights. `certificate.md` is rewritten from all rows.
+//! Each part runs on two robots at once. `rows.csv` gets a row per robot and run; `certificate.md`
+//! is rewritten from all rows.
 
 mod fuzz;
 
@@ -37,7 +37,6 @@ pub struct Arguments {
 struct Part {
     name: &'static str,
     what: &'static str,
-    /// Number in the whole certificate, over both robots.
     whole: u32,
     /// Options of `firsthand bench chaos`, without numbers; none if it does not apply.
     options: Option<&'static str>,
@@ -48,37 +47,37 @@ const FUZZ: &str = "fuzz";
 const PARTS: &[Part] = &[
     Part {
         name: "signals",
-        what: "kills and freezes of stages, successors as they start, and the supervisor",
+        what: "kills and freezes of stages, of starting successors and of the supervisor",
         whole: 10_000,
         options: Some("--include-startup --include-supervisor"),
     },
     Part {
         name: "consumers",
-        what: "the same of stages and consumers; every generation is replayed",
+        what: "kills and freezes of stages and consumers, with a replay of every generation",
         whole: 2000,
         options: Some("--include-consumers --replay"),
     },
     Part {
         name: "machine",
-        what: "freezes of all processes, while the target changes",
+        what: "freezes of all processes during changes of the target",
         whole: 1000,
         options: Some("--freeze-all --targets"),
     },
     Part {
         name: "faults-x80",
-        what: "missions with a fault of the robot, an X80",
+        what: "missions with a fault of an X80",
         whole: 500,
         options: Some("--robot-faults"),
     },
     Part {
         name: "faults-json",
-        what: "missions with a fault of the robot, which speaks lines of JSON and has a laser",
+        what: "missions with a fault of a JSON robot with a laser",
         whole: 500,
         options: Some("--robot-faults --set robot={model='kobuki',protocol='json',rate_hz=10}"),
     },
     Part {
         name: FUZZ,
-        what: "inputs, random and changed, to what decodes wires, missions, states, maps and recordings",
+        what: "random and mutated inputs to the decoders of wires, missions, states, maps and recordings",
         whole: 100_000_000,
         options: None,
     },
@@ -118,7 +117,11 @@ pub fn main(arguments: &Arguments) -> Result {
     print_text(&certificate(&rows.rows))?;
     match rows.rows[before..].iter().map(|row| row.lost).sum::<u64>() {
         0 => Ok(()),
-        lost => Err(format!("{lost} were lost now; see rows.csv in {}", out.display()).into()),
+        lost => Err(format!(
+            "{lost} attempts of this command were lost; see rows.csv in {}",
+            out.display()
+        )
+        .into()),
     }
 }
 
@@ -167,7 +170,7 @@ fn certificate(rows: &[Row]) -> String {
     for row in rows {
         parts.entry(&row.part).or_default().push(row);
     }
-    let mut text = "| part | tried | lost | at most, by 95 % | worst case | hours |\n|---|---|---|---|---|---|\n".to_owned();
+    let mut text = "| part | tried | lost | upper bound (95 %) | worst case | hours |\n|---|---|---|---|---|---|\n".to_owned();
     for (name, rows) in parts {
         let what = PARTS.iter().find(|part| part.name == name).map_or("", |part| part.what);
         let sum = |of: fn(&Row) -> u64| rows.iter().map(|row| of(row)).sum::<u64>();

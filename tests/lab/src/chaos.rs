@@ -50,7 +50,6 @@ use report::Series;
 /// stage or left something behind. It also marks a faulty robot that stopped late.
 const NOT_CLEAN: u8 = 8;
 
-/// Attempts, losses, the worst case in words, and the whole result as text.
 pub struct Judged {
     pub tried: u64,
     pub lost: u64,
@@ -83,7 +82,7 @@ pub fn judge(arguments: &Arguments) -> Result<Judged> {
         }
         Ok(judged) => {
             write_stderr(&format!(
-                "firsthand: the files of the missions that went wrong are in {directory}\n"
+                "firsthand: the files of the failed missions are in {directory}\n"
             ));
             Ok(judged)
         }
@@ -92,7 +91,6 @@ pub fn judge(arguments: &Arguments) -> Result<Judged> {
     }
 }
 
-/// Attacks missions in sequence until enough signals are sent.
 fn run(options: &Options) -> Result<report::Report> {
     let began = Instant::now();
     let mut series = Series::new(options)?;
@@ -103,7 +101,9 @@ fn run(options: &Options) -> Result<report::Report> {
         let left = leftovers::find(&options.asked.robot, &options.directory);
         let report = &mut series.report;
         let (kills, missions) = (report.signals, report.missions);
-        report.leftovers.extend(left.iter().map(|what| format!("by mission {missions}: {what}")));
+        report
+            .leftovers
+            .extend(left.iter().map(|what| format!("after mission {missions}: {what}")));
         write_stderr(&format!("{kills} of {} signals, {missions} missions\n", options.asked.kills));
     }
     series.report.took_s = began.elapsed().as_secs_f64();

@@ -121,7 +121,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
     let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
     write_stderr(&format!(
-        "{} worlds, each crossed by the body on a grid of 5 cm ({} others were left out)\n",
+        "{} worlds that the robot's body can cross on a 5 cm grid ({} others skipped)\n",
         found.trials.len(),
         found.unsolvable
     ));
@@ -147,11 +147,11 @@ pub fn main(arguments: &Arguments) -> Result {
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let parsed: Option<Vec<f64>> = text.split(',').map(ends::number).collect();
     let numbers = parsed.and_then(|it| it.try_into().ok());
-    numbers.ok_or_else(|| format!("give {N} numbers with commas between them"))
+    numbers.ok_or_else(|| format!("give {N} numbers, separated by commas"))
 }
 
-/// Returns names and assignments: each method with each sensor set. The paper's method counts once,
-/// because it only has the sonar.
+/// Returns names and assignments of each method with each sensor set. The paper's method only has
+/// the sonar.
 fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
     let with_sensors = |method: &String| -> Vec<(String, Vec<String>)> {
         let set = format!("method='{method}'");
@@ -166,7 +166,6 @@ fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
     arguments.method.iter().flat_map(with_sensors).collect()
 }
 
-/// Returns each planner with each method. All are compared with the first.
 fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
     let Arguments { realism, robot, planner: planners, .. } = arguments;
     let common = [format!("simulation.realism='{realism}'"), format!("robot.model='{robot}'")];
@@ -175,7 +174,6 @@ fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
     for planner in planners {
         let is_own = planner == HARMONIC;
         if !is_own {
-            // A missing executable is reported before anything starts.
             planner_executable::find_planner(Path::new(planner), BASELINES)?;
         }
         for (method, chosen) in &methods {

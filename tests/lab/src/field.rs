@@ -45,7 +45,7 @@ fn cell(text: &str) -> Result<Cell, &'static str> {
     let number = |text: &str| text.trim().parse::<usize>().ok();
     text.split_once(',')
         .and_then(|(col, row)| Some(Cell::new(number(col)?, number(row)?)))
-        .ok_or("a cell is its column and its row, from 0: 120,45")
+        .ok_or("give a cell as column,row, counted from 0, such as 120,45")
 }
 
 pub fn main(arguments: &Arguments) -> Result {
@@ -76,11 +76,11 @@ fn domain(arguments: &Arguments, map: &Map) -> Result<Domain> {
         match map.nearest_free(target.col, target.row) {
             Some((col, row)) if at_target => Refused::new(
                 "target",
-                format!("{file}: {cause}; the free cell nearest to it is --target-cell {col},{row}"),
+                format!("{file}: {cause}; give the nearest free cell, --target-cell {col},{row}"),
             )
             .into(),
             None if at_target => format!(
-                "{file}: no cell is free (the rim counts as blocked); check the thresholds, or `negate`, of the map"
+                "{file}: the map has no free cell (the rim counts as blocked); check its thresholds and `negate`"
             )
             .into(),
             _ => format!("{file}: {cause}").into(),

@@ -22,7 +22,7 @@
 //! | `ros2_robot` | a simulated ROS 2 robot |
 //! | `error` | failures |
 
-// Private modules: `pub` marks use by another module, and unused items are reported.
+// `pub` marks use by another module.
 #![allow(unreachable_pub)]
 
 mod background;
@@ -47,7 +47,8 @@ use std::process::{ExitCode, Termination as _};
 use clap::{Parser, Subcommand};
 use serde::Serialize;
 
-/// Measure robots: missions on many worlds, the paper's experiments, random faults, ticks, fields.
+/// Measure robots: missions on many worlds, the paper's experiments, random faults, tick latency,
+/// fields.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-lab", bin_name = "firsthand", version)]
 pub struct Arguments {
@@ -61,8 +62,7 @@ enum Command {
     Experiments(experiments::Arguments),
     Field(field::Arguments),
     Certify(certify::Arguments),
-    /// Measure ticks and fields; send random signals to a robot's processes; publish fixes of a
-    /// simulated robot.
+    /// Measure tick latency; test a robot with random signals and faults.
     #[command(subcommand)]
     Bench(Bench),
     #[command(hide = true)]
@@ -79,7 +79,6 @@ enum Bench {
     Sources(sources::Arguments),
 }
 
-/// Formats a report as TOML for people.
 fn text(report: &impl Serialize) -> String {
     toml::to_string(report).unwrap_or_else(|error| error.to_string())
 }

@@ -1,5 +1,3 @@
-//! Executable `firsthand-lab`; see the library.
-
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -20,7 +20,6 @@ pub mod trial;
 
 pub const HARMONIC: &str = "harmonic";
 
-/// Mission keys to compare on the same worlds.
 #[derive(Clone)]
 pub struct Setting {
     pub name: String,

@@ -18,12 +18,10 @@ impl Random {
         self.0.next_u64()
     }
 
-    /// Returns a uniform number in [0, 1).
     pub fn share(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Returns a uniform number in [`from`, `to`).
     pub fn within(&mut self, from: f64, to: f64) -> f64 {
         from + (to - from) * self.share()
     }

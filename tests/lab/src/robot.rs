@@ -1,5 +1,4 @@
-//! Executable `firsthand`, as started by the laboratory, its runs and simulated robots, and the
-//! processes of this machine.
+//! Executable `firsthand`, its runs, simulated robots, and this machine's processes.
 
 use std::{
     ffi::OsStr,
@@ -40,7 +39,6 @@ pub fn firsthand(arguments: &[&str]) -> Command {
     command
 }
 
-/// Returns a subcommand for `robot` in `mission` with assignments and a JSON result.
 pub fn mission(
     subcommand: &str,
     mission: impl AsRef<OsStr>,
@@ -64,17 +62,15 @@ pub struct Run {
 }
 
 impl Run {
-    /// Starts a run with files in `directory` and its standard error beside it.
     pub fn start(mut command: Command, directory: &Path, records: bool) -> Result<Self> {
         let said = append(said(directory));
         command.args((!records).then_some("--no-record"));
         command.args(["--parent", &std::process::id().to_string()]);
-        command.stdout(Stdio::null()).stderr(said.or_cannot("write what a mission says")?);
+        command.stdout(Stdio::null()).stderr(said.or_cannot("write the log of a mission")?);
         let process = Process::spawn(command).or_cannot("start a mission")?;
         Ok(Self { process, directory: directory.to_owned() })
     }
 
-    /// Waits until the run ends, and calls `look` at intervals.
     pub fn wait(mut self, every: Duration, mut look: impl FnMut()) -> Result<Self> {
         while self.process.try_reap().or_cannot("reap")?.is_none() {
             look();
@@ -92,7 +88,7 @@ impl Run {
         summary.and_then(|summary| serde_json::from_slice(&summary).ok()).ok_or_else(|| {
             let file = said(&self.directory);
             let said = log_tail(&file, 0);
-            let said = said.lines().last().unwrap_or("a mission gave no summary");
+            let said = said.lines().last().unwrap_or("a mission left no summary");
             format!("{said}; see {}", file.display()).into()
         })
     }

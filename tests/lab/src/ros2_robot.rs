@@ -43,7 +43,6 @@ use crate::{
 const WATCHDOG_S: f64 = 0.25;
 /// Share of a delay, as a divisor, by which report times catch up.
 const CATCHES_UP: u64 = 8;
-/// Maximum delay until the thread notices its end.
 const LOOK: Duration = Duration::from_millis(50);
 /// Silence after which the simulated robot is greeted again.
 const SILENT: Duration = Duration::from_secs(1);
@@ -77,7 +76,6 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 pub struct Ros2Robot {
-    /// Additional keys of a mission with this robot.
     pub keys: Vec<String>,
     _thread: Turns,
 }
@@ -111,7 +109,6 @@ impl Ros2Robot {
     }
 }
 
-/// Bridge between simulated robot and domain.
 struct Node {
     wire: UdpSocket,
     lines: Lines,

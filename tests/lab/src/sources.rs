@@ -1,5 +1,4 @@
-//! Simulated sources of fixes and turns: a camera and a gyro that observe a simulated robot by its
-//! run's ground truth.
+//! Simulated camera and gyro, which observe a robot by its run's ground truth.
 
 use std::{
     fs::File,
@@ -29,7 +28,6 @@ use crate::{
 /// Publish the measurements of a camera and a gyro of a simulated robot, until its run ends.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Directory of the run, with the ground truth.
     run: PathBuf,
     /// Robot name.
     #[arg(long, default_value = "x80")]
@@ -130,7 +128,6 @@ impl<'a> Source<'a> {
 
     fn read_truth(&mut self) -> io::Result<()> {
         if self.file.is_none() {
-            // The file may not exist yet.
             let file = File::open(self.arguments.run.join(GROUND_TRUTH));
             self.file = file.ok().map(BufReader::new);
         }
@@ -189,7 +186,6 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    /// Returns a nearly normal number of deviation 1.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.chance.share()).sum::<f64>() - 6.0
     }

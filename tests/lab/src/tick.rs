@@ -75,7 +75,6 @@ pub fn main(arguments: &Arguments) -> Result {
         return hops::run_forwarder(&robot, place, supervisor);
     }
     let rate_hz = missions::load(&arguments.mission, &arguments.set)?.robot.rate_hz;
-    // They end with this process.
     (0..arguments.busy).for_each(|_| drop(thread::spawn(busy::run)));
     let both = || vec![Regime(None), Regime(Some(rate_hz))];
     let regimes = arguments.rate.map_or_else(both, |regime| vec![regime]);
@@ -104,18 +103,15 @@ fn measure(
     Report::new(regime, &hops, &rounds, used)
 }
 
-/// Ticks per second; none if they are back to back. Their cost depends on it: caches are warm or
-/// cold, cores awake or asleep.
+/// Ticks per second; none if back to back. It decides whether caches are warm and cores awake.
 #[derive(Clone, Copy, Debug)]
 struct Regime(Option<f64>);
 
 /// Back-to-back trips per round.
 const TRIPS: u64 = 2000;
-/// Trips per round at tick intervals.
 const PACED_TRIPS: u64 = 50;
 
 impl Regime {
-    /// Returns the pace of this regime for a mission of `rate_hz`.
     fn pace(self, rate_hz: f64) -> Pace {
         self.0.map_or(Pace::Max, |hz| Pace::Rate(hz / rate_hz))
     }
@@ -142,13 +138,10 @@ fn parse_hz(text: &str) -> Result<Regime, String> {
     match text.parse() {
         _ if text == "max" => Ok(Regime(None)),
         Ok(hz) if (SLOWEST_HZ..=FASTEST_HZ).contains(&hz) => Ok(Regime(Some(hz))),
-        _ => Err(format!(
-            "{text} is no rate; give ticks a second, {SLOWEST_HZ} to {FASTEST_HZ}, or max"
-        )),
+        _ => Err(format!("{text} is not a rate; give {SLOWEST_HZ} to {FASTEST_HZ} Hz, or max")),
     }
 }
 
-/// Quantiles in microseconds.
 #[derive(Debug, Serialize)]
 struct Times {
     of: &'static str,
@@ -159,14 +152,13 @@ struct Times {
 }
 
 impl Times {
-    /// Fails if nothing was measured.
     fn new(of: &'static str, count: u64, quantiles: Quantiles) -> Result<Self> {
         match quantiles {
             Quantiles { p50: Some(p50), p99: Some(p99), max: Some(max) } => {
                 let [p50_us, p99_us, max_us] = [p50, p99, max].map(rounded);
                 Ok(Self { of, count, p50_us, p99_us, max_us })
             }
-            _ => Err("nothing was measured; does the mission drive at all?".into()),
+            _ => Err("no tick was measured; give a mission in which the robot drives".into()),
         }
     }
 }
@@ -174,7 +166,6 @@ impl Times {
 #[derive(Serialize)]
 struct Report {
     regime: String,
-    /// Ratio of the medians, tick to bare hops.
     ratio: f64,
     ratio_p99: f64,
     /// Resources of the last mission's processes and simulated robot; none for a mission of a
@@ -185,7 +176,7 @@ struct Report {
 }
 
 impl Report {
-    /// Reports medians of the rounds' quantiles, because the load of a shared machine changes.
+    /// Reports medians of the rounds' quantiles, because machine load varies.
     fn new(regime: Regime, hops: &Histogram, rounds: &[Times], used: Option<Used>) -> Result<Self> {
         let hops = Times::new("five bare hops on the bus", hops.total(), hops.into())?;
         let quantiles = Quantiles {

@@ -1,5 +1,4 @@
-//! Worlds for an evaluation, drawn from a seed or read from files, and checked to be solvable for
-//! the body.
+//! Solvable worlds for an evaluation, drawn from a seed or read from files.
 
 mod barn;
 mod corridors;
@@ -25,8 +24,7 @@ use crate::{
 
 /// Failed draws in a row after which a kind of world counts as unsolvable.
 const MOST_FAILURES: u64 = 10_000;
-const NO_MAP: &str =
-    "--start and --target are for ROS maps; give one to --worlds, or leave them out";
+const NO_MAP: &str = "--start and --target need a ROS map; give one to --worlds, or remove both";
 
 #[derive(Clone, Debug)]
 pub enum Worlds {
@@ -37,7 +35,6 @@ pub enum Worlds {
 
 #[derive(Debug)]
 pub struct Kind {
-    /// Stream of random numbers.
     stream: u64,
     name: &'static str,
     draw: fn(&mut Random, usize) -> Scene,
@@ -92,9 +89,7 @@ pub struct Asked {
     /// By default a hundred drawn worlds, all files, and ten on each map without tests.
     pub count: Option<usize>,
     pub seed: u64,
-    /// Start and target, for maps only.
     pub ends: Option<Ends>,
-    /// Half the width of the narrowest passage.
     pub swept_m: f64,
 }
 
@@ -106,7 +101,7 @@ pub fn find(worlds: &Worlds, asked: Asked) -> Result<Found> {
     };
     if found.trials.is_empty() {
         return Err(format!(
-            "none of the worlds can be crossed by a body of {:.2} m around its centre; give others, or a smaller robot",
+            "a body of {:.2} m around its centre can cross no world; give other worlds or a smaller robot",
             asked.swept_m
         )
         .into());

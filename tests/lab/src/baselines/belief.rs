@@ -1,5 +1,3 @@
-//! Planner's copy of the map: free cells and lines of sight.
-
 use common::{
     grid::{Applied, Cell, CellState, GridFrame, Replica},
     samples::GridHeader,
@@ -34,7 +32,6 @@ impl Belief {
         followed
     }
 
-    /// Returns `None` before the first keyframe.
     pub fn map(&self) -> Option<Map<'_>> {
         let frame = self.grid.frame()?;
         Some(Map { frame, epoch: self.header.epoch, cells: self.grid.cells() })
@@ -42,7 +39,6 @@ impl Belief {
 }
 
 impl Map<'_> {
-    /// Returns whether `cell` is in the map and free or unknown.
     pub fn is_free(&self, cell: Cell) -> bool {
         let inside = cell.col < self.frame.cells && cell.row < self.frame.cells;
         let byte = self.cells.get(self.frame.index(cell)).filter(|_| inside);

@@ -42,7 +42,6 @@ pub struct Bug {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Following {
-    /// Hit point, metres.
     hit: DVec2,
     place: Place,
     was_away: bool,
@@ -114,8 +113,7 @@ impl Straight<'_> {
 }
 
 impl Following {
-    /// Advances along the boundary to the place nearest to `here`. Returns whether a boundary
-    /// remains.
+    /// Advances along the boundary to the place nearest to `here`, if a boundary remains.
     ///
     /// If the map has changed, it follows the boundary near the robot, preferably to the `left` of
     /// the line to the target.

@@ -36,7 +36,6 @@ impl Way {
 }
 
 pub struct Baseline<P> {
-    /// Robot's target; none until the supervisor publishes one.
     target: Option<TargetSample>,
     looks_around: bool,
     pub belief: Belief,

@@ -41,7 +41,7 @@ pub fn main(arguments: &Arguments) -> Result {
         "wavefront" => run_stage::<Shell<Wavefront>>,
         "bug" => run_stage::<Shell<Bug>>,
         name => {
-            let message = format!("{name:?} is no planner to compare with; give wavefront or bug");
+            let message = format!("unknown comparison planner {name:?}; give wavefront or bug");
             return Err(Refused::new("unknown-stage", message).into());
         }
     };

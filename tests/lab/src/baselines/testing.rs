@@ -1,4 +1,3 @@
-//! Maps, missions and poses for tests.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
@@ -37,7 +36,6 @@ pub fn sent<P: Planner>(target: [f64; 2]) -> Baseline<P> {
     baseline
 }
 
-/// Returns a robot at (x, y) metres facing along x.
 pub fn pose([x_m, y_m]: [f64; 2]) -> PoseSample {
     PoseSample { x_m, y_m, ..PoseSample::default() }
 }

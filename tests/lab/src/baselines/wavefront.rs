@@ -16,7 +16,6 @@ use crate::baselines::{
 /// Maximum distance to the path point that the robot heads for.
 const AIM_M: f64 = 0.6;
 
-/// Stateless planner of shortest paths.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Wavefront;
 

@@ -30,7 +30,6 @@ use super::{
 };
 use crate::error::{OrCannot as _, Result};
 
-/// Wait for the bus between checks of the processes.
 const POLL: Duration = Duration::from_millis(50);
 /// Maximum signals to a stage within the hold rule's window: a stage that dies more often is held
 /// until an operator releases it. A second signal may follow at start-up, and each may be counted
@@ -57,9 +56,8 @@ pub struct Attack {
 struct Sent {
     row: Row,
     at: Instant,
-    /// Whether a working successor is still missing.
     pending: bool,
-    /// Time after its start at which to hit the successor, too.
+    /// Delay of a second hit after the successor's start.
     startup_hit: Option<Duration>,
 }
 
@@ -87,7 +85,6 @@ impl Attack {
         while child.try_reap().or_cannot("reap")?.is_none() && began.elapsed() < patience {
             self.consumers.maintain(&mut series.report)?;
             let Some(subscriptions) = &mut joined else {
-                // The bus may not exist yet.
                 joined = Subscriptions::join(series.options, child.id()).unwrap_or_default();
                 if joined.is_none() {
                     std::thread::park_timeout(POLL);
@@ -133,7 +130,6 @@ impl Attack {
         self.keep_rows(series)
     }
 
-    /// Records a signal sent now; `pending` if a successor follows.
     fn note(
         &mut self,
         series: &mut Series<'_>,
@@ -180,7 +176,7 @@ impl Attack {
         healthy.map(|(stage, generation)| format!("{stage} generation {generation}")).collect()
     }
 
-    /// Returns the last published pose's distance to the ground truth of its tick, metres.
+    /// Returns the error of the last published pose, metres.
     pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
         let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
@@ -233,7 +229,6 @@ impl Attack {
         }
     }
 
-    /// Records a sign of work: a ready beat, or a tick's sample.
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool) {
         let pending = self.sent.iter_mut().filter(|sent| sent.pending);
         for Sent { row, at, pending, .. } in pending {
@@ -245,7 +240,6 @@ impl Attack {
         }
     }
 
-    /// Freezes supervisor and stages together for `pause`.
     fn freeze_all(&mut self, pause: Duration, series: &mut Series<'_>) {
         // A stage frozen alone stays frozen.
         let hangs =
@@ -268,7 +262,6 @@ impl Attack {
         self.note(series, (EVERYTHING, None), Kind::FreezeAll, false);
     }
 
-    /// Hits a consumer, the supervisor, or a running stage without a pending recovery.
     fn hit(&mut self, series: &mut Series<'_>) -> Result {
         let Series { options, schedule, report, .. } = series;
         let asked = &options.asked;
@@ -347,7 +340,6 @@ pub fn send(pid: u32, signal: Signal) -> bool {
     Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, signal).is_ok())
 }
 
-/// Readers on the bus of one generation of the supervisor.
 struct Subscriptions {
     roster: Roster,
     deaths: Reader<DeathSample>,

@@ -37,7 +37,6 @@ pub struct Changes {
 
 type Counts = BTreeMap<&'static str, u64>;
 
-/// Thread that redirects a robot until stopped.
 pub struct Operator {
     stop: Sender<()>,
     thread: JoinHandle<Sent>,
@@ -134,13 +133,13 @@ impl Changes {
         }
         for [x, y] in sent.taken {
             if !summary.targets.iter().any(|told| (told.x_m, told.y_m) == (x, y)) {
-                wrong.push(format!("({x}, {y}) was taken and is not told of"));
+                wrong.push(format!("({x}, {y}) was accepted, but the summary lacks it"));
             }
         }
         for (nth, target) in (1..).zip(&summary.targets) {
             let TargetResult { number, x_m, y_m, outcome, .. } = *target;
             if number != nth {
-                wrong.push(format!("target {nth} is called {number}"));
+                wrong.push(format!("target {nth} has number {number}"));
             }
             let was_there = || {
                 let off = |tick: &GroundTruthTick| (tick.x - x_m).hypot(tick.y - y_m);

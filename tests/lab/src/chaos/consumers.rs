@@ -1,4 +1,4 @@
-//! Consumers of one mission: processes that are hit and restarted, and end with chaos.
+//! Consumers of one mission: hit, restarted, and ended with chaos.
 
 use std::{
     ffi::OsString,
@@ -114,7 +114,7 @@ impl Consumers {
         Ok(Some(hit))
     }
 
-    /// Ends all consumers at the end of the mission, after they write their files.
+    /// Ends all consumers after they write their files.
     pub fn end(&mut self) {
         for running in &mut self.all {
             running.thaw();
@@ -145,7 +145,6 @@ impl Running {
     fn signal(&self, signal: Signal) {
         let process = self.process.as_ref();
         if let Some(pid) = process.and_then(|it| Pid::from_raw(it.id().cast_signed())) {
-            // An ended process needs no signal.
             let _ = kill_process_group(pid, signal);
         }
     }
@@ -178,15 +177,15 @@ impl FromStr for Consumer {
             let words =
                 shlex::split(command).ok_or("it ends within quotes or after a backslash")?;
             let mut words = words.into_iter();
-            let program = words.next().ok_or("there is nothing in it")?;
+            let program = words.next().ok_or("it is empty")?;
             let found = executable::find(Path::new(&program));
             let found = found.map_err(|problem| format!("{program}: {problem}"))?;
             Ok((found, words.collect()))
         };
         let (program, arguments) = found().map_err(|problem: String| {
             format!(
-                "the consumer {command:?} cannot be started: {problem}; give a program, by its path or by a name on PATH, and its \
-                 arguments, in quotes where they contain spaces (no shell reads them)"
+                "the consumer {command:?} cannot be started: {problem}; give the path of a program, or its name on PATH, and its \
+                 arguments; quote arguments with spaces (no shell reads them)"
             )
         })?;
         Ok(Self { name: command.to_owned(), program, arguments })
@@ -204,7 +203,6 @@ impl Consumer {
         Ok([(RECORD, "record"), ("hz", "topic hz"), ("logs -f", "logs --follow")].map(own))
     }
 
-    /// Returns a command that ends with this process.
     fn command(&self) -> Command {
         let own = std::process::id().to_string();
         let mut command = process::firsthand(&["bench", "consumer", &own]);
@@ -217,7 +215,6 @@ impl Consumer {
 #[derive(Debug, Args)]
 #[command(hide = true)]
 pub struct Arguments {
-    /// Parent process.
     parent: u32,
     /// Program and its arguments.
     #[arg(required = true, trailing_var_arg = true, allow_hyphen_values = true)]
@@ -228,7 +225,7 @@ pub fn main(arguments: &Arguments) -> Result {
     // The kernel's signal at the parent's end survives exec.
     become_child("consumer", arguments.parent)?;
     let Some((program, words)) = arguments.words.split_first() else {
-        return Err("give a program".into());
+        return Err("give a program and its arguments".into());
     };
     let error = Command::new(program).args(words).exec();
     Err(format!("cannot execute {}: {error}", program.display()).into())
@@ -247,11 +244,14 @@ mod tests {
             ("sh 'x", "ends within quotes"),
             ("sh \"x\\", "ends within quotes"),
             ("sh \\", "ends within quotes"),
-            (" \t", "nothing in it"),
+            (" \t", "it is empty"),
             ("sh\0x", "zero byte"),
         ] {
             let error = command.parse::<Consumer>().unwrap_err();
-            assert!(error.contains(problem) && error.contains("give a program"), "{error}");
+            assert!(
+                error.contains(problem) && error.contains("give the path of a program"),
+                "{error}"
+            );
         }
     }
 

@@ -25,7 +25,6 @@ const RUNS_COUNTS_S: [f64; 2] = [50.0, 300.0];
 const NEAR_M: [f64; 2] = [0.005, 0.05];
 /// Maximum random speed, counts/s.
 const RANDOM_COUNTS_S: f64 = 1000.0;
-/// Maximum random reading.
 const RANDOM_M: f64 = 2.5;
 const NO_READING: f64 = -1.0;
 /// Frozen range of a sensor without earlier readings.
@@ -35,7 +34,6 @@ const MOST_KEPT: usize = 1024;
 
 #[derive(Debug)]
 pub struct Late {
-    /// Time on the clock of the incoming bytes.
     pub at: Duration,
     pub bytes: Vec<u8>,
 }
@@ -48,19 +46,15 @@ pub struct FaultInjector {
     began: Option<Duration>,
     chance: Random,
     channel: usize,
-    /// Severity of this mission's fault, from 0 to 1.
     size: f64,
     words: Words,
     base: Option<Said>,
     newest: Report,
-    /// Recent messages with wheels or readings, oldest first.
     kept: VecDeque<(Duration, Said)>,
     next_again: Duration,
     next_slow: [Duration; 4],
-    /// Newest command that moves the wheels; none once the link stopped the robot other than by
-    /// speed 0.
+    /// Newest moving command; none once the link stopped the robot other than by speed 0.
     moving: Option<Vec<u8>>,
-    /// Whether the newest speed command moves the wheels.
     pushes: bool,
 }
 
@@ -125,7 +119,6 @@ impl FaultInjector {
         passed
     }
 
-    /// Returns a value in the range by this mission's severity.
     fn drawn(&self, [least, greatest]: [f64; 2]) -> f64 {
         least + self.size * (greatest - least)
     }

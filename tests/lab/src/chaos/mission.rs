@@ -1,5 +1,3 @@
-//! One mission, undisturbed and under attack.
-
 use std::{
     fs,
     path::Path,
@@ -99,15 +97,15 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
         outcome => wrong.push(format!("{}: {}", outcome.as_str(), summary.reason)),
     }
     if collisions > 0 {
-        wrong.push(format!("touched something {collisions} times"));
+        wrong.push(format!("{collisions} collisions"));
     }
     let aborted = attack.healthy_aborted(&deaths(&directory));
-    wrong.extend(aborted.iter().map(|stage| format!("aborted although healthy: {stage}")));
+    wrong.extend(aborted.iter().map(|stage| format!("healthy stage aborted: {stage}")));
     let allowance_m = pose_allowance_m(&options.loaded, kills, &summary);
     // The undisturbed run keeps its target, so it takes another path.
     if excess_m > allowance_m && !asked.targets {
         wrong.push(format!(
-            "pose off by {excess_m:.4} m more than undisturbed, of {allowance_m:.4} m allowed"
+            "pose error {excess_m:.4} m above the undisturbed run; the allowance is {allowance_m:.4} m"
         ));
     }
     if let Some(operator) = operator {

@@ -106,19 +106,24 @@ impl Options {
         let loaded = missions::load(&asked.mission, &asked.set)?;
         let faulty = asked.robot_faults.is_some();
         if (asked.include_supervisor || faulty) && loaded.robot.address.is_some() {
-            return Err("chaos brings its own robot; leave robot.address out".into());
+            return Err("chaos simulates its own robot; remove robot.address".into());
         }
         if faulty && loaded.body().steering.is_some() {
             return Err(
-                "robot faults are of a robot with two driven wheels; leave robot.model = 'car' out"
+                "robot faults need a robot with two driven wheels; remove robot.model = 'car'"
                     .into(),
             );
         }
         if asked.ros2 && loaded.robot.protocol() != Protocol::Json {
-            return Err("--ros2 needs a robot that is simulated with lines of JSON; give --set robot.model='kobuki'".into());
+            return Err(
+                "--ros2 needs a simulated JSON robot; give --set robot.model='kobuki'".into()
+            );
         }
         if asked.pace == Pace::Max {
-            return Err("chaos needs a wall clock; give --pace R, 4 for four times as fast".into());
+            return Err(
+                "chaos needs a wall clock; give --pace R, such as 4 for four times real time"
+                    .into(),
+            );
         }
         if asked.include_supervisor || faulty {
             asked.pace = Pace::Rate(1.0);

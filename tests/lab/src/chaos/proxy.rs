@@ -76,7 +76,6 @@ struct Wire {
 }
 
 impl Wire {
-    /// Waits for a datagram and passes on due ones.
     fn turn(&mut self) -> io::Result<()> {
         let now = self.began.elapsed();
         let due = self.held.iter().map(|late| late.at.saturating_sub(now));

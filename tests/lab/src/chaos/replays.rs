@@ -80,7 +80,7 @@ impl Replays {
         let partial = hits_recorders || began_late(directory);
         let own: Vec<_> = recordings(directory).map(|file| (partial, file)).collect();
         if own.is_empty() {
-            wrong.push("nothing was recorded".to_owned());
+            wrong.push("the mission has no recording".to_owned());
         }
         let others = recordings(&consumers.directory).map(|file| (true, file));
         for (partial, file) in own.into_iter().chain(others) {

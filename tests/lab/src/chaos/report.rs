@@ -21,7 +21,6 @@ use crate::{
 };
 
 const FILE_NAME: &str = "signals.csv";
-/// Name for supervisor and stages together.
 pub const EVERYTHING: &str = "everything";
 
 #[derive(Default, Serialize)]
@@ -32,7 +31,6 @@ pub struct Report {
     /// Failed missions with seeds and reasons: target missed, contact, lost pose, unreported
     /// target, or unequal replay.
     pub wrong: Vec<String>,
-    /// Number of signals sent, including those to consumers.
     #[serde(skip)]
     pub signals: u32,
     /// Signals by kind to each stage and the supervisor.
@@ -74,7 +72,6 @@ pub struct Recovery {
     pub output: Histogram,
 }
 
-/// State shared by the missions of one chaos.
 pub struct Series<'a> {
     pub options: &'a Options,
     pub schedule: Schedule,
@@ -132,7 +129,8 @@ impl Report {
     }
 
     pub fn judged(&self, json: bool) -> Result<Judged> {
-        let moved = || format!("a pose {:.3} m worse than undisturbed", self.worst_pose_excess_m);
+        let moved =
+            || format!("pose error {:.3} m above the undisturbed run", self.worst_pose_excess_m);
         Ok(Judged {
             tried: self.signals.into(),
             lost: (self.wrong.len() + self.leftovers.len()) as u64,

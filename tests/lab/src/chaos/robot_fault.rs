@@ -36,11 +36,9 @@ pub enum Promise {
 pub struct Row {
     pub name: String,
     pub promise: Promise,
-    /// Failsafe cause by which the robot rests.
     cause: Option<String>,
     /// Effect on an X80; [`NOTHING`] if the fault has no meaning there.
     x80: String,
-    /// Effect on a robot that speaks JSON lines.
     json: String,
 }
 
@@ -92,8 +90,8 @@ static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
 });
 
 impl Row {
-    /// Returns the maximum seconds from the fault to rest; none if the robot may go on. A fault
-    /// begins between two frames.
+    /// Returns the maximum seconds from the fault to rest, including one frame; none if the robot
+    /// may go on.
     pub fn rest_within_s(&self, mission: &Mission) -> Option<f64> {
         let by_cause = || {
             let mut causes = from_faults(mission).into_iter();
@@ -136,9 +134,8 @@ impl RobotFault {
         if (self, protocol) != (Self::FramesLate, Protocol::Ros2) {
             return Some(promised_s);
         }
-        // Late messages have fresh stamps in ROS 2. The robot rests while none come, and goes on
-        // when they do. They then show that it stopped, and that its wheels ignore its commands, as
-        // with a dead encoder.
+        // Late messages have fresh stamps in ROS 2. The robot rests while none come, and continues
+        // when they do. They then show wheels that ignore commands, as with a dead encoder.
         let follows_not_s = Self::EncoderDead.row().rest_within_s(mission)?;
         Some(promised_s + LATE.as_secs_f64() + follows_not_s)
     }

@@ -1,5 +1,3 @@
-//! Missions of a robot that becomes faulty, and its behaviour afterwards.
-
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -55,11 +53,11 @@ pub fn run(options: &Options) -> Result<StopTimeTable> {
         faults.partition(|fault| fault.has_meaning(protocol));
     if !left_out.is_empty() {
         let names: Vec<_> = left_out.iter().map(|fault| &*fault.row().name).collect();
-        let left_out = format!("no faults of this robot's protocol: {}", names.join(", "));
+        let left_out = format!("this robot's protocol has no such faults: {}", names.join(", "));
         if faults.is_empty() {
             return Err(left_out.into());
         }
-        write_stderr(&format!("left out, {left_out}\n"));
+        write_stderr(&format!("skipped: {left_out}\n"));
     }
     let all = faults.len() as u64 * u64::from(asked.missions);
     let mut table = StopTimeTable::default();
@@ -129,7 +127,7 @@ fn watch(
     // A mission may leave its bus behind.
     let domain = Domain::of(asked.robot.clone());
     let mut links = Follower::new(domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
-    // The ground truth counts until the watch ends: the end of the run stops the robot.
+    // Ground truth counts only until the run ends, which stops the robot.
     let (ended, moving, is_over) = loop {
         let (now, moving) = (Instant::now(), proxy.last_moving());
         robot.poll()?;

@@ -19,7 +19,6 @@ pub enum Kind {
     /// the first one for a stack overflow, finds none, and continues.
     Crash,
     Terminate,
-    /// SIGSTOP.
     Freeze,
     /// SIGSTOP to supervisor and stages together, then SIGCONT.
     FreezeAll,
@@ -47,7 +46,6 @@ const STARTUP_SHARE: f64 = 0.3;
 /// Share of signals to the supervisor, with `--include-supervisor`.
 const SUPERVISOR_SHARE: f64 = 0.05;
 
-/// Share of signals to consumers, if any.
 const CONSUMER_SHARE: f64 = 0.5;
 
 /// Share of hits that freeze everything, with `--freeze-all`.
@@ -63,7 +61,6 @@ impl Schedule {
         Self(Random::new(seed, 7))
     }
 
-    /// Draws an exponentially distributed time.
     pub fn pause(&mut self) -> Duration {
         MEAN_PAUSE.mul_f64(-(1.0 - self.0.share()).ln())
     }

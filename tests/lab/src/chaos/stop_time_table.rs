@@ -28,9 +28,7 @@ pub struct Entry {
     pub last_moving_s: Option<f64>,
     /// Time from the fault to the last tick with a turning wheel, by the ground truth.
     pub rest_s: Option<f64>,
-    /// Travel from the fault to the end of the watch.
     pub way_m: f64,
-    /// Time from the fault to the end of the watch.
     pub watched_s: f64,
     pub collisions: u64,
     /// Mission outcome; `goes on` if still open at the end of the watch.
@@ -103,7 +101,7 @@ impl fmt::Display for StopTimeTable {
                 &format!("{}: {reason}", told.outcome),
             ]);
         }
-        writeln!(to, "{table}Times and ways are from the fault, the longest of each kind.")
+        writeln!(to, "{table}Times and ways are maxima per fault, counted from the fault.")
     }
 }
 

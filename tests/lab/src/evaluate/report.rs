@@ -49,7 +49,6 @@ pub fn report(settings: &[Setting], rows: &[Row]) -> Value {
     report
 }
 
-/// Returns shares with 95 % intervals, and the known metrics.
 fn totals(setting: &str, rows: &[Row]) -> Value {
     let rows: Vec<&Row> = rows.iter().filter(|row| row.setting == setting).collect();
     let mut totals = json!({ "setting": setting, "count": rows.len() });

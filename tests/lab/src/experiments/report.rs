@@ -25,8 +25,7 @@ const FIGURES: [&str; 7] = [
     "wheel_range_rad_s",
 ];
 
-/// Returns per experiment the paper's values, those of each method, and its claims with whether
-/// they hold.
+/// Returns each experiment's values of the paper and of each method, and whether claims hold.
 pub fn report(experiments: &[Experiment], rows: &[Row]) -> Result<Vec<Value>> {
     let claims = claims()?;
     let its = |experiment: &str, method: &str| -> Vec<&Row> {
@@ -84,7 +83,6 @@ fn count(rows: &[&Row], outcome: Outcome) -> usize {
     rows.iter().filter(|row| row.outcome == outcome).count()
 }
 
-/// Returns the quartiles of missions that arrived.
 fn spread(rows: &[&Row], figure: &str) -> Option<Spread> {
     let arrived = rows.iter().filter(|row| row.is_success());
     Spread::of(arrived.filter_map(|row| row.number(figure)))

@@ -22,7 +22,6 @@ const PAPER: &str = "paper";
 
 #[derive(Debug, Deserialize)]
 pub struct Experiment {
-    /// Number in the paper, and variant.
     pub name: String,
     pub title: String,
     pub reported: String,
@@ -42,7 +41,6 @@ pub struct Claim {
     pub experiment: String,
     pub claim: String,
     pub figure: String,
-    /// Experiment whose figure divides this one.
     pub over: Option<String>,
     pub least: f64,
     pub most: f64,
@@ -64,7 +62,7 @@ pub fn named(names: &[String]) -> Result<Vec<Experiment>> {
     if let Some(name) = names.iter().find(|name| !table.iter().any(|it| it.name == **name)) {
         let known: Vec<_> = table.into_iter().map(|it| it.name).collect();
         let known = known.join(", ");
-        let unknown = format!("no experiment is called {name:?}; give some of {known}");
+        let unknown = format!("unknown experiment {name:?}; give some of {known}");
         return Err(Refused::new("unknown-experiment", unknown).into());
     }
     table.retain(|it| names.is_empty() || names.contains(&it.name));
@@ -88,7 +86,7 @@ impl Experiment {
         let trial = Trial::of_mission(self.name.clone(), mission, swept_m);
         let unsolvable = || {
             format!(
-                "experiment {}: the robot cannot get to the target; change the obstacles of its mission",
+                "experiment {}: the target is unreachable; change the obstacles of its mission",
                 self.name
             )
         };

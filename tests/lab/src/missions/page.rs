@@ -1,5 +1,3 @@
-//! Page of results.
-
 use std::path::{Path, PathBuf};
 
 use crate::error::{OrCannot as _, Result};
@@ -30,7 +28,6 @@ impl Page {
         self.0 += &format!("<p>{}</p>\n", escaped(text));
     }
 
-    /// Adds preformatted text.
     pub fn table(&mut self, text: &str) {
         let lines: Vec<_> = text.lines().map(escaped).collect();
         self.0 += &format!("<pre>{}</pre>\n", lines.join("\n"));

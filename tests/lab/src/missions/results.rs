@@ -1,5 +1,4 @@
-//! Directory of an evaluation: its command, and two CSV files, appended as missions end and finally
-//! sorted.
+//! Directory of an evaluation: its command, and two CSV files, finally sorted.
 
 use std::{
     env,
@@ -42,12 +41,14 @@ impl Results {
     pub fn open(directory: &Path, command: &str, resume: bool) -> Result<Self> {
         let file = directory.join(PLAN_FILE);
         let named = directory.display();
-        let use_it = format!("use {named} for results, give another --out");
+        let use_it = format!("use {named} for results; give another --out");
         match fs::read_to_string(&file) {
             Ok(earlier) if resume && earlier.trim() == command => {}
             Ok(earlier) if resume => {
                 let earlier = earlier.trim();
-                let other = format!("--resume: the command in {named} was another: {earlier}");
+                let other = format!(
+                    "--resume: {named} has results of another command, `{earlier}`; give another --out"
+                );
                 return Err(Refused::new("other-results", other).into());
             }
             Ok(_) => {
@@ -75,7 +76,6 @@ impl Results {
     }
 }
 
-/// Mission identity: world, noise seed and setting.
 pub type Key = (String, u64, String);
 
 pub trait Record: Serialize + DeserializeOwned {

@@ -1,5 +1,3 @@
-//! Result of one mission: a row of the table.
-
 use std::collections::BTreeMap;
 
 use mission_control::outcome::Outcome as Reported;
@@ -159,7 +157,6 @@ impl Row {
         OUTCOMES[self.outcome as usize]
     }
 
-    /// Returns a column's number, or one derived from several.
     pub fn number(&self, column: &str) -> Option<f64> {
         match column {
             "clearance_m" => self.min_clearance_m,
@@ -181,7 +178,6 @@ impl Record for Row {
     }
 }
 
-/// Latencies of a mission, microseconds.
 #[derive(Serialize, Deserialize)]
 pub struct Latency {
     pub world: String,

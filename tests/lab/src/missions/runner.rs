@@ -39,11 +39,9 @@ pub struct Plan {
     pub noise: NoiseSeeds,
     /// Noise seed whose missions get pictures even without failure.
     pub pictured_seed: Option<u64>,
-    /// Missions at once; by default one per processor.
     pub jobs: Option<NonZero<usize>>,
     pub pace: Pace,
-    /// Whether to calibrate each mission's robot first, as its owner would. After a reported
-    /// failure the mission runs uncalibrated.
+    /// Whether to calibrate each mission's robot first. After a failure it runs uncalibrated.
     pub calibrates: bool,
 }
 
@@ -85,8 +83,7 @@ pub fn picture(row: &Row) -> PathBuf {
         .join(name.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_"))
 }
 
-/// Runs all missions of `plan` without rows in `results`. Shows progress on standard error below
-/// `title`.
+/// Runs all missions of `plan` without rows in `results`. Shows progress below `title`.
 ///
 /// # Errors
 /// Returns an error if a file cannot be written or `firsthand` does not start.
@@ -159,7 +156,7 @@ fn world_file(directory: &Path, world: &str) -> PathBuf {
     directory.join("worlds").join(format!("{world}.toml"))
 }
 
-/// Runs `jobs` on numbered threads, and takes their results as they come.
+/// Runs `jobs` on numbered threads, and takes results in order of completion.
 ///
 /// # Errors
 /// Returns the first error of `take`; no further job begins.
@@ -222,10 +219,10 @@ impl Robot<'_> {
             self.calibrated = Some(format!("robot.calibration={file}"));
         } else {
             let said = String::from_utf8_lossy(&ended.stderr);
-            let why = said.lines().last().unwrap_or("it said nothing");
+            let why = said.lines().last().unwrap_or("it gave no reason");
             let (world, seed) = (&self.trial.world, self.seed);
             write_stderr(&format!(
-                "\n{world}, seed {seed}: not calibrated, and driven as it is: {why}\n"
+                "\n{world}, seed {seed}: calibration failed, the mission uses the stated robot: {why}\n"
             ));
         }
         Ok(())

@@ -73,7 +73,6 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Returns the linearly interpolated quartiles; none without values.
     pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.collect();
         values.sort_by(f64::total_cmp);
@@ -87,7 +86,6 @@ impl Spread {
     }
 }
 
-/// Rounds to a thousandth, for people.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }

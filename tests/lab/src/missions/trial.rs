@@ -13,7 +13,6 @@ use report::shortest_path::shortest_path;
 
 /// Step of the perimeter's width: a whole number of cells by both methods.
 const WIDTH_STEP_M: f64 = 0.1;
-/// Free ground between a world's objects and the perimeter.
 const RIM_M: f64 = 0.6;
 /// Free ground on each side of the body in a world's narrowest passage.
 const MARGIN_M: f64 = 0.05;
@@ -69,9 +68,7 @@ pub struct Scene {
 #[derive(Clone, Debug)]
 pub struct Trial {
     pub world: String,
-    /// Mission, with its origin at the robot's start.
     pub mission: Mission,
-    /// Length of the body's shortest path.
     pub shortest_m: f64,
     pub rules: Rules,
     pub oncoming: Option<Box<Self>>,

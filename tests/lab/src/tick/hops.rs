@@ -26,7 +26,7 @@ use crate::error::{OrCannot as _, Result};
 /// Time after which a sample is lost: a trip takes microseconds, the forwarders' start some
 /// milliseconds.
 const LOST: Duration = Duration::from_secs(5);
-const LOST_SAMPLE: &str = "no sample came back within 5 s; is the machine overloaded?";
+const LOST_SAMPLE: &str = "no sample came back within 5 s; reduce the load of the machine";
 
 /// Cells of the smallest map. Forwarders never read it.
 const CELLS: usize = 64;

@@ -1,5 +1,4 @@
-//! Mission with measured ticks, and its consumers: threads that read every sample of grid and
-//! field.
+//! Mission with measured ticks, and threads that read every grid and field.
 
 use std::time::Duration;
 
@@ -22,7 +21,6 @@ use crate::{
 };
 
 const LOOK_EVERY: Duration = Duration::from_secs(1);
-/// Interval at which a consumer checks for its end.
 const STOPS_WITHIN: Duration = Duration::from_millis(100);
 
 /// Returns a mission's tick times and its processes' resources; none of these for a short mission.

@@ -15,7 +15,6 @@ use crate::{missions::statistics::rounded, robot::processes};
 pub struct Used {
     /// Voluntary context switches of all threads per second: each wait ends with a wakeup.
     pub wakeups_per_s: f64,
-    /// Share of one core.
     pub cpu_share: f64,
     /// Proportional memory: each shared page is divided among the processes that map it.
     pub pss_mib: f64,
@@ -134,6 +133,6 @@ mod tests {
         drop(shell.stdin.take());
         shell.wait().unwrap();
         set.look();
-        assert_eq!(set.used(), Some(used), "what came after the end counts");
+        assert_eq!(set.used(), Some(used), "use after the end counts");
     }
 }

@@ -66,7 +66,7 @@ pub fn gazebo(file: &Path) -> Result<World> {
     let mut text = String::new();
     open(file)?.take(LONGEST).read_to_string(&mut text).map_err(unreadable(file))?;
     let drums = cylinders(&text).ok_or_else(|| {
-        malformed(file, "no <model> with a <pose> and a <cylinder>; give a BARN world")
+        malformed(file, "the file has no <model> with a <pose> and a <cylinder>; give a BARN world")
     })?;
     let name = file.file_stem().unwrap_or_default().display();
     Ok((format!("barn-{name}"), scene(drums), RULES))

@@ -9,7 +9,6 @@ use crate::{missions::trial::Scene, random::Random};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bends {
-    /// Straight, along x, and empty.
     None,
     /// Two to four legs with bends of up to 50 degrees.
     Oblique,

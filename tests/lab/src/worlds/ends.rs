@@ -60,7 +60,7 @@ fn parse(text: &str) -> Result<Vec<Ends>, String> {
         }
     }
     if values.is_empty() {
-        return Err("no <arg name=\"initial_pose_x\" default=\"...\"/>; give MRPB's tests, or remove the file to have starts and targets drawn".to_owned());
+        return Err("no <arg name=\"initial_pose_x\" default=\"...\"/>; give MRPB's tests, or remove the file for random starts and targets".to_owned());
     }
     let ends = |(number, test): (usize, &[(&str, f64)])| {
         let value = |key: &str| {

@@ -22,15 +22,13 @@ use crate::{
 
 /// Default number of drawn starts and targets on a map without any.
 const DRAWN: usize = 10;
-/// Their stream of random numbers.
 const DRAWN_KIND: u64 = 7;
-/// Name of a map's file of tests, as in MRPB.
 const TESTS_FILE: &str = "config.txt";
 
 pub fn unreadable<E: Display>(file: &Path) -> impl Fn(E) -> Failure {
     let file = file.display().to_string();
     move |cause| {
-        format!("cannot read {file}: {cause}; give a kind of world, a file or a folder, see `firsthand help evaluation`").into()
+        format!("cannot read {file}: {cause}; give a kind of world, a file or a folder (`firsthand help evaluation`)").into()
     }
 }
 
@@ -49,13 +47,13 @@ pub fn read(path: &Path, asked: Asked) -> Result<Found> {
     } else if !add(&mut found, path, asked)? {
         return Err(malformed(
             path,
-            "not a world; give a mission (.toml), a ROS map (.yaml), a BARN .world or a table of its cylinders (cylinders.csv, .csv.gz)",
+            "not a world; give a mission (.toml), a ROS map (.yaml), a BARN world (.world) or its table of cylinders (cylinders.csv, .csv.gz)",
         ));
     }
     let mut names = BTreeSet::new();
     if let Some(twice) = found.trials.iter().find(|trial| !names.insert(&trial.world)) {
         let world = &twice.world;
-        let problem = format!("two worlds are called {world}; give one of them another name");
+        let problem = format!("two worlds have the name {world}; rename one");
         return Err(malformed(path, problem));
     }
     let all = found.trials.len();
@@ -235,6 +233,6 @@ mod tests {
         fs::copy(&mission, twice.join("mission.toml")).unwrap();
         fs::remove_file(folder.path().join("hall.yaml")).unwrap();
         let twice = refused(folder.path(), ALL);
-        assert!(twice.contains("two worlds are called mission"), "{twice}");
+        assert!(twice.contains("two worlds have the name mission"), "{twice}");
     }
 }

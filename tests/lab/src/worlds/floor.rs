@@ -16,7 +16,6 @@ use crate::{error::Result, random::Random};
 const LARGEST_M: f64 = 95.0;
 /// Range of the straight distance to a drawn target.
 const DRAWN_M: [f64; 2] = [3.0, 15.0];
-/// Number of starts drawn before giving up the search for a target.
 const MOST_STARTS: usize = 50;
 
 #[derive(Debug)]
@@ -30,7 +29,7 @@ impl Floor {
         let side_m = map.map.cols.max(map.map.rows) as f64 * map.cell_m;
         if side_m > LARGEST_M {
             let problem = format!(
-                "{side_m:.0} m on a side, a world has at most {LARGEST_M:.0} m; crop the map"
+                "the map is {side_m:.0} m on a side, above the limit of {LARGEST_M:.0} m; crop it"
             );
             return Err(malformed(file, problem));
         }
@@ -87,7 +86,6 @@ impl Floor {
         let away = ((at - DVec2::from(self.map.corner_m)) / self.map.cell_m).floor();
         let size = DVec2::new(self.map.map.cols as f64, self.map.map.rows as f64);
         let inside = away.cmpge(DVec2::ZERO).all() && away.cmplt(size).all();
-        // Row 0 is at the top.
         let row = size.y - 1.0 - away.y;
         inside.then_some((row * size.x + away.x) as usize)
     }
@@ -218,6 +216,6 @@ mod tests {
         std::fs::write(&file, "image: a.pgm\nresolution: 1\norigin: [0, 0, 0]").unwrap();
         let refused = Floor::load(&file).unwrap_err().to_string();
         let named = file.to_str().unwrap();
-        assert!(refused.starts_with(named) && refused.contains("200 m on a side"), "{refused}");
+        assert!(refused.starts_with(named) && refused.contains("is 200 m on a side"), "{refused}");
     }
 }

@@ -11,7 +11,6 @@ use crate::{missions::trial::Scene, random::Random};
 
 /// Objects per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.16, 0.22];
-/// Free distance around start and target.
 const KEPT_FREE_M: f64 = 0.5;
 /// Echo amplitude of cloth, relative to a hard surface.
 const SOFT: f64 = 0.1;

@@ -10,7 +10,6 @@ use crate::{missions::trial::Scene, random::Random};
 
 /// Doorway widths: through a narrow one robots pass one after the other.
 const DOORS_M: [f64; 2] = [0.8, 1.8];
-/// Drums per square metre of floor.
 const DENSITY: f64 = 0.06;
 /// Free distance of drums around start and target, and of the doorway from them.
 const KEPT_FREE_M: f64 = 0.6;

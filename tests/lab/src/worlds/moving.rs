@@ -28,7 +28,6 @@ use crate::{
 
 const START: DVec2 = DVec2::new(11.0, 0.0);
 const GOAL: DVec2 = DVec2::new(-9.0, 0.0);
-/// Half the side of the hall.
 const HALF_M: f64 = 10.0;
 const WALL_M: f64 = 0.5;
 const RADIUS_M: f64 = 0.5;
@@ -40,7 +39,6 @@ const MOVES_S: f64 = 130.0;
 /// Difficulty of a world: inclusive ranges of cylinders, orders, speeds (m/s) and their deviations.
 type Difficulty = ([usize; 2], [usize; 2], [f64; 2], [f64; 2]);
 
-/// DynaBARN's easy, medium and hard worlds.
 const DIFFICULTIES: [Difficulty; 3] = [
     ([5, 14], [1, 2], [0.5, 0.9], [0.01, 0.1]),
     ([15, 19], [2, 4], [1.0, 1.4], [0.05, 0.15]),

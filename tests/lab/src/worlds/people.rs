@@ -12,12 +12,10 @@ const SPEEDS_M_S: [f64; 2] = [0.5, 1.5];
 /// Nominal.
 const RADIUS_M: f64 = 0.25;
 const GOALS: usize = 6;
-/// Drums per square metre of floor.
 const DENSITY: f64 = 0.04;
 /// Free distance of drums around start and target, and of people and their goals from static
 /// objects.
 const KEPT_FREE_M: f64 = 0.6;
-/// Minimum distance of people from the robot at the start.
 const BEGINS_M: f64 = 1.5;
 
 /// Draws room `number`, which selects the number of people.

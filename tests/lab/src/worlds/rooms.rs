@@ -17,7 +17,6 @@ use crate::{
 
 /// Objects per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.18, 0.26];
-/// Free distance around start and target.
 const KEPT_FREE_M: f64 = 0.5;
 const DOOR_SHARE: f64 = 1.0 / 3.0;
 
@@ -56,7 +55,6 @@ pub fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene {
 pub fn glazed(random: &mut Random, number: usize) -> Scene {
     let mut scene = room(random, number, Doors::All, false);
     let Shapes { drums, boxes, walls } = &mut scene.shapes;
-    // The first wall encloses the room.
     walls.iter_mut().skip(1).for_each(|wall| wall.light = Some(Light::Glass));
     let (glass, black) = (Some(Light::Glass), Some(Light::Black));
     boxes.iter_mut().for_each(|block| block.light = [None, glass, black][random.below(3)]);

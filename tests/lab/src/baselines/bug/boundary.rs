@@ -8,7 +8,6 @@ use crate::baselines::belief::Map;
 
 /// Directions counter-clockwise from x: columns and rows.
 const DIRECTIONS: [[i32; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
-/// Quarter turns counter-clockwise.
 const LEFT: usize = 1;
 const BACK: usize = 2;
 const RIGHT: usize = 3;

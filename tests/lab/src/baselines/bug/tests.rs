@@ -63,7 +63,7 @@ impl Drive {
             }
             self.at += 0.02 * DVec2::new(guidance.ex, guidance.ey);
         }
-        panic!("no end of it: {:?} at {}", self.bug.planner, self.at);
+        panic!("it does not end: {:?} at {}", self.bug.planner, self.at);
     }
 
     fn follows(&self) -> bool {

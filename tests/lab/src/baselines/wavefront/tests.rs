@@ -37,7 +37,7 @@ fn the_way_leads_around_a_wall_and_cuts_no_corner() {
         at += 0.02 * DVec2::new(guidance.ex, guidance.ey);
         driven += 0.02;
         assert!(belief.map().unwrap().free_cell_at(at).is_some(), "in the wall at {at}");
-        assert!(driven < 2.0, "no end of it, at {at}");
+        assert!(driven < 2.0, "it does not end, at {at}");
     }
     // The path rounds the wall's end in two legs of 0.3 m by 0.3 m, 0.85 m in all; whole cells
     // lengthen it.

@@ -1,5 +1,3 @@
-//! Messages of robot and host, as far as faults change them.
-
 use std::f64::consts::TAU;
 
 use common::{
@@ -20,17 +18,8 @@ const MOTOR_BYTES: usize = 33;
 pub const COUNT_RAD: f64 = TAU / 1200.0;
 
 pub enum Words {
-    X80 {
-        robot: Decoder,
-        host: Decoder,
-        /// Newest encoders, and unwrapped counts.
-        encoders: [Encoder; 2],
-        counts: [f64; 2],
-    },
-    Json {
-        robot: Lines,
-        host: Lines,
-    },
+    X80 { robot: Decoder, host: Decoder, encoders: [Encoder; 2], counts: [f64; 2] },
+    Json { robot: Lines, host: Lines },
 }
 
 impl Words {
@@ -205,7 +194,6 @@ pub enum Effect {
     Moves {
         stand: Vec<u8>,
     },
-    /// Stop by a speed of 0.
     Stands,
     Disables,
     Other,
