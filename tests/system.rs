@@ -24,6 +24,7 @@ mod follow;
 mod foreign_payload;
 mod goto;
 mod held_wheels;
+mod init;
 mod json_robot;
 mod kills_and_freezes;
 mod laser;

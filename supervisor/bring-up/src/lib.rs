@@ -10,6 +10,7 @@
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`seen`] | what a robot says before it drives, as a new mission file |
 //! | [`trace`] | commands, counts and readings, and the legs of the procedure |
 //! | `wheels` | commands that each encoder follows; response of the base |
 //! | `scans` | body motion and laser mounting that align all scans |
@@ -19,6 +20,7 @@
 mod body;
 mod rangers;
 mod scans;
+pub mod seen;
 pub mod trace;
 mod wheels;
 

@@ -7,6 +7,7 @@ mod diff;
 mod go_back;
 mod goto;
 pub mod help;
+mod init;
 mod install;
 mod logs;
 mod man;
@@ -102,6 +103,7 @@ commands! {
         Missions missions,
         Install install,
         Help help(command_line),
+        Init init,
         BringUp bring_up,
         Calibrate calibrate,
         Completions completion,

@@ -1,5 +1,7 @@
 //! Counts of a transport.
 
+use rustix::io::Errno;
+
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
     /// Datagrams dropped because their sender is not the robot's address.
@@ -16,4 +18,6 @@ pub struct Attempts {
     pub made: u64,
     /// Time to the next attempt; 0 during one.
     pub next_ns: u64,
+    /// Why the last one failed or the wire was closed, and the remedy, if that is known.
+    pub failed: Option<(Errno, &'static str)>,
 }

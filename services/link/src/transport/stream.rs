@@ -92,7 +92,8 @@ impl<D: Dial> Wire for Stream<D> {
             State::Opening { .. } => 0,
             State::Closed => self.backoff.wait_ns(now_ns),
         };
-        Some(Attempts { made: self.backoff.attempts(), next_ns })
+        let failed = self.logged.map(|errno| (errno, remedy(errno)));
+        Some(Attempts { made: self.backoff.attempts(), next_ns, failed })
     }
 
     fn trouble(&self) -> Option<(String, &'static str)> {

@@ -3,16 +3,13 @@
 
 mod written;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::fs;
 
 use bring_up::{Finding, Trace, Verdict, findings};
 use clap::Args;
 use common::{
     file::{FileError, replace},
-    mission::{CalibrationPlan, Mission, Procedure, Protocol},
+    mission::{CalibrationPlan, Mission, Procedure},
 };
 use console::{
     consent,
@@ -22,10 +19,6 @@ use console::{
 };
 use picture::points_svg;
 use recording::Recording;
-use serde::{
-    Deserialize as _,
-    de::{IntoDeserializer as _, value::Error as ValueError},
-};
 use serde_json::json;
 
 use super::calibrate::drive::{Carried, Setting};
@@ -43,17 +36,6 @@ pub struct Arguments {
     ///
     /// Default: the simulated X80.
     mission: Option<String>,
-    /// Write a mission for a new robot of this protocol to --out.
-    ///
-    /// Protocols: x80, json, arduino, ros2.
-    #[arg(long, value_parser = protocol, conflicts_with = "mission", requires = "address")]
-    protocol: Option<Protocol>,
-    /// Address of the robot, in the form of robot.address.
-    #[arg(long, requires = "protocol")]
-    address: Option<String>,
-    /// Mission file that --protocol writes.
-    #[arg(long, value_name = "FILE", default_value = "robot.toml")]
-    out: PathBuf,
     /// Check only motors and encoders, with the wheels in the air.
     #[arg(long)]
     lifted: bool,
@@ -67,10 +49,6 @@ pub struct Arguments {
     setting: Setting,
 }
 
-fn protocol(word: &str) -> Result<Protocol, ValueError> {
-    Protocol::deserialize(word.into_deserializer())
-}
-
 const SIMULATED: &str = "target = [1.5, 0]\nsimulation.realism = 'measured'\nsensors = 'all'\n[perimeter]\nwidth_m = 6.0\ncentre = [0.0, 0.0]\n[[world.wall]]\npoints = [[1.3, -1.6], [1.3, 1.2], [-0.4, 1.6], [-1.5, 0.4], [-1.2, -1.6], [1.3, -1.6]]\n";
 
 const TITLE: &str = "What the robot saw, placed by the motion that was found";
@@ -78,9 +56,6 @@ const DESCRIPTION: &str = "Ends of beams and echoes; x points ahead of the robot
 
 pub fn main(arguments: &Arguments) -> Result {
     arguments.setting.log("bring-up.log")?;
-    if let (Some(protocol), Some(address)) = (arguments.protocol, &arguments.address) {
-        return write_new(protocol, address, &arguments.out);
-    }
     let set = &arguments.setting.set;
     let named = match &arguments.mission {
         Some(name) => missions::load(name, set)?,
@@ -142,19 +117,6 @@ fn judged(found: &[Finding]) -> Result {
         )
         .into()),
     }
-}
-
-fn write_new(protocol: Protocol, address: &str, out: &Path) -> Result {
-    let text = written::new_robot(protocol, address);
-    missions::parsed(&text, "bring-up", &[])?;
-    let place = out.display();
-    if out.exists() {
-        return Err(format!("{place} exists; bring it up: firsthand bring-up {place}").into());
-    }
-    replace(out, text).map_err(FileError::of("write", out))?;
-    Ok(print_text(&format!(
-        "wrote {place}; correct its sizes and the rows of its sensors, then: firsthand bring-up {place} --write\n"
-    ))?)
 }
 
 fn line(finding: &Finding) -> String {

@@ -1,0 +1,119 @@
+use common::{
+    json_wire::Order,
+    mission::SensorKind,
+    wire::{Addressing, CustomSensors, MotorSensors, Report as Frame, StandardSensors},
+};
+
+use super::*;
+
+const ADDRESS: &str = "udp://127.0.0.1:5600";
+
+/// A robot of JSON that has said `line` so often, twenty times a second.
+fn said(line: &str, times: u32) -> Seen {
+    let mut seen = Seen::new(Protocol::Json).unwrap();
+    for time in 0..times {
+        seen.hear(format!("{line}\n").as_bytes(), f64::from(time) / 20.0);
+    }
+    seen
+}
+
+fn mission_of(seen: &Seen) -> Mission {
+    let text = seen.mission_at(ADDRESS);
+    Mission::parse(&text, Path::new("m.toml")).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+#[test]
+fn the_words_of_a_json_robot_become_a_mission_with_its_sensors_and_its_rate() {
+    let report = r#"{"heard":1,"wheels":[0,0],"speeds":[0,0],"gyro":0,"battery_v":12.4,"ranges":{"front":1.25,"left":null},"scan":[1,2.5,null],"touched":{"bump":false}}"#;
+    let seen = said(report, 41);
+    let mission = mission_of(&seen);
+    let found: Vec<_> = mission.sensor_table().into_iter().map(|it| (it.name, it.kind)).collect();
+    let (cone, scan) = (SensorKind::Cone, SensorKind::Scan);
+    let expected = [("front", cone), ("left", cone), ("laser", scan)];
+    assert_eq!(found, expected.map(|(name, kind)| (name.to_owned(), kind)));
+    assert_eq!(mission.touches()[0].name, "bump");
+    assert_eq!((mission.robot.rate_hz, mission.robot.gyro()), (20.0, true));
+    assert_eq!(mission.lasers()[0].1.beams, 3);
+    let text = seen.mission_at(ADDRESS);
+    for told in ["20.0 a second", "12.4 V", "\"heard\"", "MEASURE", "PLACEHOLDER"] {
+        assert!(text.contains(told), "{told}: {text}");
+    }
+}
+
+#[test]
+fn a_robot_that_only_answers_or_says_nothing_of_sensors_has_a_valid_mission() {
+    let odometry = said(r#"{"odometry":[0,0,0],"speeds":[0,0]}"#, 1);
+    assert_eq!(mission_of(&odometry).robot.rate_hz, 10.0);
+    assert!(said(r#"{"heard":1}"#, 1).is_known());
+    for protocol in [Protocol::X80, Protocol::Json, Protocol::Arduino, Protocol::Ros2] {
+        let seen = Seen::new(protocol).unwrap();
+        assert!(!seen.is_known());
+        let address = if protocol == Protocol::Ros2 { "ros2:7" } else { ADDRESS };
+        let mission = Mission::parse(&seen.mission_at(address), Path::new("m.toml")).unwrap();
+        assert_eq!(mission.robot.protocol(), protocol);
+    }
+}
+
+#[test]
+fn hostile_names_are_refused_as_names_and_few_are_kept() {
+    let hostile = said(r#"{"ranges":{"a\"\n[robot]\n":1}}"#, 1).mission_at(ADDRESS);
+    let refused = Mission::parse(&hostile, Path::new("m.toml")).unwrap_err().to_string();
+    assert!(refused.contains("no name of a sensor"), "{refused}");
+    let mut seen = Seen::new(Protocol::Json).unwrap();
+    for name in 0..1000 {
+        seen.hear(format!("{{\"ranges\":{{\"n{name}\":1e300}}}}\n").as_bytes(), 0.0);
+    }
+    assert_eq!(seen.report.ranges.len(), MOST);
+    let refused = Mission::parse(&seen.mission_at(ADDRESS), Path::new("m.toml")).unwrap_err();
+    assert!(refused.to_string().contains("33 rows"), "{refused}");
+}
+
+#[test]
+fn an_echo_and_what_another_protocol_says_are_not_known() {
+    for protocol in [Protocol::X80, Protocol::Json, Protocol::Arduino] {
+        let mut seen = Seen::new(protocol).unwrap();
+        let echo = seen.ask();
+        seen.hear(&echo, 0.0);
+        seen.hear(b"HTTP/1.1 400 Bad Request\r\n\r\n{\"wheel\":1}\n", 0.1);
+        assert_eq!(seen.refused.contains("unknown field `wheel`"), protocol == Protocol::Json);
+        seen.hear(format!("{{\"\\u001b{}\":1}}\n", "x".repeat(1000)).as_bytes(), 0.2);
+        assert!(!seen.is_known(), "{protocol:?}");
+        assert!(seen.refused.len() <= MOST_TOLD && !seen.refused.contains('\u{1b}'));
+    }
+}
+
+#[test]
+fn the_frames_of_an_x80_tell_its_rate_and_the_sensors_that_read() {
+    let standard = StandardSensors { ultrasonic: [0, 80, 135, 0, 0, 0], ..Default::default() };
+    let custom = CustomSensors { ad: [1000; 8], io: 0 };
+    let mut bytes = Vec::new();
+    for frame in
+        [Frame::Standard(standard), Frame::Custom(custom), Frame::Motor(MotorSensors::default())]
+    {
+        frame.encode(Addressing::default(), &mut bytes);
+    }
+    let mut seen = Seen::new(Protocol::X80).unwrap();
+    for tick in 0..8 {
+        seen.hear(&bytes, f64::from(tick) / 7.0);
+    }
+    assert_eq!(mission_of(&seen).robot.rate_hz, 7.0);
+    let sonars = ["front", "front-left"].map(|name| seen.words.contains(name));
+    assert_eq!(sonars, [true, false], "{:?}", seen.words);
+}
+
+#[test]
+fn an_arduino_is_known_by_its_counts() {
+    let mut seen = Seen::new(Protocol::Arduino).unwrap();
+    assert_eq!(seen.ask(), b"\rb\r");
+    seen.hear(b"57600\r\n", 0.0);
+    assert!(!seen.is_known());
+    assert_eq!(seen.ask(), b"e\r");
+    seen.hear(b"10 -12\r\n", 0.1);
+    assert!(seen.is_known() && seen.ask().is_empty());
+}
+
+#[test]
+fn a_robot_is_asked_for_reports_and_its_brake_is_never_released() {
+    let asked = Seen::new(Protocol::Json).unwrap().ask();
+    assert_eq!(parse(&asked), Ok(Order::Ping {}));
+}

@@ -1,0 +1,79 @@
+//! Missions for new robots: `firsthand init`.
+
+use std::{
+    io::{Read as _, Write as _},
+    net::{TcpListener, UdpSocket},
+    thread,
+};
+
+use crate::support::{Run, printed, refused, wire::Robot};
+
+/// At this speed a mission takes longer than its test, which stops it.
+const SLOW: [&str; 6] =
+    ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
+
+/// The text of the mission that `firsthand init` writes for `robot`, after `firsthand check` accepted it.
+fn mission_of(robot: &Robot, address: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("robot.toml");
+    let out = file.to_str().unwrap();
+    let said = printed(&["init", &format!("{address}{}", robot.listening), "--out", out]);
+    assert!(said.contains(&format!("firsthand bring-up {out}")), "{said}");
+    printed(&["check", out]);
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(text.contains("MEASURE") && text.contains("PLACEHOLDER"), "{text}");
+    refused(&["init", "127.0.0.1:9", "--out", out], "file-exists", &[out]);
+    text
+}
+
+#[test]
+fn init_writes_a_mission_that_check_accepts_for_a_json_robot_and_moves_it_nowhere() {
+    let json = ["--set", "robot.model='kobuki'"];
+    let robot = Robot::start_with("obstacle-course", &json);
+    let text = mission_of(&robot, "udp://");
+    for row in ["protocol = \"json\"", "name = \"laser\"", "beams = 360", "name = \"bumper-left\""]
+    {
+        assert!(text.contains(row), "{row}: {text}");
+    }
+    assert_eq!(robot.kill(), 0.0);
+}
+
+#[test]
+fn init_writes_a_mission_that_check_accepts_for_an_x80_and_moves_it_nowhere() {
+    let robot = Robot::start("obstacle-course", "tcp", "127.0.0.1:0");
+    let text = mission_of(&robot, "tcp://");
+    assert!(text.contains("protocol = \"x80\"") && text.contains("front-left"), "{text}");
+    assert_eq!(robot.kill(), 0.0);
+}
+
+#[test]
+fn a_silent_address_a_foreign_protocol_and_a_robot_that_is_driven_are_refused_with_the_cause() {
+    let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let at = silent.local_addr().unwrap().to_string();
+    let out = tempfile::tempdir().unwrap();
+    let out = out.path().join("robot.toml");
+    let init = |address: &str, code: &str, says: &[&str]| {
+        refused(&["init", address, "--out", out.to_str().unwrap()], code, says);
+        assert!(!out.exists());
+    };
+    init(&at, "no-answer", &["nothing answers", &at]);
+    let run = Run::under_way("init-used", "open-room", &SLOW, 0.3);
+    let address = common::run::Run::load(&run.directory()).unwrap().address.to_string();
+    init(&address, "address-in-use", &["init-used"]);
+    run.stop();
+    init("tcp://127.0.0.1:9", "no-answer", &["Connection refused"]);
+    init("udp://127.0.0.1", "usage", &["has no port"]);
+    init("serial:///dev/no-such-line", "no-answer", &["is the adapter plugged in"]);
+    let garbage = TcpListener::bind("127.0.0.1:0").unwrap();
+    let at = format!("tcp://{}", garbage.local_addr().unwrap());
+    thread::spawn(move || {
+        for mut stream in garbage.incoming().map_while(Result::ok) {
+            thread::spawn(move || {
+                let _ = stream.write_all(b"220 mail.example ESMTP\r\n");
+                while stream.write_all(&[b'{'; 4096]).is_ok() {}
+                let _ = stream.read(&mut [0; 1]);
+            });
+        }
+    });
+    init(&at, "unknown-protocol", &["220 mail.example ESMTP\\r\\n"]);
+}
