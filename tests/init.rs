@@ -1,4 +1,4 @@
-//! Missions for new robots: `firsthand init`.
+//! New robots and new machines: `firsthand init` and `firsthand doctor`.
 
 use std::{
     io::{Read as _, Write as _},
@@ -6,7 +6,7 @@ use std::{
     thread,
 };
 
-use crate::support::{Run, printed, refused, wire::Robot};
+use crate::support::{Run, domain, json_of, output, printed, refused, wire::Robot};
 
 /// At this speed a mission takes longer than its test, which stops it.
 const SLOW: [&str; 6] =
@@ -76,4 +76,22 @@ fn a_silent_address_a_foreign_protocol_and_a_robot_that_is_driven_are_refused_wi
         }
     });
     init(&at, "unknown-protocol", &["220 mail.example ESMTP\\r\\n"]);
+}
+
+#[test]
+fn doctor_says_a_verdict_for_each_check_and_its_exit_code_follows_from_them() {
+    let (status, found) = json_of(&output(&["doctor", "--json"]));
+    let is_ill = found.iter().any(|it| it["verdict"] == "problem");
+    assert_eq!(status.code(), Some(i32::from(is_ill)), "{found:?}");
+    for check in [
+        "limit of open files",
+        "directory of robots",
+        "shared memory",
+        "clock",
+        "firsthand-page",
+        "other robots",
+    ] {
+        assert!(found.iter().any(|it| it["check"] == check), "{check}: {found:?}");
+    }
+    assert!(domain("any").directory().parent().unwrap().is_dir());
 }

@@ -110,7 +110,11 @@ fn shared_memory_that_is_full_is_refused_at_the_start_and_harms_no_run_later() {
         let run = ["run", "open-room", "--robot", robot, "--runs"];
         let runs = directory_of(robot);
         let runs = runs.path().to_str().unwrap();
-        refused(&[&run[..], &[runs]].concat(), "shared-memory", &["--shm-size"]);
+        refused(
+            &[&run[..], &[runs]].concat(),
+            "shared-memory",
+            &["--shm-size", "firsthand doctor"],
+        );
         memory.empty();
         let run = Run::under_way(robot, "obstacle-course", &["--pace", "4"], 0.3);
         memory.fill();

@@ -74,11 +74,6 @@ trait Wire: AsFd + fmt::Debug {
     fn attempts(&self, _now_ns: u64) -> Option<Attempts> {
         None
     }
-
-    /// Why the robot cannot be heard, and the remedy; none while it can.
-    fn trouble(&self) -> Option<(String, &'static str)> {
-        None
-    }
 }
 
 #[derive(Debug)]
@@ -164,9 +159,17 @@ impl Transport {
         self.wire.attempts(now_ns)
     }
 
-    /// Why the robot cannot be heard; none while it can.
+    /// Returns why the robot cannot be heard, if that is known.
     pub fn trouble(&self) -> Option<Refusal> {
-        let (what, remedy) = self.wire.trouble()?;
+        let failed = self.wire.attempts(0).and_then(|attempts| attempts.failed);
+        let (what, remedy) = match (failed, self.wire.tally().other_port) {
+            (Some((errno, remedy)), _) => (io::Error::from(errno).to_string(), remedy),
+            (None, 0) => return None,
+            (None, port) => {
+                let what = format!("its host answers from port {port}");
+                (what, "name that port in robot.address")
+            }
+        };
         Some(Refusal { input: self.address.to_string(), what, remedy: remedy.to_owned() })
     }
 

@@ -4,6 +4,7 @@ mod bring_up;
 mod calibrate;
 mod check;
 mod diff;
+mod doctor;
 mod go_back;
 mod goto;
 pub mod help;
@@ -103,6 +104,7 @@ commands! {
         Missions missions,
         Install install,
         Help help(command_line),
+        Doctor doctor,
         Init init,
         BringUp bring_up,
         Calibrate calibrate,

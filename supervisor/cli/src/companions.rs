@@ -17,7 +17,7 @@ use processes::executable;
 
 pub struct Companion {
     pub name: &'static str,
-    executable: &'static str,
+    pub executable: &'static str,
     /// Whether the executable has several subcommands and needs this one's name.
     is_one_of_many: bool,
     pub about: &'static str,

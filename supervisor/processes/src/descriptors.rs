@@ -4,6 +4,8 @@ use std::fs;
 
 use rustix::process::{Resource, Rlimit, setrlimit};
 
+use crate::domain_error::DomainError;
+
 /// Descriptors of a supervisor: four per topic, 355 in all, and up to 14 per consumer of all
 /// topics, for a dozen consumers.
 pub(crate) const NEEDED: u64 = 512;
@@ -12,7 +14,7 @@ pub(crate) const NEEDED: u64 = 512;
 ///
 /// # Errors
 /// Returns a limit that is too low, which the middleware would report vaguely.
-pub(crate) fn raise_limit() -> Result<(), u64> {
+pub(crate) fn raise_limit() -> Result<(), DomainError> {
     let Some([_, hard]) = limits() else {
         return Ok(());
     };
@@ -20,7 +22,7 @@ pub(crate) fn raise_limit() -> Result<(), u64> {
     // Where raising fails, as under the service's unit, the soft limit stays.
     let _ = setrlimit(Resource::Nofile, limit);
     match limits() {
-        Some([soft, _]) if soft < NEEDED => Err(soft),
+        Some([limit, _]) if limit < NEEDED => Err(DomainError::Descriptors { limit }),
         _ => Ok(()),
     }
 }

@@ -17,6 +17,7 @@ use common::{
     file::append,
     topics,
 };
+use rustix::fs::{Access, access, statvfs};
 
 use crate::{
     descriptors,
@@ -56,7 +57,7 @@ pub struct DomainLock {
 impl DomainLock {
     /// Locks `domain`, removes old files, creates services for a map of `cells` cells.
     pub fn acquire(domain: Domain, cells: usize) -> Result<Self, DomainError> {
-        descriptors::raise_limit().map_err(|limit| DomainError::Descriptors { limit })?;
+        descriptors::raise_limit()?;
         // A robot whose directory was removed is still claimed.
         let claim = claim(&domain)?;
         let lock = lock(&domain)?;
@@ -81,7 +82,7 @@ impl DomainLock {
 
     pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
         self.clear()?;
-        check_shared_memory(SHARED_MEMORY, SMALL_TOPICS_BYTES + CELL_BYTES * self.cells as u64)?;
+        check_shared_memory(SHARED_MEMORY, self.cells)?;
         let (bus, services) = Bus::make(&self.domain, "supervisor", topics::TABLE)?;
         self.bus = Some((services, Rc::new(bus)));
         (self.stages_lock, self.joining_lock) = (None, None);
@@ -338,11 +339,25 @@ fn removed(result: io::Result<()>, path: &Path) -> Result<(), DomainError> {
     }
 }
 
+/// Checks, by name, what a supervisor with a map of `cells` cells needs of this machine.
+pub fn check_machine(
+    domain: &Domain,
+    cells: usize,
+) -> [(&'static str, Result<(), DomainError>); 3] {
+    [
+        ("limit of open files", descriptors::raise_limit()),
+        ("directory of robots", domain.directory().parent().map_or(Ok(()), make_own_directory)),
+        ("shared memory", check_shared_memory(SHARED_MEMORY, cells)),
+    ]
+}
+
 /// Checks for space: writing to a segment in a full file system raises SIGBUS.
-fn check_shared_memory(mount: &str, needed: u64) -> Result<(), DomainError> {
-    let space = rustix::fs::statvfs(mount).map_err(|error| DomainError::SharedMemory {
-        problem: format!("cannot be examined: {error}"),
-        remedy: "mount a tmpfs there",
+fn check_shared_memory(mount: &str, cells: usize) -> Result<(), DomainError> {
+    let needed = SMALL_TOPICS_BYTES + CELL_BYTES * cells as u64;
+    let space = access(mount, Access::WRITE_OK).and_then(|()| statvfs(mount));
+    let space = space.map_err(|error| DomainError::SharedMemory {
+        problem: format!("cannot be used: {error}"),
+        remedy: "mount a tmpfs there that all users may write",
     })?;
     let free = space.f_bavail * space.f_frsize;
     if free < needed {
@@ -442,7 +457,7 @@ mod tests {
 
     #[test]
     fn too_little_or_no_shared_memory_is_an_error_with_the_remedy() {
-        let full = check_shared_memory(SHARED_MEMORY, u64::MAX).unwrap_err();
+        let full = check_shared_memory(SHARED_MEMORY, usize::MAX >> 8).unwrap_err();
         let missing = check_shared_memory("/no/such/mount", 1).unwrap_err();
         for (error, expected) in [(full, "--shm-size"), (missing, "mount a tmpfs")] {
             let DomainError::SharedMemory { remedy, .. } = error else { panic!("{error}") };

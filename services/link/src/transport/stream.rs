@@ -92,12 +92,8 @@ impl<D: Dial> Wire for Stream<D> {
             State::Opening { .. } => 0,
             State::Closed => self.backoff.wait_ns(now_ns),
         };
-        let failed = self.logged.map(|errno| (errno, remedy(errno)));
+        let failed = self.down.map(|errno| (errno, remedy(errno)));
         Some(Attempts { made: self.backoff.attempts(), next_ns, failed })
-    }
-
-    fn trouble(&self) -> Option<(String, &'static str)> {
-        self.down.map(|errno| (io::Error::from(errno).to_string(), remedy(errno)))
     }
 
     /// Continue or give up an attempt, or send the rest of a message.

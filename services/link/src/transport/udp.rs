@@ -73,12 +73,6 @@ impl Wire for Udp {
     fn tally(&self) -> Tally {
         self.tally
     }
-
-    fn trouble(&self) -> Option<(String, &'static str)> {
-        let port = self.tally.other_port;
-        let what = || format!("its host answers from port {port}");
-        (port != 0).then(|| (what(), "name that port in robot.address"))
-    }
 }
 
 /// Returns whether the robot is unreachable, or a signal came.

@@ -304,6 +304,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             drop(recorder);
             drop(lock);
             made_for_nothing();
+            write_stderr("firsthand: `firsthand doctor` examines this machine\n");
             return Err(error.into());
         }
     };

@@ -1,0 +1,204 @@
+//! `firsthand doctor`: this machine, a verdict a line.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    net::TcpListener,
+    path::Path,
+    process::{Command, ExitCode},
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use clap::Args;
+use common::{VERSION, clock::monotonic_ns, domain::Domain};
+use console::{failure::Result, missions, output::print_text, robots};
+use processes::{DomainError, domain, executable};
+use rustix::{
+    fs::{Access, access},
+    process::{Resource, getrlimit},
+};
+use serde_json::json;
+
+use crate::companions;
+
+/// Examine this machine: memory, limits, clock, ports, serial lines, versions, what other runs left.
+///
+/// Each line is ok, a note, or a problem with its remedy. The exit code is 1 if there is a problem.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// One JSON object a line.
+    #[arg(long)]
+    json: bool,
+}
+
+/// `ok`, `note` or `problem`, and why or the remedy.
+type Verdict = (&'static str, String);
+
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
+    let mut is_ill = false;
+    let mut tell = |check: &str, (verdict, text): Verdict| {
+        is_ill |= verdict == "problem";
+        print_text(&if arguments.json {
+            format!("{}\n", json!({ "check": check, "verdict": verdict, "text": text }))
+        } else {
+            format!("{verdict:<8} {check}: {text}\n")
+        })
+    };
+    let clocks_s = || {
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        (since_1970.as_secs_f64(), monotonic_ns() as f64 * 1e-9)
+    };
+    let (began_s, since_s) = clocks_s();
+    let cells = missions::load("obstacle-course", &[])?.grid_frame().area();
+    for (part, found) in domain::check_machine(&Domain::of("any".parse()?), cells) {
+        tell(part, needed(found))?;
+    }
+    for (viewer, number) in [("page", 8080), ("foxglove", 8765)] {
+        let is_free = TcpListener::bind(("127.0.0.1", number)).is_ok();
+        tell(&format!("port {number}"), port(viewer, is_free))?;
+    }
+    for entry in fs::read_dir("/dev")?.flatten() {
+        let name = entry.path().display().to_string();
+        if name.starts_with("/dev/ttyUSB") || name.starts_with("/dev/ttyACM") {
+            let may_use = access(&name, Access::READ_OK | Access::WRITE_OK).is_ok();
+            let group = printed(Command::new("stat").args(["-c", "%G", &name]));
+            tell(&name, serial(may_use, &group.unwrap_or_default()))?;
+        }
+    }
+    tell(
+        "real-time priority",
+        (
+            "note",
+            format!(
+                "may you set it: {}; firsthand does not need it",
+                getrlimit(Resource::Rtprio).current != Some(0)
+            ),
+        ),
+    )?;
+    for name in BTreeSet::from_iter(companions::TABLE.iter().map(|it| it.executable)) {
+        let path = executable::find(Path::new(name)).ok();
+        let version_of = path.and_then(|path| printed(Command::new(path).arg("--version")));
+        tell(name, version(version_of.as_deref()))?;
+    }
+    let own = robots::own().into_iter().filter(|robot| robot.supervisor.is_none());
+    tell("other robots", others(own.count(), &robots::other_users()))?;
+    let (now_s, went_s) = clocks_s();
+    let timesync = Path::new("/run/systemd/timesync");
+    let is_synchronised = timesync.exists().then(|| timesync.join("synchronized").exists());
+    let jumped_s = now_s - began_s - (went_s - since_s);
+    tell("clock", clock(now_s, jumped_s, is_synchronised))?;
+    Ok(u8::from(is_ill).into())
+}
+
+/// What `command` prints; none if it does not start.
+fn printed(command: &mut Command) -> Option<String> {
+    let output = command.output().ok()?;
+    Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+fn needed(it: Result<(), DomainError>) -> Verdict {
+    it.map_or_else(
+        |error| ("problem", error.to_string()),
+        |()| ("ok", "enough for a robot".to_owned()),
+    )
+}
+
+/// `now_s` counts from 1970, and `jumped_s` is how much farther the clock went than the monotonic one in the last moments.
+fn clock(now_s: f64, jumped_s: f64, is_synchronised: Option<bool>) -> Verdict {
+    let (verdict, text) = match is_synchronised {
+        // In 2025 and before.
+        _ if now_s < 1.767e9 => (
+            "problem",
+            "it shows a time before firsthand was written; set it: `timedatectl set-ntp true`",
+        ),
+        _ if jumped_s.abs() > 0.1 => {
+            ("note", "something set it just now; logs go by it, missions do not")
+        }
+        Some(true) => ("ok", "NTP synchronises it"),
+        Some(false) => ("note", "NTP has not synchronised it yet, and logs go by it"),
+        None => ("ok", "it goes; whether NTP synchronises it is unknown"),
+    };
+    (verdict, text.to_owned())
+}
+
+fn port(viewer: &str, is_free: bool) -> Verdict {
+    if is_free {
+        return ("ok", format!("free for `firsthand {viewer}`"));
+    }
+    (
+        "note",
+        format!(
+            "a program has it; give `firsthand {viewer}` another with --listen, unless it is the one that runs"
+        ),
+    )
+}
+
+/// The device belongs to `group`.
+fn serial(may_use: bool, group: &str) -> Verdict {
+    if may_use {
+        return ("ok", "you may read and write it".to_owned());
+    }
+    (
+        "problem",
+        format!(
+            "you may not use it; join its group, often dialout, and log in again: `sudo usermod -aG {group} $USER`"
+        ),
+    )
+}
+
+/// `printed` by `--version`; none without the executable.
+fn version(printed: Option<&str>) -> Verdict {
+    match printed {
+        None => ("note", "not installed; `cargo build --release --workspace` builds it".to_owned()),
+        Some(printed) if printed.ends_with(VERSION) => ("ok", printed.to_owned()),
+        Some(other) => {
+            ("problem", format!("it is {other:?}, but firsthand is {VERSION}; install both anew"))
+        }
+    }
+}
+
+/// The number of robots whose supervisor was killed, and other users who have or had robots.
+fn others(killed: usize, users: &[u32]) -> Verdict {
+    if killed == 0 && users.is_empty() {
+        return ("ok", "no killed run, no other user's robot".to_owned());
+    }
+    (
+        "note",
+        format!(
+            "killed runs: {killed}, cleared by the next run of the same robot; other users with robots: {users:?}, listed by `sudo -u '#USER' firsthand status --all`"
+        ),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_reading_of_the_machine_has_its_verdict_and_each_problem_its_remedy() {
+        let own = format!("firsthand-page {VERSION}");
+        for ((verdict, text), expected, says) in [
+            (needed(Ok(())), "ok", "enough"),
+            (needed(Err(DomainError::Descriptors { limit: 9 })), "problem", "ulimit -Hn"),
+            (clock(3600.0, 0.0, Some(true)), "problem", "timedatectl"),
+            (clock(2e9, -3.0, Some(true)), "note", "just now"),
+            (clock(2e9, 0.001, Some(false)), "note", "not synchronised"),
+            (clock(2e9, 0.001, Some(true)), "ok", "NTP synchronises"),
+            (clock(2e9, 0.001, None), "ok", "unknown"),
+            (port("page", true), "ok", "firsthand page"),
+            (port("page", false), "note", "--listen"),
+            (serial(true, "uucp"), "ok", "read and write"),
+            (serial(false, "uucp"), "problem", "-aG uucp"),
+            (version(None), "note", "cargo build"),
+            (version(Some(&own)), "ok", VERSION),
+            (version(Some("firsthand-page 0.0.9")), "problem", "0.0.9"),
+            (version(Some("")), "problem", "install both"),
+            (others(0, &[]), "ok", "no killed run"),
+            (others(2, &[]), "note", "killed runs: 2"),
+            (others(0, &[1000]), "note", "1000"),
+        ] {
+            assert_eq!(verdict, expected, "{text}");
+            assert!(text.contains(says), "{says}: {text}");
+        }
+    }
+}
