@@ -63,7 +63,7 @@ fn a_silent_address_a_foreign_protocol_and_a_robot_that_is_driven_are_refused_wi
     run.stop();
     init("tcp://127.0.0.1:9", "no-answer", &["Connection refused"]);
     init("udp://127.0.0.1", "usage", &["has no port"]);
-    init("serial:///dev/no-such-line", "no-answer", &["is the adapter plugged in"]);
+    init("serial:///dev/no-such-line", "no-answer", &["plug the adapter in"]);
     let garbage = TcpListener::bind("127.0.0.1:0").unwrap();
     let at = format!("tcp://{}", garbage.local_addr().unwrap());
     thread::spawn(move || {

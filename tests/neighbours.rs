@@ -117,7 +117,7 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_what
             guidance.publish(tick, time, GuidanceSample::default()).unwrap();
             link.publish(tick, time, LinkSample::default()).unwrap();
         }
-        let own = format!("pid={}", std::process::id());
+        let own = format!("process {}:", std::process::id());
         for reader in ["dead-reckoning", "mapper", "planner", "controller"] {
             let told = || support::logged(&run.directory(), reader, &["WARN", &own]) == 1;
             support::wait_until("a warning names the forger", told);

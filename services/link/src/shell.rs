@@ -466,9 +466,12 @@ impl Shell {
                         MissionClock::Wall { rate: pace, .. } => pace * rate,
                         MissionClock::Ticks { .. } => rate,
                     };
-                    tracing::warn!(
+                    let why: Refusal = format!(
                         "the robot's clock runs {rate:.2} times as fast as mission time; let its simulator run in real time, or give `run --pace {pace:.2}`"
-                    );
+                    )
+                    .into();
+                    tracing::warn!("{why}");
+                    self.refused = Some((why, monotonic_ns()));
                 }
                 Effect::AskedForStreams => {
                     tracing::info!("the link requests the robot's streams again");

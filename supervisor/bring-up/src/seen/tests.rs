@@ -58,7 +58,7 @@ fn a_robot_that_only_answers_or_says_nothing_of_sensors_has_a_valid_mission() {
 fn hostile_names_are_refused_as_names_and_few_are_kept() {
     let hostile = said(r#"{"ranges":{"a\"\n[robot]\n":1}}"#, 1).mission_at(ADDRESS);
     let refused = Mission::parse(&hostile, Path::new("m.toml")).unwrap_err().to_string();
-    assert!(refused.contains("no name of a sensor"), "{refused}");
+    assert!(refused.contains("invalid as a sensor name"), "{refused}");
     let mut seen = Seen::new(Protocol::Json).unwrap();
     for name in 0..1000 {
         seen.hear(format!("{{\"ranges\":{{\"n{name}\":1e300}}}}\n").as_bytes(), 0.0);

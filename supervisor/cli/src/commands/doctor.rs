@@ -65,16 +65,9 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             tell(&name, serial(may_use, &group.unwrap_or_default()))?;
         }
     }
-    tell(
-        "real-time priority",
-        (
-            "note",
-            format!(
-                "may you set it: {}; firsthand does not need it",
-                getrlimit(Resource::Rtprio).current != Some(0)
-            ),
-        ),
-    )?;
+    let may_raise = getrlimit(Resource::Rtprio).current != Some(0);
+    let text = if may_raise { "you may set it" } else { "you may not set it, which is optional" };
+    tell("real-time priority", ("note", text.to_owned()))?;
     for name in BTreeSet::from_iter(companions::TABLE.iter().map(|it| it.executable)) {
         let path = executable::find(Path::new(name)).ok();
         let version_of = path.and_then(|path| printed(Command::new(path).arg("--version")));
@@ -99,7 +92,7 @@ fn printed(command: &mut Command) -> Option<String> {
 fn needed(it: Result<(), DomainError>) -> Verdict {
     it.map_or_else(
         |error| ("problem", error.to_string()),
-        |()| ("ok", "enough for a robot".to_owned()),
+        |()| ("ok", "sufficient for a robot".to_owned()),
     )
 }
 
@@ -109,14 +102,14 @@ fn clock(now_s: f64, jumped_s: f64, is_synchronised: Option<bool>) -> Verdict {
         // In 2025 and before.
         _ if now_s < 1.767e9 => (
             "problem",
-            "it shows a time before firsthand was written; set it: `timedatectl set-ntp true`",
+            "its time is before the release of firsthand; set it: `timedatectl set-ntp true`",
         ),
         _ if jumped_s.abs() > 0.1 => {
-            ("note", "something set it just now; logs go by it, missions do not")
+            ("note", "another program set it just now; logs use this clock, missions do not")
         }
         Some(true) => ("ok", "NTP synchronises it"),
-        Some(false) => ("note", "NTP has not synchronised it yet, and logs go by it"),
-        None => ("ok", "it goes; whether NTP synchronises it is unknown"),
+        Some(false) => ("note", "NTP has not synchronised it yet; logs use this clock"),
+        None => ("ok", "it runs; whether NTP synchronises it is unknown"),
     };
     (verdict, text.to_owned())
 }
@@ -128,7 +121,7 @@ fn port(viewer: &str, is_free: bool) -> Verdict {
     (
         "note",
         format!(
-            "a program has it; give `firsthand {viewer}` another with --listen, unless it is the one that runs"
+            "another program uses it; if that is not `firsthand {viewer}`, give the viewer another port with --listen"
         ),
     )
 }
@@ -149,7 +142,7 @@ fn serial(may_use: bool, group: &str) -> Verdict {
 /// `printed` by `--version`; none without the executable.
 fn version(printed: Option<&str>) -> Verdict {
     match printed {
-        None => ("note", "not installed; `cargo build --release --workspace` builds it".to_owned()),
+        None => ("note", "not installed; build it with `cargo build --release --workspace`".to_owned()),
         Some(printed) if printed.ends_with(VERSION) => ("ok", printed.to_owned()),
         Some(other) => {
             ("problem", format!("it is {other:?}, but firsthand is {VERSION}; install both anew"))
@@ -178,7 +171,7 @@ mod tests {
     fn each_reading_of_the_machine_has_its_verdict_and_each_problem_its_remedy() {
         let own = format!("firsthand-page {VERSION}");
         for ((verdict, text), expected, says) in [
-            (needed(Ok(())), "ok", "enough"),
+            (needed(Ok(())), "ok", "sufficient"),
             (needed(Err(DomainError::Descriptors { limit: 9 })), "problem", "ulimit -Hn"),
             (clock(3600.0, 0.0, Some(true)), "problem", "timedatectl"),
             (clock(2e9, -3.0, Some(true)), "note", "just now"),

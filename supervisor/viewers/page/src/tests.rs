@@ -289,7 +289,7 @@ fn who_watches_may_stop_the_robot_and_nothing_else() {
         json!({"order": "preview", "x": 1.0, "y": 0.0}),
     ] {
         let (done, why) = browser.order(&order);
-        assert!(!done && why.contains("driving"), "{order}: {why}");
+        assert!(!done && why.contains("to drive"), "{order}: {why}");
     }
     assert_eq!(browser.order(&json!({"order": "stop"})), (true, "confirmed".to_owned()));
     assert_eq!(*noted.lock().unwrap(), [Order::Stop]);

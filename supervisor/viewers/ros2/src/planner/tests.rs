@@ -291,7 +291,7 @@ fn a_frame_is_found_in_another_by_way_of_the_one_above_both_unless_a_transform_i
     assert!((pose.matrix2.x_axis.to_angle() - 0.5 - FRAC_PI_2).abs() < 1e-12);
     assert_eq!(find(&frames, "map", None), Ok(DAffine2::IDENTITY));
     let later = now + Duration::from_secs(1);
-    assert!(find(&frames, "base_link", Some(later)).unwrap_err().contains("old"));
+    assert!(find(&frames, "base_link", Some(later)).unwrap_err().contains("outdated"));
     assert!(find(&frames, "odom", Some(later)).is_ok(), "it stays");
     let down = frames.find("map", "odom", None).unwrap();
     assert!(down.transform_point2(DVec2::new(1.0, 4.0)).distance(DVec2::new(2.0, 0.0)) < 1e-12);
@@ -389,7 +389,7 @@ fn results_are_those_of_the_clients_release_with_the_error_code_of_their_action(
     };
     for (codes, releases, [found, none]) in RESULTS {
         let failure = match codes {
-            200 => (Reason::NoPath, "no path"),
+            200 => (Reason::NoPath, "no way"),
             _ => (Reason::NoGoal, "no goal"),
         };
         let failure = Some((failure.0, failure.1.to_owned()));
