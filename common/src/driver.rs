@@ -18,7 +18,7 @@ pub trait Driver: fmt::Debug {
     /// Decodes `bytes`, together with an earlier incomplete message.
     fn hear(&mut self, bytes: &[u8]) -> Heard;
 
-    /// Discards an incomplete message; a new connection starts without its rest.
+    /// Discards an incomplete message.
     fn reset(&mut self);
 
     fn tally(&self) -> WireTally;
@@ -36,7 +36,7 @@ pub trait Base: Driver {
     /// positive. The robot stops by itself after `limit`.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
-    /// Returns the turn since the last tick by the robot's own gyro, for a tick that begins now.
+    /// Returns the turn since the last tick by the robot's own gyro.
     fn turn_for_tick(&mut self) -> Option<Turn> {
         None
     }
@@ -66,8 +66,8 @@ pub trait Base: Driver {
         false
     }
 
-    /// Returns the bytes that poll the robot now. The link calls this once per period of
-    /// `robot.rate_hz`, the driver's clock; in lockstep after each command and ping.
+    /// Returns the bytes that poll the robot. The link calls this once per period of
+    /// `robot.rate_hz`; in lockstep after each command and ping.
     fn poll(&mut self) -> Vec<u8> {
         Vec::new()
     }
@@ -87,8 +87,7 @@ pub trait Base: Driver {
     }
 }
 
-/// State of a robot that reports its pose: x, y and heading of its odometry, and the matching wheel
-/// angles.
+/// Odometry pose of a robot that reports it, and the matching wheel angles.
 pub type Memory = [f64; 5];
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -140,7 +139,7 @@ impl WireTally {
 /// Reason why a message is unusable, for the user to correct.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Refusal {
-    /// Part of the message, by its own name; empty for the whole.
+    /// Part of the message; empty for the whole.
     pub input: String,
     pub what: String,
     /// Empty if `what` includes it.

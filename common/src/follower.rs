@@ -139,8 +139,8 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
         self.joined.as_mut().map(|joined| &mut joined.topics)
     }
 
-    /// Reopens the readers, which then get whole maps. Returns the earlier ones, with their last
-    /// samples; `None` while the robot is away.
+    /// Reopens the readers, which then get whole maps. Returns the earlier ones; `None` while the
+    /// robot is away.
     pub fn reopen(&mut self) -> Result<Option<Topics>, BusError> {
         let Some(joined) = &mut self.joined else {
             return Ok(None);

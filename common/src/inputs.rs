@@ -73,7 +73,6 @@ impl InputLog {
         Ok(())
     }
 
-    /// Publishes the noted inputs, before any sample that depends on them.
     pub(crate) fn publish(&mut self, at: Progress) -> Result<(), BusError> {
         for piece in self.unpublished.chunks(self.piece) {
             self.writer.publish_quietly(at.tick, at.time, self.header, piece)?;
@@ -99,7 +98,6 @@ fn serialize_encoded<S: Serializer>(
     })
 }
 
-/// Serializes samples as fields of an input: `#[serde(with = "inputs::sample")]`.
 pub mod sample {
     use serde::{Deserializer, Serializer, de::Error as _};
 
@@ -115,7 +113,6 @@ pub mod sample {
     }
 }
 
-/// Serializes a header with a slice as a field of an input: `#[serde(with = "inputs::slice")]`.
 pub mod slice {
     use std::borrow::Cow;
 

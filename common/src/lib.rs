@@ -6,33 +6,13 @@
 //! - [`x80_protocol`], here [`wire`]
 //! - [`json_protocol`], here [`json_wire`]
 //!
-//! Modules, lowest layer first; a module uses only modules above it in this table.
+//! Modules, lowest layer first; a module uses only modules before it in this list.
 //!
-//! | module | holds |
-//! |---|---|
-//! | [`grid`] | cells and metres; parts and versions of a map |
-//! | [`latency`] | a histogram that fits in a sample |
-//! | [`least_squares`] | a fit of one factor to the newest pairs |
-//! | [`ground_truth`] | a simulated robot's record of itself |
-//! | [`signals`] | signals as a waitable descriptor |
-//! | [`checkpoint`], [`journal`] | state that survives a SIGKILL: small, and large with few changes |
-//! | [`process_status`], [`process_usage`] | kernel facts on a process; its processor and memory |
-//! | [`samples`] | payloads of the topics |
-//! | [`topics`] | table of topics |
-//! | [`faults`] | table of injectable faults |
-//! | [`follower`] | a consumer that follows a robot from run to run |
-//! | [`run`] | the supervisor's input to the stages of a run |
-//! | [`start`] | joining a run as the supervisor's child |
-//! | [`external`] | joining a run otherwise |
-//! | [`stage_command`] | command line of a stage's process |
-//! | [`wiring`] | declared topics and persistence of a stage |
-//! | [`stop_socket`] | operator's stop without middleware |
-//! | [`shell`] | process shell of every stage |
-//! | [`target`] | current target, as a stage follows it |
-//! | [`driver`] | the link's interface to a robot's protocol |
-//! | [`inputs`], [`replay`] | published inputs of every step; their replay |
-//! | [`outputs`], [`stage`] | destinations of a stage's outputs; its runner for process and replay |
-//! | [`found_response`] | identified response of the base, as stages take it |
+//! [`grid`], [`latency`], [`least_squares`], [`ground_truth`], [`signals`], [`checkpoint`],
+//! [`journal`], [`process_status`], [`process_usage`], [`samples`], [`topics`], [`faults`],
+//! [`follower`], [`run`], [`start`], [`external`], [`stage_command`], [`wiring`], [`stop_socket`],
+//! [`shell`], [`target`], [`driver`], [`inputs`], [`replay`], [`outputs`], [`stage`],
+//! [`found_response`].
 
 pub mod checkpoint;
 pub mod driver;

@@ -15,7 +15,6 @@ use crate::{
     topics::Rate,
 };
 
-/// Open file of a stage's persisted state, by [`Persists`](crate::wiring::Persists).
 #[derive(Debug, Default)]
 pub(crate) enum Saved {
     #[default]
@@ -126,7 +125,6 @@ impl Outputs {
         }
     }
 
-    /// Publishes a header with a slice on a topic without wakeups.
     pub fn publish_quietly<H: Stamped, E: Payload>(
         &mut self,
         topic: &'static Topic<H, E>,

@@ -17,7 +17,6 @@ pub struct Usage {
 
 #[derive(Debug, Default)]
 pub struct Processes {
-    /// Time of the last look, processor time then, and its result.
     seen: BTreeMap<u32, (Instant, Duration, Usage)>,
 }
 

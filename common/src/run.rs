@@ -43,7 +43,6 @@ pub enum RunError {
     OtherVersion { file: PathBuf, by: String, problem: String },
 }
 
-/// Key of the supervisor's version in a run file.
 const WRITTEN_BY: &str = "firsthand";
 
 impl Run {
@@ -68,7 +67,6 @@ impl Run {
         Self::parse(&text, &file)
     }
 
-    /// Parses the `text` of a run file; errors name `file`.
     pub fn parse(text: &str, file: &Path) -> Result<Self, RunError> {
         toml::from_str(text).map_err(|error| {
             let (file, problem) = (file.to_owned(), error.message().to_owned());

@@ -53,7 +53,6 @@ macro_rules! payloads {
     )*};
 }
 
-/// Declares an enum that is a byte on the bus, with an optional text for each value.
 macro_rules! wire_enum {
     ($(#[$meta:meta])* $name:ident, unknown = $unknown:ident, text = $text:ident { $($(#[$doc:meta])* $variant:ident = $byte:literal $words:literal),* $(,)? }) => {
         wire_enum! { $(#[$meta])* $name, unknown = $unknown { $($(#[$doc])* $variant = $byte),* } }

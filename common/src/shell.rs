@@ -1,7 +1,5 @@
-//! Process shell of every stage: join the run, open the topics, wait, take a turn, publish
+//! Process shell of every stage: join the run, open the declared topics, wait, take a turn, publish
 //! heartbeats, stop on a signal.
-//!
-//! The shell opens the topics that a [`Process`] declares.
 
 mod fault_requests;
 
@@ -41,14 +39,13 @@ pub use crate::start::{Result, StageError};
 
 /// Pause without input that marks the end of a tick on a wall clock; a tick takes a tenth of it.
 const TICK_OVER: Duration = Duration::from_millis(5);
-/// Longest wait of idle work for such a pause. A stage starved of processor time has none, and its
-/// journal and restore time would grow without bound.
+/// Longest wait of idle work for such a pause. A starved stage has none, and its journal would grow
+/// without bound.
 const IDLE_WITHIN: Duration = Duration::from_secs(1);
 
 pub struct Context {
     pub generation: Generation,
     pub run: Run,
-    /// Wakes the process. Besides its wired topics, a process can add descriptors.
     pub waiter: Waiter,
     pub(crate) bus: Bus,
     /// Open file until the process's outputs take it.
@@ -102,7 +99,7 @@ impl Progress {
     }
 }
 
-/// Stage wired to its topics. An error ends the process, and the supervisor restarts the stage.
+/// Stage wired to its topics. An error ends the process.
 pub trait Process: Sized {
     const NAME: &'static str;
     const WAKES: Topics;
@@ -125,8 +122,7 @@ pub trait Process: Sized {
     /// If one of them cannot be opened.
     fn open(context: &mut Context, readers: Self::Readers) -> Result<Self>;
 
-    /// Takes pending inputs, steps and publishes. Called when inputs may be pending, and for each
-    /// heartbeat.
+    /// Takes pending inputs, steps and publishes. Called on input and for each heartbeat.
     fn turn(&mut self) -> Result<Progress>;
 
     /// Opens resources that no process waits for. Called once, after the first ready heartbeat.
@@ -147,9 +143,9 @@ pub trait Process: Sized {
 
     /// Does work that no process waits for: publishes a whole map again, saves a snapshot.
     ///
-    /// This could keep the processor from the stage that was just woken. On a wall clock it
-    /// therefore runs in the pause after a tick, or after a second without one, if
-    /// [`Process::has_idle_work`] says so. In lockstep, without pauses, it runs after each turn.
+    /// To leave the processor to the stage just woken, on a wall clock it runs in the pause after a
+    /// tick, or after a second without one, if [`Process::has_idle_work`] says so. In lockstep,
+    /// without pauses, it runs after each turn.
     fn idle(&mut self) -> Result {
         Ok(())
     }
@@ -171,8 +167,8 @@ pub trait Process: Sized {
     }
 }
 
-/// Implements `main` of an executable with one stage: joins the run on the command line and runs
-/// until asked to stop. The supervisor saves standard error as the stage's log.
+/// Implements `main` of a stage's executable. The supervisor saves standard error as the stage's
+/// log.
 pub fn main<P: Process>() -> ExitCode {
     let stage = P::WIRING.stage;
     let start = match stage_command::start(stage, env::args_os().skip(1)) {
@@ -339,9 +335,9 @@ fn inject(
 struct Heartbeat {
     writer: Writer<HealthSample>,
     sample: HealthSample,
-    /// It is open before there is trouble: readers need time to connect, and the unread samples of a process end with it.
+    /// Opened before there is trouble: readers need time to connect.
     complaints: Writer<ComplaintSample>,
-    /// The longest time from beat to beat, by the table of topics. The stage waits no longer for input either.
+    /// Longest time between beats, and the longest wait for input.
     period: Duration,
     last: Instant,
     tick: u64,

@@ -1,15 +1,13 @@
 //! Stages and their runner, shared by each stage's process and replay.
 //!
 //! A [`Stage`] maps entries to outputs. Its [`Process`] makes entries from topics; a replay reads
-//! them from a recording. Both call [`Stage::take_entry`], so a replay computes what the process
-//! published.
+//! them from a recording.
 //!
 //! An [`Answering`] stage answers each sample of one topic, with samples of further topics if
 //! needed, by a sample of another.
 //!
 //! # Dependencies of a stage
-//! A stage is pure: it has no shared memory, socket, file, thread or clock. Tests, fuzzers and
-//! replays drive it like its process. Its only inputs are:
+//! A stage is pure: it has no shared memory, socket, file, thread or clock. Its only inputs are:
 //! - the mission, given once to [`Stage::new`];
 //! - the state given to [`Stage::begin`], which an earlier process of the stage may have saved;
 //! - its entries, in their order, each with its mission time.
@@ -48,7 +46,6 @@ use crate::{
     wiring::{Persists, Readers, Topics},
 };
 
-/// Computation of a stage, shared by process and replay.
 pub trait Stage: Sized + 'static {
     type Start: Serialize + DeserializeOwned;
     /// Input of one step: a sample, or an enum for several kinds. It may borrow from shared memory
@@ -67,8 +64,8 @@ pub trait Stage: Sized + 'static {
     /// If the state belongs to another mission. The stage then stays as [`Stage::new`] created it.
     fn begin(&mut self, start: Self::Start) -> Result<(), ForeignState>;
 
-    /// Computes, persists and publishes the effects of `entry`. Sets [`Outputs::at`] if the entry
-    /// states its tick. A repeated entry (a tick that is given again) must not count twice.
+    /// Computes, persists and publishes the effects of `entry`. A repeated tick must not count
+    /// twice. Sets [`Outputs::at`] if the entry states its tick.
     ///
     /// # Errors
     /// If an output cannot be published or the state cannot be saved.
@@ -90,7 +87,6 @@ pub trait Stage: Sized + 'static {
 #[error("the saved state belongs to another mission; the stage starts without it")]
 pub struct ForeignState;
 
-/// Running stage, in its process or in a replay.
 pub struct Runner<S> {
     pub stage: S,
     pub out: Outputs,
@@ -184,8 +180,7 @@ pub trait Answering: Sized + 'static {
     ) -> Answer<Self::Out>;
 }
 
-/// Samples of further topics that arrived before an input sample. They wake no process; the entry
-/// contains them, so a replay takes them with the same sample.
+/// Samples of further topics that arrived before an input sample. They wake no process.
 pub trait Further: Default + Serialize + DeserializeOwned + Debug + 'static {
     type Readers: Readers;
 
@@ -267,8 +262,6 @@ impl<A: Answering> Stage for A {
     }
 }
 
-/// Readers of an [`Answering`] stage: of its input, and of further topics, all of which are
-/// feedback.
 pub struct Questions<A: Answering>(Reader<A::In>, <A::Further as Further>::Readers);
 
 impl<A: Answering> Readers for Questions<A> {

@@ -11,7 +11,6 @@ use crate::{
     run::{Run, RunError},
 };
 
-/// Process of a stage in a run; each start of a stage is a generation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Generation {
     pub stage: &'static str,

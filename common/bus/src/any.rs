@@ -20,9 +20,7 @@ pub trait AnyTopic: Sync {
     fn spec(&self) -> &'static Spec;
     /// Returns the payload's name in all languages.
     fn payload(&self) -> String;
-    /// Returns the kinds of the header and of the slice's elements.
     fn layout(&self) -> (Kind, Option<Kind>);
-    /// Decodes a message of the topic into the values of an [`AnySample`].
     fn decoded(&self, message: &[u8]) -> Option<(Value, Option<Vec<Value>>)>;
     /// Returns the sample types for the middleware; the result is private to this crate.
     #[doc(hidden)]

@@ -34,7 +34,6 @@ pub type Names = Box<dyn FnMut() -> Result<Option<Vec<(String, Author)>>>>;
 /// Remembered processes per stage. A recorder still takes samples of ended ones.
 const REMEMBERED: usize = 64;
 
-/// Authorised processes, shared by all readers of a process.
 #[derive(Clone, Default)]
 pub struct Writers(Rc<RefCell<Named>>);
 
@@ -71,7 +70,6 @@ impl fmt::Debug for Writers {
 }
 
 impl Writers {
-    /// Authorises only the process `supervisor`, until stages are named.
     pub fn of(supervisor: u32) -> Self {
         Self(Rc::new(RefCell::new(Named { supervisor, ..Named::default() })))
     }

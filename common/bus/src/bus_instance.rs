@@ -13,7 +13,6 @@ use std::{
 
 use crate::domain::{Domain, SHARED_MEMORY};
 
-/// Affixes of a configuration's file name around the instance's name.
 const CONFIG: [&str; 2] = ["iceoryx2-", ".toml"];
 /// Length of an instance's name. Linux limits socket paths, which contain it twice.
 const LENGTH: usize = 4;

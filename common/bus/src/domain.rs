@@ -20,7 +20,8 @@ use crate::{claim, lock_holders::has_open};
 
 /// Name of a robot and its domain: 1 to 16 of a-z, 0-9 and `-`.
 ///
-/// Linux limits the length of socket paths. `_` ends the name in a shared memory prefix.
+/// Linux limits the length of socket paths. Without `_`, no domain's shared memory prefix starts
+/// with another's.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String")]
 pub struct RobotName(String);
@@ -81,12 +82,11 @@ impl Domain {
         Self { robot, owner, directory }
     }
 
-    /// Returns the directory of the domain's files, which only its owner may enter.
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    /// Returns the lock that the supervisor holds exclusively while it runs.
+    /// Returns the lock that the supervisor holds exclusively.
     pub fn lock_file(&self) -> PathBuf {
         self.directory.join("lock")
     }
@@ -146,22 +146,21 @@ impl Domain {
         file
     }
 
-    /// Returns the lock that consumers share while they join a bus. The supervisor holds it
-    /// exclusively to create or remove one, so no consumer recreates files of a removed bus.
+    /// Returns the lock that consumers share while they join. The supervisor holds it exclusively
+    /// to create or remove a bus, so no consumer recreates its files.
     pub fn joining_lock_file(&self) -> PathBuf {
         self.directory.join("joining.lock")
     }
 
-    /// Keeps the supervisor from creating or removing a bus until the result is dropped; hold it
-    /// only briefly.
+    /// Keeps the supervisor from creating or removing a bus until the result is dropped.
     pub fn joining(&self) -> io::Result<File> {
         let lock = File::open(self.made_again(self.joining_lock_file()))?;
         lock.lock_shared()?;
         Ok(lock)
     }
 
-    /// Returns the lock that all stages share while they run. A new supervisor waits until the last
-    /// one's stages release it.
+    /// Returns the lock that all stages share while they run. A new supervisor waits for its
+    /// release.
     pub fn stages_lock_file(&self) -> PathBuf {
         self.directory.join("stages.lock")
     }
@@ -187,12 +186,10 @@ impl Domain {
         self.directory.join("mirror")
     }
 
-    /// Returns the place of the mirrored robot; `None` if this domain is no mirror.
     pub fn mirrors(&self) -> Option<String> {
         Some(fs::read_link(self.mirror_link()).ok()?.display().to_string())
     }
 
-    /// Returns the link's socket for an operator's stop without middleware.
     pub fn stop_socket(&self) -> PathBuf {
         self.directory.join("stop")
     }
@@ -207,8 +204,7 @@ impl Domain {
         self.directory.join("owed-stop")
     }
 
-    /// Returns the socket at which the simulated robot receives the position of another in its
-    /// world.
+    /// Returns the socket for the position of another simulated robot.
     pub fn place_socket(&self) -> PathBuf {
         self.directory.join("place")
     }
@@ -219,8 +215,7 @@ impl Domain {
         self.directory.join("iceoryx2.toml")
     }
 
-    /// Returns the prefix of this domain's files in [`SHARED_MEMORY`]. Robot names contain no `_`,
-    /// so no domain's prefix starts with another's.
+    /// Returns the prefix of this domain's files in [`SHARED_MEMORY`].
     pub fn shared_memory_prefix(&self) -> String {
         format!("fh{}_{}_", self.owner, self.robot)
     }
@@ -271,10 +266,8 @@ fn places(user: &str) -> Vec<PathBuf> {
     .collect()
 }
 
-/// Returns the place of `robot` among `places`, else the first usable one. This finds a running
-/// robot even if places changed since its start.
-///
-/// If none is usable, the first is returned, and an error names it.
+/// Returns the place of `robot` among `places`, else the first usable one, else the first. This
+/// finds a running robot even if places changed since its start.
 fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
     let is_own = |path: &Path| {
         fs::symlink_metadata(path).is_ok_and(|found| found.is_dir() && found.uid() == user)

@@ -1,30 +1,6 @@
 //! Bus between the processes on one machine: writers, readers and wakeups of topics. Only this
 //! crate depends on the middleware (iceoryx2).
 //!
-//! | file | holds |
-//! |---|---|
-//! | [`clock`] | mission time, pace, the monotonic clock |
-//! | [`domain`] | a robot's directory, locks and shared memory |
-//! | [`claim`] | a supervisor's claim on its robot, without a file |
-//! | [`lock_holders`] | processes that hold a lock on a file |
-//! | [`bus_instance`] | names of one bus instance |
-//! | [`poll`], [`waiter`] | waiting for descriptors; one wait for topics, sockets, signals, processes |
-//! | [`cdr`] | encoding of payloads outside shared memory |
-//! | `layout` | memory layout, values and encoding of payloads, for other languages |
-//! | `payload` | types of samples, the stamp of every sample, samples as messages |
-//! | `spec` | description of a topic |
-//! | `topic` | rows of a table of topics |
-//! | `ports` | typed publishers and subscribers; `ports/raw.rs` compiles the middleware's ports once |
-//! | `make` | creating and joining a bus, and cleaning up after killed processes |
-//! | `leftovers` | files that killed processes leave |
-//! | `ownership` | owner and permission checks of a bus's files |
-//! | `reserve` | memory of segments, reserved at creation |
-//! | `close_on_exec` | descriptors that children must not inherit |
-//! | `authors` | processes whose samples a reader returns |
-//! | `write`, `read` | writers; readers and wakeups |
-//! | `any` | topics, readers and writers without sample types |
-//! | `error` | errors of the bus |
-//!
 //! Experiments led to these rules:
 //! - A recreated bus has its own names, and each node uses its bus's configuration. The
 //!   middleware's process-wide configuration can be set only once: it stays that of the first

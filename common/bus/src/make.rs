@@ -38,8 +38,7 @@ pub struct Bus {
     pub(super) node: BusNode,
     /// Processes whose samples are read; `None` without named authors.
     pub(super) writers: Option<Writers>,
-    /// Whether the process is a stage or supervisor, which may take the places that consumers leave
-    /// free.
+    /// Whether the process may take the places that consumers leave free.
     pub(super) is_stage: bool,
     pub(super) lost: Rc<Cell<u64>>,
     instance: BusInstance,
@@ -177,14 +176,13 @@ impl Bus {
         self.lost.get()
     }
 
-    /// Returns whether another bus replaced this one or the run has ended. A consumer then drops
-    /// everything opened on it and joins again.
+    /// Returns whether another bus replaced this one or the run has ended.
     pub fn is_replaced(&self) -> bool {
         BusInstance::current(&self.instance.domain).map_or(true, |now| now != self.instance)
     }
 
     /// Prevents removal of the bus while a consumer opens a topic, which would recreate and leave
-    /// the bus's directory. Running stages share another lock.
+    /// the bus's directory.
     pub(super) fn hold(&self) -> Result<Option<File>> {
         if self.is_stage {
             return Ok(None);

@@ -36,14 +36,12 @@ pub fn is_writable(descriptor: impl AsFd, timeout: Duration) -> io::Result<bool>
     wait(&mut [PollFd::new(&descriptor, PollFlags::OUT)], Some(timeout))
 }
 
-/// Returns whether the other end of `descriptor` is closed or broken.
 pub fn is_closed(descriptor: impl AsFd) -> io::Result<bool> {
     let nothing_else = PollFlags::empty();
     let mut polled = [PollFd::new(&descriptor, nothing_else)];
     wait(&mut polled, Some(Duration::ZERO))
 }
 
-/// Returns whether an event occurred within `timeout`; `poll` records events in `polled`.
 pub(crate) fn wait(polled: &mut [PollFd<'_>], timeout: Option<Duration>) -> io::Result<bool> {
     let began = Instant::now();
     loop {

@@ -32,7 +32,6 @@ pub enum Logged {
 
 #[derive(Debug)]
 pub struct Spec {
-    /// Name of the topic and of its two services.
     pub name: &'static str,
     /// Writer: a stage, [`SUPERVISOR`], [`OPERATOR`] or [`EVERY_STAGE`].
     pub writer: &'static str,

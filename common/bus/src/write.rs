@@ -110,7 +110,6 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         self.notifier.wake(self.publisher.topic())
     }
 
-    /// Returns whether a reader joined since the last call and needs a keyframe.
     pub fn has_new_reader(&mut self) -> bool {
         let now = self.service.readers();
         let new = !now.is_subset(&self.known);

@@ -101,7 +101,6 @@ pub fn line(message: &impl Serialize) -> Vec<u8> {
     line
 }
 
-/// Parses a line; the error says why it is invalid.
 pub fn parse<'a, M: Deserialize<'a>>(line: &'a [u8]) -> Result<M, String> {
     serde_json::from_slice(line).map_err(|error| error.to_string())
 }
@@ -110,7 +109,6 @@ pub fn parse<'a, M: Deserialize<'a>>(line: &'a [u8]) -> Result<M, String> {
 #[derive(Clone, Debug, Default)]
 pub struct Lines {
     held: Vec<u8>,
-    /// Whether it drops the rest of an overlong line.
     drops: bool,
     dropped: u64,
 }

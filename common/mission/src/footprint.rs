@@ -55,12 +55,10 @@ impl Footprint {
         self.corners().iter().map(move |corner| pose.position + pose.axis().rotate(*corner))
     }
 
-    /// Returns the radius of the disc around the origin that covers the outline at any heading.
     pub fn circumscribed_m(&self) -> f64 {
         self.corners().iter().map(|corner| corner.length()).fold(0.0, f64::max)
     }
 
-    /// Returns the radius of the largest disc around the origin inside it.
     pub fn inscribed_m(&self) -> f64 {
         -self.sides().map(|(from, out)| -out.dot(from)).fold(f64::NEG_INFINITY, f64::max)
     }
@@ -84,7 +82,6 @@ impl Footprint {
         corners.iter().zip(corners.iter().cycle().skip(1)).map(|(from, to)| (*from, *to))
     }
 
-    /// Returns a corner of each side and the side's outward unit normal.
     fn sides(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         self.edges().map(|(from, to)| (from, -(to - from).perp().normalize_or_zero()))
     }
@@ -131,7 +128,6 @@ fn greatest(gaps: impl Iterator<Item = (f64, DVec2)>) -> (f64, DVec2) {
     gaps.fold(none, |best, gap| if gap.0 > best.0 { gap } else { best })
 }
 
-/// Returns the distance and direction of the closest pair of points.
 fn least(pairs: impl Iterator<Item = (DVec2, DVec2)>) -> (f64, DVec2) {
     let none = (f64::INFINITY, DVec2::X);
     pairs.fold(none, |best, (body, thing)| {

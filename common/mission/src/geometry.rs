@@ -165,7 +165,6 @@ impl Shapes {
         self.drums.is_empty() && self.walls.is_empty() && self.boxes.is_empty()
     }
 
-    /// Returns the edges of walls and boxes as (from, to).
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
         let walls = self.walls.iter().flat_map(Wall::edges);
         let boxes = self.boxes.iter().flat_map(Box2::edges);
@@ -218,7 +217,6 @@ impl Piece<'_> {
         }
     }
 
-    /// Returns the corners of its axis-aligned bounding box, metres.
     pub fn bounds(&self) -> (DVec2, DVec2) {
         match self {
             Self::Drum(drum) => {

@@ -144,7 +144,6 @@ impl GridFrame {
         self.centre + offset * self.resolution_m
     }
 
-    /// Returns the corner with the least x and y, metres.
     pub fn corner_of(&self, cell: Cell) -> DVec2 {
         self.centre_of(cell) - DVec2::splat(self.resolution_m / 2.0)
     }
@@ -154,7 +153,6 @@ impl GridFrame {
         cell.row as usize * self.cells as usize + cell.col as usize
     }
 
-    /// Returns whether the cell is on the perimeter (18).
     pub const fn is_rim(&self, cell: Cell) -> bool {
         let last = self.cells - 1;
         cell.col == 0 || cell.row == 0 || cell.col >= last || cell.row >= last
@@ -176,7 +174,6 @@ impl GridFrame {
             .including(cell(self.to_cells(greatest).ceil()))
     }
 
-    /// Returns the cells of `window` from a row-major slice of the whole map.
     pub fn cells_of<'map, T: Copy>(&self, window: Window, map: &'map [T]) -> Cow<'map, [T]> {
         if window == self.whole() {
             return Cow::Borrowed(map);
@@ -189,7 +186,6 @@ impl GridFrame {
         Cow::Owned(cells)
     }
 
-    /// Returns the smallest window of all differences between two whole maps.
     pub fn changed_window<T: PartialEq>(&self, old: &[T], new: &[T]) -> Window {
         let side = self.cells as usize;
         let mut window = Window::default();

@@ -101,7 +101,6 @@ impl Lead {
         self.pending.push_back((now_s + self.dead_time_s, twist));
     }
 
-    /// Advances to `until_s` and returns the resulting pose of a robot at `pose` now.
     fn go_on(&mut self, mut pose: Pose2, until_s: f64) -> Pose2 {
         // Before the first call no time has passed.
         self.at_s = if self.at_s.is_finite() { self.at_s } else { until_s };

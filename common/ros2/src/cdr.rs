@@ -34,7 +34,6 @@ impl From<Malformed> for String {
     }
 }
 
-/// Pass over the fields of a message in wire order.
 pub trait Pass {
     fn release(&self) -> Release;
 

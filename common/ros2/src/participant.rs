@@ -42,7 +42,6 @@ const MOST_BROKEN: usize = 16;
 const MOST_WRITERS: usize = 256;
 
 type Payload = Vec<u8>;
-/// DDS identifier of a participant, a reader or a writer.
 pub type Gid = [u8; 16];
 
 #[derive(Clone, Copy, Debug)]
@@ -193,7 +192,6 @@ impl Participant {
         let _ = read(&self.rung, &mut [0_u8; 8]);
     }
 
-    /// Returns a handle with which other threads signal the descriptor.
     pub fn bell(&self) -> Waker {
         self.bell.clone()
     }
@@ -300,10 +298,8 @@ impl Writers {
 /// `ros2 topic pub --once`. This reader therefore opens only once its writer is known.
 ///
 /// Nodes that join later also see a participant's closed readers. This reader therefore has a
-/// separate participant, and rejoins after its last writer.
-///
-/// It misses a message that is published while another writer keeps it open, or within a
-/// millisecond after the node knows the reader.
+/// separate participant, and rejoins after its last writer. It misses messages within a millisecond
+/// after the node knows it, or while another writer keeps it open.
 #[derive(Debug)]
 pub struct LateReader {
     participant: Participant,
@@ -345,7 +341,7 @@ impl LateReader {
 pub struct Writer(DataWriter<Payload, Raw>);
 
 impl Writer {
-    /// Returns whether the library took it; a busy library takes none.
+    /// Returns whether the library took it.
     pub fn write(&self, payload: Payload) -> bool {
         self.0.write(payload, None).is_ok()
     }
@@ -371,7 +367,6 @@ fn joined(domain: u16, only: Option<Ipv4Addr>) -> io::Result<DomainParticipant> 
     builder.build().map_err(io::Error::other)
 }
 
-/// Returns whether the environment confines ROS to this machine.
 fn is_local() -> bool {
     let is = |name: &str, value: &str| env::var(name).is_ok_and(|set| set == value);
     is("ROS_LOCALHOST_ONLY", "1") || is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

@@ -106,7 +106,6 @@ enum Kind {
 impl Kind {
     const ALL: [Self; 4] = [Self::Info, Self::Health, Self::SampleRate, Self::Scan];
 
-    /// Returns the descriptor: length of the answer, its mode (many in a scan) and its type.
     const fn descriptor(self) -> [u8; 7] {
         let [length, mode, kind] = match self {
             Self::Info => [20, 0x00, 0x04],
@@ -231,7 +230,6 @@ impl Decoder {
         said
     }
 
-    /// Returns the length of the next piece of `rest` and its meaning, if any.
     fn next_piece(&mut self, rest: &[u8]) -> Option<(usize, Option<Said>)> {
         if let State::Answers(kind) = self.state {
             let (length, answer) = kind.answer(rest)?;
@@ -263,7 +261,6 @@ impl Decoder {
     }
 }
 
-/// Returns the first of the measurements in `bytes` if their angles are successive.
 fn first_of_run(bytes: &[u8]) -> Option<Node> {
     let (nodes, _) = bytes.as_chunks();
     let nodes: Option<Vec<_>> = nodes.iter().map(|node| Node::parse(*node)).collect();

@@ -19,7 +19,6 @@ pub enum WheelCounts {
 }
 
 impl WheelCounts {
-    /// Returns the counts of a tick; `endless` ones belong to the same tick.
     pub fn of(wheels: &WheelSample, endless: Option<&CountsSample>) -> Self {
         let endless = endless.map(|counts| [counts.left_counts, counts.right_counts]);
         // Any process may have written them.

@@ -78,10 +78,8 @@ impl Compared {
 /// Relative scale error of a cheap gyro, such as the MPU-6050.
 const SCALE: f64 = 0.01;
 
-/// Converts a robot's reported gyro angle to the turn of each tick.
 #[derive(Clone, Debug, Default)]
 pub struct Angle {
-    /// Newest angles of the gyro and of the wheels, radians.
     newest: Option<(f64, [f64; 2])>,
     turns: Turns<f64>,
     now_ns: f64,

@@ -18,7 +18,6 @@ const FARTHEST: f64 = 1e6;
 const MOST_COUNTS: f64 = 9e15;
 /// Greatest ratio of rolled distance to that at top speed.
 const IMPLAUSIBLE: f64 = 1.5;
-/// Greatest time between a pose and its stamp, seconds.
 const JITTER_S: f64 = 0.1;
 /// Greatest error between successive poses, metres.
 const SLACK_M: f64 = 0.01;
@@ -37,7 +36,6 @@ pub struct Odometry {
 }
 
 impl Odometry {
-    /// Returns the newest pose and the wheel angles there.
     pub fn memory(&self) -> Option<Memory> {
         let Pose2 { position, heading } = self.last?;
         let [left, right] = self.turned;

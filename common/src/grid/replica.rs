@@ -12,7 +12,6 @@ pub enum Applied {
     Missed,
 }
 
-/// Follower's copy of a map that is published in keyframes and windows.
 #[derive(Clone, Debug, Default)]
 pub struct Replica<T> {
     cells: Vec<T>,

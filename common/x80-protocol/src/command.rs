@@ -27,7 +27,6 @@ pub enum Quantity {
 impl Quantity {
     const ALL: [Self; 3] = [Self::Position, Self::Pwm, Self::Velocity];
 
-    /// Returns the DIDs of a command for one channel, and for all.
     const fn dids(self) -> [u8; 2] {
         match self {
             Self::Position => [did::POSITION, did::POSITION_ALL],

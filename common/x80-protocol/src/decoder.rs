@@ -200,7 +200,6 @@ enum Inside {
     Unknown,
 }
 
-/// Searches after the start of `bytes` and before `end`.
 fn inside(bytes: &[u8], end: usize, work: &Cell<usize>) -> Inside {
     let mut found = Inside::Nothing;
     for at in 1..end.min(bytes.len()) {

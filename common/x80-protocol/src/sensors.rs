@@ -17,7 +17,6 @@ impl Encoder {
         if self.positive { speed } else { -speed }
     }
 
-    /// Returns the shorter difference in the cycle, in the channel's positive direction.
     pub fn counts_since(&self, earlier: &Self) -> i32 {
         counts_between(earlier.position, self.position)
     }

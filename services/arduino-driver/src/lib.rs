@@ -15,7 +15,7 @@
 //!
 //! Answers must come in order, and within [`LATEST_S`] or never. The protocol has no checksum, so a
 //! digit changed into another passes: counts then jump, which the link judges, or a range is wrong
-//! once. `OK` acknowledges velocity commands.
+//! once.
 
 mod answers;
 
@@ -100,7 +100,6 @@ impl Arduino {
         }
     }
 
-    /// Takes a line; the error says why it does not fit.
     fn take(&mut self, line: &[u8], heard: &mut Heard) -> Result<(), String> {
         let answer = Answer::parse(line)?;
         // Only the baud rate shows that the board understands it.
@@ -140,10 +139,8 @@ impl Arduino {
         Ok(())
     }
 
-    /// Returns the motion at counts requested at poll `since`.
-    ///
-    /// Speeds are those of the interval before, timed by polls: the link judges counts by the
-    /// speeds beside them, and jumped counts must not vouch for themselves.
+    /// Returns the motion at counts requested at poll `since`. Speeds are those of the interval
+    /// before, so that jumped counts cannot vouch for themselves.
     fn motion(&mut self, counts: [i32; 2], since: u64) -> Motion {
         let (speeds, newest) = self.counts.map_or(([0; 2], [0; 2]), |(then, at, speeds)| {
             let gap_s = since.saturating_sub(at).max(1) as f64 / self.rate_hz;

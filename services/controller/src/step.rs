@@ -18,8 +18,7 @@ use glam::DVec2;
 /// Turn rate below which the wheels stick.
 const LEAST_TURN_RAD_S: f64 = 0.25;
 
-/// Largest distance of a robot that has arrived beside its target, metres, for any status of the
-/// planner.
+/// Largest distance of a robot that has arrived beside its target.
 const MOST_OFF_TARGET_M: f64 = 0.5;
 
 const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
@@ -74,7 +73,6 @@ pub struct Controller {
     modulated: bool,
     law: SpeedLaw,
     response: Response,
-    /// None for a prompt base, and for a car.
     lead: Option<Lead>,
     /// Turn near the antipode: 1 left, -1 right.
     side: f64,
@@ -149,7 +147,6 @@ impl Answering for Controller {
 }
 
 impl Controller {
-    /// Returns the command for the pose that `guidance` was computed for.
     pub fn command(&mut self, guidance: &GuidanceSample) -> CommandSample {
         let pose = guidance.pose();
         let distance = pose.position.distance(guidance.target.position());

@@ -89,7 +89,6 @@ impl ErrorModel {
         }
     }
 
-    /// Returns the effect of arc and turn, metres and radians, from `pose` in `seconds`.
     pub(crate) fn transition(&self, pose: Pose2, moved: Twist, seconds: f64) -> Transition {
         let Twist { v: arc, omega: turn } = moved;
         let axis = Pose2 { heading: pose.heading + turn / 2.0, ..pose }.axis();

@@ -109,7 +109,6 @@ impl Disagreement {
         self.cause.is_some()
     }
 
-    /// Compares the two fixes before `newest` with the last 2 s of ticks, which reach beyond them.
     pub(crate) fn compare(
         &mut self,
         newest: &Fix,

@@ -9,8 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Least difference from 1 of a ratio that is off: in its deviations, and absolute.
 ///
 /// Even wheels reached at most 0.89 of the greater limit in 240 missions of X80s and Kobukis, half
-/// on a busy machine. They reached 0.64 in 320 missions of Jackals, Kobukis and X80s, mostly among
-/// moving things. An encoder that counts 4 % too little for half a mission reaches 1.05.
+/// on a busy machine. An encoder that counts 4 % too little for half a mission reaches 1.05.
 const DEVIATIONS: f64 = 2.5;
 const LEAST_OFF: f64 = 0.018;
 /// Reported position doubt, metres.
@@ -67,7 +66,6 @@ impl Doubt {
         ))
     }
 
-    /// Returns variances for counts wrong all the way, m^2 and rad^2.
     fn of_wheels(&self, track_m: f64) -> [f64; 2] {
         let turn = (self.uneven * self.rolled_m / track_m).min(std::f64::consts::PI);
         let aside = (turn * self.rolled_m / 2.0).min(WIDEST_M);

@@ -1,8 +1,7 @@
 //! Error-state filter of pose, wheel errors and gyro bias, from wheels, fixes and gyro.
 //!
 //! [`Filter`] is the estimate at one tick. [`History`] holds the estimate of 2 s ago, and ticks and
-//! fixes since. A late fix applies at its own time: the estimate is recomputed, as if the fix had
-//! come at once. A tick costs at most those 2 s.
+//! fixes since. A late fix applies at its own time: the estimate is recomputed from there.
 
 use std::{collections::VecDeque, fmt, time::Duration};
 
@@ -183,8 +182,7 @@ impl Anchor {
         Fix { covariance: parts(&(shrunk * stated * shrunk)), ..*fix }
     }
 
-    /// Returns the least variances after `fix`, which corrected the estimate at `pose` by `error`,
-    /// leaving `variances`.
+    /// Returns the least variances after `fix`, which corrected the estimate at `pose` by `error`.
     fn floor(&mut self, fix: &Fix, pose: Pose2, error: &Error, variances: [f64; 3]) -> [f64; 3] {
         let shared = fix.shares();
         if shared == [0.0; 3] {
@@ -246,7 +244,6 @@ impl Filter {
         }
     }
 
-    /// Returns the pose at `fix`, during or soon after `tick` of this estimate.
     fn at(&self, motions: &Motions, tick: &Tick, fix: &Fix) -> Pose2 {
         let ago = tick.time.0 as f64 - fix.time.0 as f64;
         let share = if tick.seconds > 0.0 { ago * 1e-9 / tick.seconds } else { 0.0 };
@@ -255,7 +252,6 @@ impl Filter {
         self.pose.along_arc(-moved.v * share, -moved.omega * share)
     }
 
-    /// Applies a fix at `there`. Returns whether it agrees.
     fn take(&mut self, fix: &Fix, there: Pose2) -> bool {
         let mut laid = *fix;
         if self.anchor.variances.is_some() && fix.shares() != [0.0; 3] {
@@ -281,7 +277,6 @@ impl Filter {
         taken.is_some()
     }
 
-    /// Returns correction and covariance by a fix at `there`. None if it contradicts the estimate.
     fn updated(&self, fix: &Fix, there: Pose2) -> Option<(Error, SMatrix<f64, PARTS, PARTS>)> {
         let lever = self.pose.position - there.position;
         let mut seen = SMatrix::<f64, 3, PARTS>::identity();
@@ -413,7 +408,6 @@ impl History {
         }
     }
 
-    /// Recomputes the newest estimate. `at` sees each tick, by index, and its estimate.
     fn again(
         &self,
         motions: &Motions,

@@ -1,21 +1,9 @@
 //! Dead reckoning: encoder counts to pose, equations (20) and (21).
 //!
-//! | module | holds |
-//! |---|---|
-//! | [`step`] | pure step from a `wheels` sample and its sources to a `pose` |
-//! | `sources` | fixes and turns that come with a `wheels` sample |
-//! | `covariance` | growth of the pose's covariance |
-//! | `filter` | estimate, ticks and fixes of the last 2 s |
-//! | `tick` | motion of one tick |
-//! | `gyro` | turns of ticks from a gyro's increments |
-//! | `disagreement` | steady disagreement of laser and wheels, and its cause |
-//! | `doubt` | doubts that no fix settles, which widen the published covariance |
-//! | `relocation` | fixes that contradict the pose but agree among themselves |
-//!
 //! The state is saved after the pose is published, so that the tick does not wait for the file. A
 //! process killed in between has published a pose that its saved state lacks. That is safe: counts
 //! are cumulative and the link's last sample stays on the bus, so the successor computes the same
-//! pose. If the next tick has come, both ticks become one arc, a millimetre or two off.
+//! pose.
 //!
 //! At the first tick, and after restarted counts, the older state does not fit the counts, so the
 //! new one is saved first. If all processes are killed then, a resumed run counts the tick again.

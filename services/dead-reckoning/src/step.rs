@@ -31,8 +31,7 @@ use crate::{
 
 /// Bound on the encoded state, bytes: under 14,000 with 64 ticks and 64 fixes.
 pub const STATE_BYTES: usize = 16_384;
-/// Largest plausible multiple of a wheel's top speed. Sliding and pushed robots stay below;
-/// restarted counters are nearly always above.
+/// Largest plausible multiple of a wheel's top speed; restarted counters mostly exceed it.
 const PLAUSIBLE: f64 = 2.0;
 /// Time added to the tick for that limit, seconds: timestamps jitter by about a tick.
 const SLACK_S: f64 = 0.3;
@@ -81,7 +80,6 @@ impl State {
     }
 }
 
-/// Wheel sample behind the pose, and speeds by it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Last {
     tick: u64,
@@ -117,7 +115,6 @@ pub struct Reckoned {
 pub struct DeadReckoning {
     drive: Drive,
     body: Body,
-    /// Travel of left and right wheel over the nominal.
     wheel_scales: [f64; 2],
     distance_scale: f64,
     motions: Motions,
@@ -299,7 +296,6 @@ impl DeadReckoning {
         state.placed = place.number;
     }
 
-    /// Returns the first place of a run that continues from `state`.
     pub(crate) fn place_of(mission: &Mission, state: State) -> PlaceSample {
         let reckoning = Self { state, ..Answering::new(mission) };
         let PoseSample { x_m, y_m, heading_rad, covariance: [xx, _, _, yy, _, tt], .. } =

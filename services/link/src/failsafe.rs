@@ -200,7 +200,6 @@ pub fn rule(cause: Cause) -> Option<&'static Rule> {
 #[derive(Clone, Debug)]
 pub(crate) struct Failsafe {
     pub(crate) monitors: Monitors,
-    /// Rows of [`TABLE`] that applied at the last decision.
     applied: [bool; TABLE.len()],
 }
 
@@ -228,7 +227,6 @@ impl Failsafe {
         Decision::of(applying)
     }
 
-    /// Returns the decision at a later time without further input.
     pub(crate) fn foresee(&self, lockstep: bool, then: Moment) -> Decision {
         Decision::of(self.applying(lockstep, then))
     }

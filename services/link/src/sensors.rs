@@ -76,7 +76,6 @@ impl Sensors {
         readings
     }
 
-    /// Takes one reading per row, and the scans, for a tick that begins with `motion`.
     pub(crate) fn for_tick(
         &mut self,
         motion: &Motion,

@@ -44,7 +44,7 @@ use crate::{
 
 /// The step reports one refused message a second.
 const REFUSAL_LASTS_NS: u64 = 2_000_000_000;
-/// Interval of the checks without input, unless nothing is due sooner than the link is restated: a fifth of the shortest deadline.
+/// Interval of the checks without input: a fifth of the shortest deadline.
 const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 
 /// Longest delay of the heartbeat by a flood, besides one datagram. The rest waits for the next
@@ -87,7 +87,7 @@ pub struct Shell {
     latency: Histogram,
     latency_ns: u64,
     stated_ns: u64,
-    /// Why the newest refused message was refused, and when.
+    /// Reason of the newest refusal, and its time, nanoseconds.
     refused: Option<(Refusal, u64)>,
 }
 
@@ -238,7 +238,6 @@ impl Process for Shell {
         self.runner.open_late(context)
     }
 
-    /// Why the robot is not heard or understood, or why the failsafe holds it.
     fn trouble(&mut self) -> Option<Refusal> {
         let (link, now_ns) = (&self.runner.stage.link, monotonic_ns());
         let base = (!link.connected()).then(|| self.transport.trouble()).flatten();
@@ -335,7 +334,6 @@ impl Shell {
         Ok(())
     }
 
-    /// Tells operators about rest, and keeps the mark of a stop for the next link.
     fn answer_operators(&mut self) {
         let link = &self.runner.stage.link;
         if link.decision().stops()
@@ -379,7 +377,6 @@ impl Shell {
         }
     }
 
-    /// Reopens closed wires, and reports changes to the link.
     fn maintain(&mut self) -> Result<(), StageError> {
         let now_ns = monotonic_ns();
         if let Some(open) = self.transport.maintain(now_ns)? {

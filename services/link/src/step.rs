@@ -48,7 +48,7 @@ const PING_EVERY: Duration = Duration::from_millis(200);
 /// Ten times the longest measured tick.
 const REPEAT_AFTER: Duration = Duration::from_millis(100);
 /// Longest wait in lockstep for the supervisor's limit, beyond a planner's restart for a stalled
-/// robot. If the supervisor is silent, the failsafe stops earlier.
+/// robot.
 pub const LIMIT_WAITED: Duration = Duration::from_secs(5);
 /// Least time limit of a command: the wire carries milliseconds, and 0 mostly means none.
 const LEAST_LEFT: Duration = Duration::from_millis(1);
@@ -254,7 +254,6 @@ impl Link {
         self.monitors().presence.losses()
     }
 
-    /// Returns whether a stop is owed, given the state `before`.
     pub fn owes_stop(&self, before: bool) -> bool {
         let moves = self.monitors().stop.is_told_to_move();
         !self.in_ticks() && is_owed(before, moves, self.is_at_rest())
@@ -299,7 +298,6 @@ impl Link {
         self.state.pace == Pace::Max
     }
 
-    /// Returns whether the target is reached. In lockstep ticks then wait for another.
     fn arrived(&self) -> bool {
         self.newest_command.is_some_and(|command| {
             CommandState::from_byte(command.state) == CommandState::Arrived

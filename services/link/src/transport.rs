@@ -135,7 +135,6 @@ impl Transport {
         self.wire.is_open()
     }
 
-    /// Returns the next bytes; none when all were taken.
     pub fn receive(&mut self, now_ns: u64) -> Result<Option<&[u8]>, TransportError> {
         match self.wire.receive(&mut self.buffer, now_ns) {
             Ok(length) => Ok(length.and_then(|length| self.buffer.get(..length))),

@@ -33,7 +33,6 @@ struct Dated {
 impl ClearBeams {
     pub(crate) const SAVED_BYTES: usize = (CLEAR_BEAMS + CLEAR_RAYS) * size_of::<Dated>();
 
-    /// Adds a reading at `rolled_m` and drops old ones.
     pub(crate) fn take(&mut self, sonars: usize, reading: &Reading, rolled_m: f64) {
         let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - AHEAD_OF_ECHO_M);
         let beam = clear_beam(reading.origin, reading.axis, clear_m.min(reading.sonar.clear_m));

@@ -5,7 +5,6 @@
 //!
 //! A rotating laser measures beam by beam while the robot moves, so each beam's end follows from
 //! the pose at its time. Interpolating between these ends gives a scan from the pose in mid-sweep.
-//! Matcher and evidence grid can then look beams up by bearing.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -109,7 +108,6 @@ impl Poses {
     }
 }
 
-/// Scan with simultaneous beams, and the robot's pose then.
 pub(crate) struct Placed {
     pub(crate) row: usize,
     pub(crate) robot: PoseSample,

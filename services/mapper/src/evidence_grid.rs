@@ -7,15 +7,9 @@
 //! before it lose weight. If a well-known occupied cell explains the echo, the others keep their
 //! weight. Otherwise every wall would grow at its ends.
 //!
-//! An infrared ray is as thin as a cell and ends at a surface of any angle. It frees passed cells
-//! and marks the last one occupied. Silence is no evidence against that cell.
-//!
 //! A laser may look over or through an object, so each laser has its own grid; the other rangers
 //! beside lasers share one. A cell is hazard if any grid says so. An echo whose range the laser
-//! confirms goes where the laser sees the object. So echoes keep glass that the laser sees only at
-//! right angles.
-//!
-//! No ranger is evidence against a touched object, because all may look over it.
+//! confirms goes where the laser sees the object.
 
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -44,12 +38,12 @@ const LOOKS_FOR_A_STEP: u8 = (SCANNED - POINTED_ENOUGH) / sonar::MOST as u8 + 1;
 const OCCUPIED: u8 = 1;
 /// Flag: seen by an infrared ranger. The sonar may miss it.
 const SEEN: u8 = 2;
-/// Flag: touched by the body. Rangers may miss it.
+/// Flag: touched by the body. Rangers may miss it, so none is evidence against it.
 const TOUCHED: u8 = 4;
 /// Flag: felt by a bumper or cliff sensor. It stays even under a later pose, because wheels slip.
 const FELT: u8 = 8;
 
-/// Angle beyond which a crossed cell lies beside the sensor, outside the beam.
+/// Angle beyond which a crossed cell lies beside the sensor.
 const WIDEST_SLACK_RAD: f64 = 1.0;
 
 /// Range tolerance between an echo and the laser's object: the noise of both, and a cell.
@@ -93,15 +87,13 @@ pub(crate) struct EvidenceGrid {
     /// Flags [`OCCUPIED`] to [`FELT`].
     #[serde(with = "serde_bytes")]
     occupied: Vec<u8>,
-    /// Body and lattice, given by the mission and so unsaved.
     #[serde(skip)]
     pub(crate) ground: Ground,
     #[serde(skip)]
     pub(crate) news: News,
 }
 
-/// Returns the lattice over the perimeter and `beyond_m` around: a body centred inside can touch an
-/// obstacle outside.
+/// Returns the lattice over the perimeter and `beyond_m` around, where a body inside can touch.
 pub(crate) fn lattice(mission: &Mission, beyond_m: f64) -> GridFrame {
     let width = mission.perimeter.width_m;
     let cells = (width / sonar::RESOLUTION_M).ceil().min(f64::from(MAX_CELLS));
@@ -133,7 +125,6 @@ impl EvidenceGrid {
             .all(|layer| layer.len() == lattice.area())
     }
 
-    /// Returns whether the cell is scanned or the sonar is unable to learn more.
     pub(crate) fn is_scanned(&self, index: usize) -> bool {
         self.looks[index] >= POINTED_ENOUGH
     }
@@ -299,7 +290,7 @@ impl EvidenceGrid {
         }
     }
 
-    /// Applies an infrared reading, as [`EvidenceGrid::take`] does for a sonar.
+    /// Applies an infrared reading: frees passed cells and marks the last one occupied.
     pub(crate) fn take_ray(&mut self, ray: &Ray, robot: DVec2) {
         let Ground { lattice, radius } = self.ground;
         let half_cell = lattice.resolution_m / 2.0;
@@ -355,7 +346,6 @@ impl EvidenceGrid {
         }
     }
 
-    /// Marks every rim cell in the arc of `touch` occupied.
     pub(crate) fn touch(&mut self, touch: &Touch) {
         let Ground { lattice, radius } = self.ground;
         let rim = radius - sonar::RIM_M..=radius + lattice.resolution_m;

@@ -16,7 +16,6 @@ use crate::{
     sonar_model::NEAR_M,
 };
 
-/// Evidence, and the cells that it forbids to the body's centre.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceMap {
     /// Grid of the first laser; without lasers, of all sensors.
@@ -198,7 +197,6 @@ impl Evidential {
         self.follow(map);
     }
 
-    /// Returns the state of a cell neither known nor perimeter.
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
         let Geometry { lattice, grid, .. } = self.geometry;
         let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;

@@ -2,8 +2,7 @@
 //!
 //! A ranger triangulates a small spot 10 to 80 cm ahead, at any angle of the surface. Its voltage
 //! grows with 1 / range, so range noise grows with the square. Below 10 cm the voltage falls again:
-//! the obstacle is near at an unknown distance. A ranger misses glass and surfaces without infrared
-//! reflection; the sonar hears those.
+//! the obstacle is near at an unknown distance.
 
 use common::{
     samples::{RangeReading, RangeStatus},

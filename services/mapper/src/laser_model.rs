@@ -102,7 +102,6 @@ impl EvidenceGrid {
 }
 
 impl EvidenceGrid {
-    /// Returns whether this cell or a neighbour is occupied.
     fn is_thing_at(&self, cell: Cell) -> bool {
         let lattice = self.ground.lattice;
         let at = lattice.centre_of(cell);
@@ -142,7 +141,6 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// Marks cells passed at least `near` cells before beams' ends.
     fn pass(&mut self, near: f64, mark: u8) {
         // Beyond this range, a cell may lie between two beams.
         let close = self.fan.step_rad.recip();
@@ -182,7 +180,6 @@ impl<'a> Scan<'a> {
         }
     }
 
-    /// Decides by the share of beams that end in the cell.
     fn is_thing(&self, cell: Cell, mark: u8) -> bool {
         if mark & ENDED == 0 {
             return false;
@@ -219,7 +216,6 @@ impl<'a> Scan<'a> {
         is_enough(passed) || neighbours >= NEIGHBOURS && is_enough(passed_by_noise)
     }
 
-    /// Returns the maximum shortening of a range by noise.
     fn noise(&self, range: f64) -> f64 {
         let (least_m, share) = self.fan.noise;
         NOISE_DEVIATIONS * (least_m / self.lattice.resolution_m + share * range)
@@ -232,7 +228,6 @@ impl<'a> Scan<'a> {
     }
 }
 
-/// Passes `span` the rows and columns of cells centred in this polygon.
 fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     let last = f64::from(side) - 1.0;
     let mut crossings = vec![Vec::new(); side as usize];
@@ -259,7 +254,6 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
     }
 }
 
-/// Cells along a beam, in the order of crossed grid lines.
 struct Along {
     cell: IVec2,
     step: IVec2,

@@ -48,7 +48,7 @@ const GAP_M: f64 = 0.3;
 const GAP: f64 = 3.0;
 /// Maximum width of a tracked object.
 const WIDEST_M: f64 = 1.6;
-/// Maximum expected speed, m/s, and distance between two middles of a static object, metres.
+/// Maximum expected speed, and distance between two middles of a static object.
 const FASTEST_M_S: f64 = 2.5;
 const NEAR_M: f64 = 0.15;
 /// Time until a track missing at its predicted place, or a hidden mover, is dropped. Meanwhile its
@@ -79,7 +79,6 @@ struct Thing {
     origin: DVec2,
     /// First and last end, unless something in front hides the rest.
     own: [Option<DVec2>; 2],
-    /// Mean of the ends, and distance of the nearest.
     mean: DVec2,
     nearest_m: f64,
     half_width_m: f64,
@@ -103,7 +102,7 @@ struct Track {
     /// Position at `seen_s`.
     middle: DVec2,
     velocity: DVec2,
-    /// Variances along any axis: position, covariance with velocity, velocity.
+    /// Position variance, covariance with velocity, velocity variance.
     variance: [f64; 3],
 }
 
@@ -266,7 +265,6 @@ impl Track {
         ]
     }
 
-    /// Returns whether a mover's predicted place is outside `fan` or occluded.
     fn is_hidden(&self, fan: &Fan<'_>, at_s: f64) -> bool {
         let way = self.at(at_s) - fan.origin;
         let bearing = wrap_angle(way.to_angle() - fan.first_rad);
@@ -277,13 +275,11 @@ impl Track {
         self.is_mover && !is_seen
     }
 
-    /// Returns the maximum distance from the predicted place, greater if the mover `turns`.
     fn most_off_m(&self, at_s: f64, turns: bool) -> f64 {
         let way_m = if turns { 2.0 * FASTEST_M_S * (at_s - self.seen_s).min(CAME_S) } else { 0.0 };
         NEAR_M + (SURE * self.variance_at(at_s)[0].sqrt()).max(way_m).min(WIDEST_M)
     }
 
-    /// Updates the track with an object seen by a laser moving at `laser`.
     fn see(&mut self, thing: &Thing, laser: DVec2, turns: bool) {
         // An object that comes into view seems to move until it is whole.
         if !self.was_whole && thing.is_whole() {
@@ -349,7 +345,6 @@ impl Thing {
     }
 }
 
-/// Returns a scan's objects up to the maximum width, compared with an earlier scan.
 fn things(fan: &Fan<'_>, before: Option<&Fan<'_>>, at_s: f64) -> Vec<Thing> {
     let ends: Vec<_> = fan.ends().collect();
     let (count, is_circle) = (ends.len(), fan.is_circle());
@@ -424,7 +419,6 @@ impl Difference {
         self.by_beams.iter().any(|by| by.abs() <= self.most_m)
     }
 
-    /// Returns whether all beams ended behind the point, or all before it.
     fn is_other(&self) -> bool {
         let all = |side: f64| self.by_beams.iter().all(|by| side * by > self.most_m);
         all(1.0) || all(-1.0)

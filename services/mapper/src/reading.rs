@@ -179,7 +179,6 @@ pub(crate) struct Ray {
 pub(crate) struct Fan<'a> {
     /// Laser position, mission frame.
     pub(crate) origin: DVec2,
-    /// Bearing of the first beam, and angle between beams.
     pub(crate) first_rad: f64,
     pub(crate) step_rad: f64,
     pub(crate) reach_m: f64,

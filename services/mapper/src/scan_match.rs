@@ -1,8 +1,8 @@
-//! Scan matcher: estimates the robot's pose from its laser, or from the widest one of several.
+//! Scan matcher: estimates the robot's pose from its widest laser.
 //!
 //! It matches scan points with lines through a reference scan (point-to-line, Censi 2008). The
 //! search starts at the dead-reckoned pose, which also constrains directions without lines, such as
-//! along a corridor. A new reference replaces the old one once the robot sees other surfaces.
+//! along a corridor.
 //!
 //! The scan after a new reference moves it once, so that both references agree on this scan's pose.
 //! Otherwise reference errors add up with a bias, because badly matched scans become references.
@@ -36,8 +36,7 @@ const PRIOR: [f64; 2] = [0.10, 0.05];
 const GATE_M: f64 = 0.08;
 const GATE: f64 = 2.5;
 /// Gate of the first rounds: dead-reckoning deviations of a point [`AWAY_M`] away, at most
-/// [`MOST_GATE_M`]. Farther lines belong to other objects: a turning Jackal matched the wrong box
-/// and was 0.14 m off.
+/// [`MOST_GATE_M`]. Beyond, a turning Jackal matched the wrong box and was 0.14 m off.
 const FIRST_GATE: f64 = 4.0;
 const AWAY_M: f64 = 3.0;
 const MOST_GATE_M: f64 = 0.30;
@@ -49,7 +48,6 @@ const POINTS: usize = 240;
 /// Half-length of a line: minimum in metres, and deviations of a noisy point.
 const LINE_M: f64 = 0.06;
 const LINE: f64 = 2.5;
-/// Distance from neighbours that makes a point an edge.
 const EDGE_M: f64 = 0.20;
 /// Maximum RMS distance of points from their line, relative to its half-length.
 const STRAIGHT: f64 = 0.5;
@@ -61,8 +59,7 @@ const LEAST_POINTS: usize = 10;
 /// [`LEAST_SHARE`] does, too.
 const REPLACED_AFTER: (f64, f64) = (2.0, std::f64::consts::FRAC_PI_3);
 const LEAST_SHARE: f64 = 0.6;
-/// Deviation that a new reference adds for all later poses: metres and radians. A heading error
-/// turns all later poses.
+/// Deviation that a new reference adds for all later poses: metres and radians.
 const OF_REFERENCE: [f64; 2] = [0.0005, 0.0002];
 /// Ratio of a match's variance to its scatter's, because the reference has scan noise, too.
 const OF_SCATTER: f64 = 1.75;
@@ -97,7 +94,6 @@ pub(crate) struct Reference {
 /// Scatter of matches around dead-reckoned poses, which drift slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Scatter {
-    /// Offset of the newest match from its dead-reckoned position.
     off: DVec2,
     /// Sums of match variances, m^2: from scatter, and from points.
     seen: f64,
@@ -288,7 +284,6 @@ impl Reference {
         }
     }
 
-    /// Returns the covariance at `there`, by an exact transform from the reference.
     fn carried_to(&self, there: DVec2) -> DMat3 {
         let arm = (there - self.pose.position).perp();
         let carried = DMat3::from_cols(DVec3::X, DVec3::Y, DVec3::new(arm.x, arm.y, 1.0));
@@ -409,7 +404,6 @@ fn covariance_of(pose: &PoseSample) -> DMat3 {
     DMat3::from_cols(DVec3::new(xx, xy, xt), DVec3::new(xy, yy, yt), DVec3::new(xt, yt, tt))
 }
 
-/// Returns the covariance for deviations in metres and radians.
 fn variances([place, heading]: [f64; 2]) -> DMat3 {
     DMat3::from_diagonal(DVec3::new(place, place, heading).map(|deviation| deviation * deviation))
 }

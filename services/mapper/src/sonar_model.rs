@@ -1,8 +1,5 @@
 //! Sonar model: an echo, or none, as evidence for the cells around.
 //!
-//! The X80's front sonar is an ultrasonic ranger with a cone of about 15 degrees to either side. It
-//! gives one byte of centimetres per frame, "nothing" included.
-//!
 //! Angles are radians off the axis, to one side. Weights are quarters of an echo in the middle of
 //! its arc: positive for an obstacle, negative for free ground.
 
@@ -12,7 +9,7 @@ use common::mission::{Sensor, SensorModel};
 
 const DEGREE: f64 = TAU / 360.0;
 
-/// Cell size: the sonar's resolution, a third of the cone's width where hits start to matter.
+/// Cell size: a third of the cone's width where hits start to matter.
 pub(crate) const RESOLUTION_M: f64 = 0.05;
 
 /// Range error of an echo: noise, the byte's centimetre, half a cell.
@@ -60,7 +57,6 @@ pub(crate) const RIM_M: f64 = 0.02;
 /// Radius around the robot in which obstacles survive the first reset: it may touch them.
 pub(crate) const NEAR_M: f64 = 0.6;
 
-/// Parameters by the sensor's field of view and reach.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SonarModel {
     /// Half the angle of an echo's arc: the cone's 15 degrees, rounded up.
@@ -73,7 +69,6 @@ pub(crate) struct SonarModel {
     /// Half the angle that silence scans: below the cone's, because a surface at its edge deflects
     /// the sound.
     pub(crate) scanned: f64,
-    /// Half the angle in which the sonar counts as pointed at an invisible cell.
     pub(crate) pointed: f64,
     /// Range of scanned ground. Echoes are too wide there for mapping, but silence means free
     /// ground.
@@ -84,7 +79,6 @@ pub(crate) struct SonarModel {
 }
 
 impl SonarModel {
-    /// Scales the X80's model by field of view and reach.
     pub(crate) fn of(sensor: &Sensor) -> Self {
         let wide = sensor.field_of_view_deg / SensorModel::Dur5200.field_of_view_deg();
         let far = (sensor.reach_m / SensorModel::Dur5200.reach_m()).min(1.0);

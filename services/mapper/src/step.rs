@@ -27,7 +27,6 @@ use crate::{
     sonar_model::MOST,
 };
 
-/// Belief input. The belief follows from inputs alone, so the journal holds them.
 #[allow(clippy::large_enum_variant, reason = "one is held at a time")]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum Input {
@@ -88,7 +87,6 @@ pub struct Belief {
     /// Ticks whose readings added a hazard.
     safety_events: u64,
     epoch: u64,
-    /// Last mapped tick, and the robot's pose there: metres, radians.
     tick: Option<u64>,
     robot: DVec2,
     heading: f64,
@@ -116,7 +114,6 @@ impl Belief {
     }
 }
 
-/// Sets cells of `window` to the result of `state`, which gets the old one.
 fn paint(
     cells: &mut [u8],
     frame: &GridFrame,
@@ -135,7 +132,6 @@ fn paint(
     changed
 }
 
-/// Returns the distance from surfaces within which cells are hazard, metres.
 pub fn hazard_reach_m(mission: &Mission) -> f64 {
     match mission.method {
         // A known surface blocks like a hit on it: its cell and the margin around.
@@ -338,7 +334,6 @@ impl Mapper {
         self.belief.version += 1;
     }
 
-    /// Frees the new target's cell; the old one may become hazard again.
     fn move_target(&mut self, target: DVec2) -> Window {
         self.belief.target = target;
         let cell = self.frame.cell_at(target).filter(|cell| !self.frame.is_rim(*cell));
@@ -480,7 +475,6 @@ impl Mapper {
         })
     }
 
-    /// Marks the hit's cell and the margin around it (19), clipped to the map.
     fn mark(&mut self, hit: DVec2, robot: DVec2) -> Window {
         let margin = f64::from(self.margin);
         let middle = self.frame.to_cells(hit).round();

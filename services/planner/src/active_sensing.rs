@@ -6,7 +6,7 @@
 //! ground.
 //!
 //! Advice follows from belief and pose, so a restarted planner continues a scan. Only the side of a
-//! scan is stored: wheels lag, so a side chosen per tick could alternate.
+//! scan is stored; chosen per tick, it could alternate.
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
@@ -22,7 +22,6 @@ use crate::{
     view::{STEP_M, View},
 };
 
-/// Length of ground ahead that must be scanned, without undetected surfaces, metres.
 const SCANNED_AHEAD_M: f64 = 0.25;
 /// Length of the followed field line, and least length of the arc, metres.
 const AHEAD_M: f64 = 0.6;
@@ -40,14 +39,12 @@ pub(crate) enum Advice {
 #[derive(Clone, Debug)]
 pub(crate) struct ActiveSensing {
     radius: f64,
-    /// Radius of ground to scan around each point of the way, metres.
     ground_m: f64,
     pub(crate) outline: Option<Outline>,
     speed: f64,
     turn: f64,
     response: Response,
     brakes_within_s: f64,
-    /// Bearing of the front sonar in the body frame, a unit vector.
     bearing: DVec2,
     /// Length of the arc, metres: at least the stopping distance at top speed.
     ahead_m: f64,
@@ -56,8 +53,8 @@ pub(crate) struct ActiveSensing {
     has_laser: bool,
     /// Whether the robot heads for a point of the way ahead.
     ///
-    /// Bodies other than discs fit only on the way itself. A front sonar alone sees nothing beside
-    /// it; with aiming, such a robot touched twice as often.
+    /// Bodies other than discs fit only on the way itself; with a front sonar alone, aiming doubled
+    /// the touches.
     aims: bool,
     /// Side of the current scan: left is 0, right is 1.
     scan_side: Option<usize>,
@@ -129,8 +126,6 @@ impl ActiveSensing {
         self.response.speed_to_stop_within(clear_m, self.brakes_within_s)
     }
 
-    /// Returns whether a body along `axis` may go to `at`: scanned, without hazards or undetected
-    /// surfaces.
     fn is_open(
         &self,
         view: &View<'_>,
@@ -145,8 +140,8 @@ impl ActiveSensing {
 
     /// Returns the direction to the farthest point of the `way` that a straight open line reaches.
     ///
-    /// The field bends only right before a hazard. A robot that follows its local direction reaches
-    /// a drum in its path before it turns.
+    /// The field bends only right before a hazard, too late for a robot that follows its local
+    /// direction.
     fn aim(
         &self,
         view: &View<'_>,
@@ -194,8 +189,7 @@ impl ActiveSensing {
     }
 }
 
-/// Returns the direction that ends a scan of `unseen` directions from `axis`: the far end of one
-/// side.
+/// Returns the far end of one side of the `unseen` directions from `axis`.
 ///
 /// A scan keeps its `side` until that side is seen. A new scan begins on the side with the nearest
 /// direction.

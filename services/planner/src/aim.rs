@@ -43,7 +43,6 @@ fn is_free(frame: &GridFrame, cells: &[u8], cell: Cell) -> bool {
     !CellState::from_byte(cells[frame.index(cell)]).is_hazard()
 }
 
-/// Returns `own`, or the nearest cell to `place` within `reach_m`, for which `fits` holds.
 fn nearest(
     frame: &GridFrame,
     (own, place): (Cell, DVec2),

@@ -59,8 +59,6 @@ impl Arcs {
 
     /// Returns the direction of the best arc, a unit vector, and its speed limit, m/s; 0 without a
     /// drivable arc.
-    ///
-    /// `distance` is that to the target, metres.
     pub(crate) fn advise(&self, view: &View<'_>, pose: &Pose2, distance: f64) -> (DVec2, f64) {
         let arcs = (-ARCS_A_SIDE..=ARCS_A_SIDE).map(|number| {
             let share = f64::from(number) / f64::from(ARCS_A_SIDE);

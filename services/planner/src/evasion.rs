@@ -1,13 +1,12 @@
 //! Evasion of moving obstacles.
 //!
-//! The module predicts paths of some seconds, leg after leg, as controller and base would follow
-//! them. Legs follow the field, go in all directions, back up if a laser covers the rear, or stand.
-//! Movers are discs with constant velocity. Proximity to a mover is a danger that fades with time.
+//! Paths of some seconds are predicted as controller and base would follow them. Legs follow the
+//! field, go in all directions, back up if a laser covers the rear, or stand. Movers are discs with
+//! constant velocity. Proximity to a mover is a danger that fades with time.
 //!
 //! Advice without danger is followed. Otherwise the robot begins the path with the greatest gain
 //! along the field minus danger, so it steps aside early. It moves only if it could brake after the
-//! next tick and rest before any contact, or if the whole path is free. A robot at rest is not at
-//! fault for a contact.
+//! next tick and rest before any contact, or if the whole path is free.
 //!
 //! A robot hindered for long insists on its way. Otherwise, people who give way would make it stand
 //! and back off until its time ends. It still moves only where it could rest in time. It evades
@@ -32,8 +31,7 @@ const AHEAD_S: f64 = 5.0;
 const DIRECTIONS: u32 = 16;
 /// Shares of the top speed.
 const SPEEDS: [f64; 2] = [1.0, 0.5];
-/// Least gap between a moving robot and a mover, metres, and its growth, m/s, because movers turn
-/// and change speed.
+/// Least gap between a moving robot and a mover, metres, and its growth, m/s, because movers turn.
 const APART_M: f64 = 0.1;
 const GROWS_M_S: f64 = 0.15;
 /// Danger is 1 at a touch now and falls by a factor of e per `NEAR_M` and per `SOON_S`.
@@ -58,7 +56,7 @@ const LEGS_S: [f64; 5] = [0.5, 1.0, 2.0, 3.5, AHEAD_S];
 const KEPT: usize = 16;
 const ALIKE_M: f64 = 0.25;
 const ALIKE_M_S: f64 = 0.3;
-/// Time that the robot stands at the start of a run to detect movers, seconds.
+/// Standing time at the start of a run to detect movers.
 const WATCHES_S: f64 = 0.5;
 /// Speed below which lagging wheels count as at rest, m/s.
 const FADED_M_S: f64 = 0.05;
@@ -74,7 +72,6 @@ const LONGEST_TICK_S: f64 = 1.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Evasion {
     radius: f64,
-    /// Inflation of hazards, and the remaining radius of the body, metres.
     inflated_m: f64,
     rest_m: f64,
     motion: MotionModel,
@@ -93,7 +90,6 @@ struct Disc {
     at: DVec2,
     velocity: DVec2,
     radius: f64,
-    /// Distance from the robot's centre at a touch, metres.
     touches_m: f64,
     doubt_m_s: f64,
 }
@@ -233,7 +229,6 @@ fn around(directions: u32, speed: f64) -> impl Iterator<Item = Advice> {
     })
 }
 
-/// Returns the best paths, no two of them alike.
 fn best(mut ways: Vec<Way>, score: impl Fn(&Way) -> f64) -> Vec<Way> {
     ways.sort_by(|one, other| score(other).total_cmp(&score(one)));
     let mut kept: Vec<Way> = Vec::with_capacity(KEPT);

@@ -35,7 +35,6 @@ impl Policy {
 struct Computed {
     policy: Policy,
     at: Progress,
-    /// Window where the policy differs from the previous one.
     changed: Window,
 }
 

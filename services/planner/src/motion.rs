@@ -43,11 +43,9 @@ pub(crate) struct MotionModel {
     pub(crate) speed: f64,
     turn: f64,
     look: f64,
-    /// Controller's cosines for full speed and for turns on the spot.
     full_speed: f64,
     turns: f64,
     base: Base,
-    /// Reach of the body from the middle between the wheels, metres.
     reach_m: f64,
     pub(crate) period_s: f64,
 }

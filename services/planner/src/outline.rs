@@ -1,8 +1,8 @@
 //! Passage of a body that is not a disc through gaps narrower than its covering circle.
 //!
-//! Hazards are inflated by half the width of the body, so the field leads wherever the body may
-//! fit. From each pose, the controller's path along the field is followed with its heading. If the
-//! outline would touch, a hybrid A* search finds poses to the next open place on the field's way.
+//! Hazards are inflated by half the body's width, so the field leads wherever it may fit. From each
+//! pose, the controller's path along the field is followed with its heading. If the outline would
+//! touch, a hybrid A* search finds poses to the next open place on the field's way.
 //!
 //! If the search fails, the body cannot pass. Cells at the narrow place are then refused, at most
 //! those that the covering circle would make hazard, and the field leads elsewhere.
@@ -45,7 +45,6 @@ const ARRIVED_M: f64 = 0.02;
 const MOST_OFF_M: f64 = 0.1;
 /// Distance to the goal at which the search ends, metres.
 const NEAR_M: f64 = 0.15;
-/// Length of the field's way that contains the goal, metres.
 const GOAL_WITHIN_M: f64 = 2.0;
 const MOST_POSES: usize = 5_000;
 
@@ -58,7 +57,7 @@ pub(crate) enum Passage {
     Turn(DVec2),
     /// Drive along this unit vector with this limit, m/s; negative is back along the axis.
     Drive(DVec2, f64),
-    /// Refuse these cells; empty if the body cannot move at all.
+    /// Refuse these cells; none if the body cannot move.
     Refused(Vec<Cell>),
 }
 
@@ -108,7 +107,6 @@ impl Planned {
 #[derive(Clone, Copy)]
 struct Reached {
     pose: Pose2,
-    /// Index of the previous pose, and the step from there.
     from: usize,
     step: [f64; 2],
     cost_m: f64,
@@ -147,7 +145,6 @@ impl Outline {
         self.comes_near(view, pose, 0.0)
     }
 
-    /// Returns whether an obstacle is nearer than the margin plus `apart_m`.
     pub(crate) fn comes_near(&self, view: &View<'_>, pose: &Pose2, apart_m: f64) -> bool {
         self.touching(view, pose, -apart_m.min(self.half_width)).next().is_some()
     }
@@ -199,7 +196,6 @@ impl Outline {
         move |at| self.touching(view, at, squeezed).nth(allowed).is_none()
     }
 
-    /// Returns the next step of the plan; drops a plan that touches or starts elsewhere.
     fn go_on(&mut self, view: &View<'_>, pose: &Pose2) -> Option<Passage> {
         while self.plan.pop_if(|next| next.is_over(pose)).is_some() {}
         let Planned { step: [way, turn], .. } = *self.plan.last()?;
@@ -280,7 +276,6 @@ impl Outline {
         way
     }
 
-    /// Returns the plan, or the narrow cells that block the body.
     fn search(
         &self,
         view: &View<'_>,
@@ -337,7 +332,6 @@ impl Outline {
         Err(self.refused(view, &way, &reached))
     }
 
-    /// Returns the narrow cells where the field's `way` leaves the `reached` poses.
     fn refused(&self, view: &View<'_>, way: &[DVec2], reached: &[Reached]) -> Vec<Cell> {
         let is_reached =
             |at: &DVec2| reached.iter().any(|it| it.pose.position.distance(*at) <= NEAR_M);

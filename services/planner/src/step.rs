@@ -57,7 +57,6 @@ impl Advisor {
     }
 }
 
-/// Planner state; solves Laplace's equation and follows the gradient (11).
 #[derive(Debug)]
 pub struct Planner {
     mission: Mission,
@@ -163,7 +162,7 @@ impl Planner {
         v.abs() <= body.top_speed_m_s && omega.abs() <= most_rad_s
     }
 
-    /// Sets the target; one that is not inside the perimeter is ignored.
+    /// Sets the target if it is inside the perimeter.
     pub fn take_target(&mut self, target: &TargetSample) -> Result<Work, SolveError> {
         let before = self.target.map(|before| before.target.position());
         let Some(frame) = self.grid.frame() else {
@@ -294,7 +293,7 @@ impl Planner {
         Some(job)
     }
 
-    /// Takes the result of a job. Ignores a stale result.
+    /// Takes a job's result unless it is stale.
     pub fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
         let awaited = self.live.as_mut().filter(|it| it.awaits(solved.number));
         let Some(live) = awaited else {
@@ -480,7 +479,6 @@ impl Planner {
     }
 }
 
-/// Returns the screening of the mission; lengths are in metres.
 fn screening(mission: &Mission) -> Screening {
     mission.screening_length_m().map_or(Screening::None, |length| Screening::Uniform {
         length,

@@ -3,11 +3,8 @@
 //! A smooth surface answers from the foot of the sonar's perpendicular, and only near its normal
 //! (Kuc and Siegel 1987). A slanted surface reflects the sound away, so a silent beam ahead leaves
 //! a wall at 45 degrees possible. A surface that the body touches has its normal within a right
-//! angle of the motion.
-//!
-//! For each point of the way and each normal, a tangent surface is assumed. A reading that would
-//! have detected it excludes it. An infrared ranger detects it where its ray meets it, at any
-//! angle.
+//! angle of the motion. Each such surface is assumed until a reading that would have detected it
+//! excludes it.
 
 use std::{cell::RefCell, f64::consts::TAU};
 
@@ -24,10 +21,8 @@ const ANSWERS_WITHIN_DEG: f64 = 17.0;
 /// Same angle for distances up to [`NEAR_M`].
 const NEAR_ANSWERS_WITHIN_DEG: f64 = 20.0;
 const NEAR_M: f64 = 1.2;
-/// Extent of an assumed surface from the point of touch, metres.
-///
-/// A shorter surface could be detected only from nearer, but its end is an edge, which answers a
-/// beam ahead.
+/// Extent of an assumed surface from the point of touch, metres. The end of a shorter one is an
+/// edge, which answers a beam ahead.
 const EXTENDS_M: f64 = 1.0;
 /// Least cosine between a ray and the normal of a surface that it detects: 70 degrees.
 const LEAST_SLANT: f64 = 0.34;
@@ -42,10 +37,8 @@ const NEAR_ECHO_M: f64 = 0.25;
 /// Echoes that weigh as much as one silence: fewer than two in three pings get lost.
 const ECHOES_FOR_A_SILENCE: usize = 2;
 
-/// Number of normals: to either side of the way, and along it.
 const NORMALS: usize = 2 * (WIDEST_DEG / STEP_DEG) as usize + 1;
 
-/// Sectors that group sonar readings, because a normal concerns few.
 const SECTORS: usize = 32;
 /// Sectors between a normal and a beam that its surface answers, at most.
 const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as usize + 1;
@@ -54,7 +47,6 @@ const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as
 pub(crate) struct UndetectedSurfaces {
     beams: BySector,
     rays: Vec<Beam>,
-    /// Rays near the last query; its memory is reused.
     near: RefCell<Vec<Beam>>,
     reach: f64,
     /// Distance from the body's centre within which a ray excludes a surface, metres.
@@ -94,7 +86,6 @@ struct BySector {
 }
 
 impl BySector {
-    /// Groups readings for surfaces at most `within` metres from `place`.
     fn new(readings: &[ClearBeam], place: DVec2, within: f64) -> Self {
         let beams = readings.iter().map(|reading| {
             let beam = Beam::from(reading);
@@ -184,7 +175,6 @@ impl UndetectedSurfaces {
         undetected.into_iter().flatten()
     }
 
-    /// Returns the ray if it may meet a surface that touches a body at `at`.
     fn near(&self, ray: &Beam, at: DVec2) -> Option<Beam> {
         let offset = at - ray.origin;
         let (along, near) = (ray.axis.dot(offset), self.met_within);
@@ -193,7 +183,6 @@ impl UndetectedSurfaces {
         meets.then_some(Beam { may_echo: ray.clear < along + near, ..*ray })
     }
 
-    /// Returns whether readings exclude a surface that touches the body on the side of `normal`.
     fn is_excluded(&self, at: DVec2, normal: DVec2, beams: &[&[Beam]], rays: &[Beam]) -> bool {
         let may_echo =
             |beams: &&[Beam]| beams.iter().rev().take_while(|beam| beam.may_echo).count();
@@ -204,7 +193,6 @@ impl UndetectedSurfaces {
             || rays.iter().any(|ray| tally.is_decided_by(ray, self.met_after(ray, at, normal)))
     }
 
-    /// Returns the distance from which the surface answers `beam`, metres; `None` if it is silent.
     fn answers_from(&self, beam: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let [far, near] = self.answers;
         let square = beam.axis.dot(normal);
@@ -218,7 +206,6 @@ impl UndetectedSurfaces {
         (square >= answers && offset.perp_dot(normal).abs() <= EXTENDS_M).then_some(distance)
     }
 
-    /// Returns the distance at which `ray` meets the surface near the body, metres.
     fn met_after(&self, ray: &Beam, at: DVec2, normal: DVec2) -> Option<f64> {
         let slant = ray.axis.dot(normal);
         if slant < LEAST_SLANT {

@@ -76,7 +76,6 @@ impl View<'_> {
             .map(|cell| self.frame.centre_of(cell))
     }
 
-    /// Returns the cells in every `step`th column and row with centres within `radius`.
     pub(crate) fn cells_within(
         &self,
         at: DVec2,

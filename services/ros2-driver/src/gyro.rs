@@ -99,7 +99,6 @@ impl Gyro {
         Some(format!("{why}; publish rad/s about an axis that points up"))
     }
 
-    /// Returns the tick's turn. After a gap it only marks the next one's start.
     pub(crate) fn for_tick(&mut self) -> Option<Turn> {
         let now = self.now.filter(|_| self.compared.agrees());
         let (sequence, before) = self.turns.until(now)?;

@@ -2,13 +2,6 @@
 //!
 //! A received piece is one message: a byte, its row in [`Topics`], and the payload from DDS. The
 //! writer's number precedes another node's command. Sent pieces are command payloads.
-//!
-//! | module | holds |
-//! |---|---|
-//! | [`topics`] | table of topics |
-//! | [`messages`] | required fields of messages |
-//! | [`publishers`] | check for two odometry publishers |
-//! | `gyro` | turn of each tick by the IMU |
 
 mod gyro;
 pub mod messages;
@@ -270,12 +263,10 @@ fn is_same_fan(scan: &Scan, sensor: &Sensor) -> bool {
         && (step - its_step).abs() <= SAME_STEP * its_step
 }
 
-/// Returns whether beams form a circle, the last possibly repeating the first.
 fn is_circle(beams: usize, step: f64) -> bool {
     (beams as f64 * step.abs() - TAU).abs() <= 1.5 * step.abs()
 }
 
-/// Returns whether the row is a circle of at most twice the scan's beams.
 fn is_whole(sensor: &Sensor, scan: &Scan) -> bool {
     sensor.field_of_view_deg >= 360.0 && scan.ranges.len() * 2 >= sensor.beams
 }

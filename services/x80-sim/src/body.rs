@@ -83,7 +83,6 @@ impl Body {
         Some(self.pose.axis().angle_to(-outward?))
     }
 
-    /// Returns metres between the body and the nearest obstacle.
     pub fn clearance(&self) -> f64 {
         self.clearance
     }

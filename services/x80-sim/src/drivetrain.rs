@@ -7,7 +7,6 @@ use common::{
 
 use crate::{motor::Motor, noise::Noise};
 
-/// Returns the ground covered by a slipping rim that rolls `metres`.
 pub(crate) fn slipped(metres: f64, physics: &WheelPhysics, noise: &mut Noise) -> f64 {
     let lost = noise.normal(physics.slip_noise * metres.abs().sqrt());
     metres * (1.0 - physics.slip_share) + lost
@@ -67,7 +66,6 @@ impl Drivetrain {
         }
     }
 
-    /// Returns the metres that the speed loops ask of nominal wheels.
     pub(crate) fn step(
         &self,
         motors: &mut [Motor; 6],
@@ -80,7 +78,6 @@ impl Drivetrain {
         })
     }
 
-    /// Returns the true rims' travel for that of nominal wheels.
     pub(crate) fn rims(&self, metres: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|wheel| metres[wheel] * self.diameter[wheel])
     }

@@ -79,7 +79,6 @@ impl Laser {
         &self.sensor.name
     }
 
-    /// Returns this tick's scan with the robot's stated times.
     pub(crate) fn said(&self) -> Option<Scan> {
         let LaserTiming { delay_s, sweep_s, stated_share } = self.timing;
         let stated = [delay_s + sweep_s, sweep_s].map(|seconds| stated_share * seconds);
@@ -107,14 +106,12 @@ impl Laser {
         Some(self.poses.get(later).or(self.poses.back())?.1)
     }
 
-    /// Returns solids in reach, with a margin for earlier poses.
     pub(crate) fn near(&self, world: &World, pose: Pose2) -> Vec<Solid> {
         let position = self.sensor.mount.on(pose).position;
         let reach_m = self.sensor.reach_m + self.went_m();
         world.near(position, reach_m, self.height_m, self.sensor.model.rise())
     }
 
-    /// Returns the maximum travel from a scan's start until it is sent.
     fn went_m(&self) -> f64 {
         (self.timing.delay_s + self.timing.sweep_s) * FASTEST_M_S
     }

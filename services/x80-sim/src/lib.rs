@@ -1,22 +1,10 @@
 //! Simulated X80: the other end of the wire. The stages only see its bytes.
 //!
-//! Each module depends only on those above it:
+//! Each module depends only on those before it in this list:
 //!
-//! | module | contents |
-//! |---|---|
-//! | [`world`] | obstacles |
-//! | [`body`] | a disc on wheels, and its contacts |
-//! | [`wheel_errors`] | the wheels' deviations from the mission |
-//! | [`motor`] | one channel: modes, timed commands, the speed loop |
-//! | [`sonar`], [`infrared`], `laser`, [`sensors`] | readings |
-//! | `json_words` | JSON lines |
-//! | [`arduino_words`] | an Arduino's requests and answers |
-//! | `rplidar` | a laser with its own wire |
-//! | [`noise`] | seeded streams |
-//! | [`robot`] | the pure state machine: frames in, time forward, frames out |
-//! | [`radio`] | outages, losses, delays |
-//! | [`saved_state`] | state for the next process |
-//! | [`shell`] | the process: transport, pace, ground truth |
+//! [`world`], [`body`], [`wheel_errors`], [`motor`], [`sonar`], [`infrared`], `laser`, [`sensors`],
+//! `json_words`, [`arduino_words`], `rplidar`, [`noise`], [`robot`], [`radio`], [`saved_state`],
+//! [`shell`].
 //!
 //! Only [`shell`] and its transports use sockets and clocks:
 //!

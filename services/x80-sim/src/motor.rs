@@ -199,7 +199,6 @@ impl Motor {
         self.speed = held * grip + self.speed * (1.0 - grip);
     }
 
-    /// Returns the target in counts per second, with gain, dead band and limit.
     fn wanted(&self, now: f64) -> f64 {
         let Some(order) = self.order.filter(|_| self.enabled) else {
             return 0.0;

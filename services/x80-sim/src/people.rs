@@ -27,7 +27,6 @@ const STEP_S: f64 = 2.0;
 /// Half the field of view, and the weight of those outside it.
 const SEES_RAD: f64 = 100.0 / 180.0 * std::f64::consts::PI;
 const UNSEEN: f64 = 0.5;
-/// Maximum speed, as a multiple of the wanted speed.
 const HURRIES: f64 = 1.3;
 /// Minimum distance to another body; nominal.
 const KEPT_M: f64 = 0.1;
@@ -77,7 +76,6 @@ impl People {
         Self { walkers: people.iter().map(walker).collect(), now: None }
     }
 
-    /// Moves people to `time` among `standing` solids and a robot, a disc.
     pub(crate) fn advance(&mut self, time: f64, (robot, radius): (DVec2, f64), standing: &[Solid]) {
         let (from_s, from) = self.now.replace((time, robot)).unwrap_or((0.0, robot));
         let for_s = (time - from_s).clamp(0.0, MOST_S);

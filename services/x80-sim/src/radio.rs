@@ -134,7 +134,6 @@ impl<W: Copy + PartialEq> Radio<W> {
         lost
     }
 
-    /// Returns whether the host misses a tick, because its frames are lost.
     pub fn loses_tick(&mut self, now: f64) -> bool {
         let lost = self.loses(now);
         self.missed_ticks += u64::from(lost);

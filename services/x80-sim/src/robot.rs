@@ -89,7 +89,6 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Boots at the start, with the readings of tick 0.
     pub fn new(mission: &Mission) -> Self {
         Self::with_noise(mission, mission.seed)
     }

@@ -162,7 +162,6 @@ fn ad(volts: f64, full_scale: f64) -> u16 {
     (volts / full_scale * 4095.0).round().clamp(0.0, 4095.0) as u16
 }
 
-/// Returns a reading that is off by `error` counts.
 pub fn encoder(motor: &Motor, error: f64) -> Encoder {
     let position = (motor.turned() + error).round();
     Encoder {

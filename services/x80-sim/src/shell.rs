@@ -28,7 +28,6 @@ use crate::{
     transport::{Transport, Way},
 };
 
-/// Maximum datagrams between checks of time and stop signal.
 const MOST_AT_ONCE: usize = 64;
 
 pub struct SimOptions {
@@ -62,7 +61,7 @@ pub struct SimOptions {
 /// Runs until `stop` is readable or its other end is closed.
 ///
 /// # Errors
-/// Returns an error if it cannot listen, the transport fails, or the state cannot be saved.
+/// If it cannot listen, the transport fails, or the state cannot be saved.
 pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     let SimOptions { mission, pace, listen, transport, own_user_only, keep, ground_truth, meeting } =
         options;

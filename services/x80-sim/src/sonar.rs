@@ -62,7 +62,6 @@ impl Sector {
         off_axis(self.axis, direction) <= self.half + 1e-12
     }
 
-    /// Returns the offset from the apex to the nearest point of a face in the sector.
     fn nearest(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
         let surface = Surface::Face { from, to };
         let foot = common::geometry::nearest_on_segment(self.origin, from, to);
@@ -83,7 +82,7 @@ fn off_axis(axis: DVec2, direction: DVec2) -> f64 {
     axis.perp_dot(direction).atan2(axis.dot(direction)).abs()
 }
 
-/// Returns the noiseless range of a ranger on a robot at `centre`, metres; infinite for nothing.
+/// Returns the noiseless range, metres; infinite for nothing.
 pub fn listen(
     world: &World,
     centre: DVec2,
@@ -129,7 +128,6 @@ pub fn byte(range: f64, physics: &SonarPhysics, noise: &mut Noise) -> u8 {
     Echo::byte_at(range + noise.normal(physics.noise_m + physics.noise_per_m * range))
 }
 
-/// Returns the range of a beam that bounces off a silent wall to a surface square to it.
 fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise) -> Option<f64> {
     if !noise.chance(physics.multipath_share) {
         return None;
@@ -169,8 +167,6 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// Returns an echo's maximum range by angle off the axis, metres: full in the cone, less
-    /// outside.
     fn reach(&self, off: f64) -> f64 {
         let cone = self.cone.half;
         if off <= cone + 1e-12 {
@@ -275,7 +271,6 @@ impl<'a> Receiver<'a> {
     }
 }
 
-/// Returns the amplitude of a hard plane, or of a cylinder of `radius`.
 fn amplitude(range: f64, radius: Option<f64>) -> f64 {
     let spread = radius.map_or(1.0, |radius| (radius / (radius + range)).sqrt());
     spread * 10_f64.powf(-2.0 * ABSORPTION_DB_PER_M * range / 20.0) / range

@@ -9,7 +9,6 @@ use glam::DVec2;
 
 use crate::people::People;
 
-/// Distance from a surface at which a sensor touches it.
 const TOUCHES_M: f64 = 1e-3;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,7 +42,6 @@ impl Surface {
         (point - from).try_normalize()
     }
 
-    /// Returns metres along the ray from `origin` in the unit direction `along`.
     pub fn hit(&self, origin: DVec2, along: DVec2) -> Option<f64> {
         match *self {
             Self::Drum { at, radius } => {
@@ -70,7 +68,6 @@ impl Surface {
         }
     }
 
-    /// Returns the cosine between the unit vector `along` and the normal at a surface's `point`.
     pub fn incidence_cos(&self, point: DVec2, along: DVec2) -> f64 {
         let normal = match *self {
             Self::Drum { at, .. } => point - at,
@@ -154,7 +151,6 @@ struct Visitor {
 }
 
 impl World {
-    /// Starts at time 0, with the robot at the start.
     pub fn new(mission: &Mission) -> Self {
         let visitor = |thing: &Thing| Visitor {
             solids: solids_of(&thing.shape),
@@ -219,7 +215,6 @@ impl World {
         self.touchable().map(|surface| surface.distance(point)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns metres along the level ray at `height_m`, and the surface.
     pub fn first_hit(&self, origin: DVec2, along: DVec2, height_m: f64) -> Option<(f64, Surface)> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)

@@ -7,15 +7,6 @@
 //!
 //! Counts and commands show encoder faults. Lasers, rangers and the gyro observe the body, which
 //! shows faults of motors, mountings and sizes.
-//!
-//! | module | holds |
-//! |---|---|
-//! | [`seen`] | what a robot says before it drives, as a new mission file |
-//! | [`trace`] | commands, counts and readings, and the legs of the procedure |
-//! | `wheels` | commands that each encoder follows; response of the base |
-//! | `scans` | body motion and laser mounting that align all scans |
-//! | `rangers` | liveliness and noise of sensors, bearings of sonars, motion without a laser |
-//! | `body` | motors and sizes, from the observed body motion |
 
 mod body;
 mod rangers;

@@ -21,7 +21,7 @@ use crate::{
 const LIVES: f64 = 0.5;
 /// Least range noise at rest that is reported, metres.
 const NOISE_M: f64 = 0.1;
-/// Number of bearing bins of a range profile.
+/// Number of bearing bins.
 const BINS: usize = 72;
 /// Cap of a range difference, metres.
 const DIFFERENT_M: f64 = 0.5;

@@ -1,7 +1,7 @@
-//! What a robot says of itself while it stands, and the mission file that follows from it. Pure.
+//! What a robot says of itself while it stands, and the mission file that follows. Pure.
 //!
-//! The robot is asked for reports, and for nothing else: no order releases its brake or moves it. All that it says may be hostile. What is
-//! kept of it is limited, and whoever writes the mission reads it as any other first.
+//! The robot is only asked for reports: no order releases its brake or moves it. Its answers may be
+//! hostile, so stored data are limited, and the mission is validated like any other.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -13,25 +13,25 @@ use common::{
 };
 use link::drivers;
 
-/// With so many sensors no mission is valid, and no more are kept.
+/// Maximum stored sensors; no mission with so many is valid.
 const MOST: usize = 33;
-/// Letters of a refusal that are told.
+/// Maximum letters of a printed refusal.
 const MOST_TOLD: usize = 200;
 
 #[derive(Debug)]
 pub struct Seen {
     protocol: Protocol,
-    /// Of a robot that says nothing.
+    /// Mission of a robot that says nothing.
     pub mission: Mission,
     driver: Box<dyn Base>,
     lines: Lines,
-    /// The newest reading of each sensor, as a robot of JSON names them.
+    /// Newest reading of each sensor, under its JSON name.
     report: Report,
-    /// The words of JSON that came, or the sensors of an X80 that read something.
+    /// JSON words received, or X80 sensors with a reading.
     words: BTreeSet<String>,
-    /// When reports of motion came, seconds.
+    /// Times of motion reports, seconds.
     ticks_s: Vec<f64>,
-    /// Why the newest line is none of the protocol.
+    /// Reason why the newest line is not of the protocol.
     pub refused: String,
 }
 
@@ -46,7 +46,8 @@ impl Seen {
         Ok(Self { protocol, mission, driver, lines, report, words, ticks_s, refused })
     }
 
-    /// The bytes that ask for a report. After the first of motion the robot is not asked again, so that its own rate shows.
+    /// Returns the request for a report. After the first motion report it is empty, which shows the
+    /// robot's own rate.
     pub fn ask(&mut self) -> Vec<u8> {
         match self.protocol {
             _ if !self.ticks_s.is_empty() => Vec::new(),
@@ -56,12 +57,12 @@ impl Seen {
         }
     }
 
-    /// Whether what came is of the protocol.
+    /// Returns whether the answers follow the protocol.
     pub fn is_known(&self) -> bool {
         !self.ticks_s.is_empty() || !self.words.is_empty()
     }
 
-    /// `bytes` came at `at_s`, seconds.
+    /// Takes `bytes` that came at `at_s`.
     pub fn hear(&mut self, bytes: &[u8], at_s: f64) {
         if self.protocol == Protocol::Json {
             for line in self.lines.push(bytes) {
@@ -99,7 +100,7 @@ impl Seen {
         }
     }
 
-    /// The text of a mission for the robot at `address`. Lines that begin with `# -` say what was read.
+    /// Returns a mission for the robot at `address`. Lines that begin with `# -` list the readings.
     pub fn mission_at(&self, address: &str) -> String {
         let Report { ranges, scans, touched, battery_v, .. } = &self.report;
         let ticks_hz = match self.ticks_s[..] {
@@ -124,7 +125,7 @@ impl Seen {
                 "counts_per_turn = 3600.0         # odometry is rounded to 0.1 degrees of a wheel; nothing to measure\nwheel_radius_m = 0.033           # MEASURE\ntrack_m = 0.16                   # MEASURE: between the middles of the wheels\nradius_m = 0.12                  # MEASURE: of the disc that covers the body\ntop_speed_m_s = 0.3              # MEASURE\n\n[[robot.sensor]]                 # MEASURE all of its row\nname = \"scan\"\nkind = \"scan\"\nforward_m = 0.0\nbearing_deg = 0.0\nfield_of_view_deg = 360\nbeams = 360\nreach_m = 8.0\n",
             ),
         };
-        // One that only answers will be asked ten times a second.
+        // A robot that only answers is asked ten times a second.
         let rate_hz = if (5.0..=50.0).contains(&ticks_hz) { ticks_hz.round() } else { 10.0 };
         let gyro = if self.words.contains("gyro") { "gyro = true\n" } else { "" };
         let battery = battery_v.map_or(String::new(), |volts| {

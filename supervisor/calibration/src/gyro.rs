@@ -27,7 +27,6 @@ pub struct Motion {
 /// Minimum total distance, metres, and turn, radians, to determine ratio and track.
 const LEAST_M: f64 = 1.5;
 const LEAST_RAD: f64 = 3.0;
-/// Least time at rest, seconds.
 const LEAST_REST_S: f64 = 2.0;
 
 struct Rest {

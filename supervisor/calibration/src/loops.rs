@@ -46,7 +46,7 @@ const MOST_CHI2: f64 = 4.0;
 pub struct Loop {
     /// Number among all loops; neighbours share a normal.
     pub number: u32,
-    /// Turns, counter-clockwise positive.
+    /// Counter-clockwise positive.
     pub turns: f64,
     /// Nominal distances, forward less backward.
     pub left_m: f64,
@@ -68,7 +68,7 @@ pub fn normal_sd(differences: &[f64]) -> f64 {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wheels {
-    /// Value of (rho - 1) / (rho + 1).
+    /// (rho - 1) / (rho + 1).
     pub(crate) e: f64,
     /// Value of tau.
     pub(crate) track: f64,
@@ -270,8 +270,6 @@ impl Estimate {
         (square / off.len() as f64).sqrt()
     }
 
-    /// Checks held-out values.
-    ///
     /// # Errors
     /// Fails if they lie far from the prediction.
     pub(crate) fn agrees_with(&self, held_out: &Rows) -> Result<(), Refusal> {

@@ -48,7 +48,6 @@ impl By {
     }
 }
 
-/// Value and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     pub value: f64,

@@ -23,7 +23,6 @@ impl Ways {
         self.rolled_m += left.abs() + right.abs();
     }
 
-    /// Returns the distance of the midpoint between the wheels.
     pub(crate) fn arc_m(&self) -> f64 {
         f64::midpoint(self.left_m, self.right_m)
     }

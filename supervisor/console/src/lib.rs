@@ -1,20 +1,4 @@
 //! Command line code that all executables share.
-//!
-//! | module | holds |
-//! |---|---|
-//! | [`output`], [`stream`] | standard output, once or continuous |
-//! | [`executable`] | main function of the other executables |
-//! | [`completion`] | shell completions |
-//! | [`consent`] | questions to a person |
-//! | [`failure`] | errors of subcommands, and exit codes |
-//! | [`table`], [`item`] | text tables; Markdown items |
-//! | [`progress_line`], [`waiting`] | progress, and waiting for a robot |
-//! | [`words`] | states, ages and sizes in words |
-//! | [`missions`] | shipped missions and files, with assignments |
-//! | [`robots`], [`runs`] | this machine's robots and runs |
-//! | [`operator`] | requests and signals to a robot's processes |
-//! | [`rates`] | topic rates, compared with the table |
-//! | [`logging`] | logs to standard error, a file, the journal |
 
 pub mod completion;
 pub mod consent;

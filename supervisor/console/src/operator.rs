@@ -17,7 +17,6 @@ use super::{
     output::write_stderr,
 };
 
-/// Stops the robot and waits until it is at rest.
 pub fn stand(robot: &RobotName) -> Result {
     if let Some(why) = operator::stand(robot)? {
         write_stderr(&format!(

@@ -21,7 +21,6 @@ pub fn let_stages_go_first() {
     let _ = rustix::process::nice(NICE);
 }
 
-/// Standard output, and the signals that end the command.
 pub struct Stream {
     signals: Signals,
     ended: bool,

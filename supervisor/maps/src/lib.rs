@@ -1,12 +1,5 @@
 //! Maps of ROS map_server, PGM, PNG and MovingAI. A map says which cells are free.
 //!
-//! | module | reads |
-//! |---|---|
-//! | `ros` | map_server YAML and its image |
-//! | `image` | Netpbm or PNG |
-//! | `prior` | a ROS map as known hazards; writes a robot's belief as one |
-//! | `moving_ai` | `.map` grids of the MovingAI benchmarks |
-//!
 //! [`load`] chooses a reader by file extension. [`load_placed`] reads a ROS map with its position
 //! in metres.
 //!

@@ -59,7 +59,6 @@ fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
     Ok(Map::new(cols, rows, free.into_iter()))
 }
 
-/// Returns columns and rows, and leaves the cell lines.
 fn header<'a>(
     file: &Path,
     lines: &mut impl Iterator<Item = &'a [u8]>,

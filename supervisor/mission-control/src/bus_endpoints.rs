@@ -27,7 +27,6 @@ use crate::{
 
 pub(crate) struct BusEndpoints {
     pub observer: Observer,
-    /// Waiter for heartbeats, ends of ticks and requests.
     pub waiter: Waiter,
     pub target: Writer<TargetSample>,
     pub place: Writer<PlaceSample>,
@@ -116,7 +115,7 @@ impl BusEndpoints {
         self.roster.publish_slice(tick, time, header, entries)
     }
 
-    /// Publishes a death; logs a failure.
+    /// Logs a failure.
     pub(crate) fn publish_death(&mut self, death: DeathSample) {
         let stamp = self.observer.record.pose.unwrap_or_default().stamp;
         warn_if_failed(self.deaths.publish(stamp.tick, stamp.time(), death));

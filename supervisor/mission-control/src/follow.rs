@@ -21,7 +21,6 @@ pub(crate) struct Beacon {
     waiting: Option<BeaconSample>,
     /// Last tick before the next sample, in lockstep; makes runs repeatable.
     last_tick: u64,
-    /// Published state of the newest following.
     pub told: Option<FollowingSample>,
 }
 

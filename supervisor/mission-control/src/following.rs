@@ -24,7 +24,7 @@ use crate::target_list::Followed;
 pub(crate) const SILENT: Duration = Duration::from_secs(1);
 /// Greatest deviation of a used sample, metres. Two deviations make up [`ROOM_M`].
 const MOST_DEVIATION_M: f64 = 0.25;
-/// Radius of the followed body, metres: a person or an X80.
+/// A person or an X80.
 const BODY_M: f64 = 0.3;
 /// Default gap between the bodies, metres.
 const ROOM_M: f64 = 0.5;
@@ -85,8 +85,6 @@ impl Following {
         self.heard.map_or(DVec2::ZERO, |(_, place)| place)
     }
 
-    /// Takes a sample at `now`.
-    ///
     /// # Errors
     /// Returns why the sample is not used.
     pub(crate) fn take(
@@ -142,7 +140,6 @@ impl Following {
         loses
     }
 
-    /// Marks the beacon as lost after a change of supervisor.
     pub(crate) const fn resumed(&mut self) {
         self.is_lost = true;
     }

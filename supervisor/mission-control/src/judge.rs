@@ -74,15 +74,12 @@ pub(crate) fn touched([x, y]: [f64; 2]) -> Ending {
 /// Deadline of a target. Operators' stops do not count.
 #[derive(Clone, Copy)]
 pub(crate) struct Deadline {
-    /// Mission time of the target's start, seconds.
     pub began_s: f64,
     pub timeout_s: f64,
-    /// Mission time of operators' stops, seconds.
     pub stopped_s: f64,
 }
 
 impl Deadline {
-    /// Returns the mission time of giving up, seconds.
     pub(crate) const fn at_s(self) -> f64 {
         self.began_s + self.timeout_s + self.stopped_s
     }

@@ -20,29 +20,10 @@
 //! }
 //! ```
 //!
-//! # The files, in reading order
+//! # Reading order
 //!
-//! Pure modules do no I/O and read no clock.
-//!
-//! | module | holds |
-//! |---|---|
-//! | `order` | permission to drive, pure |
-//! | `judge` | end of the mission, pure; [`outcome`] is its result |
-//! | `decisive` | the first event that ended a mission, and its tick, pure |
-//! | `stall` | stalls and their next recovery step, pure |
-//! | `supervisor`, `stall_recovery` | the loop that asks these; its reaction to stalls |
-//! | `recovery_step` | time of a recovery step, tick limit of the link in lockstep, pure |
-//! | `run`, `shutdown` | a run from start to end; robot and stages stopped |
-//! | [`target_list`], `requests` | targets, pure; operators' requests, the next target |
-//! | `following`, `follow` | place beside a beacon, pure; its samples, the moving target |
-//! | [`operator`] | requests of an operator, in any process |
-//! | `bus_endpoints`, `observer` | writers and readers on the bus |
-//! | `long_record` | bounded records of each tick, pure |
-//! | `run_clock` | mission time, first new tick |
-//! | [`recovery`] | saved state from which another supervisor resumes |
-//! | [`simulator`] | the simulated robot as a child process |
-//! | `progress` | progress shown to the user |
-//! | `error` | reasons why a run failed |
+//! The pure modules `order`, `judge`, `decisive`, `stall`, `recovery_step`, `target_list` and
+//! `following` do no I/O and read no clock. `supervisor` has the loop that asks them.
 
 mod bus_endpoints;
 mod decisive;

@@ -43,7 +43,6 @@ pub(crate) struct Published {
     pub grid_changed: bool,
 }
 
-/// Sample of a run, for metrics and drawings.
 pub enum Heard<'a> {
     Command(&'a CommandSample),
     Guidance(&'a GuidanceSample),
@@ -71,7 +70,7 @@ pub(crate) struct Observer {
 
 #[derive(Default)]
 pub struct Record {
-    /// Pose of every tick, thinned out in a long run.
+    /// Thinned out in a long run.
     pub poses: Vec<PoseSample>,
     pub pose: Option<PoseSample>,
     pub(crate) guidance: VecDeque<GuidanceSample>,

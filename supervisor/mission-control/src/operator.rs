@@ -363,7 +363,7 @@ fn ask_with(
     ask(robot, request)
 }
 
-/// Drives by hand for 0.3 s. `stick` points ahead and to the left, in shares of full speed.
+/// Drives for 0.3 s. `stick` points ahead and to the left, in shares of full speed.
 pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result<(), OperatorError> {
     ask_with(robot, request(RequestKind::Hand), &[TargetPoint::at(stick)])
 }
@@ -373,7 +373,7 @@ pub fn follow(robot: &RobotName, distance_m: f64) -> Result<(), OperatorError> {
     ask(robot, RequestSample { deviations: [distance_m, 0.0], ..request(RequestKind::Follow) })
 }
 
-/// Ends the following. Returns when the robot rests.
+/// Returns when the robot rests.
 pub fn end_follow(robot: &RobotName) -> Result<(), OperatorError> {
     ask(robot, request(RequestKind::EndFollow))?;
     await_rest(robot, |link| link.stopped() && link.at_rest == 1)

@@ -12,14 +12,13 @@ pub(crate) struct Snapshot {
     pub field_known: bool,
     pub operator_stop: bool,
     pub stage_held: bool,
-    /// Whether the robot has no target left.
     pub waits: bool,
     pub lost: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Decision {
-    /// Whether the robot was ever ready. Since then the link stops it when a stage is down.
+    /// Whether the robot was ever ready; since then the link stops it when a stage is down.
     pub ready: bool,
     pub reason: HoldReason,
 }

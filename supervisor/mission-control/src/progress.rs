@@ -10,7 +10,7 @@ pub struct Progress<'a> {
     pub record: &'a Record,
     pub running: (usize, usize),
     pub driving: bool,
-    /// Distance from the start to the target, metres.
+    /// From the start to the target.
     pub straight_m: f64,
 }
 

@@ -29,7 +29,7 @@ const SIMULATOR: &str = "x80-sim";
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct SupervisorState {
     pub operator_stop: bool,
-    /// Mission time of operator stops since the current target's start, seconds.
+    /// Time of operator stops since the current target's start.
     pub operator_stopped_s: f64,
     pub resumes: u32,
     pub(crate) targets: Option<TargetList>,

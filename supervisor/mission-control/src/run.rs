@@ -21,7 +21,7 @@ use crate::{
 
 pub struct Finished {
     pub ending: Ending,
-    /// Last complete tick before the deciding event; `None` if no tick decided.
+    /// `None` if no tick decided.
     pub last_tick: Option<u64>,
     /// Seconds of the robot's clock from the first motion order to the end. A resumed wall-clock
     /// run counts from its own start.
@@ -31,7 +31,7 @@ pub struct Finished {
     pub drove: bool,
     pub restarts: BTreeMap<&'static str, u32>,
     pub resumes: u32,
-    /// Generations of the planner started because of stalls.
+    /// Planner generations started because of stalls.
     pub replans: u32,
     pub resets: u64,
     pub targets: Vec<TargetResult>,

@@ -154,7 +154,7 @@ impl Simulator {
         &self.truth.ticks
     }
 
-    /// Ends the simulator. The ground truth stays.
+    /// Keeps the ground truth.
     pub fn stop(&mut self) -> Result<(), SimulatorError> {
         self.process.end(REST);
         self.truth.take()

@@ -89,7 +89,6 @@ impl Supervisor<'_> {
     fn carry_out(&mut self, step: RecoveryStep) -> Result {
         match step {
             RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
-            // The directive carries the new epoch.
             RecoveryStep::Reset => self.publish_state()?,
             RecoveryStep::GiveUp => {}
         }

@@ -49,7 +49,7 @@ use crate::{
 pub struct Options {
     pub mission: Mission,
     pub robot: RobotName,
-    /// Pace of mission time. Real robots, except with ROS 2, use the wall clock.
+    /// Real robots, except with ROS 2, use the wall clock.
     pub pace: Pace,
     /// Directory of logs, checkpoints and results; it must exist.
     pub directory: PathBuf,
@@ -109,7 +109,7 @@ pub(crate) struct Supervisor<'a> {
     pub state_file: StateFile,
     pub clock: RunClock,
     pub decision: Decision,
-    /// Time of the last resume, nanoseconds of the monotonic clock.
+    /// Nanoseconds of the monotonic clock.
     pub resumed_ns: u64,
     pub drove: bool,
     pub tick_progress: TickProgress,

@@ -29,7 +29,6 @@ pub enum TargetOutcome {
     Replaced,
     /// The robot stalled, and no recovery step was left.
     Unreachable,
-    /// The robot was late.
     TimedOut,
     Missed,
     /// The run ended before the robot was sent there.
@@ -52,7 +51,7 @@ pub struct TargetResult {
     pub x_m: f64,
     pub y_m: f64,
     pub outcome: TargetOutcome,
-    /// Mission time of the outcome; `None` for an untried target.
+    /// `None` for an untried target.
     pub at_s: Option<f64>,
     /// Distance from the target on arrival by the own pose.
     pub distance_m: Option<f64>,
@@ -74,7 +73,6 @@ pub struct TargetList {
     number: u64,
     current: TargetPoint,
     since_tick: u64,
-    /// Mission time of this target's start, seconds.
     began_s: f64,
     ahead: Vec<TargetPoint>,
     results: Vec<Stored>,

@@ -1,3 +1,5 @@
+//! Cells of a map on the page.
+
 use common::grid::GridFrame;
 use glam::DVec2;
 

@@ -55,7 +55,6 @@ pub struct FieldOnMap<'a> {
     pub blocked: &'a [bool],
     /// E along columns and rows; log2 u is negative infinity where blocked or cut off.
     pub cells: &'a [FieldCell],
-    /// Column and row.
     pub target: (usize, usize),
 }
 

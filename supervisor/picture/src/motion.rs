@@ -8,7 +8,7 @@ use super::{
     scene::Scene,
 };
 
-/// Maximum poses of a drawn trajectory, for a small file even after a day at 7 Hz.
+/// Limits the file, even after a day at 7 Hz.
 const MOST_POSES: usize = 4000;
 /// Approximate number of bodies along the trajectory.
 const BODIES: f64 = 16.0;
@@ -53,7 +53,6 @@ impl<'a> Motion<'a> {
         self.every.map(|(seconds, _)| seconds)
     }
 
-    /// Iterates over about [`BODIES`] times and poses of drawn bodies.
     pub(super) fn instants(&self) -> impl Iterator<Item = (f64, &'a Pose2)> {
         (0..).map(f64::from).map_while(|nth| {
             let (seconds, stride) = self.every?;

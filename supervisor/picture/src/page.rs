@@ -219,7 +219,7 @@ impl Path {
     }
 }
 
-/// Returns a text element. `words` are XML, `style` further attributes.
+/// Takes `words` in XML, and further attributes as `style`.
 pub(super) fn text(at: DVec2, style: &str, words: &str) -> String {
     format!("<text x=\"{}\" y=\"{}\"{style}>{words}</text>\n", Px(at.x), Px(at.y))
 }

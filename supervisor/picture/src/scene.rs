@@ -38,6 +38,6 @@ pub struct Facts<'a> {
     pub straight_m: f64,
     /// Range samples that put a hazard on the map.
     pub safety_events: u64,
-    /// Seed; `None` with a real robot.
+    /// `None` with a real robot.
     pub seed: Option<u64>,
 }

@@ -24,7 +24,6 @@ pub enum State {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Activity {
     pub ran: Duration,
-    /// Time ready to run while others ran.
     pub starved: Duration,
     pub state: State,
 }
@@ -39,7 +38,6 @@ impl Activity {
     }
 }
 
-/// Times of a process since its start.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Times {
     ran: Duration,

@@ -29,7 +29,6 @@ use crate::{domain, policy::STOP_GRACE};
 
 /// Time without an iteration after which the loop hangs; a healthy one turns five times a second.
 const STUCK: Duration = Duration::from_secs(2);
-/// Exit code, as of any failed run.
 const FAILED: u8 = 1;
 
 const HANGS: &str =

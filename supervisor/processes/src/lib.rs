@@ -5,23 +5,9 @@
 //! checkpoint. The link stops the robot meanwhile. Failures of code that only reports (logs,
 //! records, published deaths) never end a mission.
 //!
-//! # The files, in reading order
+//! # Reading order
 //!
-//! | module | holds |
-//! |---|---|
-//! | [`stages`] | the only table of stages: inputs, outputs, deadlines |
-//! | [`policy`] | actions for one stage, pure |
-//! | `output_watchdog` | unanswered inputs, pure |
-//! | [`activity`] | whether a process hangs, is blocked or waits for a processor |
-//! | `observed_time` | time that counts for deadlines |
-//! | [`process`] | a process that is watched, signalled, reaped |
-//! | `stage_process`, [`stage_processes`] | one stage with its policy and process; all of them |
-//! | [`death`], [`records`] | record of a death; files of records in the run directory |
-//! | [`cleanup`] | removal of ended processes' resources from the bus |
-//! | [`domain`], `orphans`, `descriptors` | directory and shared memory; stages that outlive their supervisor; descriptor limit |
-//! | [`service_manager`] | notifications to systemd |
-//! | [`last_resort`] | end of a run whose supervisor hangs |
-//! | [`executable`], [`planner_executable`] | named executables, checked before any start; the planner's |
+//! Start with [`stages`], the table of stages, and the pure [`policy`].
 
 pub mod activity;
 pub mod cleanup;

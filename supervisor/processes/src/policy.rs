@@ -55,7 +55,6 @@ pub enum Event {
     Refused,
     /// Request for a new generation, which releases a held stage.
     Replace,
-    /// Request to stop without a successor.
     Stop,
     /// Passage of time; all of it counts without the process's activity.
     Time(Option<Activity>),
@@ -108,7 +107,6 @@ pub enum Phase {
 pub enum Stability {
     NeverReady,
     Brief,
-    /// Ready for at least [`STABLE_AFTER`].
     Stable,
 }
 

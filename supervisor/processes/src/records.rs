@@ -11,7 +11,6 @@ use serde::Serialize;
 
 pub const DEATHS: &str = "deaths.jsonl";
 pub const STALLS: &str = "stalls.jsonl";
-/// Results of targets, as they become known.
 pub const TARGETS: &str = "targets.jsonl";
 
 pub fn append(directory: &Path, name: &str, record: &impl Serialize) {

@@ -104,7 +104,7 @@ impl StageProcess {
         true
     }
 
-    /// Takes a heartbeat. Returns whether the roster must be published.
+    /// Returns whether the roster must be published.
     pub(crate) fn on_beat(&mut self, health: &HealthSample, now: Now) -> bool {
         if self.process.is_none() || self.pid() != health.pid {
             return false;

@@ -96,7 +96,7 @@ impl StageProcesses {
         Some(if left.is_zero() { LOOK_AGAIN } else { left })
     }
 
-    /// Takes a heartbeat. Returns whether it changed the roster.
+    /// Returns whether the roster changed.
     pub fn on_health(&mut self, health: &HealthSample) -> bool {
         let Some(index) = self.position(name_str(&health.stage)) else {
             return false;

@@ -128,7 +128,6 @@ pub fn find(name: &str) -> Option<&'static Stage> {
     TABLE.iter().find(|stage| stage.name == name)
 }
 
-/// Returns the error message for an unknown stage name.
 pub fn unknown(name: &str) -> String {
     let names: Vec<_> = TABLE.iter().map(|stage| stage.name).collect();
     let names = names.join(", ");

@@ -38,8 +38,7 @@ impl Bag {
         Ok(Self { output, folder: folder.to_path_buf() })
     }
 
-    /// Adds a topic with the name and definition of its type. Late joiners get its newest message
-    /// if it `is_latched`.
+    /// Adds a topic. Late joiners get its newest message if it `is_latched`.
     ///
     /// # Errors
     /// Fails if the file cannot be written.

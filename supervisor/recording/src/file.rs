@@ -1,3 +1,5 @@
+//! Writer of the MCAP file.
+
 use std::{
     collections::{BTreeMap, HashMap},
     fs::{self, File},
@@ -41,7 +43,6 @@ pub(crate) struct RecordingFile {
     chunk_began: Instant,
 }
 
-/// Returns the machine's time, nanoseconds since 1970.
 pub fn now_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0, |since| since.as_nanos() as u64)

@@ -43,21 +43,6 @@
 //! }
 //! # Ok::<(), recording::RecordingError>(())
 //! ```
-//!
-//! | module | holds |
-//! |---|---|
-//! | [`schema`] | schema of a topic, made from its layout |
-//! | `bag` | writer of rosbag2 bags |
-//! | `budget` | disk budget of a recorder's files |
-//! | `file` | writer of the file |
-//! | `log_files` | new lines in the logs of a run |
-//! | `places` | names of recordings |
-//! | `losses` | samples that the recorder missed |
-//! | [`recorder`] | the recorder |
-//! | [`reader`] | reader of the file |
-//! | [`replay`] | recordings replayed to the bit |
-//! | [`viewers`], `protobuf` | messages for viewers, and their encoding |
-//! | `error` | errors |
 
 mod bag;
 mod budget;

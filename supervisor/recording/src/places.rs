@@ -1,3 +1,5 @@
+//! Names of recordings.
+
 use std::{
     collections::BTreeMap,
     fs,
@@ -28,7 +30,6 @@ fn taken(run: &Path) -> BTreeMap<u32, PathBuf> {
     with_numbers.collect()
 }
 
-/// Returns the next free name.
 pub fn next_place(run: &Path) -> PathBuf {
     let last = taken(run).into_keys().next_back().unwrap_or(0);
     numbered(&run.join("recording.mcap"), last.saturating_add(1))

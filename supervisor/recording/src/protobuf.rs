@@ -27,7 +27,6 @@ impl Message {
         self.varint(field << 3 | kind);
     }
 
-    /// Adds an integer, an enum or a bool.
     pub(crate) fn integer(mut self, field: u64, value: u64) -> Self {
         if value != 0 {
             self.tag(field, VARINT);

@@ -67,14 +67,12 @@ pub struct Message {
 
 #[derive(Debug)]
 pub struct Sample<P> {
-    /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     pub sample: P,
 }
 
 #[derive(Debug)]
 pub struct SliceSample<H, T> {
-    /// Mission time, as nanoseconds since 1970.
     pub log_ns: u64,
     pub header: H,
     pub elements: Vec<T>,
@@ -224,7 +222,6 @@ fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
     Some(recorder.lost)
 }
 
-/// Messages of some topics in file order.
 #[derive(Debug)]
 pub struct Messages {
     records: Option<Records>,
@@ -232,7 +229,6 @@ pub struct Messages {
 }
 
 impl Messages {
-    /// Returns the next message; `None` at the end or cut.
     fn read(&mut self) -> Result<Option<Message>> {
         let Some(records) = &mut self.records else {
             return Ok(None);

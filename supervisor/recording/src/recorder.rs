@@ -78,7 +78,6 @@ impl Options {
 /// Events for the caller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Happened<'a> {
-    /// The recorder is attached, and records into this file.
     Attached(&'a Path),
     /// All samples before the caller's request are taken.
     CaughtUp,
@@ -90,7 +89,6 @@ pub enum Happened<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wish {
     Record,
-    /// Take all present samples, then report.
     CatchUp,
     Stop,
 }
@@ -111,7 +109,6 @@ impl<F: FnMut() -> Wish> Wishes for F {
 }
 
 type TopicReader = (&'static dyn AnyTopic, Box<dyn AnyReader>);
-/// The readers of one bus.
 type Readers = Vec<TopicReader>;
 
 /// Records until the caller requests a stop, or a single run ends.

@@ -3,16 +3,6 @@
 //!
 //! A generation's state follows from all its inputs, so it is replayed only from its beginning. The
 //! report explains why a generation was not replayed.
-//!
-//! | module | holds |
-//! |---|---|
-//! | [`report`] | result of a replay |
-//! | `generation` | one generation, replayed while its inputs are read |
-//! | `pieces` | entries of a generation's inputs, from their pieces |
-//! | [`driver`] | replay of a recording |
-//! | `values` | fields of a message as text |
-//! | [`diff`] | first difference of two recordings |
-//! | `samples` | recorded samples of a tick and their differences |
 
 pub mod diff;
 pub mod driver;

@@ -8,15 +8,6 @@
 //!
 //! A recording is read once. The page has a bounded number of rows, maps and fields; metrics count
 //! all.
-//!
-//! | module | holds |
-//! |---|---|
-//! | `source` | recordings of the run, and its summary |
-//! | `content` | page and metrics of the recordings |
-//! | `measured` | metrics of the recording itself |
-//! | `beliefs` | map and field at a few moments |
-//! | `metrics` | table of metrics, under their field names |
-//! | [`shortest_path`] | shortest path of a body through known shapes |
 
 mod beliefs;
 mod content;

@@ -5,13 +5,6 @@
 //! recording. [`RobotState::apply`] takes either.
 //!
 //! The guide's page `attach.md` has a dashboard, compiled with this crate's doc tests.
-//!
-//! | file | holds |
-//! |---|---|
-//! | `sample` | the only table of topics read, and the feed |
-//! | `state` | the value |
-//! | `events` | deaths, stalls, orders, the failsafe and log lines as one list |
-//! | `words` | states and causes in words |
 
 mod events;
 mod sample;

@@ -127,7 +127,6 @@ impl RobotState {
         self.events.log(process, line);
     }
 
-    /// Returns the newest events since the last call, oldest first.
     pub fn take_events(&mut self) -> Vec<Event> {
         self.events.drain()
     }
@@ -194,7 +193,7 @@ impl RobotState {
         (kind, format!("{text}; {}", guidance_in_words(status)))
     }
 
-    /// Returns the current target; `None` while the robot waits for one.
+    /// Returns `None` while the robot waits for a target.
     pub fn target(&self) -> Option<&TargetSample> {
         let waits = |it: RosterHeader| {
             matches!(HoldReason::from_byte(it.reason), HoldReason::Waiting | HoldReason::Lost)

@@ -52,7 +52,6 @@ impl WheelTotals {
         Self { extremes: Some([least.min(left).min(right), greatest.max(left).max(right)]) }
     }
 
-    /// Returns the range of both wheels' commanded speeds, rad/s.
     pub(crate) fn range_rad_s(self) -> Option<f64> {
         self.extremes.map(|[least, greatest]| greatest - least)
     }

@@ -104,7 +104,6 @@ static ROBOTS: [(&str, &str); 6] = [
 ];
 /// Pseudo-key: ratio of the turn by odometry to the turn of the wheels.
 const ODOMETRY_TURNS: &str = "odometry.turns=";
-/// Number of draws for a second fault that differs from the first.
 const DRAWS: u32 = 20;
 const PATIENCE: Duration = Duration::from_secs(400);
 const LOOK: Duration = Duration::from_millis(100);
@@ -140,7 +139,6 @@ pub fn main(arguments: &Arguments) -> Result {
         .ok_or_else(|| "the findings missed a fault or named one that does not exist".into())
 }
 
-/// Returns whether a bring-up named exactly its robot's faults, and its findings.
 fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, String)> {
     let mut random = Random::of_world(arguments.seed, 0, number);
     let robot = &*arguments.robots[number as usize % arguments.robots.len()];

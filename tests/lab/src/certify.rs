@@ -1,7 +1,6 @@
 //! Certificate of trials on real processes: attempts, losses, bounds.
 //!
-//! Each part runs on two robots at once. `rows.csv` gets a row per robot and run; `certificate.md`
-//! is rewritten from all rows.
+//! Each part runs on two robots at once.
 
 mod fuzz;
 
@@ -106,7 +105,7 @@ pub fn main(arguments: &Arguments) -> Result {
         write_stderr(&format!("{}: {}\n", part.name, part.what));
         let inputs = arguments.inputs.filter(|_| part.name == FUZZ);
         let share = inputs.map_or(*share, |inputs| f64::from(inputs) / f64::from(part.whole));
-        // The row number determines the seed, so that each is tried once.
+        // The row number determines the seed.
         let number = rows.rows.len() as u64;
         let tried =
             |number: &u64, _| one(part, share / 2.0, *number).map_err(|error| error.to_string());

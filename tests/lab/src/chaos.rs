@@ -4,21 +4,6 @@
 //! Each mission runs twice with one seed: undisturbed, then attacked. It must reach its target
 //! without contact, with about the pose error of the undisturbed run, and leave nothing on the
 //! machine.
-//!
-//! | module | contents |
-//! |---|---|
-//! | [`Options`] | the attacked mission, and the kinds of attack |
-//! | `schedule` | the seeded schedule of signals |
-//! | `mission` | one mission, undisturbed and attacked |
-//! | `attack` | the attacker and its readers on the bus |
-//! | [`consumers`] | consumers that are hit and restarted |
-//! | `changes` | changing targets |
-//! | `replays` | replays of recordings |
-//! | `leftovers` | files and processes that outlived a mission |
-//! | `report` | the overall result, and the table of signals |
-//! | `robot_fault` | the table of robot faults |
-//! | `robot_faults`, `proxy`, `fault_injector` | missions of faulty robots; the proxy before the robot; the changes of its bytes |
-//! | `stop_time_table` | stop times after faults |
 
 mod attack;
 mod changes;
@@ -46,8 +31,7 @@ use serde::Serialize;
 use crate::error::Result;
 use report::Series;
 
-/// Exit code if a mission missed its target, touched something, lost its pose, aborted a healthy
-/// stage or left something behind. It also marks a faulty robot that stopped late.
+/// Exit code after a failed mission or a faulty robot that stopped late.
 const NOT_CLEAN: u8 = 8;
 
 pub struct Judged {
@@ -67,7 +51,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     Ok(ExitCode::from(if judged.lost == 0 { 0 } else { NOT_CLEAN }))
 }
 
-/// Runs and judges without printing. Keeps the missions' directory after a failure.
+/// Keeps the missions' directory after a failure.
 pub fn judge(arguments: &Arguments) -> Result<Judged> {
     let options = Options::of(arguments)?;
     let directory = options.directory.display();

@@ -1,10 +1,5 @@
 //! `firsthand experiments`: the paper's experiments, repeated with many seeds through the real
 //! processes, beside the paper's values.
-//!
-//! | module | contents |
-//! |---|---|
-//! | `table` | `table.csv`, experiments with missions and the paper's reports, and `claims.csv`, the paper's claims |
-//! | `report` | the results as JSON objects and a page |
 
 mod report;
 mod table;

@@ -148,7 +148,6 @@ fn cells(field: &Field) -> impl Iterator<Item = Cell> {
     (0..field.height()).flat_map(move |row| (0..width).map(move |col| Cell::new(col, row)))
 }
 
-/// Returns a cell's direction, (0, 0) without one.
 fn guidance(field: &Field, cell: Cell) -> [f32; 2] {
     // The field would give a blocked cell its way out of the wall.
     let direction = field.direction(cell).filter(|_| field.is_reachable(cell));

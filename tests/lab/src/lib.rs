@@ -1,26 +1,4 @@
-//! Laboratory: measures robots.
-//!
-//! It is an ordinary bus consumer that starts `firsthand` from its own directory and contains the
-//! planners for comparison. Robots run without it.
-//!
-//! | module | contents |
-//! |---|---|
-//! | [`missions`] | missions on many worlds, judged by the ground truth |
-//! | [`worlds`] | worlds, drawn or read from files |
-//! | `evaluate` | comparison of settings on worlds |
-//! | `experiments` | the paper's experiments with many seeds |
-//! | [`baselines`] | planners for comparison: shortest paths, Bug2 |
-//! | [`chaos`] | random signals to processes; robot faults |
-//! | [`tick`] | tick latency, compared with five bare hops on the bus |
-//! | `certify` | attempts, losses, and bounds |
-//! | `bring_up` | bring-ups of misassembled robots |
-//! | [`sources`] | simulated fixes and turns |
-//! | `field` | the field of a map |
-//! | `background` | threads beside a measurement |
-//! | `random` | random numbers |
-//! | `robot` | `firsthand`, its runs, and simulated robots |
-//! | `ros2_robot` | a simulated ROS 2 robot |
-//! | `error` | failures |
+//! Laboratory: measurements of robots, and planners for comparison. Robots run without it.
 
 // `pub` marks use by another module.
 #![allow(unreachable_pub)]

@@ -1,14 +1,5 @@
 //! Missions on many worlds, each through the real processes, judged by the ground truth.
 //!
-//! | module | contents |
-//! |---|---|
-//! | [`trial`] | a mission in a world, and its rules |
-//! | [`row`] | one mission's result and latencies |
-//! | [`results`] | the directory of an evaluation, and its CSV files |
-//! | [`runner`] | the missions, several at a time |
-//! | [`statistics`] | shares with intervals, differences, medians |
-//! | [`page`] | a page of results |
-//!
 //! Every setting runs on the same worlds and noise, so that only the setting changes the results.
 
 pub mod page;

@@ -26,7 +26,7 @@ impl Random {
         from + (to - from) * self.share()
     }
 
-    /// Returns a uniform point in the rectangle of half size `half` around `centre`.
+    /// Draws uniformly in the rectangle of half size `half`.
     pub fn point(&mut self, centre: DVec2, half: DVec2) -> DVec2 {
         let x = self.within(-half.x, half.x);
         let y = self.within(-half.y, half.y);

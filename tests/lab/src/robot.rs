@@ -23,7 +23,7 @@ use crate::error::{OrCannot as _, Refused, Result};
 /// Returns the path of `firsthand`, beside this executable or on `PATH`.
 ///
 /// # Errors
-/// Returns an error if it is at neither place.
+/// It is at neither place.
 pub fn path() -> Result<PathBuf, Refused> {
     executable::find(Path::new("firsthand")).map_err(|problem| {
         let build = "build it with `cargo build --release`";
@@ -31,7 +31,7 @@ pub fn path() -> Result<PathBuf, Refused> {
     })
 }
 
-/// Returns a subcommand of `firsthand`, which fails to start without [`path`].
+/// Fails to start without [`path`].
 pub fn firsthand(arguments: &[&str]) -> Command {
     let mut command = process::child(path().unwrap_or_default());
     // ROS 2 robots stay on this machine.
@@ -79,10 +79,10 @@ impl Run {
         Ok(self)
     }
 
-    /// Returns the summary that the run leaves at its end.
+    /// Returns the run's summary.
     ///
     /// # Errors
-    /// Returns the last line of the run's standard error if there is no summary.
+    /// Without a summary, the last line of the run's standard error.
     pub fn summary(&self) -> Result<Summary> {
         let summary = fs::read(self.directory.join(SUMMARY)).ok();
         summary.and_then(|summary| serde_json::from_slice(&summary).ok()).ok_or_else(|| {

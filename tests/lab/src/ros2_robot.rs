@@ -44,7 +44,6 @@ const WATCHDOG_S: f64 = 0.25;
 /// Share of a delay, as a divisor, by which report times catch up.
 const CATCHES_UP: u64 = 8;
 const LOOK: Duration = Duration::from_millis(50);
-/// Silence after which the simulated robot is greeted again.
 const SILENT: Duration = Duration::from_secs(1);
 const MOST_COMMANDS: usize = 16;
 const RELIABLE: Quality = Quality { is_reliable: true, is_latched: false, depth: 10 };
@@ -87,7 +86,7 @@ impl Ros2Robot {
     /// Its odometry turns `turns` times as far as the wheels do.
     ///
     /// # Errors
-    /// Returns an error if there is no such mission, or DDS does not start.
+    /// There is no such mission, or DDS does not start.
     pub fn start(
         robot: SocketAddr,
         number: u64,
@@ -189,7 +188,6 @@ impl Program {
         }
     }
 
-    /// Converts a `geometry_msgs/Twist` to a wheel order. Fails for other payloads.
     fn order(&self, payload: &[u8]) -> Result<Order, Malformed> {
         let twist = msg::Twist::decode(payload)?;
         let [v, omega] = [twist.linear.x, twist.angular.z];
@@ -208,8 +206,8 @@ impl Program {
 
     /// Returns when a report that came at `now_ns` was made.
     ///
-    /// On a busy machine, reports queue and come together. A report's time is one period after the
-    /// previous one's, and catches up slowly if that is late.
+    /// Reports queue on a busy machine, so times follow one period after another and catch up
+    /// slowly.
     fn taken_ns(&mut self, report: &Report, now_ns: u64) -> u64 {
         if report.wheels.is_none() {
             return now_ns;
@@ -220,7 +218,6 @@ impl Program {
         *self.taken_ns.insert(taken_ns)
     }
 
-    /// Returns a topic's message of a `report` made at `now_ns`; none without content.
     fn message(&self, content: Content, report: &Report, now_ns: u64) -> Option<Vec<u8>> {
         match content {
             Content::Odometry => {
@@ -272,8 +269,7 @@ impl Program {
     }
 }
 
-/// Encodes active bumpers and cliff sensors, by row names, as
-/// `irobot_create_msgs/HazardDetectionVector`.
+/// Encodes active bumpers and cliff sensors, by row names.
 fn hazards(touched: &BTreeMap<String, bool>, now_ns: u64) -> Vec<u8> {
     let hazard = |(name, _): (&String, _)| HazardDetection {
         header: Header::at(now_ns, &name.replace('-', "_")),

@@ -1,12 +1,4 @@
 //! Latency of a tick, datagram in to datagram out, compared with the bus alone.
-//!
-//! | module | contents |
-//! |---|---|
-//! | [`Arguments`] | missions and bare hops, in turn |
-//! | `hops` | five bare hops between processes |
-//! | `busy` | computing threads |
-//! | `mission` | the measured mission, and its consumers |
-//! | `process_set` | resources of a process and its descendants |
 
 mod busy;
 mod hops;
@@ -83,7 +75,6 @@ pub fn main(arguments: &Arguments) -> Result {
     reports.iter().try_for_each(|report| crate::print(report, arguments.json))
 }
 
-/// Measures missions and hops, in turn, at `rate_hz` ticks per mission second.
 fn measure(
     regime: Regime,
     arguments: &Arguments,
@@ -103,7 +94,7 @@ fn measure(
     Report::new(regime, &hops, &rounds, used)
 }
 
-/// Ticks per second; none if back to back. It decides whether caches are warm and cores awake.
+/// None if back to back. The rate decides whether caches are warm and cores awake.
 #[derive(Clone, Copy, Debug)]
 struct Regime(Option<f64>);
 
@@ -168,8 +159,7 @@ struct Report {
     regime: String,
     ratio: f64,
     ratio_p99: f64,
-    /// Resources of the last mission's processes and simulated robot; none for a mission of a
-    /// second or two.
+    /// None for a mission of a second or two.
     #[serde(flatten)]
     used: Option<Used>,
     times: [Times; 2],

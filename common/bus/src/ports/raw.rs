@@ -46,7 +46,7 @@ use crate::{
     spec::{Limits, Spec},
 };
 
-/// Wraps types to compile their destructors only here, and not in each crate that drops them.
+/// Wraps types to compile their destructors only here.
 macro_rules! dropped_here {
     ($($(#[$doc:meta])* $name:ident($port:ty);)*) => {$(
         $(#[$doc])*
@@ -95,7 +95,6 @@ dropped_here! {
     RawSample(sample::Sample<ipc::Service, Bytes, CustomHeaderMarker>);
 }
 
-/// Description of a payload on which all processes must agree.
 #[derive(Clone, Copy, Debug)]
 struct Type {
     name: &'static str,

@@ -1,8 +1,7 @@
 //! Monitor for other commanders: nodes that publish commands, and hosts whose commands the robot
 //! acknowledges.
 //!
-//! The robot obeys the newest command, so two commanders drive it where neither wants. A silent
-//! publisher is harmless.
+//! The robot obeys the newest command, so two commanders drive it where neither wants.
 //!
 //! A robot acknowledges each command. Over a serial server every host receives that, and a JSON
 //! robot counts all hosts' orders. Duplicated datagrams may add a few acknowledgements.
@@ -81,7 +80,6 @@ pub struct OtherCommander {
 }
 
 impl OtherCommander {
-    /// Returns whether another's command was acknowledged since the last call.
     pub(crate) fn take_told(&mut self) -> bool {
         std::mem::take(&mut self.is_told)
     }

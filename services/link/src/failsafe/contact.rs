@@ -34,7 +34,6 @@ const LEAST_AHEAD_SHARE: f64 = 0.5;
 pub(super) struct Contacts {
     limit_ad: u16,
     currents: [u16; 2],
-    /// Time of high current on a rolling wheel, seconds.
     high_and_rolls_s: [f64; 2],
     /// Held wheels, and since when.
     held: Option<([bool; 2], MissionTime)>,
@@ -50,7 +49,6 @@ impl Contacts {
         self.currents = currents;
     }
 
-    /// Returns whether each motor draws a held one's current.
     pub(super) fn high(&self) -> [bool; 2] {
         let range = self.limit_ad.max(1)..=MOST_AD;
         let is_sign = |s: &f64| self.limit_ad > 0 && *s < HIGH_AND_ROLLS.as_secs_f64();
@@ -81,7 +79,6 @@ impl Contacts {
         true
     }
 
-    /// Returns a held wheel whose current stays high after a stop.
     pub(super) fn repeats(&self, now: MissionTime) -> Option<usize> {
         let (held, since) = self.held?;
         let stood = now.since(since);

@@ -64,7 +64,6 @@ impl LatencyMonitor {
         }
     }
 
-    /// Returns whether sending must pause, to expose late acknowledgements.
     pub const fn is_testing(&self) -> bool {
         matches!(self.state, State::Testing(_))
     }

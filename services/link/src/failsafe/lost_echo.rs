@@ -8,8 +8,8 @@
 //!
 //! Likelihoods of misses add up until the next reading that hears anything. In 450 missions with
 //! one, three and six sonars, the sum reached 7.9 for one sonar. It reached 3.2 while all of
-//! several were silent. Of these missions, 160 had harsh noise, and 70 bases that answer late. In 6
-//! missions in which three sonars fell deaf before drums, it reached 20 to 45.
+//! several were silent. In 6 missions in which three sonars fell deaf before drums, it reached 20
+//! to 45.
 
 use common::{
     kinematics::Pose2,
@@ -99,7 +99,6 @@ impl Listener {
         Echo { places: std::array::from_fn(place), from, at_s, readings: 1 }
     }
 
-    /// Returns whether a place lies within this cosine of the axis.
     fn sees(&self, place: DVec2, cosine: f64) -> bool {
         let way = place - self.from.position;
         way.dot(self.from.axis()) > cosine * way.length()
@@ -205,7 +204,6 @@ fn hears(echoes: &mut Vec<Echo>, listener: Listener, range_m: f64, at_s: f64) {
     }
 }
 
-/// Returns the likelihood that a known echo was missed.
 fn misses(echoes: &mut [Echo], listener: Listener) -> f64 {
     let mut likely = 0.0_f64;
     for echo in echoes {

@@ -39,14 +39,12 @@ pub enum Observation<'a> {
     Readings(&'a [RangeReading]),
     /// Scan, and the stated time of its middle beam, mission seconds.
     Scan(&'a LaserScan, f64),
-    /// Rows of bumpers and cliff sensors, and whether they are triggered.
     Touched(&'a [(usize, bool)]),
     /// Found response that differs from the stated one.
     Responds(Response),
     /// Command from a sender other than the link.
     Commander(Commander),
     TwoPublishers(&'a str),
-    /// Robot that answers, and was asked for its streams.
     Found {
         /// Whether it had answered before.
         again: bool,
@@ -126,7 +124,6 @@ impl fmt::Display for Clears {
     }
 }
 
-/// Observer of the link that judges the conditions of its causes.
 pub trait Monitor {
     fn new(mission: &Mission) -> Self
     where

@@ -1,22 +1,19 @@
 //! Odometry monitor: checks that the encoders follow the commands.
 //!
-//! Checks cover each wheel, and their difference, because a robot with swapped wheels turns the
-//! wrong way.
-//!
 //! A frame interval is evidence if the wheel's command, at [`LEAST_M_S`] or more, kept its sign for
 //! the settling time of the response. Commands count as far as the base's acceleration has reached
-//! them. The dead band of 20 counts/s (9 mm/s) is well below. The wheel must roll [`LEAST_SHARE`]
-//! of the smaller of the two newest commands; real wheels roll 0.75 to 0.8. Intervals over two
-//! periods are no evidence, because commands may have been lost.
+//! them. The wheel must roll [`LEAST_SHARE`] of the smaller of the two newest commands; real wheels
+//! roll 0.75 to 0.8. Intervals over two periods are no evidence, because commands may have been
+//! lost.
 //!
-//! Evidence against a wheel adds up, and evidence for it counts down at most twice as fast.
-//! Opposite motion counts twice, once a wheel could have reversed: a robot that turns away from its
-//! target gets a new direction every other tick. At [`SUSPECTED_AFTER`] the robot must stand: an
-//! X80 at 7 Hz 0.86 s after a motion began, and at rest 0.2 s later.
+//! Each wheel and their difference are checked, because swapped wheels turn the robot the wrong
+//! way. Evidence against one adds up; evidence for it counts down at most twice as fast. Opposite
+//! motion counts twice, once a wheel could have reversed: a robot that turns away from its target
+//! gets a new direction every other tick. At [`SUSPECTED_AFTER`] the robot must stand: an X80 at 7
+//! Hz 0.86 s after a motion began, and at rest 0.2 s later.
 //!
 //! Until the robot stands, [`super::response_fit`] looks for a response that explains the motion.
-//! If found, it replaces the stated one, and the link's log names it. A base heavier than stated is
-//! healthy.
+//! If found, it replaces the stated one, and the link's log names it.
 //!
 //! A commanded wheel without counts is suspected after [`STILL_AFTER`]. A controller whose pose
 //! turns the wrong way changes direction too often for the other evidence. With a held motor's
@@ -24,7 +21,7 @@
 //!
 //! Motion is uncommanded if a wheel or the difference exceeds every recent command by
 //! [`LEAST_TURN_M_S`] plus a quarter of the wheels' speed. At [`UNTOLD_AFTER`] another host may
-//! command it. The stop monitor judges commanded stops.
+//! command it.
 //!
 //! Single impossible counts are dropped ([`super::restart`]); [`MOST_JUMPS`] within
 //! [`JUMPS_WITHIN`] are suspect too.
@@ -250,7 +247,7 @@ impl Odometry {
         self.turn.ask(if tells { turn } else { 0.0 }, now);
     }
 
-    /// Commands `counts`, counts/s. Returns the speeds reached by the base's acceleration.
+    /// Returns the speeds that the base reaches, counts/s.
     fn ask(&mut self, counts: [f64; 2], now: MissionTime) -> [f64; 2] {
         self.fit.commanded(counts, now);
         self.reached.command(now.seconds(), counts);
@@ -391,8 +388,7 @@ impl Odometry {
         (found.are_told_apart && is_new).then_some(found.slowest)
     }
 
-    /// Ends a suspicion if a response explains the motion behind it. Motion until the robot stands
-    /// tells more.
+    /// Ends a suspicion if a response explains the motion behind it.
     fn look_for_explanation(&mut self, now: MissionTime) {
         let Some((suspicion, since)) = self.suspicion else {
             return;

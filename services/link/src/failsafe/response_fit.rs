@@ -35,8 +35,7 @@ const LEAST_M: f64 = 0.04;
 /// Largest unexplained share of judged motion, in squared counts.
 const UNEXPLAINED: f64 = 0.25;
 
-/// Grid of added delay. In 240 recorded missions of robots as stated it found none. With frames 0.5
-/// s late it found five of six, at the median after 1.6 s.
+/// Grid of added delay. In 240 recorded missions of robots as stated it found none.
 const LATER_STEP_S: f64 = 0.1;
 const LATER_STEPS: i32 = 20;
 const LEAST_LATER_S: f64 = 0.25;
@@ -80,8 +79,7 @@ pub(super) struct Alike {
     pub(super) slowest: Response,
     /// Shortest stopping distance among them, metres.
     pub(super) stops_within_m: f64,
-    /// Whether the alike responses differ little. Delay and acceleration both delay a start; more
-    /// motion separates them.
+    /// Whether the alike responses differ little.
     pub(super) are_told_apart: bool,
 }
 
@@ -350,7 +348,6 @@ impl ResponseFit {
         course
     }
 
-    /// Returns a delayed course's travel in each interval but the first, counts.
     fn ways(&self, course: &Course, dead_time_s: f64) -> Vec<f64> {
         let mut pieces = course.iter().peekable();
         let mut piece = &[0.0; 4];
@@ -443,7 +440,6 @@ impl Motion {
         }
     }
 
-    /// Returns the squared deviation from `factor` times the model.
     fn unlike(&self, factor: f64) -> f64 {
         self.turned - 2.0 * factor * self.both + factor * factor * self.model
     }

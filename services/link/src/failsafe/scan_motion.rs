@@ -57,7 +57,6 @@ impl Poses {
     }
 }
 
-/// Returns the delay with the greatest sum above `least`.
 pub(super) fn best(delays_s: &[f64], better: &[f64], least: f64) -> Option<f64> {
     let better = delays_s.iter().zip(better);
     let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
@@ -85,7 +84,6 @@ impl ScanMotion {
         *self = Self::new(self.row, self.sensor.clone());
     }
 
-    /// Takes a scan, stated to be measured at `at_s`.
     pub(super) fn take(&mut self, scan: &LaserScan, at_s: f64) {
         if self.poses.0.is_empty() || scan.beams.len() != self.sensor.beams {
             return;
@@ -123,8 +121,6 @@ impl ScanMotion {
         }
     }
 
-    /// Returns the mean difference of the first scan's ranges and the second's points seen from
-    /// there, metres.
     fn unlike(&self, (first, from): (&[f32], Pose2), (second, to): (&[f32], Pose2)) -> f64 {
         let [from, to] = [from, to].map(|robot| self.sensor.mount.on(robot));
         let (first_rad, step_rad) = self.sensor.fan();

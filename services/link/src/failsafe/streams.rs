@@ -91,7 +91,6 @@ impl Streams {
         self.sensors.iter().filter(is_silent).collect()
     }
 
-    /// Returns the cause by which silent sensors stop or slow the robot.
     fn silent(&self, now_ns: u64) -> Option<Cause> {
         match self.silent_sensors(now_ns)[..] {
             [] => None,

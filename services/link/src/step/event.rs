@@ -35,7 +35,7 @@ impl Default for State {
 pub struct Entry<'a> {
     #[serde(borrow)]
     pub event: Event<'a>,
-    /// Machine's monotonic clock, nanoseconds, for the deadlines of wires.
+    /// Machine's monotonic clock, for the deadlines of wires.
     pub machine_ns: u64,
     pub now: MissionTime,
 }
@@ -79,7 +79,6 @@ pub enum Effect {
         time: MissionTime,
         ranges: Vec<RangeReading>,
         scans: Vec<LaserScan>,
-        /// Turn since the last tick by the robot's gyro.
         turn: Option<TurnSample>,
         wheels: WheelSample,
         /// Unwrapped counts of a robot without a counter.
@@ -95,7 +94,6 @@ pub enum Effect {
     Unlimited {
         tick: u64,
     },
-    /// New decision. The stops that follow are separate effects.
     Decided {
         before: Decision,
         now: Decision,
@@ -104,7 +102,6 @@ pub enum Effect {
     Restarted,
     /// Counts that continue after an impossible jump.
     CountsElsewhere,
-    /// Next stop method, because the robot did not stop.
     StopBy(&'static str),
     FoundResponse(String),
     Refused(Refusal),

@@ -2,10 +2,8 @@
 
 use crate::{Cell, Change, MAX_SIDE, MIN_SCREENING_CELLS, Screening, SolveError, real::Real};
 
-/// Map of `width` x `height` cells with its target, screening and costs.
-///
-/// Arrays are row-major: index = row * width + col. Cells outside the map count as blocked, so
-/// cells at the rim may be free.
+/// Map of `width` x `height` cells with its target, screening and costs. Cells outside count as
+/// blocked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Domain {
     width: usize,
@@ -69,8 +67,7 @@ impl Domain {
     ///
     /// `costs` is row-major, with values from 0 up. For short screening lengths, the field
     /// approaches the path with the least sum of costs. Without screening, costs have no effect.
-    /// They are checked against the current screening, so call
-    /// [`with_screening`](Self::with_screening) first.
+    /// Call [`with_screening`](Self::with_screening) first.
     ///
     /// # Errors
     /// - [`SolveError::WrongLength`] if the length of `costs` differs from the number of cells.

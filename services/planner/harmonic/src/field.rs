@@ -50,7 +50,7 @@ impl Field {
         self.target
     }
 
-    /// Returns the findings of the check over all cells.
+    /// Returns the findings of the check.
     pub fn verification(&self) -> &Verification {
         &self.verification
     }
@@ -106,7 +106,6 @@ impl Field {
         least.log10()
     }
 
-    /// Returns the step along columns or rows to the neighbour with the largest u.
     pub(crate) fn steepest_ascent(&self, col: i64, row: i64) -> [i64; 2] {
         let mut best = (Scaled::ZERO, [0; 2]);
         for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
@@ -118,7 +117,6 @@ impl Field {
         best.1
     }
 
-    /// Returns whether the map size and the target equal those of `domain`.
     pub(crate) fn fits(&self, domain: &Domain) -> bool {
         (self.width, self.height, self.target) == (domain.width(), domain.height(), domain.target())
     }

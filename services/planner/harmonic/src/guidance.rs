@@ -10,9 +10,7 @@
 
 use crate::{Cell, Field};
 
-/// Answer of a field at a position.
-///
-/// Directions are unit vectors (along growing columns, along growing rows).
+/// Answer of a field at a position; directions are unit vectors (along columns, along rows).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Guidance {
     /// Direction to follow in free space.
@@ -39,8 +37,7 @@ pub(crate) const SADDLE: f64 = 1e-7;
 impl Field {
     /// Returns the guidance at a position in cell units, with cell centres at the integers.
     ///
-    /// The direction is the normalised gradient, equation (11), without its component into walls
-    /// closer than half a cell.
+    /// The direction lacks the gradient's component into walls closer than half a cell.
     pub fn guidance(&self, col: f64, row: f64) -> Guidance {
         if !(col.is_finite() && row.is_finite()) {
             return Guidance::Unreachable;
@@ -77,10 +74,10 @@ impl Field {
             .map_or(Guidance::Unreachable, Guidance::Along)
     }
 
-    /// Returns the direction at the centre of a cell, as a unit vector (along columns, along rows).
+    /// Returns the direction at the centre of a cell.
     ///
-    /// Returns `None` in blocked cells, cut-off cells and the target. The result equals that of
-    /// [`guidance`](Self::guidance), because walls have no effect at centres.
+    /// Returns `None` in blocked cells, cut-off cells and the target. Elsewhere it equals
+    /// [`guidance`](Self::guidance).
     pub fn direction(&self, cell: Cell) -> Option<[f64; 2]> {
         if cell == self.target() || !self.is_reachable(cell) {
             return None;
@@ -100,8 +97,6 @@ impl Field {
 
     /// Returns the bilinear mean of `value` over the reachable cells among the four centres around
     /// `position`.
-    ///
-    /// `position` lies in the reachable cell `here`.
     fn interpolate(
         &self,
         here: (i64, i64),
@@ -133,8 +128,7 @@ impl Field {
         sum
     }
 
-    /// Returns the central difference of u at `there`, which is `here` or one of its eight
-    /// neighbours, in units of u(here).
+    /// Returns the central difference of u at `there`, which adjoins `here`, in units of u(here).
     fn central_difference(&self, here: (i64, i64), there: (i64, i64)) -> [f64; 2] {
         let own = self.u_at(there.0, there.1);
         let u = |dc: i64, dr: i64| {
@@ -211,15 +205,13 @@ impl Field {
 
     /// Returns the direction to the centre of the neighbour with the largest u.
     ///
-    /// Two adjacent cells are convex together. The straight way is therefore free from anywhere in
-    /// `here` and leads away from every adjacent wall.
+    /// Two adjacent cells are convex together, so the straight way is free from anywhere in `here`.
     fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
         let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);
         unit([here.0 as f64 + dc - position[0], here.1 as f64 + dr - position[1]], 0.0)
     }
 
-    /// Returns the direction to the centre of the nearest reachable cell, searched in growing
-    /// rings.
+    /// Searches growing rings for the nearest reachable cell.
     fn way_out(&self, col: f64, row: f64) -> Guidance {
         let (width, height) = (self.width() as i64, self.height() as i64);
         // Far outside, the search starts at the rim of the map.
@@ -244,7 +236,6 @@ impl Field {
     }
 }
 
-/// Returns the cells inside the map at Chebyshev distance `ring` from `centre`.
 fn ring_cells(
     centre: (i64, i64),
     ring: i64,
@@ -262,7 +253,6 @@ fn ring_cells(
         .chain(sides.flat_map(move |c| rows.clone().map(move |r| (c, r))))
 }
 
-/// Scales `vector` to unit length; returns `None` if its length is at most `least` or not finite.
 fn unit(vector: [f64; 2], least: f64) -> Option<[f64; 2]> {
     let length = vector[0].hypot(vector[1]);
     (length > least && length.is_finite()).then(|| [vector[0] / length, vector[1] / length])

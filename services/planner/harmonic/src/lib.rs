@@ -3,9 +3,8 @@
 //! # Problem
 //!
 //! A robot on a grid map needs a direction at every position. The directions shall lead to the
-//! target and away from obstacles. Sums of attractive and repulsive potentials have local maxima
-//! that trap the robot. A harmonic function takes its extrema on the boundary of the free space
-//! only. Steepest ascent therefore reaches the target from every connected cell.
+//! target and away from obstacles. A harmonic function takes its extrema on the boundary of the
+//! free space only. Steepest ascent therefore reaches the target from every connected cell.
 //!
 //! # Equation
 //!
@@ -24,7 +23,7 @@
 //!
 //! u is also the probability that a random walk meets the target before a blocked cell. The walk
 //! steps to each neighbour with equal chance and ends at every step with chance k / (1 + k).
-//! Guidance follows the normalised gradient, equation (11): grad u / |grad u|.
+//! Guidance follows equation (11): grad u / |grad u|.
 //!
 //! # Range of u
 //!
@@ -48,10 +47,9 @@
 //! # Verification
 //!
 //! A returned field has passed three checks. The first two cover every reachable cell except the
-//! target:
+//! target.
 //!
-//! - The residual of the equation is at most 2e-5 of u in that cell. A norm over the map would
-//!   ignore cells where u is 1e-50.
+//! - The residual of the equation is at most 2e-5 of u in that cell.
 //! - A neighbour has a larger u, so steepest ascent ends at the target.
 //! - In every tile of 64 x 64 cells, the summed relative residuals explain at most 1 % of the
 //!   curvature of the field. Small residuals of one sign would otherwise turn all directions of a

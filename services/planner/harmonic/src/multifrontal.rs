@@ -9,14 +9,6 @@
 //! from u(target) = 1, as sums with moderate positive weights of u nearer to the target. Nothing
 //! iterates, cancels or underflows at any range of u. The cost grows with about the cube of the
 //! front width, which suits corridors better than halls.
-//!
-//! - [`tree`]: cells and order of the fronts.
-//! - [`dense`]: matrix of a front.
-//! - [`back_substitution`]: u from the factors.
-//! - [`gauss_seidel`]: correction of cells beyond the range of `f64` factors.
-//! - [`breadth_first`]: order of the cells.
-//! - [`budget`]: memory limit.
-//! - [`workspace`]: factors, and memory reused between solves.
 
 mod back_substitution;
 mod breadth_first;

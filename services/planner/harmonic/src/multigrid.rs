@@ -4,11 +4,6 @@
 //! stops at walls. The coarse equations are the Galerkin product, so corrections stay on their side
 //! of a wall. The solution is therefore relatively right even where u is 1e-40. The set-up depends
 //! on the map alone. The target is a source of inflow, and the result is divided by u there.
-//!
-//! - [`grid`]: layout in four parity planes.
-//! - [`finest`], [`coarse`], [`coarsest`]: relaxation and transfer on the three kinds of level.
-//! - [`galerkin`], [`couplings`]: interpolation and equations from those of the finer level.
-//! - [`sources`]: inflow on the coarse levels.
 
 mod coarse;
 mod coarsest;
@@ -70,14 +65,12 @@ const VISITED_TWICE: Range<usize> = 1..3;
 ///
 /// Interpolation bends u too much, especially at doors. The correction that is best by energy is
 /// therefore too small (Braess, "Towards algebraic multigrid for elliptic problems of second
-/// order", 1995). In measurements, 1.2 and 1.07 save a quarter of the cycles; 1.3 or 1.2 cost some
-/// on some maps. On small maps the second factor is one, because they visit levels once and its
-/// powers would accumulate.
+/// order", 1995). In measurements, 1.2 and 1.07 save a quarter of the cycles. On small maps the
+/// second factor is one, because they visit levels once and its powers would accumulate.
 const OVERCORRECTION: f64 = 1.2;
 const COARSE_OVERCORRECTION: f64 = 1.07;
 
-/// Longest side of a small map, on which second visits and sweeps cost more than the cycles they
-/// save.
+/// Longest side of a small map, where second visits and sweeps cost more than they save.
 const SMALL_SIDE: usize = 128;
 
 /// Full sweeps per pass over the finest level of a large map.
@@ -95,7 +88,6 @@ pub(crate) struct Multigrid<R> {
     coarsest: Coarsest,
     /// Set-up products of all levels but the coarsest, finest first.
     products: Vec<Products<R>>,
-    /// Whether the first coarse level holds a correction of u.
     corrects: bool,
     /// Whether u falls so steeply that second visits save no cycle.
     is_steep: bool,
@@ -109,7 +101,7 @@ impl<R: Real> Multigrid<R> {
         levels
     }
 
-    /// Reshapes the levels for a map of another size and clears the equations.
+    /// Reshapes the levels and clears the equations.
     ///
     /// Memory is reused, because fresh pages from the system cost as much as several cycles.
     pub(crate) fn reshape(&mut self, width: usize, height: usize) {
@@ -168,7 +160,7 @@ impl<R: Real> Multigrid<R> {
         self.start_from_sources();
     }
 
-    /// Makes `target` the only inflow and starts from a first guess.
+    /// Makes `target` the only inflow.
     ///
     /// `guess` writes a row, with 2^TOP at the target.
     pub(crate) fn start_near(&mut self, target: Cell, mut guess: impl FnMut(usize, &mut [R])) {
@@ -199,8 +191,7 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Starts from the coarser levels by full multigrid: each level is interpolated from the next
-    /// and improved by a cycle.
+    /// Starts by full multigrid: each level is interpolated from the next and improved by a cycle.
     fn start_from_sources(&mut self) {
         self.corrects = false;
         for plane in &mut self.finest.u {
@@ -306,8 +297,7 @@ impl<R: Real> Multigrid<R> {
         unsettled
     }
 
-    /// Solves on a coarse level from zero, by one cycle through the levels below, or two on some
-    /// levels.
+    /// Solves on a coarse level from zero, by one cycle through the levels below, or two.
     fn solve_level(&mut self, level: usize) {
         self.visit(level);
         if self.is_large() && !self.is_steep && VISITED_TWICE.contains(&level) {
@@ -349,7 +339,7 @@ impl<R: Real> Multigrid<R> {
     /// Interpolates the last coarse correction and smooths the remaining error, so that u can be
     /// read.
     ///
-    /// Near a saddle point the direction depends on the last digits. Further cycles may follow.
+    /// Near a saddle point the direction depends on the last digits.
     pub(crate) fn finish(&mut self) {
         self.pass(1 + SMOOTHING, false, None);
         for plane in &mut self.coarse[0].u {

@@ -34,8 +34,6 @@ const MARGIN: f64 = 16.0;
 const LARGEST: f32 = 1e35;
 
 /// Steps of a band beyond the last ones in range in the previous band, absolute and relative.
-///
-/// A band that is cut too short is computed again.
 const MORE: usize = 4;
 const RESERVE: f64 = 1.1;
 
@@ -174,13 +172,11 @@ impl<'a> Bands<'a> {
         self.mantissas[self.index(at)] > 0.0 && self.open(at).next().is_some()
     }
 
-    /// Returns the edge cells with inflow into a band.
     fn inflow(&self, top: i32) -> impl Iterator<Item = Place> {
         let least = top.saturating_sub(NO_INFLOW);
         self.edge.iter().copied().filter(move |&at| self.u(at).exponent > least)
     }
 
-    /// Returns the cells within `steps` of the inflow and marks them with the `number` of the band.
     fn unknowns(&mut self, top: i32, number: i32, steps: usize) -> Unknowns {
         let mut unknowns = Unknowns::default();
         let mut before: Vec<Place> = self.inflow(top).collect();
@@ -206,8 +202,6 @@ impl<'a> Bands<'a> {
         unknowns
     }
 
-    /// Returns the rectangle around the unknowns and their neighbours, extended to multiples of
-    /// [`SIDES`].
     fn rectangle(&self, unknowns: &Unknowns) -> Rectangle {
         let (width, height) = (self.domain.width(), self.domain.height());
         let (mut cols, mut rows) = ((width, 0), (height, 0));
@@ -224,8 +218,8 @@ impl<'a> Bands<'a> {
         Rectangle { col, row, width, height }
     }
 
-    /// Loads a band: `inverse` takes 1 / diagonal of its unknowns, `values` takes u of the adjacent
-    /// resolved cells.
+    /// Loads a band: `inverse` takes 1 / diagonal of its unknowns, `values` takes the adjacent
+    /// resolved u.
     fn load(
         &self,
         here: Rectangle,

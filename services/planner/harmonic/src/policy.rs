@@ -52,7 +52,6 @@ impl Field {
         Policy { direction: self.direction(cell).unwrap_or_default(), log2_u: self.u(cell).log2() }
     }
 
-    /// Returns the policy of `cell`; `rows` are the stored rows above, at and below it.
     fn of_cell<T: Copy + Into<f64>>(&self, rows: [&[T]; 3], exponent: i32, cell: Cell) -> Policy {
         let [above, row, below] = rows;
         let col = cell.col;

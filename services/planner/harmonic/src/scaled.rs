@@ -59,12 +59,12 @@ impl Scaled {
         }
     }
 
-    /// Returns the logarithm to base 2; negative infinity for zero.
+    /// Returns the base-2 logarithm; negative infinity for zero.
     pub fn log2(self) -> f64 {
         self.mantissa.log2() + f64::from(self.exponent)
     }
 
-    /// Returns the logarithm to base 10; negative infinity for zero.
+    /// Returns the base-10 logarithm; negative infinity for zero.
     pub fn log10(self) -> f64 {
         self.mantissa.log10() + f64::from(self.exponent) * std::f64::consts::LOG10_2
     }

@@ -1,7 +1,6 @@
 //! Solver that computes a verified field of a domain.
 //!
-//! The solver tries the method that [`plan()`] chooses and verifies the field. After a failure it
-//! tries the costlier methods.
+//! It tries the method that [`plan()`] chooses, then costlier ones.
 
 mod plan;
 
@@ -19,8 +18,8 @@ use crate::{
 
 use plan::{beyond_single, plan};
 
-/// Cycles before the first check of a solve that starts from a similar field: the first cycle has
-/// no correction to judge by.
+/// Cycles before the first check of a solve from a similar field; the first cycle has no
+/// correction.
 const FIRST_CHECK_NEAR: usize = 2;
 
 /// Cycle limit of a solve that starts from a similar field, before a solve from scratch.
@@ -61,14 +60,13 @@ pub enum Phase {
     Solved,
     /// Field was checked.
     ///
-    /// After a failed check, more cycles or a costlier method follow, with their own phases.
+    /// After a failed check, more phases follow.
     Verified,
 }
 
 /// Solver of fields.
 ///
-/// Between solves it keeps the target-independent set-up and updates it where cells changed. Every
-/// returned field has passed verification.
+/// Between solves it keeps the target-independent set-up and updates it where cells changed.
 #[derive(Debug, Default)]
 pub struct Solver {
     settings: Settings,
@@ -100,8 +98,7 @@ impl Solver {
 
     /// Solves `domain` from the field of a similar map, which saves most multigrid cycles.
     ///
-    /// A field of another map size or target is ignored. The result passes the same verification as
-    /// that of [`solve`](Self::solve) and depends on the arguments alone.
+    /// A field of another map size or target is ignored.
     ///
     /// # Errors
     /// See [`solve`](Self::solve).
@@ -115,8 +112,6 @@ impl Solver {
     }
 
     /// Solves `domain` and calls `observe` at the end of each phase.
-    ///
-    /// The library has no clock of its own, so a caller measures time here.
     ///
     /// # Errors
     /// See [`solve`](Self::solve).
@@ -270,8 +265,7 @@ impl<R: Real> Prepared<R>
 where
     Store: From<Vec<R>>,
 {
-    /// Runs cycles, from `near` if given, until every cell has converged and the check holds, or to
-    /// the cycle limit.
+    /// Runs cycles, from `near` if given, until convergence or the cycle limit.
     fn solve(
         &mut self,
         task: Task<'_>,
@@ -319,7 +313,6 @@ where
         Ok(found)
     }
 
-    /// Returns the levels: new, patched where the map changed, or unchanged.
     fn prepare(&mut self, domain: &Domain) -> &mut Multigrid<R> {
         let same_size =
             self.width == domain.width() && self.blocked.len() == domain.blocked().len();
@@ -349,7 +342,6 @@ where
         levels
     }
 
-    /// Returns the range from the first to the last row in which the map changed.
     fn changed_rows(&self, domain: &Domain) -> Option<Range<usize>> {
         let width = domain.width();
         let differs = |row: &usize| {

@@ -6,8 +6,7 @@
 //!
 //! Residuals of one sign act like screening with that coefficient. In a wide hall, 1e-4 turns most
 //! directions. Their sum over a tile is therefore compared with the curvature of the field. With
-//! screening k, laplacian u = 4 k u; and laplacian (ln u) contains (|grad u| / u)^2. This leaves
-//! angles unbounded; `cargo bench`, `-- accuracy` measures them against exact solutions.
+//! screening k, laplacian u = 4 k u; and laplacian (ln u) contains (|grad u| / u)^2.
 
 mod cells;
 mod rows;
@@ -25,7 +24,7 @@ use tiles::{TILE, Tiles};
 
 pub(crate) use cells::Check;
 
-/// Result of the verification over all cells of a field.
+/// Result of the verification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verification {
     /// Largest |u - mean / (1 + k)| / u over the reachable cells except the target, without unit.
@@ -44,8 +43,7 @@ pub struct Verification {
 /// Least cells for a further thread, which takes some ten microseconds to start.
 const CELLS_PER_THREAD: usize = 1 << 18;
 
-/// Checks every cell of a field on up to `threads` threads; their number does not change the
-/// result.
+/// Checks every cell of a field; the number of threads does not change the result.
 pub(crate) fn check(domain: &Domain, store: &Store, threads: NonZeroUsize) -> Check {
     check_above(domain, store, threads, 0.0)
 }

@@ -104,7 +104,6 @@ impl Live {
         self.state = State::Stale;
     }
 
-    /// Begins a job on `version` if the field is stale.
     pub(super) fn begin_job(&mut self, number: u64, version: u64) -> Option<Job> {
         if self.state != State::Stale {
             return None;
@@ -142,8 +141,6 @@ impl Live {
     }
 
     /// Returns status and direction at `pose`; `None` where the field must not be followed.
-    ///
-    /// `cells` are those of the newest map.
     pub(super) fn guide(
         &self,
         robot: &Robot,

@@ -46,7 +46,7 @@ const FRESH_S: f64 = 0.5;
 const LONGEST: usize = 4096;
 const MOST_AT_ONCE: usize = 64;
 
-/// Pose in the shared mission frame, metres and seconds.
+/// Pose in the shared mission frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Place {
@@ -100,7 +100,6 @@ pub(super) struct Meeting {
     goes_on_after_contact: bool,
     own: Place,
     is_told: bool,
-    /// Newest place up to this robot's time, and later ones.
     newest: Option<Place>,
     later: VecDeque<Place>,
     is_missed: bool,

@@ -50,11 +50,10 @@ pub(super) struct Session {
     /// Source of the served host's last valid frame, and destination of all streams.
     peer: Option<Source>,
     heard: Instant,
-    /// Ignored frames of other hosts since the last warning.
     strangers: u64,
     /// Decoders of the peer and one other source: partial frames must stay apart.
     decoders: Vec<SourceDecoder>,
-    /// Transport of the RPLIDAR; none if its host sends datagrams to the robot's address.
+    /// Transport of the RPLIDAR; none if it uses the robot's address.
     laser_way: Option<Way>,
     laser_peer: Option<Source>,
     /// Mission time of the newest RPLIDAR message.
@@ -113,7 +112,6 @@ impl Said<'_> {
 }
 
 impl Session {
-    /// Starts at the first tick, which goes to the ground truth.
     pub(super) fn new(
         mission: &Mission,
         robot: Robot,
@@ -306,7 +304,6 @@ impl Session {
         Ok(())
     }
 
-    /// Advances a tick, writes its ground truth and saves its state. Returns its frames.
     fn measured(&mut self) -> Result<Vec<u8>> {
         self.meet()?;
         self.robot.advance_to_next_tick();
@@ -402,7 +399,6 @@ impl Session {
         Ok(())
     }
 
-    /// Returns the peer, which a connected host is before it sends.
     fn peer(&mut self) -> Result<Option<Source>> {
         if let Some(connected) = self.way.connected()? {
             self.peer = Some(connected);
@@ -451,7 +447,6 @@ impl Session {
         self.write(&ground_truth);
     }
 
-    /// Writes a record until the reader closes the pipe.
     fn write(&mut self, record: &impl Serialize) {
         let Some(ground_truth) = &mut self.ground_truth else {
             return;

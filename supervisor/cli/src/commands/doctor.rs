@@ -83,7 +83,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     Ok(u8::from(is_ill).into())
 }
 
-/// What `command` prints; none if it does not start.
+/// Returns the output of `command`; `None` if it does not start.
 fn printed(command: &mut Command) -> Option<String> {
     let output = command.output().ok()?;
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
@@ -96,7 +96,7 @@ fn needed(it: Result<(), DomainError>) -> Verdict {
     )
 }
 
-/// `now_s` counts from 1970, and `jumped_s` is how much farther the clock went than the monotonic one in the last moments.
+/// `now_s` counts from 1970. `jumped_s` is the clock's recent gain on the monotonic one.
 fn clock(now_s: f64, jumped_s: f64, is_synchronised: Option<bool>) -> Verdict {
     let (verdict, text) = match is_synchronised {
         // In 2025 and before.
@@ -126,7 +126,6 @@ fn port(viewer: &str, is_free: bool) -> Verdict {
     )
 }
 
-/// The device belongs to `group`.
 fn serial(may_use: bool, group: &str) -> Verdict {
     if may_use {
         return ("ok", "you may read and write it".to_owned());
@@ -139,10 +138,12 @@ fn serial(may_use: bool, group: &str) -> Verdict {
     )
 }
 
-/// `printed` by `--version`; none without the executable.
+/// Takes the output of `--version`; `None` without the executable.
 fn version(printed: Option<&str>) -> Verdict {
     match printed {
-        None => ("note", "not installed; build it with `cargo build --release --workspace`".to_owned()),
+        None => {
+            ("note", "not installed; build it with `cargo build --release --workspace`".to_owned())
+        }
         Some(printed) if printed.ends_with(VERSION) => ("ok", printed.to_owned()),
         Some(other) => {
             ("problem", format!("it is {other:?}, but firsthand is {VERSION}; install both anew"))
@@ -150,7 +151,7 @@ fn version(printed: Option<&str>) -> Verdict {
     }
 }
 
-/// The number of robots whose supervisor was killed, and other users who have or had robots.
+/// Takes the number of killed supervisors' robots, and other users with robots.
 fn others(killed: usize, users: &[u32]) -> Verdict {
     if killed == 0 && users.is_empty() {
         return ("ok", "no killed run, no other user's robot".to_owned());

@@ -29,7 +29,7 @@ use serde::{
     de::{IntoDeserializer as _, value::Error as ValueError},
 };
 
-/// The time for each of three protocols.
+/// For each of three protocols.
 const LISTENS: Duration = Duration::from_secs(4);
 
 /// Write a mission file for the robot that answers at ADDRESS: its protocol, sensors and rates. The robot is asked, and never moved.
@@ -75,7 +75,6 @@ pub fn main(Arguments { address, out, protocol, robot }: &Arguments) -> Result {
     ))?)
 }
 
-/// The robot at `address`, after it was heard.
 fn heard(address: &Address<String>) -> Result<Seen> {
     let refused = |code, why: String| Err(Refused::new(code, format!("{address}: {why}")).into());
     let resolved = address.resolve()?;
@@ -92,7 +91,7 @@ fn heard(address: &Address<String>) -> Result<Seen> {
         let mut seen = Seen::new(protocol)?;
         let mut wire = Transport::of_base(&resolved, &seen.mission)?;
         let began = Instant::now();
-        // A flood ends too.
+        // Ends a flood, too.
         while let at = began.elapsed()
             && at < LISTENS
         {

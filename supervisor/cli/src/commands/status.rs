@@ -64,15 +64,10 @@ struct Status<'a> {
     mission_time_s: f64,
     /// Source machine and age, if the robot is a mirror.
     mirror: Option<MirrorStatus>,
-    /// Target, if one is published.
     target: Option<TargetStatus>,
-    /// Beacon following, if active.
     following: Option<FollowingStatus>,
-    /// Believed pose, if published.
     pose: Option<PoseStatus>,
-    /// Link, if one publishes.
     link: Option<LinkStatus>,
-    /// Battery voltages, if reported.
     power: Option<PowerStatus>,
     /// The trouble of a stage; none if no stage has any.
     complaint: Option<ComplaintStatus>,
@@ -175,7 +170,6 @@ struct StageStatus<'a> {
 /// Wait for missing data: the link at 10 Hz, batteries several times a second.
 const LINK_PATIENCE: Duration = Duration::from_millis(400);
 
-/// Least interval between two printed statuses.
 const SHOWN_EVERY: Duration = Duration::from_millis(20);
 
 pub fn main(arguments: &Arguments) -> Result {

@@ -37,7 +37,6 @@ pub struct Difference {
     pub field: String,
     pub recorded: String,
     pub computed: String,
-    /// Last inputs of the step.
     pub inputs: Vec<String>,
 }
 

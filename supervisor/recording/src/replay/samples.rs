@@ -29,7 +29,6 @@ pub struct First {
     pub topic: &'static str,
     pub writer: &'static str,
     pub field: String,
-    /// Values in both recordings.
     pub values: [String; 2],
 }
 

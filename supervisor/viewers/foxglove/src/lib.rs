@@ -1,9 +1,4 @@
 //! `firsthand foxglove`: the robot in Foxglove or Lichtblick.
-//!
-//! | module | holds |
-//! |---|---|
-//! | `gate` | access of web pages |
-//! | `live` | live channels of a recording ([`recording::viewers`]) |
 
 // `pub` marks use by another module.
 #![allow(unreachable_pub)]

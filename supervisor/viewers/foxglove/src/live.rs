@@ -32,7 +32,6 @@ use robot_state::newest_run;
 
 use crate::gate;
 
-/// Interval of checks for the start or end of a run.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const LOGS_EVERY: Duration = Duration::from_millis(500);
 const AGAIN_AFTER: Duration = Duration::from_secs(1);

@@ -3,19 +3,6 @@
 //! One thread reads the bus, and another runs the server. Browsers take new data at 10 Hz. A slow
 //! one gets only the newest maps, fields and states, and the stored rows and events. The crate
 //! [`page`] has the messages and the page.
-//!
-//! | module | holds |
-//! |---|---|
-//! | `serving` | the served page: threads, options, errors |
-//! | `access` | addresses, names, tokens |
-//! | `context` | data for every connection |
-//! | `shared` | data for browsers |
-//! | `robot` | thread that reads the bus |
-//! | `server` | connections, requests, checks |
-//! | `places` | limits of clients |
-//! | `session` | a browser: authentication, messages, orders |
-//! | `orders` | orders of an operator |
-//! | `operator` | their execution |
 
 // `pub` marks use by another module.
 #![allow(unreachable_pub)]

@@ -1,3 +1,5 @@
+//! Execution of an operator's orders.
+
 use common::{domain::RobotName, samples::TargetPoint};
 use console::{
     failure::Result,

@@ -12,10 +12,8 @@ const MOST_TARGETS: usize = 16;
 /// a failure.
 pub type Operator = Arc<dyn Fn(&Order) -> Result<String, String> + Send + Sync>;
 
-/// Message of an authenticated browser.
 #[derive(Clone, Deserialize)]
 pub struct Asked {
-    /// Number of the message and of its answer.
     pub id: u64,
     #[serde(flatten)]
     pub order: Order,

@@ -36,7 +36,6 @@ impl Places {
     }
 }
 
-/// Waits until another client takes `place`.
 pub async fn lost(place: &Place) {
     let _ = place.acquire().await;
 }

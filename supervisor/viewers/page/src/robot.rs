@@ -1,3 +1,5 @@
+//! Thread that reads the bus.
+
 use std::{
     path::PathBuf,
     thread,
@@ -24,7 +26,6 @@ use robot_state::{Feed, TOPICS, failsafe_in_words, newest_run};
 
 use crate::shared::Shared;
 
-/// Interval of checks for the start or end of a run.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 const PACK_EVERY: Duration = Duration::from_millis(500);
 const LOGS_EVERY: Duration = Duration::from_millis(500);

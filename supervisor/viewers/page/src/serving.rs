@@ -1,3 +1,5 @@
+//! Threads, options and errors of the served page.
+
 use std::{
     fs,
     io::{self, Write as _},

@@ -188,7 +188,6 @@ async fn done(order: Order, context: &Arc<Context>) -> Result<String, String> {
     if resumes { resumed(context).await } else { Ok(told) }
 }
 
-/// Waits until the link resumes.
 async fn resumed(context: &Arc<Context>) -> Result<String, String> {
     let began = Instant::now();
     loop {

@@ -4,14 +4,6 @@
 //! `firsthand/ROBOT/topic/NAME` of a zenoh session, encoded as in recordings. `show` republishes
 //! these samples on its own bus, a mirror to which viewers attach.
 //!
-//! | file | holds |
-//! |---|---|
-//! | `session` | zenoh sessions: certificates and rights |
-//! | `wire` | metadata of samples; the other machine's clock |
-//! | `serve` | from the robot's bus to the session |
-//! | `show` | from the session to a mirror's writers |
-//! | `list` | robots of several machines |
-//!
 //! iceoryx2's own zenoh tunnel is unsuitable: it carries services in both directions, so the other
 //! machine could write on the robot's bus. Its filter knows names, but no directions.
 

@@ -1,3 +1,5 @@
+//! Robots of several machines.
+
 use std::{
     thread,
     time::{Duration, Instant},

@@ -127,7 +127,7 @@ fn sent(sample: &Sample) -> Option<Sent> {
     Sent::decoded(&sample.attachment()?.to_bytes())
 }
 
-/// Requests to the robot's machine, one at a time.
+/// One request at a time.
 struct Asker<'a> {
     session: &'a Session,
     robot: &'a RobotName,

@@ -1,24 +1,5 @@
 //! `firsthand ros2`: a robot's topics and requests for RViz and other ROS 2 nodes. It is a
 //! consumer, which may be killed.
-//!
-//! | module | holds |
-//! |---|---|
-//! | `topics` | table of topics |
-//! | `shown` | from samples to messages, pure |
-//! | `asked` | from messages to requests, pure |
-//! | `drift` | covariances of odometry, pure |
-//! | `frames` | frames of `/tf`, pure |
-//! | `goals` | goals of any action, pure |
-//! | `action` | server of the action `navigate_to_pose`, pure |
-//! | `messages` | written messages |
-//! | `bag` | rosbag2 bag from a recording |
-//! | `bridge` | the bridge itself |
-//! | `endpoints` | its readers and writers |
-//! | `node` | node with readers, writers and action servers |
-//! | `planner` | Nav2's planner server, without the bridge |
-//! | `parameters` | options as parameters, pure |
-//! | `overlap` | topics that the robot's own link reads |
-//! | `orders` | execution of requests in threads |
 
 // `pub` marks use by another module.
 #![allow(unreachable_pub)]

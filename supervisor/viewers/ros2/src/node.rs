@@ -23,9 +23,7 @@ const DEPTH: u16 = 10;
 const KNOWN_AFTER: Duration = Duration::from_secs(2);
 const AT_A_TIME: usize = 16;
 
-/// Reliable quality, for messages that all count.
 pub const SURE: Quality = Quality { is_reliable: true, is_latched: false, depth: DEPTH };
-/// Quality that stores the newest message for late readers.
 pub const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, depth: 1 };
 
 /// Quality for messages of which only the newest counts, from senders of either reliability.

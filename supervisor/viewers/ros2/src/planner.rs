@@ -1,11 +1,5 @@
 //! `firsthand ros2 planner`: Nav2's planner server over the harmonic field, for any robot.
 //!
-//! | module | holds |
-//! |---|---|
-//! | `costmap` | a map and its blocked cells, pure |
-//! | `planning` | from map, start and goals to a path, pure |
-//! | `calls` | messages of the actions, pure |
-//!
 //! A goal is accepted at once, and a thread plans.
 
 mod calls;

@@ -104,7 +104,6 @@ impl Shown {
         self.state.pose.unwrap_or_default()
     }
 
-    /// Applies a sample and publishes its messages.
     pub fn sample(&mut self, sample: &Sample, now_ns: u64, sink: Sink<'_>) {
         if !self.state.apply(sample) {
             return;

@@ -117,7 +117,7 @@ impl Operator {
         Self { robot: robot.clone(), under_way: None }
     }
 
-    /// Begins `action`. Returns the text to show meanwhile.
+    /// Returns the text to show meanwhile.
     pub fn ask(&mut self, action: Action, stage: Option<&str>) -> String {
         if self.under_way.is_some() {
             return "the last action is still under way".to_owned();

@@ -1,12 +1,5 @@
 //! `firsthand top`: stages, map, field and robot on a terminal, with keys for an operator's
 //! actions.
-//!
-//! | file | holds |
-//! |---|---|
-//! | `view` | data of the screen |
-//! | `feed` | updates from the bus |
-//! | `screen`, `map` | drawing |
-//! | `action` | effects of keys |
 
 // `pub` marks use by another module.
 #![allow(unreachable_pub)]

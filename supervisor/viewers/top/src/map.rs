@@ -126,7 +126,6 @@ fn octant(angle: f64) -> usize {
     ((angle / FRAC_PI_4).round() as i64).rem_euclid(8) as usize
 }
 
-/// Draws two squares of the map, one above the other, and the field there.
 fn letter(state: &RobotState, scale: &Scale, col: usize, line: usize) -> (char, Style) {
     let square = |row: usize| {
         let (cells, side) = (state.map.cells(), scale.frame.cells as usize);
@@ -158,7 +157,6 @@ fn letter(state: &RobotState, scale: &Scale, col: usize, line: usize) -> (char, 
     }
 }
 
-/// Returns the field's direction in the middle of a letter, if drawn.
 fn field(state: &RobotState, scale: &Scale, col: usize, line: usize) -> Option<char> {
     let (every_col, every_line) = FIELD_EVERY;
     let drawn = col % every_col == every_col / 2 && line % every_line == every_line / 2;

@@ -67,7 +67,6 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     frame.render_widget(Paragraph::new(keys_line()), keys);
 }
 
-/// Returns the number of lines of `message`, wrapped between words.
 fn message_height(message: &str, width: u16) -> u16 {
     // Adds a fifth for lines that end early before a long word.
     let letters = message.chars().count() * 6 / 5;

@@ -49,7 +49,7 @@ impl Map<'_> {
         self.frame.cell_at(point).filter(|&cell| self.is_free(cell))
     }
 
-    /// Returns the neighbour at this offset if the step is free and cuts no hazard corner.
+    /// Returns the free neighbour at this offset that cuts no hazard corner.
     pub fn neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
         self.free_neighbour(cell, [cols, 0])?;
         self.free_neighbour(cell, [0, rows])?;

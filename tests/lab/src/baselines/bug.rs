@@ -5,8 +5,8 @@
 //! is back on the line from start to target. There it must be nearer to the target than at the hit
 //! point, with a free way ahead.
 //!
-//! The algorithm's point is the robot's centre, because the map's hazards include the body's
-//! margin. It sees up to [`AHEAD_M`]. A robot that returns to the hit point has no path.
+//! Hazards include the body's margin, so the robot's centre is the point. It sees up to
+//! [`AHEAD_M`]. A robot that returns to the hit point has no path.
 
 mod boundary;
 
@@ -94,7 +94,7 @@ impl Straight<'_> {
         (self.target - here).normalize_or(DVec2::X).perp()
     }
 
-    /// Returns the near hazard ahead of `here`, to be passed on its left.
+    /// Returns the near hazard ahead, to be passed on its left.
     fn hit(&self, here: DVec2) -> Option<Following> {
         let hit = self.blocked(here)?;
         let cell = self.map.free_cell_at(hit)?;
@@ -150,7 +150,7 @@ impl Following {
         self.was_away && here.distance(self.hit) <= map.frame.resolution_m
     }
 
-    /// Returns the farthest nearby boundary point that a robot at `here`, metres, sees.
+    /// Returns the farthest nearby boundary point in sight.
     fn aim(&self, map: &Map<'_>, here: DVec2) -> DVec2 {
         let centre = |cell: Cell| map.frame.centre_of(cell);
         let mut aim = centre(self.place.cell);

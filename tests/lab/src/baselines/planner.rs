@@ -52,7 +52,7 @@ impl<P: Planner> Baseline<P> {
         }
     }
 
-    /// Sets the target. A changed target restarts the planner.
+    /// Restarts the planner if the target changed.
     pub fn send_to(&mut self, target: TargetSample) {
         if self.target.replace(target).is_some() {
             self.planner = P::default();

@@ -48,7 +48,7 @@ pub fn main(arguments: &Arguments) -> Result {
     Ok(run(&stage_command::start_with(PLANNER, arguments.options.iter().cloned())?)?)
 }
 
-/// Space for the encoded state, bytes: Bug2's is under 150.
+/// Bytes; Bug2's state is under 150.
 const STATE_BYTES: usize = 256;
 
 readers! {

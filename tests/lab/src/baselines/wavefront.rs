@@ -30,7 +30,6 @@ impl Planner for Wavefront {
     }
 }
 
-/// Returns the farthest visible point of `path` within [`AIM_M`]; otherwise the next one.
 fn aim(map: &Map<'_>, here: DVec2, target: DVec2, path: &[Cell]) -> DVec2 {
     let last = path.len() - 1;
     let point = |index: usize| match path.get(index) {
@@ -44,7 +43,6 @@ fn aim(map: &Map<'_>, here: DVec2, target: DVec2, path: &[Cell]) -> DVec2 {
     near.unwrap_or_else(|| point(1))
 }
 
-/// Returns the cells between two free ones, inclusive.
 fn shortest_path(map: &Map<'_>, start: Cell, goal: Cell) -> Option<Vec<Cell>> {
     let apart = |cell: Cell| [cell.col.abs_diff(goal.col), cell.row.abs_diff(goal.row)];
     over_neighbours(start, goal, apart, |cell, step| map.neighbour(cell, step))

@@ -33,7 +33,6 @@ const ARDUINO: &str = "e 100 -100\r\n123 456\r\nOK\r\n";
 const ROS_MAP: &str = "image: map.pgm\nresolution: 0.05\norigin: [0.0, -1.5, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n";
 const MOVING_AI: &str = "type octile\nheight 2\nwidth 3\nmap\n.@.\n..T\n";
 const RPLIDAR: &[u8] = b"\xa5Z\x03\x00\x00\x00\x06\x00\x00\x00\xa5Z\x05\x00\x00@\x81=\x01\x00\x10\x10>\x81\x00\x10\x10";
-/// Bytes with a meaning in the formats.
 const TELLING: &[u8] = b"\0\xff\x7f\x80 -.9e[{\"\n";
 const STATE_BYTES: usize = 4096;
 const PERIOD_NS: u64 = 20_000_000;
@@ -94,7 +93,6 @@ fn open(file: &Path) {
     }
 }
 
-/// Opens a checkpoint, or the journal beside it.
 fn open_state(file: &Path) -> Result<Journal> {
     let state = file.with_extension("");
     let opened = Journal::open::<Persisted, Persisted>(&state, STATE_BYTES, STATE_BYTES);

@@ -1,4 +1,4 @@
-//! Attacker of one mission: sends signals, and waits until the successors work.
+//! Attacker of one mission.
 
 use std::time::{Duration, Instant};
 
@@ -48,7 +48,6 @@ pub struct Attack {
     supervisor_hit: bool,
     driving: bool,
     sent: Vec<Sent>,
-    /// Number of signals at the front of `sent` with stored rows.
     kept: usize,
     pose: Option<PoseSample>,
 }
@@ -114,7 +113,6 @@ impl Attack {
         Ok(())
     }
 
-    /// Stores signal rows up to the first incomplete measurement.
     fn keep_rows(&mut self, series: &mut Series<'_>) -> Result {
         let left = self.sent.iter().skip(self.kept);
         for sent in left.take_while(|sent| !sent.pending) {
@@ -158,7 +156,7 @@ impl Attack {
         self.sent.iter().any(|sent| sent.pending && sent.row.stage == stage)
     }
 
-    /// Returns whether a generation was frozen alone, and may be aborted as hung.
+    /// Returns whether a generation was frozen alone, and may be aborted.
     fn was_frozen(&self, stage: &str, generation: u32) -> bool {
         let frozen = self.sent.iter().filter(|sent| sent.row.kind == Kind::Freeze);
         frozen
@@ -176,7 +174,6 @@ impl Attack {
         healthy.map(|(stage, generation)| format!("{stage} generation {generation}")).collect()
     }
 
-    /// Returns the error of the last published pose, metres.
     pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
         let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
@@ -306,7 +303,7 @@ impl Attack {
         Ok(())
     }
 
-    /// Returns the next start-up hit: its time, its index among the signals, and the process.
+    /// Returns the time, signal index and process of the next start-up hit.
     fn next_startup_hit(&self) -> Option<(Instant, usize, RosterEntry)> {
         let read = self.entries_read?;
         let pending = self.sent.iter().enumerate().filter(|(_, sent)| sent.pending);
@@ -345,7 +342,6 @@ struct Subscriptions {
     deaths: Reader<DeathSample>,
     health: Reader<HealthSample>,
     pose: Reader<PoseSample>,
-    /// Other outputs of a tick, with their writers.
     outputs: Vec<(&'static str, Box<dyn AnyReader>)>,
 }
 

@@ -1,5 +1,4 @@
-//! Targets that change every few seconds during an attacked mission, as an operator sends them, and
-//! the check that each outcome is reported.
+//! Targets that change every few seconds, and the check of their outcomes.
 
 use std::{
     collections::BTreeMap,
@@ -18,7 +17,6 @@ use summary::Summary;
 use crate::{random::Random, robot::firsthand};
 
 const MOST_CHANGES: usize = 6;
-/// Wall-clock time between changes.
 const PAUSE_S: [f64; 2] = [0.8, 3.0];
 /// Maximum distance of a target from the start.
 const WITHIN_M: f64 = 2.5;
@@ -100,7 +98,7 @@ fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>)
     sent
 }
 
-/// Draws a place where the robot fits, in whole centimetres.
+/// Draws a free place in whole centimetres.
 fn place(mission: &Mission, random: &mut Random) -> [f64; 2] {
     let (world, frame) = (mission.obstacles(), mission.grid_frame());
     let clear_m = mission.body().radius_m + CLEARANCE_M;

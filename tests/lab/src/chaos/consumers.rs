@@ -25,14 +25,12 @@ use crate::{
     robot,
 };
 
-/// Time for a consumer to end. A recorder writes its last chunk within milliseconds; user programs
-/// may take longer.
+/// A recorder writes its last chunk within milliseconds; user programs may take longer.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
 
 #[derive(Default)]
 pub struct Consumers {
     all: Vec<Running>,
-    /// Directory of recordings and of the consumers' standard error.
     pub directory: PathBuf,
 }
 

@@ -15,7 +15,6 @@ const A_LITTLE_LATE_S: [f64; 2] = [0.25, 1.0];
 const RANGE_LATE_S: [f64; 2] = [0.3, 2.0];
 const OLD: Duration = Duration::from_secs(3);
 const AGAIN_EVERY: Duration = Duration::from_secs(2);
-/// Period of slow messages: three per second.
 const SLOW: Duration = Duration::from_millis(333);
 /// Share of its counts that an encoder reports.
 const LOW: [f64; 2] = [0.97, 0.90];
@@ -23,7 +22,6 @@ const LOWER: [f64; 2] = [0.90, 0.65];
 const RUNS_COUNTS_S: [f64; 2] = [50.0, 300.0];
 /// Noise of readings near a frozen one. A tenth of it is the relative noise of beams.
 const NEAR_M: [f64; 2] = [0.005, 0.05];
-/// Maximum random speed, counts/s.
 const RANDOM_COUNTS_S: f64 = 1000.0;
 const RANDOM_M: f64 = 2.5;
 const NO_READING: f64 = -1.0;

@@ -12,11 +12,9 @@ use common::domain::{Domain, RobotName, SHARED_MEMORY};
 
 use crate::robot::command_lines;
 
-/// Maximum time that a stop guard runs after a mission.
 const GUARDS_END: Duration = Duration::from_secs(10);
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Returns remaining files, shared memory and processes: paths and command lines.
 pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let domain = Domain::of(robot.clone());
     let prefix = domain.shared_memory_prefix();

@@ -1,3 +1,5 @@
+//! One mission, undisturbed and attacked.
+
 use std::{
     fs,
     path::Path,
@@ -23,7 +25,7 @@ use mission_control::{outcome::Outcome, simulator::Simulator};
 use processes::DEATHS;
 use summary::Summary;
 
-/// Timeout of a mission, which takes half a minute of wall-clock time.
+/// A mission takes half a minute of wall-clock time.
 const PATIENCE: Duration = Duration::from_secs(600);
 
 pub fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Command {
@@ -130,11 +132,9 @@ fn deaths(directory: &Path) -> Vec<Value> {
 
 /// Returns the allowed final pose error beyond that of the undisturbed run, metres.
 ///
-/// Each signal may cost one wheel count of travel. A hit run also takes another path, so its wheels
-/// are read at other fractions of a count. One count between the wheels turns the heading by `count
-/// / track` and displaces the robot by that fraction of the distance to the target. Slip may add
-/// three standard deviations of the stated pose error, because a hundred missions include a few
-/// beyond two.
+/// Each signal may cost one wheel count of travel, and another path another count. One count
+/// between the wheels turns the heading by `count / track` and displaces the robot by that fraction
+/// of the distance to the target. Slip may add three standard deviations of the stated pose error.
 fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
     let body = mission.body();
     let target = mission.start_pose().position.distance(mission.target);

@@ -95,8 +95,7 @@ impl Options {
     /// Creates the options and a new directory for the missions.
     ///
     /// # Errors
-    /// Returns an error if the mission cannot be loaded or is unsuitable for chaos, or if options
-    /// conflict.
+    /// Fails for an unsuitable mission or conflicting options.
     pub fn of(asked: &Arguments) -> Result<Self> {
         let mut asked = asked.clone();
         if asked.freeze_all {

@@ -19,7 +19,6 @@ use super::{
 };
 use crate::background::{Turns, socket, to_robot};
 
-/// Maximum delay until the thread notices the fault or the proxy's end.
 const LOOK: Duration = Duration::from_millis(10);
 /// Maximum held datagrams: two seconds at a hundred times the usual rate.
 const MOST_HELD: usize = 16_384;
@@ -39,7 +38,6 @@ pub struct Proxy {
 }
 
 impl Proxy {
-    /// Starts a proxy between the robot at `robot` and the host that sends first.
     pub fn start(
         robot: SocketAddr,
         fault: RobotFault,
@@ -59,7 +57,6 @@ impl Proxy {
         self.shared.faulty.store(true, Relaxed);
     }
 
-    /// Returns when the host last ordered motion, or the proxy's start.
     pub fn last_moving(&self) -> Instant {
         self.began + Duration::from_nanos(self.shared.last_moving_ns.load(Relaxed))
     }

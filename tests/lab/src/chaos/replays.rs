@@ -1,4 +1,4 @@
-//! Replays of the missions' recordings: every generation of every stage must be bit-equal.
+//! Replays of the missions' recordings.
 
 use std::{
     fs,
@@ -20,7 +20,6 @@ struct Counts {
     equal: u64,
     without_step: u64,
     compared: u64,
-    /// Recordings cut off before their recorder ended.
     cut: u64,
     /// Recordings without their run's name, because the recorder was killed before writing it.
     not_begun: u64,
@@ -68,8 +67,7 @@ impl Counts {
 }
 
 impl Replays {
-    /// Replays the recordings of the mission and of its `consumers`. Adds different, failed and
-    /// unreadable ones to `wrong`.
+    /// Adds different, failed and unreadable recordings to `wrong`.
     pub fn add(
         &mut self,
         directory: &Path,

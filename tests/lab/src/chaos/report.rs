@@ -1,7 +1,6 @@
 //! Result of all missions under attack, and its table `signals.csv`.
 //!
-//! A row is written once its signal and all earlier ones are measured, so a killed chaos leaves the
-//! rows known by then.
+//! A row is written once its signal and all earlier ones are measured.
 
 use std::{collections::BTreeMap, fmt, fs, path::Path, time::Instant};
 
@@ -28,12 +27,10 @@ pub struct Report {
     pub missions: u64,
     pub reached: u64,
     pub collisions: u64,
-    /// Failed missions with seeds and reasons: target missed, contact, lost pose, unreported
-    /// target, or unequal replay.
+    /// Failed missions with seeds and reasons.
     pub wrong: Vec<String>,
     #[serde(skip)]
     pub signals: u32,
-    /// Signals by kind to each stage and the supervisor.
     kills: BTreeMap<String, BTreeMap<Kind, u32>>,
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     consumers: BTreeMap<String, ConsumerCounts>,
@@ -61,13 +58,13 @@ pub struct ConsumerCounts {
 
 #[derive(Default, Serialize)]
 pub struct Recovery {
-    /// Time to the first ready beat after kills, which are noticed at once.
+    /// First ready beat after kills, which are noticed at once.
     #[serde(serialize_with = "quantiles")]
     pub ready: Histogram,
-    /// Time to the first ready beat after freezes, which are noticed by missing beats.
+    /// First ready beat after freezes, which are noticed by missing beats.
     #[serde(rename = "ready_when_frozen", serialize_with = "quantiles")]
     pub after_freeze: Histogram,
-    /// Time to the first sample of a tick, which may come up to a tick later.
+    /// First sample of a tick, which may come up to a tick later.
     #[serde(serialize_with = "quantiles")]
     pub output: Histogram,
 }
@@ -104,7 +101,6 @@ impl Report {
         self.consumers.entry(name.to_owned()).or_default()
     }
 
-    /// Returns the completely measured signals to stages and the supervisor.
     pub fn kills(&self) -> u32 {
         self.kills.values().flat_map(BTreeMap::values).sum()
     }
@@ -165,14 +161,13 @@ pub struct Row {
     pub generation: Option<u32>,
     /// Whether the hit was due in the process's first milliseconds.
     pub start_up: bool,
-    /// Time from the signal until the supervisor's record of the death was read, milliseconds. Only
-    /// for stages.
+    /// Time from the signal until the record of the death was read; only for stages.
     pub noticed_ms: Option<f64>,
-    /// Time from the signal until the successor's first sign of work was read, milliseconds. For
-    /// stages and the supervisor.
+    /// Time from the signal until the successor's first sign of work; only for stages and the
+    /// supervisor.
     pub ready_ms: Option<f64>,
-    /// Time from the signal until the successor's first sample of a tick was read, milliseconds.
-    /// For stages and the supervisor.
+    /// Time from the signal until the successor's first sample of a tick; only for stages and the
+    /// supervisor.
     pub first_output_ms: Option<f64>,
 }
 

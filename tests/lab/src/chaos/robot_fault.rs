@@ -1,5 +1,4 @@
-//! The table of robot faults: wrong data that a robot sends to its link, and the promise under
-//! each.
+//! Table of robot faults, and the promise under each.
 
 use std::sync::LazyLock;
 

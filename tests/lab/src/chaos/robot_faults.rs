@@ -33,7 +33,7 @@ use crate::{
     ros2_robot::Ros2Robot,
 };
 
-/// Time from departure to the fault: minimum, and width of the random range.
+/// Minimum, and width of the random range.
 const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
 const DEPARTED_M: f64 = 0.1;
 /// Watch time of a faulty robot: several times as long as it may move.
@@ -121,7 +121,6 @@ fn watch(
         _ => WATCHED,
     };
     let began = Instant::now();
-    // Start of the fault, and the ground-truth ticks then.
     let mut fault_began = None;
     let (mut departed_s, mut stop, mut link) = (None, None, None);
     // A mission may leave its bus behind.

@@ -13,7 +13,6 @@ use crate::random::Random;
 pub enum Kind {
     #[default]
     Kill,
-    /// SIGKILL in the first milliseconds of a generation.
     KillAtStart,
     /// SIGABRT, as after a panic that cannot unwind. SIGSEGV is unsuitable: Rust's runtime takes
     /// the first one for a stack overflow, finds none, and continues.
@@ -39,16 +38,14 @@ impl Kind {
 const MEAN_PAUSE: Duration = Duration::from_millis(500);
 /// Maximum time of a start-up hit after the start, in which the stage joins the bus.
 const STARTUP: Duration = Duration::from_millis(12);
-/// Share of signals followed by one to the starting successor, with `--include-startup`. A fifth of
-/// all signals are such; the rest find no successor, or one that was ready too soon.
+/// Share of signals followed by one to the starting successor. A fifth of all signals are such; the
+/// rest find no successor, or one that was ready too soon.
 const STARTUP_SHARE: f64 = 0.3;
 
-/// Share of signals to the supervisor, with `--include-supervisor`.
 const SUPERVISOR_SHARE: f64 = 0.05;
 
 const CONSUMER_SHARE: f64 = 0.5;
 
-/// Share of hits that freeze everything, with `--freeze-all`.
 const FREEZE_ALL_SHARE: f64 = 0.5;
 /// Range of freeze times of everything or a consumer: from below a stage's deadline to three times
 /// as long.
@@ -82,7 +79,6 @@ impl Schedule {
         }
     }
 
-    /// Draws the freeze time, if everything is hit instead of a stage.
     pub fn freeze_all(&mut self) -> Option<Duration> {
         let frozen = self.0.share() < FREEZE_ALL_SHARE;
         frozen.then(|| self.freeze())
@@ -93,8 +89,7 @@ impl Schedule {
         Duration::from_secs_f64(self.0.within(start, end))
     }
 
-    /// Draws the consumer to hit instead of a stage or the supervisor, the kind, and the freeze
-    /// time.
+    /// Draws consumer, kind and freeze time, if a consumer is hit.
     pub fn consumer(&mut self, count: usize) -> Option<(usize, Kind, Duration)> {
         // Without consumers, this leaves the sequence of decisions unchanged.
         if count == 0 || self.0.share() >= CONSUMER_SHARE {
@@ -117,7 +112,6 @@ impl Schedule {
         }
     }
 
-    /// Draws the time after its start at which to hit the successor.
     pub fn startup_hit(&mut self) -> Option<Duration> {
         // Converts the share of all signals to a share of those that can be followed by one.
         let hit = self.0.share() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);

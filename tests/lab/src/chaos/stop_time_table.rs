@@ -19,14 +19,13 @@ const AT_REST_BEFORE_S: f64 = 0.15;
 pub struct Entry {
     pub fault: RobotFault,
     pub seed: u64,
-    /// Maximum time from the fault to the last moving command and to rest, seconds; none if the
-    /// robot may go on.
+    /// Maximum of `last_moving_s` and `rest_s`; none if the robot may go on.
     pub promised_s: Option<f64>,
     /// Whether the fault began: the mission may end earlier.
     pub fault_began: bool,
-    /// Time from the fault to the link's last command that moves a wheel.
+    /// Last command that moves a wheel.
     pub last_moving_s: Option<f64>,
-    /// Time from the fault to the last tick with a turning wheel, by the ground truth.
+    /// Last tick with a turning wheel, by the ground truth.
     pub rest_s: Option<f64>,
     pub way_m: f64,
     pub watched_s: f64,

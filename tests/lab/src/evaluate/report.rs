@@ -18,8 +18,7 @@ use crate::{
 
 /// Share of collisions in motion; in the others the robot was run into at rest.
 const AT_FAULT: &str = "at_fault_collision";
-/// Shares of missions in which the failsafe stopped, or slowed to half speed, a robot that had
-/// departed.
+/// Shares of departed robots that the failsafe stopped, or slowed to half speed.
 const STOPPED: &str = "stopped_by_failsafe";
 const SLOWED: &str = "slowed_by_failsafe";
 
@@ -37,7 +36,6 @@ const METRICS: [&str; 9] = [
     "median_look_share",
 ];
 
-/// Reports the first setting; `versus` has the others with their differences from it.
 pub fn report(settings: &[Setting], rows: &[Row]) -> Value {
     let mut report = totals(&settings[0].name, rows);
     let others = settings.iter().skip(1);
@@ -80,7 +78,6 @@ fn interval(of: Estimate) -> Vec<f64> {
     [of.low, of.high].map(rounded).to_vec()
 }
 
-/// Returns the differences from setting `from` to setting `to` on the same worlds and noise.
 fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
     let of = |setting| -> BTreeMap<_, &Row> {
         let its = rows.iter().filter(|row| row.setting == setting);

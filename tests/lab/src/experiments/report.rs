@@ -25,7 +25,6 @@ const FIGURES: [&str; 7] = [
     "wheel_range_rad_s",
 ];
 
-/// Returns each experiment's values of the paper and of each method, and whether claims hold.
 pub fn report(experiments: &[Experiment], rows: &[Row]) -> Result<Vec<Value>> {
     let claims = claims()?;
     let its = |experiment: &str, method: &str| -> Vec<&Row> {

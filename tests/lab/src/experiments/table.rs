@@ -56,7 +56,7 @@ pub fn claims() -> Result<Vec<Claim>> {
     rows(include_str!("claims.csv"))
 }
 
-/// Returns the named experiments in table order; all without names.
+/// Returns the named experiments, or all without names.
 pub fn named(names: &[String]) -> Result<Vec<Experiment>> {
     let mut table: Vec<Experiment> = rows(include_str!("table.csv"))?;
     if let Some(name) = names.iter().find(|name| !table.iter().any(|it| it.name == **name)) {

@@ -1,3 +1,5 @@
+//! Page of results.
+
 use std::path::{Path, PathBuf};
 
 use crate::error::{OrCannot as _, Result};
@@ -33,7 +35,7 @@ impl Page {
         self.0 += &format!("<pre>{}</pre>\n", lines.join("\n"));
     }
 
-    /// Adds a picture and a link to its run's page, if they exist in `directory`, the page's own.
+    /// Adds a picture and a link to its run's page, if they exist in the page's `directory`.
     pub fn figure(&mut self, caption: &str, directory: &Path, picture: &Path) {
         let shown = |file: &Path, show: fn(String) -> String| {
             let there = Some(file).filter(|file| directory.join(file).exists());

@@ -14,7 +14,7 @@ use crate::error::{OrCannot as _, Refused, Result};
 
 const PLAN_FILE: &str = "plan.txt";
 
-/// Returns this process's command without options that leave the rows unchanged.
+/// Returns the command without options that leave the rows unchanged.
 pub fn command() -> Result<String> {
     let mut words = vec!["firsthand".to_owned()];
     let mut given = env::args().skip(1);
@@ -37,7 +37,7 @@ pub struct Results {
 }
 
 impl Results {
-    /// Creates `directory`, or resumes it if the command is the same.
+    /// Resumes `directory` only if the command is the same.
     pub fn open(directory: &Path, command: &str, resume: bool) -> Result<Self> {
         let file = directory.join(PLAN_FILE);
         let named = directory.display();

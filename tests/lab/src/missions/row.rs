@@ -1,3 +1,5 @@
+//! Result of one mission.
+
 use std::collections::BTreeMap;
 
 use mission_control::outcome::Outcome as Reported;
@@ -23,12 +25,10 @@ pub enum Outcome {
     Aborted,
 }
 
-/// Outcome names in report order.
 pub const OUTCOMES: [&str; 6] =
     ["success", "collision", "timeout", "wrong_place", "unreachable", "aborted"];
 
-/// Result of one mission, in metres and mission seconds. Latencies differ in every run and are in
-/// [`Latency`].
+/// Lengths are metres, times mission seconds. Latencies differ in every run and are in [`Latency`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     pub world: String,
@@ -55,13 +55,12 @@ pub struct Row {
     pub f_vs_m_s2: Option<f64>,
     /// Final distance from the estimated to the true position.
     pub pose_error_m: Option<f64>,
-    /// Expected RMS of that error, by the covariance of the last pose.
+    /// Expected RMS, by the covariance of the last pose.
     pub pose_error_expected_m: Option<f64>,
     pub true_distance_m: Option<f64>,
     pub safety_events: u64,
-    /// Share of ticks without a sonar distance.
     pub sonar_unavailable_share: Option<f64>,
-    /// Dynamic range of the wheel signals: maximum minus minimum commanded speed of either wheel.
+    /// Maximum minus minimum commanded speed of either wheel.
     pub wheel_range_rad_s: Option<f64>,
     pub looks: u64,
     pub look_s: f64,
@@ -84,7 +83,6 @@ const AT_FAULT_M_S: f64 = 0.05;
 
 /// Multiples of the optimal time for the best and the worst score.
 const BARN_CLIP: [f64; 2] = [2.0, 8.0];
-/// Speed of the challenge's optimal times.
 const BARN_SPEED_M_S: f64 = 2.0;
 
 impl Row {
@@ -143,7 +141,7 @@ impl Row {
         }
     }
 
-    /// Returns whether the robot moved at its contact. A contact of unknown speed counts.
+    /// Returns whether the robot moved at its contact, or may have.
     pub fn is_at_fault(&self) -> bool {
         let moved = self.contact_speed_m_s.is_none_or(|speed| speed > AT_FAULT_M_S);
         self.outcome == Outcome::Collision && moved

@@ -28,20 +28,18 @@ use crate::{
 
 const PICTURE: &str = "picture.svg";
 const PAGE: &str = "report/report.html";
-/// Interval of progress lines that cannot be rewritten.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
 pub struct Plan {
     pub trials: Vec<Trial>,
     pub settings: Vec<Setting>,
-    /// Missions on each world for each setting, with different noise.
     pub repeats: u64,
     pub noise: NoiseSeeds,
     /// Noise seed whose missions get pictures even without failure.
     pub pictured_seed: Option<u64>,
     pub jobs: Option<NonZero<usize>>,
     pub pace: Pace,
-    /// Whether to calibrate each mission's robot first. After a failure it runs uncalibrated.
+    /// After a failed calibration the mission runs uncalibrated.
     pub calibrates: bool,
 }
 
@@ -74,8 +72,7 @@ const fn mixed(bits: u32) -> u32 {
     bits ^ (bits >> 16)
 }
 
-/// Returns the path of a mission's picture; a failure's page is beside it, with the extension
-/// `html`.
+/// Returns the picture's path. A failure's page is beside it, with the extension `html`.
 pub fn picture(row: &Row) -> PathBuf {
     let folder = if row.is_success() { "pictures" } else { "failures" };
     let name = format!("{}-{}-{}.svg", row.world, row.seed, row.setting);
@@ -83,10 +80,10 @@ pub fn picture(row: &Row) -> PathBuf {
         .join(name.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_"))
 }
 
-/// Runs all missions of `plan` without rows in `results`. Shows progress below `title`.
+/// Runs all missions of `plan` without rows in `results`.
 ///
 /// # Errors
-/// Returns an error if a file cannot be written or `firsthand` does not start.
+/// A file cannot be written, or `firsthand` does not start.
 pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     let directory = results.directory.clone();
     let pictures = plan.pictured_seed.map(|_| "pictures");
@@ -240,11 +237,10 @@ impl Robot<'_> {
 }
 
 impl Job<'_> {
-    /// Runs the mission of each robot, all at once. A robot without a summary has no latencies.
+    /// Runs the robots' missions at once. A robot without a summary has no latencies.
     fn run(&self, worker: usize) -> Result<Vec<(Row, Option<Latency>)>> {
         let Self { plan, trial, setting, seed, directory: all } = *self;
         let files = all.join(format!("run-{worker}"));
-        // A killed worker leaves files.
         let _ = fs::remove_dir_all(&files);
         fs::create_dir(&files).or_cannot_file("make", &files)?;
         let names =

@@ -19,12 +19,10 @@ const MARGIN_M: f64 = 0.05;
 /// Mission time allowed beside [`Rules::most_s`], for turning before the clock starts.
 const BEFORE_CLOCK_S: f64 = 20.0;
 
-/// Returns half the width of the narrowest passage for the robot of `mission`, metres.
 pub fn swept_m(mission: &Mission) -> f64 {
     mission.body().radius_m + MARGIN_M
 }
 
-/// Rules by which the ground truth judges a mission.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
     /// Distance from the target beyond which an arrival is in the wrong place.
@@ -53,12 +51,12 @@ impl Rules {
 #[derive(Debug, Default)]
 pub struct Scene {
     pub shapes: Shapes,
-    /// Moving objects, which the shortest path ignores.
+    /// The shortest path ignores these.
     pub things: Vec<Thing>,
-    /// People, which the shortest path ignores.
+    /// The shortest path ignores these.
     pub people: Vec<Person>,
     pub start: DVec2,
-    /// Start heading, radians counter-clockwise from x.
+    /// Counter-clockwise from x.
     pub heading: f64,
     pub target: DVec2,
     /// Start heading of another robot that drives from target to start.
@@ -90,7 +88,7 @@ impl Trial {
         Ok(Some(trial))
     }
 
-    /// Returns a trial of an unchanged `mission`, if the body can reach its target.
+    /// Returns a trial of an unchanged `mission`.
     pub fn of_mission(world: String, mission: Mission, swept_m: f64) -> Option<Self> {
         let start = mission.start_pose().position;
         let shortest_m = shortest_path(&mission.obstacles(), start, mission.target, swept_m)?;
@@ -112,7 +110,6 @@ impl Trial {
     }
 }
 
-/// Places the origin at the start, with the scene's x axis.
 fn mission(world: &str, scene: &Scene) -> Result<Mission> {
     let target = scene.target - scene.start;
     let shapes = moved(&scene.shapes, -scene.start);

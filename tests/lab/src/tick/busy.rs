@@ -8,12 +8,11 @@ use thread_priority::{
 /// Niceness 0 on the scale of [`ThreadPriority::Crossplatform`], where 99 is the maximum priority.
 const NICENESS_0: u8 = 48;
 
-/// Computes endlessly with ordinary priority, regardless of this process's.
+/// Computes endlessly with ordinary priority.
 pub fn run() {
     if let Ok(value) = ThreadPriorityValue::try_from(NICENESS_0) {
         let policy = ThreadSchedulePolicy::Normal(Normal::Other);
         let priority = ThreadPriority::Crossplatform(value);
-        // Without permission, a thread keeps ordinary priority.
         let _ = set_thread_priority_and_policy(thread_native_id(), priority, policy);
     }
     loop {

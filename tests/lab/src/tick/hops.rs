@@ -30,15 +30,13 @@ const LOST_SAMPLE: &str = "no sample came back within 5 s; reduce the load of th
 
 /// Cells of the smallest map. Forwarders never read it.
 const CELLS: usize = 64;
-/// Forwarders, by their stages.
 const PLACES: [&str; 4] = ["dead-reckoning", "mapper", "planner", "controller"];
 /// Interval of samples to forwarders that may not have started yet.
 const SEND_AGAIN: Duration = Duration::from_millis(20);
 /// Trips before the measurement, which map all memory.
 const WARM_UP: u64 = 200;
 
-/// Sends `trips` samples around the forwarders, one every `period` or back to back, as in the
-/// warm-up.
+/// Sends a sample around the forwarders every `period`, or back to back.
 pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Result<Histogram> {
     let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
     let bus = lock.bus().ok_or(LOST_SAMPLE)?;

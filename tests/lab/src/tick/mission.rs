@@ -23,7 +23,7 @@ use crate::{
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 const STOPS_WITHIN: Duration = Duration::from_millis(100);
 
-/// Returns a mission's tick times and its processes' resources; none of these for a short mission.
+/// Returns tick times and resources; no resources for a short mission.
 pub fn measure(
     arguments: &Arguments,
     robot: &RobotName,

@@ -13,7 +13,7 @@ use crate::{missions::statistics::rounded, robot::processes};
 
 #[derive(Debug, PartialEq, Serialize)]
 pub struct Used {
-    /// Voluntary context switches of all threads per second: each wait ends with a wakeup.
+    /// Voluntary context switches of all threads: each wait ends with a wakeup.
     pub wakeups_per_s: f64,
     pub cpu_share: f64,
     /// Proportional memory: each shared page is divided among the processes that map it.

@@ -27,8 +27,7 @@ const GOAL: DVec2 = DVec2::new(-2.25, 13.0);
 const SIDES_M: [f64; 2] = [-4.425, -0.075];
 const BEHIND_M: f64 = 0.075;
 const SIDES_END_M: f64 = 9.6;
-/// Maximum file size, bytes. A world file has some hundred kilobytes, the table of all worlds one
-/// megabyte.
+/// A world file has some hundred kilobytes, the table of all worlds one megabyte.
 const LONGEST: u64 = 64 << 20;
 #[derive(Deserialize)]
 struct Cylinder {
@@ -46,7 +45,6 @@ struct IndexRow {
 
 pub type World = (String, Scene, Rules);
 
-/// Returns every world of a table of cylinders, ordered by number.
 pub fn table(file: &Path) -> Result<Vec<World>> {
     let mut cylinders: BTreeMap<u32, Vec<Drum>> = BTreeMap::new();
     for Cylinder { world, x_m, y_m, radius_m } in rows(file)? {

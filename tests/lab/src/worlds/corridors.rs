@@ -49,7 +49,7 @@ fn oblique(random: &mut Random) -> Vec<DVec2> {
     axis
 }
 
-/// Returns the line at distance `by` to the left of `axis`, metres, mitred at its corners.
+/// Returns the line at `by` to the left of `axis`, mitred at its corners.
 fn beside(axis: &[DVec2], by: f64) -> Vec<DVec2> {
     let normal = |from: usize| (axis[from + 1] - axis[from]).perp().normalize_or_zero();
     (0..axis.len())

@@ -15,7 +15,7 @@ use glam::DVec2;
 use super::files::{malformed, unreadable};
 use crate::error::Result;
 
-/// Maximum size of such a file of some twenty short lines, bytes.
+/// Such a file has some twenty short lines.
 const LONGEST: u64 = 64 << 10;
 const KEYS: [&str; 5] =
     ["initial_pose_x", "initial_pose_y", "initial_pose_a", "goal_pose_x", "goal_pose_y"];
@@ -24,12 +24,11 @@ const KEYS: [&str; 5] =
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
     pub start: DVec2,
-    /// Start heading, radians counter-clockwise from x.
+    /// Counter-clockwise from x.
     pub heading: f64,
     pub target: DVec2,
 }
 
-/// Reads the tests of a `config.txt`, in order.
 pub fn read(file: &Path) -> Result<Vec<Ends>> {
     // Opening a pipe would wait for its other end, so the check comes first.
     if !file.is_file() {
@@ -42,7 +41,7 @@ pub fn read(file: &Path) -> Result<Vec<Ends>> {
     parse(&text).map_err(|problem| malformed(file, problem))
 }
 
-/// Parses metres or radians up to 1000 km.
+/// Allows up to 1000 km.
 pub fn number(text: &str) -> Option<f64> {
     text.trim().parse().ok().filter(|number: &f64| number.abs() <= 1e6)
 }

@@ -20,7 +20,6 @@ use crate::{
     random::Random,
 };
 
-/// Default number of drawn starts and targets on a map without any.
 const DRAWN: usize = 10;
 const DRAWN_KIND: u64 = 7;
 const TESTS_FILE: &str = "config.txt";

@@ -14,7 +14,6 @@ use crate::{error::Result, random::Random};
 
 /// Maximum side of a map: that of the check whether it can be crossed.
 const LARGEST_M: f64 = 95.0;
-/// Range of the straight distance to a drawn target.
 const DRAWN_M: [f64; 2] = [3.0, 15.0];
 const MOST_STARTS: usize = 50;
 
@@ -95,7 +94,7 @@ impl Floor {
         self.map.place(col as f64 + 0.5, row as f64 + 0.5)
     }
 
-    /// Returns the cells of `open` connected to `from`, inclusive. A map's rim is never open.
+    /// Returns the cells connected to `from`. A map's rim is never open.
     fn connected(&self, open: &[bool], from: Option<usize>) -> Vec<bool> {
         let cols = self.map.map.cols;
         let mut connected = vec![false; open.len()];
@@ -109,7 +108,6 @@ impl Floor {
         connected
     }
 
-    /// Returns the free cells at least `swept_m` from the middle of any solid cell.
     fn roomy(&self, swept_m: f64) -> Vec<bool> {
         let reach = (swept_m / self.map.cell_m + 0.5).ceil() as usize;
         let mut roomy = self.free();

@@ -14,7 +14,6 @@ const DENSITIES: [f64; 3] = [0.10, 0.16, 0.22];
 const KEPT_FREE_M: f64 = 0.5;
 /// Echo amplitude of cloth, relative to a hard surface.
 const SOFT: f64 = 0.1;
-/// Distance from a curtain to the wall behind it.
 const BEHIND_CURTAIN_M: f64 = 0.12;
 
 /// Draws room `number`, which selects the density.
@@ -44,7 +43,6 @@ pub fn draw(random: &mut Random, number: usize) -> Scene {
     Scene { shapes, heading: heading(random, 3, 0.0), target, ..Scene::default() }
 }
 
-/// Returns an object, and the radius of its floor space, metres.
 fn thing(random: &mut Random, at: DVec2) -> (Shapes, f64) {
     let angle = match random.below(3) {
         0 => random.within(0.0, PI),

@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::shapes::{Room, heading, wall};
 use crate::{missions::trial::Scene, random::Random};
 
-/// Doorway widths: through a narrow one robots pass one after the other.
+/// Through a narrow one robots pass one after the other.
 const DOORS_M: [f64; 2] = [0.8, 1.8];
 const DENSITY: f64 = 0.06;
 /// Free distance of drums around start and target, and of the doorway from them.

@@ -8,9 +8,9 @@
 //! the shipped trajectories, orders are inferred from their stations, and the speeds' standard
 //! deviations are nominal.
 //!
-//! There are three differences. A cylinder returns at the end of its path, where DynaBARN's jumps
-//! to the beginning. It moves straight between stations, where DynaBARN's follows a spline. A path
-//! that leaves the hall ends at the last station inside instead of at the wall.
+//! A cylinder returns at the end of its path, where DynaBARN's jumps to the beginning. It moves
+//! straight between stations, where DynaBARN's follows a spline. A path that leaves the hall ends
+//! at the last station inside instead of at the wall.
 
 use std::f64::consts::PI;
 
@@ -31,9 +31,9 @@ const GOAL: DVec2 = DVec2::new(-9.0, 0.0);
 const HALF_M: f64 = 10.0;
 const WALL_M: f64 = 0.5;
 const RADIUS_M: f64 = 0.5;
-/// Stations of a path beside its polynomial's points, evenly spaced along x.
+/// Beside the polynomial's points, evenly spaced along x.
 const STATIONS: usize = 10;
-/// Minimum time for which cylinders move: longer than a mission by the challenge's rules.
+/// Longer than a mission by the challenge's rules.
 const MOVES_S: f64 = 130.0;
 
 /// Difficulty of a world: inclusive ranges of cylinders, orders, speeds (m/s) and their deviations.
@@ -45,7 +45,7 @@ const DIFFICULTIES: [Difficulty; 3] = [
     ([20, 24], [3, 5], [1.5, 1.9], [0.1, 0.2]),
 ];
 
-/// Challenge rules without the score, because these worlds have no reference path.
+/// These worlds have no reference path for a score.
 pub const RULES: Rules = Rules { scored: false, ..barn::RULES };
 
 /// Draws hall `number`, which selects the difficulty.
@@ -96,7 +96,7 @@ fn cylinder(random: &mut Random, &(_, orders, [least, most], deviations): &Diffi
     Thing { shape, from_s: 0.0, until_s: None, moves }
 }
 
-/// Draws the stations of a path along a polynomial, in either direction, including its points.
+/// Includes the polynomial's points, in either direction.
 fn path(random: &mut Random, orders: [usize; 2]) -> Vec<DVec2> {
     let order = one_of(random, orders);
     let mut points: Vec<DVec2> = Vec::new();
@@ -121,7 +121,7 @@ fn path(random: &mut Random, orders: [usize; 2]) -> Vec<DVec2> {
     path
 }
 
-/// Returns the polynomial through `points` at `x`, by Lagrange's formula.
+/// Evaluates the polynomial by Lagrange's formula.
 fn polynomial(points: &[DVec2], x: f64) -> f64 {
     let share = |own: &DVec2| -> f64 {
         let others = points.iter().filter(|other| other.x != own.x);

@@ -6,7 +6,6 @@ use glam::DVec2;
 use super::shapes::{Room, heading};
 use crate::{missions::trial::Scene, random::Random};
 
-/// Range of the number of people, and of their wanted speeds.
 const PEOPLE: [usize; 2] = [3, 10];
 const SPEEDS_M_S: [f64; 2] = [0.5, 1.5];
 /// Nominal.
@@ -18,7 +17,6 @@ const DENSITY: f64 = 0.04;
 const KEPT_FREE_M: f64 = 0.6;
 const BEGINS_M: f64 = 1.5;
 
-/// Draws room `number`, which selects the number of people.
 pub fn draw(random: &mut Random, number: usize) -> Scene {
     let room = Room::draw(random, 8.0, [2.0, 3.0]);
     let target = room.target;

@@ -27,15 +27,12 @@ pub enum Doors {
     All,
 }
 
-/// Maximum angle between an oblique partition and the straight one.
 const MOST_OBLIQUE_DEG: f64 = 35.0;
 
-/// Draws room `number`, which selects the density.
 pub fn draw(random: &mut Random, number: usize, doors: Doors) -> Scene {
     room(random, number, doors, false)
 }
 
-/// Draws room `number` with an oblique partition, rotated against the grid.
 pub fn rotated(random: &mut Random, number: usize, doors: Doors) -> Scene {
     let mut scene = room(random, number, doors, true);
     let angle = random.within(-PI, PI);

@@ -60,7 +60,6 @@ impl Room {
         ((self.greatest - self.least).element_product() * density).round() as usize
     }
 
-    /// Returns the wall and drums, with `free_m` around start and target.
     pub fn with_drums(&self, random: &mut Random, density: f64, free_m: f64) -> Shapes {
         let mut shapes = walls([self.closed()]);
         for _ in 0..self.things(density) {
@@ -76,7 +75,6 @@ impl Room {
     }
 }
 
-/// Returns a random heading in one of `n` cases, otherwise `usual`.
 pub fn heading(random: &mut Random, n: usize, usual: f64) -> f64 {
     match random.below(n) {
         0 => random.within(-PI, PI),

@@ -52,7 +52,6 @@ pub(super) fn substitute(
     Ok(store(domain, pass, u, known))
 }
 
-/// Stores `u`, sorted by place, and the `known` u elsewhere.
 fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled], known: Option<&Store>) -> Store {
     let (width, height) = (domain.width(), domain.height());
     let blocked = |row: usize| domain.blocked()[row * width..(row + 1) * width].iter();

@@ -5,7 +5,6 @@ use crate::simd::Simd;
 /// Columns computed together: a wide vector.
 const BLOCK: usize = 4;
 
-/// Square symmetric matrix, stored as its upper triangle, whose first rows are eliminated.
 #[derive(Default)]
 pub(super) struct Matrix {
     entries: Vec<f64>,
@@ -20,7 +19,6 @@ pub(super) struct Matrix {
 }
 
 impl Matrix {
-    /// Clears the matrix to `size` rows, the first `pivots` of which are eliminated.
     pub(super) fn reset(&mut self, size: usize, pivots: usize) {
         self.size = size;
         self.entries.clear();
@@ -39,7 +37,6 @@ impl Matrix {
         }
     }
 
-    /// Adds the upper triangle `update`, whose rows and columns go to `slots`.
     pub(super) fn add_update(&mut self, slots: &[u32], update: &[f64]) {
         let Some((&first, &last)) = slots.first().zip(slots.last()) else {
             return;
@@ -81,7 +78,6 @@ impl Matrix {
         (entries[0], &entries[1..])
     }
 
-    /// Appends the upper triangle of the remaining rows, row by row.
     pub(super) fn copy_rest(&self, into: &mut Vec<f64>) {
         for row in self.ends.len()..self.size {
             let start = row * self.stride;
@@ -181,7 +177,6 @@ fn panel<const P: usize>(
     P
 }
 
-/// Returns the first column of the block that holds the diagonal of `row`.
 #[inline(always)]
 fn first_block(row: usize) -> usize {
     row - row % BLOCK

@@ -1,10 +1,9 @@
 //! Tree of fronts: the cells that are eliminated together, and the cost.
 //!
-//! Cells are eliminated in stages, from the farthest inwards. In a single passage, a stage is a few
-//! distances. Where loops join many parallel passages, everything beyond a distance is one piece,
-//! and its fronts are as wide as all passages together. There, the space between two distances, a
-//! slab, is eliminated first, passage by passage. Only the separators, one distance in many, have
-//! wide fronts:
+//! Cells are eliminated in stages. In a single passage, a stage is a few distances. Where loops
+//! join many parallel passages, everything beyond a distance is one piece, and its fronts are as
+//! wide as all passages together. There, the space between two distances, a slab, is eliminated
+//! first, passage by passage. Only the separators, one distance in many, have wide fronts:
 //!
 //! ```text
 //! target ... separator | slab: stages inwards | separator | slab ...
@@ -20,7 +19,6 @@ use std::{cmp::Reverse, ops::Range};
 use super::{breadth_first::BreadthFirst, budget::Budget};
 use crate::{Cancellation, SolveError};
 
-/// Cells that are eliminated together, followed by the cells that take their update.
 #[derive(Clone, Copy)]
 pub(crate) struct Front {
     first: usize,
@@ -151,7 +149,6 @@ impl Tree {
         })
     }
 
-    /// Returns the bytes that grow with every front, including the weights to store.
     fn growing_bytes(&self) -> u64 {
         let fronts = self.places.len() * size_of::<u32>() + self.fronts.len() * size_of::<Front>();
         fronts as u64 + 8 * self.cost.weights as u64
@@ -193,7 +190,6 @@ struct Builder<'a> {
     pieces: Pieces,
     /// Front on whose boundary a place was last put.
     seen: Vec<u32>,
-    /// Fronts that wait for the next stage, for the outer separator and for the inner one.
     for_stage: Vec<u32>,
     for_outer: Vec<u32>,
     for_inner: Vec<u32>,
@@ -260,7 +256,6 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Makes every cell of a stage a piece; `joins` merges neighbours.
     fn begin_pieces(&mut self, stage: &Range<u32>, joins: bool) {
         self.pieces.reset(stage.len());
         for place in stage.clone().filter(|_| joins) {

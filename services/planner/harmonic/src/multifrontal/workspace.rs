@@ -28,7 +28,6 @@ impl Workspace {
 
 #[derive(Debug, Default)]
 pub(super) struct Factors {
-    /// Weights of the cells after each eliminated cell in its front, up to the last nonzero.
     pub(super) rows: Vec<f64>,
     pub(super) lengths: Vec<u32>,
 }

@@ -49,7 +49,6 @@ impl<R: Real> Coarse<R> {
         self.scratch.reset(&grid);
     }
 
-    /// Relaxes from a zero guess and restricts the residual to `next`.
     #[inline(always)]
     pub(super) fn descend(&mut self, next: &mut Self) {
         let (grid, m) = (self.grid, MARGIN);
@@ -148,7 +147,6 @@ impl<R: Real> Coarse<R> {
         self.u[plane] = row;
     }
 
-    /// Returns couplings and u of the neighbours at `steps`, for `n` places of a plane from `o`.
     #[inline(always)]
     fn terms<const COUNT: usize>(
         &self,

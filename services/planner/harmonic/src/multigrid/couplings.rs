@@ -19,7 +19,6 @@ pub(super) const SOUTH_WEST: usize = 3;
 
 pub(super) type Place = (usize, usize);
 
-/// Couplings of a row of cells to their neighbours in one direction.
 pub(super) trait Couplings<R>: Copy {
     /// Returns the coupling of cell `x` times `value`.
     fn times(self, x: usize, value: R) -> R;
@@ -73,7 +72,6 @@ pub(super) trait Level<R: Real> {
     fn weights(&self) -> &Weights<R>;
     fn weights_mut(&mut self) -> &mut Weights<R>;
 
-    /// Returns the couplings whose other side is at `neighbour`.
     fn along(
         &self,
         direction: usize,

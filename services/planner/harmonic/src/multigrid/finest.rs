@@ -49,7 +49,6 @@ pub(super) struct Finest<R> {
 pub(super) struct Work<R> {
     pub share: R,
     pub sweeps: usize,
-    /// Whether a half sweep follows that restricts its changes as the residual.
     pub descend: bool,
     /// Angle, in radians, beyond which a turned cell counts as unsettled; `None` skips the check.
     pub tolerance: Option<R>,
@@ -182,7 +181,6 @@ impl<R: Real> Finest<R> {
         unsettled as usize
     }
 
-    /// Relaxes a strip of a plane; `change` takes the change of each cell.
     #[inline(always)]
     fn relax(&mut self, plane: usize, strip: usize, mut change: Option<&mut [R]>) {
         let (o, n) = self.grid.strip(strip);

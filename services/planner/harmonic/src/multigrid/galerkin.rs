@@ -78,7 +78,6 @@ impl<R: Real> Products<R> {
         self.even_odd.swap(0, 1);
     }
 
-    /// Sums row `y` of the coarse equations with the weights of the surrounding cells.
     #[inline(always)]
     fn finish_row(
         &mut self,

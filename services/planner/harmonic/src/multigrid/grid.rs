@@ -12,8 +12,7 @@ pub(super) const OE: usize = 1;
 pub(super) const EO: usize = 2;
 pub(super) const OO: usize = 3;
 
-/// Weights of the coarse cells west and east of each odd-even cell, and north and south of each
-/// even-odd cell.
+/// Weights of the coarse cells west and east of odd-even cells, north and south of even-odd ones.
 pub(super) type Weights<R> = [Vec<R>; 4];
 
 /// Zeros before the first row; eight instead of one keep the rows aligned.
@@ -24,8 +23,7 @@ const SMALL: usize = 1 << 15;
 
 /// Slices each row to `n` values from `start` on, mutably.
 ///
-/// Loops vectorise only if the lengths of their rows are known. It is a macro, because `array::map`
-/// is not always inlined.
+/// Known lengths let loops vectorise; `array::map` is not always inlined.
 macro_rules! cut {
     ($start:expr, $n:expr, $($row:ident),+) => { $(let $row = &mut $row[$start..][..$n];)+ };
 }
@@ -45,13 +43,11 @@ pub(super) struct Grid {
     /// Columns and rows of each plane.
     pub columns: usize,
     pub rows: usize,
-    /// Values from one row of a plane to the next.
     pub stride: usize,
     /// Rows of a plane that a pass takes as one row.
     ///
     /// A small level is one strip: work per row and partial vectors would cost more than the
     /// margins between rows. The margins stay zero, because their diagonals and weights are zero.
-    /// The results are equal either way.
     pub strip_rows: usize,
     pub strips: usize,
 }
@@ -80,7 +76,6 @@ impl Grid {
         ((col & 1) + 2 * (row & 1), self.start(row / 2) + col / 2)
     }
 
-    /// Returns the first place of a strip in its plane, and the number of its places.
     #[inline(always)]
     pub(super) fn strip(&self, number: usize) -> (usize, usize) {
         let rows = self.strip_rows;
@@ -89,7 +84,7 @@ impl Grid {
 
     /// Returns the places of two consecutive strips in the buffers of a pass.
     ///
-    /// Single rows alternate between two places. The rows of a small level are contiguous.
+    /// Single rows alternate; the rows of a small level are contiguous.
     #[inline(always)]
     pub(super) fn buffered(&self, number: usize) -> [usize; 2] {
         let first = MARGIN + number % 2 * self.stride;
@@ -113,10 +108,8 @@ fn zero_values<'a, R: Real>(rows: impl IntoIterator<Item = &'a mut Vec<R>>, len:
     }
 }
 
-/// Buffers of a pass, for the current strip and a row beside it, reused between passes.
 #[derive(Debug, Default)]
 pub(super) struct Scratch<R> {
-    /// Rows of the next level in column order: its correction and its right-hand side.
     pub correction: Vec<R>,
     pub restricted: Vec<R>,
     pub change_ee: Vec<R>,
@@ -135,14 +128,11 @@ impl<R: Real> Scratch<R> {
         zero_values(others.into_iter().chain(residuals), len);
     }
 
-    /// Puts the first row of `next`, times `share`, where
-    /// [`correction_below`](Self::correction_below) expects it.
     #[inline(always)]
     pub(super) fn begin_correction(&mut self, next: &Grid, planes: &Planes<R>, share: R) {
         join_row(next, planes, 0, share, &mut self.correction[MARGIN..]);
     }
 
-    /// Returns the correction in the rows of `next` at strip `number`, and in the rows below.
     #[inline(always)]
     pub(super) fn correction_below(
         &mut self,
@@ -185,7 +175,6 @@ pub(super) fn around<R>(
     [&west[o..], &east[o - 1..], &north[o..], &south[o - stride..]]
 }
 
-/// Adds a coarse correction to `n` cells from `o` on of the odd-even and even-odd planes.
 #[inline(always)]
 pub(super) fn correct<R: Real>(
     u: &mut Planes<R>,
@@ -207,7 +196,6 @@ fn add_products<R: Real>(out: &mut [R], (w, a): (&[R], &[R]), (v, b): (&[R], &[R
     }
 }
 
-/// Writes row `row` of a level, given in column order, to the planes.
 #[inline(always)]
 pub(super) fn split_row<R: Real>(grid: &Grid, planes: &mut Planes<R>, row: usize, values: &[R]) {
     let start = grid.start(row / 2);
@@ -223,7 +211,6 @@ pub(super) fn split_row<R: Real>(grid: &Grid, planes: &mut Planes<R>, row: usize
     }
 }
 
-/// Reads row `row` of a level in column order, times `share`; zeros beyond the last row.
 #[inline(always)]
 pub(super) fn join_row<R: Real>(
     grid: &Grid,

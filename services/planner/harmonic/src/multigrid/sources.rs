@@ -42,7 +42,6 @@ pub(super) fn restrict<R: Real>(finest: &Finest<R>, coarse: &mut [Coarse<R>]) {
     }
 }
 
-/// Distributes `value` of a cell to the coarse cells it is interpolated from.
 fn spread_flow<R: Real>(
     level: &impl Level<R>,
     plane: usize,

@@ -1,8 +1,5 @@
 //! Choice of the first method, by the shape of the free space.
 //!
-//! Multigrid costs some nanoseconds per cell for every few orders of magnitude of u. Multifrontal
-//! factorisation costs the square of the passage width per cell at any range of u.
-//!
 //! Where the mean width of the free space is large, multigrid is chosen at once. Otherwise a
 //! breadth-first pass from the target gives the path lengths, hence the range of u, and the exact
 //! cost of the factorisation.
@@ -34,7 +31,6 @@ const BAND_CYCLE_PER_CELL: f64 = 2.2;
 const BAND_CYCLES: f64 = 20.0;
 const CELLS_PER_CYCLE: f64 = 6.0;
 
-/// Returns nanoseconds per cell for `bands` beyond the range of single precision.
 fn further_bands(bands: f64, decades_per_cell: f64) -> f64 {
     let depth = SINGLE_DECADES / decades_per_cell;
     let cycles = (depth / CELLS_PER_CYCLE).min(BAND_CYCLES);
@@ -48,14 +44,12 @@ fn cycles(decades: f64) -> f64 {
 }
 
 pub(super) struct Plan {
-    /// Methods in order; the multifrontal factorisation is always the last.
     pub methods: Vec<Method>,
     /// Breadth-first pass and tree of fronts, if needed.
     pub multifrontal: Option<(BreadthFirst, Tree)>,
 }
 
 impl Plan {
-    /// Plans single precision with its continuations, then double precision.
     fn multigrid() -> Self {
         use Method::{Multifrontal, MultigridDouble, MultigridSingle};
         Self { methods: vec![MultigridSingle, MultigridDouble, Multifrontal], multifrontal: None }

@@ -32,7 +32,6 @@ impl Check {
         }
     }
 
-    /// Returns the largest residual as a multiple of the limit.
     pub(crate) fn excess(&self) -> f64 {
         self.worst_residual / RESIDUAL_LIMIT
     }
@@ -41,7 +40,6 @@ impl Check {
         self.unreached == 0 && self.holds_where_reached()
     }
 
-    /// Returns whether the cells with u > 0 pass.
     pub(crate) fn holds_where_reached(&self) -> bool {
         self.local_maxima == 0
             && self.worst_residual <= RESIDUAL_LIMIT

@@ -59,7 +59,6 @@ impl<R: Real> Window<R> for Rows<R> {
     }
 }
 
-/// Three rows of numbers with an exponent per cell.
 pub(super) struct ScaledRows {
     mantissas: Rows<f64>,
     above: Vec<i32>,

@@ -22,7 +22,6 @@ pub struct Body {
     pub radius_m: f64,
     /// Least value of occupied cells, up to 100.
     pub occupied: u8,
-    /// Whether unknown cells are free.
     pub enters_unknown: bool,
 }
 
@@ -44,7 +43,6 @@ pub struct Costmap {
 }
 
 impl Costmap {
-    /// Reads a `nav_msgs/OccupancyGrid`. Errors give the reason of a refusal.
     pub fn read(payload: &[u8]) -> Result<Self, String> {
         let OccupancyGrid { header, info, data: cells } = OccupancyGrid::decode(payload)?;
         let resolution_m = f64::from(info.resolution);

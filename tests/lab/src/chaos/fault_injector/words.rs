@@ -1,3 +1,5 @@
+//! Messages of each protocol, in JSON terms.
+
 use std::f64::consts::TAU;
 
 use common::{
@@ -11,10 +13,8 @@ use common::{
 
 /// Current of a held motor, as in the simulated robot, AD counts.
 const HELD_AD: u16 = 1520;
-/// Maximum echo of a sonar that heard something.
 const LONGEST_ECHO_M: f64 = 2.54;
 const MOTOR_BYTES: usize = 33;
-/// Angle of an X80 count.
 pub const COUNT_RAD: f64 = TAU / 1200.0;
 
 pub enum Words {
@@ -162,7 +162,6 @@ impl Said {
         [!ranges.is_empty(), scan.is_some() || !scans.is_empty(), has_further]
     }
 
-    /// Returns the index of the message's sensor stream; none for an answer.
     pub fn stream(&self) -> Option<usize> {
         let has_wheels = self.report.wheels.is_some();
         std::iter::once(has_wheels).chain(self.readings()).position(|has| has)
