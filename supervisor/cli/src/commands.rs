@@ -85,7 +85,7 @@ commands! {
         Runs runs,
         Table table,
         Map map,
-        @"ros2" @"foxglove"
+        @"ros2" @"foxglove" @"remote"
     }
     "Record it" {
         Record record,

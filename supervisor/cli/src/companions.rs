@@ -55,7 +55,7 @@ pub static TABLE: [Companion; 9] = [
         "Repeat the paper's experiments and compare the results with those of the paper",
     ),
     laboratory("field", "Solve the harmonic field of a map, without a robot"),
-    laboratory("bench", "Measure tick latency; test a robot with random signals and faults"),
+    laboratory("bench", "Measure tick latency, and test a robot with random signals and faults"),
 ];
 
 pub fn find(named: &OsStr) -> Option<&'static Companion> {

@@ -250,6 +250,15 @@ fn every_test_that_a_figure_names_exists() {
 }
 
 #[test]
+fn every_subcommand_is_listed_in_the_help() {
+    let command = commands::command_line();
+    let help = command.clone().render_long_help().to_string();
+    let shown = command.get_subcommands().filter(|it| !it.is_hide_set());
+    let unlisted = shown.filter(|it| !help.contains(&format!("\n  {} ", it.get_name())));
+    assert_eq!(unlisted.map(|it| it.get_name()).collect::<Vec<_>>(), [""; 0]);
+}
+
+#[test]
 fn every_page_is_listed_in_the_help_and_the_package_and_the_readme_leads_to_each_part() {
     let help = commands::command_line().render_long_help().to_string();
     let readme = fs::read_to_string(root().join("README.md")).unwrap();
