@@ -88,7 +88,7 @@ mod tests {
         {
             assert_eq!(resolved(Path::new(named)).unwrap(), Path::new(found));
         }
-        assert!(resolved(Path::new("./bug")).unwrap_err().contains("`bug`, `wavefront`, a path"));
+        assert!(resolved(Path::new("./bug")).unwrap_err().contains("`bug`, `wavefront`, the path"));
     }
 
     #[test]
