@@ -234,7 +234,8 @@ def main(firsthand):
 
         # No request is permitted by default, and everything is published.
         deaf = bridge()
-        run = mission("shown", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=10")
+        # It is slow, so that it is still on its way when the stop comes on a busy machine.
+        run = mission("shown", "--set", "robot.model='kobuki'", "--set", "robot.rate_hz=10", speed=0.1)
         for name in ["pose", "odom", "map", "path", "field", "scan", "diagnostics", "tf", "tf_static", "map_updates"]:
             heard.until(name, lambda: heard.messages.get(name))
         heard.until("frames that are the pose", lambda: is_pose(heard))
@@ -285,7 +286,7 @@ def main(firsthand):
         heard.until("poses and a map again", lambda: heard.messages.get("pose") and heard.messages.get("map"))
         heard.until("a reader of stop", lambda: stops.get_subscription_count() > 0)
         stops.publish(Bool(data=True))
-        heard.until("rest", lambda: status(firsthand)["link"]["cause"] == "stopped by an operator")
+        heard.until("rest", lambda: (status(firsthand)["link"] or {}).get("cause") == "stopped by an operator")
         # Nav2's client is made while the robot stands: it would be at its target meanwhile.
         if BasicNavigator is not None:
             navigator = BasicNavigator()
@@ -312,7 +313,7 @@ def main(firsthand):
             assert navigator.getFeedback().distance_remaining > 0
             navigator.cancelTask()
             assert result() == (TaskResult.CANCELED, 0, "")
-            assert status(firsthand)["link"]["cause"] == "stopped by an operator"
+            assert (status(firsthand)["link"] or {}).get("cause") == "stopped by an operator"
             canceled = navigator.goal_handle
             for x, frame, code, words in [(90.0, "map", 204, "outside the perimeter"), (1.0, "odom", 9002, 'give it in "map"')]:
                 go(x, 0.0, frame)
@@ -343,7 +344,7 @@ def main(firsthand):
         heard.messages.clear()
         heard.until("movement", lambda: heard.messages.get("odom") and heard.newest("odom").twist.twist.linear.x > 0.1)
         stops.publish(Bool(data=True))
-        heard.until("rest", lambda: status(firsthand)["link"]["cause"] == "stopped by an operator" and status(firsthand)["link"]["at_rest"])
+        heard.until("rest", lambda: (status(firsthand)["link"] or {}).get("cause") == "stopped by an operator" and status(firsthand)["link"]["at_rest"])
         places = node.create_publisher(PoseWithCovarianceStamped, "initialpose", 10)
         heard.until("a reader of places", lambda: places.get_subscription_count() > 0)
         place = PoseWithCovarianceStamped()

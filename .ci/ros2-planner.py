@@ -321,7 +321,7 @@ def main(firsthand):
             print(f"{code}: {result.error_msg}")
         assert through.plan(turn, Goals(Header(), []))[1].error_code == 309
         heard = SimpleNamespace(node=node, until=until)
-        bridge.check_parameters(heard, "firsthand_planner", {"robot_radius": RADIUS, "map": "map", "occupied": 99}, "radius")
+        bridge.check_parameters(heard, "firsthand_planner", {"robot_radius": RADIUS, "map": "map", "occupied": 99}, "Radius")
         if bridge.BasicNavigator is not None:
             commander(is_free)
 
