@@ -7,6 +7,8 @@ pub mod odometry;
 
 use std::{fmt, time::Duration};
 
+use serde::Serialize;
+
 use crate::mission::Sensor;
 use crate::samples::{
     ComplaintSample, CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus,
@@ -137,7 +139,7 @@ impl WireTally {
 }
 
 /// Reason why a message is unusable, for the user to correct.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Refusal {
     /// Part of the message; empty for the whole.
     pub input: String,
@@ -168,6 +170,10 @@ impl fmt::Display for Refusal {
 }
 
 impl ComplaintSample {
+    /// Age at which a complaint is over. A stage repeats it several times a second, but may wait
+    /// seconds for a processor.
+    pub const LASTS: Duration = Duration::from_secs(10);
+
     pub fn of(stage: &str, Refusal { input, what, remedy }: &Refusal) -> Self {
         let (stage, input) = (name(stage), words(input));
         Self { stage, input, what: words(what), remedy: words(remedy), ..Self::default() }

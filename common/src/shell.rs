@@ -18,7 +18,7 @@ use self::fault_requests::{Asked, Requests};
 use crate::{
     bus::{Bus, Stamp, Writer, Writers},
     checkpoint::Checkpoint,
-    clock::{MissionClock, MissionTime},
+    clock::{MissionClock, MissionTime, monotonic_ns},
     driver::Refusal,
     external,
     journal::{Journal, Restored},
@@ -207,7 +207,7 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
         waiter.on_readable(supervisor)?;
     }
     let mut stop = StopRequest { terminated, supervisor };
-    let mut heartbeat = Heartbeat::new(&bus, &generation)?;
+    let mut heartbeat = Heartbeat::new(&bus, &generation, run.clock)?;
     let roster = Roster::open(&bus)?;
     heartbeat.beat(HealthState::Starting, Progress::default())?;
     roster.admit_named(&bus)?;
@@ -228,7 +228,7 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
     });
     if let Err(error) = &worked {
         // The stage's log has the error in any case.
-        let _ = heartbeat.complain(&error.to_string().into(), Progress::default());
+        let _ = heartbeat.complain(&error.to_string().into());
     }
     worked
 }
@@ -284,7 +284,7 @@ fn work(
         busy = came;
         if heartbeat.beat_if_due(progress)? {
             if let Some(trouble) = process.trouble() {
-                heartbeat.complain(&trouble, progress)?;
+                heartbeat.complain(&trouble)?;
             }
             let ignored = context.bus.writers().map(Writers::ignored).unwrap_or_default();
             if ignored.process != foreign {
@@ -293,13 +293,13 @@ fn work(
                 let (input, remedy) = (format!("process {foreign}"), "end it".to_owned());
                 let trouble = Refusal { input, what: what.to_owned(), remedy };
                 tracing::warn!("{trouble}");
-                heartbeat.complain(&trouble, progress)?;
+                heartbeat.complain(&trouble)?;
             }
             if context.bus.lost() > 2 * lost {
                 lost = context.bus.lost();
                 let trouble = "/dev/shm is full and samples are lost; remove files from it".into();
                 tracing::warn!(lost, "{trouble}");
-                heartbeat.complain(&trouble, progress)?;
+                heartbeat.complain(&trouble)?;
             }
             while let Some(Asked { id, fault }) = faults.take()? {
                 let answer = inject(process, fault)?;
@@ -341,10 +341,11 @@ struct Heartbeat {
     period: Duration,
     last: Instant,
     tick: u64,
+    clock: MissionClock,
 }
 
 impl Heartbeat {
-    fn new(bus: &Bus, generation: &Generation) -> Result<Self> {
+    fn new(bus: &Bus, generation: &Generation, clock: MissionClock) -> Result<Self> {
         Ok(Self {
             writer: bus.writer(&topics::HEALTH, generation.number)?,
             sample: HealthSample {
@@ -356,6 +357,7 @@ impl Heartbeat {
             period: topics::HEALTH.spec().restated_every(),
             last: Instant::now(),
             tick: 0,
+            clock,
         })
     }
 
@@ -372,9 +374,12 @@ impl Heartbeat {
         Ok(())
     }
 
-    fn complain(&mut self, trouble: &Refusal, Progress { tick, time }: Progress) -> Result {
+    /// Publishes `trouble` with the present time: readers drop old trouble, and the stage may have
+    /// had no tick yet.
+    fn complain(&mut self, trouble: &Refusal) -> Result {
         let complaint = ComplaintSample::of(name_str(&self.sample.stage), trouble);
-        Ok(self.complaints.publish_quietly(tick, time, complaint, &[])?)
+        let now = self.clock.at(self.tick, monotonic_ns());
+        Ok(self.complaints.publish_quietly(self.tick, now, complaint, &[])?)
     }
 
     fn time_to_beat(&self) -> Duration {

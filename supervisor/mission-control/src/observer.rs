@@ -1,9 +1,6 @@
 //! Readers of the supervisor, and the record by which a run is judged.
 
-use std::{
-    collections::VecDeque,
-    time::{Duration, Instant},
-};
+use std::{collections::VecDeque, time::Instant};
 
 use common::{
     bus::{Bus, BusError, Reader, Writers},
@@ -27,9 +24,6 @@ use crate::{long_record, target_list::TargetOutcome};
 const MOST_GUIDANCE: usize = 1024;
 /// Contact history, longer than the contacts between two stall checks.
 const MOST_CONTACTS: usize = 64;
-
-/// Stages repeat a complaint several times a second, and may be starved for seconds.
-const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Published {
@@ -200,7 +194,8 @@ fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
 
 impl Record {
     pub fn complaint(&self) -> Option<String> {
-        let (complaint, _) = self.complaint.filter(|(_, read)| read.elapsed() < COMPLAINT_LASTS)?;
+        let (complaint, _) =
+            self.complaint.filter(|(_, read)| read.elapsed() < ComplaintSample::LASTS)?;
         Some(complaint.to_string())
     }
 

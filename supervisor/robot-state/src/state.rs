@@ -1,6 +1,6 @@
 //! State of a robot: its newest samples.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::collections::BTreeMap;
 
 use common::{
     grid::{Applied, Replica},
@@ -26,9 +26,6 @@ const POINT_EVERY_M: f64 = 0.05;
 
 /// Age from which a mirror is outdated, seconds. States come several times a second.
 const OLD_S: f64 = 1.0;
-/// Stages repeat a complaint several times a second, and may be starved for seconds.
-const COMPLAINT_LASTS: Duration = Duration::from_secs(10);
-
 /// State of a robot. Missing samples are `None`, lists start empty. Lengths are metres in the
 /// mission frame.
 #[derive(Clone, Debug, Default)]
@@ -165,7 +162,7 @@ impl RobotState {
 
     pub fn complaint(&self) -> Option<&ComplaintSample> {
         let now = self.link?.stamp.time();
-        self.complaint.as_ref().filter(|said| now.since(said.stamp.time()) < COMPLAINT_LASTS)
+        self.complaint.as_ref().filter(|said| now.since(said.stamp.time()) < ComplaintSample::LASTS)
     }
 
     fn does(&self) -> (Kind, String) {
@@ -301,7 +298,7 @@ mod tests {
         let trouble = Refusal { remedy: "open it".to_owned(), ..Refusal::from("the port is shut") };
         state.apply(&Sample::Complaint(ComplaintSample::of("link", &trouble)));
         assert!(state.doing().1.ends_with("; link: the port is shut; open it"));
-        link.stamp.stamp_ns = COMPLAINT_LASTS.as_nanos() as u64;
+        link.stamp.stamp_ns = ComplaintSample::LASTS.as_nanos() as u64;
         state.link = Some(link);
         assert_eq!(state.complaint(), None, "the stage no longer repeats it");
     }

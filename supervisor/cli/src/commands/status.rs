@@ -70,18 +70,15 @@ struct Status<'a> {
     link: Option<LinkStatus>,
     power: Option<PowerStatus>,
     /// The trouble of a stage; none if no stage has any.
-    complaint: Option<ComplaintStatus>,
+    complaint: Option<ComplaintStatus<'a>>,
     stages: Vec<StageStatus<'a>>,
 }
 
 #[derive(Serialize)]
-struct ComplaintStatus {
-    stage: String,
-    input: String,
-    what: String,
-    remedy: String,
-    #[serde(skip)]
-    text: String,
+struct ComplaintStatus<'a> {
+    stage: &'a str,
+    #[serde(flatten)]
+    trouble: Refusal,
 }
 
 #[derive(Serialize)]
@@ -332,10 +329,9 @@ fn status<'a>(
         }),
         link: robot.link.as_ref().map(link_status),
         power: robot.power.as_ref().map(power_status),
-        complaint: robot.complaint().map(|complaint| {
-            let Refusal { input, what, remedy } = complaint.refusal();
-            let stage = name_str(&complaint.stage).to_owned();
-            ComplaintStatus { stage, input, what, remedy, text: complaint.to_string() }
+        complaint: robot.complaint().map(|complaint| ComplaintStatus {
+            stage: name_str(&complaint.stage),
+            trouble: complaint.refusal(),
         }),
         stages: robot.stages.iter().map(stage_status).collect(),
     })
@@ -432,8 +428,8 @@ impl fmt::Display for Status<'_> {
         if let Some(power) = &self.power {
             writeln!(f, "{power}")?;
         }
-        if let Some(complaint) = &self.complaint {
-            writeln!(f, "{}", complaint.text)?;
+        if let Some(ComplaintStatus { stage, trouble }) = &self.complaint {
+            writeln!(f, "{stage}: {trouble}")?;
         }
         let mut table = Table::new([
             "stage",
