@@ -29,8 +29,8 @@ pub struct Seen {
     report: Report,
     /// JSON words received, or X80 sensors with a reading.
     words: BTreeSet<String>,
-    /// Times of motion reports, seconds.
-    ticks_s: Vec<f64>,
+    /// Number of motion reports, and times of the first and the last, seconds.
+    ticks: (u32, [f64; 2]),
     /// Reason why the newest line is not of the protocol.
     pub refused: String,
 }
@@ -42,15 +42,15 @@ impl Seen {
         let mut mission = Mission::parse("target = [2, 0]\nrobot.rate_hz = 10", Path::new(""))?;
         mission.robot.protocol = Some(protocol);
         let driver = drivers::base(&mission).0;
-        let (lines, report, words, ticks_s, refused) = Default::default();
-        Ok(Self { protocol, mission, driver, lines, report, words, ticks_s, refused })
+        let (lines, report, words, ticks, refused) = Default::default();
+        Ok(Self { protocol, mission, driver, lines, report, words, ticks, refused })
     }
 
     /// Returns the request for a report. After the first motion report it is empty, which shows the
     /// robot's own rate.
     pub fn ask(&mut self) -> Vec<u8> {
         match self.protocol {
-            _ if !self.ticks_s.is_empty() => Vec::new(),
+            _ if self.ticks.0 > 0 => Vec::new(),
             Protocol::Arduino => self.driver.poll(),
             Protocol::X80 => self.driver.ask_for_sensors(),
             _ => self.driver.ping(),
@@ -59,7 +59,7 @@ impl Seen {
 
     /// Returns whether the answers follow the protocol.
     pub fn is_known(&self) -> bool {
-        !self.ticks_s.is_empty() || !self.words.is_empty()
+        self.ticks.0 > 0 || !self.words.is_empty()
     }
 
     /// Takes `bytes` that came at `at_s`.
@@ -80,14 +80,23 @@ impl Seen {
         let table = self.mission.sensor_table();
         let read = heard.readings.iter().filter(|it| it.status() != RangeStatus::Invalid);
         self.words.extend(read.map(|it| table[usize::from(it.sensor)].name.clone()));
-        self.ticks_s.extend(heard.motion.map(|_| at_s));
+        if heard.motion.is_some() {
+            self.tick(at_s);
+        }
+    }
+
+    fn tick(&mut self, at_s: f64) {
+        let (count, [first_s, _]) = self.ticks;
+        self.ticks = (count + 1, [if count == 0 { at_s } else { first_s }, at_s]);
     }
 
     fn take(&mut self, mut report: Report, at_s: f64) {
         if let Ok(serde_json::Value::Object(words)) = serde_json::to_value(&report) {
             self.words.extend(words.into_iter().map(|(word, _)| word));
         }
-        self.ticks_s.extend(report.speeds.map(|_| at_s));
+        if report.speeds.is_some() {
+            self.tick(at_s);
+        }
         if let Some(ranges) = report.scan {
             report.scans.insert("laser".to_owned(), Scan { ranges, ..Scan::default() });
         }
@@ -103,26 +112,24 @@ impl Seen {
     /// Returns a mission for the robot at `address`. Lines that begin with `# -` list the readings.
     pub fn mission_at(&self, address: &str) -> String {
         let Report { ranges, scans, touched, battery_v, .. } = &self.report;
-        let ticks_hz = match self.ticks_s[..] {
-            [first_s, .., last_s] => (self.ticks_s.len() - 1) as f64 / (last_s - first_s).max(0.1),
-            _ => 0.0,
-        };
+        let (count, [first_s, last_s]) = self.ticks;
+        let ticks_hz = f64::from(count.saturating_sub(1)) / (last_s - first_s).max(0.1);
         let (name, keys) = match self.protocol {
             Protocol::X80 => (
                 "x80",
-                "model = \"x80\"                    # or \"x80sv\", whose encoders differ\n# wheel_radius_m = 0.085         # MEASURE these, and remove the first #\n# track_m = 0.26                 # between the middles of the wheels\n# radius_m = 0.19                # of the disc that covers the body\n# counts_per_turn = 1200         # of a wheel\n",
+                "model = \"x80\"                    # or \"x80sv\", whose encoders differ\n# wheel_radius_m = 0.085         # MEASURE these, and remove the first #\n# track_m = 0.26                 # between the middles of the wheels\n# radius_m = 0.19                # of the disc that covers the body\n# counts_per_turn = 1200         # of a wheel\n".to_owned(),
             ),
             Protocol::Json => (
                 "json",
-                "counts_per_turn = 3600.0         # angles are rounded to 0.1 degrees; nothing to measure\nwheel_radius_m = 0.033           # MEASURE\ntrack_m = 0.16                   # MEASURE: between the middles of the wheels\nradius_m = 0.12                  # MEASURE: of the disc that covers the body\ntop_speed_m_s = 0.3              # MEASURE\n",
+                format!("counts_per_turn = 3600.0         # angles are rounded to 0.1 degrees; nothing to measure\n{SIZES}"),
             ),
             Protocol::Arduino => (
                 "arduino",
-                "counts_per_turn = 1200.0         # MEASURE: encoder counts of a turn of a wheel\nwheel_radius_m = 0.033           # MEASURE\ntrack_m = 0.16                   # MEASURE: between the middles of the wheels\nradius_m = 0.12                  # MEASURE: of the disc that covers the body\ntop_speed_m_s = 0.3              # MEASURE\n\n[robot.arduino]\nsonars = { front = 4 }           # MEASURE: the pin of each sonar, by the name of its row\n\n[[robot.sensor]]\nname = \"front\"\nkind = \"cone\"\nforward_m = 0.1                  # MEASURE: from the middle between the wheels, along its bearing\nbearing_deg = 0.0                # MEASURE: 0 looks ahead, positive to the left\n",
+                format!("counts_per_turn = 1200.0         # MEASURE: encoder counts of a turn of a wheel\n{SIZES}\n[robot.arduino]\nsonars = {{ front = 4 }}           # MEASURE: the pin of each sonar, by the name of its row\n\n[[robot.sensor]]\nname = \"front\"\nkind = \"cone\"\n{PLACE}"),
             ),
             Protocol::Ros2 => (
                 "ros2",
-                "counts_per_turn = 3600.0         # odometry is rounded to 0.1 degrees of a wheel; nothing to measure\nwheel_radius_m = 0.033           # MEASURE\ntrack_m = 0.16                   # MEASURE: between the middles of the wheels\nradius_m = 0.12                  # MEASURE: of the disc that covers the body\ntop_speed_m_s = 0.3              # MEASURE\n\n[[robot.sensor]]                 # MEASURE all of its row\nname = \"scan\"\nkind = \"scan\"\nforward_m = 0.0\nbearing_deg = 0.0\nfield_of_view_deg = 360\nbeams = 360\nreach_m = 8.0\n",
+                format!("counts_per_turn = 3600.0         # odometry is rounded to 0.1 degrees of a wheel; nothing to measure\n{SIZES}\n[[robot.sensor]]                 # MEASURE all of its row\nname = \"scan\"\nkind = \"scan\"\nforward_m = 0.0\nbearing_deg = 0.0\nfield_of_view_deg = 360\nbeams = 360\nreach_m = 8.0\n"),
             ),
         };
         // A robot that only answers is asked ten times a second.
@@ -168,6 +175,7 @@ impl Seen {
     }
 }
 
+const SIZES: &str = "wheel_radius_m = 0.033           # MEASURE\ntrack_m = 0.16                   # MEASURE: between the middles of the wheels\nradius_m = 0.12                  # MEASURE: of the disc that covers the body\ntop_speed_m_s = 0.3              # MEASURE\n";
 const PLACE: &str = "forward_m = 0.1                  # MEASURE: from the middle between the wheels, along its bearing\nbearing_deg = 0.0                # MEASURE: 0 looks ahead, positive to the left\n";
 
 #[cfg(test)]

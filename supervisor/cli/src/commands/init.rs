@@ -1,6 +1,8 @@
 //! `firsthand init`: a mission file for a robot that answers.
 
 use std::{
+    fs::File,
+    io::Write as _,
     path::PathBuf,
     time::{Duration, Instant},
 };
@@ -8,13 +10,8 @@ use std::{
 use bring_up::seen::Seen;
 use clap::Args;
 use common::{
-    address::Address,
-    clock::monotonic_ns,
-    domain::RobotName,
-    file::{FileError, replace},
-    mission::Protocol,
-    poll,
-    run::Run,
+    address::Address, clock::monotonic_ns, domain::RobotName, file::FileError, mission::Protocol,
+    poll, run::Run,
 };
 use console::{
     failure::{Refused, Result},
@@ -68,7 +65,9 @@ pub fn main(Arguments { address, out, protocol, robot }: &Arguments) -> Result {
     };
     let text = seen.mission_at(&address.to_string());
     missions::parsed(&text, "what the robot says", &[])?;
-    replace(out, &text).map_err(FileError::of("write", out))?;
+    // A file that appeared meanwhile stays.
+    let written = File::create_new(out).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(FileError::of("write", out))?;
     let said: String = text.split_inclusive('\n').filter(|line| line.starts_with("# -")).collect();
     Ok(print_text(&format!(
         "{said}wrote {place}; next:\n  1. correct its lines with MEASURE and PLACEHOLDER\n  2. firsthand check {place}\n  3. firsthand bring-up {place} --robot {robot} --write\n"
