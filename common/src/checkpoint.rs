@@ -284,7 +284,7 @@ mod tests {
         checkpoint.save(&vec![7_u32; 4]).unwrap();
         checkpoint.save(&vec![9_u32; 4]).unwrap();
         let whole = std::fs::read(&path).unwrap();
-        // The second save used the first slot, which is as long as its state.
+        // The second save filled the first slot, whose length equals that of its state.
         for bit in 8 * 4..8 * (HEADER + 5) {
             let mut changed = whole.clone();
             changed[bit / 8] ^= 1 << (bit % 8);

@@ -11,7 +11,7 @@ pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
     pub listening: String,
-    /// Wire of a laser with a line of its own.
+    /// Wire of a laser that has a separate line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser: Option<String>,
 }

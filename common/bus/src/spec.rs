@@ -42,7 +42,7 @@ pub struct Spec {
 }
 
 pub const EVERY_STAGE: &str = "every stage";
-/// Writer of operator topics; each command is a process of its own.
+/// Writer of operator topics. Each operator command is a separate process.
 pub const OPERATOR: &str = "operator";
 pub const SUPERVISOR: &str = "supervisor";
 

@@ -82,7 +82,7 @@ pub enum SensorModel {
     D435,
 }
 
-/// Laser that can have a serial line of its own.
+/// Laser, on the base's wire or on a separate serial line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rplidar {
     pub baud: u32,

@@ -21,7 +21,7 @@ payloads! {
         /// Covariance of the error of (x, y, theta): xx, xy, x theta, yy, y theta, theta theta;
         /// m^2, m rad, rad^2. Without a heading the entries of theta are ignored.
         covariance: [f64; 6],
-        /// Variances of the error that all fixes of this source share, for example of its own map.
+        /// Variances of the error common to all fixes of this source, such as that of its map.
         /// They are those of x and y and of theta, m^2 and rad^2. The covariance includes them, and
         /// averaging fixes cannot reduce them.
         shared: [f64; 2],

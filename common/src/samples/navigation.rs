@@ -293,7 +293,7 @@ impl ZoneCorner {
 
 payloads! {
     "firsthand.Target" TargetSample {
-        /// Counted from 1 in the run. A replacing target has a number of its own.
+        /// Counts from 1 within the run. A target that replaces another gets a new number.
         number: u64,
         last: u64,
         /// First tick in which it holds. A stage without a target takes it at once.
