@@ -45,10 +45,15 @@ fn a_signal_at_any_moment_of_a_start_ends_the_run_with_a_summary_and_leaves_noth
 
 #[test]
 fn a_signal_ends_a_run_whose_robot_or_recorder_gets_no_processor_while_it_starts() {
-    for (robot, word) in [("st-no-robot", "x80-sim.checkpoint"), ("st-no-rec", "firsthand record")]
-    {
+    let [simulator, recorder] = ["x80-sim.checkpoint", "firsthand record"];
+    // The recorder starts once the robot listens.
+    for (robot, appears, frozen) in [
+        ("st-no-robot", simulator, simulator),
+        ("st-listens", recorder, simulator),
+        ("st-no-rec", recorder, recorder),
+    ] {
         ends(robot, |_| {
-            let child = process(robot, word);
+            let child = process(robot, appears).and_then(|_| process(robot, frozen));
             child.inspect(|&child| signal_process(child, Signal::STOP)).is_some()
         });
     }

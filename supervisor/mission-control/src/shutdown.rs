@@ -43,10 +43,13 @@ impl Supervisor<'_> {
     pub(crate) fn stop_processes(&mut self) -> Result {
         self.stages.start_no_more();
         self.stop_all()?;
-        if let Some(simulator) = &mut self.robot.simulator {
-            simulator.stop()?;
-        }
-        Ok(())
+        let Some(simulator) = &mut self.robot.simulator else {
+            return Ok(());
+        };
+        self.turns.rest(true);
+        let stopped = simulator.stop();
+        self.turns.rest(false);
+        Ok(stopped?)
     }
 
     /// Recreates a bus whose files block a stage's start, and restarts all stages from their

@@ -124,7 +124,7 @@ pub(crate) struct Supervisor<'a> {
     pub recovery_steps: RecoverySteps,
     pub published_limit: Option<TickLimitSample>,
     cleanup: Cleanup,
-    turns: Turns,
+    pub turns: Turns,
     pub service: ServiceManager,
 }
 
