@@ -6,7 +6,7 @@ mod fault_requests;
 use std::{
     env, fmt,
     io::{self, Write as _},
-    os::fd::OwnedFd,
+    os::fd::{AsFd, OwnedFd},
     path::PathBuf,
     process::ExitCode,
     time::{Duration, Instant},
@@ -195,6 +195,9 @@ fn complain(error: &dyn fmt::Display) {
 /// Exit code for a wrong command line; `firsthand` has the same.
 const WRONG_USAGE: u8 = 2;
 
+/// Time for readers to connect to a stage that cannot start, whose samples end with it.
+const CONNECTED_WITHIN: Duration = Duration::from_millis(200);
+
 pub fn run_stage<P: Process>(start: &Start) -> Result {
     let terminated = Signals::catch(&[SIGTERM]).map_err(system("catch SIGTERM"))?;
     let Joined { generation, run, bus, supervisor, stage_lock: _stage_lock } = match start {
@@ -218,7 +221,9 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
         context.waiter.on(context.bus.wakeup(*topic)?);
     }
     let readers = P::Readers::open_readers(&context.bus)?;
+    let mut opened = false;
     let worked = P::open(&mut context, readers).and_then(|mut process| {
+        opened = true;
         tracing::info!(generation = number, "ready");
         let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
         // After an error, too, the stage is stopped in order: the link then stops the robot.
@@ -229,6 +234,9 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
     if let Err(error) = &worked {
         // The stage's log has the error in any case.
         let _ = heartbeat.complain(&error.to_string().into());
+        if !opened {
+            stop.came_within(CONNECTED_WITHIN);
+        }
     }
     worked
 }
@@ -241,8 +249,14 @@ struct StopRequest {
 
 impl StopRequest {
     fn came(&mut self) -> bool {
-        let ended = |supervisor| poll::is_readable(supervisor, Duration::ZERO).unwrap_or(false);
-        self.terminated.came() || self.supervisor.as_ref().is_some_and(ended)
+        self.terminated.came() || self.came_within(Duration::ZERO)
+    }
+
+    /// Waits at most `patience`.
+    fn came_within(&self, patience: Duration) -> bool {
+        let sources = [Some(self.terminated.as_fd()), self.supervisor.as_ref().map(AsFd::as_fd)];
+        let sources: Vec<_> = sources.into_iter().flatten().collect();
+        poll::readable(&sources, Some(patience)).is_ok_and(|came| came.contains(&true))
     }
 }
 

@@ -11,9 +11,9 @@ use common::{
     clock::MissionTime,
     mission::{MOST_CORNERS, MOST_ZONES},
     samples::{
-        BeaconSample, DeathSample, DirectiveSample, FollowingSample, PlaceSample, RequestAnswer,
-        RequestSample, RosterEntry, RosterHeader, StallSample, TargetSample, TickLimitSample,
-        ZoneCorner, ZonesHeader,
+        BeaconSample, ComplaintSample, DeathSample, DirectiveSample, FollowingSample, PlaceSample,
+        RequestAnswer, RequestSample, RosterEntry, RosterHeader, StallSample, TargetSample,
+        TickLimitSample, ZoneCorner, ZonesHeader,
     },
     topics,
     waiter::Waiter,
@@ -35,6 +35,7 @@ pub(crate) struct BusEndpoints {
     directive: Writer<DirectiveSample>,
     pub tick_limit: Writer<TickLimitSample>,
     roster: Writer<RosterHeader, RosterEntry>,
+    pub complaints: Writer<ComplaintSample>,
     deaths: Writer<DeathSample>,
     stalls: Writer<StallSample>,
     orders: Writer<RequestSample>,
@@ -43,6 +44,8 @@ pub(crate) struct BusEndpoints {
     /// Id and answer of the newest request; id 0 before the first.
     pub last_request: (u64, RequestAnswer),
     published: Option<Instant>,
+    /// Since the last publication.
+    pub has_new_reader: bool,
     // The bus is dropped last.
     pub bus: Rc<Bus>,
 }
@@ -72,6 +75,7 @@ impl BusEndpoints {
             zones: bus.slice_writer(&topics::ZONES, 1, MOST_ZONES * MOST_CORNERS)?,
             directive: bus.writer(&topics::DIRECTIVE, 1)?,
             tick_limit: bus.writer(&topics::TICK_LIMIT, 1)?,
+            complaints: bus.writer(&topics::COMPLAINTS, 1)?,
             roster: bus.slice_writer(&topics::ROSTER, 1, stages::TABLE.len())?,
             deaths: bus.writer(&topics::DEATHS, 1)?,
             stalls: bus.writer(&topics::STALLS, 1)?,
@@ -80,6 +84,7 @@ impl BusEndpoints {
             beacon: bus.reader(&topics::BEACON)?,
             last_request,
             published: None,
+            has_new_reader: false,
             bus,
         })
     }
@@ -97,7 +102,8 @@ impl BusEndpoints {
     /// Returns whether the last publication is a `period` old, or a new consumer waits for a
     /// roster.
     pub(crate) fn is_due(&mut self, period: Duration) -> bool {
-        self.roster.has_new_reader() || self.published.is_none_or(|last| last.elapsed() >= period)
+        self.has_new_reader |= self.roster.has_new_reader();
+        self.has_new_reader || self.published.is_none_or(|last| last.elapsed() >= period)
     }
 
     pub(crate) fn publish_state(
@@ -108,7 +114,7 @@ impl BusEndpoints {
         header: RosterHeader,
         entries: &[RosterEntry],
     ) -> Result<(), BusError> {
-        self.published = Some(Instant::now());
+        (self.published, self.has_new_reader) = (Some(Instant::now()), false);
         self.directive.publish(tick, time, directive)?;
         let (last_request, answer) = self.last_request;
         let header = RosterHeader { last_request, answer: answer.into(), ..header };

@@ -193,10 +193,9 @@ fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
 }
 
 impl Record {
-    pub fn complaint(&self) -> Option<String> {
-        let (complaint, _) =
-            self.complaint.filter(|(_, read)| read.elapsed() < ComplaintSample::LASTS)?;
-        Some(complaint.to_string())
+    pub fn complaint(&self) -> Option<ComplaintSample> {
+        let (complaint, read) = self.complaint?;
+        (read.elapsed() < ComplaintSample::LASTS).then_some(complaint)
     }
 
     /// Treats places outside the map as hazards.

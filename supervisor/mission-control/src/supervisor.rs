@@ -11,7 +11,7 @@ use common::{
     run::Run,
     samples::{
         DirectiveSample, HoldReason, Order, PlaceSample, RosterHeader, TickLimitSample, ZoneCorner,
-        ZonesHeader,
+        ZonesHeader, name_str,
     },
     signals::Signals,
     topics,
@@ -350,7 +350,7 @@ impl<'a> Supervisor<'a> {
             progress: self.tick_progress.update(record.newest_tick(), now),
             // Other stages publish at tick 0 before the robot begins it.
             has_ticked: record.pose.is_some(),
-            complaint: record.complaint(),
+            complaint: record.complaint().map(|complaint| complaint.to_string()),
             reason: self.decision.reason,
             held: self.stages.held(),
             not_started: self.stages.not_started(),
@@ -427,6 +427,12 @@ impl<'a> Supervisor<'a> {
             simulated: self.robot.simulator.is_some().into(),
             ..RosterHeader::default()
         };
+        // A stage that ended cannot repeat its trouble, and one that runs does so later.
+        if let Some(complaint) = self.bus.observer.record.complaint()
+            && (self.bus.has_new_reader || !self.stages.runs(name_str(&complaint.stage)))
+        {
+            self.bus.complaints.publish(tick, time, complaint)?;
+        }
         let entries = self.stages.roster();
         self.bus.publish_state(tick, time, directive, header, &entries)?;
         Ok(())

@@ -114,6 +114,7 @@ impl Setting {
             &mut |progress| {
                 line.update(&title, || shown(progress), true);
                 if let Some(said) = progress.record.complaint() {
+                    let said = said.to_string();
                     // Numbers in it may differ each time.
                     let words: String = said.chars().filter(|it| !it.is_numeric()).collect();
                     if !complained.contains(&words) {
