@@ -49,9 +49,10 @@ pub struct Journal {
     snapshot_after: u64,
 }
 
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Restored<S, E> {
     pub state: Option<S>,
+    /// Entries after the state, oldest first.
     pub entries: Vec<E>,
 }
 

@@ -108,8 +108,13 @@ impl Outputs {
         self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.publish(self.at))
     }
 
-    pub fn publish<H: Stamped>(&mut self, topic: &'static Topic<H>, sample: H) -> Result {
-        self.publish_slice(topic, sample, &[])
+    /// Publishes a sample, unless it is `None`.
+    pub fn publish<H: Stamped>(
+        &mut self,
+        topic: &'static Topic<H>,
+        sample: impl Into<Option<H>>,
+    ) -> Result {
+        sample.into().map_or(Ok(()), |sample| self.publish_slice(topic, sample, &[]))
     }
 
     pub fn publish_slice<H: Stamped, E: Payload>(

@@ -174,6 +174,11 @@ impl GridFrame {
             .including(cell(self.to_cells(greatest).ceil()))
     }
 
+    /// Returns the window of a square around `centre`, metres, clamped to the map.
+    pub fn around(&self, centre: DVec2, reach_m: f64) -> Window {
+        self.between(centre - reach_m, centre + reach_m)
+    }
+
     pub fn cells_of<'map, T: Copy>(&self, window: Window, map: &'map [T]) -> Cow<'map, [T]> {
         if window == self.whole() {
             return Cow::Borrowed(map);

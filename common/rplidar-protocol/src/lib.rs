@@ -16,34 +16,33 @@ const RUN: usize = 4;
 /// Greatest angle between successive measurements, 1/64 degree. An A1 corrects angles by the range.
 const MOST_STEP_Q6: u16 = 20 * 64;
 
+/// Request by its byte. Standard scans need no others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Request {
-    Stop,
-    Reset,
-    Scan,
+    Scan = 0x20,
     /// Scan without waiting for the motor's speed.
-    ForceScan,
-    Info,
-    Health,
-    SampleRate,
-    /// All others, which standard scans do not need.
-    Other,
+    ForceScan = 0x21,
+    Stop = 0x25,
+    Reset = 0x40,
+    Info = 0x50,
+    Health = 0x52,
+    SampleRate = 0x59,
 }
 
-const REQUESTS: [(Request, u8); 7] = [
-    (Request::Stop, 0x25),
-    (Request::Reset, 0x40),
-    (Request::Scan, 0x20),
-    (Request::ForceScan, 0x21),
-    (Request::Info, 0x50),
-    (Request::Health, 0x52),
-    (Request::SampleRate, 0x59),
-];
-
 impl Request {
-    pub fn encode(self) -> Vec<u8> {
-        let byte = REQUESTS.iter().find(|(request, _)| *request == self);
-        byte.map_or_else(Vec::new, |(_, byte)| vec![START, *byte])
+    const ALL: [Self; 7] = [
+        Self::Scan,
+        Self::ForceScan,
+        Self::Stop,
+        Self::Reset,
+        Self::Info,
+        Self::Health,
+        Self::SampleRate,
+    ];
+
+    pub const fn encode(self) -> [u8; 2] {
+        [START, self as u8]
     }
 }
 
@@ -53,7 +52,7 @@ pub struct Requests {
 }
 
 impl Requests {
-    /// Returns the requests that `bytes` complete.
+    /// Returns the requests that `bytes` complete, without unknown ones.
     pub fn push(&mut self, bytes: &[u8]) -> Vec<Request> {
         let mut complete = Vec::new();
         for byte in bytes {
@@ -62,15 +61,12 @@ impl Requests {
             }
             self.held.push(*byte);
             let length = match self.held[..] {
-                [_] => continue,
                 [_, name, ..] if name & HAS_PAYLOAD == 0 => 2,
-                [_, _] => continue,
                 [_, _, payload, ..] => 4 + usize::from(payload),
-                [] => continue,
+                _ => continue,
             };
             if self.held.len() >= length {
-                let known = REQUESTS.iter().find(|(_, name)| *name == self.held[1]);
-                complete.push(known.map_or(Request::Other, |(request, _)| *request));
+                complete.extend(Request::ALL.iter().find(|it| self.held.starts_with(&it.encode())));
                 self.held.clear();
             }
         }
@@ -95,58 +91,42 @@ pub enum Answer {
     Scan,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Info,
-    Health,
-    SampleRate,
-    Scan,
-}
-
-impl Kind {
-    const ALL: [Self; 4] = [Self::Info, Self::Health, Self::SampleRate, Self::Scan];
-
-    const fn descriptor(self) -> [u8; 7] {
-        let [length, mode, kind] = match self {
-            Self::Info => [20, 0x00, 0x04],
-            Self::Health => [3, 0x00, 0x06],
-            Self::SampleRate => [4, 0x00, 0x15],
-            Self::Scan => [NODE_BYTES as u8, 0x40, 0x81],
-        };
-        [START, 0x5a, length, 0, 0, mode, kind]
-    }
-
-    /// Returns `None` if `body` is too short.
-    fn answer(self, body: &[u8]) -> Option<(usize, Answer)> {
-        Some(match (self, body) {
-            (Self::Info, _) => (20, Answer::Info(*body.first_chunk()?)),
-            (Self::Health, [status, low, high, ..]) => {
-                (3, Answer::Health { status: *status, code: u16::from_le_bytes([*low, *high]) })
-            }
-            (Self::SampleRate, [a, b, c, d, ..]) => {
-                let [standard_us, express_us] = [[*a, *b], [*c, *d]].map(u16::from_le_bytes);
-                (4, Answer::SampleRate { standard_us, express_us })
-            }
-            (Self::Scan, _) => (0, Answer::Scan),
-            _ => return None,
-        })
-    }
-}
+/// Descriptor of an answer: start, length, mode and kind.
+type Descriptor = [u8; 7];
+const INFO: Descriptor = [START, 0x5a, 20, 0, 0, 0x00, 0x04];
+const HEALTH: Descriptor = [START, 0x5a, 3, 0, 0, 0x00, 0x06];
+const SAMPLE_RATE: Descriptor = [START, 0x5a, 4, 0, 0, 0x00, 0x15];
+const SCAN: Descriptor = [START, 0x5a, NODE_BYTES as u8, 0, 0, 0x40, 0x81];
 
 impl Answer {
     pub fn encode(self) -> Vec<u8> {
-        let (kind, body) = match self {
-            Self::Info(info) => (Kind::Info, info.to_vec()),
+        let (descriptor, body) = match self {
+            Self::Info(info) => (INFO, info.to_vec()),
             Self::Health { status, code } => {
-                (Kind::Health, [&[status][..], &code.to_le_bytes()].concat())
+                (HEALTH, [&[status][..], &code.to_le_bytes()].concat())
             }
             Self::SampleRate { standard_us, express_us } => {
-                let words = [standard_us, express_us].map(u16::to_le_bytes);
-                (Kind::SampleRate, words.concat())
+                (SAMPLE_RATE, [standard_us, express_us].map(u16::to_le_bytes).concat())
             }
-            Self::Scan => (Kind::Scan, Vec::new()),
+            Self::Scan => (SCAN, Vec::new()),
         };
-        [&kind.descriptor()[..], &body].concat()
+        [&descriptor[..], &body].concat()
+    }
+
+    /// Returns the length and the answer, or `None` if `body` is too short.
+    fn parse(descriptor: Descriptor, body: &[u8]) -> Option<(usize, Self)> {
+        Some(match (descriptor, body) {
+            (INFO, _) => (20, Self::Info(*body.first_chunk()?)),
+            (HEALTH, [status, low, high, ..]) => {
+                (3, Self::Health { status: *status, code: u16::from_le_bytes([*low, *high]) })
+            }
+            (SAMPLE_RATE, [a, b, c, d, ..]) => {
+                let [standard_us, express_us] = [[*a, *b], [*c, *d]].map(u16::from_le_bytes);
+                (4, Self::SampleRate { standard_us, express_us })
+            }
+            (SCAN, _) => (0, Self::Scan),
+            _ => return None,
+        })
     }
 }
 
@@ -205,7 +185,7 @@ pub struct Decoder {
 enum State {
     #[default]
     Idle,
-    Answers(Kind),
+    Answers(Descriptor),
     /// Newest measurement; `None` before the first or without synchronization.
     Scans {
         after: Option<Node>,
@@ -231,18 +211,17 @@ impl Decoder {
     }
 
     fn next_piece(&mut self, rest: &[u8]) -> Option<(usize, Option<Said>)> {
-        if let State::Answers(kind) = self.state {
-            let (length, answer) = kind.answer(rest)?;
-            self.state = match kind {
-                Kind::Scan => State::Scans { after: None, is_lost: false },
+        if let State::Answers(descriptor) = self.state {
+            let (length, answer) = Answer::parse(descriptor, rest)?;
+            self.state = match answer {
+                Answer::Scan => State::Scans { after: None, is_lost: false },
                 _ => State::Idle,
             };
             return Some((length, Some(Said::Answer(answer))));
         }
-        for kind in Kind::ALL {
-            let descriptor = kind.descriptor();
+        for descriptor in [INFO, HEALTH, SAMPLE_RATE, SCAN] {
             if rest.starts_with(&descriptor) {
-                self.state = State::Answers(kind);
+                self.state = State::Answers(descriptor);
                 return Some((descriptor.len(), None));
             }
             // One byte alone may belong to a measurement.

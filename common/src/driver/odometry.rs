@@ -4,12 +4,15 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use super::{Memory, Motion, counts::WheelCounts};
+use super::{
+    Memory, Motion,
+    counts::{WheelCounts, wheel_sample},
+};
 use crate::{
     geometry::wrap_angle,
     kinematics::{Pose2, Twist},
     mission::Body,
-    samples::{CountsSample, WheelSample},
+    samples::CountsSample,
 };
 
 /// Greatest position or heading that odometry can report, metres or radians.
@@ -109,16 +112,11 @@ fn is_start(pose: Pose2) -> bool {
 pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) -> Motion {
     let counts = |angle: f64| (angle * body.counts_per_turn / TAU).round();
     let [left, right] = turned.map(|angle| counts(angle).clamp(-MOST_COUNTS, MOST_COUNTS));
-    let [left_counts, right_counts] = WheelCounts::Endless([left, right]).cyclic();
-    let [left_counts_per_s, right_counts_per_s] = speeds.map(|speed| counts(speed) as i32);
     Motion {
-        wheels: WheelSample {
-            left_counts,
-            right_counts,
-            left_counts_per_s,
-            right_counts_per_s,
-            ..WheelSample::default()
-        },
+        wheels: wheel_sample(
+            WheelCounts::Endless([left, right]).cyclic(),
+            speeds.map(|speed| counts(speed) as i32),
+        ),
         endless: Some(CountsSample {
             left_counts: left,
             right_counts: right,

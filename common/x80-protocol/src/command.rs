@@ -25,8 +25,6 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    const ALL: [Self; 3] = [Self::Position, Self::Pwm, Self::Velocity];
-
     const fn dids(self) -> [u8; 2] {
         match self {
             Self::Position => [did::POSITION, did::POSITION_ALL],
@@ -145,6 +143,15 @@ impl Command {
         })
     }
 
+    /// Returns the setup of a wheel's channel: encoder feedback, velocity mode, enabled motor.
+    pub const fn drives(channel: u8) -> [Self; 3] {
+        [
+            Self::Parameter { channel, parameter: Parameter::Feedback(Feedback::Encoder) },
+            Self::Parameter { channel, parameter: Parameter::Mode(Mode::Velocity) },
+            Self::Enable { on: true, channel: Some(channel) },
+        ]
+    }
+
     pub fn encode(&self, addressing: Addressing, out: &mut Vec<u8>) {
         let mut data = Vec::with_capacity(16);
         let did = match *self {
@@ -164,7 +171,7 @@ impl Command {
                 stream as u8
             }
             Self::System(signal) => {
-                data.push(signal.byte());
+                data.push(signal as u8);
                 did::SYSTEM
             }
         };
@@ -174,26 +181,23 @@ impl Command {
 
 impl Motion {
     fn write(self, data: &mut Vec<u8>) -> u8 {
-        match self.targets {
+        let [of_one, of_all] = self.quantity.dids();
+        let (did, before_limit) = match self.targets {
             Targets::One { channel, value } => {
                 data.push(channel);
-                data.extend_from_slice(&value.to_le_bytes());
-                if let Some(limit) = self.limit_ms {
-                    data.push(TIME_FOLLOWS);
-                    data.extend_from_slice(&limit.to_le_bytes());
-                }
-                self.quantity.dids()[0]
+                data.extend(value.to_le_bytes());
+                (of_one, Some(TIME_FOLLOWS))
             }
             Targets::All(values) => {
-                for value in values {
-                    data.extend_from_slice(&value.unwrap_or(ALONE).to_le_bytes());
-                }
-                if let Some(limit) = self.limit_ms {
-                    data.extend_from_slice(&limit.to_le_bytes());
-                }
-                self.quantity.dids()[1]
+                data.extend(values.iter().flat_map(|value| value.unwrap_or(ALONE).to_le_bytes()));
+                (of_all, None)
             }
+        };
+        if let Some(limit) = self.limit_ms {
+            data.extend(before_limit);
+            data.extend(limit.to_le_bytes());
         }
+        did
     }
 }
 

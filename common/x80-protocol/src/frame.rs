@@ -81,11 +81,11 @@ impl Frame<'_> {
 
 /// Signals that both sides send with DID 255.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum SystemSignal {
-    /// Code 0.
-    Ping,
-    /// Code 1. Acknowledging it would never end.
-    Ack,
+    Ping = 0,
+    /// Acknowledging it would never end.
+    Ack = 1,
 }
 
 impl SystemSignal {
@@ -94,13 +94,6 @@ impl SystemSignal {
             0 => Some(Self::Ping),
             1 => Some(Self::Ack),
             _ => None,
-        }
-    }
-
-    pub(super) const fn byte(self) -> u8 {
-        match self {
-            Self::Ping => 0,
-            Self::Ack => 1,
         }
     }
 }

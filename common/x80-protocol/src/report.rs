@@ -17,17 +17,13 @@ pub enum Report {
 
 impl Report {
     pub fn encode(&self, addressing: Addressing, out: &mut Vec<u8>) {
-        let write = |did, data: &[u8], out: &mut Vec<u8>| {
-            let rid = addressing.host();
-            let frame = Frame { rid, sn: 0, did, data };
-            frame.encode(out);
+        let (did, data) = match self {
+            Self::Motor(sensors) => (did::MOTOR, sensors.to_bytes()),
+            Self::Custom(sensors) => (did::CUSTOM, sensors.to_bytes()),
+            Self::Standard(sensors) => (did::STANDARD, sensors.to_bytes()),
+            Self::System(signal) => (did::SYSTEM, vec![*signal as u8]),
         };
-        match self {
-            Self::Motor(sensors) => write(did::MOTOR, &sensors.to_bytes(), out),
-            Self::Custom(sensors) => write(did::CUSTOM, &sensors.to_bytes(), out),
-            Self::Standard(sensors) => write(did::STANDARD, &sensors.to_bytes(), out),
-            Self::System(signal) => write(did::SYSTEM, &[signal.byte()], out),
-        }
+        Frame { rid: addressing.host(), sn: 0, did, data: &data }.encode(out);
     }
 
     /// # Errors

@@ -20,27 +20,26 @@ impl Answer {
     /// Parses a line without line feed; the error says why it is no answer.
     pub(crate) fn parse(line: &[u8]) -> Result<Self, String> {
         let none = || format!("{:?} is an unknown answer", String::from_utf8_lossy(line));
+        Self::recognized(line).ok_or_else(none)
+    }
+
+    fn recognized(line: &[u8]) -> Option<Self> {
         let line = line.strip_suffix(b"\r").unwrap_or(line);
         // A carriage return within marks a lost line feed, after the end of another answer.
-        let text = std::str::from_utf8(line).map_err(|_| none())?.trim_matches(' ');
+        let text = std::str::from_utf8(line).ok()?.trim_matches(' ');
         match text {
-            "OK" => return Ok(Self::Done),
-            "Invalid Command" => return Ok(Self::Invalid),
+            "OK" => return Some(Self::Done),
+            "Invalid Command" => return Some(Self::Invalid),
             _ => {}
         }
-        let whole = |word: &str| word.parse::<i32>().map_err(|_| none());
-        if let Some((left, right)) = text.split_once(' ') {
-            let (right, gyro) = match right.split_once(' ') {
-                Some((right, gyro)) => (right, Some(whole(gyro)?)),
-                None => (right, None),
-            };
-            return Ok(Self::Counts([whole(left)?, whole(right)?], gyro));
-        }
-        match u32::try_from(whole(text)?) {
-            Ok(rate) if rate >= LEAST_BAUD => Ok(Self::Baud),
-            Ok(range) => u16::try_from(range).map(Self::Centimetres).map_err(|_| none()),
-            Err(_) => Err(none()),
-        }
+        let numbers: Result<Vec<i32>, _> = text.split(' ').map(str::parse).collect();
+        Some(match numbers.ok()?[..] {
+            [left, right] => Self::Counts([left, right], None),
+            [left, right, gyro] => Self::Counts([left, right], Some(gyro)),
+            [rate] if i64::from(rate) >= LEAST_BAUD.into() => Self::Baud,
+            [range] => Self::Centimetres(u16::try_from(range).ok()?),
+            _ => return None,
+        })
     }
 }
 

@@ -22,10 +22,11 @@ mod answers;
 use std::time::Duration;
 
 use common::{
-    driver::{Base, Driver, Heard, Motion, Turn, WireTally, gyro, range_reading},
+    driver::{
+        Base, Driver, Heard, Motion, Turn, WireTally, counts::wheel_sample, gyro, range_reading,
+    },
     json_wire::Lines,
     mission::{Body, Mission, Sensor},
-    samples::WheelSample,
     wire::COUNT_CYCLE,
 };
 
@@ -152,18 +153,14 @@ impl Arduino {
         });
         self.counts = Some((counts, since, newest));
         // The samples' cycle divides that of 32 bits, so wrapped counts continue.
-        let [left_counts, right_counts] =
-            counts.map(|count| count.rem_euclid(i32::from(COUNT_CYCLE)) as u16);
-        let [left_counts_per_s, right_counts_per_s] = speeds;
-        let wheels = WheelSample {
-            left_counts,
-            right_counts,
-            left_counts_per_s,
-            right_counts_per_s,
-            ..WheelSample::default()
-        };
+        let counts = counts.map(|count| count.rem_euclid(i32::from(COUNT_CYCLE)) as u16);
         // The board measures no currents.
-        Motion { wheels, endless: None, stamp_ns: None, currents: [0; 2] }
+        Motion {
+            wheels: wheel_sample(counts, speeds),
+            endless: None,
+            stamp_ns: None,
+            currents: [0; 2],
+        }
     }
 
     /// Restarts with an unmistakable request.

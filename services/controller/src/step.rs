@@ -61,16 +61,12 @@ enum Arrival {
 #[derive(Debug)]
 pub struct Controller {
     drive: Drive,
-    tolerance: f64,
     speed: f64,
     turn: f64,
     look: f64,
     /// Cosines of the evidential method's angles: full speed within, turns on the spot beyond.
     full_speed: f64,
     turns: f64,
-    slow_radius: f64,
-    dead_zone: f64,
-    modulated: bool,
     law: SpeedLaw,
     response: Response,
     lead: Option<Lead>,
@@ -78,6 +74,7 @@ pub struct Controller {
     side: f64,
     /// Newest target's number, and progress.
     arrival: (u64, Arrival),
+    /// Mission as stated, without a found response.
     mission: Mission,
     found: FoundResponse,
 }
@@ -96,18 +93,14 @@ impl Answering for Controller {
 
     fn new(mission: &Mission) -> Self {
         let body = mission.body();
-        let (settings, hurry) = (&mission.controller, mission.hurry());
+        let hurry = mission.hurry();
         Self {
             drive: body.drive(),
-            tolerance: mission.arrival_tolerance_m,
             speed: mission.speed_m_s(),
             turn: mission.turn_rad_s(),
             look: hurry.look_rad_s,
             full_speed: hurry.full_speed_within_deg.to_radians().cos(),
             turns: hurry.turns_beyond_deg.to_radians().cos(),
-            slow_radius: settings.slow_radius_m,
-            dead_zone: settings.dead_zone,
-            modulated: settings.modulated,
             law: match mission.method {
                 _ if body.steering.is_some() => SpeedLaw::Car,
                 Method::Paper => SpeedLaw::Paper,
@@ -226,7 +219,7 @@ impl Controller {
 
     fn is_there(&self, guidance: &GuidanceSample, distance: f64) -> bool {
         let beside = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
-        distance <= self.tolerance || beside && distance <= MOST_OFF_TARGET_M
+        distance <= self.mission.arrival_tolerance_m || beside && distance <= MOST_OFF_TARGET_M
     }
 
     /// Returns whether the robot may turn to the wanted heading. Non-circular bodies need a numeric
@@ -287,7 +280,7 @@ impl Controller {
         if cosine > 0.0 {
             return (self.turn * sine).clamp(-most, most);
         }
-        if sine.abs() >= self.dead_zone {
+        if sine.abs() >= self.mission.controller.dead_zone {
             self.side = if sine > 0.0 { 1.0 } else { -1.0 };
         }
         self.turn.min(most) * self.side
@@ -307,7 +300,7 @@ impl Controller {
     /// sticking wheels.
     fn cautious(&self, alignment: Alignment, distance: f64, limit: f64) -> f64 {
         let sharp = ((alignment.cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
-        let slow = (distance / self.slow_radius).min(1.0);
+        let slow = self.slow_near_target(distance);
         let stops = self.response.speed_to_stop_within(distance, self.response.dead_time_s());
         let wanted = (self.speed * sharp.max(0.0) * slow).min(stops);
         let least = LEAST_SPEED_M_S.min(self.speed);
@@ -324,14 +317,19 @@ impl Controller {
     /// Returns vc of (16). The slowdown at the target multiplies the aligned speed; as a separate
     /// case, as printed, it would override it.
     fn tangential(&self, alignment: Alignment, omega: f64, distance: f64) -> f64 {
-        let aligned = if !self.modulated {
+        let aligned = if !self.mission.controller.modulated {
             1.0
         } else if alignment.cosine < 0.0 {
             f64::midpoint(alignment.cosine, 1.0)
         } else {
             1.0 - (omega / self.turn).abs() / 2.0
         };
-        self.speed * aligned * (distance / self.slow_radius).min(1.0)
+        self.speed * aligned * self.slow_near_target(distance)
+    }
+
+    /// Returns the share of the speed at this distance from the target.
+    fn slow_near_target(&self, distance: f64) -> f64 {
+        (distance / self.mission.controller.slow_radius_m).min(1.0)
     }
 }
 

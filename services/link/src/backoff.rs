@@ -7,7 +7,7 @@ pub struct Backoff {
     first: Duration,
     longest: Duration,
     pause: Duration,
-    attempts: u64,
+    pub(crate) attempts: u64,
     next_ns: Option<u64>,
 }
 
@@ -30,10 +30,6 @@ impl Backoff {
 
     pub const fn reset(&mut self) {
         *self = Self::new(self.first, self.longest);
-    }
-
-    pub const fn attempts(&self) -> u64 {
-        self.attempts
     }
 
     /// Returns the nanoseconds until the next attempt; 0 when it is due.
@@ -63,8 +59,8 @@ mod tests {
             now += wait;
         }
         assert_eq!(pauses, [100, 200, 300, 300]);
-        assert_eq!(backoff.attempts(), 4);
+        assert_eq!(backoff.attempts, 4);
         backoff.reset();
-        assert!(backoff.is_due(0) && backoff.attempts() == 0);
+        assert!(backoff.is_due(0) && backoff.attempts == 0);
     }
 }

@@ -233,7 +233,7 @@ impl Failsafe {
 
     /// Returns which rows of [`TABLE`] apply; None where the monitor is skipped.
     fn applying(&self, lockstep: bool, now: Moment) -> [Option<bool>; TABLE.len()] {
-        let judges_frames = !lockstep && self.monitors.presence.connected();
+        let judges_frames = !lockstep && self.monitors.presence.connected;
         std::array::from_fn(|row| {
             let rule = &TABLE[row];
             let monitor = (rule.monitor)(&self.monitors);

@@ -193,7 +193,7 @@ impl Process for Shell {
             if now_ns - began_ns > MOST_LISTENING_NS {
                 break;
             }
-            let now = self.clock.at(self.runner.stage.link.state().next_tick, now_ns);
+            let now = self.clock.at(self.runner.stage.link.state.next_tick, now_ns);
             let mut effects = Vec::new();
             // A simulated laser sends before the frames of its tick: it is received after they
             // came, and taken before them.
@@ -244,7 +244,7 @@ impl Process for Shell {
         self.refused.take_if(|(_, at_ns)| now_ns.saturating_sub(*at_ns) > REFUSAL_LASTS_NS);
         base.or_else(|| self.wires.iter().find_map(Transport::trouble))
             .or_else(|| self.refused.as_ref().map(|(why, _)| why.clone()))
-            .or_else(|| link.explain(link.decision().cause, now_ns).map(Refusal::from))
+            .or_else(|| link.explain(link.decision.cause, now_ns).map(Refusal::from))
     }
 
     fn has_idle_work(&self) -> bool {
@@ -256,7 +256,7 @@ impl Process for Shell {
     fn looks_again_after(&self) -> Option<Duration> {
         let link = &self.runner.stage.link;
         let at = |machine_ns| {
-            let time = self.clock.at(link.state().next_tick, machine_ns);
+            let time = self.clock.at(link.state.next_tick, machine_ns);
             Moment { time, machine_ns }
         };
         let now = at(monotonic_ns());
@@ -300,7 +300,6 @@ fn without(what: &'static str) -> impl Fn(&io::Error) {
 fn log_battery(change: &BatteryChange) {
     let BatteryChange { pack, volts, charge } = *change;
     let volts = format!("{volts:.1}");
-    let pack = pack.as_str();
     match charge {
         Charge::Empty => {
             tracing::error!(pack, volts, "battery empty; charge it, or set robot.low_battery_v");
@@ -336,7 +335,7 @@ impl Shell {
 
     fn answer_operators(&mut self) {
         let link = &self.runner.stage.link;
-        if link.decision().stops()
+        if link.decision.stops()
             && link.is_at_rest()
             && let Some(socket) = &mut self.stop_socket
         {
@@ -391,7 +390,7 @@ impl Shell {
     }
 
     fn take(&mut self, event: Event<'_>, machine_ns: u64) -> Result<(), StageError> {
-        let next_tick = self.runner.stage.link.state().next_tick;
+        let next_tick = self.runner.stage.link.state.next_tick;
         let now = self.clock.at(next_tick, machine_ns);
         let effects = self.runner.take_entry(Entry { event, machine_ns, now })?;
         self.carry_out(effects)
@@ -432,12 +431,12 @@ impl Shell {
                     }
                     self.state()?;
                 }
-                Effect::Connected(true) => {
-                    tracing::info!("robot answers");
-                    self.state()?;
-                }
-                Effect::Connected(false) => {
-                    tracing::warn!("robot lost; the link pings it until it answers");
+                Effect::Connected(answers) => {
+                    if answers {
+                        tracing::info!("robot answers");
+                    } else {
+                        tracing::warn!("robot lost; the link pings it until it answers");
+                    }
                     self.state()?;
                 }
                 Effect::Restarted => {
@@ -489,7 +488,6 @@ impl Shell {
         self.stated_ns = now_ns;
         let link = &self.runner.stage.link;
         let wire = link.wire_tally();
-        let tally = link.tally();
         let absence = link.absence(now_ns);
         // Attempts to open a closed wire, else pings.
         let (attempts, next_attempt_ns) = match self.transport.attempts(now_ns) {
@@ -500,8 +498,8 @@ impl Shell {
         let ignored = self.writers.as_ref().map(Writers::ignored).unwrap_or_default();
         let sample = LinkSample {
             connected: link.connected().into(),
-            action: link.decision().action.into(),
-            cause: link.decision().cause.into(),
+            action: link.decision.action.into(),
+            cause: link.decision.cause.into(),
             at_rest: link.rest().into(),
             frames_in: wire.messages,
             bytes_dropped: wire.bytes_dropped,
@@ -515,13 +513,10 @@ impl Shell {
             lost_ns: absence.lost_ns,
             attempts,
             next_attempt_ns,
-            commands_out: tally.commands,
-            repeated_commands: tally.repeated_commands,
-            repeated_ticks: tally.repeated_ticks,
             latency_ns: self.latency_ns,
             latency_max_ns: self.latency.max_ns(),
             latency_histogram: *self.latency.counts(),
-            ..LinkSample::default()
+            ..link.tally
         };
         self.runner.out.publish(&LINK, sample)
     }

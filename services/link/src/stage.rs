@@ -66,12 +66,8 @@ impl LinkStage {
                 response,
             } => {
                 out.at = Progress { tick, time };
-                if let Some(contact) = contact {
-                    out.publish(&CONTACT, contact)?;
-                }
-                if let Some(response) = response {
-                    out.publish(&BASE_RESPONSE, *response)?;
-                }
+                out.publish(&CONTACT, contact)?;
+                out.publish(&BASE_RESPONSE, response.map(|response| *response))?;
                 for scan in scans {
                     let mut lasers = self.lasers.iter();
                     let header = lasers.find(|(header, _)| header.sensor == scan.row as u64);
@@ -79,13 +75,9 @@ impl LinkStage {
                         out.publish_slice(&SCAN, header.swept(scan.sweep), &scan.beams)?;
                     }
                 }
-                if let Some(turn) = turn {
-                    out.publish(&IMU_TURN, turn)?;
-                }
+                out.publish(&IMU_TURN, turn)?;
                 out.publish_slice(&RANGES, RangesHeader::default(), &ranges)?;
-                if let Some(counts) = endless {
-                    out.publish(&COUNTS, counts)?;
-                }
+                out.publish(&COUNTS, endless)?;
                 out.publish(&WHEELS, wheels)?;
             }
             Effect::Infrared(sample) => self.infrared = Some(sample),
@@ -101,16 +93,9 @@ impl LinkStage {
     }
 
     fn publish_telemetry(&mut self, out: &mut Outputs) -> Result<(), StageError> {
-        if let Some(infrared) = self.infrared.take() {
-            out.publish(&INFRARED, infrared)?;
-        }
-        if let Some(power) = self.power.take() {
-            out.publish(&POWER, power)?;
-        }
-        if let Some(surroundings) = self.surroundings.take() {
-            out.publish(&SURROUNDINGS, surroundings)?;
-        }
-        Ok(())
+        out.publish(&INFRARED, self.infrared.take())?;
+        out.publish(&POWER, self.power.take())?;
+        out.publish(&SURROUNDINGS, self.surroundings.take())
     }
 }
 

@@ -17,8 +17,8 @@ use common::{
     driver::{Base, Driver, Memory, Motion, Turn, WireTally, counts::WheelCounts},
     mission::Mission,
     samples::{
-        Action, Cause, CommandSample, CommandState, HoldReason, Order, Rest, TurnSample,
-        WheelSample,
+        Action, Cause, CommandSample, CommandState, HoldReason, LinkSample, Order, Rest,
+        TurnSample, WheelSample,
     },
     stop_socket::Request,
 };
@@ -28,7 +28,7 @@ use crate::{
     clock_rate::ClockRate,
     drivers,
     failsafe::{
-        Decision, Failsafe, Monitors,
+        Decision, Failsafe,
         monitor::{Moment, Observation},
         presence::Absence,
         restart::RestartWatch,
@@ -41,7 +41,7 @@ use crate::{
     wire_owner::is_owed,
 };
 
-pub use event::{Effect, Entry, Event, State, Tally};
+pub use event::{Effect, Entry, Event, State};
 
 /// Ping interval while a motor frame is missing.
 const PING_EVERY: Duration = Duration::from_millis(200);
@@ -78,8 +78,11 @@ struct Repeat {
 
 #[derive(Debug)]
 pub struct Link {
-    state: State,
+    pub state: State,
     now: MissionTime,
+    now_ns: u64,
+    /// Effects of the present step.
+    effects: Vec<Effect>,
     base: Box<dyn Base>,
     /// Drivers of sensors with their own wires.
     drivers: Vec<Box<dyn Driver>>,
@@ -101,14 +104,15 @@ pub struct Link {
     target_number: u64,
     newest_command: Option<CommandSample>,
     repeat: Option<Repeat>,
-    decision: Decision,
+    pub decision: Decision,
     /// Start of this link, or last time of an operator's stop; earlier ticks' commands are refused.
     /// None in lockstep, where a tick waits for its answer.
     stood: Option<MissionTime>,
     stop_sent_ns: Option<u64>,
     /// Motor frames due in lockstep, one per command and ping.
     due: u32,
-    tally: Tally,
+    /// Counts of commands and repetitions; the other values are unset.
+    pub tally: LinkSample,
     refused_ns: Option<u64>,
     /// Newest motion stamp, and its arrival.
     stamped: Option<(i64, MissionTime)>,
@@ -120,6 +124,8 @@ impl Link {
         Self {
             state: State::default(),
             now: MissionTime::default(),
+            now_ns: 0,
+            effects: Vec::new(),
             base: drivers::base(mission).0,
             drivers: drivers::sensors(mission).into_iter().map(|sensor| sensor.driver).collect(),
             sensors: Sensors::new(mission),
@@ -142,42 +148,37 @@ impl Link {
             stood: None,
             stop_sent_ns: None,
             due: 0,
-            tally: Tally::default(),
+            tally: LinkSample::default(),
             refused_ns: None,
             stamped: None,
         }
     }
 
-    pub const fn state(&self) -> &State {
-        &self.state
-    }
-
     pub fn restore(&mut self, state: State) {
         self.state = state;
-        self.observe(Observation::Pace(state.pace), 0);
+        self.observe(Observation::Pace(state.pace));
     }
 
     pub fn step(&mut self, entry: Entry<'_>) -> Vec<Effect> {
-        let Entry { event, machine_ns: now_ns, now } = entry;
-        self.now = now;
+        let Entry { event, machine_ns, now } = entry;
+        (self.now, self.now_ns) = (now, machine_ns);
         if !self.in_ticks() {
             self.stood.get_or_insert(now);
         }
-        let mut effects = Vec::new();
         match event {
             Event::Datagram(bytes) => {
                 let heard = self.base.hear(bytes);
-                self.take_heard(heard, now_ns, &mut effects);
+                self.take_heard(heard);
             }
-            Event::Wire(open) => self.take_wire(open, now_ns, &mut effects),
-            Event::Sensor(number, bytes) => self.take_sensor(number, bytes, now_ns, &mut effects),
-            Event::SensorWire(number, open) => self.take_sensor_wire(number, open, &mut effects),
-            Event::Command(command) => self.take_command(&command, now_ns, &mut effects),
-            Event::Order(order, reason) => self.take_order(order, reason, now_ns, &mut effects),
-            Event::Operator(Request::Stop) => self.failsafe.monitors.orders.stop_here(true),
+            Event::Wire(open) => self.take_wire(open),
+            Event::Sensor(number, bytes) => self.take_sensor(number, bytes),
+            Event::SensorWire(number, open) => self.take_sensor_wire(number, open),
+            Event::Command(command) => self.take_command(&command),
+            Event::Order(order, reason) => self.take_order(order, reason),
+            Event::Operator(Request::Stop) => self.failsafe.monitors.orders.stopped_here = true,
             Event::Operator(Request::Resume) => {
-                self.failsafe.monitors.orders.stop_here(false);
-                self.observe(Observation::Resumed, now_ns);
+                self.failsafe.monitors.orders.stopped_here = false;
+                self.observe(Observation::Resumed);
             }
             Event::TickLimit { last_tick, target_number } => {
                 (self.last_tick, self.target_number) = (Some(last_tick), target_number);
@@ -185,33 +186,29 @@ impl Link {
             Event::Quiet | Event::Operator(Request::SignOff | Request::Look) => {}
             Event::Remember(memory) => {
                 self.base.remember(&memory);
-                return effects;
+                return Vec::new();
             }
-            Event::Telemetry => return effects,
+            Event::Telemetry => return Vec::new(),
             Event::End => return self.final_stops(),
         }
-        self.keep_connected(now_ns, &mut effects);
-        self.keep_polling(&mut effects);
-        self.give_tick(now_ns, &mut effects);
-        self.repeat_command(now_ns, &mut effects);
-        self.guard(now_ns, &mut effects);
-        let sent = effects.iter().filter_map(|effect| match effect {
+        self.keep_connected();
+        self.keep_polling();
+        self.give_tick();
+        self.repeat_command();
+        self.guard();
+        let sent = self.effects.iter().filter_map(|effect| match effect {
             Effect::Send(bytes) => Some(self.base.owed(bytes)),
             _ => None,
         });
         if let Some(owed) = sent.reduce(|one, other| one + other) {
-            self.observe(Observation::Sent, now_ns);
-            self.observe(Observation::Owed(owed), now_ns);
+            self.observe(Observation::Sent);
+            self.observe(Observation::Owed(owed));
         }
-        effects
+        std::mem::take(&mut self.effects)
     }
 
     pub fn connected(&self) -> bool {
-        self.monitors().presence.connected()
-    }
-
-    pub const fn decision(&self) -> Decision {
-        self.decision
+        self.failsafe.monitors.presence.connected
     }
 
     pub fn wire_tally(&self) -> WireTally {
@@ -220,12 +217,8 @@ impl Link {
         base.with_dropped(dropped.sum())
     }
 
-    pub const fn tally(&self) -> Tally {
-        self.tally
-    }
-
     pub const fn restarts(&self) -> u32 {
-        self.restart.restarts()
+        self.restart.restarts
     }
 
     pub fn is_at_rest(&self) -> bool {
@@ -237,25 +230,25 @@ impl Link {
     pub fn rest(&self) -> Rest {
         match (self.in_ticks(), self.connected()) {
             (true, _) if self.decision.stops() => Rest::AtRest,
-            (false, true) => self.monitors().stop.rest(self.now),
+            (false, true) => self.failsafe.monitors.stop.rest(self.now),
             _ => Rest::Unknown,
         }
     }
 
-    pub fn explain(&self, cause: Cause, now_ns: u64) -> Option<String> {
-        self.failsafe.explain(cause, self.moment(now_ns))
+    pub fn explain(&self, cause: Cause, machine_ns: u64) -> Option<String> {
+        self.failsafe.explain(cause, Moment { time: self.now, machine_ns })
     }
 
     pub fn absence(&self, now_ns: u64) -> Absence {
-        self.monitors().presence.absence(now_ns)
+        self.failsafe.monitors.presence.absence(now_ns)
     }
 
     pub fn losses(&self) -> u64 {
-        self.monitors().presence.losses()
+        self.failsafe.monitors.presence.losses
     }
 
     pub fn owes_stop(&self, before: bool) -> bool {
-        let moves = self.monitors().stop.is_told_to_move();
+        let moves = self.failsafe.monitors.stop.is_told_to_move();
         !self.in_ticks() && is_owed(before, moves, self.is_at_rest())
     }
 
@@ -265,33 +258,38 @@ impl Link {
     }
 
     pub const fn is_stopped_by_operator(&self) -> bool {
-        self.monitors().orders.stopped_here()
+        self.failsafe.monitors.orders.stopped_here
     }
 
     fn final_stops(&self) -> Vec<Effect> {
         (0..STOPS).map(|_| Effect::Send(self.velocity_0())).collect()
     }
 
-    const fn monitors(&self) -> &Monitors {
-        &self.failsafe.monitors
+    const fn moment(&self) -> Moment {
+        Moment { time: self.now, machine_ns: self.now_ns }
     }
 
-    const fn moment(&self, machine_ns: u64) -> Moment {
-        Moment { time: self.now, machine_ns }
+    fn observe(&mut self, what: Observation<'_>) {
+        self.failsafe.observe(&what, self.moment());
     }
 
-    fn observe(&mut self, what: Observation<'_>, now_ns: u64) {
-        self.failsafe.observe(&what, self.moment(now_ns));
+    fn send(&mut self, bytes: Vec<u8>) {
+        self.effects.push(Effect::Send(bytes));
+    }
+
+    /// Returns true if `since_ns` is `None`.
+    fn passed(&self, since_ns: Option<u64>, span: Duration) -> bool {
+        since_ns.is_none_or(|since_ns| has_passed(since_ns, self.now_ns, span))
     }
 
     fn ordered_to_drive(&self) -> bool {
-        self.monitors().orders.drive()
+        self.failsafe.monitors.orders.drive()
     }
 
     /// Returns whether a held robot's ticks continue, so that it may be carried. In lockstep
     /// mission time stands still.
     fn stands_by(&self) -> bool {
-        !self.in_ticks() && self.monitors().orders.stands_by()
+        !self.in_ticks() && self.failsafe.monitors.orders.stands_by()
     }
 
     fn in_ticks(&self) -> bool {
@@ -305,7 +303,7 @@ impl Link {
         })
     }
 
-    fn begin_tick(&mut self, motion: Motion, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn begin_tick(&mut self, motion: Motion) {
         // The last due answer shows the present state.
         self.due = self.due.saturating_sub(1);
         if !self.ordered_to_drive() && !self.stands_by() {
@@ -315,16 +313,15 @@ impl Link {
             if self.open.is_some() || self.due > 0 {
                 return;
             }
-            self.judge_tick(&motion, now_ns, effects);
-        }
-        if !self.in_ticks() {
+            self.judge_tick(&motion);
+        } else {
             // Unanswered ticks use up their number too.
             self.state.next_tick += 1;
         }
         let endless = motion.endless;
-        let WheelRatio { ratio, deviation } = self.monitors().odometry.wheel_ratio();
+        let WheelRatio { ratio, deviation } = self.failsafe.monitors.odometry.shares.ratio();
         let wheels = WheelSample {
-            restarts: self.restart.restarts(),
+            restarts: self.restart.restarts,
             told_ratio: ratio,
             told_ratio_sd: deviation,
             ..motion.wheels
@@ -341,7 +338,7 @@ impl Link {
             TurnSample { capture_ns, sequence, turn_rad, variance_rad2, ..TurnSample::default() }
         });
         let monitors = &mut self.failsafe.monitors;
-        let contact = monitors.odometry.take_contact();
+        let contact = monitors.odometry.contacts.new.take();
         let contact = contact.or_else(|| monitors.touch.take_contact(self.now));
         let effect = Effect::Tick {
             tick: self.open_number(),
@@ -354,15 +351,15 @@ impl Link {
             contact,
             response: self.failsafe.monitors.base.sample().map(Box::new),
         };
-        self.open = Some(OpenTick { effect, began_ns: now_ns, given_ns: None });
-        self.give_tick(now_ns, effects);
+        self.open = Some(OpenTick { effect, began_ns: self.now_ns, given_ns: None });
+        self.give_tick();
     }
 
     fn open_number(&self) -> u64 {
         if self.in_ticks() { self.state.next_tick } else { self.state.next_tick - 1 }
     }
 
-    fn take_command(&mut self, command: &CommandSample, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn take_command(&mut self, command: &CommandSample) {
         let newer = |held: &CommandSample| held.stamp.tick <= command.stamp.tick;
         if !self.newest_command.as_ref().is_none_or(newer) {
             return;
@@ -373,8 +370,8 @@ impl Link {
             return;
         }
         self.newest_command = Some(*command);
-        self.observe(Observation::Command(command), now_ns);
-        let decision = self.decide(now_ns);
+        self.observe(Observation::Command(command));
+        let decision = self.decide();
         if decision.stops() || Some(command.stamp.time()) <= self.stood {
             return;
         }
@@ -382,7 +379,7 @@ impl Link {
         let counts = match CommandState::from_byte(command.state) {
             CommandState::Driving => {
                 let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);
-                let permitted = self.monitors().touch.permitted(command, self.now);
+                let permitted = self.failsafe.monitors.touch.permitted(command, self.now);
                 self.speeds.of(&permitted, share / reached, &self.wheels)
             }
             CommandState::Halt | CommandState::Arrived => [0, 0],
@@ -390,68 +387,62 @@ impl Link {
         if let Some(trim) = &mut self.trim {
             trim.told(counts);
         }
-        self.tell(counts, self.limit, now_ns, effects);
+        self.tell(counts, self.limit);
         let stamp = command.stamp.time();
         self.repeat = Some(Repeat {
             counts,
             stamp,
             due: MissionTime(stamp.0.saturating_add(self.half_period_ns)),
         });
-        self.tally.commands += 1;
+        self.tally.commands_out += 1;
         self.due += 1;
-        self.poll_in_ticks(effects);
+        self.poll_in_ticks();
         if answers && let Some(open) = self.open.take() {
-            effects.push(Effect::Answered { began_ns: open.began_ns });
+            self.effects.push(Effect::Answered { began_ns: open.began_ns });
             if self.in_ticks() {
                 self.state.next_tick += 1;
             }
         }
     }
 
-    fn take_order(
-        &mut self,
-        order: Order,
-        reason: HoldReason,
-        now_ns: u64,
-        effects: &mut Vec<Effect>,
-    ) {
+    fn take_order(&mut self, order: Order, reason: HoldReason) {
         let drives = order == Order::Drive && !self.ordered_to_drive();
-        if drives && self.monitors().orders.by_operator() {
-            self.observe(Observation::Resumed, now_ns);
+        if drives && self.failsafe.monitors.orders.by_operator() {
+            self.observe(Observation::Resumed);
         }
-        self.observe(Observation::Directive(order, reason), now_ns);
+        self.observe(Observation::Directive(order, reason));
         if drives && self.in_ticks() && self.due == 0 {
             // A robot that waits for commands answers a ping with its state, which starts tick 0.
-            self.ping(now_ns, effects);
+            self.ping();
         }
     }
 
     /// Publishes the open tick if allowed; repeats it in lockstep while unanswered.
-    fn give_tick(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn give_tick(&mut self) {
         let Some(mut open) = self.open.take() else {
             return;
         };
-        if self.is_due(&mut open, now_ns, effects) {
-            open.given_ns = Some(now_ns);
-            effects.push(open.effect.clone());
+        if self.is_due(&mut open) {
+            open.given_ns = Some(self.now_ns);
+            self.effects.push(open.effect.clone());
         }
         self.open = Some(open);
     }
 
-    fn is_due(&mut self, open: &mut OpenTick, now_ns: u64, effects: &mut Vec<Effect>) -> bool {
+    fn is_due(&mut self, open: &mut OpenTick) -> bool {
         let (tick, in_ticks) = (self.open_number(), self.in_ticks());
         match open.given_ns {
             None if in_ticks && self.arrived() => return false,
             None if in_ticks && self.last_tick.is_some_and(|last| tick > last) => {
-                if !passed(Some(open.began_ns), now_ns, LIMIT_WAITED) {
+                if !self.passed(Some(open.began_ns), LIMIT_WAITED) {
                     return false;
                 }
                 self.last_tick = None;
-                effects.push(Effect::Unlimited { tick });
-                open.began_ns = now_ns;
+                self.effects.push(Effect::Unlimited { tick });
+                open.began_ns = self.now_ns;
             }
-            None => open.began_ns = now_ns,
-            Some(given) if in_ticks && passed(Some(given), now_ns, REPEAT_AFTER) => {
+            None => open.began_ns = self.now_ns,
+            Some(given) if in_ticks && self.passed(Some(given), REPEAT_AFTER) => {
                 self.tally.repeated_ticks += 1;
             }
             Some(_) => return false,
@@ -461,7 +452,7 @@ impl Link {
 
     /// Repeats the newest command halfway to the next tick, for the rest of its limit, so that the
     /// robot stops no later. In lockstep each command yields a frame, which reveals a loss.
-    fn repeat_command(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn repeat_command(&mut self) {
         if self.in_ticks() {
             return;
         }
@@ -472,17 +463,12 @@ impl Link {
         let left = self.limit.saturating_sub(now.since(repeat.stamp));
         // The next command follows an open tick soon.
         let superseded = self.open.is_some();
-        if superseded || left < LEAST_LEFT || self.decide(now_ns).stops() {
+        if superseded || left < LEAST_LEFT || self.decide().stops() {
             return;
         }
-        self.tell(repeat.counts, left, now_ns, effects);
+        self.tell(repeat.counts, left);
         self.tally.repeated_commands += 1;
     }
-}
-
-/// Returns true if `since_ns` is `None`.
-fn passed(since_ns: Option<u64>, now_ns: u64, span: Duration) -> bool {
-    since_ns.is_none_or(|since_ns| has_passed(since_ns, now_ns, span))
 }
 
 #[cfg(test)]

@@ -97,8 +97,8 @@ impl Transport {
     pub fn open(address: &Address, line: Line) -> Result<Self, TransportError> {
         let wire = match address {
             Address::Udp(robot) => Udp::open(*robot).map(|udp| Box::new(udp) as Box<dyn Wire>),
-            Address::Tcp(robot) => Stream::boxed(Tcp::to(*robot)),
-            Address::Serial(path) => Stream::boxed(Serial::new(path, line)),
+            Address::Tcp(robot) => Stream::boxed(Tcp(*robot), address),
+            Address::Serial(path) => Stream::boxed(Serial { path: path.clone(), line }, address),
             Address::Ros2(_) => {
                 Err(io::Error::other("a sensor's own address cannot be a ROS 2 domain"))
             }

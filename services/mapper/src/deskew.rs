@@ -109,10 +109,10 @@ impl Poses {
 }
 
 pub(crate) struct Placed {
-    pub(crate) row: usize,
-    pub(crate) robot: PoseSample,
-    pub(crate) capture_ns: u64,
-    pub(crate) beams: Vec<f32>,
+    pub row: usize,
+    pub robot: PoseSample,
+    pub capture_ns: u64,
+    pub beams: Vec<f32>,
 }
 
 fn time_ns(pose: &PoseSample) -> i64 {

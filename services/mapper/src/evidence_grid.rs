@@ -53,23 +53,23 @@ const LOBE_RAD: f64 = 28.0 * TAU / 360.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Flip {
-    pub(crate) cell: Cell,
-    pub(crate) occupied: bool,
+    pub cell: Cell,
+    pub occupied: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ground {
-    pub(crate) lattice: GridFrame,
+    pub lattice: GridFrame,
     /// Body radius, metres.
-    pub(crate) radius: f64,
+    pub radius: f64,
 }
 
 /// Changes since the last query.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct News {
-    pub(crate) flips: Vec<Flip>,
+    pub flips: Vec<Flip>,
     /// Bounds of newly scanned or expired cells.
-    pub(crate) window: Window,
+    pub window: Window,
 }
 
 /// Byte layers, row-major.
@@ -88,9 +88,9 @@ pub(crate) struct EvidenceGrid {
     #[serde(with = "serde_bytes")]
     occupied: Vec<u8>,
     #[serde(skip)]
-    pub(crate) ground: Ground,
+    pub ground: Ground,
     #[serde(skip)]
-    pub(crate) news: News,
+    pub news: News,
 }
 
 /// Returns the lattice over the perimeter and `beyond_m` around, where a body inside can touch.
@@ -262,7 +262,7 @@ impl EvidenceGrid {
             return false;
         };
         let lattice = self.ground.lattice;
-        self.around(beam.origin, echo + SAME_RANGE_M).any(|cell| {
+        lattice.around(beam.origin, echo + SAME_RANGE_M).cells().any(|cell| {
             let offset = lattice.centre_of(cell) - beam.origin;
             let off = || beam.axis.perp_dot(offset).atan2(beam.axis.dot(offset)).abs();
             self.is_occupied(lattice.index(cell))
@@ -276,7 +276,7 @@ impl EvidenceGrid {
     pub(crate) fn stand(&mut self, robot: DVec2) {
         let Ground { lattice, radius } = self.ground;
         let touches = radius + lattice.resolution_m;
-        for cell in self.around(robot, touches) {
+        for cell in lattice.around(robot, touches).cells() {
             let distance = lattice.centre_of(cell).distance(robot);
             if distance > touches {
                 continue;
@@ -349,7 +349,7 @@ impl EvidenceGrid {
     pub(crate) fn touch(&mut self, touch: &Touch) {
         let Ground { lattice, radius } = self.ground;
         let rim = radius - sonar::RIM_M..=radius + lattice.resolution_m;
-        for cell in self.around(touch.robot, *rim.end()) {
+        for cell in lattice.around(touch.robot, *rim.end()).cells() {
             let offset = lattice.centre_of(cell) - touch.robot;
             let (across, along) = (touch.axis.perp_dot(offset), touch.axis.dot(offset));
             if rim.contains(&offset.length()) && across.atan2(along).abs() <= touch.half_width {
@@ -404,10 +404,6 @@ impl EvidenceGrid {
         if !occupied {
             self.occupied[index] &= !(SEEN | TOUCHED | FELT);
         }
-    }
-
-    fn around(&self, centre: DVec2, reach: f64) -> impl Iterator<Item = Cell> + use<> {
-        self.ground.lattice.between(centre - reach, centre + reach).cells()
     }
 }
 

@@ -1,8 +1,10 @@
 //! Evidential map: evidence converted to hazard and scanned ground.
+//!
+//! Cells within reach of an occupied cell are forbidden to the body's centre.
 
 use common::{
-    grid::{Cell, CellState, Window},
-    mission::Mission,
+    grid::{Cell, CellState, GridFrame, Window},
+    mission::{Mission, SensorKind},
     stage::ForeignState,
 };
 use glam::DVec2;
@@ -11,8 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     clear_beams::ClearBeams,
     evidence_grid::{EvidenceGrid, Flip, Ground, STEP_M, lattice},
-    inflation::{Geometry, Inflation},
-    reading::{Fan, Ray, Reading, Rows, Touch},
+    reading::{Fan, Ray, Reading, Touch},
     sonar_model::NEAR_M,
 };
 
@@ -23,10 +24,11 @@ pub(crate) struct EvidenceMap {
     /// Grids of further lasers, then of sonars and infrared rangers beside lasers: a laser looks
     /// over or through what they see.
     others: Vec<EvidenceGrid>,
-    pub(crate) beams: ClearBeams,
-    /// Hazard counts, recomputed and so unsaved.
+    pub beams: ClearBeams,
+    /// Number of occupied lattice cells within reach of each grid cell, row-major; recomputed and
+    /// so unsaved.
     #[serde(skip)]
-    inflation: Inflation,
+    within_reach: Vec<u16>,
 }
 
 impl EvidenceMap {
@@ -37,7 +39,9 @@ impl EvidenceMap {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Evidential {
-    geometry: Geometry,
+    grid: GridFrame,
+    /// Maximum centre distance that an occupied cell blocks, metres.
+    reach: f64,
     ground: Ground,
     /// Lattice column under each grid column's middle; rows are equal, as both are square with one
     /// centre.
@@ -57,22 +61,25 @@ impl Evidential {
             .map_or([disc; 2], |outline| [outline.half_width_m(), outline.inscribed_m()]);
         // A position is up to half a cell off the cell's centre.
         let reach = body + mission.mapper.clearance_m + grid.resolution_m / 2.0;
-        let rows = Rows::new(mission);
+        let lasers = mission.lasers().into_iter().filter(|(_, laser)| laser.used);
+        let lasers: Vec<_> = lasers.map(|(row, _)| row).collect();
+        let [sonars, rays] = [SensorKind::Cone, SensorKind::Ray].map(|kind| mission.used(kind));
         let lattice = lattice(mission, reach);
         let under = |along| lattice.cell_at(grid.centre_of(Cell { col: along, row: along }));
         Self {
             under: (0..grid.cells).map(|along| under(along).map(|cell| cell.col)).collect(),
-            geometry: Geometry { lattice, grid, reach },
+            grid,
+            reach,
             ground: Ground { lattice, radius },
             map_within: mission.map_within_m(),
-            sonars: rows.cones(),
-            lasers: rows.lasers(),
-            beside_laser: rows.are_beside_laser(),
+            sonars,
+            beside_laser: !lasers.is_empty() && sonars + rays > 0,
+            lasers,
         }
     }
 
     pub(crate) const fn reach(&self) -> f64 {
-        self.geometry.reach
+        self.reach
     }
 
     pub(crate) fn empty(&self) -> EvidenceMap {
@@ -81,7 +88,7 @@ impl Evidential {
             others: vec![evidence.clone(); self.others()],
             evidence,
             beams: ClearBeams::default(),
-            inflation: Inflation::new(&self.geometry),
+            within_reach: vec![0; self.grid.area()],
         }
     }
 
@@ -94,17 +101,17 @@ impl Evidential {
     }
 
     pub(crate) fn saved_bytes(&self) -> usize {
-        4 * (1 + self.others()) * self.geometry.lattice.area() + ClearBeams::SAVED_BYTES + 128
+        4 * (1 + self.others()) * self.ground.lattice.area() + ClearBeams::SAVED_BYTES + 128
     }
 
     /// Completes a restored map; fails for another mission's.
     pub(crate) fn complete(&self, map: &mut EvidenceMap) -> Result<(), ForeignState> {
-        let lattice = self.geometry.lattice;
+        let lattice = self.ground.lattice;
         let fits = map.others.len() == self.others() && map.grids().all(|grid| grid.fits(&lattice));
         if !fits {
             return Err(ForeignState);
         }
-        map.inflation = Inflation::new(&self.geometry);
+        map.within_reach = vec![0; self.grid.area()];
         for grid in map.grids() {
             grid.ground = self.ground;
             let occupied =
@@ -183,10 +190,25 @@ impl Evidential {
             window = window.union(self.on_grid(news.window));
             for flip in news.flips {
                 is_new |= flip.occupied;
-                window = window.union(map.inflation.follow(&self.geometry, flip));
+                window = window.union(self.inflate(&mut map.within_reach, flip));
             }
         }
         (window, is_new)
+    }
+
+    fn inflate(&self, within_reach: &mut [u16], flip: Flip) -> Window {
+        let Self { grid, reach, .. } = *self;
+        let centre = self.ground.lattice.centre_of(flip.cell);
+        let mut window = Window::default();
+        for cell in grid.around(centre, reach).cells() {
+            if grid.centre_of(cell).distance(centre) <= reach {
+                let count = &mut within_reach[grid.index(cell)];
+                let change = if flip.occupied { 1 } else { -1 };
+                *count = count.saturating_add_signed(change);
+                window = window.including(cell);
+            }
+        }
+        window
     }
 
     /// Drops evidence away from the robot, and every second time all of it, since it may be wrong.
@@ -198,8 +220,8 @@ impl Evidential {
     }
 
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
-        let Geometry { lattice, grid, .. } = self.geometry;
-        let hazard = map.inflation.is_hazard(grid.index(cell)) && !is_target;
+        let lattice = self.ground.lattice;
+        let hazard = map.within_reach[self.grid.index(cell)] > 0 && !is_target;
         let under = |along: u32| self.under[along as usize];
         let under = under(cell.col).zip(under(cell.row)).map(|(col, row)| Cell { col, row });
         let further = map.others.iter().take(self.further_lasers());
@@ -217,7 +239,7 @@ impl Evidential {
         if window.area() == 0 {
             return window;
         }
-        let Geometry { lattice, grid, .. } = self.geometry;
+        let (grid, lattice) = (self.grid, self.ground.lattice);
         let last = Cell { col: window.col + window.width - 1, row: window.row + window.height - 1 };
         // A lattice cell acts up to half a cell of both grids beyond its centre.
         let more = 0.5 * (lattice.resolution_m + grid.resolution_m);

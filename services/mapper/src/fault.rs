@@ -9,29 +9,12 @@ const WALL_M: f64 = 0.5;
 /// Thickness of the wall, which no step to a neighbouring cell crosses.
 const WALL_CELLS: f64 = 1.5;
 
-#[derive(Clone, Copy)]
-pub(crate) enum Area {
-    Disc(DVec2),
-    /// Ring of radius [`WALL_M`].
-    Wall(DVec2),
-}
-
-impl Area {
-    pub(crate) fn covers(self, at: DVec2, side: f64) -> bool {
-        match self {
-            Self::Disc(middle) => at.distance(middle) <= AROUND_M,
-            Self::Wall(middle) => {
-                (WALL_M..WALL_M + WALL_CELLS * side).contains(&at.distance(middle))
-            }
-        }
-    }
-}
-
-pub(crate) fn hazard(fault: FaultKind, robot: DVec2, target: DVec2) -> Option<Area> {
+/// Returns whether a cell of `side` metres at `at` is a hazard of `fault`.
+pub(crate) fn covers(fault: FaultKind, at: DVec2, side: f64, robot: DVec2, target: DVec2) -> bool {
     match fault {
-        FaultKind::HazardAroundRobot => Some(Area::Disc(robot)),
-        FaultKind::CutOff => Some(Area::Wall(target)),
-        _ => None,
+        FaultKind::HazardAroundRobot => at.distance(robot) <= AROUND_M,
+        FaultKind::CutOff => (WALL_M..WALL_M + WALL_CELLS * side).contains(&at.distance(target)),
+        _ => false,
     }
 }
 

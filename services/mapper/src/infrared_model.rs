@@ -27,8 +27,8 @@ pub(crate) const SCANNED_ASIDE_M: f64 = 0.04;
 #[derive(Debug, PartialEq)]
 pub(crate) struct Seen {
     /// Free length; at most 0.72.
-    pub(crate) clear_m: f64,
-    pub(crate) hit_m: Option<f64>,
+    pub clear_m: f64,
+    pub hit_m: Option<f64>,
 }
 
 /// Interprets a reading up to `reach_m`; none if the ranger may be dead or saturated.

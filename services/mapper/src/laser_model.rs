@@ -99,13 +99,10 @@ impl EvidenceGrid {
             self.weigh_seen(cell, change);
         }
     }
-}
 
-impl EvidenceGrid {
     fn is_thing_at(&self, cell: Cell) -> bool {
         let lattice = self.ground.lattice;
-        let at = lattice.centre_of(cell);
-        let beside = lattice.between(at - lattice.resolution_m, at + lattice.resolution_m);
+        let beside = lattice.around(lattice.centre_of(cell), lattice.resolution_m);
         beside.cells().any(|cell| self.is_occupied(lattice.index(cell)))
     }
 

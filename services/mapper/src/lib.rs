@@ -2,15 +2,13 @@
 //!
 //! [`step`] is the pure mapper, [`stage`] records and publishes it, [`shell`] is its process.
 //! `reading` transforms readings into the mission frame, and the models interpret them.
-//! `evidence_grid` sums evidence, `inflation` grows occupied cells by the body, and `evidential`
-//! joins both. `scan_match` estimates poses by laser; `deskew` places its scans.
+//! `evidence_grid` sums evidence, and `evidential` grows occupied cells by the body. `scan_match` estimates poses by laser; `deskew` places its scans.
 
 mod clear_beams;
 mod deskew;
 mod evidence_grid;
 mod evidential;
 mod fault;
-mod inflation;
 mod infrared_model;
 mod laser_model;
 mod movers;

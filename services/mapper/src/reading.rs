@@ -4,9 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use common::{
     kinematics::Pose2,
-    mission::{Mission, SensorKind},
+    mission::{Mission, Sensor, SensorKind},
     samples::{ContactSample, RangeReading, RangeStatus},
-    sonar::Mount,
 };
 use glam::DVec2;
 
@@ -20,89 +19,41 @@ const CONTACT_M: f64 = 0.04;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
-    /// Rows; none for unused ones.
-    rows: Vec<Option<Row>>,
+    table: Vec<Sensor>,
     front: u8,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Row {
-    mount: Mount,
-    reach_m: f64,
-    kind: SensorKind,
-    /// First beam's bearing relative to the laser's, and angle between beams.
-    fan: (f64, f64),
-    noise: (f64, f64),
-    /// Distance from which beams pass objects; 0 except for depth cameras.
-    clears_from_m: f64,
-    /// Sonar model; none for other kinds.
-    cone: Option<SonarModel>,
 }
 
 impl Rows {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let row = |sensor: common::mission::Sensor| {
-            sensor.used.then(|| Row {
-                mount: sensor.mount,
-                reach_m: sensor.reach_m,
-                kind: sensor.kind,
-                fan: sensor.fan(),
-                noise: sensor.model.beam_noise(),
-                clears_from_m: sensor.model.clears_from_m(),
-                cone: (sensor.kind == SensorKind::Cone).then(|| SonarModel::of(&sensor)),
-            })
-        };
-        Self {
-            rows: mission.sensor_table().into_iter().map(row).collect(),
-            front: mission.front_row() as u8,
-        }
+        Self { table: mission.sensor_table(), front: mission.front_row() as u8 }
     }
 
-    pub(crate) fn cones(&self) -> usize {
-        self.rows.iter().flatten().filter(|row| row.cone.is_some()).count()
+    /// Returns the sensor of a row, if used. Samples in shared memory may hold any row.
+    fn used(&self, row: usize) -> Option<&Sensor> {
+        self.table.get(row).filter(|sensor| sensor.used)
     }
 
-    pub(crate) fn lasers(&self) -> Vec<usize> {
-        (0..self.rows.len()).filter(|row| self.laser(*row).is_some()).collect()
+    fn of(&self, reading: &RangeReading, kind: SensorKind) -> Option<&Sensor> {
+        self.used(reading.sensor.into()).filter(|sensor| sensor.kind == kind)
     }
 
-    fn laser(&self, row: usize) -> Option<Row> {
-        let row = *self.rows.get(row)?;
-        row.filter(|row| row.kind == SensorKind::Scan)
-    }
-
-    pub(crate) fn are_beside_laser(&self) -> bool {
-        let is_other = |row: &Row| row.kind != SensorKind::Scan;
-        !self.lasers().is_empty() && self.rows.iter().flatten().any(is_other)
-    }
-
-    /// Returns the row, if used. Samples in shared memory may hold any value.
-    fn of(&self, reading: &RangeReading) -> Option<Row> {
-        *self.rows.get(usize::from(reading.sensor))?
-    }
-
-    pub(crate) fn uses_row(&self, row: u64) -> bool {
-        usize::try_from(row).is_ok_and(|row| self.rows.get(row).is_some_and(Option::is_some))
+    pub(crate) fn uses(&self, row: u64) -> bool {
+        usize::try_from(row).is_ok_and(|row| self.used(row).is_some())
     }
 
     pub(crate) fn scan<'a>(&self, row: usize, robot: Pose2, beams: &'a [f32]) -> Option<Fan<'a>> {
-        let Row { mount, reach_m, fan: (first, step_rad), noise, clears_from_m, .. } =
-            self.laser(row).filter(|_| !beams.is_empty())?;
-        let mount = mount.on(robot);
-        let first_rad = mount.heading + first;
+        let is_scan = |laser: &&Sensor| laser.kind == SensorKind::Scan && !beams.is_empty();
+        let laser = self.used(row).filter(is_scan)?;
+        let (mount, (first, step_rad)) = (laser.mount.on(robot), laser.fan());
         Some(Fan {
             origin: mount.position,
-            first_rad,
+            first_rad: mount.heading + first,
             step_rad,
-            reach_m,
-            noise,
-            clears_from_m,
+            reach_m: laser.reach_m,
+            noise: laser.model.beam_noise(),
+            clears_from_m: laser.model.clears_from_m(),
             beams,
         })
-    }
-
-    pub(crate) fn uses(&self, reading: &RangeReading) -> bool {
-        self.uses_row(reading.sensor.into())
     }
 
     /// Returns the distance S, metres, and the hit of (19) by the front sonar.
@@ -113,7 +64,7 @@ impl Rows {
     ) -> Option<(f64, DVec2)> {
         let reading = readings.iter().find(|reading| reading.sensor == self.front)?;
         let distance = safety_distance(reading)?;
-        Some((distance, self.of(reading)?.mount.hit(robot, distance)))
+        Some((distance, self.used(reading.sensor.into())?.mount.hit(robot, distance)))
     }
 
     pub(crate) fn beams(
@@ -122,13 +73,12 @@ impl Rows {
         readings: &[RangeReading],
     ) -> impl Iterator<Item = Reading> {
         readings.iter().filter_map(move |reading| {
-            let row = self.of(reading)?;
-            let sonar = row.cone?;
+            let cone = self.of(reading, SensorKind::Cone)?;
             let echo = match reading.status() {
                 RangeStatus::Nothing => None,
-                _ => Some(safety_distance(reading)?).filter(|range| *range <= row.reach_m),
+                _ => Some(safety_distance(reading)?).filter(|range| *range <= cone.reach_m),
             };
-            let ranger = row.mount.on(robot);
+            let (ranger, sonar) = (cone.mount.on(robot), SonarModel::of(cone));
             Some(Reading { origin: ranger.position, axis: ranger.axis(), echo, sonar })
         })
     }
@@ -140,9 +90,9 @@ impl Rows {
         readings: &[RangeReading],
     ) -> impl Iterator<Item = Ray> {
         readings.iter().filter_map(move |reading| {
-            let row = self.of(reading).filter(|row| row.kind == SensorKind::Ray)?;
-            let seen = infrared_model::seen(reading, row.reach_m)?;
-            let ranger = row.mount.on(robot);
+            let ray = self.of(reading, SensorKind::Ray)?;
+            let seen = infrared_model::seen(reading, ray.reach_m)?;
+            let ranger = ray.mount.on(robot);
             Some(Ray { origin: ranger.position, axis: ranger.axis(), seen })
         })
     }
@@ -159,35 +109,35 @@ fn safety_distance(reading: &RangeReading) -> Option<f64> {
 
 pub(crate) struct Reading {
     /// Sensor position, mission frame.
-    pub(crate) origin: DVec2,
+    pub origin: DVec2,
     /// Unit vector.
-    pub(crate) axis: DVec2,
+    pub axis: DVec2,
     /// Range in metres; none without an echo.
-    pub(crate) echo: Option<f64>,
-    pub(crate) sonar: SonarModel,
+    pub echo: Option<f64>,
+    pub sonar: SonarModel,
 }
 
 pub(crate) struct Ray {
     /// Sensor position, mission frame.
-    pub(crate) origin: DVec2,
+    pub origin: DVec2,
     /// Unit vector.
-    pub(crate) axis: DVec2,
-    pub(crate) seen: Seen,
+    pub axis: DVec2,
+    pub seen: Seen,
 }
 
 #[derive(Clone, Copy)]
 pub(crate) struct Fan<'a> {
     /// Laser position, mission frame.
-    pub(crate) origin: DVec2,
-    pub(crate) first_rad: f64,
-    pub(crate) step_rad: f64,
-    pub(crate) reach_m: f64,
+    pub origin: DVec2,
+    pub first_rad: f64,
+    pub step_rad: f64,
+    pub reach_m: f64,
     /// Range deviation: metres, and a share of the range.
-    pub(crate) noise: (f64, f64),
+    pub noise: (f64, f64),
     /// Distance below which a beam is no evidence about ground.
-    pub(crate) clears_from_m: f64,
+    pub clears_from_m: f64,
     /// Ranges in metres: infinite for nothing in reach, NaN for no reading.
-    pub(crate) beams: &'a [f32],
+    pub beams: &'a [f32],
 }
 
 impl Fan<'_> {
@@ -218,13 +168,13 @@ impl Fan<'_> {
 }
 
 pub(crate) struct Touch {
-    pub(crate) robot: DVec2,
+    pub robot: DVec2,
     /// Middle of the touched arc, a unit vector.
-    pub(crate) axis: DVec2,
+    pub axis: DVec2,
     /// Half the arc, radians.
-    pub(crate) half_width: f64,
+    pub half_width: f64,
     /// Whether a bumper or a cliff sensor touched, rather than held wheels.
-    pub(crate) is_felt: bool,
+    pub is_felt: bool,
 }
 
 impl Touch {

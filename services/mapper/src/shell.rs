@@ -86,7 +86,7 @@ impl Process for Shell {
 
     fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         let runner = Runner::open(context, |mapper: &Mapper| mapper.frame().area())?;
-        let version = runner.stage.state().version();
+        let version = runner.stage.state().version;
         if version > 1 {
             tracing::info!(version, "the belief is restored");
         }
@@ -115,7 +115,7 @@ impl Process for Shell {
                     return Ok(None);
                 };
                 let readings = slice.iter().take(MOST_SENSORS).copied();
-                let used = readings.filter(|reading| mapper.uses(reading)).collect();
+                let used = readings.filter(|reading| mapper.uses(reading.sensor.into())).collect();
                 Ok(Some((slice.header().stamp.tick, used)))
             })?;
             self.scans.retain(|(of, _)| *of >= tick);
@@ -126,7 +126,7 @@ impl Process for Shell {
                 let (of, row) = (header.stamp.tick, header.sensor as usize);
                 // A repeated tick has its scans again.
                 let is_held = self.scans.iter().any(|(held, scan)| (*held, scan.row) == (of, row));
-                if of >= tick && !is_held && mapper.uses_row(header.sensor) {
+                if of >= tick && !is_held && mapper.uses(header.sensor) {
                     let beams = slice.iter().take(MOST_BEAMS).copied().collect();
                     self.scans.push((of, Scan { row, beams, sweep: header.sweep() }));
                 }
@@ -138,7 +138,7 @@ impl Process for Shell {
                 Ok(sample.map(|sample| (sample.stamp.tick, Some(sample))))
             })?;
             let target = self.inputs.target.next(tick)?.map(|sample| sample.target.position());
-            let target = target.filter(|target| *target != self.runner.stage.target());
+            let target = target.filter(|target| *target != self.runner.stage.state().target);
             self.step(Input::Tick(Tick { pose, ranges, scans, contact, target }))?;
             // Repeats may have pushed this tick's window out of the planner's queue.
             if is_repeated {

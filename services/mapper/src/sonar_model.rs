@@ -60,22 +60,22 @@ pub(crate) const NEAR_M: f64 = 0.6;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SonarModel {
     /// Half the angle of an echo's arc: the cone's 15 degrees, rounded up.
-    pub(crate) arc: f64,
+    pub arc: f64,
     /// Half the angle of full evidence against an earlier echo; farther out the beam may have
     /// missed.
-    pub(crate) against: f64,
+    pub against: f64,
     /// Half the angle of any such evidence.
-    pub(crate) against_at_edge: f64,
+    pub against_at_edge: f64,
     /// Half the angle that silence scans: below the cone's, because a surface at its edge deflects
     /// the sound.
-    pub(crate) scanned: f64,
-    pub(crate) pointed: f64,
+    pub scanned: f64,
+    pub pointed: f64,
     /// Range of scanned ground. Echoes are too wide there for mapping, but silence means free
     /// ground.
-    pub(crate) scanned_m: f64,
+    pub scanned_m: f64,
     /// Range up to which silence excludes a square surface: half a metre below the reach, where
     /// answers grow weak.
-    pub(crate) clear_m: f64,
+    pub clear_m: f64,
 }
 
 impl SonarModel {

@@ -2,6 +2,7 @@
 
 use common::{
     grid::Part,
+    journal::Restored,
     mission::Mission,
     outputs::Outputs,
     shell::{Context, Progress},
@@ -13,13 +14,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::step::{Belief, Change, Input, Mapper};
 
-#[derive(Debug, Serialize, Deserialize)]
-pub struct Start {
-    belief: Option<Belief>,
-    /// Inputs after the snapshot, oldest first.
-    inputs: Vec<Input>,
-}
-
 #[allow(clippy::large_enum_variant, reason = "there is one at a time, on the stack")]
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Entry {
@@ -29,7 +23,7 @@ pub enum Entry {
 }
 
 impl Stage for Mapper {
-    type Start = Start;
+    type Start = Restored<Belief, Input>;
     type Entry<'a> = Entry;
     type Outcome = Option<Part>;
 
@@ -37,14 +31,13 @@ impl Stage for Mapper {
         Self::new(mission)
     }
 
-    fn start(&self, context: &mut Context) -> Result<Start, StageError> {
-        let saved = context.saved_journal(self.saved_bytes(), self.entry_bytes())?;
-        Ok(Start { belief: saved.state, inputs: saved.entries })
+    fn start(&self, context: &mut Context) -> Result<Self::Start, StageError> {
+        context.saved_journal(self.saved_bytes(), self.entry_bytes())
     }
 
-    fn begin(&mut self, start: Start) -> Result<(), ForeignState> {
-        let restored = start.belief.map_or(Ok(()), |belief| self.restore(belief));
-        for input in start.inputs {
+    fn begin(&mut self, start: Self::Start) -> Result<(), ForeignState> {
+        let restored = start.state.map_or(Ok(()), |belief| self.restore(belief));
+        for input in start.entries {
             self.step(input, Progress::default().time);
         }
         // The last input's fix was already published.
@@ -71,13 +64,13 @@ impl Stage for Mapper {
         if let Some(fix) = self.take_fix() {
             out.publish(&SCAN_FIX, fix)?;
         }
-        let (frame, version) = (self.frame(), self.state().version());
+        let (frame, version) = (self.frame(), self.state().version);
         let part = match change {
             Change::None => return Ok(None),
             Change::Window(window) => Part::of(frame, window, version),
             Change::Whole => Part::whole(frame, version),
         };
-        let (header, cells) = (self.header(part), self.state().cells());
+        let (header, cells) = (self.header(part), &self.state().cells);
         out.publish_slice(&GRID, header, &frame.cells_of(part.window(), cells))?;
         Ok(Some(part))
     }

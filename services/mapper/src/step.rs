@@ -6,7 +6,7 @@
 
 use common::{
     clock::MissionTime,
-    geometry::{Piece, Shapes, Zone},
+    geometry::{Piece, Zone},
     grid::{Cell, CellState, GridFrame, Part, Window},
     mission::{Method, Mission},
     samples::{
@@ -82,10 +82,11 @@ enum Sensed {
 pub struct Belief {
     /// [`CellState`] bytes, row-major.
     #[serde(with = "serde_bytes")]
-    cells: Vec<u8>,
-    version: u64,
+    pub cells: Vec<u8>,
+    /// 1 for a mission's first map.
+    pub version: u64,
     /// Ticks whose readings added a hazard.
-    safety_events: u64,
+    pub safety_events: u64,
     epoch: u64,
     tick: Option<u64>,
     robot: DVec2,
@@ -94,24 +95,9 @@ pub struct Belief {
     rolled: f64,
     sensed: Sensed,
     fault: FaultKind,
-    target: DVec2,
+    pub target: DVec2,
     /// Matching reference; none before the first scan.
     reference: Option<Reference>,
-}
-
-impl Belief {
-    pub fn cells(&self) -> &[u8] {
-        &self.cells
-    }
-
-    /// Returns 1 for a mission's first map.
-    pub const fn version(&self) -> u64 {
-        self.version
-    }
-
-    pub const fn safety_events(&self) -> u64 {
-        self.safety_events
-    }
 }
 
 fn paint(
@@ -145,17 +131,14 @@ pub fn hazard_reach_m(mission: &Mission) -> f64 {
 /// Mapper by (19) or the evidential method.
 #[derive(Clone, Debug)]
 pub struct Mapper {
+    /// Mission with the newest zones.
+    mission: Mission,
     frame: GridFrame,
     target: Option<Cell>,
-    /// Mission's known shapes, and their hazard's reach, metres.
-    known: (Shapes, f64),
-    zones: Vec<Zone>,
-    /// Im of (19).
-    margin: u32,
+    /// Reach of the hazard around known shapes, metres.
+    reach: f64,
     evidential: Evidential,
-    sensing: bool,
     rows: Rows,
-    map_within: f64,
     footprint: f64,
     half_track: f64,
     matcher: ScanMatcher,
@@ -173,22 +156,18 @@ impl Mapper {
     /// Maps the perimeter (18) and the mission's known shapes.
     pub fn new(mission: &Mission) -> Self {
         let frame = mission.grid_frame();
-        let margin = mission.margin_cells();
         let evidential = Evidential::new(mission);
         let sensed = match mission.method {
             Method::Paper => Sensed::Hits,
             Method::Evidential => Sensed::Evidence(evidential.empty()),
         };
         let mut mapper = Self {
+            mission: mission.clone(),
             frame,
             target: frame.cell_at(mission.target),
-            known: (mission.known.clone(), hazard_reach_m(mission)),
-            zones: mission.zones.clone(),
-            margin,
+            reach: hazard_reach_m(mission),
             evidential,
-            sensing: mission.sensing,
             rows: Rows::new(mission),
-            map_within: mission.map_within_m(),
             footprint: mission.body().radius_m,
             half_track: mission.body().track_m / 2.0,
             matcher: ScanMatcher::new(mission),
@@ -255,12 +234,9 @@ impl Mapper {
         }
     }
 
-    pub fn uses_row(&self, row: u64) -> bool {
-        self.rows.uses_row(row)
-    }
-
-    pub fn uses(&self, reading: &RangeReading) -> bool {
-        self.rows.uses(reading)
+    /// Returns whether the sensor of `row` is used.
+    pub fn uses(&self, row: u64) -> bool {
+        self.rows.uses(row)
     }
 
     /// Takes the newest tick's fix; scans may give none.
@@ -270,10 +246,6 @@ impl Mapper {
 
     pub const fn frame(&self) -> GridFrame {
         self.frame
-    }
-
-    pub const fn target(&self) -> DVec2 {
-        self.belief.target
     }
 
     pub fn saved_bytes(&self) -> usize {
@@ -304,7 +276,7 @@ impl Mapper {
     }
 
     fn mark_known(&mut self) {
-        let Self { frame, target, known: (known, reach), zones, belief, .. } = self;
+        let Self { mission: Mission { known, zones, .. }, frame, target, reach, belief, .. } = self;
         for piece in known.pieces().chain(zones.iter().map(Piece::Zone)) {
             let (least, greatest) = piece.bounds();
             let near = frame.between(least - *reach, greatest + *reach);
@@ -321,7 +293,7 @@ impl Mapper {
     /// Replaces the zones. Sensed cells of former zones show again; the paper's hits there are
     /// lost.
     fn set_zones(&mut self, zones: Vec<Zone>) {
-        self.zones = zones;
+        self.mission.zones = zones;
         let Self { frame, target, evidential, belief: Belief { cells, sensed, .. }, .. } = self;
         paint(cells, frame, frame.whole(), |cell, held| match (held, &*sensed) {
             (CellState::Known, Sensed::Hits) => CellState::Free,
@@ -349,11 +321,11 @@ impl Mapper {
 
     /// Decides by target, known shapes and evidence. The paper's hits exist only in its map.
     fn state_for_target(&self, cell: Cell) -> CellState {
-        let (known, reach) = &self.known;
+        let Mission { known, zones, .. } = &self.mission;
         let is_target = Some(cell) == self.target;
         let centre = self.frame.centre_of(cell);
-        let zones = self.zones.iter().map(|zone| zone.clearance(centre));
-        if !is_target && zones.fold(known.clearance(centre), f64::min) <= *reach {
+        let zones = zones.iter().map(|zone| zone.clearance(centre));
+        if !is_target && zones.fold(known.clearance(centre), f64::min) <= self.reach {
             return CellState::Known;
         }
         match &self.belief.sensed {
@@ -426,12 +398,13 @@ impl Mapper {
         belief.rolled += belief.robot.distance(robot.position)
             + self.half_track * (robot.heading - belief.heading).abs();
         (belief.robot, belief.heading) = (robot.position, robot.heading);
-        let (ranges, scans) = if self.sensing { (ranges, scans) } else { (&[][..], &[][..]) };
+        let (ranges, scans) =
+            if self.mission.sensing { (ranges, scans) } else { (&[][..], &[][..]) };
         let (seen, is_event) = match &mut belief.sensed {
             // The paper's method takes hits of the front sonar.
             Sensed::Hits => {
                 let hit = self.rows.front_hit(robot, ranges);
-                let near = hit.filter(|(distance, _)| *distance <= self.map_within);
+                let near = hit.filter(|(distance, _)| *distance <= self.mission.map_within_m());
                 let seen = near.map(|(_, hit)| self.mark(hit, robot.position)).unwrap_or_default();
                 (seen, seen.area() > 0)
             }
@@ -476,7 +449,7 @@ impl Mapper {
     }
 
     fn mark(&mut self, hit: DVec2, robot: DVec2) -> Window {
-        let margin = f64::from(self.margin);
+        let margin = f64::from(self.mission.margin_cells());
         let middle = self.frame.to_cells(hit).round();
         let last = DVec2::splat(f64::from(self.frame.cells) - 1.0);
         let (from, to) = ((middle - margin).max(DVec2::ZERO), (middle + margin).min(last));
@@ -531,13 +504,14 @@ impl Mapper {
 
     /// Marks an injected fault's hazard.
     fn falsify(&mut self) -> Window {
-        let Self { frame, target, belief, .. } = self;
-        let Some(area) = fault::hazard(belief.fault, belief.robot, belief.target) else {
+        let (frame, target) = (self.frame, self.target);
+        let Belief { cells, fault, robot, target: place, .. } = &mut self.belief;
+        if *fault == FaultKind::Nothing {
             return Window::default();
-        };
-        paint(&mut belief.cells, frame, frame.whole(), |cell, held| {
-            let stays = Some(cell) == *target || held.is_hazard();
-            let covered = !stays && area.covers(frame.centre_of(cell), frame.resolution_m);
+        }
+        paint(cells, &frame, frame.whole(), |cell, held| {
+            let (stays, at) = (Some(cell) == target || held.is_hazard(), frame.centre_of(cell));
+            let covered = !stays && fault::covers(*fault, at, frame.resolution_m, *robot, *place);
             if covered { CellState::Sensed } else { held }
         })
     }

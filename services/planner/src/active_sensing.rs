@@ -11,11 +11,12 @@
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
     mission::{Mission, Response, SensorKind},
-    samples::GridHeader,
+    samples::{GridHeader, GuidanceStatus},
 };
 use glam::DVec2;
 
 use crate::{
+    motion::Advice,
     near_echoes::{STANDS_BEFORE_M, clear_ahead_m},
     outline::Outline,
     undetected_surfaces::UndetectedSurfaces,
@@ -28,19 +29,11 @@ const AHEAD_M: f64 = 0.6;
 /// Distance to the point that the robot heads for, in body radii.
 const AIM_RADII: f64 = 2.4;
 
-#[derive(Clone, Copy)]
-pub(crate) enum Advice {
-    /// Drive with this speed limit, m/s, in this direction, a unit vector.
-    Go(f64, DVec2),
-    /// Turn on the spot to this unit vector.
-    Look(DVec2),
-}
-
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct ActiveSensing {
     radius: f64,
     ground_m: f64,
-    pub(crate) outline: Option<Outline>,
+    pub outline: Option<Outline>,
     speed: f64,
     turn: f64,
     response: Response,
@@ -107,13 +100,14 @@ impl ActiveSensing {
         });
         let surfaces = surfaces.filter(|_| !self.has_laser);
         let unseen = ground.chain(surfaces);
-        match scan(self.bearing.rotate(pose.axis()), unseen, &mut self.scan_side) {
-            Some(there) => Advice::Look(DVec2::new(self.bearing.x, -self.bearing.y).rotate(there)),
-            None => {
-                let direction = self.aim(view, &undetected, place, &way).unwrap_or(direction);
-                Advice::Go(self.limit(view, &undetected, belief, pose, direction), direction)
-            }
+        let axis = self.bearing.rotate(pose.axis());
+        if let Some(there) = scan(axis, unseen, &mut self.scan_side) {
+            let there = DVec2::new(self.bearing.x, -self.bearing.y).rotate(there);
+            return (GuidanceStatus::Look, there, 0.0);
         }
+        let direction = self.aim(view, &undetected, place, &way).unwrap_or(direction);
+        let limit = self.limit(view, &undetected, belief, pose, direction);
+        (GuidanceStatus::Along, direction, limit)
     }
 
     /// Returns the speed limit by the newest readings along the robot's axis, m/s: 0 for an echo

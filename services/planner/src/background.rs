@@ -20,10 +20,8 @@ use thread_priority::{
 pub(crate) struct Background<Job, Done> {
     jobs: Option<Sender<Job>>,
     results: Receiver<Done>,
+    /// Holds a byte per result.
     done: UnixStream,
-    unread: u64,
-    /// End signals read minus results taken.
-    ended: i64,
     thread: Option<JoinHandle<()>>,
     cancellation: Cancellation,
 }
@@ -51,22 +49,13 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
             }
         };
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(all)?;
-        Ok(Self {
-            jobs: Some(jobs),
-            results,
-            done,
-            unread: 0,
-            ended: 0,
-            thread: Some(thread),
-            cancellation,
-        })
+        Ok(Self { jobs: Some(jobs), results, done, thread: Some(thread), cancellation })
     }
 
     pub(crate) fn begin(&mut self, job: Job) {
         if let Some(jobs) = &self.jobs {
             // The thread ends only when this value is dropped.
             let _ = jobs.send(job);
-            self.unread += 1;
         }
     }
 
@@ -74,31 +63,18 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
     ///
     /// A signal that arrives after its result would wake the process forever.
     pub(crate) fn take(&mut self) -> Option<Done> {
-        self.drain();
-        let result = (self.ended > 0).then(|| self.results.try_recv().ok()).flatten();
-        self.ended -= i64::from(result.is_some());
-        result
+        match self.done.read(&mut [0]) {
+            Ok(1) => self.results.try_recv().ok(),
+            _ => None,
+        }
     }
 
     /// Waits for a result; `None` after the thread has ended.
     pub(crate) fn wait(&mut self) -> Option<Done> {
         let result = self.results.recv().ok();
-        self.ended -= i64::from(result.is_some());
-        self.drain();
+        // Its signal may come later and is then one too many, which only wakes the process.
+        let _ = self.done.read(&mut [0]);
         result
-    }
-
-    fn drain(&mut self) {
-        let mut wakeups = [0; 64];
-        while self.unread > 0 {
-            match self.done.read(&mut wakeups) {
-                Ok(read @ 1..) => {
-                    self.unread = self.unread.saturating_sub(read as u64);
-                    self.ended += read as i64;
-                }
-                _ => return,
-            }
-        }
     }
 }
 

@@ -69,7 +69,7 @@ const PATIENT_SPEEDS: [f64; 3] = [1.0, 0.5, 0.25];
 /// Longest time between two answers that counts, seconds.
 const LONGEST_TICK_S: f64 = 1.0;
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Evasion {
     radius: f64,
     inflated_m: f64,
@@ -268,12 +268,11 @@ impl<'a> Scene<'a> {
     }
 
     fn start(&self, sample: &PoseSample) -> Way {
-        let twist = Twist { v: sample.v_m_s, omega: sample.omega_rad_s };
         Way {
             first: STAND,
             rests: true,
             last: STAND,
-            now: Moving { pose: self.start, twist },
+            now: Moving { pose: self.start, twist: sample.twist() },
             steps: 0,
             moved_s: f64::NEG_INFINITY,
             near: self.near(self.start.position),

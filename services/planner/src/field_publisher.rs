@@ -20,9 +20,9 @@ use harmonic::Cancellation;
 use crate::{background::Background, step::Snapshot};
 
 pub(crate) struct Policy {
-    pub(crate) header: FieldHeader,
-    pub(crate) frame: GridFrame,
-    pub(crate) cells: Arc<Vec<FieldCell>>,
+    pub header: FieldHeader,
+    pub frame: GridFrame,
+    pub cells: Arc<Vec<FieldCell>>,
 }
 
 impl Policy {

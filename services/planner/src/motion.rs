@@ -28,8 +28,8 @@ const LEAST_SHARE: f64 = 0.1;
 
 #[derive(Clone, Copy)]
 pub(crate) struct Moving {
-    pub(crate) pose: Pose2,
-    pub(crate) twist: Twist,
+    pub pose: Pose2,
+    pub twist: Twist,
 }
 
 impl Moving {
@@ -38,16 +38,16 @@ impl Moving {
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct MotionModel {
-    pub(crate) speed: f64,
+    pub speed: f64,
     turn: f64,
     look: f64,
     full_speed: f64,
     turns: f64,
     base: Base,
     reach_m: f64,
-    pub(crate) period_s: f64,
+    pub period_s: f64,
 }
 
 impl MotionModel {

@@ -131,11 +131,11 @@ impl Stage for PlannerStage {
             Taken::Fault(fault, robot) => Ok(planner.corrupt(fault, robot)),
             Taken::Field(part) => {
                 self.publish_field(part, at, out)?;
-                return Ok(Ok(Work::None));
+                Ok(Work::None)
             }
             Taken::Policy => {
                 self.snapshot = planner.snapshot();
-                return Ok(Ok(Work::None));
+                Ok(Work::None)
             }
         };
         if outcome == Ok(Work::Solved) {

@@ -20,22 +20,22 @@ use common::{
 use glam::DVec2;
 use harmonic::{Cancellation, Cell, Domain, Screening, Settings, SolveError, Solver};
 
-use crate::active_sensing::{ActiveSensing, Advice};
+use crate::active_sensing::ActiveSensing;
 use crate::aim;
 use crate::arcs::Arcs;
 use crate::evasion::Evasion;
 use crate::fault::lead_astray;
-use crate::motion::{Advice as Advised, MotionModel, Moving, STAND};
+use crate::motion::{Advice, MotionModel, Moving, STAND};
 use crate::outline::Passage;
 use crate::view::field_cell;
-use live::{Live, Robot, is_hazard};
+use live::{Live, is_hazard};
 
 pub use output::{Job, Snapshot, Solved, Work};
 
 /// Speed limit out of a hazard around the robot, m/s, because an obstacle is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 enum Advisor {
     /// Paper's method, and any method without sensing.
     Follow,
@@ -63,9 +63,6 @@ pub struct Planner {
     found: FoundResponse,
     /// `None` before the supervisor names one.
     target: Option<TargetSample>,
-    tolerance_m: f64,
-    screening: Screening,
-    robot: Robot,
     advisor: Advisor,
     /// `None` for a robot that cannot detect movers.
     evasion: Option<Evasion>,
@@ -92,9 +89,6 @@ impl Planner {
             mission: mission.clone(),
             found: FoundResponse::default(),
             target: None,
-            tolerance_m: mission.arrival_tolerance_m,
-            screening: screening(mission),
-            robot: Robot::new(mission),
             advisor: Advisor::new(mission),
             evasion: Evasion::new(mission),
             motion: MotionModel::of_limited(mission),
@@ -242,9 +236,8 @@ impl Planner {
         }
     }
 
-    /// Returns whether the field is outdated and the step itself solves the newest map.
     fn is_solved_here(&self) -> bool {
-        self.live.as_ref().is_some_and(|live| live.is_small() && !live.is_current())
+        self.live.as_ref().is_some_and(Live::is_solved_here)
     }
 
     fn solve_newest(&mut self) -> Result<Work, SolveError> {
@@ -252,7 +245,7 @@ impl Planner {
             return Ok(Work::None);
         };
         let field = self.solver.solve_near(&live.map, &live.field, &Cancellation::default())?;
-        live.solve(field);
+        live.follow(Arc::new(field));
         self.full_solves += 1;
         Ok(Work::Solved)
     }
@@ -267,7 +260,7 @@ impl Planner {
         if let Some(cell) = blocked.get_mut(aim.row * side + aim.col) {
             *cell = false;
         }
-        Domain::new(side, side, blocked, aim)?.with_screening(&self.screening)
+        Domain::new(side, side, blocked, aim)?.with_screening(&screening(&self.mission))
     }
 
     fn place(&self) -> Option<DVec2> {
@@ -280,7 +273,9 @@ impl Planner {
     fn aim(&self, frame: &GridFrame) -> Option<Cell> {
         let (cells, target) = (self.grid.cells(), self.place()?);
         let aim = match self.advisor {
-            Advisor::Follow => aim::cell_with_a_way_in(frame, cells, target, self.tolerance_m),
+            Advisor::Follow => {
+                aim::cell_with_a_way_in(frame, cells, target, self.mission.arrival_tolerance_m)
+            }
             Advisor::LookFirst(_) | Advisor::Steer(_) => aim::cell(frame, cells, target),
         };
         aim.map(field_cell)
@@ -295,11 +290,12 @@ impl Planner {
 
     /// Takes a job's result unless it is stale.
     pub fn swap_in(&mut self, solved: Solved) -> Result<Work, SolveError> {
-        let awaited = self.live.as_mut().filter(|it| it.awaits(solved.number));
-        let Some(live) = awaited else {
+        let Some(live) = &mut self.live else {
             return Ok(Work::None);
         };
-        live.solved(solved.field?);
+        if !live.take(solved)? {
+            return Ok(Work::None);
+        }
         self.full_solves += 1;
         Ok(Work::SwappedIn)
     }
@@ -324,9 +320,8 @@ impl Planner {
     /// A small map is solved first if the field is not valid there.
     pub fn answer(&mut self, sample: &PoseSample) -> Result<(Work, GuidanceSample), SolveError> {
         let (pose, time_s) = (sample.pose(), sample.stamp.time().seconds());
-        let twist = Twist { v: sample.v_m_s, omega: sample.omega_rad_s };
         let foreseen = self.lead.as_mut().map(|lead| lead.foresee(pose, time_s));
-        let (acts_at, twist) = foreseen.unwrap_or((pose, twist));
+        let (acts_at, twist) = foreseen.unwrap_or((pose, sample.twist()));
         let mut work = Work::None;
         let mut followed = self.follow_field(&acts_at);
         if followed.is_none() && self.is_solved_here() {
@@ -338,7 +333,7 @@ impl Planner {
 
     fn follow_field(&self, pose: &Pose2) -> Option<(GuidanceStatus, DVec2)> {
         let (live, target) = (self.live.as_ref()?, self.place()?);
-        live.guide(&self.robot, pose, target, self.grid.cells())
+        live.guide(&self.mission, pose, target, self.grid.cells())
     }
 
     fn guide(
@@ -374,7 +369,7 @@ impl Planner {
 
     /// Returns `advice` within the limits of the base: it stands if one more tick rules out a rest
     /// without a touch.
-    fn within_motion(&self, acts_at: Moving, advice: Advised) -> Advised {
+    fn within_motion(&self, acts_at: Moving, advice: Advice) -> Advice {
         let (Some(live), Some(motion), Advisor::LookFirst(sensing)) =
             (&self.live, &self.motion, &self.advisor)
         else {
@@ -390,12 +385,7 @@ impl Planner {
         if motion.rests(acts_at, (advice, dead_s), touches) { advice } else { STAND }
     }
 
-    fn advise(
-        &mut self,
-        pose: &Pose2,
-        status: GuidanceStatus,
-        direction: DVec2,
-    ) -> (GuidanceStatus, DVec2, f64) {
+    fn advise(&mut self, pose: &Pose2, status: GuidanceStatus, direction: DVec2) -> Advice {
         let (Some(live), Some(target)) = (&self.live, self.place()) else {
             return (status, direction, f64::INFINITY);
         };
@@ -410,10 +400,7 @@ impl Planner {
             (Advisor::Follow | Advisor::Steer(_), _) => return (status, direction, f64::INFINITY),
         };
         let advice = match status {
-            GuidanceStatus::Along => match sensing.advise(&view, &self.belief, pose, direction) {
-                Advice::Look(there) => (GuidanceStatus::Look, there, 0.0),
-                Advice::Go(limit, direction) => (status, direction, limit),
-            },
+            GuidanceStatus::Along => sensing.advise(&view, &self.belief, pose, direction),
             GuidanceStatus::WayOut => {
                 let limit = sensing.limit_before_echoes(&self.belief, pose);
                 (status, direction, limit.min(WAY_OUT_M_S))
@@ -427,7 +414,7 @@ impl Planner {
             return advice;
         };
         let beside = status == GuidanceStatus::AtTarget;
-        let is_there = beside || pose.position.distance(target) <= self.tolerance_m;
+        let is_there = beside || pose.position.distance(target) <= self.mission.arrival_tolerance_m;
         let heading = self.target.and_then(|it| it.target.heading()).filter(|_| is_there);
         if heading
             .is_some_and(|heading| !outline.turns(&view, pose, wrap_angle(heading - pose.heading)))

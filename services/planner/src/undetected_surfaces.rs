@@ -43,7 +43,6 @@ const SECTORS: usize = 32;
 /// Sectors between a normal and a beam that its surface answers, at most.
 const EITHER_SIDE: usize = (NEAR_ANSWERS_WITHIN_DEG * SECTORS as f64 / 360.0) as usize + 1;
 
-#[derive(Clone)]
 pub(crate) struct UndetectedSurfaces {
     beams: BySector,
     rays: Vec<Beam>,
@@ -77,7 +76,6 @@ impl From<&ClearBeam> for Beam {
     }
 }
 
-#[derive(Clone)]
 struct BySector {
     /// Sorted by sector; within a sector, beams that may have an echo come last.
     beams: Vec<Beam>,

@@ -11,13 +11,13 @@ const GRAIN_M: f64 = 0.025;
 
 #[derive(Clone, Copy)]
 pub(crate) struct View<'a> {
-    pub(crate) frame: GridFrame,
+    pub frame: GridFrame,
     /// [`CellState`] byte per cell, row-major.
-    pub(crate) cells: &'a [u8],
-    pub(crate) field: &'a Field,
+    pub cells: &'a [u8],
+    pub field: &'a Field,
     /// Cells that the field avoids because the body cannot pass, row-major; empty if there are
     /// none.
-    pub(crate) refused: &'a [bool],
+    pub refused: &'a [bool],
 }
 
 impl View<'_> {
@@ -63,9 +63,13 @@ impl View<'_> {
     /// Returns whether a cell within `radius` differs from the map of the field.
     pub(crate) fn has_changed(&self, at: DVec2, radius: f64) -> bool {
         self.cells_within(at, radius, 1).any(|cell| {
-            let refused = self.refused.get(self.frame.index(cell)).is_some_and(|it| *it);
-            (refused || self.state(cell).is_hazard()) != self.field.is_blocked(field_cell(cell))
+            let blocked = self.is_refused(cell) || self.state(cell).is_hazard();
+            blocked != self.field.is_blocked(field_cell(cell))
         })
+    }
+
+    pub(crate) fn is_refused(&self, cell: Cell) -> bool {
+        self.refused.get(self.frame.index(cell)).is_some_and(|it| *it)
     }
 
     /// Returns the centres of unscanned free and sensed cells within `radius`.

@@ -2,43 +2,42 @@
 //!
 //! | module | holds |
 //! |---|---|
-//! | [`drive`] | motor frames in, timed commands out |
+//! | `drive` | motor frames in, timed commands out |
 //! | `rangers` | readings of a tick |
-//! | [`telemetry`] | other sensors, in the units of the topics |
+//! | `telemetry` | other sensors, in the units of the topics |
 
-pub mod drive;
+mod drive;
 mod rangers;
-pub mod telemetry;
-
-use std::time::Duration;
+mod telemetry;
 
 use common::{
-    driver::{Base, Driver, Heard, Motion, StopMethod, WireTally},
-    mission::Mission,
+    driver::{Base as _, Driver, Heard, Motion, WireTally, counts::wheel_sample},
+    mission::{Channel, Mission},
     wire::{Command, Decoder, Report, SystemSignal},
 };
 
 use self::{
-    drive::{Drive, encoded},
+    drive::{encoded, index, wheel},
     rangers::Rangers,
-    telemetry::Telemetry,
 };
 
 #[derive(Debug)]
 pub struct X80 {
-    drive: Drive,
+    /// Left and right, or a car's wheel and steering.
+    channels: [Channel; 2],
     decoder: Decoder,
     rangers: Rangers,
-    telemetry: Telemetry,
+    /// Newest motor currents, for the next power sample.
+    currents: [u16; 6],
 }
 
 impl X80 {
     pub fn new(mission: &Mission) -> Self {
         Self {
-            drive: Drive::new(mission),
+            channels: [mission.robot.left, mission.robot.right],
             decoder: Decoder::default(),
             rangers: Rangers::new(mission),
-            telemetry: Telemetry::default(),
+            currents: [0; 6],
         }
     }
 }
@@ -61,13 +60,16 @@ impl Driver for X80 {
             heard.anything = true;
         }
         if let Some(motor) = motor {
-            self.telemetry.take_motor(&motor);
-            let (wheels, currents) = (self.drive.wheels(&motor), self.drive.currents(&motor));
+            self.currents = motor.currents;
+            let both = self.channels.map(|channel| wheel(&motor, channel));
+            let speeds = both.map(|encoder| encoder.velocity());
+            let wheels = wheel_sample(both.map(|encoder| encoder.position), speeds);
+            let currents = self.channels.map(|wheel| motor.currents[index(wheel)]);
             heard.motion = Some(Motion { wheels, endless: None, stamp_ns: None, currents });
         }
         if let Some(standard) = standard {
             heard.readings = self.rangers.take_standard(&standard);
-            heard.power = Some(self.telemetry.power(&standard));
+            heard.power = Some(telemetry::power(&standard, self.currents));
             heard.surroundings = Some(telemetry::surroundings(&standard));
         }
         if let Some((infrared, readings)) =
@@ -88,40 +90,9 @@ impl Driver for X80 {
         WireTally { messages: tally.frames, bytes_dropped: tally.noise_bytes + tally.dropped_bytes }
     }
 
+    /// Returns the setup: encoder feedback, velocity mode, enabled motors, running streams.
     fn greeting(&self) -> Vec<u8> {
-        self.drive.greeting()
-    }
-}
-
-impl Base for X80 {
-    fn ask_for_sensors(&self) -> Vec<u8> {
-        self.drive.streams()
-    }
-
-    fn ping(&self) -> Vec<u8> {
-        encoded(Command::System(SystemSignal::Ping))
-    }
-
-    fn acknowledge(&self) -> Vec<u8> {
-        encoded(Command::System(SystemSignal::Ack))
-    }
-
-    fn owed(&self, sent: &[u8]) -> usize {
-        let mut decoder = Decoder::default();
-        decoder.push(sent);
-        std::iter::from_fn(|| decoder.next_frame().map(drop)).count()
-    }
-
-    fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8> {
-        self.drive.velocity(counts, limit)
-    }
-
-    fn other_stops(&self) -> Vec<StopMethod> {
-        let suspend = encoded(Command::Enable { on: false, channel: None });
-        vec![
-            StopMethod { name: "disable", bytes: self.drive.disable() },
-            StopMethod { name: "pulse width 0", bytes: self.drive.still_pulses() },
-            StopMethod { name: "suspend", bytes: suspend },
-        ]
+        let settings = self.channels.into_iter().flat_map(|wheel| Command::drives(wheel.channel));
+        settings.flat_map(encoded).chain(self.ask_for_sensors()).collect()
     }
 }

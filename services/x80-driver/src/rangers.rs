@@ -28,10 +28,9 @@ impl Rangers {
         &self,
         custom: &CustomSensors,
     ) -> Option<(InfraredSample, Vec<RangeReading>)> {
-        let [_, _, second, third, fourth, fifth, sixth, seventh] = custom.ad;
-        let first = self.first_infrared?;
-        let raw_ad = [first, second, third, fourth, fifth, sixth, seventh];
-        let range_m: [f64; INFRARED_RANGERS] = raw_ad.map(infrared_m);
+        let mut raw_ad = [self.first_infrared?; INFRARED_RANGERS];
+        raw_ad[1..].copy_from_slice(&custom.ad[2..]);
+        let range_m = raw_ad.map(infrared_m);
         let sample = InfraredSample { range_m, raw_ad, ..InfraredSample::default() };
         Some((sample, self.readings(SensorKind::Ray, &raw_ad.map(seen))))
     }

@@ -2,36 +2,21 @@
 
 use common::{
     samples::{PowerSample, SurroundingsSample},
-    wire::{
-        LOGIC_SCALE_V, MOTOR_SCALE_V, MotorSensors, StandardSensors, board_celsius, driver_celsius,
-        volts,
-    },
+    wire::{LOGIC_SCALE_V, MOTOR_SCALE_V, StandardSensors, board_celsius, driver_celsius, volts},
 };
 
-/// Values for the next sample.
-#[derive(Debug, Default)]
-pub struct Telemetry {
-    currents: [u16; 6],
-}
-
-impl Telemetry {
-    pub const fn take_motor(&mut self, motor: &MotorSensors) {
-        self.currents = motor.currents;
-    }
-
-    pub fn power(&self, standard: &StandardSensors) -> PowerSample {
-        PowerSample {
-            board_v: volts(standard.board_battery, LOGIC_SCALE_V),
-            motor_v: volts(standard.motor_battery, MOTOR_SCALE_V),
-            servo_v: volts(standard.servo_battery, LOGIC_SCALE_V),
-            driver_c: standard.overheat.map(driver_celsius),
-            current_ad: self.currents,
-            ..PowerSample::default()
-        }
+pub(crate) fn power(standard: &StandardSensors, current_ad: [u16; 6]) -> PowerSample {
+    PowerSample {
+        board_v: volts(standard.board_battery, LOGIC_SCALE_V),
+        motor_v: volts(standard.motor_battery, MOTOR_SCALE_V),
+        servo_v: volts(standard.servo_battery, LOGIC_SCALE_V),
+        driver_c: standard.overheat.map(driver_celsius),
+        current_ad,
+        ..PowerSample::default()
     }
 }
 
-pub fn surroundings(standard: &StandardSensors) -> SurroundingsSample {
+pub(crate) fn surroundings(standard: &StandardSensors) -> SurroundingsSample {
     let [alarm_1, motion_1, alarm_2, motion_2] = standard.human;
     SurroundingsSample {
         temperature_c: board_celsius(standard.temperature),
@@ -48,9 +33,6 @@ mod tests {
 
     #[test]
     fn a_standard_frame_by_hand() {
-        let mut telemetry = Telemetry::default();
-        telemetry
-            .take_motor(&MotorSensors { currents: [1, 2, 3, 4, 5, 6], ..MotorSensors::default() });
         let standard = StandardSensors {
             human: [10, 20, 30, 40],
             tilt: [50, 60],
@@ -61,7 +43,7 @@ mod tests {
             motor_battery: 2048,
             ..StandardSensors::default()
         };
-        let (power, surroundings) = (telemetry.power(&standard), surroundings(&standard));
+        let (power, surroundings) = (power(&standard, [1, 2, 3, 4, 5, 6]), surroundings(&standard));
         assert!((power.board_v - 7.2).abs() < 1e-9);
         assert!((power.motor_v - 12.003).abs() < 1e-3);
         assert_eq!(power.driver_c, [60.0, 100.0]);

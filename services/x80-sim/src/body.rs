@@ -17,14 +17,16 @@ const PUSHES: usize = 4;
 pub struct Body {
     drive: DifferentialDrive,
     wheel_radius: f64,
-    track: f64,
-    radius: f64,
+    /// True track, metres; W is the nominal one.
+    pub track: f64,
+    pub radius: f64,
     footprint: Option<Footprint>,
-    pose: Pose2,
-    clearance: f64,
+    pub pose: Pose2,
+    pub clearance: f64,
     touching: bool,
     over_hole: bool,
-    contacts: u64,
+    /// Contacts, each counted once however long it lasts.
+    pub contacts: u64,
 }
 
 impl Body {
@@ -58,33 +60,11 @@ impl Body {
         self.touching = self.clearance <= RELEASE_M;
     }
 
-    pub fn pose(&self) -> Pose2 {
-        self.pose
-    }
-
-    pub fn radius(&self) -> f64 {
-        self.radius
-    }
-
-    /// Returns the true track, metres; W is the nominal one.
-    pub fn track(&self) -> f64 {
-        self.track
-    }
-
-    /// Returns contacts, each counted once however long it lasts.
-    pub fn contacts(&self) -> u64 {
-        self.contacts
-    }
-
     /// Returns the bearing of a touched obstacle, radians counter-clockwise from the body's axis.
     pub fn touched_at(&self, world: &World) -> Option<f64> {
         let is_near = self.clearance <= RELEASE_M;
         let (_, outward) = is_near.then(|| self.nearest(world)).flatten()?;
         Some(self.pose.axis().angle_to(-outward?))
-    }
-
-    pub fn clearance(&self) -> f64 {
-        self.clearance
     }
 
     /// Moves as both wheels ask, metres of ground. On contact the body slides along the obstacle,
@@ -193,8 +173,8 @@ mod tests {
         let (mut body, world) = at_start("robot.track_m = 0.25");
         let quarter = FRAC_PI_2 * 0.25 / 2.0;
         body.roll([-quarter, quarter], &world);
-        assert!((body.pose().heading - FRAC_PI_2).abs() < 1e-12);
-        assert!(body.pose().position.length() < 1e-12);
+        assert!((body.pose.heading - FRAC_PI_2).abs() < 1e-12);
+        assert!(body.pose.position.length() < 1e-12);
     }
 
     #[test]
@@ -203,18 +183,18 @@ mod tests {
         let mut rolled = 0.0;
         for _ in 0..400 {
             rolled += body.roll([0.005; 2], &world)[0];
-            assert!(body.clearance() >= 0.0, "it went into the wall");
+            assert!(body.clearance >= 0.0, "it went into the wall");
         }
-        assert!((body.pose().position.x - 0.81).abs() < 1e-6);
+        assert!((body.pose.position.x - 0.81).abs() < 1e-6);
         assert!((rolled - 0.81).abs() < 1e-6, "the wheels went {rolled} m");
-        assert_eq!(body.contacts(), 1);
+        assert_eq!(body.contacts, 1);
         for _ in 0..40 {
             body.roll([-0.005; 2], &world);
         }
         for _ in 0..80 {
             body.roll([0.005; 2], &world);
         }
-        assert_eq!(body.contacts(), 2, "it came back");
+        assert_eq!(body.contacts, 2, "it came back");
     }
 
     #[test]
@@ -222,10 +202,10 @@ mod tests {
         let (mut body, world) = at_start("world.wall = [{ points = [[0.3, -1], [2.3, 1]] }]");
         for _ in 0..600 {
             body.roll([0.005; 2], &world);
-            assert!(body.clearance() >= 0.0, "it went into the wall");
+            assert!(body.clearance >= 0.0, "it went into the wall");
         }
-        assert!(body.pose().position.y > 0.1, "it slid to {:?}", body.pose());
-        assert_eq!(body.contacts(), 1);
+        assert!(body.pose.position.y > 0.1, "it slid to {:?}", body.pose);
+        assert_eq!(body.contacts, 1);
     }
 
     #[test]
@@ -234,9 +214,9 @@ mod tests {
             at_start("world.wall = [{ points = [[0.2, -1.5], [1.2, 0], [0.2, 1.5]] }]");
         for _ in 0..600 {
             body.roll([0.005; 2], &world);
-            assert!(body.clearance() >= 0.0, "it went into the corner");
+            assert!(body.clearance >= 0.0, "it went into the corner");
         }
-        assert!(body.pose().position.x < 1.0);
+        assert!(body.pose.position.x < 1.0);
     }
 
     const LONG: &str = "robot.footprint = [[-0.1, -0.1], [0.4, -0.1], [0.4, 0.1], [-0.1, 0.1]]\n";
@@ -248,8 +228,8 @@ mod tests {
         for _ in 0..400 {
             body.roll([0.005; 2], &world);
         }
-        assert!((body.pose().position.x - 2.0).abs() < 1e-9 && body.contacts() == 0);
-        assert!((body.clearance() - 0.05).abs() < 1e-9, "{}", body.clearance());
+        assert!((body.pose.position.x - 2.0).abs() < 1e-9 && body.contacts == 0);
+        assert!((body.clearance - 0.05).abs() < 1e-9, "{}", body.clearance);
     }
 
     #[test]
@@ -263,9 +243,9 @@ mod tests {
             body.put(Pose2 { position, heading: 0.0 }, 0, &world);
             for _ in 0..400 {
                 body.roll([-0.001, 0.001], &world);
-                assert!(body.clearance() >= 0.0, "it went into it: {shape}");
+                assert!(body.clearance >= 0.0, "it went into it: {shape}");
             }
-            assert!(body.contacts() >= 1, "{shape}");
+            assert!(body.contacts >= 1, "{shape}");
         }
     }
 }

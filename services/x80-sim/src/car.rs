@@ -63,7 +63,7 @@ impl Car {
 
     pub(crate) fn twist(&self, motors: &[Motor; 6]) -> Twist {
         let OnChannel { channel, sign } = self.driven;
-        let wheel = sign * motors[channel].speed() / self.counts_per_radian;
+        let wheel = sign * motors[channel].speed / self.counts_per_radian;
         self.drive.twist([wheel, self.angle(motors)])
     }
 
@@ -89,7 +89,7 @@ impl Car {
         let went = held_at.unwrap_or(ground) / self.wheel_radius_m * self.counts_per_radian * sign;
         let motor = &mut motors[channel];
         let share = grip.unwrap_or(0.0);
-        motor.turn(went * share + asked * (1.0 - share));
+        motor.turned += went * share + asked * (1.0 - share);
         if let Some(grip) = grip {
             motor.hold(went / dt, grip);
         }
@@ -98,8 +98,8 @@ impl Car {
     fn steer(&self, motor: &mut Motor, now: f64, dt: f64, noise: &mut Noise) {
         let limit = self.steering.counts(self.steering.limit_rad);
         let asked = motor.step(now, dt, noise);
-        let stopped = (motor.turned() + asked).clamp(-limit, limit);
-        motor.turn(stopped - motor.turned());
+        let stopped = (motor.turned + asked).clamp(-limit, limit);
+        motor.turned += stopped - motor.turned;
     }
 }
 

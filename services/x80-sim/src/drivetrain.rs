@@ -35,7 +35,7 @@ impl OnChannel {
     }
 
     pub(crate) fn turned(self, motors: &[Motor; 6]) -> f64 {
-        self.sign * motors[self.channel].turned()
+        self.sign * motors[self.channel].turned
     }
 }
 
@@ -97,7 +97,7 @@ impl Drivetrain {
             let went = went[wheel] / self.diameter[wheel];
             let share = grip[wheel].unwrap_or(0.0);
             let motor = &mut motors[on.channel];
-            motor.turn(counts(went * share + asked[wheel] * (1.0 - share)));
+            motor.turned += counts(went * share + asked[wheel] * (1.0 - share));
             if let Some(grip) = grip[wheel] {
                 motor.hold(counts(went) / dt, grip);
             }
@@ -107,7 +107,7 @@ impl Drivetrain {
     /// Returns m/s, forward positive.
     pub(crate) fn rim_speeds(&self, motors: &[Motor; 6]) -> [f64; 2] {
         self.rims(self.on.map(|OnChannel { channel, sign }| {
-            sign * motors[channel].speed() * self.metres_per_count
+            sign * motors[channel].speed * self.metres_per_count
         }))
     }
 

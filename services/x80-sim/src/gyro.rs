@@ -12,7 +12,7 @@ pub(crate) struct Gyro {
     noise: Noise,
     /// Time and true heading of the newest reading.
     newest: Option<(f64, f64)>,
-    angle: f64,
+    pub(crate) angle: f64,
 }
 
 impl Gyro {
@@ -32,16 +32,14 @@ impl Gyro {
         }
     }
 
-    pub(crate) fn read(&mut self, time_s: f64, heading: f64) {
+    /// Returns the new angle.
+    pub(crate) fn read(&mut self, time_s: f64, heading: f64) -> f64 {
         if let Some((before_s, before)) = self.newest.replace((time_s, heading)) {
             let passed_s = time_s - before_s;
             self.angle += self.scale * wrap_angle(heading - before)
                 + self.bias_rad_s * passed_s
                 + self.noise.normal(self.noise_rad_sqrt_s * passed_s.sqrt());
         }
-    }
-
-    pub(crate) const fn angle(&self) -> f64 {
         self.angle
     }
 }
@@ -64,7 +62,7 @@ mod tests {
             (0..=1000).for_each(|tick| {
                 gyro.read(f64::from(tick) / 10.0, f64::from(tick) / 100.0);
             });
-            gyro.angle() - 10.0
+            gyro.angle - 10.0
         };
         assert!(read(1, [0.0; 3]).abs() < 1e-9);
         let mean_square =

@@ -24,7 +24,7 @@ pub fn read(
         let Some(ranger) = mount.map(|mount| mount.on(pose)) else {
             return 0;
         };
-        let height_m = world.heights().infrared_m;
+        let height_m = world.heights.infrared_m;
         let range = if world.is_between(pose.position, ranger.position, height_m) {
             // A ranger pressed against an object that the body touches sees only that.
             0.0

@@ -6,8 +6,8 @@ use common::{
     json_wire::{Order, Report, Scan, line},
     mission::{Mission, RobotConfig, Sensor, SensorKind},
     wire::{
-        Command, CustomSensors, Echo, Feedback, INFRARED_LIVE_AD, MOTOR_SCALE_V, Mode,
-        MotorSensors, Parameter, StandardSensors, infrared_m, volts,
+        Command, CustomSensors, Echo, INFRARED_LIVE_AD, MOTOR_SCALE_V, MotorSensors,
+        StandardSensors, infrared_m, volts,
     },
 };
 
@@ -43,23 +43,17 @@ impl JsonWords {
     pub(crate) fn commands(&mut self, order: &Order) -> Vec<Command> {
         self.heard += 1;
         let channels = self.wheels.map(|wheel| wheel.channel as u8);
-        let enabled =
-            |on| channels.map(|channel| Command::Enable { on, channel: Some(channel) }).to_vec();
         match *order {
-            Order::Hello { .. } => {
-                let parameters = channels.iter().flat_map(|&channel| {
-                    [Parameter::Feedback(Feedback::Encoder), Parameter::Mode(Mode::Velocity)]
-                        .map(|parameter| Command::Parameter { channel, parameter })
-                });
-                parameters.chain(enabled(true)).collect()
-            }
+            Order::Hello { .. } => channels.map(Command::drives).concat(),
             Order::Drive { wheels: speeds, for_s, .. } => {
                 // A time of 0 would be a command without an end.
                 let limit_ms = (for_s * 1000.0).round().clamp(1.0, f64::from(u16::MAX));
                 let counts = speeds.map(|speed| speed * self.counts_per_radian);
                 vec![velocity(self.wheels, counts, limit_ms as u16)]
             }
-            Order::Brake {} => enabled(false),
+            Order::Brake {} => {
+                channels.map(|channel| Command::Enable { on: false, channel: Some(channel) }).into()
+            }
             Order::Ping {} => Vec::new(),
         }
     }
@@ -84,7 +78,7 @@ impl JsonWords {
         // have more per turn.
         let held = self.wheels.map(|wheel| {
             let motor = &motors[wheel.channel];
-            motor.enabled() && STALL_CURRENT * motor.load() >= self.held_current_ad
+            motor.enabled && STALL_CURRENT * motor.load >= self.held_current_ad
         });
         let ranges = self.table.iter().filter_map(|sensor| {
             let channel = usize::from(sensor.channel);
@@ -102,8 +96,7 @@ impl JsonWords {
             Some((_, Scan { ranges, age_s, time_s })) => (Some(ranges), [age_s, time_s]),
             None => (None, [None; 2]),
         };
-        let report = Report {
-            clock_s: None,
+        line(&Report {
             gyro,
             heard: Some(self.heard),
             wheels: Some(of(&|channel| turned(motor, motors, channel))),
@@ -111,14 +104,13 @@ impl JsonWords {
             held: Some(held),
             ranges: ranges.collect(),
             battery_v: Some(volts(standard.motor_battery, MOTOR_SCALE_V)),
-            odometry: None,
             scan,
             scan_age_s,
             scan_time_s,
             scans,
             touched,
-        };
-        line(&report)
+            ..Report::default()
+        })
     }
 }
 
@@ -126,7 +118,7 @@ impl JsonWords {
 fn turned(sensors: &MotorSensors, motors: &[Motor; 6], channel: usize) -> f64 {
     let cycle = f64::from(common::wire::COUNT_CYCLE);
     let (read, true_counts) =
-        (f64::from(sensors.encoders[channel].position), motors[channel].turned());
+        (f64::from(sensors.encoders[channel].position), motors[channel].turned);
     read + ((true_counts - read) / cycle).round() * cycle
 }
 

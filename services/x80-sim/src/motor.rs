@@ -35,15 +35,17 @@ pub struct Motor {
     top_speed: f64,
     /// Counts per second squared.
     acceleration: f64,
-    enabled: bool,
+    pub enabled: bool,
     mode: Mode,
     order: Option<Order>,
     /// Target changes with their times, before the delay.
     pending: VecDeque<(f64, f64)>,
     target: f64,
-    speed: f64,
-    turned: f64,
-    load: f64,
+    /// Counts per second.
+    pub speed: f64,
+    pub turned: f64,
+    /// Share of stall torque exerted against resistance to wheel or body.
+    pub load: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,28 +77,6 @@ impl Motor {
     #[must_use]
     pub fn accelerating(self, acceleration: f64) -> Self {
         Self { acceleration, ..self }
-    }
-
-    pub fn enabled(&self) -> bool {
-        self.enabled
-    }
-
-    /// Returns counts per second.
-    pub fn speed(&self) -> f64 {
-        self.speed
-    }
-
-    pub fn turned(&self) -> f64 {
-        self.turned
-    }
-
-    /// Returns the share of stall torque exerted against resistance to wheel or body.
-    pub fn load(&self) -> f64 {
-        self.load
-    }
-
-    pub(crate) fn restore(&mut self, turned: f64) {
-        self.turned = turned;
     }
 
     /// Sets the mode and runs until mission time `until`.
@@ -180,10 +160,6 @@ impl Motor {
             self.speed = 0.0;
         }
         counts + jitter * dt
-    }
-
-    pub fn turn(&mut self, counts: f64) {
-        self.turned += counts;
     }
 
     /// Limits the wheel to the ground's `speed`, counts per second.

@@ -32,19 +32,17 @@ impl Fading {
         let cut_mean = mean * (1.0 - (-longest / mean).exp());
         let share = radio.outage_share;
         let mean_good = if share > 0.0 { cut_mean * (1.0 - share) / share } else { f64::INFINITY };
-        let mut fading = Self {
+        let until =
+            if mean_good.is_finite() { noise.exponential(mean_good) } else { f64::INFINITY };
+        Self {
             mean_good,
             mean_out: mean,
             longest,
             out: false,
             since: 0.0,
-            until: f64::INFINITY,
+            until,
             longest_seen: 0.0,
-        };
-        if mean_good.is_finite() {
-            fading.until = noise.exponential(mean_good);
         }
-        fading
     }
 
     /// Requires mission time `now` never to decrease.

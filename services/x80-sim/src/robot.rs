@@ -47,13 +47,46 @@ pub enum Heard {
     Other,
 }
 
+/// Host's message in the robot's protocol.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Said<'a> {
+    Frame(&'a Frame<'a>),
+    Order(&'a Order),
+    Request(Request),
+}
+
+impl Said<'_> {
+    pub(crate) fn kind(self) -> Heard {
+        match self {
+            Self::Frame(frame) if Addressing::of_robot(frame.rid).is_none() => Heard::Foreign,
+            Self::Frame(frame) => match Command::parse(frame) {
+                Ok(Command::System(SystemSignal::Ack)) => Heard::Ack,
+                Ok(Command::System(SystemSignal::Ping)) => Heard::Ping,
+                Ok(Command::Motion(_)) if !Addressing::is_multimedia(frame.rid) => Heard::Motion,
+                Ok(_) | Err(_) => Heard::Other,
+            },
+            Self::Order(Order::Drive { .. }) | Self::Request(Request::Speeds(_)) => Heard::Motion,
+            Self::Order(Order::Ping {}) => Heard::Ping,
+            Self::Order(_) | Self::Request(_) => Heard::Other,
+        }
+    }
+
+    pub(crate) fn told(self, robot: &mut Robot, answer: &mut Vec<u8>) -> Heard {
+        match self {
+            Self::Frame(frame) => robot.on_frame(frame, answer),
+            Self::Order(order) => robot.on_order(order, answer),
+            Self::Request(request) => robot.on_request(request, answer),
+        }
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Robot {
     physics: Physics,
     ignores_time: bool,
     blocks: Vec<Block>,
     stops_when_silent: Option<f64>,
-    rate_hz: f64,
+    pub(crate) rate_hz: f64,
     drivetrain: Drivetrain,
     car: Option<Car>,
     longest_step: f64,
@@ -66,7 +99,8 @@ pub struct Robot {
     wheel_noise: Noise,
     count_noise: Noise,
 
-    time: f64,
+    /// Mission time, seconds.
+    pub(crate) time: f64,
     tick: u64,
     heard_at: f64,
     ordered_at: f64,
@@ -82,7 +116,7 @@ pub struct Robot {
     arduino: Option<ArduinoWords>,
     /// Lasers whose scans come with the robot's frames.
     lasers: Vec<Laser>,
-    rplidar: Option<Rplidar>,
+    pub(crate) rplidar: Option<Rplidar>,
     touches: Vec<TouchRow>,
     felt: Vec<bool>,
     told: Vec<bool>,
@@ -109,6 +143,7 @@ impl Robot {
             Some(car) if car.steers_by(channel) => car.top_steering_counts(),
             _ => top_counts,
         };
+        let body = Body::new(mission, &world, wheel_errors.track);
         let mut robot = Self {
             physics,
             ignores_time: mission.simulation.ignores_time,
@@ -117,7 +152,6 @@ impl Robot {
             rate_hz: mission.robot.rate_hz,
             drivetrain: Drivetrain::new(mission, wheel_errors.diameter),
             longest_step,
-            body: Body::new(mission, &world, wheel_errors.track),
             world,
             motors: std::array::from_fn(|channel| {
                 Motor::new(physics.wheels, top_counts(channel)).accelerating(acceleration)
@@ -133,7 +167,8 @@ impl Robot {
             ordered_at: 0.0,
             stopping_time: 0.0,
             addressing: Addressing::default(),
-            least_clearance: f64::INFINITY,
+            least_clearance: body.clearance,
+            body,
             standard: StandardSensors::default(),
             custom: CustomSensors::default(),
             motor: MotorSensors::default(),
@@ -147,7 +182,6 @@ impl Robot {
             told: Vec::new(),
             touches: mission.touches(),
         };
-        robot.least_clearance = robot.body.clearance();
         robot.measure();
         robot
     }
@@ -161,14 +195,14 @@ impl Robot {
         robot.time = saved.time_s;
         (robot.heard_at, robot.ordered_at) = (saved.time_s, saved.time_s);
         robot.stopping_time = saved.stopping_time_s;
-        robot.ranging.restore(saved.silent);
+        robot.ranging.silence.silent = saved.silent;
         for (motor, turned) in robot.motors.iter_mut().zip(saved.turned) {
-            motor.restore(turned);
+            motor.turned = turned;
         }
-        let (centre, radius) = (saved.pose.position, robot.body.radius());
+        let (centre, radius) = (saved.pose.position, robot.body.radius);
         robot.world.advance(saved.time_s, centre, radius);
         robot.body.put(saved.pose, saved.contacts, &robot.world);
-        robot.least_clearance = robot.body.clearance();
+        robot.least_clearance = robot.body.clearance;
         robot.measure();
         robot
     }
@@ -177,11 +211,11 @@ impl Robot {
         SavedState {
             tick: self.tick,
             time_s: self.time,
-            pose: self.body.pose(),
-            turned: std::array::from_fn(|channel| self.motors[channel].turned()),
-            contacts: self.body.contacts(),
+            pose: self.body.pose,
+            turned: std::array::from_fn(|channel| self.motors[channel].turned),
+            contacts: self.body.contacts,
             stopping_time_s: self.stopping_time,
-            silent: self.ranging.silent(),
+            silent: self.ranging.silence.silent,
         }
     }
 
@@ -201,35 +235,11 @@ impl Robot {
     }
 
     pub fn meet(&mut self, other: Option<Other>) {
-        self.world.set_other(other);
-    }
-
-    pub fn time_s(&self) -> f64 {
-        self.time
-    }
-
-    pub fn period_s(&self) -> f64 {
-        1.0 / self.rate_hz
+        self.world.other = other;
     }
 
     pub fn next_tick_s(&self) -> f64 {
         (self.tick + 1) as f64 / self.rate_hz
-    }
-
-    pub fn motor(&self, channel: u8) -> Option<&Motor> {
-        self.motors.get(usize::from(channel))
-    }
-
-    pub fn kind(frame: &Frame<'_>) -> Heard {
-        if Addressing::of_robot(frame.rid).is_none() {
-            return Heard::Foreign;
-        }
-        match Command::parse(frame) {
-            Ok(Command::System(SystemSignal::Ack)) => Heard::Ack,
-            Ok(Command::System(SystemSignal::Ping)) => Heard::Ping,
-            Ok(Command::Motion(_)) if !Addressing::is_multimedia(frame.rid) => Heard::Motion,
-            Ok(_) | Err(_) => Heard::Other,
-        }
     }
 
     pub fn on_frame(&mut self, frame: &Frame<'_>, replies: &mut Vec<u8>) -> Heard {
@@ -238,7 +248,7 @@ impl Robot {
         };
         self.addressing = addressing;
         self.heard_at = self.time;
-        let heard = Self::kind(frame);
+        let heard = Said::Frame(frame).kind();
         // Even unknown frames are acknowledged; acknowledgements are not.
         if heard != Heard::Ack {
             Report::System(SystemSignal::Ack).encode(addressing, replies);
@@ -294,15 +304,7 @@ impl Robot {
         for command in commands {
             self.take(command);
         }
-        Self::kind_of(order)
-    }
-
-    pub const fn kind_of(order: &Order) -> Heard {
-        match order {
-            Order::Drive { .. } => Heard::Motion,
-            Order::Ping {} => Heard::Ping,
-            Order::Hello { .. } | Order::Brake {} => Heard::Other,
-        }
+        Said::Order(order).kind()
     }
 
     pub fn on_request(&mut self, request: Request, replies: &mut Vec<u8>) -> Heard {
@@ -310,23 +312,14 @@ impl Robot {
             return Heard::Foreign;
         };
         if arduino.hears(self.time, &self.motors) {
-            let gyro = self.gyro.as_mut().map(|gyro| {
-                gyro.read(self.time, self.body.pose().heading);
-                gyro.angle()
-            });
+            let gyro = self.gyro.as_mut();
+            let gyro = gyro.map(|gyro| gyro.read(self.time, self.body.pose.heading));
             let (answer, command) = arduino.answer(request, &self.standard, &self.motors, gyro);
             replies.extend(answer.into_bytes());
             self.heard_at = self.time;
             command.into_iter().for_each(|command| self.take(command));
         }
-        Self::kind_of_request(request)
-    }
-
-    pub const fn kind_of_request(request: Request) -> Heard {
-        match request {
-            Request::Speeds(_) => Heard::Motion,
-            _ => Heard::Other,
-        }
+        Said::Request(request).kind()
     }
 
     /// Reboots an Arduino, as opening its line does.
@@ -337,21 +330,8 @@ impl Robot {
         }
     }
 
-    pub fn has_rplidar(&self) -> bool {
-        self.rplidar.is_some()
-    }
-
-    pub fn is_scanning(&self) -> bool {
-        self.rplidar.as_ref().is_some_and(Rplidar::is_scanning)
-    }
-
-    pub fn on_laser(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let now = self.time;
-        self.rplidar.as_mut().map_or_else(Vec::new, |rplidar| rplidar.answer(bytes, now))
-    }
-
     pub fn laser_measured(&mut self) -> Vec<u8> {
-        let (now, pose) = (self.time, self.body.pose());
+        let (now, pose) = (self.time, self.body.pose);
         let rplidar = self.rplidar.as_mut();
         rplidar.map_or_else(Vec::new, |rplidar| rplidar.measured(&self.world, pose, now))
     }
@@ -383,7 +363,7 @@ impl Robot {
                 self.time = from + span * step as f64 / steps;
                 let own = self.rplidar.as_mut().map(|rplidar| &mut rplidar.laser);
                 for laser in self.lasers.iter_mut().chain(own) {
-                    laser.follow(self.time, self.body.pose());
+                    laser.follow(self.time, self.body.pose);
                 }
             }
             // Exact time ends a command that expires now.
@@ -396,7 +376,7 @@ impl Robot {
         if silent {
             self.motors.iter_mut().for_each(Motor::halt);
         }
-        let (centre, radius) = (self.body.pose().position, self.body.radius());
+        let (centre, radius) = (self.body.pose.position, self.body.radius);
         self.world.advance(self.time + dt, centre, radius);
 
         let (now, noise) = (self.time, &mut self.wheel_noise);
@@ -407,21 +387,17 @@ impl Robot {
             car.step(&mut self.motors, &mut self.body, world, &wheels, (now, dt), noise);
         } else {
             let asked = drivetrain.step(&mut self.motors, now, dt, noise);
-            let mut ground =
+            let ground =
                 drivetrain.rims(asked).map(|metres| drivetrain::slipped(metres, &wheels, noise));
             let blocked = self.blocked_wheels();
-            for (ground, blocked) in ground.iter_mut().zip(blocked) {
-                if blocked {
-                    *ground = 0.0;
-                }
-            }
+            let ground = [0, 1].map(|wheel| if blocked[wheel] { 0.0 } else { ground[wheel] });
             let went = self.body.roll(ground, &self.world);
             let at_contact = drivetrain::grip(went != ground, &wheels);
             // A blocked wheel cannot slip.
             let grip = blocked.map(|blocked| if blocked { Some(1.0) } else { at_contact });
             drivetrain.turn(&mut self.motors, asked, went, grip, dt);
         }
-        self.least_clearance = self.least_clearance.min(self.body.clearance());
+        self.least_clearance = self.least_clearance.min(self.body.clearance);
         let [left, right] = self.rims();
         if left.abs().max(right.abs()) > GroundTruthTick::AT_REST_M_S {
             self.stopping_time = self.stopping_time.max(now + dt - self.ordered_at);
@@ -449,7 +425,7 @@ impl Robot {
             return car.twist(&self.motors);
         }
         let [left, right] = self.rims();
-        Twist { v: (left + right) / 2.0, omega: (right - left) / self.body.track() }
+        Twist { v: (left + right) / 2.0, omega: (right - left) / self.body.track }
     }
 
     pub fn advance_to_next_tick(&mut self) {
@@ -459,7 +435,7 @@ impl Robot {
     }
 
     fn feel(&mut self) {
-        let (pose, at) = (self.body.pose(), self.body.touched_at(&self.world));
+        let (pose, at) = (self.body.pose, self.body.touched_at(&self.world));
         self.felt.resize(self.touches.len(), false);
         for (row, felt) in self.touches.iter().zip(&mut self.felt) {
             let bearing = row.bearing_deg.to_radians();
@@ -469,7 +445,7 @@ impl Robot {
                 }),
                 TouchKind::Cliff => {
                     let along = DVec2::from_angle(pose.heading + bearing);
-                    let forward_m = row.forward_m.unwrap_or(self.body.radius());
+                    let forward_m = row.forward_m.unwrap_or(self.body.radius);
                     self.world.is_hole(pose.position + forward_m * along)
                 }
             };
@@ -488,12 +464,12 @@ impl Robot {
         (self.standard, self.custom) =
             self.ranging.measure(&self.world, &self.body, self.time, &self.physics);
         if let Some(gyro) = &mut self.gyro {
-            gyro.read(self.time, self.body.pose().heading);
+            gyro.read(self.time, self.body.pose.heading);
         }
         self.told = std::mem::take(&mut self.felt);
         self.feel();
         for laser in &mut self.lasers {
-            laser.measure(&self.world, self.body.pose(), (self.tick, self.time));
+            laser.measure(&self.world, self.body.pose, (self.tick, self.time));
         }
     }
 
@@ -513,7 +489,7 @@ impl Robot {
             let sensors = (&self.standard, &self.custom, &self.motor);
             let touched = self.touches.iter().map(|row| row.name.clone()).zip(self.told.clone());
             let touched = touched.collect();
-            let gyro = self.gyro.as_ref().map(Gyro::angle);
+            let gyro = self.gyro.as_ref().map(|gyro| gyro.angle);
             out.extend(json.report(sensors, &self.lasers, touched, &self.motors, gyro));
             return;
         }
@@ -529,7 +505,7 @@ impl Robot {
     }
 
     pub fn ground_truth(&mut self) -> GroundTruthTick {
-        let pose = self.body.pose();
+        let pose = self.body.pose;
         let Twist { v, omega } = self.twist();
         // The summary finds a pose's tick by these counts, which the host hears.
         let [left_counts, right_counts] = match &self.arduino {
@@ -539,7 +515,7 @@ impl Robot {
             None => self.drivetrain.counts(&self.motor.encoders),
         };
         let clearance_m = self.least_clearance.min(GroundTruthTick::NOTHING_NEAR);
-        self.least_clearance = self.body.clearance();
+        self.least_clearance = self.body.clearance;
         GroundTruthTick {
             tick: self.tick,
             time_s: self.time,
@@ -549,7 +525,7 @@ impl Robot {
             v,
             omega,
             clearance_m,
-            contacts: self.body.contacts(),
+            contacts: self.body.contacts,
             left_counts,
             right_counts,
             sonar_cm: self.ranging.front(&self.standard),

@@ -58,7 +58,6 @@ impl Rplidar {
                     info[..4].copy_from_slice(&[self.product.number, 29, 1, 7]);
                     Answer::Info(info)
                 }
-                Request::Other => continue,
             };
             answers.extend(answer.encode());
         }

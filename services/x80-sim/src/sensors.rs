@@ -31,7 +31,7 @@ pub struct Ranging {
     front: usize,
     mounts: [Option<Mount>; SONARS],
     infrared: [Option<Mount>; INFRARED_RANGERS],
-    silence: Silence,
+    pub(crate) silence: Silence,
     sonar_noise: Noise,
     infrared_noise: Noise,
     heard: Option<[u8; 6]>,
@@ -81,14 +81,6 @@ impl Ranging {
         sensors.ultrasonic[self.front]
     }
 
-    pub fn silent(&self) -> [bool; 6] {
-        self.silence.silent()
-    }
-
-    pub(crate) fn restore(&mut self, silent: [bool; 6]) {
-        self.silence.restore(silent);
-    }
-
     pub fn has_listened(&self) -> bool {
         self.heard.is_some()
     }
@@ -104,8 +96,8 @@ impl Ranging {
         let noise = &mut self.sonar_noise;
         let mut ranges: [f64; 6] = std::array::from_fn(|index| {
             let range = self.mounts[index].map_or(f64::INFINITY, |mount| {
-                let centre = body.pose().position;
-                sonar::listen(world, centre, mount.on(body.pose()), physics, noise)
+                let centre = body.pose.position;
+                sonar::listen(world, centre, mount.on(body.pose), physics, noise)
             });
             if silent[index] { f64::INFINITY } else { range }
         });
@@ -132,7 +124,7 @@ impl Ranging {
         let ultrasonic = heard.unwrap_or_else(|| self.heard_now(world, body, &physics.sonar));
         let infrared = infrared::read(
             world,
-            body.pose(),
+            body.pose,
             &self.infrared,
             &physics.infrared,
             &mut self.infrared_noise,
@@ -163,11 +155,11 @@ fn ad(volts: f64, full_scale: f64) -> u16 {
 }
 
 pub fn encoder(motor: &Motor, error: f64) -> Encoder {
-    let position = (motor.turned() + error).round();
+    let position = (motor.turned + error).round();
     Encoder {
         position: position.rem_euclid(f64::from(COUNT_CYCLE)) as u16,
-        speed: motor.speed().abs().round().min(f64::from(u16::MAX)) as u16,
-        positive: motor.speed() >= 0.0,
+        speed: motor.speed.abs().round().min(f64::from(u16::MAX)) as u16,
+        positive: motor.speed >= 0.0,
     }
 }
 
@@ -175,11 +167,11 @@ pub fn encoder(motor: &Motor, error: f64) -> Encoder {
 pub fn currents(motors: &[Motor; 6]) -> [u16; 6] {
     std::array::from_fn(|channel| {
         let motor = &motors[channel];
-        if !motor.enabled() {
+        if !motor.enabled {
             return 0;
         }
         let (standing, per_speed) = CURRENT;
-        let current = standing + per_speed * motor.speed().abs() + STALL_CURRENT * motor.load();
+        let current = standing + per_speed * motor.speed.abs() + STALL_CURRENT * motor.load;
         current.min(4095.0) as u16
     })
 }

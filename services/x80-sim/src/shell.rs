@@ -91,7 +91,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
             (robot, Some(checkpoint), Some(lock))
         }
     };
-    let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz, robot.time_s());
+    let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz, robot.time);
     let meeting = meeting
         .map(|sockets| Meeting::open(&mission, sockets, &stop, pace == Pace::Max))
         .transpose()?;

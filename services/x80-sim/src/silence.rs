@@ -12,7 +12,8 @@ pub(crate) struct Silence {
     end: f64,
     /// Probability of falling silent.
     begin: f64,
-    silent: [bool; 6],
+    /// Rangers in a run of silence.
+    pub(crate) silent: [bool; 6],
     noise: Noise,
 }
 
@@ -38,14 +39,6 @@ impl Silence {
             }
         }
         self.silent
-    }
-
-    pub(crate) fn silent(&self) -> [bool; 6] {
-        self.silent
-    }
-
-    pub(crate) fn restore(&mut self, silent: [bool; 6]) {
-        self.silent = silent;
     }
 }
 

@@ -90,7 +90,7 @@ pub fn listen(
     physics: &SonarPhysics,
     noise: &mut Noise,
 ) -> f64 {
-    let height = world.heights().sonar_m;
+    let height = world.heights.sonar_m;
     if world.is_between(centre, pose.position, height) {
         // A ranger pressed against an object that the body touches hears only that.
         return 0.0;
@@ -105,16 +105,14 @@ pub fn listen(
             .is_some_and(|(first, _)| first < candidate.level_range - HIDES_M);
         !hidden && (candidate.share >= 1.0 || noise.chance(candidate.share))
     });
-    let lost = match answer {
-        Some(candidate) if candidate.weak => noise.chance(physics.weak_dropout_share),
-        Some(_) => noise.chance(physics.dropout_share),
-        None => false,
+    let heard = match answer {
+        Some(Candidate { weak, range, .. }) => {
+            let lost = if weak { physics.weak_dropout_share } else { physics.dropout_share };
+            (!noise.chance(lost)).then_some(range)
+        }
+        None => bounced(world, pose, physics, noise),
     };
-    let mut range = match answer {
-        Some(candidate) if !lost => candidate.range,
-        Some(_) => f64::INFINITY,
-        None => bounced(world, pose, physics, noise).unwrap_or(f64::INFINITY),
-    };
+    let mut range = heard.unwrap_or(f64::INFINITY);
     if noise.chance(physics.false_echo_share) {
         range = 0.1 + noise.uniform() * (range.min(REACH_M) - 0.1).max(0.0);
     }
@@ -132,7 +130,7 @@ fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise
     if !noise.chance(physics.multipath_share) {
         return None;
     }
-    let (axis, height) = (pose.axis(), world.heights().sonar_m);
+    let (axis, height) = (pose.axis(), world.heights.sonar_m);
     let (there, Surface::Face { from, to }) = world.first_hit(pose.position, axis, height)? else {
         return None;
     };

@@ -3,7 +3,7 @@
 use common::{
     geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
     kinematics::{Pose2, Twist},
-    mission::{Footprint, Heights, Hole, Mission, Thing},
+    mission::{Footprint, Heights, Hole, Mission, Move, Thing},
 };
 use glam::DVec2;
 
@@ -136,10 +136,11 @@ pub struct World {
     standing: Vec<Solid>,
     things: Vec<Visitor>,
     people: People,
-    other: Option<Other>,
+    /// The world's other robot, extrapolated from its place.
+    pub(crate) other: Option<Other>,
     met: Vec<Solid>,
     holes: Vec<Hole>,
-    heights: Heights,
+    pub(crate) heights: Heights,
 }
 
 #[derive(Clone, Debug)]
@@ -174,7 +175,7 @@ impl World {
     /// Advances to `time`. An obstacle due inside the robot, a disc, waits until its place is free.
     pub fn advance(&mut self, time: f64, centre: DVec2, radius: f64) {
         for visitor in &mut self.things {
-            visitor.offset = visitor.thing.offset_at(time);
+            visitor.offset = offset_at(&visitor.thing.moves, time);
             let due = time >= visitor.thing.from_s
                 && visitor.thing.until_s.is_none_or(|until| time < until);
             visitor.present = due && (visitor.present || visitor.is_clear_of(centre, radius));
@@ -183,17 +184,8 @@ impl World {
         self.people.advance(time, (centre, radius), &self.standing);
     }
 
-    /// Sets the other robot, extrapolated from there.
-    pub fn set_other(&mut self, other: Option<Other>) {
-        self.other = other;
-    }
-
     pub fn is_hole(&self, point: DVec2) -> bool {
         self.holes.iter().any(|hole| hole.contains(point))
-    }
-
-    pub fn heights(&self) -> &Heights {
-        &self.heights
     }
 
     pub fn solids(&self) -> impl Iterator<Item = Solid> + '_ {
@@ -210,20 +202,13 @@ impl World {
             .map(|solid| solid.surface)
     }
 
-    /// Returns metres to the nearest touchable surface; infinite without one.
-    pub fn clearance(&self, point: DVec2) -> f64 {
-        self.touchable().map(|surface| surface.distance(point)).fold(f64::INFINITY, f64::min)
-    }
-
     pub fn first_hit(&self, origin: DVec2, along: DVec2, height_m: f64) -> Option<(f64, Surface)> {
         self.solids()
             .filter(|solid| solid.profile.height_gap(height_m) == 0.0)
             .filter_map(|Solid { surface, .. }| Some((surface.hit(origin, along)?, surface)))
             .min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
-}
 
-impl World {
     /// Returns solids within `reach_m` at which a beam from `height_m` may end.
     ///
     /// A level beam meets solids at that height. One that widens by `rise` per metre meets those
@@ -266,22 +251,16 @@ impl Visitor {
     }
 }
 
-trait Itinerary {
-    fn offset_at(&self, time: f64) -> DVec2;
-}
-
-impl Itinerary for Thing {
-    fn offset_at(&self, time: f64) -> DVec2 {
-        let next = self.moves.partition_point(|station| station.at_s <= time);
-        let before = next.checked_sub(1).and_then(|last| self.moves.get(last));
-        match (before, self.moves.get(next)) {
-            (Some(before), Some(after)) => {
-                let share = (time - before.at_s) / (after.at_s - before.at_s);
-                before.by.lerp(after.by, share)
-            }
-            (Some(only), None) | (None, Some(only)) => only.by,
-            (None, None) => DVec2::ZERO,
+fn offset_at(moves: &[Move], time: f64) -> DVec2 {
+    let next = moves.partition_point(|station| station.at_s <= time);
+    let before = next.checked_sub(1).and_then(|last| moves.get(last));
+    match (before, moves.get(next)) {
+        (Some(before), Some(after)) => {
+            let share = (time - before.at_s) / (after.at_s - before.at_s);
+            before.by.lerp(after.by, share)
         }
+        (Some(only), None) | (None, Some(only)) => only.by,
+        (None, None) => DVec2::ZERO,
     }
 }
 
@@ -289,6 +268,13 @@ impl Itinerary for Thing {
 mod tests {
     use super::*;
     use std::path::Path;
+
+    impl World {
+        /// Returns metres to the nearest touchable surface; infinite without one.
+        fn clearance(&self, point: DVec2) -> f64 {
+            self.touchable().map(|surface| surface.distance(point)).fold(f64::INFINITY, f64::min)
+        }
+    }
 
     fn world(text: &str) -> World {
         let text = format!("target = [0, -5]\n{text}");

@@ -106,7 +106,7 @@ mod tests {
 
     fn hazards(mission: &Mission) -> Vec<bool> {
         let mapper = mapper::step::Mapper::new(mission);
-        mapper.state().cells().iter().map(|cell| CellState::from_byte(*cell).is_hazard()).collect()
+        mapper.state().cells.iter().map(|cell| CellState::from_byte(*cell).is_hazard()).collect()
     }
 
     #[test]
@@ -156,7 +156,7 @@ mod tests {
         let file = folder.path().join("believed.yaml");
         let frame = before.grid_frame();
         let mapper = mapper::step::Mapper::new(&before);
-        save_believed(&file, &before, &frame, mapper.state().cells()).unwrap();
+        save_believed(&file, &before, &frame, &mapper.state().cells).unwrap();
         let after = with_prior_map(mission(&format!("map = '{}'", file.display()))).unwrap();
         let (before, after) = (hazards(&before), hazards(&after));
         let lost = before.iter().zip(&after).filter(|(was, is)| **was && !**is).count();

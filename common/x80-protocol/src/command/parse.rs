@@ -11,19 +11,21 @@ impl Command {
     /// # Errors
     /// If the DID is unknown, the length is wrong, or a byte has no meaning.
     pub fn parse(&Frame { did, data, .. }: &Frame<'_>) -> Result<Self, MessageError> {
-        let of_one = Quantity::ALL.into_iter().find(|quantity| quantity.dids()[0] == did);
-        let of_all = Quantity::ALL.into_iter().find(|quantity| quantity.dids()[1] == did);
         let stream = |stream| Some(Self::Stream { stream, request: request(data) });
-        let command = match (did, of_one, of_all) {
-            (_, Some(quantity), _) => one(data, quantity),
-            (_, _, Some(quantity)) => all(data, quantity),
-            (did::PARAMETER, ..) => parameter(data),
-            (did::ENABLE, ..) => enable(data),
-            (did::MOTOR, ..) => stream(Stream::Motor),
-            (did::CUSTOM, ..) => stream(Stream::Custom),
-            (did::STANDARD, ..) => stream(Stream::Standard),
-            (did::ALL_SENSORS, ..) => stream(Stream::All),
-            (did::SYSTEM, ..) => SystemSignal::parse(data).map(Self::System),
+        let command = match did {
+            did::POSITION => one(data, Quantity::Position),
+            did::PWM => one(data, Quantity::Pwm),
+            did::VELOCITY => one(data, Quantity::Velocity),
+            did::POSITION_ALL => all(data, Quantity::Position),
+            did::PWM_ALL => all(data, Quantity::Pwm),
+            did::VELOCITY_ALL => all(data, Quantity::Velocity),
+            did::PARAMETER => parameter(data),
+            did::ENABLE => enable(data),
+            did::MOTOR => stream(Stream::Motor),
+            did::CUSTOM => stream(Stream::Custom),
+            did::STANDARD => stream(Stream::Standard),
+            did::ALL_SENSORS => stream(Stream::All),
+            did::SYSTEM => SystemSignal::parse(data).map(Self::System),
             _ => None,
         };
         command.ok_or(MessageError { did })
@@ -90,18 +92,14 @@ fn parameter(data: &[u8]) -> Option<Command> {
     let parameter = match (sub, rest) {
         (7, terms) => Parameter::PositionPid(gains(terms)?),
         (8, terms) => Parameter::VelocityPid(gains(terms)?),
-        (13, [source, ..]) => Parameter::Feedback(match source {
-            0 => Feedback::OnePot,
-            1 => Feedback::TwoPots,
-            2 => Feedback::Encoder,
-            _ => return None,
-        }),
-        (14, [mode, ..]) => Parameter::Mode(match mode {
-            0 => Mode::Pwm,
-            1 => Mode::Position,
-            2 => Mode::Velocity,
-            _ => return None,
-        }),
+        (13, [source, ..]) => {
+            let sources = [Feedback::OnePot, Feedback::TwoPots, Feedback::Encoder];
+            Parameter::Feedback(*sources.get(usize::from(*source))?)
+        }
+        (14, [mode, ..]) => {
+            let modes = [Mode::Pwm, Mode::Position, Mode::Velocity];
+            Parameter::Mode(*modes.get(usize::from(*mode))?)
+        }
         (13 | 14, []) => return None,
         // The byte is not checked, because some parameters have no channel in second place.
         (sub, _) => {

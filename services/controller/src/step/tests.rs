@@ -285,7 +285,7 @@ fn a_robot_has_arrived_beside_a_target_that_is_not_free_if_it_is_within_half_a_m
 #[test]
 fn an_evidential_robot_slows_down_towards_its_target() {
     let mut controller = evidential();
-    controller.slow_radius = 0.5;
+    controller.mission.controller.slow_radius_m = 0.5;
     close(controller.at(short(0.6), &ahead()).v_m_s, 0.4);
     close(controller.at(short(0.25), &ahead()).v_m_s, 0.2);
 }

@@ -31,28 +31,11 @@ pub enum Charge {
     Empty,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pack {
-    Board,
-    Motor,
-    Servo,
-}
-
-impl Pack {
-    const ALL: [Self; 3] = [Self::Board, Self::Motor, Self::Servo];
-
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Board => "board",
-            Self::Motor => "motor",
-            Self::Servo => "servo",
-        }
-    }
-}
+const PACKS: [&str; 3] = ["board", "motor", "servo"];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BatteryChange {
-    pub pack: Pack,
+    pub pack: &'static str,
     pub volts: f64,
     pub charge: Charge,
 }
@@ -85,19 +68,15 @@ impl Gauge {
 #[derive(Clone, Debug)]
 pub struct Batteries {
     limits: BatteryLimits,
-    /// Ordered as [`Pack::ALL`].
+    /// Ordered as [`PACKS`].
     gauges: [Gauge; 3],
-    changes: Vec<BatteryChange>,
+    pub(crate) changes: Vec<BatteryChange>,
 }
 
 impl Batteries {
     /// Returns which batteries are low or empty: boards, motors, servos.
     pub fn low(&self) -> [bool; 3] {
         self.gauges.map(|gauge| gauge.charge > Charge::Enough)
-    }
-
-    pub fn take_changes(&mut self) -> Vec<BatteryChange> {
-        std::mem::take(&mut self.changes)
     }
 
     /// Returns the worst charge. The robot drives without servos.
@@ -109,7 +88,7 @@ impl Batteries {
     fn read(&mut self, volts: [f64; 3], now: MissionTime) {
         let BatteryLimits { board, motor, servo } = self.limits;
         let readings = volts.into_iter().zip([board, motor, servo]);
-        for ((gauge, pack), (volts, limit)) in self.gauges.iter_mut().zip(Pack::ALL).zip(readings) {
+        for ((gauge, pack), (volts, limit)) in self.gauges.iter_mut().zip(PACKS).zip(readings) {
             let before = gauge.charge;
             let charge = gauge.read(volts, limit, now);
             if charge != before {

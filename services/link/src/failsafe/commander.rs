@@ -76,14 +76,11 @@ pub struct OtherCommander {
     half_period: Duration,
     /// Evidence of another commander.
     shows: Option<&'static str>,
-    is_told: bool,
+    /// Whether an unowed acknowledgement came.
+    pub(crate) is_told: bool,
 }
 
 impl OtherCommander {
-    pub(crate) fn take_told(&mut self) -> bool {
-        std::mem::take(&mut self.is_told)
-    }
-
     fn shows(&self) -> Option<&'static str> {
         self.window.shows().or(self.shows)
     }
@@ -102,9 +99,7 @@ impl OtherCommander {
     }
 
     fn pass(&mut self, now_ns: u64) {
-        let is_lost = |then_ns: &u64| has_passed(*then_ns, now_ns, WINDOW);
-        while self.owed.front().is_some_and(is_lost) {
-            self.owed.pop_front();
+        while self.owed.pop_front_if(|then_ns| has_passed(*then_ns, now_ns, WINDOW)).is_some() {
             self.window.late += 1;
         }
         let Window { began_ns, frames, late, .. } = self.window;

@@ -31,13 +31,13 @@ const AT_ONE_WHEEL: (f64, f64) = (PI / 4.0, PI / 6.0);
 const LEAST_AHEAD_SHARE: f64 = 0.5;
 
 #[derive(Clone, Debug, Default)]
-pub(super) struct Contacts {
+pub(crate) struct Contacts {
     limit_ad: u16,
     currents: [u16; 2],
     high_and_rolls_s: [f64; 2],
     /// Held wheels, and since when.
     held: Option<([bool; 2], MissionTime)>,
-    new: Option<ContactSample>,
+    pub(crate) new: Option<ContactSample>,
 }
 
 impl Contacts {
@@ -85,10 +85,6 @@ impl Contacts {
         let stands = stood >= FALLEN_AFTER && stood < NEXT_AFTER;
         let high = self.high();
         [0, 1].into_iter().find(|&wheel| stands && held[wheel] && high[wheel])
-    }
-
-    pub(super) const fn take(&mut self) -> Option<ContactSample> {
-        self.new.take()
     }
 
     pub(super) const fn reset(&mut self) {

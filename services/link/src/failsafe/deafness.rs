@@ -8,6 +8,8 @@
 //! Without such noise deafness looks like an empty hall, which a robot must cross. It then goes
 //! slowly once it has driven the reach of its sensors without a reading.
 
+use std::collections::BTreeMap;
+
 use common::{
     mission::Mission,
     samples::{RangeReading, RangeStatus},
@@ -53,8 +55,8 @@ impl Missing {
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Deafness {
-    /// Row and reach, metres.
-    sensors: Vec<(u8, f64)>,
+    /// Reaches by row, metres.
+    sensors: BTreeMap<u8, f64>,
     /// Values of the current frame.
     answers: bool,
     hears: bool,
@@ -79,8 +81,7 @@ impl Deafness {
 
     pub(super) fn take(&mut self, readings: &[RangeReading]) {
         for reading in readings {
-            let is_row = |sensor: &&(u8, f64)| sensor.0 == reading.sensor;
-            let Some((_, reach_m)) = self.sensors.iter().find(is_row) else { continue };
+            let Some(reach_m) = self.sensors.get(&reading.sensor) else { continue };
             let status = reading.status();
             self.answers |= status != RangeStatus::Invalid;
             if status == RangeStatus::Measured {
@@ -108,7 +109,7 @@ impl Deafness {
 
     /// Explains doubtful, or surely deaf, sensors.
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
-        let reach_m = self.sensors.iter().fold(0.0, |most: f64, (_, reach_m)| most.max(*reach_m));
+        let reach_m = self.sensors.values().copied().fold(0.0, f64::max);
         let is_open = !sure && self.way_m > reach_m;
         if !self.missing.is(MISSING[usize::from(sure)]) && !is_open {
             return None;

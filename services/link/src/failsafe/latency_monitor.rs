@@ -10,6 +10,7 @@ use std::time::Duration;
 use common::{clock::Pace, mission::Mission, samples::Cause};
 
 use super::monitor::{Condition, Moment, Monitor, Observation};
+use crate::backoff::has_passed;
 
 /// Least limit, machine time: a process may be delayed by this at any pace.
 const LEAST_LIMIT: Duration = Duration::from_millis(100);
@@ -27,13 +28,13 @@ enum State {
     Late(u64),
 }
 
-/// Latency monitor. Times are machine times, nanoseconds.
+/// Latency monitor, by machine time.
 #[derive(Clone, Debug, Default)]
 pub struct LatencyMonitor {
     command_limit: Duration,
-    limit_ns: u64,
-    window_ns: u64,
-    again_ns: u64,
+    limit: Duration,
+    window: Duration,
+    again: Duration,
     sent_ns: u64,
     came_late: bool,
     state: State,
@@ -46,18 +47,17 @@ impl LatencyMonitor {
             _ => 1.0,
         };
         let machine = |mission: Duration| mission.div_f64(rate);
-        let limit = machine(self.command_limit).max(LEAST_LIMIT);
-        self.limit_ns = limit.as_nanos() as u64;
-        self.window_ns = (limit + machine(WINDOW)).as_nanos() as u64;
-        self.again_ns = machine(AGAIN).as_nanos() as u64;
+        self.limit = machine(self.command_limit).max(LEAST_LIMIT);
+        self.window = self.limit + machine(WINDOW);
+        self.again = machine(AGAIN);
     }
 
     fn pass(&mut self, now_ns: u64) {
         match self.state {
-            State::Testing(since) if now_ns.saturating_sub(since) >= self.window_ns => {
+            State::Testing(since) if has_passed(since, now_ns, self.window) => {
                 self.state = if self.came_late { State::Late(now_ns) } else { State::Timely };
             }
-            State::Late(since) if now_ns.saturating_sub(since) >= self.again_ns => {
+            State::Late(since) if has_passed(since, now_ns, self.again) => {
                 self.test(now_ns);
             }
             _ => {}
@@ -89,7 +89,7 @@ impl Monitor for LatencyMonitor {
             Observation::Sent => self.sent_ns = now.machine_ns,
             Observation::Acknowledged => {
                 let age_ns = now.machine_ns.saturating_sub(self.sent_ns);
-                self.came_late |= age_ns > self.limit_ns;
+                self.came_late |= Duration::from_nanos(age_ns) > self.limit;
             }
             Observation::Found { again: true } => self.test(now.machine_ns),
             Observation::Lost => self.state = State::Timely,

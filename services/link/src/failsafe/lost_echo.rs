@@ -11,6 +11,8 @@
 //! several were silent. In 6 missions in which three sonars fell deaf before drums, it reached 20
 //! to 45.
 
+use std::collections::BTreeMap;
+
 use common::{
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
@@ -121,7 +123,7 @@ impl Listener {
 
 #[derive(Clone, Debug)]
 pub(super) struct LostEcho {
-    sonars: Vec<(u8, Sensor, Missing)>,
+    sonars: BTreeMap<u8, (Sensor, Missing)>,
     all: Missing,
     echoes: Vec<Echo>,
 }
@@ -130,14 +132,14 @@ impl LostEcho {
     pub(super) fn of(mission: &Mission) -> Self {
         let table = (0..).zip(mission.sensor_table());
         let used = table.filter(|(_, it)| it.used && it.kind == SensorKind::Cone);
-        let sonars = used.map(|(row, sensor)| (row, sensor, Missing::default())).collect();
+        let sonars = used.map(|(row, sensor)| (row, (sensor, Missing::default()))).collect();
         Self { sonars, all: Missing::default(), echoes: Vec::new() }
     }
 
     pub(super) fn reset(&mut self) {
         self.echoes.clear();
         self.all = Missing::default();
-        self.sonars.iter_mut().for_each(|(.., missing)| *missing = Missing::default());
+        self.sonars.values_mut().for_each(|(_, missing)| *missing = Missing::default());
     }
 
     /// Takes readings at a time, seconds, with the pose by the wheels.
@@ -145,8 +147,7 @@ impl LostEcho {
         self.echoes.retain(|echo| (0.0..FORGOTTEN_S).contains(&(at_s - echo.at_s)));
         let is_silent = readings.iter().all(|it| it.status() != RangeStatus::Measured);
         for reading in readings {
-            let is_row = |(row, ..): &&mut (u8, Sensor, Missing)| *row == reading.sensor;
-            let Some((_, sensor, missing)) = self.sonars.iter_mut().find(is_row) else { continue };
+            let Some((sensor, missing)) = self.sonars.get_mut(&reading.sensor) else { continue };
             let listener = Listener::at(sensor, robot);
             match reading.status() {
                 RangeStatus::Measured => {
@@ -168,10 +169,10 @@ impl LostEcho {
 
     pub(super) fn judged(&self, sure: bool) -> Option<String> {
         let it = usize::from(sure);
-        let deaf = self.sonars.iter().find(|(.., missing)| missing.is(ONE[it]));
+        let deaf = self.sonars.values().find(|(_, missing)| missing.is(ONE[it]));
         let who = match deaf {
             _ if self.sonars.len() > 1 && self.all.is(ALL[it]) => "no sonar hears".to_owned(),
-            Some((_, sensor, _)) => format!("the sonar {} does not hear", sensor.name),
+            Some((sensor, _)) => format!("the sonar {} does not hear", sensor.name),
             None => return None,
         };
         Some(format!(
@@ -239,7 +240,7 @@ mod tests {
             let robot = Pose2 { position, heading };
             let readings: Vec<_> = (0..2)
                 .map(|sensor| {
-                    let listener = Listener::at(&lost.sonars[usize::from(sensor)].1, robot);
+                    let listener = Listener::at(&lost.sonars[&sensor].0, robot);
                     let post = DVec2::new(1.2, 0.1);
                     let hears =
                         listener.sees(post, listener.half_rad.cos()) && is_heard(tick, sensor);

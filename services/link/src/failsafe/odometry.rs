@@ -32,7 +32,7 @@ use common::{
     clock::MissionTime,
     driver::counts::WheelCounts,
     mission::{Mission, ModelledSpeed, Procedure, Response},
-    samples::{Cause, ContactSample, Order},
+    samples::{Cause, Order},
 };
 
 use super::{
@@ -41,7 +41,7 @@ use super::{
     modelled_wheels::{Axle, ModelledWheels},
     monitor::{Condition, Counts, Moment, Monitor, Observation},
     response_fit::{ResponseFit, Suspected},
-    wheel_shares::{WheelRatio, WheelShares},
+    wheel_shares::WheelShares,
 };
 
 /// Slowest judged rim speed, m/s.
@@ -192,25 +192,24 @@ pub struct Odometry {
     axle: Axle,
     response: Response,
     /// Whether it identifies the response while driving.
-    searches: bool,
+    pub(crate) searches: bool,
     known: Known,
     top_speed_m_s: f64,
     /// Commands as far as accelerations have reached them, counts/s.
     reached: ModelledWheels,
     fit: ResponseFit,
-    shares: WheelShares,
-    /// Found response, until reported.
-    found: Option<Response>,
+    pub(crate) shares: WheelShares,
+    /// Response that explained a motion its predecessor did not, until reported.
+    pub(crate) found: Option<Response>,
     /// Two periods.
     longest_gap: Duration,
     limit: Duration,
     commanded: Option<MissionTime>,
     frame: Option<(WheelCounts, MissionTime)>,
-    left: Evidence,
-    right: Evidence,
-    turn: Evidence,
+    /// Of the left and the right wheel, and of their difference.
+    evidence: [Evidence; 3],
     untold_s: f64,
-    contacts: Contacts,
+    pub(crate) contacts: Contacts,
     jumps: VecDeque<MissionTime>,
     recoveries: u32,
     suspicion: Option<(Suspicion, MissionTime)>,
@@ -236,15 +235,15 @@ impl Odometry {
         }
         self.commanded = Some(now);
         let [left, right] = self.ask(counts.map(f64::from), now);
-        self.left.ask(left, now);
-        if self.axle.track_m.is_none() {
-            return;
-        }
-        self.right.ask(right, now);
         let mean = (left.abs() + right.abs()) / 2.0;
         let turn = right - left;
         let tells = turn.abs() >= LEAST_TURN_SHARE * mean;
-        self.turn.ask(if tells { turn } else { 0.0 }, now);
+        let asked = [left, right, if tells { turn } else { 0.0 }];
+        // Only one wheel of a car drives.
+        let judged = self.axle.track_m.map_or(1, |_| asked.len());
+        for (evidence, asked) in self.evidence.iter_mut().zip(asked).take(judged) {
+            evidence.ask(asked, now);
+        }
     }
 
     /// Returns the speeds that the base reaches, counts/s.
@@ -256,26 +255,13 @@ impl Odometry {
     }
 
     fn adopt(&mut self, response: Response) {
-        self.response = response;
+        (self.response, self.found) = (response, Some(response));
         self.reached = ModelledWheels::new(self.axle, 0.0, &response);
         self.shares.adopt(response);
     }
 
     fn stops_within_m(&self, response: Response) -> f64 {
         response.way_to_stop_m(self.top_speed_m_s, response.dead_time_s())
-    }
-
-    pub(crate) fn wheel_ratio(&self) -> WheelRatio {
-        self.shares.ratio()
-    }
-
-    pub(crate) const fn searches(&self) -> bool {
-        self.searches
-    }
-
-    /// Takes a response that explained a motion its predecessor did not.
-    pub(crate) const fn take_found(&mut self) -> Option<Response> {
-        self.found.take()
     }
 
     fn plausible(&mut self, counts: impl Into<WheelCounts>, now: MissionTime) {
@@ -292,7 +278,7 @@ impl Odometry {
             self.restart_evidence(now);
         }
         if let Some(wheel) = self.contacts.repeats(now)
-            && [&self.left, &self.right].iter().all(|evidence| evidence.asked == [0.0; 2])
+            && self.evidence[..2].iter().all(|evidence| evidence.asked == [0.0; 2])
         {
             let suspicion = [Suspicion::Left, Suspicion::Right][wheel];
             self.suspicion.get_or_insert((suspicion, now));
@@ -314,15 +300,15 @@ impl Odometry {
         let gap_s = gap.as_secs_f64();
         let least = LEAST_M_S * self.axle.counts_per_m;
         let high = self.contacts.high();
-        let wheels = [(&mut self.left, left), (&mut self.right, right)];
-        for (wheel, (evidence, counts)) in wheels.into_iter().enumerate() {
-            if evidence.weigh((counts, gap_s), least, high[wheel], settles, now) && high[wheel] {
+        for (wheel, evidence) in self.evidence[..2].iter_mut().enumerate() {
+            let rolled = (turned[wheel], gap_s);
+            if evidence.weigh(rolled, least, high[wheel], settles, now) && high[wheel] {
                 self.contacts.rolled(wheel, gap_s);
             }
         }
         if high == [false; 2] {
             let least = LEAST_TURN_M_S * self.axle.counts_per_m;
-            self.turn.weigh((right - left, gap_s), least, false, settles, now);
+            self.evidence[2].weigh((right - left, gap_s), least, false, settles, now);
             let from_s = now.seconds() - gap_s - settles.settled_s - self.limit.as_secs_f64();
             let speeds = turned.map(|counts| counts / gap_s);
             let slows = (from_s, self.axle.limits(&self.response));
@@ -330,16 +316,12 @@ impl Odometry {
             self.untold_s = (self.untold_s + if is_untold { gap_s } else { -gap_s }).max(0.0);
         }
         self.look_for_contact(now);
-        let suspected = |evidence: &Evidence| {
+        let suspected = |(evidence, _): &(&Evidence, Suspicion)| {
             evidence.against_s >= SUSPECTED_AFTER.as_secs_f64()
                 || evidence.still_s >= STILL_AFTER.as_secs_f64()
         };
-        let all = [
-            (&self.left, Suspicion::Left),
-            (&self.right, Suspicion::Right),
-            (&self.turn, Suspicion::Turn),
-        ];
-        let suspicion = all.into_iter().find(|(evidence, _)| suspected(evidence));
+        let all = [Suspicion::Left, Suspicion::Right, Suspicion::Turn];
+        let suspicion = self.evidence.iter().zip(all).find(suspected);
         let untold = (self.untold_s >= UNTOLD_AFTER.as_secs_f64()).then_some(Suspicion::Untold);
         if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion).or(untold)
             && !self.is_bring_up
@@ -362,7 +344,6 @@ impl Odometry {
                 self.known = Known::Found;
             }
             self.adopt(found);
-            self.found = Some(found);
             self.clear_evidence();
         }
     }
@@ -412,7 +393,6 @@ impl Odometry {
                     self.known = Known::Found;
                 }
                 self.adopt(found);
-                self.found = Some(found);
             }
             self.suspicion = None;
             self.clear_evidence();
@@ -420,19 +400,15 @@ impl Odometry {
     }
 
     fn look_for_contact(&mut self, now: MissionTime) {
-        let [left, right] = [&self.left, &self.right].map(|evidence| evidence.held_s);
+        let [left, right, _] = self.evidence.map(|evidence| evidence.held_s);
         if left.max(right) < HELD_AFTER.as_secs_f64() {
             return;
         }
         let held = if self.axle.track_m.is_none() { [true; 2] } else { [left > 0.0, right > 0.0] };
-        let asked = [&self.left, &self.right].map(|evidence| evidence.asked[1]);
+        let [asked @ .., _] = self.evidence.map(|evidence| evidence.asked[1]);
         if self.contacts.begin(held, asked, now) {
-            (self.left.held_s, self.right.held_s) = (0.0, 0.0);
+            self.evidence.iter_mut().for_each(|evidence| evidence.held_s = 0.0);
         }
-    }
-
-    pub(crate) const fn take_contact(&mut self) -> Option<ContactSample> {
-        self.contacts.take()
     }
 
     fn implausible(&mut self, now: MissionTime) {
@@ -459,14 +435,12 @@ impl Odometry {
     }
 
     fn clear_evidence(&mut self) {
-        self.left = Evidence::default();
-        self.right = Evidence::default();
-        self.turn = Evidence::default();
+        self.evidence = Default::default();
         self.untold_s = 0.0;
     }
 
     fn restart_evidence(&mut self, now: MissionTime) {
-        for evidence in [&mut self.left, &mut self.right, &mut self.turn] {
+        for evidence in &mut self.evidence {
             evidence.since = now;
             (evidence.still_s, evidence.held_s) = (0.0, 0.0);
         }
@@ -493,9 +467,7 @@ impl Monitor for Odometry {
             limit: Duration::from_secs_f64(mission.robot.command_limit_s),
             commanded: None,
             frame: None,
-            left: Evidence::default(),
-            right: Evidence::default(),
-            turn: Evidence::default(),
+            evidence: Default::default(),
             untold_s: 0.0,
             contacts: Contacts::new(mission),
             jumps: VecDeque::new(),

@@ -23,7 +23,8 @@ struct Directive {
 #[derive(Clone, Debug)]
 pub struct Orders {
     newest: Option<Directive>,
-    stopped_here: bool,
+    /// Operator's stop at the link. A supervisor that missed it does not end it.
+    pub(crate) stopped_here: bool,
 }
 
 impl Orders {
@@ -42,16 +43,6 @@ impl Orders {
             || self.newest.is_some_and(|directive| {
                 matches!(directive.reason, HoldReason::Waiting | HoldReason::Lost)
             })
-    }
-
-    pub const fn stopped_here(&self) -> bool {
-        self.stopped_here
-    }
-
-    /// Applies an operator's stop or resume at the link. A supervisor that missed the stop does not
-    /// end it.
-    pub const fn stop_here(&mut self, stop: bool) {
-        self.stopped_here = stop;
     }
 
     fn is(&self, order: Order) -> bool {

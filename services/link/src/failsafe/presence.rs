@@ -50,27 +50,15 @@ impl Silence {
 #[derive(Clone, Debug)]
 pub struct Presence {
     silence: Silence,
-    wire_open: bool,
-    connected: bool,
+    pub(crate) wire_open: bool,
+    pub(crate) connected: bool,
     heard_ns: Option<u64>,
     lost_since_ns: Option<u64>,
     pings: Backoff,
-    losses: u64,
+    pub(crate) losses: u64,
 }
 
 impl Presence {
-    pub const fn is_wire_open(&self) -> bool {
-        self.wire_open
-    }
-
-    pub const fn connected(&self) -> bool {
-        self.connected
-    }
-
-    pub const fn losses(&self) -> u64 {
-        self.losses
-    }
-
     /// Registers a frame. Returns whether the robot was silent before.
     pub fn heard(&mut self, now_ns: u64) -> bool {
         self.heard_ns = Some(now_ns);
@@ -119,7 +107,7 @@ impl Presence {
         }
         Absence {
             lost_ns: self.lost_since_ns.map_or(0, |since| now_ns.saturating_sub(since)),
-            pings: self.pings.attempts(),
+            pings: self.pings.attempts,
             next_ping_ns: self.pings.wait_ns(now_ns),
         }
     }

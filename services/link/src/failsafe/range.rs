@@ -27,7 +27,7 @@ use super::{
     lost_echo::LostEcho,
     monitor::{Condition, Counts, Moment, Monitor, Observation},
     range_motion::RangeMotion,
-    scan_motion::ScanMotion,
+    scan_motion::{Poses, ScanMotion},
     undetected_surface::UndetectedSurface,
 };
 
@@ -80,8 +80,12 @@ impl Staying {
         };
     }
 
+    fn spread(&self) -> Value {
+        [0, 1, 2].map(|it| self.most[it] - self.least[it])
+    }
+
     fn motion(&self, readings: u32) -> f64 {
-        let [_, way_m, turn_rad] = [0, 1, 2].map(|it| self.most[it] - self.least[it]);
+        let [_, way_m, turn_rad] = self.spread();
         if self.readings < readings { 0.0 } else { way_m / WAY_M + turn_rad / TURN_RAD }
     }
 }
@@ -169,7 +173,7 @@ impl Row {
     fn words(&self) -> String {
         let Past { staying: [equal, near], odd_share, .. } = &self.past;
         let near = if equal.motion(READINGS) >= 1.0 { equal } else { near };
-        let [spread_m, way_m, turn_rad] = [0, 1, 2].map(|it| near.most[it] - near.least[it]);
+        let [spread_m, way_m, turn_rad] = near.spread();
         let said = if near.motion(READINGS) >= 1.0 {
             format!(
                 "reads {:.2} m within {:.0} cm in {} frames although the robot drove {way_m:.2} m and turned {:.0} degrees",
@@ -201,8 +205,9 @@ pub struct Range {
     sensing: bool,
     body: Body,
     counts: Option<WheelCounts>,
-    /// Pose by the wheels.
+    /// Pose by the wheels, and recent ones.
     pose: Pose2,
+    poses: Poses,
     way_m: f64,
     spot_rad: f64,
     rows: Vec<Row>,
@@ -232,10 +237,7 @@ impl Range {
                 self.spot_rad += twist.omega;
             }
         }
-        for scans in &mut self.scans {
-            scans.poses.robot_is(self.pose, now);
-        }
-        self.motion.poses.robot_is(self.pose, now);
+        self.poses.robot_is(self.pose, now);
     }
 
     fn judged(&self, sure: bool) -> Option<String> {
@@ -250,7 +252,7 @@ impl Range {
     }
 
     fn forget(&mut self) {
-        self.counts = None;
+        (self.counts, self.poses) = (None, Poses::default());
         for row in &mut self.rows {
             (row.past, row.implausible) = (Past::default(), [None; 2]);
         }
@@ -276,6 +278,7 @@ impl Monitor for Range {
             body: mission.body(),
             counts: None,
             pose: Pose2::default(),
+            poses: Poses::default(),
             way_m: 0.0,
             spot_rad: 0.0,
             rows: others.into_iter().map(|(row, sensor)| Row::of(row, sensor, front)).collect(),
@@ -302,11 +305,11 @@ impl Monitor for Range {
                 }
                 self.deafness.take(readings);
                 self.lost_echo.take(readings, self.pose, now.time.seconds());
-                self.motion.take(readings, now.time.seconds());
+                self.motion.take(readings, &self.poses, now.time.seconds());
             }
             Observation::Scan(scan, at_s) => {
                 if let Some(scans) = self.scans.iter_mut().find(|scans| scans.row == scan.row) {
-                    scans.take(scan, at_s);
+                    scans.take(scan, &self.poses, at_s);
                 }
             }
             Observation::Motor(counts, Counts::Follow) => self.turn(counts, now.time),

@@ -13,7 +13,7 @@
 //! In 416 recorded missions no sum exceeded 2.1, and 8 exceeded 1.4. 48 whose readings became 1 s
 //! late passed both limits.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use common::{
     kinematics::Pose2,
@@ -50,10 +50,9 @@ const BETTER: [f64; 2] = [1.4, 2.6];
 
 type Hit = [DVec2; DELAYS_S.len()];
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct RangeMotion {
-    sensors: Vec<(u8, Sensor)>,
-    pub(super) poses: Poses,
+    sensors: BTreeMap<u8, Sensor>,
     hits: VecDeque<(f64, Hit)>,
     latest: Pose2,
     newest_s: f64,
@@ -66,20 +65,16 @@ impl RangeMotion {
     pub(super) fn of(mission: &Mission) -> Self {
         let is_single = |sensor: &Sensor| sensor.used && sensor.kind != SensorKind::Scan;
         let table = (0..).zip(mission.sensor_table());
-        Self::new(table.filter(|(_, sensor)| is_single(sensor)).collect())
-    }
-
-    fn new(sensors: Vec<(u8, Sensor)>) -> Self {
-        let (poses, hits, latest, better) = Default::default();
-        Self { sensors, poses, hits, latest, newest_s: 0.0, motion_s: 0.0, better }
+        let sensors = table.filter(|(_, sensor)| is_single(sensor)).collect();
+        Self { sensors, ..Self::default() }
     }
 
     pub(super) fn reset(&mut self) {
-        *self = Self::new(std::mem::take(&mut self.sensors));
+        *self = Self { sensors: std::mem::take(&mut self.sensors), ..Self::default() };
     }
 
-    pub(super) fn take(&mut self, readings: &[RangeReading], at_s: f64) {
-        let robots = DELAYS_S.map(|delay_s| self.poses.at(at_s - delay_s));
+    pub(super) fn take(&mut self, readings: &[RangeReading], poses: &Poses, at_s: f64) {
+        let robots = DELAYS_S.map(|delay_s| poses.at(at_s - delay_s));
         let latest = robots[DELAYS_S.len() - 1];
         let moved_m = latest.position.distance(self.latest.position)
             + 0.1 * (latest.heading - self.latest.heading).abs();
@@ -99,8 +94,7 @@ impl RangeMotion {
         }
         let older = self.hits.partition_point(|(then_s, _)| now_s - then_s >= LEAST_AGE_S);
         for reading in readings.iter().filter(|it| it.status() == RangeStatus::Measured) {
-            let is_row = |sensor: &&(u8, Sensor)| sensor.0 == reading.sensor;
-            let Some((_, sensor)) = self.sensors.iter().find(is_row) else { continue };
+            let Some(sensor) = self.sensors.get(&reading.sensor) else { continue };
             let range_m = reading.range_m;
             if range_m > KNOWN * sensor.reach_m {
                 continue;
@@ -171,13 +165,14 @@ mod tests {
         let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
         let table = mission.sensor_table();
         let mut motion = RangeMotion::of(&mission);
+        let mut by_wheels = Poses::default();
         let mut poses = vec![Pose2::default()];
         for tick in 0..280 {
             let at_s = f64::from(tick) / 7.0;
             let pose = poses[poses.len() - 1]
                 .along_arc(0.04 * (at_s * 0.9).cos(), 0.1 * (at_s * 0.7).cos());
             poses.push(pose);
-            motion.poses.robot_is(pose, MissionTime::from_seconds(at_s));
+            by_wheels.robot_is(pose, MissionTime::from_seconds(at_s));
             let late = if tick < 140 { late } else { 0 };
             let then = poses[poses.len().saturating_sub(1 + late)];
             let readings: Vec<_> = (0..)
@@ -188,7 +183,7 @@ mod tests {
                     Some(RangeReading { range_m: range(it, then)?, sensor, raw: 0, status })
                 })
                 .collect();
-            motion.take(&readings, at_s);
+            motion.take(&readings, &by_wheels, at_s);
         }
         motion.judged(true)
     }

@@ -20,19 +20,24 @@ const PERIODS: f64 = 6.0;
 /// Consistent frames that make implausible counts accepted.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
-#[derive(Clone, Debug)]
+/// Counts and their time.
+type Frame = (WheelCounts, MissionTime);
+
+#[derive(Clone, Debug, Default)]
 pub struct RestartWatch {
-    last: Option<(WheelCounts, MissionTime)>,
+    last: Option<Frame>,
     /// Reported and counted speeds at the last plausible counts, counts/s.
     turned: [[f64; 2]; 2],
     /// Two newest commands, counts/s, and the time of the newest nonzero one.
     commanded: [[f64; 2]; 2],
     driven: Option<MissionTime>,
     /// Newest implausible counts, their time, and the number of consistent frames.
-    suspected: Option<(WheelCounts, MissionTime, u32)>,
-    away: bool,
-    jumped: bool,
-    restarts: u32,
+    suspected: Option<(Frame, u32)>,
+    /// Whether the robot was lost since the last frame.
+    pub(crate) away: bool,
+    /// Whether its odometry jumped since the last frame, which the next counts omit.
+    pub(crate) jumped: bool,
+    pub(crate) restarts: u32,
     top_counts: f64,
     jitter_s: f64,
     slack: f64,
@@ -42,17 +47,10 @@ impl RestartWatch {
     pub fn new(mission: &Mission) -> Self {
         let body = mission.body();
         Self {
-            last: None,
-            turned: [[0.0; 2]; 2],
-            commanded: [[0.0; 2]; 2],
-            driven: None,
-            suspected: None,
-            away: false,
-            jumped: false,
-            restarts: 0,
             top_counts: body.top_speed_m_s / body.metres_per_count(),
             jitter_s: 1.0 / mission.robot.rate_hz,
             slack: SLACK_M / body.metres_per_count(),
+            ..Self::default()
         }
     }
 
@@ -62,15 +60,6 @@ impl RestartWatch {
         if counts != [0, 0] {
             self.driven = Some(now);
         }
-    }
-
-    pub const fn lost(&mut self) {
-        self.away = true;
-    }
-
-    /// Registers a jump of the robot's odometry, which the next counts omit.
-    pub const fn jumped(&mut self) {
-        self.jumped = true;
     }
 
     /// Classifies counts with reported `speeds`, counts/s.
@@ -84,76 +73,64 @@ impl RestartWatch {
         was_away: bool,
         now: MissionTime,
     ) -> Counts {
-        let counts = counts.into();
+        let frame = (counts.into(), now);
         let speeds = speeds.map(f64::from);
         let away = std::mem::take(&mut self.away);
         if std::mem::take(&mut self.jumped) {
-            self.begin_at(counts, now);
+            self.begin_at(frame);
             return Counts::Elsewhere;
         }
-        let Some((before, then)) = self.last else {
-            self.last = Some((counts, now));
+        let Some(before) = self.last else {
+            self.last = Some(frame);
             return Counts::Follow;
         };
-        let share = self
-            .share_of_reach(before, then, counts, now)
-            .max(self.share_of_driven(before, then, counts, speeds, now));
-        if counts.restarted_since(before) && (away || share > 1.0) {
-            self.begin_at(counts, now);
+        let share =
+            self.share_of_reach(before, frame).max(self.share_of_driven(before, frame, speeds));
+        if frame.0.restarted_since(before.0) && (away || share > 1.0) {
+            self.begin_at(frame);
             return Counts::Restarted { was_away };
         }
         if share <= IMPLAUSIBLE {
-            (self.last, self.suspected) = (Some((counts, now)), None);
-            let gap_s = now.since(then).as_secs_f64().max(self.jitter_s);
-            self.turned = [speeds, counts.since(before).map(|turned| turned / gap_s)];
+            (self.last, self.suspected) = (Some(frame), None);
+            let (turned, gap_s) = since(before, frame);
+            let gap_s = gap_s.max(self.jitter_s);
+            self.turned = [speeds, turned.map(|turned| turned / gap_s)];
             return Counts::Follow;
         }
-        let following = self.suspected.map_or(1, |(suspected, at, following)| {
-            let follows = self.share_of_reach(suspected, at, counts, now) <= IMPLAUSIBLE;
+        let following = self.suspected.map_or(1, |(suspected, following)| {
+            let follows = self.share_of_reach(suspected, frame) <= IMPLAUSIBLE;
             if follows { following + 1 } else { 1 }
         });
         if following >= FOLLOW_EACH_OTHER {
-            self.begin_at(counts, now);
+            self.begin_at(frame);
             return Counts::Elsewhere;
         }
-        self.suspected = Some((counts, now, following));
+        self.suspected = Some((frame, following));
         Counts::Implausible
     }
 
-    fn begin_at(&mut self, counts: WheelCounts, now: MissionTime) {
-        (self.last, self.suspected) = (Some((counts, now)), None);
+    fn begin_at(&mut self, frame: Frame) {
+        (self.last, self.suspected) = (Some(frame), None);
         self.restarts += 1;
     }
 
     /// Returns the step relative to the most that wheels can turn.
-    fn share_of_reach(
-        &self,
-        before: WheelCounts,
-        then: MissionTime,
-        counts: WheelCounts,
-        now: MissionTime,
-    ) -> f64 {
-        let reach = self.top_counts * (now.since(then).as_secs_f64() + self.jitter_s);
-        let [left, right] = counts.since(before).map(f64::abs);
+    fn share_of_reach(&self, before: Frame, now: Frame) -> f64 {
+        let (turned, gap_s) = since(before, now);
+        let reach = self.top_counts * (gap_s + self.jitter_s);
+        let [left, right] = turned.map(f64::abs);
         left.max(right) / reach
     }
 
     /// Returns the step relative to the most by known speeds times [`IMPLAUSIBLE`]; 0 if not
     /// driven.
-    fn share_of_driven(
-        &self,
-        before: WheelCounts,
-        then: MissionTime,
-        counts: WheelCounts,
-        speeds: [f64; 2],
-        now: MissionTime,
-    ) -> f64 {
-        let recent = |at: MissionTime| now.since(at).as_secs_f64() <= PERIODS * self.jitter_s;
-        if !recent(then) || !self.driven.is_some_and(recent) {
+    fn share_of_driven(&self, before: Frame, now: Frame, speeds: [f64; 2]) -> f64 {
+        let recent = |at: MissionTime| now.1.since(at).as_secs_f64() <= PERIODS * self.jitter_s;
+        if !recent(before.1) || !self.driven.is_some_and(recent) {
             return 0.0;
         }
-        let time = now.since(then).as_secs_f64() + self.jitter_s;
-        let turned = counts.since(before);
+        let (turned, gap_s) = since(before, now);
+        let time = gap_s + self.jitter_s;
         let share = |wheel: usize| {
             let counts = turned[wheel];
             let known =
@@ -164,10 +141,11 @@ impl RestartWatch {
         };
         share(0).max(share(1))
     }
+}
 
-    pub const fn restarts(&self) -> u32 {
-        self.restarts
-    }
+/// Returns the counts turned between two frames, and the seconds.
+fn since((before, then): Frame, (counts, now): Frame) -> ([f64; 2], f64) {
+    (counts.since(before), now.since(then).as_secs_f64())
 }
 
 #[cfg(test)]
@@ -192,7 +170,7 @@ mod tests {
             Counts::Follow,
             "the first frame"
         );
-        watch.lost();
+        watch.away = true;
         assert_eq!(
             watch.step([0, 1], [0; 2], false, at(3.0)),
             Counts::Restarted { was_away: false }
@@ -202,19 +180,19 @@ mod tests {
             Counts::Follow,
             "it drives on"
         );
-        assert_eq!(watch.restarts(), 1);
+        assert_eq!(watch.restarts, 1);
     }
 
     #[test]
     fn a_robot_that_comes_back_with_its_counts_is_no_restart() {
         let mut watch = watch();
         watch.step([32_168, 600], [0; 2], false, at(0.0));
-        watch.lost();
+        watch.away = true;
         assert_eq!(watch.step([32_000, 768], [0; 2], false, at(3.0)), Counts::Follow);
-        watch.lost();
+        watch.away = true;
         // The robot stood at its start.
         watch.step([3, 32_765], [0; 2], false, at(6.0));
-        watch.lost();
+        watch.away = true;
         assert_eq!(watch.step([0, 0], [0; 2], false, at(9.0)), Counts::Follow);
     }
 
@@ -240,7 +218,7 @@ mod tests {
         }
         assert_eq!(watch.step([31_000, 2000], [0; 2], false, at(0.95)), Counts::Implausible);
         assert_eq!(watch.step([1784, 5000], [0; 2], false, at(1.0)), Counts::Follow);
-        assert_eq!(watch.restarts(), 0);
+        assert_eq!(watch.restarts, 0);
     }
 
     #[test]
@@ -251,7 +229,7 @@ mod tests {
         assert_eq!(watch.step([9100, 17_100], [0; 2], false, at(0.286)), Counts::Implausible);
         assert_eq!(watch.step([9200, 17_200], [0; 2], false, at(0.429)), Counts::Elsewhere);
         assert_eq!(watch.step([9300, 17_300], [0; 2], false, at(0.571)), Counts::Follow);
-        assert_eq!(watch.restarts(), 1, "the step between them is no motion");
+        assert_eq!(watch.restarts, 1, "the step between them is no motion");
     }
 
     #[test]

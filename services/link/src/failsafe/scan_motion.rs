@@ -67,7 +67,6 @@ pub(super) fn best(delays_s: &[f64], better: &[f64], least: f64) -> Option<f64> 
 pub(super) struct ScanMotion {
     pub(super) row: usize,
     sensor: Sensor,
-    pub(super) poses: Poses,
     /// Recent scans. The newest is judged once later poses are known.
     scans: VecDeque<(f64, Vec<f32>)>,
     /// Advantage of each delay over none.
@@ -76,16 +75,15 @@ pub(super) struct ScanMotion {
 
 impl ScanMotion {
     pub(super) fn new(row: usize, sensor: Sensor) -> Self {
-        let (poses, scans) = (Poses::default(), VecDeque::new());
-        Self { row, sensor, poses, scans, better: [0.0; DELAYS_S.len()] }
+        Self { row, sensor, scans: VecDeque::new(), better: [0.0; DELAYS_S.len()] }
     }
 
     pub(super) fn reset(&mut self) {
         *self = Self::new(self.row, self.sensor.clone());
     }
 
-    pub(super) fn take(&mut self, scan: &LaserScan, at_s: f64) {
-        if self.poses.0.is_empty() || scan.beams.len() != self.sensor.beams {
+    pub(super) fn take(&mut self, scan: &LaserScan, poses: &Poses, at_s: f64) {
+        if poses.0.is_empty() || scan.beams.len() != self.sensor.beams {
             return;
         }
         if let Some((newest_s, newest)) = self.scans.back()
@@ -96,7 +94,7 @@ impl ScanMotion {
                 let [from, to] = if delay_s.is_infinite() {
                     [Pose2::default(); 2]
                 } else {
-                    [self.poses.at(first_s - delay_s), self.poses.at(newest_s - delay_s)]
+                    [poses.at(first_s - delay_s), poses.at(newest_s - delay_s)]
                 };
                 self.unlike((first, from), (newest, to))
             };
@@ -175,7 +173,7 @@ mod tests {
         let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
         let (row, sensor) = mission.laser().unwrap();
         let (first_rad, step_rad) = sensor.fan();
-        let mut motion = ScanMotion::new(row, sensor.clone());
+        let (mut motion, mut poses) = (ScanMotion::new(row, sensor.clone()), Poses::default());
         let (mut pose, mut scans) = (Pose2::default(), Vec::new());
         for tick in 0..60 {
             let turn = if tick % 40 < 20 { 0.0 } else { 0.08 };
@@ -189,9 +187,9 @@ mod tests {
             };
             scans.push((0..sensor.beams).map(beam).collect::<Vec<_>>());
             let at_s = tick as f64 * 0.1;
-            motion.poses.robot_is(pose, MissionTime::from_seconds(at_s));
+            poses.robot_is(pose, MissionTime::from_seconds(at_s));
             let beams = scans[seen(tick)].clone();
-            motion.take(&LaserScan { row, beams, ..LaserScan::default() }, at_s);
+            motion.take(&LaserScan { row, beams, ..LaserScan::default() }, &poses, at_s);
         }
         motion.judged(true)
     }

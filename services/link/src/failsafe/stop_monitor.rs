@@ -52,7 +52,8 @@ pub struct StopMonitor {
     moves: bool,
     moving: Duration,
     resting: Duration,
-    method: usize,
+    /// Number of the stop method. It grows past the last one; the first then follows.
+    pub(crate) method: usize,
     tried: Option<MissionTime>,
 }
 
@@ -131,11 +132,6 @@ impl StopMonitor {
 
     pub fn is_told_to_move(&self) -> bool {
         self.told_to_stand.is_none() && self.driven > 0.0
-    }
-
-    /// Returns the method's number. It grows past the last method; the first then follows.
-    pub const fn method(&self) -> usize {
-        self.method
     }
 
     /// Advances if the next method is due; returns whether it was. `does_not_stop`: the cause

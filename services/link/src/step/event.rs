@@ -113,10 +113,3 @@ pub enum Effect {
     Surroundings(SurroundingsSample),
     Battery(BatteryChange),
 }
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    pub commands: u64,
-    pub repeated_commands: u64,
-    pub repeated_ticks: u64,
-}

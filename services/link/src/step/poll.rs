@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use common::clock::MissionTime;
 
-use super::{Effect, Link};
+use super::Link;
 use crate::failsafe::monitor::Moment;
 
 impl Link {
@@ -19,32 +19,32 @@ impl Link {
     pub(crate) fn is_calm_until(&self, then: Moment) -> bool {
         !self.in_ticks()
             && !self.decision.stops()
-            && !self.monitors().presence.is_silent(then.machine_ns)
+            && !self.failsafe.monitors.presence.is_silent(then.machine_ns)
             && self.failsafe.foresee(false, then) == self.decision
     }
 
-    pub(super) fn keep_polling(&mut self, effects: &mut Vec<Effect>) {
+    pub(super) fn keep_polling(&mut self) {
         if self.polls_by_time() && self.polls.take_due(self.now) {
-            self.poll(effects);
+            self.poll();
         }
     }
 
     fn polls_by_time(&self) -> bool {
-        self.base.is_polled() && !self.in_ticks() && self.monitors().presence.is_wire_open()
+        self.base.is_polled() && !self.in_ticks() && self.failsafe.monitors.presence.wire_open
     }
 
     /// Polls in lockstep after each command and ping; the robot begins one tick however many came.
-    pub(super) fn poll_in_ticks(&mut self, effects: &mut Vec<Effect>) {
+    pub(super) fn poll_in_ticks(&mut self) {
         if self.base.is_polled() && self.in_ticks() {
             self.due = self.due.min(1);
-            self.poll(effects);
+            self.poll();
         }
     }
 
-    fn poll(&mut self, effects: &mut Vec<Effect>) {
+    fn poll(&mut self) {
         let asked = self.base.poll();
         if !asked.is_empty() {
-            effects.push(Effect::Send(asked));
+            self.send(asked);
         }
     }
 }

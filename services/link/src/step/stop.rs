@@ -4,26 +4,26 @@ use std::time::Duration;
 
 use common::{driver::StopMethod, samples::Cause};
 
-use super::{Effect, Link, STOP_AGAIN, passed};
+use super::{Effect, Link, STOP_AGAIN};
 use crate::failsafe::{
     Decision,
     monitor::{Monitor as _, Observation},
 };
 
 impl Link {
-    pub(super) fn decide(&mut self, now_ns: u64) -> Decision {
-        self.failsafe.decide(self.in_ticks(), self.moment(now_ns))
+    pub(super) fn decide(&mut self) -> Decision {
+        self.failsafe.decide(self.in_ticks(), self.moment())
     }
 
     /// Stops the robot when it must not move. In lockstep the link only withholds commands: mission
     /// time stands still, so the run continues as if never held.
-    pub(super) fn guard(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        self.observe(Observation::Time, now_ns);
-        let now = self.decide(now_ns);
+    pub(super) fn guard(&mut self) {
+        self.observe(Observation::Time);
+        let now = self.decide();
         let before = std::mem::replace(&mut self.decision, now);
         if now.cause == Cause::AnotherCommander {
             // The wheels obey the other commander.
-            let now = self.moment(now_ns);
+            let now = self.moment();
             self.failsafe.monitors.odometry.observe(&Observation::Resumed, now);
         }
         if now.stops() {
@@ -34,72 +34,67 @@ impl Link {
                 }
                 // The robot may still obey a command of an earlier link.
                 let new = !before.stops()
-                    || self.stop_sent_ns.is_none() && self.monitors().presence.is_wire_open();
-                self.send_stop(new, now_ns, effects);
+                    || self.stop_sent_ns.is_none() && self.failsafe.monitors.presence.wire_open;
+                self.send_stop(new);
             }
         }
         if now != before {
-            effects.push(Effect::Decided { before, now });
+            self.effects.push(Effect::Decided { before, now });
         }
     }
 
     /// Sends speeds, counts/s.
-    pub(super) fn tell(
-        &mut self,
-        counts: [i16; 2],
-        limit: Duration,
-        now_ns: u64,
-        effects: &mut Vec<Effect>,
-    ) {
-        if self.monitors().stop.method() > 0 && counts != [0, 0] {
+    pub(super) fn tell(&mut self, counts: [i16; 2], limit: Duration) {
+        if self.failsafe.monitors.stop.method > 0 && counts != [0, 0] {
             // Another stop method may have changed the robot's settings.
-            effects.push(Effect::Send(self.base.greeting()));
+            self.send(self.base.greeting());
         }
-        self.commanded(counts, now_ns);
-        effects.push(Effect::Send(self.base.velocity(counts, limit)));
+        self.commanded(counts);
+        self.send(self.base.velocity(counts, limit));
     }
 
     /// Sends copies of a new stop, then repeats it at intervals.
-    pub(super) fn send_stop(&mut self, new: bool, now_ns: u64, effects: &mut Vec<Effect>) {
+    pub(super) fn send_stop(&mut self, new: bool) {
+        let does_not_stop = self.failsafe.applied(Cause::RobotDoesNotStop);
         if new {
-            effects.extend(self.final_stops());
-        } else if self.monitors().latency.is_testing() && self.stop_sent_ns.is_some() {
+            self.effects.extend(self.final_stops());
+        } else if self.failsafe.monitors.latency.is_testing() && self.stop_sent_ns.is_some() {
             // The latency monitor waits for late acknowledgements.
             return;
-        } else if self.takes_next_stop_method() {
-            effects.push(Effect::Send(self.stop()));
-            effects
-                .push(Effect::StopBy(self.other_stop().map_or("velocity 0", |other| other.name)));
-        } else if self.failsafe.applied(Cause::RobotDoesNotStop) {
+        } else if self.failsafe.monitors.stop.takes_next_method(does_not_stop, self.now) {
+            self.send(self.stop());
+            let method = self.other_stop().map_or("velocity 0", |other| other.name);
+            self.effects.push(Effect::StopBy(method));
+        } else if does_not_stop {
             // The last method needs time to take effect.
             return;
-        } else if self.is_stop_due(now_ns) {
-            effects.push(Effect::Send(self.stop()));
+        } else if self.is_stop_due() {
+            self.send(self.stop());
         } else {
             return;
         }
-        self.commanded([0, 0], now_ns);
-        self.stop_sent_ns = Some(now_ns);
+        self.commanded([0, 0]);
+        self.stop_sent_ns = Some(self.now_ns);
     }
 
     /// Returns whether a stop is due. A silent robot may receive, so it gets one with each ping.
-    fn is_stop_due(&self, now_ns: u64) -> bool {
+    fn is_stop_due(&self) -> bool {
         match self.connected() {
-            true => passed(self.stop_sent_ns, now_ns, STOP_AGAIN),
-            false => self.pinged_ns == Some(now_ns) && self.stop_sent_ns != Some(now_ns),
+            true => self.passed(self.stop_sent_ns, STOP_AGAIN),
+            false => self.pinged_ns == Some(self.now_ns) && self.stop_sent_ns != Some(self.now_ns),
         }
     }
 
-    fn commanded(&mut self, counts: [i16; 2], now_ns: u64) {
+    fn commanded(&mut self, counts: [i16; 2]) {
         self.speeds.told(counts);
-        self.observe(Observation::Commanded(counts), now_ns);
+        self.observe(Observation::Commanded(counts));
         self.restart.commanded(counts, self.now);
     }
 
     /// Returns None for velocity 0, the first method, which also follows the last.
     pub(super) fn other_stop(&self) -> Option<StopMethod> {
         // Usually nothing needs encoding.
-        let method = Some(self.monitors().stop.method()).filter(|method| *method > 0)?;
+        let method = Some(self.failsafe.monitors.stop.method).filter(|method| *method > 0)?;
         let mut others = self.base.other_stops();
         let method = method % (others.len() + 1);
         method.checked_sub(1).map(|other| others.swap_remove(other))
@@ -111,10 +106,5 @@ impl Link {
 
     pub(super) fn velocity_0(&self) -> Vec<u8> {
         self.base.velocity([0, 0], self.limit)
-    }
-
-    fn takes_next_stop_method(&mut self) -> bool {
-        let does_not_stop = self.failsafe.applied(Cause::RobotDoesNotStop);
-        self.failsafe.monitors.stop.takes_next_method(does_not_stop, self.now)
     }
 }

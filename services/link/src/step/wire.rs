@@ -9,7 +9,7 @@ use common::{
     wire::COUNT_CYCLE,
 };
 
-use super::{Effect, Link, PING_EVERY, passed};
+use super::{Effect, Link, PING_EVERY};
 use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
 
 /// Log interval of refused messages, and logged characters of a reason.
@@ -17,115 +17,109 @@ const REFUSED_AGAIN: Duration = Duration::from_secs(1);
 const LONGEST_REFUSAL: usize = 200;
 
 impl Link {
-    pub(super) fn take_wire(&mut self, open: bool, now_ns: u64, effects: &mut Vec<Effect>) {
+    pub(super) fn take_wire(&mut self, open: bool) {
         self.failsafe.monitors.presence.wire(open);
         self.base.reset();
         // Bytes for a closed wire are lost.
         self.stop_sent_ns = None;
         self.due = 0;
         if !open {
-            self.lose(now_ns, effects);
+            self.lose();
         }
     }
 
     /// Takes a sensor's bytes, which say nothing about the robot's motion or presence.
-    pub(super) fn take_sensor(
-        &mut self,
-        number: u8,
-        bytes: &[u8],
-        now_ns: u64,
-        effects: &mut Vec<Effect>,
-    ) {
+    pub(super) fn take_sensor(&mut self, number: u8, bytes: &[u8]) {
         let Some(driver) = self.drivers.get_mut(usize::from(number)) else {
             return;
         };
-        let Heard { readings, scans, refused, .. } = driver.hear(bytes);
-        self.take_refusal(refused, now_ns, effects);
-        let mut heard = Heard { readings, scans, ..Heard::default() };
-        self.take_readings(&mut heard, Some(self.now), now_ns);
+        let mut heard = driver.hear(bytes);
+        heard.motion = None;
+        self.take_refusal(heard.refused.take());
+        self.take_readings(&mut heard, Some(self.now));
     }
 
-    pub(super) fn take_sensor_wire(&mut self, number: u8, open: bool, effects: &mut Vec<Effect>) {
+    pub(super) fn take_sensor_wire(&mut self, number: u8, open: bool) {
         if let Some(driver) = self.drivers.get_mut(usize::from(number)) {
             driver.reset();
             if open {
-                effects.push(Effect::SendSensor(number, driver.greeting()));
+                self.effects.push(Effect::SendSensor(number, driver.greeting()));
             }
         }
     }
 
-    fn take_refusal(&mut self, why: Option<Refusal>, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn take_refusal(&mut self, why: Option<Refusal>) {
         if let Some(why) = why
-            && passed(self.refused_ns, now_ns, REFUSED_AGAIN)
+            && self.passed(self.refused_ns, REFUSED_AGAIN)
         {
-            self.refused_ns = Some(now_ns);
+            self.refused_ns = Some(self.now_ns);
             // The reason may quote arbitrary text.
             let clean = |letter: char| if letter.is_control() { '?' } else { letter };
             let [input, what, remedy] = [why.input, why.what, why.remedy]
                 .map(|text| text.chars().take(LONGEST_REFUSAL).map(clean).collect());
-            effects.push(Effect::Refused(Refusal { input, what, remedy }));
+            self.effects.push(Effect::Refused(Refusal { input, what, remedy }));
         }
     }
 
-    pub(super) fn take_heard(&mut self, mut heard: Heard, now_ns: u64, effects: &mut Vec<Effect>) {
-        self.take_refusal(heard.refused.take(), now_ns, effects);
+    pub(super) fn take_heard(&mut self, mut heard: Heard) {
+        self.take_refusal(heard.refused.take());
         let rate = heard.stamp_ns.and_then(|stamp_ns| self.clock_rate.take(stamp_ns, self.now));
-        effects.extend(rate.map(Effect::ClockRate));
+        self.effects.extend(rate.map(Effect::ClockRate));
         if let Some(words) = heard.two_publishers.take() {
-            self.observe(Observation::TwoPublishers(&words), now_ns);
+            self.observe(Observation::TwoPublishers(&words));
         }
         for _ in 0..heard.acknowledged {
-            self.observe(Observation::Acknowledged, now_ns);
+            self.observe(Observation::Acknowledged);
         }
         if let Some(commander) = heard.commander {
-            self.observe(Observation::Commander(commander), now_ns);
+            self.observe(Observation::Commander(commander));
         }
-        let is_told = self.failsafe.monitors.commander.take_told();
+        let is_told = std::mem::take(&mut self.failsafe.monitors.commander.is_told);
         // The robot obeys the newest command, so each of another commander gets a stop. At the
         // first one, the failsafe stops it below.
         if (is_told || heard.commander.is_some_and(|commander| commander.moves))
             && self.decision.stops()
             && !self.in_ticks()
         {
-            effects.push(Effect::Send(self.stop()));
+            self.send(self.stop());
         }
         if heard.pinged {
-            effects.push(Effect::Send(self.base.acknowledge()));
+            self.send(self.base.acknowledge());
         }
         if heard.jumped {
-            self.restart.jumped();
+            self.restart.jumped = true;
         }
         let motion = heard.motion;
-        let counts = motion.map(|motion| self.judge_counts(&motion, now_ns, effects));
+        let counts = motion.map(|motion| self.judge_counts(&motion));
         if counts == Some(Counts::Elsewhere) {
-            effects.push(Effect::CountsElsewhere);
+            self.effects.push(Effect::CountsElsewhere);
         }
         let restarted = heard.restarted || matches!(counts, Some(Counts::Restarted { .. }));
         if restarted {
-            effects.push(Effect::Restarted);
+            self.effects.push(Effect::Restarted);
         }
         if (restarted || counts == Some(Counts::Elsewhere)) && self.connected() && !self.in_ticks()
         {
             // A restarted robot has default settings.
-            effects.push(Effect::Send(self.base.greeting()));
+            self.send(self.base.greeting());
         }
-        self.take_power(&heard, now_ns, effects);
-        self.take_readings(&mut heard, None, now_ns);
+        self.take_power(&heard);
+        self.take_readings(&mut heard, None);
         if !heard.touched.is_empty() {
-            self.observe(Observation::Touched(&heard.touched), now_ns);
+            self.observe(Observation::Touched(&heard.touched));
         }
-        if heard.anything && self.failsafe.monitors.presence.heard(now_ns) {
+        if heard.anything && self.failsafe.monitors.presence.heard(self.now_ns) {
             let again = self.losses() > 0;
-            self.observe(Observation::Found { again }, now_ns);
-            effects.push(Effect::Connected(true));
-            effects.push(Effect::Send(self.base.greeting()));
+            self.observe(Observation::Found { again });
+            self.effects.push(Effect::Connected(true));
+            self.send(self.base.greeting());
             // The robot may still obey an earlier link's command.
             self.stop_sent_ns = None;
             if self.in_ticks() && self.base.is_polled() {
                 // Its answer to a ping has no motion, and it was not polled yet.
                 self.due = 0;
                 if self.ordered_to_drive() {
-                    self.ping(now_ns, effects);
+                    self.ping();
                 }
             }
         }
@@ -133,52 +127,52 @@ impl Link {
             // No tick starts here. The robot stands until its motion is known again, to lose little
             // of it.
             self.repeat = None;
-            self.tell([0, 0], self.limit, now_ns, effects);
+            self.tell([0, 0], self.limit);
         } else if let Some(motion) = motion {
-            self.begin_tick(motion, now_ns, effects);
+            self.begin_tick(motion);
         }
     }
 
     /// Classifies counts. In lockstep all are plausible, because a simulated robot does not
     /// restart. Its motion is judged as a tick begins, because the number of further frames depends
     /// on the machine.
-    fn judge_counts(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) -> Counts {
+    fn judge_counts(&mut self, motion: &Motion) -> Counts {
         if self.in_ticks() {
             return Counts::Follow;
         }
         let wheels = motion.wheels;
         let counts = cyclic(motion);
-        self.observe(Observation::Currents(motion.currents), now_ns);
+        self.observe(Observation::Currents(motion.currents));
         let speeds = [wheels.left_counts_per_s, wheels.right_counts_per_s];
         let was_away = !self.connected();
         let are = self.restart.step(counts, speeds, was_away, self.now);
-        self.observe(Observation::Motor(counts, are), now_ns);
-        self.tell_response(now_ns, effects);
+        self.observe(Observation::Motor(counts, are));
+        self.tell_response();
         are
     }
 
-    fn tell_response(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        if let Some(response) = self.failsafe.monitors.odometry.take_found() {
-            self.observe(Observation::Responds(response), now_ns);
+    fn tell_response(&mut self) {
+        if let Some(response) = self.failsafe.monitors.odometry.found.take() {
+            self.observe(Observation::Responds(response));
             let base = &self.failsafe.monitors.base;
-            effects.extend(base.words().map(Effect::FoundResponse));
+            self.effects.extend(base.words().map(Effect::FoundResponse));
         }
     }
 
     /// Judges a lockstep tick's motion: contacts, wheel shares, and an unstated response.
-    pub(super) fn judge_tick(&mut self, motion: &Motion, now_ns: u64, effects: &mut Vec<Effect>) {
-        let now = self.moment(now_ns);
+    pub(super) fn judge_tick(&mut self, motion: &Motion) {
+        let now = self.moment();
         let odometry = &mut self.failsafe.monitors.odometry;
         odometry.observe(&Observation::Currents(motion.currents), now);
         odometry.observe(&Observation::Motor(cyclic(motion), Counts::Follow), now);
         // A simulated X80 answers as stated.
-        if odometry.searches() {
-            self.tell_response(now_ns, effects);
+        if odometry.searches {
+            self.tell_response();
         }
     }
 
     /// Takes readings, which came at `own_wire` if apart from the robot's motion.
-    fn take_readings(&mut self, heard: &mut Heard, own_wire: Option<MissionTime>, now_ns: u64) {
+    fn take_readings(&mut self, heard: &mut Heard, own_wire: Option<MissionTime>) {
         if let Some(stamp_ns) = heard.motion.and_then(|motion| motion.stamp_ns) {
             self.stamped = Some((stamp_ns, self.now));
         }
@@ -190,70 +184,75 @@ impl Link {
                 _ => (came_s, first_beam_ns),
             };
             let middle_ns = age_ns + beam_ns.abs() * scan.beams.len() as i64 / 2;
-            self.observe(Observation::Scan(scan, first_s + middle_ns as f64 * 1e-9), now_ns);
+            self.observe(Observation::Scan(scan, first_s + middle_ns as f64 * 1e-9));
         }
         let readings = self.sensors.take_heard(heard, own_wire);
         if !readings.is_empty() {
-            self.observe(Observation::Readings(&readings), now_ns);
+            self.observe(Observation::Readings(&readings));
         }
     }
 
-    fn take_power(&mut self, heard: &Heard, now_ns: u64, effects: &mut Vec<Effect>) {
+    fn take_power(&mut self, heard: &Heard) {
         if let Some(power) = heard.power {
             let volts = [power.board_v, power.motor_v, power.servo_v];
-            self.observe(Observation::Batteries(volts), now_ns);
+            self.observe(Observation::Batteries(volts));
             let battery = &mut self.failsafe.monitors.battery;
             let [board_low, motor_low, servo_low] = battery.low().map(u8::from);
-            effects.push(Effect::Power(PowerSample { board_low, motor_low, servo_low, ..power }));
-            effects.extend(battery.take_changes().into_iter().map(Effect::Battery));
+            self.effects.push(Effect::Power(PowerSample {
+                board_low,
+                motor_low,
+                servo_low,
+                ..power
+            }));
+            self.effects.extend(battery.changes.drain(..).map(Effect::Battery));
         }
-        effects.extend(heard.surroundings.map(Effect::Surroundings));
-        effects.extend(heard.infrared.map(Effect::Infrared));
+        self.effects.extend(heard.surroundings.map(Effect::Surroundings));
+        self.effects.extend(heard.infrared.map(Effect::Infrared));
     }
 
-    pub(super) fn ping(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        self.pinged_ns = Some(now_ns);
-        self.failsafe.monitors.presence.pinged(now_ns);
+    pub(super) fn ping(&mut self) {
+        self.pinged_ns = Some(self.now_ns);
+        self.failsafe.monitors.presence.pinged(self.now_ns);
         self.due += 1;
-        effects.push(Effect::Send(self.base.ping()));
-        self.poll_in_ticks(effects);
+        self.send(self.base.ping());
+        self.poll_in_ticks();
     }
 
-    pub(super) fn keep_connected(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        let silent = self.monitors().presence.is_silent(now_ns);
+    pub(super) fn keep_connected(&mut self) {
+        let silent = self.failsafe.monitors.presence.is_silent(self.now_ns);
         // A robot that waits for a command is present: if its next motor frame is missing, a
         // datagram was lost.
         let owes = self.ordered_to_drive() && self.open.is_none();
         if silent && !self.in_ticks() {
-            self.lose(now_ns, effects);
+            self.lose();
         }
         if !self.in_ticks()
             && self.connected()
-            && !self.monitors().latency.is_testing()
+            && !self.failsafe.monitors.latency.is_testing()
             && self.other_stop().is_none()
-            && self.failsafe.monitors.streams.wants_request(now_ns)
+            && self.failsafe.monitors.streams.wants_request(self.now_ns)
         {
-            effects.push(Effect::Send(self.base.ask_for_sensors()));
+            self.send(self.base.ask_for_sensors());
             let greetings = (0..).zip(self.drivers.iter().map(|driver| driver.greeting()));
-            effects.extend(greetings.map(|(number, bytes)| Effect::SendSensor(number, bytes)));
-            effects.push(Effect::AskedForStreams);
+            self.effects.extend(greetings.map(|(number, bytes)| Effect::SendSensor(number, bytes)));
+            self.effects.push(Effect::AskedForStreams);
         }
         let owing = self.in_ticks() && owes && silent && self.connected();
-        if self.failsafe.monitors.presence.wants_ping(now_ns) {
-            self.ping(now_ns, effects);
-        } else if owing && passed(self.pinged_ns, now_ns, PING_EVERY) {
+        if self.failsafe.monitors.presence.wants_ping(self.now_ns) {
+            self.ping();
+        } else if owing && self.passed(self.pinged_ns, PING_EVERY) {
             self.due = 0;
-            self.ping(now_ns, effects);
+            self.ping();
         }
     }
 
-    pub(super) fn lose(&mut self, now_ns: u64, effects: &mut Vec<Effect>) {
-        if !self.failsafe.monitors.presence.lose(now_ns) {
+    pub(super) fn lose(&mut self) {
+        if !self.failsafe.monitors.presence.lose(self.now_ns) {
             return;
         }
-        self.restart.lost();
-        self.observe(Observation::Lost, now_ns);
-        effects.push(Effect::Connected(false));
+        self.restart.away = true;
+        self.observe(Observation::Lost);
+        self.effects.push(Effect::Connected(false));
     }
 }
 

@@ -32,8 +32,6 @@ pub(super) struct Dds {
     readers: Vec<Reader>,
     writer: Writer,
     topics: Topics,
-    commands: Option<usize>,
-    odometry: Option<usize>,
     publishers: Publishers,
     /// Next reader, so that a flood on one topic does not hold back others.
     next: usize,
@@ -47,12 +45,9 @@ impl Dds {
     pub(super) fn open(domain: u16, topics: Topics) -> io::Result<Self> {
         let participant = Participant::join(domain, None)?;
         let (readers, writer) = endpoints(&participant, &topics)?;
-        let row_of = |wanted| topics.heard.iter().position(|(content, _)| *content == wanted);
         Ok(Self {
             readers,
             writer,
-            commands: row_of(Content::Command),
-            odometry: row_of(Content::Odometry),
             publishers: Publishers::default(),
             topics,
             next: 0,
@@ -93,8 +88,9 @@ impl Wire for Dds {
             };
             self.next = (row + 1) % count;
             self.heard_ns = Some(now_ns);
-            let writer = if self.commands == Some(row) { &from[..] } else { &[] };
-            let is_odometry = self.odometry == Some(row);
+            let content = self.topics.heard.get(row).map(|(content, _)| *content);
+            let writer = if content == Some(Content::Command) { &from[..] } else { &[] };
+            let is_odometry = content == Some(Content::Odometry);
             // The piece that names two publishers replaces the message that shows them.
             let two = is_odometry.then(|| self.publishers.take(from, now_ns)).flatten();
             let piece = two.unwrap_or_else(|| [&[row as u8], writer, &payload].concat());

@@ -5,12 +5,7 @@
 
 #![allow(unsafe_code)]
 
-use std::{
-    fmt, io,
-    os::fd::OwnedFd,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{io, os::fd::OwnedFd, path::PathBuf, time::Duration};
 
 use rustix::{
     fs::{FlockOperation, Mode, OFlags, flock, open},
@@ -26,14 +21,8 @@ use super::{Line, stream::Dial};
 
 #[derive(Debug)]
 pub(super) struct Serial {
-    path: PathBuf,
-    line: Line,
-}
-
-impl Serial {
-    pub(super) fn new(path: &Path, line: Line) -> Self {
-        Self { path: path.to_owned(), line }
-    }
+    pub(super) path: PathBuf,
+    pub(super) line: Line,
 }
 
 /// Lowers DTR, if the line has it; pseudo-terminals do not.
@@ -45,12 +34,6 @@ fn lower_dtr(line: &OwnedFd) {
     let lowered = unsafe { ioctl(line, Setter::<TIOCMBIC, _>::new(TIOCM_DTR)) };
     if let Err(error) = lowered {
         tracing::debug!(%error, "cannot lower DTR, so it stays unchanged");
-    }
-}
-
-impl fmt::Display for Serial {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "serial://{}", self.path.display())
     }
 }
 
@@ -91,10 +74,6 @@ impl Dial for Serial {
         // Bytes for an earlier holder are outdated.
         tcflush(&line, QueueSelector::IOFlush)?;
         Ok(line)
-    }
-
-    fn finish(&self, _: &OwnedFd) -> io::Result<()> {
-        Ok(())
     }
 
     fn abandon(&self, line: &OwnedFd) {

@@ -11,7 +11,7 @@ use std::{
     time::Duration,
 };
 
-use common::poll;
+use common::{address::Address, poll};
 use rustix::{
     event::epoll::{self, CreateFlags, EventData, EventFlags},
     io::{Errno, read, write},
@@ -30,7 +30,7 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// Time limit of an attempt, as a robot that is off stays silent.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-pub(super) trait Dial: fmt::Display + fmt::Debug {
+pub(super) trait Dial: fmt::Debug {
     /// Silence of a dead stream; none if the system reports that.
     const SILENCE: Option<Duration>;
 
@@ -38,24 +38,30 @@ pub(super) trait Dial: fmt::Display + fmt::Debug {
     fn dial(&self) -> io::Result<OwnedFd>;
 
     /// Checks that a writable `descriptor` is connected.
-    fn finish(&self, descriptor: &OwnedFd) -> io::Result<()>;
+    fn finish(&self, _descriptor: &OwnedFd) -> io::Result<()> {
+        Ok(())
+    }
 
-    /// Discards unsent bytes, so that closing does not wait.
-    fn abandon(&self, descriptor: &OwnedFd);
+    /// Discards unsent bytes, so that closing does not wait. The system closes connections in the
+    /// background.
+    fn abandon(&self, _descriptor: &OwnedFd) {}
 }
 
 #[derive(Debug)]
-enum State {
-    Closed,
-    Opening { descriptor: OwnedFd, since_ns: u64 },
-    Open { descriptor: OwnedFd, heard_ns: u64 },
+struct Connection {
+    descriptor: OwnedFd,
+    /// Otherwise it is being opened.
+    is_open: bool,
+    /// Start of the attempt, or when bytes last came.
+    since_ns: u64,
 }
 
 #[derive(Debug)]
 pub(super) struct Stream<D> {
     dial: D,
+    robot: Address,
     epoll: OwnedFd,
-    state: State,
+    connection: Option<Connection>,
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
@@ -64,11 +70,12 @@ pub(super) struct Stream<D> {
 }
 
 impl<D: Dial + 'static> Stream<D> {
-    pub(super) fn boxed(dial: D) -> io::Result<Box<dyn Wire>> {
+    pub(super) fn boxed(dial: D, robot: &Address) -> io::Result<Box<dyn Wire>> {
         Ok(Box::new(Self {
             dial,
+            robot: robot.clone(),
             epoll: epoll::create(CreateFlags::CLOEXEC)?,
-            state: State::Closed,
+            connection: None,
             tail: Vec::new(),
             backoff: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
             unsent: 0,
@@ -79,7 +86,7 @@ impl<D: Dial + 'static> Stream<D> {
 
 impl<D: Dial> Wire for Stream<D> {
     fn is_open(&self) -> bool {
-        matches!(self.state, State::Open { .. })
+        self.connection.as_ref().is_some_and(|it| it.is_open)
     }
 
     fn tally(&self) -> Tally {
@@ -87,18 +94,18 @@ impl<D: Dial> Wire for Stream<D> {
     }
 
     fn attempts(&self, now_ns: u64) -> Option<Attempts> {
-        let next_ns = match self.state {
-            State::Open { .. } => return None,
-            State::Opening { .. } => 0,
-            State::Closed => self.backoff.wait_ns(now_ns),
+        let next_ns = match &self.connection {
+            Some(Connection { is_open: true, .. }) => return None,
+            Some(_) => 0,
+            None => self.backoff.wait_ns(now_ns),
         };
         let failed = self.down.map(|errno| (errno, remedy(errno)));
-        Some(Attempts { made: self.backoff.attempts(), next_ns, failed })
+        Some(Attempts { made: self.backoff.attempts, next_ns, failed })
     }
 
     /// Continue or give up an attempt, or send the rest of a message.
     fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
-        if matches!(self.state, State::Closed) {
+        if self.connection.is_none() {
             if !self.backoff.is_due(now_ns) {
                 return Ok(());
             }
@@ -107,43 +114,41 @@ impl<D: Dial> Wire for Stream<D> {
                 Ok(descriptor) => {
                     let events = EventFlags::IN | EventFlags::OUT;
                     epoll::add(&self.epoll, &descriptor, EventData::new_u64(0), events)?;
-                    self.state = State::Opening { descriptor, since_ns: now_ns };
+                    self.connection =
+                        Some(Connection { descriptor, is_open: false, since_ns: now_ns });
                 }
                 Err(error) => self.log(&error),
             }
         }
-        match &self.state {
-            State::Closed => {}
-            State::Opening { descriptor, since_ns } => {
-                if poll::is_writable(descriptor, Duration::ZERO)? {
-                    match self.dial.finish(descriptor) {
-                        Ok(()) => self.opened(now_ns)?,
-                        Err(error) => self.close(&error),
-                    }
-                } else if has_passed(*since_ns, now_ns, PATIENCE) {
-                    self.close(&Errno::TIMEDOUT.into());
+        let Some(connection) = &mut self.connection else {
+            return Ok(());
+        };
+        let longest = if connection.is_open { D::SILENCE } else { Some(PATIENCE) };
+        if !connection.is_open && poll::is_writable(&connection.descriptor, Duration::ZERO)? {
+            match self.dial.finish(&connection.descriptor) {
+                Ok(()) => {
+                    (connection.is_open, connection.since_ns) = (true, now_ns);
+                    self.watch(EventFlags::IN)?;
+                    tracing::info!(robot = %self.robot, "the wire is open");
                 }
+                Err(error) => self.close(&error),
             }
-            State::Open { heard_ns, .. } => {
-                let heard_ns = *heard_ns;
-                if D::SILENCE.is_some_and(|silence| has_passed(heard_ns, now_ns, silence)) {
-                    self.close(&Errno::TIMEDOUT.into());
-                } else {
-                    self.flush()?;
-                }
-            }
+        } else if longest.is_some_and(|longest| has_passed(connection.since_ns, now_ns, longest)) {
+            self.close(&Errno::TIMEDOUT.into());
+        } else {
+            self.flush()?;
         }
         Ok(())
     }
 
     fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> io::Result<Option<usize>> {
-        let State::Open { descriptor, heard_ns } = &mut self.state else {
+        let Some(Connection { descriptor, is_open: true, since_ns }) = &mut self.connection else {
             return Ok(None);
         };
         match read(&*descriptor, buffer) {
             Ok(0) => self.close(&io::ErrorKind::UnexpectedEof.into()),
             Ok(length) => {
-                *heard_ns = now_ns;
+                *since_ns = now_ns;
                 // Only received bytes reset the pauses. Otherwise a peer that closes each
                 // connection would be called ten times a second.
                 self.backoff.reset();
@@ -158,14 +163,11 @@ impl<D: Dial> Wire for Stream<D> {
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.flush()?;
-        let State::Open { descriptor, .. } = &self.state else {
+        let free = self.connection.as_ref().filter(|it| it.is_open && self.tail.is_empty());
+        let Some(Connection { descriptor, .. }) = free else {
             self.unsent += 1;
             return Ok(());
         };
-        if !self.tail.is_empty() {
-            self.unsent += 1;
-            return Ok(());
-        }
         match write(descriptor, bytes) {
             Ok(sent) if sent == bytes.len() => {}
             Ok(sent) => {
@@ -184,12 +186,10 @@ impl<D: Dial> Wire for Stream<D> {
 
 impl<D: Dial> Stream<D> {
     fn flush(&mut self) -> io::Result<()> {
-        let State::Open { descriptor, .. } = &self.state else {
+        let held = self.connection.as_ref().filter(|_| !self.tail.is_empty());
+        let Some(Connection { descriptor, .. }) = held else {
             return Ok(());
         };
-        if self.tail.is_empty() {
-            return Ok(());
-        }
         match write(descriptor, &self.tail) {
             Ok(sent) => {
                 self.tail.drain(..sent);
@@ -203,18 +203,8 @@ impl<D: Dial> Stream<D> {
         Ok(())
     }
 
-    fn opened(&mut self, now_ns: u64) -> io::Result<()> {
-        if let State::Opening { descriptor, .. } = std::mem::replace(&mut self.state, State::Closed)
-        {
-            self.state = State::Open { descriptor, heard_ns: now_ns };
-            self.watch(EventFlags::IN)?;
-            tracing::info!(robot = %self.dial, "the wire is open");
-        }
-        Ok(())
-    }
-
     fn watch(&self, events: EventFlags) -> io::Result<()> {
-        if let State::Open { descriptor, .. } = &self.state {
+        if let Some(Connection { descriptor, .. }) = &self.connection {
             epoll::modify(&self.epoll, descriptor, EventData::new_u64(0), events)?;
         }
         Ok(())
@@ -223,9 +213,7 @@ impl<D: Dial> Stream<D> {
     /// Closes the stream, whose descriptor leaves the epoll one.
     fn close(&mut self, error: &io::Error) {
         self.log(error);
-        if let State::Opening { descriptor, .. } | State::Open { descriptor, .. } =
-            std::mem::replace(&mut self.state, State::Closed)
-        {
+        if let Some(Connection { descriptor, .. }) = self.connection.take() {
             self.dial.abandon(&descriptor);
         }
         self.tail.clear();
@@ -236,7 +224,7 @@ impl<D: Dial> Stream<D> {
         let errno = Errno::from_io_error(error).unwrap_or(Errno::PIPE);
         if self.down.replace(errno) != Some(errno) {
             let remedy = remedy(errno);
-            tracing::warn!(robot = %self.dial, %error, "the wire is down; {remedy} (the link retries without end)");
+            tracing::warn!(robot = %self.robot, %error, "the wire is down; {remedy} (the link retries without end)");
         }
     }
 }

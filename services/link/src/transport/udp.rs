@@ -20,12 +20,12 @@ pub(super) struct Udp {
 impl Udp {
     /// Binds any free port.
     pub(super) fn open(robot: SocketAddr) -> io::Result<Self> {
-        let any = match robot.ip() {
+        let any: IpAddr = match (robot.is_ipv4(), robot.ip().is_loopback()) {
             // Loopback sockets receive nothing from other machines.
-            IpAddr::V4(ip) if ip.is_loopback() => IpAddr::V4(Ipv4Addr::LOCALHOST),
-            IpAddr::V6(ip) if ip.is_loopback() => IpAddr::V6(Ipv6Addr::LOCALHOST),
-            IpAddr::V4(_) => IpAddr::V4(Ipv4Addr::UNSPECIFIED),
-            IpAddr::V6(_) => IpAddr::V6(Ipv6Addr::UNSPECIFIED),
+            (true, true) => Ipv4Addr::LOCALHOST.into(),
+            (false, true) => Ipv6Addr::LOCALHOST.into(),
+            (true, false) => Ipv4Addr::UNSPECIFIED.into(),
+            (false, false) => Ipv6Addr::UNSPECIFIED.into(),
         };
         let socket = UdpSocket::bind((any, 0))?;
         socket.set_nonblocking(true)?;

@@ -90,14 +90,14 @@ fn sensed(mapper: &Mapper) -> Vec<(u32, u32)> {
     let cells = mapper.frame().cells;
     let marked = |(index, _): (usize, _)| (index as u32 % cells, index as u32 / cells);
     let is_sensed = |(_, cell): &(usize, &u8)| **cell == CellState::Sensed as u8;
-    let all = mapper.state().cells().iter().enumerate();
+    let all = mapper.state().cells.iter().enumerate();
     all.filter(is_sensed).map(marked).collect()
 }
 
 #[test]
 fn equation_18_blocks_the_border_and_nothing_else() {
     let mapper = mapper("");
-    let blocked = mapper.state().cells().iter().filter(|&&cell| cell != 0);
+    let blocked = mapper.state().cells.iter().filter(|&&cell| cell != 0);
     assert_eq!(blocked.count(), 4 * 49);
 }
 
@@ -109,8 +109,8 @@ fn equation_19_by_hand() {
     let want: Vec<_> = (29..=31).flat_map(|row| (27..=29).map(move |col| (col, row))).collect();
     assert_eq!(sensed(&mapper), want);
     assert_eq!((window.col, window.row, window.width, window.height), (27, 29, 3, 3));
-    assert_eq!(mapper.state().safety_events(), 1);
-    assert_eq!(mapper.state().version(), 2);
+    assert_eq!(mapper.state().safety_events, 1);
+    assert_eq!(mapper.state().version, 2);
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn a_reading_that_shows_nothing_leaves_the_map_alone() {
     mapper.sense(at(8, 0.0, 0.0, 0.0), &[]);
     mapper.sense(at(9, 0.0, 0.0, 0.0), &[echo(2.1)]);
     assert_eq!(sensed(&mapper), []);
-    assert_eq!(mapper.state().version(), 1);
+    assert_eq!(mapper.state().version, 1);
 }
 
 #[test]
@@ -188,7 +188,7 @@ fn the_robots_own_cells_are_never_marked() {
 fn the_border_stays_border_when_a_margin_falls_on_it() {
     let mut mapper = mapper("");
     mapper.sense(at(0, 1.9, 0.0, 0.0), &[echo(0.2)]);
-    let cells = mapper.state().cells();
+    let cells = &mapper.state().cells;
     assert_eq!(cells[25 * 50 + 49], CellState::Perimeter as u8);
 }
 
@@ -196,7 +196,7 @@ fn the_border_stays_border_when_a_margin_falls_on_it() {
 fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
     let mut mapper = mapper("[[known.drum]]\nat = [1.0, 1.0]\nradius_m = 0.2");
     let known = |mapper: &Mapper| {
-        let cells = mapper.state().cells();
+        let cells = &mapper.state().cells;
         cells.iter().filter(|&&cell| cell == CellState::Known as u8).count()
     };
     let before = known(&mapper);
@@ -213,7 +213,7 @@ fn a_tick_given_twice_is_one_safety_event() {
     let (pose, range) = (at(3, 0.0, 0.0, 0.0), echo(0.5));
     mapper.sense(pose, &[range]);
     assert_eq!(mapper.sense(pose, &[range]).area(), 0);
-    assert_eq!(mapper.state().safety_events(), 1);
+    assert_eq!(mapper.state().safety_events, 1);
 }
 
 #[test]
@@ -223,14 +223,14 @@ fn without_sensing_nothing_that_the_sonar_gives_is_mapped_by_either_method() {
             "target = [1.5, 0.0]\nmethod = '{method}'\nsensing = false\nknown.drum = [{{ at = [1, 1], radius_m = 0.2 }}]"
         );
         let mut mapper = mapper_of(&text);
-        let before = mapper.state().cells().to_vec();
+        let before = mapper.state().cells.to_vec();
         assert!(before.contains(&(CellState::Known as u8)), "{method}");
         let echo = echo(0.5);
         for tick in 0..10 {
             mapper.sense(at(tick, 0.0, 0.0, 0.0), &[echo]);
         }
-        assert_eq!(mapper.state().cells(), before, "{method}");
-        assert_eq!(mapper.state().safety_events(), 0, "{method}");
+        assert_eq!(mapper.state().cells, before, "{method}");
+        assert_eq!(mapper.state().safety_events, 0, "{method}");
     }
 }
 
@@ -256,13 +256,13 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
         // Listed targets may lie in a drum's margin.
         let margin = -1.25;
         assert_eq!(mapper.state_at(margin, 0.0), CellState::Known, "{method}");
-        let version = mapper.state().version();
+        let version = mapper.state().version;
         assert_eq!(send(&mut mapper, 1, margin), 1, "{method}");
         assert!(!mapper.is_hazard(margin, 0.0), "{method}");
-        assert_eq!(mapper.state().version(), version + 1, "{method}");
+        assert_eq!(mapper.state().version, version + 1, "{method}");
         let mut restored = mapper.clone();
         restored.restore(mapper.state().clone()).unwrap();
-        assert_eq!(restored.target(), DVec2::new(margin, 0.0));
+        assert_eq!(restored.state().target, DVec2::new(margin, 0.0));
         assert_eq!(send(&mut restored, 2, 1.5), 1, "{method}");
         assert_eq!(restored.state_at(margin, 0.0), CellState::Known, "{method}");
     }

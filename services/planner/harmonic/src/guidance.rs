@@ -54,23 +54,22 @@ impl Field {
         if cell == self.target() {
             return Guidance::AtTarget;
         }
-        let position = [col, row];
-        let gradient =
-            self.interpolate(here, position, |c, r| self.central_difference(here, (c, r)));
-        let allowed = self.without_wall_component(here, position, gradient);
+        let offset = [col - here.0 as f64, row - here.1 as f64];
+        let gradient = self.interpolate(here, offset, |c, r| self.central_difference(here, (c, r)));
+        let allowed = self.without_wall_component(here, offset, gradient);
         // Steepest ascent replaces the removed component and leads around walls. A gradient
         // straight into a wall would otherwise keep its direction.
         let removed = (gradient[0] - allowed[0]).hypot(gradient[1] - allowed[1]);
         let mut total = allowed;
         if removed > 0.0 {
-            let ascent = self.interpolate(here, position, |c, r| {
+            let ascent = self.interpolate(here, offset, |c, r| {
                 self.steepest_ascent(c, r).map(|step| step as f64)
             });
-            let ascent = self.without_wall_component(here, position, ascent);
+            let ascent = self.without_wall_component(here, offset, ascent);
             total = [allowed[0] + removed * ascent[0], allowed[1] + removed * ascent[1]];
         }
         unit(total, SADDLE)
-            .or_else(|| self.toward_best_neighbour(here, position))
+            .or_else(|| self.toward_best_neighbour(here, [col, row]))
             .map_or(Guidance::Unreachable, Guidance::Along)
     }
 
@@ -96,14 +95,13 @@ impl Field {
     }
 
     /// Returns the bilinear mean of `value` over the reachable cells among the four centres around
-    /// `position`.
+    /// the position at `offset` from the centre of `here`.
     fn interpolate(
         &self,
         here: (i64, i64),
-        position: [f64; 2],
+        offset: [f64; 2],
         value: impl Fn(i64, i64) -> [f64; 2],
     ) -> [f64; 2] {
-        let offset = [position[0] - here.0 as f64, position[1] - here.1 as f64];
         let side = |o: f64| if o < 0.0 { -1 } else { 1 };
         let (col, row) = (here.0 + side(offset[0]), here.1 + side(offset[1]));
         let [x, y] = [offset[0].abs(), offset[1].abs()];
@@ -169,10 +167,9 @@ impl Field {
     fn without_wall_component(
         &self,
         here: (i64, i64),
-        position: [f64; 2],
+        offset: [f64; 2],
         gradient: [f64; 2],
     ) -> [f64; 2] {
-        let offset = [position[0] - here.0 as f64, position[1] - here.1 as f64];
         let blocked = |dc: i64, dr: i64| self.blocked_at(here.0 + dc, here.1 + dr);
         let mut allowed = gradient;
         for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)] {

@@ -28,20 +28,37 @@ pub(crate) use gauss_seidel::relax;
 pub(crate) use tree::Tree;
 pub(crate) use workspace::Workspace;
 
+/// Cells in the order of a breadth-first pass, and the tree of their fronts.
+pub(crate) type Ordered = (BreadthFirst, Tree);
+
+/// Orders the cells of `domain` from its target.
+///
+/// # Errors
+/// [`SolveError::Cancelled`] and [`SolveError::TooCostly`].
+pub(crate) fn order(
+    domain: &Domain,
+    budget: &Budget,
+    cancellation: &Cancellation,
+) -> Result<Ordered, SolveError> {
+    let pass = BreadthFirst::from_target(domain, budget, cancellation)?;
+    let tree = Tree::of(&pass, budget, cancellation)?;
+    Ok((pass, tree))
+}
+
 /// Solves the five-point equations on `domain`, exact except for rounding.
 ///
 /// With `known`, solves only the cells that `pass` visits, from the values of its first cells.
 pub(crate) fn solve(
     domain: &Domain,
-    (pass, tree): (&BreadthFirst, &Tree),
+    ordered: &Ordered,
     known: Option<&Store>,
     budget: &Budget,
     workspace: &mut Workspace,
     cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
-    budget.ask(tree.cost.bytes)?;
-    let solved = factor(domain, pass, tree, workspace, cancellation)
-        .and_then(|()| substitute(domain, (pass, tree), known, workspace, cancellation));
+    budget.ask(ordered.1.cost.bytes)?;
+    let solved = factor(domain, ordered, workspace, cancellation)
+        .and_then(|()| substitute(domain, ordered, known, workspace, cancellation));
     workspace.trim();
     solved
 }
@@ -51,16 +68,15 @@ const NOWHERE: u32 = u32::MAX;
 
 fn factor(
     domain: &Domain,
-    pass: &BreadthFirst,
-    tree: &Tree,
+    (pass, tree): &Ordered,
     workspace: &mut Workspace,
     cancellation: &Cancellation,
 ) -> Result<(), SolveError> {
-    let Workspace { factors, slot, .. } = workspace;
-    factors.rows.clear();
-    factors.rows.reserve(tree.cost.weights);
-    factors.lengths.clear();
-    factors.lengths.reserve(pass.len());
+    let Workspace { rows, lengths, slot, .. } = workspace;
+    rows.clear();
+    rows.reserve(tree.cost.weights);
+    lengths.clear();
+    lengths.reserve(pass.len());
     slot.clear();
     slot.resize(pass.len(), NOWHERE);
     // Updates wait here for the parent front; spent buffers are reused.
@@ -100,8 +116,8 @@ fn factor(
         for row in 0..own {
             let (pivot, rest) = matrix.row(row);
             let scale = -1.0 / pivot;
-            factors.rows.extend(rest.iter().map(|&entry| entry * scale));
-            factors.lengths.push(rest.len() as u32);
+            rows.extend(rest.iter().map(|&entry| entry * scale));
+            lengths.push(rest.len() as u32);
         }
         if front.has_parent {
             let mut update = spent.pop().unwrap_or_default();

@@ -95,12 +95,6 @@ pub(crate) struct Multigrid<R> {
 }
 
 impl<R: Real> Multigrid<R> {
-    pub(crate) fn new(width: usize, height: usize) -> Self {
-        let mut levels = Self::default();
-        levels.reshape(width, height);
-        levels
-    }
-
     /// Reshapes the levels and clears the equations.
     ///
     /// Memory is reused, because fresh pages from the system cost as much as several cycles.
@@ -124,15 +118,18 @@ impl<R: Real> Multigrid<R> {
     pub(crate) fn set_up_rows(&mut self, domain: &Domain, rows: Range<usize>) {
         self.is_steep = false;
         let finest = &mut self.finest;
-        let width = domain.width();
-        let mut weights = vec![R::default(); width];
+        let (grid, width) = (finest.grid, domain.width());
+        let mut inverse = vec![R::default(); 2 * grid.columns];
         self.simd.run(
             #[inline(always)]
             || {
                 for row in rows.clone() {
                     let blocked = &domain.blocked()[row * width..(row + 1) * width];
-                    domain.weights_of_row(row, &mut weights);
-                    finest.set_row(row, blocked, &weights);
+                    domain.weights_of_row(row, &mut inverse[..width]);
+                    for (inverse, &blocked) in inverse.iter_mut().zip(blocked) {
+                        *inverse = if blocked { R::default() } else { *inverse };
+                    }
+                    grid::split_row(&grid, &mut finest.inverse, row, &inverse);
                 }
             },
         );
@@ -154,9 +151,8 @@ impl<R: Real> Multigrid<R> {
 
     /// Makes `target` the only inflow and starts from the solution of the coarsest level.
     pub(crate) fn start(&mut self, target: Cell) {
-        let (plane, at) = self.finest.grid.locate(target.col, target.row);
-        let value = R::of(pow2(R::TOP));
-        self.finest.sources = vec![Source { plane, row: target.row / 2, at, value }];
+        let source = Source::of(&self.finest.grid, target, R::of(pow2(R::TOP)));
+        self.finest.sources = vec![source];
         self.start_from_sources();
     }
 
@@ -185,25 +181,19 @@ impl<R: Real> Multigrid<R> {
         let around = around + u(Some(col), row.checked_sub(1)) + u(Some(col), Some(row + 1));
         let (plane, at) = grid.locate(col, row);
         let value = finest.inverse[plane][at].inverse() * finest.u[plane][at] - around;
-        finest.sources = vec![Source { plane, row: row / 2, at, value }];
-        for plane in &mut self.coarse[0].u {
-            plane.fill(R::default());
-        }
+        finest.sources = vec![Source::of(&grid, target, value)];
+        grid::clear(&mut self.coarse[0].u);
     }
 
     /// Starts by full multigrid: each level is interpolated from the next and improved by a cycle.
     fn start_from_sources(&mut self) {
         self.corrects = false;
-        for plane in &mut self.finest.u {
-            plane.fill(R::default());
-        }
+        grid::clear(&mut self.finest.u);
         sources::restrict(&self.finest, &mut self.coarse);
         let last = self.coarse.len() - 1;
         self.coarsest.solve(&mut self.coarse[last]);
         for level in (0..last).rev() {
-            for plane in &mut self.coarse[level].u {
-                plane.fill(R::default());
-            }
+            grid::clear(&mut self.coarse[level].u);
             self.ascend(level, R::ONE);
             if self.is_large() && level >= VISITED_TWICE.start {
                 self.second_visit(level);
@@ -235,10 +225,7 @@ impl<R: Real> Multigrid<R> {
             grid::split_row(&grid, &mut finest.inverse, row, &buffer);
         }
         finest.sources.clear();
-        finest.sources.extend(inflow.map(|(cell, value)| {
-            let (plane, at) = grid.locate(cell.col, cell.row);
-            Source { plane, row: cell.row / 2, at, value }
-        }));
+        finest.sources.extend(inflow.map(|(cell, value)| Source::of(&grid, cell, value)));
         finest.sources.sort_unstable_by_key(|source| (source.plane, source.row));
         self.set_up_levels(0..height);
         self.start_from_sources();
@@ -342,9 +329,7 @@ impl<R: Real> Multigrid<R> {
     /// Near a saddle point the direction depends on the last digits.
     pub(crate) fn finish(&mut self) {
         self.pass(1 + SMOOTHING, false, None);
-        for plane in &mut self.coarse[0].u {
-            plane.fill(R::default());
-        }
+        grid::clear(&mut self.coarse[0].u);
     }
 
     fn pass(&mut self, sweeps: usize, descend: bool, tolerance: Option<f64>) -> usize {

@@ -8,7 +8,7 @@ use std::{num::NonZeroUsize, ops::Range};
 
 use crate::{
     Cancellation, Domain, Field, Method, SolveError,
-    multifrontal::{self, BreadthFirst, Budget, Tree, Workspace},
+    multifrontal::{self, Budget, Ordered, Workspace},
     multigrid::{DOUBLE_CYCLES, FIRST_CHECK, Multigrid, SINGLE_CYCLES},
     multigrid_bands,
     real::Real,
@@ -125,16 +125,30 @@ impl Solver {
     }
 }
 
-#[derive(Clone, Copy)]
 struct Task<'a> {
     threads: NonZeroUsize,
     domain: &'a Domain,
+    budget: Budget,
     cancellation: &'a Cancellation,
+    observe: &'a mut dyn FnMut(Phase),
 }
+
+impl Task<'_> {
+    /// Verifies a field that was just computed.
+    fn check(&mut self, store: &Store) -> Check {
+        (self.observe)(Phase::Solved);
+        let check = verification::check(self.domain, store, self.threads);
+        (self.observe)(Phase::Verified);
+        check
+    }
+}
+
+/// Computed field with the result of its check, and the method that computed it.
+type Solved = (Store, Check, Method);
 
 #[derive(Debug, Default)]
 pub(super) struct Prepared<R> {
-    levels: Option<Multigrid<R>>,
+    levels: Multigrid<R>,
     width: usize,
     blocked: Vec<bool>,
     screening: f64,
@@ -142,67 +156,39 @@ pub(super) struct Prepared<R> {
 }
 
 impl Solver {
-    pub(super) fn run(
+    fn run(
         &mut self,
         domain: &Domain,
         near: Option<&Field>,
         cancellation: &Cancellation,
         observe: &mut dyn FnMut(Phase),
     ) -> Result<Field, SolveError> {
-        let threads = self.settings.threads;
-        let task = Task { threads, domain, cancellation };
+        let Settings { threads, memory_limit } = self.settings;
         cancellation.check()?;
-        let budget = Budget::of(domain, self.settings.memory_limit);
+        let budget = Budget::of(domain, memory_limit);
+        let mut task = Task { threads, domain, budget, cancellation, observe };
         if let Some(near) = near.filter(|near| near.fits(domain)) {
             let method = near.verification().method;
             // The shape of the map alone decides the cost of the factorisation, so the usual plan
             // applies.
             if method != Method::Multifrontal {
-                let ((store, check), method) =
-                    self.multigrid(method, task, Some(near), &budget, observe)?;
+                let (store, check, method) = self.multigrid(method, Some(near), &mut task)?;
                 if check.holds() {
                     return Ok(Field::new(domain, store, &check, method));
                 }
             }
         }
-        let mut plan = plan(domain, &budget, cancellation)?;
+        let mut ordered = plan(domain, &budget, cancellation)?;
+        // Unless it was planned, the factorisation is the last resort.
+        let multigrid: &[_] = match ordered {
+            Some(_) => &[],
+            None => &[Method::MultigridSingle, Method::MultigridDouble],
+        };
         let mut failed = Check::default();
-        for method in plan.methods {
-            let ((store, check), method) = match method {
-                Method::MultigridSingle
-                | Method::MultigridAndMultifrontal
-                | Method::MultigridBands
-                | Method::MultigridDouble => {
-                    self.multigrid(method, task, None, &budget, observe)?
-                }
-                Method::Multifrontal => {
-                    let (pass, tree) = if let Some(planned) = plan.multifrontal.take() {
-                        planned
-                    } else {
-                        let pass = BreadthFirst::from_target(domain, &budget, cancellation)?;
-                        let tree = Tree::of(&pass, &budget, cancellation)?;
-                        (pass, tree)
-                    };
-                    observe(Phase::SetUp);
-                    let mut store = multifrontal::solve(
-                        domain,
-                        (&pass, &tree),
-                        None,
-                        &budget,
-                        &mut self.multifrontal,
-                        cancellation,
-                    )?;
-                    observe(Phase::Solved);
-                    let mut check = verification::check(domain, &store, threads);
-                    observe(Phase::Verified);
-                    if !check.holds() {
-                        store = multifrontal::relax(domain, &pass, &store);
-                        observe(Phase::Solved);
-                        check = verification::check(domain, &store, threads);
-                        observe(Phase::Verified);
-                    }
-                    ((store, check), method)
-                }
+        for &method in multigrid.iter().chain(&[Method::Multifrontal]) {
+            let (store, check, method) = match method {
+                Method::Multifrontal => self.multifrontal(ordered.take(), &mut task)?,
+                method => self.multigrid(method, None, &mut task)?,
             };
             if check.holds() {
                 return Ok(Field::new(domain, store, &check, method));
@@ -214,9 +200,29 @@ impl Solver {
             local_maxima: failed.local_maxima + failed.unreached,
         })
     }
-}
 
-impl Solver {
+    fn multifrontal(
+        &mut self,
+        planned: Option<Ordered>,
+        task: &mut Task<'_>,
+    ) -> Result<Solved, SolveError> {
+        let Task { domain, budget, cancellation, .. } = *task;
+        let ordered = match planned {
+            Some(ordered) => ordered,
+            None => multifrontal::order(domain, &budget, cancellation)?,
+        };
+        (task.observe)(Phase::SetUp);
+        let workspace = &mut self.multifrontal;
+        let mut store =
+            multifrontal::solve(domain, &ordered, None, &budget, workspace, cancellation)?;
+        let mut check = task.check(&store);
+        if !check.holds() {
+            store = multifrontal::relax(domain, &ordered.0, &store);
+            check = task.check(&store);
+        }
+        Ok((store, check, Method::Multifrontal))
+    }
+
     /// Solves by multigrid, in double precision if `method` says so.
     ///
     /// Where u falls below the range of single precision, the cheaper of two methods continues:
@@ -224,40 +230,35 @@ impl Solver {
     fn multigrid(
         &mut self,
         method: Method,
-        task: Task<'_>,
         near: Option<&Field>,
-        budget: &Budget,
-        observe: &mut dyn FnMut(Phase),
-    ) -> Result<((Store, Check), Method), SolveError> {
-        let Task { threads, domain, cancellation } = task;
+        task: &mut Task<'_>,
+    ) -> Result<Solved, SolveError> {
+        let Task { domain, budget, cancellation, .. } = *task;
         let most_cycles = |from_scratch| if near.is_some() { NEAR_CYCLES } else { from_scratch };
         if method == Method::MultigridDouble {
-            let solved = self.double.solve(task, near, most_cycles(DOUBLE_CYCLES), observe)?;
-            return Ok((solved, method));
+            let (store, check) = self.double.solve(task, near, most_cycles(DOUBLE_CYCLES))?;
+            return Ok((store, check, method));
         }
-        let (store, check) = self.single.solve(task, near, most_cycles(SINGLE_CYCLES), observe)?;
+        let (store, check) = self.single.solve(task, near, most_cycles(SINGLE_CYCLES))?;
         if check.holds() || check.unreached == 0 {
-            return Ok(((store, check), Method::MultigridSingle));
+            return Ok((store, check, Method::MultigridSingle));
         }
-        let beyond = beyond_single(domain, &store, budget, cancellation)?;
-        let (store, method) = if let Some((pass, tree)) = beyond {
-            let (places, workspace) = ((&pass, &tree), &mut self.multifrontal);
-            let known = Some(&store);
+        let beyond = beyond_single(domain, &store, &budget, cancellation)?;
+        let (store, method) = if let Some(ordered) = beyond {
+            let (known, workspace) = (Some(&store), &mut self.multifrontal);
             let store =
-                multifrontal::solve(domain, places, known, budget, workspace, cancellation)?;
+                multifrontal::solve(domain, &ordered, known, &budget, workspace, cancellation)?;
             (store, Method::MultigridAndMultifrontal)
         } else {
-            let cycled = &mut || observe(Phase::Cycled);
+            let cycled = &mut || (task.observe)(Phase::Cycled);
             // The bands overwrite the levels, so the next solve sets them up again.
             self.single.width = 0;
-            let levels = self.single.levels.get_or_insert_with(|| Multigrid::new(1, 1));
+            let levels = &mut self.single.levels;
             let store = multigrid_bands::solve(domain, store, levels, cancellation, cycled)?;
             (store, Method::MultigridBands)
         };
-        observe(Phase::Solved);
-        let check = verification::check(domain, &store, threads);
-        observe(Phase::Verified);
-        Ok(((store, check), method))
+        let check = task.check(&store);
+        Ok((store, check, method))
     }
 }
 
@@ -268,14 +269,13 @@ where
     /// Runs cycles, from `near` if given, until convergence or the cycle limit.
     fn solve(
         &mut self,
-        task: Task<'_>,
+        task: &mut Task<'_>,
         near: Option<&Field>,
         most_cycles: usize,
-        observe: &mut dyn FnMut(Phase),
     ) -> Result<(Store, Check), SolveError> {
-        let Task { threads, domain, cancellation } = task;
+        let Task { threads, domain, cancellation, .. } = *task;
         let levels = self.prepare(domain);
-        observe(Phase::SetUp);
+        (task.observe)(Phase::SetUp);
         let mut first_check = FIRST_CHECK;
         match near {
             Some(near) => {
@@ -290,7 +290,7 @@ where
         }
         let mut found = (Store::from(Vec::new()), Check::default());
         levels.converge((first_check, most_cycles), cancellation, |levels, checked| {
-            observe(Phase::Cycled);
+            (task.observe)(Phase::Cycled);
             if !checked {
                 return None;
             }
@@ -298,9 +298,7 @@ where
             let mut values = Vec::new();
             levels.read(domain.target(), R::of(BLOCKED), &mut values);
             let store = Store::from(values);
-            observe(Phase::Solved);
-            let check = verification::check(domain, &store, threads);
-            observe(Phase::Verified);
+            let check = task.check(&store);
             let mut excess = check.excess();
             if check.unreached > 0 {
                 // u falls below the range of this precision, so the check covers only the cells
@@ -314,24 +312,21 @@ where
     }
 
     fn prepare(&mut self, domain: &Domain) -> &mut Multigrid<R> {
-        let same_size =
-            self.width == domain.width() && self.blocked.len() == domain.blocked().len();
+        let (width, height) = (domain.width(), domain.height());
+        let same_size = self.width == width && self.blocked.len() == domain.blocked().len();
         let changed = if same_size
-            && self.levels.is_some()
             && self.screening == domain.screening_coefficient()
             && self.costs.len() == domain.costs().len()
         {
             self.changed_rows(domain)
         } else {
-            Some(0..domain.height())
+            Some(0..height)
         };
-        let (width, height) = (domain.width(), domain.height());
-        let levels = self.levels.get_or_insert_with(|| Multigrid::new(1, 1));
         if !same_size {
-            levels.reshape(width, height);
+            self.levels.reshape(width, height);
         }
         if let Some(rows) = changed {
-            levels.set_up_rows(domain, rows);
+            self.levels.set_up_rows(domain, rows);
             self.width = width;
             self.blocked.clear();
             self.blocked.extend_from_slice(domain.blocked());
@@ -339,7 +334,7 @@ where
             self.costs.clear();
             self.costs.extend_from_slice(domain.costs());
         }
-        levels
+        &mut self.levels
     }
 
     fn changed_rows(&self, domain: &Domain) -> Option<Range<usize>> {

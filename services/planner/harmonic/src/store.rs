@@ -75,6 +75,17 @@ impl Store {
         }
     }
 
+    /// Stores u of the cells in the [`narrowest`](Self::narrowest) format.
+    pub(crate) fn of(blocked: &[bool], u: impl Iterator<Item = Scaled>) -> Self {
+        let mut mantissas = Vec::with_capacity(blocked.len());
+        let mut exponents = Vec::with_capacity(blocked.len());
+        for (&blocked, u) in blocked.iter().zip(u) {
+            mantissas.push(if blocked { BLOCKED } else { u.mantissa });
+            exponents.push(u.exponent);
+        }
+        Self::narrowest(mantissas, exponents)
+    }
+
     /// Stores mantissas, which may be 0 or [`BLOCKED`], with a common exponent if an `f64` holds
     /// all values.
     pub(crate) fn narrowest(mut mantissas: Vec<f64>, exponents: Vec<i32>) -> Self {

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use crate::{
     Cancellation, Domain, Field, Method, SolveError,
-    multifrontal::{self, BreadthFirst, Budget, Tree, Workspace},
+    multifrontal::{self, Budget, Workspace},
     verification,
 };
 
@@ -18,12 +18,11 @@ use crate::{
 pub fn solve_exactly(domain: &Domain) -> Result<Field, SolveError> {
     let cancellation = Cancellation::new();
     let budget = Budget::of(domain, u64::MAX);
-    let pass = BreadthFirst::from_target(domain, &budget, &cancellation)?;
-    let tree = Tree::of(&pass, &budget, &cancellation)?;
+    let ordered = multifrontal::order(domain, &budget, &cancellation)?;
     let mut workspace = Workspace::default();
     let store =
-        multifrontal::solve(domain, (&pass, &tree), None, &budget, &mut workspace, &cancellation)?;
-    let store = multifrontal::relax(domain, &pass, &store);
+        multifrontal::solve(domain, &ordered, None, &budget, &mut workspace, &cancellation)?;
+    let store = multifrontal::relax(domain, &ordered.0, &store);
     let check = verification::check(domain, &store, NonZeroUsize::MIN);
     Ok(Field::new(domain, store, &check, Method::Multifrontal))
 }

@@ -22,7 +22,7 @@ use common::{
 use glam::DVec2;
 use harmonic::{Cell, Change, Domain, Field, Guidance, SolveError};
 
-use super::output::Job;
+use super::output::{Job, Solved};
 use crate::view::{View, field_cell};
 
 /// Limit of cells (512 x 512) for a solve within the step; larger maps are solved in the
@@ -51,10 +51,10 @@ enum State {
 
 #[derive(Debug)]
 pub(super) struct Live {
-    pub(super) frame: GridFrame,
-    pub(super) map: Domain,
+    pub frame: GridFrame,
+    pub map: Domain,
     /// Field of `map` or of an older one; shared with its snapshots.
-    pub(super) field: Arc<Field>,
+    pub field: Arc<Field>,
     /// Version of an outdated field.
     field_version: u64,
     /// Whether the field leads to the previous target and must not be followed.
@@ -78,12 +78,9 @@ impl Live {
         }
     }
 
-    pub(super) fn is_small(&self) -> bool {
-        self.frame.area() <= SMALL_CELLS
-    }
-
-    pub(super) fn is_current(&self) -> bool {
-        self.state == State::Current
+    /// Returns whether the field is outdated and the step itself solves the newest map.
+    pub(super) fn is_solved_here(&self) -> bool {
+        self.frame.area() <= SMALL_CELLS && self.state != State::Current
     }
 
     pub(super) fn map_changed(&mut self, before: u64) {
@@ -113,22 +110,24 @@ impl Live {
         Some(Job { number, domain })
     }
 
-    pub(super) fn awaits(&self, number: u64) -> bool {
-        matches!(self.state, State::Solving { job, .. } if job == number)
+    /// Takes the result of a job and returns whether it was awaited.
+    pub(super) fn take(&mut self, solved: Solved) -> Result<bool, SolveError> {
+        match self.state {
+            State::Solving { job, version, changed } if job == solved.number => {
+                self.follow(solved.field?);
+                self.field_version = version;
+                if changed {
+                    self.state = State::Stale;
+                }
+                Ok(true)
+            }
+            _ => Ok(false),
+        }
     }
 
-    pub(super) fn solved(&mut self, field: Arc<Field>) {
-        let State::Solving { version, changed, .. } = self.state else {
-            return;
-        };
+    /// Follows the field of the newest map.
+    pub(super) fn follow(&mut self, field: Arc<Field>) {
         self.field = field;
-        self.field_version = version;
-        self.leads_elsewhere = false;
-        self.state = if changed { State::Stale } else { State::Current };
-    }
-
-    pub(super) fn solve(&mut self, field: Field) {
-        self.field = Arc::new(field);
         self.leads_elsewhere = false;
         self.state = State::Current;
     }
@@ -143,7 +142,7 @@ impl Live {
     /// Returns status and direction at `pose`; `None` where the field must not be followed.
     pub(super) fn guide(
         &self,
-        robot: &Robot,
+        mission: &Mission,
         pose: &Pose2,
         target: DVec2,
         cells: &[u8],
@@ -170,9 +169,10 @@ impl Live {
             // The newest map may have a way.
             (_, GuidanceStatus::Unreachable) => false,
             _ => {
-                let way = view.way(pose.position, direction, robot.ahead_m);
+                let way = view.way(pose.position, direction, mission.speed_m_s() * AHEAD_S);
+                let radius_m = mission.body().radius_m;
                 let mut points = std::iter::once(pose.position).chain(way);
-                !points.any(|at| view.has_changed(at, robot.radius_m))
+                !points.any(|at| view.has_changed(at, radius_m))
             }
         };
         follow.then_some((status, direction))
@@ -180,10 +180,6 @@ impl Live {
 
     pub(super) fn view<'a>(&'a self, cells: &'a [u8]) -> View<'a> {
         View { frame: self.frame, cells, field: &self.field, refused: &self.refused }
-    }
-
-    pub(super) fn is_refused(&self, cell: grid::Cell) -> bool {
-        self.refused.get(self.frame.index(cell)).is_some_and(|it| *it)
     }
 
     pub(super) fn refuse(&mut self, cells: &[grid::Cell], version: u64) -> Result<(), SolveError> {
@@ -218,26 +214,15 @@ impl Live {
     }
 
     pub(super) fn changes_in(&self, window: Window, cells: &[u8]) -> Vec<Change> {
+        let view = self.view(cells);
         let changed = window.cells().filter_map(|cell| {
-            let blocked = is_hazard(cells[self.frame.index(cell)]) || self.is_refused(cell);
+            let blocked = is_hazard(cells[self.frame.index(cell)]) || view.is_refused(cell);
             let cell = field_cell(cell);
             // The target's cell counts as free.
             let changed = cell != self.map.target() && blocked != self.map.is_blocked(cell);
             changed.then_some(Change { cell, blocked })
         });
         changed.collect()
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Robot {
-    radius_m: f64,
-    ahead_m: f64,
-}
-
-impl Robot {
-    pub(super) fn new(mission: &Mission) -> Self {
-        Self { radius_m: mission.body().radius_m, ahead_m: mission.speed_m_s() * AHEAD_S }
     }
 }
 

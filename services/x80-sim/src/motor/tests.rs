@@ -17,8 +17,8 @@ fn run(motor: &mut Motor, from: f64, seconds: f64) -> Vec<f64> {
     (0..steps)
         .map(|step| {
             let counts = motor.step(from + step as f64 * DT, DT, &mut noise);
-            motor.turn(counts);
-            motor.speed()
+            motor.turned += counts;
+            motor.speed
         })
         .collect()
 }
@@ -28,8 +28,8 @@ fn a_velocity_command_alone_turns_the_wheel_and_ends_in_time() {
     let mut motor = Motor::new(ideal(), 2000.0);
     motor.order(Quantity::Velocity, 400, Some(0.5));
     run(&mut motor, 0.0, 2.0);
-    assert!((motor.turned() - 200.0).abs() < 1e-6, "{}", motor.turned());
-    assert_eq!(motor.speed(), 0.0);
+    assert!((motor.turned - 200.0).abs() < 1e-6, "{}", motor.turned);
+    assert_eq!(motor.speed, 0.0);
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn a_position_is_reached_the_shorter_way_round_and_held() {
     let mut motor = Motor::new(ideal(), 2000.0);
     motor.order(Quantity::Position, 32_700, None);
     run(&mut motor, 0.0, 4.0);
-    assert!((motor.turned() + 68.0).abs() < 0.5, "{}", motor.turned());
+    assert!((motor.turned + 68.0).abs() < 0.5, "{}", motor.turned);
 }
 
 #[test]
@@ -86,9 +86,9 @@ fn a_timed_position_is_reached_to_the_last_count_by_a_measured_loop() {
         let mut motor = Motor::new(physics, 2000.0);
         motor.order(Quantity::Position, way, Some(1.0));
         run(&mut motor, 0.0, 4.0);
-        let off = motor.turned() - f64::from(way);
+        let off = motor.turned - f64::from(way);
         assert!(off.abs() < 1.5, "{way}: {off}");
-        assert_eq!(motor.speed(), 0.0, "{way}");
+        assert_eq!(motor.speed, 0.0, "{way}");
     }
 }
 
@@ -114,7 +114,7 @@ fn suspending_stops_and_resuming_does_not_start() {
     motor.enable(false);
     motor.enable(true);
     run(&mut motor, 0.0, 1.0);
-    assert_eq!(motor.turned(), 0.0);
+    assert_eq!(motor.turned, 0.0);
 }
 
 #[test]

@@ -117,11 +117,11 @@ fn the_multimedia_board_acknowledges_and_moves_nothing() {
     assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Other);
     assert_eq!(replies.len(), 10, "an acknowledgement");
     robot.advance_to(1.0);
-    assert_eq!(robot.motor(0).map(Motor::turned), Some(0.0));
+    assert_eq!(robot.motors[0].turned, 0.0);
     let frame = Frame { rid: 1, ..frame };
     assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Motion);
     robot.advance_to(2.0);
-    assert!(robot.motor(0).is_some_and(|motor| motor.turned() > 0.0));
+    assert!(robot.motors[0].turned > 0.0);
 }
 
 #[test]
@@ -227,15 +227,15 @@ fn a_silent_host_stops_the_motors_only_where_the_mission_says_so() {
 }
 
 fn motor_speed(robot: &Robot) -> f64 {
-    robot.motor(1).unwrap().speed()
+    robot.motors[1].speed
 }
 
 #[test]
 fn enabling_and_a_speed_reach_their_channel() {
     let mut robot = robot("");
-    assert!(!robot.motor(5).unwrap().enabled(), "it boots suspended");
+    assert!(!robot.motors[5].enabled, "it boots suspended");
     send(&mut robot, Command::Enable { on: true, channel: None });
-    assert!(robot.motor(5).unwrap().enabled());
+    assert!(robot.motors[5].enabled);
     let other = Motion {
         quantity: Quantity::Velocity,
         targets: Targets::One { channel: 4, value: 100 },
@@ -365,7 +365,7 @@ proptest! {
             prop_assert_eq!(replies.is_empty(), heard == Heard::Ack);
             let due = robot.next_tick_s();
             robot.advance_to_next_tick();
-            prop_assert_eq!(robot.time_s(), due);
+            prop_assert_eq!(robot.time, due);
             let ground_truth = robot.ground_truth();
             prop_assert!(ground_truth.clearance_m >= -1e-9, "{:?}", ground_truth);
             prop_assert!(ground_truth.x.is_finite() && ground_truth.y.is_finite() && ground_truth.heading.is_finite());

@@ -10,19 +10,19 @@ use common::{
     checkpoint::Checkpoint,
     clock::Pace,
     ground_truth::GroundTruthHeader,
-    json_wire::{Lines, Order, parse},
+    json_wire::{Lines, line, parse},
     mission::{Mission, Protocol},
-    wire::{Decoder, Frame},
+    wire::Decoder,
 };
 use rplidar_protocol::START;
 use serde::Serialize;
 
 use super::meeting::Meeting;
 use crate::{
-    arduino_words::{Request, Requests},
+    arduino_words::Requests,
     error::Result,
     radio::Radio,
-    robot::{Heard, Robot},
+    robot::{Heard, Robot, Said},
     transport::{Source, Way},
 };
 
@@ -52,7 +52,7 @@ pub(super) struct Session {
     heard: Instant,
     strangers: u64,
     /// Decoders of the peer and one other source: partial frames must stay apart.
-    decoders: Vec<SourceDecoder>,
+    decoders: Vec<(Source, Words)>,
     /// Transport of the RPLIDAR; none if it uses the robot's address.
     laser_way: Option<Way>,
     laser_peer: Option<Source>,
@@ -62,11 +62,6 @@ pub(super) struct Session {
     ground_truth: Option<Box<dyn Write + Send>>,
     meeting: Option<Meeting>,
     checkpoint: Option<Checkpoint>,
-}
-
-struct SourceDecoder {
-    source: Source,
-    words: Words,
 }
 
 enum Words {
@@ -82,31 +77,6 @@ impl Words {
             Protocol::Arduino => Self::Arduino(Requests::default()),
             // ROS 2 robots are external: their missions have an address.
             Protocol::Json | Protocol::Ros2 => Self::Json(Lines::default()),
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Said<'a> {
-    Frame(&'a Frame<'a>),
-    Order(&'a Order),
-    Request(Request),
-}
-
-impl Said<'_> {
-    fn kind(self) -> Heard {
-        match self {
-            Self::Frame(frame) => Robot::kind(frame),
-            Self::Order(order) => Robot::kind_of(order),
-            Self::Request(request) => Robot::kind_of_request(request),
-        }
-    }
-
-    fn told(self, robot: &mut Robot, answer: &mut Vec<u8>) -> Heard {
-        match self {
-            Self::Frame(frame) => robot.on_frame(frame, answer),
-            Self::Order(order) => robot.on_order(order, answer),
-            Self::Request(request) => robot.on_request(request, answer),
         }
     }
 }
@@ -178,7 +148,8 @@ impl Session {
     /// Returns the mission time of the next self-triggered event.
     pub(super) fn next_due_s(&self) -> f64 {
         let flight = self.radio.as_ref().and_then(Radio::next_due);
-        let laser = self.robot.is_scanning().then_some(self.gathered_s + GATHERS_S);
+        let scanning = self.robot.rplidar.as_ref().filter(|rplidar| rplidar.is_scanning());
+        let laser = scanning.map(|_| self.gathered_s + GATHERS_S);
         flight.into_iter().chain(laser).fold(self.next_tick_s(), f64::min)
     }
 
@@ -190,16 +161,18 @@ impl Session {
     }
 
     fn send_measured(&mut self) {
-        self.gathered_s = self.robot.time_s();
+        self.gathered_s = self.robot.time;
         let measured = self.robot.laser_measured();
         self.send_laser(&measured);
     }
 
     fn hear_laser(&mut self, source: Source, bytes: &[u8]) {
         self.laser_peer = Some(source);
-        self.gathered_s = self.robot.time_s();
-        let answers = self.robot.on_laser(bytes);
-        self.send_laser(&answers);
+        self.gathered_s = self.robot.time;
+        if let Some(rplidar) = &mut self.robot.rplidar {
+            let answers = rplidar.answer(bytes, self.gathered_s);
+            self.send_laser(&answers);
+        }
     }
 
     /// Takes up to `most` received pieces; `now` is mission time, if there is a clock.
@@ -223,7 +196,7 @@ impl Session {
             };
             let opened = self.way.take_opened();
             // Messages of the robot protocols begin differently.
-            let is_laser = self.robot.has_rplidar()
+            let is_laser = self.robot.rplidar.is_some()
                 && (self.laser_peer == Some(source) || bytes.starts_with(&[START]))
                 && self.laser_way.is_none();
             if let Some(now) = now() {
@@ -231,7 +204,7 @@ impl Session {
                 if opened {
                     self.robot.on_opened();
                 }
-                let now = self.robot.time_s();
+                let now = self.robot.time;
                 if let Some(radio) = self.radio.as_mut().filter(|_| !is_laser) {
                     radio.send(now, Leg::ToRobot(source), bytes);
                     continue;
@@ -248,7 +221,7 @@ impl Session {
 
     fn meet(&mut self) -> Result {
         if let Some(meeting) = &mut self.meeting {
-            self.robot.meet(meeting.other_at(self.robot.time_s())?);
+            self.robot.meet(meeting.other_at(self.robot.time)?);
         }
         Ok(())
     }
@@ -257,7 +230,7 @@ impl Session {
     pub(super) fn pass(&mut self, now: f64) -> Result {
         self.meet()?;
         // The shell's clock waits, so a delay beyond a period is dropped.
-        let now = now.min(self.next_tick_s() + self.robot.period_s());
+        let now = now.min(self.next_tick_s() + 1.0 / self.robot.rate_hz);
         loop {
             let due = self.next_due_s();
             if due > now {
@@ -279,7 +252,7 @@ impl Session {
     /// Advances to the next tick, writes its ground truth and sends its frames.
     fn tick(&mut self) -> Result {
         let frames = self.measured()?;
-        self.peer()?;
+        self.peer = self.way.connected()?.or(self.peer);
         self.send(&frames);
         Ok(())
     }
@@ -289,7 +262,7 @@ impl Session {
     fn tick_until_heard(&mut self) -> Result {
         for _ in 0..MOST_UNHEARD {
             let frames = self.measured()?;
-            let now = self.robot.time_s();
+            let now = self.robot.time;
             let radio = self.radio.as_mut();
             if !radio.is_some_and(|radio| radio.loses_tick(now)) {
                 let (first, second) = match &mut self.radio {
@@ -316,12 +289,10 @@ impl Session {
     }
 
     fn hear(&mut self, source: Source, bytes: &[u8]) -> Result {
-        let known = self.decoders.iter().position(|heard| heard.source == source);
-        let mut heard = known.map_or_else(
-            || SourceDecoder { source, words: Words::of(self.protocol) },
-            |at| self.decoders.swap_remove(at),
-        );
-        match &mut heard.words {
+        let known = self.decoders.iter().position(|(heard, _)| *heard == source);
+        let mut words =
+            known.map_or_else(|| Words::of(self.protocol), |at| self.decoders.swap_remove(at).1);
+        match &mut words {
             Words::X80(decoder) => {
                 decoder.push(bytes);
                 while let Some(frame) = decoder.next_frame() {
@@ -345,11 +316,11 @@ impl Session {
         // At most one source besides the peer is stored.
         if self.peer != Some(source) {
             let peer = self.peer;
-            self.decoders.retain(|other| Some(other.source) == peer);
+            self.decoders.retain(|(other, _)| Some(*other) == peer);
         } else if self.decoders.len() > 1 {
             self.decoders.remove(0);
         }
-        self.decoders.push(heard);
+        self.decoders.push((source, words));
         Ok(())
     }
 
@@ -365,45 +336,34 @@ impl Session {
             }
             return Ok(());
         }
-        match said.kind() {
-            Heard::Foreign => {}
+        let kind = said.kind();
+        if kind == Heard::Foreign {
+            return Ok(());
+        }
+        self.peer = Some(source);
+        if kind == Heard::Motion
+            && let Some(radio) = &mut self.radio
+        {
             // The period passes even if the radio loses or delays the command.
-            Heard::Motion => {
-                self.peer = Some(source);
-                let now = self.robot.time_s();
-                let lost = self.radio.as_mut().is_some_and(|radio| radio.loses(now));
-                if !lost {
-                    if let Some(radio) = &mut self.radio {
-                        let both_ways = radio.delay() + radio.delay();
-                        self.robot.advance_to((now + both_ways).min(self.next_tick_s()));
-                    }
-                    said.told(&mut self.robot, &mut answer);
-                    self.deliver(&answer);
-                }
-                self.tick_until_heard()?;
+            let now = self.robot.time;
+            if radio.loses(now) {
+                return self.tick_until_heard();
             }
+            let both_ways = radio.delay() + radio.delay();
+            self.robot.advance_to((now + both_ways).min(self.next_tick_s()));
+        }
+        said.told(&mut self.robot, &mut answer);
+        self.deliver(&answer);
+        match kind {
+            Heard::Motion => self.tick_until_heard()?,
             Heard::Ping => {
-                self.peer = Some(source);
-                said.told(&mut self.robot, &mut answer);
-                self.deliver(&answer);
                 let mut frames = Vec::with_capacity(256);
                 self.robot.repeat(&mut frames);
                 self.deliver(&frames);
             }
-            Heard::Ack | Heard::Other => {
-                self.peer = Some(source);
-                said.told(&mut self.robot, &mut answer);
-                self.deliver(&answer);
-            }
+            _ => {}
         }
         Ok(())
-    }
-
-    fn peer(&mut self) -> Result<Option<Source>> {
-        if let Some(connected) = self.way.connected()? {
-            self.peer = Some(connected);
-        }
-        Ok(self.peer)
     }
 
     /// Returns whether `source` is the served host, or may replace it after its silence.
@@ -422,7 +382,7 @@ impl Session {
     }
 
     fn send(&mut self, bytes: &[u8]) {
-        let now = self.robot.time_s();
+        let now = self.robot.time;
         match (&mut self.radio, self.peer) {
             (Some(radio), Some(peer)) if !bytes.is_empty() => {
                 radio.send(now, Leg::ToHost(peer), bytes);
@@ -452,13 +412,7 @@ impl Session {
             return;
         };
         // One write per line: a pipe write costs far more than its bytes.
-        let written = serde_json::to_vec(record)
-            .map_err(std::io::Error::from)
-            .and_then(|mut line| {
-                line.push(b'\n');
-                ground_truth.write_all(&line)
-            })
-            .and_then(|()| ground_truth.flush());
+        let written = ground_truth.write_all(&line(record)).and_then(|()| ground_truth.flush());
         if let Err(error) = written {
             tracing::warn!(%error, "the ground truth has lost its reader; the robot continues without one");
             self.ground_truth = None;

@@ -42,14 +42,16 @@ impl Tcp {
                 self.connection = Some(connection);
                 Ok(())
             }
-            Err(error) => match error.kind() {
-                ErrorKind::WouldBlock | ErrorKind::Interrupted | ErrorKind::ConnectionAborted => {
-                    Ok(())
-                }
-                _ => Err(error),
-            },
+            Err(error) if is_passing(&error) || error.kind() == ErrorKind::ConnectionAborted => {
+                Ok(())
+            }
+            Err(error) => Err(error),
         }
     }
+}
+
+fn is_passing(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
 impl Wire for Tcp {
@@ -68,19 +70,12 @@ impl Wire for Tcp {
             return Ok(None);
         };
         match connection.read(buffer) {
-            Ok(0) => {
-                self.connection = None;
-                Ok(None)
-            }
-            Ok(length) => Ok(Some((Source::Connection(self.accepted), length))),
-            Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(None),
-            Err(error) if error.kind() == ErrorKind::Interrupted => Ok(None),
+            Ok(length @ 1..) => return Ok(Some((Source::Connection(self.accepted), length))),
+            Err(error) if is_passing(&error) => {}
             // The robot outlives a vanished host.
-            Err(_) => {
-                self.connection = None;
-                Ok(None)
-            }
+            Ok(0) | Err(_) => self.connection = None,
         }
+        Ok(None)
     }
 
     fn take_opened(&mut self) -> bool {

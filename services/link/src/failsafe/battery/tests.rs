@@ -10,9 +10,9 @@ fn batteries(limits: BatteryLimits) -> Batteries {
 }
 
 impl Batteries {
-    fn at(&mut self, seconds: f64, volts: [f64; 3]) -> ([bool; 3], Vec<(Pack, Charge)>) {
+    fn at(&mut self, seconds: f64, volts: [f64; 3]) -> ([bool; 3], Vec<(&'static str, Charge)>) {
         self.read(volts, MissionTime::from_seconds(seconds));
-        let changes = self.take_changes().into_iter();
+        let changes = std::mem::take(&mut self.changes).into_iter();
         let changes = changes.map(|change| (change.pack, change.charge));
         (self.low(), changes.collect())
     }
@@ -26,10 +26,10 @@ fn a_low_battery_is_said_once_and_gives_enough_again_only_clearly_above_its_limi
         (low, changes)
     };
     assert_eq!(at(6.7), (false, vec![]));
-    assert_eq!(at(6.5), (true, vec![(Pack::Board, Charge::Low)]));
+    assert_eq!(at(6.5), (true, vec![("board", Charge::Low)]));
     assert_eq!(at(6.4), (true, vec![]));
     assert_eq!(at(6.8), (true, vec![]), "it recovers while nothing turns");
-    assert_eq!(at(7.0), (false, vec![(Pack::Board, Charge::Enough)]));
+    assert_eq!(at(7.0), (false, vec![("board", Charge::Enough)]));
 }
 
 #[test]

@@ -1,5 +1,5 @@
 use super::*;
-use common::samples::HoldReason;
+use common::samples::{ContactSample, HoldReason};
 use std::path::Path;
 
 /// Frame period at 7 Hz, seconds.
@@ -271,7 +271,7 @@ fn held(current: impl Fn(bool) -> [u16; 2]) -> (Vec<(f64, ContactSample)>, Suspe
         let now = MissionTime::from_seconds(time);
         odometry.contacts.take_currents(current(told_to_stand));
         odometry.plausible([7, 7], now);
-        contacts.extend(odometry.take_contact().map(|contact| (time, contact)));
+        contacts.extend(odometry.contacts.new.take().map(|contact| (time, contact)));
         if let Some(suspicion) = suspicion(&odometry) {
             return (contacts, Some((time, suspicion)));
         }
@@ -320,7 +320,7 @@ fn a_current_that_is_high_on_rolling_wheels_is_no_sign_of_held_ones() {
         } else {
             odometry.plausible([0; 2], now);
         }
-        assert_eq!(odometry.take_contact().map(|contact| contact.left), None);
+        assert_eq!(odometry.contacts.new.take().map(|contact| contact.left), None);
         if suspicion(&odometry).is_some() {
             suspected.get_or_insert(time);
         }
@@ -341,7 +341,7 @@ fn one_held_wheel_is_a_contact_at_its_side_and_behind_a_robot_that_backs() {
             let current = held.map(|held| if held { HELD_AD } else { ROLLS_AD });
             odometry.contacts.take_currents(current);
             odometry.plausible(turned, now);
-            if let Some(contact) = odometry.take_contact() {
+            if let Some(contact) = odometry.contacts.new.take() {
                 return contact;
             }
             odometry.commanded(told, now);

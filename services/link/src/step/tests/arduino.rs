@@ -48,15 +48,15 @@ impl Scene {
     fn driving() -> Self {
         let mut scene = Self::at(Pace::Rate(1.0));
         scene.run(2000);
-        assert_eq!(scene.link.decision(), Decision::GO);
+        assert_eq!(scene.link.decision, Decision::GO);
         assert!(scene.speed > 0);
         scene
     }
 
     fn event(&mut self, event: Event<'_>) {
         let machine_ns = self.ms * MS;
-        let now = match self.link.state().pace {
-            Pace::Max => self.link.state().next_tick * POLL_MS * MS,
+        let now = match self.link.state.pace {
+            Pace::Max => self.link.state.next_tick * POLL_MS * MS,
             Pace::Rate(_) => (machine_ns as f64 * self.rate) as u64,
         };
         let now = MissionTime(now);
@@ -169,7 +169,7 @@ fn answers_later_than_a_command_lasts_begin_no_tick_and_the_robot_stands() {
     scene.ticks = Vec::new();
     scene.run(2000);
     assert_eq!((&scene.ticks[..], scene.speed), (&[][..], 0));
-    assert!(scene.link.decision().stops());
+    assert!(scene.link.decision.stops());
 }
 
 #[test]
@@ -182,7 +182,7 @@ fn one_garbled_line_costs_three_ticks_and_no_more() {
     let before = scene.ticks.len();
     scene.run(1000);
     assert!(usual - (scene.ticks.len() - before) <= 3, "{usual}");
-    assert_eq!(scene.link.decision(), Decision::GO);
+    assert_eq!(scene.link.decision, Decision::GO);
 }
 
 #[test]
@@ -194,5 +194,5 @@ fn in_lockstep_each_command_and_ping_is_followed_by_one_poll_and_one_tick() {
     assert!(commands >= 20, "{:?}", scene.sent);
     assert_eq!(scene.ticks, (0..scene.ticks.len() as u64).collect::<Vec<_>>());
     assert!(scene.rounds().len().abs_diff(scene.ticks.len()) <= 1, "{:?}", scene.sent);
-    assert!(scene.link.tally().repeated_ticks == 0);
+    assert!(scene.link.tally.repeated_ticks == 0);
 }

@@ -12,7 +12,7 @@ fn in_lockstep_no_command_is_sent_again() {
     for now in (0..90).step_by(10) {
         assert_eq!(timed(&link.at(Event::Quiet, now * MS)), []);
     }
-    assert_eq!(link.tally().repeated_commands, 0);
+    assert_eq!(link.tally.repeated_commands, 0);
 }
 
 #[test]

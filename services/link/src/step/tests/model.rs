@@ -125,6 +125,7 @@ fn copy(link: &Link) -> Link {
         state: link.state,
         base: Box::new(X80::new(&MISSION)),
         drivers: Vec::new(),
+        effects: Vec::new(),
         sensors: link.sensors.clone(),
         speeds: link.speeds.clone(),
         failsafe: link.failsafe.clone(),
@@ -199,7 +200,7 @@ impl World {
         if let Some(since) = self.cause_since
             && self.now_ns - since > self.cause.1 * MS
         {
-            let decision = self.link.decision();
+            let decision = self.link.decision;
             assert!(decision.stops(), "{:?} holds: {decision:?}, {:?}", self.cause, self.history);
         }
         if !self.has(Cause::RobotLost) {
@@ -354,7 +355,7 @@ impl World {
     }
 
     fn restart_link(&mut self) {
-        self.link = started(self.now_ns, self.link.state().next_tick);
+        self.link = started(self.now_ns, self.link.state.next_tick);
         self.supervisor.said = None;
         if self.has(Cause::BatteryEmpty) {
             // The next link must see it again; the supervisor ended the mission.
@@ -371,7 +372,7 @@ impl World {
         let all = &link.failsafe.monitors;
         let applied: Vec<_> = TABLE.iter().map(|row| link.failsafe.applied(row.cause)).collect();
         let does_not_stop = all.stop.condition(Cause::RobotDoesNotStop, moment);
-        let presence = (all.presence.connected(), all.presence.is_silent(self.now_ns));
+        let presence = (all.presence.connected, all.presence.is_silent(self.now_ns));
         // The last send's time matters only for late acknowledgements.
         let latency = format!("{:?}", all.latency);
         let latency = latency.split("came_late").last();
@@ -388,7 +389,7 @@ impl World {
         let held_ns = self.cause_since.map(|since| self.now_ns - since);
         let state = (
             (&all.orders, presence, latency, &all.battery, all.streams.motor_frames(self.now_ns)),
-            (does_not_stop == Condition::Holds, all.stop.method(), applied, link.decision),
+            (does_not_stop == Condition::Holds, all.stop.method, applied, link.decision),
             (link.repeat.map(|repeat| repeat.due <= link.now), link.open.is_some()),
             (command(link.newest_command), command(self.old), command(self.newest)),
             (self.is_marked, supervisor.is_starting, supervisor.operator_stop, asked, in_order),

@@ -51,16 +51,16 @@ fn a_robot_whose_counts_stay_while_it_is_told_to_drive_stands_in_time_and_its_mi
 fn an_operators_stop_and_resume_let_a_suspected_robot_go_on_and_its_wait_is_no_end() {
     let mut link = driving(on_the_wall());
     drive(&mut link, 0..10, |_| datagram(255, 0, 0));
-    assert_eq!(link.decision().cause, Cause::OdometryImplausible);
+    assert_eq!(link.decision.cause, Cause::OdometryImplausible);
     let stop = Event::Order(Order::Hold, HoldReason::Operator);
     for number in 10..100 {
         link.at(stop, number * PERIOD_NS);
         link.at(Event::Datagram(&datagram(255, 0, 0)), number * PERIOD_NS);
     }
-    assert_eq!(link.decision().cause, Cause::OperatorStop);
+    assert_eq!(link.decision.cause, Cause::OperatorStop);
     assert!(link.is_at_rest());
     drive(&mut link, 100..101, |_| datagram(255, 0, 0));
-    assert_eq!(link.decision(), Decision::GO);
+    assert_eq!(link.decision, Decision::GO);
 }
 
 #[test]
@@ -108,7 +108,7 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
         link.at(Event::Datagram(&frames), number * PERIOD_NS);
     }
     assert!(link.is_at_rest());
-    assert_eq!(link.decision().cause, Cause::OperatorStop);
+    assert_eq!(link.decision.cause, Cause::OperatorStop);
     let now = 36 * PERIOD_NS;
     link.at(Event::Order(Order::Drive, HoldReason::None), now);
     link.at(Event::Datagram(&datagram(255, 2320, 29_680)), now);
@@ -130,10 +130,10 @@ fn a_sonar_that_says_0_holds_the_robot_until_its_next_reading_and_255_is_one() {
     };
     let last_reading = 4 * PERIOD_NS / MS;
     assert!((750..900).contains(&(when - last_reading)), "{decisions:?}");
-    let stopped_at = link.decision().cause;
+    let stopped_at = link.decision.cause;
     assert_eq!(stopped_at, Cause::RangeSilent);
     drive(&mut link, 20..21, |number| obeying(255, number));
-    assert_eq!(link.decision(), Decision::GO);
+    assert_eq!(link.decision, Decision::GO);
 }
 
 #[test]
@@ -213,15 +213,15 @@ fn on_the_wall_clock_a_second_command_for_a_tick_reaches_the_robot_too() {
         let told = velocities(&link.at(Event::Command(answer), PERIOD_NS + MS));
         assert_eq!(told[0][1], Some((speed / TURN * 1200.0) as i16));
     }
-    assert_eq!(link.tally().commands, 2);
+    assert_eq!(link.tally.commands_out, 2);
 }
 
 #[test]
 fn a_suspicion_outlasts_a_hold_that_is_no_operators() {
     let mut link = driving(on_the_wall());
     drive(&mut link, 0..10, |_| datagram(255, 0, 0));
-    assert_eq!(link.decision().cause, Cause::OdometryImplausible);
+    assert_eq!(link.decision.cause, Cause::OdometryImplausible);
     link.at(Event::Order(Order::Hold, HoldReason::StageHeld), 10 * PERIOD_NS);
     link.at(Event::Order(Order::Drive, HoldReason::None), 11 * PERIOD_NS);
-    assert_eq!(link.decision().cause, Cause::OdometryImplausible);
+    assert_eq!(link.decision.cause, Cause::OdometryImplausible);
 }

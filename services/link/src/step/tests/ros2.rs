@@ -76,7 +76,7 @@ impl Scene {
             refused: Vec::new(),
         };
         scene.run(2000);
-        assert_eq!(scene.link.decision(), Decision::GO);
+        assert_eq!(scene.link.decision, Decision::GO);
         assert!(scene.told[0] > 0.1 && scene.pose[0] > 0.1);
         (scene.decided, scene.sent) = (Vec::new(), Vec::new());
         scene
@@ -167,7 +167,7 @@ impl Scene {
     }
 
     fn holds(&self, cause: Cause) {
-        let decision = self.link.decision();
+        let decision = self.link.decision;
         assert_eq!((decision.action, decision.cause), (Action::Stop, cause), "{:?}", self.decided);
         assert_eq!(self.told, [0.0; 2]);
     }
@@ -186,7 +186,7 @@ fn beside_another_commander_the_robot_is_told_to_stand_after_each_of_its_command
         scene.run(100);
     }
     scene.run(1000);
-    assert_eq!(scene.link.decision(), Decision::GO);
+    assert_eq!(scene.link.decision, Decision::GO);
     scene.run(100);
     assert!(scene.told[0] > 0.1);
 }
@@ -210,7 +210,7 @@ fn a_robot_that_freezes_is_lost_and_drives_on_when_it_is_back() {
     scene.holds(Cause::RobotLost);
     (scene.odometry, scene.scans) = (true, true);
     scene.run(2000);
-    assert_eq!(scene.link.decision(), Decision::GO);
+    assert_eq!(scene.link.decision, Decision::GO);
 }
 
 #[test]
@@ -255,7 +255,7 @@ fn odometry_that_jumps_once_is_no_motion_and_a_restart_of_the_counts() {
         assert_eq!(scene.wheels.restarts, restarts + 1, "{jump:?}");
         assert!(scene.refused[0].contains("odometry jumps"), "{:?}", scene.refused);
         scene.run(1000);
-        assert_eq!((scene.link.decision(), &scene.decided[..]), (Decision::GO, &[][..]));
+        assert_eq!((scene.link.decision, &scene.decided[..]), (Decision::GO, &[][..]));
         assert_eq!(scene.wheels.restarts, restarts + 1);
     }
 }
@@ -305,7 +305,7 @@ fn while_odometry_jumps_again_and_again_the_robot_stands() {
     scene.holds(Cause::OdometryImplausible);
     assert!(scene.wheels.restarts >= 19);
     scene.run(4000);
-    assert_eq!(scene.link.decision(), Decision::GO);
+    assert_eq!(scene.link.decision, Decision::GO);
 }
 
 #[test]
@@ -332,7 +332,7 @@ fn a_tick_has_the_turn_of_the_robots_gyro_which_ends_with_it() {
     scene.turns.clear();
     let from = scene.pose[2];
     scene.run(1000);
-    assert_eq!((scene.turns.len(), scene.link.decision()), (10, Decision::GO));
+    assert_eq!((scene.turns.len(), scene.link.decision), (10, Decision::GO));
     let turned: f64 = scene.turns.iter().map(|turn| turn.turn_rad).sum();
     assert!((turned - (scene.pose[2] - from)).abs() < 0.01 && turned > 0.2, "{turned}");
     assert!(scene.turns.windows(2).all(|pair| pair[1].sequence == pair[0].sequence + 1));

@@ -30,7 +30,7 @@ fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept(
     assert_eq!(mapper.state_at(0.7, 0.0), CellState::Margin);
     assert_eq!(mapper.state_at(0.5, 0.0), CellState::Scanned);
     assert_eq!(mapper.state_at(0.5, 0.5), CellState::Free);
-    assert_eq!(mapper.state().safety_events(), 1);
+    assert_eq!(mapper.state().safety_events, 1);
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
     assert!(!mapper.is_hazard(-0.5, 0.0));
     assert_eq!(mapper.state_at(-1.2, 0.0), CellState::Free);
     assert_eq!(mapper.state_at(-0.4, 0.3), CellState::Free, "it is thin");
-    assert_eq!(mapper.state().safety_events(), 1);
+    assert_eq!(mapper.state().safety_events, 1);
 }
 
 #[test]
@@ -84,14 +84,14 @@ fn an_infrared_ranger_that_sees_nothing_frees_ground_only_if_it_is_live() {
     let mut live = mapper(INFRARED);
     live.see(0, rear(0.81));
     assert_eq!(live.state_at(-0.8, 0.0), CellState::Scanned);
-    assert_eq!(live.state().safety_events(), 0);
+    assert_eq!(live.state().safety_events, 0);
     let mut dead = mapper(INFRARED);
     dead.see(0, [0; 7]);
     let mut saturated = mapper(INFRARED);
     saturated.see(0, [4095; 7]);
     for mapper in [dead, saturated] {
         assert_eq!(mapper.state_at(-0.4, 0.0), CellState::Free);
-        assert_eq!(mapper.state().safety_events(), 0);
+        assert_eq!(mapper.state().safety_events, 0);
     }
 }
 
@@ -124,7 +124,7 @@ fn without_infrared_among_the_sensors_its_readings_are_not_mapped() {
     let mut mapper = mapper("sensors = 'front'");
     mapper.see(0, rear(0.6));
     assert_eq!(mapper.state_at(-0.4, 0.0), CellState::Free);
-    assert_eq!(mapper.state().safety_events(), 0);
+    assert_eq!(mapper.state().safety_events, 0);
 }
 
 #[test]
@@ -168,7 +168,7 @@ fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
 fn an_echo_beyond_reach_is_not_mapped() {
     let mut mapper = mapper("");
     mapper.hear(0, 0.0, 0.0, Some(1.4));
-    assert_eq!(mapper.state().safety_events(), 0);
+    assert_eq!(mapper.state().safety_events, 0);
     assert_eq!(mapper.state_at(1.0, 0.0), CellState::Scanned);
 }
 
@@ -303,7 +303,7 @@ fn a_reading_that_no_sensor_can_give_is_ignored() {
     let wrong = [(200, 0.5), (0, f64::NAN), (4, f64::NAN), (5, -1.0)];
     let readings = wrong.map(|(sensor, range_m)| RangeReading { sensor, ..echo(range_m) });
     mapper.sense(PoseSample::default(), &readings);
-    assert_eq!(mapper.state().safety_events(), 0);
+    assert_eq!(mapper.state().safety_events, 0);
 }
 
 #[test]

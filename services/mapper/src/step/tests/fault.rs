@@ -15,7 +15,7 @@ fn stand(mapper: &mut Mapper, tick: u64, x_m: f64) {
 fn is_connected(mapper: &Mapper) -> bool {
     let frame = mapper.frame();
     let free =
-        |cell: Cell| !CellState::from_byte(mapper.state().cells()[frame.index(cell)]).is_hazard();
+        |cell: Cell| !CellState::from_byte(mapper.state().cells[frame.index(cell)]).is_hazard();
     let mut seen = vec![false; frame.area()];
     let mut next = vec![frame.cell_at(DVec2::ZERO).unwrap()];
     while let Some(Cell { col, row }) = next.pop() {
@@ -64,9 +64,9 @@ fn a_version_differs_from_the_one_before_in_one_window_broken_or_not() {
     let mut mapper = mapper("evidential");
     mapper.step(Input::Fault(FaultKind::HazardAroundRobot), MissionTime(0));
     for tick in 0..4 {
-        let before = (mapper.state().version(), mapper.state().cells().to_vec());
+        let before = (mapper.state().version, mapper.state().cells.to_vec());
         stand(&mut mapper, tick, 0.1 * tick as f64);
-        assert_eq!(mapper.state().version(), before.0 + 1);
-        assert_ne!(mapper.state().cells(), before.1);
+        assert_eq!(mapper.state().version, before.0 + 1);
+        assert_ne!(mapper.state().cells, before.1);
     }
 }

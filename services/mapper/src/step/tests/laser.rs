@@ -97,7 +97,7 @@ fn what_one_laser_sees_is_hazard_though_another_looks_over_it_and_both_scan_grou
     let frame = mapper.frame();
     let state = |x: f64| {
         let cell = frame.cell_at(DVec2::new(x, 0.0)).unwrap();
-        CellState::from_byte(mapper.state().cells()[frame.index(cell)])
+        CellState::from_byte(mapper.state().cells[frame.index(cell)])
     };
     assert_eq!([state(-0.6), state(0.4), state(1.4)], [CellState::Scanned; 3]);
     let mut restarted = mapper_of(&text);
@@ -242,7 +242,7 @@ fn a_scan_of_impossible_times_is_left_out() {
         Sweep { first_beam_ns: 0, beam_ns: 1, first_beam: 360 },
     ] {
         let mut mapper = mapper();
-        let before = mapper.state().cells().to_vec();
+        let before = mapper.state().cells.to_vec();
         for tick in 1..4 {
             let mut pose = at(tick, 0.0, 0.0, 0.0);
             (pose.stamp.stamp_ns, pose.v_m_s) = (tick * 100_000_000, 0.3);
@@ -250,6 +250,6 @@ fn a_scan_of_impossible_times_is_left_out() {
             mapper.give(Tick { pose, scans, ..Tick::default() });
             assert!(mapper.take_fix().is_none());
         }
-        assert_eq!(mapper.state().cells(), before, "{sweep:?}");
+        assert_eq!(mapper.state().cells, before, "{sweep:?}");
     }
 }

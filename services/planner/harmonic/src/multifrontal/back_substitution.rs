@@ -1,11 +1,8 @@
 //! Back substitution in extended range: from the factors to u, outwards from the cells with known
 //! u.
 
-use super::{breadth_first::BreadthFirst, tree::Tree, workspace::Workspace};
-use crate::{
-    Cancellation, Domain, Scaled, SolveError,
-    store::{BLOCKED, Store},
-};
+use super::{Ordered, breadth_first::BreadthFirst, workspace::Workspace};
+use crate::{Cancellation, Domain, Scaled, SolveError, store::Store};
 
 /// Binary orders of magnitude up to which a front uses plain `f64` with one common exponent.
 const PLAIN_SPAN: i32 = 300;
@@ -21,12 +18,12 @@ const PLAIN_LEAST: f64 = 1e-180;
 /// [`SolveError::Cancelled`].
 pub(super) fn substitute(
     domain: &Domain,
-    (pass, tree): (&BreadthFirst, &Tree),
+    (pass, tree): &Ordered,
     known: Option<&Store>,
     workspace: &mut Workspace,
     cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
-    let Workspace { factors, u, .. } = workspace;
+    let Workspace { rows, lengths, u, .. } = workspace;
     // Sorted by place, the cells of a front lie close together.
     u.clear();
     u.resize(pass.len(), Scaled::ZERO);
@@ -34,7 +31,7 @@ pub(super) fn substitute(
         u[place as usize] = known.map_or(Scaled::ONE, |known| known.u(pass.cell(place)));
     }
     let mut plain = Vec::new();
-    let (mut rows, mut lengths) = (&factors.rows[..], &factors.lengths[..]);
+    let (mut rows, mut lengths) = (&rows[..], &lengths[..]);
     for front in tree.fronts.iter().rev() {
         cancellation.check()?;
         let cells = tree.cells(front);
@@ -53,22 +50,12 @@ pub(super) fn substitute(
 }
 
 fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled], known: Option<&Store>) -> Store {
-    let (width, height) = (domain.width(), domain.height());
-    let blocked = |row: usize| domain.blocked()[row * width..(row + 1) * width].iter();
-    let at = |index: usize, place: u32| {
+    let at = |(index, &place): (usize, &u32)| {
         let known = || known.map_or(Scaled::ZERO, |known| known.u(index));
         u.get(place as usize).copied().unwrap_or_else(known)
     };
-    let mut mantissas = Vec::with_capacity(width * height);
-    let mut exponents = Vec::with_capacity(width * height);
-    for row in 0..height {
-        for ((index, &place), &blocked) in (row * width..).zip(pass.row(row)).zip(blocked(row)) {
-            let u = at(index, place);
-            mantissas.push(if blocked { BLOCKED } else { u.mantissa });
-            exponents.push(u.exponent);
-        }
-    }
-    Store::narrowest(mantissas, exponents)
+    let places = (0..domain.height()).flat_map(|row| pass.row(row));
+    Store::of(domain.blocked(), places.enumerate().map(at))
 }
 
 #[derive(Clone, Copy)]

@@ -8,10 +8,7 @@
 //! u changes by orders of magnitude per cell there.
 
 use super::breadth_first::{ABSENT, BreadthFirst};
-use crate::{
-    Domain, Scaled,
-    store::{BLOCKED, Store},
-};
+use crate::{Domain, Scaled, store::Store};
 
 /// Limit of sweeps, each in both directions.
 const SWEEPS: usize = 200;
@@ -39,7 +36,5 @@ pub(crate) fn relax(domain: &Domain, pass: &BreadthFirst, store: &Store) -> Stor
             break;
         }
     }
-    let mantissa = |(u, &blocked): (&Scaled, &bool)| if blocked { BLOCKED } else { u.mantissa };
-    let mantissas = u.iter().zip(domain.blocked()).map(mantissa).collect();
-    Store::narrowest(mantissas, u.iter().map(|u| u.exponent).collect())
+    Store::of(domain.blocked(), u.into_iter())
 }

@@ -115,12 +115,12 @@ impl Tree {
                 }
                 stages += 1;
                 let start = end.saturating_sub(shape.thickness).max(inner + 1);
-                let next = if start > inner + 1 { Next::Stage } else { Next::Separator };
+                let next = if start > inner + 1 { STAGE } else { INNER };
                 let joins = several || end - start > 1;
-                builder.add_stage(&(at(start)..at(end)), &outer, joins, next);
+                builder.add_stage(&(at(start)..at(end)), Some(&outer), joins, [STAGE, next]);
                 end = start;
             }
-            builder.add_separator(&outer, several);
+            builder.add_stage(&outer, None, several, [OUTER, INNER]);
         }
         let mut tree = builder.tree;
         tree.cost.bytes = tree.bytes(pass);
@@ -177,12 +177,11 @@ impl Cost {
     }
 }
 
-#[derive(Clone, Copy, Eq, PartialEq)]
-enum Next {
-    Stage,
-    /// Inner separator, or the target.
-    Separator,
-}
+/// What a front waits for: the next stage, or the separator outside or inside its slab, which may
+/// be the target.
+const STAGE: usize = 0;
+const OUTER: usize = 1;
+const INNER: usize = 2;
 
 struct Builder<'a> {
     pass: &'a BreadthFirst,
@@ -190,9 +189,8 @@ struct Builder<'a> {
     pieces: Pieces,
     /// Front on whose boundary a place was last put.
     seen: Vec<u32>,
-    for_stage: Vec<u32>,
-    for_outer: Vec<u32>,
-    for_inner: Vec<u32>,
+    /// Fronts without a parent, by what they wait for.
+    waiting: [Vec<u32>; 3],
 }
 
 impl<'a> Builder<'a> {
@@ -217,42 +215,35 @@ impl<'a> Builder<'a> {
             },
             pieces: Pieces::default(),
             seen: vec![NONE; pass.len()],
-            for_stage: Vec::new(),
-            for_outer: Vec::new(),
-            for_inner: Vec::new(),
+            waiting: Default::default(),
         }
     }
 
     fn begin_slab(&mut self) {
-        self.for_outer.append(&mut self.for_inner);
+        let [_, outer, inner] = &mut self.waiting;
+        outer.append(inner);
     }
 
-    /// Adds the fronts of a stage; the outer separator of its slab takes the places `outer`.
-    fn add_stage(&mut self, stage: &Range<u32>, outer: &Range<u32>, joins: bool, next: Next) {
+    /// Adds the fronts of a stage, whose children wait in `from`; they wait in `to`, but in
+    /// [`OUTER`] instead of [`INNER`] if they touch `outer`.
+    ///
+    /// The outer separator of a slab takes the places `outer`; a separator itself has `None`.
+    fn add_stage(
+        &mut self,
+        stage: &Range<u32>,
+        outer: Option<&Range<u32>>,
+        joins: bool,
+        [from, to]: [usize; 2],
+    ) {
         self.begin_pieces(stage, joins);
-        let mut waiting = std::mem::take(&mut self.for_stage);
-        self.adopt(stage, &waiting);
-        waiting.clear();
-        self.for_stage = waiting;
+        let mut children = std::mem::take(&mut self.waiting[from]);
+        self.adopt(stage, &children);
+        children.clear();
+        self.waiting[from] = children;
         for piece in 0..self.pieces.count() {
-            let (index, touches_outer) = self.add_front(piece, stage, Some(outer));
-            match next {
-                Next::Stage => self.for_stage.push(index),
-                Next::Separator if touches_outer => self.for_outer.push(index),
-                Next::Separator => self.for_inner.push(index),
-            }
-        }
-    }
-
-    fn add_separator(&mut self, separator: &Range<u32>, joins: bool) {
-        self.begin_pieces(separator, joins);
-        let mut waiting = std::mem::take(&mut self.for_outer);
-        self.adopt(separator, &waiting);
-        waiting.clear();
-        self.for_outer = waiting;
-        for piece in 0..self.pieces.count() {
-            let (index, _) = self.add_front(piece, separator, None);
-            self.for_inner.push(index);
+            let (index, touches_outer) = self.add_front(piece, stage, outer);
+            let to = if to == INNER && touches_outer { OUTER } else { to };
+            self.waiting[to].push(index);
         }
     }
 
@@ -439,7 +430,7 @@ mod tests {
         let field = |pass: BreadthFirst, known: Option<&Store>| {
             let tree = Tree::of(&pass, &budget, &none).unwrap();
             let mut workspace = Workspace::default();
-            solve(&domain, (&pass, &tree), known, &budget, &mut workspace, &none).unwrap()
+            solve(&domain, &(pass, tree), known, &budget, &mut workspace, &none).unwrap()
         };
         let right = field(BreadthFirst::from_target(&domain, &budget, &none).unwrap(), None);
         // Cells in the middle are equally far from both ends.

@@ -14,7 +14,7 @@ use super::{
     coarse::Coarse,
     grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct, first},
 };
-use crate::real::Real;
+use crate::{Cell, real::Real};
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source<R> {
@@ -22,6 +22,13 @@ pub(super) struct Source<R> {
     pub row: usize,
     pub at: usize,
     pub value: R,
+}
+
+impl<R> Source<R> {
+    pub(super) fn of(grid: &Grid, cell: Cell, value: R) -> Self {
+        let (plane, at) = grid.locate(cell.col, cell.row);
+        Self { plane, row: cell.row / 2, at, value }
+    }
 }
 
 /// Relative change of u by a coarse correction above which a cell counts as unsettled in any case.
@@ -60,26 +67,6 @@ impl<R: Real> Finest<R> {
         grid.reset(self.u.iter_mut().chain(&mut self.inverse).chain(&mut self.weights));
         self.sources.clear();
         self.scratch.reset(&grid);
-    }
-
-    /// Sets one row of cells; `inverse` is 1 / diagonal of the free ones.
-    #[inline(always)]
-    pub(super) fn set_row(&mut self, row: usize, blocked: &[bool], inverse: &[R]) {
-        let Grid { width, columns, .. } = self.grid;
-        let (plane, start) = self.grid.locate(0, row);
-        let (first, second) = self.inverse.split_at_mut(plane + 1);
-        let even = &mut first[plane][start..][..columns];
-        let odd = &mut second[0][start..][..columns];
-        let value = |col: usize| {
-            if blocked[col] { R::default() } else { inverse[col] }
-        };
-        for x in 0..width / 2 {
-            even[x] = value(2 * x);
-            odd[x] = value(2 * x + 1);
-        }
-        if width % 2 == 1 {
-            even[columns - 1] = value(width - 1);
-        }
     }
 
     /// Applies the correction from `next`, sweeps and restricts the residual.

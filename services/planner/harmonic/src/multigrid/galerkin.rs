@@ -65,19 +65,6 @@ impl<R: Real> Products<R> {
         }
     }
 
-    fn start(&mut self) {
-        let [_, corner] = &mut self.corner;
-        let [_, even_odd] = &mut self.even_odd;
-        for row in corner.iter_mut().chain(even_odd) {
-            row.fill(R::default());
-        }
-    }
-
-    fn next_row(&mut self) {
-        self.corner.swap(0, 1);
-        self.even_odd.swap(0, 1);
-    }
-
     #[inline(always)]
     fn finish_row(
         &mut self,
@@ -169,14 +156,18 @@ pub(super) fn coarsen<R: Real>(
     products: &mut Products<R>,
 ) {
     let Grid { columns: n, stride: s, .. } = fine.grid();
-    products.start();
+    let Products { corner: [_, corner], even_odd: [_, even_odd], .. } = products;
+    for row in corner.iter_mut().chain(even_odd) {
+        row.fill(R::default());
+    }
     let (zero, m) = (R::default(), MARGIN);
     let [west, east, north, south] = fine.weights();
     let we = |at: usize| [&west[at..][..n], &east[at..][..n]];
     let ns = |at: usize| [&north[at..][..n], &south[at..][..n]];
     // The row before the first contributes to the first row.
     for y in rows.start.saturating_sub(1)..rows.end {
-        products.next_row();
+        products.corner.swap(0, 1);
+        products.even_odd.swap(0, 1);
         let o = fine.grid().start(y);
         let along =
             |direction, plane, start, there| fine.along(direction, (plane, start), (EE, there), n);

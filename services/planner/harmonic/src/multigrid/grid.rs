@@ -108,6 +108,10 @@ fn zero_values<'a, R: Real>(rows: impl IntoIterator<Item = &'a mut Vec<R>>, len:
     }
 }
 
+pub(super) fn clear<R: Real>(planes: &mut Planes<R>) {
+    planes.iter_mut().for_each(|plane| plane.fill(R::default()));
+}
+
 #[derive(Debug, Default)]
 pub(super) struct Scratch<R> {
     pub correction: Vec<R>,

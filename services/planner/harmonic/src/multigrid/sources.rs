@@ -5,7 +5,7 @@ use super::{
     couplings::Level,
     finest::Finest,
     galerkin::corner_weights,
-    grid::{EE, EO, MARGIN, OE},
+    grid::{EE, EO, MARGIN, OE, clear},
 };
 use crate::real::Real;
 
@@ -18,9 +18,7 @@ pub(super) fn restrict<R: Real>(finest: &Finest<R>, coarse: &mut [Coarse<R>]) {
         spread_flow(finest, source.plane, source.at, source.value, &mut flows);
     }
     for level in coarse {
-        for plane in &mut level.f {
-            plane.fill(R::default());
-        }
+        clear(&mut level.f);
         let mut next = Vec::new();
         for &((col, row), value) in &flows {
             if col >= level.grid.width || row >= level.grid.height {

@@ -24,7 +24,8 @@ fn domain() -> Domain {
 }
 
 fn levels() -> Multigrid<f64> {
-    let mut levels = Multigrid::new(11, 9);
+    let mut levels = Multigrid::default();
+    levels.reshape(11, 9);
     levels.set_up_rows(&domain(), 0..9);
     levels
 }

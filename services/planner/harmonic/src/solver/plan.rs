@@ -5,8 +5,8 @@
 //! cost of the factorisation.
 
 use crate::{
-    Cancellation, Domain, Method, SolveError,
-    multifrontal::{BreadthFirst, Budget, Tree},
+    Cancellation, Domain, SolveError,
+    multifrontal::{BreadthFirst, Budget, Ordered, Tree},
     real::Real as _,
     store::Store,
 };
@@ -43,20 +43,8 @@ fn cycles(decades: f64) -> f64 {
     6.0 + decades / 3.5
 }
 
-pub(super) struct Plan {
-    pub methods: Vec<Method>,
-    /// Breadth-first pass and tree of fronts, if needed.
-    pub multifrontal: Option<(BreadthFirst, Tree)>,
-}
-
-impl Plan {
-    fn multigrid() -> Self {
-        use Method::{Multifrontal, MultigridDouble, MultigridSingle};
-        Self { methods: vec![MultigridSingle, MultigridDouble, Multifrontal], multifrontal: None }
-    }
-}
-
-/// Plans the methods for `domain`; beyond `budget`, the factorisation is only the last resort.
+/// Plans the methods for `domain`: returns the order of a factorisation that costs less than
+/// multigrid.
 ///
 /// # Errors
 /// [`SolveError::Cancelled`].
@@ -64,53 +52,52 @@ pub(super) fn plan(
     domain: &Domain,
     budget: &Budget,
     cancellation: &Cancellation,
-) -> Result<Plan, SolveError> {
+) -> Result<Option<Ordered>, SolveError> {
     let width = mean_width(domain);
     if width >= WIDE {
-        return Ok(Plan::multigrid());
+        return Ok(None);
     }
-    let pass = match BreadthFirst::from_target(domain, budget, cancellation) {
-        Err(SolveError::TooCostly { .. }) => return Ok(Plan::multigrid()),
-        pass => pass?,
+    let pass = BreadthFirst::from_target(domain, budget, cancellation);
+    let Some(pass) = unless_too_costly(pass)? else {
+        return Ok(None);
     };
     let cells = pass.len() as f64;
     // Runs along a passage also count; on mazes they make the mean width about 1.7 times too large.
     let passage = (width + 1.0) / 1.7 - 1.0;
     let per_cell = decades_per_cell(domain, passage);
     let decades = pass.levels.len() as f64 * per_cell;
-    let multigrid = Plan::multigrid();
     let first = SET_UP_PER_CELL + SINGLE_CYCLE_PER_CELL * cycles(decades.min(SINGLE_DECADES));
     let further = further_bands(decades / SINGLE_DECADES - 1.0, per_cell);
     let cost = domain.blocked().len() as f64 * (first + further);
     // The factorisation costs more than this on any map, so its tree is not built.
     if cost < 0.5 * MULTIFRONTAL_PER_CELL * cells {
-        return Ok(multigrid);
+        return Ok(None);
     }
-    Ok(match cheaper_tree(&pass, cost, budget, cancellation)? {
-        Some(tree) => {
-            Plan { methods: vec![Method::Multifrontal], multifrontal: Some((pass, tree)) }
-        }
-        None => multigrid,
-    })
+    if_cheaper(pass, cost, budget, cancellation)
 }
 
-/// Returns the tree of fronts for the unknown cells of `pass` if its factorisation takes at most
+fn unless_too_costly<T>(found: Result<T, SolveError>) -> Result<Option<T>, SolveError> {
+    match found {
+        Err(SolveError::TooCostly { .. }) => Ok(None),
+        found => found.map(Some),
+    }
+}
+
+/// Returns the order for the unknown cells of `pass` if its factorisation takes at most
 /// `nanoseconds`.
-fn cheaper_tree(
-    pass: &BreadthFirst,
+fn if_cheaper(
+    pass: BreadthFirst,
     nanoseconds: f64,
     budget: &Budget,
     cancellation: &Cancellation,
-) -> Result<Option<Tree>, SolveError> {
+) -> Result<Option<Ordered>, SolveError> {
     let cells = pass.unknown().len() as f64;
     let operations = (nanoseconds - MULTIFRONTAL_PER_CELL * cells) / MULTIFRONTAL_PER_OPERATION;
-    match Tree::of(pass, &budget.with_operations(operations), cancellation) {
-        Err(SolveError::TooCostly { .. }) => Ok(None),
-        tree => tree.map(Some),
-    }
+    let tree = Tree::of(&pass, &budget.with_operations(operations), cancellation);
+    Ok(unless_too_costly(tree)?.map(|tree| (pass, tree)))
 }
 
-/// Returns the cells with u below the range of single precision, and their tree of fronts.
+/// Returns the order of the cells with u below the range of single precision.
 ///
 /// Returns `None` if multigrid in bands costs less.
 ///
@@ -121,19 +108,16 @@ pub(super) fn beyond_single(
     store: &Store,
     budget: &Budget,
     cancellation: &Cancellation,
-) -> Result<Option<(BreadthFirst, Tree)>, SolveError> {
+) -> Result<Option<Ordered>, SolveError> {
     let is_known = |index: usize| store.raw(index).0 > f32::KNOWN;
-    let pass = match BreadthFirst::from_known(domain, is_known, budget, cancellation) {
-        Err(SolveError::TooCostly { .. }) => return Ok(None),
-        pass => pass?,
-    };
-    if pass.unknown().is_empty() {
+    let pass = BreadthFirst::from_known(domain, is_known, budget, cancellation);
+    let Some(pass) = unless_too_costly(pass)?.filter(|pass| !pass.unknown().is_empty()) else {
         return Ok(None);
-    }
+    };
     let per_cell = decades_per_cell(domain, pass.width());
     let bands = (pass.levels.len() as f64 * per_cell / SINGLE_DECADES).max(1.0);
     let bands = domain.blocked().len() as f64 * further_bands(bands, per_cell);
-    Ok(cheaper_tree(&pass, bands, budget, cancellation)?.map(|tree| (pass, tree)))
+    if_cheaper(pass, bands, budget, cancellation)
 }
 
 /// Returns the orders of magnitude by which u falls per cell along a passage.

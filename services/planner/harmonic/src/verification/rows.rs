@@ -12,17 +12,38 @@ pub(super) trait Window<R> {
     fn around(&mut self) -> Around<'_, R>;
 }
 
-/// Three rows of numbers with a zero at either end; blocked cells are zero.
-pub(super) struct Rows<R> {
-    above: Vec<R>,
-    here: Vec<R>,
-    below: Vec<R>,
+/// Three rows of the map with a zero at either end; blocked cells are zero.
+pub(super) struct Rows<T> {
+    above: Vec<T>,
+    here: Vec<T>,
+    below: Vec<T>,
 }
 
-impl<R: Real> Rows<R> {
+impl<T: Copy + Default> Rows<T> {
     pub(super) fn new(width: usize) -> Self {
-        let row = vec![R::default(); width + 2];
+        let row = vec![T::default(); width + 2];
         Self { above: row.clone(), here: row.clone(), below: row }
+    }
+
+    /// Moves down one row and returns the row below, which is still that above.
+    #[inline(always)]
+    fn move_down(&mut self) -> &mut [T] {
+        std::mem::swap(&mut self.above, &mut self.here);
+        std::mem::swap(&mut self.here, &mut self.below);
+        let width = self.below.len() - 2;
+        &mut self.below[1..=width]
+    }
+
+    #[inline(always)]
+    fn neighbours(&self) -> Around<'_, T> {
+        let n = self.here.len() - 2;
+        Around {
+            here: &self.here[1..][..n],
+            west: &self.here[..n],
+            east: &self.here[2..][..n],
+            north: &self.above[1..][..n],
+            south: &self.below[1..][..n],
+        }
     }
 }
 
@@ -31,11 +52,8 @@ impl<R: Real> Window<R> for Rows<R> {
 
     #[inline(always)]
     fn take(&mut self, next: Option<&[R]>) {
-        std::mem::swap(&mut self.above, &mut self.here);
-        std::mem::swap(&mut self.here, &mut self.below);
         let zero = R::default();
-        let width = self.below.len() - 2;
-        let below = &mut self.below[1..=width];
+        let below = self.move_down();
         match next {
             Some(next) => {
                 for (to, &from) in below.iter_mut().zip(next) {
@@ -48,34 +66,22 @@ impl<R: Real> Window<R> for Rows<R> {
 
     #[inline(always)]
     fn around(&mut self) -> Around<'_, R> {
-        let n = self.here.len() - 2;
-        Around {
-            here: &self.here[1..][..n],
-            west: &self.here[..n],
-            east: &self.here[2..][..n],
-            north: &self.above[1..][..n],
-            south: &self.below[1..][..n],
-        }
+        self.neighbours()
     }
 }
 
 pub(super) struct ScaledRows {
     mantissas: Rows<f64>,
-    above: Vec<i32>,
-    here: Vec<i32>,
-    below: Vec<i32>,
+    exponents: Rows<i32>,
     /// West, east, north and south neighbours, with the exponent of the cell itself.
     relative: [Vec<f64>; 4],
 }
 
 impl ScaledRows {
     pub(super) fn new(width: usize) -> Self {
-        let row = vec![0; width + 2];
         Self {
             mantissas: Rows::new(width),
-            above: row.clone(),
-            here: row.clone(),
-            below: row,
+            exponents: Rows::new(width),
             relative: std::array::from_fn(|_| vec![0.0; width]),
         }
     }
@@ -88,29 +94,27 @@ impl Window<f64> for ScaledRows {
     #[inline(always)]
     fn take(&mut self, next: Option<(&[f64], &[i32])>) {
         self.mantissas.take(next.map(|(mantissas, _)| mantissas));
-        std::mem::swap(&mut self.above, &mut self.here);
-        std::mem::swap(&mut self.here, &mut self.below);
+        let below = self.exponents.move_down();
         if let Some((_, exponents)) = next {
-            let width = self.below.len() - 2;
-            self.below[1..=width].copy_from_slice(exponents);
+            below.copy_from_slice(exponents);
         }
     }
 
     #[inline(always)]
     fn around(&mut self) -> Around<'_, f64> {
-        let u = self.mantissas.around();
+        let (u, exponents) = (self.mantissas.neighbours(), self.exponents.neighbours());
         let n = u.here.len();
-        let exponents = &self.here[1..][..n];
+        let own = &exponents.here[..n];
         let neighbours = [
-            (u.west, &self.here[..n]),
-            (u.east, &self.here[2..][..n]),
-            (u.north, &self.above[1..][..n]),
-            (u.south, &self.below[1..][..n]),
+            (u.west, exponents.west),
+            (u.east, exponents.east),
+            (u.north, exponents.north),
+            (u.south, exponents.south),
         ];
         for (into, (mantissas, theirs)) in self.relative.iter_mut().zip(neighbours) {
             let (into, mantissas, theirs) = (&mut into[..n], &mantissas[..n], &theirs[..n]);
             for x in 0..n {
-                let steps = theirs[x].saturating_sub(exponents[x]);
+                let steps = theirs[x].saturating_sub(own[x]);
                 // Zero has no exponent. A cell of zero only needs to know whether a neighbour is
                 // larger, and a neighbour of zero stays zero.
                 let known = (u.here[x] > 0.0) & (mantissas[x] > 0.0);

@@ -165,7 +165,7 @@ fn a_resumed_robot_has_the_wheels_and_the_silences_it_had() {
     let curvature = |robot: &mut Robot| {
         let before = robot.ground_truth();
         send(robot, forward(562, None));
-        robot.advance_to(robot.time_s() + 4.0);
+        robot.advance_to(robot.time + 4.0);
         let after = robot.ground_truth();
         let way = (after.x - before.x).hypot(after.y - before.y);
         (after.heading - before.heading) / way
