@@ -18,7 +18,6 @@ use nix::{
 /// Most bytes of an IP packet.
 const LARGEST: u32 = 65_535;
 
-#[derive(Clone, Copy, Debug)]
 pub struct Net<A> {
     addr: A,
     netmask: A,
@@ -35,7 +34,6 @@ impl<A: Copy> Net<A> {
 }
 
 /// Interface with one of its addresses, or without a known one.
-#[derive(Clone, Debug)]
 pub struct Interface {
     pub index: u32,
     pub mtu: Option<u32>,

@@ -10,6 +10,8 @@ pub const LONGEST_TEXT: usize = 256;
 /// Length of the encoding's name before the message.
 pub(crate) const ENCAPSULATION: usize = 4;
 
+pub type Result<T = (), E = Malformed> = std::result::Result<T, E>;
+
 #[derive(Debug, PartialEq, Eq, Error)]
 pub enum Malformed {
     #[error("its encoding is {0:#06x} instead of plain CDR; set the robot's middleware to XCDR1")]
@@ -38,20 +40,20 @@ pub trait Pass {
     fn release(&self) -> Release;
 
     /// Passes a number, least significant byte first.
-    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Malformed>;
+    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result;
 
     /// Returns the number of elements of a list, which has `length` before the pass and at most
     /// `most`.
-    fn length(&mut self, length: usize, most: usize) -> Result<usize, Malformed>;
+    fn length(&mut self, length: usize, most: usize) -> Result<usize>;
 }
 
 pub trait Cdr: Sized {
     /// Passes its fields. Lists and texts have at most `most` elements.
-    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed>;
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result;
 
     /// Reads a message in the newest layout that fits; fields appended by later releases are
     /// ignored.
-    fn decode(payload: &[u8]) -> Result<Self, Malformed>
+    fn decode(payload: &[u8]) -> Result<Self>
     where
         Self: Default,
     {
@@ -62,7 +64,7 @@ pub trait Cdr: Sized {
 
     /// Reads a message in the only layout that consumes all of `payload`, and returns the releases
     /// with it, the newest first.
-    fn decode_whole(payload: &[u8]) -> Result<(Vec<Release>, Self), Malformed>
+    fn decode_whole(payload: &[u8]) -> Result<(Vec<Release>, Self)>
     where
         Self: Clone + Default,
     {
@@ -91,10 +93,7 @@ pub trait Cdr: Sized {
 
 /// Decodes a message and returns whether it ends the payload. RTPS pads a payload to a multiple of
 /// 4 bytes.
-pub(crate) fn read<T: Cdr + Default>(
-    payload: &[u8],
-    release: Release,
-) -> Result<(T, bool), Malformed> {
+pub(crate) fn read<T: Cdr + Default>(payload: &[u8], release: Release) -> Result<(T, bool)> {
     let (header, bytes) = payload.split_at_checked(ENCAPSULATION).ok_or(Malformed::Short)?;
     let is_big = match [header[0], header[1]] {
         [0, order @ (0 | 1)] => order == 0,
@@ -119,7 +118,7 @@ impl Pass for Reader<'_> {
         self.release
     }
 
-    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Malformed> {
+    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result {
         let start = self.at.next_multiple_of(N);
         let found = self.bytes.get(start..).and_then(<[u8]>::first_chunk);
         *bytes = *found.ok_or(Malformed::Short)?;
@@ -130,7 +129,7 @@ impl Pass for Reader<'_> {
         Ok(())
     }
 
-    fn length(&mut self, _: usize, most: usize) -> Result<usize, Malformed> {
+    fn length(&mut self, _: usize, most: usize) -> Result<usize> {
         let mut length = 0_u32;
         length.pass(self, most)?;
         match length as usize {
@@ -152,14 +151,14 @@ impl Pass for Writer {
         self.release
     }
 
-    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result<(), Malformed> {
+    fn number<const N: usize>(&mut self, bytes: &mut [u8; N]) -> Result {
         let end = (self.bytes.len() - ENCAPSULATION).next_multiple_of(N) + ENCAPSULATION;
         self.bytes.resize(end, 0);
         self.bytes.extend(*bytes);
         Ok(())
     }
 
-    fn length(&mut self, length: usize, most: usize) -> Result<usize, Malformed> {
+    fn length(&mut self, length: usize, most: usize) -> Result<usize> {
         u32::try_from(length).unwrap_or(u32::MAX).pass(self, most)?;
         Ok(length)
     }
@@ -168,7 +167,7 @@ impl Pass for Writer {
 macro_rules! numbers {
     ($($number:ident)*) => {$(
         impl Cdr for $number {
-            fn pass<P: Pass>(&mut self, pass: &mut P, _: usize) -> Result<(), Malformed> {
+            fn pass<P: Pass>(&mut self, pass: &mut P, _: usize) -> Result {
                 let mut bytes = self.to_le_bytes();
                 pass.number(&mut bytes)?;
                 *self = Self::from_le_bytes(bytes);
@@ -181,7 +180,7 @@ macro_rules! numbers {
 numbers! { u8 i8 u16 i16 u32 i32 u64 i64 f32 f64 }
 
 impl Cdr for bool {
-    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result {
         let mut byte = u8::from(*self);
         byte.pass(pass, most)?;
         *self = byte == 1;
@@ -192,7 +191,7 @@ impl Cdr for bool {
 /// Text, with a final zero byte on the wire; some implementations omit it for an empty text.
 /// Invalid UTF-8 is replaced.
 impl Cdr for String {
-    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result {
         let mut bytes = [self.as_bytes(), &[0]].concat();
         bytes.pass(pass, most)?;
         if bytes.pop().unwrap_or_default() != 0 {
@@ -204,14 +203,14 @@ impl Cdr for String {
 }
 
 impl<T: Cdr, const N: usize> Cdr for [T; N] {
-    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result {
         self.iter_mut().try_for_each(|element| element.pass(pass, most))
     }
 }
 
 /// Grows as its elements arrive.
 impl<T: Cdr + Default> Cdr for Vec<T> {
-    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result<(), Malformed> {
+    fn pass<P: Pass>(&mut self, pass: &mut P, most: usize) -> Result {
         let length = pass.length(self.len(), most)?;
         self.truncate(length);
         for at in 0..length {

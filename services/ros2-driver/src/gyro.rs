@@ -77,17 +77,16 @@ impl Gyro {
     pub(crate) fn odometry(&mut self, stamp_ns: i64, by_odometry: f64) -> Option<String> {
         let newest = self.newest?;
         let since_ns = stamp_ns - newest.imu.stamp_ns;
+        let since_s = since_ns as f64 / 1e9;
         let before = self.now.take();
         if since_ns.abs() > LONGEST_GAP_NS {
             self.turns.interrupt();
             let is_new = !std::mem::replace(&mut self.is_missed, true);
-            let apart_s = since_ns as f64 / 1e9;
             return is_new.then(|| {
-                format!("the newest message is {apart_s:.2} s older than odometry; publish it at 20 Hz or more with stamps of the same clock")
+                format!("the newest message is {since_s:.2} s older than odometry; publish it at 20 Hz or more with stamps of the same clock")
             });
         }
         self.is_missed = false;
-        let since_s = since_ns as f64 / 1e9;
         let unknown = 0.5 * CHANGES_BY * since_s * since_s;
         let now = Turned {
             angle: self.turned.angle + newest.rate * since_s,

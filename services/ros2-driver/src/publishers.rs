@@ -1,7 +1,5 @@
 //! Publishers of odometry. With two the pose alternates between theirs.
 
-use std::fmt::Write as _;
-
 /// DDS writer identifier.
 pub type Gid = [u8; 16];
 
@@ -43,13 +41,7 @@ pub(crate) fn words(topic: &str, gids: &[u8]) -> Option<String> {
 
 #[must_use]
 pub fn gid_text(gid: Gid) -> String {
-    let mut text = String::new();
-    for (place, byte) in gid.into_iter().enumerate() {
-        let dot = if place == 0 { "" } else { "." };
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{dot}{byte:02x}");
-    }
-    text
+    gid.map(|byte| format!("{byte:02x}")).join(".")
 }
 
 #[cfg(test)]

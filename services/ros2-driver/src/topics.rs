@@ -28,40 +28,38 @@ pub struct Topics {
 impl Topics {
     pub fn of(mission: &Mission) -> Self {
         let topics = &mission.robot.ros2;
-        let command = match topics.stamped {
-            true => "geometry_msgs::msg::dds_::TwistStamped_",
-            false => "geometry_msgs::msg::dds_::Twist_",
-        };
-        let odometry = Topic::new(&topics.odom, "nav_msgs::msg::dds_::Odometry_");
-        let mut heard = vec![(Content::Odometry, odometry)];
+        let mut heard = Vec::new();
+        let mut hear =
+            |content, name: &str, kind: &str| heard.push((content, Topic::new(name, kind)));
+        hear(Content::Odometry, &topics.odom, "nav_msgs::msg::dds_::Odometry_");
         for (row, laser) in mission.lasers_of_base() {
             let name = topics.ranges.get(&laser.name).unwrap_or(&topics.scan);
-            let scan = Topic::new(name, "sensor_msgs::msg::dds_::LaserScan_");
-            heard.push((Content::Scan(row), scan));
+            hear(Content::Scan(row), name, "sensor_msgs::msg::dds_::LaserScan_");
         }
-        let battery = Topic::new(&topics.battery, "sensor_msgs::msg::dds_::BatteryState_");
-        heard.push((Content::Battery, battery));
+        hear(Content::Battery, &topics.battery, "sensor_msgs::msg::dds_::BatteryState_");
         for (row, sensor) in mission.sensor_table().iter().enumerate() {
             if sensor.kind != SensorKind::Scan
                 && let Some(name) = topics.ranges.get(&sensor.name)
             {
-                let range = Topic::new(name, "sensor_msgs::msg::dds_::Range_");
-                heard.push((Content::Range(row), range));
+                hear(Content::Range(row), name, "sensor_msgs::msg::dds_::Range_");
             }
         }
         if let Some(imu) = &topics.imu {
-            heard.push((Content::Imu, Topic::new(imu, "sensor_msgs::msg::dds_::Imu_")));
+            hear(Content::Imu, imu, "sensor_msgs::msg::dds_::Imu_");
         }
         for (row, touch) in mission.touches().iter().enumerate() {
             if let Some(name) = topics.ranges.get(&touch.name) {
-                heard.push((Content::Touch(row), Topic::new(name, "std_msgs::msg::dds_::Bool_")));
+                hear(Content::Touch(row), name, "std_msgs::msg::dds_::Bool_");
             }
         }
         if let Some(hazards) = mission.hazards_topic() {
-            let hazards =
-                Topic::new(&hazards, "irobot_create_msgs::msg::dds_::HazardDetectionVector_");
-            heard.push((Content::Hazards, hazards));
+            let kind = "irobot_create_msgs::msg::dds_::HazardDetectionVector_";
+            hear(Content::Hazards, &hazards, kind);
         }
+        let command = match topics.stamped {
+            true => "geometry_msgs::msg::dds_::TwistStamped_",
+            false => "geometry_msgs::msg::dds_::Twist_",
+        };
         let command = Topic::new(&topics.cmd_vel, command);
         heard.push((Content::Command, command.clone()));
         Self { command, heard }

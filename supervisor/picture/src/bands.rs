@@ -1,10 +1,10 @@
 //! Background: pale bands between level sets of log2 u, each a constant factor of u wide.
 
 use common::samples::FieldCell;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::{
-    lattice::Lattice,
+    lattice::{Lattice, around},
     page::{Path, round_up},
 };
 
@@ -55,10 +55,9 @@ impl Levels {
         let along = f64::from(nth) / f64::from(self.count.max(1)) * (self.ramp.len() - 1) as f64;
         let from = (along as usize).min(self.ramp.len() - 2);
         let part = along - from as f64;
-        let [red, green, blue] = [0, 1, 2].map(|channel| {
-            let (a, b) = (self.ramp[from][channel], self.ramp[from + 1][channel]);
-            (a + (b - a) * part).round() as u8
-        });
+        let [a, b] = [from, from + 1].map(|at| DVec3::from_array(self.ramp[at]));
+        let channels = (a + (b - a) * part).round().to_array();
+        let [red, green, blue] = channels.map(|channel| channel as u8);
         format!("#{red:02x}{green:02x}{blue:02x}")
     }
 }
@@ -147,15 +146,6 @@ struct Samples {
     values: Vec<f64>,
 }
 
-/// Side of a square that a level set crosses, from a sample to the next one along x or y.
-#[derive(Clone, Copy)]
-enum Side {
-    Below,
-    Right,
-    Above,
-    Left,
-}
-
 impl Samples {
     fn of(lattice: &Lattice, cells: &[FieldCell], finest: usize, levels: Levels) -> Self {
         let block = lattice.longest().div_ceil(finest).max(1);
@@ -185,7 +175,14 @@ impl Samples {
             .map(|at| match mean(&sums[at]) {
                 Some(value) => value,
                 None if is_outermost(at) => nowhere,
-                None => mean(&sum_around(&sums, across, at)).unwrap_or(nowhere),
+                // The bands continue below hazard cells instead of following their outline.
+                None => {
+                    let near = around([across, down], (at % across, at / across));
+                    let sum = near
+                        .map(|near| sums[near])
+                        .fold((0.0, 0), |all, one| (all.0 + one.0, all.1 + one.1));
+                    mean(&sum).unwrap_or(nowhere)
+                }
             })
             .collect();
         Self { across, down, block, values }
@@ -197,7 +194,7 @@ impl Samples {
         for row in 0..self.down - 1 {
             for col in 0..self.across - 1 {
                 for (from, to) in self.passages(col, row, level) {
-                    next[self.crossing(col, row, *from)] = self.crossing(col, row, *to);
+                    next[from] = to;
                 }
             }
         }
@@ -216,73 +213,37 @@ impl Samples {
         path
     }
 
-    /// Returns the passages of the square with lower left sample (col, row).
-    fn passages(&self, col: usize, row: usize, level: f64) -> &'static [(Side, Side)] {
-        use Side::{Above, Below, Left, Right};
+    /// Returns the passages through the square with lower left sample (col, row), from crossing to
+    /// crossing.
+    ///
+    /// A crossing's index is even along x from its sample, odd along y.
+    fn passages(&self, col: usize, row: usize, level: f64) -> impl Iterator<Item = (usize, usize)> {
         let at = row * self.across + col;
+        // Counter-clockwise, each with the crossing on the way to the next.
         let corners = [at, at + 1, at + self.across + 1, at + self.across];
-        let inside = corners.iter().enumerate().fold(0, |bits, (nth, &corner)| {
-            bits | usize::from(self.values[corner] >= level) << nth
-        });
-        const PASSAGES: [&[(Side, Side)]; 16] = [
-            &[],
-            &[(Below, Left)],
-            &[(Right, Below)],
-            &[(Right, Left)],
-            &[(Above, Right)],
-            &[(Below, Left), (Above, Right)],
-            &[(Above, Below)],
-            &[(Above, Left)],
-            &[(Left, Above)],
-            &[(Below, Above)],
-            &[(Right, Below), (Left, Above)],
-            &[(Right, Above)],
-            &[(Left, Right)],
-            &[(Below, Right)],
-            &[(Left, Below)],
-            &[],
-        ];
-        PASSAGES[inside]
-    }
-
-    /// Returns the index of a crossing: even along x from its sample, odd along y.
-    fn crossing(&self, col: usize, row: usize, side: Side) -> usize {
-        let at = row * self.across + col;
-        match side {
-            Side::Below => 2 * at,
-            Side::Left => 2 * at + 1,
-            Side::Above => 2 * (at + self.across),
-            Side::Right => 2 * (at + 1) + 1,
-        }
+        let inside = corners.map(|corner| self.values[corner] >= level);
+        let crossings = [2 * at, 2 * (at + 1) + 1, 2 * (at + self.across), 2 * at + 1];
+        // A passage has the area on its left: from where the way leaves it to where it last entered.
+        let leaves = (0..4).filter(move |&corner| inside[corner] && !inside[(corner + 1) % 4]);
+        leaves.filter_map(move |corner| {
+            let outside =
+                (1..4).map(|back| (corner + 4 - back) % 4).find(|&before| !inside[before])?;
+            Some((crossings[corner], crossings[outside]))
+        })
     }
 
     fn position(&self, lattice: &Lattice, crossing: usize, level: f64) -> DVec2 {
         let from = crossing / 2;
-        let (col, row) = (from % self.across, from / self.across);
-        let (to, end) = if crossing.is_multiple_of(2) {
-            (from + 1, (col + 1, row))
-        } else {
-            (from + self.across, (col, row + 1))
-        };
+        let to = from + if crossing.is_multiple_of(2) { 1 } else { self.across };
         let (a, b) = (self.values[from], self.values[to]);
         let part = ((level - a) / (b - a)).clamp(0.0, 1.0);
-        let middle = |(col, row): (usize, usize)| {
+        let middle = |at: usize| {
             let block = self.block as f64;
             let centre = |index: usize| (index as f64 - AROUND as f64 + 0.5) * block - 0.5;
-            DVec2::new(centre(col), centre(row))
+            DVec2::new(centre(at % self.across), centre(at / self.across))
         };
-        lattice.place(middle((col, row)).lerp(middle(end), part))
+        lattice.place(middle(from).lerp(middle(to), part))
     }
-}
-
-/// Sums the neighbours of an empty sample, so that the bands continue below hazard cells instead of
-/// following their outline.
-fn sum_around(sums: &[(f64, u32)], across: usize, at: usize) -> (f64, u32) {
-    let (col, row) = (at % across, at / across);
-    (row - 1..=row + 1)
-        .flat_map(|row| (col - 1..=col + 1).map(move |col| row * across + col))
-        .map(|near| sums[near])
-        .fold((0.0, 0), |all, one| (all.0 + one.0, all.1 + one.1))
 }
 
 #[cfg(test)]

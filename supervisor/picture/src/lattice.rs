@@ -5,6 +5,16 @@ use glam::DVec2;
 
 use super::page::{PLOT_SIDE, View, metres};
 
+/// Returns the indices of a place on a row-major grid and of its neighbours.
+pub(super) fn around(
+    [cols, rows]: [usize; 2],
+    (col, row): (usize, usize),
+) -> impl Iterator<Item = usize> {
+    let columns = col.saturating_sub(1)..(col + 2).min(cols);
+    (row.saturating_sub(1)..(row + 2).min(rows))
+        .flat_map(move |row| columns.clone().map(move |col| row * cols + col))
+}
+
 #[derive(Clone, Copy)]
 pub(super) struct Lattice {
     pub(super) cols: usize,

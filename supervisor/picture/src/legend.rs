@@ -40,7 +40,7 @@ impl Legend<'_> {
         column.text + &self.scale_bar()
     }
 
-    pub(super) fn field_rows(&self, column: &mut Column) {
+    fn field_rows(&self, column: &mut Column) {
         if self.guidance {
             column.heading("Field of that belief");
             column.row("guidance E", guidance_symbol);
@@ -56,9 +56,16 @@ impl Legend<'_> {
         }
     }
 
-    pub(super) fn motion_rows(&self, column: &mut Column) {
+    fn motion_rows(&self, column: &mut Column) {
         column.heading("Motion");
         let line = |style: String| move |at: DVec2| line(at, &style);
+        let circle = |style: String| {
+            move |at: DVec2| {
+                let mut path = Path::default();
+                path.circle(at, 9.0);
+                path.element(&style)
+            }
+        };
         let body = |style: String| {
             move |at: DVec2| {
                 let mut path = Path::default();
@@ -79,27 +86,21 @@ impl Legend<'_> {
             column.row("robot at the end", body(motion::final_body()));
         }
         if self.motion.has_covariance() {
-            column.row("95 % of the believed end", |at: DVec2| {
-                let mut path = Path::default();
-                path.circle(at, 9.0);
-                path.element(&motion::region_style())
-            });
+            column.row("95 % of the believed end", circle(motion::region_style()));
         }
         if !self.movers.is_empty() {
             column.row("path of what moves", line(movers::line()));
         }
         if let Some(seconds) = self.movers.period_s() {
-            column.row(&format!("it and the robot at {seconds} s"), |at: DVec2| {
-                let mut path = Path::default();
-                path.circle(at, 9.0);
-                path.element(&movers::disc()) + &movers::number(at, seconds)
+            column.row(&format!("it and the robot at {seconds} s"), |at| {
+                circle(movers::disc())(at) + &movers::number(at, seconds)
             });
         }
         column.row("start", motion::start_mark);
         column.row("target, tolerance", |at| motion::target(at, 9.5));
     }
 
-    pub(super) fn hazard_rows(&self, column: &mut Column) {
+    fn hazard_rows(&self, column: &mut Column) {
         let cell = |colour: &'static str| move |at: DVec2| patch(at, &format!("fill=\"{colour}\""));
         if let Some(hazard) = self.hazard {
             column.heading("Believed hazardous");
@@ -135,14 +136,14 @@ impl Legend<'_> {
     }
 }
 
-pub(super) struct Column {
+struct Column {
     x: f64,
-    pub(super) y: f64,
-    pub(super) text: String,
+    y: f64,
+    text: String,
 }
 
 impl Column {
-    pub(super) const fn at(corner: DVec2) -> Self {
+    const fn at(corner: DVec2) -> Self {
         Self { x: corner.x, y: corner.y, text: String::new() }
     }
 

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{
     bands::{self, Bands, Levels},
     cells::Blocks,
-    lattice::Lattice,
+    lattice::{self, Lattice},
     page::Px,
     streamlines,
 };
@@ -146,20 +146,15 @@ const OPEN: f64 = 8.0;
 /// apart.
 fn is_beside_thin_wall(map: &FieldOnMap<'_>, at: usize, step: f64) -> bool {
     let own = map.cells[at].log2_u;
+    let (cols, rows) = map.size;
+    let around = |at: usize| lattice::around([cols, rows], (at % cols, at / cols));
     let apart = OPEN.max(2.0 * step);
     own.is_finite()
-        && around(map.size, at)
+        && around(at)
             .filter(|&wall| map.blocked[wall])
-            .flat_map(|wall| around(map.size, wall))
+            .flat_map(around)
             .map(|across| map.cells[across].log2_u)
             .any(|across| across.is_finite() && f64::from((across - own).abs()) > apart)
-}
-
-fn around((cols, rows): (usize, usize), at: usize) -> impl Iterator<Item = usize> {
-    let (col, row) = (at % cols, at / cols);
-    let columns = col.saturating_sub(1)..(col + 2).min(cols);
-    (row.saturating_sub(1)..(row + 2).min(rows))
-        .flat_map(move |row| columns.clone().map(move |col| row * cols + col))
 }
 
 fn target(lattice: &Lattice, (col, row): (usize, usize)) -> String {

@@ -84,15 +84,17 @@ impl<'a> Motion<'a> {
 
     fn bodies(&self, view: &View, radius: f64) -> String {
         let mut outlines = Path::default();
-        for (_, pose) in self.instants().filter(|(_, pose)| is_shown(view, pose)) {
-            let at = view.place(pose.position);
-            add_body(&mut outlines, at, radius, pose.heading);
-            self.add_footprint(&mut outlines, view, pose);
+        for (_, pose) in self.instants() {
+            self.add_outline(&mut outlines, view, radius, pose);
         }
         outlines.element(BODY)
     }
 
-    fn add_footprint(&self, path: &mut Path, view: &View, pose: &Pose2) {
+    fn add_outline(&self, path: &mut Path, view: &View, radius: f64, pose: &Pose2) {
+        if !is_shown(view, pose) {
+            return;
+        }
+        add_body(path, view.place(pose.position), radius, pose.heading);
         if let Some(footprint) = self.scene.mission.body().footprint {
             path.polygon(footprint.corners_at(*pose).map(|corner| view.place(corner)));
         }
@@ -126,9 +128,8 @@ impl<'a> Motion<'a> {
     fn end(&self, view: &View, radius: f64) -> String {
         let body = |pose: Option<&Pose2>, style: &str| {
             let mut path = Path::default();
-            if let Some(pose) = pose.filter(|pose| is_shown(view, pose)) {
-                add_body(&mut path, view.place(pose.position), radius, pose.heading);
-                self.add_footprint(&mut path, view, pose);
+            if let Some(pose) = pose {
+                self.add_outline(&mut path, view, radius, pose);
             }
             path.element(style)
         };

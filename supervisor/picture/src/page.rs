@@ -79,25 +79,21 @@ impl View {
     /// Draws a line in metres, cut at the plot and broken at non-finite points.
     pub(super) fn line(&self, points: impl IntoIterator<Item = DVec2>) -> Path {
         let mut path = Path::default();
-        let mut last: Option<DVec2> = None;
+        let (mut last, mut pen) = (None, None);
         for point in points {
-            let to = self.place(point);
-            if !to.is_finite() {
-                last = None;
-                continue;
+            let to = Some(self.place(point)).filter(|to| to.is_finite());
+            if let (Some(from), Some(to)) = (last, to) {
+                if to.distance(from) < FINEST {
+                    continue;
+                }
+                if let Some((enter, leave)) = cut(from, to) {
+                    if pen.replace(leave) != Some(enter) {
+                        path.move_to(enter);
+                    }
+                    path.line_to(leave);
+                }
             }
-            let Some(from) = last else {
-                last = Some(to);
-                continue;
-            };
-            if from.distance(to) < FINEST {
-                continue;
-            }
-            if let Some((enter, leave)) = cut(from, to) {
-                path.join(enter);
-                path.line_to(leave);
-            }
-            last = Some(to);
+            last = to;
         }
         path
     }
@@ -147,7 +143,6 @@ impl Display for Px {
 #[derive(Clone, Default)]
 pub(super) struct Path {
     data: String,
-    pen: Option<DVec2>,
 }
 
 impl Path {
@@ -167,13 +162,6 @@ impl Path {
         self.push('L', to);
     }
 
-    /// Moves to `to` unless the pen is there.
-    pub(super) fn join(&mut self, to: DVec2) {
-        if self.pen != Some(to) {
-            self.move_to(to);
-        }
-    }
-
     pub(super) fn segment(&mut self, from: DVec2, to: DVec2) {
         self.move_to(from);
         self.line_to(to);
@@ -184,26 +172,21 @@ impl Path {
             self.push(if nth == 0 { 'M' } else { 'L' }, corner);
         }
         self.data.push('Z');
-        self.pen = None;
     }
 
     pub(super) fn rectangle(&mut self, corner: DVec2, size: DVec2) {
-        let (x, y, width, height) = (Px(corner.x), Px(corner.y), Px(size.x), Px(size.y));
-        let back = Px(-size.x);
+        let [x, y, width, height, back] = [corner.x, corner.y, size.x, size.y, -size.x].map(Px);
         self.write(format_args!("M{x} {y}h{width}v{height}h{back}z"));
-        self.pen = None;
     }
 
     pub(super) fn circle(&mut self, centre: DVec2, radius: f64) {
-        let (x, y) = (Px(centre.x - radius), Px(centre.y));
-        let (r, there, back) = (Px(radius), Px(2.0 * radius), Px(-2.0 * radius));
+        let [x, y, r] = [centre.x - radius, centre.y, radius].map(Px);
+        let [there, back] = [2.0, -2.0].map(|times| Px(times * radius));
         self.write(format_args!("M{x} {y}a{r} {r} 0 1 0 {there} 0a{r} {r} 0 1 0 {back} 0z"));
-        self.pen = None;
     }
 
     fn push(&mut self, command: char, to: DVec2) {
         self.write(format_args!("{command}{} {}", Px(to.x), Px(to.y)));
-        self.pen = Some(to);
     }
 
     fn write(&mut self, text: fmt::Arguments<'_>) {

@@ -5,7 +5,7 @@ use common::samples::FieldCell;
 use glam::DVec2;
 
 use super::{
-    lattice::Lattice,
+    lattice::{Lattice, around},
     page::{Path, ink},
 };
 
@@ -243,15 +243,10 @@ impl Tracer<'_> {
     }
 
     fn is_crowded(&self, at: DVec2, share: f64) -> bool {
-        let (col, row) = self.bin(at);
         let limit = share * self.spacing;
-        let rows = row.saturating_sub(1)..=(row + 1).min(self.bins[1] - 1);
-        rows.flat_map(|row| {
-            (col.saturating_sub(1)..=(col + 1).min(self.bins[0] - 1))
-                .map(move |col| row * self.bins[0] + col)
-        })
-        .filter_map(|bin| self.drawn.get(bin))
-        .flatten()
-        .any(|point| point.distance_squared(at) < limit * limit)
+        around(self.bins, self.bin(at))
+            .filter_map(|bin| self.drawn.get(bin))
+            .flatten()
+            .any(|point| point.distance_squared(at) < limit * limit)
     }
 }

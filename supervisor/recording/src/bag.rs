@@ -44,7 +44,7 @@ impl Bag {
     /// Fails if the file cannot be written.
     pub fn add(&mut self, [topic, kind, definition]: [&str; 3], is_latched: bool) -> Result {
         let quality = if is_latched { LATCHED } else { "" };
-        let about = BTreeMap::from([("offered_qos_profiles".to_owned(), quality.to_owned())]);
+        let about = [("offered_qos_profiles", quality)];
         self.output.add(topic, kind, "ros2msg", definition.as_bytes(), "cdr", &about)
     }
 

@@ -62,9 +62,8 @@ impl RecordingFile {
         if path.exists() {
             return Err(named(io::ErrorKind::AlreadyExists.into()).into());
         }
-        let mut unfinished = path.as_os_str().to_owned();
-        unfinished.push(".new");
-        let mut output = Output::create(unfinished.as_ref(), "")?;
+        let unfinished = path.with_added_extension("new");
+        let mut output = Output::create(&unfinished, "")?;
         output.path = path.to_path_buf();
         let mut recording = Self {
             output,
@@ -77,25 +76,14 @@ impl RecordingFile {
         for topic in topics {
             let schema::Schema { name, text } = schema::of(*topic);
             let spec = topic.spec();
-            let about = BTreeMap::from([
-                ("writer".to_owned(), spec.writer.to_owned()),
-                ("meaning".to_owned(), spec.meaning.trim().to_owned()),
-            ]);
+            let about = [("writer", spec.writer), ("meaning", spec.meaning.trim())];
             recording.output.add(spec.name, &name, "ros2msg", text.as_bytes(), "cdr", &about)?;
         }
-        let none = BTreeMap::new();
         for Channel { topic, schema, descriptors } in viewers::channels(run.map(|run| &run.mission))
         {
-            recording.output.add(&topic, schema, "protobuf", descriptors, "protobuf", &none)?;
+            recording.output.add(&topic, schema, "protobuf", descriptors, "protobuf", &[])?;
         }
-        recording.output.add(
-            LOST,
-            "firsthand.Recorder",
-            "jsonschema",
-            LOST_SCHEMA,
-            "json",
-            &none,
-        )?;
+        recording.output.add(LOST, "firsthand.Recorder", "jsonschema", LOST_SCHEMA, "json", &[])?;
         recording.output.metadata(RUN, about)?;
         recording.flush()?;
         fs::rename(&unfinished, path).map_err(named)?;
@@ -191,12 +179,13 @@ impl Output {
         language: &str,
         text: &[u8],
         encoding: &str,
-        about: &BTreeMap<String, String>,
+        about: &[(&str, &str)],
     ) -> Result {
         let failed = failed(&self.path);
+        let about = about.iter().map(|&(key, value)| (key.to_owned(), value.to_owned())).collect();
         let schema = self.writer.add_schema(schema, language, text);
         let added =
-            schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, about));
+            schema.and_then(|schema| self.writer.add_channel(schema, topic, encoding, &about));
         self.channels.insert(topic.to_owned(), added.map_err(failed)?);
         Ok(())
     }

@@ -66,14 +66,15 @@ impl LogFiles {
         files.filter(|file| file.extension().is_some_and(|extension| extension == "log")).collect()
     }
 
-    /// Calls `each` with process and text of every new line. An unreadable log is retried later.
-    pub fn take(&mut self, each: &mut dyn FnMut(&str, &str)) {
+    /// Returns process and text of every new line. An unreadable log is retried later.
+    pub fn take(&mut self) -> Vec<(String, String)> {
+        let mut taken = Vec::new();
         for file in self.files() {
-            let process = file.file_stem().map(|name| name.to_string_lossy().into_owned());
-            for line in self.read.entry(file.clone()).or_default().lines(&file).lines() {
-                each(process.as_deref().unwrap_or_default(), line);
-            }
+            let lines = self.read.entry(file.clone()).or_default().lines(&file);
+            let process = file.file_stem().unwrap_or_default().to_string_lossy();
+            taken.extend(lines.lines().map(|line| (process.to_string(), line.to_owned())));
         }
+        taken
     }
 }
 
@@ -89,9 +90,8 @@ mod tests {
         let mut log = File::options().create(true).append(true).open(&path).unwrap();
         let mut files = LogFiles::follow(directory.path(), true);
         let mut take = || {
-            let mut lines = Vec::new();
-            files.take(&mut |process, line| lines.push(format!("{process}: {line}")));
-            lines
+            let lines = files.take().into_iter();
+            lines.map(|(process, line)| format!("{process}: {line}")).collect::<Vec<_>>()
         };
         log.write_all(b"one\ntw").unwrap();
         assert_eq!(take(), ["mapper: one"]);

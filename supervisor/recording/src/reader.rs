@@ -4,6 +4,7 @@ use std::{
     collections::BTreeMap,
     fs::File,
     io::{self, BufReader, Read as _},
+    iter,
     path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
@@ -99,11 +100,10 @@ impl Recording {
         let mut bounds: Option<(u64, u64)> = None;
         let problem = loop {
             match records.next() {
-                Ok(Some(Found::Metadata(name, entries))) if name == RUN => {
-                    about.get_or_insert(entries);
+                Ok(Some(Record::Metadata(found))) if found.name == RUN => {
+                    about.get_or_insert(found.metadata);
                 }
-                Ok(Some(Found::Metadata(..))) => {}
-                Ok(Some(Found::Message(header, data))) => {
+                Ok(Some(Record::Message { header, data })) => {
                     let topic = records.topic(&header)?;
                     if &*topic == LOST {
                         lost = losses(&data).unwrap_or(lost);
@@ -113,6 +113,7 @@ impl Recording {
                     let (from, to) = bounds.unwrap_or((time, time));
                     bounds = Some((from.min(time), to.max(time)));
                 }
+                Ok(Some(_)) => {}
                 Ok(None) => break None,
                 Err(Stop::Cut(problem)) => break Some(problem),
                 Err(Stop::Error(error)) => return Err(error),
@@ -168,11 +169,19 @@ impl Recording {
 
     /// Returns the messages of the topics in `wanted`, or of all if empty, in file order up to a
     /// cut.
-    pub fn messages(&self, wanted: &[&str]) -> Result<Messages> {
-        Ok(Messages {
-            records: Some(Records::open(&self.path)?),
-            wanted: wanted.iter().map(|&topic| topic.to_owned()).collect(),
-        })
+    pub fn messages(
+        &self,
+        wanted: &[&str],
+    ) -> Result<impl Iterator<Item = Result<Message>> + use<>> {
+        let mut records = Some(Records::open(&self.path)?);
+        let wanted: Vec<_> = wanted.iter().map(|&topic| topic.to_owned()).collect();
+        Ok(iter::from_fn(move || {
+            let read = records.as_mut().map_or(Ok(None), |records| records.message(&wanted));
+            if !matches!(read, Ok(Some(_))) {
+                records = None;
+            }
+            read.transpose()
+        }))
     }
 
     pub fn samples<P: Payload + Stamped + Layout>(
@@ -214,56 +223,8 @@ impl Recording {
 }
 
 fn losses(message: &[u8]) -> Option<BTreeMap<String, u64>> {
-    #[derive(serde::Deserialize)]
-    struct Recorder {
-        lost: BTreeMap<String, u64>,
-    }
-    let recorder: Recorder = serde_json::from_slice(message).ok()?;
-    Some(recorder.lost)
-}
-
-#[derive(Debug)]
-pub struct Messages {
-    records: Option<Records>,
-    wanted: Vec<String>,
-}
-
-impl Messages {
-    fn read(&mut self) -> Result<Option<Message>> {
-        let Some(records) = &mut self.records else {
-            return Ok(None);
-        };
-        loop {
-            let (header, data) = match records.next() {
-                Ok(Some(Found::Message(header, data))) => (header, data),
-                Ok(Some(Found::Metadata(..))) => continue,
-                Ok(None) | Err(Stop::Cut(_)) => return Ok(None),
-                Err(Stop::Error(error)) => return Err(error),
-            };
-            let topic = records.topic(&header)?;
-            if self.wanted.is_empty() || self.wanted.iter().any(|name| **name == *topic) {
-                let MessageHeader { log_time: log_ns, sequence, .. } = header;
-                return Ok(Some(Message { topic, log_ns, sequence, data }));
-            }
-        }
-    }
-}
-
-impl Iterator for Messages {
-    type Item = Result<Message>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let read = self.read();
-        if !matches!(read, Ok(Some(_))) {
-            self.records = None;
-        }
-        read.transpose()
-    }
-}
-
-enum Found {
-    Metadata(String, BTreeMap<String, String>),
-    Message(MessageHeader, Vec<u8>),
+    let mut recorder: BTreeMap<String, _> = serde_json::from_slice(message).ok()?;
+    recorder.remove("lost")
 }
 
 enum Stop {
@@ -277,12 +238,6 @@ struct Records {
     file: BufReader<File>,
     reader: LinearReader,
     channels: BTreeMap<u16, Arc<str>>,
-}
-
-impl std::fmt::Debug for Records {
-    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        to.debug_struct("Records").field("path", &self.path).finish_non_exhaustive()
-    }
 }
 
 impl Records {
@@ -308,8 +263,26 @@ impl Records {
         })
     }
 
-    /// Returns the next relevant record; `None` at the end of a complete file.
-    fn next(&mut self) -> Result<Option<Found>, Stop> {
+    /// Returns the next message of the topics in `wanted`; `None` at the end of the file or a cut.
+    fn message(&mut self, wanted: &[String]) -> Result<Option<Message>> {
+        loop {
+            let (header, data) = match self.next() {
+                Ok(Some(Record::Message { header, data })) => (header, data.into_owned()),
+                Ok(Some(_)) => continue,
+                Ok(None) | Err(Stop::Cut(_)) => return Ok(None),
+                Err(Stop::Error(error)) => return Err(error),
+            };
+            let topic = self.topic(&header)?;
+            if wanted.is_empty() || wanted.iter().any(|name| **name == *topic) {
+                let MessageHeader { log_time: log_ns, sequence, .. } = header;
+                return Ok(Some(Message { topic, log_ns, sequence, data }));
+            }
+        }
+    }
+
+    /// Returns the next record apart from schemas and channels; `None` at the end of a complete
+    /// file.
+    fn next(&mut self) -> Result<Option<Record<'static>>, Stop> {
         while let Some(event) = self.reader.next_event() {
             let cut = |error: McapError| Stop::Cut(error.to_string());
             match event.map_err(cut)? {
@@ -335,13 +308,8 @@ impl Records {
                         Record::Channel(channel) => {
                             self.channels.insert(channel.id, channel.topic.into());
                         }
-                        Record::Metadata(found) => {
-                            return Ok(Some(Found::Metadata(found.name, found.metadata)));
-                        }
-                        Record::Message { header, data } => {
-                            return Ok(Some(Found::Message(header, data.into_owned())));
-                        }
-                        _ => {}
+                        Record::Schema { .. } => {}
+                        record => return Ok(Some(record.into_owned())),
                     }
                 }
             }

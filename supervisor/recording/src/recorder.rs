@@ -8,7 +8,7 @@
 use std::{
     collections::BTreeMap,
     fs::{self, File},
-    io::{self, BufRead, BufReader},
+    io::{self, Read as _},
     os::fd::BorrowedFd,
     path::{Path, PathBuf},
     time::{Duration, Instant, SystemTime},
@@ -147,13 +147,11 @@ pub fn record(
             Wish::Record => LOOK_EVERY,
             Wish::CatchUp | Wish::Stop => Duration::ZERO,
         };
-        let news = match follower.wait_also_for(&wishes.descriptors(), patience)? {
-            Event::Connected => Some(true),
-            Event::Disconnected => Some(false),
-            Event::Samples(_) | Event::Nothing => None,
-        };
-        joins = news.unwrap_or(joins);
-        left = news.map_or(left, |joined| !joined);
+        match follower.wait_also_for(&wishes.descriptors(), patience)? {
+            Event::Connected => (joins, left) = (true, false),
+            Event::Disconnected => (joins, left) = (false, true),
+            Event::Samples(_) | Event::Nothing => {}
+        }
         // A bus exists before its run.
         if joins && let Some(run) = find_run(options) {
             joins = false;
@@ -166,7 +164,7 @@ pub fn record(
             }
             supervisor = holder;
             // A bus recreated within the run continues the file.
-            if let Some(ended) = current.take_if(|current| !current.is_of(&run)) {
+            if let Some(ended) = current.take_if(|current| current.directory != run) {
                 let file = ended.finish(tell)?;
                 if let Some(budget) = &mut budget {
                     budget.complete(file);
@@ -260,19 +258,18 @@ impl CurrentRun {
     ) -> Result<Self> {
         let text = file::text(&directory.join(run::FILE_NAME), LONGEST_RUN_FILE);
         let run: Option<Run> = text.as_ref().and_then(|text| toml::from_str(text).ok());
-        let mut about = BTreeMap::from([
+        let about = [
             ("robot", options.domain.robot.to_string()),
             ("build", build()),
             ("machine", machine()),
             ("began", fmt_http_date(SystemTime::now())),
             ("run_toml", text.unwrap_or_default()),
-        ]);
+        ];
+        let mut about = BTreeMap::from(about.map(|(key, value)| (key.to_owned(), value)));
         if let Some(run) = &run {
-            about.insert("mission", run.mission.name.clone());
-            about.insert("seed", run.mission.seed.to_string());
+            about.insert("mission".to_owned(), run.mission.name.clone());
+            about.insert("seed".to_owned(), run.mission.seed.to_string());
         }
-        let about = about.into_iter();
-        let about: BTreeMap<_, _> = about.map(|(key, value)| (key.to_owned(), value)).collect();
         let file = RecordingFile::create(path, topics, run.as_ref(), about.clone())?;
         let whole = options.run.is_some();
         let logs = LogFiles::follow(&directory, whole);
@@ -299,10 +296,6 @@ impl CurrentRun {
         self.file.lost(self.losses.counts())?;
         self.began = Instant::now();
         Ok(std::mem::replace(&mut self.path, path.to_path_buf()))
-    }
-
-    fn is_of(&self, run: &Path) -> bool {
-        self.directory == run
     }
 
     /// Takes all samples. A process that ends takes unread samples along, so the first reader, that
@@ -344,17 +337,11 @@ impl CurrentRun {
             return Ok(());
         }
         self.logs_taken = Instant::now();
-        let (file, logs) = (&mut self.file, &mut self.logs);
-        let mut written = Ok(());
-        let now_ns = file.now_ns();
-        logs.take(&mut |process, line| {
-            viewers::log(process, line, now_ns, &mut |topic, message| {
-                if written.is_ok() {
-                    written = file.message(topic, now_ns, message);
-                }
-            });
-        });
-        written
+        let now_ns = self.file.now_ns();
+        let mut lines = self.logs.take().into_iter();
+        lines.try_for_each(|(process, line)| {
+            self.file.message(viewers::LOG, now_ns, &viewers::log(&process, &line, now_ns))
+        })
     }
 
     fn finish(mut self, tell: &mut dyn FnMut(Happened<'_>)) -> Result<PathBuf> {
@@ -370,17 +357,13 @@ fn build() -> String {
     format!("{}, executable crc32 {crc:08x}", env!("CARGO_PKG_VERSION"))
 }
 
-fn checksum(file: File) -> io::Result<u32> {
-    let mut reader = BufReader::with_capacity(1 << 16, file);
-    let mut crc = crc32fast::Hasher::new();
+fn checksum(mut file: File) -> io::Result<u32> {
+    let (mut crc, mut piece) = (crc32fast::Hasher::new(), vec![0; 1 << 16]);
     loop {
-        let piece = reader.fill_buf()?;
-        if piece.is_empty() {
-            return Ok(crc.finalize());
+        match file.read(&mut piece)? {
+            0 => return Ok(crc.finalize()),
+            length => crc.update(&piece[..length]),
         }
-        crc.update(piece);
-        let read = piece.len();
-        reader.consume(read);
     }
 }
 

@@ -1,6 +1,9 @@
 //! Schema of a topic, made from its layout: the text of a ROS 2 message and its nested messages.
 
-use std::{collections::BTreeMap, sync::LazyLock};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::LazyLock,
+};
 
 use common::{
     bus::{Kind, Structure},
@@ -37,33 +40,29 @@ const RULE: &str =
 pub fn of(topic: &dyn AnyTopic) -> Schema {
     let (header, element) = topic.layout();
     let mut parts = Vec::new();
-    let (name, text) = match (header, element) {
-        (Kind::Struct(sample), None) => (
-            sample.name.to_owned(),
-            format!("# {}\n{}", topic.spec().meaning.trim(), fields(&sample, &mut parts)),
-        ),
+    let mut text = format!("# {}\n", topic.spec().meaning.trim());
+    let name = match (header, element) {
+        (Kind::Struct(sample), None) => {
+            text += &fields(&sample, &mut parts);
+            sample.name
+        }
         (header, element) => {
-            let name = match &header {
-                Kind::Struct(header) => header.name.trim_end_matches("Header").to_owned(),
-                _ => topic.spec().name.to_owned(),
-            };
-            let mut text = format!("# {}\n", topic.spec().meaning.trim());
             text += &format!("{} header\n", kind(&header, &mut parts));
             if let Some(element) = element {
                 text += &format!("{}[] elements\n", kind(&element, &mut parts));
             }
-            (name, text)
+            match header {
+                Kind::Struct(header) => header.name.trim_end_matches("Header"),
+                _ => topic.spec().name,
+            }
         }
     };
-    let mut text = text;
-    let mut written: Vec<&'static str> = Vec::new();
+    let mut written = BTreeSet::new();
     while let Some(part) = parts.pop() {
-        if written.contains(&part.name) {
-            continue;
+        if written.insert(part.name) {
+            let body = fields(&part, &mut parts);
+            text += &format!("{RULE}MSG: {}\n{body}", part.name.replace('.', "/"));
         }
-        written.push(part.name);
-        let body = fields(&part, &mut parts);
-        text += &format!("{RULE}MSG: {}\n{body}", part.name.replace('.', "/"));
     }
     Schema { name: name.replacen('.', "/msg/", 1), text }
 }

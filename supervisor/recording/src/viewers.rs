@@ -4,8 +4,6 @@
 //! The schemas in `foxglove/` are those of Foxglove's SDK 0.30.3 (MIT licence). Tests of
 //! `firsthand-foxglove`, which contains the SDK, compare them and decode the messages with it.
 
-use std::collections::BTreeMap;
-
 use common::{
     grid::{Cell, CellState, GridFrame},
     kinematics::Pose2,
@@ -156,9 +154,9 @@ impl Drawn {
             sink(SCENE, self.scene(time).bytes());
         }
         for reading in readings {
-            let sensor = self.sensors.get(usize::from(reading.sensor));
             // A laser's beams have their own topic.
-            if let Some(sensor) = sensor.filter(|sensor| sensor.used)
+            if let Some(sensor) = self.sensors.get(usize::from(reading.sensor))
+                && sensor.used
                 && sensor.kind != SensorKind::Scan
                 && reading.status() != RangeStatus::Absent
             {
@@ -326,14 +324,14 @@ fn laser_scan(
         .numbers(6, ranges)
 }
 
-/// Passes a log line of `process`, read at `now_ns` since 1970, to `sink`.
-pub fn log(process: &str, line: &str, now_ns: u64, sink: Sink<'_>) {
-    let log = Message::default()
+/// Returns the message of [`LOG`] for a log line of `process`, read at `now_ns` since 1970.
+pub fn log(process: &str, line: &str, now_ns: u64) -> Vec<u8> {
+    Message::default()
         .part(1, &time(now_ns))
         .integer(2, level(line))
         .text(LOG_MESSAGE, line)
-        .text(LOG_NAME, process);
-    sink(LOG, log.bytes());
+        .text(LOG_NAME, process)
+        .into_bytes()
 }
 
 const LOG_MESSAGE: u64 = 3;
@@ -352,9 +350,8 @@ fn level(line: &str) -> u64 {
 /// Returns process and text of a `log` message, JSON in older recordings.
 pub fn log_line(message: &[u8]) -> Option<(String, String)> {
     if message.first() == Some(&b'{') {
-        let mut fields: BTreeMap<String, serde_json::Value> =
-            serde_json::from_slice(message).ok()?;
-        let mut text = |key| fields.remove(key)?.as_str().map(str::to_owned);
+        let fields: serde_json::Value = serde_json::from_slice(message).ok()?;
+        let text = |key: &str| fields.get(key)?.as_str().map(str::to_owned);
         return Some((text("name")?, text("message")?));
     }
     Some((text_in(message, LOG_NAME)?, text_in(message, LOG_MESSAGE)?))
@@ -414,18 +411,11 @@ mod tests {
 
     #[test]
     fn a_log_line_has_the_level_it_names_and_is_read_from_both_encodings() {
-        let mut sent = Vec::new();
-        log("mapper", "12.5  WARN missed a grid version", 7, &mut |topic, message| {
-            sent.push((topic.to_owned(), message.to_vec()));
-        });
-        let [(topic, message)] = &sent[..] else {
-            panic!("{sent:?}");
-        };
-        assert_eq!(topic, LOG);
+        let message = log("mapper", "12.5  WARN missed a grid version", 7);
         assert_eq!(level("12.5  WARN missed a grid version"), 3);
         assert_eq!(level("mapper: cannot open"), 4);
         let line = ("mapper".to_owned(), "12.5  WARN missed a grid version".to_owned());
-        assert_eq!(log_line(message).as_ref(), Some(&line));
+        assert_eq!(log_line(&message).as_ref(), Some(&line));
         let json = br#"{"level":3,"message":"12.5  WARN missed a grid version","name":"mapper"}"#;
         assert_eq!(log_line(json), Some(line));
         assert_eq!(log_line(b"{"), None);

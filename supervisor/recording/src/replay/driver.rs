@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use common::{
-    bus::decode_slice,
+    bus::{decode_sample, decode_slice},
     clock::MissionTime,
     run::Run,
     samples::{DeathSample, HealthSample, InputsHeader, name_str},
@@ -33,15 +33,13 @@ pub struct Options {
 const NOT_COMPUTED: [&str; 1] = ["link"];
 
 pub fn replay(recording: &Recording, options: &Options) -> Result<Report> {
-    let counts = &recording.counts;
-    let recorded = |topic: &str| counts.contains_key(topic);
     let cut = match &recording.end {
         End::Complete => None,
         End::Cut { after, .. } => Some(after.as_secs_f64()),
     };
     let setting = Setting {
         run: options.run.as_ref().unwrap_or(&recording.run),
-        recorded: &recorded,
+        recorded: &recording.counts,
         from: options.from,
         cut: cut.is_some(),
     };
@@ -61,60 +59,63 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report> {
     for stage in &chosen {
         report.stages.entry(stage.name).or_default();
     }
-    let mut generations = Generations { chosen, all: BTreeMap::new() };
+    let mut generations = Generations { setting: &setting, chosen, all: BTreeMap::new() };
     for message in recording.messages(&wanted)? {
-        generations.take(&setting, message?).map_err(|topic| RecordingError::Message {
-            file: recording.path.to_path_buf(),
-            topic: topic.to_owned(),
+        let message = message?;
+        let topic = message.topic.clone();
+        generations.take(message).ok_or_else(|| RecordingError::Message {
+            file: recording.path.clone(),
+            topic: topic.to_string(),
         })?;
     }
     for ((_, stage, _), generation) in generations.all {
         let found = report.stages.entry(stage).or_default();
-        if let Some(difference) = generation.end(&setting, found) {
+        if let Some(difference) = generation.end(found) {
             report.differs(difference);
         }
     }
     Ok(report)
 }
 
-struct Generations {
+struct Generations<'a> {
+    setting: &'a Setting<'a>,
     chosen: Vec<&'static Stage>,
     /// Generations by stage index, stage name and number.
-    all: BTreeMap<(usize, &'static str, u32), Generation>,
+    all: BTreeMap<(usize, &'static str, u32), Generation<'a>>,
 }
 
-impl Generations {
-    fn of(&mut self, stage: &str, number: u32) -> Option<&mut Generation> {
+impl<'a> Generations<'a> {
+    fn of(&mut self, stage: &str, number: u32) -> Option<&mut Generation<'a>> {
         let (place, stage) =
             self.chosen.iter().enumerate().find(|(_, chosen)| chosen.name == stage)?;
         let key = (place, stage.name, number);
-        Some(self.all.entry(key).or_insert_with(|| Generation::new(stage, number)))
+        let new = || Generation::new(self.setting, stage, number);
+        Some(self.all.entry(key).or_insert_with(new))
     }
 
-    /// Takes a message. The error names the mismatched topic.
-    fn take(&mut self, setting: &Setting<'_>, message: Message) -> Result<(), &'static str> {
+    /// Takes a message; `None` if it is malformed.
+    fn take(&mut self, message: Message) -> Option<()> {
         let topic = &*message.topic;
         if topic == topics::INPUTS.spec().name {
-            let piece = decode_slice::<InputsHeader, u8>(&message.data);
-            let (header, piece) = piece.ok_or("inputs")?;
+            let (header, piece) = decode_slice::<InputsHeader, u8>(&message.data)?;
             let stamp = header.stamp;
             if let Some(generation) = self.of(name_str(&header.stage), stamp.generation) {
-                generation.piece(setting, stamp.sequence, &piece);
+                generation.piece(stamp.sequence, &piece);
             }
         } else if topic == topics::HEALTH.spec().name {
-            let health: HealthSample = common::bus::decode_sample(&message.data).ok_or("health")?;
+            let health: HealthSample = decode_sample(&message.data)?;
             self.of(name_str(&health.stage), health.stamp.generation);
         } else if topic == topics::DEATHS.spec().name {
-            let death: DeathSample = common::bus::decode_sample(&message.data).ok_or("deaths")?;
+            let death: DeathSample = decode_sample(&message.data)?;
             self.of(name_str(&death.stage), death.generation);
         } else {
             let writer = topics::TABLE.iter().find(|known| known.spec().name == topic);
             let writer = writer.map_or("", |topic| topic.spec().writer);
             if let Some(generation) = self.of(writer, stamp_of(&message.data).generation) {
                 let Message { topic, sequence, data, .. } = message;
-                generation.output(setting, &topic, sequence, data);
+                generation.output(&topic, sequence, data);
             }
         }
-        Ok(())
+        Some(())
     }
 }

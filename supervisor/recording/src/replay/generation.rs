@@ -32,7 +32,8 @@ const SHOWN_LENGTH: usize = 600;
 
 pub(crate) struct Setting<'a> {
     pub(crate) run: &'a Run,
-    pub(crate) recorded: &'a dyn Fn(&str) -> bool,
+    /// Counts of recorded messages by topic.
+    pub(crate) recorded: &'a BTreeMap<String, u64>,
     /// Start of comparison; earlier outputs are only computed.
     pub(crate) from: MissionTime,
     pub(crate) cut: bool,
@@ -53,7 +54,8 @@ struct Channel {
     recorded: VecDeque<(u32, Vec<u8>)>,
 }
 
-pub(crate) struct Generation {
+pub(crate) struct Generation<'a> {
+    setting: &'a Setting<'a>,
     stage: &'static Stage,
     number: u32,
     pieces: Pieces,
@@ -70,9 +72,10 @@ pub(crate) struct Generation {
     worked: bool,
 }
 
-impl Generation {
-    pub(crate) fn new(stage: &'static Stage, number: u32) -> Self {
+impl<'a> Generation<'a> {
+    pub(crate) fn new(setting: &'a Setting<'a>, stage: &'static Stage, number: u32) -> Self {
         Self {
+            setting,
             stage,
             number,
             pieces: Pieces::default(),
@@ -89,7 +92,7 @@ impl Generation {
         }
     }
 
-    pub(crate) fn piece(&mut self, setting: &Setting<'_>, sequence: u32, piece: &[u8]) {
+    pub(crate) fn piece(&mut self, sequence: u32, piece: &[u8]) {
         self.pieces_came = true;
         if self.is_over() {
             return;
@@ -99,17 +102,17 @@ impl Generation {
         }
         while !self.is_over() {
             match self.pieces.entry() {
-                Ok(Some(body)) => self.entry(setting, body),
+                Ok(Some(body)) => self.entry(body),
                 Ok(None) => return,
                 Err(broken) => self.give_up(&broken),
             }
         }
     }
 
-    fn entry(&mut self, setting: &Setting<'_>, body: Vec<u8>) {
+    fn entry(&mut self, body: Vec<u8>) {
         let Some(replay) = &mut self.replay else {
-            let fields = (setting.recorded)(topics::FIELD.spec().name);
-            let beginning = Beginning { run: setting.run, start: &body, fields };
+            let fields = self.setting.recorded.contains_key(topics::FIELD.spec().name);
+            let beginning = Beginning { run: self.setting.run, start: &body, fields };
             match (self.stage.replay)(beginning) {
                 Ok(replay) => self.replay = Some(replay),
                 Err(error) => self.give_up(&error),
@@ -126,7 +129,7 @@ impl Generation {
         }
         self.last_inputs.push_back(Rc::new(body));
         for output in outputs {
-            if !(setting.recorded)(output.topic) {
+            if !self.setting.recorded.contains_key(output.topic) {
                 continue;
             }
             let channel = self.channels.entry(output.topic.to_owned()).or_default();
@@ -143,43 +146,32 @@ impl Generation {
                 message,
                 inputs: self.last_inputs.iter().cloned().collect(),
             });
-            self.compare(setting, output.topic);
+            self.compare(output.topic);
         }
     }
 
-    pub(crate) fn output(
-        &mut self,
-        setting: &Setting<'_>,
-        topic: &str,
-        sequence: u32,
-        message: Vec<u8>,
-    ) {
+    pub(crate) fn output(&mut self, topic: &str, sequence: u32, message: Vec<u8>) {
         self.worked = true;
         if !self.is_over() {
             let channel = self.channels.entry(topic.to_owned()).or_default();
             channel.recorded.push_back((sequence, message));
-            self.compare(setting, topic);
+            self.compare(topic);
         }
     }
 
-    fn compare(&mut self, setting: &Setting<'_>, topic: &str) {
-        while let Some(channel) = self.channels.get_mut(topic) {
-            let (Some((sequence, _)), Some(computed)) =
-                (channel.recorded.front(), channel.computed.front())
-            else {
-                return;
-            };
+    fn compare(&mut self, topic: &str) {
+        while let Some(channel) = self.channels.get_mut(topic)
+            && let Some((sequence, _)) = channel.recorded.front()
+            && let Some(computed) = channel.computed.pop_front()
+        {
             if computed.sequence < *sequence {
-                channel.computed.pop_front();
                 self.unrecorded += 1;
                 continue;
             }
-            let recorded = channel.recorded.pop_front();
-            let computed = channel.computed.pop_front();
-            let (Some((_, recorded)), Some(computed)) = (recorded, computed) else {
+            let Some((_, recorded)) = channel.recorded.pop_front() else {
                 return;
             };
-            if time_of(&recorded) < setting.from {
+            if time_of(&recorded) < self.setting.from {
                 continue;
             }
             self.compared += 1;
@@ -229,13 +221,9 @@ impl Generation {
         self.last_inputs.clear();
     }
 
-    pub(crate) fn end(
-        mut self,
-        setting: &Setting<'_>,
-        report: &mut StageReport,
-    ) -> Option<Difference> {
-        if !self.is_over() && !setting.cut {
-            self.find_what_was_not_computed(setting);
+    pub(crate) fn end(mut self, report: &mut StageReport) -> Option<Difference> {
+        if !self.is_over() && !self.setting.cut {
+            self.find_what_was_not_computed();
         }
         let waiting = self.channels.values().map(|channel| channel.computed.len() as u64);
         self.unrecorded += waiting.sum::<u64>();
@@ -244,7 +232,7 @@ impl Generation {
         report.unrecorded += self.unrecorded;
         if self.difference.is_some() {
             report.different += 1;
-        } else if let Some(why) = self.why_not_replayed(setting) {
+        } else if let Some(why) = self.why_not_replayed() {
             report.not_replayed.insert(self.number, why);
         } else if self.inputs == 0 {
             report.without_step += 1;
@@ -254,10 +242,10 @@ impl Generation {
         self.difference
     }
 
-    fn find_what_was_not_computed(&mut self, setting: &Setting<'_>) {
+    fn find_what_was_not_computed(&mut self) {
         let late = |(topic, channel): (&String, &Channel)| {
             let (_, message) = channel.recorded.front()?;
-            (time_of(message) >= setting.from).then(|| (topic.clone(), message.clone()))
+            (time_of(message) >= self.setting.from).then(|| (topic.clone(), message.clone()))
         };
         if self.replay.is_some()
             && let Some((topic, message)) = self.channels.iter().find_map(late)
@@ -273,11 +261,11 @@ impl Generation {
 
     /// Returns why the generation was not replayed; `None` if it was, or if it ended before its
     /// first input.
-    fn why_not_replayed(&self, setting: &Setting<'_>) -> Option<String> {
+    fn why_not_replayed(&self) -> Option<String> {
         if self.not_replayed.is_some() || self.pieces_came || !self.worked {
             return self.not_replayed.clone();
         }
-        Some(match self.stage.executable(&setting.run.mission) {
+        Some(match self.stage.executable(&self.setting.run.mission) {
             Some(executable) => {
                 format!("it was {}, which publishes no `inputs`", executable.display())
             }

@@ -63,15 +63,7 @@ impl fmt::Display for Report {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             to,
-            "{:<16} {:>11} {:>9} {:>12} {:>12} {:>9} {:>9} {:>10}",
-            "stage",
-            "bit-equal",
-            "different",
-            "without step",
-            "not replayed",
-            "inputs",
-            "compared",
-            "unrecorded"
+            "stage              bit-equal different without step not replayed    inputs  compared unrecorded"
         )?;
         for (stage, found) in &self.stages {
             writeln!(

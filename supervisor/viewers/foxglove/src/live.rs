@@ -93,18 +93,17 @@ impl Live {
         let mut follower = Follower::new(domain.clone(), "foxglove", &topics::LINK, open);
         let mut serving = None;
         while !ended() {
-            let taken = match follower.wait(LOOK_EVERY) {
-                Ok(Event::Connected) => {
+            let taken = follower.wait(LOOK_EVERY).and_then(|event| match event {
+                Event::Connected => {
                     serving = None;
                     Ok(())
                 }
-                Ok(Event::Samples(readers)) => {
-                    serving = serving.or_else(|| self.begin(domain));
+                Event::Samples(readers) => {
+                    serving = serving.take().or_else(|| self.begin(domain));
                     serving.as_mut().map_or(Ok(()), |serving| serving.take_samples(readers))
                 }
-                Ok(Event::Disconnected | Event::Nothing) => Ok(()),
-                Err(error) => Err(error),
-            };
+                Event::Disconnected | Event::Nothing => Ok(()),
+            });
             if let Some(serving) = &mut serving {
                 serving.take_logs();
             }
@@ -169,9 +168,9 @@ impl Serving {
         }
         self.logs_read = Instant::now();
         if let Some(channel) = self.channels.get(viewers::LOG) {
-            self.logs.take(&mut |process, line| {
-                viewers::log(process, line, now_ns(), &mut |_, message| channel.log(message));
-            });
+            for (process, line) in self.logs.take() {
+                channel.log(&viewers::log(&process, &line, now_ns()));
+            }
         }
     }
 }

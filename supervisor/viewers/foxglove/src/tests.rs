@@ -70,7 +70,8 @@ fn sent() -> Sent {
     (header.movers[0], header.mover_count) = (mover, 1);
     let cells = vec![CellState::Sensed as u8; frame.area()];
     slice("grid", &mut |to| encode_slice(&header, &cells, to));
-    viewers::log("mapper", "12.5  WARN missed a grid version", 7_000_000_009, &mut sink);
+    let log = viewers::log("mapper", "12.5  WARN missed a grid version", 7_000_000_009);
+    sink(viewers::LOG, &log);
     sent
 }
 

@@ -68,7 +68,9 @@ impl Reading {
         let mut ended = Vec::new();
         if logs_read.elapsed() >= LOGS_EVERY {
             *logs_read = Instant::now();
-            logs.take(&mut |process, line| collector.state.log(process, line));
+            for (process, line) in logs.take() {
+                collector.state.log(&process, &line);
+            }
             ended = results.take();
         }
         let usage = processes.look(&collector.processes(), Instant::now());

@@ -112,10 +112,11 @@ impl Server {
     }
 
     pub fn command(&mut self, command: &CommandSample) {
-        let has_arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
-        let goal = self.goals.current();
-        let goal = goal.filter(|goal| goal.known.number == Some(command.target_number));
-        if has_arrived && goal.is_some_and(|goal| goal.status == Status::Executing) {
+        if CommandState::from_byte(command.state) == CommandState::Arrived
+            && let Some(goal) = self.goals.current()
+            && goal.known.number == Some(command.target_number)
+            && goal.status == Status::Executing
+        {
             self.goals.end(Status::Succeeded);
         }
     }

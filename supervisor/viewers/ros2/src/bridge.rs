@@ -2,7 +2,6 @@
 
 use std::{
     fs, io,
-    net::Ipv4Addr,
     path::PathBuf,
     time::{Duration, Instant},
 };
@@ -10,7 +9,7 @@ use std::{
 use common::{
     bus::{Bus, BusError},
     clock::MissionClock,
-    domain::{Domain, RobotName},
+    domain::Domain,
     file,
     follower::{Event, Follower},
     samples::{RequestKind, TargetPoint},
@@ -28,17 +27,18 @@ use ros2::{
 use thiserror::Error;
 
 use crate::{
-    action::{Aim, Refusal, Sent, Server},
+    Arguments,
+    action::{Refusal, Sent, Server},
     asked,
-    endpoints::{self, is_of_robot},
+    endpoints::{self, is_of_robot, published},
     frames::Frames as Transforms,
-    goals::{Goals, Status, Uuid},
-    node::{Call, Node},
+    goals::{Status, Uuid, reply_to_goal},
+    node::{Call, Network, Node},
     orders::{Done, Order, Orders, Why},
     overlap::overlap,
     parameters::Parameter,
     shown::{BASE, ODOM, Shown},
-    topics::{Accept, Frames, Id},
+    topics::{Frames, Id},
 };
 
 /// Interval of checks for requests and for the start or end of a run.
@@ -52,20 +52,6 @@ const GOALS: &str = "ros2-goals.json";
 const MOST_RECORDED: u64 = 1 << 20;
 const RUN_ENDED: &str = "the run ended before the robot arrived";
 const TELL_EVERY: Duration = Duration::from_secs(1);
-
-#[derive(Clone)]
-pub struct Options {
-    pub robot: RobotName,
-    pub domain: u16,
-    /// Address of the network interface, or all of them.
-    pub interface: Option<Ipv4Addr>,
-    pub namespace: String,
-    pub accepted: Vec<Accept>,
-    pub frames: Frames,
-    /// Whether stamps are mission time, which is published.
-    pub clock: bool,
-    pub parameters: Vec<Parameter>,
-}
 
 #[derive(Debug, Error)]
 pub enum BridgeError {
@@ -81,8 +67,9 @@ pub enum BridgeError {
     System(io::Error),
 }
 
-struct Bridge {
-    options: Options,
+struct Bridge<'a> {
+    network: Network<'a>,
+    options: &'a Arguments,
     node: Node<Id>,
     transforms: Transforms,
     orders: Orders,
@@ -98,12 +85,20 @@ struct Bridge {
     told_at: Option<Instant>,
 }
 
-pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), BridgeError> {
-    let (robot, domain) = (&options.robot, options.domain);
-    let join = || endpoints::open(options).map_err(|source| BridgeError::Join { domain, source });
+pub fn serve(
+    network: Network<'_>,
+    (options, parameters): (&Arguments, Vec<Parameter>),
+    ended: &mut dyn FnMut() -> bool,
+) -> Result<(), BridgeError> {
+    let robot = &options.robot;
+    let join = || {
+        let node = endpoints::open(network, options, parameters.clone());
+        node.map_err(|source| BridgeError::Join { domain: network.0, source })
+    };
     let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
     let mut bridge = Bridge {
-        options: options.clone(),
+        network,
+        options,
         node: join()?,
         transforms: Transforms::default(),
         orders: Orders::new(robot).map_err(BridgeError::System)?,
@@ -156,7 +151,7 @@ pub fn serve(options: &Options, ended: &mut dyn FnMut() -> bool) -> Result<(), B
     Ok(())
 }
 
-impl Bridge {
+impl Bridge<'_> {
     /// Begins a run. Its file may appear after the first samples.
     ///
     /// # Errors
@@ -168,15 +163,17 @@ impl Bridge {
         let Some((directory, run)) = newest_run(domain) else {
             return Ok(());
         };
-        let Options { robot, domain, namespace, frames, clock, .. } = &self.options;
+        let (domain, _, namespace) = self.network;
+        let Arguments { robot, frames, clock, .. } = self.options;
         let mut shown = Shown::new(robot.to_string(), run.mission.clone());
-        let own = overlap((*domain, namespace), &run, shown.sensor_topics());
+        let own = overlap((domain, namespace), &run, shown.sensor_topics());
         let is_left = |id| *frames == Frames::Map && is_of_robot(id);
         if let Some((_, topic)) = own.iter().find(|(id, _)| !is_left(*id)) {
-            return Err(BridgeError::Overlap { topic: topic.clone(), domain: *domain });
+            return Err(BridgeError::Overlap { topic: topic.clone(), domain });
         }
-        let topics = [(Id::Odom, ""), (Id::Battery, "")].into_iter().chain(shown.sensor_topics());
-        let topics = topics.filter(|(id, _)| !own.iter().any(|(own, _)| own == id));
+        let is_own = |id| own.iter().any(|(own, _)| *own == id);
+        let topics = published(namespace, shown.sensor_topics());
+        let topics = topics.filter(|(_, id, _)| is_of_robot(*id) && !is_own(*id));
         let opened = endpoints::open_robot(&mut self.node, topics);
         if let (MissionClock::Wall { rate, .. }, false) = (run.clock, clock) {
             shown.pace = rate;
@@ -272,7 +269,6 @@ impl Bridge {
     }
 
     fn hear(&mut self) {
-        self.node.answer();
         let heard = self.node.heard().unwrap_or_else(|error| {
             self.tell(&format!("cannot read a topic: {error}"));
             Vec::new()
@@ -299,7 +295,7 @@ impl Bridge {
             Id::Teleop => {
                 // Without a robot there is nothing to drive.
                 if let Some(shown) = &self.shown {
-                    let stick = asked::stick(&message.payload, shown.mission())?;
+                    let stick = asked::stick(&message.payload, &shown.mission)?;
                     self.orders.give(Order::Hand(stick, Instant::now()));
                 }
             }
@@ -320,12 +316,11 @@ impl Bridge {
     }
 
     fn hear_call(&mut self, call: Call, message: &Message) -> Result<(), String> {
-        let request = &message.request;
-        let payload = request.without_header(&message.payload);
+        let Message { request, payload, .. } = message;
         match call {
             Call::SendGoal => {
-                let (id, point) = Server::read_goal(&payload).inspect_err(|_| {
-                    self.node.reply(0, call, request, &Goals::<Aim>::reply(false, now_ns()));
+                let (id, point) = Server::read_goal(payload).inspect_err(|_| {
+                    self.node.reply(0, call, request, &reply_to_goal(false, now_ns()));
                 })?;
                 match point {
                     Ok(point) => {
@@ -340,14 +335,14 @@ impl Bridge {
                 }
             }
             Call::CancelGoal => {
-                let (reply, stands) = self.server.goals.cancel(&payload)?;
+                let (reply, stands) = self.server.goals.cancel(payload)?;
                 self.node.reply(0, call, request, &reply);
                 if stands {
                     self.stands_for_cancel = Some(0);
                     self.orders.give(Order::Stand { is_cancel: true });
                 }
             }
-            Call::GetResult => self.server.goals.wait(request, &payload)?,
+            Call::GetResult => self.server.goals.wait(request, payload)?,
         }
         Ok(())
     }
@@ -355,7 +350,7 @@ impl Bridge {
     /// Accepts a goal and aborts it with the reason, as Nav2 does. A rejected goal has no result.
     fn refuse(&mut self, request: &Request, id: Uuid, why: &Refusal) {
         let now_ns = self.now_ns();
-        self.node.reply(0, Call::SendGoal, request, &Goals::<Aim>::reply(true, now_ns));
+        self.node.reply(0, Call::SendGoal, request, &reply_to_goal(true, now_ns));
         self.server.refuse(id, why, now_ns);
     }
 
@@ -372,7 +367,7 @@ impl Bridge {
                     let now_ns = self.now_ns();
                     match result {
                         Ok(()) => {
-                            let reply = Goals::<Aim>::reply(true, now_ns);
+                            let reply = reply_to_goal(true, now_ns);
                             self.node.reply(0, Call::SendGoal, &request, &reply);
                             self.server.accept(sent, after, now_ns);
                             // Its target may have preceded the supervisor's answer.

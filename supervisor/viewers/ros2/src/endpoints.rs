@@ -5,38 +5,37 @@ use std::io;
 use ros2::participant::Quality;
 
 use crate::{
-    bridge::Options,
-    node::{LATCHED, NEWEST, Node, SURE},
+    Arguments,
+    node::{LATCHED, NEWEST, Network, Node, SURE, full_name},
+    parameters::Parameter,
     topics::{Accept, Frames, Id, Spec, TABLE, spec},
 };
 
 /// Transforms come from many nodes, of either reliability.
 const TRANSFORMS: Quality = Quality { is_reliable: false, is_latched: false, depth: 100 };
 
-pub fn open(options: &Options) -> io::Result<Node<Id>> {
-    let Options { domain, interface, namespace, accepted, parameters, .. } = options;
-    let mut node = Node::join((*domain, *interface, namespace), "firsthand", parameters.clone())?;
+pub fn open(
+    network: Network<'_>,
+    options: &Arguments,
+    parameters: Vec<Parameter>,
+) -> io::Result<Node<Id>> {
+    let mut node = Node::join(network, "firsthand", parameters)?;
     if options.frames == Frames::Map {
         node.read_from(Id::Tf, ["tf", "tf2_msgs::msg::dds_::TFMessage_"], TRANSFORMS)?;
     }
     for row in TABLE {
+        let topic = [row.name, row.type_name];
         match row.accepted_by {
             None if is_of_robot(row.id) || (row.id == Id::Clock && !options.clock) => {}
-            None => write_to(&mut node, row.id, row, "")?,
-            Some(Accept::Stop) if accepted.contains(&Accept::Stop) => {
-                let name = topic_name(namespace, row, "");
-                node.read_late(row.id, [&name, row.type_name])?;
-            }
-            Some(by) if accepted.contains(&by) => {
-                let name = topic_name(namespace, row, "");
-                // Old deflections of a joystick are not resent.
-                let quality = if row.id == Id::Teleop { NEWEST } else { SURE };
-                node.read_from(row.id, [&name, row.type_name], quality)?;
-            }
-            Some(_) => {}
+            None => write_to(&mut node, (row, row.id, row.name.to_owned()))?,
+            Some(by) if !options.accept.contains(&by) => {}
+            Some(Accept::Stop) => node.read_late(row.id, topic)?,
+            // Old deflections of a joystick are not resent.
+            Some(Accept::Hand) => node.read_from(row.id, topic, NEWEST)?,
+            Some(Accept::Goals | Accept::Pose) => node.read_from(row.id, topic, SURE)?,
         }
     }
-    if accepted.contains(&Accept::Goals) {
+    if options.accept.contains(&Accept::Goals) {
         node.serve("navigate_to_pose", "NavigateToPose")?;
     }
     node.announce();
@@ -48,22 +47,17 @@ pub const fn is_of_robot(id: Id) -> bool {
     matches!(id, Id::Odom | Id::Battery | Id::Range(_) | Id::Scan(_))
 }
 
-pub fn open_robot<'a>(
+pub fn open_robot(
     node: &mut Node<Id>,
-    topics: impl Iterator<Item = (Id, &'a str)>,
+    topics: impl IntoIterator<Item = Published>,
 ) -> io::Result<()> {
     node.retain_writers(|id| !is_of_robot(id));
-    for (id, sensor) in topics {
-        if let Some(row) = spec(id) {
-            write_to(node, id, row, sensor)?;
-        }
-    }
+    topics.into_iter().try_for_each(|topic| write_to(node, topic))?;
     node.announce();
     Ok(())
 }
 
-fn write_to(node: &mut Node<Id>, id: Id, row: &Spec, sensor: &str) -> io::Result<()> {
-    let name = topic_name(&node.namespace, row, sensor);
+fn write_to(node: &mut Node<Id>, (row, id, name): Published) -> io::Result<()> {
     let quality = match id {
         // Late readers get earlier events, as from other nodes.
         Id::Rosout => Quality { depth: 100, ..LATCHED },
@@ -73,32 +67,25 @@ fn write_to(node: &mut Node<Id>, id: Id, row: &Spec, sensor: &str) -> io::Result
     node.write_to(id, [&name, row.type_name], quality)
 }
 
-/// Returns the published topics of a robot with these sensors: row, id and name below `namespace`.
+/// Row, id and name of a published topic.
+pub type Published = (&'static Spec, Id, String);
+
+/// Returns the published topics of a robot with these sensors, named below `namespace`.
 pub fn published<'a>(
     namespace: &str,
     sensors: impl Iterator<Item = (Id, &'a str)>,
-) -> impl Iterator<Item = (&'static Spec, Id, String)> {
+) -> impl Iterator<Item = Published> {
     let is_sensor = |id| matches!(id, Id::Range(_) | Id::Scan(_));
     let others = TABLE.iter().filter(move |row| row.accepted_by.is_none() && !is_sensor(row.id));
     let topics = others.map(|row| (row.id, "")).chain(sensors);
     topics.filter_map(move |(id, sensor)| {
         let row = spec(id)?;
-        Some((row, id, topic_name(namespace, row, sensor)))
+        Some((row, id, full_name(namespace, &topic_name(row, sensor))))
     })
 }
 
-pub fn topic_name(namespace: &str, row: &Spec, sensor: &str) -> String {
-    let name = row.name.replace("SENSOR", &ros_name(sensor));
-    let name = name.trim_end_matches('/');
-    match namespace.trim_matches('/') {
-        _ if name.starts_with('/') => name.to_owned(),
-        "" => format!("/{name}"),
-        namespace => format!("/{namespace}/{name}"),
-    }
-}
-
-/// Converts `name` to a topic name part of letters, digits and `_`.
-fn ros_name(name: &str) -> String {
-    let letter = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
-    name.chars().map(letter).collect()
+/// Returns the topic's name with that of the sensor in letters, digits and `_`.
+pub fn topic_name(row: &Spec, sensor: &str) -> String {
+    let sensor = sensor.replace(|letter: char| !letter.is_ascii_alphanumeric(), "_");
+    row.name.replace("SENSOR", &sensor).trim_end_matches('/').to_owned()
 }

@@ -50,6 +50,11 @@ impl<T> Goal<T> {
     }
 }
 
+/// Returns the reply to a goal, at `now_ns` since 1970.
+pub fn reply_to_goal(accepted: bool, now_ns: u64) -> Vec<u8> {
+    NavigateToPoseSendGoalResponse { accepted, stamp: now_ns.into() }.encode()
+}
+
 #[derive(Default, Serialize, Deserialize)]
 pub struct Goals<T> {
     goals: VecDeque<Goal<T>>,
@@ -59,11 +64,6 @@ pub struct Goals<T> {
 }
 
 impl<T> Goals<T> {
-    /// Returns the reply to a goal, at `now_ns` since 1970.
-    pub fn reply(is_accepted: bool, now_ns: u64) -> Vec<u8> {
-        NavigateToPoseSendGoalResponse { accepted: is_accepted, stamp: now_ns.into() }.encode()
-    }
-
     pub fn accept(&mut self, id: Uuid, known: T, now_ns: u64) {
         self.end(Status::Aborted);
         self.add(id, Status::Executing, known, now_ns);

@@ -32,10 +32,7 @@ use console::{
     executable, failure::Failure, item::item, output::print_text, stream::let_stages_go_first,
 };
 
-use self::{
-    bridge::{Options, serve},
-    topics::{Accept, Frames, Spec, TABLE},
-};
+use self::topics::{Accept, Frames, Spec, TABLE};
 
 /// Show a robot in ROS 2, to RViz and other nodes.
 ///
@@ -117,40 +114,32 @@ pub fn topics() -> String {
 }
 
 fn show(arguments: &Arguments) -> Result<ExitCode, Failure> {
-    if arguments.topics {
-        print_text(&topics())?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    if arguments.rviz {
-        print_text(RVIZ)?;
-        return Ok(ExitCode::SUCCESS);
-    }
-    if let Some(Command::Bag(options)) = &arguments.command {
-        let_stages_go_first();
-        print_text(&bag::make(&arguments.namespace, options)?)?;
-        return Ok(ExitCode::SUCCESS);
-    }
+    let text = match &arguments.command {
+        _ if arguments.topics => topics(),
+        _ if arguments.rviz => RVIZ.to_owned(),
+        Some(Command::Bag(options)) => {
+            let_stages_go_first();
+            bag::make(&arguments.namespace, options)?
+        }
+        Some(Command::Planner(_)) | None => return join(arguments),
+    };
+    print_text(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn join(arguments: &Arguments) -> Result<ExitCode, Failure> {
     let mut signals = Signals::that_end()?;
     let domain = arguments.domain.map_or_else(domain_of_environment, Ok)?;
     let mut command = Arguments::command();
     let matches = command.get_matches_mut();
     let parameters = parameters::of_options(&command, &matches);
+    let network = (domain, arguments.interface, arguments.namespace.as_str());
+    let mut ended = || signals.came();
     if let Some(Command::Planner(options)) = &arguments.command {
-        let network = (domain, arguments.interface, arguments.namespace.as_str());
-        planner::serve(network, (options, parameters), &mut || signals.came())?;
-        return Ok(ExitCode::SUCCESS);
+        planner::serve(network, (options, parameters), &mut ended)?;
+    } else {
+        let_stages_go_first();
+        bridge::serve(network, (arguments, parameters), &mut ended)?;
     }
-    let_stages_go_first();
-    let options = Options {
-        robot: arguments.robot.clone(),
-        domain,
-        interface: arguments.interface,
-        namespace: arguments.namespace.clone(),
-        accepted: arguments.accept.clone(),
-        frames: arguments.frames,
-        clock: arguments.clock,
-        parameters,
-    };
-    serve(&options, &mut || signals.came())?;
     Ok(ExitCode::SUCCESS)
 }

@@ -15,7 +15,7 @@ use ros2::{
     topic::Topic,
 };
 
-use crate::parameters::{self, Parameter, SERVICES, Service};
+use crate::parameters::{self, Parameter, SERVICES};
 
 /// Most messages of a topic that wait for a slow reader or for the node.
 const DEPTH: u16 = 10;
@@ -29,30 +29,34 @@ pub const LATCHED: Quality = Quality { is_reliable: true, is_latched: true, dept
 /// Quality for messages of which only the newest counts, from senders of either reliability.
 pub const NEWEST: Quality = Quality { is_reliable: false, is_latched: false, depth: 1 };
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Call {
     SendGoal,
     CancelGoal,
     GetResult,
 }
 
-#[derive(Debug)]
-struct Action {
-    services: Vec<(Call, Reader, Writer)>,
-    feedback: Writer,
-    status: Writer,
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Service {
+    Action(usize, Call),
+    Parameters(parameters::Service),
 }
+
+/// ROS domain, address of the only network interface to use, and namespace.
+pub type Network<'a> = (u16, Option<Ipv4Addr>, &'a str);
 
 /// Node: topics by `Id`, actions by their opening order.
 pub struct Node<Id> {
     name: &'static str,
-    pub namespace: String,
+    namespace: String,
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
     late_readers: Vec<(Id, LateReader)>,
-    actions: Vec<Action>,
+    /// Requests and replies.
+    services: BTreeMap<Service, (Reader, Writer)>,
+    /// Feedback and status of each action.
+    actions: Vec<[Writer; 2]>,
     parameters: Vec<Parameter>,
-    of_parameters: Vec<(Service, Reader, Writer)>,
     /// List of the participant's readers and writers, for other nodes.
     entities: Writer,
     joined: Instant,
@@ -61,25 +65,24 @@ pub struct Node<Id> {
 
 impl<Id: Copy + Ord> Node<Id> {
     pub fn join(
-        (domain, only, namespace): (u16, Option<Ipv4Addr>, &str),
+        (domain, only, namespace): Network<'_>,
         name: &'static str,
         parameters: Vec<Parameter>,
     ) -> io::Result<Self> {
         let participant = Participant::join(domain, only)?;
-        let namespace = namespace.trim_matches('/');
         let entities = Topic::plain(
             "ros_discovery_info",
             "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_",
         );
         let mut node = Self {
             name,
-            namespace: if namespace.is_empty() { String::new() } else { format!("/{namespace}") },
+            namespace: namespace.trim_matches('/').to_owned(),
             writers: BTreeMap::new(),
             readers: Vec::new(),
             late_readers: Vec::new(),
+            services: BTreeMap::new(),
             actions: Vec::new(),
             parameters,
-            of_parameters: Vec::new(),
             entities: participant.writer(&entities, LATCHED)?,
             joined: Instant::now(),
             participant,
@@ -87,8 +90,7 @@ impl<Id: Copy + Ord> Node<Id> {
         for (service, part, kind) in SERVICES {
             let name = node.full_name(&format!("{name}/{part}"));
             let kind = format!("rcl_interfaces::srv::dds_::{kind}");
-            let (requests, replies) = node.service(&name, &kind)?;
-            node.of_parameters.push((service, requests, replies));
+            node.offer(Service::Parameters(service), &name, &kind)?;
         }
         Ok(node)
     }
@@ -98,19 +100,16 @@ impl<Id: Copy + Ord> Node<Id> {
         self.joined.elapsed() >= KNOWN_AFTER
     }
 
-    /// Returns the absolute name. Names without a leading slash are below the namespace.
     pub fn full_name(&self, name: &str) -> String {
-        if name.starts_with('/') { name.to_owned() } else { format!("{}/{name}", self.namespace) }
+        full_name(&self.namespace, name)
     }
 
-    pub fn write_to(
-        &mut self,
-        id: Id,
-        [name, kind]: [&str; 2],
-        quality: Quality,
-    ) -> io::Result<()> {
-        let topic = Topic::new(&self.full_name(name), kind);
-        self.writers.insert(id, self.participant.writer(&topic, quality)?);
+    fn topic(&self, [name, kind]: [&str; 2]) -> Topic {
+        Topic::new(&self.full_name(name), kind)
+    }
+
+    pub fn write_to(&mut self, id: Id, topic: [&str; 2], quality: Quality) -> io::Result<()> {
+        self.writers.insert(id, self.participant.writer(&self.topic(topic), quality)?);
         Ok(())
     }
 
@@ -118,70 +117,56 @@ impl<Id: Copy + Ord> Node<Id> {
         self.writers.retain(|id, _| keep(*id));
     }
 
-    pub fn read_from(
-        &mut self,
-        id: Id,
-        [name, kind]: [&str; 2],
-        quality: Quality,
-    ) -> io::Result<()> {
-        let topic = Topic::new(&self.full_name(name), kind);
-        self.readers.push((id, self.participant.reader(&topic, quality)?));
+    pub fn read_from(&mut self, id: Id, topic: [&str; 2], quality: Quality) -> io::Result<()> {
+        self.readers.push((id, self.participant.reader(&self.topic(topic), quality)?));
         Ok(())
     }
 
     /// Reads a topic of which every message counts.
-    pub fn read_late(&mut self, id: Id, [name, kind]: [&str; 2]) -> io::Result<()> {
-        let topic = Topic::new(&self.full_name(name), kind);
-        self.late_readers.push((id, self.participant.late_reader(topic, SURE)?));
+    pub fn read_late(&mut self, id: Id, topic: [&str; 2]) -> io::Result<()> {
+        self.late_readers.push((id, self.participant.late_reader(self.topic(topic), SURE)?));
         Ok(())
     }
 
-    fn service(&self, name: &str, kind: &str) -> io::Result<(Reader, Writer)> {
+    fn offer(&mut self, service: Service, name: &str, kind: &str) -> io::Result<()> {
         let [requests, replies] = Topic::service(name, kind);
         let requests = self.participant.reader(&requests, SURE)?;
-        Ok((requests, self.participant.writer(&replies, SURE)?))
+        let replies = self.participant.writer(&replies, SURE)?;
+        self.services.insert(service, (requests, replies));
+        Ok(())
     }
 
     pub fn serve(&mut self, name: &str, kind: &str) -> io::Result<()> {
-        let name = |part| format!("{}/_action/{part}", self.full_name(name));
+        let name = self.full_name(name);
+        let name = |part| format!("{name}/_action/{part}");
         let kind = |part| format!("nav2_msgs::action::dds_::{kind}_{part}");
-        let mut services = Vec::new();
         for (call, part, kind) in [
             (Call::SendGoal, "send_goal", kind("SendGoal")),
             (Call::CancelGoal, "cancel_goal", "action_msgs::srv::dds_::CancelGoal".to_owned()),
             (Call::GetResult, "get_result", kind("GetResult")),
         ] {
-            let (requests, replies) = self.service(&name(part), &kind)?;
-            services.push((call, requests, replies));
+            self.offer(Service::Action(self.actions.len(), call), &name(part), &kind)?;
         }
         let writer = |part, kind: &str, quality| {
             self.participant.writer(&Topic::new(&name(part), kind), quality)
         };
         let feedback = writer("feedback", &kind("FeedbackMessage_"), SURE)?;
         let status = writer("status", "action_msgs::msg::dds_::GoalStatusArray_", LATCHED)?;
-        self.actions.push(Action { services, feedback, status });
+        self.actions.push([feedback, status]);
         Ok(())
     }
 
     pub fn announce(&self) {
-        let services = || {
-            let actions = self.actions.iter().flat_map(|action| &action.services);
-            let actions = actions.map(|(_, requests, replies)| (requests, replies));
-            actions
-                .chain(self.of_parameters.iter().map(|(_, requests, replies)| (requests, replies)))
-        };
-        let readers = self.readers.iter().map(|(_, reader)| reader);
-        let readers = readers.chain(services().map(|(requests, _)| requests)).map(Reader::gid);
-        let writers = self.writers.values().chain(services().map(|(_, replies)| replies));
-        let topics = self.actions.iter().flat_map(|action| [&action.feedback, &action.status]);
-        let writers = writers.chain(topics).map(Writer::gid);
+        let requests = self.services.values().map(|(requests, _)| requests);
+        let replies = self.services.values().map(|(_, replies)| replies);
+        let readers = self.readers.iter().map(|(_, reader)| reader).chain(requests);
+        let writers = self.writers.values().chain(replies).chain(self.actions.iter().flatten());
         let gid = |data| msg::Gid { data };
-        let namespace = if self.namespace.is_empty() { "/" } else { &self.namespace };
         let node = NodeEntitiesInfo {
-            node_namespace: namespace.to_owned(),
+            node_namespace: format!("/{}", self.namespace),
             node_name: self.name.to_owned(),
-            reader_gid_seq: readers.map(gid).collect(),
-            writer_gid_seq: writers.map(gid).collect(),
+            reader_gid_seq: readers.map(Reader::gid).map(gid).collect(),
+            writer_gid_seq: writers.map(Writer::gid).map(gid).collect(),
         };
         let gid = gid(self.participant.gid());
         let entities = ParticipantEntitiesInfo { gid, node_entities_info_seq: vec![node] };
@@ -195,28 +180,14 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 
     pub fn publish_feedback(&self, action: usize, payload: Vec<u8>) {
-        if let Some(action) = self.actions.get(action) {
-            action.feedback.write(payload);
+        if let Some([feedback, _]) = self.actions.get(action) {
+            feedback.write(payload);
         }
     }
 
     pub fn publish_status(&self, action: usize, payload: Vec<u8>) {
-        if let Some(action) = self.actions.get(action) {
-            action.status.write(payload);
-        }
-    }
-
-    pub fn answer(&self) {
-        for (service, requests, replies) in &self.of_parameters {
-            for Message { payload, request, .. } in requests.messages().take(AT_A_TIME) {
-                let payload = request.without_header(&payload);
-                match parameters::reply(&self.parameters, *service, &payload) {
-                    Ok(reply) => {
-                        replies.reply(&request, &reply);
-                    }
-                    Err(why) => tracing::warn!("refused a request for parameters: {why}"),
-                }
-            }
+        if let Some([_, status]) = self.actions.get(action) {
+            status.write(payload);
         }
     }
 
@@ -231,20 +202,40 @@ impl<Id: Copy + Ord> Node<Id> {
         Ok(heard)
     }
 
+    /// Answers requests for parameters. Returns calls of actions, without their headers.
     pub fn called(&self) -> Vec<(usize, Call, Message)> {
-        let actions = self.actions.iter().enumerate();
-        let called = actions.flat_map(|(action, it)| {
-            it.services.iter().flat_map(move |(call, requests, _)| {
-                requests.messages().take(AT_A_TIME).map(move |message| (action, *call, message))
-            })
-        });
-        called.collect()
+        let mut called = Vec::new();
+        for (service, (requests, replies)) in &self.services {
+            for mut message in requests.messages().take(AT_A_TIME) {
+                message.payload = message.request.without_header(&message.payload);
+                match service {
+                    Service::Action(action, call) => called.push((*action, *call, message)),
+                    Service::Parameters(service) => {
+                        match parameters::reply(&self.parameters, *service, &message.payload) {
+                            Ok(reply) => {
+                                replies.reply(&message.request, &reply);
+                            }
+                            Err(why) => tracing::warn!("refused a request for parameters: {why}"),
+                        }
+                    }
+                }
+            }
+        }
+        called
     }
 
     pub fn reply(&self, action: usize, call: Call, to: &Request, payload: &[u8]) {
-        let services = self.actions.get(action).map(|action| &action.services);
-        if let Some((.., replies)) = services.into_iter().flatten().find(|(of, ..)| *of == call) {
+        if let Some((_, replies)) = self.services.get(&Service::Action(action, call)) {
             replies.reply(to, payload);
         }
+    }
+}
+
+/// Returns the absolute name. Names without a leading slash are below the namespace.
+pub fn full_name(namespace: &str, name: &str) -> String {
+    match namespace.trim_matches('/') {
+        _ if name.starts_with('/') => name.to_owned(),
+        "" => format!("/{name}"),
+        namespace => format!("/{namespace}/{name}"),
     }
 }

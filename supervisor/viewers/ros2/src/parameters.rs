@@ -15,7 +15,7 @@ use ros2::{
 
 const OTHERS: [&str; 4] = ["help", "version", "topics", "rviz"];
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Service {
     List,
     Describe,
@@ -62,34 +62,32 @@ pub fn of_options(mut command: &Command, mut matches: &ArgMatches) -> Vec<Parame
 fn value(option: &Arg, matches: &ArgMatches) -> Option<ParameterValue> {
     let id = option.get_id().as_str();
     let mut value = ParameterValue::default();
-    if !option.get_action().takes_values() {
-        value.bool_value = matches.try_get_one(id).ok().flatten().copied()?;
-        value.r#type = ParameterType::PARAMETER_BOOL;
-        return Some(value);
-    }
     let written = matches.get_raw(id).into_iter().flatten();
     let mut texts = written.map(|text| text.to_string_lossy().into_owned());
-    if option.get_value_delimiter().is_some() {
-        value.string_array_value = texts.collect();
-        value.r#type = ParameterType::PARAMETER_STRING_ARRAY;
-        return Some(value);
-    }
-    let text = texts.next()?;
     let is = |of: &[TypeId]| of.iter().any(|of| option.get_value_parser().type_id() == *of);
-    if is(&[TypeId::of::<u8>(), TypeId::of::<u16>()])
-        && let Ok(number) = text.parse()
-    {
-        value.integer_value = number;
-        value.r#type = ParameterType::PARAMETER_INTEGER;
-    } else if is(&[TypeId::of::<f64>()])
-        && let Ok(number) = text.parse()
-    {
-        value.double_value = number;
-        value.r#type = ParameterType::PARAMETER_DOUBLE;
+    value.r#type = if !option.get_action().takes_values() {
+        value.bool_value = matches.try_get_one(id).ok().flatten().copied()?;
+        ParameterType::PARAMETER_BOOL
+    } else if option.get_value_delimiter().is_some() {
+        value.string_array_value = texts.collect();
+        ParameterType::PARAMETER_STRING_ARRAY
     } else {
-        value.string_value = text;
-        value.r#type = ParameterType::PARAMETER_STRING;
-    }
+        let text = texts.next()?;
+        if is(&[TypeId::of::<u8>(), TypeId::of::<u16>()])
+            && let Ok(number) = text.parse()
+        {
+            value.integer_value = number;
+            ParameterType::PARAMETER_INTEGER
+        } else if is(&[TypeId::of::<f64>()])
+            && let Ok(number) = text.parse()
+        {
+            value.double_value = number;
+            ParameterType::PARAMETER_DOUBLE
+        } else {
+            value.string_value = text;
+            ParameterType::PARAMETER_STRING
+        }
+    };
     Some(value)
 }
 

@@ -11,7 +11,6 @@ mod tests;
 use std::{
     collections::BTreeMap,
     env, io,
-    net::Ipv4Addr,
     sync::{
         Arc,
         mpsc::{Receiver, SyncSender, channel, sync_channel},
@@ -46,9 +45,9 @@ use self::{
 use crate::{
     bridge::BridgeError,
     frames::{Frames, placed},
-    goals::{Goals, Status, Uuid},
+    goals::{Goals, Status, Uuid, reply_to_goal},
     messages,
-    node::{Call, LATCHED, NEWEST, Node, SURE},
+    node::{Call, LATCHED, NEWEST, Network, Node, SURE},
     parameters::Parameter,
     shown::arrows,
 };
@@ -169,7 +168,7 @@ struct Plan {
 }
 
 pub fn serve(
-    network: (u16, Option<Ipv4Addr>, &str),
+    network: Network<'_>,
     (options, parameters): (&Arguments, Vec<Parameter>),
     ended: &mut dyn FnMut() -> bool,
 ) -> Result<(), BridgeError> {
@@ -192,7 +191,7 @@ pub fn serve(
 }
 
 fn open(
-    network: (u16, Option<Ipv4Addr>, &str),
+    network: Network<'_>,
     options: &Arguments,
     parameters: Vec<Parameter>,
 ) -> io::Result<Node<Id>> {
@@ -270,7 +269,7 @@ impl<'a> Server<'a> {
         if self.clients.len() >= MOST_CLIENTS {
             self.clients.clear();
         }
-        let known = self.clients.entry(participant).or_insert_with(|| asked.to_vec());
+        let known = self.clients.entry(participant).or_default();
         known.retain(|release| asked.contains(release));
         if known.is_empty() {
             *known = asked.to_vec();
@@ -282,7 +281,6 @@ impl<'a> Server<'a> {
 
     fn turn(&mut self) {
         self.node.participant.unring();
-        self.node.answer();
         for (id, message) in self.node.heard().unwrap_or_default() {
             if let Err(why) = self.hear(id, &message.payload) {
                 tracing::warn!("refused a message of {id:?}: {why}");
@@ -341,25 +339,24 @@ impl<'a> Server<'a> {
     }
 
     fn hear_call(&mut self, action: usize, call: Call, message: &Message) -> Result<(), String> {
-        let request = &message.request;
-        let payload = request.without_header(&message.payload);
+        let Message { request, payload, from } = message;
         match call {
             Call::SendGoal => {
-                let asked = calls::read(&payload, action == 0);
-                let reply = Goals::<Plan>::reply(asked.is_ok(), self.now_ns());
+                let asked = calls::read(payload, action == 0);
+                let reply = reply_to_goal(asked.is_ok(), self.now_ns());
                 self.node.reply(action, call, request, &reply);
                 let asked = asked?;
-                let release = self.release(message.from, &asked.releases);
+                let release = self.release(*from, &asked.releases);
                 self.begin(action, &asked, release);
             }
             Call::CancelGoal => {
-                let (reply, is_canceled) = self.goals[action].cancel(&payload)?;
+                let (reply, is_canceled) = self.goals[action].cancel(payload)?;
                 self.node.reply(action, call, request, &reply);
                 if is_canceled {
                     self.interrupt(action);
                 }
             }
-            Call::GetResult => self.goals[action].wait(request, &payload)?,
+            Call::GetResult => self.goals[action].wait(request, payload)?,
         }
         Ok(())
     }

@@ -48,7 +48,7 @@ pub type Sink<'a> = &'a mut dyn FnMut(Id, Vec<u8>);
 #[derive(Debug)]
 pub struct Shown {
     robot: String,
-    mission: Mission,
+    pub mission: Mission,
     sensors: Vec<Sensor>,
     pub state: RobotState,
     /// Version and time of the last published whole map.
@@ -77,10 +77,6 @@ impl Shown {
             pace: 1.0,
             others_odom: None,
         }
-    }
-
-    pub const fn mission(&self) -> &Mission {
-        &self.mission
     }
 
     pub fn sensor_topics(&self) -> impl Iterator<Item = (Id, &str)> {
@@ -149,7 +145,8 @@ impl Shown {
     fn ranges(&self, readings: &[RangeReading], now_ns: u64, sink: Sink<'_>) {
         for reading in readings {
             let row = usize::from(reading.sensor);
-            let Some(sensor) = self.sensors.get(row).filter(|sensor| sensor.used) else {
+            let is_shown = |sensor: &&Sensor| sensor.used && sensor.kind != SensorKind::Scan;
+            let Some(sensor) = self.sensors.get(row).filter(is_shown) else {
                 continue;
             };
             let range = match reading.status() {
@@ -159,23 +156,21 @@ impl Shown {
                 RangeStatus::Invalid => f64::NAN,
                 RangeStatus::Absent => continue,
             };
-            if sensor.kind != SensorKind::Scan {
-                let limits = [sensor.model.least_m(), sensor.reach_m];
-                let [min_range, max_range] = limits.map(|limit| limit as f32);
-                let message = Range {
-                    header: Header::at(now_ns, &sensor.name),
-                    radiation_type: match sensor.kind {
-                        SensorKind::Cone => Range::ULTRASOUND,
-                        _ => Range::INFRARED,
-                    },
-                    field_of_view: sensor.field_of_view_deg.to_radians().min(TAU) as f32,
-                    min_range,
-                    max_range,
-                    range: within(limits, range) as f32,
-                    ..Range::default()
-                };
-                sink(Id::Range(row), message.encode());
-            }
+            let limits = [sensor.model.least_m(), sensor.reach_m];
+            let [min_range, max_range] = limits.map(|limit| limit as f32);
+            let message = Range {
+                header: Header::at(now_ns, &sensor.name),
+                radiation_type: match sensor.kind {
+                    SensorKind::Cone => Range::ULTRASOUND,
+                    _ => Range::INFRARED,
+                },
+                field_of_view: sensor.field_of_view_deg.to_radians().min(TAU) as f32,
+                min_range,
+                max_range,
+                range: within(limits, range) as f32,
+                ..Range::default()
+            };
+            sink(Id::Range(row), message.encode());
         }
     }
 
@@ -311,12 +306,14 @@ impl Shown {
         let mut statuses = vec![self.status(level, "failsafe", message, values)];
         statuses.extend(self.state.stages.iter().map(|entry| self.stage(entry)));
         if let Some(power) = &self.state.power {
-            let level = if power.is_low() { DiagnosticStatus::WARN } else { DiagnosticStatus::OK };
-            let message = if power.is_low() { "low" } else { "not low" }.to_owned();
+            let (level, message) = match power.is_low() {
+                true => (DiagnosticStatus::WARN, "low"),
+                false => (DiagnosticStatus::OK, "not low"),
+            };
             let volts = |volts: f64| format!("{volts:.2}");
             let values =
                 vec![("board, V", volts(power.board_v)), ("motors, V", volts(power.motor_v))];
-            statuses.push(self.status(level, "battery", message, values));
+            statuses.push(self.status(level, "battery", message.to_owned(), values));
         }
         statuses
     }

@@ -514,7 +514,8 @@ fn the_scan_of_a_single_laser_is_the_topic_scan_and_those_of_several_have_the_na
         let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
         let shown = Shown::new("r".to_owned(), mission);
         let named = shown.sensor_topics().map(|(id, sensor)| {
-            crate::endpoints::topic_name("r", crate::topics::spec(id).unwrap(), sensor)
+            let name = crate::endpoints::topic_name(crate::topics::spec(id).unwrap(), sensor);
+            crate::node::full_name("r", &name)
         });
         assert!(named.eq(topics.iter().copied()), "{names:?}");
     }

@@ -52,15 +52,14 @@ pub struct Planner {
 
 impl Planner {
     pub fn new(body: Body, screening_m: f64) -> Self {
-        let (solver, fields) = (Solver::default(), VecDeque::new());
         Self {
             body,
             screening_m,
-            solver,
+            solver: Solver::default(),
             map: None,
             blocked: Vec::new(),
             costs: Vec::new(),
-            fields,
+            fields: VecDeque::new(),
         }
     }
 
@@ -158,11 +157,12 @@ impl Planner {
     ) -> Result<Vec<DVec2>, Failure> {
         let [start, goal] = ends.map(|end| format!("({:.2}, {:.2})", end.x, end.y));
         let [from, to] = ends.map(|end| map.place.inverse().transform_point2(end));
-        let fails = |reason, text: String| move || (reason, text);
-        let of_start = format!("the start {start} is outside the map");
-        let of_goal = format!("the goal {goal} is outside the map");
-        let first = map.cell_at(from).ok_or_else(fails(Reason::StartOutside, of_start))?;
-        let last = map.cell_at(to).ok_or_else(fails(Reason::GoalOutside, of_goal))?;
+        let first = map.cell_at(from).ok_or_else(|| {
+            (Reason::StartOutside, format!("the start {start} is outside the map"))
+        })?;
+        let last = map
+            .cell_at(to)
+            .ok_or_else(|| (Reason::GoalOutside, format!("the goal {goal} is outside the map")))?;
         if map.is_occupied(first, &self.body) {
             return Err((Reason::StartOccupied, format!("the start {start} is occupied")));
         }
