@@ -177,6 +177,14 @@ impl Shapes {
         self.drums.iter().map(Piece::Drum).chain(walls).chain(self.boxes.iter().map(Piece::Box))
     }
 
+    /// Returns the least and greatest corner of all shapes and two points.
+    pub fn bounds_with(&self, one: DVec2, other: DVec2) -> (DVec2, DVec2) {
+        let points = (one.min(other), one.max(other));
+        self.pieces()
+            .map(|piece| piece.bounds())
+            .fold(points, |(least, greatest), (from, to)| (least.min(from), greatest.max(to)))
+    }
+
     /// Returns the shapes that a body between two heights, metres, can touch.
     pub fn between(&self, lower_m: f64, upper_m: f64) -> Self {
         let mut shapes = self.clone();

@@ -42,7 +42,7 @@ pub fn own() -> Vec<Robot> {
 }
 
 /// Returns the readable entries of `directory`.
-pub(crate) fn entries(directory: &Path) -> impl Iterator<Item = fs::DirEntry> + use<> {
+pub fn entries(directory: &Path) -> impl Iterator<Item = fs::DirEntry> + use<> {
     fs::read_dir(directory).into_iter().flatten().flatten()
 }
 

@@ -37,7 +37,7 @@ pub fn shortest_path(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) 
 /// Returns the shortest path over eight neighbours from `start` to `goal`, including both.
 ///
 /// `apart` returns the columns and rows from a cell to the goal, `neighbour` the free cell at such
-/// a step.
+/// a step. A diagonal step cuts no blocked corner.
 pub fn over_neighbours<C: Copy + Eq + Hash>(
     start: C,
     goal: C,
@@ -53,6 +53,9 @@ pub fn over_neighbours<C: Copy + Eq + Hash>(
     let neighbours = |&cell: &C| {
         let next = |&step: &[i32; 2]| {
             let length = if step.contains(&0) { STRAIGHT } else { DIAGONAL };
+            let [cols, rows] = step;
+            neighbour(cell, [cols, 0])?;
+            neighbour(cell, [0, rows])?;
             Some((neighbour(cell, step)?, length))
         };
         steps.iter().filter_map(next).collect::<Vec<_>>()
@@ -69,11 +72,7 @@ struct Grid {
 
 impl Grid {
     fn new(shapes: &Shapes, start: DVec2, target: DVec2, radius: f64) -> Option<Self> {
-        let all = shapes.pieces().map(|piece| piece.bounds());
-        let (least, greatest) = all
-            .fold((start.min(target), start.max(target)), |(least, greatest), (from, to)| {
-                (least.min(from), greatest.max(to))
-            });
+        let (least, greatest) = shapes.bounds_with(start, target);
         let rim = DVec2::splat(radius + RIM_M);
         let origin = least - rim;
         let size = ((greatest + rim - origin) / CELL_M).ceil() + 1.0;
@@ -122,12 +121,8 @@ impl Grid {
         inside && !self.blocked[self.index(cell)]
     }
 
-    /// Returns the free cell at this step from `cell`. A diagonal step must not cut a blocked
-    /// corner.
-    fn neighbour(&self, cell: IVec2, [cols, rows]: [i32; 2]) -> Option<IVec2> {
-        let next = cell + IVec2::new(cols, rows);
-        let through = [next, cell + IVec2::new(cols, 0), cell + IVec2::new(0, rows)];
-        through.into_iter().all(|cell| self.is_free(cell)).then_some(next)
+    fn neighbour(&self, cell: IVec2, step: [i32; 2]) -> Option<IVec2> {
+        Some(cell + IVec2::from(step)).filter(|&next| self.is_free(next))
     }
 
     fn straightened(&self, cells: &[IVec2], start: DVec2, target: DVec2) -> f64 {

@@ -119,8 +119,7 @@ fn walls(random: &mut Random) -> String {
 pub fn main(arguments: &Arguments) -> Result {
     robot::path()?;
     fs::create_dir_all(&arguments.out).or_cannot_file("make", &arguments.out)?;
-    let table = csv::Reader::from_reader(include_str!("bring_up/faults.csv").as_bytes());
-    let table: Vec<Fault> = table.into_deserialize().collect::<Result<_, _>>()?;
+    let table: Vec<Fault> = crate::rows(include_str!("bring_up/faults.csv").as_bytes())?;
     let all = arguments.faulty + arguments.right;
     let mut right = 0;
     let one = |number: &u64, _| {

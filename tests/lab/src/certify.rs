@@ -4,7 +4,7 @@
 
 mod fuzz;
 
-use std::{collections::BTreeMap, fs, path::PathBuf, thread, time::Instant};
+use std::{collections::BTreeMap, fs, path::PathBuf, sync::LazyLock, thread, time::Instant};
 
 use clap::{Args, Parser as _, ValueEnum as _, builder::PossibleValuesParser};
 use console::output::{print_text, write_stderr};
@@ -26,61 +26,26 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0.001)]
     share: f64,
     /// Parts, with commas; by default all.
-    #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(PARTS.iter().map(|part| part.name)))]
+    #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(PARTS.iter().map(|part| &*part.name)))]
     parts: Vec<String>,
     /// Inputs of the part fuzz, instead of its share.
     #[arg(long, value_name = "N")]
     inputs: Option<u32>,
 }
 
+#[derive(Deserialize)]
 struct Part {
-    name: &'static str,
-    what: &'static str,
+    name: String,
+    what: String,
     whole: u32,
     /// Options of `firsthand bench chaos`, without numbers; none if it does not apply.
-    options: Option<&'static str>,
+    options: Option<String>,
 }
 
 const FUZZ: &str = "fuzz";
 
-const PARTS: &[Part] = &[
-    Part {
-        name: "signals",
-        what: "kills and freezes of stages, of starting successors and of the supervisor",
-        whole: 10_000,
-        options: Some("--include-startup --include-supervisor"),
-    },
-    Part {
-        name: "consumers",
-        what: "kills and freezes of stages and consumers, with a replay of every generation",
-        whole: 2000,
-        options: Some("--include-consumers --replay"),
-    },
-    Part {
-        name: "machine",
-        what: "freezes of all processes during changes of the target",
-        whole: 1000,
-        options: Some("--freeze-all --targets"),
-    },
-    Part {
-        name: "faults-x80",
-        what: "missions with a fault of an X80",
-        whole: 500,
-        options: Some("--robot-faults"),
-    },
-    Part {
-        name: "faults-json",
-        what: "missions with a fault of a JSON robot with a laser",
-        whole: 500,
-        options: Some("--robot-faults --set robot={model='kobuki',protocol='json',rate_hz=10}"),
-    },
-    Part {
-        name: FUZZ,
-        what: "random and mutated inputs to the decoders of wires, missions, states, maps and recordings",
-        whole: 100_000_000,
-        options: None,
-    },
-];
+static PARTS: LazyLock<Vec<Part>> =
+    LazyLock::new(|| crate::rows(include_str!("certify/parts.csv").as_bytes()).unwrap_or_default());
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Row {
@@ -100,7 +65,7 @@ pub fn main(arguments: &Arguments) -> Result {
     fs::create_dir_all(out).or_cannot_file("make", out)?;
     let mut rows = Table::open(out.join("rows.csv"))?;
     let before = rows.rows.len();
-    let is_asked = |part: &&Part| parts.is_empty() || parts.iter().any(|name| name == part.name);
+    let is_asked = |part: &&Part| parts.is_empty() || parts.contains(&part.name);
     for part in PARTS.iter().filter(is_asked) {
         write_stderr(&format!("{}: {}\n", part.name, part.what));
         let inputs = arguments.inputs.filter(|_| part.name == FUZZ);
@@ -134,7 +99,7 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
     let began = Instant::now();
     let many = (f64::from(part.whole) * share).ceil().max(1.0);
     let seed = 1 + number * 10_000;
-    let (Judged { tried, lost, worst, .. }, command) = match part.options {
+    let (Judged { tried, lost, worst, .. }, command) = match &part.options {
         None => (
             fuzz::judge(many as u64, seed)?,
             format!("firsthand-lab certify --parts {FUZZ}, {many} of seed {seed}"),
@@ -152,7 +117,7 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
         }
     };
     Ok(Row {
-        part: part.name.to_owned(),
+        part: part.name.clone(),
         seed,
         tried,
         lost,
@@ -171,7 +136,7 @@ fn certificate(rows: &[Row]) -> String {
     }
     let mut text = "| part | tried | lost | upper bound (95 %) | worst case | hours |\n|---|---|---|---|---|---|\n".to_owned();
     for (name, rows) in parts {
-        let what = PARTS.iter().find(|part| part.name == name).map_or("", |part| part.what);
+        let what = PARTS.iter().find(|part| part.name == name).map_or("", |part| &part.what);
         let sum = |of: fn(&Row) -> u64| rows.iter().map(|row| of(row)).sum::<u64>();
         let (tried, lost) = (sum(|row| row.tried), sum(|row| row.lost));
         let worst = rows.iter().rfind(|row| row.lost > 0).or(rows.last());
@@ -210,7 +175,7 @@ mod tests {
 
     #[test]
     fn every_part_is_a_chaos_that_its_options_allow() {
-        for options in PARTS.iter().filter_map(|part| part.options) {
+        for options in PARTS.iter().filter_map(|part| part.options.as_ref()) {
             let words = format!("chaos --seed 1 {options}");
             assert!(Chaos::try_parse_from(words.split(' ')).is_ok(), "{options}");
         }

@@ -23,7 +23,7 @@ mod stop_time_table;
 pub use options::{Arguments, Options};
 pub use robot_fault::RobotFault;
 
-use std::{fmt::Display, fs, process::ExitCode, time::Instant};
+use std::{fs, process::ExitCode, time::Instant};
 
 use console::output::{print_text, write_stderr};
 use serde::Serialize;
@@ -41,8 +41,8 @@ pub struct Judged {
     pub text: String,
 }
 
-fn text(result: &(impl Display + Serialize), json: bool) -> Result<String> {
-    Ok(if json { serde_json::to_string(result)? + "\n" } else { result.to_string() })
+fn text(result: &impl Serialize, json: bool, plain: String) -> Result<String> {
+    Ok(if json { serde_json::to_string(result)? + "\n" } else { plain })
 }
 
 pub fn main(arguments: &Arguments) -> Result<ExitCode> {

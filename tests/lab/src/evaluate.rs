@@ -18,12 +18,12 @@ use crate::{
     error::Result,
     missions::{
         HARMONIC, Setting,
-        results::{self, Results},
+        results::Results,
         runner::{self, NoiseSeeds, Plan},
         trial::swept_m,
     },
     worlds::{
-        self, Asked, Worlds,
+        self, Asked,
         ends::{self, Ends},
     },
 };
@@ -36,7 +36,7 @@ pub struct Arguments {
     /// furnished, glazed, moving-cylinders, people, meeting; a mission file, a ROS map (.yaml), a
     /// BARN .world or cylinders.csv; or a folder of such files.
     #[arg(long, default_value = "rooms")]
-    worlds: Worlds,
+    worlds: String,
     /// Number of worlds; by default 100 if drawn, all if read, and ten starts and targets on a map
     /// without any.
     #[arg(long)]
@@ -103,7 +103,6 @@ pub struct Arguments {
 
 pub fn main(arguments: &Arguments) -> Result {
     let settings = settings(arguments)?;
-    let described = results::command()?;
     let Arguments { start, target, seed, .. } = *arguments;
     let ends = start.zip(target).map(|([x, y, heading_deg], target)| Ends {
         start: DVec2::new(x, y),
@@ -119,7 +118,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let asked = Asked { count: arguments.count, seed, ends, swept_m };
     // A damaged world is no error of the mission on the command line.
     let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
-    let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
+    let mut results = Results::open(&arguments.out, arguments.resume)?;
     write_stderr(&format!(
         "{} worlds that the robot's body can cross on a 5 cm grid ({} others skipped)\n",
         found.trials.len(),
@@ -138,8 +137,7 @@ pub fn main(arguments: &Arguments) -> Result {
     runner::run(&plan, &mut results, "evaluation")?;
     results.sort()?;
     let report = report::report(&plan.settings, &results.rows.rows);
-    let page = report::save_page(&results, &report, &described)?;
-    write_stderr(&format!("rows and pictures: {}\n", page.display()));
+    report::save_page(&results, &report)?;
     crate::print(&report, arguments.json)
 }
 
@@ -153,17 +151,19 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 /// Returns names and assignments of each method with each sensor set. The paper's method only has
 /// the sonar.
 fn methods(arguments: &Arguments) -> Vec<(String, Vec<String>)> {
-    let with_sensors = |method: &String| -> Vec<(String, Vec<String>)> {
+    let mut methods = Vec::new();
+    for method in &arguments.method {
         let set = format!("method='{method}'");
         if arguments.sensors.is_empty() || method == "paper" {
-            return vec![(method.clone(), vec![set])];
+            methods.push((method.clone(), vec![set]));
+            continue;
         }
-        let sensed = |sensors: &String| {
-            (format!("{method} {sensors}"), vec![set.clone(), format!("sensors='{sensors}'")])
-        };
-        arguments.sensors.iter().map(sensed).collect()
-    };
-    arguments.method.iter().flat_map(with_sensors).collect()
+        for sensors in &arguments.sensors {
+            let set = vec![set.clone(), format!("sensors='{sensors}'")];
+            methods.push((format!("{method} {sensors}"), set));
+        }
+    }
+    methods
 }
 
 fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
@@ -172,17 +172,15 @@ fn settings(arguments: &Arguments) -> Result<Vec<Setting>> {
     let methods = methods(arguments);
     let mut settings = Vec::new();
     for planner in planners {
-        let is_own = planner == HARMONIC;
-        if !is_own {
+        let mut executable = Vec::new();
+        if planner != HARMONIC {
             planner_executable::find_planner(Path::new(planner), BASELINES)?;
+            executable.push(format!("planner.executable={}", toml::Value::from(&**planner)));
         }
         for (method, chosen) in &methods {
-            let mut set = [&common, &*arguments.set, chosen].concat();
-            if !is_own {
-                set.push(format!("planner.executable={}", toml::Value::from(&**planner)));
-            }
+            let set = [&common, &*arguments.set, chosen, &executable].concat();
             let name = match (&planners[..], &methods[..]) {
-                ([_], _) if is_own => method.clone(),
+                ([_], _) if executable.is_empty() => method.clone(),
                 (_, [_]) => planner.clone(),
                 _ => format!("{planner} {method}"),
             };

@@ -8,13 +8,12 @@ use std::{num::NonZero, path::PathBuf};
 
 use clap::Args;
 use common::{clock::Pace, mission::Odometry};
-use console::output::write_stderr;
 
 use crate::{
     error::Result,
     missions::{
         HARMONIC, Setting,
-        results::{self, Results},
+        results::Results,
         runner::{self, NoiseSeeds, Plan},
     },
 };
@@ -58,18 +57,16 @@ const OUTAGE: &str = "simulation.radio.outage_share=0.2";
 fn uncalibrated() -> [String; 3] {
     let Odometry { diameter_ratio_sd, track_scale_sd, distance_scale_sd, .. } = Odometry::default();
     [
-        ("diameter_ratio", diameter_ratio_sd),
-        ("track_scale", track_scale_sd),
-        ("distance_scale", distance_scale_sd),
+        format!("robot.odometry.diameter_ratio_sd={diameter_ratio_sd}"),
+        format!("robot.odometry.track_scale_sd={track_scale_sd}"),
+        format!("robot.odometry.distance_scale_sd={distance_scale_sd}"),
     ]
-    .map(|(of, sd)| format!("robot.odometry.{of}_sd={sd}"))
 }
 
 pub fn main(arguments: &Arguments) -> Result {
     let Arguments { seeds, realism, .. } = arguments;
     let chosen = table::named(&arguments.only)?;
-    let described = results::command()?;
-    let mut results = Results::open(&arguments.out, &described, arguments.resume)?;
+    let mut results = Results::open(&arguments.out, arguments.resume)?;
     for (method, own) in METHODS {
         let mut set: Vec<_> = own.iter().map(|&text| text.to_owned()).collect();
         if realism != LABORATORY {
@@ -91,8 +88,6 @@ pub fn main(arguments: &Arguments) -> Result {
     }
     results.sort()?;
     let report = report::report(&chosen, &results.rows.rows)?;
-    let all = (&results.rows.rows[..], &report[..]);
-    let page = report::save_page(&results.directory, &chosen, all, &described, FIRST_SEED)?;
-    write_stderr(&format!("rows and pictures: {}\n", page.display()));
+    report::save_page(&results, &chosen, &report)?;
     report.iter().try_for_each(|object| crate::print(object, arguments.json))
 }

@@ -1,8 +1,7 @@
 //! `firsthand field MAP`: the harmonic field of a map, without a robot.
 
 use std::{
-    fs::File,
-    io::{self, BufWriter, Write},
+    fs,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -56,10 +55,10 @@ pub fn main(arguments: &Arguments) -> Result {
     let field = field.map_err(|cause| format!("{}: {cause}", arguments.map.display()))?;
     let report = report(arguments, &field, began.elapsed());
     if let Some(file) = &arguments.out {
-        write(file, |to| write_array(to, &field))?;
+        write(file, array(&field))?;
     }
     if let Some(file) = &arguments.picture {
-        write(file, |to| to.write_all(draw(&map, &field).as_bytes()))?;
+        write(file, draw(&map, &field))?;
     }
     crate::print(&report, arguments.json)
 }
@@ -110,18 +109,13 @@ fn report(arguments: &Arguments, field: &Field, took: Duration) -> Value {
     report
 }
 
-fn write(
-    file: &Path,
-    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), String> {
-    File::create(file)
-        .map(BufWriter::new)
-        .and_then(|mut to| fill(&mut to).and_then(|()| to.flush()))
+fn write(file: &Path, content: impl AsRef<[u8]>) -> Result<(), String> {
+    fs::write(file, content)
         .map_err(|cause| format!("cannot write {}: {cause}; give another file", file.display()))
 }
 
-/// Writes u and guidance as a structured NumPy array of shape (rows, cols), format version 1.0.
-fn write_array(to: &mut impl Write, field: &Field) -> io::Result<()> {
+/// Encodes u and guidance as a structured NumPy array of shape (rows, cols), format version 1.0.
+fn array(field: &Field) -> Vec<u8> {
     let header = format!(
         "{{'descr': [('mantissa', '<f8'), ('exponent', '<i4'), ('ex', '<f4'), ('ey', '<f4')], \
          'fortran_order': False, 'shape': ({}, {})}}",
@@ -130,17 +124,16 @@ fn write_array(to: &mut impl Write, field: &Field) -> io::Result<()> {
     );
     const BEFORE: usize = 10;
     let length = (BEFORE + header.len() + 1).next_multiple_of(64) - BEFORE;
-    to.write_all(b"\x93NUMPY\x01\x00")?;
-    to.write_all(&(length as u16).to_le_bytes())?;
-    writeln!(to, "{header:<0$}", length - 1)?;
+    let mut array = b"\x93NUMPY\x01\x00".to_vec();
+    array.extend((length as u16).to_le_bytes());
+    array.extend(format!("{header:<0$}\n", length - 1).bytes());
     for cell in cells(field) {
         let (u, [ex, ey]) = (field.u(cell), guidance(field, cell));
-        to.write_all(&u.mantissa.to_le_bytes())?;
-        to.write_all(&u.exponent.to_le_bytes())?;
-        to.write_all(&ex.to_le_bytes())?;
-        to.write_all(&ey.to_le_bytes())?;
+        array.extend(u.mantissa.to_le_bytes());
+        array.extend(u.exponent.to_le_bytes());
+        array.extend([ex, ey].map(f32::to_le_bytes).concat());
     }
-    Ok(())
+    array
 }
 
 fn cells(field: &Field) -> impl Iterator<Item = Cell> {

@@ -20,10 +20,13 @@ mod sources;
 mod tick;
 mod worlds;
 
-use std::process::{ExitCode, Termination as _};
+use std::{
+    io::Read,
+    process::{ExitCode, Termination as _},
+};
 
 use clap::{Parser, Subcommand};
-use serde::Serialize;
+use serde::{Serialize, de::DeserializeOwned};
 
 /// Measure robots: missions on many worlds, the paper's experiments, random faults, tick latency,
 /// fields.
@@ -55,6 +58,11 @@ enum Bench {
     Consumer(chaos::consumers::Arguments),
     Ros2Robot(ros2_robot::Arguments),
     Sources(sources::Arguments),
+}
+
+/// Reads a CSV table.
+fn rows<T: DeserializeOwned>(table: impl Read) -> csv::Result<Vec<T>> {
+    csv::Reader::from_reader(table).into_deserialize().collect()
 }
 
 fn text(report: &impl Serialize) -> String {

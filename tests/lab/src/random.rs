@@ -26,6 +26,10 @@ impl Random {
         from + (to - from) * self.share()
     }
 
+    pub fn in_range(&mut self, [from, to]: [f64; 2]) -> f64 {
+        self.within(from, to)
+    }
+
     /// Draws uniformly in the rectangle of half size `half`.
     pub fn point(&mut self, centre: DVec2, half: DVec2) -> DVec2 {
         let x = self.within(-half.x, half.x);

@@ -10,6 +10,7 @@ use std::{
 };
 
 use common::{clock::Pace, file::append, mission::Mission, poll};
+use console::robots::entries;
 use mission_control::{recovery::SUMMARY, simulator::Simulator};
 use processes::{
     death::log_tail,
@@ -99,8 +100,7 @@ fn said(directory: &Path) -> PathBuf {
 }
 
 pub fn processes() -> impl Iterator<Item = u32> {
-    let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
-    entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok())
+    entries("/proc".as_ref()).filter_map(|entry| entry.file_name().to_str()?.parse().ok())
 }
 
 /// Returns other processes and their command lines, a space after each word.

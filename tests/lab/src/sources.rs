@@ -1,29 +1,21 @@
 //! Simulated camera and gyro, which observe a robot by its run's ground truth.
 
-use std::{
-    fs::File,
-    io::{self, BufRead as _, BufReader},
-    path::PathBuf,
-    time::Duration,
-};
+use std::{path::PathBuf, time::Duration};
 
 use clap::Args;
-use common::ground_truth::GROUND_TRUTH;
 use common::{
     bus::{Bus, Reader, Writer},
     domain::{Domain, RobotName},
     follower::{Event, Follower},
-    ground_truth::GroundTruthTick,
+    ground_truth::{GROUND_TRUTH, GroundTruthTick},
     samples::{FixSample, PoseSample, TurnSample, name},
     topics,
 };
 
 use console::output::print_text;
+use recording::log_files::Tail;
 
-use crate::{
-    error::{OrCannot as _, Result},
-    random::Random,
-};
+use crate::{error::Result, random::Random};
 
 /// Publish the measurements of a camera and a gyro of a simulated robot, until its run ends.
 #[derive(Debug, Args)]
@@ -62,10 +54,20 @@ pub fn main(arguments: &Arguments) -> Result {
     };
     let mut robot =
         Follower::new(Domain::of(arguments.robot.clone()), "sources", &topics::POSE, open);
-    let mut source = Source::new(arguments);
+    let mut source = Source {
+        arguments,
+        chance: Random::new(arguments.seed, 23),
+        file: Tail::default(),
+        truth: Vec::new(),
+        poses: Vec::new(),
+        next_fix_s: 0.0,
+        turned: None,
+        fixes: 0,
+        turns: 0,
+    };
     loop {
         match robot.wait(Duration::from_secs(1))? {
-            Event::Connected => source.file = None,
+            Event::Connected => source.file = Tail::default(),
             Event::Samples((poses, writers)) => source.take(poses, writers)?,
             Event::Nothing => {}
             Event::Disconnected => break,
@@ -80,8 +82,7 @@ type Writers = (Writer<FixSample>, Writer<TurnSample>);
 struct Source<'a> {
     arguments: &'a Arguments,
     chance: Random,
-    file: Option<BufReader<File>>,
-    line: String,
+    file: Tail,
     truth: Vec<GroundTruthTick>,
     poses: Vec<PoseSample>,
     next_fix_s: f64,
@@ -90,27 +91,12 @@ struct Source<'a> {
     turns: u64,
 }
 
-impl<'a> Source<'a> {
-    fn new(arguments: &'a Arguments) -> Self {
-        Self {
-            arguments,
-            chance: Random::new(arguments.seed, 23),
-            file: None,
-            line: String::new(),
-            truth: Vec::new(),
-            poses: Vec::new(),
-            next_fix_s: 0.0,
-            turned: None,
-            fixes: 0,
-            turns: 0,
-        }
-    }
-
+impl Source<'_> {
     fn take(&mut self, poses: &mut Reader<PoseSample>, writers: &mut Writers) -> Result {
         while let Some(pose) = poses.next_sample()? {
             self.poses.push(pose);
         }
-        self.read_truth().or_cannot("read the ground truth of the run")?;
+        self.read_truth();
         // Equal counts match a pose with the ground truth's mission time.
         for pose in std::mem::take(&mut self.poses) {
             let Some(at) = self.truth.iter().position(|truth| truth.is_of(&pose)) else {
@@ -126,18 +112,14 @@ impl<'a> Source<'a> {
         Ok(())
     }
 
-    fn read_truth(&mut self) -> io::Result<()> {
-        if self.file.is_none() {
-            let file = File::open(self.arguments.run.join(GROUND_TRUTH));
-            self.file = file.ok().map(BufReader::new);
-        }
-        let Some(file) = &mut self.file else { return Ok(()) };
-        while file.read_line(&mut self.line)? > 0 && self.line.ends_with('\n') {
-            self.truth.extend(serde_json::from_str::<GroundTruthTick>(&self.line).ok());
-            self.line.clear();
+    fn read_truth(&mut self) {
+        let file = self.arguments.run.join(GROUND_TRUTH);
+        let lines = std::iter::repeat_with(|| self.file.lines(&file));
+        for lines in lines.take_while(|lines| !lines.is_empty()) {
+            let ticks = lines.lines().map(serde_json::from_str::<GroundTruthTick>);
+            self.truth.extend(ticks.flatten());
         }
         self.truth.drain(..self.truth.len().saturating_sub(WAITING));
-        Ok(())
     }
 
     fn measure(
@@ -167,8 +149,8 @@ impl<'a> Source<'a> {
             self.fixes += 1;
         }
         if let Some(noise) = gyro {
-            let (before_s, heading) =
-                self.turned.replace((now_s, truth.heading)).unwrap_or((now_s, truth.heading));
+            let now = (now_s, truth.heading);
+            let (before_s, heading) = self.turned.replace(now).unwrap_or(now);
             let seconds = now_s - before_s;
             let deviation = noise.to_radians() * seconds.max(0.0).sqrt();
             let turn = TurnSample {

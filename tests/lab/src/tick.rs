@@ -5,7 +5,7 @@ mod hops;
 mod mission;
 mod process_set;
 
-use std::{fmt, thread, time::Duration};
+use std::{thread, time::Duration};
 
 use clap::Args;
 use common::{clock::Pace, domain::RobotName, latency::Histogram};
@@ -110,14 +110,9 @@ impl Regime {
     fn period(self) -> Option<Duration> {
         Some(Duration::from_secs_f64(1.0 / self.0?))
     }
-}
 
-impl fmt::Display for Regime {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            None => to.write_str("back to back"),
-            Some(hz) => write!(to, "at {hz} Hz"),
-        }
+    fn name(self) -> String {
+        self.0.map_or("back to back".to_owned(), |hz| format!("at {hz} Hz"))
     }
 }
 
@@ -144,13 +139,11 @@ struct Times {
 
 impl Times {
     fn new(of: &'static str, count: u64, quantiles: Quantiles) -> Result<Self> {
-        match quantiles {
-            Quantiles { p50: Some(p50), p99: Some(p99), max: Some(max) } => {
-                let [p50_us, p99_us, max_us] = [p50, p99, max].map(rounded);
-                Ok(Self { of, count, p50_us, p99_us, max_us })
-            }
-            _ => Err("no tick was measured; give a mission in which the robot drives".into()),
-        }
+        let Quantiles { p50: Some(p50), p99: Some(p99), max: Some(max) } = quantiles else {
+            return Err("no tick was measured; give a mission in which the robot drives".into());
+        };
+        let [p50_us, p99_us, max_us] = [p50, p99, max].map(rounded);
+        Ok(Self { of, count, p50_us, p99_us, max_us })
     }
 }
 
@@ -177,7 +170,7 @@ impl Report {
         let count = rounds.iter().map(|round| round.count).sum();
         let tick = Times::new("a tick, datagram in to datagram out", count, quantiles)?;
         Ok(Self {
-            regime: regime.to_string(),
+            regime: regime.name(),
             ratio: rounded(tick.p50_us / hops.p50_us),
             ratio_p99: rounded(tick.p99_us / hops.p99_us),
             used,
@@ -195,10 +188,10 @@ mod tests {
         let regime = parse_hz("7").unwrap();
         assert_eq!(regime.pace(3.5), Pace::Rate(2.0));
         assert_eq!(regime.period(), Some(Duration::from_secs_f64(1.0 / 7.0)));
-        assert_eq!(regime.to_string(), "at 7 Hz");
+        assert_eq!(regime.name(), "at 7 Hz");
         let at_once = parse_hz("max").unwrap();
         assert_eq!((at_once.pace(7.0), at_once.period()), (Pace::Max, None));
-        assert_eq!(at_once.to_string(), "back to back");
+        assert_eq!(at_once.name(), "back to back");
     }
 
     #[test]

@@ -6,16 +6,13 @@ pub mod ends;
 mod files;
 mod floor;
 mod furnished;
-mod meeting;
 mod moving;
 mod people;
 mod rooms;
 mod shapes;
 mod traps;
 
-use std::{convert::Infallible, path::PathBuf, str::FromStr};
-
-use self::{corridors::Bends, ends::Ends, rooms::Doors};
+use self::{ends::Ends, rooms::Doors};
 use crate::{
     error::Result,
     missions::trial::{Rules, Scene, Trial},
@@ -26,15 +23,7 @@ use crate::{
 const MOST_FAILURES: u64 = 10_000;
 const NO_MAP: &str = "--start and --target need a ROS map; give one to --worlds, or remove both";
 
-#[derive(Clone, Debug)]
-pub enum Worlds {
-    Drawn(&'static Kind),
-    /// File or folder: a mission, a ROS map, a BARN `.world` or table of cylinders.
-    Path(PathBuf),
-}
-
-#[derive(Debug)]
-pub struct Kind {
+struct Kind {
     stream: u64,
     name: &'static str,
     draw: fn(&mut Random, usize) -> Scene,
@@ -49,8 +38,8 @@ static KINDS: [Kind; 12] = [
     kind(1, "rooms", |random, number| rooms::draw(random, number, Doors::Some)),
     kind(2, "doors", |random, number| rooms::draw(random, number, Doors::All)),
     kind(3, "traps", traps::draw),
-    kind(4, "corridors", |random, _| corridors::draw(random, Bends::Oblique)),
-    kind(5, "straight-corridors", |random, _| corridors::draw(random, Bends::None)),
+    kind(4, "corridors", |random, _| corridors::oblique(random)),
+    kind(5, "straight-corridors", |random, _| corridors::straight(random)),
     kind(6, "furnished", furnished::draw),
     // Stream 7 draws starts and targets on maps.
     kind(8, "rotated-rooms", |random, number| rooms::rotated(random, number, Doors::Some)),
@@ -58,17 +47,8 @@ static KINDS: [Kind; 12] = [
     kind(10, "glazed", rooms::glazed),
     Kind { rules: moving::RULES, ..kind(11, "moving-cylinders", moving::draw) },
     kind(12, "people", people::draw),
-    kind(13, "meeting", |random, _| meeting::draw(random)),
+    kind(13, "meeting", |random, _| rooms::meeting(random)),
 ];
-
-impl FromStr for Worlds {
-    type Err = Infallible;
-
-    fn from_str(text: &str) -> Result<Self, Infallible> {
-        let drawn = KINDS.iter().find(|kind| kind.name == text);
-        Ok(drawn.map_or_else(|| Self::Path(text.into()), Self::Drawn))
-    }
-}
 
 /// Trials, and the number of worlds that the body cannot cross.
 #[derive(Debug, Default)]
@@ -93,11 +73,13 @@ pub struct Asked {
     pub swept_m: f64,
 }
 
-pub fn find(worlds: &Worlds, asked: Asked) -> Result<Found> {
-    let found = match worlds {
-        Worlds::Drawn(_) if asked.ends.is_some() => return Err(NO_MAP.into()),
-        Worlds::Drawn(kind) => draw(kind, asked)?,
-        Worlds::Path(path) => files::read(path, asked)?,
+/// Finds the worlds of a kind, or of a file or folder: a mission, a ROS map, a BARN `.world` or
+/// table of cylinders.
+pub fn find(worlds: &str, asked: Asked) -> Result<Found> {
+    let found = match KINDS.iter().find(|kind| kind.name == worlds) {
+        Some(_) if asked.ends.is_some() => return Err(NO_MAP.into()),
+        Some(kind) => draw(kind, asked)?,
+        None => files::read(worlds.as_ref(), asked)?,
     };
     if found.trials.is_empty() {
         return Err(format!(
@@ -119,7 +101,7 @@ fn draw(&Kind { stream, name, draw, rules }: &Kind, asked: Asked) -> Result<Foun
         }
         let scene = draw(&mut Random::of_world(seed, stream, drawn), number);
         let world = format!("{name}-{seed}-{number:04}");
-        found.add(Trial::new(world, &scene, rules, asked.swept_m)?);
+        found.add(Trial::new(&world, scene, rules, asked.swept_m)?);
     }
     Ok(found)
 }
@@ -134,22 +116,22 @@ mod tests {
 
     #[test]
     fn a_seed_gives_the_same_worlds_and_another_others() {
-        for worlds in KINDS.iter().map(Worlds::Drawn) {
+        for Kind { name, .. } in &KINDS {
             let missions = |seed| -> Vec<Mission> {
-                let found = find(&worlds, Asked { seed, ..ASKED }).unwrap();
+                let found = find(name, Asked { seed, ..ASKED }).unwrap();
                 found.trials.into_iter().map(|trial| trial.mission).collect()
             };
-            assert_eq!(missions(1), missions(1), "{worlds:?}");
-            assert_ne!(missions(1), missions(2), "{worlds:?}");
+            assert_eq!(missions(1), missions(1), "{name}");
+            assert_ne!(missions(1), missions(2), "{name}");
         }
     }
 
     #[test]
     fn every_world_can_be_crossed_and_nothing_stands_in_the_robot() {
-        for worlds in KINDS.iter().map(Worlds::Drawn) {
-            for trial in find(&worlds, Asked { count: Some(20), ..ASKED }).unwrap().trials {
+        for Kind { name, .. } in &KINDS {
+            for trial in find(name, Asked { count: Some(20), ..ASKED }).unwrap().trials {
                 let mission = &trial.mission;
-                let name = &trial.world;
+                let name = &mission.name;
                 assert!(trial.shortest_m >= mission.target.length() - 1e-9, "{name}");
                 assert!(trial.shortest_m < 5.0 * mission.target.length(), "{name}");
                 let touched = Heights::preset(Realism::default()).touched(&mission.world);

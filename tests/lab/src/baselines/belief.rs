@@ -49,13 +49,6 @@ impl Map<'_> {
         self.frame.cell_at(point).filter(|&cell| self.is_free(cell))
     }
 
-    /// Returns the free neighbour at this offset that cuts no hazard corner.
-    pub fn neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
-        self.free_neighbour(cell, [cols, 0])?;
-        self.free_neighbour(cell, [0, rows])?;
-        self.free_neighbour(cell, [cols, rows])
-    }
-
     pub fn free_neighbour(&self, cell: Cell, [cols, rows]: [i32; 2]) -> Option<Cell> {
         let col = cell.col.checked_add_signed(cols)?;
         let row = cell.row.checked_add_signed(rows)?;
@@ -85,7 +78,7 @@ impl Map<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::baselines::testing::drawn;
+    use crate::baselines::{testing::drawn, wavefront::shortest_path};
 
     fn belief(rows: &[&str]) -> Belief {
         let (header, cells) = drawn(rows);
@@ -118,10 +111,12 @@ mod tests {
     fn a_step_cuts_no_corner() {
         let belief = belief(&CORNER);
         let map = belief.map().unwrap();
-        let from = Cell { col: 1, row: 2 };
-        assert_eq!(map.neighbour(from, [1, 1]), None, "past the corner");
-        assert_eq!(map.neighbour(from, [0, 1]), Some(Cell { col: 1, row: 3 }));
-        assert_eq!(map.neighbour(Cell { col: 0, row: 0 }, [-1, 0]), None);
+        let (from, to) = (Cell { col: 1, row: 2 }, Cell { col: 2, row: 3 });
+        let path = shortest_path(&map, from, to);
+        let around = vec![from, Cell { col: 1, row: 3 }, to];
+        assert_eq!(path, Some(around), "past the corner");
+        assert_eq!(map.free_neighbour(from, [0, 1]), Some(Cell { col: 1, row: 3 }));
+        assert_eq!(map.free_neighbour(Cell { col: 0, row: 0 }, [-1, 0]), None);
     }
 
     #[test]

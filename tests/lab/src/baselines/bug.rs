@@ -10,7 +10,6 @@
 
 mod boundary;
 
-use common::grid::Cell;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
@@ -57,23 +56,15 @@ impl Planner for Bug {
             return Way::out(map, here);
         }
         let way = Straight { map, line_from, target };
-        if let Some(following) = &mut self.following
-            && (!following.is_led_on(map, here, way.left(here)) || way.is_resumed(here, following))
-        {
-            self.following = None;
-        }
-        if self.following.is_none() {
-            let Some(following) = way.hit(here) else {
-                return Way::To(target);
-            };
-            self.following = Some(following);
-        }
-        let following = self.following.as_ref();
-        self.enclosed |= following.is_some_and(|it| it.is_back(map));
-        match following {
-            Some(following) if !self.enclosed => Way::To(following.aim(map, here)),
-            _ => Way::None,
-        }
+        let led_on = |it: Following| {
+            it.led_on(map, here, way.left(here)).filter(|it| !way.is_resumed(here, it))
+        };
+        self.following = self.following.and_then(led_on).or_else(|| way.hit(here));
+        let Some(following) = self.following else {
+            return Way::To(target);
+        };
+        self.enclosed |= following.is_back(map);
+        if self.enclosed { Way::None } else { Way::To(following.aim(map, here)) }
     }
 }
 
@@ -113,29 +104,22 @@ impl Straight<'_> {
 }
 
 impl Following {
-    /// Advances along the boundary to the place nearest to `here`, if a boundary remains.
+    /// Advances along the boundary to the place nearest to `here`; none if no boundary remains.
     ///
     /// If the map has changed, it follows the boundary near the robot, preferably to the `left` of
     /// the line to the target.
-    fn is_led_on(&mut self, map: &Map<'_>, here: DVec2, left: DVec2) -> bool {
+    fn led_on(mut self, map: &Map<'_>, here: DVec2, left: DVec2) -> Option<Self> {
         if !self.place.is_on(map) {
             let cells = [Some(self.place.cell), map.free_cell_at(here)];
             let mut cells = cells.into_iter().flatten();
-            let Some(place) = cells.find_map(|cell| Place::at(map, cell, left)) else {
-                return false;
-            };
-            self.place = place;
+            self.place = cells.find_map(|cell| Place::at(map, cell, left))?;
         }
         let away = |place: &Place| map.frame.centre_of(place.cell).distance(here);
-        let mut nearest = self.place;
-        for place in self.ahead(map) {
-            if away(&place) <= away(&nearest) {
-                nearest = place;
-            }
-        }
-        self.place = nearest;
+        // Of equally near places, the last.
+        let nearest = self.ahead(map).max_by(|a, b| away(b).total_cmp(&away(a)));
+        self.place = nearest.unwrap_or(self.place);
         self.was_away |= here.distance(self.hit) > AWAY_M;
-        true
+        Some(self)
     }
 
     fn ahead<'a>(&self, map: &'a Map<'_>) -> impl Iterator<Item = Place> + 'a {
@@ -152,15 +136,9 @@ impl Following {
 
     /// Returns the farthest nearby boundary point in sight.
     fn aim(&self, map: &Map<'_>, here: DVec2) -> DVec2 {
-        let centre = |cell: Cell| map.frame.centre_of(cell);
-        let mut aim = centre(self.place.cell);
-        for place in self.ahead(map) {
-            let point = centre(place.cell);
-            if here.distance(point) <= AHEAD_M && map.sees(here, point) {
-                aim = point;
-            }
-        }
-        aim
+        let centre = |place: Place| map.frame.centre_of(place.cell);
+        let near = |point: &DVec2| here.distance(*point) <= AHEAD_M && map.sees(here, *point);
+        self.ahead(map).map(centre).filter(near).last().unwrap_or(centre(self.place))
     }
 }
 

@@ -43,9 +43,9 @@ fn aim(map: &Map<'_>, here: DVec2, target: DVec2, path: &[Cell]) -> DVec2 {
     near.unwrap_or_else(|| point(1))
 }
 
-fn shortest_path(map: &Map<'_>, start: Cell, goal: Cell) -> Option<Vec<Cell>> {
+pub fn shortest_path(map: &Map<'_>, start: Cell, goal: Cell) -> Option<Vec<Cell>> {
     let apart = |cell: Cell| [cell.col.abs_diff(goal.col), cell.row.abs_diff(goal.row)];
-    over_neighbours(start, goal, apart, |cell, step| map.neighbour(cell, step))
+    over_neighbours(start, goal, apart, |cell, step| map.free_neighbour(cell, step))
 }
 
 #[cfg(test)]

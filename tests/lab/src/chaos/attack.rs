@@ -20,7 +20,7 @@ use processes::{
     process::Process,
 };
 use rustix::process::{Pid, Signal, kill_process};
-use serde_json::Value;
+use serde::Deserialize;
 
 use super::{
     consumers::Consumers,
@@ -50,6 +50,14 @@ pub struct Attack {
     sent: Vec<Sent>,
     kept: usize,
     pose: Option<PoseSample>,
+}
+
+/// Death in the record of a run.
+#[derive(Deserialize)]
+pub struct Death {
+    stage: String,
+    generation: u32,
+    hung: bool,
 }
 
 struct Sent {
@@ -158,20 +166,17 @@ impl Attack {
 
     /// Returns whether a generation was frozen alone, and may be aborted.
     fn was_frozen(&self, stage: &str, generation: u32) -> bool {
-        let frozen = self.sent.iter().filter(|sent| sent.row.kind == Kind::Freeze);
-        frozen
-            .map(|sent| &sent.row)
-            .any(|it| it.stage == stage && it.generation == Some(generation))
+        self.sent.iter().map(|sent| &sent.row).any(|row| {
+            row.kind == Kind::Freeze && row.stage == stage && row.generation == Some(generation)
+        })
     }
 
     /// Returns stages aborted as hung, by the run's `deaths`, that were not frozen alone.
-    pub fn healthy_aborted(&self, deaths: &[Value]) -> Vec<String> {
-        let hung = deaths.iter().filter(|death| death["hung"] == true);
-        let named = hung.filter_map(|death| {
-            Some((death["stage"].as_str()?, u32::try_from(death["generation"].as_u64()?).ok()?))
-        });
-        let healthy = named.filter(|(stage, generation)| !self.was_frozen(stage, *generation));
-        healthy.map(|(stage, generation)| format!("{stage} generation {generation}")).collect()
+    pub fn healthy_aborted(&self, deaths: &[Death]) -> Vec<String> {
+        let healthy =
+            deaths.iter().filter(|it| it.hung && !self.was_frozen(&it.stage, it.generation));
+        let name = |it: &Death| format!("{} generation {}", it.stage, it.generation);
+        healthy.map(name).collect()
     }
 
     pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
@@ -246,9 +251,7 @@ impl Attack {
         let all = std::iter::once(self.supervisor).chain(stages.map(|entry| entry.pid));
         let all: Vec<u32> = all.filter(|&process| send(process, Signal::STOP)).collect();
         let began = Instant::now();
-        while let Some(left) = pause.checked_sub(began.elapsed()) {
-            std::thread::park_timeout(left);
-        }
+        std::thread::sleep(pause);
         for process in all.into_iter().rev() {
             send(process, Signal::CONT);
         }

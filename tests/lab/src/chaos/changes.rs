@@ -65,7 +65,7 @@ fn send(robot: &RobotName, mission: &Mission, seed: u64, stopped: &Receiver<()>)
     let mut sent = Sent::default();
     let mut changes = 0;
     while changes < MOST_CHANGES {
-        let pause = Duration::from_secs_f64(random.within(PAUSE_S[0], PAUSE_S[1]));
+        let pause = Duration::from_secs_f64(random.in_range(PAUSE_S));
         if stopped.recv_timeout(pause) != Err(RecvTimeoutError::Timeout) {
             break;
         }

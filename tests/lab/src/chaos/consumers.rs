@@ -19,7 +19,7 @@ use processes::{
 };
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use super::{options::Options, report::Report, schedule::Kind};
+use super::{options, report::Report, schedule::Kind};
 use crate::{
     error::{OrCannot as _, Refused, Result},
     robot,
@@ -44,10 +44,18 @@ struct Running {
 }
 
 impl Consumers {
-    pub fn start(options: &Options, directory: PathBuf, report: &mut Report) -> Result<Self> {
+    pub fn start(
+        asked: &options::Arguments,
+        directory: PathBuf,
+        report: &mut Report,
+    ) -> Result<Self> {
         fs::create_dir(&directory).or_cannot("make a directory")?;
+        let mut consumers = asked.consumer.clone();
+        if asked.include_consumers {
+            consumers.extend(Consumer::own(&asked.robot)?);
+        }
         let mut all = Vec::new();
-        for (place, consumer) in options.consumers()?.into_iter().enumerate() {
+        for (place, consumer) in consumers.into_iter().enumerate() {
             let said = directory.join(format!("stderr-{place}"));
             let mut running =
                 Running { consumer, process: None, starts: 0, frozen_until: None, said };

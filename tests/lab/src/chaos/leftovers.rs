@@ -1,7 +1,6 @@
 //! Files, shared memory and processes that outlived a mission.
 
 use std::{
-    fs,
     path::Path,
     thread,
     time::{Duration, Instant},
@@ -9,6 +8,7 @@ use std::{
 
 use ::processes::STOP_GUARD;
 use common::domain::{Domain, RobotName, SHARED_MEMORY};
+use console::robots::entries;
 
 use crate::robot::command_lines;
 
@@ -18,8 +18,8 @@ const LOOK: Duration = Duration::from_millis(10);
 pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let domain = Domain::of(robot.clone());
     let prefix = domain.shared_memory_prefix();
-    let entries = fs::read_dir(SHARED_MEMORY).into_iter().flatten().flatten();
-    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let names = entries(SHARED_MEMORY.as_ref())
+        .map(|entry| entry.file_name().to_string_lossy().into_owned());
     let shared = names.filter(|name| name.starts_with(&prefix));
     let mut found: Vec<String> = shared.map(|name| format!("{SHARED_MEMORY}/{name}")).collect();
     let directory = directory.to_string_lossy();

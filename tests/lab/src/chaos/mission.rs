@@ -8,10 +8,9 @@ use std::{
 };
 
 use common::{clock::Pace, mission::Mission};
-use serde_json::Value;
 
 use crate::chaos::{
-    attack::Attack,
+    attack::{Attack, Death},
     changes::Operator,
     consumers::Consumers,
     options::{Arguments, Options},
@@ -28,16 +27,16 @@ use summary::Summary;
 /// A mission takes half a minute of wall-clock time.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-pub fn command(options: &Options, seed: u64, pace: &str, out: &Path) -> Command {
+pub fn command(options: &Options, seed: u64, pace: Pace, out: &Path) -> Command {
     let Arguments { mission, robot, set, .. } = &options.asked;
     let mut command = robot::mission("run", mission, robot, set);
-    command.args(["--pace", pace, "--seed", &seed.to_string(), "--out"]).arg(out);
+    command.args(["--pace", &pace.to_string(), "--seed", &seed.to_string(), "--out"]).arg(out);
     command
 }
 
 pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     let directory = options.directory.join("undisturbed");
-    let command = command(options, seed, &Pace::Max.to_string(), &directory);
+    let command = command(options, seed, Pace::Max, &directory);
     let summary = Run::start(command, &directory, false)?.wait(PATIENCE, || ())?.summary()?;
     fs::remove_dir_all(directory).or_cannot("remove its directory")?;
     Ok(summary)
@@ -53,19 +52,19 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     let directory = files.join("run");
     let mut robot =
         asked.include_supervisor.then(|| robot(options, seed, &files, false)).transpose()?;
-    let mut start = command(options, seed, &asked.pace.to_string(), &directory);
+    let mut start = command(options, seed, asked.pace, &directory);
     if let Some(robot) = &robot {
         let address = robot.address();
         start.args(["--set", &format!("robot.address='udp://{address}'")]);
     }
     let consumers = files.join("consumers");
-    let consumers = Consumers::start(options, consumers, &mut series.report)?;
+    let consumers = Consumers::start(asked, consumers, &mut series.report)?;
     let operator =
         asked.targets.then(|| Operator::start(asked.robot.clone(), &options.loaded, seed));
     let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
-        let mut run = Run::start(start, &directory, options.records())?;
+        let mut run = Run::start(start, &directory, asked.replay || asked.include_consumers)?;
         let attacked = attack.run(series, &mut run.process, robot.as_mut(), PATIENCE);
         run.process.end(Duration::from_secs(2));
         attacked?;
@@ -124,7 +123,7 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     Ok(())
 }
 
-fn deaths(directory: &Path) -> Vec<Value> {
+fn deaths(directory: &Path) -> Vec<Death> {
     let text = fs::read_to_string(directory.join(DEATHS)).unwrap_or_default();
     let lines = text.lines().map(serde_json::from_str);
     lines.filter_map(Result::ok).collect()

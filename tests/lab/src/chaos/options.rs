@@ -136,16 +136,4 @@ impl Options {
     pub fn protocol(&self) -> Protocol {
         if self.asked.ros2 { Protocol::Ros2 } else { self.loaded.robot.protocol() }
     }
-
-    pub fn records(&self) -> bool {
-        self.asked.replay || self.asked.include_consumers
-    }
-
-    pub fn consumers(&self) -> Result<Vec<Consumer>> {
-        let mut consumers = self.asked.consumer.clone();
-        if self.asked.include_consumers {
-            consumers.extend(Consumer::own(&self.asked.robot)?);
-        }
-        Ok(consumers)
-    }
 }

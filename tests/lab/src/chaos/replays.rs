@@ -5,6 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use console::robots::entries;
 use recording::{
     End, Recording, RecordingError,
     replay::{Options, replay},
@@ -98,7 +99,6 @@ fn began_late(directory: &Path) -> bool {
 }
 
 fn recordings(directory: &Path) -> impl Iterator<Item = PathBuf> {
-    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
-    let files = entries.map(|entry| entry.path());
+    let files = entries(directory).map(|entry| entry.path());
     files.filter(|file| file.extension().is_some_and(|extension| extension == "mcap"))
 }

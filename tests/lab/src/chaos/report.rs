@@ -2,7 +2,7 @@
 //!
 //! A row is written once its signal and all earlier ones are measured.
 
-use std::{collections::BTreeMap, fmt, fs, path::Path, time::Instant};
+use std::{collections::BTreeMap, fs, path::Path, time::Instant};
 
 use common::latency::Histogram;
 use serde::{Deserialize, Serialize, Serializer};
@@ -131,7 +131,7 @@ impl Report {
             tried: self.signals.into(),
             lost: (self.wrong.len() + self.leftovers.len()) as u64,
             worst: self.wrong.iter().chain(&self.leftovers).next().cloned().unwrap_or_else(moved),
-            text: super::text(self, json)?,
+            text: super::text(self, json, crate::text(self))?,
         })
     }
 }
@@ -140,12 +140,6 @@ impl Report {
 fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Error> {
     let us = [0.5, 0.99, 1.0].into_iter().filter_map(|share| histogram.quantile_us(share));
     us.map(|us| rounded(us / 1e3)).collect::<Vec<_>>().serialize(to)
-}
-
-impl fmt::Display for Report {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-        to.write_str(&crate::text(self))
-    }
 }
 
 /// Signal; unmeasured values are empty cells.

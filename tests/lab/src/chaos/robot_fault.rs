@@ -83,10 +83,8 @@ pub enum RobotFault {
     Garbage,
 }
 
-static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
-    let table = csv::Reader::from_reader(include_str!("robot_faults.csv").as_bytes());
-    table.into_deserialize().flatten().collect()
-});
+static TABLE: LazyLock<Vec<Row>> =
+    LazyLock::new(|| crate::rows(include_str!("robot_faults.csv").as_bytes()).unwrap_or_default());
 
 impl Row {
     /// Returns the maximum seconds from the fault to rest, including one frame; none if the robot

@@ -83,7 +83,7 @@ fn one(options: &Options, fault: RobotFault, seed: u64, files: &Path) -> Result<
     let mut robot = mission::robot(options, seed, files, fault.is_kill())?;
     let proxy = Proxy::start(robot.address(), fault, loaded.robot.protocol(), seed);
     let proxy = proxy.or_cannot("start a proxy")?;
-    let mut start = mission::command(options, seed, "1", &directory);
+    let mut start = mission::command(options, seed, asked.pace, &directory);
     let node = if asked.ros2 {
         let stated =
             |keys: &[String]| missions::load(&asked.mission, &[&asked.set[..], keys].concat());

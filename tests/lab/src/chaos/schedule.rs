@@ -1,6 +1,6 @@
 //! Kinds of hits on a process, and their repeatable, seeded schedule.
 
-use std::{ops::Range, time::Duration};
+use std::time::Duration;
 
 use processes::stages::TABLE;
 use rustix::process::Signal;
@@ -49,7 +49,7 @@ const CONSUMER_SHARE: f64 = 0.5;
 const FREEZE_ALL_SHARE: f64 = 0.5;
 /// Range of freeze times of everything or a consumer: from below a stage's deadline to three times
 /// as long.
-const FREEZE_S: Range<f64> = 0.3..1.5;
+const FREEZE_S: [f64; 2] = [0.3, 1.5];
 
 pub struct Schedule(Random);
 
@@ -85,8 +85,7 @@ impl Schedule {
     }
 
     fn freeze(&mut self) -> Duration {
-        let Range { start, end } = FREEZE_S;
-        Duration::from_secs_f64(self.0.within(start, end))
+        Duration::from_secs_f64(self.0.in_range(FREEZE_S))
     }
 
     /// Draws consumer, kind and freeze time, if a consumer is hit.

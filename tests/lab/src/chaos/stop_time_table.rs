@@ -1,7 +1,5 @@
 //! Stop-time table: how long robots moved after their fault.
 
-use std::fmt;
-
 use console::table::Table;
 use serde::Serialize;
 
@@ -67,13 +65,11 @@ impl StopTimeTable {
                 let Entry { fault, seed, way_m, outcome, reason, .. } = entry;
                 format!("{} (seed {seed}): {way_m:.2} m, {outcome}: {reason}", fault.row().name)
             }),
-            text: super::text(self, json)?,
+            text: super::text(self, json, self.text())?,
         })
     }
-}
 
-impl fmt::Display for StopTimeTable {
-    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn text(&self) -> String {
         let mut table = Table::new([
             "robot",
             ">last command",
@@ -100,7 +96,7 @@ impl fmt::Display for StopTimeTable {
                 &format!("{}: {reason}", told.outcome),
             ]);
         }
-        writeln!(to, "{table}Times and ways are maxima per fault, counted from the fault.")
+        format!("{table}Times and ways are maxima per fault, counted from the fault.\n")
     }
 }
 
@@ -164,7 +160,7 @@ mod tests {
     fn the_table_shows_the_longest_time_of_each_kind_and_who_still_moved() {
         let moved = Entry { last_moving_s: Some(9.9), ..entry(RobotFault::Silence) };
         let table = StopTimeTable { entries: vec![entry(RobotFault::Silence), moved] };
-        let text = table.to_string();
+        let text = table.text();
         let row = text.lines().nth(1).unwrap_or_default();
         let words: Vec<_> = row.split_whitespace().collect();
         let want = "silence > 9.90 s 0.90 s 2.00 s 0.12 m 0 1 of 2 goes on: robot lost";

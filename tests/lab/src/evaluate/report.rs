@@ -1,6 +1,6 @@
 //! Results per setting, paired differences of settings, and the page of failures.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
@@ -10,7 +10,7 @@ use crate::{
         Setting,
         page::Page,
         results::Results,
-        row::{OUTCOMES, Outcome, Row},
+        row::{OUTCOMES, Outcome, Row, spread},
         runner,
         statistics::{Estimate, mean, median, paired_difference, rounded, share},
     },
@@ -61,10 +61,7 @@ fn totals(setting: &str, rows: &[Row]) -> Value {
     add(SLOWED, &|row| !row.slowed.is_empty());
     for key in METRICS {
         let value = match key.strip_prefix("median_") {
-            Some(column) => {
-                let successes = rows.iter().filter(|row| row.is_success());
-                median(successes.filter_map(|row| row.number(column)))
-            }
+            Some(column) => spread(&rows, column).map(|spread| spread.median),
             None => mean(rows.iter().filter_map(|row| row.number(key))),
         };
         if let Some(value) = value {
@@ -107,22 +104,20 @@ fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
     versus
 }
 
-/// Writes the page beside its pictures. `command` reproduces the results.
-pub fn save_page(results: &Results, report: &Value, command: &str) -> Result<PathBuf> {
-    let Results { directory, rows, .. } = results;
-    let mut page = Page::new("Evaluation", command);
-    page.table(&crate::text(report));
+pub fn save_page(results: &Results, report: &Value) -> Result {
+    let rows = &results.rows.rows;
+    let mut page = Page::new("Evaluation", results);
+    page.element("pre", &crate::text(report));
     for outcome in OUTCOMES.into_iter().skip(1) {
-        let failures: Vec<_> =
-            rows.rows.iter().filter(|row| row.outcome_name() == outcome).collect();
+        let failures: Vec<_> = rows.iter().filter(|row| row.outcome_name() == outcome).collect();
         if !failures.is_empty() {
-            page.heading(&format!("{outcome} ({})", failures.len()));
+            page.element("h2", &format!("{outcome} ({})", failures.len()));
         }
         for row in failures {
             let Row { world, seed, setting, reason, .. } = row;
             let caption = format!("{world}, seed {seed}, {setting}: {reason}");
-            page.figure(&caption, directory, &runner::picture(row));
+            page.figure(&caption, &runner::picture(row));
         }
     }
-    page.save(directory)
+    page.save()
 }

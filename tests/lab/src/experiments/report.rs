@@ -1,17 +1,19 @@
 //! Results of the experiments as JSON objects, and their page.
 
-use std::path::{Path, PathBuf};
-
 use serde_json::{Value, json};
 
-use super::table::{Claim, Experiment, METHODS, claims};
+use super::{
+    FIRST_SEED,
+    table::{Claim, Experiment, METHODS, claims},
+};
 use crate::{
     error::Result,
     missions::{
         page::Page,
-        row::{Outcome, Row},
+        results::Results,
+        row::{Outcome, Row, spread},
         runner::picture,
-        statistics::{Estimate, Spread, share},
+        statistics::{Estimate, share},
     },
 };
 
@@ -82,11 +84,6 @@ fn count(rows: &[&Row], outcome: Outcome) -> usize {
     rows.iter().filter(|row| row.outcome == outcome).count()
 }
 
-fn spread(rows: &[&Row], figure: &str) -> Option<Spread> {
-    let arrived = rows.iter().filter(|row| row.is_success());
-    Spread::of(arrived.filter_map(|row| row.number(figure)))
-}
-
 /// Returns the median of a figure, or the share that `arrived`.
 fn value(rows: &[&Row], figure: &str) -> Option<f64> {
     if figure == "arrived" {
@@ -96,28 +93,21 @@ fn value(rows: &[&Row], figure: &str) -> Option<f64> {
     Some(spread(rows, figure)?.median)
 }
 
-/// Writes the page beside its pictures. `command` reproduces the results.
-pub fn save_page(
-    directory: &Path,
-    experiments: &[Experiment],
-    (rows, report): (&[Row], &[Value]),
-    command: &str,
-    pictured_seed: u64,
-) -> Result<PathBuf> {
-    let mut page = Page::new("The paper's experiments", command);
+pub fn save_page(results: &Results, experiments: &[Experiment], report: &[Value]) -> Result {
+    let mut page = Page::new("The paper's experiments", results);
     for (Experiment { name, title, reported, .. }, object) in experiments.iter().zip(report) {
-        page.heading(&format!("{name}: {title}"));
-        page.text(&format!("The paper: {reported}."));
-        page.table(&crate::text(object));
-        for row in rows.iter().filter(|row| row.world == *name) {
-            if row.seed == pictured_seed || !row.is_success() {
+        page.element("h2", &format!("{name}: {title}"));
+        page.element("p", &format!("The paper: {reported}."));
+        page.element("pre", &crate::text(object));
+        for row in results.rows.rows.iter().filter(|row| row.world == *name) {
+            if row.seed == FIRST_SEED || !row.is_success() {
                 let Row { setting, seed, .. } = row;
                 let caption = format!("{setting}, seed {seed}: {}", row.outcome_name());
-                page.figure(&caption, directory, &picture(row));
+                page.figure(&caption, &picture(row));
             }
         }
     }
-    page.save(directory)
+    page.save()
 }
 
 #[cfg(test)]

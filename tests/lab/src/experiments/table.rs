@@ -2,7 +2,7 @@
 //! choose them.
 
 use console::missions;
-use serde::{Deserialize, de::DeserializeOwned};
+use serde::Deserialize;
 
 use crate::{
     error::{Refused, Result},
@@ -46,19 +46,13 @@ pub struct Claim {
     pub most: f64,
 }
 
-fn rows<T: DeserializeOwned>(table: &str) -> Result<Vec<T>> {
-    let rows: csv::Result<_> =
-        csv::Reader::from_reader(table.as_bytes()).into_deserialize().collect();
-    Ok(rows?)
-}
-
-pub fn claims() -> Result<Vec<Claim>> {
-    rows(include_str!("claims.csv"))
+pub fn claims() -> csv::Result<Vec<Claim>> {
+    crate::rows(include_str!("claims.csv").as_bytes())
 }
 
 /// Returns the named experiments, or all without names.
 pub fn named(names: &[String]) -> Result<Vec<Experiment>> {
-    let mut table: Vec<Experiment> = rows(include_str!("table.csv"))?;
+    let mut table: Vec<Experiment> = crate::rows(include_str!("table.csv").as_bytes())?;
     if let Some(name) = names.iter().find(|name| !table.iter().any(|it| it.name == **name)) {
         let known: Vec<_> = table.into_iter().map(|it| it.name).collect();
         let known = known.join(", ");
@@ -83,7 +77,7 @@ impl Experiment {
             mission.known.drums.retain(|drum| drum.at.to_array() != UNKNOWN_AT_M);
         }
         let swept_m = swept_m(&mission);
-        let trial = Trial::of_mission(self.name.clone(), mission, swept_m);
+        let trial = Trial::of_mission(mission, swept_m);
         let unsolvable = || {
             format!(
                 "experiment {}: the target is unreachable; change the obstacles of its mission",

@@ -15,7 +15,7 @@ use crate::error::{OrCannot as _, Refused, Result};
 const PLAN_FILE: &str = "plan.txt";
 
 /// Returns the command without options that leave the rows unchanged.
-pub fn command() -> Result<String> {
+fn command() -> Result<String> {
     let mut words = vec!["firsthand".to_owned()];
     let mut given = env::args().skip(1);
     while let Some(word) = given.next() {
@@ -30,6 +30,8 @@ pub fn command() -> Result<String> {
 }
 
 pub struct Results {
+    /// Command that reproduces the results.
+    pub command: String,
     pub directory: PathBuf,
     pub rows: Table<Row>,
     /// Latencies, which differ in every run, unlike rows.
@@ -38,49 +40,45 @@ pub struct Results {
 
 impl Results {
     /// Resumes `directory` only if the command is the same.
-    pub fn open(directory: &Path, command: &str, resume: bool) -> Result<Self> {
+    pub fn open(directory: &Path, resume: bool) -> Result<Self> {
+        let command = command()?;
         let file = directory.join(PLAN_FILE);
         let named = directory.display();
         let use_it = format!("use {named} for results; give another --out");
-        match fs::read_to_string(&file) {
-            Ok(earlier) if resume && earlier.trim() == command => {}
-            Ok(earlier) if resume => {
-                let earlier = earlier.trim();
-                let other = format!(
-                    "--resume: {named} has results of another command, `{earlier}`; give another --out"
-                );
-                return Err(Refused::new("other-results", other).into());
-            }
-            Ok(_) => {
+        if let Ok(earlier) = fs::read_to_string(&file) {
+            let earlier = earlier.trim();
+            if !resume {
                 let taken = format!(
                     "{named} contains results; continue them with --resume, or give another --out"
                 );
                 return Err(Refused::new("results-there", taken).into());
             }
-            Err(_) => {
-                fs::create_dir_all(directory).or_cannot(&use_it)?;
-                fs::write(&file, format!("{command}\n")).or_cannot(&use_it)?;
+            if earlier != command {
+                let other = format!(
+                    "--resume: {named} has results of another command, `{earlier}`; give another --out"
+                );
+                return Err(Refused::new("other-results", other).into());
             }
+        } else {
+            fs::create_dir_all(directory).or_cannot(&use_it)?;
+            fs::write(&file, format!("{command}\n")).or_cannot(&use_it)?;
         }
         let directory = fs::canonicalize(directory).or_cannot(&use_it)?;
         Ok(Self {
             rows: Table::open(directory.join("rows.csv"))?,
             latencies: Table::open(directory.join("latencies.csv"))?,
+            command,
             directory,
         })
     }
 
     pub fn sort(&mut self) -> Result {
-        self.rows.sort()?;
-        self.latencies.sort()
+        self.rows.sort(Row::key)?;
+        self.latencies.sort(|it| (it.world.clone(), it.seed, it.setting.clone()))
     }
 }
 
 pub type Key = (String, u64, String);
-
-pub trait Record: Serialize + DeserializeOwned {
-    fn key(&self) -> Key;
-}
 
 #[derive(Debug)]
 pub struct Table<R> {
@@ -118,15 +116,12 @@ impl<R: Serialize + DeserializeOwned> Table<R> {
         self.rows.iter().try_for_each(|row| writer.serialize(row))?;
         replace(&self.file, writer.into_inner()?).or_cannot_file("write", &self.file)
     }
-}
 
-impl<R: Record> Table<R> {
-    /// Sorts by world, seed and setting, and rewrites the file. Of a mission's two rows, the later
-    /// stays.
-    pub fn sort(&mut self) -> Result {
+    /// Sorts by `key`, and rewrites the file. Of two rows with one key, the later stays.
+    fn sort(&mut self, key: impl Fn(&R) -> Key) -> Result {
         self.rows.reverse();
-        self.rows.sort_by_key(R::key);
-        self.rows.dedup_by_key(|row| row.key());
+        self.rows.sort_by_key(&key);
+        self.rows.dedup_by_key(|row| key(row));
         self.save()
     }
 }

@@ -6,11 +6,7 @@ use mission_control::outcome::Outcome as Reported;
 use serde::{Deserialize, Serialize};
 use summary::Summary;
 
-use super::{
-    Setting,
-    results::{Key, Record},
-    trial::Trial,
-};
+use super::{Setting, results::Key, statistics::Spread, trial::Trial};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -106,8 +102,26 @@ impl Row {
         let optimal_s = rules.optimal_time_s.unwrap_or(shortest_m / BARN_SPEED_M_S);
         let [least_s, most_s] = BARN_CLIP.map(|times| times * optimal_s);
         let path_m = summary.path_length_m;
+        let Summary {
+            min_clearance_m,
+            p_o,
+            f_ps_m2,
+            f_vs_m_s2,
+            pose_error_m,
+            pose_error_expected_m,
+            true_distance_m,
+            safety_events,
+            sonar_unavailable_share,
+            wheel_range_rad_s,
+            looks,
+            look_s,
+            resets,
+            full_solves,
+            contact_speed_m_s,
+            ..
+        } = *summary;
         Self {
-            world: trial.world.clone(),
+            world: trial.mission.name.clone(),
             seed,
             setting: setting.name.clone(),
             planner: setting.planner.clone(),
@@ -120,22 +134,22 @@ impl Row {
             k: path_m / straight_m,
             spl: if_success(shortest_m / path_m.max(shortest_m)),
             barn_score: rules.scored.then(|| if_success(optimal_s / time_s.clamp(least_s, most_s))),
-            min_clearance_m: summary.min_clearance_m,
-            p_o: summary.p_o,
-            f_ps_m2: summary.f_ps_m2,
-            f_vs_m_s2: summary.f_vs_m_s2,
-            pose_error_m: summary.pose_error_m,
-            pose_error_expected_m: summary.pose_error_expected_m,
-            true_distance_m: summary.true_distance_m,
-            safety_events: summary.safety_events,
-            sonar_unavailable_share: summary.sonar_unavailable_share,
-            wheel_range_rad_s: summary.wheel_range_rad_s,
-            looks: summary.looks,
-            look_s: summary.look_s,
+            min_clearance_m,
+            p_o,
+            f_ps_m2,
+            f_vs_m_s2,
+            pose_error_m,
+            pose_error_expected_m,
+            true_distance_m,
+            safety_events,
+            sonar_unavailable_share,
+            wheel_range_rad_s,
+            looks,
+            look_s,
             replans: summary.replans.into(),
-            resets: summary.resets,
-            full_solves: summary.full_solves,
-            contact_speed_m_s: summary.contact_speed_m_s,
+            resets,
+            full_solves,
+            contact_speed_m_s,
             stops: causes(&summary.stops),
             slowed: causes(&summary.slowed),
         }
@@ -149,6 +163,10 @@ impl Row {
 
     pub fn is_success(&self) -> bool {
         self.outcome == Outcome::Success
+    }
+
+    pub fn key(&self) -> Key {
+        (self.world.clone(), self.seed, self.setting.clone())
     }
 
     pub const fn outcome_name(&self) -> &'static str {
@@ -165,15 +183,15 @@ impl Row {
     }
 }
 
+/// Returns the spread of a column over the successes.
+pub fn spread(rows: &[&Row], column: &str) -> Option<Spread> {
+    let successes = rows.iter().filter(|row| row.is_success());
+    Spread::of(successes.filter_map(|row| row.number(column)))
+}
+
 fn causes(times: &BTreeMap<String, u32>) -> String {
     let each: Vec<_> = times.iter().map(|(cause, times)| format!("{cause} {times}x")).collect();
     each.join(", ")
-}
-
-impl Record for Row {
-    fn key(&self) -> Key {
-        (self.world.clone(), self.seed, self.setting.clone())
-    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -208,12 +226,6 @@ impl Latency {
     }
 }
 
-impl Record for Latency {
-    fn key(&self) -> Key {
-        (self.world.clone(), self.seed, self.setting.clone())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -228,7 +240,6 @@ mod tests {
     fn trial(optimal_time_s: Option<f64>) -> Trial {
         let mission = Mission::parse("target = [4, 0]", Path::new("test.toml")).unwrap();
         Trial {
-            world: "test".to_owned(),
             mission,
             shortest_m: 4.0,
             rules: Rules {

@@ -17,7 +17,7 @@ use summary::Summary;
 
 use super::{
     Setting,
-    results::{Record as _, Results},
+    results::Results,
     row::{Latency, Outcome, Row},
     trial::Trial,
 };
@@ -96,8 +96,8 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     let done: BTreeSet<_> = settled.map(Row::key).collect();
     let (mut all, mut left) = (0, Vec::new());
     for (number, trial) in (0..).zip(&plan.trials) {
-        for Trial { world, mission, .. } in trial.robots() {
-            let file = world_file(&directory, world);
+        for Trial { mission, .. } in trial.robots() {
+            let file = world_file(&directory, &mission.name);
             fs::write(&file, toml::to_string(mission)?).or_cannot_file("write", &file)?;
         }
         for repeat in 0..plan.repeats {
@@ -105,7 +105,7 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
             for setting in &plan.settings {
                 all += 1;
                 let is_done = |(noise, robot): (u64, &Trial)| {
-                    done.contains(&(robot.world.clone(), noise, setting.name.clone()))
+                    done.contains(&(robot.mission.name.clone(), noise, setting.name.clone()))
                 };
                 if !noises(seed).zip(trial.robots()).all(is_done) {
                     left.push(Job { plan, trial, setting, seed, directory: &directory });
@@ -114,8 +114,7 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
         }
     }
     let first = all - left.len();
-    let processors = || thread::available_parallelism().map_or(1, NonZero::get);
-    let threads = plan.jobs.map_or_else(processors, NonZero::get);
+    let threads = plan.jobs.or(thread::available_parallelism().ok()).map_or(1, NonZero::get);
     let (began, mut ended, mut line) = (Instant::now(), 0, ProgressLine::new(LINE_EVERY));
     let run = |job: &Job<'_>, thread| {
         let ended = match job.run(thread) {
@@ -191,15 +190,14 @@ struct Robot<'a> {
     trial: &'a Trial,
     seed: u64,
     name: &'a str,
-    other: Option<&'a str>,
     directory: PathBuf,
-    calibrated: Option<String>,
+    set: Vec<String>,
 }
 
 impl Robot<'_> {
     fn firsthand(&self, subcommand: &str) -> Command {
-        let file = world_file(self.job.directory, &self.trial.world);
-        let mut command = robot::mission(subcommand, &file, self.name, &self.job.setting.set);
+        let file = world_file(self.job.directory, &self.trial.mission.name);
+        let mut command = robot::mission(subcommand, &file, self.name, &self.set);
         command.args(["--seed", &self.seed.to_string()]);
         command
     }
@@ -213,11 +211,11 @@ impl Robot<'_> {
         let ended = calibrate.stdout(Stdio::null()).output().or_cannot("start a calibration")?;
         if ended.status.success() {
             let file = toml::Value::from(file.to_string_lossy().into_owned());
-            self.calibrated = Some(format!("robot.calibration={file}"));
+            self.set.push(format!("robot.calibration={file}"));
         } else {
             let said = String::from_utf8_lossy(&ended.stderr);
             let why = said.lines().last().unwrap_or("it gave no reason");
-            let (world, seed) = (&self.trial.world, self.seed);
+            let (world, seed) = (&self.trial.mission.name, self.seed);
             write_stderr(&format!(
                 "\n{world}, seed {seed}: calibration failed, the mission uses the stated robot: {why}\n"
             ));
@@ -227,11 +225,7 @@ impl Robot<'_> {
 
     fn start(&self, records: bool) -> Result<Run> {
         let mut command = self.firsthand("run");
-        command.args(["--pace", &self.job.plan.pace.to_string()]);
-        let other = self.other.map(|other| format!("simulation.other='{other}'"));
-        command.args(other.iter().flat_map(|key| ["--set", key]));
-        command.args(self.calibrated.iter().flat_map(|key| ["--set", key]));
-        command.arg("--out").arg(&self.directory);
+        command.args(["--pace", &self.job.plan.pace.to_string(), "--out"]).arg(&self.directory);
         Run::start(command, &self.directory, records)
     }
 }
@@ -246,16 +240,15 @@ impl Job<'_> {
         let names =
             ["evaluate", "oncoming"].map(|robot| format!("{robot}{}-{worker}", std::process::id()));
         let mut robots: Vec<Robot<'_>> = Vec::new();
-        for (at, (trial, seed)) in trial.robots().zip(noises(seed)).enumerate() {
-            robots.push(Robot {
-                job: self,
-                trial,
-                seed,
-                name: &names[at],
-                other: self.trial.oncoming.is_some().then_some(&names[1 - at]),
-                directory: files.join(&names[at]),
-                calibrated: None,
-            });
+        let others = names.iter().rev();
+        for (((trial, seed), name), other) in
+            trial.robots().zip(noises(seed)).zip(&names).zip(others)
+        {
+            let mut set = setting.set.clone();
+            if self.trial.oncoming.is_some() {
+                set.push(format!("simulation.other='{other}'"));
+            }
+            robots.push(Robot { job: self, trial, seed, name, directory: files.join(name), set });
         }
         if plan.calibrates {
             robots.iter_mut().try_for_each(Robot::calibrate)?;
@@ -279,20 +272,20 @@ impl Job<'_> {
             }
             rows.push((row, latency));
         }
-        let has_page = |row: &Row| !matches!(row.outcome, Outcome::Success | Outcome::Aborted);
-        if rows.iter().any(|(row, _)| has_page(row)) {
-            // Recording every mission would take too much space; in lockstep a rerun is bit-equal.
-            if plan.pace == Pace::Max {
-                for robot in &robots {
-                    let _ = fs::remove_dir_all(&robot.directory);
-                }
-                run(true)?;
+        let paged = robots
+            .iter()
+            .zip(&rows)
+            .filter(|(_, (row, _))| !matches!(row.outcome, Outcome::Success | Outcome::Aborted));
+        // Recording every mission would take too much space; in lockstep a rerun is bit-equal.
+        if plan.pace == Pace::Max && paged.clone().next().is_some() {
+            for robot in &robots {
+                let _ = fs::remove_dir_all(&robot.directory);
             }
-            for (robot, (row, _)) in robots.iter().zip(&rows).filter(|(_, (row, _))| has_page(row))
-            {
-                let kept = all.join(picture(row)).with_extension("html");
-                let _ = fs::rename(robot.directory.join(PAGE), kept);
-            }
+            run(true)?;
+        }
+        for (robot, (row, _)) in paged {
+            let kept = all.join(picture(row)).with_extension("html");
+            let _ = fs::rename(robot.directory.join(PAGE), kept);
         }
         let _ = fs::remove_dir_all(&files);
         Ok(rows)

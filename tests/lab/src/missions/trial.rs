@@ -6,7 +6,7 @@ use common::{
 };
 use glam::DVec2;
 use mission_control::outcome::RIGHT_PLACE_M;
-use std::path::Path;
+use std::{iter, path::Path};
 
 use crate::error::Result;
 use report::shortest_path::shortest_path;
@@ -65,7 +65,7 @@ pub struct Scene {
 
 #[derive(Clone, Debug)]
 pub struct Trial {
-    pub world: String,
+    /// Its name is that of the world.
     pub mission: Mission,
     pub shortest_m: f64,
     pub rules: Rules,
@@ -74,35 +74,35 @@ pub struct Trial {
 
 impl Trial {
     /// Returns a trial, if the body can reach the target with `swept_m` around its centre.
-    pub fn new(world: String, scene: &Scene, rules: Rules, swept_m: f64) -> Result<Option<Self>> {
+    pub fn new(world: &str, scene: Scene, rules: Rules, swept_m: f64) -> Result<Option<Self>> {
+        let oncoming = scene.oncoming;
         let touched = Heights::preset(Realism::default()).touched(&scene.shapes);
         let Some(shortest_m) = shortest_path(&touched, scene.start, scene.target, swept_m) else {
             return Ok(None);
         };
-        let mut mission = mission(&world, scene)?;
+        let mut mission = mission(world, scene)?;
         // Four times the time at 0.25 m/s, plus half a minute.
         let timeout_s = (30.0 + 16.0 * shortest_m).round();
         mission.timeout_s = rules.most_s.map_or(timeout_s, |it| it + BEFORE_CLOCK_S);
-        let mut trial = Self { world, mission, shortest_m, rules, oncoming: None };
-        trial.oncoming = scene.oncoming.map(|heading| Box::new(trial.reversed(heading)));
+        let mut trial = Self { mission, shortest_m, rules, oncoming: None };
+        trial.oncoming = oncoming.map(|heading| Box::new(trial.reversed(heading)));
         Ok(Some(trial))
     }
 
     /// Returns a trial of an unchanged `mission`.
-    pub fn of_mission(world: String, mission: Mission, swept_m: f64) -> Option<Self> {
+    pub fn of_mission(mission: Mission, swept_m: f64) -> Option<Self> {
         let start = mission.start_pose().position;
         let shortest_m = shortest_path(&mission.obstacles(), start, mission.target, swept_m)?;
-        Some(Self { world, mission, shortest_m, rules: Rules::PLAIN, oncoming: None })
+        Some(Self { mission, shortest_m, rules: Rules::PLAIN, oncoming: None })
     }
 
     pub fn robots(&self) -> impl Iterator<Item = &Self> {
-        std::iter::once(self).chain(self.oncoming.as_deref())
+        iter::once(self).chain(self.oncoming.as_deref())
     }
 
     fn reversed(&self, heading: f64) -> Self {
         let mut trial = self.clone();
-        trial.world = format!("{}-oncoming", self.world);
-        trial.mission.name.clone_from(&trial.world);
+        trial.mission.name += "-oncoming";
         trial.mission.start.at = self.mission.target;
         trial.mission.start.heading_deg = heading.to_degrees();
         trial.mission.target = self.mission.start.at;
@@ -110,13 +110,14 @@ impl Trial {
     }
 }
 
-fn mission(world: &str, scene: &Scene) -> Result<Mission> {
-    let target = scene.target - scene.start;
-    let shapes = moved(&scene.shapes, -scene.start);
-    let (least, greatest) = shapes.pieces().map(|piece| piece.bounds()).fold(
-        (DVec2::ZERO.min(target), DVec2::ZERO.max(target)),
-        |(least, greatest), (from, to)| (least.min(from), greatest.max(to)),
-    );
+fn mission(world: &str, scene: Scene) -> Result<Mission> {
+    let Scene { mut shapes, mut things, mut people, start, heading, target, .. } = scene;
+    let target = target - start;
+    let placed = things.iter_mut().map(|thing| &mut thing.shape);
+    let walked = people.iter_mut().flat_map(|it| iter::once(&mut it.at).chain(&mut it.goals));
+    let all = iter::once(&mut shapes).chain(placed).flat_map(points).chain(walked);
+    all.for_each(|point| *point -= start);
+    let (least, greatest) = shapes.bounds_with(DVec2::ZERO, target);
     let centre = (least + greatest) / 2.0;
     let width_m =
         (((greatest - least).max_element() + 2.0 * RIM_M) / WIDTH_STEP_M).ceil() * WIDTH_STEP_M;
@@ -126,22 +127,10 @@ fn mission(world: &str, scene: &Scene) -> Result<Mission> {
     );
     let mut mission = Mission::parse(&text, Path::new(world))?;
     mission.name = world.to_owned();
-    mission.start.heading_deg = scene.heading.to_degrees();
+    mission.start.heading_deg = heading.to_degrees();
     mission.world = shapes;
-    let placed = scene.things.iter().cloned();
-    mission.simulation.things =
-        placed.map(|it| Thing { shape: moved(&it.shape, -scene.start), ..it }).collect();
-    mission.simulation.people = scene.people.clone();
-    for person in &mut mission.simulation.people {
-        std::iter::once(&mut person.at).chain(&mut person.goals).for_each(|at| *at -= scene.start);
-    }
+    (mission.simulation.things, mission.simulation.people) = (things, people);
     Ok(mission)
-}
-
-fn moved(shapes: &Shapes, by: DVec2) -> Shapes {
-    let mut shapes = shapes.clone();
-    points(&mut shapes).for_each(|point| *point += by);
-    shapes
 }
 
 pub fn points(shapes: &mut Shapes) -> impl Iterator<Item = &mut DVec2> {

@@ -6,7 +6,7 @@
 use std::time::{Duration, Instant};
 
 use common::{
-    bus::{Author, Bus, BusError, Payload, Stamped, Topic},
+    bus::{Author, Bus, Payload, Stamped, Topic},
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     latency::Histogram,
@@ -90,6 +90,22 @@ pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Resul
 }
 
 pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result {
+    let process = (robot, place, supervisor);
+    match place {
+        "dead-reckoning" => forward(process, &topics::WHEELS, &topics::POSE),
+        "mapper" => forward(process, &topics::POSE, &topics::GRID),
+        "planner" => forward(process, &topics::GRID, &topics::GUIDANCE),
+        "controller" => forward(process, &topics::GUIDANCE, &topics::COMMAND),
+        _ => Err(format!("no forwarder stands for {place:?}").into()),
+    }
+}
+
+/// Publishes a sample of `to` for each of `from`.
+fn forward<H: Stamped, E: Payload, To: Stamped + Default, ToE: Payload>(
+    (robot, place, supervisor): (&RobotName, &str, u32),
+    from: &Topic<H, E>,
+    to: &Topic<To, ToE>,
+) -> Result {
     let mut terminated = Signals::catch(&[SIGTERM]).or_cannot("catch SIGTERM")?;
     become_child(place, supervisor)?;
     let domain = Domain::of(robot.clone());
@@ -97,40 +113,14 @@ pub fn run_forwarder(robot: &RobotName, place: &str, supervisor: u32) -> Result 
     let bus = Bus::join(&domain, place)?;
     let mut waiter = Waiter::default();
     waiter.on_readable(&terminated)?;
-    let mut forward = forwarder(&bus, place, &mut waiter)?;
-    while !terminated.came() {
-        forward()?;
-        waiter.wait(LOST)?;
-    }
-    Ok(())
-}
-
-type Forward = Box<dyn FnMut() -> Result<(), BusError>>;
-
-fn forwarder(bus: &Bus, place: &str, waiter: &mut Waiter) -> Result<Forward> {
-    match place {
-        "dead-reckoning" => forward(bus, waiter, &topics::WHEELS, &topics::POSE),
-        "mapper" => forward(bus, waiter, &topics::POSE, &topics::GRID),
-        "planner" => forward(bus, waiter, &topics::GRID, &topics::GUIDANCE),
-        "controller" => forward(bus, waiter, &topics::GUIDANCE, &topics::COMMAND),
-        _ => Err(format!("no forwarder stands for {place:?}").into()),
-    }
-}
-
-/// Wakes `waiter` on samples of `from`; the result publishes one of `to` for each.
-fn forward<H: Stamped, E: Payload, To: Stamped + Default, ToE: Payload>(
-    bus: &Bus,
-    waiter: &mut Waiter,
-    from: &Topic<H, E>,
-    to: &Topic<To, ToE>,
-) -> Result<Forward> {
     waiter.on(bus.wakeup(from)?);
     let (mut from, mut to) = (bus.reader(from)?, bus.slice_writer(to, 1, CELLS)?);
-    Ok(Box::new(move || {
+    while !terminated.came() {
         while let Some(sample) = from.next_slice()? {
             let tick = sample.header().stamp().tick;
             to.publish_slice(tick, MissionTime::default(), To::default(), &[])?;
         }
-        Ok(())
-    }))
+        waiter.wait(LOST)?;
+    }
+    Ok(())
 }

@@ -119,9 +119,7 @@ fn open(file: &Path) -> Result<Box<dyn Read>> {
 }
 
 fn rows<T: DeserializeOwned>(file: &Path) -> Result<Vec<T>> {
-    let reader = csv::Reader::from_reader(open(file)?.take(LONGEST));
-    let rows: csv::Result<_> = reader.into_deserialize().collect();
-    rows.map_err(|error| match error.kind() {
+    crate::rows(open(file)?.take(LONGEST)).map_err(|error| match error.kind() {
         csv::ErrorKind::Io(_) => unreadable(file)(error),
         _ => malformed(file, error),
     })

@@ -7,24 +7,28 @@ use glam::DVec2;
 use super::shapes::{heading, wall, walls};
 use crate::{missions::trial::Scene, random::Random};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Bends {
-    None,
-    /// Two to four legs with bends of up to 50 degrees.
-    Oblique,
+pub fn straight(random: &mut Random) -> Scene {
+    let length = random.within(4.0, 8.0);
+    let width = random.within(0.8, 1.2);
+    along(random, &[DVec2::ZERO, DVec2::new(length, 0.0)], width)
 }
 
-pub fn draw(random: &mut Random, bends: Bends) -> Scene {
-    let (width, axis) = match bends {
-        Bends::None => {
-            let length = random.within(4.0, 8.0);
-            let axis = vec![DVec2::ZERO, DVec2::new(length, 0.0)];
-            (random.within(0.8, 1.2), axis)
-        }
-        Bends::Oblique => (random.within(1.0, 1.8), oblique(random)),
-    };
-    let mut points = beside(&axis, width / 2.0);
-    points.extend(beside(&axis, -width / 2.0).into_iter().rev());
+/// Draws two to four legs with bends of up to 50 degrees.
+pub fn oblique(random: &mut Random) -> Scene {
+    let width = random.within(1.0, 1.8);
+    let mut axis = vec![DVec2::ZERO];
+    let (mut at, mut angle) = (DVec2::ZERO, random.within(-PI, PI));
+    for _ in 0..2 + random.below(3) {
+        at += DVec2::from_angle(angle) * random.within(1.8, 3.0);
+        axis.push(at);
+        angle += random.within(-50.0, 50.0).to_radians();
+    }
+    along(random, &axis, width)
+}
+
+fn along(random: &mut Random, axis: &[DVec2], width: f64) -> Scene {
+    let mut points = beside(axis, width / 2.0);
+    points.extend(beside(axis, -width / 2.0).into_iter().rev());
     points.extend(points.first().copied());
     let last = axis.len() - 1;
     let back = (axis[last - 1] - axis[last]).normalize_or_zero();
@@ -36,17 +40,6 @@ pub fn draw(random: &mut Random, bends: Bends) -> Scene {
         target: axis[last] + back * 0.7,
         ..Scene::default()
     }
-}
-
-fn oblique(random: &mut Random) -> Vec<DVec2> {
-    let mut axis = vec![DVec2::ZERO];
-    let (mut at, mut angle) = (DVec2::ZERO, random.within(-PI, PI));
-    for _ in 0..2 + random.below(3) {
-        at += DVec2::from_angle(angle) * random.within(1.8, 3.0);
-        axis.push(at);
-        angle += random.within(-50.0, 50.0).to_radians();
-    }
-    axis
 }
 
 /// Returns the line at `by` to the left of `axis`, mitred at its corners.

@@ -50,8 +50,8 @@ pub fn read(path: &Path, asked: Asked) -> Result<Found> {
         ));
     }
     let mut names = BTreeSet::new();
-    if let Some(twice) = found.trials.iter().find(|trial| !names.insert(&trial.world)) {
-        let world = &twice.world;
+    if let Some(twice) = found.trials.iter().find(|trial| !names.insert(&trial.mission.name)) {
+        let world = &twice.mission.name;
         let problem = format!("two worlds have the name {world}; rename one");
         return Err(malformed(path, problem));
     }
@@ -93,7 +93,7 @@ fn add(found: &mut Found, file: &Path, asked: Asked) -> Result<bool> {
     }
     let worlds = if ends(&[".toml"]) {
         let mission = Mission::load(file)?.with_calibration()?;
-        found.add(Trial::of_mission(mission.name.clone(), mission, asked.swept_m));
+        found.add(Trial::of_mission(mission, asked.swept_m));
         Vec::new()
     } else if ends(&[".world"]) {
         vec![barn::gazebo(file)?]
@@ -106,7 +106,7 @@ fn add(found: &mut Found, file: &Path, asked: Asked) -> Result<bool> {
         return Err(NO_MAP.into());
     }
     for (world, scene, rules) in worlds {
-        found.add(Trial::new(world, &scene, rules, asked.swept_m)?);
+        found.add(Trial::new(&world, scene, rules, asked.swept_m)?);
     }
     Ok(true)
 }
@@ -138,7 +138,7 @@ fn add_map(found: &mut Found, file: &Path, asked: Asked) -> Result {
         }
         let scene = Scene { shapes, start, heading, target, ..Scene::default() };
         let world = format!("{}-{number}", name.display());
-        found.add(Trial::new(world, &scene, Rules::PLAIN, asked.swept_m)?);
+        found.add(Trial::new(&world, scene, Rules::PLAIN, asked.swept_m)?);
     }
     Ok(())
 }
@@ -152,7 +152,7 @@ mod tests {
     const ALL: Asked = Asked { count: None, seed: 1, ends: None, swept_m: 0.24 };
 
     fn names(found: &Found) -> Vec<&str> {
-        found.trials.iter().map(|trial| &*trial.world).collect()
+        found.trials.iter().map(|trial| &*trial.mission.name).collect()
     }
 
     /// Returns the map of a hall of 6 m by 3 m at (10, 20), its walls 10 cm thick.

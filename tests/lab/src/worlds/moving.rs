@@ -72,10 +72,10 @@ fn one_of(random: &mut Random, [least, most]: [usize; 2]) -> usize {
     least + random.below(most - least + 1)
 }
 
-fn cylinder(random: &mut Random, &(_, orders, [least, most], deviations): &Difficulty) -> Thing {
+fn cylinder(random: &mut Random, &(_, orders, speeds, deviations): &Difficulty) -> Thing {
     let path = path(random, orders);
-    let mean = random.within(least, most);
-    let deviation = random.within(deviations[0], deviations[1]);
+    let mean = random.in_range(speeds);
+    let deviation = random.in_range(deviations);
     let (mut at_s, mut at) = (0.0, path[0]);
     let mut moves = vec![Move { at_s, by: DVec2::ZERO }];
     for &next in path.iter().skip(1).chain(path.iter().rev().skip(1)).cycle() {
@@ -83,7 +83,7 @@ fn cylinder(random: &mut Random, &(_, orders, [least, most], deviations): &Diffi
             break;
         }
         let speed = loop {
-            let speed = random.within(least, most);
+            let speed = random.in_range(speeds);
             if random.share() < (-0.5 * ((speed - mean) / deviation).powi(2)).exp() {
                 break speed;
             }

@@ -39,7 +39,7 @@ pub fn draw(random: &mut Random, number: usize) -> Scene {
         people.push(Person {
             at,
             goals: (0..GOALS).map(|_| free(random)).collect(),
-            speed_m_s: random.within(SPEEDS_M_S[0], SPEEDS_M_S[1]),
+            speed_m_s: random.in_range(SPEEDS_M_S),
             radius_m: RADIUS_M,
         });
     }

@@ -3,13 +3,16 @@
 //!
 //! Rotated rooms are at any angle to the grid, and their partitions at an angle to the walls.
 //! Glazed rooms have partitions and cabinets of glass, and black objects.
+//!
+//! In rooms for a meeting, two robots pass a doorway in opposite directions, each starting at the
+//! other's target.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use common::geometry::{Light, Shapes};
+use common::geometry::{Light, Shapes, Wall};
 use glam::DVec2;
 
-use super::shapes::{Room, block, drum, wall, walls};
+use super::shapes::{Room, block, drum, heading, wall, walls};
 use crate::{
     missions::trial::{Scene, points},
     random::Random,
@@ -19,6 +22,14 @@ use crate::{
 const DENSITIES: [f64; 3] = [0.10, 0.18, 0.26];
 const KEPT_FREE_M: f64 = 0.5;
 const DOOR_SHARE: f64 = 1.0 / 3.0;
+const DOORS_M: [f64; 2] = [0.8, 1.2];
+
+/// Doors of a meeting; through a narrow one robots pass one after the other.
+const MEETING_DOORS_M: [f64; 2] = [0.8, 1.8];
+const MEETING_DENSITY: f64 = 0.06;
+/// Free distance of drums around start and target, and of the doorway from them.
+const MEETING_KEPT_FREE_M: f64 = 0.6;
+const MEETING_DOOR_FROM_ENDS_M: f64 = 1.5;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doors {
@@ -59,27 +70,46 @@ pub fn glazed(random: &mut Random, number: usize) -> Scene {
     scene
 }
 
+pub fn meeting(random: &mut Random) -> Scene {
+    let room = Room::draw(random, 8.0, [1.6, 3.0]);
+    let target = room.target;
+    let from_ends = MEETING_DOOR_FROM_ENDS_M;
+    let x = random.within(from_ends, target.x - from_ends);
+    let door = door(random, &room, MEETING_DOORS_M);
+    let mut shapes = room.with_drums(random, MEETING_DENSITY, MEETING_KEPT_FREE_M);
+    shapes.walls.extend(partition(&room, x, door, 0.0));
+    let [ahead, oncoming] = [0.0, PI].map(|usual| heading(random, 4, usual));
+    Scene { shapes, heading: ahead, target, oncoming: Some(oncoming), ..Scene::default() }
+}
+
+/// Draws the middle and the width of a door in a partition.
+fn door(random: &mut Random, room: &Room, widths: [f64; 2]) -> [f64; 2] {
+    let gap = random.in_range(widths);
+    let reach = room.greatest.y - gap / 2.0 - 0.1;
+    [random.within(-reach, reach), gap]
+}
+
+/// Returns a partition through (`x`, 0) with `slant` metres in x per metre in y, and a door.
+fn partition(room: &Room, x: f64, [middle, gap]: [f64; 2], slant: f64) -> [Wall; 2] {
+    let (half_width, half_gap) = (room.greatest.y, gap / 2.0 / slant.hypot(1.0));
+    [[-half_width, middle - half_gap], [middle + half_gap, half_width]]
+        .map(|ends| wall(ends.map(|y| DVec2::new(x + slant * y, y))))
+}
+
 fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scene {
     let room = Room::draw(random, 8.0, [1.6, 3.0]);
-    let (target, half_width) = (room.target, room.greatest.y);
+    let target = room.target;
     let mut shapes = walls([room.closed()]);
     if doors == Doors::All || random.share() < DOOR_SHARE {
         let at = random.within(1.2, target.x - 1.2);
-        let gap = random.within(0.8, 1.2);
-        let reach = half_width - gap / 2.0 - 0.1;
-        let middle = random.within(-reach, reach);
+        let door = door(random, &room, DOORS_M);
         let mut slant = 0.0;
         if oblique {
-            let most = (0.7 * (at.min(target.x - at) - KEPT_FREE_M) / half_width).atan();
+            let most = (0.7 * (at.min(target.x - at) - KEPT_FREE_M) / room.greatest.y).atan();
             let most = MOST_OBLIQUE_DEG.min(most.to_degrees());
             slant = random.within(-most, most).to_radians().tan();
         }
-        // The wall crosses the room through (`at`, 0) with `slant` metres in x per metre in y, and
-        // a door around y = `middle`.
-        let half_gap = gap / 2.0 / slant.hypot(1.0);
-        for ends in [[-half_width, middle - half_gap], [middle + half_gap, half_width]] {
-            shapes.walls.push(wall(ends.map(|y| DVec2::new(at + slant * y, y))));
-        }
+        shapes.walls.extend(partition(&room, at, door, slant));
     }
     for _ in 0..room.things(DENSITIES[number % DENSITIES.len()]) {
         let at = room.place(random);

@@ -40,9 +40,9 @@ pub struct Room {
 
 impl Room {
     /// Draws a room with a target 4 m to `farthest_m` along x, and half its width from a range.
-    pub fn draw(random: &mut Random, farthest_m: f64, [least, most]: [f64; 2]) -> Self {
+    pub fn draw(random: &mut Random, farthest_m: f64, half_widths: [f64; 2]) -> Self {
         let distance = random.within(4.0, farthest_m);
-        let half_width = random.within(least, most);
+        let half_width = random.in_range(half_widths);
         Self {
             target: DVec2::new(distance, random.within(-0.5, 0.5) * half_width),
             least: DVec2::new(-1.2, -half_width),

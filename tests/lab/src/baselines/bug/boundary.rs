@@ -44,7 +44,7 @@ impl Place {
     /// Returns the next free cell: right, ahead, left or behind; none in a closed cell.
     pub fn next(&self, map: &Map<'_>) -> Option<Self> {
         [RIGHT, 0, LEFT, BACK].into_iter().find_map(|turn| {
-            let cell = map.neighbour(self.cell, self.turned(turn))?;
+            let cell = map.free_neighbour(self.cell, self.turned(turn))?;
             let heading = (usize::from(self.heading) + turn) % DIRECTIONS.len();
             Some(Self { cell, heading: heading as u8 })
         })
