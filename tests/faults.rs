@@ -165,7 +165,7 @@ fn ask_planner(robot: &str, although_real: bool) -> FaultAnswer {
         waiter.wait(support::PATIENCE).unwrap();
         while let Some(beat) = health.next_sample().unwrap() {
             if name_str(&beat.stage) == "planner" && beat.last_fault == request.id {
-                return FaultAnswer::from_byte(beat.fault_answer);
+                return beat.fault_answer();
             }
         }
     }

@@ -151,7 +151,7 @@ fn follows_round(robot: &str) -> (Vec<GroundTruthTick>, Value, TempDir) {
         let source = Ends(&ends);
         scope.spawn(|| {
             publish(robot, &ends, |pose| {
-                let at_s = pose.stamp.time().seconds();
+                let at_s = pose.stamp.seconds();
                 (at_s < over_s).then(|| beacon(pose, place(at_s)))
             });
         });

@@ -61,7 +61,7 @@ fn a_robot_that_is_sent_elsewhere_in_flight_goes_on_without_a_stop() {
     let mut number = 0;
     follow("goto-flight", |command| {
         number = number.max(command.target_number);
-        let state = CommandState::from_byte(command.state);
+        let state = command.state();
         assert!(number == 0 || state != CommandState::Halt, "{command:?}");
         number == 2 && command.v_m_s > 0.1
     });

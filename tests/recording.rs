@@ -94,10 +94,7 @@ fn every_order_that_was_answered_is_recorded_with_its_answer_though_its_process_
     let recording = open(directory.path());
     let orders = recording.samples(&topics::ORDERS).unwrap().map(|order| order.unwrap().sample);
     let orders: Vec<_> = orders.collect();
-    let answered: Vec<_> = orders
-        .iter()
-        .map(|order| (RequestKind::from_byte(order.kind), RequestAnswer::from_byte(order.answer)))
-        .collect();
+    let answered: Vec<_> = orders.iter().map(|order| (order.kind(), order.answer())).collect();
     // An order is repeated until it is taken, possibly after its sender has ended.
     let mut rest = answered.iter();
     assert!(asked.iter().all(|order| rest.any(|it| it == order)), "{answered:?}");

@@ -10,7 +10,7 @@
 
 use std::{
     fs::{File, OpenOptions},
-    io,
+    io::{Read as _, Seek as _, SeekFrom},
     os::unix::fs::FileExt,
     path::{Path, PathBuf},
 };
@@ -22,12 +22,12 @@ use rustix::{
 use serde::{Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
+use crate::file::FileError;
+
 #[derive(Debug, Error)]
 pub enum CheckpointError {
-    #[error(
-        "cannot {action} checkpoint {file}: {source}; check that the run directory is writable and has space"
-    )]
-    File { action: &'static str, file: PathBuf, source: io::Error },
+    #[error("{0}; check that the run directory is writable and has space")]
+    File(#[from] FileError),
     #[error(
         "checkpoint {file} holds at most {capacity} bytes, and the state has {length}; report this fault of the stage"
     )]
@@ -69,18 +69,11 @@ impl Checkpoint {
         let file = open_reserved(path, 2 * (HEADER + capacity) as u64)?;
         let mut checkpoint =
             Self { file, path: path.to_path_buf(), capacity, sequence: 0, buffer: Vec::new() };
-        let mut newest: Option<(u64, T)> = None;
-        for slot in 0..2 {
-            if let Some((sequence, state)) = checkpoint.read_slot(slot)?
-                && newest.as_ref().is_none_or(|(held, _)| *held < sequence)
-            {
-                newest = Some((sequence, state));
-            }
-        }
-        if let Some((sequence, _)) = &newest {
-            checkpoint.sequence = *sequence;
-        }
-        Ok((checkpoint, newest.map(|(_, state)| state)))
+        let slots = [checkpoint.read_slot(0)?, checkpoint.read_slot(1)?];
+        let newest = slots.into_iter().flatten().max_by_key(|(sequence, _)| *sequence);
+        let (sequence, state) = newest.unzip();
+        checkpoint.sequence = sequence.unwrap_or_default();
+        Ok((checkpoint, state))
     }
 
     fn slot_offset(&self, slot: u64) -> u64 {
@@ -92,11 +85,11 @@ impl Checkpoint {
         &self,
         slot: u64,
     ) -> Result<Option<(u64, T)>, CheckpointError> {
-        let offset = self.slot_offset(slot);
-        let mut bytes = vec![0; HEADER + self.capacity];
-        let length =
-            read_up_to(&self.file, &mut bytes, offset).map_err(failed("read", &self.path))?;
-        decode(&bytes[..length])
+        let (mut file, mut bytes) = (&self.file, Vec::new());
+        file.seek(SeekFrom::Start(self.slot_offset(slot)))
+            .and_then(|_| file.take((HEADER + self.capacity) as u64).read_to_end(&mut bytes))
+            .map_err(FileError::of("read checkpoint", &self.path))?;
+        decode(&bytes)
             .map_err(|problem| CheckpointError::Foreign { file: self.path.clone(), problem })
     }
 
@@ -116,19 +109,11 @@ impl Checkpoint {
         bytes[16..20].copy_from_slice(&crc.to_le_bytes());
         self.file
             .write_all_at(&bytes, self.slot_offset(sequence % 2))
-            .map_err(failed("write", &self.path))?;
+            .map_err(FileError::of("write checkpoint", &self.path))?;
         self.sequence = sequence;
         self.buffer = bytes;
         Ok(())
     }
-}
-
-pub(crate) fn failed(
-    action: &'static str,
-    path: &Path,
-) -> impl FnOnce(io::Error) -> CheckpointError {
-    let file = path.to_path_buf();
-    move |source| CheckpointError::File { action, file, source }
 }
 
 pub(crate) fn encode_after<T: Serialize>(
@@ -193,24 +178,11 @@ pub(crate) fn open_reserved(path: &Path, length: u64) -> Result<File, Checkpoint
         .create(true)
         .truncate(false)
         .open(path)
-        .map_err(failed("open", path))?;
+        .map_err(FileError::of("open checkpoint", path))?;
     match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length) {
         Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(file),
-        Err(errno) => Err(failed("reserve space for", path)(errno.into())),
+        Err(errno) => Err(FileError::of("reserve space for checkpoint", path)(errno).into()),
     }
-}
-
-fn read_up_to(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<usize> {
-    let mut length = 0;
-    while length < bytes.len() {
-        match file.read_at(&mut bytes[length..], offset + length as u64) {
-            Ok(0) => break,
-            Ok(read) => length += read,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(length)
 }
 
 #[cfg(test)]

@@ -75,7 +75,7 @@ struct Place {
 fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place> {
     let mut holder = None;
     let place = Roster::open(bus)?.find(PATIENCE, |header, entries| {
-        if Order::from_byte(header.order) == Order::Stop {
+        if header.order() == Order::Stop {
             let error = StageError::Other("the robot is being stopped".to_owned());
             return Some(Err(error));
         }

@@ -76,7 +76,7 @@ pub fn admit(
     stage: &str,
     simulated: bool,
 ) -> Result<FaultKind, FaultAnswer> {
-    let kind = FaultKind::from_byte(request.kind);
+    let kind = request.kind();
     if !of(stage).any(|fault| fault.kind == kind) {
         Err(FaultAnswer::Impossible)
     } else if simulated || request.although_real == 1 {

@@ -19,9 +19,11 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::checkpoint::{
-    Checkpoint, CheckpointError, VERSION, checksum, encode_after, failed, open_reserved,
-    other_version,
+use crate::{
+    checkpoint::{
+        Checkpoint, CheckpointError, VERSION, checksum, encode_after, open_reserved, other_version,
+    },
+    file::FileError,
 };
 
 /// Least and greatest number of entries before a snapshot.
@@ -86,7 +88,8 @@ impl Journal {
 
     /// Cuts the file after the last whole entry. Fails on a whole one of another version.
     fn read<E: DeserializeOwned>(&mut self) -> Result<Vec<E>, CheckpointError> {
-        let bytes = std::fs::read(&self.path).map_err(failed("read", &self.path))?;
+        let bytes =
+            std::fs::read(&self.path).map_err(FileError::of("read checkpoint", &self.path))?;
         let mut entries = Vec::new();
         let mut rest = &bytes[..];
         let foreign = |problem| CheckpointError::Foreign { file: self.path.clone(), problem };
@@ -108,14 +111,14 @@ impl Journal {
         self.end = (bytes.len() - rest.len()) as u64;
         // A whole tail stays, because cutting it may wait for the disk.
         if !rest.is_empty() && !rest.starts_with(&END) {
-            self.cut()?;
+            self.write(&END)?;
         }
         Ok(entries)
     }
 
-    fn cut(&self) -> Result<(), CheckpointError> {
-        let cut = self.file.write_all_at(&END, self.end);
-        cut.map_err(failed("write", &self.path))
+    fn write(&self, bytes: &[u8]) -> Result<(), CheckpointError> {
+        let written = self.file.write_all_at(bytes, self.end);
+        Ok(written.map_err(FileError::of("write checkpoint", &self.path))?)
     }
 
     /// Fails if the entry is too long, or cannot be encoded or written.
@@ -129,7 +132,7 @@ impl Journal {
         let end = HEADER + length;
         let crc = checksum(&bytes[..end], 12);
         bytes[12..16].copy_from_slice(&crc.to_le_bytes());
-        self.file.write_all_at(&bytes, self.end).map_err(failed("write", &self.path))?;
+        self.write(&bytes)?;
         self.end += end as u64;
         self.number += 1;
         Ok(())
@@ -145,7 +148,7 @@ impl Journal {
         self.snapshots.save(&Snapshot { next: self.number, state })?;
         self.first = self.number;
         self.end = 0;
-        self.cut()
+        self.write(&END)
     }
 }
 

@@ -8,8 +8,8 @@ const PER_OCTAVE: f64 = 8.0;
 /// Bucket k counts latencies from 2^(k/8) microseconds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Histogram {
-    counts: [u32; BUCKETS],
-    max_ns: u64,
+    pub counts: [u32; BUCKETS],
+    pub max_ns: u64,
 }
 
 impl Default for Histogram {
@@ -25,14 +25,6 @@ impl Histogram {
         let count = &mut self.counts[bucket.min(BUCKETS - 1)];
         *count = count.saturating_add(1);
         self.max_ns = self.max_ns.max(latency_ns);
-    }
-
-    pub const fn counts(&self) -> &[u32; BUCKETS] {
-        &self.counts
-    }
-
-    pub const fn max_ns(&self) -> u64 {
-        self.max_ns
     }
 
     pub fn total(&self) -> u64 {
@@ -88,6 +80,6 @@ mod tests {
         let mut histogram = Histogram::default();
         assert_eq!(histogram.quantile_us(0.5), None);
         histogram.record(u64::MAX);
-        assert_eq!(histogram.counts()[BUCKETS - 1], 1);
+        assert_eq!(histogram.counts[BUCKETS - 1], 1);
     }
 }

@@ -154,17 +154,17 @@ impl Outputs {
     }
 
     pub fn save(&mut self, state: &impl Serialize) -> Result {
-        match &mut self.saved {
-            Saved::State(checkpoint) => Ok(checkpoint.save(state)?),
-            Saved::Nothing | Saved::Journal(_) => Ok(()),
+        if let Saved::State(checkpoint) = &mut self.saved {
+            checkpoint.save(state)?;
         }
+        Ok(())
     }
 
     pub fn append(&mut self, entry: &impl Serialize) -> Result {
-        match &mut self.saved {
-            Saved::Journal(journal) => Ok(journal.append(entry)?),
-            Saved::Nothing | Saved::State(_) => Ok(()),
+        if let Saved::Journal(journal) = &mut self.saved {
+            journal.append(entry)?;
         }
+        Ok(())
     }
 
     pub const fn is_journal_long(&self) -> bool {
@@ -172,9 +172,11 @@ impl Outputs {
     }
 
     pub fn shorten_journal(&mut self, state: &impl Serialize) -> Result {
-        match &mut self.saved {
-            Saved::Journal(journal) if journal.is_long() => Ok(journal.snapshot(state)?),
-            _ => Ok(()),
+        if let Saved::Journal(journal) = &mut self.saved
+            && journal.is_long()
+        {
+            journal.snapshot(state)?;
         }
+        Ok(())
     }
 }

@@ -15,7 +15,7 @@ use crate::{
     address::Address,
     clock::MissionClock,
     domain::RobotName,
-    file::{append, replace},
+    file::{FileError, append, replace},
     mission::Mission,
 };
 
@@ -31,10 +31,8 @@ pub struct Run {
 
 #[derive(Debug, Error)]
 pub enum RunError {
-    #[error(
-        "cannot {action} {file}: {source}; check that the run directory exists and is writable"
-    )]
-    File { action: &'static str, file: PathBuf, source: io::Error },
+    #[error("{0}; check that the run directory exists and is writable")]
+    File(#[from] FileError),
     #[error("{file} is not a run file: {problem}; start the stage through `firsthand run`")]
     Content { file: PathBuf, problem: String },
     #[error(
@@ -53,17 +51,13 @@ impl Run {
             problem: error.to_string(),
         })?;
         let text = format!("{WRITTEN_BY} = {VERSION:?}\n{text}");
-        replace(&file, &text).map_err(|source| RunError::File { action: "write", file, source })
+        Ok(replace(&file, &text).map_err(FileError::of("write", &file))?)
     }
 
     /// Fails if the file is unreadable or invalid, or from another version with other keys.
     pub fn load(directory: &Path) -> Result<Self, RunError> {
         let file = directory.join(FILE_NAME);
-        let text = fs::read_to_string(&file).map_err(|source| RunError::File {
-            action: "read",
-            file: file.clone(),
-            source,
-        })?;
+        let text = fs::read_to_string(&file).map_err(FileError::of("read", &file))?;
         Self::parse(&text, &file)
     }
 
@@ -94,11 +88,7 @@ pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
         let count = lines.metadata()?.len();
         u32::try_from(count).map_err(|_| io::Error::other(format!("too many generations: {count}")))
     };
-    count().map_err(|source| RunError::File {
-        action: "count a generation in",
-        file: file.clone(),
-        source,
-    })
+    Ok(count().map_err(FileError::of("count a generation in", &file))?)
 }
 
 pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {

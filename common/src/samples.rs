@@ -11,18 +11,24 @@
 pub use bus::{Stamp, Stamped};
 
 /// Declares structs for shared memory, each with a name for other languages. A field without a
-/// default is 0.
+/// default is 0. A byte `as` a state has a getter of its name.
 #[macro_export]
 macro_rules! structs {
     (@) => { $crate::bus::Layout::zero() };
     (@ $default:expr) => { $default };
-    ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[doc = $doc:literal])* $field:ident: $kind:ty $(= $default:expr)?,)* })*) => {$(
+    ($($(#[$meta:meta])* $type_name:literal $name:ident { $($(#[doc = $doc:literal])* $field:ident: $kind:ty $(as $state:ty)? $(= $default:expr)?,)* })*) => {$(
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, $crate::bus::ZeroCopySend)]
         #[type_name($type_name)]
         #[repr(C)]
         pub struct $name {
             $($(#[doc = $doc])* pub $field: $kind,)*
+        }
+
+        impl $name {
+            $($(pub const fn $field(&self) -> $state {
+                <$state>::from_byte(self.$field)
+            })?)*
         }
 
         impl Default for $name {

@@ -14,7 +14,7 @@ use std::{
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use self::fault_requests::{Asked, Requests};
+use self::fault_requests::Requests;
 use crate::{
     bus::{Bus, Stamp, Writer, Writers},
     checkpoint::Checkpoint,
@@ -315,7 +315,7 @@ fn work(
                 tracing::warn!(lost, "{trouble}");
                 heartbeat.complain(&trouble)?;
             }
-            while let Some(Asked { id, fault }) = faults.take()? {
+            while let Some((id, fault)) = faults.take()? {
                 let answer = inject(process, fault)?;
                 tracing::warn!(?fault, ?answer, "a fault was requested");
                 heartbeat.answer(id, answer, progress)?;

@@ -33,12 +33,12 @@ pub enum Start {
 }
 
 pub(crate) struct Joined {
-    pub(crate) generation: Generation,
-    pub(crate) run: Run,
-    pub(crate) bus: Bus,
+    pub generation: Generation,
+    pub run: Run,
+    pub bus: Bus,
     /// Becomes readable when the supervisor has ended; a child gets a signal instead.
-    pub(crate) supervisor: Option<OwnedFd>,
-    pub(crate) stage_lock: File,
+    pub supervisor: Option<OwnedFd>,
+    pub stage_lock: File,
 }
 
 pub type Result<T = (), E = StageError> = std::result::Result<T, E>;

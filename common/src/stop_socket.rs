@@ -22,17 +22,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::{clock::monotonic_ns, domain::Domain, poll, samples::Rest};
 
-/// Operator's request to the link. Recordings hold the number of the variant.
+/// Operator's request to the link: its byte. Recordings hold the number of the variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[repr(u8)]
 pub enum Request {
-    Resume,
+    Resume = b'r',
     /// The robot stands until an operator resumes.
-    Stop,
+    Stop = b's',
     /// Releases the stop guard: a person has seen the robot at rest, or it is off. A link ignores
     /// this.
-    SignOff,
+    SignOff = b'x',
     /// Asks for the stop guard's observations. A link ignores this.
-    Look,
+    Look = b'?',
+}
+
+impl Request {
+    const ALL: [Self; 4] = [Self::Resume, Self::Stop, Self::SignOff, Self::Look];
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,10 +48,6 @@ pub enum Answer {
     Sees(Rest, u8),
 }
 
-const STOP: u8 = b's';
-const RESUME: u8 = b'r';
-const SIGN_OFF: u8 = b'x';
-const LOOK: u8 = b'?';
 const HEARD: u8 = b'h';
 const AT_REST: u8 = b'a';
 
@@ -80,13 +81,8 @@ impl StopSocket {
         loop {
             // The robot drives on despite any fault of the socket.
             let (length, from) = self.socket.recv_from(&mut byte).ok()?;
-            let request = match (length, byte) {
-                (1, [STOP]) => Request::Stop,
-                (1, [RESUME]) => Request::Resume,
-                (1, [SIGN_OFF]) => Request::SignOff,
-                (1, [LOOK]) => Request::Look,
-                _ => continue,
-            };
+            let known = Request::ALL.into_iter().find(|it| (length, byte) == (1, [*it as u8]));
+            let Some(request) = known else { continue };
             self.answer(&from, &[HEARD]);
             let waiting = match request {
                 Request::Stop => &mut self.asking,
@@ -155,13 +151,7 @@ impl Operator {
     }
 
     pub fn send(&self, request: Request) -> io::Result<()> {
-        let byte = match request {
-            Request::Stop => STOP,
-            Request::Resume => RESUME,
-            Request::SignOff => SIGN_OFF,
-            Request::Look => LOOK,
-        };
-        self.socket.send(&[byte]).map(drop)
+        self.socket.send(&[request as u8]).map(drop)
     }
 
     /// Waits up to `patience`. Fails if the link is gone.

@@ -86,11 +86,6 @@ impl Domain {
         &self.directory
     }
 
-    /// Returns the lock that the supervisor holds exclusively.
-    pub fn lock_file(&self) -> PathBuf {
-        self.directory.join("lock")
-    }
-
     /// Returns the process that holds the supervisor's lock or claims the robot.
     pub fn supervisor(&self) -> io::Result<Option<u32>> {
         match self.supervision()? {
@@ -146,23 +141,11 @@ impl Domain {
         file
     }
 
-    /// Returns the lock that consumers share while they join. The supervisor holds it exclusively
-    /// to create or remove a bus, so no consumer recreates its files.
-    pub fn joining_lock_file(&self) -> PathBuf {
-        self.directory.join("joining.lock")
-    }
-
     /// Keeps the supervisor from creating or removing a bus until the result is dropped.
     pub fn joining(&self) -> io::Result<File> {
         let lock = File::open(self.made_again(self.joining_lock_file()))?;
         lock.lock_shared()?;
         Ok(lock)
-    }
-
-    /// Returns the lock that all stages share while they run. A new supervisor waits for its
-    /// release.
-    pub fn stages_lock_file(&self) -> PathBuf {
-        self.directory.join("stages.lock")
     }
 
     /// Shares the stages' lock until the result is dropped.
@@ -172,53 +155,51 @@ impl Domain {
         Ok(lock)
     }
 
-    /// Returns the link to the run directory, created if another program starts the stages.
-    pub fn run_link(&self) -> PathBuf {
-        self.directory.join("run")
-    }
-
-    pub fn run_directory(&self) -> PathBuf {
-        self.directory.join("run-directory")
-    }
-
-    /// Returns the link whose text names the robot's machine, if this domain is a mirror.
-    pub fn mirror_link(&self) -> PathBuf {
-        self.directory.join("mirror")
-    }
-
     pub fn mirrors(&self) -> Option<String> {
         Some(fs::read_link(self.mirror_link()).ok()?.display().to_string())
-    }
-
-    pub fn stop_socket(&self) -> PathBuf {
-        self.directory.join("stop")
-    }
-
-    /// Returns the socket of the stop guard, which orders the stop after its link ended.
-    pub fn guard_socket(&self) -> PathBuf {
-        self.directory.join("guard")
-    }
-
-    /// Returns the link to the run directory of a robot that may be moving.
-    pub fn owed_stop(&self) -> PathBuf {
-        self.directory.join("owed-stop")
-    }
-
-    /// Returns the socket for the position of another simulated robot.
-    pub fn place_socket(&self) -> PathBuf {
-        self.directory.join("place")
-    }
-
-    /// Returns the link to the middleware configuration of the current
-    /// [`BusInstance`](crate::bus_instance::BusInstance), which consumers load first.
-    pub fn middleware_config(&self) -> PathBuf {
-        self.directory.join("iceoryx2.toml")
     }
 
     /// Returns the prefix of this domain's files in [`SHARED_MEMORY`].
     pub fn shared_memory_prefix(&self) -> String {
         format!("fh{}_{}_", self.owner, self.robot)
     }
+}
+
+/// Declares the paths of a robot's files, which are names in its directory.
+macro_rules! files {
+    ($($(#[$doc:meta])* $file:ident: $name:literal,)*) => {
+        impl Domain {
+            $($(#[$doc])* pub fn $file(&self) -> PathBuf {
+                self.directory.join($name)
+            })*
+        }
+    };
+}
+
+files! {
+    /// Returns the lock that the supervisor holds exclusively.
+    lock_file: "lock",
+    /// Returns the lock that consumers share while they join. The supervisor holds it exclusively
+    /// to create or remove a bus, so no consumer recreates its files.
+    joining_lock_file: "joining.lock",
+    /// Returns the lock that all stages share while they run. A new supervisor waits for its
+    /// release.
+    stages_lock_file: "stages.lock",
+    /// Returns the link to the run directory, created if another program starts the stages.
+    run_link: "run",
+    run_directory: "run-directory",
+    /// Returns the link whose text names the robot's machine, if this domain is a mirror.
+    mirror_link: "mirror",
+    stop_socket: "stop",
+    /// Returns the socket of the stop guard, which orders the stop after its link ended.
+    guard_socket: "guard",
+    /// Returns the link to the run directory of a robot that may be moving.
+    owed_stop: "owed-stop",
+    /// Returns the socket for the position of another simulated robot.
+    place_socket: "place",
+    /// Returns the link to the middleware configuration of the current
+    /// [`BusInstance`](crate::bus_instance::BusInstance), which consumers load first.
+    middleware_config: "iceoryx2.toml",
 }
 
 /// Evidence of a supervisor.

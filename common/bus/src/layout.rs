@@ -103,6 +103,11 @@ pub fn kind_of<P, F: Layout>(_: fn(&P) -> &F) -> Kind {
     F::kind()
 }
 
+/// Returns the text in an array that is padded with zeros.
+pub fn unpadded(array: &[u8]) -> &[u8] {
+    array.split(|&byte| byte == 0).next().unwrap_or_default()
+}
+
 macro_rules! numbers {
     ($($number:ident: $value:ident $({ $($of_many:tt)* })?)*) => {$(
         impl Layout for $number {
@@ -134,8 +139,7 @@ macro_rules! numbers {
 numbers! {
     u8: Unsigned {
         fn array(array: &[Self]) -> Value {
-            let text = array.split(|&byte| byte == 0).next().unwrap_or_default();
-            Value::Text(String::from_utf8_lossy(text).into_owned())
+            Value::Text(String::from_utf8_lossy(unpadded(array)).into_owned())
         }
 
         fn encode_all(items: &[Self], to: &mut Encoder<'_>) {

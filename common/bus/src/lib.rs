@@ -41,7 +41,7 @@ pub use self::{
     bus_instance::VERSION,
     close_on_exec::close_all_on_exec,
     error::BusError,
-    layout::{Field, Kind, Layout, Structure, Value, kind_of},
+    layout::{Field, Kind, Layout, Structure, Value, kind_of, unpadded},
     make::{Bus, Services},
     payload::{
         Payload, Stamp, Stamped, ZeroCopySend, decode_sample, decode_slice, encode_sample,

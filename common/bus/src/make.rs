@@ -47,9 +47,9 @@ pub struct Bus {
 /// Services of all topics, which exist while this value is held.
 pub struct Services(#[allow(dead_code, reason = "held, not read")] Vec<Box<dyn Any>>);
 
-fn no_join(domain: &Domain) -> impl Fn(String) -> BusError + use<> {
+fn no_join<D: ToString>(domain: &Domain) -> impl Fn(D) -> BusError + use<D> {
     let robot = domain.robot.to_string();
-    move |detail| BusError::Join { robot: robot.clone(), detail }
+    move |detail| BusError::Join { robot: robot.clone(), detail: detail.to_string() }
 }
 
 fn not_running(domain: &Domain) -> impl Fn(io::Error) -> BusError {
@@ -65,19 +65,19 @@ impl Bus {
         name: &str,
         topics: impl Iterator<Item = (&'static Spec, Carried)>,
     ) -> Result<(Self, Services)> {
-        let failed = |error: io::Error| no_join(domain)(error.to_string());
+        let failed = no_join(domain);
         let instance = BusInstance::new(domain);
         // An existing directory is an error, because another user may have created it.
-        DirBuilder::new().mode(0o700).create(instance.root()).map_err(failed)?;
+        DirBuilder::new().mode(0o700).create(instance.root()).map_err(&failed)?;
         Self::write_config(&instance)?;
-        ownership::create_count_of_nodes(&instance).map_err(failed)?;
+        ownership::create_count_of_nodes(&instance).map_err(&failed)?;
         let mut bus = Self::join_instance(instance, name)?;
         bus.writers = Some(Writers::of(std::process::id()));
         bus.is_stage = true;
         let services = topics
             .map(|(spec, carried)| ports::create(&bus.node, spec, &carried))
             .collect::<Result<_, _>>()?;
-        leftovers::back_up(&bus.services(), &bus.backup()).map_err(failed)?;
+        leftovers::back_up(&bus.services(), &bus.backup()).map_err(&failed)?;
         bus.instance.make_current().map_err(failed)?;
         Ok((bus, Services(services)))
     }
@@ -85,8 +85,7 @@ impl Bus {
     /// Rewrites the configuration for joining processes.
     pub fn restore_config(&self) -> Result {
         Self::write_config(&self.instance)?;
-        let failed = |error: io::Error| no_join(&self.instance.domain)(error.to_string());
-        self.instance.make_current().map_err(failed)
+        self.instance.make_current().map_err(no_join(&self.instance.domain))
     }
 
     fn write_config(instance: &BusInstance) -> Result {
@@ -142,8 +141,8 @@ impl Bus {
         set_log_level_from_env_or(LogLevel::Fatal);
         let join = no_join(&instance.domain);
         let refused = |error: &dyn Debug| join(format!("{error:?}"));
-        ownership::check(&instance).map_err(|error| join(error.to_string()))?;
-        let other = instance.made_by_another().map_err(|error| join(error.to_string()))?;
+        ownership::check(&instance).map_err(no_join(&instance.domain))?;
+        let other = instance.made_by_another().map_err(no_join(&instance.domain))?;
         if let Some(runs) = other {
             return Err(BusError::OtherVersion { robot: instance.domain.robot.to_string(), runs });
         }

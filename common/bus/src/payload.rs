@@ -44,6 +44,10 @@ impl Stamp {
     pub const fn time(&self) -> MissionTime {
         MissionTime(self.stamp_ns)
     }
+
+    pub fn seconds(&self) -> f64 {
+        self.time().seconds()
+    }
 }
 
 /// Header of a sample: a payload that starts with a [`Stamp`].

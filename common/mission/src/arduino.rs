@@ -14,9 +14,3 @@ keys! {
         sonars: BTreeMap<String, u8>,
     }
 }
-
-impl ArduinoBoard {
-    pub(crate) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}

@@ -335,8 +335,8 @@ fn point(key: &'static str, point: DVec2) -> Result {
 fn stages(mission: &Mission) -> Result {
     let Mission { controller, mapper, planner, perimeter, .. } = mission;
     let top = mission.body().top_speed_m_s;
-    let Hurry { full_speed_within_deg: full, turns_beyond_deg: turns, .. } = mission.hurry();
-    let Hurry { look_rad_s, stops_within_s, .. } = mission.hurry();
+    let Hurry { full_speed_within_deg: full, turns_beyond_deg: turns, look_rad_s, stops_within_s } =
+        mission.hurry();
     let most_margin_m = perimeter.width_m / 4.0;
     // The check applies to the written value, before the sensors' reach limits it.
     let speed_m_s = mission.controller.speed_m_s.unwrap_or_else(|| mission.speed_m_s());

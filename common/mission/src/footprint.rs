@@ -2,7 +2,10 @@
 
 use glam::DVec2;
 
-use crate::{geometry::nearest_on_segment, kinematics::Pose2};
+use crate::{
+    geometry::{nearest_on_segment, ring},
+    kinematics::Pose2,
+};
 
 const MOST_CORNERS: usize = 16;
 
@@ -78,8 +81,7 @@ impl Footprint {
     }
 
     pub fn edges(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
-        let corners = self.corners();
-        corners.iter().zip(corners.iter().cycle().skip(1)).map(|(from, to)| (*from, *to))
+        ring(self.corners())
     }
 
     fn sides(&self) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {

@@ -42,18 +42,19 @@ macro_rules! shape {
         $(#[$about:meta])*
         $name:ident { $($(#[$doc:meta])* $field:ident: $type:ty,)* }
     ) => {
-        $(#[$about])*
-        #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields)]
-        pub struct $name {
-            $($(#[$doc])* pub $field: $type,)*
-            pub bottom_m: Option<f64>,
-            /// Defaults to a shape higher than the robot.
-            pub top_m: Option<f64>,
-            /// Defaults to a hard shape.
-            pub echo: Option<f64>,
-            /// Defaults to matt.
-            pub light: Option<Light>,
+        rows! {
+            #[derive(Default)]
+            $(#[$about])*
+            $name {
+                $($(#[$doc])* $field: $type,)*
+                bottom_m: Option<f64>,
+                /// Defaults to a shape higher than the robot.
+                top_m: Option<f64>,
+                /// Defaults to a hard shape.
+                echo: Option<f64>,
+                /// Defaults to matt.
+                light: Option<Light>,
+            }
         }
 
         impl $name {
@@ -117,19 +118,19 @@ impl Box2 {
     }
 }
 
-/// Keep-out polygon.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Zone {
-    pub points: Vec<DVec2>,
+rows! {
+    /// Keep-out polygon.
+    #[derive(Default)]
+    Zone {
+        points: Vec<DVec2>,
+    }
 }
 
 impl Zone {
     /// Returns the distance to its edge, metres; negative inside.
     pub fn clearance(&self, point: DVec2) -> f64 {
-        let next = self.points.iter().cycle().skip(1);
         let (mut nearest, mut is_inside) = (f64::INFINITY, false);
-        for (&from, &to) in self.points.iter().zip(next) {
+        for (from, to) in ring(&self.points) {
             nearest = nearest.min(distance_to_segment(point, from, to));
             let way = to - from;
             let crosses = (from.y > point.y) != (to.y > point.y)
@@ -140,24 +141,22 @@ impl Zone {
     }
 
     pub fn crosses_itself(&self) -> bool {
-        let ends = self.points.iter().cycle().skip(1);
-        let edges: Vec<_> = self.points.iter().copied().zip(ends.copied()).collect();
         let side = |(from, to): (DVec2, DVec2), at: DVec2| (to - from).perp_dot(at - from);
         let splits = |line, (from, to)| side(line, from) * side(line, to) < 0.0;
         let crosses = |one, other| splits(one, other) && splits(other, one);
-        edges.iter().any(|one| edges.iter().any(|other| crosses(*one, *other)))
+        ring(&self.points).any(|one| ring(&self.points).any(|other| crosses(one, other)))
     }
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Shapes {
-    #[serde(rename = "drum")]
-    pub drums: Vec<Drum>,
-    #[serde(rename = "wall")]
-    pub walls: Vec<Wall>,
-    #[serde(rename = "box")]
-    pub boxes: Vec<Box2>,
+keys! {
+    Shapes {
+        #[serde(rename = "drum")]
+        drums: Vec<Drum>,
+        #[serde(rename = "wall")]
+        walls: Vec<Wall>,
+        #[serde(rename = "box")]
+        boxes: Vec<Box2>,
+    }
 }
 
 impl Shapes {
@@ -243,6 +242,11 @@ fn bounds(corners: &[DVec2]) -> (DVec2, DVec2) {
     let wider =
         |(least, most): (DVec2, DVec2), corner: &DVec2| (least.min(*corner), most.max(*corner));
     corners.iter().fold(nothing, wider)
+}
+
+/// Returns the edges of a polygon.
+pub(crate) fn ring(corners: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
+    corners.iter().zip(corners.iter().cycle().skip(1)).map(|(from, to)| (*from, *to))
 }
 
 pub fn distance_to_segment(point: DVec2, from: DVec2, to: DVec2) -> f64 {

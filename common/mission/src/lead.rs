@@ -27,7 +27,7 @@ const MOST_PENDING: usize = 256;
 pub struct Lead {
     drive: DifferentialDrive,
     base: Base,
-    dead_time_s: f64,
+    pub(crate) dead_time_s: f64,
     /// Pending commands with their times of effect.
     pending: VecDeque<(f64, Twist)>,
     wanted: Twist,
@@ -58,10 +58,6 @@ impl Lead {
             first: None,
             has_begun: false,
         })
-    }
-
-    pub const fn dead_time_s(&self) -> f64 {
-        self.dead_time_s
     }
 
     /// Returns the pose and motion at which a command given now acts; `pose` belongs to `now_s`.

@@ -15,17 +15,27 @@
 //! | [`address`] | a robot's address |
 //! | `arduino`, `ros2` | the Arduino board; ROS 2 topics |
 
-/// Declares mission tables as keys with optional defaults, else the type's. Unknown keys are
-/// errors.
+/// Declares mission tables. Unknown keys are errors, and so are missing ones without a default.
+macro_rules! rows {
+    ($($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $key:ident: $type:ty,)* })*) => {$(
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        $(#[$about])*
+        pub struct $name {
+            $($(#[$doc])* pub $key: $type,)*
+        }
+    )*};
+}
+
+/// Declares a mission table as keys with optional defaults, else the type's.
 macro_rules! keys {
     (@) => { Default::default() };
     (@ $default:expr) => { $default };
     ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $key:ident: $type:ty $(= $default:expr)?,)* }) => {
-        $(#[$about])*
-        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(deny_unknown_fields, default)]
-        pub struct $name {
-            $($(#[$doc])* pub $key: $type,)*
+        rows! {
+            #[serde(default)]
+            $(#[$about])*
+            $name { $($(#[$doc])* $key: $type,)* }
         }
 
         impl Default for $name {
@@ -140,6 +150,11 @@ keys! {
         #[serde(skip)]
         remarks: Vec<String>,
     }
+}
+
+/// Omits a table that a mission need not write.
+fn is_default<T: Default + PartialEq>(table: &T) -> bool {
+    *table == T::default()
 }
 
 pub const MOST_TARGETS: usize = 16;
@@ -371,10 +386,7 @@ impl Mission {
     /// This needs the evidential method with sensing and the built-in planner, and a robot that
     /// turns on the spot. It can stop within scanned ground, so its defaults are faster.
     pub fn looks_first(&self) -> bool {
-        self.method == Method::Evidential
-            && self.sensing
-            && self.planner.executable.is_none()
-            && self.body().ackermann().is_none()
+        self.brakes_by_response() && self.body().ackermann().is_none()
     }
 
     /// Returns the outline to keep clear where the covering circle does not fit. Only robots with a
@@ -527,7 +539,7 @@ impl Mission {
     /// answers. On a late base that is where the command acts.
     pub fn brakes_within_s(&self) -> f64 {
         let within_s = self.hurry().stops_within_s;
-        Lead::new(self).map_or(within_s, |lead| (within_s - lead.dead_time_s()).max(0.0))
+        Lead::new(self).map_or(within_s, |lead| (within_s - lead.dead_time_s).max(0.0))
     }
 
     /// Returns wd: `controller.turn_rad_s`, by default 2.4 for a robot that looks first, else the

@@ -26,18 +26,18 @@ keys! {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Provenance {
-    /// Year-month-day, UTC.
-    pub date: String,
-    pub robot: String,
-    /// `wall`, `squares` or `gyro`.
-    pub method: String,
-    /// Mean distance rolled by the wheels.
-    pub metres: f64,
-    /// Sum of squared residuals over their variances, per degree of freedom.
-    pub chi2_per_dof: f64,
+rows! {
+    Provenance {
+        /// Year-month-day, UTC.
+        date: String,
+        robot: String,
+        /// `wall`, `squares` or `gyro`.
+        method: String,
+        /// Mean distance rolled by the wheels.
+        metres: f64,
+        /// Sum of squared residuals over their variances, per degree of freedom.
+        chi2_per_dof: f64,
+    }
 }
 
 keys! {

@@ -18,10 +18,6 @@ keys! {
 }
 
 impl ResponseKeys {
-    pub(crate) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// Returns the response of a base with `track_m` between its wheels; `preset` is the model's.
     pub(crate) fn over(&self, preset: Response, track_m: f64) -> Response {
         let turn = self.acceleration_m_s2.map(|acceleration| 2.0 * acceleration / track_m);

@@ -65,13 +65,14 @@ impl Protocol {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Channel {
-    /// Encoder channel, 0 or 1.
-    pub channel: u8,
-    /// Counts fall when the robot drives forward.
-    pub reversed: bool,
+rows! {
+    #[derive(Copy, Eq)]
+    Channel {
+        /// Encoder channel, 0 or 1.
+        channel: u8,
+        /// Counts fall when the robot drives forward.
+        reversed: bool,
+    }
 }
 
 keys! {
@@ -120,12 +121,12 @@ keys! {
         /// Calibration file whose values replace `odometry` before a run starts:
         /// [`crate::Mission::with_calibration`].
         calibration: Option<PathBuf>,
-        #[serde(skip_serializing_if = "ResponseKeys::is_default")]
+        #[serde(skip_serializing_if = "crate::is_default")]
         response: ResponseKeys,
         odometry: Odometry,
-        #[serde(skip_serializing_if = "ArduinoBoard::is_default")]
+        #[serde(skip_serializing_if = "crate::is_default")]
         arduino: ArduinoBoard,
-        #[serde(skip_serializing_if = "Ros2Topics::is_default")]
+        #[serde(skip_serializing_if = "crate::is_default")]
         ros2: Ros2Topics,
         /// Up to [`crate::MOST_SENSORS`] rows; by default those of the model.
         #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]

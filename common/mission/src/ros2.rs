@@ -23,9 +23,3 @@ keys! {
         ranges: BTreeMap<String, String>,
     }
 }
-
-impl Ros2Topics {
-    pub(crate) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}

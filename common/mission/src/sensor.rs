@@ -97,7 +97,7 @@ pub struct Rplidar {
 
 /// Values from the source of a [`SensorModel`].
 pub(crate) struct Product {
-    pub(crate) kind: SensorKind,
+    pub kind: SensorKind,
     /// 0 for a ray.
     field_of_view_deg: f64,
     reach_m: f64,
@@ -196,43 +196,40 @@ impl SensorModel {
     }
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SensorRow {
-    pub name: String,
-    pub kind: SensorKind,
-    /// Channel of an X80. A cone has the sonar's index in the standard frame (0 to 5), a ray the
-    /// infrared ranger (0 to 6). Other protocols have no channels.
-    pub channel: Option<u8>,
-    /// Distance from the robot's centre along the bearing.
-    pub forward_m: f64,
-    /// delta of (19), counter-clockwise from the robot's axis.
-    pub bearing_deg: f64,
-    /// Angle from the bearing to a laser's middle beam, counter-clockwise; 0 looks outward.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub turned_deg: f64,
-    /// 180 for a laser mounted upside down, otherwise 0.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub roll_deg: f64,
-    /// Height of a laser above the ground, for the simulator only; by default
-    /// `simulation.heights.infrared_m`.
-    pub height_m: Option<f64>,
-    /// Defaults to the model's; a ray has none.
-    pub field_of_view_deg: Option<f64>,
-    /// Defaults to the model's.
-    pub reach_m: Option<f64>,
-    /// Beams, evenly spaced over the field of view; by default the model's.
-    pub beams: Option<u16>,
-    /// Measurement rate, if below the frame rate. Frames in between are ignored.
-    pub rate_hz: Option<f64>,
-    /// Defaults to the X80's.
-    pub model: Option<SensorModel>,
-    /// Address of an RPLIDAR with its own line, in the form of the robot's address.
-    pub address: Option<String>,
-}
-
-fn is_zero(deg: &f64) -> bool {
-    *deg == 0.0
+rows! {
+    #[derive(Default)]
+    SensorRow {
+        name: String,
+        kind: SensorKind,
+        /// Channel of an X80. A cone has the sonar's index in the standard frame (0 to 5), a ray the
+        /// infrared ranger (0 to 6). Other protocols have no channels.
+        channel: Option<u8>,
+        /// Distance from the robot's centre along the bearing.
+        forward_m: f64,
+        /// delta of (19), counter-clockwise from the robot's axis.
+        bearing_deg: f64,
+        /// Angle from the bearing to a laser's middle beam, counter-clockwise; 0 looks outward.
+        #[serde(default, skip_serializing_if = "crate::is_default")]
+        turned_deg: f64,
+        /// 180 for a laser mounted upside down, otherwise 0.
+        #[serde(default, skip_serializing_if = "crate::is_default")]
+        roll_deg: f64,
+        /// Height of a laser above the ground, for the simulator only; by default
+        /// `simulation.heights.infrared_m`.
+        height_m: Option<f64>,
+        /// Defaults to the model's; a ray has none.
+        field_of_view_deg: Option<f64>,
+        /// Defaults to the model's.
+        reach_m: Option<f64>,
+        /// Beams, evenly spaced over the field of view; by default the model's.
+        beams: Option<u16>,
+        /// Measurement rate, if below the frame rate. Frames in between are ignored.
+        rate_hz: Option<f64>,
+        /// Defaults to the X80's.
+        model: Option<SensorModel>,
+        /// Address of an RPLIDAR with its own line, in the form of the robot's address.
+        address: Option<String>,
+    }
 }
 
 keys! {

@@ -57,57 +57,66 @@ pub enum Realism {
     Harsh,
 }
 
-impl Realism {
-    pub const ALL: [Self; 3] = [Self::Laboratory, Self::Measured, Self::Harsh];
-
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Laboratory => "laboratory",
-            Self::Measured => "measured",
-            Self::Harsh => "harsh",
-        }
+rows! {
+    Ranger {
+        /// Index among the six of the standard frame.
+        index: u8,
+        forward_m: f64,
+        /// Counter-clockwise from the robot's axis.
+        bearing_deg: f64,
     }
-}
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Ranger {
-    /// Index among the six of the standard frame.
-    pub index: u8,
-    pub forward_m: f64,
-    /// Counter-clockwise from the robot's axis.
-    pub bearing_deg: f64,
-}
+    /// Obstacle that appears, disappears or moves.
+    Thing {
+        /// Shape before any move.
+        shape: Shapes,
+        /// Time of appearance; it is delayed while the robot occupies the place.
+        #[serde(default)]
+        from_s: f64,
+        /// Absent for a thing that stays.
+        until_s: Option<f64>,
+        /// Positions in order of time, joined by straight lines.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        moves: Vec<Move>,
+    }
 
-/// Obstacle that appears, disappears or moves.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Thing {
-    /// Shape before any move.
-    pub shape: Shapes,
-    /// Time of appearance; it is delayed while the robot occupies the place.
-    #[serde(default)]
-    pub from_s: f64,
-    /// Absent for a thing that stays.
-    pub until_s: Option<f64>,
-    /// Positions in order of time, joined by straight lines.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub moves: Vec<Move>,
-}
+    #[derive(Copy)]
+    Move {
+        at_s: f64,
+        /// Displacement from the shape's position, metres.
+        by: DVec2,
+    }
 
-/// Person who walks from goal to goal in a loop and gives way.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Person {
-    /// Start position.
-    pub at: DVec2,
-    pub goals: Vec<DVec2>,
-    /// Unhindered walking speed; 1.34 is the mean of people (Helbing and Molnar, 1995).
-    #[serde(default = "walking_m_s")]
-    pub speed_m_s: f64,
-    /// Radius of the person's cylinder; nominal.
-    #[serde(default = "person_radius_m")]
-    pub radius_m: f64,
+    /// Person who walks from goal to goal in a loop and gives way.
+    Person {
+        /// Start position.
+        at: DVec2,
+        goals: Vec<DVec2>,
+        /// Unhindered walking speed; 1.34 is the mean of people (Helbing and Molnar, 1995).
+        #[serde(default = "walking_m_s")]
+        speed_m_s: f64,
+        /// Radius of the person's cylinder; nominal.
+        #[serde(default = "person_radius_m")]
+        radius_m: f64,
+    }
+
+    /// Rectangle without floor. A wheel over it is a contact.
+    #[derive(Copy)]
+    Hole {
+        /// Centre.
+        at: DVec2,
+        /// Extent along x and y.
+        size_m: DVec2,
+    }
+
+    /// Block that stops wheels for a while, for example a cable around an axle.
+    #[derive(Copy)]
+    Block {
+        wheels: BlockedWheels,
+        #[serde(default)]
+        from_s: f64,
+        until_s: Option<f64>,
+    }
 }
 
 const fn walking_m_s() -> f64 {
@@ -118,30 +127,10 @@ const fn person_radius_m() -> f64 {
     0.25
 }
 
-/// Rectangle without floor. A wheel over it is a contact.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Hole {
-    /// Centre.
-    pub at: DVec2,
-    /// Extent along x and y.
-    pub size_m: DVec2,
-}
-
 impl Hole {
     pub fn contains(&self, point: DVec2) -> bool {
         (2.0 * (point - self.at)).abs().cmplt(self.size_m).all()
     }
-}
-
-/// Block that stops wheels for a while, for example a cable around an axle.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Block {
-    pub wheels: BlockedWheels,
-    #[serde(default)]
-    pub from_s: f64,
-    pub until_s: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -150,14 +139,6 @@ pub enum BlockedWheels {
     Left,
     Right,
     Both,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Move {
-    pub at_s: f64,
-    /// Displacement from the shape's position, metres.
-    pub by: DVec2,
 }
 
 /// Key, its value and its range.
@@ -195,11 +176,11 @@ macro_rules! section {
             }
         }
 
-        #[doc = concat!("`[", $table, "]` as a mission writes it: [`", stringify!($settled), "`].")]
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-        #[serde(deny_unknown_fields, default)]
-        pub struct $written {
-            $($(#[$doc])* pub $key: Option<f64>,)*
+        rows! {
+            #[doc = concat!("`[", $table, "]` as a mission writes it: [`", stringify!($settled), "`].")]
+            #[derive(Copy, Default)]
+            #[serde(default)]
+            $written { $($(#[$doc])* $key: Option<f64>,)* }
         }
 
         impl $written {

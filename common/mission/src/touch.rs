@@ -13,18 +13,18 @@ pub enum TouchKind {
     Cliff,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TouchRow {
-    pub name: String,
-    pub kind: TouchKind,
-    /// Counter-clockwise from the robot's axis, to the middle of a bumper's arc.
-    pub bearing_deg: f64,
-    /// Width of a bumper's arc.
-    #[serde(default = "wide_deg")]
-    pub wide_deg: f64,
-    /// Distance of a cliff sensor from the robot's centre; by default the body's radius.
-    pub forward_m: Option<f64>,
+rows! {
+    TouchRow {
+        name: String,
+        kind: TouchKind,
+        /// Counter-clockwise from the robot's axis, to the middle of a bumper's arc.
+        bearing_deg: f64,
+        /// Width of a bumper's arc.
+        #[serde(default = "wide_deg")]
+        wide_deg: f64,
+        /// Distance of a cliff sensor from the robot's centre; by default the body's radius.
+        forward_m: Option<f64>,
+    }
 }
 
 const fn wide_deg() -> f64 {

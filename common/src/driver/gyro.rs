@@ -48,14 +48,10 @@ pub struct Compared {
     since_ns: i64,
     /// Turns since then by odometry and by the gyro, radians.
     turned: [f64; 2],
-    agrees: bool,
+    pub agrees: bool,
 }
 
 impl Compared {
-    pub const fn agrees(&self) -> bool {
-        self.agrees
-    }
-
     /// Adds the turns by odometry and gyro up to `now_ns`, radians. Returns a description if a
     /// comparison fails.
     pub fn take(&mut self, now_ns: i64, turns: [f64; 2]) -> Option<String> {
@@ -115,7 +111,7 @@ impl Angle {
 
     /// Returns the turn of a tick. After a gap it only marks where the next one begins.
     pub fn for_tick(&mut self, rate_hz: f64) -> Option<Turn> {
-        let now = self.newest.filter(|_| self.compared.agrees()).map(|(angle, _)| angle);
+        let now = self.newest.filter(|_| self.compared.agrees).map(|(angle, _)| angle);
         let (sequence, before) = self.turns.until(now)?;
         let turn_rad = now? - before;
         let variance_rad2 = NOISE * NOISE / rate_hz + (SCALE * turn_rad).powi(2);

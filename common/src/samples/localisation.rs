@@ -53,9 +53,7 @@ payloads! {
         /// Variance of its error, rad^2.
         variance_rad2: f64,
     }
-}
 
-payloads! {
     /// Position of the followed thing, from an external source.
     "firsthand.Beacon" BeaconSample {
         /// Mission time of the measurement, nanoseconds; at most 1 s ago.

@@ -326,7 +326,7 @@ payloads! {
         /// Greatest tangential speed by the map of the way ahead, m/s; infinite for no limit.
         speed_limit_m_s: f64,
         /// A [`GuidanceStatus`].
-        status: u8,
+        status: u8 as GuidanceStatus,
         /// Mission time of the pose, nanoseconds.
         pose_ns: u64,
         /// Pose: metres in the mission frame, radians counter-clockwise from x, not wrapped.
@@ -423,6 +423,6 @@ payloads! {
         /// Target that it leads to, or that is reached.
         target_number: u64,
         /// A [`CommandState`].
-        state: u8,
+        state: u8 as CommandState,
     }
 }

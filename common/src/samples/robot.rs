@@ -38,13 +38,7 @@ structs! {
         /// Row of [`crate::mission::Mission::sensor_table`].
         sensor: u8,
         /// A [`RangeStatus`].
-        status: u8,
-    }
-}
-
-impl RangeReading {
-    pub const fn status(&self) -> RangeStatus {
-        RangeStatus::from_byte(self.status)
+        status: u8 as RangeStatus,
     }
 }
 
@@ -152,18 +146,14 @@ payloads! {
         told_ratio: f64 = 1.0,
         told_ratio_sd: f64,
     }
-}
 
-payloads! {
     /// Counts of [`WheelSample`] without wraparound, whole numbers.
     #[derive(Serialize, Deserialize)]
     "firsthand.Counts" CountsSample {
         left_counts: f64,
         right_counts: f64,
     }
-}
 
-payloads! {
     #[derive(Serialize, Deserialize)]
     "firsthand.BaseResponse" BaseResponseSample {
         /// Time from a command to its effect, including the lag, seconds.
@@ -171,9 +161,7 @@ payloads! {
         /// Infinite for a base that the dead time alone describes.
         acceleration_m_s2: f64,
     }
-}
 
-payloads! {
     /// Contact. Blocked wheels stand by their encoders while their motors draw a high current;
     /// otherwise a bumper or cliff sensor reported it.
     #[derive(Serialize, Deserialize)]
@@ -272,11 +260,11 @@ payloads! {
         /// 1: the robot answers.
         connected: u32,
         /// The failsafe's [`Action`].
-        action: u8 = Action::Stop.into(),
+        action: u8 as Action = Action::Stop.into(),
         /// The [`Cause`] of the action.
-        cause: u8 = Cause::NotOrdered.into(),
+        cause: u8 as Cause = Cause::NotOrdered.into(),
         /// A [`Rest`]. 1: no wheel turns.
-        at_rest: u8,
+        at_rest: u8 as Rest,
         frames_in: u64,
         /// Bytes outside any frame.
         bytes_dropped: u64,
@@ -313,18 +301,6 @@ payloads! {
 }
 
 impl LinkSample {
-    pub const fn action(&self) -> Action {
-        Action::from_byte(self.action)
-    }
-
-    pub const fn cause(&self) -> Cause {
-        Cause::from_byte(self.cause)
-    }
-
-    pub const fn rest(&self) -> Rest {
-        Rest::from_byte(self.at_rest)
-    }
-
     pub fn stopped(&self) -> bool {
         self.action() >= Action::Stop
     }
@@ -337,9 +313,7 @@ payloads! {
         range_m: [f64; INFRARED_RANGERS],
         raw_ad: [u16; INFRARED_RANGERS],
     }
-}
 
-payloads! {
     "firsthand.Power" PowerSample {
         board_v: f64,
         motor_v: f64,

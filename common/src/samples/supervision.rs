@@ -4,8 +4,11 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize, Serializer, ser::SerializeStruct as _};
 
-use super::navigation::{MOST_TARGETS, TargetPoint};
-use crate::bus::ZeroCopySend;
+use super::{
+    localisation::BeaconRefusal,
+    navigation::{MOST_TARGETS, TargetPoint},
+};
+use crate::bus::{ZeroCopySend, unpadded};
 
 wire_enum! {
     HealthState, unknown = Starting {
@@ -18,19 +21,22 @@ wire_enum! {
 
 pub type Name = [u8; 24];
 
-/// Encodes `text` as UTF-8, cut at 24 bytes and padded with zeros.
-pub fn name(text: &str) -> Name {
-    let mut name = [0; 24];
-    for (slot, byte) in name.iter_mut().zip(text.bytes()) {
+fn padded<const N: usize>(text: &str) -> [u8; N] {
+    let mut padded = [0; N];
+    for (slot, byte) in padded.iter_mut().zip(text.bytes()) {
         *slot = byte;
     }
-    name
+    padded
+}
+
+/// Encodes `text` as UTF-8, cut at 24 bytes and padded with zeros.
+pub fn name(text: &str) -> Name {
+    padded(text)
 }
 
 /// Returns the text of a [`Name`]; empty if it is invalid UTF-8.
 pub fn name_str(name: &Name) -> &str {
-    let text = name.split(|&byte| byte == 0).next().unwrap_or_default();
-    std::str::from_utf8(text).unwrap_or_default()
+    std::str::from_utf8(unpadded(name)).unwrap_or_default()
 }
 
 payloads! {
@@ -38,12 +44,12 @@ payloads! {
         stage: Name,
         pid: u32,
         /// A [`HealthState`].
-        state: u8,
+        state: u8 as HealthState,
         turns: u64,
         /// Newest fault request to this generation; 0 for none.
         last_fault: u64,
         /// A [`FaultAnswer`].
-        fault_answer: u8,
+        fault_answer: u8 as FaultAnswer,
     }
 }
 
@@ -65,13 +71,11 @@ payloads! {
         /// Epoch of the belief: a mapper with a lower one resets the sensed belief.
         epoch: u64,
         /// An [`Order`].
-        order: u8,
+        order: u8 as Order,
         /// A [`HoldReason`].
-        reason: u8,
+        reason: u8 as HoldReason,
     }
-}
 
-payloads! {
     /// Lead of the link over the supervisor in lockstep. It makes a recovery step begin at a tick
     /// that is independent of machine speed.
     "firsthand.TickLimit" TickLimitSample {
@@ -123,14 +127,14 @@ payloads! {
     "firsthand.RosterHeader" RosterHeader {
         supervisor_pid: u32,
         /// The current [`Order`].
-        order: u8,
+        order: u8 as Order,
         /// A [`HoldReason`].
-        reason: u8,
+        reason: u8 as HoldReason,
         simulated: u8,
         /// Newest answered request; 0 for none.
         last_request: u64,
         /// A [`RequestAnswer`].
-        answer: u8,
+        answer: u8 as RequestAnswer,
     }
 }
 
@@ -141,7 +145,7 @@ structs! {
         pid: u32,
         generation: u32,
         /// A [`StageState`].
-        state: u8,
+        state: u8 as StageState,
         restarts: u32,
         uptime_ns: u64,
         /// Age of its last heartbeat; u64::MAX for none yet.
@@ -185,18 +189,13 @@ structs! {
 
 /// Encodes `text` as [`Words`], cut at 400 bytes.
 pub fn words(text: &str) -> Words {
-    let mut words = Words::default();
-    for (slot, byte) in words.bytes.iter_mut().zip(text.bytes()) {
-        *slot = byte;
-    }
-    words
+    Words { bytes: padded(text) }
 }
 
 impl Words {
     /// Returns the text, with a replacement for a truncated character.
     pub fn text(&self) -> std::borrow::Cow<'_, str> {
-        let text = self.bytes.split(|&byte| byte == 0).next();
-        String::from_utf8_lossy(text.unwrap_or_default())
+        String::from_utf8_lossy(unpadded(&self.bytes))
     }
 }
 
@@ -210,9 +209,7 @@ payloads! {
         /// Empty if `what` includes it.
         remedy: Words,
     }
-}
 
-payloads! {
     "firsthand.Death" DeathSample {
         stage: Name,
         pid: u32,
@@ -226,9 +223,9 @@ payloads! {
         /// Deaths in the last ten seconds, including this one.
         deaths_in_window: u32,
         /// A [`DeathCause`].
-        cause: u8,
+        cause: u8 as DeathCause,
         /// A [`NextStep`].
-        next: u8,
+        next: u8 as NextStep,
         /// 1: the supervisor ended it: it hung or was never ready.
         hung: u8,
         log_tail: Words,
@@ -279,19 +276,9 @@ payloads! {
         /// Resets of the sensed map, including this one.
         resets: u64,
         /// A [`StallCause`].
-        cause: u8,
+        cause: u8 as StallCause,
         /// A [`RecoveryStep`].
-        recovery: u8,
-    }
-}
-
-impl StallSample {
-    pub const fn cause(&self) -> StallCause {
-        StallCause::from_byte(self.cause)
-    }
-
-    pub const fn recovery(&self) -> RecoveryStep {
-        RecoveryStep::from_byte(self.recovery)
+        recovery: u8 as RecoveryStep,
     }
 }
 
@@ -299,7 +286,7 @@ impl Serialize for StallSample {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
         let mut line = to.serialize_struct("Stall", 9)?;
         line.serialize_field("tick", &self.stamp.tick)?;
-        line.serialize_field("time_s", &self.stamp.time().seconds())?;
+        line.serialize_field("time_s", &self.stamp.seconds())?;
         line.serialize_field("x_m", &self.x_m)?;
         line.serialize_field("y_m", &self.y_m)?;
         line.serialize_field("cause", &self.cause())?;
@@ -325,9 +312,9 @@ payloads! {
     /// State of following a beacon, or of the last following.
     "firsthand.Following" FollowingSample {
         /// A [`FollowState`].
-        state: u8,
+        state: u8 as FollowState,
         /// The newest [`BeaconRefusal`](super::BeaconRefusal).
-        refusal: u8,
+        refusal: u8 as BeaconRefusal,
         /// Distance that the robot keeps between its centre and the beacon, metres.
         distance_m: f64,
         /// Newest used beacon, metres in the mission frame.
@@ -347,10 +334,6 @@ payloads! {
 }
 
 impl FollowingSample {
-    pub const fn state(&self) -> FollowState {
-        FollowState::from_byte(self.state)
-    }
-
     /// Returns the seconds since the beacon was heard, at mission time `now_s`; `None` if never.
     pub fn heard_ago_s(&self, now_s: f64) -> Option<f64> {
         (self.heard_ns != u64::MAX).then(|| (now_s - self.heard_ns as f64 * 1e-9).max(0.0))
@@ -430,10 +413,10 @@ payloads! {
         /// Empty for none.
         stage: Name,
         /// A [`RequestKind`].
-        kind: u8,
+        kind: u8 as RequestKind,
         target_count: u8,
         /// A [`RequestAnswer`], in `orders`.
-        answer: u8,
+        answer: u8 as RequestAnswer,
         targets: [TargetPoint; MOST_TARGETS],
         /// Standard deviations of position, metres, and heading, radians. For following, the first
         /// is the distance, metres.
@@ -499,13 +482,11 @@ payloads! {
         id: u64,
         stage: Name,
         /// A [`FaultKind`].
-        kind: u8,
+        kind: u8 as FaultKind,
         /// 1: inject the fault into a real robot too.
         although_real: u8,
     }
-}
 
-payloads! {
     /// Inputs of a stage; the slice is a piece of the entries of [`crate::inputs`], ordered by
     /// sequence within a generation.
     "firsthand.InputsHeader" InputsHeader {

@@ -7,11 +7,8 @@ use crate::{
     topics,
 };
 
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
-    pub(super) id: u64,
-    pub(super) fault: Result<FaultKind, FaultAnswer>,
-}
+/// Number of a request, and its fault or the refusal.
+pub(super) type Asked = (u64, Result<FaultKind, FaultAnswer>);
 
 #[derive(Debug)]
 pub(super) struct Requests {
@@ -28,10 +25,7 @@ impl Requests {
     pub(super) fn take(&mut self) -> Result<Option<Asked>, BusError> {
         while let Some(request) = self.requests.next_sample()? {
             if name_str(&request.stage) == self.stage {
-                return Ok(Some(Asked {
-                    id: request.id,
-                    fault: admit(&request, self.stage, self.simulated),
-                }));
+                return Ok(Some((request.id, admit(&request, self.stage, self.simulated))));
             }
         }
         Ok(None)

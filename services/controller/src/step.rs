@@ -160,7 +160,7 @@ impl Controller {
                 }
                 _ => {
                     let direction = DVec2::new(guidance.ex, guidance.ey);
-                    (GuidanceStatus::from_byte(guidance.status), direction)
+                    (guidance.status(), direction)
                 }
             };
         // Samples may hold anything; only unit vectors are followed.
@@ -218,14 +218,14 @@ impl Controller {
     }
 
     fn is_there(&self, guidance: &GuidanceSample, distance: f64) -> bool {
-        let beside = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
+        let beside = guidance.status() == GuidanceStatus::AtTarget;
         distance <= self.mission.arrival_tolerance_m || beside && distance <= MOST_OFF_TARGET_M
     }
 
     /// Returns whether the robot may turn to the wanted heading. Non-circular bodies need a numeric
     /// limit, by which the planner shows room.
     fn may_turn(&self, guidance: &GuidanceSample, distance: f64) -> bool {
-        let waits = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Waiting;
+        let waits = guidance.status() == GuidanceStatus::Waiting;
         let allows = !waits && !guidance.speed_limit_m_s.is_nan();
         self.mission.outline().is_none() || allows && self.is_there(guidance, distance)
     }

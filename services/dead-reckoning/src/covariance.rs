@@ -21,7 +21,7 @@ pub(crate) const BIAS: usize = 6;
 pub(crate) type Error = SVector<f64, PARTS>;
 type Matrix = SMatrix<f64, PARTS, PARTS>;
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Covariance(pub(crate) Matrix);
 
 /// Deviation of a gyro's bias before it is learned at rest, rad/s: 0.1 degrees/s. Worse sources
@@ -43,8 +43,8 @@ pub(crate) struct ErrorModel {
 
 /// Factor of the earlier error, and added covariance.
 pub(crate) struct Transition {
-    pub(crate) carried: Matrix,
-    pub(crate) noise: Matrix,
+    pub carried: Matrix,
+    pub noise: Matrix,
 }
 
 impl ErrorModel {
@@ -153,8 +153,13 @@ impl ErrorModel {
 impl Covariance {
     /// Returns xx, xy, x theta, yy, y theta, theta theta; m^2, m rad, rad^2.
     pub(crate) fn of_pose(&self) -> [f64; 6] {
-        [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| self.0[entry])
+        upper(self.0.fixed_view::<3, 3>(0, 0).into_owned())
     }
+}
+
+/// Returns the upper triangle of a covariance, row by row.
+pub(crate) fn upper(covariance: SMatrix<f64, 3, 3>) -> [f64; 6] {
+    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|entry| covariance[entry])
 }
 
 #[cfg(test)]

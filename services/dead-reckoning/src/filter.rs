@@ -16,7 +16,7 @@ use nalgebra::{Const, DimMin, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    covariance::{BIAS, Covariance, Error, ErrorModel, PARTS, Transition},
+    covariance::{BIAS, Covariance, Error, ErrorModel, PARTS, Transition, upper},
     gyro::Gyro,
     tick::Tick,
 };
@@ -42,8 +42,8 @@ const JOINT: usize = PARTS + 1;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motions {
-    pub(crate) errors: ErrorModel,
-    pub(crate) integration: Integration,
+    pub errors: ErrorModel,
+    pub integration: Integration,
 }
 
 impl Motions {
@@ -57,12 +57,12 @@ impl Motions {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Fix {
-    pub(crate) time: MissionTime,
-    pub(crate) position: DVec2,
-    pub(crate) heading: Option<f64>,
-    pub(crate) covariance: [f64; 6],
+    pub time: MissionTime,
+    pub position: DVec2,
+    pub heading: Option<f64>,
+    pub covariance: [f64; 6],
     /// Variances shared by all fixes of the source: of x and of y, and of the heading.
-    pub(crate) shared: [f64; 2],
+    pub shared: [f64; 2],
 }
 
 impl TryFrom<&FixSample> for Fix {
@@ -94,10 +94,6 @@ impl TryFrom<&FixSample> for Fix {
     }
 }
 
-fn parts(noise: &SMatrix<f64, 3, 3>) -> [f64; 6] {
-    [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|at: (usize, usize)| noise[at])
-}
-
 impl Fix {
     fn laid(&self, frame: Pose2) -> Self {
         let turned = DVec2::from_angle(frame.heading);
@@ -106,7 +102,7 @@ impl Fix {
         Self {
             position: frame.position + turned.rotate(self.position),
             heading: self.heading.map(|heading| heading + frame.heading),
-            covariance: parts(&(turn * self.noise() * turn.transpose())),
+            covariance: upper(turn * self.noise() * turn.transpose()),
             ..*self
         }
     }
@@ -142,13 +138,13 @@ pub(crate) fn wrapped(turn: f64) -> f64 {
     turn - (turn / std::f64::consts::TAU).round() * std::f64::consts::TAU
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Filter {
-    pub(crate) pose: Pose2,
+    pub pose: Pose2,
     /// Errors of diameter ratio, track and distance.
     shares: [f64; 3],
     bias: f64,
-    pub(crate) covariance: Covariance,
+    pub covariance: Covariance,
     anchor: Anchor,
 }
 
@@ -179,7 +175,7 @@ impl Anchor {
             let all = stated[(part, part)];
             ((all - shared[part] + drift[part]).max(LEAST_VARIANCES[part]) / all).sqrt()
         })));
-        Fix { covariance: parts(&(shrunk * stated * shrunk)), ..*fix }
+        Fix { covariance: upper(shrunk * stated * shrunk), ..*fix }
     }
 
     /// Returns the least variances after `fix`, which corrected the estimate at `pose` by `error`.
@@ -205,7 +201,7 @@ impl Anchor {
 
 impl Filter {
     pub(crate) fn new(pose: Pose2, covariance: Covariance) -> Self {
-        Self { pose, shares: [0.0; 3], bias: 0.0, covariance, anchor: Anchor::default() }
+        Self { pose, covariance, ..Self::default() }
     }
 
     pub(crate) fn moved(&self, motions: &Motions, tick: &Tick) -> Twist {
@@ -341,14 +337,14 @@ where
     Some((gain * residual, (after + after.transpose()) * 0.5))
 }
 
-#[derive(Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct History {
     /// Estimate before `ticks`.
     base: Filter,
-    ticks: VecDeque<Tick>,
+    pub ticks: VecDeque<Tick>,
     /// Used fixes, by their ticks' times.
     fixes: VecDeque<(MissionTime, Fix)>,
-    newest: Filter,
+    pub newest: Filter,
 }
 
 impl fmt::Debug for History {
@@ -361,16 +357,8 @@ impl fmt::Debug for History {
 }
 
 impl History {
-    pub(crate) const fn new(start: Filter) -> Self {
-        Self { base: start, ticks: VecDeque::new(), fixes: VecDeque::new(), newest: start }
-    }
-
-    pub(crate) const fn newest(&self) -> &Filter {
-        &self.newest
-    }
-
-    pub(crate) const fn ticks(&self) -> &VecDeque<Tick> {
-        &self.ticks
+    pub(crate) fn new(start: Filter) -> Self {
+        Self { base: start, newest: start, ..Self::default() }
     }
 
     pub(crate) fn restart(&mut self, estimate: Filter) {
@@ -462,6 +450,6 @@ impl History {
 /// Refusal of a fix, with the pose at its time if the fix contradicts it.
 #[derive(Clone, Copy)]
 pub(crate) struct Refused {
-    pub(crate) why: FixRefusal,
-    pub(crate) there: Option<Pose2>,
+    pub why: FixRefusal,
+    pub there: Option<Pose2>,
 }

@@ -48,7 +48,7 @@ const BOOTS_IN_S: f64 = 2.0;
 /// Largest correction per tick, metres and radians, so that the map around the robot does not tear.
 const MOST_CORRECTION: (f64, f64) = (0.02, std::f64::consts::PI / 180.0);
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Follows the estimate smoothly.
     pose: Pose2,
@@ -153,18 +153,7 @@ impl Answering for DeadReckoning {
                 pose: start,
                 odometry: start,
                 history: History::new(Filter::new(start, errors.start())),
-                travelled: 0.0,
-                last: None,
-                gyro: None,
-                contradictions: Contradictions::default(),
-                relocations: 0,
-                fixes: 0,
-                fixes_refused: 0,
-                refusal: FixRefusal::None.into(),
-                counts: None,
-                disagreement: Disagreement::default(),
-                doubt: Doubt::default(),
-                placed: 0,
+                ..State::default()
             },
         }
     }
@@ -233,7 +222,7 @@ impl DeadReckoning {
             let lost_s = if rejected { elapsed.min(self.turns_on_s) } else { 0.0 };
             let lost_m = self.body.top_speed_m_s * lost_s;
             tick = Tick { seconds: elapsed, arc, turn, lost_m, ..tick };
-            motion = self.state.history.newest().moved(&self.motions, &tick);
+            motion = self.state.history.newest.moved(&self.motions, &tick);
         }
         let state = &mut self.state;
         for pose in [&mut state.pose, &mut state.odometry] {
@@ -253,7 +242,7 @@ impl DeadReckoning {
             let taken = self.take_fix(fix);
             if let Ok(fix) = Fix::try_from(fix) {
                 let State { disagreement, history, .. } = &mut self.state;
-                let found = disagreement.compare(&fix, history.ticks(), self.body.track_m);
+                let found = disagreement.compare(&fix, &history.ticks, self.body.track_m);
                 disagree = found.or(disagree);
             }
             relocated |= taken == Taken::Relocated;
@@ -285,7 +274,7 @@ impl DeadReckoning {
     /// Sets the estimate as an operator says; wheel and gyro errors stay.
     fn place(&mut self, place: &PlaceSample) {
         let state = &mut self.state;
-        let estimate = state.history.newest();
+        let estimate = &state.history.newest;
         let turn = wrapped(place.heading_rad - estimate.pose.heading);
         let position = DVec2::new(place.x_m, place.y_m);
         let pose = Pose2 { position, heading: estimate.pose.heading + turn };
@@ -329,7 +318,7 @@ impl DeadReckoning {
             return Taken::Used;
         };
         state.fixes_refused += 1;
-        let estimate = state.history.newest();
+        let estimate = &state.history.newest;
         if let (Ok(fix), Some(there)) = (fix, there)
             && let Some(elsewhere) = state.contradictions.add(there, &fix, estimate)
         {
@@ -347,7 +336,7 @@ impl DeadReckoning {
 
     /// Moves the pose towards the estimate, fully if `relocated`.
     fn follow(&mut self, relocated: bool) {
-        let estimate = self.state.history.newest().pose;
+        let estimate = self.state.history.newest.pose;
         let pose = &mut self.state.pose;
         let way = estimate.position - pose.position;
         let turn = estimate.heading - pose.heading;
@@ -421,7 +410,7 @@ impl DeadReckoning {
         let Pose2 { position, heading } = *pose;
         let (left_counts, right_counts, v, omega) =
             last.map_or((0, 0, 0.0, 0.0), |last| (last.left, last.right, last.v, last.omega));
-        let estimate = history.newest();
+        let estimate = &history.newest;
         // The error is the estimate's, plus the offset to it.
         let [x, y] = (estimate.pose.position - position).to_array();
         let turn = estimate.pose.heading - heading;

@@ -3,20 +3,20 @@ use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Tick {
-    pub(crate) time: MissionTime,
-    pub(crate) seconds: f64,
+    pub time: MissionTime,
+    pub seconds: f64,
     /// By the counts of ideal wheels; metres and radians.
-    pub(crate) arc: f64,
-    pub(crate) turn: f64,
+    pub arc: f64,
+    pub turn: f64,
     /// Possible travel of each wheel with lost counts, metres.
-    pub(crate) lost_m: f64,
-    pub(crate) gyro: Option<GyroTurn>,
+    pub lost_m: f64,
+    pub gyro: Option<GyroTurn>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct GyroTurn {
-    pub(crate) turn: f64,
-    pub(crate) variance: f64,
+    pub turn: f64,
+    pub variance: f64,
 }
 
 impl Tick {

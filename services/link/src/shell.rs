@@ -15,10 +15,7 @@ use common::{
     driver::{Memory, Refusal},
     latency::Histogram,
     readers,
-    samples::{
-        Action, Cause, CommandSample, DirectiveSample, HoldReason, LinkSample, Order,
-        TickLimitSample,
-    },
+    samples::{Action, Cause, CommandSample, DirectiveSample, LinkSample, TickLimitSample},
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
     stop_socket::{Identity, OwedStop, Request, StopMark, StopSocket},
@@ -175,8 +172,8 @@ impl Process for Shell {
         self.take_operators_requests()?;
         self.maintain()?;
         if let Some(directive) = self.inputs.directive.newest()? {
-            let order = Order::from_byte(directive.order);
-            let reason = HoldReason::from_byte(directive.reason);
+            let order = directive.order();
+            let reason = directive.reason();
             self.take(Event::Order(order, reason), monotonic_ns())?;
         }
         // After the order, because the supervisor publishes the first limit before it.
@@ -514,8 +511,8 @@ impl Shell {
             attempts,
             next_attempt_ns,
             latency_ns: self.latency_ns,
-            latency_max_ns: self.latency.max_ns(),
-            latency_histogram: *self.latency.counts(),
+            latency_max_ns: self.latency.max_ns,
+            latency_histogram: self.latency.counts,
             ..link.tally
         };
         self.runner.out.publish(&LINK, sample)

@@ -298,8 +298,7 @@ impl Link {
 
     fn arrived(&self) -> bool {
         self.newest_command.is_some_and(|command| {
-            CommandState::from_byte(command.state) == CommandState::Arrived
-                && command.target_number >= self.target_number
+            command.state() == CommandState::Arrived && command.target_number >= self.target_number
         })
     }
 
@@ -376,7 +375,7 @@ impl Link {
             return;
         }
         let share = decision.action.speed_share();
-        let counts = match CommandState::from_byte(command.state) {
+        let counts = match command.state() {
             CommandState::Driving => {
                 let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);
                 let permitted = self.failsafe.monitors.touch.permitted(command, self.now);

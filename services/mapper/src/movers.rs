@@ -203,7 +203,7 @@ impl Movers {
 
     pub(crate) fn place(&mut self, pose: &PoseSample) {
         let [x, y, turn] = pose.map_from_odom;
-        let (at_s, turned) = (pose.stamp.time().seconds(), DVec2::from_angle(turn));
+        let (at_s, turned) = (pose.stamp.seconds(), DVec2::from_angle(turn));
         let movers = self.tracks.iter().filter(|it| it.is_mover && at_s - it.seen_s <= HIDDEN_S);
         let mover = |track: &Track| {
             let unseen_s = (at_s - track.seen_s - CAME_S).max(0.0);

@@ -152,7 +152,7 @@ impl Evasion {
         pose: &PoseSample,
         advice: Advice,
     ) -> Advice {
-        let at_s = pose.stamp.time().seconds();
+        let at_s = pose.stamp.seconds();
         let for_s = (at_s - self.answered_s).clamp(0.0, LONGEST_TICK_S);
         self.answered_s = at_s;
         if at_s < WATCHES_S {

@@ -319,7 +319,7 @@ impl Planner {
     ///
     /// A small map is solved first if the field is not valid there.
     pub fn answer(&mut self, sample: &PoseSample) -> Result<(Work, GuidanceSample), SolveError> {
-        let (pose, time_s) = (sample.pose(), sample.stamp.time().seconds());
+        let (pose, time_s) = (sample.pose(), sample.stamp.seconds());
         let foreseen = self.lead.as_mut().map(|lead| lead.foresee(pose, time_s));
         let (acts_at, twist) = foreseen.unwrap_or((pose, sample.twist()));
         let mut work = Work::None;

@@ -99,7 +99,7 @@ impl Gyro {
     }
 
     pub(crate) fn for_tick(&mut self) -> Option<Turn> {
-        let now = self.now.filter(|_| self.compared.agrees());
+        let now = self.now.filter(|_| self.compared.agrees);
         let (sequence, before) = self.turns.until(now)?;
         let now = now?;
         let variance_rad2 = now.variance - before.variance + now.ahead + before.ahead;

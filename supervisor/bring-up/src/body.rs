@@ -9,22 +9,22 @@ use crate::Finding;
 /// Motion of the body relative to its wheels.
 pub(crate) struct Moves {
     /// Whether it turns, or drives, in reverse; `None` if undetermined.
-    pub(crate) turns_back: Option<bool>,
-    pub(crate) drives_back: Option<bool>,
+    pub turns_back: Option<bool>,
+    pub drives_back: Option<bool>,
     /// Whether turning and driving are exchanged.
-    pub(crate) exchanged: bool,
+    pub exchanged: bool,
     /// True turn and distance, relative to the wheels'; `None` if undetermined.
-    pub(crate) turn: Option<f64>,
-    pub(crate) way: Option<f64>,
+    pub turn: Option<f64>,
+    pub way: Option<f64>,
     /// True turn per metre, radians.
-    pub(crate) curl: f64,
+    pub curl: f64,
 }
 
 /// Minimum reported deviations of motion and diameters, shares.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SizesTold {
-    pub(crate) sizes: f64,
-    pub(crate) ratio: f64,
+    pub sizes: f64,
+    pub ratio: f64,
 }
 
 pub(crate) const MOTOR: &str = "motor turns";

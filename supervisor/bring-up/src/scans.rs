@@ -79,7 +79,7 @@ pub(crate) struct Placed {
     share: f64,
     row: usize,
     /// Ends of the beams, metres.
-    pub(crate) points: Vec<DVec2>,
+    pub points: Vec<DVec2>,
     poses: Vec<(f64, [f64; 3])>,
 }
 

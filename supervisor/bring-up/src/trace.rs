@@ -94,17 +94,17 @@ impl Trace {
                     [0, 1].map(|it| rolled[it] + went[it] * body.metres_per_count() * scales[it]);
             }
             before = Some((wheels, counts));
-            trace.rolled.push((wheels.stamp.time().seconds(), rolled));
+            trace.rolled.push((wheels.stamp.seconds(), rolled));
         }
         for command in recording.samples(&COMMAND)? {
             let command = command?.sample;
             let rims = [command.left_rad_s, command.right_rad_s].map(|it| it * body.wheel_radius_m);
-            trace.told.push((command.stamp.time().seconds(), rims));
+            trace.told.push((command.stamp.seconds(), rims));
         }
         let mut newest = None;
         for link in recording.samples(&LINK)? {
             let link = link?.sample;
-            let at = link.stamp.time().seconds();
+            let at = link.stamp.seconds();
             let told = trace.told.partition_point(|it| it.0 <= at).checked_sub(1);
             let Some((_, rims)) = told.and_then(|it| trace.told.get(it)) else { continue };
             if newest.replace((told, link.action)) == Some((told, link.action)) {
@@ -122,16 +122,16 @@ impl Trace {
             let turn = turn?.sample;
             // A gap in the sequence numbers means an unknown turn.
             if before.replace(turn.sequence) == turn.sequence.checked_sub(1) {
-                trace.gyro.push((turn.stamp.time().seconds(), turn.turn_rad));
+                trace.gyro.push((turn.stamp.seconds(), turn.turn_rad));
             }
         }
         for ranges in recording.slices(&RANGES)? {
             let ranges = ranges?;
-            trace.ranges.push((ranges.header.stamp.time().seconds(), ranges.elements));
+            trace.ranges.push((ranges.header.stamp.seconds(), ranges.elements));
         }
         for scan in recording.slices(&SCAN)? {
             let scan = scan?;
-            trace.scans.push((scan.header.stamp.time().seconds(), scan.header, scan.elements));
+            trace.scans.push((scan.header.stamp.seconds(), scan.header, scan.elements));
         }
         Ok(trace)
     }

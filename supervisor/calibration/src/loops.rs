@@ -74,9 +74,14 @@ pub struct Wheels {
     pub(crate) track: f64,
 }
 
-impl Wheels {
-    pub const NOMINAL: Self = Self { e: 0.0, track: 1.0 };
+/// Nominal wheels.
+impl Default for Wheels {
+    fn default() -> Self {
+        Self { e: 0.0, track: 1.0 }
+    }
+}
 
+impl Wheels {
     /// Returns the turn for these nominal distances, radians.
     pub fn turned(self, left_m: f64, right_m: f64, track_m: f64) -> f64 {
         (right_m - left_m + self.e * (right_m + left_m)) / (track_m * self.track)

@@ -61,12 +61,12 @@ impl Leg {
 
 #[derive(Debug, PartialEq)]
 pub(crate) struct Normal {
-    pub(crate) heading: f64,
+    pub heading: f64,
     /// Middle of the first turn's arc less that of the second. The age of the ranges shifts all
     /// sweeps equally, so the scatter is the normals'.
-    pub(crate) difference: f64,
+    pub difference: f64,
     /// Distance of the wall from the sonar.
-    pub(crate) range_m: f64,
+    pub range_m: f64,
 }
 
 #[derive(Debug, PartialEq, Eq)]

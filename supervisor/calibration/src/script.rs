@@ -130,7 +130,7 @@ impl Script {
         let (from, ways) = (self.from, self.ways);
         let rolled_m = (ways.rolled_m - from.rolled_m) / 2.0;
         let side = if self.procedure == Procedure::RightSquare { -1.0 } else { 1.0 };
-        let heading = side * Wheels::NOMINAL.turned(ways.left_m, ways.right_m, body.track_m);
+        let heading = side * Wheels::default().turned(ways.left_m, ways.right_m, body.track_m);
         let left = |leg: u32| FRAC_PI_2 * f64::from(leg.div_ceil(2)) - heading;
         let seconds = f64::from(self.ticks) / self.rate_hz;
         let (way_m, way_m_s, ahead_m) = match self.procedure {

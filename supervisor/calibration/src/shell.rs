@@ -169,9 +169,9 @@ impl Process for Shell {
             let mut echo_m = readings.and_then(|(_, echo_m)| echo_m);
             if let Some(free) = &mut self.scan {
                 while let Some(scan) = self.inputs.scan.next_slice()? {
-                    free.take(scan.header().stamp.time().seconds(), scan.header(), &scan);
+                    free.take(scan.header().stamp.seconds(), scan.header(), &scan);
                 }
-                echo_m = Some(free.free_m(pose.stamp.time().seconds()));
+                echo_m = Some(free.free_m(pose.stamp.seconds()));
             }
             self.answer(&pose, echo_m)?;
         }

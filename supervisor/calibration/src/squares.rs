@@ -77,7 +77,7 @@ fn rows(squares: &[Driven], wheels: Wheels, track_m: f64) -> Rows {
 }
 
 fn estimate(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
-    let mut wheels = Wheels::NOMINAL;
+    let mut wheels = Wheels::default();
     for _ in 1..STEPS {
         wheels = Estimate::of(&rows(squares, wheels, track_m))?.wheels();
     }

@@ -51,7 +51,7 @@ const NEAR_M_S: f64 = 0.12;
 /// Sufficient deviation of the track, relative to that of the ratio.
 const TRACK_OVER_RATIO: f64 = 3.0;
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Wall {
     plan: CalibrationPlan,
     ways: Ways,
@@ -76,12 +76,13 @@ pub struct Wall {
     legs: [Leg; 2],
     /// Differences between both directions of each sweep, radians.
     differences: Vec<f64>,
-    loops: Vec<Loop>,
+    pub loops: Vec<Loop>,
     visits: u32,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 enum Phase {
+    #[default]
     Approach,
     Aside,
     Sweep(usize),
@@ -137,31 +138,7 @@ pub(crate) fn direction_aside(left: f64, most: f64) -> f64 {
 
 impl Wall {
     pub fn new(plan: CalibrationPlan) -> Self {
-        Self {
-            plan,
-            ways: Ways::default(),
-            wheels: Wheels::NOMINAL,
-            visit: Ways::default(),
-            is_measured: false,
-            facing: 0.0,
-            phase: Phase::Approach,
-            phase_from_m: 0.0,
-            away_from_m: 0.0,
-            away_m: 0.0,
-            swept_m: STOP_M,
-            near: 0,
-            silent: 0,
-            sweeps: 0,
-            wider: 0,
-            legs: Default::default(),
-            differences: Vec::new(),
-            loops: Vec::new(),
-            visits: 0,
-        }
-    }
-
-    pub fn loops(&self) -> &[Loop] {
-        &self.loops
+        Self { plan, swept_m: STOP_M, ..Self::default() }
     }
 
     pub fn normal_sd(&self) -> f64 {

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Ways {
     counts: Option<[u16; 2]>,
-    pub(crate) left_m: f64,
-    pub(crate) right_m: f64,
+    pub left_m: f64,
+    pub right_m: f64,
     /// Sum of both distances, each counted as positive.
-    pub(crate) rolled_m: f64,
+    pub rolled_m: f64,
 }
 
 impl Ways {

@@ -34,13 +34,12 @@ pub(crate) fn read(file: &Path, most: u64) -> Result<Vec<u8>, MapError> {
 }
 
 /// Refuses empty maps, too.
-pub(crate) fn check_size(file: &Path, cols: u64, rows: u64) -> Result<(), MapError> {
+pub(crate) fn check_size(cols: u64, rows: u64) -> Result<(), String> {
     let sides = 1..=MAX_SIDE as u64;
     if sides.contains(&cols) && sides.contains(&rows) {
         return Ok(());
     }
-    let problem = format!(
+    Err(format!(
         "{cols} x {rows} cells; a map has 1 to {MAX_SIDE} on each side, so crop or scale it"
-    );
-    Err(MapError::of(file, problem))
+    ))
 }

@@ -93,7 +93,7 @@ fn netpbm(
     let mut header = || number(&mut bytes);
     let (cols, rows, most) = (header()?, header()?, header()?);
     // Checked first, because decoding allocates by the header.
-    check_size(file, cols.into(), rows.into())?;
+    check_size(cols.into(), rows.into()).map_err(|problem| MapError::of(file, problem))?;
     if !(1..=0xffff).contains(&most) {
         return Err(format!("its brightest is {most}").into());
     }
@@ -147,7 +147,7 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     let (cols, rows) = decoder.read_header_info()?.size();
-    check_size(file, cols.into(), rows.into())?;
+    check_size(cols.into(), rows.into()).map_err(|problem| MapError::of(file, problem))?;
     let mut reader = decoder.read_info()?;
     let (colour, depth) = reader.output_color_type();
     // Like the map_server's trinary mode, which takes alpha as a fourth colour.

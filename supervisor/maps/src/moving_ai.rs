@@ -17,52 +17,40 @@ use crate::{
 const LONGEST: u64 = MAX_SIDE as u64 * (MAX_SIDE as u64 + 2) + 4096;
 
 pub(super) fn load(file: &Path) -> Result<Map, MapError> {
-    parse(file, &read(file, LONGEST)?)
+    parse(&read(file, LONGEST)?).map_err(|problem| MapError::of(file, problem))
 }
 
-fn parse(file: &Path, bytes: &[u8]) -> Result<Map, MapError> {
+fn parse(bytes: &[u8]) -> Result<Map, String> {
     let mut lines =
         bytes.split(|&byte| byte == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line));
-    let (cols, rows) = header(file, &mut lines)?;
-    check_size(file, cols, rows)?;
+    let (cols, rows) = header(&mut lines)?;
+    check_size(cols, rows)?;
     let (cols, rows) = (cols as usize, rows as usize);
     let mut free = Vec::with_capacity(cols.saturating_mul(rows).min(bytes.len()));
     for row in 0..rows {
         let line = lines.next().unwrap_or_default();
         if line.len() != cols {
-            return Err(MapError::of(
-                file,
-                format!(
-                    "row {row} has {} cells, but the header states {cols} and {rows} rows; complete the file or correct its header",
-                    line.len()
-                ),
+            return Err(format!(
+                "row {row} has {} cells, but the header states {cols} and {rows} rows; complete the file or correct its header",
+                line.len()
             ));
         }
         for (col, &cell) in line.iter().enumerate() {
             free.push(is_free(cell).ok_or_else(|| {
-                MapError::of(
-                    file,
-                    format!(
-                        "'{}' in row {row}, column {col} is not a cell; use . G S (free) and @ O T W (blocked)",
-                        cell.escape_ascii()
-                    ),
+                format!(
+                    "'{}' in row {row}, column {col} is not a cell; use . G S (free) and @ O T W (blocked)",
+                    cell.escape_ascii()
                 )
             })?);
         }
     }
     if lines.any(|line| !line.trim_ascii().is_empty()) {
-        return Err(MapError::of(
-            file,
-            format!("more than the {rows} rows of its header; correct `height`"),
-        ));
+        return Err(format!("more than the {rows} rows of its header; correct `height`"));
     }
     Ok(Map::new(cols, rows, free.into_iter()))
 }
 
-fn header<'a>(
-    file: &Path,
-    lines: &mut impl Iterator<Item = &'a [u8]>,
-) -> Result<(u64, u64), MapError> {
+fn header<'a>(lines: &mut impl Iterator<Item = &'a [u8]>) -> Result<(u64, u64), &'static str> {
     let (mut cols, mut rows, mut begun) = (None, None, false);
     // `type` is the kind of motion between cells, and unused.
     for line in lines.take(4) {
@@ -82,10 +70,9 @@ fn header<'a>(
     }
     match (cols, rows) {
         (Some(cols), Some(rows)) if begun => Ok((cols, rows)),
-        _ => Err(MapError::of(
-            file,
+        _ => Err(
             "not a MovingAI map: it begins with the lines `type octile`, `height H`, `width W`, `map`",
-        )),
+        ),
     }
 }
 
@@ -104,7 +91,7 @@ mod tests {
     use super::*;
 
     fn map_of(text: &str) -> Result<Map, String> {
-        parse(Path::new("some.map"), text.as_bytes()).map_err(|error| error.to_string())
+        parse(text.as_bytes())
     }
 
     #[test]

@@ -24,10 +24,7 @@ const CELL_M: RangeInclusive<f64> = 0.005..=1.0;
 const FARTHEST_M: f64 = 1e6;
 
 /// Scalars and lists of scalars, including other programs' keys.
-struct Keys<'a> {
-    file: &'a Path,
-    values: HashMap<String, Vec<String>>,
-}
+struct Keys(HashMap<String, Vec<String>>);
 
 pub(super) fn load(file: &Path) -> Result<Map, MapError> {
     image_of(file, &text(file)?)
@@ -57,30 +54,16 @@ fn placed(
     map_of: fn(&Path, &str) -> Result<Map, MapError>,
 ) -> Result<PlacedMap, MapError> {
     let text = text(file)?;
-    let keys = Keys::parse(file, &text)?;
-    let cell_m = keys.number("resolution")?.ok_or_else(|| keys.missing("resolution: METRES"))?;
-    if !CELL_M.contains(&cell_m) {
-        let problem = format!(
-            "resolution: {cell_m} is not a cell size; set it to {} to {} m",
-            CELL_M.start(),
-            CELL_M.end()
-        );
-        return Err(MapError::of(file, problem));
-    }
-    let origin = keys.values.get("origin").ok_or_else(|| keys.missing("origin: [x, y, 0]"))?;
-    let numbers: Vec<f64> = origin.iter().map_while(|number| number.parse().ok()).collect();
-    match numbers[..] {
-        [x, y, 0.0] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && origin.len() == 3 => {
-            Ok(PlacedMap { map: map_of(file, &text)?, cell_m, corner_m: [x, y] })
-        }
-        _ => Err(MapError::of(
-            file,
-            format!(
-                "origin: {:?} is not supported; set it to [x, y, 0] in metres, without rotation",
-                origin.get(..3).unwrap_or(origin)
-            ),
-        )),
-    }
+    let (cell_m, corner_m) = of_keys(file, &text, Keys::place)?;
+    Ok(PlacedMap { map: map_of(file, &text)?, cell_m, corner_m })
+}
+
+fn of_keys<T>(
+    file: &Path,
+    text: &str,
+    value: impl FnOnce(&Keys) -> Result<T, String>,
+) -> Result<T, MapError> {
+    Keys::parse(text).and_then(|keys| value(&keys)).map_err(|problem| MapError::of(file, problem))
 }
 
 fn text(file: &Path) -> Result<String, MapError> {
@@ -94,11 +77,12 @@ fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
 }
 
 fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError> {
-    let keys = Keys::parse(file, text)?;
-    let image = keys.scalar("image")?.ok_or_else(|| keys.missing("image: FILE"))?;
-    let folder = file.parent().unwrap_or(Path::new(""));
-    // `join` keeps an absolute path.
-    Ok((folder.join(image), keys.lightness()?))
+    of_keys(file, text, |keys| {
+        let image = keys.scalar("image")?.ok_or_else(|| missing("image: FILE"))?;
+        let folder = file.parent().unwrap_or(Path::new(""));
+        // `join` keeps an absolute path.
+        Ok((folder.join(image), keys.lightness()?))
+    })
 }
 
 /// Row-major image, row 0 at the top.
@@ -128,18 +112,21 @@ pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
     file::replace(file, yaml).map_err(unwritable)
 }
 
-impl<'a> Keys<'a> {
+fn missing(needed: &str) -> String {
+    format!("not a map_server map: it needs at least `{needed}`")
+}
+
+impl Keys {
     /// Reads YAML event by event and refuses aliases, which bounds memory by the text's length.
-    fn parse(file: &'a Path, text: &str) -> Result<Self, MapError> {
-        let refused =
-            |problem: &str| MapError::of(file, format!("not a map_server map: {problem}"));
+    fn parse(text: &str) -> Result<Self, String> {
+        let refused = |problem: &str| format!("not a map_server map: {problem}");
         let mut values: HashMap<String, Vec<String>> = HashMap::new();
         let mut parser = Parser::new_from_str(text);
         let (mut depth, mut key) = (0_u32, None);
         loop {
             let (event, _) = parser.next_token().map_err(|error| refused(&error.to_string()))?;
             match event {
-                Event::StreamEnd => return Ok(Self { file, values }),
+                Event::StreamEnd => return Ok(Self(values)),
                 Event::Alias(_) => return Err(refused("it has aliases; write each value out")),
                 Event::MappingStart(..) | Event::SequenceStart(..) => depth += 1,
                 Event::MappingEnd | Event::SequenceEnd => {
@@ -165,52 +152,61 @@ impl<'a> Keys<'a> {
         }
     }
 
-    fn missing(&self, needed: &str) -> MapError {
-        let problem = format!("not a map_server map: it needs at least `{needed}`");
-        MapError::of(self.file, problem)
-    }
-
     /// Returns `None` for a missing key.
-    fn scalar(&self, key: &str) -> Result<Option<&str>, MapError> {
-        match self.values.get(key).map(Vec::as_slice) {
+    fn scalar(&self, key: &str) -> Result<Option<&str>, String> {
+        match self.0.get(key).map(Vec::as_slice) {
             None => Ok(None),
             Some([scalar]) => Ok(Some(scalar)),
-            Some(_) => Err(MapError::of(self.file, format!("{key}: is not a single value"))),
+            Some(_) => Err(format!("{key}: is not a single value")),
         }
     }
 
-    fn number(&self, key: &str) -> Result<Option<f64>, MapError> {
-        let number = |text: &str| {
-            let problem = || format!("{key}: {text:?} is not a number");
-            text.parse().map_err(|_| MapError::of(self.file, problem()))
-        };
+    fn number(&self, key: &str) -> Result<Option<f64>, String> {
+        let number =
+            |text: &str| text.parse().map_err(|_| format!("{key}: {text:?} is not a number"));
         self.scalar(key)?.map(number).transpose()
     }
 
-    fn lightness(&self) -> Result<Lightness, MapError> {
-        let malformed = |problem| MapError::of(self.file, problem);
+    /// Returns the side of a cell and the corner of least x and y, metres.
+    fn place(&self) -> Result<(f64, [f64; 2]), String> {
+        let cell_m = self.number("resolution")?.ok_or_else(|| missing("resolution: METRES"))?;
+        if !CELL_M.contains(&cell_m) {
+            let (least, most) = (CELL_M.start(), CELL_M.end());
+            return Err(format!(
+                "resolution: {cell_m} is not a cell size; set it to {least} to {most} m"
+            ));
+        }
+        let origin = self.0.get("origin").ok_or_else(|| missing("origin: [x, y, 0]"))?;
+        let numbers: Vec<f64> = origin.iter().map_while(|number| number.parse().ok()).collect();
+        match numbers[..] {
+            [x, y, 0.0] if x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && origin.len() == 3 => {
+                Ok((cell_m, [x, y]))
+            }
+            _ => Err(format!(
+                "origin: {:?} is not supported; set it to [x, y, 0] in metres, without rotation",
+                origin.get(..3).unwrap_or(origin)
+            )),
+        }
+    }
+
+    fn lightness(&self) -> Result<Lightness, String> {
         if let Some(mode) = self.scalar("mode")?.filter(|mode| *mode != "trinary") {
-            let problem = format!("mode: {mode:?} is not supported; set it to trinary");
-            return Err(malformed(problem));
+            return Err(format!("mode: {mode:?} is not supported; set it to trinary"));
         }
         // The map_server writes 0 and 1, people write false and true.
         let negate = match self.scalar("negate")? {
             None | Some("0" | "false") => false,
             Some("1" | "true") => true,
             Some(other) => {
-                let problem = format!("negate: {other} is neither 0 nor 1; set it to one of them");
-                return Err(malformed(problem));
+                return Err(format!("negate: {other} is neither 0 nor 1; set it to one of them"));
             }
         };
         let usual = Lightness::default();
         let share = |key: &str, usual: f64| match self.number(key)?.unwrap_or(usual) {
             value if (0.0..=1.0).contains(&value) => Ok(value),
-            value => {
-                let problem = format!(
-                    "{key}: {value} is not a share of darkness; set it to a value from 0 to 1"
-                );
-                Err(malformed(problem))
-            }
+            value => Err(format!(
+                "{key}: {value} is not a share of darkness; set it to a value from 0 to 1"
+            )),
         };
         Ok(Lightness {
             negate,

@@ -37,7 +37,7 @@ impl Timeout {
             let late = truth.partition_point(|tick| tick.time_s < seconds);
             return truth.get(late).map(|tick| tick_of(tick, poses));
         }
-        let late = poses.partition_point(|pose| pose.stamp.time().seconds() < seconds);
+        let late = poses.partition_point(|pose| pose.stamp.seconds() < seconds);
         poses.get(late).map(|pose| pose.stamp.tick)
     }
 }

@@ -131,7 +131,7 @@ impl Observer {
             record.published.tick = Some(command.stamp.tick);
             record.published.commands += 1;
             listener(Heard::Command(&command));
-            if CommandState::from_byte(command.state) == CommandState::Arrived
+            if command.state() == CommandState::Arrived
                 && command.target_number == record.target_number
             {
                 record.arrival.get_or_insert(command);
@@ -173,7 +173,7 @@ impl Observer {
             listener(Heard::Link(&link));
             record.link = Some(link);
             // Without motor frames the link begins no tick that a stage could answer.
-            if link.rest() != Rest::Unknown {
+            if link.at_rest() != Rest::Unknown {
                 stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
                 record.rest_read = Some(Instant::now());
             }
@@ -223,7 +223,7 @@ impl Record {
     /// point to a target in or beside a hazard.
     pub(crate) fn beside(&self, arrival: &CommandSample, tolerance_m: f64) -> Option<DVec2> {
         let guidance = self.guidance_at(arrival.stamp.tick)?;
-        let is_near = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::AtTarget;
+        let is_near = guidance.status() == GuidanceStatus::AtTarget;
         let pose = self.pose_at(arrival.stamp.tick)?;
         (is_near && arrival.distance_m > tolerance_m).then(|| pose.pose().position)
     }

@@ -298,7 +298,9 @@ fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result<
         Some(link) if link.connected == 0 => {
             "it does not answer; it receives the stop order as soon as it does".to_owned()
         }
-        Some(link) if link.rest() == Rest::Moving => format!("{}: it moves", link.cause().name()),
+        Some(link) if link.at_rest() == Rest::Moving => {
+            format!("{}: it moves", link.cause().name())
+        }
         Some(_) => "whether it rests is unknown: no usable motor frames arrive".to_owned(),
     };
     Err(not_at_rest(robot, &seen))
@@ -433,10 +435,8 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
     // The roster is opened first, so that the answer is not missed.
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;
-    let goes = matches!(
-        RequestKind::from_byte(request.kind),
-        RequestKind::Goto | RequestKind::Append | RequestKind::Follow
-    );
+    let goes =
+        matches!(request.kind(), RequestKind::Goto | RequestKind::Append | RequestKind::Follow);
     if goes {
         // A starting supervisor does not read yet. Hand requests are too frequent to wait for a
         // roster.
@@ -447,7 +447,7 @@ fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
         let id = new_id();
         requests.publish(0, MissionTime::default(), RequestSample { id, ..request })?;
         let answer = find(&mut roster, robot, |header, _| {
-            (header.last_request == id).then(|| RequestAnswer::from_byte(header.answer))
+            (header.last_request == id).then(|| header.answer())
         })?;
         match answer {
             RequestAnswer::Taken => return Ok(()),

@@ -34,7 +34,7 @@ impl Supervisor<'_> {
         while let Some(request) = self.bus.requests.next_sample()? {
             asked = true;
             let answer = self.carry_out_request(&request, first_tick);
-            let (kind, reason) = (RequestKind::from_byte(request.kind), answer.text());
+            let (kind, reason) = (request.kind(), answer.text());
             if answer != RequestAnswer::Taken {
                 tracing::warn!(?kind, reason, "an operator's request is refused");
             }
@@ -47,7 +47,7 @@ impl Supervisor<'_> {
     }
 
     fn carry_out_request(&mut self, request: &RequestSample, first_tick: u64) -> RequestAnswer {
-        match RequestKind::from_byte(request.kind) {
+        match request.kind() {
             // A run that ends takes only stops.
             kind if kind != RequestKind::Stop && self.decision == Decision::ENDING => {
                 return RequestAnswer::NotRunning;
@@ -102,7 +102,7 @@ impl Supervisor<'_> {
             HoldReason::Operator | HoldReason::Waiting | HoldReason::Lost
         );
         let link = self.bus.observer.record.link;
-        if !stands_by || link.is_none_or(|link| link.rest() != Rest::AtRest) {
+        if !stands_by || link.is_none_or(|link| link.at_rest() != Rest::AtRest) {
             return RequestAnswer::Moves;
         }
         let number = self.state_file.state.place.number + 1;
@@ -264,7 +264,7 @@ impl Supervisor<'_> {
         let arrival = record.sure_arrival(mission).filter(|_| !self.targets.is_last());
         let Some(arrival) = arrival else { return false };
         let stamp = arrival.0.stamp;
-        if stamp.time().seconds() >= self.deadline().at_s() {
+        if stamp.seconds() >= self.deadline().at_s() {
             return false;
         }
         let since_tick = match self.clock.in_ticks() {

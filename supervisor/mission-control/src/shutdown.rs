@@ -117,7 +117,7 @@ impl Supervisor<'_> {
             return Wheels::Unknown("it does not answer".to_owned());
         };
         let age = self.bus.observer.record.rest_read.map(|read| read.elapsed());
-        match (link.rest(), age) {
+        match (link.at_rest(), age) {
             (_, None) => Wheels::Unknown("no usable motor frames came".to_owned()),
             (Rest::AtRest, Some(age)) if age < NEW && link.action() == Action::End => {
                 Wheels::AtRest

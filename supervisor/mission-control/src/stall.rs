@@ -357,7 +357,7 @@ impl StallWatch {
 
     /// Returns whether the robot waits for a field within [`FIELD_WITHIN`].
     fn waits_for_field(&mut self, pose: &PoseSample, guidance: &GuidanceSample) -> bool {
-        if GuidanceStatus::from_byte(guidance.status) != GuidanceStatus::Waiting {
+        if guidance.status() != GuidanceStatus::Waiting {
             self.waits_since = None;
             return false;
         }
@@ -373,7 +373,7 @@ impl StallWatch {
         guidance: &GuidanceSample,
     ) -> Option<StallCause> {
         let (now, travelled) = (pose.stamp.time(), pose.travelled_m);
-        let status = GuidanceStatus::from_byte(guidance.status);
+        let status = guidance.status();
         let is = |what| status == what && guidance.epoch == self.epoch;
         if !is(GuidanceStatus::Unreachable) {
             self.cut_off_since = None;
@@ -426,7 +426,7 @@ impl StallWatch {
         }
         let since = place.since;
         // The planner looks around first, which has its own timeout.
-        if GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Unreachable {
+        if guidance.status() == GuidanceStatus::Unreachable {
             return None;
         }
         let still = now.since(anchor.time) >= STALLED_AFTER;

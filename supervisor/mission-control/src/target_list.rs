@@ -279,7 +279,7 @@ impl TargetList {
         self.store_arrival(arrival);
         self.current = self.ahead.remove(0);
         self.number += 1;
-        (self.since_tick, self.began_s) = (since_tick, arrival.0.stamp.time().seconds());
+        (self.since_tick, self.began_s) = (since_tick, arrival.0.stamp.seconds());
     }
 
     fn result_of(&self, point: &TargetPoint, outcome: TargetOutcome) -> TargetResult {
@@ -297,7 +297,7 @@ impl TargetList {
 
     fn store_arrival(&mut self, (command, outcome): (CommandSample, TargetOutcome)) {
         let result = TargetResult {
-            at_s: Some(command.stamp.time().seconds()),
+            at_s: Some(command.stamp.seconds()),
             distance_m: Some(command.distance_m),
             ..self.result_of(&self.current, outcome)
         };
@@ -361,7 +361,7 @@ impl TargetList {
         };
         let mut current = self.result_of(&self.current, outcome);
         if let Some(arrival) = arrival.filter(|_| outcome != TargetOutcome::Missed) {
-            current.at_s = Some(arrival.stamp.time().seconds());
+            current.at_s = Some(arrival.stamp.seconds());
             current.distance_m = Some(arrival.distance_m);
             current.truth_m = ended.map(|ended| apart_m(ended, &current));
         }

@@ -7,8 +7,8 @@ use common::{
     mission::Mission,
     process_usage::Usage,
     samples::{
-        CommandSample, GridHeader, GuidanceSample, LinkSample, Mover, Order, PoseSample,
-        RangeReading, RangeStatus, RosterEntry, RosterHeader, StageState, WheelSample, name_str,
+        CommandSample, GridHeader, GuidanceSample, LinkSample, Mover, PoseSample, RangeReading,
+        RangeStatus, RosterEntry, RosterHeader, WheelSample, name_str,
     },
 };
 use glam::DVec2;
@@ -169,7 +169,7 @@ impl Collector {
         let truth = truth.map_or([f64::NAN; 3], |truth| [truth.x, truth.y, truth.heading]);
         let volts = self.state.power.map_or([f64::NAN; 2], |power| [power.board_v, power.motor_v]);
         let values = [
-            pose.stamp.time().seconds(),
+            pose.stamp.seconds(),
             pose.x_m,
             pose.y_m,
             pose.heading_rad,
@@ -305,7 +305,7 @@ impl Collector {
         let stages = self.state.stages.iter().enumerate().map(|(at, entry)| {
             json!({
                 "name": name_str(&entry.stage),
-                "state": words(StageState::from_byte(entry.state)),
+                "state": words(entry.state()),
                 "pid": entry.pid,
                 "generation": entry.generation,
                 "restarts": entry.restarts,
@@ -319,7 +319,7 @@ impl Collector {
         let targets = self.state.targets().map(|at| [at.x_m, at.y_m]);
         json!({
             "t": rounded(self.state.now_s()),
-            "order": words(Order::from_byte(roster.order)),
+            "order": words(roster.order()),
             "kind": kind,
             "does": does,
             "to_go": self.state.way_to_go(),

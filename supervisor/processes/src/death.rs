@@ -160,7 +160,7 @@ mod tests {
         let sample = death.sample();
         assert_eq!((sample.code, sample.deaths_in_window), (9, 2));
         assert_eq!(sample.uptime_ns, 12_500_000_000);
-        assert_eq!(NextStep::from_byte(sample.next), NextStep::StartLater);
+        assert_eq!(sample.next(), NextStep::StartLater);
         let read = serde_json::to_value(&death).unwrap();
         assert_eq!(read["cause"]["signalled"]["signal"], 9);
         assert_eq!(read["next"]["start_later"]["after_s"], 0.05);

@@ -111,7 +111,7 @@ impl StageProcess {
         }
         self.beat = Some(now);
         let was_running = self.is_running();
-        let state = HealthState::from_byte(health.state);
+        let state = health.state();
         self.stopping = state == HealthState::Stopping;
         let event = match state {
             HealthState::Ready => Event::BeatReady,

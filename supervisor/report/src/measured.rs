@@ -26,13 +26,13 @@ impl Measured {
     /// Takes a pose. Two ticks received together by a late machine make its speed invalid.
     pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) {
         self.ticks += 1;
-        self.time_s = self.time_s.max(pose.stamp.time().seconds());
+        self.time_s = self.time_s.max(pose.stamp.seconds());
         self.path_m = pose.travelled_m;
         let Some(last) = self.last_pose.replace(*pose) else {
             self.last_speed = Some(pose.v_m_s);
             return;
         };
-        let time = pose.stamp.time().seconds() - last.stamp.time().seconds();
+        let time = pose.stamp.seconds() - last.stamp.seconds();
         if time * mission.robot.rate_hz > 0.5 {
             if let Some(before) = self.last_speed.filter(|before| before.is_finite()) {
                 self.speed_change += (pose.v_m_s - before).abs() / time;

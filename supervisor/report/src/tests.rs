@@ -92,8 +92,8 @@ fn metrics_count_every_generation_and_every_sample() {
     for (tick, generation) in [(0, 1), (1, 1), (2, 2)] {
         content.heard.hear(&Heard::Link(&LinkSample {
             stamp: stamp(tick, generation),
-            latency_histogram: *histogram.counts(),
-            latency_max_ns: histogram.max_ns(),
+            latency_histogram: histogram.counts,
+            latency_max_ns: histogram.max_ns,
             ..LinkSample::default()
         }));
         let pose =
@@ -113,7 +113,7 @@ fn metrics_count_every_generation_and_every_sample() {
     let mut late = PoseSample { stamp: stamp(2, 1), v_m_s: 900.0, ..PoseSample::default() };
     late.stamp.stamp_ns += 1000;
     content.measured.pose(&late, &content.mission);
-    let counts: u32 = content.heard.latency().counts().iter().sum();
+    let counts: u32 = content.heard.latency().counts.iter().sum();
     assert_eq!(counts, 2);
     assert_eq!(content.measured.speed_change(), Some(0.5));
     assert_eq!(content.measured.near(), Some(1.0 / 3.0));

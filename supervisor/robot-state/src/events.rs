@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 
 use common::samples::{
-    Cause, CommandSample, CommandState, ComplaintSample, DeathSample, DirectiveSample, FaultKind,
-    FaultSample, FollowState, FollowingSample, HoldReason, LinkSample, Order, RequestAnswer,
-    RequestKind, RequestSample, RosterEntry, StageState, StallSample, TargetSample, name_str,
+    Cause, CommandSample, CommandState, ComplaintSample, DeathSample, DirectiveSample, FaultSample,
+    FollowState, FollowingSample, HoldReason, LinkSample, RequestAnswer, RequestSample,
+    RosterEntry, StageState, StallSample, TargetSample, name_str,
 };
 use serde::Serialize;
 
@@ -87,7 +87,7 @@ impl Events {
 
     pub(crate) fn sample(&mut self, sample: &Sample) {
         if let Sample::Pose(pose) = sample {
-            self.now_s = self.now_s.max(pose.stamp.time().seconds());
+            self.now_s = self.now_s.max(pose.stamp.seconds());
         }
         self.at_s = match sample {
             // A new process reads earlier single events late.
@@ -125,7 +125,7 @@ impl Events {
 
     fn roster(&mut self, entries: &[RosterEntry]) {
         for entry in entries {
-            if StageState::from_byte(entry.state) != StageState::Running {
+            if entry.state() != StageState::Running {
                 continue;
             }
             let name = name_str(&entry.stage);
@@ -168,8 +168,8 @@ impl Events {
         if self.directive.replace(now) == Some(now) {
             return;
         }
-        let order = words(Order::from_byte(directive.order));
-        let text = match HoldReason::from_byte(directive.reason) {
+        let order = words(directive.order());
+        let text = match directive.reason() {
             HoldReason::None => format!("order: {order}"),
             reason => format!("order: {order} ({})", words(reason)),
         };
@@ -185,10 +185,10 @@ impl Events {
         let targets = request.targets().unwrap_or_default().iter();
         let targets: String =
             targets.map(|at| format!("({:.2}, {:.2}) ", at.x_m, at.y_m)).collect();
-        let kind = words(RequestKind::from_byte(request.kind));
+        let kind = words(request.kind());
         let asked = format!("{kind} {}{targets}", name_str(&request.stage));
         let asked = asked.trim_end();
-        match RequestAnswer::from_byte(request.answer) {
+        match request.answer() {
             RequestAnswer::Taken => self.add("operator", Kind::Note, asked),
             answer => {
                 self.add("operator", Kind::Bad, format!("{asked}, refused: {}", answer.text()));
@@ -197,7 +197,7 @@ impl Events {
     }
 
     fn fault(&mut self, fault: &FaultSample) {
-        let kind = words(FaultKind::from_byte(fault.kind));
+        let kind = words(fault.kind());
         self.add("operator", Kind::Note, format!("fault {kind} in {}", name_str(&fault.stage)));
     }
 
@@ -219,7 +219,7 @@ impl Events {
     }
 
     fn command(&mut self, command: &CommandSample) {
-        let arrived = CommandState::from_byte(command.state) == CommandState::Arrived;
+        let arrived = command.state() == CommandState::Arrived;
         if arrived && self.arrived != command.target_number && !self.follows {
             self.arrived = command.target_number;
             let text = format!("target {} is reached", command.target_number);

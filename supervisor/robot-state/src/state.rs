@@ -168,7 +168,7 @@ impl RobotState {
     fn does(&self) -> (Kind, String) {
         let supervisor = self.supervisor.unwrap_or_default();
         let status = self.guidance.unwrap_or_default().status;
-        let (kind, text) = match (&self.link, HoldReason::from_byte(supervisor.reason)) {
+        let (kind, text) = match (&self.link, supervisor.reason()) {
             (Some(link), _) if link.connected == 0 && link.losses > 0 => {
                 return (Kind::Bad, "the robot does not answer".to_owned());
             }
@@ -192,9 +192,8 @@ impl RobotState {
 
     /// Returns `None` while the robot waits for a target.
     pub fn target(&self) -> Option<&TargetSample> {
-        let waits = |it: RosterHeader| {
-            matches!(HoldReason::from_byte(it.reason), HoldReason::Waiting | HoldReason::Lost)
-        };
+        let waits =
+            |it: RosterHeader| matches!(it.reason(), HoldReason::Waiting | HoldReason::Lost);
         self.target.as_ref().filter(|_| !self.supervisor.is_some_and(waits))
     }
 

@@ -29,7 +29,7 @@ pub const fn guidance_in_words(status: u8) -> &'static str {
 
 pub fn death_in_words(death: &DeathSample) -> String {
     let code = death.code;
-    match DeathCause::from_byte(death.cause) {
+    match death.cause() {
         DeathCause::Exited => format!("exit code {code}"),
         DeathCause::Signalled => format!("signal {code}"),
         DeathCause::SignalledWithCore => format!("signal {code}, core dumped"),

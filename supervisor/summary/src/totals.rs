@@ -44,7 +44,7 @@ pub(crate) struct WheelTotals {
 impl WheelTotals {
     /// Adds a driving command; every mission begins and ends at rest.
     pub(crate) fn with(self, command: &CommandSample) -> Self {
-        if CommandState::from_byte(command.state) != CommandState::Driving {
+        if command.state() != CommandState::Driving {
             return self;
         }
         let (left, right) = (command.left_rad_s, command.right_rad_s);
@@ -66,7 +66,7 @@ pub(crate) struct LookTotals {
 
 impl LookTotals {
     pub(crate) fn with(self, guidance: &GuidanceSample) -> Self {
-        let looking = GuidanceStatus::from_byte(guidance.status) == GuidanceStatus::Look;
+        let looking = guidance.status() == GuidanceStatus::Look;
         Self {
             looks: self.looks + u64::from(looking && !self.looking),
             ticks: self.ticks + u64::from(looking),

@@ -60,7 +60,7 @@ pub(crate) struct Trails(pub(crate) Vec<Trail>);
 
 impl Trails {
     pub(crate) fn hear(&mut self, grid: &GridHeader) {
-        let at_s = grid.stamp.time().seconds();
+        let at_s = grid.stamp.seconds();
         for mover in grid.drawn_movers().filter(|it| f64::from(it.doubt_m) <= SURE_M) {
             let near = self.0.iter_mut().filter_map(|it| Some((it.off_m(at_s, mover)?, it)));
             match near.min_by(|one, other| one.0.total_cmp(&other.0)) {

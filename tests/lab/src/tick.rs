@@ -86,7 +86,7 @@ fn measure(
     let trips = if period.is_some() { PACED_TRIPS } else { TRIPS };
     for _ in 0..arguments.rounds {
         let round = hops::measure(robot, trips, period)?;
-        hops.add(round.counts(), round.max_ns());
+        hops.add(&round.counts, round.max_ns);
         let (ticks, its) = mission::measure(arguments, robot, regime.pace(rate_hz))?;
         rounds.push(ticks);
         used = its;

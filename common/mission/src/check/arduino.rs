@@ -1,5 +1,5 @@
 use super::objection::{Result, all_within, objection, refuse_if};
-use crate::{LEAST_BAUD, Mission, Protocol, SensorKind};
+use crate::{LEAST_BAUD, Mission, Protocol, SensorKind, is_default};
 
 /// Greatest rim speed of one count per run of the speed loop, m/s. With coarser steps a robot turns
 /// past its target.
@@ -11,7 +11,7 @@ pub(super) fn check(mission: &Mission) -> Result {
     if robot.protocol() != Protocol::Arduino {
         let remedy = "set robot.protocol = \"arduino\", or remove it";
         let problem = "it applies only to the protocol arduino";
-        return refuse_if(!board.is_default(), "robot.arduino", problem, remedy);
+        return refuse_if(!is_default(board), "robot.arduino", problem, remedy);
     }
     let baud = f64::from(LEAST_BAUD)..=2_000_000.0;
     all_within([

@@ -1,9 +1,9 @@
 pub(super) type Result<T = (), E = Objection> = std::result::Result<T, E>;
 
 pub(super) struct Objection {
-    pub(super) key: &'static str,
-    pub(super) problem: String,
-    pub(super) remedy: String,
+    pub key: &'static str,
+    pub problem: String,
+    pub remedy: String,
 }
 
 pub(super) fn objection(

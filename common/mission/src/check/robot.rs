@@ -106,8 +106,8 @@ fn steering(mission: &Mission) -> Result {
         ];
         let problem = "this robot has two driven wheels and no steering";
         let remedy = "remove the key, or set robot.model = \"car\"";
-        let mut written = written.into_iter();
         return written
+            .into_iter()
             .try_for_each(|(key, value)| refuse_if(value.is_some(), key, problem, remedy));
     };
     refuse_if(

@@ -1,27 +1,25 @@
 use super::objection::{Result, objection, refuse_if};
-use crate::{Mission, Protocol, Sensor, SensorKind, address::Address};
+use crate::{Mission, Protocol, Sensor, SensorKind, address::Address, is_default};
 
 const LONGEST_TOPIC: usize = 200;
 
 pub(super) fn check(mission: &Mission) -> Result {
     let robot = &mission.robot;
-    let speaks = robot.protocol() == Protocol::Ros2;
     let address = robot.address.as_deref().map(str::parse);
     let is_domain = matches!(address, Some(Ok(Address::Ros2(_))));
-    refuse_if(
-        is_domain && !speaks,
-        "robot.address",
-        "the address is a ROS domain, but robot.protocol is not \"ros2\"",
-        "set robot.protocol = \"ros2\", or give another address",
-    )?;
-    refuse_if(
-        !speaks && !robot.ros2.is_default(),
-        "robot.ros2",
-        "it applies only to the protocol ros2",
-        "set robot.protocol = \"ros2\", or remove it",
-    )?;
-    if !speaks {
-        return Ok(());
+    if robot.protocol() != Protocol::Ros2 {
+        refuse_if(
+            is_domain,
+            "robot.address",
+            "the address is a ROS domain, but robot.protocol is not \"ros2\"",
+            "set robot.protocol = \"ros2\", or give another address",
+        )?;
+        return refuse_if(
+            !is_default(&robot.ros2),
+            "robot.ros2",
+            "it applies only to the protocol ros2",
+            "set robot.protocol = \"ros2\", or remove it",
+        );
     }
     refuse_if(
         !is_domain,

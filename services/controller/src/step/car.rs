@@ -72,7 +72,7 @@ mod tests {
     }
 
     fn drives(command: &CommandSample) -> bool {
-        CommandState::from_byte(command.state) == CommandState::Driving
+        command.state() == CommandState::Driving
     }
 
     #[test]

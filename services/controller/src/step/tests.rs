@@ -27,7 +27,7 @@ impl Controller {
 }
 
 fn state(command: &CommandSample) -> CommandState {
-    CommandState::from_byte(command.state)
+    command.state()
 }
 
 fn first(heading: f64) -> CommandSample {

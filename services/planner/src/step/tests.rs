@@ -55,7 +55,7 @@ fn in_room(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> Planner {
 }
 
 fn status(sample: &GuidanceSample) -> GuidanceStatus {
-    GuidanceStatus::from_byte(sample.status)
+    sample.status()
 }
 
 fn at(x_m: f64, y_m: f64) -> PoseSample {

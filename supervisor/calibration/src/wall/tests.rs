@@ -81,9 +81,9 @@ fn a_robot_that_does_not_slip_is_calibrated_to_a_thousandth_and_stands_where_it_
         let mut robot = Robot::new(ratio, track);
         let wall = run(&mut robot, CalibrationPlan::default());
         assert_eq!(wall.state(), State::Finished);
-        assert!(wall.loops().len() >= FEWEST_LOOPS);
+        assert!(wall.loops.len() >= FEWEST_LOOPS);
         let (estimate, _) =
-            crate::loops::checked(wall.loops(), wall.normal_sd(), body().track_m).unwrap();
+            crate::loops::checked(&wall.loops, wall.normal_sd(), body().track_m).unwrap();
         assert!((estimate.ratio() - ratio).abs() < 0.001, "{ratio}: {}", estimate.ratio());
         assert!((estimate.track() - track).abs() < 0.002, "{track}: {}", estimate.track());
         let y = robot.pose.position.y;
@@ -94,7 +94,7 @@ fn a_robot_that_does_not_slip_is_calibrated_to_a_thousandth_and_stands_where_it_
 #[test]
 fn loops_go_to_the_left_and_to_the_right_in_turn() {
     let wall = run(&mut Robot::new(1.0, 1.0), CalibrationPlan::default());
-    let turns: Vec<f64> = wall.loops().iter().map(|it| it.turns).collect();
+    let turns: Vec<f64> = wall.loops.iter().map(|it| it.turns).collect();
     assert_eq!(turns[..4], [1.0, -1.0, 4.0, -4.0]);
 }
 
@@ -102,7 +102,7 @@ fn loops_go_to_the_left_and_to_the_right_in_turn() {
 fn it_stops_after_the_most_loops_if_the_values_are_not_good_enough() {
     let plan = CalibrationPlan { ratio_sd: 0.0, loops: 7, ..CalibrationPlan::default() };
     let wall = run(&mut Robot::new(1.0, 1.0), plan);
-    assert_eq!((wall.state(), wall.loops().len()), (State::Finished, 7));
+    assert_eq!((wall.state(), wall.loops.len()), (State::Finished, 7));
 }
 
 #[test]

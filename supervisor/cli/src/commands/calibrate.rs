@@ -163,7 +163,7 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
             )));
         }
     }
-    let (estimate, _) = loops::checked(wall.loops(), wall.normal_sd(), body.track_m)
+    let (estimate, _) = loops::checked(&wall.loops, wall.normal_sd(), body.track_m)
         .map_err(|refusal| refused(&refusal.to_string()))?;
     let metres = wall.metres();
     Ok(Found { method: "wall", before, estimate, metres, seconds })

@@ -13,8 +13,8 @@ use common::{
     geometry::wrap_angle,
     roster,
     samples::{
-        Action, BeaconRefusal, FollowState, HoldReason, LinkSample, Order, PowerSample,
-        RosterEntry, StageState, TargetSample, name_str,
+        Action, BeaconRefusal, FollowState, LinkSample, PowerSample, RosterEntry, TargetSample,
+        name_str,
     },
     topics::{self, AnyTopic},
     waiter::Waiter,
@@ -296,9 +296,9 @@ fn status<'a>(
     Some(Status {
         robot: &arguments.robot,
         supervisor_pid: header.supervisor_pid,
-        order: order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)),
+        order: order(header.order(), header.reason()),
         tick: header.stamp.tick,
-        mission_time_s: header.stamp.time().seconds(),
+        mission_time_s: header.stamp.seconds(),
         mirror: robot
             .mirror
             .map(|mirror| MirrorStatus { of: mirrors.unwrap_or_default(), age_s: mirror.age_s() }),
@@ -311,11 +311,11 @@ fn status<'a>(
         }),
         following: robot.following().map(|following| FollowingStatus {
             lost: following.state() == FollowState::Lost,
-            seen_ago_s: following.heard_ago_s(header.stamp.time().seconds()),
+            seen_ago_s: following.heard_ago_s(header.stamp.seconds()),
             distance_m: following.distance_m,
             used: following.used,
             refused: following.refused,
-            refusal: match BeaconRefusal::from_byte(following.refusal) {
+            refusal: match following.refusal() {
                 BeaconRefusal::None => None,
                 refusal => Some(refusal.words()),
             },
@@ -340,7 +340,7 @@ fn status<'a>(
 fn stage_status(entry: &RosterEntry) -> StageStatus<'_> {
     StageStatus {
         name: name_str(&entry.stage),
-        state: state(StageState::from_byte(entry.state)),
+        state: state(entry.state()),
         pid: entry.pid,
         generation: entry.generation,
         restarts: entry.restarts,

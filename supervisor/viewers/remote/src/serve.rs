@@ -13,7 +13,7 @@ use common::{
     domain::{Domain, RobotName},
     follower::{Event, Follower},
     run,
-    samples::{HoldReason, Order, RosterEntry, RosterHeader},
+    samples::{RosterEntry, RosterHeader},
     topics::{self, AnyTopic, EVERY_STAGE, Logged, OPERATOR},
 };
 use console::{
@@ -151,9 +151,8 @@ fn tell(
 ) -> Result<u64> {
     while let Some(entries) = roster.next_slice()? {
         let header = entries.header();
-        told.hello.order =
-            order(Order::from_byte(header.order), HoldReason::from_byte(header.reason)).to_owned();
-        told.hello.mission_time_s = header.stamp.time().seconds();
+        told.hello.order = order(header.order(), header.reason()).to_owned();
+        told.hello.mission_time_s = header.stamp.seconds();
     }
     // The run file appears after the bus.
     if told.hello.id == 0

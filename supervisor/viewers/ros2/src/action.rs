@@ -112,7 +112,7 @@ impl Server {
     }
 
     pub fn command(&mut self, command: &CommandSample) {
-        if CommandState::from_byte(command.state) == CommandState::Arrived
+        if command.state() == CommandState::Arrived
             && let Some(goal) = self.goals.current()
             && goal.known.number == Some(command.target_number)
             && goal.status == Status::Executing
@@ -123,7 +123,7 @@ impl Server {
 
     /// Aborts the goal if the run gives up its target.
     pub fn directive(&mut self, directive: &DirectiveSample) {
-        let waits = HoldReason::from_byte(directive.reason) == HoldReason::Waiting;
+        let waits = directive.reason() == HoldReason::Waiting;
         if let Some(goal) = self.goals.current().filter(|goal| goal.known.number.is_some())
             && std::mem::replace(&mut goal.known.waits, waits)
             && waits

@@ -249,9 +249,7 @@ impl Bridge<'_> {
                 Sample::Target(target) => server.target(target),
                 Sample::Command(command) => server.command(command),
                 Sample::Directive(directive) => server.directive(directive),
-                Sample::Order(request)
-                    if RequestKind::from_byte(request.kind) == RequestKind::Stop =>
-                {
+                Sample::Order(request) if request.kind() == RequestKind::Stop => {
                     *stands_for_cancel = stands_for_cancel.map(|stops| stops + 1);
                 }
                 _ => {}

@@ -30,7 +30,7 @@ impl Drift {
     pub fn after(&mut self, sample: &PoseSample, mission: &Mission, pace: f64) -> [Covariance; 2] {
         let (model, body) = (&mission.robot.odometry, mission.body());
         let period_s = 1.0 / mission.robot.rate_hz;
-        let now_s = sample.stamp.time().seconds();
+        let now_s = sample.stamp.seconds();
         let gap_s = self.at_s.replace(now_s).map_or(0.0, |before| (now_s - before).max(0.0));
         let (v, omega, track_m) = (sample.v_m_s, sample.omega_rad_s, body.track_m);
         self.grow(model, track_m, sample.odometry(), [v * gap_s, omega * gap_s]);

@@ -342,7 +342,7 @@ impl Shown {
             .deaths
             .get(name)
             .map(|death| format!("generation {}: {}", death.generation, death_in_words(death)));
-        let (level, state) = match StageState::from_byte(entry.state) {
+        let (level, state) = match entry.state() {
             StageState::Running => (DiagnosticStatus::OK, "runs"),
             StageState::Starting => (DiagnosticStatus::WARN, "starts"),
             StageState::Stopping => (DiagnosticStatus::WARN, "stops"),

@@ -1,7 +1,7 @@
 use common::{
     latency::Histogram,
     process_usage::Usage,
-    samples::{Action, HoldReason, LinkSample, Order, RosterEntry, StageState, name_str},
+    samples::{Action, LinkSample, RosterEntry, StageState, name_str},
 };
 use ratatui::{
     Frame,
@@ -81,11 +81,8 @@ fn heading(view: &View) -> Line<'static> {
     };
     let kind = if supervisor.simulated == 1 { " (simulated): " } else { ": " };
     let state = if view.connected {
-        let order = words::order(
-            Order::from_byte(supervisor.order),
-            HoldReason::from_byte(supervisor.reason),
-        );
-        format!("{order}, {:.1} s", supervisor.stamp.time().seconds())
+        let order = words::order(supervisor.order(), supervisor.reason());
+        format!("{order}, {:.1} s", supervisor.stamp.seconds())
     } else {
         waiting::ENDED.to_owned()
     };
@@ -159,7 +156,7 @@ fn usage(view: &View, at: usize) -> Usage {
 }
 
 fn stage_row(view: &View, at: usize, entry: &RosterEntry) -> ([String; 9], Style) {
-    let state = StageState::from_byte(entry.state);
+    let state = entry.state();
     let runs = view.connected && entry.pid != 0;
     let texts = [
         name_str(&entry.stage).to_owned(),

@@ -194,7 +194,7 @@ impl Attack {
             }
         }
         while let Some(entries) = subscriptions.roster.samples.next_slice()? {
-            self.driving = Order::from_byte(entries.header().order) == Order::Drive;
+            self.driving = entries.header().order() == Order::Drive;
             self.supervisor = entries.header().supervisor_pid;
             self.entries = entries.to_vec();
             self.entries_read = Some(Instant::now());
@@ -203,7 +203,7 @@ impl Attack {
             }
         }
         while let Some(health) = subscriptions.health.next_sample()? {
-            if HealthState::from_byte(health.state) == HealthState::Ready {
+            if health.state() == HealthState::Ready {
                 self.on_sign(name_str(&health.stage), health.stamp.generation, true);
             }
         }
@@ -288,8 +288,7 @@ impl Attack {
         let (stage, kind, startup_hit) =
             (schedule.stage(), schedule.kind(), schedule.startup_hit());
         let running = |entry: &&RosterEntry| {
-            name_str(&entry.stage) == stage
-                && StageState::from_byte(entry.state) == StageState::Running
+            name_str(&entry.stage) == stage && entry.state() == StageState::Running
         };
         let Some(&RosterEntry { pid, generation, .. }) = self.entries.iter().find(running) else {
             return Ok(());

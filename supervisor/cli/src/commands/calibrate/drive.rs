@@ -167,5 +167,5 @@ pub struct Carried {
 fn shown(progress: &Progress<'_>) -> String {
     let pose = progress.record.pose.unwrap_or_default();
     let state = if progress.driving { "" } else { ", starting" };
-    format!("{:6.1} s  {:5.1} m driven{state}", pose.stamp.time().seconds(), pose.travelled_m)
+    format!("{:6.1} s  {:5.1} m driven{state}", pose.stamp.seconds(), pose.travelled_m)
 }

@@ -294,7 +294,8 @@ fn the_guide_has_the_three_presets_of_every_key_of_the_simulation_and_its_source
         .lines()
         .map(|line| line.trim_matches('|').split('|').map(str::trim).collect())
         .collect();
-    let presets = Realism::ALL.map(|realism| Simulation { realism, ..Default::default() }.ranges());
+    let all = [Realism::Laboratory, Realism::Measured, Realism::Harsh];
+    let presets = all.map(|realism| Simulation { realism, ..Default::default() }.ranges());
     for (index, (key, ..)) in presets[0].iter().enumerate() {
         let presets = [0, 1, 2].map(|realism| presets[realism][index].1);
         let key = format!("`{}`", key.trim_start_matches("simulation."));

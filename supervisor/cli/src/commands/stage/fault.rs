@@ -96,7 +96,7 @@ fn request_fault(bus: &Bus, stage: &str, request: FaultSample) -> Result<Option<
     loop {
         while let Some(beat) = health.next_sample()? {
             if name_str(&beat.stage) == stage && beat.last_fault == request.id {
-                return Ok(Some(FaultAnswer::from_byte(beat.fault_answer)));
+                return Ok(Some(beat.fault_answer()));
             }
         }
         let left = PATIENCE.saturating_sub(began.elapsed());

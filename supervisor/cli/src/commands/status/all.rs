@@ -6,7 +6,6 @@ use common::{
     bus::BusError,
     domain::Domain,
     roster::{self, Roster},
-    samples::{HoldReason, Order},
     topics,
 };
 use serde::Serialize;
@@ -93,9 +92,8 @@ fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
         if is_mirror && age_s.is_none() {
             return None;
         }
-        let order =
-            words::order(Order::from_byte(header.order), HoldReason::from_byte(header.reason));
-        let time_s = header.stamp.time().seconds();
+        let order = words::order(header.order(), header.reason());
+        let time_s = header.stamp.seconds();
         Some((order, Some(time_s), Some(header.simulated == 1), age_s))
     })
 }
