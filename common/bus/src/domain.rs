@@ -51,6 +51,12 @@ impl TryFrom<String> for RobotName {
     }
 }
 
+impl RobotName {
+    pub fn domain(&self) -> Domain {
+        Domain::of(self.clone())
+    }
+}
+
 impl fmt::Display for RobotName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)

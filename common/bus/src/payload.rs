@@ -45,6 +45,7 @@ impl Stamp {
         MissionTime(self.stamp_ns)
     }
 
+    /// Returns the mission time, seconds.
     pub fn seconds(&self) -> f64 {
         self.time().seconds()
     }

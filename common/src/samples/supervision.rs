@@ -168,6 +168,17 @@ wire_enum! {
     }
 }
 
+impl DeathCause {
+    pub fn in_words(self, code: i32) -> String {
+        match self {
+            Self::Exited => format!("exit code {code}"),
+            Self::Signalled => format!("signal {code}"),
+            Self::SignalledWithCore => format!("signal {code}, core dumped"),
+            Self::Unknown => "ended; systemctl status says how".to_owned(),
+        }
+    }
+}
+
 wire_enum! {
     NextStep, unknown = Nothing {
         /// The run ends.

@@ -199,7 +199,7 @@ pub fn rule(cause: Cause) -> Option<&'static Rule> {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Failsafe {
-    pub(crate) monitors: Monitors,
+    pub monitors: Monitors,
     applied: [bool; TABLE.len()],
 }
 

@@ -13,8 +13,8 @@ use common::{
     kinematics::{LEAST_SPEED_M_S, Pose2, Twist},
     mission::{Lead, Method, Mission},
     samples::{
-        CommandSample, CommandState, FaultKind, FieldHeader, GridHeader, GuidanceSample,
-        GuidanceStatus, PoseSample, TargetSample,
+        CommandSample, CommandState, FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample,
+        GuidanceStatus, PoseSample, TargetPoint, TargetSample,
     },
 };
 use glam::DVec2;
@@ -449,6 +449,21 @@ impl Planner {
                 (GuidanceStatus::Along, axis, 0.0)
             }
         }
+    }
+
+    /// Returns the field to `target` on a map, which a new planner computes.
+    pub fn field_to(
+        target: DVec2,
+        mission: &Mission,
+        header: &GridHeader,
+        cells: &[u8],
+    ) -> Option<Vec<FieldCell>> {
+        let mut planner = Self::new(mission);
+        let target = TargetPoint::at(target);
+        let sent = TargetSample { number: 1, last: 1, target, ..TargetSample::default() };
+        planner.take_target(&sent).ok()?;
+        planner.take_grid(header, cells).ok()?;
+        Some(planner.snapshot()?.cells())
     }
 
     pub fn snapshot(&self) -> Option<Snapshot> {

@@ -21,8 +21,8 @@ pub(crate) fn grip(held: bool, physics: &WheelPhysics) -> Option<f64> {
 /// Channel of a wheel or a car's steering, and its counts' sign for driving ahead or steering left.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OnChannel {
-    pub(crate) channel: usize,
-    pub(crate) sign: f64,
+    pub channel: usize,
+    pub sign: f64,
 }
 
 impl OnChannel {

@@ -12,7 +12,7 @@ pub(crate) struct Gyro {
     noise: Noise,
     /// Time and true heading of the newest reading.
     newest: Option<(f64, f64)>,
-    pub(crate) angle: f64,
+    pub angle: f64,
 }
 
 impl Gyro {

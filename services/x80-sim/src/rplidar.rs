@@ -14,7 +14,7 @@ const QUALITY: u8 = 47;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Rplidar {
-    pub(crate) laser: Laser,
+    pub laser: Laser,
     product: Product,
     requests: Requests,
     /// Mission time of the next measurement while scanning.

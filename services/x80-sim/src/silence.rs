@@ -13,7 +13,7 @@ pub(crate) struct Silence {
     /// Probability of falling silent.
     begin: f64,
     /// Rangers in a run of silence.
-    pub(crate) silent: [bool; 6],
+    pub silent: [bool; 6],
     noise: Noise,
 }
 

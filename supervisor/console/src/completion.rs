@@ -39,7 +39,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let shell = shells.completer(&arguments.shell).ok_or("name a shell")?;
     let mut script = Vec::new();
     shell.write_registration(VARIABLE, EXECUTABLE, EXECUTABLE, EXECUTABLE, &mut script)?;
-    Ok(print_text(&String::from_utf8_lossy(&script))?)
+    print_text(String::from_utf8_lossy(&script))
 }
 
 /// Answers a shell's request and ends. `whole` is the command line, `pages` the guide.

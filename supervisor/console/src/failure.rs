@@ -14,7 +14,7 @@ use processes::{DomainError, planner_executable::PlannerExecutableError};
 use recording::RecordingError;
 use thiserror::Error;
 
-use super::{missions::LookupError, output::write_stderr, robots};
+use super::{missions::LookupError, output::say, robots};
 
 /// Sentence that names the input and the remedy.
 pub type Failure = Box<dyn Error>;
@@ -35,12 +35,16 @@ impl Refused {
     }
 }
 
+pub fn refuse<T, E: From<Refused>>(code: &'static str, message: impl Into<String>) -> Result<T, E> {
+    Err(Refused::new(code, message).into())
+}
+
 pub fn report(result: Result<ExitCode>) -> ExitCode {
     result.unwrap_or_else(|error| {
         let error = error.as_ref();
         let code = code(error).map_or(String::new(), |code| format!(" [{code}]"));
         let said = not_running(error).unwrap_or_else(|| error.to_string());
-        write_stderr(&format!("firsthand: {said}{code}\n"));
+        say(format_args!("{said}{code}"));
         exit_code(error)
     })
 }

@@ -3,7 +3,7 @@
 use std::{fs::File, io, path::Path};
 
 use common::{
-    domain::{Domain, RobotName},
+    domain::RobotName,
     lock_holders,
     roster::{self, Roster},
     samples::{RosterEntry, name_str},
@@ -14,14 +14,12 @@ use rustix::process::Signal;
 
 use super::{
     failure::{Refused, Result},
-    output::write_stderr,
+    output::say,
 };
 
 pub fn stand(robot: &RobotName) -> Result {
     if let Some(why) = operator::stand(robot)? {
-        write_stderr(&format!(
-            "firsthand: the robot is at rest, but its supervisor was not told: {why}\n"
-        ));
+        say(format_args!("the robot is at rest, but its supervisor was not told: {why}"));
     }
     Ok(())
 }
@@ -37,7 +35,7 @@ pub fn known_stage(stage: &str) -> Result<&'static Stage, Refused> {
 /// Signals the named process if it holds the robot's lock. Waits if the roster, published at 5 Hz,
 /// still names an ended process.
 pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result {
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     operator::refuse_mirror(&domain)?;
     // A frozen supervisor publishes nothing.
     if stage == "supervisor" {

@@ -7,19 +7,36 @@ use std::{
 
 use serde::Serialize;
 
+use super::failure::Result;
+
 /// Writes and flushes. Accepts a closed reader (`firsthand help tables | head`).
-pub fn print_text(text: &str) -> io::Result<()> {
+pub fn print_text(text: impl Display) -> Result {
     let mut stdout = io::stdout();
-    unless_closed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
+    let written = stdout.write_all(text.to_string().as_bytes()).and_then(|()| stdout.flush());
+    Ok(unless_closed(written)?)
 }
 
-pub fn print(value: &(impl Display + Serialize), json: bool) -> io::Result<()> {
-    print_text(&if json { serde_json::to_string(value)? + "\n" } else { value.to_string() })
+pub fn print_line(line: impl Display) -> Result {
+    print_text(format_args!("{line}\n"))
 }
 
-pub fn json_lines<T: Serialize>(values: &[T]) -> serde_json::Result<String> {
+pub fn print(value: &(impl Display + Serialize), json: bool) -> Result {
+    print_rows(std::slice::from_ref(value), json, value)
+}
+
+/// Prints a line of JSON for each of `values`, or `text`.
+pub fn print_rows(values: &[impl Serialize], json: bool, text: impl Display) -> Result {
+    if json { print_text(json_lines(values)?) } else { print_text(text) }
+}
+
+pub fn json_lines(values: &[impl Serialize]) -> serde_json::Result<String> {
     let lines = values.iter().map(serde_json::to_string);
     lines.map(|line| Ok(line? + "\n")).collect()
+}
+
+/// Says `text` on standard error, after the name of the program.
+pub fn say(text: impl Display) {
+    write_stderr(&format!("firsthand: {text}\n"));
 }
 
 /// Ignores errors, such as a closed reader.

@@ -21,7 +21,7 @@ pub struct Robot {
 
 impl Robot {
     pub fn find(name: RobotName) -> Self {
-        let supervisor = Domain::of(name.clone()).supervisor().ok().flatten();
+        let supervisor = name.domain().supervisor().ok().flatten();
         Self { name, supervisor, run: supervisor.and_then(run_directory) }
     }
 }

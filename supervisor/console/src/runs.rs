@@ -14,8 +14,8 @@ use recording::log_files::Tail;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    failure::{Refused, Result},
-    output::write_stderr,
+    failure::{Result, refuse},
+    output::say,
     robots::{Robot, entries},
 };
 
@@ -31,14 +31,6 @@ pub struct RunDirectory {
     pub robot: RobotName,
     /// `None` if another version wrote the run file.
     pub mission: Option<String>,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-pub enum Outcome {
-    Running,
-    /// Run ended by a kill of its supervisor or machine.
-    CutOff,
-    Ended(Ended),
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -127,17 +119,17 @@ impl RunDirectory {
         self.directory.join(SUMMARY).exists()
     }
 
-    pub fn outcome(&self) -> Outcome {
+    /// Returns how the run ended, or that it is running or cut off.
+    pub fn outcome(&self) -> Ended {
         let file = self.directory.join(SUMMARY);
         let text = file::text(&file, LARGEST_SUMMARY);
-        match text.map(|text| serde_json::from_str(&text)) {
-            Some(Ok(ended)) => Outcome::Ended(ended),
-            _ if self.has_ended() => {
-                Outcome::Ended(Ended { outcome: "unreadable".to_owned(), ..Ended::default() })
-            }
-            _ if self.is_running() => Outcome::Running,
-            _ => Outcome::CutOff,
-        }
+        let outcome = match text.map(|text| serde_json::from_str(&text)) {
+            Some(Ok(ended)) => return ended,
+            _ if self.has_ended() => "unreadable",
+            _ if self.is_running() => "running",
+            _ => "cut off",
+        };
+        Ended { outcome: outcome.to_owned(), ..Ended::default() }
     }
 
     fn is_running(&self) -> bool {
@@ -170,11 +162,11 @@ pub fn own(directory: &Path) -> Result<PathBuf> {
         format!("cannot make {}: {error}; give another --out", directory.display())
     })?;
     if directory.join(run::FILE_NAME).exists() {
-        let message = format!(
-            "{} holds an earlier run; give an empty or new directory with --out",
-            directory.display()
+        let directory = directory.display();
+        return refuse(
+            "results-there",
+            format!("{directory} holds an earlier run; give an empty or new directory with --out"),
         );
-        return Err(Refused::new("results-there", message).into());
     }
     Ok(fs::canonicalize(directory)?)
 }
@@ -215,7 +207,7 @@ pub fn prune(runs: &Path, robot: &RobotName, keep: usize) {
     for RunDirectory { directory, .. } in &ended[..surplus] {
         if let Err(error) = fs::remove_dir_all(directory) {
             let directory = directory.display();
-            write_stderr(&format!("firsthand: cannot remove {directory}: {error}\n"));
+            say(format_args!("cannot remove {directory}: {error}"));
         }
     }
 }
@@ -252,14 +244,13 @@ mod tests {
         let mut listed = list(runs.path());
         listed.sort_by_key(|run| run.directory.clone());
         let outcomes: Vec<_> = listed.iter().map(RunDirectory::outcome).collect();
-        let ended = |outcome: &str, mission_time_s| {
-            Outcome::Ended(Ended {
-                outcome: outcome.to_owned(),
-                mission_time_s,
-                ..Ended::default()
-            })
+        let ended = |outcome: &str, mission_time_s| Ended {
+            outcome: outcome.to_owned(),
+            mission_time_s,
+            ..Ended::default()
         };
-        let expected = [ended("timeout", Some(2.5)), ended("unreadable", None), Outcome::CutOff];
+        let cut_off = ended("cut off", None);
+        let expected = [ended("timeout", Some(2.5)), ended("unreadable", None), cut_off];
         assert_eq!(outcomes, expected);
         assert_eq!(listed[0].mission.as_deref(), Some("trap"));
         assert!(listed[0].size() >= 1024, "{}", listed[0].size());

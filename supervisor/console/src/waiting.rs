@@ -2,7 +2,7 @@
 
 use common::{domain::RobotName, follower::Event};
 
-use super::output::write_stderr;
+use super::output::say;
 
 #[derive(Default)]
 pub struct Waiting {
@@ -26,7 +26,7 @@ impl Waiting {
 
     fn report(&mut self, robot: &RobotName, state: &str) {
         if !std::mem::replace(&mut self.reported, true) {
-            write_stderr(&format!("firsthand: robot {robot} {state}\n"));
+            say(format_args!("robot {robot} {state}"));
         }
     }
 }

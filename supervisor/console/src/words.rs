@@ -1,10 +1,10 @@
 //! States, ages and sizes in words.
 
-use common::samples::{HoldReason, Order, StageState};
+use common::samples::{HoldReason, Order, RosterHeader};
 
-pub const fn order(order: Order, reason: HoldReason) -> &'static str {
-    match order {
-        Order::Hold => match reason {
+pub const fn order(header: &RosterHeader) -> &'static str {
+    match Order::from_byte(header.order) {
+        Order::Hold => match HoldReason::from_byte(header.reason) {
             HoldReason::Operator => "stopped by an operator",
             HoldReason::StageHeld => "stopped, a stage is held",
             HoldReason::Waiting => "waiting for a target",
@@ -13,17 +13,6 @@ pub const fn order(order: Order, reason: HoldReason) -> &'static str {
         },
         Order::Drive => "driving",
         Order::Stop => "stopping",
-    }
-}
-
-pub const fn state(state: StageState) -> &'static str {
-    match state {
-        StageState::Down => "down",
-        StageState::Starting => "starting",
-        StageState::Running => "running",
-        StageState::BackingOff => "backing off",
-        StageState::Stopping => "stopping",
-        StageState::Held => "held",
     }
 }
 

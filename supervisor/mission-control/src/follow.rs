@@ -20,7 +20,7 @@ pub(crate) struct Beacon {
     /// tick.
     waiting: Option<BeaconSample>,
     /// Last tick before the next sample, in lockstep; makes runs repeatable.
-    last_tick: u64,
+    pub last_tick: u64,
     pub told: Option<FollowingSample>,
 }
 
@@ -44,7 +44,7 @@ impl Supervisor<'_> {
         self.targets.follow(now.seconds(), arrival);
         let is_late = |it: &mut BeaconSample| now.since(MissionTime(it.capture_ns)) > SILENT;
         self.beacon.waiting.take_if(is_late);
-        self.state_file.state.following = Some(Following::new(distance_m, now, pose.as_ref()));
+        self.state.following = Some(Following::new(distance_m, now, pose.as_ref()));
         self.beacon.last_tick = self.bus.observer.record.newest_tick().unwrap_or_default();
         self.await_target();
         tracing::info!(distance_m, "the robot follows the beacon");
@@ -61,7 +61,7 @@ impl Supervisor<'_> {
 
     /// Ends the following, if any, and lets the robot wait. Returns whether it did.
     pub(crate) fn end_following(&mut self, outcome: TargetOutcome) -> bool {
-        let Some(following) = self.state_file.state.following.take() else { return false };
+        let Some(following) = self.state.following.take() else { return false };
         let (now, pose) = (self.beacon_time(), self.bus.observer.record.pose);
         let followed = following.followed(now, pose.as_ref());
         self.targets.end_following((outcome, followed), following.place(), now.seconds());
@@ -75,7 +75,7 @@ impl Supervisor<'_> {
     /// Takes the beacon's samples. Returns whether to publish.
     pub(crate) fn take_beacon(&mut self) -> Result<bool> {
         let mut changed = false;
-        if self.state_file.state.following.is_none() {
+        if self.state.following.is_none() {
             self.beacon.waiting = self.bus.beacon.newest()?.or(self.beacon.waiting);
             return Ok(false);
         }
@@ -90,7 +90,7 @@ impl Supervisor<'_> {
             changed |= self.follow_to(&beacon);
         }
         let now = self.beacon_time();
-        if let Some(following) = &mut self.state_file.state.following
+        if let Some(following) = &mut self.state.following
             && following.loses(now)
         {
             tracing::warn!("the robot lost its beacon and stops");
@@ -111,7 +111,7 @@ impl Supervisor<'_> {
     /// Returns whether, in lockstep, the stages have yet to answer the tick of `beacon`'s capture.
     fn is_early(&self, beacon: &BeaconSample) -> bool {
         let (Some(following), Some(captured)) =
-            (&self.state_file.state.following, self.clock.tick_at(beacon.capture_ns))
+            (&self.state.following, self.clock.tick_at(beacon.capture_ns))
         else {
             return false;
         };
@@ -126,8 +126,8 @@ impl Supervisor<'_> {
     fn follow_to(&mut self, beacon: &BeaconSample) -> bool {
         let now = self.beacon_time();
         let mission = &self.options.mission;
-        let Some(following) = &mut self.state_file.state.following else { return false };
-        let was_lost = following.is_lost();
+        let Some(following) = &mut self.state.following else { return false };
+        let was_lost = following.is_lost;
         let taken = following.take(beacon, now, mission);
         let record = &self.bus.observer.record;
         if let (Some(captured), Some(pose)) = (self.clock.tick_at(beacon.capture_ns), record.pose) {
@@ -145,7 +145,7 @@ impl Supervisor<'_> {
             let rolls_m = pose.v_m_s * mission.trusted_response().dead_time_s();
             pose.pose().position + pose.pose().axis() * rolls_m
         });
-        let current = (!self.targets.waits()).then(|| self.targets.current().position());
+        let current = (!self.targets.waits).then(|| self.targets.current.position());
         let arrived = record.arrival.is_some();
         let next = following.next_place(&record.grid, mission, (here, current), arrived);
         // In lockstep no tick follows an arrival until the target changes.
@@ -167,17 +167,13 @@ impl Supervisor<'_> {
     }
 
     fn tell_following(&mut self) {
-        if let Some(following) = &self.state_file.state.following {
+        if let Some(following) = &self.state.following {
             let now = self.beacon_time();
             self.beacon.told = Some(following.sample(now, self.bus.observer.record.pose.as_ref()));
         }
     }
 
-    pub(crate) fn beacon_limit(&self) -> Option<u64> {
-        self.state_file.state.following.map(|_| self.beacon.last_tick)
-    }
-
     pub(crate) fn stands_beside(&self) -> bool {
-        self.targets.follows() && self.bus.observer.record.arrival.is_some()
+        self.targets.follows && self.bus.observer.record.arrival.is_some()
     }
 }

@@ -43,7 +43,7 @@ pub(crate) fn kept_m(distance_m: f64, mission: &Mission) -> Option<f64> {
     (least_m..=MOST_DISTANCE_M).contains(&wanted_m).then_some(wanted_m)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Following {
     distance_m: f64,
     began: MissionTime,
@@ -51,7 +51,7 @@ pub(crate) struct Following {
     began_m: f64,
     /// Time and place of the newest used sample.
     heard: Option<(MissionTime, DVec2)>,
-    is_lost: bool,
+    pub is_lost: bool,
     used: u64,
     refused: u64,
     refusal: u8,
@@ -64,21 +64,13 @@ impl Following {
             distance_m,
             began: now,
             began_m: pose.map_or(0.0, |pose| pose.travelled_m),
-            heard: None,
             is_lost: true,
-            used: 0,
-            refused: 0,
-            refusal: 0,
-            lost: 0,
+            ..Self::default()
         }
     }
 
     pub(crate) const fn is_new(&self) -> bool {
         self.used + self.refused == 0
-    }
-
-    pub(crate) const fn is_lost(&self) -> bool {
-        self.is_lost
     }
 
     pub(crate) fn place(&self) -> DVec2 {
@@ -138,10 +130,6 @@ impl Following {
         self.is_lost |= silent;
         self.lost += u64::from(loses);
         loses
-    }
-
-    pub(crate) const fn resumed(&mut self) {
-        self.is_lost = true;
     }
 
     pub(crate) fn followed(&self, now: MissionTime, pose: Option<&PoseSample>) -> Followed {

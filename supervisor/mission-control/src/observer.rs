@@ -253,10 +253,6 @@ impl Record {
         })
     }
 
-    pub fn newest_guidance(&self) -> Option<&GuidanceSample> {
-        self.guidance.back()
-    }
-
     pub fn pose_at(&self, tick: u64) -> Option<&PoseSample> {
         self.poses.iter().rev().find(|pose| pose.stamp.tick <= tick)
     }

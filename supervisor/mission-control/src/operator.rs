@@ -24,7 +24,7 @@ use common::{
         RosterEntry, RosterHeader, TargetPoint, name,
     },
     start::StageError,
-    stop_socket::{self, Answer, Identity, OwedStop, Request, StopMark},
+    stop_socket::{Answer, Identity, Operator, OwedStop, Request, StopMark},
     topics,
     waiter::Waiter,
 };
@@ -57,6 +57,16 @@ impl OperatorError {
     fn refused(code: &'static str, message: impl Into<String>) -> Self {
         Self::Refused { code, message: message.into() }
     }
+}
+
+type Result<T = (), E = OperatorError> = std::result::Result<T, E>;
+
+fn system(action: &'static str) -> impl Fn(io::Error) -> OperatorError + Copy {
+    move |error| OperatorError::System(action, error)
+}
+
+fn refuse<T>(code: &'static str, message: impl Into<String>) -> Result<T> {
+    Err(OperatorError::refused(code, message))
 }
 
 const fn code(answer: RequestAnswer) -> &'static str {
@@ -97,13 +107,13 @@ const GUARD_STARTS: Duration = Duration::from_millis(20);
 ///
 /// The request reaches the link without the middleware. The supervisor hears it too, so that its
 /// successors keep the stop. If no link answers, a stop guard stops the robot.
-pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
+pub fn stand(robot: &RobotName) -> Result<Untold> {
     let asked_ns = monotonic_ns();
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
-    let link = stop_socket::Operator::connect(&domain.stop_socket())
-        .map_err(|error| OperatorError::System("open a socket to the link", error))?
+    let link = Operator::connect(&domain.stop_socket())
+        .map_err(system("open a socket to the link"))?
         .filter(|link| {
             let answer = link.send(Request::Stop).and_then(|()| link.answer(LINK_ANSWERS));
             matches!(answer, Ok(Some(_)))
@@ -143,7 +153,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold, OperatorError> {
 
 /// Tells the link to stop the robot, without waiting. [`stand`] does the rest.
 pub fn stop_at_once(robot: &RobotName) {
-    let link = stop_socket::Operator::connect(&Domain::of(robot.clone()).stop_socket());
+    let link = Operator::connect(&robot.domain().stop_socket());
     if let Ok(Some(link)) = link {
         let _ = link.send(Request::Stop);
     }
@@ -151,31 +161,31 @@ pub fn stop_at_once(robot: &RobotName) {
 
 /// Returns whether the robot may move although no link drives it.
 pub fn owes_stop(robot: &RobotName) -> bool {
-    OwedStop::of(Domain::of(robot.clone())).is_set()
+    OwedStop::of(robot.domain()).is_set()
 }
 
 /// Connects to the robot's stop guard; starts one if none answers.
-fn guard(domain: &Domain) -> Result<stop_socket::Operator, OperatorError> {
-    let system = |error| OperatorError::System("reach the stop guard", error);
-    let told = || -> Result<_, OperatorError> {
-        let guard = stop_socket::Operator::connect(&domain.guard_socket()).map_err(system)?;
-        guard.iter().try_for_each(|guard| guard.send(Request::Stop)).map_err(system)?;
-        Ok(guard)
+fn guard(domain: &Domain) -> Result<Operator> {
+    let unreachable = system("reach the stop guard");
+    let told = || {
+        let guard = Operator::connect(&domain.guard_socket()).map_err(unreachable)?;
+        guard.iter().try_for_each(|guard| guard.send(Request::Stop)).map_err(unreachable)?;
+        Ok::<_, OperatorError>(guard)
     };
     if let Some(guard) = told()? {
         return Ok(guard);
     }
     let directory = fs::canonicalize(domain.owed_stop())
-        .map_err(|error| OperatorError::System("find the run of the robot that may move", error))?;
+        .map_err(system("find the run of the robot that may move"))?;
     let link = Identity::now(&domain.stop_socket());
-    stop_guard::spawn(robot_executable(), &directory, &link, Stdio::null()).map_err(system)?;
+    stop_guard::spawn(robot_executable(), &directory, &link, Stdio::null()).map_err(unreachable)?;
     let began = Instant::now();
     loop {
         match told()? {
             Some(guard) => return Ok(guard),
             None if began.elapsed() > PATIENCE => {
                 let message = "the stop guard does not start; see link.log of the run";
-                return Err(OperatorError::refused("no-answer", message));
+                return refuse("no-answer", message);
             }
             None => thread::park_timeout(GUARD_STARTS),
         }
@@ -184,7 +194,7 @@ fn guard(domain: &Domain) -> Result<stop_socket::Operator, OperatorError> {
 
 /// Returns the stop guard's observation and its seconds of silence.
 pub fn sees(robot: &RobotName) -> Option<(String, u8)> {
-    let guard = stop_socket::Operator::connect(&Domain::of(robot.clone()).guard_socket());
+    let guard = Operator::connect(&robot.domain().guard_socket());
     let guard = guard.ok().flatten()?;
     guard.send(Request::Look).ok()?;
     loop {
@@ -203,24 +213,24 @@ pub fn sees(robot: &RobotName) -> Option<(String, u8)> {
 ///
 /// # Errors
 /// Fails while a link runs.
-pub fn sign_off(robot: &RobotName) -> Result<(), OperatorError> {
-    let domain = Domain::of(robot.clone());
-    let system = |error| OperatorError::System("sign the robot off", error);
+pub fn sign_off(robot: &RobotName) -> Result {
+    let domain = robot.domain();
+    let failed = system("sign the robot off");
     if domain.is_supervised() {
         let message = format!("robot {robot} has a run; end it first");
-        return Err(OperatorError::refused("running", message));
+        return refuse("running", message);
     }
-    if let Some(guard) = stop_socket::Operator::connect(&domain.guard_socket()).map_err(system)? {
-        return guard.send(Request::SignOff).map_err(system);
+    if let Some(guard) = Operator::connect(&domain.guard_socket()).map_err(failed)? {
+        return guard.send(Request::SignOff).map_err(failed);
     }
-    OwedStop::of(domain.clone()).set(false, Path::new("")).map_err(system)?;
+    OwedStop::of(domain.clone()).set(false, Path::new("")).map_err(failed)?;
     // A killed guard leaves these files.
     let _ = fs::remove_file(domain.guard_socket());
     let _ = fs::remove_dir(domain.directory());
     Ok(())
 }
 
-fn rests_by(link: &stop_socket::Operator) -> bool {
+fn rests_by(link: &Operator) -> bool {
     let began = Instant::now();
     loop {
         match link.answer(REST_PATIENCE.saturating_sub(began.elapsed())) {
@@ -242,7 +252,7 @@ fn robot_executable() -> PathBuf {
 
 /// Tells the supervisor of a stop in a separate process, because files of a damaged bus can kill a
 /// process.
-fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorError> {
+fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child> {
     let (robot, asked) = (robot.to_string(), asked_ns.to_string());
     let child = process::child(robot_executable())
         .arg0("firsthand")
@@ -250,11 +260,10 @@ fn tell_supervisor(robot: &RobotName, asked_ns: u64) -> Result<Child, OperatorEr
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn();
-    let system = |error| OperatorError::System("start a process that tells the supervisor", error);
-    child.map_err(system)
+    child.map_err(system("start a process that tells the supervisor"))
 }
 
-fn told(mut teller: Child) -> Result<(), OperatorError> {
+fn told(mut teller: Child) -> Result {
     let mut why = String::new();
     let mut said = teller.stderr.take();
     // The pipe closes when the process ends.
@@ -268,19 +277,14 @@ fn told(mut teller: Child) -> Result<(), OperatorError> {
     }
     match teller.wait() {
         Ok(status) if status.success() => Ok(()),
-        Ok(status) if why.is_empty() => {
-            Err(OperatorError::refused("no-answer", format!("it ended with {status}")))
-        }
-        _ => Err(OperatorError::refused(
-            "no-answer",
-            why.trim().trim_start_matches("firsthand: ").to_owned(),
-        )),
+        Ok(status) if why.is_empty() => refuse("no-answer", format!("it ended with {status}")),
+        _ => refuse("no-answer", why.trim().trim_start_matches("firsthand: ")),
     }
 }
 
 /// Waits until `rests` accepts a link sample.
-fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result<(), OperatorError> {
-    let bus = roster::join(&Domain::of(robot.clone()), "operator")?;
+fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result {
+    let bus = roster::join(&robot.domain(), "operator")?;
     let mut links = bus.reader(&topics::LINK)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::LINK)?);
@@ -320,12 +324,12 @@ fn stopped_for_good(link: &LinkSample) -> bool {
     stopped && link.at_rest == 1
 }
 
-pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
-    let domain = Domain::of(robot.clone());
+pub fn resume(robot: &RobotName) -> Result {
+    let domain = robot.domain();
     refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
     // Only this request ends the link's own stop. Without a link, the mark alone holds it.
-    let _ = match stop_socket::Operator::connect(&domain.stop_socket()) {
+    let _ = match Operator::connect(&domain.stop_socket()) {
         Ok(Some(link)) => link.send(Request::Resume),
         _ => StopMark::of(&domain.run_directory()).set(false),
     };
@@ -334,29 +338,21 @@ pub fn resume(robot: &RobotName) -> Result<(), OperatorError> {
 
 /// Tells the supervisor of a stop asked at `asked_ns` of the monotonic clock. A later resume ends
 /// it.
-pub fn request_stop(robot: &RobotName, asked_ns: u64) -> Result<(), OperatorError> {
+pub fn request_stop(robot: &RobotName, asked_ns: u64) -> Result {
     ask(robot, RequestSample { asked_ns, ..request(RequestKind::Stop) })
 }
 
-pub fn restart(robot: &RobotName, stage: &str) -> Result<(), OperatorError> {
+pub fn restart(robot: &RobotName, stage: &str) -> Result {
     ask(robot, RequestSample { stage: name(stage), ..request(RequestKind::Restart) })
 }
 
 /// Sends the robot to `points` in turn: now, or after its present targets if `appends`.
-pub fn send_to(
-    robot: &RobotName,
-    points: &[TargetPoint],
-    appends: bool,
-) -> Result<(), OperatorError> {
+pub fn send_to(robot: &RobotName, points: &[TargetPoint], appends: bool) -> Result {
     let kind = if appends { RequestKind::Append } else { RequestKind::Goto };
     ask_with(robot, request(kind), points)
 }
 
-fn ask_with(
-    robot: &RobotName,
-    mut request: RequestSample,
-    points: &[TargetPoint],
-) -> Result<(), OperatorError> {
+fn ask_with(robot: &RobotName, mut request: RequestSample, points: &[TargetPoint]) -> Result {
     if points.len() > MOST_TARGETS {
         return Err(refused(robot, RequestAnswer::TooMany));
     }
@@ -366,43 +362,35 @@ fn ask_with(
 }
 
 /// Drives for 0.3 s. `stick` points ahead and to the left, in shares of full speed.
-pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result<(), OperatorError> {
+pub fn drive_by_hand(robot: &RobotName, stick: DVec2) -> Result {
     ask_with(robot, request(RequestKind::Hand), &[TargetPoint::at(stick)])
 }
 
 /// Follows the beacon at `distance_m` (0: the robot's default).
-pub fn follow(robot: &RobotName, distance_m: f64) -> Result<(), OperatorError> {
+pub fn follow(robot: &RobotName, distance_m: f64) -> Result {
     ask(robot, RequestSample { deviations: [distance_m, 0.0], ..request(RequestKind::Follow) })
 }
 
 /// Returns when the robot rests.
-pub fn end_follow(robot: &RobotName) -> Result<(), OperatorError> {
+pub fn end_follow(robot: &RobotName) -> Result {
     ask(robot, request(RequestKind::EndFollow))?;
     await_rest(robot, |link| link.stopped() && link.at_rest == 1)
 }
 
 /// Adds the keep-out zone with these corners, or removes the zones that contain a point.
-pub fn change_zones(
-    robot: &RobotName,
-    points: &[TargetPoint],
-    removes: bool,
-) -> Result<(), OperatorError> {
+pub fn change_zones(robot: &RobotName, points: &[TargetPoint], removes: bool) -> Result {
     let kind = if removes { RequestKind::RemoveZone } else { RequestKind::AddZone };
     ask_with(robot, request(kind), points)
 }
 
-pub fn send_back(robot: &RobotName) -> Result<(), OperatorError> {
-    let start = Run::load(&Domain::of(robot.clone()).run_directory())
-        .map_or(DVec2::ZERO, |run| run.mission.start.at);
+pub fn send_back(robot: &RobotName) -> Result {
+    let start =
+        Run::load(&robot.domain().run_directory()).map_or(DVec2::ZERO, |run| run.mission.start.at);
     send_to(robot, &[TargetPoint::at(start)], false)
 }
 
 /// Sets the pose of the standing robot, with standard deviations in metres and radians.
-pub fn place(
-    robot: &RobotName,
-    point: TargetPoint,
-    deviations: [f64; 2],
-) -> Result<(), OperatorError> {
+pub fn place(robot: &RobotName, point: TargetPoint, deviations: [f64; 2]) -> Result {
     ask_with(robot, RequestSample { deviations, ..request(RequestKind::Place) }, &[point])
 }
 
@@ -419,17 +407,17 @@ fn refused(robot: &RobotName, answer: RequestAnswer) -> OperatorError {
 ///
 /// # Errors
 /// Fails if `domain` is a mirror; the order belongs on the robot's machine.
-pub fn refuse_mirror(domain: &Domain) -> Result<(), OperatorError> {
+pub fn refuse_mirror(domain: &Domain) -> Result {
     let Some(at) = domain.mirrors() else { return Ok(()) };
     let message = format!(
         "this is a mirror of robot {} at {at}, which accepts no orders; give them on its machine",
         domain.robot
     );
-    Err(OperatorError::refused("mirror", message))
+    refuse("mirror", message)
 }
 
-fn ask(robot: &RobotName, request: RequestSample) -> Result<(), OperatorError> {
-    let domain = Domain::of(robot.clone());
+fn ask(robot: &RobotName, request: RequestSample) -> Result {
+    let domain = robot.domain();
     refuse_mirror(&domain)?;
     let bus = roster::join(&domain, "operator")?;
     // The roster is opened first, so that the answer is not missed.
@@ -468,7 +456,7 @@ pub fn find<T>(
     roster: &mut Roster,
     robot: &RobotName,
     find: impl Fn(&RosterHeader, &[RosterEntry]) -> Option<T>,
-) -> Result<T, OperatorError> {
+) -> Result<T> {
     let found = roster.find(PATIENCE, find)?;
     found.ok_or_else(|| {
         let message = format!(

@@ -27,7 +27,7 @@ impl fmt::Display for Progress<'_> {
         let time = record.pose.map_or(0.0, |pose| pose.stamp.seconds());
         let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
         let distance = record.command.map_or(self.straight_m, |command| command.distance_m);
-        let events = record.newest_guidance().map_or(0, |guidance| guidance.safety_events);
+        let events = record.guidance.back().map_or(0, |guidance| guidance.safety_events);
         write!(
             f,
             "{time:6.1} s  {distance:5.2} m to go  {speed:5.2} m/s  hazards mapped {events:3} times  {running}/{all} stages alive"

@@ -40,21 +40,11 @@ pub struct SupervisorState {
     pub(crate) zones: Option<(u64, Vec<Zone>)>,
 }
 
-#[derive(Debug)]
-pub struct StateFile {
-    checkpoint: Checkpoint,
-    pub state: SupervisorState,
-}
-
-impl StateFile {
-    pub fn open(directory: &Path) -> Result<Self, CheckpointError> {
+impl SupervisorState {
+    pub(crate) fn open(directory: &Path) -> Result<(Checkpoint, Self), CheckpointError> {
         let file = run::checkpoint_file(directory, "supervisor");
-        let (checkpoint, state) = Checkpoint::open::<SupervisorState>(&file, CAPACITY)?;
-        Ok(Self { checkpoint, state: state.unwrap_or_default() })
-    }
-
-    pub fn save(&mut self) -> Result<(), CheckpointError> {
-        self.checkpoint.save(&self.state)
+        let (checkpoint, state) = Checkpoint::open::<Self>(&file, CAPACITY)?;
+        Ok((checkpoint, state.unwrap_or_default()))
     }
 }
 
@@ -143,10 +133,10 @@ mod tests {
         }
         assert!(!list.append(&points[..1]), "the list is full");
         let directory = tempfile::tempdir().unwrap();
-        let mut file = StateFile::open(directory.path()).unwrap();
-        file.state.targets = Some(list);
+        let (mut checkpoint, mut state) = SupervisorState::open(directory.path()).unwrap();
+        state.targets = Some(list);
         let zone = Zone { points: vec![DVec2::splat(1.5); MOST_CORNERS] };
-        file.state.zones = Some((1 << 40, vec![zone; MOST_ZONES]));
-        file.save().unwrap();
+        state.zones = Some((1 << 40, vec![zone; MOST_ZONES]));
+        checkpoint.save(&state).unwrap();
     }
 }

@@ -34,7 +34,8 @@ struct Step {
 }
 
 pub(crate) struct RecoverySteps {
-    limit: Option<TickLimitSample>,
+    /// Limit of the link; `None` in wall-clock time.
+    pub limit: Option<TickLimitSample>,
     step: Option<Step>,
 }
 
@@ -46,11 +47,6 @@ impl RecoverySteps {
             ..TickLimitSample::default()
         });
         Self { limit, step: None }
-    }
-
-    /// Returns the link's limit; `None` in wall-clock time.
-    pub(crate) const fn limit(&self) -> Option<TickLimitSample> {
-        self.limit
     }
 
     pub(crate) fn on_checked(&mut self, tick: u64) {
@@ -148,9 +144,9 @@ mod tests {
         ];
         for (recovery, published, answered) in rows {
             let mut lockstep = RecoverySteps::new(Some(0));
-            assert_eq!(lockstep.limit().unwrap().last_tick, 4);
+            assert_eq!(lockstep.limit.unwrap().last_tick, 4);
             lockstep.on_stall(stall(recovery));
-            assert_eq!(lockstep.limit().unwrap().last_tick, 14);
+            assert_eq!(lockstep.limit.unwrap().last_tick, 14);
             assert_eq!(lockstep.withholds(1), recovery == Reset);
             let early = Published { tick: Some(13), ..at_rest };
             assert_eq!(lockstep.next(early, now), Next::Wait);
@@ -159,7 +155,7 @@ mod tests {
             let next = if answered { Next::Check } else { Next::Wait };
             assert_eq!(lockstep.next(published, now), next, "{recovery:?} {published:?}");
             assert_eq!(lockstep.next(published, now + ANSWERED), Next::Check);
-            let TickLimitSample { holds_from_tick, epoch, .. } = lockstep.limit().unwrap();
+            let TickLimitSample { holds_from_tick, epoch, .. } = lockstep.limit.unwrap();
             assert_eq!((holds_from_tick, epoch), (15, 1));
         }
     }
@@ -171,6 +167,6 @@ mod tests {
         steps.on_stall(stall(RecoveryStep::Reset));
         assert_eq!(steps.next(published, now), Next::Begin(RecoveryStep::Reset));
         assert!(!steps.withholds(1));
-        assert_eq!((steps.next(published, now), steps.limit()), (Next::Check, None));
+        assert_eq!((steps.next(published, now), steps.limit), (Next::Check, None));
     }
 }

@@ -64,11 +64,11 @@ impl Supervisor<'_> {
             }
             RequestKind::Stop => {
                 tracing::warn!("an operator stops the robot");
-                self.state_file.state.operator_stop = true;
+                self.state.operator_stop = true;
             }
             RequestKind::Resume => {
                 tracing::warn!("an operator resumes the robot");
-                self.state_file.state.operator_stop = false;
+                self.state.operator_stop = false;
                 // A future time would void all stops until then.
                 self.resumed_ns = request.asked_ns.min(monotonic_ns());
             }
@@ -105,12 +105,11 @@ impl Supervisor<'_> {
         if !stands_by || link.is_none_or(|link| link.at_rest() != Rest::AtRest) {
             return RequestAnswer::Moves;
         }
-        let number = self.state_file.state.place.number + 1;
+        let number = self.state.place.number + 1;
         let (x_m, y_m, heading_rad) = (point.x_m, point.y_m, point.heading_rad);
         tracing::warn!(x_m, y_m, heading_rad, "an operator places the robot");
         let stamp = Default::default();
-        self.state_file.state.place =
-            PlaceSample { stamp, number, x_m, y_m, heading_rad, sigma_m, sigma_rad };
+        self.state.place = PlaceSample { stamp, number, x_m, y_m, heading_rad, sigma_m, sigma_rad };
         RequestAnswer::Taken
     }
 
@@ -121,7 +120,7 @@ impl Supervisor<'_> {
         if !points.iter().all(|point| point.is_finite()) {
             return RequestAnswer::Malformed;
         }
-        let state = &mut self.state_file.state;
+        let state = &mut self.state;
         let (number, mut zones) = state.zones.clone().unwrap_or((0, mission.zones.clone()));
         let before = zones.len();
         match points[..] {
@@ -169,7 +168,7 @@ impl Supervisor<'_> {
 
     fn replace_targets(&mut self, points: &[TargetPoint], first_tick: u64) {
         self.end_following(TargetOutcome::Followed);
-        let limit = self.recovery_steps.limit();
+        let limit = self.recovery_steps.limit;
         let since_tick = limit.map_or(first_tick, |limit| limit.last_tick + 1);
         let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
         self.targets.replace(points, (since_tick, self.mission_time().seconds()), arrival);
@@ -199,7 +198,7 @@ impl Supervisor<'_> {
             return answer;
         }
         self.replace_targets(&point, first_tick);
-        self.targets.take_in_hand();
+        self.targets.by_hand = true;
         self.hand_until = Some(Instant::now() + DEAD_MAN);
         RequestAnswer::Taken
     }
@@ -217,7 +216,7 @@ impl Supervisor<'_> {
     /// Returns the hold reason. The link may obey an operator before the supervisor does.
     pub(crate) fn why_held(&self) -> HoldReason {
         let link = self.bus.observer.record.link;
-        let stopped = self.state_file.state.operator_stop
+        let stopped = self.state.operator_stop
             || link.is_some_and(|link| link.cause() == Cause::OperatorStop);
         if stopped { HoldReason::Operator } else { self.decision.reason }
     }
@@ -233,7 +232,7 @@ impl Supervisor<'_> {
         let now_s = self.mission_time().seconds();
         let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
         tracing::info!(
-            number = self.targets.number(),
+            number = self.targets.number,
             outcome = ending.outcome.as_str(),
             reason = ending.reason,
             "the robot waits for its next target"
@@ -285,10 +284,10 @@ impl Supervisor<'_> {
     }
 
     pub(crate) fn on_new_target(&mut self) {
-        self.bus.observer.record.target_number = self.targets.number();
+        self.bus.observer.record.target_number = self.targets.number;
         self.bus.observer.record.arrival = None;
         self.arrived = None;
         // Each target has its own deadline.
-        self.state_file.state.operator_stopped_s = 0.0;
+        self.state.operator_stopped_s = 0.0;
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use common::{domain::Domain, ground_truth::GroundTruthTick, signals::Signals};
+use common::{ground_truth::GroundTruthTick, signals::Signals};
 use processes::{
     domain::DomainLock,
     last_resort::{self, Turns},
@@ -110,7 +110,7 @@ pub fn run<'a>(
     show: &mut dyn FnMut(&Progress<'_>),
 ) -> Result<(Finished, Option<StillMoving<'a>>)> {
     let turns = Turns::default();
-    let domain = Domain::of(options.robot.clone());
+    let domain = options.robot.domain();
     last_resort::watch(for_last_resort, turns.clone(), domain.clone());
     let lock = lock.insert(DomainLock::acquire(domain, options.mission.grid_frame().area())?);
     let mut supervisor =
@@ -155,9 +155,9 @@ pub fn run<'a>(
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);
     let (ended, at_rest) = (truth.last(), record.pose.as_ref());
-    let place = targets.current().position();
+    let place = targets.current.position();
     let ending = decided.ending.checked(&options.mission, place, ended, at_rest);
-    let recorded = targets.recorded();
+    let recorded = targets.recorded;
     let targets = targets.results(&ending, decided.last_tick, record.arrival.as_ref(), ended);
     for result in targets.iter().skip(recorded) {
         records::append(&options.directory, records::TARGETS, result);
@@ -171,7 +171,7 @@ pub fn run<'a>(
         truth,
         drove: supervisor.drove,
         restarts: supervisor.stages.restarts().collect(),
-        resumes: supervisor.state_file.state.resumes,
+        resumes: supervisor.state.resumes,
         replans,
         resets,
         targets,

@@ -103,8 +103,8 @@ impl Simulator {
         let pipe = process
             .take_stdout()
             .ok_or_else(|| SimulatorError::Startup("it has no output".into()))?;
-        let flags = fcntl_getfl(&pipe).map_err(|errno| system("listen to")(errno.into()))?;
-        fcntl_setfl(&pipe, flags | OFlags::NONBLOCK)
+        fcntl_getfl(&pipe)
+            .and_then(|flags| fcntl_setfl(&pipe, flags | OFlags::NONBLOCK))
             .map_err(|errno| system("listen to")(errno.into()))?;
         let file = append(directory.join(GROUND_TRUTH));
         let mut truth = GroundTruth {

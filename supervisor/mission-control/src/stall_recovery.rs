@@ -116,9 +116,9 @@ impl Supervisor<'_> {
     }
 
     pub(crate) fn publish_tick_limit(&mut self) -> Result {
-        let target_number = self.targets.number();
-        let limit = self.recovery_steps.limit();
-        let beacon = self.beacon_limit().unwrap_or(u64::MAX);
+        let target_number = self.targets.number;
+        let limit = self.recovery_steps.limit;
+        let beacon = self.state.following.map_or(u64::MAX, |_| self.beacon.last_tick);
         let limit = limit.map(|limit| TickLimitSample {
             target_number,
             last_tick: limit.last_tick.min(beacon),

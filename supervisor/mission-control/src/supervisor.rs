@@ -4,8 +4,9 @@ use std::{net::Ipv4Addr, os::fd::AsFd as _, path::PathBuf, time::Instant};
 
 use common::{
     address::Address,
+    checkpoint::Checkpoint,
     clock::{MissionTime, Pace},
-    domain::{Domain, RobotName},
+    domain::RobotName,
     ground_truth::GroundTruthTick,
     mission::Mission,
     run::Run,
@@ -31,13 +32,12 @@ use crate::{
     decisive,
     error::Result,
     follow::Beacon,
-    following::Following,
     judge::{self, Arrival, Deadline, StopClock, TickProgress},
     observer::Listener,
     order::{self, Decision},
     outcome::{Ending, Outcome},
     progress::Progress,
-    recovery::{RecoveredRun, StateFile},
+    recovery::{RecoveredRun, SupervisorState},
     recovery_step::RecoverySteps,
     run::{CAUGHT_UP_EVERY, Consumer},
     run_clock::RunClock,
@@ -106,7 +106,8 @@ pub(crate) struct Supervisor<'a> {
     pub robot: Robot,
     pub bus: BusEndpoints,
     pub listener: Listener,
-    pub state_file: StateFile,
+    checkpoint: Checkpoint,
+    pub state: SupervisorState,
     pub clock: RunClock,
     pub decision: Decision,
     /// Nanoseconds of the monotonic clock.
@@ -139,13 +140,13 @@ impl<'a> Supervisor<'a> {
     ) -> Result<Self> {
         let directory = &options.directory;
         let mission = &options.mission;
-        let mut state_file = StateFile::open(directory)?;
-        state_file.state.operator_stop |= options.stands;
-        state_file.state.place = options.place.unwrap_or(state_file.state.place);
+        let (checkpoint, mut state) = SupervisorState::open(directory)?;
+        state.operator_stop |= options.stands;
+        state.place = options.place.unwrap_or(state.place);
         let robot = Robot::start(options, signals)?;
         let clock = match &options.recovered {
             Some(run) => {
-                state_file.state.resumes += 1;
+                state.resumes += 1;
                 let (tick, seconds) = (run.first_tick, run.time.seconds());
                 tracing::warn!(tick, seconds, "the run is resumed");
                 RunClock::recovered(run)
@@ -160,18 +161,19 @@ impl<'a> Supervisor<'a> {
         };
         run.save(directory)?;
         let unchecked = clock.in_ticks().then(|| clock.first_tick(None));
-        let targets = state_file.state.targets.take();
+        let targets = state.targets.take();
         let mut targets = targets.unwrap_or_else(|| TargetList::of(mission));
         // A hand-driven robot needs a new request.
         targets.release();
-        state_file.state.following.iter_mut().for_each(Following::resumed);
+        state.following.iter_mut().for_each(|following| following.is_lost = true);
         let mut supervisor = Self {
             options,
             stages: StageProcesses::new(directory.clone(), options.starter, mission),
             robot,
             bus: BusEndpoints::open(lock)?,
             listener,
-            state_file,
+            checkpoint,
+            state,
             clock,
             decision: Decision::STARTING,
             resumed_ns: 0,
@@ -189,11 +191,11 @@ impl<'a> Supervisor<'a> {
             turns,
             service: ServiceManager::of_environment(),
         };
-        supervisor.bus.observer.record.target_number = supervisor.targets.number();
-        if supervisor.targets.waits() {
+        supervisor.bus.observer.record.target_number = supervisor.targets.number;
+        if supervisor.targets.waits {
             supervisor.await_target();
         }
-        let domain = Domain::of(options.robot.clone());
+        let domain = options.robot.domain();
         lock.link_to_run(directory, domain.run_directory())?;
         if !signals.pending() {
             consumer.attach(signals);
@@ -301,10 +303,10 @@ impl<'a> Supervisor<'a> {
             robot_answers: record.link.is_some_and(|link| link.connected == 1),
             // A user's planner need not publish a field.
             field_known: record.field_known || self.options.mission.planner.executable.is_some(),
-            operator_stop: self.state_file.state.operator_stop,
+            operator_stop: self.state.operator_stop,
             stage_held: !self.stages.held().is_empty(),
-            waits: self.targets.waits(),
-            lost: self.state_file.state.following.is_some_and(|following| following.is_lost()),
+            waits: self.targets.waits,
+            lost: self.state.following.is_some_and(|following| following.is_lost),
         });
         if decision.ready && !self.decision.ready {
             tracing::info!("all stages ready");
@@ -323,10 +325,10 @@ impl<'a> Supervisor<'a> {
     fn judge(&mut self, simulator_ended: bool) -> Option<Ending> {
         let now = self.stages.now();
         let record = &self.bus.observer.record;
-        let target = self.targets.current().position();
+        let target = self.targets.current.position();
         let newest_m = record.pose.map(|pose| target.distance(pose.pose().position));
         // A robot that follows goes on with its beacon.
-        let ends = self.targets.is_last() && !self.targets.follows();
+        let ends = self.targets.is_last() && !self.targets.follows;
         let arrival = record.arrival.filter(|_| ends).map(|command| Arrival {
             distance_m: newest_m.unwrap_or(command.distance_m),
             beside: record.beside(&command, self.options.mission.arrival_tolerance_m),
@@ -336,7 +338,7 @@ impl<'a> Supervisor<'a> {
         let collision = decisive::first_contact(self.robot.truth()).filter(|_| !goes_on);
         let time = self.mission_time();
         let stopped = self.decision.reason == HoldReason::Operator;
-        self.state_file.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
+        self.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
         judge::Snapshot {
             arrival,
             link: record.link.as_ref(),
@@ -366,14 +368,14 @@ impl<'a> Supervisor<'a> {
 
     /// Returns the current target's deadline; infinite while waiting or following.
     pub(crate) const fn deadline(&self) -> Deadline {
-        let timeout_s = match self.targets.waits() || self.targets.follows() {
+        let timeout_s = match self.targets.waits || self.targets.follows {
             true => f64::INFINITY,
             false => self.options.mission.timeout_s,
         };
         Deadline {
-            began_s: self.targets.began_s(),
+            began_s: self.targets.began_s,
             timeout_s,
-            stopped_s: self.state_file.state.operator_stopped_s,
+            stopped_s: self.state.operator_stopped_s,
         }
     }
 
@@ -390,8 +392,8 @@ impl<'a> Supervisor<'a> {
 
     /// Saves the state, then publishes order and roster, because the roster confirms requests.
     pub(crate) fn publish_state(&mut self) -> Result {
-        self.state_file.state.targets = Some(self.targets.clone());
-        if let Err(error) = self.state_file.save() {
+        self.state.targets = Some(self.targets.clone());
+        if let Err(error) = self.checkpoint.save(&self.state) {
             // Only a resuming supervisor needs the state, so the mission goes on.
             tracing::error!(%error, "cannot save the state; a supervisor that resumes this run misses the last requests");
         }
@@ -401,11 +403,11 @@ impl<'a> Supervisor<'a> {
         if let Some(following) = self.beacon.told {
             self.bus.following.publish(tick, time, following)?;
         }
-        let place = self.state_file.state.place;
+        let place = self.state.place;
         if place.number > 0 {
             self.bus.place.publish(tick, time, place)?;
         }
-        if let Some((number, zones)) = &self.state_file.state.zones {
+        if let Some((number, zones)) = &self.state.zones {
             let header = ZonesHeader { number: *number, ..ZonesHeader::default() };
             self.bus.zones.publish_slice(tick, time, header, &ZoneCorner::of(zones))?;
         }
@@ -443,7 +445,7 @@ impl<'a> Supervisor<'a> {
             record: &self.bus.observer.record,
             running: self.stages.running(),
             driving: self.decision.order() == Order::Drive,
-            straight_m: self.targets.current().position().distance(self.options.mission.start.at),
+            straight_m: self.targets.current.position().distance(self.options.mission.start.at),
         };
         show(&progress);
         self.service.show(|| progress.to_string());

@@ -68,21 +68,21 @@ struct Stored {
     tick: Option<u64>,
 }
 
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct TargetList {
-    number: u64,
-    current: TargetPoint,
+    pub(crate) number: u64,
+    pub(crate) current: TargetPoint,
     since_tick: u64,
-    began_s: f64,
+    pub(crate) began_s: f64,
     ahead: Vec<TargetPoint>,
     results: Vec<Stored>,
     /// Results in the records file, oldest first.
-    recorded: usize,
+    pub(crate) recorded: usize,
     /// Whether the current target is finished, and the robot waits.
-    waits: bool,
-    by_hand: bool,
+    pub(crate) waits: bool,
+    pub(crate) by_hand: bool,
     /// Whether the target moves with a beacon; one result covers all places.
-    follows: bool,
+    pub(crate) follows: bool,
 }
 
 impl TargetList {
@@ -94,44 +94,15 @@ impl TargetList {
             // The start is no target.
             number: u64::from(!waits),
             current: points.next().unwrap_or_default(),
-            since_tick: 0,
-            began_s: 0.0,
             ahead: points.collect(),
-            results: Vec::new(),
-            recorded: 0,
             waits,
-            by_hand: false,
-            follows: false,
+            ..Self::default()
         }
-    }
-
-    pub(crate) const fn number(&self) -> u64 {
-        self.number
-    }
-
-    pub(crate) const fn current(&self) -> &TargetPoint {
-        &self.current
-    }
-
-    pub(crate) const fn began_s(&self) -> f64 {
-        self.began_s
-    }
-
-    pub(crate) const fn recorded(&self) -> usize {
-        self.recorded
-    }
-
-    pub(crate) const fn waits(&self) -> bool {
-        self.waits
     }
 
     /// Returns whether the current target gets a result when it ends.
     pub(crate) const fn has_target(&self) -> bool {
         !self.waits && !self.by_hand && !self.follows
-    }
-
-    pub(crate) const fn follows(&self) -> bool {
-        self.follows
     }
 
     /// Follows a beacon. The first sample gives the first target.
@@ -157,10 +128,6 @@ impl TargetList {
         let (at_s, followed) = (Some(now_s), Some(followed));
         self.store(TargetResult { at_s, followed, ..result }, None);
         (self.waits, self.follows) = (true, false);
-    }
-
-    pub(crate) const fn take_in_hand(&mut self) {
-        self.by_hand = true;
     }
 
     /// Lets the robot wait without its hand. Returns whether a hand drove it.

@@ -65,12 +65,13 @@ struct Tick {
 
 #[derive(Debug, Default)]
 pub struct Collector {
-    mission: Mission,
+    pub mission: Mission,
     ticks: BTreeMap<u64, Tick>,
     pose_tick: u64,
     newest: Tick,
     pub state: RobotState,
-    usage: Vec<Usage>,
+    /// Of [`RobotState::processes`], in their order.
+    pub usage: Vec<Usage>,
     truths: VecDeque<GroundTruthTick>,
     state_of: Option<(Vec<u64>, f64)>,
     map_of: Option<u64>,
@@ -213,16 +214,6 @@ impl Collector {
         self.truths.len() < MOST_TRUTHS
     }
 
-    pub fn processes(&self) -> Vec<u32> {
-        let stages = self.state.stages.iter().map(|entry| entry.pid);
-        stages.chain([self.roster().supervisor_pid]).collect()
-    }
-
-    /// Takes the usage of [`Self::processes`], in their order.
-    pub fn used(&mut self, usage: Vec<Usage>) {
-        self.usage = usage;
-    }
-
     /// Returns the rows of newly ended ticks. A sample of the link ends a tick.
     pub fn take_rows(&mut self) -> Vec<Value> {
         let last = self.link().stamp.tick.min(self.pose_tick);
@@ -266,10 +257,6 @@ impl Collector {
 
     pub fn target(&self) -> DVec2 {
         self.state.target.map_or(self.mission.target, |sent| sent.target.position())
-    }
-
-    pub fn mission(&self) -> &Mission {
-        &self.mission
     }
 
     /// Returns a changed state of the processes, once a second if only ages differ.

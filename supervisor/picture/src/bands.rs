@@ -10,13 +10,13 @@ use super::{
 
 pub(super) struct Style {
     /// Size limit of this layer, bytes; an irregular field gets coarser.
-    pub(super) budget: usize,
+    pub budget: usize,
     /// Most samples along the longer side, enough for the width of the bands.
-    pub(super) finest: usize,
-    pub(super) bands: f64,
+    pub finest: usize,
+    pub bands: f64,
     /// Colours from the target outwards.
-    pub(super) ramp: &'static [[f64; 3]],
-    pub(super) stroke: &'static str,
+    pub ramp: &'static [[f64; 3]],
+    pub stroke: &'static str,
 }
 
 /// Pale style, with as many bands as the eye can distinguish.
@@ -40,8 +40,8 @@ const BELOW: f64 = 0.02;
 /// Levels at -step, -2 step, ..., -count step of log2 u.
 #[derive(Clone, Copy)]
 pub(super) struct Levels {
-    pub(super) step: f64,
-    pub(super) count: u32,
+    pub step: f64,
+    pub count: u32,
     ramp: &'static [[f64; 3]],
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Bands<'a> {
     lattice: Lattice,
     cells: &'a [FieldCell],
     style: &'static Style,
-    pub(super) levels: Levels,
+    pub levels: Levels,
 }
 
 impl<'a> Bands<'a> {

@@ -45,9 +45,9 @@ impl BelievedHazard {
 }
 
 pub(super) struct Blocks<'a, Kind> {
-    pub(super) lattice: &'a Lattice,
-    pub(super) side: usize,
-    pub(super) kinds: Vec<Kind>,
+    pub lattice: &'a Lattice,
+    pub side: usize,
+    pub kinds: Vec<Kind>,
 }
 
 /// Coarsens to blocks. A block with hazard cells gets their most frequent kind.

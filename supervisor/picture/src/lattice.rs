@@ -17,10 +17,10 @@ pub(super) fn around(
 
 #[derive(Clone, Copy)]
 pub(super) struct Lattice {
-    pub(super) cols: usize,
-    pub(super) rows: usize,
-    pub(super) width: f64,
-    pub(super) height: f64,
+    pub cols: usize,
+    pub rows: usize,
+    pub width: f64,
+    pub height: f64,
     /// Outer corner of the first cell, and the cell steps in both directions.
     corner: DVec2,
     step: DVec2,

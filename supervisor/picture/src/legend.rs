@@ -14,15 +14,15 @@ use super::{
 };
 
 pub(super) struct Legend<'a> {
-    pub(super) view: &'a View,
-    pub(super) levels: Option<Levels>,
-    pub(super) guidance: bool,
+    pub view: &'a View,
+    pub levels: Option<Levels>,
+    pub guidance: bool,
     /// Whether the target is unreachable from some free cells of the map.
-    pub(super) isolated: bool,
-    pub(super) hazard: Option<&'a BelievedHazard>,
-    pub(super) world: &'a Shapes,
-    pub(super) motion: &'a Motion<'a>,
-    pub(super) movers: &'a Movers<'a>,
+    pub isolated: bool,
+    pub hazard: Option<&'a BelievedHazard>,
+    pub world: &'a Shapes,
+    pub motion: &'a Motion<'a>,
+    pub movers: &'a Movers<'a>,
 }
 
 const COLUMN: f64 = PLOT_LEFT + PLOT_SIDE + 30.0;

@@ -38,8 +38,8 @@ pub(super) mod ink {
 
 pub(super) struct View {
     /// Least x and y, metres.
-    pub(super) low: DVec2,
-    pub(super) side_m: f64,
+    pub low: DVec2,
+    pub side_m: f64,
 }
 
 impl View {

@@ -11,14 +11,14 @@ use super::{
 
 pub(super) struct Style {
     /// Size limit of the lines, bytes; an irregular field gets sparser.
-    pub(super) budget: usize,
+    pub budget: usize,
     /// Spacing of lines on the sheet.
-    pub(super) spacing: f64,
+    pub spacing: f64,
     /// Least spacing in cells; the field has no detail within a cell.
-    pub(super) least_cells: f64,
-    pub(super) colour: &'static str,
+    pub least_cells: f64,
+    pub colour: &'static str,
     /// Width on the sheet, and opacity of lines and arrowheads.
-    pub(super) stroke: (f64, f64, f64),
+    pub stroke: (f64, f64, f64),
 }
 
 pub(super) const MISSION: Style = Style {

@@ -8,7 +8,7 @@ use std::{
 };
 
 use common::{
-    samples::{DeathCause, DeathSample, NextStep, name, words},
+    samples::{DeathSample, NextStep, name, words},
     start,
 };
 use serde::Serialize;
@@ -71,12 +71,7 @@ impl Death {
     }
 
     pub fn sample(&self) -> DeathSample {
-        let (cause, code) = match self.cause {
-            ExitCause::Exited(code) => (DeathCause::Exited, code),
-            ExitCause::Signalled { signal, core: false } => (DeathCause::Signalled, signal),
-            ExitCause::Signalled { signal, core: true } => (DeathCause::SignalledWithCore, signal),
-            ExitCause::Unknown => (DeathCause::Unknown, 0),
-        };
+        let (cause, code) = self.cause.coded();
         let (next, after) = match self.next {
             Next::StartNow => (NextStep::StartNow, 0.0),
             Next::StartLater { after_s } => (NextStep::StartLater, after_s),

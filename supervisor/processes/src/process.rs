@@ -13,7 +13,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{bus::close_all_on_exec, poll, stage_command, start::Generation};
+use common::{bus::close_all_on_exec, poll, samples::DeathCause, stage_command, start::Generation};
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use serde::Serialize;
 
@@ -96,13 +96,19 @@ impl From<ExitStatus> for ExitCause {
 
 impl fmt::Display for ExitCause {
     fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (cause, code) = self.coded();
+        to.write_str(&cause.in_words(code))
+    }
+}
+
+impl ExitCause {
+    /// Returns the cause and its code, as in a death sample.
+    pub(crate) const fn coded(&self) -> (DeathCause, i32) {
         match *self {
-            Self::Exited(code) => write!(to, "exit code {code}"),
-            Self::Unknown => to.write_str("ended; systemctl status says how"),
-            Self::Signalled { signal, core } => {
-                let core = if core { ", core dumped" } else { "" };
-                write!(to, "signal {signal}{core}")
-            }
+            Self::Exited(code) => (DeathCause::Exited, code),
+            Self::Signalled { signal, core: false } => (DeathCause::Signalled, signal),
+            Self::Signalled { signal, core: true } => (DeathCause::SignalledWithCore, signal),
+            Self::Unknown => (DeathCause::Unknown, 0),
         }
     }
 }

@@ -1,9 +1,6 @@
 //! Map and field at a few moments of a run. The field is computed; recordings omit it by default.
 
-use common::{
-    mission::Mission,
-    samples::{GridHeader, TargetPoint, TargetSample},
-};
+use common::{mission::Mission, samples::GridHeader};
 use glam::DVec2;
 use page::blob;
 use planner::step::Planner;
@@ -28,12 +25,7 @@ struct Belief {
 impl Belief {
     /// Returns the map's field as a message of the page, as the planner computes it.
     fn field(&self, mission: &Mission) -> Option<Vec<u8>> {
-        let mut planner = Planner::new(mission);
-        let target = TargetPoint::at(self.target);
-        let sent = TargetSample { number: 1, last: 1, target, ..TargetSample::default() };
-        planner.take_target(&sent).ok()?;
-        planner.take_grid(&self.header, &self.cells).ok()?;
-        let cells = planner.snapshot()?.cells();
+        let cells = Planner::field_to(self.target, mission, &self.header, &self.cells)?;
         let frame = self.header.part.frame();
         Some(blob::field(blob::Shown::Field, frame, &cells, self.target, self.time_s))
     }

@@ -3,7 +3,7 @@
 use std::{
     fs::File,
     io::{BufRead as _, BufReader, Lines, Read as _, Take},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use common::ground_truth::GROUND_TRUTH;
@@ -18,11 +18,7 @@ use robot_state::{Kind, Sample, TOPICS};
 use serde_json::{Map, Value, json};
 use summary::Hearer;
 
-use crate::{
-    beliefs::Beliefs,
-    measured::Measured,
-    source::{self, Source},
-};
+use crate::{beliefs::Beliefs, measured::Measured, source};
 
 const LOG: &str = "log";
 /// Maximum bytes of ground truth: an hour at 10 Hz takes 10 MB.
@@ -35,14 +31,14 @@ const MOST_MAPS: usize = 2400;
 
 #[derive(Default)]
 pub(crate) struct Content {
-    pub(crate) mission: Mission,
+    pub mission: Mission,
     /// Names and values: robot, build, machine and others.
     about: Vec<(&'static str, String)>,
-    pub(crate) remarks: Vec<String>,
-    pub(crate) summary: Map<String, Value>,
+    pub remarks: Vec<String>,
+    pub summary: Map<String, Value>,
     front: Option<usize>,
-    pub(crate) measured: Measured,
-    pub(crate) heard: Hearer,
+    pub measured: Measured,
+    pub heard: Hearer,
     collector: Collector,
     beliefs: Beliefs,
     page: Recorded,
@@ -54,10 +50,11 @@ pub(crate) struct Content {
 }
 
 impl Content {
-    pub(crate) fn read(source: &Source) -> Result<Self, RecordingError> {
-        let first = Recording::open(&source.files[0])?;
+    /// Reads the parts of a run in order; there is at least one.
+    pub(crate) fn read(files: &[PathBuf]) -> Result<Self, RecordingError> {
+        let first = Recording::open(&files[0])?;
         let mut content = Self::of(&first);
-        for file in &source.files {
+        for file in files {
             content.part(&Recording::open(file)?)?;
         }
         Ok(content)
@@ -228,11 +225,6 @@ impl Content {
 
     pub(crate) fn outcome(&self) -> Option<&str> {
         self.summary.get("outcome")?.as_str()
-    }
-
-    /// Returns the mission time of the end, seconds.
-    pub(crate) fn duration_s(&self) -> f64 {
-        self.measured.time_s
     }
 }
 

@@ -26,7 +26,7 @@ use std::{
 use common::file::FileError;
 use recording::RecordingError;
 
-use self::{content::Content, source::Source};
+use self::content::Content;
 
 pub const PAGE: &str = "report.html";
 
@@ -35,9 +35,9 @@ pub const PAGE: &str = "report.html";
 ///
 /// Default of `out`: `report` in the run's directory, or `F-report` beside the recording `F.mcap`.
 pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, RecordingError> {
-    let source = Source::find(run)?;
-    let out = out.map_or_else(|| source.default_out(), Path::to_path_buf);
-    let content = Content::read(&source)?;
+    let files = recording::files(run)?;
+    let out = out.map_or_else(|| source::default_out(run, &files[0]), Path::to_path_buf);
+    let content = Content::read(&files)?;
     fs::create_dir_all(&out).map_err(FileError::of("make", &out))?;
     let page = out.join(PAGE);
     fs::write(&page, html(content)).map_err(|error| {

@@ -7,11 +7,11 @@ use common::{
 
 #[derive(Default)]
 pub(crate) struct Measured {
-    pub(crate) ticks: u64,
+    pub ticks: u64,
     /// Mission time of the newest pose, seconds.
-    pub(crate) time_s: f64,
-    pub(crate) path_m: f64,
-    pub(crate) last_pose: Option<PoseSample>,
+    pub time_s: f64,
+    pub path_m: f64,
+    pub last_pose: Option<PoseSample>,
     last_speed: Option<f64>,
     speed_change: f64,
     changes: u64,
@@ -19,7 +19,7 @@ pub(crate) struct Measured {
     unavailable: u64,
     near: u64,
     /// Hits on the map.
-    pub(crate) safety_events: u64,
+    pub safety_events: u64,
 }
 
 impl Measured {

@@ -54,7 +54,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
         |name, field, measured, digits, unit| row(name, field, of(field, measured), digits, unit);
     let count = |value: u64| Some(value as f64);
     let pose = measured.last_pose.as_ref();
-    let time = has_poses.then_some(content.duration_s());
+    let time = has_poses.then_some(measured.time_s);
     let [rms, within] = [PoseSample::position_rms_m, PoseSample::position_within_m];
     vec![
         json!(["success", success, "outcome"]),

@@ -3,32 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use common::{file, run::Run};
-use recording::{Recording, RecordingError};
+use recording::Recording;
 use serde_json::{Map, Value};
 
 /// Greatest size of a summary, bytes; real ones take 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
-pub(crate) struct Source {
-    /// Parts of the run in order; never empty.
-    pub(crate) files: Vec<PathBuf>,
-    is_run: bool,
-}
-
-impl Source {
-    pub(crate) fn find(run: &Path) -> Result<Self, RecordingError> {
-        Ok(Self { files: recording::files(run)?, is_run: run.is_dir() })
+/// Returns the default directory of the report of `run`, which begins with `file`.
+pub(crate) fn default_out(run: &Path, file: &Path) -> PathBuf {
+    if run.is_dir() {
+        return file.with_file_name("report");
     }
-
-    pub(crate) fn default_out(&self) -> PathBuf {
-        let file = &self.files[0];
-        if self.is_run {
-            return file.with_file_name("report");
-        }
-        let mut name = file.file_stem().unwrap_or_default().to_owned();
-        name.push("-report");
-        file.with_file_name(name)
-    }
+    let mut name = file.file_stem().unwrap_or_default().to_owned();
+    name.push("-report");
+    file.with_file_name(name)
 }
 
 pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {

@@ -7,7 +7,7 @@ use common::{
 use mission_control::Heard;
 use recording::Recording;
 
-use crate::{content::Content, html, source::Source};
+use crate::{content::Content, html};
 
 #[allow(unreachable_pub, reason = "the system tests share it")]
 #[path = "../../../tests/support/recorded_page.rs"]
@@ -16,7 +16,7 @@ use recorded_page::messages;
 
 fn golden() -> Content {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
-    Content::read(&Source::find(Path::new(file)).unwrap()).unwrap()
+    Content::read(&recording::files(Path::new(file)).unwrap()).unwrap()
 }
 
 #[test]

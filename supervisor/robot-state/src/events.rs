@@ -64,7 +64,7 @@ pub(crate) struct Events {
     /// Generation of each stage seen to run.
     running: Vec<(String, u32)>,
     /// Mission time of the newest pose, seconds, for new processes.
-    pub(crate) now_s: f64,
+    pub now_s: f64,
     at_s: f64,
 }
 

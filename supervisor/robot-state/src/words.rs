@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use common::samples::{Action, Cause, DeathCause, DeathSample, GuidanceStatus, LinkSample};
+use common::samples::{Action, Cause, DeathSample, GuidanceStatus, LinkSample};
 
 /// Returns the name of a variant in words: `CommandStale` as `command stale`.
 pub fn words(variant: impl Debug) -> String {
@@ -28,13 +28,7 @@ pub const fn guidance_in_words(status: u8) -> &'static str {
 }
 
 pub fn death_in_words(death: &DeathSample) -> String {
-    let code = death.code;
-    match death.cause() {
-        DeathCause::Exited => format!("exit code {code}"),
-        DeathCause::Signalled => format!("signal {code}"),
-        DeathCause::SignalledWithCore => format!("signal {code}, core dumped"),
-        DeathCause::Unknown => "ended; systemctl status says how".to_owned(),
-    }
+    death.cause().in_words(death.code)
 }
 
 pub fn failsafe_in_words(link: &LinkSample) -> String {

@@ -32,8 +32,8 @@ pub struct Hearer {
 pub(crate) struct Interruptions {
     has_gone: bool,
     newest: Option<(Action, Cause)>,
-    pub(crate) stops: BTreeMap<String, u32>,
-    pub(crate) slowed: BTreeMap<String, u32>,
+    pub stops: BTreeMap<String, u32>,
+    pub slowed: BTreeMap<String, u32>,
 }
 
 impl Interruptions {

@@ -128,11 +128,11 @@ pub fn main(arguments: &Arguments) -> Result {
     in_parallel((0..all).collect(), arguments.jobs.max(1), one, |(is_right, line)| {
         right += u64::from(is_right);
         if !is_right {
-            print_text(&format!("{line}\n"))?;
+            print_text(format!("{line}\n"))?;
         }
         Ok(())
     })?;
-    print_text(&format!("findings of {right} of {all} robots are right\n"))?;
+    print_text(format!("findings of {right} of {all} robots are right\n"))?;
     (right == all)
         .then_some(())
         .ok_or_else(|| "the findings missed a fault or named one that does not exist".into())

@@ -78,7 +78,7 @@ pub fn main(arguments: &Arguments) -> Result {
         let page = out.join("certificate.md");
         fs::write(&page, certificate(&rows.rows)).or_cannot_file("write", &page)?;
     }
-    print_text(&certificate(&rows.rows))?;
+    print_text(certificate(&rows.rows))?;
     match rows.rows[before..].iter().map(|row| row.lost).sum::<u64>() {
         0 => Ok(()),
         lost => Err(format!(

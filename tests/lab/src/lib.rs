@@ -71,7 +71,7 @@ fn text(report: &impl Serialize) -> String {
 
 fn print(report: &impl Serialize, json: bool) -> error::Result {
     let text = if json { serde_json::to_string(report)? } else { text(report) };
-    Ok(console::output::print_text(&format!("{text}\n"))?)
+    console::output::print_text(format!("{text}\n"))
 }
 
 pub fn main() -> ExitCode {

@@ -67,7 +67,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut simulator = simulated(out, &missions::load(mission, set)?, Pace::Rate(1.0))?;
     let stated = |keys: &[String]| missions::load(mission, keys);
     let robot = Ros2Robot::start(simulator.address(), 0, 1.0, stated)?;
-    print_text(&robot.keys.iter().map(|key| format!("--set={key}\n")).collect::<String>())?;
+    print_text(robot.keys.iter().map(|key| format!("--set={key}\n")).collect::<String>())?;
     while simulator.poll()? {
         std::thread::sleep(LOOK);
     }

@@ -74,7 +74,7 @@ pub fn main(arguments: &Arguments) -> Result {
         }
     }
     let Source { fixes, turns, .. } = source;
-    Ok(print_text(&format!("published {fixes} fixes and {turns} turns\n"))?)
+    print_text(format!("published {fixes} fixes and {turns} turns\n"))
 }
 
 type Writers = (Writer<FixSample>, Writer<TurnSample>);

@@ -271,15 +271,15 @@ impl RawService {
 }
 
 pub(super) struct Loan<'a> {
-    pub(super) header: *mut CustomHeaderMarker,
-    pub(super) elements: &'a mut [MaybeUninit<CustomPayloadMarker>],
+    pub header: *mut CustomHeaderMarker,
+    pub elements: &'a mut [MaybeUninit<CustomPayloadMarker>],
 }
 
 #[derive(Debug)]
 pub(super) struct RawPublisher {
     port: PublisherPort,
     places: Places,
-    pub(super) topic: &'static str,
+    pub topic: &'static str,
 }
 
 impl RawPublisher {

@@ -37,7 +37,7 @@ pub(crate) struct Contacts {
     high_and_rolls_s: [f64; 2],
     /// Held wheels, and since when.
     held: Option<([bool; 2], MissionTime)>,
-    pub(crate) new: Option<ContactSample>,
+    pub new: Option<ContactSample>,
 }
 
 impl Contacts {

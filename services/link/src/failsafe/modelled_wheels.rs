@@ -10,9 +10,9 @@ const AS_WHEELS: f64 = 0.01;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Axle {
-    pub(crate) counts_per_m: f64,
+    pub counts_per_m: f64,
     /// None for a car, whose second channel steers.
-    pub(crate) track_m: Option<f64>,
+    pub track_m: Option<f64>,
 }
 
 impl From<&Body> for Axle {
@@ -44,8 +44,8 @@ impl Axle {
 /// counts/s^2.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
-    pub(super) are_apart: bool,
-    pub(super) most: [f64; 2],
+    pub are_apart: bool,
+    pub most: [f64; 2],
 }
 
 impl Limits {

@@ -68,19 +68,19 @@ const TURN: usize = 2;
 /// Motion that a response must explain to end a suspicion, besides that of a wheel before it died.
 #[derive(Clone, Copy)]
 pub(super) struct Suspected {
-    pub(super) channel: usize,
+    pub channel: usize,
     /// Start of the evidence, seconds.
-    pub(super) from_s: f64,
+    pub from_s: f64,
 }
 
 #[derive(Clone, Copy)]
 pub(super) struct Alike {
     /// Response that stops last from top speed.
-    pub(super) slowest: Response,
+    pub slowest: Response,
     /// Shortest stopping distance among them, metres.
-    pub(super) stops_within_m: f64,
+    pub stops_within_m: f64,
     /// Whether the alike responses differ little.
-    pub(super) are_told_apart: bool,
+    pub are_told_apart: bool,
 }
 
 /// Returns whether deviation `unlike` is far better than `other`.

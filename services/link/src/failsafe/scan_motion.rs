@@ -65,7 +65,7 @@ pub(super) fn best(delays_s: &[f64], better: &[f64], least: f64) -> Option<f64> 
 
 #[derive(Clone, Debug)]
 pub(super) struct ScanMotion {
-    pub(super) row: usize,
+    pub row: usize,
     sensor: Sensor,
     /// Recent scans. The newest is judged once later poses are known.
     scans: VecDeque<(f64, Vec<f32>)>,

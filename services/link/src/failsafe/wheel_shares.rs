@@ -95,8 +95,8 @@ fn curve([left, right]: [f64; 2]) -> f64 {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct WheelRatio {
-    pub(crate) ratio: f64,
-    pub(crate) deviation: f64,
+    pub ratio: f64,
+    pub deviation: f64,
 }
 
 impl WheelRatio {

@@ -21,8 +21,8 @@ use super::{Line, stream::Dial};
 
 #[derive(Debug)]
 pub(super) struct Serial {
-    pub(super) path: PathBuf,
-    pub(super) line: Line,
+    pub path: PathBuf,
+    pub line: Line,
 }
 
 /// Lowers DTR, if the line has it; pseudo-terminals do not.

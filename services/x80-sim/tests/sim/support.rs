@@ -31,7 +31,7 @@ pub(crate) fn mission(text: &str) -> Mission {
 }
 
 pub(crate) struct Sim {
-    pub(crate) listening: String,
+    pub listening: String,
     /// Lines, read as they come: a robot waits for a slow reader.
     ground_truth: Receiver<String>,
     stop: Option<UnixStream>,

@@ -13,9 +13,9 @@ use common::{
 };
 use console::{
     consent,
-    failure::{Refused, Result},
+    failure::{Result, refuse},
     missions,
-    output::{print_text, write_stderr},
+    output::{print_line, print_text, say},
 };
 use picture::points_svg;
 use recording::Recording;
@@ -84,12 +84,12 @@ pub fn main(arguments: &Arguments) -> Result {
             "picture": picture,
             "directory": directory,
         });
-        print_text(&format!("{object}\n"))?;
+        print_line(object)?;
     } else {
         for finding in &found {
-            print_text(&line(finding))?;
+            print_text(line(finding))?;
         }
-        print_text(&format!("picture: {}\n", picture.display()))?;
+        print_line(format_args!("picture: {}", picture.display()))?;
     }
     let file = arguments.mission.as_deref().filter(|_| arguments.write);
     let keys: Vec<_> = found.iter().flat_map(|finding| finding.keys.iter()).collect();
@@ -98,7 +98,7 @@ pub fn main(arguments: &Arguments) -> Result {
     {
         let text = written::with_keys(&Mission::read(file.as_ref())?, &keys)?;
         replace(file.as_ref(), text).map_err(FileError::of("write", file.as_ref()))?;
-        write_stderr(&format!("firsthand: {} keys were written to {file}\n", keys.len()));
+        say(format_args!("{} keys were written to {file}", keys.len()));
     }
     judged(&found)
 }
@@ -106,16 +106,17 @@ pub fn main(arguments: &Arguments) -> Result {
 fn judged(found: &[Finding]) -> Result {
     if found.iter().all(|finding| finding.verdict == Verdict::Unknown) {
         let message = "nothing was measured: the robot did not move, or its sensors reported nothing; see the link's log in the run directory";
-        return Err(Refused::new("nothing-measured", message).into());
+        return refuse("nothing-measured", message);
     }
     let wrong = found.iter().filter(|finding| finding.verdict == Verdict::Wrong).count();
     match wrong {
         0 => Ok(()),
-        _ => Err(Refused::new(
+        _ => refuse(
             "not-as-stated",
-            format!("findings that contradict the mission: {wrong}; correct the robot or change the keys, then repeat"),
-        )
-        .into()),
+            format!(
+                "findings that contradict the mission: {wrong}; correct the robot or change the keys, then repeat"
+            ),
+        ),
     }
 }
 

@@ -4,7 +4,7 @@ mod gyro;
 mod response;
 mod written;
 
-use std::path::PathBuf;
+use std::{fmt::Display, path::PathBuf};
 
 use calibration::{loops, shell::Drive, squares, wall::State};
 use clap::Args;
@@ -138,7 +138,7 @@ fn share(text: &str) -> std::result::Result<f64, String> {
     share.ok_or_else(|| "give a share from 0 to 0.1: 0.01 is 1 %".to_owned())
 }
 
-fn refused(message: &str) -> Failure {
+fn refused(message: impl Display) -> Failure {
     Refused::new("not-calibrated", format!("nothing was written: {message}")).into()
 }
 
@@ -150,21 +150,21 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
         arguments.setting.carry_out(&mission, "calibration")?;
     let place = directory.display();
     let Some(Drive::Wall(wall)) = Drive::of_run(&directory)? else {
-        return Err(refused(&format!(
+        return Err(refused(format_args!(
             "the planner of the run in {place} saved nothing; repeat the calibration"
         )));
     };
     match wall.state() {
         State::Finished => {}
-        State::Failed(fault) => return Err(refused(&fault.to_string())),
+        State::Failed(fault) => return Err(refused(fault)),
         State::Running => {
-            return Err(refused(&format!(
+            return Err(refused(format_args!(
                 "the run in {place} ended too early; repeat the calibration"
             )));
         }
     }
-    let (estimate, _) = loops::checked(&wall.loops, wall.normal_sd(), body.track_m)
-        .map_err(|refusal| refused(&refusal.to_string()))?;
+    let (estimate, _) =
+        loops::checked(&wall.loops, wall.normal_sd(), body.track_m).map_err(refused)?;
     let metres = wall.metres();
     Ok(Found { method: "wall", before, estimate, metres, seconds })
 }
@@ -213,7 +213,6 @@ fn by_squares(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
         };
         driven.push(squares::Driven { ways, end });
     }
-    let estimate =
-        squares::checked(&driven, body.track_m).map_err(|refusal| refused(&refusal.to_string()))?;
+    let estimate = squares::checked(&driven, body.track_m).map_err(refused)?;
     Ok(Found { method: "squares", before, estimate, metres, seconds })
 }

@@ -2,7 +2,7 @@ use clap::Args;
 use common::mission::{Mission, Sensor, SensorKind};
 use console::{
     failure::Result,
-    output::{print_text, write_stderr},
+    output::{print_text, say},
 };
 use link::failsafe::stop_distance::{self, Stop};
 use mission_control::outcome::RIGHT_PLACE_M;
@@ -37,7 +37,7 @@ pub struct Arguments {
 pub fn main(arguments: &Arguments) -> Result {
     let mission = super::run::ready(&arguments.mission, &arguments.set)?;
     for remark in &mission.remarks {
-        write_stderr(&format!("firsthand: {remark}\n"));
+        say(remark);
     }
     let frame = mission.grid_frame();
     let mut text = format!(
@@ -63,7 +63,7 @@ pub fn main(arguments: &Arguments) -> Result {
         );
     }
     text += &unseen(&mission).unwrap_or_default();
-    Ok(print_text(&text)?)
+    print_text(text)
 }
 
 /// Describes heights that the body can touch and no forward sensor sees at [`AHEAD_M`], as in the

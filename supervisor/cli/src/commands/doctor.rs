@@ -11,7 +11,7 @@ use std::{
 
 use clap::Args;
 use common::{VERSION, clock::monotonic_ns, domain::Domain};
-use console::{failure::Result, missions, output::print_text, robots};
+use console::{failure::Result, missions, output::print_line, robots};
 use processes::{DomainError, domain, executable};
 use rustix::{
     fs::{Access, access},
@@ -38,11 +38,11 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let mut is_ill = false;
     let mut tell = |check: &str, (verdict, text): Verdict| {
         is_ill |= verdict == "problem";
-        print_text(&if arguments.json {
-            format!("{}\n", json!({ "check": check, "verdict": verdict, "text": text }))
+        if arguments.json {
+            print_line(json!({ "check": check, "verdict": verdict, "text": text }))
         } else {
-            format!("{verdict:<8} {check}: {text}\n")
-        })
+            print_line(format_args!("{verdict:<8} {check}: {text}"))
+        }
     };
     let clocks_s = || {
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();

@@ -7,8 +7,8 @@ use common::{domain::RobotName, samples::TargetPoint};
 use mission_control::{operator, outcome::Outcome};
 
 use console::{
-    failure::{Refused, Result},
-    output::print_text,
+    failure::{Result, refuse},
+    output::print_line,
     robots::Robot,
     runs::{Results, Target},
 };
@@ -86,7 +86,7 @@ fn await_result(
         let goes_on = Robot::find(robot.clone()).run.as_deref() == Some(run);
         let is_its = |it: &Target| (it.x_m, it.y_m) == (target.x_m, target.y_m);
         if let Some(result) = results.take().into_iter().find(is_its) {
-            print_text(&format!("{}\n", result.outcome.replace('_', " ")))?;
+            print_line(result.outcome.replace('_', " "))?;
             // Target outcomes share a run's names; others, such as `replaced`, have no exit code.
             let outcome = serde_json::from_value::<Outcome>(result.outcome.into());
             return Ok(outcome.map_or(ExitCode::FAILURE, |outcome| outcome.exit_code().into()));
@@ -98,11 +98,11 @@ fn await_result(
     }
 }
 
-pub fn points(places: &[f64]) -> Result<Vec<TargetPoint>, Refused> {
+pub fn points(places: &[f64]) -> Result<Vec<TargetPoint>> {
     let (places, rest) = places.as_chunks::<2>();
     if !rest.is_empty() {
         let message = format!("{} is an X without a Y; give two numbers for each place", rest[0]);
-        return Err(Refused::new("no-target", message));
+        return refuse("no-target", message);
     }
     let point = |&[x_m, y_m]: &[f64; 2]| TargetPoint { x_m, y_m, ..TargetPoint::default() };
     Ok(places.iter().map(point).collect())

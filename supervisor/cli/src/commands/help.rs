@@ -117,21 +117,20 @@ pub fn main(arguments: &Arguments, mut whole: Command) -> Result {
         && let Some(page) = page(name)
     {
         let text = terminal_width().map_or(page.text.to_owned(), |width| wrapped(page.text, width));
-        return Ok(print_text(&text)?);
+        return print_text(text);
     }
     // Usage lines are complete only after `build`.
     whole.build();
     match subcommand(&mut whole, &arguments.page) {
-        Some(command) => print_text(&command.render_long_help().to_string())?,
+        Some(command) => print_text(command.render_long_help()),
         None => {
             let name = arguments.page.join(" ");
             let message = format!(
                 "{name:?} is neither a page of the guide nor a subcommand; `firsthand help` lists both"
             );
-            whole.error(ErrorKind::InvalidValue, message).exit();
+            whole.error(ErrorKind::InvalidValue, message).exit()
         }
     }
-    Ok(())
 }
 
 /// Returns `None` without a terminal: other programs get raw Markdown.

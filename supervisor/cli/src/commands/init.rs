@@ -14,9 +14,9 @@ use common::{
     poll, run::Run,
 };
 use console::{
-    failure::{Refused, Result},
+    failure::{Result, refuse},
     missions,
-    output::{print_text, write_stderr},
+    output::{print_line, say},
     robots,
 };
 use link::transport::Transport;
@@ -56,7 +56,7 @@ pub fn main(Arguments { address, out, protocol, robot }: &Arguments) -> Result {
     let place = out.display();
     if out.exists() {
         let message = format!("{place} exists; give another file with --out");
-        return Err(Refused::new("file-exists", message).into());
+        return refuse("file-exists", message);
     }
     let seen = match (protocol, address) {
         (Some(protocol), _) => Seen::new(*protocol)?,
@@ -69,13 +69,13 @@ pub fn main(Arguments { address, out, protocol, robot }: &Arguments) -> Result {
     let written = File::create_new(out).and_then(|mut file| file.write_all(text.as_bytes()));
     written.map_err(FileError::of("write", out))?;
     let said: String = text.split_inclusive('\n').filter(|line| line.starts_with("# -")).collect();
-    Ok(print_text(&format!(
-        "{said}wrote {place}; next:\n  1. correct its lines with MEASURE and PLACEHOLDER\n  2. firsthand check {place}\n  3. firsthand bring-up {place} --robot {robot} --write\n"
-    ))?)
+    print_line(format_args!(
+        "{said}wrote {place}; next:\n  1. correct its lines with MEASURE and PLACEHOLDER\n  2. firsthand check {place}\n  3. firsthand bring-up {place} --robot {robot} --write"
+    ))
 }
 
 fn heard(address: &Address<String>) -> Result<Seen> {
-    let refused = |code, why: String| Err(Refused::new(code, format!("{address}: {why}")).into());
+    let refused = |code, why: String| refuse(code, format!("{address}: {why}"));
     let resolved = address.resolve()?;
     let mut runs = robots::own().into_iter().filter_map(|robot| Run::load(&robot.run?).ok());
     if let Some(Run { robot, .. }) = runs.find(|run| run.address == resolved) {
@@ -84,7 +84,7 @@ fn heard(address: &Address<String>) -> Result<Seen> {
             format!("robot {robot} runs here and has it; end its run first"),
         );
     }
-    write_stderr(&format!("firsthand: asking {address}, for 12 s at most\n"));
+    say(format_args!("asking {address}, for 12 s at most"));
     let (mut first, mut refusal) = (Vec::new(), String::new());
     for protocol in [Protocol::Json, Protocol::X80, Protocol::Arduino] {
         let mut seen = Seen::new(protocol)?;

@@ -11,8 +11,8 @@ use thiserror::Error;
 
 use console::{
     consent,
-    failure::{Refused, Result},
-    output::print_text,
+    failure::{Result, refuse},
+    output::print_line,
 };
 
 /// Make this executable a systemd service: units, user, configuration.
@@ -82,11 +82,11 @@ pub fn main(arguments: &Arguments) -> Result {
     }
     let mut changed = Vec::new();
     for part in &PARTS {
-        let text = part.text_for(&executable);
+        let text = part.text.replace(PACKAGED, &executable.to_string_lossy());
         let file = arguments.root.join(part.path);
         let (name, there) = (file.display(), fs::read_to_string(&file).ok());
         if arguments.print {
-            print_text(&format!("# {name}\n{text}\n"))?;
+            print_line(format_args!("# {name}\n{text}"))?;
             continue;
         }
         let becomes = match there {
@@ -94,7 +94,7 @@ pub fn main(arguments: &Arguments) -> Result {
             Some(_) => "will be replaced",
             None => "is new",
         };
-        print_text(&format!("{name} {becomes}\n"))?;
+        print_line(format_args!("{name} {becomes}"))?;
         if becomes != "stays as it is" {
             changed.push((file, text));
         }
@@ -105,11 +105,11 @@ pub fn main(arguments: &Arguments) -> Result {
     for (file, text) in &changed {
         put(file, text)?;
     }
-    Ok(print_text(&format!("# Then:\n{}\n", remaining()))?)
+    print_line(format_args!("# Then:\n{}", remaining()))
 }
 
 /// Refuses an executable that a service could not start.
-fn refuse_hidden(executable: &Path) -> Result<(), Refused> {
+fn refuse_hidden(executable: &Path) -> Result {
     if !HIDDEN.iter().any(|hidden| executable.starts_with(hidden)) {
         return Ok(());
     }
@@ -118,13 +118,7 @@ fn refuse_hidden(executable: &Path) -> Result<(), Refused> {
         "{executable} lies in a home directory, which a service cannot read; `sudo install {executable} /usr/local/bin/`, then \
          `sudo /usr/local/bin/firsthand install`"
     );
-    Err(Refused::new("home-directory", message))
-}
-
-impl Part {
-    fn text_for(&self, executable: &Path) -> String {
-        self.text.replace(PACKAGED, &executable.to_string_lossy())
-    }
+    refuse("home-directory", message)
 }
 
 fn put(file: &Path, text: &str) -> Result<(), InstallError> {

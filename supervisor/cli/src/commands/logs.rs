@@ -10,7 +10,7 @@ use common::{domain::RobotName, follower::Event};
 
 use self::merged::Logs;
 use console::{
-    failure::{Refused, Result},
+    failure::{Result, refuse},
     operator,
     robots::Robot,
     runs,
@@ -57,11 +57,8 @@ pub fn main(arguments: &Arguments) -> Result {
 
 fn newest(arguments: &Arguments) -> Option<PathBuf> {
     let robot = &arguments.robot;
-    Robot::find(robot.clone()).run.or_else(|| {
-        let runs = runs::list(&arguments.runs).into_iter();
-        let newest = runs.filter(|run| run.robot == *robot).max();
-        newest.map(|run| run.directory)
-    })
+    let current = Robot::find(robot.clone()).run;
+    current.or_else(|| Some(runs::newest(&arguments.runs, robot)?.directory))
 }
 
 fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs> {
@@ -71,7 +68,7 @@ fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs> {
     if let Some(stage) = stage.filter(|stage| !processes.iter().any(|it| it == stage)) {
         let (directory, there) = (directory.display(), processes.join(", "));
         let message = format!("{stage:?} has no log in {directory}; there are {there}");
-        return Err(Refused::new("unknown-process", message).into());
+        return refuse("unknown-process", message);
     }
     Ok(Logs::of(directory, stage))
 }

@@ -14,7 +14,7 @@ use console::{failure::Result, output::print_text};
 pub struct Arguments {}
 
 pub fn main(_: &Arguments, whole: Command) -> Result {
-    Ok(print_text(&String::from_utf8_lossy(&page(whole)?))?)
+    print_text(String::from_utf8_lossy(&page(whole)?))
 }
 
 fn page(mut whole: Command) -> io::Result<Vec<u8>> {

@@ -6,7 +6,7 @@ use recording::Recording;
 
 use console::{
     failure::{Refused, Result},
-    output::print_text,
+    output::print_line,
 };
 
 /// Save maps in the format of the ROS map_server.
@@ -48,5 +48,5 @@ pub fn main(arguments: &Arguments) -> Result {
     })?;
     let mission = &recording.run.mission;
     maps::save_believed(out, mission, &frame, grid.cells())?;
-    Ok(print_text(&format!("{}\n", out.display()))?)
+    print_line(out.display())
 }

@@ -3,7 +3,7 @@ use clap::Args;
 use console::{
     failure::Result,
     missions::{self, LookupError, SHIPPED},
-    output::print_text,
+    output::{print_line, print_text},
 };
 
 /// List the shipped missions, or print one as a template.
@@ -18,11 +18,11 @@ pub fn main(arguments: &Arguments) -> Result {
     if let Some(name) = &arguments.name {
         let text =
             missions::shipped(name).ok_or_else(|| LookupError::Unknown { name: name.clone() })?;
-        return Ok(print_text(text)?);
+        return print_text(text);
     }
     for (name, _) in SHIPPED {
         let description = missions::load(name, &[])?.description;
-        print_text(&format!("{name:<18} {description}\n"))?;
+        print_line(format_args!("{name:<18} {description}"))?;
     }
     Ok(())
 }

@@ -8,13 +8,7 @@ use std::{
 };
 
 use clap::Args;
-use common::{
-    domain::{Domain, RobotName},
-    file::FileError,
-    poll,
-    signals::Signals,
-    start::become_child,
-};
+use common::{domain::RobotName, file::FileError, poll, signals::Signals, start::become_child};
 use recording::{
     Options,
     recorder::{Happened, Wish, Wishes},
@@ -23,7 +17,7 @@ use recording::{
 use super::topic::readable;
 use console::{
     failure::Result,
-    output::{print_text, write_stderr},
+    output::{print_line, say},
 };
 
 /// Record the topics of a robot until Ctrl-C, across runs.
@@ -130,7 +124,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let chosen = arguments.topics.as_ref();
     let chosen = chosen.map(|names| names.iter().map(|name| readable(name)).collect::<Result<_>>());
     let options = Options {
-        domain: Domain::of(arguments.robot.clone()),
+        domain: arguments.robot.domain(),
         out: arguments.out.clone(),
         topics: chosen.transpose()?,
         fields: arguments.fields,
@@ -143,15 +137,15 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut tell = |happened: Happened<'_>| {
         let printed = match happened {
             Happened::Attached(file) => {
-                print_text(&format!("recording {} into {}\n", arguments.robot, file.display()))
+                print_line(format_args!("recording {} into {}", arguments.robot, file.display()))
             }
-            Happened::CaughtUp => print_text("caught up\n"),
+            Happened::CaughtUp => print_line("caught up"),
             Happened::Complete(file, lost) => {
-                print_text(&format!("{}: complete, {lost} samples lost\n", file.display()))
+                print_line(format_args!("{}: complete, {lost} samples lost", file.display()))
             }
         };
         if let Err(error) = printed {
-            write_stderr(&format!("firsthand: cannot print the state of the recording: {error}\n"));
+            say(format_args!("cannot print the state of the recording: {error}"));
         }
     };
     let supervisor = match arguments.supervisor {

@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use console::{failure::Result, output::print_text};
+use console::{failure::Result, output::print_line};
 
 /// Write a run as the robot's page, in one self-contained file.
 ///
@@ -21,5 +21,5 @@ pub struct Arguments {
 
 pub fn main(arguments: &Arguments) -> Result {
     let page = report::write(&arguments.run, arguments.out.as_deref())?;
-    Ok(print_text(&format!("{}\n", page.display()))?)
+    print_line(page.display())
 }

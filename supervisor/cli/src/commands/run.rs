@@ -23,7 +23,6 @@ use glam::DVec2;
 use link::transport::SPEAKS_ROS2;
 use mission_control::{
     Consumer, Finished, Options, Progress,
-    outcome::Ending,
     recovery::{self, RecoveredRun},
 };
 use processes::{Starter, planner_executable};
@@ -32,9 +31,9 @@ use summary::{Hearer, Summary};
 use self::{recorder::RunRecorder, summary_file::SummaryFile};
 use super::{record::DiskBudget, run_report, stage::OTHER_PLANNERS};
 use console::{
-    failure::{Refused, Result},
+    failure::{Refused, Result, refuse},
     logging, missions,
-    output::{print_text, write_stderr},
+    output::{json_lines, print, print_line, say, write_stderr},
     progress_line::{LINE_EVERY, ProgressLine},
     robots::SUPERVISOR_LOG,
     runs,
@@ -144,7 +143,7 @@ fn options(arguments: &Arguments) -> Result<Options> {
                 return Ok(Options { stands, ..options });
             }
             Err(problem) => {
-                write_stderr(&format!("firsthand: the last run ends here: {problem}\n"));
+                say(format_args!("the last run ends here: {problem}"));
             }
         }
         is_cut_off = true;
@@ -192,7 +191,7 @@ fn tell_place(place: Option<&(PlaceSample, f64)>, stands: bool) {
     });
     let place = place.unwrap_or("the pose of the robot is unknown".to_owned());
     let until = if stands { "; it stands until `firsthand resume`" } else { "" };
-    write_stderr(&format!("firsthand: {place}; `firsthand place` corrects it{until}\n"));
+    say(format_args!("{place}; `firsthand place` corrects it{until}"));
 }
 
 fn resumed(arguments: &Arguments, directory: PathBuf) -> Result<Options> {
@@ -242,14 +241,14 @@ pub fn ready(name: &str, set: &[String]) -> Result<Mission> {
         let message = format!(
             "robot.address: {device} does not exist; plug in its adapter, or name another (`ls -l /dev/serial/by-id`)"
         );
-        return Err(Refused::new("no-device", message).into());
+        return refuse("no-device", message);
     }
     planner_executable::resolve(&mut mission, OTHER_PLANNERS)?;
     refuse_without_memory(&mission)?;
     Ok(mission)
 }
 
-fn refuse_without_memory(mission: &Mission) -> Result<(), Refused> {
+fn refuse_without_memory(mission: &Mission) -> Result {
     /// Memory of all processes per cell, bytes: 1.84 GiB at 4096 x 4096.
     const PER_CELL: u64 = 118;
     let memory = fs::read_to_string("/proc/meminfo").unwrap_or_default();
@@ -263,15 +262,15 @@ fn refuse_without_memory(mission: &Mission) -> Result<(), Refused> {
     let message = format!(
         "perimeter.cells: {cells} x {cells} cells need more memory than this machine has free; give {most} or fewer"
     );
-    Err(Refused::new("mission", message))
+    refuse("mission", message)
 }
 
-fn refuse_unspoken(mission: &Mission) -> Result<(), Refused> {
+fn refuse_unspoken(mission: &Mission) -> Result {
     if mission.robot.protocol() != Protocol::Ros2 || SPEAKS_ROS2 {
         return Ok(());
     }
     let message = "robot.protocol: this executable is built without ROS 2; build it with `cargo build --release --features ros2`";
-    Err(Refused::new("mission", message))
+    refuse("mission", message)
 }
 
 pub fn main(arguments: &Arguments) -> Result<ExitCode> {
@@ -304,33 +303,32 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             drop(recorder);
             drop(lock);
             made_for_nothing();
-            write_stderr("firsthand: `firsthand doctor` examines this machine\n");
+            say("`firsthand doctor` examines this machine");
             return Err(error.into());
         }
     };
     line.end();
     let summary = Summary::new(&options.mission, &finished, &heard.borrow());
-    let json = serde_json::to_string(&summary)?;
-    let text = if arguments.json { format!("{json}\n") } else { summary.to_string() };
-    complain(print_text(&text).map_err(|error| format!("cannot print the summary: {error}")));
+    let printed = print(&summary, arguments.json);
+    complain(printed.map_err(|error| format!("cannot print the summary: {error}")));
     let may_be_removed = may_be_removed(arguments, &options, &finished);
     if !may_be_removed {
-        complain(summary_file.write(&format!("{json}\n")));
+        complain(summary_file.write(&json_lines(&[&summary])?));
     }
     if let Some(robot) = still_moving {
-        write_stderr(
-            "firsthand: THE ROBOT MOVES although every stop method was tried; its link keeps ordering the stop; Ctrl-C hands that over to its stop guard\n",
+        say(
+            "THE ROBOT MOVES although every stop method was tried; its link keeps ordering the stop; Ctrl-C hands that over to its stop guard",
         );
         let did = robot.watch()?;
-        write_stderr(&format!("firsthand: the robot {did}\n"));
+        say(format_args!("the robot {did}"));
     }
     // A starved recorder may need seconds for its last chunks.
     drop(recorder);
     drop(lock);
     if mission_control::operator::owes_stop(&options.robot) {
         let robot = &options.robot;
-        write_stderr(&format!(
-            "firsthand: THE ROBOT WAS NOT SEEN AT REST; its stop guard keeps ordering the stop: `firsthand status --robot {robot}` shows what it sees, `firsthand stop --sign-off --robot {robot}` ends it\n"
+        say(format_args!(
+            "THE ROBOT WAS NOT SEEN AT REST; its stop guard keeps ordering the stop: `firsthand status --robot {robot}` shows what it sees, `firsthand stop --sign-off --robot {robot}` ends it"
         ));
     }
     let ending = &finished.ending;
@@ -339,7 +337,8 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         format!("firsthand: {outcome}: {}; the logs are in {directory}\n", ending.reason)
     });
     let told = told.unwrap_or_default();
-    let code = exit_code(&summary, ending);
+    let as_asked = ending.asked_for && summary.outcome == ending.outcome;
+    let code = if as_asked { 0 } else { summary.outcome.exit_code() };
     if may_be_removed {
         let _ = fs::remove_dir_all(directory);
         if !arguments.json {
@@ -360,8 +359,8 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         });
         let show = |written: run_report::Written| {
             let (name, file) = written?;
-            let line = format!("{name}: {}\n", file.display());
-            let printed = if arguments.json { Ok(()) } else { print_text(&line) };
+            let line = format!("{name}: {}", file.display());
+            let printed = if arguments.json { Ok(()) } else { print_line(line) };
             printed.map_err(|error| format!("cannot print where the {name} is: {error}"))
         };
         complain(show(run_report::picture(&options, &finished, &heard.borrow(), &summary)));
@@ -378,7 +377,7 @@ fn prepare(options: &Options) -> Result<SummaryFile> {
     logging::to_file(&log).map_err(|error| format!("cannot log to {}: {error}", log.display()))?;
     for remark in &options.mission.remarks {
         tracing::warn!("{remark}");
-        write_stderr(&format!("firsthand: {remark}\n"));
+        say(remark);
     }
     // A resumed run already has its files.
     let cells = options.recovered.is_none().then(|| options.mission.grid_frame().area());
@@ -388,7 +387,7 @@ fn prepare(options: &Options) -> Result<SummaryFile> {
 fn complain(reported: Result<(), String>) {
     if let Err(problem) = reported {
         tracing::error!("{problem}");
-        write_stderr(&format!("firsthand: {problem}\n"));
+        say(problem);
     }
 }
 
@@ -404,17 +403,10 @@ fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished)
         && finished.restarts.values().all(|&restarts| restarts == 0)
 }
 
-fn exit_code(summary: &Summary, ending: &Ending) -> u8 {
-    let as_asked = ending.asked_for && summary.outcome == ending.outcome;
-    if as_asked { 0 } else { summary.outcome.exit_code() }
-}
-
 fn print_removed(directory: &Path) -> Result<(), String> {
-    let text = format!(
-        "the robot did not drive, so {} is removed; --out DIR keeps it\n",
-        directory.display()
-    );
-    print_text(&text).map_err(|error| format!("cannot print what is removed: {error}"))
+    let directory = directory.display();
+    let text = format!("the robot did not drive, so {directory} is removed; --out DIR keeps it");
+    print_line(text).map_err(|error| format!("cannot print what is removed: {error}"))
 }
 
 fn title(options: &Options) -> String {

@@ -12,8 +12,8 @@ use serde::Serialize;
 use super::diff;
 use console::{
     failure::Result,
-    output::{json_lines, print_text},
-    runs::{self, Ended, Outcome, RunDirectory, Target},
+    output::print_rows,
+    runs::{self, Ended, RunDirectory, Target},
     table::Table,
     words,
 };
@@ -107,7 +107,7 @@ fn targets(run: &Path, json: bool) -> Result<ExitCode> {
             &with(target.truth_m, "m"),
         ]);
     }
-    print_text(&if json { json_lines(&targets)? } else { table.to_string() })?;
+    print_rows(&targets, json, table)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -134,17 +134,12 @@ fn list(arguments: &List) -> Result<ExitCode> {
     let mut chosen: Vec<_> = chosen().collect();
     chosen.sort();
     let listed: Vec<_> = chosen.iter().map(listed).collect();
-    print_text(&if arguments.json { json_lines(&listed)? } else { table(&listed) })?;
+    print_rows(&listed, arguments.json, table(&listed))?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn listed(run: &RunDirectory) -> Listed<'_> {
-    let of = |outcome: &str| Ended { outcome: outcome.to_owned(), ..Ended::default() };
-    let Ended { outcome, mission_time_s, targets } = match run.outcome() {
-        Outcome::Running => of("running"),
-        Outcome::CutOff => of("cut off"),
-        Outcome::Ended(ended) => ended,
-    };
+    let Ended { outcome, mission_time_s, targets } = run.outcome();
     let began = run.began.duration_since(UNIX_EPOCH).unwrap_or_default();
     let so_far = runs::targets(&run.directory);
     Listed {

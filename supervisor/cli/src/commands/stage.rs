@@ -71,17 +71,16 @@ impl Arguments {
 
 pub fn main(arguments: &Arguments) -> Result {
     match arguments.command.as_ref().unwrap_or(&Command::List) {
-        Command::List => print_text(&table::stages())?,
-        Command::Kill { process, signal } => process.send(*signal)?,
-        Command::Freeze(process) => process.send(Signal::STOP)?,
-        Command::Thaw(process) => process.send(Signal::CONT)?,
+        Command::List => print_text(table::stages()),
+        Command::Kill { process, signal } => process.send(*signal),
+        Command::Freeze(process) => process.send(Signal::STOP),
+        Command::Thaw(process) => process.send(Signal::CONT),
         Command::Restart { stage, robot } => {
-            mission_control::operator::restart(robot, operator::known(stage)?)?;
+            Ok(mission_control::operator::restart(robot, operator::known(stage)?)?)
         }
-        Command::Fault(arguments) => fault::main(arguments)?,
-        Command::Process(words) => process::run(words)?,
+        Command::Fault(arguments) => fault::main(arguments),
+        Command::Process(words) => process::run(words),
     }
-    Ok(())
 }
 
 impl StageProcess {

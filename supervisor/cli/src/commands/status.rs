@@ -7,29 +7,29 @@ use std::{
 
 use clap::Args;
 use common::{
-    domain::{Domain, RobotName},
+    domain::RobotName,
     driver::Refusal,
     follower::{Event, Follower},
     geometry::wrap_angle,
     roster,
     samples::{
-        Action, BeaconRefusal, FollowState, LinkSample, PowerSample, RosterEntry, TargetSample,
-        name_str,
+        Action, BeaconRefusal, FollowState, LinkSample, RosterEntry, TargetSample, name_str,
     },
     topics::{self, AnyTopic},
     waiter::Waiter,
 };
 use mission_control::operator::{self, PATIENCE};
-use robot_state::{Feed, RobotState};
+use robot_state::{Feed, RobotState, words};
 use serde::Serialize;
+use serde_json::json;
 
 use console::{
     failure::Result,
-    output::{print, print_text},
+    output::{json_lines, print, print_line},
     stream::{LOOK_EVERY, Stream},
     table::Table,
     waiting::Waiting,
-    words::{age, order, seconds, state},
+    words::{age, order, seconds},
 };
 
 /// Show the stages, link and batteries of a running robot.
@@ -155,7 +155,7 @@ struct PowerStatus {
 #[derive(Serialize)]
 struct StageStatus<'a> {
     name: &'a str,
-    state: &'static str,
+    state: String,
     pid: u32,
     generation: u32,
     restarts: u32,
@@ -199,7 +199,7 @@ fn is_complete(robot: &RobotState, waited: Duration) -> bool {
 }
 
 fn print_one(arguments: &Arguments) -> Result {
-    let domain = Domain::of(arguments.robot.clone());
+    let domain = arguments.robot.domain();
     // A killed supervisor leaves its bus.
     if operator::owes_stop(&arguments.robot) && !domain.is_supervised() {
         return print_guarded(arguments);
@@ -217,7 +217,7 @@ fn print_one(arguments: &Arguments) -> Result {
             robot.apply(&sample);
         })?;
         if let Some(status) = status(arguments, &robot, began.elapsed()) {
-            return Ok(print(&status, arguments.json)?);
+            return print(&status, arguments.json);
         }
         if began.elapsed() >= PATIENCE {
             return Err(format!(
@@ -234,25 +234,22 @@ fn print_guarded(arguments: &Arguments) -> Result {
     let robot = &arguments.robot;
     let sees = operator::sees(robot);
     if arguments.json {
-        let guard =
-            sees.map(|(sees, silent_s)| serde_json::json!({ "sees": sees, "silent_s": silent_s }));
-        print_text(&format!("{}\n", serde_json::json!({ "robot": robot, "stop_guard": guard })))?;
-        return Ok(());
+        let guard = sees.map(|(sees, silent_s)| json!({ "sees": sees, "silent_s": silent_s }));
+        return print_line(json!({ "robot": robot, "stop_guard": guard }));
     }
-    print_text(&match sees {
-        Some((sees, _)) => format!(
-            "robot {robot}: no run; its stop guard orders the stop: {sees}; once you see it at rest, `firsthand stop --sign-off` ends that\n"
-        ),
-        None => format!(
-            "robot {robot}: no run, and NO STOP GUARD although it was not seen at rest: `firsthand stop` starts one\n"
-        ),
-    })?;
-    Ok(())
+    match sees {
+        Some((sees, _)) => print_line(format_args!(
+            "robot {robot}: no run; its stop guard orders the stop: {sees}; once you see it at rest, `firsthand stop --sign-off` ends that"
+        )),
+        None => print_line(format_args!(
+            "robot {robot}: no run, and NO STOP GUARD although it was not seen at rest: `firsthand stop` starts one"
+        )),
+    }
 }
 
 fn follow(arguments: &Arguments) -> Result {
     let mut stream = Stream::with_usual_priority()?;
-    let domain = Domain::of(arguments.robot.clone());
+    let domain = arguments.robot.domain();
     let mut follower = Follower::new(domain, "status", WANTED[0], |bus| Feed::open(bus, &WANTED))
         .also_on(WANTED[1..3].iter().copied());
     let (mut robot, mut waiting) = (RobotState::default(), Waiting::default());
@@ -272,7 +269,7 @@ fn follow(arguments: &Arguments) -> Result {
                     && let Some(status) = status(arguments, &robot, began.elapsed())
                 {
                     shown = Some(Instant::now());
-                    let line = serde_json::to_string(&status)? + "\n";
+                    let line = json_lines(&[&status])?;
                     stream.write(&if arguments.json { line } else { format!("{status}\n") })?;
                 }
             }
@@ -288,7 +285,7 @@ fn status<'a>(
     waited: Duration,
 ) -> Option<Status<'a>> {
     let header = robot.supervisor.filter(|_| is_complete(robot, waited))?;
-    let mirrors = Domain::of(arguments.robot.clone()).mirrors();
+    let mirrors = arguments.robot.domain().mirrors();
     // Without its age, a mirror's status would look local.
     if mirrors.is_some() && robot.mirror.is_none() {
         return None;
@@ -296,7 +293,7 @@ fn status<'a>(
     Some(Status {
         robot: &arguments.robot,
         supervisor_pid: header.supervisor_pid,
-        order: order(header.order(), header.reason()),
+        order: order(&header),
         tick: header.stamp.tick,
         mission_time_s: header.stamp.seconds(),
         mirror: robot
@@ -328,7 +325,12 @@ fn status<'a>(
             within_m: pose.position_within_m(),
         }),
         link: robot.link.as_ref().map(link_status),
-        power: robot.power.as_ref().map(power_status),
+        power: robot.power.map(|power| PowerStatus {
+            board_v: power.board_v,
+            motor_v: power.motor_v,
+            servo_v: power.servo_v,
+            low: power.is_low(),
+        }),
         complaint: robot.complaint().map(|complaint| ComplaintStatus {
             stage: name_str(&complaint.stage),
             trouble: complaint.refusal(),
@@ -340,7 +342,7 @@ fn status<'a>(
 fn stage_status(entry: &RosterEntry) -> StageStatus<'_> {
     StageStatus {
         name: name_str(&entry.stage),
-        state: state(entry.state()),
+        state: words(entry.state()),
         pid: entry.pid,
         generation: entry.generation,
         restarts: entry.restarts,
@@ -369,15 +371,6 @@ fn link_status(link: &LinkSample) -> LinkStatus {
         ignored_samples: link.ignored_samples,
         ignored_writer: link.ignored_writer,
         other_port: link.other_port,
-    }
-}
-
-const fn power_status(power: &PowerSample) -> PowerStatus {
-    PowerStatus {
-        board_v: power.board_v,
-        motor_v: power.motor_v,
-        servo_v: power.servo_v,
-        low: power.is_low(),
     }
 }
 

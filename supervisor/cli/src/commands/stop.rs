@@ -1,5 +1,5 @@
 use clap::Args;
-use common::domain::{Domain, RobotName};
+use common::domain::RobotName;
 
 use console::{failure::Result, operator};
 
@@ -32,7 +32,7 @@ pub struct Arguments {
 
 pub fn main(arguments: &Arguments) -> Result {
     if arguments.cut_off
-        && !Domain::of(arguments.robot.clone()).run_directory().exists()
+        && !arguments.robot.domain().run_directory().exists()
         && !mission_control::operator::owes_stop(&arguments.robot)
     {
         return Ok(());

@@ -35,13 +35,13 @@ enum Table {
 }
 
 pub fn main(arguments: &Arguments) -> Result {
-    Ok(print_text(&match arguments.table {
+    print_text(match arguments.table {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
         Table::Results => stored::results(),
         Table::Capabilities => stored::markdown("capabilities", None).unwrap_or_default(),
         Table::Versions => stored::markdown("versions", None).unwrap_or_default(),
-    })?)
+    })
 }
 
 pub fn topics() -> String {

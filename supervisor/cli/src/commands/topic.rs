@@ -49,5 +49,5 @@ pub fn main(arguments: &Arguments) -> Result {
 }
 
 fn list(arguments: &List) -> Result {
-    Ok(print_text(&if arguments.python { python::module() } else { table::topics() })?)
+    print_text(if arguments.python { python::module() } else { table::topics() })
 }

@@ -97,14 +97,14 @@ fn a_sample_that_cannot_be_used_is_refused_for_its_reason_and_leaves_the_place_a
 #[test]
 fn a_beacon_is_lost_once_for_each_silence_and_the_result_counts_it() {
     let mut following = Following::new(1.0, NOW, None);
-    assert!(following.is_lost() && !following.loses(NOW), "it was not heard yet");
+    assert!(following.is_lost && !following.loses(NOW), "it was not heard yet");
     for silence in 1..=3 {
         let heard = MissionTime(NOW.0 * silence);
         let sample = BeaconSample { capture_ns: heard.0, ..beacon(1.0, 0.0) };
         following.take(&sample, heard, &mission()).unwrap();
         assert!(!following.loses(MissionTime(heard.0 + 1_000_000_000)));
         assert!(following.loses(MissionTime(heard.0 + 1_000_000_001)), "{silence}");
-        assert!(!following.loses(MissionTime(heard.0 + 2_000_000_000)) && following.is_lost());
+        assert!(!following.loses(MissionTime(heard.0 + 2_000_000_000)) && following.is_lost);
     }
     let pose = PoseSample { travelled_m: 84.2, ..PoseSample::default() };
     let told = following.sample(MissionTime(NOW.0 + 130_000_000_000), Some(&pose));

@@ -34,7 +34,7 @@ fn a_list_goes_on_from_target_to_target_and_says_what_became_of_each() {
     list.advance((arrival(7), Reached), 8);
     let TargetSample { number, last, since_tick, target, .. } = list.sample();
     assert_eq!((number, last, since_tick, target), (2, 3, 8, at(1.0, 1.0)));
-    assert_eq!(list.began_s(), 7.0);
+    assert_eq!(list.began_s, 7.0);
     list.replace(&[at(0.5, 0.0), at(0.0, 0.0)], (12, 11.0), None);
     let TargetSample { number, last, since_tick, target, .. } = list.sample();
     assert_eq!((number, last, since_tick, target), (4, 5, 12, at(0.5, 0.0)));
@@ -141,9 +141,9 @@ fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
     use TargetOutcome::{NotTried, Reached, TimedOut};
     let stays = Mission::parse("stay = true\nperimeter.width_m = 8", Path::new("m.toml")).unwrap();
     let mut list = TargetList::of(&stays);
-    assert_eq!((list.waits(), list.outcome_while_waiting()), (true, Some(Outcome::Waited)));
+    assert_eq!((list.waits, list.outcome_while_waiting()), (true, Some(Outcome::Waited)));
     list.replace(&[at(1.0, 0.0), at(2.0, 0.0)], (5, 5.0), None);
-    assert!(!list.waits());
+    assert!(!list.waits);
     list.settle(Outcome::Timeout, 9.0, None);
     assert_eq!(list.outcome_while_waiting(), Some(Outcome::Timeout));
     list.replace(&[at(0.5, 0.0)], (20, 20.0), None);
@@ -159,15 +159,15 @@ fn a_hands_target_has_no_result_and_ends_in_waiting_for_the_next_one() {
     let mut list = TargetList::of(&mission("stay = true"));
     let hand = |list: &mut TargetList, x| {
         list.replace(&[at(x, 0.0)], (5, 4.0), None);
-        list.take_in_hand();
+        list.by_hand = true;
     };
     hand(&mut list, 0.5);
     hand(&mut list, 0.6);
-    assert_eq!((list.number(), list.waits(), list.has_target()), (3, false, false));
+    assert_eq!((list.number, list.waits, list.has_target()), (3, false, false));
     list.settle(Outcome::Reached, 6.0, Some((arrival(6), Reached)));
-    assert!(list.waits() && !list.release());
+    assert!(list.waits && !list.release());
     hand(&mut list, 0.7);
-    assert!(list.release() && list.waits());
+    assert!(list.release() && list.waits);
     hand(&mut list, 0.8);
     assert_eq!(list.outcome_while_waiting(), Some(Outcome::Waited));
     list.replace(&[at(2.0, 0.0)], (9, 8.0), None);

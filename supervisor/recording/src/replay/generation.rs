@@ -31,12 +31,12 @@ const SHOWN_INPUTS: usize = 4;
 const SHOWN_LENGTH: usize = 600;
 
 pub(crate) struct Setting<'a> {
-    pub(crate) run: &'a Run,
+    pub run: &'a Run,
     /// Counts of recorded messages by topic.
-    pub(crate) recorded: &'a BTreeMap<String, u64>,
+    pub recorded: &'a BTreeMap<String, u64>,
     /// Start of comparison; earlier outputs are only computed.
-    pub(crate) from: MissionTime,
-    pub(crate) cut: bool,
+    pub from: MissionTime,
+    pub cut: bool,
 }
 
 type Body = Rc<Vec<u8>>;

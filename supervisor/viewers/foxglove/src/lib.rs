@@ -63,7 +63,7 @@ fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
     if !listen.ip().is_loopback() {
         tracing::warn!(%listen, "the protocol has no authentication: every client that reaches this address can watch the robot");
     }
-    print_text(&format!("ws://{address}\n"))?;
+    print_text(format!("ws://{address}\n"))?;
     live.serve(&Domain::of(arguments.robot.clone()), &mut || signals.came());
     Ok(ExitCode::SUCCESS)
 }

@@ -25,12 +25,9 @@ use std::{net::SocketAddr, process::ExitCode, sync::Arc};
 use clap::Parser;
 use common::{domain::RobotName, signals::Signals};
 
-use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
+use console::{executable, failure::Result, output::print_line, stream::let_stages_go_first};
 
-use self::{
-    access::host_name,
-    serving::{Options, Page},
-};
+use self::{access::host_name, serving::Page};
 
 /// Show a robot in a browser: map, field, charts, stages, events.
 ///
@@ -59,14 +56,12 @@ pub fn main() -> ExitCode {
     executable::run("error", serve)
 }
 
-fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
+fn serve(arguments: &Arguments) -> Result<ExitCode> {
     let_stages_go_first();
     let mut signals = Signals::that_end()?;
-    let Arguments { robot, listen, behind_proxy } = arguments;
-    let options = Options { robot: robot.clone(), listen: *listen, proxy: behind_proxy.clone() };
-    let driven = robot.clone();
-    let page = Page::open(&options, Arc::new(move |order| operator::perform(&driven, order)))?;
-    print_text(&format!("{}kept in {}\n", page.access.addresses(), page.kept.display()))?;
+    let driven = arguments.robot.clone();
+    let page = Page::open(arguments, Arc::new(move |order| operator::perform(&driven, order)))?;
+    print_line(format_args!("{}kept in {}", page.access.addresses(), page.kept.display()))?;
     page.show(&mut || signals.came());
     Ok(ExitCode::SUCCESS)
 }

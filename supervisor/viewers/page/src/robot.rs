@@ -13,7 +13,7 @@ use common::{
     domain::Domain,
     follower::{Event, Follower},
     process_usage::Processes,
-    samples::{Cause, TargetPoint, TargetSample},
+    samples::Cause,
     topics,
 };
 use console::runs::Results;
@@ -73,8 +73,7 @@ impl Reading {
             }
             ended = results.take();
         }
-        let usage = processes.look(&collector.processes(), Instant::now());
-        collector.used(usage);
+        collector.usage = processes.look(&collector.state.processes(), Instant::now());
         let (rows, events) = (collector.take_rows(), collector.state.take_events());
         let state = collector.take_state();
         let is_due = packed.is_none_or(|packed| packed.elapsed() >= PACK_EVERY);
@@ -121,16 +120,7 @@ fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
     if cells.len() > PREVIEW_MOST_CELLS || frame.cell_at(target).is_none_or(|at| frame.is_rim(at)) {
         return None;
     }
-    let mut planner = Planner::new(collector.mission());
-    let sent = TargetSample {
-        number: 1,
-        last: 1,
-        target: TargetPoint::at(target),
-        ..TargetSample::default()
-    };
-    planner.take_target(&sent).ok()?;
-    planner.take_grid(&header, cells).ok()?;
-    let cells = planner.snapshot()?.cells();
+    let cells = Planner::field_to(target, &collector.mission, &header, cells)?;
     Some(blob::field(blob::Shown::Preview, frame, &cells, target, collector.state.now_s()))
 }
 
@@ -140,32 +130,25 @@ pub fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool)
         .also_on([&topics::ROSTER as _, &topics::DEATHS as _]);
     let mut reading = None;
     while !ended() {
-        let taken = match follower.wait(LOOK_EVERY) {
-            Ok(Event::Connected) => {
-                reading = None;
-                Ok(())
-            }
-            Ok(Event::Disconnected) => {
-                shared.lock().connected = false;
-                Ok(())
-            }
-            Ok(Event::Nothing) => Ok(()),
-            Ok(Event::Samples(feed)) => {
-                reading = reading.or_else(|| Reading::begin(domain, shared));
-                match &mut reading {
-                    Some(Reading { collector, truth, .. }) => {
+        let taken = follower.wait(LOOK_EVERY).and_then(|event| {
+            match event {
+                Event::Connected => reading = None,
+                Event::Disconnected => shared.lock().connected = false,
+                Event::Nothing => {}
+                Event::Samples(feed) => {
+                    reading = reading.take().or_else(|| Reading::begin(domain, shared));
+                    if let Some(Reading { collector, truth, .. }) = &mut reading {
                         let (file, tail) = truth;
                         tail.skip(file, TRUTH_AT_ONCE);
                         tail.lines(file).lines().for_each(|line| {
                             collector.truth(line);
                         });
-                        feed.read(&mut |sample| collector.apply(&sample))
+                        feed.read(&mut |sample| collector.apply(&sample))?;
                     }
-                    None => Ok(()),
                 }
             }
-            Err(error) => Err(error),
-        };
+            Ok(())
+        });
         let problem = taken.err().map(|error| error.to_string()).unwrap_or_default();
         if problem != shared.lock().problem {
             if !problem.is_empty() {

@@ -1,4 +1,4 @@
-//! Threads, options and errors of the served page.
+//! Threads and errors of the served page.
 
 use std::{
     fs,
@@ -11,28 +11,17 @@ use std::{
     time::Duration,
 };
 
-use common::{
-    domain::{Domain, RobotName},
-    file::FileError,
-};
-use console::failure::{Refused, Result};
+use common::{domain::Domain, file::FileError};
+use console::failure::{Refused, Result, refuse};
 use processes::domain::make_own_directory;
 use thiserror::Error;
 
 use crate::{
-    access::Access, context::Context, orders::Operator, places::Places, robot, server,
+    Arguments, access::Access, context::Context, orders::Operator, places::Places, robot, server,
     shared::Shared,
 };
 
 const MOST_SESSIONS: usize = 16;
-
-#[derive(Clone)]
-pub struct Options {
-    pub robot: RobotName,
-    pub listen: SocketAddr,
-    /// Name by which browsers know the proxy, if there is one.
-    pub proxy: Option<String>,
-}
 
 #[derive(Debug, Error)]
 enum PageError {
@@ -59,31 +48,31 @@ impl Page {
     ///
     /// # Errors
     /// The address is not loopback, or is taken.
-    pub fn open(options: &Options, operator: Operator) -> Result<Self> {
-        let address = options.listen;
+    pub fn open(arguments: &Arguments, operator: Operator) -> Result<Self> {
+        let address = arguments.listen;
         if !address.ip().is_loopback() {
             let message = format!(
                 "{address} is not a loopback address, and the page does not encrypt; listen on 127.0.0.1 and use a tunnel, or a proxy with --behind-proxy"
             );
-            return Err(Refused::new("not-loopback", message).into());
+            return refuse("not-loopback", message);
         }
         let listener = TcpListener::bind(address).map_err(|problem| {
             let message =
                 format!("cannot listen on {address}: {problem}; choose another port with --listen");
             Refused::new("cannot-listen", message)
         })?;
-        Ok(Self::serve(options, listener, operator)?)
+        Ok(Self::serve(arguments, listener, operator)?)
     }
 
     fn serve(
-        options: &Options,
+        arguments: &Arguments,
         listener: TcpListener,
         operator: Operator,
     ) -> Result<Self, PageError> {
         listener.set_nonblocking(true)?;
         let address = listener.local_addr()?;
-        let access = Arc::new(Access::new(address, options.proxy.as_deref())?);
-        let domain = Domain::of(options.robot.clone());
+        let access = Arc::new(Access::new(address, arguments.behind_proxy.as_deref())?);
+        let domain = arguments.robot.domain();
         let kept = keep(&domain, address.port(), &access.addresses())?;
         let shared = Arc::new(Shared::default());
         let context = Arc::new(Context {

@@ -10,13 +10,15 @@ use std::{
     time::Duration,
 };
 
+use clap::Parser as _;
 use console::failure::code;
 use rustix::process::geteuid;
 use serde_json::{Value, json};
 
 use crate::{
+    Arguments,
     orders::{Operator, Order},
-    serving::{Options, Page},
+    serving::Page,
 };
 
 /// Orders given to an operator.
@@ -34,8 +36,8 @@ fn noting(noted: &Noted) -> Operator {
     })
 }
 
-fn options(listen: &str) -> Options {
-    Options { robot: "page-test".parse().unwrap(), listen: listen.parse().unwrap(), proxy: None }
+fn options(listen: &str) -> Arguments {
+    Arguments::parse_from(["firsthand-page", "--robot", "page-test", "--listen", listen])
 }
 
 fn page() -> (Page, Noted) {
@@ -406,7 +408,7 @@ fn a_request_without_an_end_is_not_waited_for() {
 
 #[test]
 fn a_page_that_cannot_be_served_says_why() {
-    let refused = |options: &Options| Page::open(options, noting(&Noted::default())).unwrap_err();
+    let refused = |options: &Arguments| Page::open(options, noting(&Noted::default())).unwrap_err();
     let far = refused(&options("0.0.0.0:0"));
     assert_eq!(code(far.as_ref()), Some("not-loopback"), "{far}");
     let (first, _) = page();
@@ -416,8 +418,8 @@ fn a_page_that_cannot_be_served_says_why() {
 
 #[test]
 fn behind_a_proxy_a_page_is_served_under_its_name_alone() {
-    let proxy = Some("robot.example".to_owned());
-    let options = Options { proxy, ..options("127.0.0.1:0") };
+    let behind_proxy = Some("robot.example".to_owned());
+    let options = Arguments { behind_proxy, ..options("127.0.0.1:0") };
     let page = Page::open(&options, noting(&Noted::default())).unwrap();
     let answer = ask(&page, &["GET / HTTP/1.1", "Host: robot.example"]);
     assert_eq!(status(&answer), "200");

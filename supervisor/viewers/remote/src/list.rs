@@ -6,8 +6,8 @@ use std::{
 };
 
 use console::{
-    failure::{Refused, Result},
-    output::{json_lines, print_text, write_stderr},
+    failure::{Result, refuse},
+    output::{print_rows, say},
     table::Table,
 };
 use serde::Serialize;
@@ -63,14 +63,11 @@ pub fn list(arguments: &Arguments) -> Result {
         }));
     }
     for at in &silent {
-        write_stderr(&format!("firsthand: no answer from {at} within {} s\n", PATIENCE.as_secs()));
+        say(format_args!("no answer from {at} within {} s", PATIENCE.as_secs()));
     }
     if listed.is_empty() {
         let message = "no machine answers; check that `firsthand remote serve` runs there and that this machine may read";
-        return Err(Refused::new("no-answer", message).into());
-    }
-    if arguments.json {
-        return Ok(print_text(&json_lines(&listed)?)?);
+        return refuse("no-answer", message);
     }
     let mut table = Table::new(["robot", "at", "state", ">time"]);
     for robot in &listed {
@@ -78,7 +75,7 @@ pub fn list(arguments: &Arguments) -> Result {
         let order = robot.order.as_deref().unwrap_or("does not run");
         table.row([&robot.robot, &robot.at, &order, &time]);
     }
-    Ok(print_text(&table.to_string())?)
+    print_rows(&listed, arguments.json, table)
 }
 
 /// Collects the answers over `session`, which may not be connected yet.

@@ -17,11 +17,11 @@ use common::{
     topics::{self, AnyTopic, EVERY_STAGE, Logged, OPERATOR},
 };
 use console::{
-    failure::{Refused, Result},
+    failure::{Result, refuse},
     stream::{LOOK_EVERY, Stream},
     words::order,
 };
-use zenoh::{Session, Wait, pubsub::Publisher};
+use zenoh::{Session, Wait};
 
 use crate::{
     session::{self, Certificates, failed},
@@ -79,13 +79,9 @@ fn topics(named: &[String]) -> Result<Vec<&'static dyn AnyTopic>> {
     }
     let find = |name: &String| {
         let found = all.clone().find(|topic| topic.spec().name == name);
-        found.ok_or_else(|| {
-            Refused::new(
-                "unknown-topic",
-                format!("topic {name:?} cannot be served; `firsthand topic list` names the topics"),
-            )
-            .into()
-        })
+        let message =
+            format!("topic {name:?} cannot be served; `firsthand topic list` names the topics");
+        found.map_or_else(|| refuse("unknown-topic", message), Ok)
     };
     named.iter().map(find).collect()
 }
@@ -113,7 +109,7 @@ pub fn serve(arguments: &Arguments) -> Result {
         session.declare_publisher(key).wait().map_err(failed)
     });
     let publishers = publishers.collect::<Result<Vec<_>>>()?;
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     let open = |bus: &Bus| {
         let readers = topics.iter().map(|topic| topic.recorder_reader(bus));
         let readers = readers.collect::<Result<_, BusError>>()?;
@@ -133,7 +129,12 @@ pub fn serve(arguments: &Arguments) -> Result {
             Event::Samples(readers) => {
                 let id = tell(&mut lock(&told), &domain, &mut readers.roster)?;
                 for (reader, publisher) in readers.topics.iter_mut().zip(&publishers) {
-                    put(id, reader.as_mut(), publisher, &mut message)?;
+                    while reader.next_message(&mut message)?.is_some() {
+                        // A slow link drops samples.
+                        let sent = Sent { id, sent_ns: monotonic_ns() }.encoded();
+                        let put = publisher.put(message.as_slice()).attachment(sent);
+                        put.wait().map_err(failed)?;
+                    }
                 }
             }
         }
@@ -151,7 +152,7 @@ fn tell(
 ) -> Result<u64> {
     while let Some(entries) = roster.next_slice()? {
         let header = entries.header();
-        told.hello.order = order(header.order(), header.reason()).to_owned();
+        told.hello.order = order(header).to_owned();
         told.hello.mission_time_s = header.stamp.seconds();
     }
     // The run file appears after the bus.
@@ -162,20 +163,6 @@ fn tell(
         told.hello.id = RandomState::new().hash_one(std::process::id()) | 1;
     }
     Ok(told.hello.id)
-}
-
-fn put(
-    id: u64,
-    reader: &mut dyn AnyReader,
-    publisher: &Publisher<'_>,
-    message: &mut Vec<u8>,
-) -> Result {
-    while reader.next_message(message)?.is_some() {
-        let sent = Sent { id, sent_ns: monotonic_ns() };
-        // A slow link drops samples.
-        publisher.put(message.as_slice()).attachment(sent.encoded()).wait().map_err(failed)?;
-    }
-    Ok(())
 }
 
 type Answering = zenoh::query::Queryable<()>;

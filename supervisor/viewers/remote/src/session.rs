@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use common::grid::MAX_CELLS;
 use console::{
-    failure::{Failure, Refused, Result},
-    output::write_stderr,
+    failure::{Failure, Result, refuse},
+    output::say,
 };
 use serde_json::{Value, json};
 use zenoh::{Session, Wait};
@@ -39,11 +39,11 @@ pub fn listen(
     let secured = endpoints.iter().all(|at| at.starts_with("tls/"));
     if !secured && clients.is_some() {
         let message = "--clients checks certificates, and tcp has none; give each --listen as tls/ADDRESS:PORT";
-        return Err(Refused::new("no-tls", message).into());
+        return refuse("no-tls", message);
     }
     if !secured {
-        write_stderr(
-            "firsthand: over tcp every machine that reaches the port can read the robot; to restrict readers, use tls with --clients\n",
+        say(
+            "over tcp every machine that reaches the port can read the robot; to restrict readers, use tls with --clients",
         );
     }
     let mut reader = json!({ "id": "readers" });

@@ -20,7 +20,7 @@ use common::{
 };
 use console::{
     failure::Result,
-    output::write_stderr,
+    output::say,
     stream::{LOOK_EVERY, Stream},
 };
 use processes::domain::{DomainLock, make_own_directory};
@@ -81,8 +81,8 @@ pub fn show(arguments: &Arguments) -> Result {
         if hello.is_some() {
             silent_until = None;
         } else if silent_until.take_if(|until| *until <= Instant::now()).is_some() {
-            write_stderr(&format!(
-                "firsthand: no robot {robot} answers at {host}, and the mirror asks again; check its name (--robot) and that `firsthand remote serve` runs there\n"
+            say(format_args!(
+                "no robot {robot} answers at {host}, and the mirror asks again; check its name (--robot) and that `firsthand remote serve` runs there"
             ));
         }
         if let Some(hello) = hello
@@ -173,7 +173,7 @@ impl<'a> Asker<'a> {
         let reply = self.ask("run")?.recv().ok();
         let run = reply.and_then(|reply| checked(&String::from_utf8(payload(&reply)?).ok()?));
         if run.is_none() {
-            write_stderr("firsthand: the robot's run file is missing or of another version\n");
+            say("the robot's run file is missing or of another version");
         }
         Ok(run)
     }
@@ -292,10 +292,9 @@ impl Mirror {
     fn refuse(&mut self, topic: &str) {
         self.refused += 1;
         if self.refused == 1 {
-            let text = format!(
-                "firsthand: the mirror drops samples of {topic:?} that are from another run or version\n"
-            );
-            write_stderr(&text);
+            say(format_args!(
+                "the mirror drops samples of {topic:?} that are from another run or version"
+            ));
         }
     }
 

@@ -56,7 +56,7 @@ impl ScreenFeed {
             view.apply(&sample);
         })?;
         if has_roster {
-            view.usage = self.processes.look(&view.processes(), Instant::now());
+            view.usage = self.processes.look(&view.state.processes(), Instant::now());
         }
         self.count(view)
     }

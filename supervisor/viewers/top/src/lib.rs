@@ -21,7 +21,7 @@ use std::{
 use clap::Parser;
 use common::{
     bus::BusError,
-    domain::{Domain, RobotName},
+    domain::RobotName,
     follower::{Event, Follower},
     poll,
     signals::Signals,
@@ -37,7 +37,7 @@ use self::{
 };
 use console::{
     executable,
-    failure::{Failure, Refused},
+    failure::{Result, refuse},
     stream::let_stages_go_first,
 };
 
@@ -68,11 +68,11 @@ pub fn main() -> ExitCode {
     executable::run("error", show_on_terminal)
 }
 
-fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode, Failure> {
+fn show_on_terminal(arguments: &Arguments) -> Result<ExitCode> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         let message =
             "top needs a terminal; elsewhere use `firsthand status` and `firsthand topic hz`";
-        return Err(Refused::new("no-terminal", message).into());
+        return refuse("no-terminal", message);
     }
     let_stages_go_first();
     show(&arguments.robot)?;
@@ -104,7 +104,7 @@ fn run(
     signals: &mut Signals,
     terminal: &mut DefaultTerminal,
 ) -> Result<(), TopError> {
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     let mut follower = Follower::new(domain, "top", &topics::POSE, ScreenFeed::open)
         .also_on([&topics::ROSTER as _, &topics::LINK as _]);
     let mut view = View::new(robot.clone());

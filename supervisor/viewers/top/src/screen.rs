@@ -35,36 +35,25 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     .areas(frame.area());
     frame.render_widget(Paragraph::new(heading(view)), title);
     let table_height = view.state.stages.len() as u16 + 3;
-    if body.width >= WIDE {
-        let [left, _, right] = Layout::horizontal([
-            Constraint::Length(TABLE_WIDTH),
-            Constraint::Length(2),
-            Constraint::Min(0),
-        ])
-        .areas(body);
-        let [stages, below] =
-            Layout::vertical([Constraint::Length(table_height), Constraint::Min(0)]).areas(left);
-        table(view, frame, stages);
-        details(view, frame, below);
-        draw_map(view, frame, right);
-    } else {
-        let [stages, below] =
-            Layout::vertical([Constraint::Length(table_height), Constraint::Min(0)]).areas(body);
-        table(view, frame, stages);
-        // The map is square, and a line is as high as two letters are wide.
-        let side = (2 * below.height).min(below.width / 2);
-        let [left, _, right] = Layout::horizontal([
-            Constraint::Length(side),
-            Constraint::Length(2),
-            Constraint::Min(0),
-        ])
-        .areas(below);
-        draw_map(view, frame, left);
-        details(view, frame, right);
-    }
+    let split = |area: Rect, left: u16| {
+        let columns = [Constraint::Length(left), Constraint::Length(2), Constraint::Min(0)];
+        let [left, _, right] = Layout::horizontal(columns).areas(area);
+        [left, right]
+    };
+    let is_wide = body.width >= WIDE;
+    let [left, right] = if is_wide { split(body, TABLE_WIDTH) } else { [body; 2] };
+    let [stages, below] =
+        Layout::vertical([Constraint::Length(table_height), Constraint::Min(0)]).areas(left);
+    // The map is square, and a line is as high as two letters are wide.
+    let side = (2 * below.height).min(below.width / 2);
+    let [map, text] = if is_wide { [right, below] } else { split(below, side) };
+    table(view, frame, stages);
+    details(view, frame, text);
+    draw_map(view, frame, map);
     let wrapped = Paragraph::new(view.message.as_str()).wrap(Wrap { trim: true });
     frame.render_widget(wrapped, message);
-    frame.render_widget(Paragraph::new(keys_line()), keys);
+    let keys_line = explained(KEYS.map(|(key, what, _)| (key, TITLE, what)));
+    frame.render_widget(Paragraph::new(keys_line), keys);
 }
 
 fn message_height(message: &str, width: u16) -> u16 {
@@ -81,7 +70,7 @@ fn heading(view: &View) -> Line<'static> {
     };
     let kind = if supervisor.simulated == 1 { " (simulated): " } else { ": " };
     let state = if view.connected {
-        let order = words::order(supervisor.order(), supervisor.reason());
+        let order = words::order(&supervisor);
         format!("{order}, {:.1} s", supervisor.stamp.seconds())
     } else {
         waiting::ENDED.to_owned()
@@ -92,15 +81,17 @@ fn heading(view: &View) -> Line<'static> {
     Line::from(vec![Span::styled(robot, TITLE), Span::raw(kind), Span::raw(state), age])
 }
 
-fn keys_line() -> Line<'static> {
-    let spans = KEYS.iter().flat_map(|(key, what, _)| {
-        [Span::styled(*key, TITLE), Span::styled(format!(" {what}  "), DIM)]
+/// Returns a line of signs, each with its meaning.
+fn explained(
+    signs: impl IntoIterator<Item = (impl ToString, Style, &'static str)>,
+) -> Line<'static> {
+    let spans = signs.into_iter().flat_map(|(sign, style, what)| {
+        [Span::styled(sign.to_string(), style), Span::styled(format!(" {what}  "), DIM)]
     });
     Line::from(spans.collect::<Vec<_>>())
 }
 
 fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
-    let right = |text: String, width: usize| format!("{text:>width$}");
     let mut rows: Vec<_> = view
         .state
         .stages
@@ -112,34 +103,22 @@ fn table(view: &View, frame: &mut Frame<'_>, area: Rect) {
         let pid = supervisor.supervisor_pid.to_string();
         let state = if view.connected { "running" } else { "ended" };
         let usage = usage(view, view.state.stages.len());
-        let blank = String::new;
-        let texts = [
-            "supervisor".to_owned(),
-            state.to_owned(),
-            pid,
-            blank(),
-            blank(),
-            blank(),
-            blank(),
-            cpu(usage),
-            memory(usage),
-        ];
-        rows.push((texts, Style::new()));
+        let (cpu, memory) = (cpu(usage), memory(usage));
+        let texts = ["supervisor", state, &pid, "", "", "", "", &cpu, &memory];
+        rows.push((texts.map(str::to_owned), Style::new()));
     }
     let widths: [u16; 9] = [14, 11, 7, 3, 8, 7, 7, 5, 8];
     let heads = ["stage", "state", "pid", "gen", "restarts", "rate", "beat", "CPU", "memory"];
-    let cells = |texts: [String; 9]| {
-        let mut at = 0;
-        texts.map(|text| {
-            at += 1;
-            match at {
-                1 | 2 => text,
-                _ => right(text, usize::from(widths[at - 1])),
-            }
-        })
+    let row = |texts: [String; 9], style| {
+        let cells = texts.into_iter().zip(widths).enumerate();
+        let cells = cells.map(|(at, (text, width))| match at {
+            0 | 1 => text,
+            _ => format!("{text:>width$}", width = usize::from(width)),
+        });
+        Row::new(cells).style(style)
     };
-    let heads = Row::new(cells(heads.map(str::to_owned))).style(DIM);
-    let rows = rows.into_iter().map(|(texts, style)| Row::new(cells(texts)).style(style));
+    let heads = row(heads.map(str::to_owned), DIM);
+    let rows = rows.into_iter().map(|(texts, style)| row(texts, style));
     let table = Table::new(rows, widths)
         .header(heads)
         .column_spacing(1)
@@ -160,7 +139,7 @@ fn stage_row(view: &View, at: usize, entry: &RosterEntry) -> ([String; 9], Style
     let runs = view.connected && entry.pid != 0;
     let texts = [
         name_str(&entry.stage).to_owned(),
-        words::state(state).to_owned(),
+        robot_state::words(state),
         if runs { entry.pid.to_string() } else { "-".to_owned() },
         entry.generation.to_string(),
         entry.restarts.to_string(),
@@ -282,19 +261,12 @@ fn time(microseconds: f64) -> String {
 }
 
 fn legend() -> Vec<Line<'static>> {
-    let mut letters = Vec::new();
-    let mut of = |letter: char, style: Style, what: &'static str| {
-        letters.push(Span::styled(letter.to_string(), style));
-        letters.push(Span::styled(format!(" {what}  "), DIM));
-    };
-    of(map::robot(0.0), map::ROBOT_STYLE, "robot");
-    of(map::TARGET, map::TARGET_STYLE, "target");
-    of(map::WAY, map::WAY_STYLE, "way");
-    of('→', map::FIELD_STYLE, "field");
-    let mut hazards = Vec::new();
-    for (style, what) in map::legend() {
-        hazards.push(Span::styled("█", style));
-        hazards.push(Span::styled(format!(" {what}  "), DIM));
-    }
-    vec![Line::from(letters), Line::from(hazards)]
+    let letters = [
+        (map::robot(0.0), map::ROBOT_STYLE, "robot"),
+        (map::TARGET, map::TARGET_STYLE, "target"),
+        (map::WAY, map::WAY_STYLE, "way"),
+        ('→', map::FIELD_STYLE, "field"),
+    ];
+    let hazards = map::legend().map(|(style, what)| ('█', style, what));
+    vec![explained(letters), explained(hazards)]
 }

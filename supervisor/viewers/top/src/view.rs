@@ -49,11 +49,6 @@ impl View {
         self.chosen = self.chosen.saturating_add_signed(down).min(last);
     }
 
-    pub fn processes(&self) -> Vec<u32> {
-        let supervisor = self.state.supervisor.map_or(0, |header| header.supervisor_pid);
-        self.state.stages.iter().map(|entry| entry.pid).chain([supervisor]).collect()
-    }
-
     pub fn apply(&mut self, sample: &Sample) {
         self.state.apply(sample);
         if let Sample::Roster(..) = sample {

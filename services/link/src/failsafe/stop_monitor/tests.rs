@@ -161,7 +161,7 @@ fn every_method_is_tried_in_turn_while_the_robot_does_not_stop() {
         let tried = times.filter_map(|ms| {
             let now = MissionTime(ms * 1_000_000);
             let takes = stop_monitor.takes_next_method(does_not_stop, now);
-            takes.then(|| (ms, stop_monitor.method))
+            takes.then_some((ms, stop_monitor.method))
         });
         tried.collect::<Vec<_>>()
     };

@@ -12,7 +12,7 @@ use mission_control::{Options, Progress, outcome::Outcome};
 use processes::Starter;
 
 use console::{
-    failure::{Refused, Result},
+    failure::{Result, refuse},
     logging, missions,
     output::write_stderr,
     progress_line::{LINE_EVERY, ProgressLine},
@@ -150,7 +150,7 @@ impl Setting {
                 let message = format!(
                     "nothing was written: the run ended in {outcome}, {reason}; see {place}"
                 );
-                Err(Refused::new("not-calibrated", message).into())
+                refuse("not-calibrated", message)
             }
         }
     }

@@ -23,9 +23,9 @@ pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> R
     // Nominal distances are those of uncalibrated wheels.
     mission.robot.odometry = Odometry::default();
     let trace = Trace::read(&mission, &recording)?;
-    let (at_rest, motions) = motions(&mission, &trace).map_err(|why| refused(&why))?;
-    let estimate = checked(&at_rest, &motions, scale_sd, mission.body().track_m)
-        .map_err(|refusal| refused(&refusal.to_string()))?;
+    let (at_rest, motions) = motions(&mission, &trace).map_err(refused)?;
+    let estimate =
+        checked(&at_rest, &motions, scale_sd, mission.body().track_m).map_err(refused)?;
     let metres = motions.iter().map(|it| it.rolled_m).sum::<f64>() / 2.0;
     Ok(Found { method: "gyro", before, estimate, metres, seconds })
 }

@@ -7,7 +7,10 @@ use recording::Recording;
 use serde_json::json;
 
 use super::{Arguments, drive::Carried, refused};
-use console::{failure::Result, output::print_text};
+use console::{
+    failure::Result,
+    output::{print_line, print_text},
+};
 
 pub fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result {
     let mission = arguments.mission(plan)?;
@@ -18,12 +21,11 @@ pub fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result {
     let turn = |(at, [left, right]): &(f64, [f64; 2])| (*at, (right - left) / body.track_m);
     let [told, turned] =
         [&trace.told, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());
-    let found = estimate(&told, &turned, &body, By::Turns).map_err(|why| refused(&why))?;
-    let text = match arguments.setting.json {
-        true => format!("{}\n", as_json(&found)),
-        false => keys(&found, body.response),
-    };
-    Ok(print_text(&text)?)
+    let found = estimate(&told, &turned, &body, By::Turns).map_err(refused)?;
+    match arguments.setting.json {
+        true => print_line(as_json(&found)),
+        false => print_text(keys(&found, body.response)),
+    }
 }
 
 fn as_json(found: &Estimate) -> serde_json::Value {

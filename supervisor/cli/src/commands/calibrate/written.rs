@@ -8,7 +8,7 @@ use common::{
 use serde_json::json;
 
 use super::Arguments;
-use console::{failure::Result, logging::today, output::print_text};
+use console::{failure::Result, logging::today, output::print_line};
 
 pub struct Found {
     pub method: &'static str,
@@ -34,17 +34,16 @@ impl Found {
         let mut object = serde_json::to_value(&odometry)?;
         let text = Calibration::new(odometry).to_text()?;
         replace(file, &text).map_err(FileError::of("write", file))?;
-        let said = if setting.json {
+        if setting.json {
             object["residuals"] = json!(it.residuals);
             object["seconds"] = json!(self.seconds);
             object["file"] = json!(file);
-            format!("{object}\n")
+            print_line(object)
         } else {
             let (loops, minutes) = (it.residuals.len(), self.seconds / 60.0);
-            format!(
-                "{text}# {loops} loops, squares or motions in {minutes:.1} min; name it in a mission: robot.calibration = {file:?}\n"
-            )
-        };
-        Ok(print_text(&said)?)
+            print_line(format_args!(
+                "{text}# {loops} loops, squares or motions in {minutes:.1} min; name it in a mission: robot.calibration = {file:?}"
+            ))
+        }
     }
 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use common::{
     bus::{Bus, BusError, Reader, Writer},
-    domain::{Domain, RobotName},
+    domain::RobotName,
     follower::{Event, Follower},
     kinematics::Pose2,
     samples::{BeaconSample, FollowState, FollowingSample, PoseSample, name},
@@ -12,8 +12,8 @@ use common::{
     topics,
 };
 use console::{
-    failure::{Refused, Result},
-    output::print_text,
+    failure::{Result, refuse},
+    output::print_line,
 };
 use glam::DVec2;
 use mission_control::operator;
@@ -43,20 +43,18 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
     let distance_m = arguments.distance.unwrap_or(0.0);
     if !(distance_m > 0.0 || arguments.distance.is_none()) {
         let message = format!("--distance {distance_m} is not a distance; give metres above 0");
-        return Err(Refused::new("too-near", message).into());
+        return refuse("too-near", message);
     }
     if followed == Some(robot) {
         let message = format!("robot {robot} cannot follow itself; name another with --robot");
-        return Err(Refused::new("follows-itself", message).into());
+        return refuse("follows-itself", message);
     }
     let mut signals = Signals::that_end()?;
     operator::follow(robot, distance_m)?;
     let mut other = followed.map(|other| {
-        Follower::new(Domain::of(other.clone()), "follow", &topics::POSE, |bus| {
-            bus.reader(&topics::POSE)
-        })
+        Follower::new(other.domain(), "follow", &topics::POSE, |bus| bus.reader(&topics::POSE))
     });
-    let mut own = Follower::new(Domain::of(robot.clone()), "follow", &topics::FOLLOWING, open);
+    let mut own = Follower::new(robot.domain(), "follow", &topics::FOLLOWING, open);
     let (mut newest, mut pose) = (None::<FollowingSample>, PoseSample::default());
     while !signals.came() {
         let seen = match &mut other {
@@ -89,7 +87,7 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
         }
     }
     let result = newest.unwrap_or_default().result();
-    Ok(print_text(&format!("{result}\n"))?)
+    print_line(result)
 }
 
 /// Returns the beacon for a robot at `own` from the other's pose `seen`, stamped with the time of
@@ -106,12 +104,12 @@ fn sample(own: &PoseSample, seen: &PoseSample, frame: Pose2) -> BeaconSample {
     }
 }
 
-fn frame(numbers: &[f64]) -> Result<Pose2, Refused> {
+fn frame(numbers: &[f64]) -> Result<Pose2> {
     match *numbers {
         [] => Ok(Pose2::default()),
         [x, y, heading] if [x, y, heading].iter().all(|number| number.is_finite()) => {
             Ok(Pose2 { position: DVec2::new(x, y), heading: heading.to_radians() })
         }
-        _ => Err(Refused::new("no-frame", "--frame is not a pose; give three finite numbers")),
+        _ => refuse("no-frame", "--frame is not a pose; give three finite numbers"),
     }
 }

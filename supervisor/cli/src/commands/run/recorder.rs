@@ -7,51 +7,40 @@ use std::{
     time::Duration,
 };
 
-use common::{file::append, poll, signals::Signals};
+use common::{file::append, mission::Mission, poll, signals::Signals};
 use mission_control::{Consumer, Options};
 use processes::process::{Process, firsthand};
 
 use crate::commands::record::DiskBudget;
 
-/// Longest times that a run waits for its recorder.
-struct Patience {
-    /// A recorder that attaches later misses the beginning.
-    attached: Duration,
-    caught_up: Duration,
-    ended: Duration,
-}
-
-/// Returns the wait times. The recorder needs milliseconds, or seconds beside 30 busy processes per
+/// Returns the wait times, milliseconds, until the recorder has attached, caught up and ended. It needs milliseconds, or seconds beside 30 busy processes per
 /// core.
 ///
 /// Short for a real robot, long for a simulated one, and for a calibration, which needs its
 /// recording.
-const fn patience(options: &Options) -> Patience {
-    let mission = &options.mission;
-    let [attached, caught_up, ended] = match (&mission.robot.address, &mission.planner.calibration)
-    {
+const fn patience_ms(Mission { robot, planner, .. }: &Mission) -> [u64; 3] {
+    match (&robot.address, &planner.calibration) {
         (Some(_), None) => [2_000, 500, 5_000],
         _ => [20_000, 20_000, 60_000],
-    };
-    Patience {
-        attached: Duration::from_millis(attached),
-        caught_up: Duration::from_millis(caught_up),
-        ended: Duration::from_millis(ended),
     }
 }
 
 pub struct RunRecorder<'a> {
     options: &'a Options,
     budget: Option<DiskBudget>,
-    patience: Patience,
+    /// Longest times that a run waits. A recorder that attaches later misses the beginning.
+    attached: Duration,
+    caught_up: Duration,
+    ended: Duration,
     process: Option<Process>,
     /// Pipes for catch-up requests. `None` after a missing answer.
     pipes: Option<(ChildStdin, ChildStdout)>,
 }
 
 impl<'a> RunRecorder<'a> {
-    pub const fn new(options: &'a Options, budget: Option<DiskBudget>) -> Self {
-        Self { options, budget, patience: patience(options), process: None, pipes: None }
+    pub fn new(options: &'a Options, budget: Option<DiskBudget>) -> Self {
+        let [attached, caught_up, ended] = patience_ms(&options.mission).map(Duration::from_millis);
+        Self { options, budget, attached, caught_up, ended, process: None, pipes: None }
     }
 
     fn spawn(&self) -> io::Result<Process> {
@@ -86,7 +75,7 @@ impl Consumer for RunRecorder<'_> {
         let attached = self.spawn().and_then(|mut process| {
             self.pipes = process.take_stdin().zip(process.take_stdout());
             self.process = Some(process);
-            self.hear(self.patience.attached, signals)
+            self.hear(self.attached, signals)
         });
         match attached {
             Ok(true) => {}
@@ -96,7 +85,7 @@ impl Consumer for RunRecorder<'_> {
                 );
                 // A recorder that never attached has recorded nothing.
                 if signals.pending() {
-                    self.patience.ended = Duration::ZERO;
+                    self.ended = Duration::ZERO;
                 }
             }
             Err(error) => tracing::error!(%error, "nothing is recorded"),
@@ -108,7 +97,7 @@ impl Consumer for RunRecorder<'_> {
             Some((ask, _)) => ask.write_all(b"?"),
             None => return,
         };
-        let answered = asked.and_then(|()| self.hear(self.patience.caught_up, signals));
+        let answered = asked.and_then(|()| self.hear(self.caught_up, signals));
         if !matches!(answered, Ok(true)) && !signals.pending() {
             tracing::warn!("the recorder does not answer; its file counts what it misses");
             self.pipes = None;
@@ -120,7 +109,7 @@ impl Consumer for RunRecorder<'_> {
 impl Drop for RunRecorder<'_> {
     fn drop(&mut self) {
         if let Some(process) = &mut self.process {
-            process.end(self.patience.ended);
+            process.end(self.ended);
         }
     }
 }

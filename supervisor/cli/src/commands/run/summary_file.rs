@@ -12,7 +12,7 @@ use rustix::{
     io::Errno,
 };
 
-use console::failure::Refused;
+use console::failure::{Refused, refuse};
 
 /// Incomplete summary. [`SUMMARY`] means that the run has ended.
 const UNFINISHED: &str = "summary.json.unfinished";
@@ -59,7 +59,7 @@ impl SummaryFile {
             let text = format!(
                 "the disk of {directory} has {free} KiB free of the {needed} KiB that the files of a run need; remove old runs, or give another directory"
             );
-            return Err(Refused::new("disk-full", text));
+            return refuse("disk-full", text);
         }
         Ok(Self { file, directory: directory.to_path_buf() })
     }

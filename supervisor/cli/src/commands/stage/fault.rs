@@ -4,7 +4,7 @@ use clap::Args;
 use common::{
     bus::Bus,
     clock::MissionTime,
-    domain::{Domain, RobotName},
+    domain::RobotName,
     faults,
     roster::{self, Roster},
     samples::{FaultAnswer, FaultSample, name, name_str},
@@ -15,7 +15,7 @@ use common::{
 use mission_control::operator::{PATIENCE, find, new_id, refuse_mirror};
 
 use console::{
-    failure::{Refused, Result},
+    failure::{Refused, Result, refuse},
     operator::known,
 };
 
@@ -50,10 +50,10 @@ pub fn main(arguments: &Arguments) -> Result {
         let known: Vec<_> = faults::of(stage).map(|fault| fault.name).collect();
         let (fault, known) = (&arguments.fault, known.join(", "));
         let message = format!("{stage} has no fault called {fault:?}; it has {known}");
-        return Err(Refused::new("unknown-fault", message).into());
+        return refuse("unknown-fault", message);
     };
     let robot = &arguments.robot;
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     refuse_mirror(&domain)?;
     let bus = roster::join(&domain, "operator")?;
     let simulated = find(&mut Roster::open(&bus)?, robot, |header, _| Some(header.simulated == 1))?;

@@ -4,7 +4,6 @@ use std::{path::PathBuf, thread};
 
 use common::{
     bus::BusError,
-    domain::Domain,
     roster::{self, Roster},
     topics,
 };
@@ -12,7 +11,7 @@ use serde::Serialize;
 
 use console::{
     failure::Result,
-    output::{json_lines, print_text, write_stderr},
+    output::{json_lines, print_text, say},
     robots::{self, Robot},
     table::Table,
     words,
@@ -39,21 +38,18 @@ pub fn print(json: bool) -> Result {
         asked.into_iter().filter_map(|listed| listed.join().ok()).collect()
     });
     if json {
-        print_text(&json_lines(&listed)?)?;
-        return Ok(());
+        return print_text(json_lines(&listed)?);
     }
     if listed.is_empty() {
-        write_stderr(
-            "firsthand: no robot runs here for this user; start one with `firsthand run`\n",
-        );
+        say("no robot runs here for this user; start one with `firsthand run`");
     } else {
-        print_text(&table(&listed))?;
+        print_text(table(&listed))?;
     }
     let others: Vec<_> = robots::other_users().iter().map(u32::to_string).collect();
     if !others.is_empty() {
         let others = others.join(", ");
-        write_stderr(&format!(
-            "firsthand: users {others} have, or had, robots here: `sudo -u '#USER' firsthand status --all`\n"
+        say(format_args!(
+            "users {others} have, or had, robots here: `sudo -u '#USER' firsthand status --all`"
         ));
     }
     Ok(())
@@ -83,7 +79,7 @@ fn listed(robot: Robot) -> Listed {
 type RosterFacts = (&'static str, Option<f64>, Option<bool>, Option<f64>);
 
 fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
-    let domain = Domain::of(robot.name.clone());
+    let domain = robot.name.domain();
     let bus = roster::join(&domain, "list")?;
     let (is_mirror, mut ages, mut age_s) =
         (domain.mirrors().is_some(), bus.reader(&topics::MIRROR)?, None);
@@ -92,7 +88,7 @@ fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
         if is_mirror && age_s.is_none() {
             return None;
         }
-        let order = words::order(header.order(), header.reason());
+        let order = words::order(header);
         let time_s = header.stamp.seconds();
         Some((order, Some(time_s), Some(header.simulated == 1), age_s))
     })

@@ -1,6 +1,6 @@
 use clap::Args;
 use common::{
-    domain::{Domain, RobotName},
+    domain::RobotName,
     follower::{Event, Follower},
     topics::{self, AnyTopic},
 };
@@ -36,7 +36,7 @@ pub struct Arguments {
 pub fn main(arguments: &Arguments) -> Result {
     let topic = readable(&arguments.topic)?;
     let mut stream = Stream::open()?;
-    let domain = Domain::of(arguments.robot.clone());
+    let domain = arguments.robot.domain();
     // Topics that wake no reader are read when the link ends the tick.
     let mut follower = Follower::new(domain, "echo", topic, |bus| topic.any_reader(bus))
         .also_on([&topics::LINK as &'static dyn AnyTopic]);

@@ -3,7 +3,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use common::{
     bus::{AnyReader, Bus, BusError},
-    domain::{Domain, RobotName},
+    domain::RobotName,
     follower::{Event, Follower},
     topics::{self, AnyTopic},
 };
@@ -72,7 +72,7 @@ pub fn main(arguments: &Arguments) -> Result {
         None => topics::TABLE.to_vec(),
     };
     let mut stream = Stream::open()?;
-    let domain = Domain::of(arguments.robot.clone());
+    let domain = arguments.robot.domain();
     let open = |bus: &Bus| Readers::open(bus, &topics);
     let others = topics.iter().skip(1).map(|&topic| topic as &'static dyn AnyTopic);
     // Topics that wake no reader are read when the link ends the tick.

@@ -7,12 +7,12 @@ use super::reference::angle;
 /// Angles in degrees, over the cells that can reach the target.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Angles {
-    pub(crate) p50: f64,
-    pub(crate) p99: f64,
-    pub(crate) max: f64,
+    pub p50: f64,
+    pub p99: f64,
+    pub max: f64,
     /// Maximum away from saddle points: where u changes by at least [`CLEAR`] of itself between
     /// cells.
-    pub(crate) clear_max: f64,
+    pub clear_max: f64,
 }
 
 /// Relative change of u to the next cell from which a direction is clear.

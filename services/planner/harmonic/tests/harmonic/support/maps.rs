@@ -27,11 +27,11 @@ pub(crate) enum Kind {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Map {
-    pub(crate) width: usize,
-    pub(crate) height: usize,
-    pub(crate) blocked: Vec<bool>,
+    pub width: usize,
+    pub height: usize,
+    pub blocked: Vec<bool>,
     /// Free cell.
-    pub(crate) target: Cell,
+    pub target: Cell,
 }
 
 impl Map {

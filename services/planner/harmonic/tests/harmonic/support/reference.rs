@@ -10,7 +10,7 @@ pub(crate) struct Reference {
     domain: Domain,
     u: Vec<Scaled>,
     /// Largest relative residual of the cells with u > 0.
-    pub(crate) worst_residual: f64,
+    pub worst_residual: f64,
 }
 
 impl Reference {
