@@ -28,7 +28,7 @@ use crate::{
 const PATIENCE: Duration = Duration::from_secs(1);
 
 pub fn mission(robot: &RobotName) -> Result<Mission> {
-    let (directory, _stage_lock) = enter_run(&Domain::of(robot.clone()))?;
+    let (directory, _stage_lock) = enter_run(&robot.domain())?;
     Ok(Run::load(&directory)?.mission)
 }
 
@@ -55,7 +55,7 @@ fn enter_run(domain: &Domain) -> Result<(PathBuf, File)> {
 
 pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined> {
     name_process(stage)?;
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     let (directory, stage_lock) = enter_run(&domain)?;
     let run = Run::load(&directory)?;
     let supervisor = domain.supervisor().map_err(system("find the supervisor"))?;

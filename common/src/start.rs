@@ -75,7 +75,7 @@ impl StageError {
 pub(crate) fn join_as_child(generation: &Generation, supervisor: u32) -> Result<Joined> {
     become_child(generation.stage, supervisor)?;
     let run = Run::load(&generation.directory)?;
-    let domain = Domain::of(run.robot.clone());
+    let domain = run.robot.domain();
     let stage_lock = enter(&domain)?;
     let bus = Bus::join_as_stage(&domain, generation.stage, supervisor)?;
     Ok(Joined { generation: generation.clone(), run, bus, supervisor: None, stage_lock })

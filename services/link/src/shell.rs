@@ -11,7 +11,6 @@ use common::{
     address::Address,
     bus::{Reader, Writers},
     clock::{MissionClock, monotonic_ns},
-    domain::Domain,
     driver::{Memory, Refusal},
     latency::Histogram,
     readers,
@@ -110,7 +109,7 @@ impl Process for Shell {
 
     fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         // The guard identifies this link by its socket, so that comes first.
-        let domain = Domain::of(context.run.robot.clone());
+        let domain = context.run.robot.domain();
         let stop_socket = StopSocket::bind(domain.stop_socket())
             .inspect_err(without("operators' stops without middleware"))
             .ok();

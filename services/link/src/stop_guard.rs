@@ -19,7 +19,6 @@ use common::{
     address::Address,
     bus::close_all_on_exec,
     clock::{MissionClock, Pace, monotonic_ns},
-    domain::Domain,
     file::append,
     poll,
     run::Run,
@@ -91,7 +90,7 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
         // In lockstep a robot waits for commands.
         return Ok(());
     };
-    let domain = Domain::of(run.robot.clone());
+    let domain = run.robot.domain();
     let mark = OwedStop::of(domain.clone());
     let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
     if !mark.is_set() || link.is_succeeded(&domain.stop_socket()) {

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             Event::Nothing => {}
             Event::Samples(poses) => {
                 while let Some(pose) = poses.next_sample()? {
-                    let seconds = pose.stamp.time().seconds();
+                    let seconds = pose.stamp.seconds();
                     println!("{seconds:.2} s ({:.3}, {:.3})", pose.x_m, pose.y_m);
                 }
             }

@@ -45,9 +45,7 @@ pub fn find_planner(
     named: &Path,
     others: &'static [&'static str],
 ) -> Result<PathBuf, PlannerExecutableError> {
-    // Each was once an executable.
-    let name = named.to_str().map(|named| named.strip_prefix("firsthand-").unwrap_or(named));
-    if let Some(other) = others.iter().find(|other| name == Some(**other)) {
+    if let Some(other) = others.iter().find(|other| named == Path::new(other)) {
         return Ok(other.into());
     }
     executable::find(named).map_err(|problem| PlannerExecutableError {
@@ -65,7 +63,7 @@ mod tests {
     fn resolved(named: &Path) -> Result<PathBuf, String> {
         let text = format!("target = [1, 0]\nplanner.executable = {named:?}");
         let mut mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
-        resolve(&mut mission, &["bug", "wavefront"]).map_err(|error| error.to_string())?;
+        resolve(&mut mission, &["odometry", "wavefront"]).map_err(|error| error.to_string())?;
         Ok(mission.planner.executable.unwrap())
     }
 
@@ -83,12 +81,12 @@ mod tests {
     }
 
     #[test]
-    fn another_planner_of_firsthand_is_found_by_its_name_and_by_that_of_its_former_executable() {
-        for (named, found) in [("bug", "bug"), ("wavefront", "wavefront"), ("firsthand-bug", "bug")]
-        {
-            assert_eq!(resolved(Path::new(named)).unwrap(), Path::new(found));
+    fn another_planner_of_firsthand_is_found_by_its_name() {
+        for named in ["odometry", "wavefront"] {
+            assert_eq!(resolved(Path::new(named)).unwrap(), Path::new(named));
         }
-        assert!(resolved(Path::new("./bug")).unwrap_err().contains("`bug`, `wavefront`, the path"));
+        let refused = resolved(Path::new("./odometry")).unwrap_err();
+        assert!(refused.contains("`odometry`, `wavefront`, the path"), "{refused}");
     }
 
     #[test]

@@ -1,10 +1,9 @@
-//! Baselines: planner stages for comparison, with the harmonic planner's map, sonar and controller.
+//! Baseline: a planner stage for comparison, with the harmonic planner's map, sonar and controller.
 //!
-//! Both treat unknown cells as free, like the harmonic planner. Unlike it with the evidential
-//! method, neither looks around before driving.
+//! It treats unknown cells as free, like the harmonic planner. Unlike it with the evidential
+//! method, it does not look around before driving.
 
 pub mod belief;
-pub mod bug;
 pub mod planner;
 pub mod process;
 #[cfg(test)]

@@ -56,7 +56,7 @@ pub struct Arguments {
     /// evidential or paper; several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = "evidential")]
     method: Vec<String>,
-    /// harmonic; the baselines wavefront (shortest paths) and bug (Bug2); or any planner
+    /// harmonic; the baseline wavefront (shortest paths); or any planner
     /// executable. Several, with commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = HARMONIC)]
     planner: Vec<String>,

@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use clap::Args;
 use common::{
     bus::{Bus, Reader, Writer},
-    domain::{Domain, RobotName},
+    domain::RobotName,
     follower::{Event, Follower},
     ground_truth::{GROUND_TRUTH, GroundTruthTick},
     samples::{FixSample, PoseSample, TurnSample, name},
@@ -52,8 +52,7 @@ pub fn main(arguments: &Arguments) -> Result {
         let writers = (bus.writer(&topics::FIX, 1)?, bus.writer(&topics::TURN, 1)?);
         Ok((bus.reader(&topics::POSE)?, writers))
     };
-    let mut robot =
-        Follower::new(Domain::of(arguments.robot.clone()), "sources", &topics::POSE, open);
+    let mut robot = Follower::new(arguments.robot.domain(), "sources", &topics::POSE, open);
     let mut source = Source {
         arguments,
         chance: Random::new(arguments.seed, 23),

@@ -12,10 +12,7 @@ use std::{net::SocketAddr, process::ExitCode};
 
 use self::live::Live;
 use clap::Parser;
-use common::{
-    domain::{Domain, RobotName},
-    signals::Signals,
-};
+use common::{domain::RobotName, signals::Signals};
 use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
 
 /// Serve a robot live to Foxglove or Lichtblick.
@@ -64,6 +61,6 @@ fn serve(arguments: &Arguments) -> Result<ExitCode, Failure> {
         tracing::warn!(%listen, "the protocol has no authentication: every client that reaches this address can watch the robot");
     }
     print_text(format!("ws://{address}\n"))?;
-    live.serve(&Domain::of(arguments.robot.clone()), &mut || signals.came());
+    live.serve(&arguments.robot.domain(), &mut || signals.came());
     Ok(ExitCode::SUCCESS)
 }

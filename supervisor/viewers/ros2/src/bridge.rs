@@ -111,7 +111,7 @@ pub fn serve(
         stands_for_cancel: None,
         told_at: None,
     };
-    let robot_domain = Domain::of(robot.clone());
+    let robot_domain = robot.domain();
     bridge.restore(&robot_domain);
     let open = |bus: &Bus| Feed::open(bus, TOPICS);
     let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, open);

@@ -17,7 +17,6 @@ pub struct Belief {
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
     pub frame: GridFrame,
-    pub epoch: u64,
     cells: &'a [u8],
 }
 
@@ -34,7 +33,7 @@ impl Belief {
 
     pub fn map(&self) -> Option<Map<'_>> {
         let frame = self.grid.frame()?;
-        Some(Map { frame, epoch: self.header.epoch, cells: self.grid.cells() })
+        Some(Map { frame, cells: self.grid.cells() })
     }
 }
 
@@ -55,17 +54,12 @@ impl Map<'_> {
         Some(Cell { col, row }).filter(|&next| self.is_free(next))
     }
 
-    /// Returns the last free point before a hazard on a line, metres; none if the line is free.
-    pub fn last_free(&self, from: DVec2, to: DVec2) -> Option<DVec2> {
+    /// Returns whether the line between two points, metres, is free.
+    pub fn sees(&self, from: DVec2, to: DVec2) -> bool {
         let steps = (from.distance(to) / (SIGHT_STEP * self.frame.resolution_m)).ceil();
         let steps = steps.clamp(1.0, f64::from(u32::MAX)) as u32;
         let at = |step: u32| from.lerp(to, f64::from(step) / f64::from(steps));
-        let hazard = (0..=steps).find(|&step| self.free_cell_at(at(step)).is_none())?;
-        Some(at(hazard.saturating_sub(1)))
-    }
-
-    pub fn sees(&self, from: DVec2, to: DVec2) -> bool {
-        self.last_free(from, to).is_none()
+        (0..=steps).all(|step| self.free_cell_at(at(step)).is_some())
     }
 
     pub fn nearest_free(&self, point: DVec2) -> Option<DVec2> {
@@ -102,9 +96,6 @@ mod tests {
         let sees = |from: [f64; 2], to: [f64; 2]| map.sees(from.into(), to.into());
         assert!(sees([-0.2, 0.1], [0.2, 0.1]));
         assert!(!sees([-0.2, 0.0], [0.2, 0.0]));
-        let last = map.last_free(DVec2::new(-0.2, 0.0), DVec2::new(0.2, 0.0));
-        let last = last.unwrap();
-        assert!((-0.07..-0.05).contains(&last.x), "{last}");
     }
 
     #[test]

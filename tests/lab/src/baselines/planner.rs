@@ -1,24 +1,16 @@
 //! Planner for comparison, with the shared map and path guidance.
 
-use std::fmt::Debug;
-
 use common::{
     mission::{Method, Mission},
     samples::{GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
 };
 use glam::DVec2;
-use serde::{Serialize, de::DeserializeOwned};
 
-use crate::baselines::belief::{Belief, Map};
+use crate::baselines::{belief::Belief, wavefront};
 
 /// Speed of a robot that leaves a hazard, m/s, as of the harmonic planner with the evidential
 /// method.
 const WAY_OUT_M_S: f64 = 0.08;
-
-/// Planner for comparison, saved after each answer.
-pub trait Planner: Default + Debug + Serialize + DeserializeOwned {
-    fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way;
-}
 
 #[derive(Clone, Copy)]
 pub enum Way {
@@ -29,40 +21,25 @@ pub enum Way {
     None,
 }
 
-impl Way {
-    pub fn out(map: &Map<'_>, point: DVec2) -> Self {
-        map.nearest_free(point).map_or(Self::None, Self::Out)
-    }
-}
-
-pub struct Baseline<P> {
-    target: Option<TargetSample>,
+pub struct Baseline {
+    pub target: Option<TargetSample>,
     looks_around: bool,
     pub belief: Belief,
-    pub planner: P,
 }
 
-impl<P: Planner> Baseline<P> {
+impl Baseline {
     pub fn new(mission: &Mission) -> Self {
         Self {
             target: None,
             looks_around: mission.method == Method::Evidential,
             belief: Belief::default(),
-            planner: P::default(),
         }
     }
 
-    /// Restarts the planner if the target changed.
-    pub fn send_to(&mut self, target: TargetSample) {
-        if self.target.replace(target).is_some() {
-            self.planner = P::default();
-        }
-    }
-
-    pub fn guidance(&mut self, sample: &PoseSample) -> GuidanceSample {
+    pub fn guidance(&self, sample: &PoseSample) -> GuidanceSample {
         let here = sample.pose().position;
         let way = match (self.belief.map(), &self.target) {
-            (Some(map), Some(sample)) => self.planner.way(&map, here, sample.target.position()),
+            (Some(map), Some(sample)) => wavefront::way(&map, here, sample.target.position()),
             _ => Way::Unknown,
         };
         self.along(way, sample)
@@ -96,14 +73,11 @@ impl<P: Planner> Baseline<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::baselines::{
-        testing::{pose, sent},
-        wavefront::Wavefront,
-    };
+    use crate::baselines::testing::{pose, sent};
 
     #[test]
     fn a_robot_without_a_way_is_told_so_and_looks_around() {
-        let baseline = sent::<Wavefront>([1.0, 0.0]);
+        let baseline = sent([1.0, 0.0]);
         let guidance = baseline.along(Way::None, &pose([0.0, 0.0]));
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Unreachable));
         assert_eq!((guidance.ex, guidance.ey), (0.0, 1.0));
@@ -111,7 +85,7 @@ mod tests {
 
     #[test]
     fn without_a_map_the_robot_waits() {
-        let guidance = sent::<Wavefront>([0.3, 0.0]).guidance(&pose([0.0, 0.0]));
+        let guidance = sent([0.3, 0.0]).guidance(&pose([0.0, 0.0]));
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));
     }
 }

@@ -1,7 +1,7 @@
 //! `firsthand-lab stage NAME`: a planner for comparison as a stage process, which `firsthand stage
 //! NAME` becomes.
 //!
-//! Reads `grid` and `pose`, and publishes `guidance` after saving its state.
+//! Reads `grid` and `pose`, and publishes `guidance`. It keeps no state between ticks.
 
 use std::ffi::OsString;
 
@@ -15,20 +15,16 @@ use common::{
     stage_command,
     target::TargetReader,
     topics::{GRID, GUIDANCE, POSE, TARGET},
-    wiring::{Persists, Topics},
+    wiring::Topics,
 };
 use processes::stages::PLANNER;
 
-use super::{
-    bug::Bug,
-    planner::{Baseline, Planner},
-    wavefront::Wavefront,
-};
+use super::planner::Baseline;
 use crate::error::{Refused, Result};
 
-pub const BASELINES: &[&str] = &["wavefront", "bug"];
+pub const BASELINES: &[&str] = &["wavefront"];
 
-/// Be a planner for comparison: wavefront or bug.
+/// Be a planner for comparison: wavefront.
 #[derive(Debug, Args)]
 pub struct Arguments {
     name: String,
@@ -37,19 +33,13 @@ pub struct Arguments {
 }
 
 pub fn main(arguments: &Arguments) -> Result {
-    let run = match &*arguments.name {
-        "wavefront" => run_stage::<Shell<Wavefront>>,
-        "bug" => run_stage::<Shell<Bug>>,
-        name => {
-            let message = format!("unknown comparison planner {name:?}; give wavefront or bug");
-            return Err(Refused::new("unknown-stage", message).into());
-        }
-    };
-    Ok(run(&stage_command::start_with(PLANNER, arguments.options.iter().cloned())?)?)
+    let name = &*arguments.name;
+    if !BASELINES.contains(&name) {
+        let message = format!("unknown comparison planner {name:?}; give wavefront");
+        return Err(Refused::new("unknown-stage", message).into());
+    }
+    Ok(run_stage::<Shell>(&stage_command::start_with(PLANNER, arguments.options.iter().cloned())?)?)
 }
-
-/// Bytes; Bug2's state is under 150.
-const STATE_BYTES: usize = 256;
 
 readers! {
     pub struct Inputs {
@@ -61,26 +51,21 @@ readers! {
     }
 }
 
-pub struct Shell<P> {
+pub struct Shell {
     inputs: Inputs,
     out: Outputs,
-    baseline: Baseline<P>,
+    baseline: Baseline,
     latest: Option<PoseSample>,
 }
 
-impl<P: Planner> Process for Shell<P> {
+impl Process for Shell {
     const NAME: &'static str = "planner";
     const WAKES: Topics = &[&GRID];
     const OUTPUTS: Topics = &[&GUIDANCE];
-    const PERSISTS: Persists = Persists::State(STATE_BYTES);
     type Readers = Inputs;
 
     fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
-        let mut baseline = Baseline::new(&context.run.mission);
-        if let Some(planner) = context.saved_state()? {
-            baseline.planner = planner;
-            tracing::info!(state = ?baseline.planner, "restored");
-        }
+        let baseline = Baseline::new(&context.run.mission);
         let out = Outputs::without_inputs(context)?;
         Ok(Self { inputs, out, baseline, latest: None })
     }
@@ -98,11 +83,10 @@ impl<P: Planner> Process for Shell<P> {
             // tick.
             self.latest = self.inputs.pose.newest()?.or(self.latest);
             if let Some(target) = self.inputs.target.next(tick)? {
-                self.baseline.send_to(target);
+                self.baseline.target = Some(target);
             }
             if let Some(pose) = self.latest.take_if(|pose| pose.stamp.tick == tick) {
                 let guidance = self.baseline.guidance(&pose);
-                self.out.save(&self.baseline.planner)?;
                 self.out.publish(&GUIDANCE, guidance)?;
             }
         }

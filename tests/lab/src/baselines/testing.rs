@@ -9,7 +9,7 @@ use common::{
 };
 use glam::DVec2;
 
-use super::planner::{Baseline, Planner};
+use super::planner::Baseline;
 
 /// Returns the header and cells of a drawn map: `#` is hazard, the first row has the greatest y.
 /// Cells are 0.1 m wide, the middle one at (0, 0).
@@ -29,10 +29,10 @@ pub fn mission([x, y]: [f64; 2]) -> Mission {
     Mission::parse(&text, Path::new("test.toml")).unwrap()
 }
 
-pub fn sent<P: Planner>(target: [f64; 2]) -> Baseline<P> {
+pub fn sent(target: [f64; 2]) -> Baseline {
     let mission = mission(target);
     let mut baseline = Baseline::new(&mission);
-    baseline.send_to(TargetSample::first(&mission));
+    baseline.target = Some(TargetSample::first(&mission));
     baseline
 }
 

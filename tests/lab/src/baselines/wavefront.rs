@@ -6,28 +6,19 @@
 use common::grid::Cell;
 use glam::DVec2;
 use report::shortest_path::over_neighbours;
-use serde::{Deserialize, Serialize};
 
-use crate::baselines::{
-    belief::Map,
-    planner::{Planner, Way},
-};
+use crate::baselines::{belief::Map, planner::Way};
 
 /// Maximum distance to the path point that the robot heads for.
 const AIM_M: f64 = 0.6;
 
-#[derive(Debug, Default, Serialize, Deserialize)]
-pub struct Wavefront;
-
-impl Planner for Wavefront {
-    fn way(&mut self, map: &Map<'_>, here: DVec2, target: DVec2) -> Way {
-        let Some(start) = map.free_cell_at(here) else {
-            return Way::out(map, here);
-        };
-        let goal = map.free_cell_at(target);
-        let path = goal.and_then(|goal| shortest_path(map, start, goal));
-        path.map_or(Way::None, |path| Way::To(aim(map, here, target, &path)))
-    }
+pub fn way(map: &Map<'_>, here: DVec2, target: DVec2) -> Way {
+    let Some(start) = map.free_cell_at(here) else {
+        return map.nearest_free(here).map_or(Way::None, Way::Out);
+    };
+    let goal = map.free_cell_at(target);
+    let path = goal.and_then(|goal| shortest_path(map, start, goal));
+    path.map_or(Way::None, |path| Way::To(aim(map, here, target, &path)))
 }
 
 fn aim(map: &Map<'_>, here: DVec2, target: DVec2, path: &[Cell]) -> DVec2 {

@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 use common::{
     bus::{AnyReader, AnyTopic, Bus, BusError, Reader},
     clock::MissionTime,
-    domain::Domain,
     ground_truth::GroundTruthTick,
     roster::Roster,
     samples::{
@@ -351,7 +350,7 @@ impl Subscriptions {
     /// Joins the bus of `supervisor`; none for another's. A killed supervisor leaves its bus until
     /// its successor removes it.
     fn join(options: &Options, supervisor: u32) -> Result<Option<Self>> {
-        let bus = Bus::join(&Domain::of(options.asked.robot.clone()), "chaos")?;
+        let bus = Bus::join(&options.asked.robot.domain(), "chaos")?;
         let mut roster = Roster::open(&bus)?;
         roster.waiter.on(bus.wakeup(&topics::DEATHS)?);
         roster.waiter.on(bus.wakeup(&topics::HEALTH)?);

@@ -7,7 +7,7 @@ use std::{
 };
 
 use ::processes::STOP_GUARD;
-use common::domain::{Domain, RobotName, SHARED_MEMORY};
+use common::domain::{RobotName, SHARED_MEMORY};
 use console::robots::entries;
 
 use crate::robot::command_lines;
@@ -16,7 +16,7 @@ const GUARDS_END: Duration = Duration::from_secs(10);
 const LOOK: Duration = Duration::from_millis(10);
 
 pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     let prefix = domain.shared_memory_prefix();
     let names = entries(SHARED_MEMORY.as_ref())
         .map(|entry| entry.file_name().to_string_lossy().into_owned());

@@ -7,7 +7,6 @@ use std::{
 
 use clap::ValueEnum as _;
 use common::{
-    domain::Domain,
     follower::{Event, Follower},
     ground_truth::GroundTruthTick,
     samples::LinkSample,
@@ -124,7 +123,7 @@ fn watch(
     let mut fault_began = None;
     let (mut departed_s, mut stop, mut link) = (None, None, None);
     // A mission may leave its bus behind.
-    let domain = Domain::of(asked.robot.clone());
+    let domain = asked.robot.domain();
     let mut links = Follower::new(domain, "chaos", &topics::LINK, |bus| bus.reader(&topics::LINK));
     // Ground truth counts only until the run ends, which stops the robot.
     let (ended, moving, is_over) = loop {

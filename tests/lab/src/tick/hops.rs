@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use common::{
     bus::{Author, Bus, Payload, Stamped, Topic},
     clock::{MissionTime, monotonic_ns},
-    domain::{Domain, RobotName},
+    domain::RobotName,
     latency::Histogram,
     samples::WheelSample,
     signals::{SIGTERM, Signals},
@@ -38,7 +38,7 @@ const WARM_UP: u64 = 200;
 
 /// Sends a sample around the forwarders every `period`, or back to back.
 pub fn measure(robot: &RobotName, trips: u64, period: Option<Duration>) -> Result<Histogram> {
-    let lock = DomainLock::acquire(Domain::of(robot.clone()), CELLS)?;
+    let lock = DomainLock::acquire(robot.domain(), CELLS)?;
     let bus = lock.bus().ok_or(LOST_SAMPLE)?;
     let mut start = bus.writer(&topics::WHEELS, 1)?;
     let mut end = bus.reader(&topics::COMMAND)?;
@@ -108,7 +108,7 @@ fn forward<H: Stamped, E: Payload, To: Stamped + Default, ToE: Payload>(
 ) -> Result {
     let mut terminated = Signals::catch(&[SIGTERM]).or_cannot("catch SIGTERM")?;
     become_child(place, supervisor)?;
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     let _stage_lock = domain.enter().or_cannot("enter the domain")?;
     let bus = Bus::join(&domain, place)?;
     let mut waiter = Waiter::default();

@@ -5,7 +5,7 @@ use std::time::Duration;
 use common::{
     bus::BusError,
     clock::Pace,
-    domain::{Domain, RobotName},
+    domain::RobotName,
     follower::{Event, Follower},
     topics,
 };
@@ -44,7 +44,7 @@ pub fn measure(
 }
 
 fn consumer(robot: &RobotName) -> Turns {
-    let domain = Domain::of(robot.clone());
+    let domain = robot.domain();
     Turns::start(move || {
         let mut follower = Follower::new(domain, "consumer", &topics::GRID, |bus| {
             Ok((bus.reader(&topics::GRID)?, bus.reader(&topics::FIELD)?))

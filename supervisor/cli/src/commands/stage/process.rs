@@ -60,7 +60,7 @@ pub fn run(words: &[OsString]) -> Result {
 }
 
 /// Alternative planners: two for comparison, and that of `firsthand calibrate`.
-pub const OTHER_PLANNERS: &[&str] = &["wavefront", "bug", calibration::PLANNER];
+pub const OTHER_PLANNERS: &[&str] = &["wavefront", calibration::PLANNER];
 
 fn become_executable(stage: &Stage, mission: &Mission, options: &[OsString]) -> Result {
     let Some(executable) = stage.executable(mission) else {

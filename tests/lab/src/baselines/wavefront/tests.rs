@@ -18,7 +18,7 @@ const WALL: [&str; 9] = [
 ];
 
 fn guidance(rows: &[&str], at: [f64; 2]) -> GuidanceSample {
-    let mut planner = sent::<Wavefront>([0.3, 0.0]);
+    let mut planner = sent([0.3, 0.0]);
     let (header, cells) = drawn(rows);
     assert!(planner.belief.follow(&header, &cells));
     planner.guidance(&pose(at))
