@@ -116,8 +116,9 @@ commands! {
 
 /// Drive a ground robot through unknown, cluttered places to a target.
 ///
-/// It needs encoders and range sensors: a front sonar suffices. Other sonars, infrared rangers,
-/// lasers and depth cameras are optional. Without a subcommand: `firsthand run obstacle-course`.
+/// The robot needs encoders and range sensors: a front sonar suffices. Other sonars, infrared
+/// rangers, lasers and depth cameras are optional. Without a subcommand: `firsthand run
+/// obstacle-course`.
 #[derive(Debug, Parser)]
 #[command(
     name = "firsthand",

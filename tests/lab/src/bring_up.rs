@@ -26,19 +26,19 @@ use crate::{
 /// Bring up simulated robots with assembly faults, and count found and invented faults.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Robots with one or two faults.
+    /// Number of robots with one or two faults.
     #[arg(long, default_value_t = 60)]
     faulty: u64,
-    /// Robots without a fault.
+    /// Number of robots without a fault.
     #[arg(long, default_value_t = 20)]
     right: u64,
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Robots in turn: by default x80, kobuki (JSON), arduino and sonars. ros2 and burger speak ROS
-    /// 2, which requires a firsthand built with --features ros2.
+    /// Kinds of robots, taken in turn: by default x80, kobuki (JSON), arduino and sonars. ros2 and
+    /// burger speak ROS 2, which requires a firsthand built with --features ros2.
     #[arg(long, value_delimiter = ',', default_value = "x80,kobuki,arduino,sonars", value_parser = PossibleValuesParser::new(ROBOTS.map(|it| it.0)))]
     robots: Vec<String>,
-    /// Robots at once; each takes about a minute of wall-clock time.
+    /// Number of robots at once; each takes about a minute of wall-clock time.
     #[arg(long, default_value_t = 6)]
     jobs: usize,
     /// Directory of the runs.

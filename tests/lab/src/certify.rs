@@ -16,19 +16,20 @@ use crate::{
     missions::{results::Table, runner::in_parallel, statistics::most_by_95_percent},
 };
 
-/// Try robots with signals and faults, and write the losses to a page, with bounds at 95 %.
+/// Test robots with signals and faults, and write attempts and failures to a page, with 95 %
+/// bounds.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Directory of the page and of `rows.csv`, which is appended to.
     #[arg(long, default_value = "certificate")]
     out: PathBuf,
-    /// Share of the whole certificate to try now.
+    /// Share of the whole campaign to run now.
     #[arg(long, default_value_t = 0.001)]
     share: f64,
-    /// Parts, with commas; by default all.
+    /// Parts to run, separated by commas; by default all.
     #[arg(long, value_delimiter = ',', value_parser = PossibleValuesParser::new(PARTS.iter().map(|part| &*part.name)))]
     parts: Vec<String>,
-    /// Inputs of the part fuzz, instead of its share.
+    /// Number of inputs for the part `fuzz`, instead of its share.
     #[arg(long, value_name = "N")]
     inputs: Option<u32>,
 }

@@ -50,26 +50,27 @@ pub struct Arguments {
     /// Seed of the worlds and their noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Missions on each world, each with its own noise.
+    /// Number of missions on each world, each with its own noise.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     repeats: u64,
-    /// evidential or paper; several, with commas, are compared on the same worlds.
+    /// Method: evidential or paper. Several methods, separated by commas, are compared on the same
+    /// worlds.
     #[arg(long, value_delimiter = ',', default_value = "evidential")]
     method: Vec<String>,
-    /// harmonic; the baseline wavefront (shortest paths); or any planner
-    /// executable. Several, with commas, are compared on the same worlds.
+    /// Planner: harmonic; the baseline wavefront (shortest paths); or any planner executable.
+    /// Several planners, separated by commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',', default_value = HARMONIC)]
     planner: Vec<String>,
     /// Sensors of the evidential method: front (the front sonar), front+infrared, three-front (the
     /// front sonar and its two neighbours), laser or all, the default. The paper's method only has
-    /// the front sonar. Several, with commas, are compared on the same worlds.
+    /// the front sonar. Several values, separated by commas, are compared on the same worlds.
     #[arg(long, value_delimiter = ',')]
     sensors: Vec<String>,
-    /// laboratory, measured or harsh.
+    /// Realism of the simulator: laboratory, measured or harsh.
     #[arg(long, default_value = "measured")]
     realism: String,
-    /// Calibrate each mission's robot first, by `firsthand calibrate`. If that fails, standard
-    /// error says why, and the mission runs uncalibrated.
+    /// Calibrate each mission's robot first, by `firsthand calibrate`. If calibration fails,
+    /// standard error says why, and the mission runs uncalibrated.
     #[arg(long)]
     calibrate: bool,
     /// Robot model.
@@ -86,7 +87,7 @@ pub struct Arguments {
     /// do not repeat bit for bit.
     #[arg(long, value_name = "R", default_value = "max")]
     pace: Pace,
-    /// Missions at once; by default one per processor.
+    /// Number of missions at once; by default one per processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
     /// Directory of rows, worlds, pictures and the page.

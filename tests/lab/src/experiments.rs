@@ -23,7 +23,7 @@ use table::METHODS;
 /// the paper's.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Missions per experiment and method, with noise seeds from 1.
+    /// Number of missions per experiment and method, with noise seeds from 1.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
     /// Experiments to run, with commas: 1a, 1b, 2, 3, 4-180, 4-90, 4-0, 5-constant, 5-modulated.
@@ -33,7 +33,7 @@ pub struct Arguments {
     /// laboratory.
     #[arg(long, default_value = "measured", value_parser = ["measured", "harsh", LABORATORY])]
     realism: String,
-    /// Missions at once; by default one per processor.
+    /// Number of missions at once; by default one per processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
     /// Directory of rows, missions, pictures and the page.

@@ -52,7 +52,7 @@ const RELIABLE: Quality = Quality { is_reliable: true, is_latched: false, depth:
 /// keys as options of `firsthand run`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// A mission of a robot that is simulated with JSON lines.
+    /// Mission whose simulated robot speaks JSON lines.
     mission: String,
     /// Set a key of the simulated robot, unknown to its program and mission.
     #[arg(long, value_name = "KEY=VALUE")]

@@ -29,7 +29,8 @@ pub struct Arguments {
     /// Measure only at this many ticks per second, or back to back: max.
     #[arg(long, value_name = "HZ", value_parser = parse_hz)]
     rate: Option<Regime>,
-    /// Number of rounds. Each measures both, because the load of a shared machine varies.
+    /// Number of rounds. Each round measures ticks and bare hops, because the load of a shared
+    /// machine varies.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     rounds: u32,
     /// Set a mission key; repeatable.

@@ -27,9 +27,9 @@ use super::calibrate::drive::{Carried, Setting};
 ///
 /// Checks wheels, gyro, laser, rangers and response. Prints faults to fix and keys to change.
 ///
-/// Put the robot on a free floor, 1 to 2 m in front of a wall, with objects around it. It stands,
-/// turns 1.5 times to each side, drives 0.3 m forward and back, and turns left and right: about a
-/// minute.
+/// Put the robot on a free floor, 1 to 2 m in front of a wall, with objects around it. The robot
+/// stands, turns 1.5 times to each side, drives 0.3 m forward and back, and turns left and right:
+/// about a minute.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Mission file with the robot.

@@ -25,22 +25,22 @@ use console::{
 /// Measure the ratio of wheel diameters, the track and the slip.
 ///
 /// Put the robot 0.5 to 2 m in front of the middle of a flat wall 3 m wide. It faces the wall, with
-/// 3 m of free floor behind it. It drives loops until the values are precise enough, and writes
-/// them to a file. A mission names the file as robot.calibration.
+/// 3 m of free floor behind it. The robot drives loops until the values are precise enough.
+/// `calibrate` writes them to a file. A mission names the file as robot.calibration.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Mission whose robot is calibrated.
+    /// Mission whose robot to calibrate.
     ///
     /// Default: the simulated X80 with measured realism.
     mission: Option<String>,
     #[command(flatten)]
     setting: Setting,
-    /// Drive squares to both sides, whose ends you measure by tape.
+    /// Drive squares to both sides; you measure where each ends, by tape.
     ///
-    /// No wall is needed. The ends of a simulated robot are known.
+    /// This needs no wall. With a simulated robot, you measure nothing.
     #[arg(long)]
     squares: bool,
-    /// Calibrate by the robot's gyro, in half a minute.
+    /// Calibrate by the robot's gyro, in 40 s.
     ///
     /// The robot drives forward, turns, drives back and turns. SHARE is the relative standard
     /// deviation of the gyro's scale, and becomes that of the track.
@@ -56,15 +56,15 @@ pub struct Arguments {
     gyro: Option<f64>,
     /// Measure delay and acceleration of the base.
     ///
-    /// The robot turns on the spot for ten seconds. Prints the keys of [robot.response].
+    /// The robot turns on the spot for 13 seconds. Prints the keys of [robot.response].
     #[arg(long, conflicts_with = "squares")]
     response: bool,
-    /// Squares to each side.
+    /// Number of squares to each side.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(3..=50))]
     count: u32,
-    /// Stop at this standard deviation of the ratio.
+    /// Stop at this standard deviation of the diameter ratio.
     ///
-    /// That of the track may be three times as large.
+    /// The track's standard deviation may be three times as large.
     #[arg(long, value_name = "SHARE", default_value_t = CalibrationPlan::default().ratio_sd)]
     sd: f64,
     /// Stop after N loops at the latest, each about a minute.
@@ -72,7 +72,7 @@ pub struct Arguments {
     loops: u32,
     /// Distance to drive, metres.
     ///
-    /// Away from the wall, with --gyro forward, or with --squares along a side.
+    /// The robot drives away from the wall, with --gyro forward, with --squares along a side.
     #[arg(long, value_name = "M", default_value_t = CalibrationPlan::default().drive_m)]
     drive: f64,
     /// File to write.

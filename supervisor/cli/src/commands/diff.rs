@@ -7,7 +7,7 @@ use console::{failure::Result, output::print};
 
 /// Find the first tick, topic and field in which two recordings differ.
 ///
-/// Exits with 1 if they differ.
+/// Exits with 1 if the recordings differ.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// First recording, or the directory of its run.

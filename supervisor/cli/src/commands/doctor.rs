@@ -26,7 +26,7 @@ use crate::companions;
 /// Each line is ok, a note, or a problem with its remedy. The exit code is 1 if there is a problem.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// One JSON object a line.
+    /// Print one JSON object per line.
     #[arg(long)]
     json: bool,
 }

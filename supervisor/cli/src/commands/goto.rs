@@ -18,9 +18,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Send a driving robot to one or more other targets.
 ///
-/// It continues without a stop. Fails if the supervisor refuses: a place in a believed hazard or
-/// outside the perimeter, or a robot that an operator stopped. With `--follow`, a robot under
-/// `run --stay` follows a beacon until Ctrl-C, and stands while the beacon is silent.
+/// The robot continues without a stop. Fails if a target is in a mapped hazard or outside the
+/// perimeter, or if an operator stopped the robot. With `--follow`, a robot under `run --stay`
+/// follows a beacon until Ctrl-C, and stands while the beacon is silent.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// X and Y of each target, metres in the mission frame.
@@ -40,7 +40,7 @@ pub struct Arguments {
     /// The default leaves 0.5 m between the robot and a person.
     #[arg(long, value_name = "M", requires = "follow")]
     distance: Option<f64>,
-    /// Pose of the followed robot's mission frame in this robot's.
+    /// Pose of the followed robot's mission frame in this robot's frame.
     ///
     /// Metres, and degrees counter-clockwise from x.
     #[arg(long, value_names = ["X", "Y", "DEG"], num_args = 3, requires = "follow", allow_negative_numbers = true)]

@@ -31,16 +31,16 @@ const LISTENS: Duration = Duration::from_secs(4);
 
 /// Write a mission file for the robot that answers at ADDRESS: its protocol, sensors and rates. The robot is asked, and never moved.
 ///
-/// MEASURE and PLACEHOLDER mark what a robot cannot say. It is asked for JSON lines, then frames of an X80, then ROSArduinoBridge, 4 s each.
-/// ROS 2 is not asked.
+/// MEASURE and PLACEHOLDER mark what a robot cannot say. `init` tries JSON lines, then frames of an X80, then ROSArduinoBridge, 4 s each.
+/// `init` sends nothing to a ROS 2 robot.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// The robot's address: udp://192.168.0.20:5600, tcp://HOST:PORT, serial:///dev/ttyUSB0, ros2:0.
     address: Address<String>,
-    /// The file to write. It must not exist.
+    /// The mission file to write, which must not exist.
     #[arg(long, value_name = "FILE", default_value = "robot.toml")]
     out: PathBuf,
-    /// Ask nothing, and write what only you can say for a robot of this protocol: json, x80, arduino or ros2.
+    /// Ask the robot nothing, and write a file to complete for this protocol: json, x80, arduino or ros2.
     #[arg(long, value_parser = protocol)]
     protocol: Option<Protocol>,
     /// The name that the robot gets on this machine.

@@ -20,7 +20,7 @@ use console::{
 /// Names each file before writing it. Enables and starts nothing.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Only print every file, each after its path.
+    /// Only print the path and the content of each file.
     #[arg(long)]
     print: bool,
     /// Install below DIR instead of /.

@@ -22,7 +22,7 @@ pub struct Arguments {
 enum Action {
     /// Write the believed map of a run's end.
     ///
-    /// It has surfaces as occupied, scanned ground as free, and the rest as unknown.
+    /// Surfaces are occupied, scanned ground is free, and the rest is unknown.
     Save {
         /// Directory of a recorded run, or a recording.
         #[arg(value_name = "RUN|F.mcap")]

@@ -6,17 +6,17 @@ use console::failure::Result;
 
 /// Set the pose of a standing robot.
 ///
-/// It forgets earlier sensor data. Fails if the supervisor refuses: a robot that drives, or a place
-/// outside the perimeter.
+/// The robot forgets earlier sensor data. Fails if the robot drives, or if the place is outside the
+/// perimeter.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Metres in the mission frame.
+    /// X in the mission frame, metres.
     #[arg(allow_negative_numbers = true)]
     x: f64,
-    /// Metres in the mission frame.
+    /// Y in the mission frame, metres.
     #[arg(allow_negative_numbers = true)]
     y: f64,
-    /// Degrees counter-clockwise from x.
+    /// Heading, degrees counter-clockwise from x.
     #[arg(allow_negative_numbers = true)]
     heading: f64,
     /// Standard deviation of X and of Y, metres.

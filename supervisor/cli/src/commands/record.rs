@@ -38,14 +38,15 @@ pub struct Arguments {
     /// A replay needs `inputs`.
     #[arg(long, value_name = "TOPICS", value_delimiter = ',')]
     topics: Option<Vec<String>>,
-    /// Also record fields.
+    /// Also record guidance fields.
     ///
-    /// They are larger than all other topics together.
+    /// Fields are larger than all other topics together.
     #[arg(long)]
     fields: bool,
     /// Largest size of all files: `500MB`, `2GB`.
     ///
-    /// A file ends at a quarter of it or after an hour. The oldest files are removed.
+    /// A new file begins at a quarter of SIZE or after an hour. The recorder removes the oldest
+    /// files.
     #[arg(long, value_name = "SIZE")]
     disk_budget: Option<DiskBudget>,
     /// Directory of the one run to record.

@@ -51,7 +51,7 @@ pub struct Arguments {
     robot: RobotName,
     /// Speed of mission time: `max`, or R times wall-clock time.
     ///
-    /// Robots that speak ROS 2 accept R only. Other real robots run in real time.
+    /// Robots that speak ROS 2 accept R only. All real robots without ROS 2 run in real time.
     #[arg(long, default_value = "max")]
     pace: Pace,
     /// Seed of the simulation, instead of the mission's.
@@ -81,8 +81,9 @@ pub struct Arguments {
     resume: Option<PathBuf>,
     /// Continue this robot's newest run below --runs if cut off.
     ///
-    /// The robot stands until `firsthand resume`, unless the mission says `resume = "automatic"`. A
-    /// mission that stays begins where the previous run ended. For systemd services.
+    /// A robot that continues stands until `firsthand resume`, unless the mission says `resume =
+    /// "automatic"`. A new run with --stay begins where the previous run ended. For systemd
+    /// services.
     #[arg(long, conflicts_with_all = ["resume", "out"])]
     resume_last: bool,
     /// Give up after S seconds, instead of the mission's timeout.
@@ -95,8 +96,8 @@ pub struct Arguments {
     set: Vec<String>,
     /// Wait for further targets until Ctrl-C.
     ///
-    /// After each target the robot stands, until `goto`, the page or ROS 2 sends the next. The
-    /// mission needs no target.
+    /// After each target the robot stands, until `goto`, the page or ROS 2 sends the next. With
+    /// --stay, a mission needs no target.
     #[arg(long, conflicts_with = "resume")]
     stay: bool,
     /// Start no stages: use systemd or `firsthand stage NAME --robot R`.
@@ -109,7 +110,8 @@ pub struct Arguments {
     no_record: bool,
     /// Largest size of the recordings: `500MB`, `2GB`.
     ///
-    /// A file ends at a quarter of it or after an hour. The oldest files are removed.
+    /// A new file begins at a quarter of SIZE or after an hour. The recorder removes the oldest
+    /// files.
     #[arg(long, value_name = "SIZE", default_value = "2GB")]
     disk_budget: Option<DiskBudget>,
     /// Print only one line of JSON on standard output, at the end.

@@ -36,7 +36,7 @@ enum Command {
     Diff(diff::Arguments),
     /// List the targets of a run, even in progress.
     ///
-    /// Prints place, outcome, mission time, and distance by robot and ground truth.
+    /// Prints place, outcome, mission time, and final distance, as estimated and true.
     Targets {
         /// Directory of the run.
         run: PathBuf,

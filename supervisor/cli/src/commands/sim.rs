@@ -29,7 +29,7 @@ pub struct Arguments {
     transport: Transport,
     /// Speed of mission time: `max`, or R times wall-clock time.
     ///
-    /// `max` waits for a command in each tick.
+    /// With `max`, each tick waits for a command of the controlling program.
     #[arg(long, default_value = "1")]
     pace: Pace,
     /// Seed of the simulation, instead of the mission's.
@@ -38,13 +38,13 @@ pub struct Arguments {
     /// Set a key of the mission; may be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Checkpoint of the robot, from which it continues if present.
+    /// Checkpoint file, from which the simulated robot continues if present.
     #[arg(long, value_name = "FILE")]
     keep: Option<PathBuf>,
     /// Write the ground truth to standard output as JSON lines.
     #[arg(long)]
     ground_truth: bool,
-    /// Name by which other robots in its world find it.
+    /// Name by which other robots in the same world find this robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
     /// End when this parent process ends.

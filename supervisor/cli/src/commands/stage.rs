@@ -14,8 +14,8 @@ use console::{failure::Result, operator, output::print_text};
 
 /// List, kill, freeze, restart and break the stages of a robot.
 ///
-/// `firsthand stage NAME [--robot R]` is the process of the stage NAME. The supervisor starts it.
-/// With --watch-only, systemd or you do. Without a subcommand: `firsthand stage list`.
+/// `firsthand stage NAME [--robot R]` runs the stage NAME. The supervisor starts this command; with
+/// `run --watch-only`, systemd or you do. Without a subcommand: `firsthand stage list`.
 #[derive(Debug, Args)]
 pub struct Arguments {
     #[command(subcommand)]
@@ -38,7 +38,7 @@ enum Command {
     Freeze(StageProcess),
     /// Continue the frozen process of a stage.
     Thaw(StageProcess),
-    /// Replace a stage by a new generation.
+    /// Replace the process of a stage by a new one.
     ///
     /// Releases a stage that is held because it died too often.
     Restart {

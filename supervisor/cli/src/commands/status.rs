@@ -34,7 +34,7 @@ use console::{
 
 /// Show the stages, link and batteries of a running robot.
 ///
-/// Stages: pid, generation, uptime, restarts and ages.
+/// Prints pid, generation, uptime, restarts and ages of each stage.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot.
@@ -45,12 +45,12 @@ pub struct Arguments {
     all: bool,
     /// Print a status after each change, until Ctrl-C.
     ///
-    /// At most fifty a second, across runs.
+    /// Prints at most fifty a second, across runs.
     #[arg(long, conflicts_with = "all")]
     follow: bool,
     /// Print one line of JSON per robot.
     ///
-    /// An age of null means never.
+    /// An age is null if nothing has happened yet.
     #[arg(long)]
     json: bool,
 }

@@ -15,7 +15,7 @@ pub struct Arguments {
     robot: RobotName,
     /// End the stop guard: you saw the robot at rest, or off.
     ///
-    /// Refused during a run.
+    /// During a run, this is refused.
     #[arg(long, conflicts_with = "cut_off")]
     sign_off: bool,
     /// Do nothing unless a run was cut off.

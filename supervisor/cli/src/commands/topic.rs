@@ -32,7 +32,7 @@ enum Command {
 /// Print the table of topics.
 #[derive(Debug, Args)]
 struct List {
-    /// Print a Python module for consumers instead.
+    /// Print a Python module for consumers instead of the table.
     ///
     /// It has the structs of all topics, and a class that follows a robot.
     #[arg(long)]

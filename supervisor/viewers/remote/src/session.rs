@@ -19,7 +19,7 @@ const LONGEST: usize = (MAX_CELLS as usize).pow(2) + (1 << 16);
 
 #[derive(Debug, Args)]
 pub struct Certificates {
-    /// Own certificate, a PEM file.
+    /// Certificate of this machine, a PEM file.
     #[arg(long, requires = "key")]
     cert: Option<PathBuf>,
     /// Private key of the certificate.

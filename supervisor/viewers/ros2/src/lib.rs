@@ -36,9 +36,9 @@ use self::topics::{Accept, Frames, Spec, TABLE};
 
 /// Show a robot in ROS 2, to RViz and other nodes.
 ///
-/// `--topics` lists its topics. It is a consumer, which may be killed and restarted. Nodes may only
+/// `--topics` lists its topics. You may kill and restart the bridge at any time. Nodes may only
 /// request what --accept permits. DDS has no authentication here: everyone who reaches the domain
-/// may do so. The robot's link is outside the domain.
+/// may make these requests. The robot's link is outside the domain.
 #[derive(Debug, Parser)]
 #[command(name = "firsthand-ros2", version)]
 pub struct Arguments {

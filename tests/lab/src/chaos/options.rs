@@ -25,11 +25,11 @@ pub struct Arguments {
     /// Seed of the schedule; the missions' own seeds count up from it.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Hit some successors again within their first 12 ms: about a fifth of all signals.
+    /// Also signal some restarted processes within their first 12 ms: about a fifth of all signals.
     #[arg(long)]
     pub include_startup: bool,
-    /// Hit the supervisor too, one in twenty signals, and resume its run each time. The robot then
-    /// has its own process, and mission time is wall-clock.
+    /// Also signal the supervisor, one in twenty signals, and resume its run each time. The robot
+    /// then has its own process, and mission time is wall-clock time.
     #[arg(long, conflicts_with = "pace")]
     pub include_supervisor: bool,
     /// Kill and freeze consumers too, one in two signals: a recorder beside the run's own, `topic
@@ -50,7 +50,7 @@ pub struct Arguments {
     /// Record the missions, and replay every generation of every stage, which must be bit-equal.
     #[arg(long)]
     pub replay: bool,
-    /// Mission time, R times wall-clock.
+    /// Speed of mission time: R times wall-clock time.
     #[arg(long, default_value = "4")]
     pub pace: Pace,
     /// Set a mission key; repeatable.
@@ -70,11 +70,11 @@ pub struct Arguments {
         conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
     )]
     pub robot_faults: Option<Vec<RobotFault>>,
-    /// Missions per fault.
+    /// Number of missions per fault.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
     pub missions: u32,
-    /// Let the mission's robot, which speaks JSON lines, speak ROS 2 to its link; the faults are in
-    /// the input of its program.
+    /// Let the mission's robot, which speaks JSON lines, speak ROS 2 to its link. The faults are in
+    /// the JSON lines that its ROS 2 program reads.
     #[arg(long, requires = "robot_faults")]
     pub ros2: bool,
     /// Print one line of JSON.

@@ -19,7 +19,7 @@ use console::{
 
 /// Print the rates of topics each second.
 ///
-/// Also longest gaps and ages, compared with the table of topics.
+/// Also prints longest gaps and ages, and compares with the table of topics.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Print only this topic (`firsthand topic list`).
