@@ -3,7 +3,9 @@
 
 use std::net::UdpSocket;
 
-use crate::support::{Run, assert_nothing_left, assert_refused, output, refused};
+use crate::support::{
+    Run, assert_nothing_left, assert_refused, json_of, output, refused, wait_for_status,
+};
 
 #[test]
 fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike() {
@@ -28,6 +30,31 @@ fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike
         assert_eq!(check, run, "{content:?}");
     }
     assert_nothing_left("bad");
+}
+
+#[test]
+fn status_names_the_trouble_of_a_stage_that_cannot_start() {
+    let laser = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-arduino/laser.toml");
+    let text = std::fs::read_to_string(laser).unwrap();
+    let model = "model = \"rplidar-a1\"";
+    let nowhere = format!("{model}\naddress = \"tcp://no-such-host.invalid:1\"");
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("laser.toml");
+    std::fs::write(&file, text.replace(model, &nowhere)).unwrap();
+    let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = format!("robot.address='udp://{}'", silent.local_addr().unwrap());
+    let mission = file.to_str().unwrap();
+    let run = Run::start("no-host", mission, &["--set", &address]);
+    let named = |status: &serde_json::Value| {
+        status["complaint"].to_string().contains("no-such-host.invalid")
+    };
+    wait_for_status("no-host", named);
+    let (_, once) = json_of(&output(&["status", "--robot", "no-host", "--json"]));
+    assert!(named(&once[0]), "{once:?}");
+    let (code, summary) = run.finish();
+    assert_eq!(code, Some(6), "{summary}");
+    assert!(summary["reason"].to_string().contains("no-such-host.invalid"), "{summary}");
+    assert_nothing_left("no-host");
 }
 
 #[cfg(not(feature = "ros2"))]

@@ -44,8 +44,8 @@ pub(crate) struct BusEndpoints {
     /// Id and answer of the newest request; id 0 before the first.
     pub last_request: (u64, RequestAnswer),
     published: Option<Instant>,
-    /// Since the last publication.
-    pub has_new_reader: bool,
+    /// A reader of `complaints` is new since the last publication.
+    pub misses_trouble: bool,
     // The bus is dropped last.
     pub bus: Rc<Bus>,
 }
@@ -84,7 +84,7 @@ impl BusEndpoints {
             beacon: bus.reader(&topics::BEACON)?,
             last_request,
             published: None,
-            has_new_reader: false,
+            misses_trouble: false,
             bus,
         })
     }
@@ -102,8 +102,10 @@ impl BusEndpoints {
     /// Returns whether the last publication is a `period` old, or a new consumer waits for a
     /// roster.
     pub(crate) fn is_due(&mut self, period: Duration) -> bool {
-        self.has_new_reader |= self.roster.has_new_reader();
-        self.has_new_reader || self.published.is_none_or(|last| last.elapsed() >= period)
+        let old = self.published.is_none_or(|last| last.elapsed() >= period);
+        // A consumer opens one reader after the other.
+        self.misses_trouble |= self.complaints.has_new_reader();
+        self.roster.has_new_reader() || self.misses_trouble || old
     }
 
     pub(crate) fn publish_state(
@@ -114,7 +116,7 @@ impl BusEndpoints {
         header: RosterHeader,
         entries: &[RosterEntry],
     ) -> Result<(), BusError> {
-        (self.published, self.has_new_reader) = (Some(Instant::now()), false);
+        (self.published, self.misses_trouble) = (Some(Instant::now()), false);
         self.directive.publish(tick, time, directive)?;
         let (last_request, answer) = self.last_request;
         let header = RosterHeader { last_request, answer: answer.into(), ..header };

@@ -431,7 +431,7 @@ impl<'a> Supervisor<'a> {
         };
         // A stage that ended cannot repeat its trouble, and one that runs does so later.
         if let Some(complaint) = self.bus.observer.record.complaint()
-            && (self.bus.has_new_reader || !self.stages.runs(name_str(&complaint.stage)))
+            && (self.bus.misses_trouble || !self.stages.runs(name_str(&complaint.stage)))
         {
             self.bus.complaints.publish(tick, time, complaint)?;
         }

@@ -166,9 +166,12 @@ impl RobotState {
         Some((is_old, format!("another machine, {how} {age_s:.1} s{ago}")))
     }
 
+    /// Without samples of the link, no newer time makes a complaint old.
     pub fn complaint(&self) -> Option<&ComplaintSample> {
-        let now = self.link?.stamp.time();
-        self.complaint.as_ref().filter(|said| now.since(said.stamp.time()) < ComplaintSample::LASTS)
+        let said = self.complaint.as_ref()?;
+        let is_old =
+            |link: LinkSample| link.stamp.time().since(said.stamp.time()) >= ComplaintSample::LASTS;
+        (!self.link.is_some_and(is_old)).then_some(said)
     }
 
     fn does(&self) -> (Kind, String) {
