@@ -235,7 +235,7 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
         // The stage's log has the error in any case.
         let _ = heartbeat.complain(&error.to_string().into());
         if !opened {
-            stop.came_within(CONNECTED_WITHIN);
+            stop.wait(CONNECTED_WITHIN);
         }
     }
     worked
@@ -249,14 +249,15 @@ struct StopRequest {
 
 impl StopRequest {
     fn came(&mut self) -> bool {
-        self.terminated.came() || self.came_within(Duration::ZERO)
+        let ended = |supervisor| poll::is_readable(supervisor, Duration::ZERO).unwrap_or(false);
+        self.terminated.came() || self.supervisor.as_ref().is_some_and(ended)
     }
 
-    /// Waits at most `patience`.
-    fn came_within(&self, patience: Duration) -> bool {
-        let sources = [Some(self.terminated.as_fd()), self.supervisor.as_ref().map(AsFd::as_fd)];
-        let sources: Vec<_> = sources.into_iter().flatten().collect();
-        poll::readable(&sources, Some(patience)).is_ok_and(|came| came.contains(&true))
+    /// Waits for a request for at most `patience`.
+    fn wait(&self, patience: Duration) {
+        let mut sources = vec![self.terminated.as_fd()];
+        sources.extend(self.supervisor.as_ref().map(AsFd::as_fd));
+        let _ = poll::readable(&sources, Some(patience));
     }
 }
 

@@ -100,7 +100,7 @@ impl BusEndpoints {
     }
 
     /// Returns whether the last publication is a `period` old, or a new consumer waits for a
-    /// roster.
+    /// roster or the newest trouble.
     pub(crate) fn is_due(&mut self, period: Duration) -> bool {
         let old = self.published.is_none_or(|last| last.elapsed() >= period);
         // A consumer opens one reader after the other.
