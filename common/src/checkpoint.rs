@@ -8,21 +8,12 @@
 //! The magic ends with the version of the states. A whole state of another version or type is
 //! refused rather than silently lost.
 
-use std::{
-    fs::{File, OpenOptions},
-    io::{Read as _, Seek as _, SeekFrom},
-    os::unix::fs::FileExt,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use rustix::{
-    fs::{FallocateFlags, fallocate},
-    io::Errno,
-};
 use serde::{Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
-use crate::file::FileError;
+use crate::file::{FileError, Store};
 
 #[derive(Debug, Error)]
 pub enum CheckpointError {
@@ -49,7 +40,7 @@ const HEADER: usize = 20;
 
 #[derive(Debug)]
 pub struct Checkpoint {
-    file: File,
+    file: Store,
     path: PathBuf,
     capacity: usize,
     sequence: u64,
@@ -85,10 +76,8 @@ impl Checkpoint {
         &self,
         slot: u64,
     ) -> Result<Option<(u64, T)>, CheckpointError> {
-        let (mut file, mut bytes) = (&self.file, Vec::new());
-        file.seek(SeekFrom::Start(self.slot_offset(slot)))
-            .and_then(|_| file.take((HEADER + self.capacity) as u64).read_to_end(&mut bytes))
-            .map_err(FileError::of("read checkpoint", &self.path))?;
+        let bytes = self.file.read(self.slot_offset(slot), (HEADER + self.capacity) as u64);
+        let bytes = bytes.map_err(FileError::of("read checkpoint", &self.path))?;
         decode(&bytes)
             .map_err(|problem| CheckpointError::Foreign { file: self.path.clone(), problem })
     }
@@ -108,7 +97,7 @@ impl Checkpoint {
         let crc = checksum(&bytes, 16);
         bytes[16..20].copy_from_slice(&crc.to_le_bytes());
         self.file
-            .write_all_at(&bytes, self.slot_offset(sequence % 2))
+            .write(&bytes, self.slot_offset(sequence % 2))
             .map_err(FileError::of("write checkpoint", &self.path))?;
         self.sequence = sequence;
         self.buffer = bytes;
@@ -169,20 +158,8 @@ fn whole(bytes: &[u8]) -> Option<(u64, &[u8])> {
     (word(16)? == checksum(whole, 16)).then(|| (sequence, &whole[HEADER..]))
 }
 
-/// Opens or creates `path` and reserves `length` bytes on disk, if the file system can; the file's
-/// length stays.
-pub(crate) fn open_reserved(path: &Path, length: u64) -> Result<File, CheckpointError> {
-    let file = OpenOptions::new()
-        .read(true)
-        .write(true)
-        .create(true)
-        .truncate(false)
-        .open(path)
-        .map_err(FileError::of("open checkpoint", path))?;
-    match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length) {
-        Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(file),
-        Err(errno) => Err(FileError::of("reserve space for checkpoint", path)(errno).into()),
-    }
+pub(crate) fn open_reserved(path: &Path, length: u64) -> Result<Store, CheckpointError> {
+    Ok(Store::open(path, length).map_err(FileError::of("open checkpoint", path))?)
 }
 
 #[cfg(test)]

@@ -1,12 +1,20 @@
-//! File helpers: the error of an unusable file, replacement, appending, and bounded reading.
+//! Files of the system or of a simulated machine: replacement, appending, bounded reading, and the
+//! error of an unusable file.
 
 use std::{
     fs,
-    io::{self, Read as _},
+    io::{self, Read as _, Seek as _, SeekFrom, Write as _},
+    os::unix::fs::FileExt as _,
     path::{Path, PathBuf},
 };
 
+use rustix::{
+    fs::{FallocateFlags, fallocate},
+    io::Errno,
+};
 use thiserror::Error;
+
+use crate::machine::{self, Content};
 
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", file.display())]
@@ -26,8 +34,74 @@ impl FileError {
     }
 }
 
+/// File that a process keeps open: the system's, or a simulated machine's.
+#[derive(Debug)]
+pub(crate) enum Store {
+    System(fs::File),
+    Simulated(Content),
+}
+
+impl Store {
+    /// Opens or creates `path` and reserves `length` bytes on disk, if the file system can; the
+    /// file's length stays.
+    pub(crate) fn open(path: &Path, length: u64) -> io::Result<Self> {
+        if let Some(machine) = machine::simulated() {
+            return killed().map(|()| Self::Simulated(machine.files().open(path)));
+        }
+        let mut options = fs::File::options();
+        let file = options.read(true).write(true).create(true).truncate(false).open(path)?;
+        match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length) {
+            Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(Self::System(file)),
+            Err(errno) => Err(errno.into()),
+        }
+    }
+
+    /// Returns at most `most` bytes from `at` on.
+    pub(crate) fn read(&self, at: u64, most: u64) -> io::Result<Vec<u8>> {
+        match self {
+            Self::System(file) => {
+                let (mut file, mut bytes) = (file, Vec::new());
+                file.seek(SeekFrom::Start(at))?;
+                file.take(most).read_to_end(&mut bytes)?;
+                Ok(bytes)
+            }
+            Self::Simulated(content) => {
+                let content = content.borrow();
+                let from = content.get(at as usize..).unwrap_or_default();
+                Ok(from.get(..most as usize).unwrap_or(from).to_vec())
+            }
+        }
+    }
+
+    pub(crate) fn write(&self, bytes: &[u8], at: u64) -> io::Result<()> {
+        match self {
+            Self::System(file) => file.write_all_at(bytes, at),
+            Self::Simulated(content) => {
+                killed()?;
+                let (mut content, end) = (content.borrow_mut(), at as usize + bytes.len());
+                let length = content.len().max(end);
+                content.resize(length, 0);
+                content[at as usize..end].copy_from_slice(bytes);
+                Ok(())
+            }
+        }
+    }
+}
+
+fn killed() -> io::Result<()> {
+    match machine::is_killed() {
+        true => Err(io::ErrorKind::BrokenPipe.into()),
+        false => Ok(()),
+    }
+}
+
 /// Replaces `file` so that a kill leaves the old or the new content.
 pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
+    if let Some(machine) = machine::simulated() {
+        killed()?;
+        machine.files().open(file).replace(content.as_ref().to_vec());
+        return Ok(());
+    }
     let mut new = file.as_os_str().to_owned();
     new.push(".new");
     fs::write(&new, content)?;
@@ -36,6 +110,56 @@ pub fn replace(file: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
 
 pub fn append(file: impl AsRef<Path>) -> io::Result<fs::File> {
     fs::File::options().create(true).append(true).open(file)
+}
+
+/// Appends `bytes` in one write. Returns the new length.
+pub fn append_bytes(file: &Path, bytes: &[u8]) -> io::Result<u64> {
+    if let Some(machine) = machine::simulated() {
+        killed()?;
+        let content = machine.files().open(file);
+        content.borrow_mut().extend_from_slice(bytes);
+        return Ok(content.borrow().len() as u64);
+    }
+    let mut file = append(file)?;
+    file.write_all(bytes)?;
+    Ok(file.metadata()?.len())
+}
+
+/// Returns the whole text of a file.
+pub fn read_text(file: &Path) -> io::Result<String> {
+    let Some(machine) = machine::simulated() else { return fs::read_to_string(file) };
+    if !machine.files().exists(file) {
+        return Err(io::ErrorKind::NotFound.into());
+    }
+    let content = machine.files().open(file).borrow().clone();
+    String::from_utf8(content).map_err(io::Error::other)
+}
+
+/// Returns whether there is a file or link at `path`.
+pub fn exists(path: &Path) -> bool {
+    match machine::simulated() {
+        Some(machine) => machine.files().exists(path),
+        None => path.symlink_metadata().is_ok(),
+    }
+}
+
+/// Creates an empty file at `path`.
+pub fn create(path: &Path) -> io::Result<()> {
+    match machine::simulated() {
+        Some(machine) => killed().map(|()| drop(machine.files().open(path))),
+        None => fs::File::create(path).map(drop),
+    }
+}
+
+/// Removes the file at `path`, if there is one.
+pub fn remove(path: &Path) -> io::Result<()> {
+    if let Some(machine) = machine::simulated() {
+        return killed().map(|()| machine.files().remove(path));
+    }
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// Returns the first `most` bytes of a text file.

@@ -11,11 +11,7 @@
 //! Opening reserves space in case the disk fills up. An end mark empties the journal, because
 //! truncation would release the space.
 
-use std::{
-    fs::File,
-    os::unix::fs::FileExt,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -23,7 +19,7 @@ use crate::{
     checkpoint::{
         Checkpoint, CheckpointError, VERSION, checksum, encode_after, open_reserved, other_version,
     },
-    file::FileError,
+    file::{FileError, Store},
 };
 
 /// Least and greatest number of entries before a snapshot.
@@ -42,7 +38,7 @@ const NUMBER: usize = 10;
 #[derive(Debug)]
 pub struct Journal {
     snapshots: Checkpoint,
-    file: File,
+    file: Store,
     path: PathBuf,
     end: u64,
     number: u64,
@@ -88,8 +84,8 @@ impl Journal {
 
     /// Cuts the file after the last whole entry. Fails on a whole one of another version.
     fn read<E: DeserializeOwned>(&mut self) -> Result<Vec<E>, CheckpointError> {
-        let bytes =
-            std::fs::read(&self.path).map_err(FileError::of("read checkpoint", &self.path))?;
+        let bytes = self.file.read(0, u64::MAX);
+        let bytes = bytes.map_err(FileError::of("read checkpoint", &self.path))?;
         let mut entries = Vec::new();
         let mut rest = &bytes[..];
         let foreign = |problem| CheckpointError::Foreign { file: self.path.clone(), problem };
@@ -117,7 +113,7 @@ impl Journal {
     }
 
     fn write(&self, bytes: &[u8]) -> Result<(), CheckpointError> {
-        let written = self.file.write_all_at(bytes, self.end);
+        let written = self.file.write(bytes, self.end);
         Ok(written.map_err(FileError::of("write checkpoint", &self.path))?)
     }
 

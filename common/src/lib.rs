@@ -54,7 +54,9 @@ pub mod target;
 pub mod topics;
 pub mod wiring;
 
-pub use bus::{self, VERSION, bus_instance, claim, clock, domain, lock_holders, poll, waiter};
+pub use bus::{
+    self, VERSION, bus_instance, claim, clock, domain, lock_holders, machine, poll, waiter,
+};
 #[cfg(feature = "stage")]
 pub use json_protocol as json_wire;
 pub use mission::{self, address, geometry, kinematics, sonar};

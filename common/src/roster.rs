@@ -1,10 +1,12 @@
 //! Supervisor's roster, as another process reads it.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::{
     bus::{Author, Bus, BusError, Names, Reader},
+    clock::Instant,
     domain::Domain,
+    machine,
     samples::{RosterEntry, RosterHeader, name_str},
     topics,
     waiter::Waiter,
@@ -14,7 +16,7 @@ use crate::{
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Wait for a stage to be named. Earlier samples, such as the first whole map, are lost.
 #[cfg(feature = "stage")]
-const NAMED_WITHIN: Duration = Duration::from_secs(10);
+pub(crate) const NAMED_WITHIN: Duration = Duration::from_secs(10);
 
 #[derive(Debug)]
 pub struct Roster {
@@ -59,26 +61,27 @@ impl Roster {
         Ok(Self { samples: bus.reader(&topics::ROSTER)?, waiter })
     }
 
-    /// Waits until a roster names this process, then admits the processes in rosters on `bus`. That
-    /// roster precedes all samples of this process, so readers elsewhere know it by then.
+    /// Waits until a roster names this process. That roster precedes all samples of this process,
+    /// so readers elsewhere know it by then. Returns whether it came within `patience`.
     #[cfg(feature = "stage")]
-    pub(crate) fn admit_named(mut self, bus: &Bus) -> Result<(), BusError> {
+    pub(crate) fn await_named(&mut self, bus: &Bus, patience: Duration) -> Result<bool, BusError> {
         let Some(writers) = bus.writers() else {
-            return Ok(());
+            return Ok(true);
         };
-        let own = std::process::id();
-        let first = self.find(NAMED_WITHIN, |_, entries| {
+        let own = machine::process();
+        let first = self.find(patience, |_, entries| {
             let names_own = entries.iter().any(|entry| entry.pid == own);
             names_own.then(|| named(entries).collect::<Vec<_>>())
         })?;
-        match first {
-            Some(stages) => writers.name(stages),
-            None => tracing::warn!(
-                "the supervisor's roster lacks this process; check whether the supervisor is frozen"
-            ),
+        Ok(first.map(|stages| writers.name(stages)).is_some())
+    }
+
+    /// Admits the processes in rosters from now on.
+    #[cfg(feature = "stage")]
+    pub(crate) fn admit(self, bus: &Bus) {
+        if let Some(writers) = bus.writers() {
+            writers.read_from(names(self.samples));
         }
-        writers.read_from(names(self.samples));
-        Ok(())
     }
 
     /// Returns the first result of `find` in a roster; `None` after `patience`.

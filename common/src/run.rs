@@ -2,8 +2,7 @@
 //! stages' generation counts.
 
 use std::{
-    fs,
-    io::{self, Write as _},
+    io,
     path::{Path, PathBuf},
 };
 
@@ -15,7 +14,7 @@ use crate::{
     address::Address,
     clock::MissionClock,
     domain::RobotName,
-    file::{FileError, append, replace},
+    file::{FileError, append_bytes, read_text, replace},
     mission::Mission,
 };
 
@@ -57,7 +56,7 @@ impl Run {
     /// Fails if the file is unreadable or invalid, or from another version with other keys.
     pub fn load(directory: &Path) -> Result<Self, RunError> {
         let file = directory.join(FILE_NAME);
-        let text = fs::read_to_string(&file).map_err(FileError::of("read", &file))?;
+        let text = read_text(&file).map_err(FileError::of("read", &file))?;
         Self::parse(&text, &file)
     }
 
@@ -83,9 +82,7 @@ impl Run {
 pub fn next_generation(directory: &Path, stage: &str) -> Result<u32, RunError> {
     let file = directory.join(format!("{stage}.generations"));
     let count = || {
-        let mut lines = append(&file)?;
-        lines.write_all(b"\n")?;
-        let count = lines.metadata()?.len();
+        let count = append_bytes(&file, b"\n")?;
         u32::try_from(count).map_err(|_| io::Error::other(format!("too many generations: {count}")))
     };
     Ok(count().map_err(FileError::of("count a generation in", &file))?)
@@ -97,6 +94,8 @@ pub fn checkpoint_file(directory: &Path, process: &str) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -9,7 +9,7 @@ use std::{
     os::fd::{AsFd, OwnedFd},
     path::PathBuf,
     process::ExitCode,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -18,13 +18,14 @@ use self::fault_requests::Requests;
 use crate::{
     bus::{Bus, Stamp, Writer, Writers},
     checkpoint::Checkpoint,
-    clock::{MissionClock, MissionTime, monotonic_ns},
+    clock::{Instant, MissionClock, MissionTime, monotonic_ns},
     driver::Refusal,
     external,
     journal::{Journal, Restored},
+    machine,
     outputs::Saved,
     poll,
-    roster::Roster,
+    roster::{NAMED_WITHIN, Roster},
     run::{self, Run},
     samples::{ComplaintSample, FaultAnswer, FaultKind, HealthSample, HealthState, name, name_str},
     signals::{SIGTERM, Signals},
@@ -210,35 +211,103 @@ pub fn run_stage<P: Process>(start: &Start) -> Result {
         waiter.on_readable(supervisor)?;
     }
     let mut stop = StopRequest { terminated, supervisor };
-    let mut heartbeat = Heartbeat::new(&bus, &generation, run.clock)?;
-    let roster = Roster::open(&bus)?;
-    heartbeat.beat(HealthState::Starting, Progress::default())?;
-    roster.admit_named(&bus)?;
-    let number = generation.number;
-    let mut context =
-        Context { generation, run, bus, waiter, saved: Saved::default(), wiring: P::WIRING };
-    for topic in P::WIRING.wakes {
-        context.waiter.on(context.bus.wakeup(*topic)?);
+    let (mut host, mut roster) = Host::announce::<P>(generation, run, bus, waiter)?;
+    if !roster.await_named(&host.context.bus, NAMED_WITHIN)? {
+        tracing::warn!(
+            "the supervisor's roster lacks this process; check whether the supervisor is frozen"
+        );
     }
-    let readers = P::Readers::open_readers(&context.bus)?;
+    roster.admit(&host.context.bus);
     let mut opened = false;
-    let worked = P::open(&mut context, readers).and_then(|mut process| {
+    let worked = host.open::<P>().and_then(|mut work| {
         opened = true;
-        tracing::info!(generation = number, "ready");
-        let worked = work(&mut process, &mut heartbeat, &mut context, &mut stop);
+        let worked = work.until_stopped(&mut host, &mut stop);
         // After an error, too, the stage is stopped in order: the link then stops the robot.
-        let stopped = process.stop();
+        let stopped = work.process.stop();
         tracing::info!("stopped");
         worked.and(stopped)
     });
     if let Err(error) = &worked {
         // The stage's log has the error in any case.
-        let _ = heartbeat.complain(&error.to_string().into());
+        let _ = host.heartbeat.complain(&error.to_string().into());
         if !opened {
             stop.wait(CONNECTED_WITHIN);
         }
     }
     worked
+}
+
+/// A stage's process on a simulated machine, which gives it turns.
+pub trait Simulated {
+    /// Takes a turn. Returns the time after which the next is due without input; `None` if the
+    /// process hangs by request.
+    fn turn(&mut self) -> Result<Option<Duration>>;
+
+    /// Returns whether an input waits. The wires of the link wake it apart from this.
+    fn is_woken(&self) -> bool;
+
+    /// Ends the process in order.
+    fn stop(&mut self) -> Result;
+}
+
+struct Simulation<P> {
+    host: Host,
+    /// Until a roster names the process, and since when it waits.
+    starting: Option<(Roster, Instant)>,
+    work: Option<Work<P>>,
+}
+
+/// Starts a stage's process on a simulated machine.
+pub fn simulate<P: Process>(
+    generation: Generation,
+    run: Run,
+    bus: Bus,
+) -> Result<Box<dyn Simulated>>
+where
+    P: 'static,
+{
+    let (host, roster) = Host::announce::<P>(generation, run, bus, Waiter::default())?;
+    Ok(Box::new(Simulation::<P> { host, starting: Some((roster, Instant::now())), work: None }))
+}
+
+impl<P: Process> Simulated for Simulation<P> {
+    fn turn(&mut self) -> Result<Option<Duration>> {
+        let host = &mut self.host;
+        if let Some((mut roster, since)) = self.starting.take() {
+            let named = roster.await_named(&host.context.bus, Duration::ZERO)?;
+            if !named && since.elapsed() < NAMED_WITHIN {
+                self.starting = Some((roster, since));
+                return Ok(Some(NAMED_WITHIN.saturating_sub(since.elapsed())));
+            }
+            roster.admit(&host.context.bus);
+            let work = self.work.insert(host.open::<P>()?);
+            work.begin(host)?;
+            return Ok(Some(work.patience(host)));
+        }
+        let Some(work) = &mut self.work else { return Ok(None) };
+        let came = host.context.waiter.is_woken();
+        host.context.waiter.wait(Duration::ZERO)?;
+        match work.turn(host, came)? {
+            Some(FaultKind::Spin | FaultKind::Mute) => {
+                self.work = None;
+                Ok(None)
+            }
+            _ => Ok(Some(work.patience(host))),
+        }
+    }
+
+    fn is_woken(&self) -> bool {
+        match &self.starting {
+            Some((roster, _)) => roster.waiter.is_woken(),
+            None => self.host.context.waiter.is_woken(),
+        }
+    }
+
+    fn stop(&mut self) -> Result {
+        let Some(work) = &mut self.work else { return Ok(()) };
+        self.host.heartbeat.beat(HealthState::Stopping, work.progress)?;
+        work.process.stop()
+    }
 }
 
 /// Sources of a stop request: SIGTERM, or the end of a supervisor that is not the parent.
@@ -261,76 +330,150 @@ impl StopRequest {
     }
 }
 
-fn work(
-    process: &mut impl Process,
-    heartbeat: &mut Heartbeat,
-    context: &mut Context,
-    stop: &mut StopRequest,
-) -> Result {
-    let ticks_follow_at_once = matches!(context.run.clock, MissionClock::Ticks { .. });
-    let mut progress = process.turn()?;
-    if ticks_follow_at_once {
-        // Idle work belongs to the previous tick.
-        process.idle()?;
+/// What a stage's process has besides the stage.
+struct Host {
+    context: Context,
+    heartbeat: Heartbeat,
+}
+
+impl Host {
+    /// Publishes the first heartbeat, which the supervisor answers with a roster.
+    fn announce<P: Process>(
+        generation: Generation,
+        run: Run,
+        bus: Bus,
+        waiter: Waiter,
+    ) -> Result<(Self, Roster)> {
+        let mut heartbeat = Heartbeat::new(&bus, &generation, run.clock)?;
+        let roster = Roster::open(&bus)?;
+        heartbeat.beat(HealthState::Starting, Progress::default())?;
+        let saved = Saved::default();
+        let context = Context { generation, run, bus, waiter, saved, wiring: P::WIRING };
+        Ok((Self { context, heartbeat }, roster))
     }
-    heartbeat.beat(HealthState::Ready, progress)?;
-    process.after_ready(context)?;
-    let simulated = context.run.mission.robot.address.is_none();
-    let mut faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
-    let (mut busy, mut idled) = (true, Instant::now());
-    // Process whose samples were ignored last.
-    let mut foreign = 0;
-    let mut lost = 0;
-    while !stop.came() {
-        let pause = (busy && process.has_idle_work()).then_some(TICK_OVER);
-        let patience = [pause, process.looks_again_after()]
-            .into_iter()
-            .flatten()
-            .fold(heartbeat.time_to_beat(), Duration::min);
-        let came = context.waiter.wait(patience)?;
-        progress = process.turn()?;
-        let overdue = process.has_idle_work() && idled.elapsed() >= IDLE_WITHIN;
-        if ticks_follow_at_once || busy && !came || overdue {
-            process.idle()?;
+
+    fn open<P: Process>(&mut self) -> Result<Work<P>> {
+        let context = &mut self.context;
+        for topic in P::WIRING.wakes {
+            context.waiter.on(context.bus.wakeup(*topic)?);
         }
-        if !process.has_idle_work() {
-            idled = Instant::now();
-        }
-        busy = came;
-        if heartbeat.beat_if_due(progress)? {
-            if let Some(trouble) = process.trouble() {
-                heartbeat.complain(&trouble)?;
-            }
-            let ignored = context.bus.writers().map(Writers::ignored).unwrap_or_default();
-            if ignored.process != foreign {
-                foreign = ignored.process;
-                let what = "its samples are ignored, because the supervisor's roster lacks it";
-                let (input, remedy) = (format!("process {foreign}"), "end it".to_owned());
-                let trouble = Refusal { input, what: what.to_owned(), remedy };
-                tracing::warn!("{trouble}");
-                heartbeat.complain(&trouble)?;
-            }
-            if context.bus.lost() > 2 * lost {
-                lost = context.bus.lost();
-                let trouble = "/dev/shm is full and samples are lost; remove files from it".into();
-                tracing::warn!(lost, "{trouble}");
-                heartbeat.complain(&trouble)?;
-            }
-            while let Some((id, fault)) = faults.take()? {
-                let answer = inject(process, fault)?;
-                tracing::warn!(?fault, ?answer, "a fault was requested");
-                heartbeat.answer(id, answer, progress)?;
-                while fault == Ok(FaultKind::Spin) && !stop.came() {
-                    std::hint::spin_loop();
-                }
-                while fault == Ok(FaultKind::Mute) && !stop.came() {
-                    std::thread::park_timeout(heartbeat.period);
-                    heartbeat.beat(HealthState::Ready, progress)?;
-                }
-            }
-        }
+        let readers = P::Readers::open_readers(&context.bus)?;
+        let process = P::open(context, readers)?;
+        tracing::info!(generation = context.generation.number, "ready");
+        Ok(Work {
+            process,
+            progress: Progress::default(),
+            faults: None,
+            busy: true,
+            idled: Instant::now(),
+            foreign: 0,
+            lost: 0,
+        })
     }
-    heartbeat.beat(HealthState::Stopping, progress)
+
+    const fn ticks_follow_at_once(&self) -> bool {
+        matches!(self.context.run.clock, MissionClock::Ticks { .. })
+    }
+}
+
+/// Work of an open process, turn by turn.
+struct Work<P> {
+    process: P,
+    progress: Progress,
+    /// `None` before the first ready heartbeat.
+    faults: Option<Requests>,
+    busy: bool,
+    idled: Instant,
+    /// Process whose samples were ignored last.
+    foreign: u32,
+    lost: u64,
+}
+
+impl<P: Process> Work<P> {
+    fn until_stopped(&mut self, host: &mut Host, stop: &mut StopRequest) -> Result {
+        self.begin(host)?;
+        while !stop.came() {
+            let came = host.context.waiter.wait(self.patience(host))?;
+            let endless = self.turn(host, came)?;
+            while endless == Some(FaultKind::Spin) && !stop.came() {
+                std::hint::spin_loop();
+            }
+            while endless == Some(FaultKind::Mute) && !stop.came() {
+                std::thread::park_timeout(host.heartbeat.period);
+                host.heartbeat.beat(HealthState::Ready, self.progress)?;
+            }
+        }
+        host.heartbeat.beat(HealthState::Stopping, self.progress)
+    }
+
+    /// Takes the first turn and announces readiness.
+    fn begin(&mut self, host: &mut Host) -> Result {
+        self.progress = self.process.turn()?;
+        if host.ticks_follow_at_once() {
+            // Idle work belongs to the previous tick.
+            self.process.idle()?;
+        }
+        host.heartbeat.beat(HealthState::Ready, self.progress)?;
+        let context = &mut host.context;
+        self.process.after_ready(context)?;
+        let simulated = context.run.mission.robot.address.is_none();
+        let faults = Requests::open(&context.bus, context.generation.stage, simulated)?;
+        (self.faults, self.idled) = (Some(faults), Instant::now());
+        Ok(())
+    }
+
+    /// Returns the longest wait for input before the next turn.
+    fn patience(&self, host: &Host) -> Duration {
+        let pause = (self.busy && self.process.has_idle_work()).then_some(TICK_OVER);
+        let waits = [pause, self.process.looks_again_after()];
+        waits.into_iter().flatten().fold(host.heartbeat.time_to_beat(), Duration::min)
+    }
+
+    /// Takes a turn after a wait in which input `came`. Returns a requested fault that never ends.
+    fn turn(&mut self, host: &mut Host, came: bool) -> Result<Option<FaultKind>> {
+        self.progress = self.process.turn()?;
+        let overdue = self.process.has_idle_work() && self.idled.elapsed() >= IDLE_WITHIN;
+        if host.ticks_follow_at_once() || self.busy && !came || overdue {
+            self.process.idle()?;
+        }
+        if !self.process.has_idle_work() {
+            self.idled = Instant::now();
+        }
+        self.busy = came;
+        if !host.heartbeat.beat_if_due(self.progress)? {
+            return Ok(None);
+        }
+        let Host { heartbeat, context } = host;
+        if let Some(trouble) = self.process.trouble() {
+            heartbeat.complain(&trouble)?;
+        }
+        let ignored = context.bus.writers().map(Writers::ignored).unwrap_or_default();
+        if ignored.process != self.foreign {
+            self.foreign = ignored.process;
+            let what = "its samples are ignored, because the supervisor's roster lacks it";
+            let (input, remedy) = (format!("process {}", self.foreign), "end it".to_owned());
+            let trouble = Refusal { input, what: what.to_owned(), remedy };
+            tracing::warn!("{trouble}");
+            heartbeat.complain(&trouble)?;
+        }
+        if context.bus.lost() > 2 * self.lost {
+            self.lost = context.bus.lost();
+            let trouble = "/dev/shm is full and samples are lost; remove files from it".into();
+            tracing::warn!(self.lost, "{trouble}");
+            heartbeat.complain(&trouble)?;
+        }
+        while let Some((id, fault)) =
+            self.faults.as_mut().map(Requests::take).transpose()?.flatten()
+        {
+            let answer = inject(&mut self.process, fault)?;
+            tracing::warn!(?fault, ?answer, "a fault was requested");
+            heartbeat.answer(id, answer, self.progress)?;
+            if let Ok(endless @ (FaultKind::Spin | FaultKind::Mute)) = fault {
+                return Ok(Some(endless));
+            }
+        }
+        Ok(None)
+    }
 }
 
 fn inject(
@@ -365,7 +508,7 @@ impl Heartbeat {
             writer: bus.writer(&topics::HEALTH, generation.number)?,
             sample: HealthSample {
                 stage: name(generation.stage),
-                pid: std::process::id(),
+                pid: machine::process(),
                 ..HealthSample::default()
             },
             complaints: bus.writer(&topics::COMPLAINTS, generation.number)?,

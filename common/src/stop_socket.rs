@@ -20,7 +20,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{clock::monotonic_ns, domain::Domain, poll, samples::Rest};
+use crate::{clock::monotonic_ns, domain::Domain, file, machine, poll, samples::Rest};
 
 /// Operator's request to the link: its byte. Recordings hold the number of the variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -66,7 +66,7 @@ pub struct StopSocket {
 impl StopSocket {
     /// Binds `path` in place of an earlier process's socket.
     pub fn bind(path: PathBuf) -> io::Result<Self> {
-        remove(&path)?;
+        file::remove(&path)?;
         Ok(Self { socket: bind(&path)?, path, asking: Vec::new(), looking: Vec::new() })
     }
 
@@ -206,14 +206,11 @@ impl StopMark {
     }
 
     pub fn is_set(&self) -> bool {
-        self.path.exists()
+        file::exists(&self.path)
     }
 
     pub fn set(&self, stopped: bool) -> io::Result<()> {
-        if stopped {
-            return fs::File::create(&self.path).map(drop);
-        }
-        remove(&self.path)
+        if stopped { file::create(&self.path) } else { file::remove(&self.path) }
     }
 }
 
@@ -229,16 +226,19 @@ impl OwedStop {
     }
 
     pub fn is_set(&self) -> bool {
-        self.0.owed_stop().symlink_metadata().is_ok()
+        file::exists(&self.0.owed_stop())
     }
 
     /// Sets or clears the mark for the robot of the run in `directory`.
     pub fn set(&self, owed: bool, directory: &Path) -> io::Result<()> {
         if !owed {
-            return remove(&self.0.owed_stop());
+            return file::remove(&self.0.owed_stop());
         }
         if self.is_set() {
             return Ok(());
+        }
+        if machine::is_simulated() {
+            return file::create(&self.0.owed_stop());
         }
         make_directory(self.0.directory())?;
         symlink(directory, self.0.owed_stop())
@@ -247,13 +247,6 @@ impl OwedStop {
 
 fn make_directory(directory: &Path) -> io::Result<()> {
     fs::DirBuilder::new().recursive(true).mode(0o700).create(directory)
-}
-
-fn remove(path: &Path) -> io::Result<()> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    }
 }
 
 #[cfg(test)]

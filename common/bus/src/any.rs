@@ -31,7 +31,7 @@ pub trait AnyTopic: Sync {
     fn any_writer(&self, bus: &Bus, generation: u32, longest: usize) -> Result<Box<dyn AnyWriter>>;
     /// Returns the processes that have the topic open.
     fn opened_by(&self, bus: &Bus) -> Result<OpenedBy> {
-        ports::opened_by(&bus.node, self.spec(), &self.carried())
+        ports::opened_by(&bus.medium, self.spec(), &self.carried())
     }
 }
 

@@ -2,11 +2,18 @@
 //!
 //! Samples carry mission time. Deadlines that detect ended or hung processes use [`monotonic_ns`].
 
-use std::{fmt, str::FromStr, time::Duration};
+use std::{
+    fmt,
+    ops::{Add, Sub},
+    str::FromStr,
+    time::Duration,
+};
 
 use rustix::time::{ClockId, clock_gettime};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+use crate::machine;
 
 /// Nanoseconds since the start of the mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -85,10 +92,48 @@ impl MissionClock {
     }
 }
 
-/// Returns CLOCK_MONOTONIC, nanoseconds, which all processes of the machine share.
+/// Returns CLOCK_MONOTONIC, nanoseconds, which all processes of the machine share. A simulated
+/// machine has its own.
 pub fn monotonic_ns() -> u64 {
+    if let Some(machine) = machine::simulated() {
+        return machine.monotonic_ns();
+    }
     let now = clock_gettime(ClockId::Monotonic);
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
+
+/// Instant of [`monotonic_ns`], with the interface of [`std::time::Instant`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Instant(u64);
+
+impl Instant {
+    pub fn now() -> Self {
+        Self(monotonic_ns())
+    }
+
+    pub fn elapsed(self) -> Duration {
+        Self::now().saturating_duration_since(self)
+    }
+
+    pub const fn saturating_duration_since(self, earlier: Self) -> Duration {
+        Duration::from_nanos(self.0.saturating_sub(earlier.0))
+    }
+}
+
+impl Add<Duration> for Instant {
+    type Output = Self;
+
+    fn add(self, after: Duration) -> Self {
+        Self(self.0.saturating_add(u64::try_from(after.as_nanos()).unwrap_or(u64::MAX)))
+    }
+}
+
+impl Sub<Duration> for Instant {
+    type Output = Self;
+
+    fn sub(self, before: Duration) -> Self {
+        Self(self.0.saturating_sub(u64::try_from(before.as_nanos()).unwrap_or(u64::MAX)))
+    }
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@ mod error;
 mod layout;
 mod leftovers;
 pub mod lock_holders;
+pub mod machine;
 mod make;
 mod ownership;
 mod payload;
@@ -47,7 +48,7 @@ pub use self::{
         Payload, Stamp, Stamped, ZeroCopySend, decode_sample, decode_slice, encode_sample,
         encode_slice,
     },
-    ports::{OpenedBy, Slice},
+    ports::{Memory, OpenedBy, Slice},
     read::{Reader, Wakeup},
     spec::{EVERY_STAGE, Limits, Logged, OPERATOR, Rate, SUPERVISOR, Spec},
     topic::Topic,

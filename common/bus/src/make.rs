@@ -25,7 +25,7 @@ use super::{
     authors::Writers,
     error::{BusError, Result},
     leftovers, ownership,
-    ports::{self, BusNode, Carried},
+    ports::{self, BusNode, Carried, Medium, Memory},
     spec::{Limits, Spec},
 };
 use crate::{
@@ -35,13 +35,12 @@ use crate::{
 
 #[derive(Debug)]
 pub struct Bus {
-    pub(super) node: BusNode,
+    pub(super) medium: Medium,
     /// Processes whose samples are read; `None` without named authors.
     pub(super) writers: Option<Writers>,
     /// Whether the process may take the places that consumers leave free.
     pub(super) is_stage: bool,
     pub(super) lost: Rc<Cell<u64>>,
-    instance: BusInstance,
 }
 
 /// Services of all topics, which exist while this value is held.
@@ -74,18 +73,33 @@ impl Bus {
         let mut bus = Self::join_instance(instance, name)?;
         bus.writers = Some(Writers::of(std::process::id()));
         bus.is_stage = true;
-        let services = topics
-            .map(|(spec, carried)| ports::create(&bus.node, spec, &carried))
-            .collect::<Result<_, _>>()?;
-        leftovers::back_up(&bus.services(), &bus.backup()).map_err(&failed)?;
-        bus.instance.make_current().map_err(failed)?;
+        let mut services = Vec::new();
+        if let Medium::Shared { node, instance } = &bus.medium {
+            for (spec, carried) in topics {
+                services.push(ports::create(node, spec, &carried)?);
+            }
+            leftovers::back_up(&services_of(node), &backup_of(node)).map_err(&failed)?;
+            instance.make_current().map_err(failed)?;
+        }
         Ok((bus, Services(services)))
+    }
+
+    /// Returns the bus of a process on a simulated machine. With a `supervisor`, it reads only the
+    /// samples of processes that it names.
+    pub fn in_memory(memory: Rc<Memory>, supervisor: Option<u32>) -> Self {
+        Self {
+            medium: Medium::Memory(memory),
+            writers: supervisor.map(Writers::of),
+            is_stage: true,
+            lost: Rc::default(),
+        }
     }
 
     /// Rewrites the configuration for joining processes.
     pub fn restore_config(&self) -> Result {
-        Self::write_config(&self.instance)?;
-        self.instance.make_current().map_err(no_join(&self.instance.domain))
+        let Medium::Shared { instance, .. } = &self.medium else { return Ok(()) };
+        Self::write_config(instance)?;
+        instance.make_current().map_err(no_join(&instance.domain))
     }
 
     fn write_config(instance: &BusInstance) -> Result {
@@ -160,8 +174,8 @@ impl Bus {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| refused(&error))?;
-        let (node, lost) = (node.into(), Rc::default());
-        Ok(Self { node, writers: None, is_stage: false, lost, instance })
+        let medium = Medium::Shared { node: node.into(), instance };
+        Ok(Self { medium, writers: None, is_stage: false, lost: Rc::default() })
     }
 
     /// Returns the processes whose samples are read; `None` means the newest generation of any
@@ -177,30 +191,22 @@ impl Bus {
 
     /// Returns whether another bus replaced this one or the run has ended.
     pub fn is_replaced(&self) -> bool {
-        BusInstance::current(&self.instance.domain).map_or(true, |now| now != self.instance)
+        let Medium::Shared { instance, .. } = &self.medium else { return false };
+        BusInstance::current(&instance.domain).map_or(true, |now| now != *instance)
     }
 
     /// Prevents removal of the bus while a consumer opens a topic, which would recreate and leave
     /// the bus's directory.
     pub(super) fn hold(&self) -> Result<Option<File>> {
-        if self.is_stage {
-            return Ok(None);
-        }
-        let domain = &self.instance.domain;
+        let domain = match &self.medium {
+            Medium::Shared { instance, .. } if !self.is_stage => &instance.domain,
+            _ => return Ok(None),
+        };
         let held = domain.joining().map_err(not_running(domain))?;
         match self.is_replaced() {
             false => Ok(Some(held)),
             true => Err(not_running(domain)(io::ErrorKind::NotFound.into())),
         }
-    }
-
-    fn services(&self) -> PathBuf {
-        let services = self.node.config().global.service_dir();
-        PathBuf::from(OsStr::from_bytes(services.as_bytes()))
-    }
-
-    fn backup(&self) -> PathBuf {
-        self.services().with_extension("backup")
     }
 
     /// Prepares the bus for a successor of `process`, which must have ended. Only the supervisor
@@ -209,13 +215,9 @@ impl Bus {
     /// Removes unfilled shared memory of `process`, for which the successor could wait forever, and
     /// restores missing service files. Returns whether unfilled memory of others is left.
     pub fn remove_unfinished(&self, process: u32) -> io::Result<bool> {
-        leftovers::restore(&self.backup(), &self.services())?;
-        self.remove_unfilled(process)
-    }
-
-    fn remove_unfilled(&self, process: u32) -> io::Result<bool> {
-        let prefix = String::from_utf8_lossy(self.node.config().global.prefix.as_bytes());
-        leftovers::remove_unfilled(Path::new(SHARED_MEMORY), &prefix, process)
+        let Medium::Shared { node, .. } = &self.medium else { return Ok(false) };
+        leftovers::restore(&backup_of(node), &services_of(node))?;
+        remove_unfilled(node, process)
     }
 
     /// Cleans up after ended processes, at a few milliseconds each. Only the supervisor calls this.
@@ -224,14 +226,15 @@ impl Bus {
     /// have ended), and restores missing service files. If it returns false, call it again later
     /// with the same processes.
     pub fn clear_up(&self, killed: &[u32]) -> io::Result<bool> {
-        leftovers::restore(&self.backup(), &self.services())?;
-        let config = self.node.config();
+        let Medium::Shared { node, .. } = &self.medium else { return Ok(true) };
+        leftovers::restore(&backup_of(node), &services_of(node))?;
+        let config = node.config();
         let nodes = config.global.node_dir();
         let nodes = Path::new(OsStr::from_bytes(nodes.as_bytes()));
         let (mut outcome, mut all) = (Ok(()), true);
-        let listed = Node::<ipc::Service>::list(config, |node| {
-            if let NodeState::Dead(dead) = node {
-                match self.remove_unfilled(leftovers::process_of(dead.id().value())) {
+        let listed = Node::<ipc::Service>::list(config, |listed| {
+            if let NodeState::Dead(dead) = listed {
+                match remove_unfilled(node, leftovers::process_of(dead.id().value())) {
                     // The next call lists it again.
                     Ok(false) => drop(dead.try_remove_stale_resources()),
                     // The middleware could wait forever for the unfilled memory, which the next
@@ -251,10 +254,24 @@ impl Bus {
         // last.
         if all {
             killed.iter().try_for_each(|&process| {
-                self.remove_unfilled(process)?;
+                remove_unfilled(node, process)?;
                 leftovers::remove_nodes(nodes, process)
             })?;
         }
         Ok(all)
     }
+}
+
+fn services_of(node: &BusNode) -> PathBuf {
+    let services = node.config().global.service_dir();
+    PathBuf::from(OsStr::from_bytes(services.as_bytes()))
+}
+
+fn backup_of(node: &BusNode) -> PathBuf {
+    services_of(node).with_extension("backup")
+}
+
+fn remove_unfilled(node: &BusNode, process: u32) -> io::Result<bool> {
+    let prefix = String::from_utf8_lossy(node.config().global.prefix.as_bytes());
+    leftovers::remove_unfilled(Path::new(SHARED_MEMORY), &prefix, process)
 }

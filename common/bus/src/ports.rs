@@ -13,13 +13,14 @@
 //!   through a number itself.
 #![allow(unsafe_code)]
 
+mod memory;
 mod raw;
 
 use std::{collections::HashSet, marker::PhantomData, mem::MaybeUninit, ops::Deref, ptr};
 
-pub use self::raw::OpenedBy;
-pub(super) use self::raw::{BusNode, Carried, Listener, Notifier, create, opened_by};
+pub(super) use self::raw::{BusNode, Carried, Listener, Medium, Notifier, create, opened_by};
 use self::raw::{RawPublisher, RawSample, RawService, RawSubscriber};
+pub use self::{memory::Memory, raw::OpenedBy};
 use super::{
     authors::Author,
     error::Result,
@@ -35,8 +36,8 @@ pub(super) struct Service<H, E> {
 }
 
 impl<H: Payload, E: Payload> Service<H, E> {
-    pub(super) fn open(node: &BusNode, spec: &'static Spec) -> Result<Self> {
-        let raw = RawService::open(node, spec, &Carried::of::<H, E>())?;
+    pub(super) fn open(medium: &Medium, spec: &'static Spec) -> Result<Self> {
+        let raw = RawService::open(medium, spec, &Carried::of::<H, E>())?;
         Ok(Self { raw, spec, carries: PhantomData })
     }
 

@@ -2,7 +2,7 @@
 
 use std::{
     cell::Cell,
-    os::fd::{AsFd, BorrowedFd},
+    os::fd::BorrowedFd,
     thread,
     time::{Duration, Instant},
 };
@@ -42,7 +42,7 @@ impl Bus {
         buffer: usize,
     ) -> Result<Reader<H, E>> {
         let subscriber = self.once_freed(|| {
-            let service = Service::open(&self.node, topic.spec)?;
+            let service = Service::open(&self.medium, topic.spec)?;
             self.leave_places(topic.spec, topic.spec.limits.readers, service.readers().len())?;
             service.subscriber(buffer)
         })?;
@@ -129,7 +129,7 @@ pub struct Wakeup {
 impl Wakeup {
     pub(super) fn open(bus: &Bus, spec: &'static Spec) -> Result<Self> {
         let admit = |taken| bus.leave_places(spec, Limits::LISTENERS, taken);
-        let listener = bus.once_freed(|| Listener::open(&bus.node, spec, admit))?;
+        let listener = bus.once_freed(|| Listener::open(&bus.medium, spec, admit))?;
         Ok(Self { listener, had_events: Cell::new(false) })
     }
 
@@ -148,10 +148,13 @@ impl Wakeup {
     pub(crate) fn drain_what_came_meanwhile(&self) -> Result<bool> {
         Ok(self.had_events.get() && self.drain()?)
     }
-}
 
-impl AsFd for Wakeup {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.listener.as_fd()
+    /// Returns whether an event waits, on a simulated machine.
+    pub(crate) fn is_woken(&self) -> bool {
+        self.listener.is_woken()
+    }
+
+    pub(crate) fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.listener.descriptor()
     }
 }

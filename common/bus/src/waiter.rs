@@ -1,12 +1,14 @@
 //! Wait for all inputs of a process at once: wakeups of topics, sockets, signals, other processes.
 
 use std::{
+    io,
     os::fd::{AsFd, BorrowedFd, OwnedFd},
     time::Duration,
 };
 
 use crate::{
     error::{BusError, Result},
+    machine,
     poll::{self, polled},
     read::Wakeup,
 };
@@ -35,8 +37,21 @@ impl Waiter {
         self.wait_also_for(&[], timeout)
     }
 
+    /// Returns whether an event waits, on a simulated machine.
+    pub fn is_woken(&self) -> bool {
+        self.wakeups.iter().any(Wakeup::is_woken)
+    }
+
     pub fn wait_also_for(&self, others: &[BorrowedFd<'_>], timeout: Duration) -> Result<bool> {
-        let wakeups = self.wakeups.iter().map(AsFd::as_fd);
+        if let Some(machine) = machine::simulated() {
+            let came = machine.wait(timeout, &|| self.is_woken());
+            if machine.is_killed() {
+                return Err(BusError::Wait(io::ErrorKind::BrokenPipe.into()));
+            }
+            self.wakeups.iter().try_for_each(|wakeup| wakeup.drain().map(drop))?;
+            return Ok(came);
+        }
+        let wakeups = self.wakeups.iter().filter_map(Wakeup::descriptor);
         let own = self.descriptors.iter().map(AsFd::as_fd);
         let all = wakeups.chain(own).chain(others.iter().copied());
         let mut all: Vec<_> = all.map(polled).collect();

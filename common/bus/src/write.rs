@@ -29,12 +29,12 @@ impl Bus {
         longest: usize,
     ) -> Result<Writer<H, E>> {
         let _held = self.hold()?;
-        let service = Service::open(&self.node, topic.spec)?;
+        let service = Service::open(&self.medium, topic.spec)?;
         Ok(Writer {
             publisher: service.publisher(longest.min(topic.spec.limits.longest))?,
             service,
             known: HashSet::new(),
-            notifier: Notifier::open(&self.node, topic.spec)?,
+            notifier: Notifier::open(&self.medium, topic.spec)?,
             generation,
             sequence: 0,
             lost: Rc::clone(&self.lost),

@@ -13,7 +13,7 @@ use common::{
     clock::{MissionClock, monotonic_ns},
     driver::{Memory, Refusal},
     latency::Histogram,
-    readers,
+    machine, readers,
     samples::{Action, Cause, CommandSample, DirectiveSample, LinkSample, TickLimitSample},
     shell::{Context, Process, Progress, StageError},
     stage::Runner,
@@ -67,17 +67,16 @@ pub struct Shell {
     inputs: Inputs,
     writers: Option<Writers>,
     runner: Runner<LinkStage>,
-    /// None if it could not be created, which the log says.
+    /// None on a simulated machine, and if it could not be created, which the log says.
     stop_socket: Option<StopSocket>,
     stop_mark: StopMark,
     marked: bool,
-    /// None in lockstep, where a robot waits for commands, and if it could not be started, which
-    /// the log says.
+    /// None on a simulated machine, in lockstep, where a robot waits for commands, and if it could
+    /// not be started, which the log says.
     guard: Option<StopGuard>,
     owed_mark: OwedStop,
     owes_stop: bool,
     directory: PathBuf,
-    identity: Identity,
     has_telemetry: bool,
     clock: MissionClock,
     latency: Histogram,
@@ -110,13 +109,16 @@ impl Process for Shell {
     fn open(context: &mut Context, inputs: Inputs) -> Result<Self, StageError> {
         // The guard identifies this link by its socket, so that comes first.
         let domain = context.run.robot.domain();
-        let stop_socket = StopSocket::bind(domain.stop_socket())
-            .inspect_err(without("operators' stops without middleware"))
-            .ok();
+        let is_real = !machine::is_simulated();
+        let bind = || StopSocket::bind(domain.stop_socket());
+        let stop_socket = is_real.then(bind).and_then(|bound| {
+            bound.inspect_err(without("operators' stops without middleware")).ok()
+        });
         let directory = &context.generation.directory.clone();
         let in_ticks = matches!(context.run.clock, MissionClock::Ticks { .. });
-        let identity = Identity::now(&domain.stop_socket());
-        let guard = (!in_ticks).then(|| start_guard(directory, &identity)).flatten();
+        let guard = (is_real && !in_ticks)
+            .then(|| start_guard(directory, Identity::now(&domain.stop_socket())))
+            .flatten();
         let owed_mark = OwedStop::of(domain);
         let stop_mark = StopMark::of(directory);
         let mission = &context.run.mission;
@@ -129,7 +131,8 @@ impl Process for Shell {
                 Ok(Transport::open(&address.unwrap_or(context.run.address.clone()), sensor.line)?)
             })
             .collect::<Result<Vec<_>, StageError>>()?;
-        for wire in std::iter::once(&transport).chain(&wires) {
+        let all = std::iter::once(&transport).chain(&wires);
+        for wire in all.filter_map(Transport::descriptor) {
             context.waiter.on_readable(wire)?;
         }
         if let Some(socket) = &stop_socket {
@@ -150,7 +153,6 @@ impl Process for Shell {
             owes_stop: owed_mark.is_set(),
             owed_mark,
             directory: directory.clone(),
-            identity,
             has_telemetry: false,
             clock: context.run.clock,
             latency: Histogram::default(),
@@ -285,7 +287,7 @@ impl Process for Shell {
     }
 }
 
-fn start_guard(directory: &Path, link: &Identity) -> Option<StopGuard> {
+fn start_guard(directory: &Path, link: Identity) -> Option<StopGuard> {
     StopGuard::start(directory, link).inspect_err(without("stop guard")).ok()
 }
 
@@ -366,9 +368,9 @@ impl Shell {
         if self.owes_stop {
             self.set_owed_mark();
         }
-        if self.guard.as_mut().is_some_and(StopGuard::has_ended) {
+        if let Some(ended) = self.guard.take_if(StopGuard::has_ended) {
             tracing::warn!("the stop guard ended; the link starts another");
-            self.guard = start_guard(&self.directory, &self.identity);
+            self.guard = start_guard(&self.directory, ended.link);
         }
     }
 

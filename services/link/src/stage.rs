@@ -1,7 +1,6 @@
 //! Link as a stage: records and publishes the step, telemetry and wire bytes.
 
 use common::{
-    clock::{MissionClock, Pace},
     mission::{Mission, SensorKind},
     outputs::Outputs,
     samples::{
@@ -119,13 +118,7 @@ impl Stage for LinkStage {
     }
 
     fn start(&self, context: &mut Context) -> Result<State, StageError> {
-        Ok(State {
-            pace: match context.run.clock {
-                MissionClock::Ticks { .. } => Pace::Max,
-                MissionClock::Wall { rate, .. } => Pace::Rate(rate),
-            },
-            next_tick: context.generation.first_tick,
-        })
+        Ok(State::new(context.run.clock, context.generation.first_tick))
     }
 
     fn begin(&mut self, start: State) -> Result<(), ForeignState> {

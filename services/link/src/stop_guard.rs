@@ -3,7 +3,8 @@
 //!
 //! The link starts it and holds the writing end of a pipe, which the kernel closes with the link.
 //! The guard has its own session, so signals to the link, the supervisor or their process groups
-//! miss it. It uses the same [`Link`], and answers operators at its own socket.
+//! miss it. It uses the same [`Link`], and answers operators at its own socket. [`Orders`] is its
+//! part without a process, which a simulation drives.
 
 use std::{
     fs, io,
@@ -18,7 +19,7 @@ use std::{
 use common::{
     address::Address,
     bus::close_all_on_exec,
-    clock::{MissionClock, Pace, monotonic_ns},
+    clock::{MissionClock, monotonic_ns},
     file::append,
     poll,
     run::Run,
@@ -41,19 +42,20 @@ const LOOKS_AGAIN: Duration = Duration::from_millis(20);
 /// Check interval for a silent robot. Frames and requests wake the guard.
 const LOOKS_FOR_SILENT: Duration = Duration::from_millis(200);
 /// The machine may be out of descriptors or ports.
-const TRIES_AGAIN: Duration = Duration::from_secs(1);
+pub const TRIES_AGAIN: Duration = Duration::from_secs(1);
 
 pub(crate) struct StopGuard {
     process: Child,
     _pipe: io::PipeWriter,
+    pub(crate) link: Identity,
 }
 
 impl StopGuard {
     /// Starts the guard.
-    pub(crate) fn start(directory: &Path, link: &Identity) -> io::Result<Self> {
+    pub(crate) fn start(directory: &Path, link: Identity) -> io::Result<Self> {
         let (ended, pipe) = io::pipe()?;
-        let process = spawn("/proc/self/exe".into(), directory, link, ended.into())?;
-        Ok(Self { process, _pipe: pipe })
+        let process = spawn("/proc/self/exe".into(), directory, &link, ended.into())?;
+        Ok(Self { process, _pipe: pipe, link })
     }
 
     pub(crate) fn has_ended(&mut self) -> bool {
@@ -86,10 +88,10 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     let _ = setsid();
     // The directory may vanish with the link.
     let run = Run::load(directory)?;
-    let MissionClock::Wall { rate, .. } = run.clock else {
-        // In lockstep a robot waits for commands.
+    if matches!(run.clock, MissionClock::Ticks { .. }) {
+        // A robot waits for commands.
         return Ok(());
-    };
+    }
     let domain = run.robot.domain();
     let mark = OwedStop::of(domain.clone());
     let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
@@ -103,7 +105,7 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
     let own = Identity::now(&domain.guard_socket());
     let is_succeeded =
         || link.is_succeeded(&domain.stop_socket()) || own.is_succeeded(&domain.guard_socket());
-    let mut guard = Guard { directory, run: &run, rate, mark, socket, heard_ns: monotonic_ns() };
+    let mut guard = Guard { directory, run: &run, mark, socket, heard_ns: monotonic_ns() };
     while let Err(error) = guard.order_stop(&is_succeeded) {
         tracing::error!(%error, "the stop guard tries again");
         thread::park_timeout(TRIES_AGAIN);
@@ -123,43 +125,19 @@ pub fn run(directory: &Path, link: &Identity) -> Result<(), StageError> {
 struct Guard<'a> {
     directory: &'a Path,
     run: &'a Run,
-    rate: f64,
     mark: OwedStop,
     socket: Option<StopSocket>,
     heard_ns: u64,
 }
 
 impl Guard<'_> {
-    /// Orders the stop, by each method in turn, until the guard leaves. Fails when the wire is
-    /// unusable.
+    /// Orders the stop until the guard leaves. Fails when the wire is unusable.
     fn order_stop(&mut self, is_succeeded: &dyn Fn() -> bool) -> Result<(), StageError> {
         let run = self.run;
-        let mut transport = Transport::of_base(&run.address, &run.mission)?;
-        let mut link = Link::new(&run.mission);
-        link.restore(State { pace: Pace::Rate(self.rate), next_tick: 0 });
+        let mut orders = Orders::open(run)?;
         loop {
             let now_ns = monotonic_ns();
-            let mut effects = Vec::new();
-            let now = run.clock.at(0, now_ns);
-            let mut take = |event: Event<'_>| {
-                effects.extend(link.step(Entry { event, machine_ns: now_ns, now }));
-            };
-            take(Event::Order(Order::Stop, HoldReason::Ending));
-            if let Some(open) = transport.maintain(now_ns)? {
-                take(Event::Wire(open));
-            }
-            while let Some(bytes) = transport.receive(now_ns)? {
-                take(Event::Datagram(bytes));
-            }
-            for effect in effects {
-                match effect {
-                    Effect::Send(bytes) => transport.send(&bytes)?,
-                    Effect::Connected(true) => tracing::warn!("the robot answers the stop guard"),
-                    Effect::Connected(false) => tracing::warn!("the stop guard hears nothing"),
-                    _ => {}
-                }
-            }
-            let rest = link.rest();
+            let rest = orders.turn(now_ns)?;
             if rest != Rest::Unknown {
                 self.heard_ns = now_ns;
             }
@@ -176,10 +154,9 @@ impl Guard<'_> {
             }
             // A cleaner of temporary files may have removed it.
             let _ = self.mark.set(true, self.directory);
-            let wires = [Some(transport.as_fd()), self.socket.as_ref().map(|it| it.as_fd())];
-            let wires: Vec<_> = wires.into_iter().flatten().collect();
-            let pause = if link.connected() { LOOKS_AGAIN } else { LOOKS_FOR_SILENT };
-            poll::readable(&wires, Some(pause)).map_err(|error| {
+            let socket = self.socket.as_ref().map(|it| it.as_fd());
+            let wires: Vec<_> = orders.transport.descriptor().into_iter().chain(socket).collect();
+            poll::readable(&wires, Some(orders.pause())).map_err(|error| {
                 StageError::Other(format!("cannot wait for the robot: {error}"))
             })?;
         }
@@ -204,6 +181,57 @@ impl Guard<'_> {
             socket.tell_at_rest();
         }
         false
+    }
+}
+
+/// Stop that a guard orders, by each method in turn.
+pub struct Orders {
+    transport: Transport,
+    link: Link,
+    clock: MissionClock,
+}
+
+impl Orders {
+    /// Takes the wire of the run's robot.
+    pub fn open(run: &Run) -> Result<Self, StageError> {
+        let transport = Transport::of_base(&run.address, &run.mission)?;
+        let mut link = Link::new(&run.mission);
+        link.restore(State::new(run.clock, 0));
+        Ok(Self { transport, link, clock: run.clock })
+    }
+
+    /// Orders the stop, takes the robot's datagrams, and returns the rest by the encoders.
+    ///
+    /// # Errors
+    /// If the wire is unusable.
+    pub fn turn(&mut self, now_ns: u64) -> Result<Rest, StageError> {
+        let Self { transport, link, clock } = self;
+        let mut effects = Vec::new();
+        let now = clock.at(0, now_ns);
+        let mut take = |event: Event<'_>| {
+            effects.extend(link.step(Entry { event, machine_ns: now_ns, now }));
+        };
+        take(Event::Order(Order::Stop, HoldReason::Ending));
+        if let Some(open) = transport.maintain(now_ns)? {
+            take(Event::Wire(open));
+        }
+        while let Some(bytes) = transport.receive(now_ns)? {
+            take(Event::Datagram(bytes));
+        }
+        for effect in effects {
+            match effect {
+                Effect::Send(bytes) => transport.send(&bytes)?,
+                Effect::Connected(true) => tracing::warn!("the robot answers the stop guard"),
+                Effect::Connected(false) => tracing::warn!("the stop guard hears nothing"),
+                _ => {}
+            }
+        }
+        Ok(link.rest())
+    }
+
+    /// Returns the longest time to the next turn. Datagrams and requests shorten it.
+    pub fn pause(&self) -> Duration {
+        if self.link.connected() { LOOKS_AGAIN } else { LOOKS_FOR_SILENT }
     }
 }
 

@@ -10,12 +10,15 @@ mod stream;
 mod tcp;
 mod udp;
 
-use std::{
-    fmt, io,
-    os::fd::{AsFd, BorrowedFd},
-};
+use std::{fmt, io, os::fd::BorrowedFd};
 
-use common::{address::Address, driver::Refusal, mission::Mission, start::StageError};
+use common::{
+    address::Address,
+    driver::Refusal,
+    machine::{self, MachineWire},
+    mission::Mission,
+    start::StageError,
+};
 use thiserror::Error;
 
 pub use self::counts::{Attempts, Tally};
@@ -52,7 +55,10 @@ pub struct Line {
 pub const SPEAKS_ROS2: bool = cfg!(feature = "ros2");
 
 /// Wire to a device. Errors are faults of this machine.
-trait Wire: AsFd + fmt::Debug {
+trait Wire: fmt::Debug {
+    /// Returns what is readable when the wire needs attention, also after a reopening.
+    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
+
     /// Reopens the wire if due on the monotonic clock, and sends the rest of a message.
     fn maintain(&mut self, _now_ns: u64) -> io::Result<()> {
         Ok(())
@@ -88,7 +94,9 @@ impl Transport {
     /// Opens the base's wire.
     pub fn of_base(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
         match address {
-            Address::Ros2(domain) => Self::new(address, ros2(domain.unwrap_or_default(), mission)),
+            Address::Ros2(domain) if !machine::is_simulated() => {
+                Self::new(address, ros2(domain.unwrap_or_default(), mission))
+            }
             _ => Self::open(address, Line { baud: drivers::base(mission).1, lowers_dtr: false }),
         }
     }
@@ -96,6 +104,9 @@ impl Transport {
     /// Creates a wire, which [`Transport::maintain`] opens.
     pub fn open(address: &Address, line: Line) -> Result<Self, TransportError> {
         let wire = match address {
+            _ if let Some(machine) = machine::simulated() => {
+                Ok(Box::new(machine.wire(&address.to_string())) as Box<dyn Wire>)
+            }
             Address::Udp(robot) => Udp::open(*robot).map(|udp| Box::new(udp) as Box<dyn Wire>),
             Address::Tcp(robot) => Stream::boxed(Tcp(*robot), address),
             Address::Serial(path) => Stream::boxed(Serial { path: path.clone(), line }, address),
@@ -150,6 +161,11 @@ impl Transport {
         self.wire.send(bytes).map_err(|source| self.broken(source))
     }
 
+    /// Returns what is readable when the wire needs attention; `None` on a simulated machine.
+    pub fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.wire.descriptor()
+    }
+
     pub fn tally(&self) -> Tally {
         self.wire.tally()
     }
@@ -187,10 +203,30 @@ fn ros2(_: u16, _: &Mission) -> io::Result<Box<dyn Wire>> {
     Err(io::Error::other("this executable lacks ROS 2 support; build it with `--features ros2`"))
 }
 
-/// Readable when the wire needs attention, also after a reopening.
-impl AsFd for Transport {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.wire.as_fd()
+/// Wire of a simulated machine, which wakes the link itself.
+impl Wire for Box<dyn MachineWire> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], _: u64) -> io::Result<Option<usize>> {
+        Ok((**self).receive().map(|bytes| {
+            let length = bytes.len().min(buffer.len());
+            buffer[..length].copy_from_slice(&bytes[..length]);
+            length
+        }))
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if machine::is_killed() {
+            return Err(io::Error::other("the simulation has killed this process"));
+        }
+        (**self).send(bytes);
+        Ok(())
+    }
+
+    fn tally(&self) -> Tally {
+        Tally::default()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Thread that runs jobs in order beside the tick; only the tick's thread has real-time priority.
 
 use std::{
+    collections::VecDeque,
     io::{self, Read as _, Write as _},
     os::{
         fd::{AsFd, BorrowedFd},
@@ -10,14 +11,21 @@ use std::{
     thread::JoinHandle,
 };
 
+use common::machine;
 use harmonic::Cancellation;
 use thread_priority::{
     NormalThreadSchedulePolicy as Normal, ThreadPriority, ThreadPriorityValue,
     ThreadSchedulePolicy, set_thread_priority_and_policy, thread_native_id,
 };
 
+/// Jobs beside the tick. A simulated machine has no threads: a job is done when it begins.
+pub(crate) enum Background<Job, Done> {
+    Thread(Thread<Job, Done>),
+    Simulated(Box<dyn FnMut(Job) -> Done>, VecDeque<Done>),
+}
+
 /// Background thread; dropping it cancels the running job, if possible, and waits for it.
-pub(crate) struct Background<Job, Done> {
+pub(crate) struct Thread<Job, Done> {
     jobs: Option<Sender<Job>>,
     results: Receiver<Done>,
     /// Holds a byte per result.
@@ -33,6 +41,9 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
         cancellation: Cancellation,
         mut work: impl FnMut(Job) -> Done + Send + 'static,
     ) -> io::Result<Self> {
+        if machine::is_simulated() {
+            return Ok(Self::Simulated(Box::new(work), VecDeque::new()));
+        }
         let (jobs, orders) = channel::<Job>();
         let (finished, results) = channel();
         let (done, mut wakeup) = UnixStream::pair()?;
@@ -49,13 +60,15 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
             }
         };
         let thread = std::thread::Builder::new().name(name.to_owned()).spawn(all)?;
-        Ok(Self { jobs: Some(jobs), results, done, thread: Some(thread), cancellation })
+        let (jobs, thread) = (Some(jobs), Some(thread));
+        Ok(Self::Thread(Thread { jobs, results, done, thread, cancellation }))
     }
 
     pub(crate) fn begin(&mut self, job: Job) {
-        if let Some(jobs) = &self.jobs {
+        match self {
             // The thread ends only when this value is dropped.
-            let _ = jobs.send(job);
+            Self::Thread(thread) => drop(thread.jobs.as_ref().map(|jobs| jobs.send(job))),
+            Self::Simulated(work, done) => done.push_back(work(job)),
         }
     }
 
@@ -63,29 +76,40 @@ impl<Job: Send + 'static, Done: Send + 'static> Background<Job, Done> {
     ///
     /// A signal that arrives after its result would wake the process forever.
     pub(crate) fn take(&mut self) -> Option<Done> {
-        match self.done.read(&mut [0]) {
-            Ok(1) => self.results.try_recv().ok(),
-            _ => None,
+        match self {
+            Self::Thread(thread) => match thread.done.read(&mut [0]) {
+                Ok(1) => thread.results.try_recv().ok(),
+                _ => None,
+            },
+            Self::Simulated(_, done) => done.pop_front(),
         }
     }
 
     /// Waits for a result; `None` after the thread has ended.
     pub(crate) fn wait(&mut self) -> Option<Done> {
-        let result = self.results.recv().ok();
-        // Its signal may come later and is then one too many, which only wakes the process.
-        let _ = self.done.read(&mut [0]);
-        result
+        match self {
+            Self::Thread(thread) => {
+                let result = thread.results.recv().ok();
+                // Its signal may come later and is then one too many, which only wakes the process.
+                let _ = thread.done.read(&mut [0]);
+                result
+            }
+            Self::Simulated(_, done) => done.pop_front(),
+        }
     }
 }
 
-/// Readable when a job is done.
-impl<Job, Done> AsFd for Background<Job, Done> {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.done.as_fd()
+impl<Job, Done> Background<Job, Done> {
+    /// Returns what becomes readable when a job is done, unless it is done at once.
+    pub(crate) fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        match self {
+            Self::Thread(thread) => Some(thread.done.as_fd()),
+            Self::Simulated(..) => None,
+        }
     }
 }
 
-impl<Job, Done> Drop for Background<Job, Done> {
+impl<Job, Done> Drop for Thread<Job, Done> {
     fn drop(&mut self) {
         self.jobs = None;
         self.cancellation.cancel();
@@ -120,11 +144,12 @@ mod tests {
     #[test]
     fn after_its_result_was_taken_a_job_wakes_nobody() {
         for job in 0..200 {
-            let mut thread =
+            let mut background =
                 Background::start("test", Cancellation::default(), |job: u32| job).unwrap();
-            thread.begin(job);
-            let result = std::iter::repeat_with(|| thread.take()).flatten().next();
+            background.begin(job);
+            let result = std::iter::repeat_with(|| background.take()).flatten().next();
             assert_eq!(result, Some(job));
+            let Background::Thread(mut thread) = background else { unreachable!() };
             thread.jobs = None;
             thread.thread.take().unwrap().join().unwrap();
             let error = thread.done.read(&mut [0]).map_err(|error| error.kind());

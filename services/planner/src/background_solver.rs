@@ -1,7 +1,8 @@
 //! Background solver: it solves the newest map while the robot follows the previous field.
 
-use std::{io, sync::Arc, time::Instant};
+use std::{io, sync::Arc};
 
+use common::clock::Instant;
 use harmonic::{Cancellation, Field, Solver};
 
 use crate::{

@@ -1,11 +1,7 @@
 //! Topic `field`: after a tick, a thread computes the policy of every cell, so later ticks need not
 //! wait.
 
-use std::{
-    io,
-    os::fd::{AsFd, BorrowedFd},
-    sync::Arc,
-};
+use std::{io, os::fd::BorrowedFd, sync::Arc};
 
 use common::{
     clock::MissionTime,
@@ -144,11 +140,9 @@ impl FieldPublisher {
         };
         Some((part, at))
     }
-}
 
-/// Readable when a policy is ready.
-impl AsFd for FieldPublisher {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.thread.as_fd()
+    /// Returns what becomes readable when a policy is ready.
+    pub(crate) fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        self.thread.descriptor()
     }
 }

@@ -64,11 +64,11 @@ impl Process for Shell {
         let background = Worker::on_a_thread().map_err(no_thread)?;
         // In lockstep, a due result is awaited instead.
         let lockstep = matches!(context.run.clock, MissionClock::Ticks { .. });
-        if !lockstep {
-            context.waiter.on_readable(&background)?;
-        }
         let field = FieldPublisher::start().map_err(no_thread)?;
-        context.waiter.on_readable(&field)?;
+        let solved = background.descriptor().filter(|_| !lockstep);
+        for descriptor in solved.into_iter().chain(field.descriptor()) {
+            context.waiter.on_readable(descriptor)?;
+        }
         let cells = context.run.mission.grid_frame().area();
         Ok(Self {
             runner: Runner::open(context, |_| cells)?,

@@ -1,8 +1,9 @@
 //! Planner as a stage: records and publications.
 
-use std::{borrow::Cow, collections::VecDeque, time::Instant};
+use std::{borrow::Cow, collections::VecDeque};
 
 use common::{
+    clock::Instant,
     found_response::FoundResponse,
     grid::Part,
     inputs,

@@ -53,5 +53,5 @@ pub mod wheel_errors;
 pub mod world;
 
 pub use error::SimError;
-pub use shell::{SimOptions, run};
+pub use shell::{InMemory, SimOptions, run};
 pub use transport::Transport;

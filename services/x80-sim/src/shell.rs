@@ -1,5 +1,6 @@
 //! Process around [`crate::robot`]: a socket, a pace and the ground truth.
 
+mod in_memory;
 mod meeting;
 mod session;
 
@@ -16,10 +17,14 @@ use common::{
     checkpoint::Checkpoint,
     clock::{Pace, monotonic_ns},
     file::append,
+    ground_truth::GroundTruthHeader,
+    json_wire::line,
     mission::Mission,
     poll,
 };
+use serde::Serialize;
 
+pub use self::in_memory::InMemory;
 use self::{meeting::Meeting, session::Session};
 use crate::{
     error::{Result, SimError},
@@ -27,8 +32,6 @@ use crate::{
     saved_state::{self, SavedState},
     transport::{Transport, Way},
 };
-
-const MOST_AT_ONCE: usize = 64;
 
 pub struct SimOptions {
     pub mission: Mission,
@@ -74,42 +77,62 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     if let Some(way) = &laser_way {
         tracing::info!(address = way.address(), "its laser listens");
     }
-    let (robot, checkpoint, _lock) = match keep {
-        None => (Robot::new(&mission), None, None),
+    let (saved, checkpoint, _lock) = match keep {
+        None => (None, None, None),
         Some(file) => {
             // The previous process may still be coming to rest.
             let lock =
                 lock(&file).map_err(|source| SimError::Lock { file: file.clone(), source })?;
             let (checkpoint, saved) = Checkpoint::open::<SavedState>(&file, saved_state::CAPACITY)?;
-            let robot = match saved {
-                None => Robot::new(&mission),
-                Some(saved) => {
-                    tracing::info!(?saved, "the robot starts at the last process's pose");
-                    Robot::restored(&mission, &saved)
-                }
-            };
-            (robot, Some(checkpoint), Some(lock))
+            (saved, Some(checkpoint), Some(lock))
         }
     };
-    let mut clock = SimClock::new(pace, 1.0 / mission.robot.rate_hz, robot.time);
+    let robot = robot(&mission, saved.as_ref());
     let meeting = meeting
         .map(|sockets| Meeting::open(&mission, sockets, &stop, pace == Pace::Max))
         .transpose()?;
-    let mut session =
-        Session::new(&mission, robot, pace, (way, laser_way), (ground_truth, meeting), checkpoint)?;
+    let mut lines = TruthLines(ground_truth);
+    let (listening, laser) = (way.address(), laser_way.as_ref().map(Way::address));
+    lines.write(&GroundTruthHeader { listening, laser });
+    let ground_truth = Box::new(move |tick| lines.write(&tick));
+    let (ways, others) = ((way, laser_way), (meeting, checkpoint));
+    let mut session = Session::new(&mission, robot, pace, ways, ground_truth, others)?;
     let mut buffer = vec![0; 65_536];
     loop {
-        let timeout = clock.wait_for(session.next_due_s(), monotonic_ns());
-        let [came, stopped] = wait(&session, &stop, timeout)?;
+        let [came, stopped] = wait(&session, &stop)?;
         if stopped {
-            return session.end();
+            return session.end().map(drop);
         }
         if came {
-            session.listen(&mut buffer, MOST_AT_ONCE, || clock.now(monotonic_ns()))?;
+            session.listen(&mut buffer)?;
         }
-        if let Some(now) = clock.now(monotonic_ns()) {
-            session.pass(now)?;
-            clock.forgive(session.next_tick_s(), monotonic_ns());
+        session.catch_up()?;
+    }
+}
+
+fn robot(mission: &Mission, saved: Option<&SavedState>) -> Robot {
+    saved.map_or_else(
+        || Robot::new(mission),
+        |saved| {
+            tracing::info!(?saved, "the robot starts at the last process's pose");
+            Robot::restored(mission, saved)
+        },
+    )
+}
+
+/// Ground truth as JSON lines; none without a reader.
+struct TruthLines(Option<Box<dyn Write + Send>>);
+
+impl TruthLines {
+    fn write(&mut self, record: &impl Serialize) {
+        let Some(reader) = &mut self.0 else {
+            return;
+        };
+        // One write per line: a pipe write costs far more than its bytes.
+        let written = reader.write_all(&line(record)).and_then(|()| reader.flush());
+        if let Err(error) = written {
+            tracing::warn!(%error, "the ground truth has lost its reader; the robot continues without one");
+            self.0 = None;
         }
     }
 }
@@ -121,10 +144,11 @@ fn lock(file: &Path) -> io::Result<File> {
     Ok(file)
 }
 
-fn wait(session: &Session, stop: &impl AsFd, timeout: Option<Duration>) -> Result<[bool; 2]> {
+fn wait(session: &Session, stop: &impl AsFd) -> Result<[bool; 2]> {
     let mut descriptors = session.readable();
     descriptors.push(stop.as_fd());
-    let mut came = poll::readable(&descriptors, timeout).map_err(SimError::Wait)?;
+    let came = poll::readable(&descriptors, session.patience());
+    let mut came = came.map_err(SimError::Wait)?;
     let stopped = came.pop().unwrap_or_default();
     Ok([came.contains(&true), stopped])
 }
@@ -149,16 +173,20 @@ impl SimClock {
         Self { runs, period_s }
     }
 
+    const fn is_lock_step(&self) -> bool {
+        self.runs.is_none()
+    }
+
     fn now(&self, machine_ns: u64) -> Option<f64> {
         let (epoch, rate) = self.runs?;
         Some(machine_ns.saturating_sub(epoch) as f64 * 1e-9 * rate)
     }
 
-    /// Returns the time until `due`; none in lockstep.
+    /// Returns the time until `due`, which is 0 only if `due` has come; none in lockstep.
     fn wait_for(&self, due: f64, machine_ns: u64) -> Option<Duration> {
         let (_, rate) = self.runs?;
-        let seconds = ((due - self.now(machine_ns)?) / rate).max(0.0);
-        Some(Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
+        let seconds = (due - self.now(machine_ns)?) / rate;
+        Some(Duration::from_nanos((seconds * 1e9).ceil() as u64))
     }
 
     /// Shifts late mission time to the next tick `due`, so that an unscheduled process makes up no

@@ -1,12 +1,13 @@
 //! Byte transport to the robot: datagrams, a connection or a serial line.
 
+mod memory;
 mod owner;
 mod pty;
 mod source;
 mod tcp;
 mod udp;
 
-use std::{io, net::SocketAddr, os::fd::BorrowedFd};
+use std::{io, net::SocketAddr, os::fd::BorrowedFd, sync::mpsc::Sender};
 
 pub(crate) use self::source::Source;
 use crate::error::{Result, SimError};
@@ -26,7 +27,7 @@ trait Wire {
     fn address(&self) -> String;
 
     /// Becomes readable when bytes have come.
-    fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>);
+    fn readable(&self) -> [Option<BorrowedFd<'_>>; 2];
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>>;
 
@@ -61,6 +62,11 @@ impl Way {
         }))
     }
 
+    /// Sends datagrams, each with its receiver, to `host`, and receives none.
+    pub(crate) fn to(host: Sender<(SocketAddr, Vec<u8>)>) -> Self {
+        Self(Box::new(host))
+    }
+
     pub(crate) fn connected(&mut self) -> Result<Option<Source>> {
         self.0.connected().map_err(|source| self.lost(source))
     }
@@ -70,8 +76,7 @@ impl Way {
     }
 
     pub(crate) fn readable(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
-        let (first, second) = self.0.readable();
-        std::iter::once(first).chain(second)
+        self.0.readable().into_iter().flatten()
     }
 
     pub(crate) fn take_opened(&mut self) -> bool {

@@ -1,14 +1,10 @@
 //! Readers and writers of the supervisor on one bus.
 
-use std::{
-    io,
-    rc::Rc,
-    time::{Duration, Instant},
-};
+use std::{rc::Rc, time::Duration};
 
 use common::{
     bus::{Bus, BusError, Reader, Writer},
-    clock::MissionTime,
+    clock::{Instant, MissionTime},
     mission::{MOST_CORNERS, MOST_ZONES},
     samples::{
         BeaconSample, ComplaintSample, DeathSample, DirectiveSample, FollowingSample, PlaceSample,
@@ -18,11 +14,12 @@ use common::{
     topics,
     waiter::Waiter,
 };
-use processes::{domain::DomainLock, stages};
+use processes::stages;
 
 use crate::{
-    error::{Result, system},
+    error::Result,
     observer::{Observer, Record},
+    surroundings::Surroundings,
 };
 
 pub(crate) struct BusEndpoints {
@@ -51,17 +48,11 @@ pub(crate) struct BusEndpoints {
 }
 
 impl BusEndpoints {
-    pub(crate) fn open(lock: &DomainLock) -> Result<Self> {
-        Self::continued(lock, Record::default(), (0, RequestAnswer::Taken))
+    pub(crate) fn open(bus: Rc<Bus>) -> Result<Self> {
+        Self::continued(bus, Record::default(), (0, RequestAnswer::Taken))
     }
 
-    fn continued(
-        lock: &DomainLock,
-        record: Record,
-        last_request: (u64, RequestAnswer),
-    ) -> Result<Self> {
-        let bus = lock.bus();
-        let bus = bus.ok_or_else(|| system("open the bus")(io::ErrorKind::NotConnected.into()))?;
+    fn continued(bus: Rc<Bus>, record: Record, last_request: (u64, RequestAnswer)) -> Result<Self> {
         let mut waiter = Waiter::default();
         let observer = Observer::new(&bus, &mut waiter, record)?;
         waiter.on(bus.wakeup(&topics::REQUESTS)?);
@@ -90,12 +81,12 @@ impl BusEndpoints {
     }
 
     /// Replaces the bus. After an error, these endpoints belong to the abandoned bus.
-    pub(crate) fn recreate(&mut self, lock: &mut DomainLock) -> Result {
-        lock.recreate_bus()?;
+    pub(crate) fn recreate(&mut self, surroundings: &mut dyn Surroundings) -> Result {
+        surroundings.recreate_bus()?;
         let mut record = std::mem::take(&mut self.observer.record);
         // The next link connects to the robot anew.
         record.link = None;
-        *self = Self::continued(lock, record, self.last_request)?;
+        *self = Self::continued(surroundings.bus()?, record, self.last_request)?;
         Ok(())
     }
 

@@ -47,10 +47,11 @@ pub mod simulator;
 mod stall;
 mod stall_recovery;
 mod supervisor;
+pub mod surroundings;
 pub mod target_list;
 
 pub use error::SupervisorError;
 pub use observer::{Heard, Listener, Record};
 pub use progress::Progress;
-pub use run::{Consumer, EndSignals, Finished, StillMoving, end_signals, run};
+pub use run::{Consumer, EndSignals, Finished, StillMoving, end_signals, run, simulate};
 pub use supervisor::Options;

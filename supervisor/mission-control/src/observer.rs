@@ -1,9 +1,10 @@
 //! Readers of the supervisor, and the record by which a run is judged.
 
-use std::{collections::VecDeque, time::Instant};
+use std::collections::VecDeque;
 
 use common::{
     bus::{Bus, BusError, Reader, Writers},
+    clock::Instant,
     grid::{Applied, CellState, Part, Replica},
     mission::Mission,
     roster,

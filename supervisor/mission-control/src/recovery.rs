@@ -8,6 +8,7 @@ use std::{fs, path::Path};
 use common::{
     checkpoint::{Checkpoint, CheckpointError},
     clock::{MissionClock, MissionTime, Pace, monotonic_ns},
+    file,
     geometry::Zone,
     mission::Mission,
     run::{self, Run, RunError},
@@ -79,11 +80,11 @@ impl RecoveredRun {
     pub fn load(directory: &Path) -> Result<Self, ResumeError> {
         let run = Run::load(directory)?;
         let named = || directory.display().to_string();
-        if directory.join(SUMMARY).exists() {
+        if file::exists(&directory.join(SUMMARY)) {
             return Err(ResumeError::Ended { directory: named() });
         }
         let simulated = run.mission.robot.address.is_none();
-        if simulated && !run::checkpoint_file(directory, SIMULATOR).exists() {
+        if simulated && !file::exists(&run::checkpoint_file(directory, SIMULATOR)) {
             return Err(ResumeError::NoRobot { directory: named() });
         }
         let newest = saved_state(directory)?.and_then(|state| state.newest());

@@ -6,9 +6,12 @@
 //! [`AHEAD`], where the step is carried out. The limit rises once the planner and, after a reset,
 //! the controller have answered.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use common::samples::{RecoveryStep, StallSample, TickLimitSample};
+use common::{
+    clock::Instant,
+    samples::{RecoveryStep, StallSample, TickLimitSample},
+};
 
 use crate::observer::Published;
 

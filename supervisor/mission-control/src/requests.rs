@@ -1,9 +1,7 @@
 //! Part of the loop that handles operators' requests and the next target.
 
-use std::time::Instant;
-
 use common::{
-    clock::monotonic_ns,
+    clock::{Instant, monotonic_ns},
     geometry::Zone,
     mission::MOST_ZONES,
     samples::{

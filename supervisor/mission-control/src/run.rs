@@ -16,6 +16,7 @@ use crate::{
     outcome::{Ending, Outcome, Wheels, allowed_m},
     progress::Progress,
     supervisor::{Options, Supervisor},
+    surroundings::{Real, Surroundings},
     target_list::{self, TargetOutcome, TargetResult},
 };
 
@@ -103,7 +104,7 @@ pub(crate) const CAUGHT_UP_EVERY: u64 = 32;
 /// robot's files stay until `lock` is dropped, after the consumers.
 pub fn run<'a>(
     options: &'a Options,
-    [mut signals, for_last_resort]: EndSignals,
+    [signals, for_last_resort]: EndSignals,
     lock: &mut Option<DomainLock>,
     consumer: &mut dyn Consumer,
     listener: Listener,
@@ -112,14 +113,28 @@ pub fn run<'a>(
     let turns = Turns::default();
     let domain = options.robot.domain();
     last_resort::watch(for_last_resort, turns.clone(), domain.clone());
-    let lock = lock.insert(DomainLock::acquire(domain, options.mission.grid_frame().area())?);
-    let mut supervisor =
-        Supervisor::start(options, lock, (turns.clone(), &signals), consumer, listener)
-            .inspect_err(|_| turns.rest(true))?;
+    let cells = options.mission.grid_frame().area();
+    let lock = lock.insert(DomainLock::acquire(domain.clone(), cells)?);
+    let mut surroundings = Real { domain, lock, signals, consumer };
+    let (finished, moving) = conduct(options, &mut surroundings, turns, listener, show)?;
+    let signals = surroundings.signals;
+    Ok((finished, moving.map(|supervisor| StillMoving { supervisor, signals })))
+}
+
+/// Conducts a run to its result. Returns the supervisor of a robot that still moves.
+pub(crate) fn conduct<'a>(
+    options: &'a Options,
+    surroundings: &mut dyn Surroundings,
+    turns: Turns,
+    listener: Listener,
+    show: &mut dyn FnMut(&Progress<'_>),
+) -> Result<(Finished, Option<Supervisor<'a>>)> {
+    let mut supervisor = Supervisor::start(options, surroundings, turns.clone(), listener)
+        .inspect_err(|_| turns.rest(true))?;
     let ending = loop {
-        let driven = supervisor.drive(&mut signals, lock, consumer, show);
+        let driven = supervisor.drive(surroundings, show);
         match driven.and_then(|ending| match ending {
-            None => supervisor.recreate_bus(lock).map(|()| None),
+            None => supervisor.recreate_bus(surroundings).map(|()| None),
             ending => Ok(ending),
         }) {
             Ok(None) => {}
@@ -129,7 +144,7 @@ pub fn run<'a>(
     };
     let stopped = supervisor.end_mission(&mut || {
         turns.rest(true);
-        consumer.catch_up(&signals);
+        surroundings.let_catch_up();
         turns.rest(false);
     });
     turns.rest(true);
@@ -176,6 +191,12 @@ pub fn run<'a>(
         resets,
         targets,
     };
-    let still_moving = (wheels == Wheels::Turning).then_some(StillMoving { supervisor, signals });
-    Ok((finished, still_moving))
+    Ok((finished, (wheels == Wheels::Turning).then_some(supervisor)))
+}
+
+/// Conducts a run on a simulated machine.
+pub fn simulate(options: &Options, surroundings: &mut dyn Surroundings) -> Result<Finished> {
+    let listener: Listener = Box::new(|_| {});
+    let conducted = conduct(options, surroundings, Turns::default(), listener, &mut |_| {});
+    conducted.map(|(finished, _)| finished)
 }

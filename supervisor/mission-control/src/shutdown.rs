@@ -6,7 +6,7 @@ use common::{
     samples::{Action, LinkSample, Rest},
     topics,
 };
-use processes::{domain::DomainLock, policy::Now};
+use processes::policy::Now;
 
 use crate::{
     error::Result,
@@ -14,6 +14,7 @@ use crate::{
     order::Decision,
     outcome::Wheels,
     supervisor::Supervisor,
+    surroundings::Surroundings,
 };
 
 /// Time for the link to confirm the stop order.
@@ -56,14 +57,14 @@ impl Supervisor<'_> {
     /// checkpoints.
     ///
     /// Consumers ask [`Bus::is_replaced`](common::bus::Bus::is_replaced).
-    pub(crate) fn recreate_bus(&mut self, lock: &mut DomainLock) -> Result {
+    pub(crate) fn recreate_bus(&mut self, surroundings: &mut dyn Surroundings) -> Result {
         tracing::error!("the bus is recreated; consumers must join it again");
         self.decision = Decision::STARTING;
         self.stand()?;
         // A stage that dies now must not start again on the old bus.
         self.stages.start_no_more();
         self.stop_all()?;
-        self.bus.recreate(lock)?;
+        self.bus.recreate(surroundings)?;
         self.publish_state()?;
         self.stages.start_all(self.first_tick());
         self.tick_progress = TickProgress::new(self.stages.now());

@@ -22,7 +22,7 @@ use processes::process::Process;
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use thiserror::Error;
 
-use crate::long_record;
+use crate::{long_record, surroundings::SimulatedRobot};
 
 /// Start timeout; a start takes seconds with 30 busy processes per core.
 const STARTUP: Duration = Duration::from_secs(30);
@@ -133,31 +133,29 @@ impl Simulator {
             }
         }
     }
+}
 
-    pub const fn address(&self) -> SocketAddr {
+impl SimulatedRobot for Simulator {
+    fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Returns a descriptor that becomes readable when the process ends. Ground truth is read at
-    /// the end of a tick.
-    pub fn descriptor(&self) -> BorrowedFd<'_> {
-        self.process.as_fd()
+    fn truth(&self) -> &[GroundTruthTick] {
+        &self.truth.ticks
     }
 
-    /// Reads the simulator's output. Returns whether it still runs.
-    pub fn poll(&mut self) -> Result<bool, SimulatorError> {
+    fn poll(&mut self) -> Result<bool, SimulatorError> {
         self.truth.take()?;
         Ok(self.process.try_reap().map_err(system("watch"))?.is_none())
     }
 
-    pub fn truth(&self) -> &[GroundTruthTick] {
-        &self.truth.ticks
-    }
-
-    /// Keeps the ground truth.
-    pub fn stop(&mut self) -> Result<(), SimulatorError> {
+    fn stop(&mut self) -> Result<(), SimulatorError> {
         self.process.end(REST);
         self.truth.take()
+    }
+
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        Some(self.process.as_fd())
     }
 }
 

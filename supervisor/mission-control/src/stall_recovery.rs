@@ -1,8 +1,9 @@
 //! Part of the loop that detects stalls and carries out recovery steps.
 
-use std::time::Instant;
-
-use common::samples::{Cause, Order, RecoveryStep, StallSample, TickLimitSample};
+use common::{
+    clock::Instant,
+    samples::{Cause, Order, RecoveryStep, StallSample, TickLimitSample},
+};
 use processes::{records, stages};
 
 use crate::{

@@ -1,25 +1,22 @@
 //! Loop of the supervisor: reads events, calls the pure decisions, carries them out.
 
-use std::{net::Ipv4Addr, os::fd::AsFd as _, path::PathBuf, time::Instant};
+use std::path::PathBuf;
 
 use common::{
-    address::Address,
     checkpoint::Checkpoint,
-    clock::{MissionTime, Pace},
+    clock::{Instant, MissionTime, Pace},
     domain::RobotName,
-    ground_truth::GroundTruthTick,
+    machine,
     mission::Mission,
     run::Run,
     samples::{
         DirectiveSample, HoldReason, Order, PlaceSample, RosterHeader, TickLimitSample, ZoneCorner,
         ZonesHeader, name_str,
     },
-    signals::Signals,
     topics,
 };
 use processes::{
     cleanup::Cleanup,
-    domain::DomainLock,
     last_resort::Turns,
     policy::Now,
     records,
@@ -39,10 +36,10 @@ use crate::{
     progress::Progress,
     recovery::{RecoveredRun, SupervisorState},
     recovery_step::RecoverySteps,
-    run::{CAUGHT_UP_EVERY, Consumer},
+    run::CAUGHT_UP_EVERY,
     run_clock::RunClock,
-    simulator::{Simulator, SimulatorError},
     stall::StallWatch,
+    surroundings::{Robot, Surroundings},
     target_list::{TargetList, TargetOutcome},
 };
 
@@ -59,44 +56,6 @@ pub struct Options {
     pub stands: bool,
     /// Place of a new run's robot; default: the mission's start.
     pub place: Option<PlaceSample>,
-}
-
-pub(crate) struct Robot {
-    pub simulator: Option<Simulator>,
-    address: Address,
-}
-
-impl Robot {
-    fn start(options: &Options, signals: &Signals) -> Result<Self> {
-        if let Some(address) = &options.mission.robot.address {
-            let address = address.parse::<Address<String>>()?.resolve()?;
-            return Ok(Self { simulator: None, address });
-        }
-        let started = Simulator::start(
-            processes::process::firsthand(&[]),
-            Some(&options.robot),
-            &options.directory,
-            &options.mission,
-            options.pace,
-            Some(signals.as_fd()),
-        );
-        let simulator = match started {
-            // The run ends before it contacts a robot.
-            Err(SimulatorError::GivenUp) => None,
-            started => Some(started?),
-        };
-        let address = simulator.as_ref().map(Simulator::address);
-        let address = Address::Udp(address.unwrap_or((Ipv4Addr::UNSPECIFIED, 0).into()));
-        Ok(Self { simulator, address })
-    }
-
-    pub(crate) fn truth(&self) -> &[GroundTruthTick] {
-        self.simulator.as_ref().map_or(&[], Simulator::truth)
-    }
-
-    pub(crate) fn poll(&mut self) -> Result<bool> {
-        Ok(self.simulator.as_mut().map(Simulator::poll).transpose()?.unwrap_or(true))
-    }
 }
 
 pub(crate) struct Supervisor<'a> {
@@ -130,12 +89,11 @@ pub(crate) struct Supervisor<'a> {
 }
 
 impl<'a> Supervisor<'a> {
-    /// Starts the robot, writes the run file, starts the stages, unless one of `signals` came.
+    /// Starts the robot, writes the run file, starts the stages, unless the run is asked to end.
     pub(crate) fn start(
         options: &'a Options,
-        lock: &mut DomainLock,
-        (turns, signals): (Turns, &Signals),
-        consumer: &mut dyn Consumer,
+        surroundings: &mut dyn Surroundings,
+        turns: Turns,
         listener: Listener,
     ) -> Result<Self> {
         let directory = &options.directory;
@@ -143,7 +101,7 @@ impl<'a> Supervisor<'a> {
         let (checkpoint, mut state) = SupervisorState::open(directory)?;
         state.operator_stop |= options.stands;
         state.place = options.place.unwrap_or(state.place);
-        let robot = Robot::start(options, signals)?;
+        let robot = surroundings.start_robot(options)?;
         let clock = match &options.recovered {
             Some(run) => {
                 state.resumes += 1;
@@ -168,9 +126,14 @@ impl<'a> Supervisor<'a> {
         state.following.iter_mut().for_each(|following| following.is_lost = true);
         let mut supervisor = Self {
             options,
-            stages: StageProcesses::new(directory.clone(), options.starter, mission),
+            stages: StageProcesses::new(
+                directory.clone(),
+                options.starter,
+                mission,
+                surroundings.host(options),
+            ),
             robot,
-            bus: BusEndpoints::open(lock)?,
+            bus: BusEndpoints::open(surroundings.bus()?)?,
             listener,
             checkpoint,
             state,
@@ -195,18 +158,17 @@ impl<'a> Supervisor<'a> {
         if supervisor.targets.waits {
             supervisor.await_target();
         }
-        let domain = options.robot.domain();
-        lock.link_to_run(directory, domain.run_directory())?;
-        if !signals.pending() {
-            consumer.attach(signals);
+        surroundings.link_to_run(directory, false)?;
+        if !surroundings.is_asked_to_end() {
+            surroundings.attach_consumer();
         }
-        if signals.pending() {
+        if surroundings.is_asked_to_end() {
             return Ok(supervisor);
         }
         supervisor.publish_state()?;
         supervisor.stages.start_all(supervisor.first_tick());
         if options.starter == Starter::External {
-            lock.link_to_run(directory, domain.run_link())?;
+            surroundings.link_to_run(directory, true)?;
             // Systemd starts the stages after this notification.
             supervisor.service.ready();
         }
@@ -216,16 +178,16 @@ impl<'a> Supervisor<'a> {
     /// Iterates until the mission ends. Returns `None` if the bus needs recreation.
     pub(crate) fn drive(
         &mut self,
-        signals: &mut Signals,
-        lock: &mut DomainLock,
-        consumer: &mut dyn Consumer,
+        surroundings: &mut dyn Surroundings,
         show: &mut dyn FnMut(&Progress<'_>),
     ) -> Result<Option<Ending>> {
-        self.bus.waiter.on_readable(&*signals)?;
+        if let Some(descriptor) = surroundings.descriptor() {
+            self.bus.waiter.on_readable(descriptor)?;
+        }
         // In wall-clock time the run does not wait for slow consumers.
         let mut catch_up_at = self.clock.in_ticks().then_some(0);
         loop {
-            if signals.came() {
+            if surroundings.take_request_to_end() {
                 self.end_following(TargetOutcome::Followed);
                 let (outcome, reason) = match self.targets.outcome_while_waiting() {
                     Some(outcome) => (outcome, "stopped by a signal while it waited for a target"),
@@ -241,13 +203,13 @@ impl<'a> Supervisor<'a> {
             }
             let tick = self.bus.observer.record.published.tick;
             if let Some(tick) = tick.filter(|tick| catch_up_at.is_some_and(|at| *tick >= at)) {
-                consumer.catch_up(signals);
+                surroundings.let_catch_up();
                 catch_up_at = Some(tick + CAUGHT_UP_EVERY);
             }
             if self.bus.is_due(topics::RESTATE) {
                 self.publish_state()?;
                 self.show_progress(show);
-                lock.restore();
+                surroundings.restore();
             }
             let any_starting = self.stages.any_starting();
             self.cleanup.run_if_due(&self.bus.bus, any_starting);
@@ -423,7 +385,7 @@ impl<'a> Supervisor<'a> {
             ..DirectiveSample::default()
         };
         let header = RosterHeader {
-            supervisor_pid: std::process::id(),
+            supervisor_pid: machine::process(),
             order: order.into(),
             reason: reason.into(),
             simulated: self.robot.simulator.is_some().into(),
@@ -454,7 +416,7 @@ impl<'a> Supervisor<'a> {
     pub(crate) fn wait(&mut self) -> Result {
         self.turns.count();
         let mut descriptors = self.stages.descriptors();
-        descriptors.extend(self.robot.simulator.as_ref().map(Simulator::descriptor));
+        descriptors.extend(self.robot.simulator.as_ref().and_then(|it| it.descriptor()));
         let hand = self.hand_until.map(|until| until.saturating_duration_since(Instant::now()));
         let deadlines = [self.stages.time_to_deadline(), self.service.time_to_feed(), hand];
         let soonest = deadlines.into_iter().flatten().min();

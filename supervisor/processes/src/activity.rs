@@ -39,8 +39,8 @@ impl Activity {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Times {
-    ran: Duration,
+pub struct Times {
+    pub ran: Duration,
     pub starved: Duration,
 }
 

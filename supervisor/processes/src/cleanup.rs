@@ -1,8 +1,8 @@
 //! Cleanup of ended processes' places on topics, shared memory and node files on the bus.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use common::bus::Bus;
+use common::{bus::Bus, clock::Instant};
 
 use crate::{death::Death, stages};
 

@@ -16,6 +16,7 @@ mod descriptors;
 pub mod domain;
 mod domain_error;
 pub mod executable;
+pub mod host;
 pub mod last_resort;
 mod observed_time;
 mod orphans;

@@ -1,7 +1,9 @@
 //! Time in which the supervisor ran, the only time for deadlines: a standstill of the machine or of
 //! this process makes no stage late.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use common::clock::Instant;
 
 use crate::policy::Now;
 

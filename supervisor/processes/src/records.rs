@@ -1,9 +1,6 @@
 //! Record files in the run directory, one JSON object a line. A failed write only logs a warning.
 
-use std::{
-    io::{self, Write as _},
-    path::Path,
-};
+use std::{io, path::Path};
 
 use common::file;
 
@@ -22,6 +19,5 @@ pub fn append(directory: &Path, name: &str, record: &impl Serialize) {
 fn append_line(path: &Path, record: &impl Serialize) -> io::Result<()> {
     let mut line = serde_json::to_vec(record)?;
     line.push(b'\n');
-    let mut file = file::append(path)?;
-    file.write_all(&line)
+    file::append_bytes(path, &line).map(drop)
 }

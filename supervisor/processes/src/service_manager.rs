@@ -1,8 +1,9 @@
 //! Notifications to systemd: ready, status, watchdog, stopping. Without `NOTIFY_SOCKET` the
 //! functions do nothing.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use common::clock::Instant;
 use sd_notify::NotifyState;
 
 const STATUS_EVERY: Duration = Duration::from_secs(1);

@@ -3,11 +3,9 @@
 use std::{
     io,
     path::{Path, PathBuf},
-    process::Stdio,
 };
 
 use common::{
-    file::append,
     mission::Mission,
     run,
     samples::{HealthSample, HealthState, RosterEntry, StageState, name},
@@ -18,9 +16,10 @@ use thiserror::Error;
 
 use crate::{
     activity::{Activity, Times},
-    death::{Death, Next, log_tail},
+    death::{Death, Next},
+    host::{Host, Watched},
     policy::{Event, Now, Phase, Policy},
-    process::{self, ExitCause, Process},
+    process::ExitCause,
     stages::Stage,
 };
 
@@ -36,14 +35,13 @@ pub(crate) struct StageProcess {
     pub stage: &'static Stage,
     executable: Option<PathBuf>,
     pub policy: Policy,
-    pub process: Option<Process>,
+    pub process: Option<Box<dyn Watched>>,
     generation: u32,
     started: Now,
     beat: Option<Now>,
     /// Process times at its start or last ready beat; `None` if uncounted.
     times: Option<Times>,
     pub output: Option<Now>,
-    log_start: u64,
     hung: Option<Now>,
     /// Whether the last beat announced a stop on request.
     pub stopping: bool,
@@ -64,7 +62,6 @@ impl StageProcess {
             beat: None,
             times: None,
             output: None,
-            log_start: 0,
             hung: None,
             stopping: false,
             found_ended: false,
@@ -80,7 +77,7 @@ impl StageProcess {
     }
 
     fn pid(&self) -> u32 {
-        self.process.as_ref().map_or(0, Process::id)
+        self.process.as_ref().map_or(0, |process| process.id())
     }
 
     pub(crate) const fn restarts(&self) -> u32 {
@@ -89,18 +86,18 @@ impl StageProcess {
 
     /// Watches the external process that published `health`, if it is a successor; returns whether
     /// it is.
-    pub(crate) fn adopt(&mut self, health: &HealthSample, now: Now) -> bool {
+    pub(crate) fn adopt(&mut self, host: &mut dyn Host, health: &HealthSample, now: Now) -> bool {
         // Beats of an ended process may still arrive.
         if self.process.is_some() || self.generation >= health.stamp.generation {
             return false;
         }
-        let Ok(process) = Process::adopt(health.pid, self.stage.name) else {
+        let Ok(process) = host.adopt(health.pid, self.stage.name) else {
             return false;
         };
         self.policy.step(Event::Start, now);
+        (self.started, self.times) = (now, process.times());
         self.process = Some(process);
         self.generation = health.stamp.generation;
-        (self.started, self.times) = (now, Times::of(health.pid));
         true
     }
 
@@ -118,21 +115,28 @@ impl StageProcess {
             HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
         };
         if event == Event::BeatReady {
-            self.times = Times::of(health.pid);
+            self.times = self.process.as_ref().and_then(|process| process.times());
         }
         self.policy.step(event, now);
         // A starting process waits for a roster that names it.
         state == HealthState::Starting || !was_running && event == Event::BeatReady
     }
 
-    pub(crate) fn start(&mut self, directory: &Path, first_tick: u64, now: Now) {
+    pub(crate) fn start(
+        &mut self,
+        host: &mut dyn Host,
+        directory: &Path,
+        first_tick: u64,
+        now: Now,
+    ) {
         let stage = self.stage.name;
         (self.started, self.hung, self.times) = (now, None, Some(Times::default()));
-        self.log_start = self.log(directory).metadata().map_or(0, |log| log.len());
-        let generation = run::next_generation(directory, stage).map_err(io::Error::other);
-        let spawned = generation.and_then(|generation| {
-            self.generation = generation;
-            self.spawn(directory, first_tick)
+        let number = run::next_generation(directory, stage).map_err(io::Error::other);
+        let spawned = number.and_then(|number| {
+            self.generation = number;
+            let directory = directory.to_path_buf();
+            let generation = Generation { stage, directory, number, first_tick };
+            host.start(self.executable.as_deref(), &generation)
         });
         match spawned {
             Ok(process) => self.process = Some(process),
@@ -142,26 +146,6 @@ impl StageProcess {
                 self.policy.step(Event::StartFailed, now);
             }
         }
-    }
-
-    fn spawn(&self, directory: &Path, first_tick: u64) -> io::Result<Process> {
-        let log = self.log(directory);
-        let named =
-            |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", log.display()));
-        let log = append(&log).map_err(named)?;
-        let generation = Generation {
-            stage: self.stage.name,
-            directory: directory.to_path_buf(),
-            number: self.generation,
-            first_tick,
-        };
-        let mut command = process::stage(self.executable.as_deref(), &generation);
-        command.stdout(Stdio::null()).stderr(log);
-        Process::spawn(command)
-    }
-
-    fn log(&self, directory: &Path) -> PathBuf {
-        directory.join(format!("{}.log", self.stage.name))
     }
 
     pub(crate) fn signal(&mut self, signal: Signal, now: Now) {
@@ -177,7 +161,7 @@ impl StageProcess {
     /// Returns the activity since the last beat, if a deadline has passed.
     pub(crate) fn overdue_activity(&self, now: Now) -> Option<Activity> {
         self.policy.deadline().filter(|deadline| now >= *deadline)?;
-        self.times?.activity(self.pid())
+        self.process.as_ref()?.activity(self.times?)
     }
 
     /// Returns `now` without the process's waits for a processor.
@@ -201,7 +185,7 @@ impl StageProcess {
         Ok(cause.filter(|_| is_known))
     }
 
-    pub(crate) fn record_death(&mut self, cause: ExitCause, directory: &Path, now: Now) -> Death {
+    pub(crate) fn record_death(&mut self, cause: ExitCause, now: Now) -> Death {
         let age = |then: Now| now.saturating_sub(then).as_secs_f64();
         let hung_after = |(hung, beat): (Now, Now)| hung.saturating_sub(beat).as_secs_f64();
         let death = Death {
@@ -215,7 +199,7 @@ impl StageProcess {
             uptime_s: age(self.started),
             deaths_in_window: 0,
             next: Next::Nothing,
-            log_tail: log_tail(&self.log(directory), self.log_start),
+            log_tail: self.process.as_ref().map(|process| process.log_tail()).unwrap_or_default(),
         };
         (self.process, self.beat) = (None, None);
         (self.stopping, self.found_ended) = (false, false);

@@ -1,13 +1,10 @@
 //! Stages of a run, each with a policy from beats, deaths and deadlines to actions.
 
-use std::{
-    os::fd::{AsFd, BorrowedFd},
-    path::PathBuf,
-    time::{Duration, Instant},
-};
+use std::{os::fd::BorrowedFd, path::PathBuf, time::Duration};
 
 use common::{
     bus::Bus,
+    clock::Instant,
     mission::Mission,
     samples::{HealthSample, RosterEntry, name_str},
 };
@@ -15,6 +12,7 @@ use rustix::process::Signal;
 
 use crate::{
     death::Death,
+    host::Host,
     observed_time::ObservedTime,
     output_watchdog::OutputWatchdog,
     policy::{Action, Event, Now, Phase, STOP_GRACE},
@@ -38,13 +36,19 @@ pub struct StageProcesses {
     directory: PathBuf,
     clock: ObservedTime,
     starter: Starter,
+    host: Box<dyn Host>,
     ending: bool,
     start_blocked: bool,
 }
 
 impl StageProcesses {
-    /// Creates all stages, not yet running. They log to the run `directory`.
-    pub fn new(directory: PathBuf, starter: Starter, mission: &Mission) -> Self {
+    /// Creates all stages of the run in `directory`, not yet running.
+    pub fn new(
+        directory: PathBuf,
+        starter: Starter,
+        mission: &Mission,
+        host: Box<dyn Host>,
+    ) -> Self {
         let cells = mission.grid_frame().area();
         let stages = start_order().into_iter();
         Self {
@@ -53,6 +57,7 @@ impl StageProcesses {
             directory,
             clock: ObservedTime::new(Instant::now()),
             starter,
+            host,
             ending: false,
             start_blocked: false,
         }
@@ -87,7 +92,7 @@ impl StageProcesses {
 
     pub fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
         let processes = self.stages.iter().filter_map(|stage| stage.process.as_ref());
-        processes.map(AsFd::as_fd).collect()
+        processes.filter_map(|process| process.descriptor()).collect()
     }
 
     pub fn time_to_deadline(&self) -> Option<Duration> {
@@ -104,7 +109,7 @@ impl StageProcesses {
         let now = self.now();
         let stage = &mut self.stages[index];
         let external = self.starter == Starter::External && !self.ending;
-        let adopted = external && stage.adopt(health, now);
+        let adopted = external && stage.adopt(&mut *self.host, health, now);
         if adopted {
             self.watchdog.on_start(stage.stage.name);
         }
@@ -154,7 +159,7 @@ impl StageProcesses {
                 // Systemd stops external stages before their supervisor.
                 let by_starter = self.starter == Starter::External && stage.stopping;
                 let asked = by_us || by_starter;
-                let mut death = stage.record_death(cause, &self.directory, now);
+                let mut death = stage.record_death(cause, now);
                 if let Err(error) = bus.remove_unfinished(death.pid) {
                     tracing::warn!(stage = death.stage, %error, "cannot prepare the bus for its successor");
                 }
@@ -223,7 +228,7 @@ impl StageProcesses {
             }
             Action::Start => {
                 self.watchdog.on_start(stage.stage.name);
-                stage.start(&self.directory, first_tick, now);
+                stage.start(&mut *self.host, &self.directory, first_tick, now);
             }
             Action::Terminate => stage.signal(Signal::TERM, now),
             Action::Abort => stage.signal(Signal::ABORT, now),

@@ -7,11 +7,13 @@
 use std::{path::Path, time::Duration};
 
 use common::{
+    bus::Bus,
     mission::Mission,
     replay::Begin,
-    shell::{Process, run_stage},
+    run::Run,
+    shell::{Process, Simulated, run_stage, simulate},
     stage::{Answering, Answers, replay},
-    start::{StageError, Start},
+    start::{self, Generation, StageError, Start},
     wiring::Wiring,
 };
 
@@ -25,6 +27,8 @@ pub struct Stage {
     pub per_million_cells: Duration,
     pub while_down: &'static str,
     pub run: fn(&Start) -> Result<(), StageError>,
+    /// Starts the stage's process on a simulated machine.
+    pub simulate: fn(Generation, Run, Bus) -> start::Result<Box<dyn Simulated>>,
     pub replay: Begin,
 }
 
@@ -41,7 +45,7 @@ pub struct Deadlines {
 }
 
 impl Stage {
-    const fn new<P: Process>(replay: Begin, while_down: &'static str) -> Self {
+    const fn new<P: Process + 'static>(replay: Begin, while_down: &'static str) -> Self {
         Self {
             name: P::WIRING.stage,
             wiring: P::WIRING,
@@ -49,6 +53,7 @@ impl Stage {
             per_million_cells: Duration::ZERO,
             while_down,
             run: run_stage::<P>,
+            simulate: simulate::<P>,
             replay,
         }
     }

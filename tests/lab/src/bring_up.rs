@@ -11,6 +11,7 @@ use std::{
 use clap::{Args, builder::PossibleValuesParser};
 use common::clock::Pace;
 use console::{missions, output::print_text};
+use mission_control::surroundings::SimulatedRobot as _;
 use processes::process::Process;
 use serde::Deserialize;
 use serde_json::Value;

@@ -16,6 +16,7 @@ mod missions;
 mod random;
 mod robot;
 mod ros2_robot;
+mod simulate;
 mod sources;
 mod tick;
 mod worlds;
@@ -43,6 +44,7 @@ enum Command {
     Experiments(experiments::Arguments),
     Field(field::Arguments),
     Certify(certify::Arguments),
+    Simulate(simulate::Arguments),
     /// Measure tick latency; test a robot with random signals and faults.
     #[command(subcommand)]
     Bench(Bench),
@@ -83,6 +85,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
         Command::Evaluate(arguments) => evaluate::main(arguments),
         Command::Experiments(arguments) => experiments::main(arguments),
         Command::Certify(arguments) => certify::main(arguments),
+        Command::Simulate(arguments) => return simulate::main(arguments),
         Command::Field(arguments) => field::main(arguments),
         Command::Stage(arguments) => baselines::process::main(arguments),
         Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),

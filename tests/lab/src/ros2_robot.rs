@@ -26,6 +26,7 @@ use console::{
     missions::{self, LookupError},
     output::print_text,
 };
+use mission_control::surroundings::SimulatedRobot as _;
 use ros2::{
     cdr::{Cdr as _, Malformed},
     messages::{COVARIANCE, battery, odometry, scan},

@@ -16,8 +16,9 @@ use std::{
     fmt,
     mem::{ManuallyDrop, MaybeUninit},
     ops::Deref,
-    os::fd::{AsFd, BorrowedFd},
+    os::fd::BorrowedFd,
     ptr,
+    rc::Rc,
 };
 
 use iceoryx2::{
@@ -37,7 +38,9 @@ use iceoryx2::{
     },
 };
 
+use super::memory::{self, Memory, alive};
 use crate::{
+    bus_instance::BusInstance,
     error::{BusError, Result, opening, reading, refused, taking},
     layout::type_name,
     leftovers::process_of,
@@ -86,13 +89,50 @@ type Bytes = [CustomPayloadMarker];
 
 dropped_here! {
     BusNode(Node<ipc::Service>);
-    /// Wakes the readers of a topic.
-    Notifier(notifier::Notifier<ipc::Service>);
-    Listener(listener::Listener<ipc::Service>);
-    RawService(PortFactory<ipc::Service, Bytes, CustomHeaderMarker>);
+    SharedNotifier(notifier::Notifier<ipc::Service>);
+    SharedListener(listener::Listener<ipc::Service>);
+    SharedService(PortFactory<ipc::Service, Bytes, CustomHeaderMarker>);
     PublisherPort(publisher::Publisher<ipc::Service, Bytes, CustomHeaderMarker>);
-    RawSubscriber(subscriber::Subscriber<ipc::Service, Bytes, CustomHeaderMarker>);
-    RawSample(sample::Sample<ipc::Service, Bytes, CustomHeaderMarker>);
+    SharedSubscriber(subscriber::Subscriber<ipc::Service, Bytes, CustomHeaderMarker>);
+    SharedSample(sample::Sample<ipc::Service, Bytes, CustomHeaderMarker>);
+}
+
+/// Where the topics of a bus are.
+#[derive(Debug)]
+pub(crate) enum Medium {
+    Shared { node: BusNode, instance: BusInstance },
+    Memory(Rc<Memory>),
+}
+
+#[derive(Debug)]
+pub(super) enum RawService {
+    Shared(SharedService),
+    Memory(Rc<memory::Topic>, Carried),
+}
+
+#[derive(Debug)]
+pub(super) enum RawSubscriber {
+    Shared(SharedSubscriber),
+    Memory(Rc<memory::Queue>),
+}
+
+#[derive(Debug)]
+pub(super) enum RawSample {
+    Shared(SharedSample),
+    Memory(Rc<memory::Sample>),
+}
+
+/// Wakes the readers of a topic.
+#[derive(Debug)]
+pub(crate) enum Notifier {
+    Shared(SharedNotifier),
+    Memory(Rc<memory::Topic>),
+}
+
+#[derive(Debug)]
+pub(crate) enum Listener {
+    Shared(SharedListener),
+    Memory(Rc<memory::Listener>),
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -136,6 +176,11 @@ impl Carried {
         };
         let layout = crc32fast::hash(format!("{:?}", (H::kind(), E::kind())).as_bytes());
         Self { header, element, elements, layout }
+    }
+
+    /// Returns the bytes of a sample's header, and of `count` elements.
+    pub(super) const fn sizes(&self, count: usize) -> (usize, usize) {
+        (self.header.size, self.element.size * count)
     }
 
     fn layout(&self, spec: &Spec) -> Result<(AttributeKey, AttributeValue)> {
@@ -202,8 +247,11 @@ pub struct OpenedBy {
     pub woken: BTreeSet<u32>,
 }
 
-pub(crate) fn opened_by(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<OpenedBy> {
-    let service = RawService::open(node, spec, carried)?;
+pub(crate) fn opened_by(medium: &Medium, spec: &Spec, carried: &Carried) -> Result<OpenedBy> {
+    let Medium::Shared { node, .. } = medium else {
+        return Err(refused("list the processes of", spec.name)("a simulated machine has none"));
+    };
+    let service = SharedService::open(node, spec, carried)?;
     let event = event(node, spec)?;
     let (mut writers, mut woken) = (BTreeSet::new(), BTreeSet::new());
     service.dynamic_config().list_publishers(|writer| {
@@ -221,8 +269,8 @@ pub(crate) fn opened_by(node: &BusNode, spec: &Spec, carried: &Carried) -> Resul
     })
 }
 
-impl RawService {
-    pub(super) fn open(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Self> {
+impl SharedService {
+    fn open(node: &BusNode, spec: &Spec, carried: &Carried) -> Result<Self> {
         let (key, layout) = carried.layout(spec)?;
         let layout = AttributeVerifier::new().require(&key, &layout);
         let layout = layout.map_err(refused("describe the layout of", spec.name))?;
@@ -238,7 +286,7 @@ impl RawService {
         Ok(service.into())
     }
 
-    pub(super) fn publisher(&self, spec: &Spec, longest: usize) -> Result<RawPublisher> {
+    fn publisher(&self, spec: &Spec, longest: usize) -> Result<RawPublisher> {
         let port: PublisherPort = self
             .publisher_builder()
             .initial_max_slice_len(longest)
@@ -251,22 +299,56 @@ impl RawService {
             || unsafe { port.loan_custom_payload(longest) }.map_err(refused("write", spec.name));
         let first = [loan()?, loan()?];
         let first = first.each_ref().map(|sample| ptr::from_ref(sample.header()).addr());
-        Ok(RawPublisher { places: Places::of_segment(first), port, topic: spec.name })
+        let port = PublisherTo::Shared { places: Places::of_segment(first), port };
+        Ok(RawPublisher { port, topic: spec.name })
     }
 
-    pub(super) fn subscriber(&self, spec: &Spec, buffer: usize) -> Result<RawSubscriber> {
-        let subscriber =
-            self.subscriber_builder().buffer_size(buffer).create().map_err(reading(spec))?;
-        Ok(subscriber.into())
-    }
-
-    pub(super) fn readers(&self) -> HashSet<u128> {
+    fn readers(&self) -> HashSet<u128> {
         let mut readers = HashSet::new();
         self.dynamic_config().list_subscribers(|reader| {
             readers.insert(reader.subscriber_id.value());
             CallbackProgression::Continue
         });
         readers
+    }
+}
+
+impl RawService {
+    pub(super) fn open(medium: &Medium, spec: &Spec, carried: &Carried) -> Result<Self> {
+        Ok(match medium {
+            Medium::Shared { node, .. } => Self::Shared(SharedService::open(node, spec, carried)?),
+            Medium::Memory(memory) => {
+                alive(spec.name)?;
+                Self::Memory(memory.topic(spec), *carried)
+            }
+        })
+    }
+
+    pub(super) fn publisher(&self, spec: &Spec, longest: usize) -> Result<RawPublisher> {
+        match self {
+            Self::Shared(service) => service.publisher(spec, longest),
+            Self::Memory(topic, carried) => {
+                let port = PublisherTo::Memory(Rc::clone(topic), topic.write(), *carried);
+                Ok(RawPublisher { port, topic: spec.name })
+            }
+        }
+    }
+
+    pub(super) fn subscriber(&self, spec: &Spec, buffer: usize) -> Result<RawSubscriber> {
+        Ok(match self {
+            Self::Shared(service) => {
+                let subscriber = service.subscriber_builder().buffer_size(buffer).create();
+                RawSubscriber::Shared(subscriber.map_err(reading(spec))?.into())
+            }
+            Self::Memory(topic, _) => RawSubscriber::Memory(topic.read(buffer)),
+        })
+    }
+
+    pub(super) fn readers(&self) -> HashSet<u128> {
+        match self {
+            Self::Shared(service) => service.readers(),
+            Self::Memory(topic, _) => topic.reader_numbers().collect(),
+        }
     }
 }
 
@@ -277,9 +359,14 @@ pub(super) struct Loan<'a> {
 
 #[derive(Debug)]
 pub(super) struct RawPublisher {
-    port: PublisherPort,
-    places: Places,
+    port: PublisherTo,
     pub topic: &'static str,
+}
+
+#[derive(Debug)]
+enum PublisherTo {
+    Shared { port: PublisherPort, places: Places },
+    Memory(Rc<memory::Topic>, Rc<memory::Writer>, Carried),
 }
 
 impl RawPublisher {
@@ -287,10 +374,18 @@ impl RawPublisher {
     /// not fit.
     pub(super) fn send(&self, elements: usize, fill: &mut dyn FnMut(Loan<'_>) -> bool) -> Result {
         let topic = self.topic;
+        let (port, places) = match &self.port {
+            PublisherTo::Shared { port, places } => (port, places),
+            PublisherTo::Memory(memory, writer, carried) => {
+                alive(topic)?;
+                let sent = memory.send(writer, carried, elements, fill);
+                return if sent { Ok(()) } else { Err(BusError::Incompatible { topic }) };
+            }
+        };
         // SAFETY: `elements` is 1 where samples have no slice.
-        let sample = unsafe { self.port.loan_custom_payload(elements) };
+        let sample = unsafe { port.loan_custom_payload(elements) };
         let mut sample = sample.map_err(refused("publish on", topic))?;
-        if !self.places.reserve_behind(ptr::from_ref(sample.header()).expose_provenance()) {
+        if !places.reserve_behind(ptr::from_ref(sample.header()).expose_provenance()) {
             return Err(BusError::NoMemory { topic });
         }
         let header = ptr::from_mut(sample.user_header_mut());
@@ -306,66 +401,118 @@ impl RawPublisher {
 impl RawSubscriber {
     #[inline(never)]
     pub(super) fn receive_sample(&self, spec: &Spec) -> Result<Option<RawSample>> {
-        let sample = self.receive().map_err(taking(spec))?;
-        Ok(sample.map(RawSample::from))
+        Ok(match self {
+            Self::Shared(subscriber) => {
+                let sample = subscriber.receive().map_err(taking(spec))?;
+                sample.map(|sample| RawSample::Shared(sample.into()))
+            }
+            Self::Memory(queue) => {
+                alive(spec.name)?;
+                queue.receive().map(RawSample::Memory)
+            }
+        })
     }
 }
 
 impl RawSample {
     #[inline(never)]
     pub(super) fn header(&self) -> *const CustomHeaderMarker {
-        self.user_header()
+        match self {
+            Self::Shared(sample) => sample.user_header(),
+            Self::Memory(sample) => sample.header(),
+        }
     }
 
     #[inline(never)]
     pub(super) fn elements(&self) -> &Bytes {
-        self.payload()
+        match self {
+            Self::Shared(sample) => sample.payload(),
+            Self::Memory(sample) => sample.elements(),
+        }
     }
 
     #[inline(never)]
     pub(super) fn process(&self) -> u32 {
-        process_of(self.origin().value())
+        match self {
+            Self::Shared(sample) => process_of(sample.origin().value()),
+            Self::Memory(sample) => sample.process,
+        }
     }
 }
+
 fn event(node: &BusNode, spec: &Spec) -> Result<event::PortFactory<ipc::Service>> {
     node.service_builder(&service_name(spec)?).event().open().map_err(refused("open", spec.name))
 }
 
 impl Notifier {
-    pub(crate) fn open(node: &BusNode, spec: &Spec) -> Result<Self> {
-        let notifier = event(node, spec)?.notifier_builder().create();
-        Ok(notifier.map_err(refused("write", spec.name))?.into())
+    pub(crate) fn open(medium: &Medium, spec: &Spec) -> Result<Self> {
+        Ok(match medium {
+            Medium::Shared { node, .. } => {
+                let notifier = event(node, spec)?.notifier_builder().create();
+                Self::Shared(notifier.map_err(refused("write", spec.name))?.into())
+            }
+            Medium::Memory(memory) => Self::Memory(memory.topic(spec)),
+        })
     }
 
     #[inline(never)]
     pub(crate) fn wake(&self, topic: &'static str) -> Result {
-        self.notify().map(drop).map_err(refused("wake the readers of", topic))
+        match self {
+            Self::Shared(notifier) => {
+                notifier.notify().map(drop).map_err(refused("wake the readers of", topic))
+            }
+            Self::Memory(memory) => {
+                alive(topic)?;
+                memory.wake();
+                Ok(())
+            }
+        }
     }
 }
 
 impl Listener {
     /// Listens to a topic if `admit` accepts the number of present listeners.
     pub(crate) fn open(
-        node: &BusNode,
+        medium: &Medium,
         spec: &Spec,
         admit: impl FnOnce(usize) -> Result,
     ) -> Result<Self> {
+        let node = match medium {
+            Medium::Shared { node, .. } => node,
+            Medium::Memory(memory) => return Ok(Self::Memory(memory.topic(spec).listen())),
+        };
         let service = event(node, spec)?;
         admit(service.dynamic_config().number_of_listeners())?;
         let listener = service.listener_builder().create();
-        Ok(listener.map_err(refused("listen to", spec.name))?.into())
+        Ok(Self::Shared(listener.map_err(refused("listen to", spec.name))?.into()))
+    }
+
+    /// Returns whether there is a notification; always false in shared memory, where a descriptor
+    /// shows it.
+    pub(crate) fn is_woken(&self) -> bool {
+        matches!(self, Self::Memory(listener) if listener.is_woken())
     }
 
     /// Clears the notifications; returns whether there were any.
     pub(crate) fn drain(&self) -> Result<bool> {
-        self.try_wait(|_| {}).map(|events| events > 0).map_err(refused("listen to", "a topic"))
+        match self {
+            Self::Shared(listener) => {
+                let events = listener.try_wait(|_| {});
+                events.map(|events| events > 0).map_err(refused("listen to", "a topic"))
+            }
+            Self::Memory(listener) => Ok(listener.drain()),
+        }
     }
-}
 
-impl AsFd for Listener {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        // SAFETY: the descriptor stays open until the listener is dropped, after the borrow has
-        // ended.
-        unsafe { BorrowedFd::borrow_raw(self.file_descriptor().native_handle()) }
+    /// Returns the descriptor that a notification makes readable; none in memory.
+    pub(crate) fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        match self {
+            // SAFETY: the descriptor stays open until the listener is dropped, after the borrow
+            // has ended.
+            Self::Shared(listener) => {
+                Some(unsafe { BorrowedFd::borrow_raw(listener.file_descriptor().native_handle()) })
+            }
+            Self::Memory(_) => None,
+        }
     }
 }

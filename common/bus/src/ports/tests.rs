@@ -4,7 +4,7 @@ use std::{
     ffi::{c_int, c_long, c_void},
     fs,
     os::{
-        fd::{AsFd as _, AsRawFd as _},
+        fd::AsRawFd as _,
         unix::{
             fs::{DirBuilderExt as _, MetadataExt as _},
             net::UnixDatagram,
@@ -98,7 +98,8 @@ const TIME: MissionTime = MissionTime(7);
 fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() {
     with_bus("typed", |bus| {
         let name = |name: &str| ServiceName::new(name).unwrap();
-        let structs = bus.node.service_builder(&name("structs"));
+        let Medium::Shared { node, .. } = &bus.medium else { unreachable!() };
+        let structs = node.service_builder(&name("structs"));
         let structs = structs.publish_subscribe::<Test>().open().unwrap();
         let typed = structs.subscriber_builder().create().unwrap();
         let mut reader = bus.reader(&STRUCTS).unwrap();
@@ -114,7 +115,7 @@ fn what_the_bus_writes_is_read_with_the_middlewares_own_types_and_the_reverse() 
         let taken = reader.next_slice().unwrap().unwrap();
         assert_eq!((taken.author().process, *taken.header()), (std::process::id(), sent));
 
-        let slices = bus.node.service_builder(&name("slices"));
+        let slices = node.service_builder(&name("slices"));
         let slices = slices.publish_subscribe::<[Cell]>().user_header::<Test>().open().unwrap();
         let typed = slices.subscriber_builder().create().unwrap();
         let mut reader = bus.reader(&SLICES).unwrap();
@@ -272,7 +273,7 @@ fn a_waiter_is_woken_again_after_a_publication_in_the_middle_of_a_drain() {
     with_bus("woken", |bus| {
         let mut writer = bus.writer(&STRUCTS, 1).unwrap();
         let wakeup = bus.wakeup(&STRUCTS).unwrap();
-        let socket = UnixDatagram::from(wakeup.as_fd().try_clone_to_owned().unwrap());
+        let socket = UnixDatagram::from(wakeup.descriptor().unwrap().try_clone_to_owned().unwrap());
         let mut waiter = Waiter::default();
         waiter.on(wakeup);
         let mut publish = || writer.publish(1, TIME, Test::default()).unwrap();

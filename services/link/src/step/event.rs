@@ -1,7 +1,7 @@
 //! Events and effects of the link.
 
 use common::{
-    clock::{MissionTime, Pace},
+    clock::{MissionClock, MissionTime, Pace},
     driver::{LaserScan, Memory, Refusal},
     inputs,
     samples::{
@@ -22,6 +22,16 @@ pub struct State {
     /// wall-clock time multiplied by a rate.
     pub pace: Pace,
     pub next_tick: u64,
+}
+
+impl State {
+    pub(crate) const fn new(clock: MissionClock, next_tick: u64) -> Self {
+        let pace = match clock {
+            MissionClock::Ticks { .. } => Pace::Max,
+            MissionClock::Wall { rate, .. } => Pace::Rate(rate),
+        };
+        Self { pace, next_tick }
+    }
 }
 
 impl Default for State {

@@ -65,6 +65,10 @@ impl Dds {
 }
 
 impl Wire for Dds {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        Some(self.participant.as_fd())
+    }
+
     fn maintain(&mut self, now_ns: u64) -> io::Result<()> {
         let joined_ns = *self.joined_ns.get_or_insert(now_ns);
         let (since_ns, most_ns) =
@@ -118,10 +122,4 @@ fn endpoints(participant: &Participant, topics: &Topics) -> io::Result<(Vec<Read
     let readers = topics.heard.iter().map(|(_, topic)| participant.reader(topic, heard));
     let told = Quality { is_reliable: true, is_latched: false, depth: 1 };
     Ok((readers.collect::<io::Result<_>>()?, participant.writer(&topics.command, told)?))
-}
-
-impl AsFd for Dds {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.participant.as_fd()
-    }
 }

@@ -85,6 +85,10 @@ impl<D: Dial + 'static> Stream<D> {
 }
 
 impl<D: Dial> Wire for Stream<D> {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        Some(self.epoll.as_fd())
+    }
+
     fn is_open(&self) -> bool {
         self.connection.as_ref().is_some_and(|it| it.is_open)
     }
@@ -240,11 +244,5 @@ const fn remedy(errno: Errno) -> &'static str {
         Errno::AGAIN => "end the other program that holds the line",
         Errno::NOTTY => "name a serial line in robot.address",
         _ => "switch the robot on, or correct robot.address",
-    }
-}
-
-impl<D> AsFd for Stream<D> {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.epoll.as_fd()
     }
 }

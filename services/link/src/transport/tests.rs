@@ -1,12 +1,16 @@
 use std::{
+    cell::Cell,
+    collections::VecDeque,
     io::{Read, Write},
     net::{SocketAddr, TcpListener, TcpStream, UdpSocket},
-    os::fd::OwnedFd,
+    os::fd::{AsFd, OwnedFd},
     path::{Path, PathBuf},
+    rc::Rc,
     time::Duration,
 };
 
 use common::{
+    machine::{Files, Machine, simulate},
     poll,
     wire::{Addressing, Command, Decoder},
 };
@@ -33,7 +37,7 @@ fn ready(descriptor: impl AsFd) {
 
 fn maintain_until(transport: &mut Transport, open: bool, now_ns: u64) {
     while transport.maintain(now_ns).unwrap() != Some(open) {
-        ready(&*transport);
+        ready(transport.descriptor().unwrap());
     }
 }
 
@@ -42,7 +46,7 @@ fn expect(transport: &mut Transport, wanted: &[u8], now_ns: u64) {
     while came.len() < wanted.len() {
         match transport.receive(now_ns).unwrap() {
             Some(bytes) => came.extend_from_slice(bytes),
-            None => ready(&*transport),
+            None => ready(transport.descriptor().unwrap()),
         }
     }
     assert_eq!(came, wanted);
@@ -50,7 +54,7 @@ fn expect(transport: &mut Transport, wanted: &[u8], now_ns: u64) {
 
 fn expect_closing(transport: &mut Transport, now_ns: u64) {
     while transport.is_open() {
-        ready(&*transport);
+        ready(transport.descriptor().unwrap());
         assert_eq!(transport.receive(now_ns).unwrap(), None);
     }
     assert_eq!(transport.maintain(now_ns).unwrap(), Some(false));
@@ -64,7 +68,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     transport.send(b"where?").unwrap();
     let (_, link) = robot.recv_from(&mut [0; 16]).unwrap();
     other.send_to(b"go left", link).unwrap();
-    ready(&transport);
+    ready(transport.descriptor().unwrap());
     assert_eq!(transport.receive(0).unwrap(), None);
     assert_eq!(transport.tally().foreign_datagrams, 1);
     // It may be the robot, if the mission has a wrong port.
@@ -72,7 +76,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     let trouble = transport.trouble().unwrap().to_string();
     assert!(trouble.contains(&format!("answers from port {port}; name that port")), "{trouble}");
     robot.send_to(b"hello", link).unwrap();
-    ready(&transport);
+    ready(transport.descriptor().unwrap());
     assert_eq!(transport.receive(0).unwrap(), Some(&b"hello"[..]));
 }
 
@@ -336,4 +340,71 @@ fn a_file_that_is_no_serial_line_is_never_written_to() {
     assert_eq!(transport.maintain(0).unwrap(), Some(false));
     transport.send(b"ping").unwrap();
     assert_eq!(transport.tally().unsent, 1);
+}
+
+/// Machine with a device that sends each datagram back.
+#[derive(Default)]
+struct Echoes {
+    files: Files,
+    is_killed: Cell<bool>,
+}
+
+#[derive(Debug, Default)]
+struct Echo(VecDeque<Vec<u8>>);
+
+impl MachineWire for Echo {
+    fn receive(&mut self) -> Option<Vec<u8>> {
+        self.0.pop_front()
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        self.0.push_back(bytes.to_vec());
+    }
+}
+
+impl Machine for Echoes {
+    fn monotonic_ns(&self) -> u64 {
+        0
+    }
+
+    fn process(&self) -> u32 {
+        1
+    }
+
+    fn wait(&self, _: Duration, is_ready: &dyn Fn() -> bool) -> bool {
+        is_ready()
+    }
+
+    fn is_killed(&self) -> bool {
+        self.is_killed.get()
+    }
+
+    fn files(&self) -> &Files {
+        &self.files
+    }
+
+    fn wire(&self, address: &str) -> Box<dyn MachineWire> {
+        assert_eq!(address, "udp://127.0.0.1:9");
+        Box::new(Echo::default())
+    }
+}
+
+#[test]
+fn a_wire_of_a_simulated_machine_carries_datagrams_without_a_socket_until_its_process_is_killed() {
+    let machine = Rc::new(Echoes::default());
+    simulate(machine.clone(), || {
+        let address = Address::Udp("127.0.0.1:9".parse().unwrap());
+        let mut transport = open_at(&address).unwrap();
+        assert!(transport.descriptor().is_none());
+        assert_eq!(transport.maintain(0).unwrap(), Some(true));
+        for datagram in [b"one", b"two"] {
+            transport.send(datagram).unwrap();
+        }
+        assert_eq!(transport.receive(0).unwrap(), Some(&b"one"[..]));
+        assert_eq!(transport.receive(0).unwrap(), Some(&b"two"[..]));
+        assert_eq!(transport.receive(0).unwrap(), None);
+        machine.is_killed.set(true);
+        assert!(transport.send(b"three").is_err());
+        assert_eq!(transport.receive(0).unwrap(), None);
+    });
 }

@@ -34,6 +34,10 @@ impl Udp {
 }
 
 impl Wire for Udp {
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        Some(self.socket.as_fd())
+    }
+
     /// Drops and counts datagrams from other addresses.
     fn receive(&mut self, buffer: &mut [u8], _: u64) -> io::Result<Option<usize>> {
         loop {
@@ -85,10 +89,4 @@ fn is_passing(error: &io::Error) -> bool {
             | io::ErrorKind::NetworkUnreachable
             | io::ErrorKind::NetworkDown
     )
-}
-
-impl AsFd for Udp {
-    fn as_fd(&self) -> BorrowedFd<'_> {
-        self.socket.as_fd()
-    }
 }

@@ -1,28 +1,24 @@
 //! Session of robot, radio, transport and ground truth.
 
-use std::{
-    io::Write,
-    os::fd::BorrowedFd,
-    time::{Duration, Instant},
-};
+use std::{os::fd::BorrowedFd, time::Duration};
 
 use common::{
     checkpoint::Checkpoint,
-    clock::Pace,
-    ground_truth::GroundTruthHeader,
-    json_wire::{Lines, line, parse},
+    clock::{Instant, Pace, monotonic_ns},
+    ground_truth::GroundTruthTick,
+    json_wire::{Lines, parse},
     mission::{Mission, Protocol},
     wire::Decoder,
 };
 use rplidar_protocol::START;
-use serde::Serialize;
 
-use super::meeting::Meeting;
+use super::{SimClock, meeting::Meeting};
 use crate::{
     arduino_words::Requests,
     error::Result,
     radio::Radio,
     robot::{Heard, Robot, Said},
+    saved_state::SavedState,
     transport::{Source, Way},
 };
 
@@ -32,6 +28,8 @@ const MOST_UNHEARD: usize = 120_000;
 
 /// Host silence by wall clock after which another host may take the robot.
 const HOST_SILENT: Duration = Duration::from_secs(2);
+
+const MOST_AT_ONCE: usize = 64;
 
 /// Interval of RPLIDAR messages: a serial adapter buffers for a few milliseconds.
 const GATHERS_S: f64 = 0.004;
@@ -44,7 +42,7 @@ enum Leg {
 
 pub(super) struct Session {
     robot: Robot,
-    lock_step: bool,
+    clock: SimClock,
     way: Way,
     radio: Option<Radio<Leg>>,
     /// Source of the served host's last valid frame, and destination of all streams.
@@ -59,7 +57,7 @@ pub(super) struct Session {
     /// Mission time of the newest RPLIDAR message.
     gathered_s: f64,
     protocol: Protocol,
-    ground_truth: Option<Box<dyn Write + Send>>,
+    ground_truth: Box<dyn FnMut(GroundTruthTick)>,
     meeting: Option<Meeting>,
     checkpoint: Option<Checkpoint>,
 }
@@ -87,14 +85,13 @@ impl Session {
         robot: Robot,
         pace: Pace,
         (way, laser_way): (Way, Option<Way>),
-        (ground_truth, meeting): (Option<Box<dyn Write + Send>>, Option<Meeting>),
-        checkpoint: Option<Checkpoint>,
+        ground_truth: Box<dyn FnMut(GroundTruthTick)>,
+        (meeting, checkpoint): (Option<Meeting>, Option<Checkpoint>),
     ) -> Result<Self> {
-        let (listening, laser) = (way.address(), laser_way.as_ref().map(Way::address));
         let radio = Radio::new(mission.simulation.physics().radio, mission.seed);
         let mut session = Self {
+            clock: SimClock::new(pace, 1.0 / mission.robot.rate_hz, robot.time),
             robot,
-            lock_step: pace == Pace::Max,
             way,
             radio: Some(radio).filter(|radio| !radio.is_perfect()),
             peer: None,
@@ -109,7 +106,6 @@ impl Session {
             meeting,
             checkpoint,
         };
-        session.write(&GroundTruthHeader { listening, laser });
         session.write_tick();
         session.save()?;
         Ok(session)
@@ -122,8 +118,8 @@ impl Session {
         Ok(())
     }
 
-    /// Ends the process and all commands: the robot comes to rest.
-    pub(super) fn end(mut self) -> Result {
+    /// Ends the process and all commands: the robot comes to rest. Returns its state there.
+    pub(super) fn end(mut self) -> Result<SavedState> {
         // The other robot sees the same path to rest, regardless of late commands.
         let Self { robot, meeting, .. } = &mut self;
         let mut tell = |robot: &mut Robot, ended| {
@@ -133,7 +129,8 @@ impl Session {
         };
         robot.come_to_rest(|robot| tell(robot, false));
         tell(robot, true);
-        self.save()
+        self.save()?;
+        Ok(self.robot.saved_state())
     }
 
     pub(super) fn readable(&self) -> Vec<BorrowedFd<'_>> {
@@ -141,12 +138,17 @@ impl Session {
         ways.flat_map(Way::readable).collect()
     }
 
-    pub(super) fn next_tick_s(&self) -> f64 {
+    /// Returns the time to the next self-triggered event; none in lockstep.
+    pub(super) fn patience(&self) -> Option<Duration> {
+        self.clock.wait_for(self.next_due_s(), monotonic_ns())
+    }
+
+    fn next_tick_s(&self) -> f64 {
         self.robot.next_tick_s()
     }
 
     /// Returns the mission time of the next self-triggered event.
-    pub(super) fn next_due_s(&self) -> f64 {
+    fn next_due_s(&self) -> f64 {
         let flight = self.radio.as_ref().and_then(Radio::next_due);
         let scanning = self.robot.rplidar.as_ref().filter(|rplidar| rplidar.is_scanning());
         let laser = scanning.map(|_| self.gathered_s + GATHERS_S);
@@ -175,48 +177,48 @@ impl Session {
         }
     }
 
-    /// Takes up to `most` received pieces; `now` is mission time, if there is a clock.
-    pub(super) fn listen(
-        &mut self,
-        buffer: &mut [u8],
-        most: usize,
-        now: impl Fn() -> Option<f64>,
-    ) -> Result {
+    /// Takes received pieces, up to a limit.
+    pub(super) fn listen(&mut self, buffer: &mut [u8]) -> Result {
         while let Some((source, bytes)) =
             self.laser_way.as_mut().map(|way| way.receive(buffer)).transpose()?.flatten()
         {
-            if let Some(now) = now() {
+            if let Some(now) = self.clock.now(monotonic_ns()) {
                 self.pass(now)?;
             }
             self.hear_laser(source, bytes);
         }
-        for _ in 0..most {
+        for _ in 0..MOST_AT_ONCE {
             let Some((source, bytes)) = self.way.receive(buffer)? else {
                 return Ok(());
             };
-            let opened = self.way.take_opened();
-            // Messages of the robot protocols begin differently.
-            let is_laser = self.robot.rplidar.is_some()
-                && (self.laser_peer == Some(source) || bytes.starts_with(&[START]))
-                && self.laser_way.is_none();
-            if let Some(now) = now() {
-                self.pass(now)?;
-                if opened {
-                    self.robot.on_opened();
-                }
-                let now = self.robot.time;
-                if let Some(radio) = self.radio.as_mut().filter(|_| !is_laser) {
-                    radio.send(now, Leg::ToRobot(source), bytes);
-                    continue;
-                }
-            }
-            if is_laser {
-                self.hear_laser(source, bytes);
-            } else {
-                self.hear(source, bytes)?;
-            }
+            self.take(source, bytes)?;
         }
         Ok(())
+    }
+
+    /// Takes a received piece.
+    pub(super) fn take(&mut self, source: Source, bytes: &[u8]) -> Result {
+        let opened = self.way.take_opened();
+        // Messages of the robot protocols begin differently.
+        let is_laser = self.robot.rplidar.is_some()
+            && (self.laser_peer == Some(source) || bytes.starts_with(&[START]))
+            && self.laser_way.is_none();
+        if let Some(now) = self.clock.now(monotonic_ns()) {
+            self.pass(now)?;
+            if opened {
+                self.robot.on_opened();
+            }
+            let now = self.robot.time;
+            if let Some(radio) = self.radio.as_mut().filter(|_| !is_laser) {
+                radio.send(now, Leg::ToRobot(source), bytes);
+                return Ok(());
+            }
+        }
+        if is_laser {
+            self.hear_laser(source, bytes);
+            return Ok(());
+        }
+        self.hear(source, bytes)
     }
 
     fn meet(&mut self) -> Result {
@@ -226,10 +228,19 @@ impl Session {
         Ok(())
     }
 
+    /// Processes everything due by the clock.
+    pub(super) fn catch_up(&mut self) -> Result {
+        if let Some(now) = self.clock.now(monotonic_ns()) {
+            self.pass(now)?;
+            self.clock.forgive(self.next_tick_s(), monotonic_ns());
+        }
+        Ok(())
+    }
+
     /// Processes everything due by mission time `now`.
-    pub(super) fn pass(&mut self, now: f64) -> Result {
+    fn pass(&mut self, now: f64) -> Result {
         self.meet()?;
-        // The shell's clock waits, so a delay beyond a period is dropped.
+        // The clock waits, so a delay beyond a period is dropped.
         let now = now.min(self.next_tick_s() + 1.0 / self.robot.rate_hz);
         loop {
             let due = self.next_due_s();
@@ -329,7 +340,7 @@ impl Session {
             return Ok(());
         }
         let mut answer = Vec::with_capacity(16);
-        if !self.lock_step {
+        if !self.clock.is_lock_step() {
             if said.told(&mut self.robot, &mut answer) != Heard::Foreign {
                 self.peer = Some(source);
                 self.send(&answer);
@@ -404,18 +415,6 @@ impl Session {
         if let Some(meeting) = &mut self.meeting {
             meeting.tell(&ground_truth, false);
         }
-        self.write(&ground_truth);
-    }
-
-    fn write(&mut self, record: &impl Serialize) {
-        let Some(ground_truth) = &mut self.ground_truth else {
-            return;
-        };
-        // One write per line: a pipe write costs far more than its bytes.
-        let written = ground_truth.write_all(&line(record)).and_then(|()| ground_truth.flush());
-        if let Err(error) = written {
-            tracing::warn!(%error, "the ground truth has lost its reader; the robot continues without one");
-            self.ground_truth = None;
-        }
+        (self.ground_truth)(ground_truth);
     }
 }

@@ -65,8 +65,8 @@ impl Wire for Pty {
         self.path.clone()
     }
 
-    fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
-        (self.robot.as_fd(), None)
+    fn readable(&self) -> [Option<BorrowedFd<'_>>; 2] {
+        [Some(self.robot.as_fd()), None]
     }
 
     fn connected(&mut self) -> io::Result<Option<Source>> {

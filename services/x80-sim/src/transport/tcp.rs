@@ -59,9 +59,9 @@ impl Wire for Tcp {
         self.address.to_string()
     }
 
-    fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
+    fn readable(&self) -> [Option<BorrowedFd<'_>>; 2] {
         let connection = self.connection.as_ref().map(AsFd::as_fd);
-        (self.listener.as_fd(), connection)
+        [Some(self.listener.as_fd()), connection]
     }
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {

@@ -8,7 +8,7 @@ use super::{Wire, owner::OwnUser, source::Source};
 
 /// Maximum datagram, below UDP's limit of 65,507 bytes. Lines with a scan of thousands of beams
 /// take several.
-const LONGEST: usize = 60_000;
+pub(super) const LONGEST: usize = 60_000;
 
 #[derive(Debug)]
 pub(crate) struct Udp {
@@ -32,8 +32,8 @@ impl Wire for Udp {
         self.address.to_string()
     }
 
-    fn readable(&self) -> (BorrowedFd<'_>, Option<BorrowedFd<'_>>) {
-        (self.socket.as_fd(), None)
+    fn readable(&self) -> [Option<BorrowedFd<'_>>; 2] {
+        [Some(self.socket.as_fd()), None]
     }
 
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(Source, usize)>> {

@@ -8,6 +8,7 @@
 
 mod bad_radio;
 mod foreign_clients;
+mod in_memory;
 mod loopback;
 mod meeting;
 mod support;

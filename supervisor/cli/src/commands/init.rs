@@ -100,7 +100,7 @@ fn heard(address: &Address<String>) -> Result<Seen> {
                 seen.hear(bytes, at.as_secs_f64());
             } else {
                 wire.send(&seen.ask())?;
-                poll::is_readable(&wire, Duration::from_millis(100))?;
+                poll::readable(wire.descriptor().as_slice(), Some(Duration::from_millis(100)))?;
             }
         }
         if seen.is_known() {

@@ -13,7 +13,7 @@ use common::{
     },
     topics::{self, SUPERVISOR},
 };
-use mission_control::simulator::Simulator;
+use mission_control::{simulator::Simulator, surroundings::SimulatedRobot as _};
 use processes::{
     policy::{HOLD_AFTER, HOLD_WINDOW},
     process::Process,

@@ -20,7 +20,7 @@ use crate::{
     error::{OrCannot as _, Result},
     robot::{self, Run, firsthand},
 };
-use mission_control::{outcome::Outcome, simulator::Simulator};
+use mission_control::{outcome::Outcome, simulator::Simulator, surroundings::SimulatedRobot as _};
 use processes::DEATHS;
 use summary::Summary;
 

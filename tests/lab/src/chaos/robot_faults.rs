@@ -13,6 +13,7 @@ use common::{
     topics,
 };
 use console::{missions, output::write_stderr};
+use mission_control::surroundings::SimulatedRobot as _;
 use mission_control::{operator::sign_off, outcome::RIGHT_PLACE_M, simulator::Simulator};
 use processes::process::Process;
 use rustix::process::Signal;

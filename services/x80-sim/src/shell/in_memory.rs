@@ -1,0 +1,73 @@
+//! Simulated robot without process, socket, file or thread.
+
+use std::{
+    net::SocketAddr,
+    sync::mpsc::{Receiver, channel},
+};
+
+use common::{
+    clock::{Pace, monotonic_ns},
+    ground_truth::GroundTruthTick,
+    mission::Mission,
+};
+
+use super::session::Session;
+use crate::{
+    error::Result,
+    saved_state::SavedState,
+    transport::{Source, Way},
+};
+
+/// Robot that a simulation drives, by the clock of its [machine](common::machine).
+pub struct InMemory {
+    session: Session,
+    sent: Receiver<(SocketAddr, Vec<u8>)>,
+    truth: Receiver<GroundTruthTick>,
+}
+
+impl InMemory {
+    /// Starts the robot, at the place where an earlier one came to rest.
+    pub fn start(mission: &Mission, pace: Pace, earlier: Option<&SavedState>) -> Result<Self> {
+        let ((host, sent), (told, truth)) = (channel(), channel());
+        // Without a reader, the ground truth is lost.
+        let tell = Box::new(move |tick| {
+            let _ = told.send(tick);
+        });
+        let (robot, ways) = (super::robot(mission, earlier), (Way::to(host), None));
+        let session = Session::new(mission, robot, pace, ways, tell, (None, None))?;
+        Ok(Self { session, sent, truth })
+    }
+
+    /// Takes a datagram of the host's wire at `from`. Each wire needs its own port, as robot and
+    /// laser share an address.
+    pub fn hear(&mut self, from: SocketAddr, datagram: &[u8]) -> Result {
+        self.session.take(Source::Peer(from), datagram)?;
+        self.pass()
+    }
+
+    /// Takes the time that passed. Does nothing in lockstep.
+    pub fn pass(&mut self) -> Result {
+        self.session.catch_up()
+    }
+
+    /// Returns the time of the next [`InMemory::pass`] on the monotonic clock; none in lockstep.
+    pub fn next_due_ns(&self) -> Option<u64> {
+        let after = self.session.patience()?;
+        Some(monotonic_ns() + after.as_nanos() as u64)
+    }
+
+    /// Returns the datagrams sent since the last call, each with the wire that receives it.
+    pub fn sent(&mut self) -> impl Iterator<Item = (SocketAddr, Vec<u8>)> {
+        self.sent.try_iter()
+    }
+
+    /// Returns the ground truth since the last call, one of each tick.
+    pub fn truth(&mut self) -> impl Iterator<Item = GroundTruthTick> {
+        self.truth.try_iter()
+    }
+
+    /// Ends all commands: the robot comes to rest, where the next one starts.
+    pub fn end(self) -> Result<SavedState> {
+        self.session.end()
+    }
+}

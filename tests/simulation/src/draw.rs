@@ -1,0 +1,67 @@
+//! Draws what disturbs a run.
+
+use std::time::Duration;
+
+use common::mission::Mission;
+use processes::stages;
+
+use crate::{
+    disturbance::{Disturbance, Request, What},
+    load::Load,
+    random::Random,
+    wire::{Quality, Way},
+};
+
+/// Most disturbances of one run.
+const MOST: usize = 8;
+/// Time in which they begin.
+const WITHIN: Duration = Duration::from_secs(14);
+
+pub(crate) fn load(random: &mut Random) -> Load {
+    let loads = [Load::IDLE, Load::IDLE, Load::BUSY, Load::OVERLOADED];
+    loads[random.below(loads.len())]
+}
+
+pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Disturbance> {
+    let mut all = Vec::new();
+    for _ in 0..random.below(MOST + 1) {
+        let at = WITHIN.mul_f64(random.share());
+        one(random, mission, at, &mut all);
+    }
+    all
+}
+
+fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Disturbance>) {
+    let stage = stages::TABLE[random.below(stages::TABLE.len())].name;
+    let operations = random.below(200) as u32;
+    let lasts = Duration::from_secs_f64(random.within(0.05, 3.0));
+    let mut add = |after: Duration, what| all.push(Disturbance { at: at + after, what });
+    match random.below(12) {
+        0..=2 => add(Duration::ZERO, What::Kill(stage)),
+        3..=4 => add(Duration::ZERO, What::KillAfter(stage, operations)),
+        5 => {
+            add(Duration::ZERO, What::Freeze(stage));
+            add(lasts, What::Thaw(stage));
+        }
+        6 => add(Duration::ZERO, What::Hang(stage)),
+        7 => add(Duration::ZERO, What::KillSupervisor(operations)),
+        8..=9 => {
+            let mut share = || if random.chance(0.5) { random.within(0.0, 1.0) } else { 0.0 };
+            let (lost, doubled, reordered) = (share(), share(), share());
+            let delay = lasts.mul_f64(0.1 * share());
+            let way = if share() > 0.0 { Way::ToRobot } else { Way::ToHost };
+            add(Duration::ZERO, What::Wire(way, Quality { lost, doubled, reordered, delay }));
+            add(lasts, What::Wire(way, Quality::default()));
+        }
+        10 => {
+            add(Duration::ZERO, What::Ask(Request::Stop));
+            add(lasts, What::Ask(Request::Resume));
+        }
+        _ => {
+            let target = mission.target;
+            let place = [target.x * random.share(), target.y * random.share()];
+            let requests = [Request::Goto(place), Request::Append(place), Request::Restart(stage)];
+            add(Duration::ZERO, What::Ask(requests[random.below(requests.len())]));
+        }
+    }
+}

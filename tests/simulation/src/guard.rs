@@ -1,0 +1,65 @@
+//! The stop guard's process on a simulated machine: it orders an owed stop while no link lives.
+
+use common::{run::Run, samples::Rest, stop_socket::OwedStop};
+use link::{
+    stop_guard::{Orders, TRIES_AGAIN},
+    wire_owner::{Found, Role},
+};
+
+/// Time from the end of a link to its guard's first order, nanoseconds.
+const STARTS_AFTER_NS: u64 = 30_000_000;
+
+#[derive(Default)]
+pub(crate) struct Guard {
+    run: Option<Run>,
+    orders: Option<Orders>,
+    due_ns: Option<u64>,
+}
+
+impl Guard {
+    pub(crate) const fn next_ns(&self) -> Option<u64> {
+        self.due_ns
+    }
+
+    /// Waits for the end of a link that starts.
+    pub(crate) fn on_link_started(&mut self, run: &Run) {
+        self.run = Some(run.clone());
+    }
+
+    pub(crate) fn on_link_ended(&mut self, now_ns: u64) {
+        self.due_ns.get_or_insert(now_ns + STARTS_AFTER_NS);
+    }
+
+    pub(crate) fn turn(&mut self, now_ns: u64, is_succeeded: bool) {
+        self.due_ns = None;
+        let Some(run) = &self.run else { return };
+        let mark = OwedStop::of(run.robot.domain());
+        let orders = match self.orders.take() {
+            Some(orders) => Ok(orders),
+            None if is_succeeded || !mark.is_set() => return,
+            None => Orders::open(run),
+        };
+        let turned = orders.and_then(|mut orders| {
+            let rest = orders.turn(now_ns)?;
+            Ok((orders, rest))
+        });
+        let Ok((orders, rest)) = turned else {
+            self.due_ns = Some(now_ns + TRIES_AGAIN.as_nanos() as u64);
+            return;
+        };
+        let found = Found {
+            link_lives: false,
+            is_owed: rest != Rest::AtRest,
+            is_succeeded,
+            is_signed_off: false,
+            is_robot_gone: false,
+        };
+        if found.role() == Role::Orders {
+            self.due_ns = Some(now_ns + orders.pause().as_nanos() as u64);
+            self.orders = Some(orders);
+        } else if !is_succeeded {
+            // Nothing else can be done about a mark that stays.
+            let _ = mark.set(false, std::path::Path::new(""));
+        }
+    }
+}

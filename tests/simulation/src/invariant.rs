@@ -1,0 +1,338 @@
+//! What holds after every event, whatever was disturbed.
+
+use std::{collections::VecDeque, fmt, rc::Rc, time::Duration};
+
+use common::{
+    bus::{Bus, BusError, Memory, Reader},
+    grid::Replica,
+    json_wire,
+    mission::{Mission, Protocol},
+    samples::{
+        CommandSample, DeathSample, DirectiveSample, GridHeader, LinkSample, Order, PoseSample,
+        name_str,
+    },
+    topics,
+    wire::{Command, Decoder, Quantity, Targets},
+};
+use mission_control::{Finished, outcome::Outcome};
+use thiserror::Error;
+
+use crate::{
+    disturbance::What,
+    machine::SimulatedMachine,
+    wire::{Quality, Way},
+};
+
+/// Longest pause between two orders to a robot that moves: a hung link is found, and a successor
+/// starts.
+const TOLD_EVERY: Duration = Duration::from_secs(4);
+/// Speed of a robot that moves, m/s.
+const MOVES_M_S: f64 = 0.05;
+/// Time to come to rest after the last motion command, on a wire that loses nothing.
+const RESTS_WITHIN: Duration = Duration::from_secs(3);
+/// Pose error beyond four standard deviations, metres.
+const POSE_SLACK_M: f64 = 0.3;
+/// Motion of a pose between two ticks beyond the top speed, metres.
+const JUMP_SLACK_M: f64 = 0.1;
+
+/// A broken invariant.
+#[derive(Clone, Debug, Error)]
+#[error("invariant '{invariant}' broken at event {event}, {:.6} s: {detail}", at.as_secs_f64())]
+pub struct Broken {
+    pub invariant: &'static str,
+    pub detail: String,
+    pub event: u64,
+    pub at: Duration,
+}
+
+/// Readers of one supervisor's bus.
+struct Observed {
+    directive: Reader<DirectiveSample>,
+    link: Reader<LinkSample>,
+    pose: Reader<PoseSample>,
+    command: Reader<CommandSample>,
+    deaths: Reader<DeathSample>,
+    /// Two readers of the map: one from the start, one that joins again and again.
+    grids: [(Reader<GridHeader, u8>, Replica<u8>); 2],
+    bus: Bus,
+}
+
+impl Observed {
+    fn open(memory: &Rc<Memory>) -> Result<Self, BusError> {
+        let bus = Bus::in_memory(Rc::clone(memory), None);
+        let grid = || Ok((bus.reader(&topics::GRID)?, Replica::default()));
+        Ok(Self {
+            directive: bus.reader(&topics::DIRECTIVE)?,
+            link: bus.reader(&topics::LINK)?,
+            pose: bus.reader(&topics::POSE)?,
+            command: bus.reader(&topics::COMMAND)?,
+            deaths: bus.reader(&topics::DEATHS)?,
+            grids: [grid()?, grid()?],
+            bus,
+        })
+    }
+}
+
+pub(crate) struct Invariants {
+    protocol: Protocol,
+    top_speed_m_s: f64,
+    in_ticks: bool,
+    observed: Option<Observed>,
+    decoder: Decoder,
+    /// Newest order of the supervisor that lives.
+    order: Option<Order>,
+    link_stops: bool,
+    /// Whether the newest motion command of this event moves.
+    sent: Option<bool>,
+    told: Option<Duration>,
+    moved: Option<Duration>,
+    /// Whether the wire to the robot keeps what it carries, and since when.
+    wire_is_calm: bool,
+    wire_changed: Duration,
+    pose: Option<PoseSample>,
+    /// Stages that were disturbed, and when.
+    disturbed: VecDeque<(&'static str, Duration)>,
+    command: u64,
+    /// Newest compared version of the map.
+    compared: u64,
+    joins: u64,
+}
+
+type Checked = Result<(), (&'static str, String)>;
+
+fn holds(holds: bool, invariant: &'static str, detail: impl FnOnce() -> String) -> Checked {
+    if holds { Ok(()) } else { Err((invariant, detail())) }
+}
+
+impl Invariants {
+    pub(crate) fn new(mission: &Mission, in_ticks: bool) -> Self {
+        Self {
+            protocol: mission.robot.protocol(),
+            top_speed_m_s: mission.body().top_speed_m_s,
+            in_ticks,
+            observed: None,
+            decoder: Decoder::default(),
+            order: None,
+            link_stops: true,
+            sent: None,
+            told: None,
+            moved: None,
+            wire_is_calm: true,
+            wire_changed: Duration::ZERO,
+            pose: None,
+            disturbed: VecDeque::new(),
+            command: 0,
+            compared: 0,
+            joins: 0,
+        }
+    }
+
+    pub(crate) fn on_bus(&mut self, memory: &Rc<Memory>) {
+        self.observed = Observed::open(memory).ok();
+        (self.order, self.compared) = (None, 0);
+    }
+
+    pub(crate) fn on_disturbance(&mut self, what: &What, now: Duration) {
+        match what {
+            What::Kill(stage)
+            | What::KillAfter(stage, _)
+            | What::Freeze(stage)
+            | What::Thaw(stage)
+            | What::Hang(stage) => self.disturbed.push_back((stage, now)),
+            What::Wire(Way::ToRobot, quality) => {
+                self.wire_is_calm = *quality == Quality::default();
+                self.wire_changed = now;
+            }
+            What::KillSupervisor(_) | What::Wire(..) | What::Load(_) | What::Ask(_) => {}
+        }
+    }
+
+    /// Notes what the link or its guard sends.
+    pub(crate) fn on_sent(&mut self, bytes: &[u8], now: Duration) {
+        let Some(moves) = self.moves(bytes) else { return };
+        (self.sent, self.told) = (Some(moves), Some(now));
+        if moves {
+            self.moved = Some(now);
+        }
+    }
+
+    /// Returns whether a message makes the wheels turn; `None` for messages about other things.
+    fn moves(&mut self, bytes: &[u8]) -> Option<bool> {
+        match self.protocol {
+            Protocol::X80 => {
+                self.decoder.push(bytes);
+                let mut moves = None;
+                while let Some(frame) = self.decoder.next_frame() {
+                    match Command::parse(&frame) {
+                        Ok(Command::Motion(motion)) if motion.quantity == Quantity::Velocity => {
+                            let Targets::All(speeds) = motion.targets else { continue };
+                            let turns = speeds.iter().flatten().any(|speed| *speed != 0);
+                            moves = Some(turns);
+                        }
+                        Ok(Command::Motion(_) | Command::Enable { on: false, .. }) => {
+                            moves = Some(false);
+                        }
+                        _ => {}
+                    }
+                }
+                moves
+            }
+            Protocol::Json => {
+                let text = std::str::from_utf8(bytes).ok()?;
+                let orders = text.lines().filter_map(|line| json_wire::parse(line.as_bytes()).ok());
+                orders.fold(None, |moves, order| match order {
+                    json_wire::Order::Drive { wheels, .. } => Some(wheels != [0.0; 2]),
+                    _ => moves,
+                })
+            }
+            Protocol::Arduino | Protocol::Ros2 => None,
+        }
+    }
+
+    /// Checks every invariant after an event.
+    pub(crate) fn check(&mut self, machine: &SimulatedMachine) -> Result<(), Broken> {
+        let now = machine.now();
+        self.check_now(machine, now).map_err(|(invariant, detail)| Broken {
+            invariant,
+            detail,
+            event: machine.events(),
+            at: now,
+        })
+    }
+
+    fn check_now(&mut self, machine: &SimulatedMachine, now: Duration) -> Checked {
+        let sent = self.sent.take();
+        // A link reads its orders before it sends, so the order before this event counts.
+        let may_move = self.order.is_none_or(|order| order == Order::Drive);
+        self.read(now)?;
+        if !self.in_ticks && sent == Some(true) {
+            holds(!self.link_stops, "zero command while held", || {
+                "the link sends a motion command although its cause says stop".to_owned()
+            })?;
+            holds(may_move, "no command after the order to stop", || {
+                format!("the link sends a motion command at the order {:?}", self.order)
+            })?;
+        }
+        let Some(truth) = machine.truth() else { return Ok(()) };
+        if self.in_ticks {
+            return Ok(());
+        }
+        let moves = truth.v.abs() > MOVES_M_S;
+        let age =
+            |then: Option<Duration>| then.map_or(Duration::MAX, |then| now.saturating_sub(then));
+        if moves {
+            holds(age(self.told) < TOLD_EVERY, "a robot that moves is told", || {
+                format!("it moves at {:.2} m/s and hears nothing since {:?}", truth.v, self.told)
+            })?;
+            let calm = self.wire_is_calm && age(Some(self.wire_changed)) > RESTS_WITHIN;
+            let stands = age(self.moved) > RESTS_WITHIN;
+            holds(!(calm && stands), "a robot that is told to stand stands", || {
+                format!("it moves at {:.2} m/s since {:?}", truth.v, self.moved)
+            })?;
+        }
+        Ok(())
+    }
+
+    fn read(&mut self, now: Duration) -> Checked {
+        let unread = |error: BusError| ("the bus can be read", error.to_string());
+        let Some(observed) = &mut self.observed else { return Ok(()) };
+        while let Some(directive) = observed.directive.next_sample().map_err(unread)? {
+            self.order = Some(directive.order());
+        }
+        while let Some(link) = observed.link.next_sample().map_err(unread)? {
+            self.link_stops = link.stopped();
+        }
+        while let Some(pose) = observed.pose.next_sample().map_err(unread)? {
+            let before = self.pose.replace(pose);
+            if let Some(before) = before
+                && pose.stamp.stamp_ns > before.stamp.stamp_ns
+                && pose.relocations == before.relocations
+            {
+                let passed_s = pose.stamp.seconds() - before.stamp.seconds();
+                let moved_m = (pose.x_m - before.x_m).hypot(pose.y_m - before.y_m);
+                let most_m = 1.2 * self.top_speed_m_s * passed_s + JUMP_SLACK_M;
+                holds(moved_m <= most_m, "a pose continues that of the last process", || {
+                    format!("{moved_m:.2} m in {passed_s:.2} s, at tick {}", pose.stamp.tick)
+                })?;
+            }
+        }
+        while let Some(command) = observed.command.next_sample().map_err(unread)? {
+            let tick = command.stamp.tick;
+            holds(tick + 1 >= self.command, "ticks do not go back", || {
+                format!("tick {tick} is commanded after tick {}", self.command)
+            })?;
+            self.command = self.command.max(tick);
+        }
+        for (reader, replica) in &mut observed.grids {
+            while let Some(grid) = reader.next_slice().map_err(unread)? {
+                replica.apply(&grid.header().part, &grid);
+            }
+        }
+        let [(_, whole), (_, joined)] = &observed.grids;
+        let version = whole.version();
+        if version == joined.version() && version != self.compared {
+            self.compared = version;
+            holds(whole.cells() == joined.cells(), "replicas of one version are equal", || {
+                format!("two readers of the map differ at version {}", whole.version())
+            })?;
+            self.joins += 1;
+            // The late reader joins again and begins with the next keyframe.
+            if self.joins.is_multiple_of(64) {
+                let reader = observed.bus.reader(&topics::GRID).map_err(unread)?;
+                observed.grids[1] = (reader, Replica::default());
+            }
+        }
+        while let Some(death) = observed.deaths.next_sample().map_err(unread)? {
+            let stage = name_str(&death.stage);
+            let caused = self.disturbed.iter().any(|(disturbed, at)| {
+                *disturbed == stage && now.saturating_sub(*at) < Duration::from_secs(20)
+            });
+            holds(death.hung == 0 || caused, "no stage is ended without cause", || {
+                format!("{stage} was ended as hung")
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Checks how a run ended.
+    pub(crate) fn check_end(
+        &self,
+        machine: &SimulatedMachine,
+        mission: &Mission,
+        finished: &Finished,
+    ) -> Result<(), Broken> {
+        let checked = || {
+            let targets = &finished.targets;
+            let numbers: Vec<_> = targets.iter().map(|target| target.number).collect();
+            let mut once = numbers.clone();
+            once.dedup();
+            holds(once == numbers, "every target has one result", || format!("{numbers:?}"))?;
+            let truth = machine.truth();
+            if let (Outcome::Reached, Some(truth)) = (finished.ending.outcome, truth) {
+                let target =
+                    targets.last().map_or(mission.target.into(), |last| [last.x_m, last.y_m]);
+                let off_m = (truth.x - target[0]).hypot(truth.y - target[1]);
+                let sure_m = finished.record.pose.map_or(0.0, |pose| {
+                    4.0 * (pose.covariance[0] + pose.covariance[3]).max(0.0).sqrt()
+                });
+                let most_m = mission.arrival_tolerance_m + sure_m + POSE_SLACK_M;
+                holds(off_m <= most_m, "reached is true", || {
+                    format!("{off_m:.2} m from the target, {most_m:.2} m at most")
+                })?;
+            }
+            Ok(())
+        };
+        checked().map_err(|(invariant, detail)| Broken {
+            invariant,
+            detail,
+            event: machine.events(),
+            at: machine.now(),
+        })
+    }
+}
+
+impl fmt::Debug for Invariants {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Invariants").finish_non_exhaustive()
+    }
+}

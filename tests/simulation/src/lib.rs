@@ -1,0 +1,185 @@
+//! The whole robot in one process, from one seed.
+//!
+//! The five stages, the supervisor, the stop guard and the simulated robot run as they do in their
+//! processes, on a simulated [machine](common::machine) in one thread, without sockets, files,
+//! shared memory or clock. Bytes on the wire, samples and checkpoints are the real ones.
+//!
+//! A seed draws how late each process runs, what the wire loses, doubles, reorders and delays, which
+//! process is killed, frozen or hangs, and what operators ask. After every event the
+//! [invariants](invariant) are checked. The same seed of the same program gives the same events, so
+//! a failure is a seed.
+//!
+//! # Limits
+//! A turn of a process is one event: a process does not run beside another. The operator's stop
+//! without middleware, systemd, signals to the supervisor and the middleware itself need real
+//! processes.
+
+mod disturbance;
+mod draw;
+mod guard;
+mod invariant;
+mod load;
+mod machine;
+mod random;
+mod robot;
+mod surroundings;
+mod wire;
+
+use std::{path::PathBuf, rc::Rc, time::Duration};
+
+use common::{clock::Pace, ground_truth::GroundTruthTick, mission::Mission};
+use mission_control::{Finished, Options, recovery::RecoveredRun};
+use processes::Starter;
+
+pub use self::{
+    disturbance::{Disturbance, Request, What},
+    invariant::Broken,
+    load::Load,
+    wire::{Quality, Way},
+};
+use self::{
+    invariant::Invariants, machine::SimulatedMachine, random::Random, robot::Robot,
+    surroundings::Simulated,
+};
+
+/// Directory of the run, which exists only on the simulated machine.
+const DIRECTORY: &str = "/simulation/run";
+/// Longest run, beyond the mission's timeout.
+const LATE: Duration = Duration::from_secs(120);
+/// Address of a robot that outlives its supervisor.
+const ADDRESS: &str = "192.0.2.1:10001";
+
+/// A run to simulate.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    pub seed: u64,
+    pub mission: Mission,
+    pub pace: Pace,
+    pub load: Load,
+    pub disturbances: Vec<Disturbance>,
+}
+
+impl Scenario {
+    /// Returns the undisturbed run of a simulated robot in lockstep, as `firsthand run` drives it.
+    pub fn lockstep(mission: &Mission) -> Self {
+        Self {
+            seed: mission.seed,
+            mission: mission.clone(),
+            pace: Pace::Max,
+            load: Load::NONE,
+            disturbances: Vec::new(),
+        }
+    }
+
+    /// Draws a run in wall-clock time, whose robot outlives its supervisor.
+    pub fn draw(mission: &Mission, seed: u64) -> Self {
+        let mut random = Random::new(seed, 3);
+        let mut mission = mission.clone();
+        mission.seed = seed;
+        mission.robot.address = Some(ADDRESS.to_owned());
+        let load = draw::load(&mut random);
+        let disturbances = draw::disturbances(&mut random, &mission);
+        Self { seed, mission, pace: Pace::Rate(1.0), load, disturbances }
+    }
+
+    /// Runs the scenario.
+    pub fn run(&self) -> Ran {
+        let in_ticks = self.pace == Pace::Max;
+        let invariants = Invariants::new(&self.mission, in_ticks);
+        let machine =
+            SimulatedMachine::new(self.seed, self.load, self.disturbances.clone(), invariants);
+        let finished = common::machine::simulate(Rc::<SimulatedMachine>::clone(&machine), || {
+            self.conduct(&machine)
+        });
+        Ran {
+            finished,
+            broken: machine.broken(),
+            events: machine.events(),
+            simulated: machine.now(),
+            supervisors: machine.supervisors(),
+            truth: machine.take_truth(),
+        }
+    }
+
+    /// Conducts the run to its end, with a new supervisor for each that is killed.
+    fn conduct(&self, machine: &Rc<SimulatedMachine>) -> Option<Finished> {
+        match Robot::start(&self.mission, self.pace) {
+            Ok(robot) => machine.place(robot),
+            Err(error) => {
+                machine.break_off("the robot starts", error.to_string());
+                return None;
+            }
+        }
+        machine.end_after(Duration::from_secs_f64(self.mission.timeout_s) + LATE);
+        let directory = PathBuf::from(DIRECTORY);
+        let mut random = Random::new(self.seed, 4);
+        let mut recovered = None;
+        loop {
+            let mut surroundings = Simulated::new(machine);
+            let options = Options {
+                mission: self.mission.clone(),
+                robot: "x80".parse().ok()?,
+                pace: self.pace,
+                directory: directory.clone(),
+                starter: Starter::Supervisor,
+                recovered,
+                stands: false,
+                place: None,
+            };
+            let conducted = mission_control::simulate(&options, &mut surroundings);
+            if machine.broken().is_some() {
+                return None;
+            }
+            if machine.supervisor_is_killed() {
+                machine.pass(Duration::from_secs_f64(random.within(0.1, 3.0)));
+                recovered = match RecoveredRun::load(&directory) {
+                    Ok(run) => Some(run),
+                    Err(error) => {
+                        machine.break_off("a killed run can be resumed", error.to_string());
+                        return None;
+                    }
+                };
+                continue;
+            }
+            return match conducted {
+                Ok(finished) => {
+                    machine.check_end(&self.mission, &finished);
+                    Some(finished)
+                }
+                Err(error) => {
+                    machine.break_off("a run ends with its result", error.to_string());
+                    None
+                }
+            };
+        }
+    }
+
+    /// Removes disturbances as long as the same invariant breaks.
+    pub fn shrink(&self, broken: &Broken) -> Self {
+        let mut least = self.clone();
+        let mut at = 0;
+        while at < least.disturbances.len() {
+            let mut fewer = least.clone();
+            fewer.disturbances.remove(at);
+            let breaks = fewer.run().broken;
+            if breaks.is_some_and(|now| now.invariant == broken.invariant) {
+                least = fewer;
+            } else {
+                at += 1;
+            }
+        }
+        least
+    }
+}
+
+/// What came of a run.
+pub struct Ran {
+    /// `None` if an invariant broke.
+    pub finished: Option<Finished>,
+    pub broken: Option<Broken>,
+    pub events: u64,
+    pub simulated: Duration,
+    /// Number of supervisors, one more than were killed.
+    pub supervisors: u32,
+    pub truth: Vec<GroundTruthTick>,
+}

@@ -1,0 +1,595 @@
+//! The simulated machine: clock, processes, and what runs next.
+//!
+//! The supervisor is the caller. Whenever it waits, the machine runs the events of the others until
+//! the supervisor's inputs are ready: turns of stages, datagrams, the robot, and disturbances, each
+//! at its time. Events at one time run in a fixed order, so a seed decides everything.
+
+use std::{
+    cell::{Cell, RefCell},
+    collections::BTreeMap,
+    rc::{Rc, Weak},
+    time::Duration,
+};
+
+use common::{
+    bus::{Bus, Memory},
+    ground_truth::GroundTruthTick,
+    machine::{Files, Machine, MachineWire},
+    mission::Mission,
+    run::Run,
+    shell::Simulated,
+    start::Generation,
+};
+use mission_control::Finished;
+use processes::{
+    activity::{Activity, State},
+    process::ExitCause,
+    stages,
+};
+use rustix::process::Signal;
+use x80_sim::SimError;
+
+use crate::{
+    disturbance::{Disturbance, What},
+    guard::Guard,
+    invariant::{Broken, Invariants},
+    load::Load,
+    random::Random,
+    robot::Robot,
+    wire::{HostEnd, Port, Way, Wires},
+};
+
+/// Monotonic clock at the start, nanoseconds.
+const BEGIN_NS: u64 = 1_000_000_000_000;
+const FIRST_PROCESS: u32 = 1000;
+/// Process that publishes operators' requests, and the one that checks the invariants.
+const OPERATOR: u32 = 1;
+const OBSERVER: u32 = 2;
+const GUARD: u32 = 3;
+const LINK: &str = "link";
+
+/// A stage's process.
+struct Process {
+    stage: &'static str,
+    /// Until its first turn.
+    starts: Option<(Generation, Run)>,
+    turns: Option<Box<dyn Simulated>>,
+    /// Next turn without input.
+    due_ns: u64,
+    /// Turn for an input that has come.
+    woken_ns: Option<u64>,
+    /// End of the last turn.
+    busy_until_ns: u64,
+    frozen: bool,
+    /// Start of a computation that never ends.
+    spins_since_ns: Option<u64>,
+    is_terminated: bool,
+    exit: Option<ExitCause>,
+    ran: Duration,
+    starved: Duration,
+}
+
+impl Process {
+    fn is_live(&self) -> bool {
+        self.exit.is_none()
+    }
+
+    /// Returns the time of the next turn.
+    fn next_ns(&self) -> Option<u64> {
+        let runs = self.is_live() && !self.frozen && self.spins_since_ns.is_none();
+        runs.then(|| self.woken_ns.map_or(self.due_ns, |woken| woken.min(self.due_ns)))
+    }
+}
+
+enum Event {
+    Disturbance,
+    ToRobot,
+    ToHost,
+    Robot,
+    Guard,
+    Turn(u32),
+}
+
+pub(crate) struct SimulatedMachine {
+    own: Weak<Self>,
+    now_ns: Cell<u64>,
+    running: Cell<u32>,
+    supervisor: Cell<u32>,
+    supervisors: Cell<u32>,
+    ends_ns: Cell<u64>,
+    processes_started: Cell<u32>,
+    /// Operations that a process still completes before its death.
+    doomed: RefCell<BTreeMap<u32, u32>>,
+    files: Files,
+    memory: RefCell<Rc<Memory>>,
+    wires: Rc<RefCell<Wires>>,
+    robot: RefCell<Option<Robot>>,
+    guard: RefCell<Guard>,
+    processes: RefCell<BTreeMap<u32, Process>>,
+    random: RefCell<Random>,
+    load: Cell<Load>,
+    /// The soonest last.
+    disturbances: RefCell<Vec<Disturbance>>,
+    invariants: RefCell<Invariants>,
+    broken: RefCell<Option<Broken>>,
+    events: Cell<u64>,
+}
+
+impl SimulatedMachine {
+    pub(crate) fn new(
+        seed: u64,
+        load: Load,
+        mut disturbances: Vec<Disturbance>,
+        invariants: Invariants,
+    ) -> Rc<Self> {
+        disturbances.sort_by_key(|disturbance| std::cmp::Reverse(disturbance.at));
+        Rc::new_cyclic(|own| Self {
+            own: own.clone(),
+            now_ns: Cell::new(BEGIN_NS),
+            running: Cell::new(OBSERVER),
+            supervisor: Cell::new(OBSERVER),
+            supervisors: Cell::new(0),
+            ends_ns: Cell::new(u64::MAX),
+            processes_started: Cell::new(0),
+            doomed: RefCell::default(),
+            files: Files::default(),
+            memory: RefCell::default(),
+            wires: Rc::new(RefCell::new(Wires::new(seed))),
+            robot: RefCell::default(),
+            guard: RefCell::default(),
+            processes: RefCell::default(),
+            random: RefCell::new(Random::new(seed, 0)),
+            load: Cell::new(load),
+            disturbances: RefCell::new(disturbances),
+            invariants: RefCell::new(invariants),
+            broken: RefCell::default(),
+            events: Cell::new(0),
+        })
+    }
+
+    pub(crate) fn now(&self) -> Duration {
+        Duration::from_nanos(self.now_ns.get() - BEGIN_NS)
+    }
+
+    pub(crate) fn place(&self, robot: Robot) {
+        self.robot.replace(Some(robot));
+    }
+
+    /// Returns the newest ground truth.
+    pub(crate) fn truth(&self) -> Option<GroundTruthTick> {
+        self.robot.borrow().as_ref()?.truth.last().copied()
+    }
+
+    pub(crate) fn take_truth(&self) -> Vec<GroundTruthTick> {
+        self.robot.take().map(|robot| robot.truth).unwrap_or_default()
+    }
+
+    /// Copies the ground truth from the `known`-th tick on.
+    pub(crate) fn add_truth(&self, to: &mut Vec<GroundTruthTick>) {
+        if let Some(robot) = &*self.robot.borrow() {
+            to.extend_from_slice(robot.truth.get(to.len()..).unwrap_or_default());
+        }
+    }
+
+    /// Sets the time after which a run that goes on breaks an invariant.
+    pub(crate) fn end_after(&self, time: Duration) {
+        self.ends_ns.set(BEGIN_NS + time.as_nanos() as u64);
+    }
+
+    pub(crate) const fn supervisors(&self) -> u32 {
+        self.supervisors.get()
+    }
+
+    pub(crate) fn events(&self) -> u64 {
+        self.events.get()
+    }
+
+    pub(crate) fn broken(&self) -> Option<Broken> {
+        self.broken.borrow().clone()
+    }
+
+    pub(crate) fn check_end(&self, mission: &Mission, finished: &Finished) {
+        let checked = self.invariants.borrow().check_end(self, mission, finished);
+        if let Err(broken) = checked {
+            self.broken.borrow_mut().get_or_insert(broken);
+        }
+    }
+
+    /// Begins the life of a supervisor, with a new bus. Returns the bus.
+    pub(crate) fn start_supervisor(&self) -> Bus {
+        let process = self.new_process();
+        self.supervisors.set(self.supervisors.get() + 1);
+        self.supervisor.set(process);
+        self.running.set(process);
+        self.new_bus()
+    }
+
+    /// Makes a bus for the supervisor and its next stages.
+    pub(crate) fn new_bus(&self) -> Bus {
+        let memory = Rc::<Memory>::default();
+        self.memory.replace(Rc::clone(&memory));
+        self.invariants.borrow_mut().on_bus(&memory);
+        Bus::in_memory(memory, Some(self.supervisor.get()))
+    }
+
+    pub(crate) fn supervisor_is_killed(&self) -> bool {
+        self.doomed.borrow().get(&self.supervisor.get()) == Some(&0)
+    }
+
+    /// Passes time without a supervisor, whose stages end in order.
+    pub(crate) fn pass(&self, time: Duration) {
+        self.running.set(OBSERVER);
+        for process in self.processes.borrow_mut().values_mut() {
+            (process.is_terminated, process.due_ns) = (true, self.now_ns.get());
+        }
+        self.run_until(self.now_ns.get() + time.as_nanos() as u64, &mut || false);
+    }
+
+    fn new_process(&self) -> u32 {
+        self.processes_started.set(self.processes_started.get() + 1);
+        FIRST_PROCESS + self.processes_started.get()
+    }
+
+    /// Starts a stage's process.
+    pub(crate) fn start(&self, generation: &Generation, run: Run) -> u32 {
+        let process = self.new_process();
+        if generation.stage == LINK {
+            self.guard.borrow_mut().on_link_started(&run);
+        }
+        let due_ns = self.now_ns.get() + self.lateness().0;
+        self.processes.borrow_mut().insert(
+            process,
+            Process {
+                stage: generation.stage,
+                starts: Some((generation.clone(), run)),
+                turns: None,
+                due_ns,
+                woken_ns: None,
+                busy_until_ns: due_ns,
+                frozen: false,
+                spins_since_ns: None,
+                is_terminated: false,
+                exit: None,
+                ran: Duration::ZERO,
+                starved: Duration::ZERO,
+            },
+        );
+        process
+    }
+
+    pub(crate) fn signal(&self, process: u32, signal: Signal) {
+        let mut processes = self.processes.borrow_mut();
+        let Some(process) = processes.get_mut(&process).filter(|process| process.is_live()) else {
+            return;
+        };
+        match signal {
+            Signal::KILL => self.end(process, killed_by(signal)),
+            // A stopped process takes no other signal.
+            _ if process.frozen => {}
+            Signal::ABORT => self.end(process, killed_by(signal)),
+            Signal::TERM if process.turns.is_none() => self.end(process, killed_by(signal)),
+            _ => (process.is_terminated, process.due_ns) = (true, self.now_ns.get()),
+        }
+    }
+
+    /// Returns how the process ended, if it did, and forgets it.
+    pub(crate) fn reap(&self, process: u32) -> Option<ExitCause> {
+        let mut processes = self.processes.borrow_mut();
+        let ended = processes.get(&process).is_some_and(|process| !process.is_live());
+        ended.then(|| processes.remove(&process)).flatten()?.exit
+    }
+
+    /// Returns the time that a process ran and starved, and its state.
+    pub(crate) fn activity(&self, process: u32) -> Option<Activity> {
+        let (processes, now_ns) = (self.processes.borrow(), self.now_ns.get());
+        let process = processes.get(&process).filter(|process| process.is_live())?;
+        let since = |ns: u64| Duration::from_nanos(now_ns.saturating_sub(ns));
+        let state = match process {
+            Process { frozen: true, .. } => State::Stopped,
+            Process { spins_since_ns: Some(_), .. } => State::Ready,
+            Process { woken_ns: Some(woken), .. } if *woken > now_ns => State::Ready,
+            _ => State::Asleep,
+        };
+        Some(Activity {
+            ran: process.ran + process.spins_since_ns.map_or(Duration::ZERO, since),
+            starved: process.starved,
+            state,
+        })
+    }
+
+    /// Draws the time from a wakeup to its turn, and which part of it the process starves.
+    fn lateness(&self) -> (u64, Duration) {
+        let (load, mut random) = (self.load.get(), self.random.borrow_mut());
+        let starved = match load.starved {
+            (share, mean) if share > 0.0 && random.chance(share) => random.exponential(mean),
+            _ => Duration::ZERO,
+        };
+        let latency = match load.latency.is_zero() {
+            true => Duration::ZERO,
+            false => random.exponential(load.latency),
+        };
+        ((latency + starved).as_nanos() as u64, starved)
+    }
+
+    fn next(&self) -> Option<(u64, Event)> {
+        let mut next: Option<(u64, Event)> = None;
+        let mut offer = |at_ns: Option<u64>, event: Event| {
+            if let Some(at_ns) = at_ns
+                && next.as_ref().is_none_or(|(soonest, _)| at_ns < *soonest)
+            {
+                next = Some((at_ns, event));
+            }
+        };
+        let disturbances = self.disturbances.borrow();
+        let at = disturbances.last().map(|disturbance| disturbance.at);
+        offer(at.map(|at| BEGIN_NS + at.as_nanos() as u64), Event::Disturbance);
+        let wires = self.wires.borrow();
+        offer(wires.next_ns(Way::ToRobot), Event::ToRobot);
+        offer(wires.next_ns(Way::ToHost), Event::ToHost);
+        offer(self.robot.borrow().as_ref().and_then(Robot::next_ns), Event::Robot);
+        offer(self.guard.borrow().next_ns(), Event::Guard);
+        for (number, process) in self.processes.borrow().iter() {
+            offer(process.next_ns(), Event::Turn(*number));
+        }
+        next
+    }
+
+    /// Runs events until `deadline_ns`, or until `is_ready`, whose turn comes late like others'.
+    fn run_until(&self, deadline_ns: u64, is_ready: &mut dyn FnMut() -> bool) {
+        let mut until_ns = None;
+        while self.broken.borrow().is_none() {
+            if until_ns.is_none() && is_ready() {
+                until_ns = Some((self.now_ns.get() + self.lateness().0).min(deadline_ns));
+            }
+            let until = until_ns.unwrap_or(deadline_ns);
+            match self.next() {
+                Some((at_ns, event)) if at_ns <= until => {
+                    self.now_ns.set(self.now_ns.get().max(at_ns));
+                    if self.now_ns.get() > self.ends_ns.get() {
+                        self.break_off(
+                            "a run ends",
+                            "it outlasts its mission's timeout".to_owned(),
+                        );
+                    }
+                    self.execute(&event);
+                    if is_killed(&self.doomed.borrow(), self.supervisor.get()) {
+                        return;
+                    }
+                }
+                _ => {
+                    self.now_ns.set(self.now_ns.get().max(until));
+                    return;
+                }
+            }
+        }
+    }
+
+    fn execute(&self, event: &Event) {
+        let before = self.running.replace(OBSERVER);
+        self.events.set(self.events.get() + 1);
+        let now_ns = self.now_ns.get();
+        match event {
+            Event::Disturbance => {
+                if let Some(Disturbance { what, .. }) = self.disturbances.borrow_mut().pop() {
+                    self.disturb(&what);
+                }
+            }
+            Event::ToRobot => {
+                let datagram = self.wires.borrow_mut().take_for_robot();
+                if let Some((from, bytes)) = datagram {
+                    self.with_robot(|robot| robot.hear(from, &bytes));
+                }
+            }
+            Event::ToHost => self.wires.borrow_mut().deliver_to_host(),
+            Event::Robot => {
+                self.with_robot(Robot::pass);
+            }
+            Event::Guard => {
+                self.running.set(GUARD);
+                let is_succeeded = self.is_open(LINK);
+                self.guard.borrow_mut().turn(now_ns, is_succeeded);
+            }
+            Event::Turn(process) => self.turn(*process),
+        }
+        self.wake();
+        self.running.set(OBSERVER);
+        let checked = self.invariants.borrow_mut().check(self);
+        if let Err(broken) = checked {
+            self.broken.borrow_mut().get_or_insert(broken);
+        }
+        self.running.set(before);
+    }
+
+    fn with_robot(&self, act: impl FnOnce(&mut Robot) -> Result<(), SimError>) {
+        let mut robot = self.robot.borrow_mut();
+        let Some(robot) = &mut *robot else { return };
+        if let Err(error) = act(robot) {
+            self.break_off("the robot runs", error.to_string());
+        }
+        let mut wires = self.wires.borrow_mut();
+        for (to, datagram) in robot.sent() {
+            wires.send(Way::ToHost, to, &datagram, self.now_ns.get());
+        }
+    }
+
+    fn send_to_robot(&self, from: Port, bytes: &[u8]) {
+        self.invariants.borrow_mut().on_sent(bytes, self.now());
+        self.wires.borrow_mut().send(Way::ToRobot, from, bytes, self.now_ns.get());
+    }
+
+    /// Ends the simulation.
+    pub(crate) fn break_off(&self, invariant: &'static str, detail: String) {
+        let (event, at) = (self.events.get(), self.now());
+        let broken = Broken { invariant, detail, event, at };
+        self.broken.borrow_mut().get_or_insert(broken);
+    }
+
+    /// Gives every process whose input has come a turn.
+    fn wake(&self) {
+        let mail = self.wires.borrow().has_mail();
+        for process in self.processes.borrow_mut().values_mut() {
+            let woken = process.turns.as_ref().is_some_and(|turns| turns.is_woken())
+                || mail && process.stage == LINK && process.turns.is_some();
+            if woken && process.woken_ns.is_none() {
+                let (late_ns, starved) = self.lateness();
+                process.starved += starved;
+                let from_ns = self.now_ns.get().max(process.busy_until_ns);
+                process.woken_ns = Some(from_ns + late_ns);
+            }
+        }
+    }
+
+    fn turn(&self, number: u32) {
+        let Some(mut process) = self.processes.borrow_mut().remove(&number) else { return };
+        self.running.set(number);
+        process.woken_ns = None;
+        let turned = match (&mut process.turns, process.starts.take()) {
+            (_, Some((generation, run))) => self.open(generation, run).and_then(|mut turns| {
+                let turned = turns.turn();
+                process.turns = Some(turns);
+                turned
+            }),
+            (Some(turns), _) if process.is_terminated => turns.stop().map(|()| None),
+            (Some(turns), _) => turns.turn(),
+            (None, None) => Ok(None),
+        };
+        let work = self.load.get().work;
+        process.ran += work;
+        process.busy_until_ns = self.now_ns.get() + work.as_nanos() as u64;
+        match turned {
+            _ if is_killed(&self.doomed.borrow(), number) => {
+                self.end(&mut process, killed_by(Signal::KILL));
+            }
+            Err(error) => self.end(&mut process, ExitCause::Exited(error.exit_code().into())),
+            Ok(Some(patience)) => {
+                process.due_ns = process.busy_until_ns + patience.as_nanos() as u64;
+            }
+            Ok(None) if process.is_terminated => self.end(&mut process, ExitCause::Exited(0)),
+            Ok(None) => process.spins_since_ns = Some(self.now_ns.get()),
+        }
+        self.processes.borrow_mut().insert(number, process);
+    }
+
+    fn open(&self, generation: Generation, run: Run) -> common::start::Result<Box<dyn Simulated>> {
+        let bus = Bus::in_memory(Rc::clone(&self.memory.borrow()), Some(self.supervisor.get()));
+        match stages::find(generation.stage) {
+            Some(stage) => (stage.simulate)(generation, run, bus),
+            None => Err(common::start::StageError::Other("no such stage".to_owned())),
+        }
+    }
+
+    /// Returns the live process of a stage.
+    pub(crate) fn process_of(&self, stage: &str) -> Option<u32> {
+        let processes = self.processes.borrow();
+        let mut live = processes.iter().filter(|(_, it)| it.stage == stage && it.is_live());
+        live.next_back().map(|(number, _)| *number)
+    }
+
+    /// Returns whether the stage's process has opened its topics.
+    pub(crate) fn is_open(&self, stage: &str) -> bool {
+        let processes = self.processes.borrow();
+        processes.values().any(|it| it.stage == stage && it.is_live() && it.turns.is_some())
+    }
+
+    fn disturb(&self, what: &What) {
+        self.invariants.borrow_mut().on_disturbance(what, self.now());
+        match what {
+            What::Kill(stage) => {
+                self.with(stage, |process| self.end(process, killed_by(Signal::KILL)));
+            }
+            What::KillAfter(stage, operations) => {
+                if let Some(process) = self.process_of(stage) {
+                    self.doomed.borrow_mut().insert(process, *operations);
+                }
+            }
+            What::KillSupervisor(operations) => {
+                self.doomed.borrow_mut().insert(self.supervisor.get(), *operations);
+            }
+            What::Freeze(stage) => self.with(stage, |process| process.frozen = true),
+            What::Thaw(stage) => self.with(stage, |process| {
+                process.frozen = false;
+                process.due_ns = process.due_ns.max(self.now_ns.get());
+            }),
+            What::Hang(stage) => {
+                self.with(stage, |process| process.spins_since_ns = Some(self.now_ns.get()));
+            }
+            What::Wire(way, quality) => self.wires.borrow_mut().set_quality(*way, *quality),
+            What::Load(load) => self.load.set(*load),
+            What::Ask(request) => {
+                self.running.set(OPERATOR);
+                let bus = Bus::in_memory(Rc::clone(&self.memory.borrow()), None);
+                // Nobody hears an operator while there is no supervisor.
+                let _ = request.publish(&bus);
+                self.running.set(OBSERVER);
+            }
+        }
+    }
+
+    /// Changes the live process of a stage, if there is one.
+    fn with(&self, stage: &str, change: impl FnOnce(&mut Process)) {
+        if let Some(process) = self.process_of(stage)
+            && let Some(process) = self.processes.borrow_mut().get_mut(&process)
+        {
+            change(process);
+        }
+    }
+
+    fn end(&self, process: &mut Process, cause: ExitCause) {
+        (process.exit, process.turns, process.starts) = (Some(cause), None, None);
+        if process.stage == LINK {
+            self.guard.borrow_mut().on_link_ended(self.now_ns.get());
+        }
+    }
+}
+
+const fn killed_by(signal: Signal) -> ExitCause {
+    ExitCause::Signalled { signal: signal.as_raw(), core: false }
+}
+
+fn is_killed(doomed: &BTreeMap<u32, u32>, process: u32) -> bool {
+    doomed.get(&process) == Some(&0)
+}
+
+impl Machine for SimulatedMachine {
+    fn monotonic_ns(&self) -> u64 {
+        self.now_ns.get()
+    }
+
+    fn process(&self) -> u32 {
+        self.running.get()
+    }
+
+    fn wait(&self, timeout: Duration, is_ready: &dyn Fn() -> bool) -> bool {
+        if self.running.get() != self.supervisor.get() || timeout.is_zero() {
+            return is_ready();
+        }
+        let deadline_ns = self.now_ns.get().saturating_add(timeout.as_nanos() as u64);
+        self.run_until(deadline_ns, &mut || is_ready());
+        is_ready()
+    }
+
+    fn is_killed(&self) -> bool {
+        match self.doomed.borrow_mut().get_mut(&self.running.get()) {
+            None => false,
+            Some(0) => true,
+            Some(left) => {
+                *left -= 1;
+                false
+            }
+        }
+    }
+
+    fn files(&self) -> &Files {
+        &self.files
+    }
+
+    fn wire(&self, _: &str) -> Box<dyn MachineWire> {
+        let machine = self.own.clone();
+        let send = move |from: Port, bytes: &[u8]| {
+            if let Some(machine) = machine.upgrade() {
+                machine.send_to_robot(from, bytes);
+            }
+        };
+        Box::new(HostEnd::open(&self.wires, Box::new(send)))
+    }
+}

@@ -1,0 +1,159 @@
+//! Surroundings of a supervisor on a simulated machine.
+
+use std::{
+    io,
+    net::{Ipv4Addr, SocketAddr},
+    os::fd::BorrowedFd,
+    path::Path,
+    rc::Rc,
+    time::Duration,
+};
+
+use common::{
+    address::Address, bus::Bus, ground_truth::GroundTruthTick, run::Run, start::Generation,
+};
+use mission_control::{
+    Options, SupervisorError,
+    simulator::SimulatorError,
+    surroundings::{Robot, SimulatedRobot, Surroundings},
+};
+use processes::{
+    activity::{Activity, Times},
+    host::{Host, Watched},
+    process::ExitCause,
+};
+use rustix::process::Signal;
+
+use crate::machine::SimulatedMachine;
+
+pub(crate) struct Simulated {
+    machine: Rc<SimulatedMachine>,
+    bus: Rc<Bus>,
+}
+
+impl Simulated {
+    pub(crate) fn new(machine: &Rc<SimulatedMachine>) -> Self {
+        Self { machine: Rc::clone(machine), bus: Rc::new(machine.start_supervisor()) }
+    }
+}
+
+impl Surroundings for Simulated {
+    fn bus(&self) -> Result<Rc<Bus>, SupervisorError> {
+        Ok(Rc::clone(&self.bus))
+    }
+
+    fn recreate_bus(&mut self) -> Result<(), SupervisorError> {
+        self.bus = Rc::new(self.machine.new_bus());
+        Ok(())
+    }
+
+    fn host(&self, _: &Options) -> Box<dyn Host> {
+        Box::new(SimulatedHost(Rc::clone(&self.machine)))
+    }
+
+    fn start_robot(&mut self, options: &Options) -> Result<Robot, SupervisorError> {
+        if let Some(robot) = Robot::at_address(&options.mission)? {
+            return Ok(robot);
+        }
+        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 1));
+        let robot = Truth { machine: Rc::clone(&self.machine), ticks: Vec::new(), address };
+        Ok(Robot { simulator: Some(Box::new(robot)), address: Address::Udp(address) })
+    }
+
+    fn is_asked_to_end(&self) -> bool {
+        false
+    }
+
+    fn take_request_to_end(&mut self) -> bool {
+        false
+    }
+}
+
+/// The robot as its supervisor sees it.
+struct Truth {
+    machine: Rc<SimulatedMachine>,
+    ticks: Vec<GroundTruthTick>,
+    address: SocketAddr,
+}
+
+impl SimulatedRobot for Truth {
+    fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    fn truth(&self) -> &[GroundTruthTick] {
+        &self.ticks
+    }
+
+    fn poll(&mut self) -> Result<bool, SimulatorError> {
+        self.machine.add_truth(&mut self.ticks);
+        Ok(true)
+    }
+
+    fn stop(&mut self) -> Result<(), SimulatorError> {
+        self.poll().map(drop)
+    }
+
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+}
+
+struct SimulatedHost(Rc<SimulatedMachine>);
+
+impl Host for SimulatedHost {
+    fn start(&mut self, _: Option<&Path>, generation: &Generation) -> io::Result<Box<dyn Watched>> {
+        let run = Run::load(&generation.directory).map_err(io::Error::other)?;
+        let number = self.0.start(generation, run);
+        Ok(Box::new(SimulatedProcess { machine: Rc::clone(&self.0), number }))
+    }
+
+    fn adopt(&mut self, _: u32, _: &str) -> io::Result<Box<dyn Watched>> {
+        Err(io::ErrorKind::NotFound.into())
+    }
+}
+
+struct SimulatedProcess {
+    machine: Rc<SimulatedMachine>,
+    number: u32,
+}
+
+impl Watched for SimulatedProcess {
+    fn id(&self) -> u32 {
+        self.number
+    }
+
+    fn is_child(&self) -> bool {
+        true
+    }
+
+    fn signal(&self, signal: Signal) {
+        self.machine.signal(self.number, signal);
+    }
+
+    fn try_reap(&mut self) -> io::Result<Option<ExitCause>> {
+        Ok(self.machine.reap(self.number))
+    }
+
+    fn end(&mut self, _: Duration) {
+        self.machine.signal(self.number, Signal::KILL);
+    }
+
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
+
+    fn times(&self) -> Option<Times> {
+        let Activity { ran, starved, .. } = self.machine.activity(self.number)?;
+        Some(Times { ran, starved })
+    }
+
+    fn activity(&self, then: Times) -> Option<Activity> {
+        let now = self.machine.activity(self.number)?;
+        Some(Activity {
+            ran: now.ran.saturating_sub(then.ran),
+            starved: now.starved.saturating_sub(then.starved),
+            ..now
+        })
+    }
+}

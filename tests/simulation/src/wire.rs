@@ -1,0 +1,187 @@
+//! Wires between hosts and robot: datagrams on their way, and what becomes of them.
+
+use std::{
+    cell::RefCell,
+    collections::{BTreeMap, VecDeque},
+    fmt,
+    rc::Rc,
+    time::Duration,
+};
+
+use common::machine::MachineWire;
+
+use crate::random::Random;
+
+/// Direction of a datagram.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    ToRobot,
+    ToHost,
+}
+
+/// What the wire does to the datagrams of one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quality {
+    /// Shares of datagrams.
+    pub lost: f64,
+    pub doubled: f64,
+    pub reordered: f64,
+    /// Mean delay besides the least one.
+    pub delay: Duration,
+}
+
+/// Port of a host's end. Each opened wire has another.
+pub(crate) type Port = u16;
+
+#[derive(Debug)]
+struct Datagram {
+    due_ns: u64,
+    port: Port,
+    bytes: Vec<u8>,
+}
+
+/// Datagrams of one direction.
+#[derive(Debug)]
+struct Lane {
+    quality: Quality,
+    /// Arrival of the last datagram that kept its order.
+    in_order_ns: u64,
+    under_way: VecDeque<Datagram>,
+    random: Random,
+}
+
+/// Least delay of a datagram.
+const LEAST_NS: u64 = 100_000;
+/// Time by which a reordered datagram is late.
+const LATE: Duration = Duration::from_millis(150);
+
+impl Lane {
+    fn new(random: Random) -> Self {
+        Self { quality: Quality::default(), in_order_ns: 0, under_way: VecDeque::new(), random }
+    }
+
+    fn send(&mut self, port: Port, bytes: &[u8], now_ns: u64) {
+        let Quality { lost, doubled, reordered, delay } = self.quality;
+        if lost > 0.0 && self.random.chance(lost) {
+            return;
+        }
+        let copies = 1 + u32::from(doubled > 0.0 && self.random.chance(doubled));
+        for _ in 0..copies {
+            let mut due_ns = now_ns + LEAST_NS;
+            if !delay.is_zero() {
+                due_ns += self.random.exponential(delay).as_nanos() as u64;
+            }
+            if reordered > 0.0 && self.random.chance(reordered) {
+                due_ns += LATE.as_nanos() as u64;
+            } else {
+                self.in_order_ns = self.in_order_ns.max(due_ns);
+                due_ns = self.in_order_ns;
+            }
+            let at = self.under_way.partition_point(|datagram| datagram.due_ns <= due_ns);
+            self.under_way.insert(at, Datagram { due_ns, port, bytes: bytes.to_vec() });
+        }
+    }
+}
+
+#[derive(Debug)]
+pub(crate) struct Wires {
+    to_robot: Lane,
+    to_host: Lane,
+    /// What has come for each open end.
+    inboxes: BTreeMap<Port, VecDeque<Vec<u8>>>,
+    opened: Port,
+}
+
+const FIRST_PORT: Port = 40_000;
+
+impl Wires {
+    pub(crate) fn new(seed: u64) -> Self {
+        let lane = |stream| Lane::new(Random::new(seed, stream));
+        Self { to_robot: lane(1), to_host: lane(2), inboxes: BTreeMap::new(), opened: 0 }
+    }
+
+    const fn lane(&mut self, way: Way) -> &mut Lane {
+        match way {
+            Way::ToRobot => &mut self.to_robot,
+            Way::ToHost => &mut self.to_host,
+        }
+    }
+
+    pub(crate) const fn set_quality(&mut self, way: Way, quality: Quality) {
+        self.lane(way).quality = quality;
+    }
+
+    pub(crate) fn send(&mut self, way: Way, port: Port, bytes: &[u8], now_ns: u64) {
+        self.lane(way).send(port, bytes, now_ns);
+    }
+
+    pub(crate) fn next_ns(&self, way: Way) -> Option<u64> {
+        let lane = match way {
+            Way::ToRobot => &self.to_robot,
+            Way::ToHost => &self.to_host,
+        };
+        lane.under_way.front().map(|datagram| datagram.due_ns)
+    }
+
+    /// Takes a datagram that has come to the robot, with its sender.
+    pub(crate) fn take_for_robot(&mut self) -> Option<(Port, Vec<u8>)> {
+        let Datagram { port, bytes, .. } = self.to_robot.under_way.pop_front()?;
+        Some((port, bytes))
+    }
+
+    /// Puts a datagram that has come to its host's end, unless that is closed.
+    pub(crate) fn deliver_to_host(&mut self) {
+        if let Some(Datagram { port, bytes, .. }) = self.to_host.under_way.pop_front()
+            && let Some(inbox) = self.inboxes.get_mut(&port)
+        {
+            inbox.push_back(bytes);
+        }
+    }
+
+    pub(crate) fn has_mail(&self) -> bool {
+        self.inboxes.values().any(|inbox| !inbox.is_empty())
+    }
+}
+
+/// Sends a host's datagram.
+pub(crate) type Send = Box<dyn Fn(Port, &[u8])>;
+
+/// A host's end of a wire.
+pub(crate) struct HostEnd {
+    wires: Rc<RefCell<Wires>>,
+    port: Port,
+    send: Send,
+}
+
+impl HostEnd {
+    pub(crate) fn open(wires: &Rc<RefCell<Wires>>, send: Send) -> Self {
+        let mut opened = wires.borrow_mut();
+        opened.opened = opened.opened.wrapping_add(1);
+        let port = FIRST_PORT.wrapping_add(opened.opened);
+        opened.inboxes.insert(port, VecDeque::new());
+        drop(opened);
+        Self { wires: Rc::clone(wires), port, send }
+    }
+}
+
+impl Drop for HostEnd {
+    fn drop(&mut self) {
+        self.wires.borrow_mut().inboxes.remove(&self.port);
+    }
+}
+
+impl fmt::Debug for HostEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("HostEnd").field("port", &self.port).finish_non_exhaustive()
+    }
+}
+
+impl MachineWire for HostEnd {
+    fn receive(&mut self) -> Option<Vec<u8>> {
+        self.wires.borrow_mut().inboxes.get_mut(&self.port)?.pop_front()
+    }
+
+    fn send(&mut self, bytes: &[u8]) {
+        (self.send)(self.port, bytes);
+    }
+}
