@@ -9,10 +9,10 @@
 //! Modules, lowest layer first; a module uses only modules before it in this list.
 //!
 //! [`grid`], [`latency`], [`least_squares`], [`ground_truth`], [`signals`], [`checkpoint`],
-//! [`journal`], [`process_status`], [`process_usage`], [`samples`], [`topics`], [`faults`],
-//! [`follower`], [`run`], [`start`], [`external`], [`stage_command`], [`wiring`], [`stop_socket`],
-//! [`shell`], [`target`], [`driver`], [`inputs`], [`replay`], [`outputs`], [`stage`],
-//! [`found_response`].
+//! [`journal`], [`process_status`], [`process_usage`], [`samples`], [`motion_law`], [`topics`],
+//! [`faults`], [`follower`], [`run`], [`start`], [`external`], [`stage_command`], [`wiring`],
+//! [`stop_socket`], [`shell`], [`target`], [`driver`], [`inputs`], [`replay`], [`outputs`],
+//! [`stage`], [`found_response`].
 
 pub mod checkpoint;
 pub mod driver;
@@ -30,6 +30,8 @@ pub mod inputs;
 pub mod journal;
 pub mod latency;
 pub mod least_squares;
+#[cfg(feature = "stage")]
+pub mod motion_law;
 #[cfg(feature = "stage")]
 pub mod outputs;
 pub mod process_status;

@@ -117,6 +117,7 @@ mod tests {
         assert_eq!(Order::from_byte(200), Order::Stop);
         assert_eq!(CommandState::from_byte(200), CommandState::Halt);
         assert_eq!(GuidanceStatus::from_byte(200), GuidanceStatus::Waiting);
+        assert_eq!(Maneuver::from_byte(200), Maneuver::Stand);
         assert_eq!(RangeStatus::from_byte(200), RangeStatus::Absent);
         assert_eq!(Action::from_byte(200), Action::Stop);
     }

@@ -86,12 +86,12 @@ impl Response {
     }
 
     /// Returns the greatest turn rate, rad/s, that allows a stop within `angle_rad`, excluding the
-    /// dead time.
-    pub fn turn_to_stop_within(&self, angle_rad: f64) -> f64 {
+    /// dead time. Only a limited base needs the angle.
+    pub fn turn_to_stop_within(&self, angle_rad: impl FnOnce() -> f64) -> f64 {
         if self.turn_acceleration_rad_s2.is_infinite() {
             return f64::INFINITY;
         }
-        (2.0 * self.turn_acceleration_rad_s2 * angle_rad).max(0.0).sqrt()
+        (2.0 * self.turn_acceleration_rad_s2 * angle_rad()).max(0.0).sqrt()
     }
 }
 

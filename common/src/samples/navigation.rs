@@ -221,6 +221,32 @@ wire_enum! {
     }
 }
 
+wire_enum! {
+    Maneuver, unknown = Stand {
+        /// No motion. At its target, a disc still turns to the wanted heading, and another body
+        /// only with `AtTarget`.
+        Stand = 0,
+        /// Along (ex, ey) within the speed limit. Below the least speed, a robot that can turn on
+        /// the spot only faces (ex, ey).
+        Follow = 1,
+        /// On the spot to (ex, ey).
+        Turn = 2,
+        /// Straight back along the robot's axis, within the speed limit.
+        Back = 3,
+    }
+}
+
+impl GuidanceStatus {
+    /// Returns the usual maneuver of a planner in this status.
+    pub const fn maneuver(self) -> Maneuver {
+        match self {
+            Self::Along | Self::WayOut => Maneuver::Follow,
+            Self::Look | Self::Unreachable => Maneuver::Turn,
+            Self::Waiting | Self::AtTarget => Maneuver::Stand,
+        }
+    }
+}
+
 structs! {
     #[derive(Serialize, Deserialize)]
     "firsthand.TargetPoint" TargetPoint {
@@ -323,10 +349,12 @@ payloads! {
         ey: f64,
         /// dst of (14): straight to the target, metres.
         distance_m: f64,
-        /// Greatest tangential speed by the map of the way ahead, m/s; infinite for no limit.
+        /// Greatest speed of `Follow` and `Back`, m/s, by the map of the way; infinite for no limit.
         speed_limit_m_s: f64,
         /// A [`GuidanceStatus`].
         status: u8 as GuidanceStatus,
+        /// A [`Maneuver`].
+        maneuver: u8 as Maneuver,
         /// Mission time of the pose, nanoseconds.
         pose_ns: u64,
         /// Pose: metres in the mission frame, radians counter-clockwise from x, not wrapped.
@@ -363,6 +391,12 @@ impl GuidanceSample {
 
     pub const fn pose(&self) -> Pose2 {
         Pose2 { position: DVec2::new(self.x_m, self.y_m), heading: self.heading_rad }
+    }
+
+    /// Returns the speed limit as viewers show it: negative to back up.
+    pub fn signed_limit_m_s(&self) -> f64 {
+        let limit = self.speed_limit_m_s;
+        if self.maneuver() == Maneuver::Back { -limit } else { limit }
     }
 }
 

@@ -1,53 +1,23 @@
 //! Controller: aligns the robot with the guidance, which sets its speed.
 
-mod car;
-
 use common::{
     bus::Topic,
     clock::MissionTime,
     found_response::FoundResponse,
     geometry::wrap_angle,
-    kinematics::{Drive, FACES_COSINE, LEAST_SPEED_M_S, TURN_GAIN, Twist},
-    mission::{Lead, Method, Mission, Response},
-    samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
+    kinematics::Drive,
+    mission::{Lead, Mission},
+    motion_law::{Alignment, MotionLaw},
+    samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus, Maneuver},
     stage::{Answer, Answering, ForeignState},
     topics::{COMMAND, GUIDANCE},
 };
 use glam::DVec2;
 
-/// Turn rate below which the wheels stick.
-const LEAST_TURN_RAD_S: f64 = 0.25;
-
 /// Largest distance of a robot that has arrived beside its target.
 const MOST_OFF_TARGET_M: f64 = 0.5;
 
 const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
-
-/// Alignment (14), with the heading for the measured velocity, which has no direction at rest,
-/// where every mission starts.
-#[derive(Clone, Copy, Debug)]
-pub struct Alignment {
-    /// eta_d: cosine of the angle to the guidance.
-    pub cosine: f64,
-    /// eta_c: its sine, positive for guidance to the left. The printed sign turns away.
-    pub sine: f64,
-}
-
-impl Alignment {
-    pub fn of(axis: DVec2, guidance: DVec2) -> Self {
-        Self { cosine: axis.dot(guidance), sine: axis.perp_dot(guidance) }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-enum SpeedLaw {
-    /// Law (16): the robot drives while it turns.
-    Paper,
-    /// Turns on the spot towards the guidance, then drives within its limit.
-    Evidential,
-    /// Law (16) within the limit for either method, as cars cannot turn on the spot.
-    Car,
-}
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Arrival {
@@ -61,14 +31,7 @@ enum Arrival {
 #[derive(Debug)]
 pub struct Controller {
     drive: Drive,
-    speed: f64,
-    turn: f64,
-    look: f64,
-    /// Cosines of the evidential method's angles: full speed within, turns on the spot beyond.
-    full_speed: f64,
-    turns: f64,
-    law: SpeedLaw,
-    response: Response,
+    law: MotionLaw,
     lead: Option<Lead>,
     /// Turn near the antipode: 1 left, -1 right.
     side: f64,
@@ -92,21 +55,9 @@ impl Answering for Controller {
     type State = ();
 
     fn new(mission: &Mission) -> Self {
-        let body = mission.body();
-        let hurry = mission.hurry();
         Self {
-            drive: body.drive(),
-            speed: mission.speed_m_s(),
-            turn: mission.turn_rad_s(),
-            look: hurry.look_rad_s,
-            full_speed: hurry.full_speed_within_deg.to_radians().cos(),
-            turns: hurry.turns_beyond_deg.to_radians().cos(),
-            law: match mission.method {
-                _ if body.steering.is_some() => SpeedLaw::Car,
-                Method::Paper => SpeedLaw::Paper,
-                Method::Evidential => SpeedLaw::Evidential,
-            },
-            response: mission.trusted_response(),
+            drive: mission.body().drive(),
+            law: MotionLaw::new(mission),
             lead: Lead::new(mission),
             side: 1.0,
             arrival: Default::default(),
@@ -150,18 +101,15 @@ impl Controller {
             target_number: guidance.target_number,
             ..CommandSample::default()
         };
-        let (status, direction) =
+        let (maneuver, direction) =
             match (self.arrival(guidance, distance), guidance.target.heading()) {
                 (Arrival::Arrived, _) => {
                     return CommandSample { state: CommandState::Arrived.into(), ..command };
                 }
                 (Arrival::Turning, Some(heading)) if self.may_turn(guidance, distance) => {
-                    (GuidanceStatus::Look, DVec2::from_angle(heading))
+                    (Maneuver::Turn, DVec2::from_angle(heading))
                 }
-                _ => {
-                    let direction = DVec2::new(guidance.ex, guidance.ey);
-                    (guidance.status(), direction)
-                }
+                _ => (guidance.maneuver(), DVec2::new(guidance.ex, guidance.ey)),
             };
         // Samples may hold anything; only unit vectors are followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
@@ -173,8 +121,9 @@ impl Controller {
             _ => pose,
         };
         let alignment = Alignment::of(acts_at.axis(), direction);
+        let limit = guidance.speed_limit_m_s;
         let twist = if sane {
-            self.motion(status, alignment, distance, guidance.speed_limit_m_s)
+            self.law.twist(maneuver, alignment, distance, limit, &mut self.side)
         } else {
             None
         };
@@ -222,114 +171,12 @@ impl Controller {
         distance <= self.mission.arrival_tolerance_m || beside && distance <= MOST_OFF_TARGET_M
     }
 
-    /// Returns whether the robot may turn to the wanted heading. Non-circular bodies need a numeric
-    /// limit, by which the planner shows room.
+    /// Returns whether the robot may turn to the wanted heading. The planner lets non-circular
+    /// bodies stand where they lack room.
     fn may_turn(&self, guidance: &GuidanceSample, distance: f64) -> bool {
-        let waits = guidance.status() == GuidanceStatus::Waiting;
-        let allows = !waits && !guidance.speed_limit_m_s.is_nan();
+        let is_beside = guidance.status() == GuidanceStatus::AtTarget;
+        let allows = is_beside || guidance.maneuver() != Maneuver::Stand;
         self.mission.outline().is_none() || allows && self.is_there(guidance, distance)
-    }
-
-    /// Returns None to stand.
-    fn motion(
-        &mut self,
-        status: GuidanceStatus,
-        alignment: Alignment,
-        distance: f64,
-        limit: f64,
-    ) -> Option<Twist> {
-        let on_the_spot =
-            |controller: &mut Self| Twist { v: 0.0, omega: controller.turn_to(alignment) };
-        match (status, self.law) {
-            (_, SpeedLaw::Car) => self.car_motion(status, alignment, distance, limit),
-            // The paper's method gives no direction to an unreachable target.
-            (GuidanceStatus::Look, _) | (GuidanceStatus::Unreachable, SpeedLaw::Evidential) => {
-                Some(on_the_spot(self))
-            }
-            (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Paper) => {
-                let omega = self.angular(alignment);
-                let v = self.tangential(alignment, omega, distance);
-                Some(Twist { v, omega })
-            }
-            // Backs straight. A non-circular body may lack room to turn, and an approaching
-            // obstacle leaves no time.
-            (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential)
-                if limit < 0.0 =>
-            {
-                Some(Twist { v: limit.max(-self.speed), omega: 0.0 })
-            }
-            (GuidanceStatus::Along | GuidanceStatus::WayOut, SpeedLaw::Evidential) => {
-                let v = self.cautious(alignment, distance, limit);
-                if v == 0.0 {
-                    // Without a limit above 0 the robot only turns; the planner allows speed where
-                    // it must leave.
-                    let faces = alignment.cosine > FACES_COSINE;
-                    return (!faces).then(|| on_the_spot(self));
-                }
-                let omega = self.angular(alignment);
-                Some(Twist { v, omega })
-            }
-            _ => None,
-        }
-    }
-
-    /// Returns wc of (15). Near the antipode it holds its side against noise.
-    fn angular(&mut self, alignment: Alignment) -> f64 {
-        let Alignment { cosine, sine } = alignment;
-        let most = self.response.turn_to_stop_within(sine.atan2(cosine).abs());
-        if cosine > 0.0 {
-            return (self.turn * sine).clamp(-most, most);
-        }
-        if sine.abs() >= self.mission.controller.dead_zone {
-            self.side = if sine > 0.0 { 1.0 } else { -1.0 };
-        }
-        self.turn.min(most) * self.side
-    }
-
-    /// Returns the evidential wc on the spot: no farther than the guidance, and fast enough for
-    /// sticking wheels.
-    fn turn_to(&mut self, alignment: Alignment) -> f64 {
-        let angle = alignment.sine.atan2(alignment.cosine).abs();
-        let side = self.angular(alignment).signum();
-        let least = LEAST_TURN_RAD_S.min(self.look);
-        let most = self.look.min(self.response.turn_to_stop_within(angle)).max(least);
-        side * (TURN_GAIN * angle).clamp(least, most)
-    }
-
-    /// Returns the evidential vc: 0 until nearly aligned, at most `limit`, and fast enough for
-    /// sticking wheels.
-    fn cautious(&self, alignment: Alignment, distance: f64, limit: f64) -> f64 {
-        let sharp = ((alignment.cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
-        let slow = self.slow_near_target(distance);
-        let stops = self.response.speed_to_stop_within(distance, self.response.dead_time_s());
-        let wanted = (self.speed * sharp.max(0.0) * slow).min(stops);
-        let least = LEAST_SPEED_M_S.min(self.speed);
-        // A NaN limit means stand.
-        if sharp <= 0.0 {
-            0.0
-        } else if limit >= least {
-            wanted.clamp(least, limit)
-        } else {
-            0.0
-        }
-    }
-
-    /// Returns vc of (16). The slowdown at the target multiplies the aligned speed; as a separate
-    /// case, as printed, it would override it.
-    fn tangential(&self, alignment: Alignment, omega: f64, distance: f64) -> f64 {
-        let aligned = if !self.mission.controller.modulated {
-            1.0
-        } else if alignment.cosine < 0.0 {
-            f64::midpoint(alignment.cosine, 1.0)
-        } else {
-            1.0 - (omega / self.turn).abs() / 2.0
-        };
-        self.speed * aligned * self.slow_near_target(distance)
-    }
-
-    /// Returns the share of the speed at this distance from the target.
-    fn slow_near_target(&self, distance: f64) -> f64 {
-        (distance / self.mission.controller.slow_radius_m).min(1.0)
     }
 }
 

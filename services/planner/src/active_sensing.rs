@@ -103,11 +103,11 @@ impl ActiveSensing {
         let axis = self.bearing.rotate(pose.axis());
         if let Some(there) = scan(axis, unseen, &mut self.scan_side) {
             let there = DVec2::new(self.bearing.x, -self.bearing.y).rotate(there);
-            return (GuidanceStatus::Look, there, 0.0);
+            return Advice::new(GuidanceStatus::Look, there, 0.0);
         }
         let direction = self.aim(view, &undetected, place, &way).unwrap_or(direction);
         let limit = self.limit(view, &undetected, belief, pose, direction);
-        (GuidanceStatus::Along, direction, limit)
+        Advice::along(direction, limit)
     }
 
     /// Returns the speed limit by the newest readings along the robot's axis, m/s: 0 for an echo

@@ -16,9 +16,9 @@ use std::f64::consts::{PI, TAU};
 
 use common::{
     geometry::{nearest_on_segment, wrap_angle},
-    kinematics::{Pose2, Twist},
+    kinematics::Twist,
     mission::{Mission, Sensor, SensorKind},
-    samples::{GuidanceStatus, Mover, PoseSample},
+    samples::Mover,
 };
 use glam::DVec2;
 
@@ -144,49 +144,45 @@ impl Evasion {
         (self.kept_s, self.insists) = (0.0, false);
     }
 
-    /// Returns the field's `advice` for a robot at `pose`, or other advice because of `movers`.
+    /// Returns the field's `advice`, or other advice because of `movers`.
     pub(crate) fn advise(
         &mut self,
         view: &View<'_>,
         movers: &[Mover],
-        pose: &PoseSample,
+        at_s: f64,
+        now: Moving,
         advice: Advice,
     ) -> Advice {
-        let at_s = pose.stamp.seconds();
         let for_s = (at_s - self.answered_s).clamp(0.0, LONGEST_TICK_S);
         self.answered_s = at_s;
         if at_s < WATCHES_S {
             return STAND;
         }
-        let scene = Scene::new(self, view, movers, pose.pose());
-        let safe = self.safe(&scene, pose, advice);
-        // A NaN limit that is kept also counts as the same.
-        let is_same = safe.2.total_cmp(&advice.2).is_eq();
-        let follows = (safe.0, safe.1) == (advice.0, advice.1) && is_same;
+        let scene = Scene::new(self, view, movers, now);
+        let safe = self.safe(&scene, advice);
         // An insisting robot follows its way, so only an empty scene ends the encounter.
-        let is_free = scene.discs.is_empty() || follows && !self.insists;
+        let is_free = scene.discs.is_empty() || safe == advice && !self.insists;
         let change_s = if is_free { -for_s } else { for_s };
         self.kept_s = (self.kept_s + change_s).clamp(0.0, PATIENCE_S);
         self.insists = self.kept_s >= PATIENCE_S || self.insists && self.kept_s > 0.0;
         safe
     }
 
-    fn safe(&self, scene: &Scene<'_>, pose: &PoseSample, advice: Advice) -> Advice {
-        let start = scene.start(pose);
+    fn safe(&self, scene: &Scene<'_>, advice: Advice) -> Advice {
+        let start = scene.start();
         let acts_until_s = self.motion.dead_s() + self.motion.period_s;
         let is_safe = |to: Advice| scene.rests(scene.go(start, to, acts_until_s));
         let is_clear = || scene.go(start, advice, AHEAD_S).danger < LEAST_DANGER;
         if scene.discs.is_empty() || is_clear() && is_safe(advice) {
             return advice;
         }
-        let (status, along, limit) = advice;
-        let speed = self.motion.speed;
+        let speed = self.motion.law.speed;
         if self.insists {
-            let slower = PATIENT_SPEEDS.map(|share| (status, along, share * limit));
+            let slower = PATIENT_SPEEDS.map(|share| advice.slower(share));
             return slower.into_iter().find(|to| is_safe(*to)).unwrap_or(STAND);
         }
-        let advised = SPEEDS.map(|share| (status, along, share * limit));
-        let back = SPEEDS.map(|share| (GuidanceStatus::Along, pose.pose().axis(), -share * speed));
+        let advised = SPEEDS.map(|share| advice.slower(share));
+        let back = SPEEDS.map(|share| Advice::back(scene.start.pose.axis(), share * speed));
         let back = back.into_iter().filter(|_| self.backs);
         let all = SPEEDS.into_iter().flat_map(|share| around(DIRECTIONS, share * speed));
         let open = advised.into_iter().chain(all).chain(back);
@@ -199,7 +195,7 @@ impl Evasion {
         for until_s in &LEGS_S[1..] {
             let next = best(ways, score).into_iter().flat_map(|way| {
                 let field = scene.field(way.now.pose.position);
-                let field = field.map(|to| (GuidanceStatus::Along, to, speed));
+                let field = field.map(|to| Advice::along(to, speed));
                 let legs = around(DIRECTIONS / 2, speed).chain(field).chain([STAND, way.last]);
                 legs.map(move |to| scene.go(way, to, *until_s))
             });
@@ -225,7 +221,7 @@ impl Evasion {
 fn around(directions: u32, speed: f64) -> impl Iterator<Item = Advice> {
     (0..directions).map(move |step| {
         let angle = TAU * f64::from(step) / f64::from(directions);
-        (GuidanceStatus::Along, DVec2::from_angle(angle), speed)
+        Advice::along(DVec2::from_angle(angle), speed)
     })
 }
 
@@ -249,33 +245,33 @@ struct Scene<'a> {
     evasion: &'a Evasion,
     view: &'a View<'a>,
     discs: Vec<Disc>,
-    start: Pose2,
+    start: Moving,
 }
 
 impl<'a> Scene<'a> {
     /// Leaves out movers that the robot cannot meet within the prediction.
-    fn new(evasion: &'a Evasion, view: &'a View<'a>, movers: &[Mover], start: Pose2) -> Self {
-        let reach_m = AHEAD_S * evasion.motion.speed + FAR_M;
+    fn new(evasion: &'a Evasion, view: &'a View<'a>, movers: &[Mover], start: Moving) -> Self {
+        let (at, reach_m) = (start.pose.position, AHEAD_S * evasion.motion.law.speed + FAR_M);
         let comes = |disc: &Disc| {
             let way = AHEAD_S * disc.velocity;
-            let share = (start.position - disc.at).dot(way) / way.length_squared();
+            let share = (at - disc.at).dot(way) / way.length_squared();
             // The share is NaN for a mover that stands.
             let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
-            (disc.at + share * way).distance(start.position) <= reach_m + disc.touches_m
+            (disc.at + share * way).distance(at) <= reach_m + disc.touches_m
         };
         let discs = movers.iter().map(|mover| evasion.disc(mover)).filter(comes).collect();
         Self { evasion, view, discs, start }
     }
 
-    fn start(&self, sample: &PoseSample) -> Way {
+    fn start(&self) -> Way {
         Way {
             first: STAND,
             rests: true,
             last: STAND,
-            now: Moving { pose: self.start, twist: sample.twist() },
+            now: self.start,
             steps: 0,
             moved_s: f64::NEG_INFINITY,
-            near: self.near(self.start.position),
+            near: self.near(self.start.pose.position),
             meets_s: f64::INFINITY,
             hazard_s: f64::INFINITY,
             danger: 0.0,
@@ -369,7 +365,7 @@ impl<'a> Scene<'a> {
             }
             let gap_m = there.distance(at) - disc.touches_m;
             let least_m = APART_M + (GROWS_M_S + disc.doubt_m_s) * at_s;
-            let first_m = disc.at.distance(self.start.position) - disc.touches_m;
+            let first_m = disc.at.distance(self.start.pose.position) - disc.touches_m;
             if moves && gap_m < least_m.min(first_m) {
                 way.meets_s = way.meets_s.min(at_s);
             }

@@ -4,16 +4,43 @@
 //! curve, and one commanded to turn on the spot hardly brakes.
 
 use common::{
-    kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2, TURN_GAIN, Twist},
+    kinematics::{LEAST_SPEED_M_S, Pose2, Twist},
     mission::{Base, Mission},
-    samples::GuidanceStatus,
+    motion_law::{Alignment, MotionLaw},
+    samples::{GuidanceStatus, Maneuver},
 };
 use glam::DVec2;
 
-/// Status, direction and speed limit of the guidance.
-pub(crate) type Advice = (GuidanceStatus, DVec2, f64);
+/// Guidance from which a motion follows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Advice {
+    pub status: GuidanceStatus,
+    pub maneuver: Maneuver,
+    /// Unit vector, or 0 for none.
+    pub to: DVec2,
+    /// Speed limit, m/s.
+    pub limit: f64,
+}
 
-pub(crate) const STAND: Advice = (GuidanceStatus::Waiting, DVec2::ZERO, 0.0);
+impl Advice {
+    pub(crate) const fn new(status: GuidanceStatus, to: DVec2, limit: f64) -> Self {
+        Self { status, maneuver: status.maneuver(), to, limit }
+    }
+
+    pub(crate) const fn along(to: DVec2, limit: f64) -> Self {
+        Self::new(GuidanceStatus::Along, to, limit)
+    }
+
+    pub(crate) const fn back(axis: DVec2, limit: f64) -> Self {
+        Self { maneuver: Maneuver::Back, ..Self::along(axis, limit) }
+    }
+
+    pub(crate) fn slower(self, share: f64) -> Self {
+        Self { limit: share * self.limit, ..self }
+    }
+}
+
+pub(crate) const STAND: Advice = Advice::new(GuidanceStatus::Waiting, DVec2::ZERO, 0.0);
 
 pub(crate) const STEP_S: f64 = 0.1;
 /// Limit of the predicted time to rest, seconds.
@@ -30,6 +57,8 @@ const LEAST_SHARE: f64 = 0.1;
 pub(crate) struct Moving {
     pub pose: Pose2,
     pub twist: Twist,
+    /// Place of the target, before which the robot slows down.
+    pub target: DVec2,
 }
 
 impl Moving {
@@ -40,11 +69,7 @@ impl Moving {
 
 #[derive(Debug)]
 pub(crate) struct MotionModel {
-    pub speed: f64,
-    turn: f64,
-    look: f64,
-    full_speed: f64,
-    turns: f64,
+    pub law: MotionLaw,
     base: Base,
     reach_m: f64,
     pub period_s: f64,
@@ -52,13 +77,9 @@ pub(crate) struct MotionModel {
 
 impl MotionModel {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let (body, hurry) = (mission.body(), mission.hurry());
+        let body = mission.body();
         Self {
-            speed: mission.speed_m_s(),
-            turn: mission.turn_rad_s(),
-            look: hurry.look_rad_s,
-            full_speed: hurry.full_speed_within_deg.to_radians().cos(),
-            turns: hurry.turns_beyond_deg.to_radians().cos(),
+            law: MotionLaw::new(mission),
             base: Base::new(mission.trusted_response(), body.track_m),
             reach_m: body.radius_m,
             period_s: 1.0 / mission.robot.rate_hz,
@@ -79,19 +100,17 @@ impl MotionModel {
     ///
     /// Wheels that accelerate at their limit have no reserve to turn the robot.
     pub(crate) fn turns_too(&self, now: Moving, dead_s: f64, advice: Advice) -> Advice {
-        let (status, to, limit) = advice;
-        // NaN and reverse have meanings of their own.
-        if limit.is_nan() || limit <= 0.0 {
+        if advice.maneuver != Maneuver::Follow {
             return advice;
         }
-        let wanted = self.command(now.pose.axis(), advice);
+        let wanted = self.command(now, advice);
         let gains_m_s = self.base.response.acceleration_m_s2 * (dead_s + self.period_s);
         let turns_m_s = self.base.wheel_m * (wanted.omega - now.twist.omega).abs();
         if turns_m_s < LEAST_SHARE * gains_m_s {
             return advice;
         }
         let most_m_s = (now.twist.v + (gains_m_s - turns_m_s).max(0.0)).max(LEAST_SPEED_M_S);
-        (status, to, limit.min(most_m_s))
+        Advice { limit: advice.limit.min(most_m_s), ..advice }
     }
 
     /// Returns whether a robot that follows `to` for one more tick then rests without a touch.
@@ -104,7 +123,7 @@ impl MotionModel {
         touches: impl Fn(&Pose2, f64) -> bool,
     ) -> bool {
         let Twist { v, omega } = start.twist;
-        let command = self.command(start.pose.axis(), to);
+        let command = self.command(start, to);
         // A wheel that turns ahead cannot brake.
         let on_the_spot = command.v == 0.0 && command.omega != 0.0;
         if on_the_spot && v > self.base.response.acceleration_m_s2 * self.period_s {
@@ -137,30 +156,22 @@ impl MotionModel {
     /// Predicts the motion after `for_s` seconds towards `to`; `None` continues the current twist.
     pub(crate) fn next(&self, now: Moving, for_s: f64, to: Option<Advice>) -> Moving {
         let twist = match to {
-            Some(to) => self.base.approach(now.twist, self.command(now.pose.axis(), to), for_s),
+            Some(to) => self.base.approach(now.twist, self.command(now, to), for_s),
             None => now.twist,
         };
-        Moving { pose: now.pose.along_arc(twist.v * for_s, twist.omega * for_s), twist }
+        Moving { pose: now.pose.along_arc(twist.v * for_s, twist.omega * for_s), twist, ..now }
     }
 
-    fn command(&self, axis: DVec2, (status, to, limit): Advice) -> Twist {
-        let (cosine, sine) = (axis.dot(to), axis.perp_dot(to));
-        let angle = sine.atan2(cosine).abs();
-        let most = self.base.response.turn_to_stop_within(angle);
-        let drives = matches!(status, GuidanceStatus::Along | GuidanceStatus::WayOut);
-        let sharp = ((cosine - self.turns) / (self.full_speed - self.turns)).min(1.0);
-        let (v, omega) = if to == DVec2::ZERO {
-            (0.0, 0.0)
-        } else if drives && limit < 0.0 {
-            (limit, 0.0)
-        } else if drives && sharp > 0.0 && limit >= LEAST_SPEED_M_S {
-            ((self.speed * sharp).min(limit), (self.turn * sine).clamp(-most, most))
-        } else if drives && cosine > FACES_COSINE {
-            (0.0, 0.0)
-        } else {
-            (0.0, (TURN_GAIN * angle).min(self.look).min(most) * sine.signum())
-        };
-        Twist { v, omega }
+    fn command(&self, now: Moving, Advice { maneuver, to, limit, .. }: Advice) -> Twist {
+        if to == DVec2::ZERO {
+            return Twist::default();
+        }
+        let Moving { pose, twist, target } = now;
+        let alignment = Alignment::of(pose.axis(), to);
+        let distance = pose.position.distance(target);
+        // The controller keeps the side of a turning robot.
+        let mut side = 1_f64.copysign(twist.omega);
+        self.law.twist(maneuver, alignment, distance, limit, &mut side).unwrap_or_default()
     }
 }
 
@@ -179,12 +190,12 @@ mod tests {
     }
 
     fn moving(v: f64, omega: f64) -> Moving {
-        Moving { pose: Pose2::default(), twist: Twist { v, omega } }
+        Moving { pose: Pose2::default(), twist: Twist { v, omega }, target: 9.0 * DVec2::X }
     }
 
     #[test]
     fn a_heavy_base_stands_before_its_way_to_rest_ends_in_a_thing_and_a_light_one_goes_on() {
-        let ahead = (GuidanceStatus::Along, DVec2::X, 0.5);
+        let ahead = Advice::along(DVec2::X, 0.5);
         let wall = |pose: &Pose2, apart_m: f64| pose.position.x > 0.5 - apart_m;
         let rests = |acceleration, v| {
             let motion = motion(acceleration);
@@ -195,20 +206,29 @@ mod tests {
 
     #[test]
     fn a_heavy_base_brakes_before_it_turns_on_the_spot() {
-        let look = (GuidanceStatus::Look, DVec2::Y, 0.0);
+        let look = Advice::new(GuidanceStatus::Look, DVec2::Y, 0.0);
         let rests = |v| motion(0.3).rests(moving(v, 0.0), (look, 0.1), |_, _| false);
         assert!(!rests(0.3) && rests(0.02));
+    }
+
+    #[test]
+    fn a_robot_is_predicted_to_slow_down_before_its_target() {
+        let v = |target_m| {
+            let start = Moving { target: target_m * DVec2::X, ..moving(0.0, 0.0) };
+            motion(20.0).next(start, 1.0, Some(Advice::along(DVec2::X, f64::INFINITY))).twist.v
+        };
+        assert!(v(0.1) > 0.0 && v(0.1) < 0.5 * v(9.0), "{} {}", v(0.1), v(9.0));
     }
 
     #[test]
     fn wheels_that_have_to_turn_the_robot_gain_less_speed() {
         let motion = motion(0.6);
         let limit = |omega| {
-            let ahead = (GuidanceStatus::Along, DVec2::X, 2.0);
-            motion.turns_too(moving(0.5, omega), motion.dead_s(), ahead).2
+            let ahead = Advice::along(DVec2::X, 2.0);
+            motion.turns_too(moving(0.5, omega), motion.dead_s(), ahead).limit
         };
         assert!(limit(0.0) > 0.6 && limit(1.0) < 0.51, "{} {}", limit(0.0), limit(1.0));
-        let back = (GuidanceStatus::Along, DVec2::X, -0.2);
+        let back = Advice::back(DVec2::X, 0.2);
         assert_eq!(motion.turns_too(moving(0.5, 1.0), 0.1, back), back);
     }
 }

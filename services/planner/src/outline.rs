@@ -55,8 +55,10 @@ pub(crate) enum Passage {
     Follow(f64),
     /// Turn on the spot to this unit vector.
     Turn(DVec2),
-    /// Drive along this unit vector with this limit, m/s; negative is back along the axis.
+    /// Drive along this unit vector with this limit, m/s.
     Drive(DVec2, f64),
+    /// Drive back along the axis with this limit, m/s.
+    Back(f64),
     /// Refuse these cells; none if the body cannot move.
     Refused(Vec<Cell>),
 }
@@ -215,7 +217,7 @@ impl Outline {
             moves(0.0, next).then_some(Passage::Turn(there.axis()))
         } else if way < 0.0 {
             let speed = speed.min(BACK_M_S);
-            moves(way, 0.0).then_some(Passage::Drive(pose.axis(), -speed))
+            moves(way, 0.0).then_some(Passage::Back(speed))
         } else {
             // Pure pursuit of a place after the next two steps, or the step itself.
             let to = run.take(2).last()?.pose;

@@ -14,7 +14,7 @@ use common::{
     mission::{Lead, Method, Mission},
     samples::{
         CommandSample, CommandState, FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample,
-        GuidanceStatus, PoseSample, TargetPoint, TargetSample,
+        GuidanceStatus, Maneuver, PoseSample, TargetPoint, TargetSample,
     },
 };
 use glam::DVec2;
@@ -328,7 +328,8 @@ impl Planner {
             work = self.solve_newest()?;
             followed = self.follow_field(&acts_at);
         }
-        Ok((work, self.guide(sample, Moving { pose: acts_at, twist }, followed)))
+        let target = self.place().unwrap_or_default();
+        Ok((work, self.guide(sample, Moving { pose: acts_at, twist, target }, followed)))
     }
 
     fn follow_field(&self, pose: &Pose2) -> Option<(GuidanceStatus, DVec2)> {
@@ -343,24 +344,27 @@ impl Planner {
         followed: Option<(GuidanceStatus, DVec2)>,
     ) -> GuidanceSample {
         let (status, direction) = followed.unwrap_or((GuidanceStatus::Waiting, DVec2::ZERO));
-        let (status, direction, limit) = if self.on_a_saddle {
-            (GuidanceStatus::Along, DVec2::ZERO, 0.0)
+        let Advice { status, maneuver, to, limit } = if self.on_a_saddle {
+            Advice::along(DVec2::ZERO, 0.0)
         } else {
             let advice = self.advise(&acts_at.pose, status, direction);
             let advice = match (&self.live, &mut self.evasion) {
-                (Some(live), Some(evasion)) if advice.0 != GuidanceStatus::AtTarget => {
+                (Some(live), Some(evasion)) if advice.status != GuidanceStatus::AtTarget => {
                     let view = live.view(self.grid.cells());
-                    evasion.advise(&view, self.belief.movers(), sample, advice)
+                    let now = Moving { pose: sample.pose(), twist: sample.twist(), ..acts_at };
+                    let at_s = sample.stamp.seconds();
+                    evasion.advise(&view, self.belief.movers(), at_s, now, advice)
                 }
                 _ => advice,
             };
             self.within_motion(acts_at, advice)
         };
         GuidanceSample {
-            ex: direction.x,
-            ey: direction.y,
+            ex: to.x,
+            ey: to.y,
             speed_limit_m_s: limit,
             status: status.into(),
+            maneuver: maneuver.into(),
             grid_version: self.grid.version(),
             full_solves: self.full_solves,
             ..GuidanceSample::for_pose(sample, &self.belief, &self.target.unwrap_or_default())
@@ -386,29 +390,30 @@ impl Planner {
     }
 
     fn advise(&mut self, pose: &Pose2, status: GuidanceStatus, direction: DVec2) -> Advice {
+        let free = Advice::new(status, direction, f64::INFINITY);
         let (Some(live), Some(target)) = (&self.live, self.place()) else {
-            return (status, direction, f64::INFINITY);
+            return free;
         };
         let view = live.view(self.grid.cells());
         let sensing = match (&mut self.advisor, status) {
             (Advisor::LookFirst(sensing), _) => sensing,
             (Advisor::Steer(arcs), GuidanceStatus::Along | GuidanceStatus::WayOut) => {
                 let distance = pose.position.distance(target);
-                let (direction, limit) = arcs.advise(&view, pose, distance);
-                return (status, direction, limit);
+                let (to, limit) = arcs.advise(&view, pose, distance);
+                return Advice { to, limit, ..free };
             }
-            (Advisor::Follow | Advisor::Steer(_), _) => return (status, direction, f64::INFINITY),
+            (Advisor::Follow | Advisor::Steer(_), _) => return free,
         };
         let advice = match status {
             GuidanceStatus::Along => sensing.advise(&view, &self.belief, pose, direction),
             GuidanceStatus::WayOut => {
                 let limit = sensing.limit_before_echoes(&self.belief, pose);
-                (status, direction, limit.min(WAY_OUT_M_S))
+                Advice { limit: limit.min(WAY_OUT_M_S), ..free }
             }
             // A false echo may block the way, so the robot looks around once before the map is
             // reset.
-            GuidanceStatus::Unreachable => (status, pose.axis().perp(), 0.0),
-            _ => (status, direction, 0.0),
+            GuidanceStatus::Unreachable => Advice::new(status, pose.axis().perp(), 0.0),
+            _ => Advice { limit: 0.0, ..free },
         };
         let Some(outline) = &mut sensing.outline else {
             return advice;
@@ -419,34 +424,38 @@ impl Planner {
         if heading
             .is_some_and(|heading| !outline.turns(&view, pose, wrap_angle(heading - pose.heading)))
         {
-            return (GuidanceStatus::Unreachable, DVec2::ZERO, f64::NAN);
+            return Advice { status: GuidanceStatus::Unreachable, ..STAND };
         }
-        let (axis, (status, there, limit)) = (pose.axis(), advice);
-        let may_turn = outline.turns(&view, pose, axis.angle_to(there));
-        let slow = match status {
-            GuidanceStatus::Along => limit,
+        let axis = pose.axis();
+        let may_turn = outline.turns(&view, pose, axis.angle_to(advice.to));
+        let slow = match advice.status {
+            GuidanceStatus::Along => advice.limit,
             GuidanceStatus::Look if !may_turn => LEAST_SPEED_M_S,
             GuidanceStatus::WayOut if !may_turn => {
-                let ahead = axis.dot(there).signum();
-                return (status, axis, limit.min(WAY_OUT_M_S) * ahead);
+                let is_behind = axis.dot(advice.to).is_sign_negative();
+                let maneuver = if is_behind { Maneuver::Back } else { Maneuver::Follow };
+                return Advice { maneuver, to: axis, ..advice };
             }
-            GuidanceStatus::Unreachable if !may_turn => return (status, DVec2::ZERO, 0.0),
+            GuidanceStatus::Unreachable if !may_turn => {
+                return Advice { to: DVec2::ZERO, ..advice };
+            }
             _ => return advice,
         };
         match outline.pass(&view, pose, direction) {
-            Passage::Follow(most) => (GuidanceStatus::Along, direction, slow.min(most)),
-            Passage::Turn(there) => (GuidanceStatus::Look, there, 0.0),
+            Passage::Follow(most) => Advice::along(direction, slow.min(most)),
+            Passage::Turn(there) => Advice::new(GuidanceStatus::Look, there, 0.0),
             Passage::Drive(there, most) => {
                 let limit = sensing.limit_before_echoes(&self.belief, pose);
-                (GuidanceStatus::Along, there, most.min(limit))
+                Advice::along(there, most.min(limit))
             }
+            Passage::Back(limit) => Advice::back(axis, limit),
             Passage::Refused(cells) => {
                 let version = self.grid.version();
                 if let Some(live) = self.live.as_mut().filter(|_| !cells.is_empty()) {
                     // The cells come from this map, so they lie inside it.
                     let _ = live.refuse(&cells, version);
                 }
-                (GuidanceStatus::Along, axis, 0.0)
+                Advice::along(axis, 0.0)
             }
         }
     }

@@ -195,6 +195,7 @@ impl Shell {
             distance_m: self.target.target.position().distance(DVec2::new(order.x_m, 0.0)),
             speed_limit_m_s: order.speed_limit_m_s,
             status: order.status.into(),
+            maneuver: order.status.maneuver().into(),
             // The place before the wall: uncalibrated dead reckoning would be metres off after some
             // loops.
             x_m: order.x_m,

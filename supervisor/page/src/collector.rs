@@ -186,7 +186,7 @@ impl Collector {
             sent * command.left_rad_s,
             sent * command.right_rad_s,
             guidance.distance_m,
-            guidance.speed_limit_m_s,
+            guidance.signed_limit_m_s(),
             latency_ns as f64 / 1e6,
             volts[0],
             volts[1],

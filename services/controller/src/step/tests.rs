@@ -1,3 +1,5 @@
+mod car;
+
 use super::*;
 use common::{
     kinematics::Pose2,
@@ -47,6 +49,7 @@ fn ahead() -> GuidanceSample {
         ex: 1.0,
         speed_limit_m_s: f64::INFINITY,
         status: GuidanceStatus::Along.into(),
+        maneuver: Maneuver::Follow.into(),
         target_number: 1,
         target: TargetPoint::at(DVec2::new(3.0, 0.0)),
         ..GuidanceSample::default()
@@ -128,7 +131,8 @@ fn equation_17_by_hand() {
 
 fn evidential() -> Controller {
     let text = "target = [3, 0]\nrobot = { wheel_radius_m = 0.1, track_m = 0.4 }\n\
-                controller = { speed_m_s = 0.4, turn_rad_s = 0.8, look_rad_s = 1.4 }";
+                controller = { speed_m_s = 0.4, turn_rad_s = 0.8, look_rad_s = 1.4, \
+                slow_radius_m = 0.5 }";
     Controller::new(&Mission::parse(text, Path::new("test.toml")).unwrap())
 }
 
@@ -136,10 +140,13 @@ fn limited(speed_limit_m_s: f64) -> GuidanceSample {
     GuidanceSample { speed_limit_m_s, ..ahead() }
 }
 
+fn told(maneuver: Maneuver) -> GuidanceSample {
+    GuidanceSample { maneuver: maneuver.into(), ..ahead() }
+}
+
 #[test]
 fn a_look_turns_on_the_spot_and_ends_where_it_should() {
-    let look =
-        GuidanceSample { status: GuidanceStatus::Look.into(), speed_limit_m_s: 0.0, ..ahead() };
+    let look = told(Maneuver::Turn);
     let far = evidential().at(facing(-2.0), &look);
     assert_eq!((far.v_m_s, far.omega_rad_s), (0.0, 1.4));
     let near = evidential().at(facing(0.2), &look);
@@ -161,7 +168,6 @@ fn an_evidential_robot_turns_on_the_spot_beyond_73_degrees_and_hurries_within_26
 fn an_evidential_robot_goes_no_faster_than_its_guidance_allows() {
     close(evidential().at(facing(0.0), &limited(0.1)).v_m_s, 0.1);
     close(evidential().at(facing(0.4), &limited(0.0)).v_m_s, 0.0);
-    close(evidential().at(facing(0.4), &limited(f64::NAN)).v_m_s, 0.0);
 }
 
 #[test]
@@ -208,12 +214,13 @@ fn arrival_is_final() {
 #[test]
 fn without_guidance_the_robot_stands() {
     let nan = GuidanceSample { ex: f64::NAN, ..ahead() };
-    let unreachable = GuidanceSample { status: GuidanceStatus::Unreachable.into(), ..ahead() };
-    for guidance in [GuidanceSample::default(), unreachable, nan] {
-        let command = controller("").at(facing(0.0), &guidance);
-        assert_eq!(state(&command), CommandState::Halt);
-        close(command.v_m_s, 0.0);
-        close(command.left_rad_s, 0.0);
+    for guidance in [GuidanceSample::default(), told(Maneuver::Stand), nan] {
+        for mut controller in [controller(""), evidential()] {
+            let command = controller.at(facing(0.4), &guidance);
+            assert_eq!(state(&command), CommandState::Halt);
+            close(command.v_m_s, 0.0);
+            close(command.left_rad_s, 0.0);
+        }
     }
 }
 
@@ -285,7 +292,6 @@ fn a_robot_has_arrived_beside_a_target_that_is_not_free_if_it_is_within_half_a_m
 #[test]
 fn an_evidential_robot_slows_down_towards_its_target() {
     let mut controller = evidential();
-    controller.mission.controller.slow_radius_m = 0.5;
     close(controller.at(short(0.6), &ahead()).v_m_s, 0.4);
     close(controller.at(short(0.25), &ahead()).v_m_s, 0.2);
 }
@@ -308,9 +314,9 @@ fn a_controller_goes_by_the_response_that_the_link_found_as_if_it_were_stated() 
     }
     assert!(told.lead.is_some());
     let hostile = BaseResponseSample { dead_time_s: f64::NAN, ..sample };
-    let before = told.response;
+    let before = told.law.clone();
     told.answer(&guidance, &hostile.into(), MissionTime::default());
-    assert_eq!(told.response, before);
+    assert_eq!(told.law, before);
 }
 
 fn jackal() -> Controller {
@@ -319,24 +325,27 @@ fn jackal() -> Controller {
 }
 
 #[test]
-fn a_robot_backs_along_its_axis_at_a_limit_below_0_and_no_faster_than_the_mission_allows() {
-    for (limit, v) in [(-0.1, -0.1), (f64::NEG_INFINITY, -2.0)] {
-        let command = jackal().at(facing(0.3), &limited(limit));
+fn a_robot_that_is_to_back_does_so_along_its_axis_and_no_faster_than_the_mission_allows() {
+    for (speed_limit_m_s, v) in [(0.1, -0.1), (f64::INFINITY, -2.0), (0.0, 0.0)] {
+        let back = GuidanceSample { speed_limit_m_s, ..told(Maneuver::Back) };
+        let command = jackal().at(facing(0.3), &back);
         assert_eq!((command.v_m_s, command.omega_rad_s), (v, 0.0));
     }
 }
 
 #[test]
-fn a_body_that_is_no_disc_turns_to_a_heading_only_where_the_planner_gives_a_limit() {
+fn a_body_that_is_no_disc_turns_to_a_heading_only_where_the_planner_lets_it_move() {
     let target = TargetPoint {
         heading_rad: FRAC_PI_2,
         has_heading: 1,
         ..TargetPoint::at(DVec2::new(3.0, 0.0))
     };
-    for (limit, short_m, turns) in [(0.0, 0.1, true), (f64::NAN, 0.1, false), (0.5, 0.3, false)] {
+    let (turn, stand, follow) = (Maneuver::Turn, Maneuver::Stand, Maneuver::Follow);
+    for (maneuver, short_m, turns) in [(turn, 0.1, true), (stand, 0.1, false), (follow, 0.3, false)]
+    {
         let mut jackal = jackal();
         jackal.at(short(0.1), &GuidanceSample { target, ..ahead() });
-        let command = jackal.at(short(short_m), &GuidanceSample { target, ..limited(limit) });
-        assert_eq!(command.omega_rad_s != 0.0, turns, "{limit}: {command:?}");
+        let command = jackal.at(short(short_m), &GuidanceSample { target, ..told(maneuver) });
+        assert_eq!(command.omega_rad_s != 0.0, turns, "{maneuver:?}: {command:?}");
     }
 }

@@ -95,7 +95,8 @@ fn drive(mission: &Mission, map: &(Vec<u8>, Field), outline: &Outline, start: Po
             Passage::Follow(_) if at.axis().dot(direction) < outline.turns => (direction, 0.0),
             Passage::Follow(_) => (direction, 0.03),
             Passage::Turn(there) => (there, 0.0),
-            Passage::Drive(there, limit) => (there, 0.03 * limit.signum()),
+            Passage::Drive(there, _) => (there, 0.03),
+            Passage::Back(_) => (at.axis(), -0.03),
             Passage::Refused(_) => break,
         };
         let angle = at.axis().angle_to(there);
@@ -129,7 +130,7 @@ fn a_long_body_that_faces_a_dead_end_backs_out() {
     let map = room(&mission, pocket);
     let start = pose(0.3, 0.0, 0.0);
     let passage = outline.clone().pass(&view(&mission, &map), &start, DVec2::NEG_X);
-    assert!(matches!(passage, Passage::Drive(_, limit) if limit < 0.0), "{passage:?}");
+    assert!(matches!(passage, Passage::Back(_)), "{passage:?}");
     let end = drive(&mission, &map, &outline, start);
     assert!(end.position.distance(mission.target) < 0.2, "{end:?}");
 }

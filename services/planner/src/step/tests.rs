@@ -188,7 +188,7 @@ fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
     let guidance = planner.ask(&at(0.0, 0.0));
     assert_eq!(status(&guidance), GuidanceStatus::Look);
     assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
-    assert_eq!(guidance.speed_limit_m_s, 0.0);
+    assert_eq!(guidance.maneuver(), Maneuver::Turn);
 }
 
 #[test]
@@ -300,7 +300,7 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
         let limit = guidance.speed_limit_m_s;
         assert_eq!(limit > 0.0, may_go, "{clear_m} m: {guidance:?}");
         let ahead = planner.advise(&Pose2::default(), GuidanceStatus::WayOut, DVec2::X);
-        assert_eq!(ahead.2 > 0.0, may_go, "on the way out of a hazard, {clear_m} m");
+        assert_eq!(ahead.limit > 0.0, may_go, "on the way out of a hazard, {clear_m} m");
     }
 }
 
@@ -580,7 +580,7 @@ fn a_long_body_is_not_turned_to_a_targets_heading_where_it_would_touch() {
         let target = TargetSample { number: 1, last: 1, target: turned, ..Default::default() };
         planner.take_target(&target).unwrap();
         let guidance = planner.ask(&at(1.0, 0.0));
-        assert_eq!(guidance.speed_limit_m_s.is_nan(), refuses, "{guidance:?}");
+        assert_eq!(guidance.maneuver() == Maneuver::Stand, refuses, "{guidance:?}");
     }
 }
 
@@ -646,7 +646,7 @@ fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time
     assert!(first.iter().all(|it| it.ey.abs() > 0.3), "{first:?}");
     guidance(17, 4.5);
     let (far, near) = (guidance(18, 4.5), guidance(19, 1.0));
-    assert!(far.ex > 0.99 && far.speed_limit_m_s > 0.0, "{far:?}");
+    assert!(far.ex > 0.99 && far.signed_limit_m_s() > 0.0, "{far:?}");
     assert_eq!(status(&near), GuidanceStatus::Waiting, "{near:?}");
 }
 
@@ -678,7 +678,7 @@ fn what_goes_away_or_passes_far_off_changes_no_guidance() {
     for (at, velocity) in [([1.5, 0.0], [1.5, 0.0]), ([0.0, 3.0], [1.0, 0.0])] {
         let (guidance, speed) = guidance_beside(at.into(), velocity.into());
         assert_eq!(status(&guidance), GuidanceStatus::Along);
-        assert!(guidance.ex > 0.99 && guidance.speed_limit_m_s >= speed, "{guidance:?}");
+        assert!(guidance.ex > 0.99 && guidance.signed_limit_m_s() >= speed, "{guidance:?}");
     }
 }
 
@@ -686,7 +686,7 @@ fn what_goes_away_or_passes_far_off_changes_no_guidance() {
 fn a_robot_gets_out_of_the_way_of_what_comes() {
     let (at, velocity) = (DVec2::new(2.5, 0.1), DVec2::new(-0.8, 0.0));
     let (guidance, speed) = guidance_of("jackal", at, velocity);
-    let aside = guidance.ey.abs() > 0.3 || guidance.speed_limit_m_s < 0.0;
+    let aside = guidance.ey.abs() > 0.3 || guidance.maneuver() == Maneuver::Back;
     assert!(aside && status(&guidance) == GuidanceStatus::Along, "{speed}: {guidance:?}");
 }
 
@@ -704,7 +704,7 @@ fn a_robot_does_not_take_a_wall_beside_what_comes_for_its_trace_and_does_not_ste
         (13..19).any(|decimetres| {
             let at = DVec2::new(0.1 * f64::from(decimetres), 0.0);
             let guidance = guidance_between(wall_m, "jackal", at, slowly).0;
-            guidance.ey.abs() > 0.3 && guidance.speed_limit_m_s > 0.0
+            guidance.ey.abs() > 0.3 && guidance.signed_limit_m_s() > 0.0
         })
     };
     assert_eq!([6.0, 0.1].map(aside), [true, false]);
@@ -715,7 +715,7 @@ fn a_robot_backs_only_where_a_laser_looks() {
     let backs = |model| {
         (2..30).any(|decimetres| {
             let at = DVec2::new(0.1 * f64::from(decimetres), 0.0);
-            guidance_of(model, at, DVec2::new(-0.8, 0.0)).0.speed_limit_m_s < 0.0
+            guidance_of(model, at, DVec2::new(-0.8, 0.0)).0.maneuver() == Maneuver::Back
         })
     };
     assert_eq!(["kobuki", "jackal"].map(backs), [true, false]);

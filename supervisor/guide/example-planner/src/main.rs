@@ -88,6 +88,7 @@ impl Planner {
             ey: direction.y,
             speed_limit_m_s: f64::INFINITY,
             status: status.into(),
+            maneuver: status.maneuver().into(),
             grid_version: header.part.version,
             ..GuidanceSample::for_pose(pose, header, &self.target)
         }

@@ -206,7 +206,7 @@ fn numbers(state: &RobotState) -> Vec<Line<'static>> {
         line("driven", format!("{:.2} m", pose.travelled_m), plain);
     }
     if let Some(guidance) = state.guidance {
-        let limit = guidance.speed_limit_m_s;
+        let limit = guidance.signed_limit_m_s();
         let limit =
             if limit.is_finite() { format!(", at most {limit:.2} m/s") } else { String::new() };
         line("guidance", format!("{}{limit}", guidance_in_words(guidance.status)), plain);

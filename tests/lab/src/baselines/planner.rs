@@ -64,6 +64,7 @@ impl Baseline {
             ey: direction.y,
             speed_limit_m_s: limit,
             status: status.into(),
+            maneuver: status.maneuver().into(),
             grid_version: belief.part.version,
             ..GuidanceSample::for_pose(sample, belief, &self.target.unwrap_or_default())
         }

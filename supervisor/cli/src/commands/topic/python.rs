@@ -19,7 +19,7 @@ macro_rules! enums {
 
 enums! {
     Action BeaconRefusal Cause CommandState DeathCause Direction FaultAnswer FaultKind FixRefusal FollowState GuidanceStatus HealthState
-    HoldReason NextStep Order RangeStatus RecoveryStep RequestAnswer RequestKind Rest StageState StallCause
+    HoldReason Maneuver NextStep Order RangeStatus RecoveryStep RequestAnswer RequestKind Rest StageState StallCause
 }
 
 /// Bytes of `grid`, which belong to no field.
