@@ -164,6 +164,9 @@ pub fn remove(path: &Path) -> io::Result<()> {
 
 /// Returns the first `most` bytes of a text file.
 pub fn text(file: &Path, most: u64) -> Option<String> {
+    if machine::is_simulated() {
+        return read_text(file).ok();
+    }
     let mut text = String::new();
     fs::File::open(file).ok()?.take(most).read_to_string(&mut text).ok()?;
     Some(text)

@@ -43,6 +43,13 @@ impl FromStr for RobotName {
     }
 }
 
+/// Name of a robot that nobody names.
+impl Default for RobotName {
+    fn default() -> Self {
+        Self("x80".to_owned())
+    }
+}
+
 impl TryFrom<String> for RobotName {
     type Error = RobotNameError;
 

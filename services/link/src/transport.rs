@@ -210,7 +210,7 @@ impl Wire for Box<dyn MachineWire> {
     }
 
     fn receive(&mut self, buffer: &mut [u8], _: u64) -> io::Result<Option<usize>> {
-        Ok((**self).receive().map(|bytes| {
+        Ok(MachineWire::receive(self.as_mut()).map(|bytes| {
             let length = bytes.len().min(buffer.len());
             buffer[..length].copy_from_slice(&bytes[..length]);
             length
@@ -221,7 +221,7 @@ impl Wire for Box<dyn MachineWire> {
         if machine::is_killed() {
             return Err(io::Error::other("the simulation has killed this process"));
         }
-        (**self).send(bytes);
+        MachineWire::send(self.as_mut(), bytes);
         Ok(())
     }
 

@@ -65,6 +65,6 @@ pub use self::{
     file::now_ns,
     places::{files, next_place, parts},
     reader::{End, Message, Recording, Sample, SliceSample},
-    recorder::{Options, record},
+    recorder::{Options, Tape, record},
     viewers::log_line,
 };

@@ -17,7 +17,7 @@ use std::{
 use common::{
     bus::{AnyReader, Bus, BusError, Logged},
     clock::MissionClock,
-    domain::Domain,
+    domain::{Domain, RobotName},
     file,
     follower::{Event, Follower},
     run::{self, Run},
@@ -73,6 +73,13 @@ impl Options {
             None => topics::TABLE.iter().filter(logged).copied().collect(),
         }
     }
+
+    /// Returns the topics with the inputs first, as [`CurrentRun::take`] needs them.
+    fn sorted_topics(&self) -> Vec<&'static dyn AnyTopic> {
+        let mut topics = self.topics();
+        topics.sort_by_key(|topic| topic.spec().name != topics::INPUTS.spec().name);
+        topics
+    }
 }
 
 /// Events for the caller.
@@ -108,6 +115,11 @@ impl<F: FnMut() -> Wish> Wishes for F {
     }
 }
 
+fn open_readers(topics: &[&'static dyn AnyTopic], bus: &Bus) -> Result<Readers, BusError> {
+    let read = |topic: &&'static dyn AnyTopic| Ok((*topic, topic.recorder_reader(bus)?));
+    topics.iter().map(read).collect()
+}
+
 type TopicReader = (&'static dyn AnyTopic, Box<dyn AnyReader>);
 type Readers = Vec<TopicReader>;
 
@@ -117,13 +129,8 @@ pub fn record(
     wishes: &mut dyn Wishes,
     tell: &mut dyn FnMut(Happened<'_>),
 ) -> Result {
-    let mut chosen = options.topics();
-    // `CurrentRun::take` needs the inputs first.
-    chosen.sort_by_key(|topic| topic.spec().name != topics::INPUTS.spec().name);
-    let open = |bus: &Bus| -> Result<Readers, BusError> {
-        let read = |topic: &&'static dyn AnyTopic| Ok((*topic, topic.recorder_reader(bus)?));
-        chosen.iter().map(read).collect()
-    };
+    let chosen = options.sorted_topics();
+    let open = |bus: &Bus| open_readers(&chosen, bus);
     let domain = options.domain.clone();
     // LINK ends a tick; three more topics wake the recorder. INPUTS marks the start of a
     // generation, which may be killed soon. The others prevent losses at their processes' ends and
@@ -217,6 +224,52 @@ pub fn record(
         if stopped || run_over && options.run.is_some() {
             return Ok(());
         }
+    }
+}
+
+/// Recording of a run on a simulated machine.
+pub struct Tape {
+    options: Options,
+    readers: Readers,
+    current: Option<CurrentRun>,
+}
+
+impl Tape {
+    /// Makes the recording `out` of the run in `directory` once that begins.
+    pub fn new(robot: &RobotName, directory: PathBuf, out: PathBuf) -> Self {
+        let options = Options {
+            domain: robot.domain(),
+            run: Some(directory),
+            out,
+            topics: None,
+            fields: true,
+            budget: None,
+        };
+        Self { options, readers: Vec::new(), current: None }
+    }
+
+    /// Reads from `bus`, which replaces an earlier one, from now on.
+    pub fn attach(&mut self, bus: &Bus) -> Result {
+        if let Some(current) = &mut self.current {
+            current.take(&mut self.readers)?;
+            current.losses.joined_again();
+        }
+        self.readers = open_readers(&self.options.sorted_topics(), bus)?;
+        Ok(())
+    }
+
+    /// Takes all samples.
+    pub fn take(&mut self) -> Result {
+        let directory = self.options.run.clone().unwrap_or_default();
+        if self.current.is_none() && file::exists(&directory.join(run::FILE_NAME)) {
+            let (topics, out) = (self.options.sorted_topics(), &self.options.out);
+            self.current = Some(CurrentRun::begin(&self.options, &topics, out, directory)?);
+        }
+        self.current.as_mut().map_or(Ok(()), |current| current.take(&mut self.readers))
+    }
+
+    pub fn finish(self) -> Result {
+        self.current.map_or(Ok(()), |current| current.finish(&mut |_| {}).map(drop))
     }
 }
 

@@ -1,16 +1,23 @@
 //! `simulate`: runs of the whole robot in one process, each from one seed.
 
 use std::{
+    cell::RefCell,
+    path::{Path, PathBuf},
     process::ExitCode,
+    rc::Rc,
     time::{Instant, SystemTime},
 };
 
 use clap::Args;
-use common::VERSION;
+use common::{VERSION, bus::Bus};
 use console::{missions, output::print_line};
-use simulation::{Broken, Scenario};
+use recording::{
+    Recording, RecordingError, Tape,
+    replay::{Options, replay},
+};
+use simulation::{Broken, Observer, Ran, Scenario};
 
-use crate::error::Result;
+use crate::error::{OrCannot as _, Result};
 
 /// Simulate runs in one process, with faults drawn from a seed, and check invariants after every
 /// event.
@@ -34,6 +41,12 @@ pub struct Arguments {
     /// Run the mission in lockstep without any disturbance.
     #[arg(long)]
     undisturbed: bool,
+    /// Record the run, for `firsthand replay` and the page.
+    #[arg(long, value_name = "FILE", conflicts_with = "count")]
+    out: Option<PathBuf>,
+    /// Replay every generation of every stage, which must give the same samples to the bit.
+    #[arg(long)]
+    replay: bool,
     /// Set a mission key; repeatable.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -53,7 +66,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             true => Scenario::lockstep(&mission),
             false => Scenario::draw(&mission, seed),
         };
-        let ran = scenario.run();
+        let ran = run(&scenario, arguments)?;
         events += ran.events;
         simulated_s += ran.simulated.as_secs_f64();
         supervisors += ran.supervisors - 1;
@@ -73,6 +86,64 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         began.elapsed().as_secs_f64()
     ))?;
     Ok(if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Runs `scenario`; records and replays it if asked.
+fn run(scenario: &Scenario, arguments: &Arguments) -> Result<Ran> {
+    if arguments.out.is_none() && !arguments.replay {
+        return Ok(scenario.run());
+    }
+    let directory = tempfile::tempdir().or_cannot("make a directory for recordings")?;
+    let replayed = directory.path().join("recording.mcap");
+    let out = arguments.out.as_ref().unwrap_or(&replayed);
+    let tape = Rc::new(RefCell::new(Some(Recorder::new(out)?)));
+    let mut ran = scenario.run_before(Some(Box::new(Shared(Rc::clone(&tape)))));
+    if let Some(tape) = tape.take() {
+        tape.finish()?;
+    }
+    if arguments.replay && ran.broken.is_none() {
+        let report = replay(&Recording::open(out)?, &Options::default())?;
+        let not_replayed = report.stages.values().flat_map(|stage| &stage.not_replayed);
+        let why = not_replayed.map(|(number, why)| format!("generation {number}: {why}")).next();
+        let detail = report.difference.map(|difference| difference.to_string()).or(why);
+        ran.broken =
+            detail.map(|detail| ran.broken_at_end("a generation replays to the bit", detail));
+    }
+    Ok(ran)
+}
+
+/// Recorder of a simulated run. After its first error it only keeps that.
+struct Recorder {
+    tape: Tape,
+    failed: std::result::Result<(), RecordingError>,
+}
+
+impl Recorder {
+    fn new(out: &Path) -> Result<Self> {
+        let tape = Tape::new(&Scenario::robot(), Scenario::directory(), out.to_path_buf());
+        Ok(Self { tape, failed: Ok(()) })
+    }
+
+    fn finish(self) -> Result {
+        self.failed?;
+        Ok(self.tape.finish()?)
+    }
+}
+
+struct Shared(Rc<RefCell<Option<Recorder>>>);
+
+impl Observer for Shared {
+    fn on_bus(&mut self, bus: &Bus) {
+        if let Some(Recorder { tape, failed: failed @ Ok(()) }) = &mut *self.0.borrow_mut() {
+            *failed = tape.attach(bus);
+        }
+    }
+
+    fn observe(&mut self) {
+        if let Some(Recorder { tape, failed: failed @ Ok(()) }) = &mut *self.0.borrow_mut() {
+            *failed = tape.take();
+        }
+    }
 }
 
 fn show(scenario: &Scenario) -> Result {

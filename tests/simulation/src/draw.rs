@@ -22,6 +22,11 @@ pub(crate) fn load(random: &mut Random) -> Load {
     loads[random.below(loads.len())]
 }
 
+/// Draws how the robot takes commands: some keep the last one when none follows.
+pub(crate) fn robot(random: &mut Random, mission: &mut Mission) {
+    mission.simulation.ignores_time |= random.chance(0.3);
+}
+
 pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Disturbance> {
     let mut all = Vec::new();
     for _ in 0..random.below(MOST + 1) {
@@ -34,7 +39,8 @@ pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Distur
 fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Disturbance>) {
     let stage = stages::TABLE[random.below(stages::TABLE.len())].name;
     let operations = random.below(200) as u32;
-    let lasts = Duration::from_secs_f64(random.within(0.05, 3.0));
+    let longest_s = if random.chance(0.2) { 30.0 } else { 3.0 };
+    let lasts = Duration::from_secs_f64(random.within(0.05, longest_s));
     let mut add = |after: Duration, what| all.push(Disturbance { at: at + after, what });
     match random.below(12) {
         0..=2 => add(Duration::ZERO, What::Kill(stage)),
@@ -46,7 +52,11 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
         6 => add(Duration::ZERO, What::Hang(stage)),
         7 => add(Duration::ZERO, What::KillSupervisor(operations)),
         8..=9 => {
-            let mut share = || if random.chance(0.5) { random.within(0.0, 1.0) } else { 0.0 };
+            let mut share = || match random.below(4) {
+                0..=1 => 0.0,
+                2 => random.within(0.0, 1.0),
+                _ => 1.0,
+            };
             let (lost, doubled, reordered) = (share(), share(), share());
             let delay = lasts.mul_f64(0.1 * share());
             let way = if share() > 0.0 { Way::ToRobot } else { Way::ToHost };

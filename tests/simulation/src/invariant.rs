@@ -32,8 +32,6 @@ const MOVES_M_S: f64 = 0.05;
 const RESTS_WITHIN: Duration = Duration::from_secs(3);
 /// Pose error beyond four standard deviations, metres.
 const POSE_SLACK_M: f64 = 0.3;
-/// Motion of a pose between two ticks beyond the top speed, metres.
-const JUMP_SLACK_M: f64 = 0.1;
 
 /// A broken invariant.
 #[derive(Clone, Debug, Error)]
@@ -75,7 +73,6 @@ impl Observed {
 
 pub(crate) struct Invariants {
     protocol: Protocol,
-    top_speed_m_s: f64,
     in_ticks: bool,
     observed: Option<Observed>,
     decoder: Decoder,
@@ -89,7 +86,6 @@ pub(crate) struct Invariants {
     /// Whether the wire to the robot keeps what it carries, and since when.
     wire_is_calm: bool,
     wire_changed: Duration,
-    pose: Option<PoseSample>,
     /// Stages that were disturbed, and when.
     disturbed: VecDeque<(&'static str, Duration)>,
     command: u64,
@@ -108,7 +104,6 @@ impl Invariants {
     pub(crate) fn new(mission: &Mission, in_ticks: bool) -> Self {
         Self {
             protocol: mission.robot.protocol(),
-            top_speed_m_s: mission.body().top_speed_m_s,
             in_ticks,
             observed: None,
             decoder: Decoder::default(),
@@ -119,7 +114,6 @@ impl Invariants {
             moved: None,
             wire_is_calm: true,
             wire_changed: Duration::ZERO,
-            pose: None,
             disturbed: VecDeque::new(),
             command: 0,
             compared: 0,
@@ -204,7 +198,7 @@ impl Invariants {
         let sent = self.sent.take();
         // A link reads its orders before it sends, so the order before this event counts.
         let may_move = self.order.is_none_or(|order| order == Order::Drive);
-        self.read(now)?;
+        self.read(machine, now)?;
         if !self.in_ticks && sent == Some(true) {
             holds(!self.link_stops, "zero command while held", || {
                 "the link sends a motion command although its cause says stop".to_owned()
@@ -233,7 +227,7 @@ impl Invariants {
         Ok(())
     }
 
-    fn read(&mut self, now: Duration) -> Checked {
+    fn read(&mut self, machine: &SimulatedMachine, now: Duration) -> Checked {
         let unread = |error: BusError| ("the bus can be read", error.to_string());
         let Some(observed) = &mut self.observed else { return Ok(()) };
         while let Some(directive) = observed.directive.next_sample().map_err(unread)? {
@@ -243,18 +237,14 @@ impl Invariants {
             self.link_stops = link.stopped();
         }
         while let Some(pose) = observed.pose.next_sample().map_err(unread)? {
-            let before = self.pose.replace(pose);
-            if let Some(before) = before
-                && pose.stamp.stamp_ns > before.stamp.stamp_ns
-                && pose.relocations == before.relocations
-            {
-                let passed_s = pose.stamp.seconds() - before.stamp.seconds();
-                let moved_m = (pose.x_m - before.x_m).hypot(pose.y_m - before.y_m);
-                let most_m = 1.2 * self.top_speed_m_s * passed_s + JUMP_SLACK_M;
-                holds(moved_m <= most_m, "a pose continues that of the last process", || {
-                    format!("{moved_m:.2} m in {passed_s:.2} s, at tick {}", pose.stamp.tick)
-                })?;
-            }
+            // Frames may be late, so the counts find the truth of a pose.
+            let truth = machine.truth_of(&pose);
+            let off_m = truth.map_or(0.0, |truth| truth.pose_error_m(&pose));
+            let variance = (pose.covariance[0] + pose.covariance[3]).max(0.0);
+            let most_m = 4.0 * variance.sqrt() + POSE_SLACK_M;
+            holds(off_m <= most_m, "a pose is where the robot was", || {
+                format!("{off_m:.2} m off, at most {most_m:.2} m, at tick {}", pose.stamp.tick)
+            })?;
         }
         while let Some(command) = observed.command.next_sample().map_err(unread)? {
             let tick = command.stamp.tick;

@@ -27,7 +27,9 @@ mod wire;
 
 use std::{path::PathBuf, rc::Rc, time::Duration};
 
-use common::{clock::Pace, ground_truth::GroundTruthTick, mission::Mission};
+use common::{
+    bus::Bus, clock::Pace, domain::RobotName, ground_truth::GroundTruthTick, mission::Mission,
+};
 use mission_control::{Finished, Options, recovery::RecoveredRun};
 use processes::Starter;
 
@@ -46,6 +48,8 @@ use self::{
 const DIRECTORY: &str = "/simulation/run";
 /// Longest run, beyond the mission's timeout.
 const LATE: Duration = Duration::from_secs(120);
+/// Time that is watched after a run.
+const AFTERWARDS: Duration = Duration::from_secs(6);
 /// Address of a robot that outlives its supervisor.
 const ADDRESS: &str = "192.0.2.1:10001";
 
@@ -60,6 +64,16 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// Returns the name of the simulated robot.
+    pub fn robot() -> RobotName {
+        RobotName::default()
+    }
+
+    /// Returns the directory of the run on the simulated machine.
+    pub fn directory() -> PathBuf {
+        PathBuf::from(DIRECTORY)
+    }
+
     /// Returns the undisturbed run of a simulated robot in lockstep, as `firsthand run` drives it.
     pub fn lockstep(mission: &Mission) -> Self {
         Self {
@@ -76,6 +90,7 @@ impl Scenario {
         let mut random = Random::new(seed, 3);
         let mut mission = mission.clone();
         mission.seed = seed;
+        draw::robot(&mut random, &mut mission);
         mission.robot.address = Some(ADDRESS.to_owned());
         let load = draw::load(&mut random);
         let disturbances = draw::disturbances(&mut random, &mission);
@@ -84,10 +99,16 @@ impl Scenario {
 
     /// Runs the scenario.
     pub fn run(&self) -> Ran {
+        self.run_before(None)
+    }
+
+    /// Runs the scenario before an observer.
+    pub fn run_before(&self, observer: Option<Box<dyn Observer>>) -> Ran {
         let in_ticks = self.pace == Pace::Max;
         let invariants = Invariants::new(&self.mission, in_ticks);
         let machine =
             SimulatedMachine::new(self.seed, self.load, self.disturbances.clone(), invariants);
+        machine.show_to(observer);
         let finished = common::machine::simulate(Rc::<SimulatedMachine>::clone(&machine), || {
             self.conduct(&machine)
         });
@@ -111,14 +132,14 @@ impl Scenario {
             }
         }
         machine.end_after(Duration::from_secs_f64(self.mission.timeout_s) + LATE);
-        let directory = PathBuf::from(DIRECTORY);
+        let directory = Self::directory();
         let mut random = Random::new(self.seed, 4);
         let mut recovered = None;
         loop {
             let mut surroundings = Simulated::new(machine);
             let options = Options {
                 mission: self.mission.clone(),
-                robot: "x80".parse().ok()?,
+                robot: Self::robot(),
                 pace: self.pace,
                 directory: directory.clone(),
                 starter: Starter::Supervisor,
@@ -144,6 +165,8 @@ impl Scenario {
             return match conducted {
                 Ok(finished) => {
                     machine.check_end(&self.mission, &finished);
+                    // Whatever has ended, the robot comes to rest.
+                    machine.pass(AFTERWARDS);
                     Some(finished)
                 }
                 Err(error) => {
@@ -172,6 +195,15 @@ impl Scenario {
     }
 }
 
+/// Sees everything that is published, without a part in it.
+pub trait Observer {
+    /// Is given each new bus, before anything is published on it.
+    fn on_bus(&mut self, bus: &Bus);
+
+    /// Is called after each event.
+    fn observe(&mut self);
+}
+
 /// What came of a run.
 pub struct Ran {
     /// `None` if an invariant broke.
@@ -182,4 +214,11 @@ pub struct Ran {
     /// Number of supervisors, one more than were killed.
     pub supervisors: u32,
     pub truth: Vec<GroundTruthTick>,
+}
+
+impl Ran {
+    /// Returns a broken invariant that shows after the run.
+    pub fn broken_at_end(&self, invariant: &'static str, detail: String) -> Broken {
+        Broken { invariant, detail, event: self.events, at: self.simulated }
+    }
 }

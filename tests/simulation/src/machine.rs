@@ -17,6 +17,7 @@ use common::{
     machine::{Files, Machine, MachineWire},
     mission::Mission,
     run::Run,
+    samples::PoseSample,
     shell::Simulated,
     start::Generation,
 };
@@ -30,6 +31,7 @@ use rustix::process::Signal;
 use x80_sim::SimError;
 
 use crate::{
+    Observer,
     disturbance::{Disturbance, What},
     guard::Guard,
     invariant::{Broken, Invariants},
@@ -47,6 +49,12 @@ const OPERATOR: u32 = 1;
 const OBSERVER: u32 = 2;
 const GUARD: u32 = 3;
 const LINK: &str = "link";
+/// Ticks that a pose may be late.
+const RECENT_TICKS: usize = 400;
+/// Most turns of a process in a second; in lockstep a tick takes no time.
+const MOST_TURNS: u32 = 20_000;
+/// Time of a supervisor's turn: even one that never waits lets time pass.
+const LEAST_WAIT: Duration = Duration::from_micros(20);
 
 /// A stage's process.
 struct Process {
@@ -67,6 +75,8 @@ struct Process {
     exit: Option<ExitCause>,
     ran: Duration,
     starved: Duration,
+    /// Second of the clock, and the turns in it.
+    turns_of: (u64, u32),
 }
 
 impl Process {
@@ -111,6 +121,7 @@ pub(crate) struct SimulatedMachine {
     /// The soonest last.
     disturbances: RefCell<Vec<Disturbance>>,
     invariants: RefCell<Invariants>,
+    observer: RefCell<Option<Box<dyn Observer>>>,
     broken: RefCell<Option<Broken>>,
     events: Cell<u64>,
 }
@@ -142,6 +153,7 @@ impl SimulatedMachine {
             load: Cell::new(load),
             disturbances: RefCell::new(disturbances),
             invariants: RefCell::new(invariants),
+            observer: RefCell::default(),
             broken: RefCell::default(),
             events: Cell::new(0),
         })
@@ -151,6 +163,10 @@ impl SimulatedMachine {
         Duration::from_nanos(self.now_ns.get() - BEGIN_NS)
     }
 
+    pub(crate) fn show_to(&self, observer: Option<Box<dyn Observer>>) {
+        self.observer.replace(observer);
+    }
+
     pub(crate) fn place(&self, robot: Robot) {
         self.robot.replace(Some(robot));
     }
@@ -158,6 +174,13 @@ impl SimulatedMachine {
     /// Returns the newest ground truth.
     pub(crate) fn truth(&self) -> Option<GroundTruthTick> {
         self.robot.borrow().as_ref()?.truth.last().copied()
+    }
+
+    /// Returns the ground truth of a recent pose, by its counts.
+    pub(crate) fn truth_of(&self, pose: &PoseSample) -> Option<GroundTruthTick> {
+        let robot = self.robot.borrow();
+        let recent = robot.as_ref()?.truth.iter().rev().take(RECENT_TICKS);
+        recent.copied().find(|tick| tick.is_of(pose))
     }
 
     pub(crate) fn take_truth(&self) -> Vec<GroundTruthTick> {
@@ -191,7 +214,7 @@ impl SimulatedMachine {
     pub(crate) fn check_end(&self, mission: &Mission, finished: &Finished) {
         let checked = self.invariants.borrow().check_end(self, mission, finished);
         if let Err(broken) = checked {
-            self.broken.borrow_mut().get_or_insert(broken);
+            self.end_by(broken);
         }
     }
 
@@ -209,11 +232,14 @@ impl SimulatedMachine {
         let memory = Rc::<Memory>::default();
         self.memory.replace(Rc::clone(&memory));
         self.invariants.borrow_mut().on_bus(&memory);
+        if let Some(observer) = &mut *self.observer.borrow_mut() {
+            observer.on_bus(&Bus::in_memory(Rc::clone(&memory), None));
+        }
         Bus::in_memory(memory, Some(self.supervisor.get()))
     }
 
     pub(crate) fn supervisor_is_killed(&self) -> bool {
-        self.doomed.borrow().get(&self.supervisor.get()) == Some(&0)
+        is_killed(&self.doomed.borrow(), self.supervisor.get())
     }
 
     /// Passes time without a supervisor, whose stages end in order.
@@ -252,6 +278,7 @@ impl SimulatedMachine {
                 exit: None,
                 ran: Duration::ZERO,
                 starved: Duration::ZERO,
+                turns_of: (0, 0),
             },
         );
         process
@@ -352,9 +379,6 @@ impl SimulatedMachine {
                         );
                     }
                     self.execute(&event);
-                    if is_killed(&self.doomed.borrow(), self.supervisor.get()) {
-                        return;
-                    }
                 }
                 _ => {
                     self.now_ns.set(self.now_ns.get().max(until));
@@ -393,9 +417,12 @@ impl SimulatedMachine {
         }
         self.wake();
         self.running.set(OBSERVER);
+        if let Some(observer) = &mut *self.observer.borrow_mut() {
+            observer.observe();
+        }
         let checked = self.invariants.borrow_mut().check(self);
         if let Err(broken) = checked {
-            self.broken.borrow_mut().get_or_insert(broken);
+            self.end_by(broken);
         }
         self.running.set(before);
     }
@@ -420,8 +447,13 @@ impl SimulatedMachine {
     /// Ends the simulation.
     pub(crate) fn break_off(&self, invariant: &'static str, detail: String) {
         let (event, at) = (self.events.get(), self.now());
-        let broken = Broken { invariant, detail, event, at };
+        self.end_by(Broken { invariant, detail, event, at });
+    }
+
+    /// Ends the simulation: the supervisor fails whatever it does next.
+    fn end_by(&self, broken: Broken) {
         self.broken.borrow_mut().get_or_insert(broken);
+        self.doomed.borrow_mut().insert(self.supervisor.get(), 0);
     }
 
     /// Gives every process whose input has come a turn.
@@ -455,6 +487,15 @@ impl SimulatedMachine {
         };
         let work = self.load.get().work;
         process.ran += work;
+        let second = self.now().as_secs();
+        process.turns_of = match process.turns_of {
+            (of, turns) if of == second => (of, turns + 1),
+            _ => (second, 1),
+        };
+        if process.turns_of.1 > MOST_TURNS {
+            let detail = format!("{} takes {MOST_TURNS} turns in a second", process.stage);
+            self.break_off("no process runs without pause", detail);
+        }
         process.busy_until_ns = self.now_ns.get() + work.as_nanos() as u64;
         match turned {
             _ if is_killed(&self.doomed.borrow(), number) => {
@@ -560,11 +601,12 @@ impl Machine for SimulatedMachine {
     }
 
     fn wait(&self, timeout: Duration, is_ready: &dyn Fn() -> bool) -> bool {
-        if self.running.get() != self.supervisor.get() || timeout.is_zero() {
+        if self.running.get() != self.supervisor.get() {
             return is_ready();
         }
-        let deadline_ns = self.now_ns.get().saturating_add(timeout.as_nanos() as u64);
-        self.run_until(deadline_ns, &mut || is_ready());
+        let timeout_ns = timeout.max(LEAST_WAIT).as_nanos() as u64;
+        let deadline_ns = self.now_ns.get().saturating_add(timeout_ns);
+        self.run_until(deadline_ns, &mut || self.supervisor_is_killed() || is_ready());
         is_ready()
     }
 

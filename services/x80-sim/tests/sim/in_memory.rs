@@ -14,11 +14,17 @@ use common::{
     machine::{Files, Machine, MachineWire, simulate},
     wire::{Addressing, Command, SystemSignal},
 };
+use rplidar_protocol::START;
 use x80_sim::InMemory;
 
 use crate::support::{Sim, mission};
 
-const HOST: SocketAddr = SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::LOCALHOST, 7));
+const fn wire(port: u16) -> SocketAddr {
+    SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::LOCALHOST, port))
+}
+
+const HOST: SocketAddr = wire(7);
+const LASER: SocketAddr = wire(8);
 
 fn x80(command: Command) -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -39,26 +45,33 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
     let drive = line(&Order::Drive { wheels: [4.0, 3.0], twist: [0.1, 0.1], for_s: 0.25 });
     let ping = x80(Command::System(SystemSignal::Ping));
     let json_ping = line(&Order::Ping {});
+    let arduino = format!(
+        "robot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\n{world}\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0\nbearing_deg = 0"
+    );
+    let requests = [b"e\rm 30 20\r".to_vec(), vec![START, 0x20]];
     for (text, orders) in [
         (world, [forward(), ping.clone()]),
         (&radio, [forward(), ping]),
         (&json, [drive, json_ping]),
+        (&arduino, requests),
     ] {
         let mut sim = Sim::start(text, Pace::Max);
-        let host = sim.host();
+        let hosts = [(HOST, sim.host()), (LASER, sim.host())];
         let mut robot = InMemory::start(&mission(text), Pace::Max, None).unwrap();
         assert_eq!(robot.next_due_ns(), None);
         let mut buffer = vec![0; 65_536];
         for order in orders.iter().cycle().take(60) {
+            let (from, host) = &hosts[usize::from(order.starts_with(&[START]))];
             host.send(order).unwrap();
-            robot.hear(HOST, order).unwrap();
+            robot.hear(*from, order).unwrap();
             for (to, datagram) in robot.sent() {
+                let (_, host) = hosts.iter().find(|(at, _)| *at == to).unwrap();
                 let length = host.recv(&mut buffer).unwrap();
-                assert!(to == HOST && datagram == buffer[..length], "{text}");
+                assert!(datagram == buffer[..length], "{text}");
             }
         }
         sim.finish();
-        let as_told = |tick: GroundTruthTick| {
+        let as_told = |tick: GroundTruthTick| -> GroundTruthTick {
             serde_json::from_str(&serde_json::to_string(&tick).unwrap()).unwrap()
         };
         let process =
