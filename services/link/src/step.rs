@@ -57,6 +57,9 @@ pub const STOPS: u32 = 3;
 /// Stop interval: a fading radio may lose all copies, and the robot may ignore its last command's
 /// limit.
 const STOP_AGAIN: Duration = Duration::from_millis(200);
+/// Least interval of stops against another commander. On a wire that doubles datagrams, the
+/// acknowledgements of each stop look like another commander's and would be answered by the next.
+const STOP_AGAINST_OTHERS: Duration = Duration::from_millis(10);
 
 #[derive(Clone, Debug)]
 struct OpenTick {

@@ -9,7 +9,7 @@ use common::{
     wire::COUNT_CYCLE,
 };
 
-use super::{Effect, Link, PING_EVERY};
+use super::{Effect, Link, PING_EVERY, STOP_AGAINST_OTHERS};
 use crate::failsafe::monitor::{Counts, Monitor as _, Observation};
 
 /// Log interval of refused messages, and logged characters of a reason.
@@ -80,8 +80,10 @@ impl Link {
         if (is_told || heard.commander.is_some_and(|commander| commander.moves))
             && self.decision.stops()
             && !self.in_ticks()
+            && self.passed(self.stop_sent_ns, STOP_AGAINST_OTHERS)
         {
             self.send(self.stop());
+            self.stop_sent_ns = Some(self.now_ns);
         }
         if heard.pinged {
             self.send(self.base.acknowledge());
