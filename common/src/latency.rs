@@ -41,6 +41,7 @@ impl Histogram {
 
     /// Returns the upper end of the bucket of the `share` quantile, at most the longest latency.
     pub fn quantile_us(&self, share: f64) -> Option<f64> {
+        assert!((0.0..=1.0).contains(&share));
         let total = self.total();
         if total == 0 {
             return None;

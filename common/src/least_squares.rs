@@ -13,6 +13,7 @@ pub struct Line {
 impl Line {
     /// Adds a pair after scaling the previous sums by `left`.
     pub fn add(&mut self, left: f64, x: f64, y: f64) {
+        assert!((0.0..=1.0).contains(&left));
         for (sum, term) in [(&mut self.xx, x * x), (&mut self.xy, x * y), (&mut self.yy, y * y)] {
             *sum = *sum * left + term;
         }
@@ -42,6 +43,7 @@ impl Two {
     pub fn of(x: &Line, z: &Line, xz: f64, pairs: f64, alone: f64) -> Option<Self> {
         let determinant = x.xx * z.xx - xz * xz;
         (determinant > alone * x.xx * z.xx).then(|| {
+            assert!(pairs > 0.0);
             let a = (x.xy * z.xx - z.xy * xz) / determinant;
             let b = (z.xy * x.xx - x.xy * xz) / determinant;
             let rest = (x.yy - a * x.xy - b * z.xy).max(0.0);

@@ -97,6 +97,7 @@ pub enum Order {
 pub fn line(message: &impl Serialize) -> Vec<u8> {
     // A struct of numbers and names always serialises.
     let mut line = serde_json::to_vec(message).unwrap_or_default();
+    debug_assert!(!line.contains(&b'\n'));
     line.push(b'\n');
     line
 }
@@ -133,6 +134,7 @@ impl Lines {
                 complete.extend(Some(line).filter(|line| !line.trim_ascii().is_empty()));
             }
         }
+        assert!(self.held.len() < LONGEST_LINE && (self.held.is_empty() || !self.drops));
         if self.held.trim_ascii_end().ends_with(b"}") {
             let is_object = |line| serde_json::from_slice::<IgnoredAny>(line).map(drop);
             let last = bytes.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();

@@ -92,6 +92,8 @@ impl Mission {
             problem,
             remedy,
         })?;
+        assert!(mission.target.is_finite() && mission.contains(mission.start.at));
+        assert!(mission.speed_m_s() >= 0.0 && mission.turn_rad_s() > 0.0);
         Ok(mission)
     }
 

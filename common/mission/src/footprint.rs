@@ -47,6 +47,8 @@ impl Footprint {
         if footprint.inscribed_m() < 0.01 {
             return Err("the robot's origin, between its wheels, must lie at least 0.01 m inside");
         }
+        assert!(footprint.inscribed_m() <= footprint.circumscribed_m() + 1e-9);
+        assert!(footprint.half_width_m() >= footprint.inscribed_m() - 1e-9);
         Ok(footprint)
     }
 

@@ -274,7 +274,9 @@ pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
 pub fn wrap_angle(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let turned = angle.rem_euclid(TAU);
-    if turned > PI { turned - TAU } else { turned }
+    let wrapped = if turned > PI { turned - TAU } else { turned };
+    debug_assert!(wrapped.abs() <= PI || wrapped.is_nan());
+    wrapped
 }
 
 #[cfg(test)]

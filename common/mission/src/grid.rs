@@ -180,6 +180,8 @@ impl GridFrame {
     }
 
     pub fn cells_of<'map, T: Copy>(&self, window: Window, map: &'map [T]) -> Cow<'map, [T]> {
+        assert!(self.contains(window));
+        assert_eq!(map.len(), self.area());
         if window == self.whole() {
             return Cow::Borrowed(map);
         }
@@ -192,6 +194,8 @@ impl GridFrame {
     }
 
     pub fn changed_window<T: PartialEq>(&self, old: &[T], new: &[T]) -> Window {
+        assert_eq!(old.len(), new.len());
+        assert_eq!(old.len(), self.area());
         let side = self.cells as usize;
         let mut window = Window::default();
         let rows = old.chunks_exact(side).zip(new.chunks_exact(side));

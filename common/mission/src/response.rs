@@ -119,6 +119,7 @@ impl Base {
             return wanted;
         }
         let near = |now: f64, wanted: f64, most: f64| now + (wanted - now).clamp(-most, most);
+        assert!(for_s >= 0.0 && self.wheel_m > 0.0);
         let most_rad_s = self.response.turn_acceleration_rad_s2 * for_s;
         let most_m_s = self.response.acceleration_m_s2 * for_s;
         let [left, right] = [-self.wheel_m, self.wheel_m]
@@ -147,6 +148,7 @@ pub struct ModelledSpeed {
 
 impl ModelledSpeed {
     pub const fn new(delay_s: f64, most_change: f64) -> Self {
+        assert!(delay_s >= 0.0 && most_change > 0.0);
         let pending = VecDeque::new();
         Self { delay_s, most_change, pending, target: 0.0, speed: 0.0, at_s: f64::NEG_INFINITY }
     }
@@ -196,6 +198,7 @@ impl ModelledSpeed {
         let before = self.speed;
         let left = self.target - before;
         let changes_s = (left.abs() / self.most_change).min(for_s);
+        assert!(changes_s >= 0.0 && for_s >= 0.0);
         self.speed = if changes_s < for_s || self.most_change.is_infinite() {
             self.target
         } else {

@@ -220,6 +220,7 @@ impl Body {
         if acceleration == [f64::INFINITY; 2] {
             return wanted;
         }
+        assert!(rate_hz > 0.0);
         let drive = self.unlimited();
         let [now, then] = [wanted, told].map(|wheels| drive.twist(wheels));
         let grown = |now: f64, then: f64, acceleration: f64| {

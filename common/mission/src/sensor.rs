@@ -365,6 +365,7 @@ pub(crate) fn table(
         return table;
     };
     let front_deg = table[front].bearing_deg();
+    assert_eq!(table.len(), rows.len());
     for (index, sensor) in table.iter_mut().enumerate() {
         let beside = (sensor.bearing_deg() - front_deg).abs() <= BESIDE_FRONT_DEG;
         let is_cone = sensor.kind == SensorKind::Cone;

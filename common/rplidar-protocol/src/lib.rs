@@ -144,6 +144,7 @@ pub struct Node {
 
 impl Node {
     pub fn encode(self) -> [u8; NODE_BYTES] {
+        debug_assert!(self.angle_q6 < TURN_Q6 && self.quality < 64);
         let flags = if self.is_first { 0b01 } else { 0b10 };
         let [angle_low, angle_high] = (self.angle_q6 << 1 | 1).to_le_bytes();
         let [low, high] = self.distance_q2.to_le_bytes();
@@ -162,6 +163,7 @@ impl Node {
     }
 
     fn follows(self, earlier: Self) -> bool {
+        assert!(self.angle_q6 < TURN_Q6 && earlier.angle_q6 < TURN_Q6);
         let step = (self.angle_q6 + TURN_Q6 - earlier.angle_q6) % TURN_Q6;
         step.min(TURN_Q6 - step) <= MOST_STEP_Q6 && !(self.is_first && earlier.is_first)
     }
@@ -203,6 +205,7 @@ impl Decoder {
         let mut at = 0;
         while let Some((length, meaning)) = held.get(at..).and_then(|rest| self.next_piece(rest)) {
             at += length;
+            assert!(at <= held.len());
             said.extend(meaning);
         }
         held.drain(..at);

@@ -62,6 +62,7 @@ impl<T: Copy + PartialEq> Replica<T> {
         if held_frame != frame || !follows {
             return Applied::Missed;
         }
+        assert_eq!(self.cells.len(), frame.area());
         for (offset, row) in cells.chunks_exact(window.width.max(1) as usize).enumerate() {
             let start = frame.index(Cell { col: window.col, row: window.row + offset as u32 });
             self.cells[start..start + row.len()].copy_from_slice(row);

@@ -175,6 +175,7 @@ impl Command {
                 did::SYSTEM
             }
         };
+        assert!(data.len() <= usize::from(u8::MAX));
         Frame { rid: addressing.robot(), sn: 0, did, data: &data }.encode(out);
     }
 }

@@ -77,6 +77,7 @@ impl Decoder {
         self.buffer.drain(..from_held);
         self.buffer.extend_from_slice(&bytes[excess - from_held..]);
         self.tally.dropped_bytes += excess as u64;
+        assert!(self.buffer.len() <= CAPACITY);
         self.work.set(0);
     }
 
@@ -139,6 +140,10 @@ impl Decoder {
             self.start += 2;
         }
         let frame = &self.buffer[from..from + end];
+        assert!(
+            frame.starts_with(&HEADER) && frame.len() == BEFORE_DATA + usize::from(frame[5]) + 1
+        );
+        debug_assert_eq!(crc8(&frame[HEADER.len()..end - 1]), frame[end - 1]);
         Some(Frame {
             rid: frame[2],
             sn: frame[3],
@@ -159,6 +164,7 @@ impl Decoder {
     fn skip(&mut self, bytes: usize) {
         self.start += bytes;
         self.tally.noise_bytes += bytes as u64;
+        assert!(self.start <= self.buffer.len());
     }
 }
 

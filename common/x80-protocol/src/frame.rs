@@ -76,6 +76,10 @@ impl Frame<'_> {
         let crc = crc8(&out[checked_from..]);
         out.push(crc);
         out.extend_from_slice(&END);
+        assert_eq!(
+            out.len() - checked_from,
+            BEFORE_DATA - HEADER.len() + data.len() + 1 + END.len()
+        );
     }
 }
 

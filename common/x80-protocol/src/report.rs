@@ -23,6 +23,7 @@ impl Report {
             Self::Standard(sensors) => (did::STANDARD, sensors.to_bytes()),
             Self::System(signal) => (did::SYSTEM, vec![*signal as u8]),
         };
+        debug_assert!(Self::parse(&Frame { rid: 0, sn: 0, did, data: &data }).is_ok());
         Frame { rid: addressing.host(), sn: 0, did, data: &data }.encode(out);
     }
 

@@ -26,7 +26,9 @@ impl Encoder {
 pub fn counts_between(old: u16, new: u16) -> i32 {
     let cycle = i32::from(COUNT_CYCLE);
     let ahead = (i32::from(new) - i32::from(old)).rem_euclid(cycle);
-    if ahead >= cycle / 2 { ahead - cycle } else { ahead }
+    let between = if ahead >= cycle / 2 { ahead - cycle } else { ahead };
+    assert_eq!((i32::from(old) + between - i32::from(new)) % cycle, 0);
+    between
 }
 
 /// DID 123.
@@ -91,6 +93,7 @@ pub(super) trait Layout: Default {
     fn to_bytes(mut self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(Self::BYTES);
         self.each_byte(&mut |byte| bytes.push(*byte));
+        assert!(bytes.len() <= Self::BYTES);
         bytes.resize(Self::BYTES, 0);
         bytes
     }

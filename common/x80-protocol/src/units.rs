@@ -54,7 +54,9 @@ pub fn infrared_m(ad: u16) -> f64 {
 /// Inverts [`infrared_m`].
 pub fn infrared_ad(range: f64) -> u16 {
     let range = range.clamp(INFRARED_M.0, INFRARED_M.1);
-    ((0.216 / range + 0.17) * 4028.0 / 3.0).round() as u16
+    let ad = ((0.216 / range + 0.17) * 4028.0 / 3.0).round() as u16;
+    debug_assert!(range.is_nan() || (infrared_m(ad) - range).abs() < 0.002);
+    ad
 }
 
 /// Board and servos, for [`volts`].

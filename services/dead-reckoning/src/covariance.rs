@@ -49,6 +49,7 @@ pub(crate) struct Transition {
 
 impl ErrorModel {
     pub(crate) fn new(odometry: &Odometry, body: &Body) -> Self {
+        assert!(body.track_m > 0.0 && body.metres_per_count() > 0.0);
         Self {
             slip: odometry.slip.powi(2),
             systematic: [

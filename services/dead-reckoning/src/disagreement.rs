@@ -199,6 +199,7 @@ impl Disagreement {
     }
 
     fn late(&self) -> Option<f64> {
+        assert!(self.pairs >= LEAST_PAIRS);
         let unshifted = self.shifted[(-FIRST_SHIFT_S / SHIFT_STEP_S).round() as usize];
         let best = (1..SHIFTS - 1)
             .min_by(|one, other| self.shifted[*one].total_cmp(&self.shifted[*other]))?;
@@ -223,6 +224,7 @@ fn moved(ticks: &VecDeque<Tick>, from_s: f64, to_s: f64) -> Option<Pose2> {
     if from_s < first.time.seconds() - first.seconds || to_s > ticks.back()?.time.seconds() {
         return None;
     }
+    assert!(from_s <= to_s);
     let mut pose = Pose2::default();
     for tick in ticks {
         let end_s = tick.time.seconds();

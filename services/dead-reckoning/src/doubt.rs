@@ -49,6 +49,7 @@ impl Doubt {
         rim_m: f64,
         track_m: f64,
     ) -> Option<String> {
+        assert!(rim_m >= 0.0 || rim_m.is_nan());
         self.rolled_m += rim_m;
         let WheelSample { told_ratio, told_ratio_sd, .. } = *wheels;
         let off = (told_ratio - 1.0).abs();

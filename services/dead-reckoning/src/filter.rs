@@ -90,6 +90,8 @@ impl TryFrom<&FixSample> for Fix {
             Some(_) => spare.cholesky().is_some(),
             None => spare.fixed_view::<2, 2>(0, 0).into_owned().cholesky().is_some(),
         };
+        assert!(!positive || fix.variance() > 0.0);
+        assert!(fix.heading.is_some() || fix.covariance[5] == 0.0);
         if positive { Ok(fix) } else { Err(FixRefusal::Covariance) }
     }
 }

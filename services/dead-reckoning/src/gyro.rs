@@ -43,10 +43,12 @@ impl Gyro {
         };
         let seconds = |from: MissionTime, to: MissionTime| to.since(from).as_secs_f64();
         let whole = seconds(before.end, end);
+        assert!(whole > 0.0);
         let mut rest = Self { sequence, end, ..before };
         let (mut given, mut completed) = (0.0, false);
         for tick in ticks.iter_mut().filter(|tick| tick.time > before.end && tick.time <= end) {
             let share = seconds(before.end, tick.time) / whole;
+            assert!((0.0..=1.0).contains(&share));
             let part = share - given;
             let divided = UNEVEN * share * (1.0 - share) * turn_rad;
             let turn = rest.turn + part * turn_rad;

@@ -220,6 +220,7 @@ impl DeadReckoning {
             let Twist { v: arc, omega: turn } = counted.unwrap_or_default();
             // Without ticks there are no commands, so the wheels soon rest.
             let lost_s = if rejected { elapsed.min(self.turns_on_s) } else { 0.0 };
+            assert!(elapsed >= 0.0 && (0.0..=self.turns_on_s).contains(&lost_s));
             let lost_m = self.body.top_speed_m_s * lost_s;
             tick = Tick { seconds: elapsed, arc, turn, lost_m, ..tick };
             motion = self.state.history.newest.moved(&self.motions, &tick);
@@ -279,6 +280,7 @@ impl DeadReckoning {
         let position = DVec2::new(place.x_m, place.y_m);
         let pose = Pose2 { position, heading: estimate.pose.heading + turn };
         let [along, turned] = [place.sigma_m, place.sigma_rad].map(|sigma| sigma * sigma);
+        assert!(place.number > state.placed);
         state.history.restart(estimate.moved_to(pose, along, turned));
         state.contradictions = Contradictions::default();
         state.doubt.place();
@@ -366,6 +368,7 @@ impl DeadReckoning {
         let per_count = std::f64::consts::TAU / self.body.counts_per_turn;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();
         let limit = top * PLAUSIBLE * (elapsed + SLACK_S);
+        assert!(limit > 0.0);
         // The link reports restarts within its generation; only between two links must the counts
         // show one. A robot that turned back through its start gives the same counts, but sooner.
         let restarted = match last.generation == wheels.stamp.generation {
@@ -396,12 +399,14 @@ impl DeadReckoning {
     /// Returns m/s and rad/s, limited along the same curve.
     fn speeds(&self, moved: Twist, elapsed: f64) -> Twist {
         let time = elapsed.max(LEAST_SHARE_OF_A_TICK * self.period_s);
+        assert!(time > 0.0);
         let (v, omega) = (moved.v / time, moved.omega / time);
         let wheel = match self.body.steering {
             Some(_) => v.abs(),
             None => v.abs() + omega.abs() * self.body.track_m / 2.0,
         };
         let share = (self.body.top_speed_m_s / wheel).min(1.0);
+        assert!((0.0..=1.0).contains(&share));
         Twist { v: v * share, omega: omega * share }
     }
 

@@ -15,6 +15,7 @@ impl Backoff {
     /// Returns a backoff whose first attempt is due at once. Pauses double from `first` up to
     /// `longest`.
     pub const fn new(first: Duration, longest: Duration) -> Self {
+        assert!(first.as_nanos() <= longest.as_nanos());
         Self { first, longest, pause: first, attempts: 0, next_ns: None }
     }
 
@@ -26,6 +27,7 @@ impl Backoff {
         self.attempts += 1;
         self.next_ns = Some(now_ns.saturating_add(self.pause.as_nanos() as u64));
         self.pause = (self.pause * 2).min(self.longest);
+        assert!(self.pause >= self.first);
     }
 
     pub const fn reset(&mut self) {

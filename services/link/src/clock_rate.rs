@@ -35,6 +35,7 @@ impl ClockRate {
             return None;
         }
         self.since = Some((stamp_ns, now));
+        assert!(stamp_ns >= from_ns);
         let rate = stamp_ns.saturating_sub(from_ns) as f64 / mission_ns as f64;
         let before = self.before.replace(rate)?;
         let off = |rate: f64| if (rate - 1.0).abs() > SHARE { (rate - 1.0).signum() } else { 0.0 };

@@ -189,6 +189,7 @@ impl Decision {
                 worst = Self { action, cause };
             }
         }
+        assert_eq!(worst.action == Action::Go, worst.cause == Cause::None);
         worst
     }
 }

@@ -26,6 +26,7 @@ impl Polls {
             let [after_next, after_now] =
                 [self.next, now].map(|from| MissionTime(from.0.saturating_add(self.period_ns)));
             self.next = if after_next > now { after_next } else { after_now };
+            assert!(self.next >= now);
         }
         is_due
     }

@@ -84,6 +84,8 @@ impl Sensors {
         let tick = self.ticks;
         self.ticks += 1;
         let mut readings = std::mem::replace(&mut self.newest, absent(&self.table));
+        assert_eq!(readings.len(), self.table.len());
+        debug_assert!((0..).zip(&readings).all(|(row, reading)| reading.sensor == row));
         for (reading, sensor) in readings.iter_mut().zip(&self.table) {
             if !tick.is_multiple_of(sensor.every_ticks) {
                 *reading = RangeReading { sensor: reading.sensor, ..RangeReading::default() };
@@ -175,6 +177,7 @@ impl Laser {
             let wheels = [0, 1].map(|wheel| turned[wheel] - turned_then[wheel]);
             let turn = body.unlimited().twist(wheels).omega;
             // Turns remove things from a partial view.
+            assert!(self.sensor.fan().1 > 0.0);
             let is_circle = self.sensor.field_of_view_deg >= 360.0;
             let lost = if is_circle { 0.0 } else { turn.abs() / self.sensor.fan().1 };
             self.is_blind |= near > beams.len() / BLIND_ONE_IN + lost.ceil() as usize;

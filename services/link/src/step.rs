@@ -199,6 +199,8 @@ impl Link {
         self.give_tick();
         self.repeat_command();
         self.guard();
+        assert!(self.connected() || self.decision.stops(), "the link stops a lost robot");
+        assert!(!self.decision.stops() || self.repeat.is_none());
         let sent = self.effects.iter().filter_map(|effect| match effect {
             Effect::Send(bytes) => Some(self.base.owed(bytes)),
             _ => None,
@@ -358,6 +360,7 @@ impl Link {
     }
 
     fn open_number(&self) -> u64 {
+        assert!(self.in_ticks() || self.state.next_tick > 0, "a tick is open");
         if self.in_ticks() { self.state.next_tick } else { self.state.next_tick - 1 }
     }
 
@@ -378,9 +381,11 @@ impl Link {
             return;
         }
         let share = decision.action.speed_share();
+        assert!(share > 0.0 && share <= 1.0);
         let counts = match command.state() {
             CommandState::Driving => {
                 let reached = self.trim.as_ref().map_or(1.0, SpeedTrim::share);
+                assert!(reached > 0.0 && reached <= 1.0);
                 let permitted = self.failsafe.monitors.touch.permitted(command, self.now);
                 self.speeds.of(&permitted, share / reached, &self.wheels)
             }

@@ -45,6 +45,7 @@ impl WheelSpeeds {
         let Some(steering) = self.body.steering else {
             let wanted = [command.left_rad_s, command.right_rad_s].map(|speed| share * speed);
             let fastest = wanted.map(f64::abs).into_iter().fold(self.body.top_rad_s(), f64::max);
+            assert!(fastest > 0.0);
             let slower = if self.keeps_curve { self.body.top_rad_s() / fastest } else { 1.0 };
             let wanted = wanted.map(|speed| slower * speed);
             let told = self.told.map(|it| f64::from(it) / self.counts_per_radian());

@@ -34,6 +34,8 @@ impl ClearBeams {
     pub(crate) const SAVED_BYTES: usize = (CLEAR_BEAMS + CLEAR_RAYS) * size_of::<Dated>();
 
     pub(crate) fn take(&mut self, sonars: usize, reading: &Reading, rolled_m: f64) {
+        assert!(sonars > 0, "a reading comes from a used sonar");
+        assert!(reading.echo.is_none_or(|range| range >= 0.0));
         let clear_m = reading.echo.map_or(f64::INFINITY, |range| range - AHEAD_OF_ECHO_M);
         let beam = clear_beam(reading.origin, reading.axis, clear_m.min(reading.sonar.clear_m));
         let most = (OF_ONE_SONAR * sonars).min(CLEAR_BEAMS);
@@ -41,6 +43,7 @@ impl ClearBeams {
     }
 
     pub(crate) fn take_ray(&mut self, ray: &Ray, rolled_m: f64) {
+        assert!(ray.seen.clear_m >= 0.0);
         let beam = clear_beam(ray.origin, ray.axis, ray.seen.clear_m);
         append(&mut self.rays, CLEAR_RAYS, Dated { beam, rolled_m });
     }
@@ -67,6 +70,7 @@ fn clear_beam(origin: DVec2, axis: DVec2, clear_m: f64) -> ClearBeam {
 }
 
 fn append(readings: &mut Vec<Dated>, most: usize, newest: Dated) {
+    assert!(most > 0);
     let oldest_m = newest.rolled_m - CLEAR_FOR_M;
     readings.retain(|dated| dated.rolled_m > oldest_m);
     if readings.len() >= most {

@@ -45,12 +45,14 @@ impl Poses {
         if self.held.is_empty() && (pose.v_m_s, pose.omega_rad_s) == (0.0, 0.0) {
             self.stood_at = Some((ns, robot));
         }
+        debug_assert!(self.stood_at.is_none_or(|(first_ns, _)| first_ns <= ns));
         self.held.push_back((ns, robot));
         let oldest_ns = ns - KEPT.as_nanos() as i64;
         let is_old = |(ns, _): &(i64, Pose2)| *ns < oldest_ns;
         while self.held.len() > MOST_POSES || self.held.front().is_some_and(is_old) {
             self.held.pop_front();
         }
+        assert!(!self.held.is_empty());
     }
 
     /// Interpolates the pose at a time, or extrapolates by at most a tick.
@@ -58,9 +60,11 @@ impl Poses {
         if let Some((_, pose)) = self.stood_at.filter(|(first_ns, _)| ns <= *first_ns) {
             return Some(pose);
         }
+        debug_assert!(self.held.iter().is_sorted_by(|one, next| one.0 < next.0));
         let last = self.held.len().max(2) - 1;
         let later = self.held.partition_point(|(at, _)| *at < ns).clamp(1, last);
         let ((from_ns, from), (to_ns, to)) = (self.held.get(later - 1)?, self.held.get(later)?);
+        assert!(from_ns < to_ns);
         let share = (ns - from_ns) as f64 / (to_ns - from_ns) as f64;
         (-1.0..=2.0).contains(&share).then(|| Pose2 {
             position: from.position.lerp(to.position, share),
@@ -123,6 +127,7 @@ fn time_ns(pose: &PoseSample) -> i64 {
 /// origin.
 fn at_once<'a>(fan: &Fan<'_>, seen_from: impl Fn(usize) -> Option<Fan<'a>>) -> Option<Vec<f32>> {
     let count = fan.beams.len();
+    assert!(count > 0 && fan.step_rad > 0.0);
     let end = |(beam, range): (usize, &f32)| {
         let (own, range, place) = (seen_from(beam)?, f64::from(*range), beam as f64);
         let along = DVec2::from_angle(own.first_rad + own.step_rad * place);
@@ -138,6 +143,7 @@ fn at_once<'a>(fan: &Fan<'_>, seen_from: impl Fn(usize) -> Option<Fan<'a>>) -> O
     if is_circle {
         ends.extend(ends.first().map(|(place, range)| (place + count as f64, *range)));
     }
+    assert_eq!(ends.len(), count + usize::from(is_circle));
     let mut beams = vec![f32::NAN; count];
     for pair in ends.windows(2) {
         let [mut low, mut high] = [pair[0], pair[1]];

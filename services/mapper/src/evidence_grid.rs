@@ -11,7 +11,7 @@
 //! beside lasers share one. A cell is hazard if any grid says so. An echo whose range the laser
 //! confirms goes where the laser sees the object.
 
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 use common::{
     grid::{Cell, GridFrame, MAX_CELLS, Window},
@@ -99,6 +99,7 @@ pub(crate) fn lattice(mission: &Mission, beyond_m: f64) -> GridFrame {
     let cells = (width / sonar::RESOLUTION_M).ceil().min(f64::from(MAX_CELLS));
     let resolution_m = (width / cells).max(sonar::RESOLUTION_M);
     let beyond = (beyond_m / resolution_m).ceil();
+    assert!(cells >= 1.0 && beyond >= 0.0);
     GridFrame {
         cells: (cells + 2.0 * beyond) as u32,
         resolution_m,
@@ -134,6 +135,7 @@ impl EvidenceGrid {
     }
 
     pub(crate) fn grow_stale(&mut self, steps: u8) {
+        assert_eq!(self.looks.len(), self.ground.lattice.area());
         // Branch-free passes over a row vectorise.
         let is_over =
             |looks: u8| looks >= POINTED_ENOUGH && looks.saturating_sub(steps) < POINTED_ENOUGH;
@@ -156,6 +158,7 @@ impl EvidenceGrid {
 
     /// Weakens all evidence by `steps`, also of scanned ground.
     pub(crate) fn forget(&mut self, steps: i8) {
+        assert!((1..=sonar::MOST).contains(&steps));
         for cell in self.ground.lattice.whole().cells() {
             let weight = self.weight_of(self.ground.lattice.index(cell));
             if weight != 0 {
@@ -172,6 +175,9 @@ impl EvidenceGrid {
         let half_cell = lattice.resolution_m / 2.0;
         let half_diagonal = half_cell * SQRT_2;
         let band = sonar::BAND_M.max(half_cell * 1.2);
+        assert!(self.fits(&lattice) && seen.is_none_or(|seen| seen.fits(&lattice)));
+        assert!(beam.echo.is_none_or(|range| range >= 0.0));
+        assert!(!beam.axis.is_finite() || beam.axis.is_normalized());
         let model = &beam.sonar;
         let echo = beam.echo.filter(|range| *range <= reach);
         let passed_to = beam.echo.map_or(f64::INFINITY, |range| range - sonar::BEFORE_M);
@@ -184,6 +190,7 @@ impl EvidenceGrid {
         let near = half_diagonal / model.arc.sin();
         let outside = model.arc.tan() * (1.0 + 1e-9);
 
+        assert!(near > 0.0 && outside > 0.0, "the cone is narrower than a half turn");
         let mut arc = Vec::new();
         let mut explained = false;
         // All relevant cells lie within `near`, or in the widest cone's triangle.
@@ -250,6 +257,7 @@ impl EvidenceGrid {
             if under_the_robot || elsewhere || explained && !self.is_occupied(index) {
                 continue;
             }
+            assert!(off >= 0.0);
             self.side[index] = came_from;
             self.weigh(cell, (sonar::HIT - sonar::HIT * off.min(1.0)) as i8);
         }
@@ -262,6 +270,7 @@ impl EvidenceGrid {
             return false;
         };
         let lattice = self.ground.lattice;
+        assert!(self.fits(&lattice) && echo >= 0.0);
         lattice.around(beam.origin, echo + SAME_RANGE_M).cells().any(|cell| {
             let offset = lattice.centre_of(cell) - beam.origin;
             let off = || beam.axis.perp_dot(offset).atan2(beam.axis.dot(offset)).abs();
@@ -295,6 +304,8 @@ impl EvidenceGrid {
         let Ground { lattice, radius } = self.ground;
         let half_cell = lattice.resolution_m / 2.0;
         let Seen { clear_m, hit_m } = ray.seen;
+        assert!(clear_m >= 0.0 && hit_m.is_none_or(|hit_m| clear_m < hit_m));
+        assert!(self.fits(&lattice));
         let far = clear_m.max(hit_m.unwrap_or(0.0)) + half_cell;
         let aside = half_cell.max(SCANNED_ASIDE_M);
         let end = ray.origin + far * ray.axis;
@@ -328,6 +339,7 @@ impl EvidenceGrid {
     /// Adds `change`, positive for an obstacle, to a cell that a laser saw, and marks it scanned.
     pub(crate) fn weigh_seen(&mut self, cell: Cell, change: i8) {
         let index = self.ground.lattice.index(cell);
+        assert!(change.unsigned_abs() <= sonar::MOST.unsigned_abs());
         let was_occupied = self.is_occupied(index);
         let is_over = change == 0 || change < 0 && self.weight_of(index) == sonar::LEAST;
         let was_scanned = self.is_scanned(index);
@@ -348,6 +360,8 @@ impl EvidenceGrid {
 
     pub(crate) fn touch(&mut self, touch: &Touch) {
         let Ground { lattice, radius } = self.ground;
+        assert!(self.fits(&lattice));
+        assert!(touch.half_width > 0.0 && touch.half_width <= PI);
         let rim = radius - sonar::RIM_M..=radius + lattice.resolution_m;
         for cell in lattice.around(touch.robot, *rim.end()).cells() {
             let offset = lattice.centre_of(cell) - touch.robot;
@@ -364,6 +378,7 @@ impl EvidenceGrid {
 
     /// Clears scanned ground, and weights farther than `keep` metres from `robot`.
     pub(crate) fn reset(&mut self, robot: DVec2, keep: f64) {
+        assert!(keep >= 0.0);
         self.looks.fill(0);
         let lattice = self.ground.lattice;
         for cell in lattice.whole().cells() {

@@ -64,6 +64,7 @@ impl Evidential {
         let lasers = mission.lasers().into_iter().filter(|(_, laser)| laser.used);
         let lasers: Vec<_> = lasers.map(|(row, _)| row).collect();
         let [sonars, rays] = [SensorKind::Cone, SensorKind::Ray].map(|kind| mission.used(kind));
+        assert!(radius > 0.0 && reach > 0.0);
         let lattice = lattice(mission, reach);
         let under = |along| lattice.cell_at(grid.centre_of(Cell { col: along, row: along }));
         Self {
@@ -135,6 +136,9 @@ impl Evidential {
             impl Iterator<Item = Reading>,
         ),
     ) -> (Window, bool) {
+        assert!(rolled_m >= before_m || rolled_m.is_nan());
+        assert_eq!(map.others.len(), self.others());
+        assert_eq!(map.within_reach.len(), self.grid.area());
         let steps = (rolled_m / STEP_M).floor() - (before_m / STEP_M).floor();
         if steps >= 1.0 {
             let by_lasers = map.grids().take(1 + self.further_lasers());
@@ -199,10 +203,12 @@ impl Evidential {
     fn inflate(&self, within_reach: &mut [u16], flip: Flip) -> Window {
         let Self { grid, reach, .. } = *self;
         let centre = self.ground.lattice.centre_of(flip.cell);
+        let may_saturate = reach > 50.0 * self.ground.lattice.resolution_m;
         let mut window = Window::default();
         for cell in grid.around(centre, reach).cells() {
             if grid.centre_of(cell).distance(centre) <= reach {
                 let count = &mut within_reach[grid.index(cell)];
+                assert!(flip.occupied || *count > 0 || may_saturate);
                 let change = if flip.occupied { 1 } else { -1 };
                 *count = count.saturating_add_signed(change);
                 window = window.including(cell);
@@ -221,6 +227,7 @@ impl Evidential {
 
     pub(crate) fn state(&self, map: &EvidenceMap, cell: Cell, is_target: bool) -> CellState {
         let lattice = self.ground.lattice;
+        debug_assert!(cell.col < self.grid.cells && cell.row < self.grid.cells);
         let hazard = map.within_reach[self.grid.index(cell)] > 0 && !is_target;
         let under = |along: u32| self.under[along as usize];
         let under = under(cell.col).zip(under(cell.row)).map(|(col, row)| Cell { col, row });
@@ -239,6 +246,7 @@ impl Evidential {
         if window.area() == 0 {
             return window;
         }
+        assert!(self.ground.lattice.contains(window));
         let (grid, lattice) = (self.grid, self.ground.lattice);
         let last = Cell { col: window.col + window.width - 1, row: window.row + window.height - 1 };
         // A lattice cell acts up to half a cell of both grids beyond its centre.

@@ -73,6 +73,7 @@ impl EvidenceGrid {
     /// `seen`.
     pub(crate) fn take_scan(&mut self, fan: &Fan<'_>, robot: DVec2, seen: Option<&Self>) {
         let Ground { lattice, radius } = self.ground;
+        assert!(self.fits(&lattice) && seen.is_none_or(|seen| seen.fits(&lattice)));
         let Some(mut scan) = Scan::new(&lattice, fan) else {
             return;
         };
@@ -139,6 +140,7 @@ impl<'a> Scan<'a> {
     }
 
     fn pass(&mut self, near: f64, mark: u8) {
+        assert!(near >= 0.0 && self.fan.step_rad > 0.0);
         // Beyond this range, a cell may lie between two beams.
         let close = self.fan.step_rad.recip();
         let corner = |beam: &Beam| self.origin + (beam.range - near).clamp(0.0, close) * beam.along;
@@ -226,6 +228,7 @@ impl<'a> Scan<'a> {
 }
 
 fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
+    debug_assert!(corners.iter().all(|corner| corner.is_finite()));
     let last = f64::from(side) - 1.0;
     let mut crossings = vec![Vec::new(); side as usize];
     let before = corners.iter().skip(corners.len().saturating_sub(1)).chain(corners);
@@ -241,6 +244,7 @@ fn fill(side: u32, corners: &[DVec2], mut span: impl FnMut(u32, Range<u32>)) {
         }
     }
     for (row, crossings) in (0..).zip(&mut crossings) {
+        assert!(crossings.len().is_multiple_of(2), "the polygon is closed");
         crossings.sort_unstable_by(f64::total_cmp);
         for pair in crossings.chunks_exact(2) {
             let (from, to) = (pair[0].ceil().max(0.0), pair[1].floor().min(last));

@@ -144,6 +144,7 @@ impl Movers {
             let before = before.map(|(_, before)| before);
             self.follow(&things(&fan, before.as_ref(), at_s), &fan, at_s, laser);
         }
+        debug_assert!(scans.iter().is_sorted_by(|one, next| one.0 < next.0));
         let moves = self.moves(at_s);
         let mut beams = scan.beams.clone();
         if moves {
@@ -159,6 +160,7 @@ impl Movers {
         if is_next {
             self.scans.retain(|(then, ..)| at_s - then <= KEPT_S);
             self.scans.push_back((at_s, robot, scan.beams.clone()));
+            assert!((self.scans.len() as f64) < KEPT_S / APART_S + 2.0);
         }
         (beams, moves && !moved)
     }
@@ -173,6 +175,7 @@ impl Movers {
             age_s <= FORGOTTEN_S || age_s <= HIDDEN_S && track.is_hidden(fan, at_s)
         });
         let mut is_free = vec![true; things.len()];
+        debug_assert!(self.tracks.iter().all(|track| track.seen_s < at_s));
         for turns in [false, true] {
             let mut pairs = Vec::new();
             for (index, track) in self.tracks.iter().enumerate() {
@@ -194,6 +197,9 @@ impl Movers {
                 }
             }
         }
+        debug_assert!(
+            self.tracks.iter().filter(|track| track.seen_s == at_s).count() <= things.len()
+        );
         let new = things.iter().zip(is_free).filter(|(_, is_free)| *is_free);
         self.tracks.extend(new.map(|(thing, _)| Track::new(thing)));
         if self.tracks.iter().any(|track| track.is_mover) {
@@ -223,6 +229,7 @@ impl Movers {
     }
 
     pub(crate) fn fill(&self, header: &mut GridHeader) {
+        assert_eq!(header.mover_count, 0);
         for (mover, placed) in header.movers.iter_mut().zip(&self.placed) {
             *mover = *placed;
             header.mover_count += 1;
@@ -286,6 +293,7 @@ impl Track {
             *self = Self::new(thing);
             return;
         }
+        assert!(self.seen_s < thing.at_s);
         let (middle, doubt_m) = thing.middle(self);
         let off = middle - self.at(thing.at_s);
         let [place, both, velocity] = self.variance_at(thing.at_s);
@@ -297,9 +305,11 @@ impl Track {
         self.variance =
             [(1.0 - gain[0]) * place, (1.0 - gain[0]) * both, velocity - gain[1] * both];
         self.seen_s = thing.at_s;
+        assert!(!self.variance.iter().any(|variance| *variance < -1e-9));
         self.places += 1;
         self.came += NEWEST.max(1.0 / f64::from(self.places))
             * (f64::from(u8::from(thing.came)) - self.came);
+        assert!((0.0..=1.0).contains(&self.came));
         self.radius_m = thing.half_width_m.max(RADIUS_LEFT * self.radius_m);
         let deviation_m_s = self.variance[2].sqrt();
         // A reflection in glass appears where the laser is perpendicular to it and follows the
@@ -403,6 +413,7 @@ struct Difference {
 impl Difference {
     fn of(before: &Fan<'_>, end: DVec2) -> Self {
         let way = end - before.origin;
+        assert!(before.step_rad > 0.0);
         let bearing = wrap_angle(way.to_angle() - before.first_rad);
         let beam = (bearing.rem_euclid(TAU) / before.step_rad).round() as usize;
         let count = before.beams.len();

@@ -45,6 +45,7 @@ impl Rows {
         let is_scan = |laser: &&Sensor| laser.kind == SensorKind::Scan && !beams.is_empty();
         let laser = self.used(row).filter(is_scan)?;
         let (mount, (first, step_rad)) = (laser.mount.on(robot), laser.fan());
+        assert!(step_rad > 0.0 && laser.reach_m > 0.0);
         Some(Fan {
             origin: mount.position,
             first_rad: mount.heading + first,

@@ -112,6 +112,7 @@ impl Default for Scatter {
 
 impl Scatter {
     fn add(&mut self, off: DVec2, stated: f64) {
+        assert!(stated > 0.0);
         self.seen = self.seen * REMEMBERED + 0.5 * (off - self.off).length_squared();
         self.stated = self.stated * REMEMBERED + stated;
         self.off = off;
@@ -128,6 +129,7 @@ impl Scatter {
     /// Before the first measurement it is a match's ratio. Later, the scatter counts as one
     /// measurement of `variance`.
     fn scale_of_reference(&self, variance: f64) -> f64 {
+        assert!(variance > 0.0);
         if self.added_stated == 0.0 {
             return self.scale();
         }
@@ -161,6 +163,7 @@ impl ScanMatcher {
             None => (0, 1),
         };
         let fixes_hz = rate_hz / every_ticks.max(scans) as f64;
+        assert!(every_ticks > 0 && fixes_hz <= MOST_FIXES_HZ * (1.0 + 1e-9));
         Self { row, every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
     }
 
@@ -204,6 +207,7 @@ impl ScanMatcher {
         let start = (robot, first_gate_m);
         let found = held.matched(&fan, &seen_from, start);
         let (mut pose, matched, share) = found.unwrap_or((robot, DMat3::IDENTITY, 1.0));
+        assert!((0.0..=1.0).contains(&share));
         let variance = matched.x_axis.x + matched.y_axis.y;
         if found.is_some() {
             if let Some((before, is_laid)) = held.before.take()
@@ -300,6 +304,8 @@ impl Reference {
         (start, first_gate_m): (Pose2, f64),
     ) -> Option<(Pose2, DMat3, f64)> {
         let ends = fan.ends().collect::<Vec<_>>();
+        assert_eq!(self.lines.len(), self.beams.len());
+        assert_eq!(ends.len(), seen_from.beams.len());
         let seen: Vec<_> = (0..ends.len()).filter(|beam| ends[*beam].is_some()).collect();
         let every = seen.len().div_ceil(POINTS).max(1);
         let back = DVec2::from_angle(-start.heading);

@@ -70,6 +70,7 @@ impl Stage for Mapper {
             Change::Window(window) => Part::of(frame, window, version),
             Change::Whole => Part::whole(frame, version),
         };
+        assert!(frame.contains(part.window()));
         let (header, cells) = (self.header(part), &self.state().cells);
         out.publish_slice(&GRID, header, &frame.cells_of(part.window(), cells))?;
         Ok(Some(part))

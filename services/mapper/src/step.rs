@@ -107,6 +107,8 @@ fn paint(
     state: impl Fn(Cell, CellState) -> CellState,
 ) -> Window {
     let mut changed = Window::default();
+    assert!(frame.contains(window));
+    assert_eq!(cells.len(), frame.area());
     for cell in window.cells() {
         let held = &mut cells[frame.index(cell)];
         let state = state(cell, CellState::from_byte(*held)) as u8;
@@ -191,6 +193,7 @@ impl Mapper {
                 reference: None,
             },
         };
+        assert!(mapper.reach >= 0.0 && mapper.half_track > 0.0);
         mapper.mark_known();
         mapper
     }
@@ -392,6 +395,7 @@ impl Mapper {
         (ranges, scans): (&[RangeReading], &[Placed]),
         contact: Option<&ContactSample>,
     ) -> Window {
+        assert_ne!(self.belief.tick, Some(pose.stamp.tick), "a tick counts once");
         let (belief, robot) = (&mut self.belief, pose.pose());
         let before_m = belief.rolled;
         belief.tick = Some(pose.stamp.tick);

@@ -58,6 +58,7 @@ impl ActiveSensing {
         let (response, speed) = (mission.trusted_response(), mission.speed_m_s());
         let brakes_within_s = mission.brakes_within_s();
         let stops_m = response.way_to_stop_m(speed, brakes_within_s);
+        assert!(stops_m >= 0.0 && stops_m.is_finite());
         let (radius, outline) = (mission.body().radius_m, mission.outline());
         Self {
             radius,

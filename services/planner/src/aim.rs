@@ -40,6 +40,7 @@ pub(crate) fn cell_with_a_way_in(
 }
 
 fn is_free(frame: &GridFrame, cells: &[u8], cell: Cell) -> bool {
+    debug_assert_eq!(cells.len(), frame.area());
     !CellState::from_byte(cells[frame.index(cell)]).is_hazard()
 }
 
@@ -51,6 +52,7 @@ fn nearest(
 ) -> Option<Cell> {
     let distance = |cell: &Cell| frame.centre_of(*cell).distance(place);
     let others = around(frame, own, (reach_m / frame.resolution_m) as u32);
+    assert!(reach_m >= 0.0 && own.col < frame.cells && own.row < frame.cells);
     let own = Some(own).filter(|own| fits(*own));
     own.or_else(|| {
         others

@@ -60,6 +60,7 @@ impl Arcs {
     /// Returns the direction of the best arc, a unit vector, and its speed limit, m/s; 0 without a
     /// drivable arc.
     pub(crate) fn advise(&self, view: &View<'_>, pose: &Pose2, distance: f64) -> (DVec2, f64) {
+        assert!(distance >= 0.0 || distance.is_nan());
         let arcs = (-ARCS_A_SIDE..=ARCS_A_SIDE).map(|number| {
             let share = f64::from(number) / f64::from(ARCS_A_SIDE);
             Self::follow(view, pose, share * self.most_curvature, distance)
@@ -97,6 +98,7 @@ impl Arcs {
         // With s the sine of the angle to the direction, the turn rate is wd s and the speed vd (1
         // - s/2), less near the target.
         let speed = self.speed * (distance / self.slow_radius).min(1.0);
+        assert!(curvature.abs() <= self.most_curvature);
         let sine = curvature * speed / (self.turn + curvature.abs() * speed / 2.0);
         let angle = if sine.abs() < 1.0 { sine.asin() } else { FRAC_PI_2.copysign(sine) };
         DVec2::from_angle(angle).rotate(pose.axis())

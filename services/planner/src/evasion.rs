@@ -165,6 +165,7 @@ impl Evasion {
         let change_s = if is_free { -for_s } else { for_s };
         self.kept_s = (self.kept_s + change_s).clamp(0.0, PATIENCE_S);
         self.insists = self.kept_s >= PATIENCE_S || self.insists && self.kept_s > 0.0;
+        assert!(!self.insists || self.kept_s > 0.0);
         safe
     }
 
@@ -202,6 +203,7 @@ impl Evasion {
             ways = next.collect();
         }
         let open = ways.iter().filter(|way| way.rests || way.meets_s.is_infinite());
+        assert!(!ways.is_empty());
         let best = open.max_by(|one, other| score(one).total_cmp(&score(other)));
         best.map_or(STAND, |way| way.first)
     }
@@ -307,6 +309,7 @@ impl<'a> Scene<'a> {
     fn go(&self, way: Way, to: Advice, until_s: f64) -> Way {
         let motion = &self.evasion.motion;
         let dead_s = motion.dead_s();
+        assert!(until_s > 0.0);
         let mut way = Way { last: to, ..way };
         let until = (until_s / STEP_S).ceil() as u32;
         while way.steps < until {
@@ -371,6 +374,7 @@ impl<'a> Scene<'a> {
             }
             let near = ((doubt_m - gap_m) / NEAR_M).exp().min(MOST_DANGER);
             way.danger = way.danger.max(near * (-at_s / SOON_S).exp());
+            assert!((0.0..=MOST_DANGER).contains(&way.danger));
         }
     }
 }

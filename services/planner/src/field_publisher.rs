@@ -53,6 +53,7 @@ impl Worker {
             }
         };
         let cells = Arc::new(snapshot.cells_with(yields));
+        assert_eq!(cells.len(), frame.area());
         let changed = if self.before.len() == cells.len() {
             frame.changed_window(&self.before, &cells)
         } else {
@@ -96,6 +97,7 @@ impl FieldPublisher {
     }
 
     pub(crate) fn begin(&mut self, snapshot: Snapshot, at: Progress) {
+        assert!(!self.busy);
         self.busy = true;
         self.change_published = Some(at.time);
         self.thread.begin((snapshot, at));
@@ -126,6 +128,7 @@ impl FieldPublisher {
         let age = self.keyframe_published.map(|then| now.time.since(then));
         self.keyframe |= age.is_none_or(|age| age >= topics::FIELD.spec().restated_every());
         let frame = policy.as_ref()?.frame;
+        assert!(frame.contains(changed));
         if changed.area() > 0 {
             self.version += 1;
         } else if !self.keyframe {

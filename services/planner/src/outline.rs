@@ -117,6 +117,7 @@ struct Reached {
 impl Outline {
     pub(crate) fn new(mission: &Mission, footprint: &Footprint) -> Self {
         let (body, hurry) = (mission.body(), mission.hurry());
+        assert!(footprint.half_width_m() > 0.0 && footprint.half_width_m() <= body.radius_m + 1e-5);
         Self {
             points: footprint.outline(mission.grid_frame().resolution_m).collect(),
             half_width: footprint.half_width_m(),
@@ -203,6 +204,7 @@ impl Outline {
         let Planned { step: [way, turn], .. } = *self.plan.last()?;
         let run = self.plan.iter().rev().take_while(|it| it.step[0] == way);
         let room_m = run.clone().count() as f64 * WAY_M;
+        assert!(room_m > 0.0);
         let speed = self.response.speed_to_stop_within(room_m, self.brakes_within_s);
         let speed = speed.max(LEAST_SPEED_M_S);
         let fits = self.fits(view, pose);
@@ -312,9 +314,11 @@ impl Outline {
                 let mut index = index;
                 while index > 0 {
                     let Reached { pose, step, from, .. } = reached[index];
+                    assert!(from < index);
                     plan.push(Planned { pose, step });
                     index = from;
                 }
+                assert!(!plan.is_empty());
                 return Ok(plan);
             }
             for step in STEPS {
@@ -327,6 +331,7 @@ impl Outline {
                 let back = if way < 0.0 { 2.0 } else { 1.0 };
                 let cost_m = cost_m + back * way.abs() + TURN_COSTS_M * turn.abs();
                 let estimate_mm = 1e3 * (cost_m + end.position.distance(goal));
+                assert!(cost_m >= reached[index].cost_m);
                 open.push((Reverse(estimate_mm as u32), reached.len()));
                 reached.push(Reached { pose: end, from: index, step, cost_m });
             }

@@ -92,6 +92,7 @@ impl BySector {
         });
         let mut sorted: Vec<_> = beams.collect();
         sorted.sort_by_key(|(sector, beam)| (*sector, beam.may_echo));
+        assert!(sorted.last().is_none_or(|(sector, _)| *sector < SECTORS));
         Self {
             starts: std::array::from_fn(|start| sorted.partition_point(|it| it.0 < start)),
             beams: sorted.into_iter().map(|(_, beam)| beam).collect(),
@@ -123,6 +124,7 @@ impl Tally {
     ///
     /// Returns whether echoes can no longer outweigh the silences.
     fn is_decided_by(&mut self, reading: &Beam, distance: Option<f64>) -> bool {
+        assert!(self.left > 0 || !reading.may_echo, "each possible echo is counted");
         self.left -= usize::from(reading.may_echo);
         match distance {
             Some(distance) if distance <= reading.clear => self.silences += 1,
@@ -141,6 +143,7 @@ impl UndetectedSurfaces {
     /// Prepares the surfaces that the body could touch within `ahead_m` metres of `place`.
     pub(crate) fn new(belief: &GridHeader, radius: f64, place: DVec2, ahead_m: f64) -> Self {
         let reach = radius + MARGIN_M;
+        assert!(radius > 0.0 && ahead_m >= 0.0);
         Self {
             beams: BySector::new(belief.clear_beams(), place, ahead_m + reach),
             rays: belief.clear_rays().iter().map(Beam::from).collect(),
@@ -185,6 +188,7 @@ impl UndetectedSurfaces {
         let may_echo =
             |beams: &&[Beam]| beams.iter().rev().take_while(|beam| beam.may_echo).count();
         let left = beams.iter().chain(&[rays]).map(may_echo).sum();
+        debug_assert!(rays.is_sorted_by_key(|ray| ray.may_echo));
         let mut tally = Tally { silences: 0, echoes: 0, left };
         let mut beams = beams.iter().copied().flatten();
         beams.any(|beam| tally.is_decided_by(beam, self.answers_from(beam, at, normal)))

@@ -23,6 +23,7 @@ pub(crate) struct View<'a> {
 impl View<'_> {
     pub(crate) fn guidance(&self, at: DVec2) -> Guidance {
         let cells = self.frame.to_cells(at);
+        debug_assert_eq!(self.field.width(), self.frame.cells as usize);
         self.field.guidance(cells.x, cells.y)
     }
 
@@ -69,6 +70,7 @@ impl View<'_> {
     }
 
     pub(crate) fn is_refused(&self, cell: Cell) -> bool {
+        debug_assert!(self.refused.is_empty() || self.refused.len() == self.frame.area());
         self.refused.get(self.frame.index(cell)).is_some_and(|it| *it)
     }
 
@@ -86,6 +88,7 @@ impl View<'_> {
         radius: f64,
         step: usize,
     ) -> impl Iterator<Item = Cell> {
+        assert!(step > 0);
         let frame = self.frame;
         let last = f64::from(frame.cells) - 1.0;
         let inside = |corner: DVec2| corner.clamp(DVec2::ZERO, DVec2::splat(last));

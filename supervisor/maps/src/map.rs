@@ -25,6 +25,7 @@ impl Map {
     /// Blocks the rim like a mission's perimeter.
     pub(crate) fn new(cols: usize, rows: usize, free: impl Iterator<Item = bool>) -> Self {
         let mut blocked: Vec<bool> = free.map(|free| !free).collect();
+        assert_eq!(blocked.len(), cols * rows);
         for (row, line) in blocked.chunks_mut(cols.max(1)).enumerate() {
             if row == 0 || row + 1 == rows {
                 line.fill(true);
@@ -60,6 +61,7 @@ impl PlacedMap {
     /// down.
     pub fn boxes(&self, solid: &[bool], mut wanted: Vec<bool>) -> impl Iterator<Item = Box2> {
         let Map { cols, rows, .. } = self.map;
+        assert!(solid.len() == cols * rows && wanted.len() == solid.len());
         (0..wanted.len()).filter_map(move |first| {
             if !wanted[first] {
                 return None;

@@ -98,6 +98,7 @@ pub(super) struct Saved {
 pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
     let unwritable =
         |cause| MapError::of(file, format!("{cause}; give the name of a map to write"));
+    assert!(map.pixels.len().is_multiple_of(map.cols));
     let image = file.with_extension("pgm");
     let mut bytes = format!("P5\n{} {}\n255\n", map.cols, map.pixels.len() / map.cols).into_bytes();
     bytes.extend_from_slice(&map.pixels);

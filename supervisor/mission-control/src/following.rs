@@ -89,6 +89,7 @@ impl Following {
         match taken {
             Ok(heard) => {
                 (self.heard, self.is_lost) = (Some(heard), false);
+                assert!(heard.1.is_finite());
                 self.used += 1;
             }
             Err(refusal) => {
@@ -219,6 +220,7 @@ impl Around<'_> {
     fn nearest(&self, from: DVec2, distance_m: f64) -> Option<DVec2> {
         let start = self.start(from)?;
         let side = self.frame.cells as usize;
+        assert_eq!(self.cells.len(), self.frame.area());
         let mut costs = vec![u32::MAX; self.frame.area()];
         // A* heuristic: a lower bound to the circle around the beacon.
         let least_cost = |at: DVec2| {
@@ -232,6 +234,7 @@ impl Around<'_> {
             if cost > costs[index] {
                 continue;
             }
+            assert_eq!(cost, costs[index], "a cheaper way replaces the entry");
             let cell = Cell { col: (index % side) as u32, row: (index / side) as u32 };
             let at = self.frame.centre_of(cell);
             let off_m = at.distance(self.beacon);

@@ -40,6 +40,7 @@ pub(crate) fn push<T: Recorded>(record: &mut Vec<T>, tick: T) {
             }
         }
         thinned.extend_from_slice(newer);
+        assert!(thinned.len() <= record.len());
         *record = thinned;
     }
     record.push(tick);

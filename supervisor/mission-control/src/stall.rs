@@ -203,11 +203,13 @@ impl StallWatch {
     }
 
     const fn resets(&self) -> u64 {
+        assert!(self.skipped <= self.epoch);
         self.epoch - self.skipped
     }
 
     pub(crate) fn gave_up(&self) -> Option<&StallSample> {
         let is_last = |stall: &&StallSample| stall.recovery() == RecoveryStep::GiveUp;
+        assert!(self.settled <= self.stalls.len());
         self.stalls.iter().skip(self.settled).find(is_last)
     }
 
@@ -280,6 +282,7 @@ impl StallWatch {
 
     fn recover(&mut self, cause: StallCause, pose: &PoseSample) -> StallSample {
         let relocated = cause == StallCause::Relocated;
+        assert!(self.relocated + self.resets_before <= self.resets());
         let recovery = if self.may_replan(cause, pose.pose().position) {
             self.replans += 1;
             RecoveryStep::Replan
@@ -332,6 +335,7 @@ impl StallWatch {
         };
         let may = *replans < MOST_REPLANS;
         *replans += u32::from(may);
+        assert!(*replans <= MOST_REPLANS);
         may
     }
 

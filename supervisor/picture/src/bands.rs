@@ -198,6 +198,7 @@ impl Samples {
                 }
             }
         }
+        debug_assert!(next.iter().all(|to| *to == usize::MAX || next[*to] != usize::MAX));
         let mut path = Path::default();
         for start in 0..next.len() {
             let mut ring = Vec::new();
@@ -236,6 +237,7 @@ impl Samples {
         let from = crossing / 2;
         let to = from + if crossing.is_multiple_of(2) { 1 } else { self.across };
         let (a, b) = (self.values[from], self.values[to]);
+        debug_assert!((a >= level) != (b >= level), "the line crosses the level");
         let part = ((level - a) / (b - a)).clamp(0.0, 1.0);
         let middle = |at: usize| {
             let block = self.block as f64;

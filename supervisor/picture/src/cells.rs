@@ -76,6 +76,7 @@ impl<Kind: Copy + PartialEq> Blocks<'_, Kind> {
     /// Joins equal runs of neighbouring rows.
     pub(super) fn area(&self, kind: Kind) -> Path {
         let across = self.lattice.cols.div_ceil(self.side).max(1);
+        assert!(self.kinds.len().is_multiple_of(across));
         let mut path = Path::default();
         // First row of each unfinished run.
         let mut open = BTreeMap::new();

@@ -203,6 +203,7 @@ impl Tracer<'_> {
     fn followed(&self, seed: DVec2, sense: f64) -> Vec<DVec2> {
         // A step shorter than a cell cannot skip a wall.
         let step = (0.2 * self.spacing).min(0.9) * sense;
+        assert!(step.abs() > 0.0);
         let most = (3.0 * self.lattice.longest() as f64 / step.abs()) as usize;
         let mut points = Vec::new();
         let mut at = seed;

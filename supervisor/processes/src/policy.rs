@@ -162,6 +162,8 @@ impl Policy {
 
     pub fn step(&mut self, event: Event, now: Now) -> Option<Action> {
         let due = self.deadline().is_some_and(|deadline| now >= deadline);
+        let dies_often = self.deaths.max(self.recent.len()) >= HOLD_AFTER;
+        assert!(dies_often || self.phase != Phase::Held);
         match (self.phase, event) {
             (Phase::Down | Phase::BackingOff { .. }, Event::Start) => Some(self.start(now)),
             (Phase::BackingOff { .. }, Event::Time(_)) if due => Some(self.start(now)),
@@ -260,6 +262,7 @@ impl Policy {
     }
 
     fn abort(&mut self, stability: Stability, now: Now) -> Option<Action> {
+        assert!(matches!(self.phase, Phase::Starting { .. } | Phase::Running { .. }));
         let kill = now + ABORT_GRACE;
         self.phase = Phase::Aborted { stability, kill };
         Some(Action::Abort)
@@ -270,6 +273,7 @@ impl Policy {
         if let Phase::Aborted { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill } =
             &mut self.phase
         {
+            assert!(*kill <= now);
             *kill = now + ABORT_GRACE;
         }
     }
@@ -278,6 +282,7 @@ impl Policy {
     /// ready generation.
     fn record_blocked_start(&mut self, now: Now) -> Option<Action> {
         self.blocked_starts = self.blocked_starts.saturating_add(1);
+        assert!(matches!(self.phase, Phase::Starting { .. } | Phase::Aborted { .. }));
         let next = self.record_death(Stability::NeverReady, now);
         if self.blocked_starts == BLOCKED_STARTS && self.phase != Phase::Held {
             return Some(Action::RecreateBus);
@@ -303,8 +308,10 @@ impl Policy {
         if self.deaths == 1 {
             return Some(self.start(now));
         }
+        assert!((2..HOLD_AFTER).contains(&self.deaths));
         let doublings = (self.deaths - 2).min(10) as u32;
         let backoff = (FIRST_BACKOFF * 2_u32.pow(doublings)).min(LONGEST_BACKOFF);
+        assert!((FIRST_BACKOFF..=LONGEST_BACKOFF).contains(&backoff));
         self.phase = Phase::BackingOff { until: now + backoff };
         None
     }

@@ -50,6 +50,7 @@ impl Beliefs {
         if self.held.len() == MOST {
             drop_every_second(&mut self.held);
             self.apart_s *= 2.0;
+            assert!(self.held.len() < MOST);
         }
         self.end(time_s, target, header, cells);
     }

@@ -61,11 +61,13 @@ impl Measured {
 
     /// Returns the share of ticks without a sonar distance.
     pub(crate) fn unavailable(&self) -> Option<f64> {
+        assert!(self.unavailable <= self.ranges);
         share(self.unavailable as f64, self.ranges)
     }
 
     /// Returns the share of ticks with a reading below the mapping range.
     pub(crate) fn near(&self) -> Option<f64> {
+        assert!(self.near <= self.ranges);
         share(self.near as f64, self.ranges)
     }
 }

@@ -113,6 +113,7 @@ impl Grid {
     }
 
     fn index(&self, cell: IVec2) -> usize {
+        debug_assert!(cell.cmpge(IVec2::ZERO).all() && cell.cmplt(self.size).all());
         (cell.y * self.size.x + cell.x) as usize
     }
 
@@ -133,6 +134,7 @@ impl Grid {
         if let Some(last) = points.last_mut() {
             *last = target;
         }
+        assert!(!points.is_empty());
         let (mut length, mut at) = (0.0, 0);
         while at + 1 < points.len() {
             let farthest = (at + 1..points.len())

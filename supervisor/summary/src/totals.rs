@@ -27,6 +27,7 @@ impl<T: Copy + Default> Totals<T> {
             self.newest.pop_front();
         }
         self.newest.push_back((tick, add(totals)));
+        assert!(self.newest.len() <= MOST);
     }
 
     pub(crate) fn at(&self, tick: u64) -> T {

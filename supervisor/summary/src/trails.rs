@@ -52,6 +52,7 @@ impl Trail {
             self.apart_s *= 2.0;
         }
         self.places.push((at_s, mover.place()));
+        assert!(self.places.len() <= MOST_PLACES);
     }
 }
 
@@ -70,6 +71,7 @@ impl Trails {
                         self.0.remove(0);
                     }
                     self.0.push(Trail::begin(at_s, mover));
+                    assert!(self.0.len() <= MOST_WAYS);
                 }
             }
         }

@@ -29,6 +29,7 @@ impl Pose2 {
         // sin(h)/h, the chord over its arc, stable through h = 0.
         let half = turn / 2.0;
         let chord = if half.abs() < 1e-6 { 1.0 - half * half / 6.0 } else { half.sin() / half };
+        debug_assert!(chord <= 1.0 || chord.is_nan());
         Self {
             position: self.position + DVec2::from_angle(self.heading + half) * (arc * chord),
             heading: self.heading + turn,

@@ -97,6 +97,7 @@ impl Monitor for BaseResponse {
     fn observe(&mut self, what: &Observation<'_>, now: Moment) {
         match *what {
             Observation::Responds(response) => {
+                assert!(response.dead_time_s() >= 0.0 && response.acceleration_m_s2 > 0.0);
                 let stated_m = self.stops_within_m(self.stated);
                 let is_slower = is_longer(self.stops_within_m(response), stated_m);
                 if is_slower || !self.is_stated {

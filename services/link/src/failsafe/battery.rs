@@ -91,6 +91,10 @@ impl Batteries {
         for ((gauge, pack), (volts, limit)) in self.gauges.iter_mut().zip(PACKS).zip(readings) {
             let before = gauge.charge;
             let charge = gauge.read(volts, limit, now);
+            assert!(
+                before != Charge::Empty || charge == Charge::Empty,
+                "an empty pack stays empty"
+            );
             if charge != before {
                 self.changes.push(BatteryChange { pack, volts, charge });
             }

@@ -106,6 +106,7 @@ impl OtherCommander {
         if has_passed(began_ns, now_ns, WINDOW) {
             let stated = self.stated.min(self.most as f64);
             let away = stated - frames as f64;
+            assert!(stated >= 0.0);
             let is_shared = away > AWAY_SHARE * stated && (2 * late) as f64 <= away;
             if !is_shared {
                 self.shared = 0;

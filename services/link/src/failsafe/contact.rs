@@ -67,7 +67,9 @@ impl Contacts {
             return false;
         }
         self.held = Some((held, now));
+        assert_ne!(held, [false; 2]);
         let (bearing_rad, half_width_rad) = arc(held, asked);
+        assert!(bearing_rad.abs() <= 2.0 * PI && (0.0..=PI).contains(&half_width_rad));
         let [left, right] = held.map(u8::from);
         self.new = Some(ContactSample {
             bearing_rad,

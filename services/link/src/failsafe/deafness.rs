@@ -35,6 +35,7 @@ pub(super) struct Missing {
 
 impl Missing {
     pub(super) fn add(&mut self, more: f64, sure: f64) {
+        assert!(more >= 0.0 && sure > 0.0);
         let was_sure = self.sum >= sure;
         self.sum += more;
         self.spells += u32::from(!was_sure && self.sum >= sure);
@@ -95,6 +96,7 @@ impl Deafness {
     pub(super) fn went(&mut self, way_m: f64) {
         if self.hears {
             self.mean_ends += (self.ends - self.mean_ends) / MEAN_OF;
+            assert!(self.mean_ends >= 0.0);
             self.missing.end();
             (self.frames, self.way_m) = (0, 0.0);
         } else if self.answers {

@@ -49,6 +49,7 @@ impl LatencyMonitor {
         let machine = |mission: Duration| mission.div_f64(rate);
         self.limit = machine(self.command_limit).max(LEAST_LIMIT);
         self.window = self.limit + machine(WINDOW);
+        assert!(self.window >= self.limit && self.limit >= LEAST_LIMIT);
         self.again = machine(AGAIN);
     }
 

@@ -69,7 +69,9 @@ impl Echo {
             *share *= if of { factor } else { 1.0 };
         }
         let sum = self.share([true; PLACES]);
+        assert!(sum > 0.0);
         self.places.iter_mut().for_each(|(_, share)| *share /= sum);
+        debug_assert!((self.share([true; PLACES]) - 1.0).abs() < 1e-9);
     }
 }
 
@@ -201,6 +203,7 @@ fn hears(echoes: &mut Vec<Echo>, listener: Listener, range_m: f64, at_s: f64) {
                 echoes.remove(0);
             }
             echoes.push(listener.echo(range_m, at_s));
+            assert!(echoes.len() <= MOST);
         }
     }
 }
@@ -212,6 +215,7 @@ fn misses(echoes: &mut [Echo], listener: Listener) -> f64 {
         let must = echo.are(|place| listener.must_hear(place, echo.from, nearer_m));
         if echo.readings >= KNOWN {
             likely = likely.max(echo.share(must));
+            assert!(likely <= 1.0 + 1e-9);
         }
         echo.weigh(MISSED, must);
     }

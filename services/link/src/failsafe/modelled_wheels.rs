@@ -28,6 +28,7 @@ impl Axle {
         let turn = self.track_m.map(|track| response.turn_acceleration_rad_s2 * track / 2.0);
         // inf / inf is NaN.
         let apart = turn.filter(|turn| (turn / most - 1.0).abs() > AS_WHEELS);
+        assert!(most > 0.0 && self.counts_per_m > 0.0);
         let both = [most, apart.unwrap_or(most)];
         Limits { are_apart: apart.is_some(), most: both.map(|most| most * self.counts_per_m) }
     }
@@ -91,6 +92,7 @@ impl ModelledWheels {
     /// Returns pending commands; see [`ModelledSpeed::pending`].
     pub(crate) fn pending(&self) -> impl Iterator<Item = (f64, [f64; 2])> {
         let both = self.axes[0].pending().zip(self.axes[1].pending());
+        debug_assert_eq!(self.axes[0].pending().count(), self.axes[1].pending().count());
         both.map(|((at_s, one), (_, other))| (at_s, self.limits.wheels([one, other])))
     }
 }

@@ -116,6 +116,7 @@ struct Settles {
 
 impl From<Response> for Settles {
     fn from(Response { delay_s, lag_s, .. }: Response) -> Self {
+        assert!(delay_s >= 0.0 && lag_s >= 0.0);
         Self { settled_s: delay_s + 2.0 * lag_s + 0.02, turned_s: delay_s + 0.375 * lag_s }
     }
 }
@@ -255,6 +256,7 @@ impl Odometry {
     }
 
     fn adopt(&mut self, response: Response) {
+        assert!(response.dead_time_s() >= 0.0 && response.acceleration_m_s2 > 0.0);
         (self.response, self.found) = (response, Some(response));
         self.reached = ModelledWheels::new(self.axle, 0.0, &response);
         self.shares.adopt(response);
@@ -314,6 +316,7 @@ impl Odometry {
             let slows = (from_s, self.axle.limits(&self.response));
             let is_untold = self.fit.is_untold(speeds, slows, least);
             self.untold_s = (self.untold_s + if is_untold { gap_s } else { -gap_s }).max(0.0);
+            assert!(gap_s <= self.longest_gap.as_secs_f64());
         }
         self.look_for_contact(now);
         let suspected = |(evidence, _): &(&Evidence, Suspicion)| {
@@ -417,6 +420,7 @@ impl Odometry {
             self.jumps.pop_front();
         }
         let first = self.jumps.front().copied().unwrap_or(now);
+        assert!((1..=MOST_JUMPS).contains(&self.jumps.len()));
         if self.jumps.len() == MOST_JUMPS && now.since(first) <= JUMPS_WITHIN {
             self.suspicion.get_or_insert((Suspicion::Jumps, now));
         }

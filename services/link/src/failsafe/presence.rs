@@ -74,6 +74,7 @@ impl Presence {
     /// Registers a loss. Returns whether it is new.
     pub fn lose(&mut self, now_ns: u64) -> bool {
         let new = std::mem::replace(&mut self.connected, false);
+        assert!(!new || self.heard_ns.is_some() && self.lost_since_ns.is_none());
         if new {
             self.lost_since_ns = Some(now_ns);
             self.losses += 1;
@@ -103,6 +104,7 @@ impl Presence {
 
     pub fn absence(&self, now_ns: u64) -> Absence {
         if self.connected {
+            assert!(self.heard_ns.is_some() && self.lost_since_ns.is_none());
             return Absence::default();
         }
         Absence {

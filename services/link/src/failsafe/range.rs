@@ -86,6 +86,7 @@ impl Staying {
 
     fn motion(&self, readings: u32) -> f64 {
         let [_, way_m, turn_rad] = self.spread();
+        assert!(way_m >= 0.0 && turn_rad >= 0.0);
         if self.readings < readings { 0.0 } else { way_m / WAY_M + turn_rad / TURN_RAD }
     }
 }
@@ -144,6 +145,7 @@ impl Row {
             if let Some(one) = follow.reduce(|one, other| one || other) {
                 past.odd_share += (f64::from(u8::from(!one)) - past.odd_share) / SHARE_OF;
             }
+            assert!((0.0..=1.0).contains(&past.odd_share));
             past.newest = [past.newest[1], Some([range_m, way_m, heading])];
             let moved = if self.looks_ahead { [way_m, heading] } else { [0.0, spot] };
             for (staying, band_m) in past.staying.iter_mut().zip(BANDS_M) {

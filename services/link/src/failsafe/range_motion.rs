@@ -86,12 +86,14 @@ impl RangeMotion {
         }
         (self.latest, self.newest_s) = (latest, at_s);
         self.motion_s += passed_s;
+        assert!((APART_S[0]..=APART_S[1]).contains(&passed_s));
         let now_s = self.motion_s;
         self.better = self.better.map(|better| better * (-passed_s / FADE_S).exp());
         let is_old = |(then_s, _): &(f64, Hit)| now_s - then_s > MOST_AGE_S;
         while self.hits.len() > MOST_HITS || self.hits.front().is_some_and(is_old) {
             self.hits.pop_front();
         }
+        debug_assert!(self.hits.iter().is_sorted_by(|one, next| one.0 <= next.0));
         let older = self.hits.partition_point(|(then_s, _)| now_s - then_s >= LEAST_AGE_S);
         for reading in readings.iter().filter(|it| it.status() == RangeStatus::Measured) {
             let Some(sensor) = self.sensors.get(&reading.sensor) else { continue };

@@ -165,6 +165,7 @@ impl ResponseFit {
         let explained = self.weighed(|dead_time_s, limits, ways| {
             let explained = self.explained(limits, ways, suspected)?;
             let lag_s = stated.lag_s.min(dead_time_s);
+            assert!((0.0..=dead_time_s).contains(&lag_s));
             let found = self.axle.response(dead_time_s - lag_s, limits);
             Some((explained, Response { lag_s, ..found }))
         });
@@ -338,6 +339,7 @@ impl ResponseFit {
             let target = limits.axes(told)[axis];
             let rate = limits.most[axis].copysign(target - speed);
             let reached = (at + (target - speed) / rate).min(end);
+            assert!((at..=end).contains(&reached));
             course.push([at, way, speed, if reached > at { rate } else { 0.0 }]);
             let before = speed;
             speed = if reached < end { target } else { speed + rate * (end - at) };
@@ -385,6 +387,8 @@ impl ResponseFit {
     ) -> [[Motion; CHANNELS]; 2] {
         let mut all = [Motion::default(); CHANNELS];
         let mut judged_all = all;
+        assert_eq!(one.len(), other.len());
+        assert!(one.len() + 1 == self.turned.len() || one.is_empty());
         for ((&(until, turned), one), other) in self.turned.iter().skip(1).zip(one).zip(other) {
             let modelled = channels(limits.wheels([*one, *other]));
             for (channel, turned) in turned.map(channels).into_iter().flatten().enumerate() {

@@ -86,6 +86,7 @@ impl RestartWatch {
         };
         let share =
             self.share_of_reach(before, frame).max(self.share_of_driven(before, frame, speeds));
+        assert!(share >= 0.0);
         if frame.0.restarted_since(before.0) && (away || share > 1.0) {
             self.begin_at(frame);
             return Counts::Restarted { was_away };
@@ -118,6 +119,7 @@ impl RestartWatch {
     fn share_of_reach(&self, before: Frame, now: Frame) -> f64 {
         let (turned, gap_s) = since(before, now);
         let reach = self.top_counts * (gap_s + self.jitter_s);
+        assert!(reach > 0.0);
         let [left, right] = turned.map(f64::abs);
         left.max(right) / reach
     }

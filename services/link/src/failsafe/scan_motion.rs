@@ -58,6 +58,7 @@ impl Poses {
 }
 
 pub(super) fn best(delays_s: &[f64], better: &[f64], least: f64) -> Option<f64> {
+    assert_eq!(delays_s.len(), better.len());
     let better = delays_s.iter().zip(better);
     let (likely_s, better) = better.max_by(|(_, one), (_, other)| one.total_cmp(other))?;
     (*better > least).then_some(*likely_s)
@@ -122,6 +123,7 @@ impl ScanMotion {
     fn unlike(&self, (first, from): (&[f32], Pose2), (second, to): (&[f32], Pose2)) -> f64 {
         let [from, to] = [from, to].map(|robot| self.sensor.mount.on(robot));
         let (first_rad, step_rad) = self.sensor.fan();
+        assert!(step_rad > 0.0);
         let axis = from.axis();
         let differences = second.iter().enumerate().step_by((second.len() / BEAMS).max(1));
         let differences = differences.filter_map(|(beam, range)| {

@@ -98,9 +98,11 @@ impl StopMonitor {
             Duration::ZERO
         };
         if self.resting >= AT_REST_AFTER {
+            assert!(!moves);
             self.response = self.found.take().unwrap_or(self.response);
         }
         self.moves = moves;
+        assert!(!moves || self.resting.is_zero());
         let comes_to_rest = self.comes_to_rest();
         let due = |told: MissionTime| now.since(told).saturating_sub(gap) >= comes_to_rest;
         if !moves {
@@ -187,6 +189,7 @@ impl Monitor for StopMonitor {
     }
 
     fn condition(&self, _: Cause, _: Moment) -> Condition {
+        assert!(self.moving.is_zero() || self.resting.is_zero());
         if self.moving >= DOES_NOT_STOP_AFTER {
             Condition::Holds
         } else {

@@ -76,8 +76,10 @@ impl Streams {
             return Motor::Silent;
         }
         let mut sorted = [Duration::ZERO; INTERVALS];
+        assert!(self.intervals.len() <= INTERVALS);
         sorted.iter_mut().zip(&self.intervals).for_each(|(slot, interval)| *slot = *interval);
         sorted.sort_unstable();
+        const { assert!(SHORT_ONES < INTERVALS) };
         let interval = sorted[SHORT_ONES];
         match self.intervals.len() == INTERVALS && interval > self.limit {
             true => Motor::Slow(1.0 / interval.as_secs_f64()),

@@ -64,6 +64,7 @@ impl Touches {
     /// the robot also stops by it. Cars have no touch sensors.
     pub(crate) fn permitted(&self, command: &CommandSample, now: MissionTime) -> CommandSample {
         let CommandSample { left_rad_s: left, right_rad_s: right, .. } = *command;
+        assert_eq!(self.rows.len(), self.feel.len());
         let felt = self.rows.iter().zip(&self.feel).filter(|(_, feels)| **feels);
         let mut towards = felt.map(|(row, _)| (left + right) * row.bearing_deg.to_radians().cos());
         let turn = if self.stands(now) {

@@ -65,6 +65,7 @@ impl Sums {
         let (x, y) = (counted[0] * right / way_m, counted[1] * left / way_m);
         let left = LEFT_AFTER_A_METRE.powf(way_m);
         self.way_m = self.way_m * left + way_m;
+        assert!(way_m > 0.0 && left < 1.0);
         self.ticks = self.ticks * left + 1.0;
         self.line.add(left, x, y);
         self.change.add(left, change * x, y);
@@ -81,6 +82,7 @@ impl Sums {
                     true => alone,
                     false => (ratio, deviation),
                 };
+                assert!(deviation >= 0.0);
                 WheelRatio { ratio, deviation }
             }
             _ => WheelRatio::UNKNOWN,

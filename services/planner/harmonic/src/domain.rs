@@ -59,6 +59,7 @@ impl Domain {
             check_length(length / cell)?;
         }
         self.screening = screening.coefficient();
+        assert!(self.screening >= 0.0 && self.screening.is_finite());
         Ok(self)
     }
 
@@ -102,6 +103,7 @@ impl Domain {
             let index = self.index(change.cell);
             self.blocked[index] = change.blocked;
         }
+        assert!(!self.is_blocked(self.target));
         Ok(())
     }
 
@@ -160,6 +162,7 @@ impl Domain {
 
     /// Writes 0.25 / (1 + k) of each cell of a row.
     pub(crate) fn weights_of_row<R: Real>(&self, row: usize, into: &mut [R]) {
+        assert_eq!(into.len(), self.width);
         let width = self.width;
         match self.costs.get(row * width..(row + 1) * width) {
             Some(costs) => {
@@ -174,6 +177,7 @@ impl Domain {
     }
 
     pub(crate) fn index(&self, cell: Cell) -> usize {
+        debug_assert!(cell.col < self.width && cell.row < self.height);
         cell.row * self.width + cell.col
     }
 

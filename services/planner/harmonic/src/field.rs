@@ -21,6 +21,12 @@ pub struct Field {
 
 impl Field {
     pub(crate) fn new(domain: &Domain, store: Store, check: &Check, method: Method) -> Self {
+        assert!(check.holds() && check.reachable > 0);
+        assert_eq!(store.u(domain.index(domain.target())), Scaled::ONE);
+        debug_assert!(domain.blocked().iter().enumerate().all(|(index, is_blocked)| {
+            // The maximum principle: u is greatest at the target.
+            *is_blocked == (store.raw(index).0 < 0.0) && store.u(index) <= Scaled::ONE
+        }));
         Self {
             width: domain.width(),
             height: domain.height(),

@@ -106,6 +106,7 @@ impl Field {
         let (col, row) = (here.0 + side(offset[0]), here.1 + side(offset[1]));
         let [x, y] = [offset[0].abs(), offset[1].abs()];
 
+        assert!(x <= 0.5 && y <= 0.5);
         let free = |c: i64, r: i64| !self.u_at(c, r).is_zero();
         let beside = free(col, here.1);
         let below = free(here.0, row);
@@ -129,6 +130,7 @@ impl Field {
     /// Returns the central difference of u at `there`, which adjoins `here`, in units of u(here).
     fn central_difference(&self, here: (i64, i64), there: (i64, i64)) -> [f64; 2] {
         let own = self.u_at(there.0, there.1);
+        assert!(!own.is_zero(), "the cell is reachable");
         let u = |dc: i64, dr: i64| {
             let beside = self.u_at(there.0 + dc, there.1 + dr);
             beside.relative_to(own.exponent) / own.mantissa
@@ -144,6 +146,7 @@ impl Field {
     fn ratio(&self, here: (i64, i64), there: (i64, i64)) -> f64 {
         let step = |from: (i64, i64), to: (i64, i64)| {
             let own = self.u_at(from.0, from.1);
+            assert!(!own.is_zero());
             self.u_at(to.0, to.1).relative_to(own.exponent) / own.mantissa
         };
         if here == there {
@@ -192,6 +195,7 @@ impl Field {
                 [dc as f64 / length, dr as f64 / length]
             };
             let inward = allowed[0] * normal[0] + allowed[1] * normal[1];
+            debug_assert!((normal[0].hypot(normal[1]) - 1.0).abs() < 1e-9);
             if inward > 0.0 {
                 let share = inward * (1.0 - distance / WALL_REACH);
                 allowed = [allowed[0] - share * normal[0], allowed[1] - share * normal[1]];
@@ -204,6 +208,7 @@ impl Field {
     ///
     /// Two adjacent cells are convex together, so the straight way is free from anywhere in `here`.
     fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
+        debug_assert!(!self.u_at(here.0, here.1).is_zero());
         let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);
         unit([here.0 as f64 + dc - position[0], here.1 as f64 + dr - position[1]], 0.0)
     }

@@ -89,6 +89,7 @@ fn factor(
         cancellation.check()?;
         let cells = tree.cells(front);
         let own = front.own as usize;
+        assert!(own <= cells.len());
         for (at, &place) in cells.iter().enumerate() {
             slot[place as usize] = at as u32;
         }
@@ -97,6 +98,7 @@ fn factor(
             let boundary = tree.boundary(&tree.fronts[child]);
             slots.clear();
             slots.extend(boundary.iter().map(|&place| slot[place as usize]));
+            debug_assert!(!slots.contains(&NOWHERE), "the parent has the child's boundary");
             let update = std::mem::take(&mut left[child]);
             matrix.add_update(&slots, &update);
             spent.push(update);
@@ -115,6 +117,10 @@ fn factor(
         matrix.eliminate();
         for row in 0..own {
             let (pivot, rest) = matrix.row(row);
+            // The matrix is an M-matrix, so u is a mean of its neighbours with weights.
+            assert!(pivot > 0.0);
+            debug_assert!(rest.iter().all(|entry| *entry <= 0.0));
+            debug_assert!(-rest.iter().sum::<f64>() <= pivot * (1.0 + 1e-6));
             let scale = -1.0 / pivot;
             rows.extend(rest.iter().map(|&entry| entry * scale));
             lengths.push(rest.len() as u32);

@@ -119,6 +119,8 @@ impl<R: Real> Multigrid<R> {
         self.is_steep = false;
         let finest = &mut self.finest;
         let (grid, width) = (finest.grid, domain.width());
+        assert_eq!((grid.width, grid.height), (width, domain.height()));
+        assert!(rows.end <= grid.height);
         let mut inverse = vec![R::default(); 2 * grid.columns];
         self.simd.run(
             #[inline(always)]
@@ -137,6 +139,7 @@ impl<R: Real> Multigrid<R> {
     }
 
     fn set_up_levels(&mut self, rows: Range<usize>) {
+        assert_eq!(self.products.len(), self.coarse.len());
         let (first, products) = (&mut self.coarse[0], &mut self.products[0]);
         let mut rows = set_up_next(&mut self.finest, first, rows, products, self.simd);
         for level in 1..self.coarse.len() {
@@ -254,6 +257,7 @@ impl<R: Real> Multigrid<R> {
         cancellation: &Cancellation,
         mut after: impl FnMut(&mut Self, bool) -> Option<f64>,
     ) -> Result<(), SolveError> {
+        assert!(first_check <= most);
         let mut next_check = first_check;
         for cycle in 1..=most {
             cancellation.check()?;
@@ -293,6 +297,7 @@ impl<R: Real> Multigrid<R> {
     }
 
     fn visit(&mut self, level: usize) {
+        assert!(level < self.coarse.len());
         if level == self.coarse.len() - 1 {
             return self.coarsest.solve(&mut self.coarse[level]);
         }
@@ -356,6 +361,7 @@ impl<R: Real> Multigrid<R> {
         let grid = &self.finest.grid;
         let (plane, at) = grid.locate(target.col, target.row);
         let top = pow2(R::TOP);
+        assert!(target.col < grid.width && target.row < grid.height);
         let scale = R::of(top / self.finest.u[plane][at].wide());
         into.clear();
         into.resize(grid.width * grid.height, R::default());
@@ -386,6 +392,7 @@ fn set_up_next<R: Real>(
     simd: Simd,
 ) -> Range<usize> {
     let grid = fine.grid();
+    assert_eq!((next.grid.width, next.grid.height), (grid.columns, grid.rows));
     // One row more on either side than the cells have neighbours in.
     let coarse_rows = |more: usize| {
         (rows.start / 2).saturating_sub(more)..(rows.end / 2 + more + 1).min(grid.rows)

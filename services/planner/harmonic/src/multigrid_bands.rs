@@ -117,6 +117,7 @@ pub(crate) fn solve(
         let value = |at: Place| f64::from(values[here.index(at)]);
         let farthest = unknowns.places.iter().rposition(|&at| value(at) > CUT).unwrap_or(0);
         let reached = unknowns.starts.partition_point(|&start| start <= farthest);
+        assert!(reached <= unknowns.starts.len() && unknowns.starts.len() <= steps);
         if reached >= steps {
             steps *= 2;
             continue;
@@ -211,10 +212,12 @@ impl<'a> Bands<'a> {
             rows = (rows.0.min(row), rows.1.max(row + 1));
         }
         let fit = |(start, end): (usize, usize), most: usize| {
+            assert!(start < end && end <= most);
             let side = (end + 2 - start).next_multiple_of(SIDES).min(most);
             (start.saturating_sub(1).min(most - side), side)
         };
         let ((col, width), (row, height)) = (fit(cols, width), fit(rows, height));
+        assert!(col + width <= self.domain.width() && row + height <= self.domain.height());
         Rectangle { col, row, width, height }
     }
 
@@ -256,6 +259,7 @@ impl<'a> Bands<'a> {
             let value = value(at);
             if value > f32::KNOWN {
                 let (u, cell) = (Scaled::new(value, top - f32::TOP), self.index(at));
+                assert_eq!(self.mantissas[cell], 0.0, "a band resolves a cell once");
                 (self.mantissas[cell], self.exponents[cell]) = (u.mantissa, u.exponent);
                 self.edge.push(at);
             }
@@ -281,6 +285,7 @@ impl Rectangle {
     }
 
     fn index(self, at: Place) -> usize {
+        debug_assert!(self.contains(at));
         let Cell { col, row } = self.cell(at);
         row * self.width + col
     }

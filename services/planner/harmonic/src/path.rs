@@ -35,6 +35,10 @@ impl Field {
                 steps = if stays { steps + 1 } else { 0 };
             } else {
                 let [right, down] = self.steepest_ascent(cell.0, cell.1);
+                assert!(
+                    u(cell.0 + right, cell.1 + down) > u(cell.0, cell.1),
+                    "the field has no maximum"
+                );
                 cell = (cell.0 + right, cell.1 + down);
                 (at, steps) = ([cell.0 as f64, cell.1 as f64], 0);
             }

@@ -20,6 +20,7 @@ impl Field {
     /// Directions equal those of [`direction`](Self::direction) except for rounding.
     pub fn policy_of_row(&self, row: usize, mut each: impl FnMut(Policy)) {
         let width = self.width();
+        assert!(row < self.height());
         let inside = (1..self.height().saturating_sub(1)).contains(&row);
         match &self.store {
             Store::Single { values, exponent } if inside => {
@@ -42,6 +43,7 @@ impl Field {
         mut each: impl FnMut(Policy),
     ) {
         let width = self.width();
+        assert_eq!(values.len(), width * self.height());
         let rows = [row - 1, row, row + 1].map(|row| &values[row * width..(row + 1) * width]);
         for col in 0..width {
             each(self.of_cell(rows, exponent, Cell::new(col, row)));
@@ -70,6 +72,7 @@ impl Field {
         if !plain {
             return self.policy(cell);
         }
+        assert!(own > 0.0);
         let length = square.sqrt();
         Policy {
             direction: [gradient[0] / length, gradient[1] / length],

@@ -33,6 +33,7 @@ impl Scaled {
         let bits = value.to_bits();
         let own = ((bits >> 52) & 0x7ff) as i32 - 1023;
         let mantissa = f64::from_bits((bits & 0x000f_ffff_ffff_ffff) | (1023 << 52));
+        debug_assert!((1.0..2.0).contains(&mantissa));
         Self { mantissa, exponent: exponent.saturating_add(own) }
     }
 

@@ -297,6 +297,7 @@ where
             levels.finish();
             let mut values = Vec::new();
             levels.read(domain.target(), R::of(BLOCKED), &mut values);
+            assert_eq!(values.len(), domain.blocked().len());
             let store = Store::from(values);
             let check = task.check(&store);
             let mut excess = check.excess();

@@ -58,6 +58,7 @@ impl Store {
     /// Reads u of a range of cells in units of 2^`reference`; 0 if the result is below the range of
     /// `R`.
     pub(crate) fn read_row_as<R: Real>(&self, cells: Range<usize>, reference: i32, into: &mut [R]) {
+        assert_eq!(into.len(), cells.len());
         if let Self::Single { values, exponent } = self
             && *exponent == reference
         {
@@ -83,12 +84,14 @@ impl Store {
             mantissas.push(if blocked { BLOCKED } else { u.mantissa });
             exponents.push(u.exponent);
         }
+        assert_eq!(mantissas.len(), blocked.len());
         Self::narrowest(mantissas, exponents)
     }
 
     /// Stores mantissas, which may be 0 or [`BLOCKED`], with a common exponent if an `f64` holds
     /// all values.
     pub(crate) fn narrowest(mut mantissas: Vec<f64>, exponents: Vec<i32>) -> Self {
+        assert_eq!(mantissas.len(), exponents.len());
         let positive = mantissas.iter().zip(&exponents).filter(|(mantissa, _)| **mantissa > 0.0);
         if positive.map(|(_, &exponent)| exponent).min().is_none_or(|it| it < BOTTOM - TOP) {
             return Self::Extended { mantissas, exponents };

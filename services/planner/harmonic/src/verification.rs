@@ -156,7 +156,9 @@ fn check_rows<'f, R: Real, W: Window<R>>(
         || {
             let width = cells.weights.len();
             let mut found = Check::default();
+            assert!(strip.end * width <= raw.len());
             let mut tiles = Tiles::new(width);
+            assert!(strip.start.is_multiple_of(TILE));
             rows.take(strip.start.checked_sub(1).and_then(&row_of));
             rows.take(row_of(strip.start));
             for row in strip.clone() {

@@ -46,6 +46,7 @@ pub(super) fn substitute(
             in_extended_range(u, cells, here);
         }
     }
+    assert!(rows.is_empty() && lengths.is_empty());
     Ok(store(domain, pass, u, known))
 }
 

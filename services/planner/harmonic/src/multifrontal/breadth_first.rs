@@ -107,6 +107,10 @@ impl BreadthFirst {
                 }
             }
         }
+        assert!(order.len() <= known + free);
+        assert_eq!(levels.last().copied(), Some(order.len() as u32));
+        debug_assert!(levels.is_sorted());
+        debug_assert!((0..).zip(&order).all(|(at, cell)| place[*cell as usize] == at));
         Ok(Self { order, place, levels, width })
     }
 

@@ -20,6 +20,7 @@ pub(super) struct Matrix {
 
 impl Matrix {
     pub(super) fn reset(&mut self, size: usize, pivots: usize) {
+        assert!(pivots <= size);
         self.size = size;
         self.entries.clear();
         self.stride = size.next_multiple_of(BLOCK);
@@ -30,6 +31,7 @@ impl Matrix {
 
     /// Adds `value`; row and column may be swapped.
     pub(super) fn add(&mut self, row: usize, column: usize, value: f64) {
+        debug_assert!(row.max(column) < self.size);
         let (row, column) = (row.min(column), row.max(column));
         self.entries[row * self.stride + column] += value;
         if let Some(end) = self.ends.get_mut(row) {
@@ -38,6 +40,7 @@ impl Matrix {
     }
 
     pub(super) fn add_update(&mut self, slots: &[u32], update: &[f64]) {
+        assert_eq!(update.len(), slots.len() * (slots.len() + 1) / 2);
         let Some((&first, &last)) = slots.first().zip(slots.last()) else {
             return;
         };
@@ -87,6 +90,7 @@ impl Matrix {
 
     /// Eliminates the first rows by Gauss; the rest becomes the Schur complement.
     pub(super) fn eliminate(&mut self) {
+        debug_assert!(self.ends.iter().all(|end| *end <= self.size));
         for row in 1..self.ends.len() {
             self.ends[row] = self.ends[row].max(self.ends[row - 1]);
         }

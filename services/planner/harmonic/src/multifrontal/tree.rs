@@ -123,6 +123,8 @@ impl Tree {
             builder.add_stage(&outer, None, several, [OUTER, INNER]);
         }
         let mut tree = builder.tree;
+        let own = tree.fronts.iter().map(|front| front.own as usize).sum::<usize>();
+        assert_eq!(own, pass.unknown().len(), "each unknown cell has one front");
         tree.cost.bytes = tree.bytes(pass);
         budget.ask(tree.cost.bytes)?;
         budget.ask_operations(tree.cost.operations)?;
@@ -277,6 +279,7 @@ impl<'a> Builder<'a> {
             };
             let piece = self.pieces.piece[(first - stage.start) as usize] as usize;
             let front = &mut self.tree.fronts[child as usize];
+            assert!(!front.has_parent);
             front.has_parent = true;
             front.next_sibling = std::mem::replace(&mut self.pieces.first_child[piece], child);
         }
@@ -401,6 +404,7 @@ impl Pieces {
             self.members[*end as usize] = at;
             *end += 1;
         }
+        assert_eq!(self.ends.last().map_or(0, |end| *end as usize), len);
         self.first_child.clear();
         self.first_child.resize(self.ends.len(), NONE);
     }

@@ -21,6 +21,7 @@ impl Coarsest {
         let positions = (0..grid.height).flat_map(|row| (0..grid.width).map(move |col| (col, row)));
         self.cells.extend(positions.map(|(col, row)| grid.locate(col, row)));
         let n = self.cells.len();
+        assert!(n <= super::COARSEST_SIDE.pow(2));
         let mut matrix = vec![0.0; n * n];
         for (i, &(plane, at)) in self.cells.iter().enumerate() {
             let inverse = level.inverse[plane][at].wide();

@@ -26,6 +26,7 @@ pub(super) struct Source<R> {
 
 impl<R> Source<R> {
     pub(super) fn of(grid: &Grid, cell: Cell, value: R) -> Self {
+        assert!(cell.col < grid.width && cell.row < grid.height);
         let (plane, at) = grid.locate(cell.col, cell.row);
         Self { plane, row: cell.row / 2, at, value }
     }
@@ -78,6 +79,7 @@ impl<R: Real> Finest<R> {
         let Work { share, sweeps, descend, tolerance } = work;
         let (grid, strips, m) = (self.grid, self.grid.strips, MARGIN);
         let mut unsettled = 0;
+        debug_assert!(self.sources.is_sorted_by_key(|source| (source.plane, source.row)));
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.change_oo[..m + grid.stride].fill(R::default());
         scratch.residual_eo[..m + grid.stride].fill(R::default());

@@ -59,6 +59,7 @@ impl Grid {
         let stride = (columns + 1).next_multiple_of(8);
         let strip_rows = if rows * stride <= SMALL { rows } else { 1 };
         let strips = rows / strip_rows;
+        assert_eq!(strips * strip_rows, rows);
         Self { width, height, columns, rows, stride, strip_rows, strips }
     }
 

@@ -82,6 +82,7 @@ impl<R: Real> Cells<R> {
         let (here, west, east) = (&here[..n], &west[..n], &east[..n]);
         let (north, south, weights) = (&north[..n], &south[..n], &self.weights[..n]);
         let (residuals, slopes) = (&mut self.residuals[..n], &mut self.slopes[..n]);
+        assert_eq!(n, self.weights.len());
         let quarter = R::of(0.25);
         let larger = |a: R, b: R| if a > b { a } else { b };
         let (mut local_maxima, mut unreached, mut reachable) = (0_u32, 0_u32, 0_u32);
