@@ -82,6 +82,8 @@ fn the_response_of_a_stated_base_is_found_again() {
         assert!((found("acceleration_m_s2") / acceleration - 1.0).abs() < 0.15, "{said}");
         assert!(found("delay_s_sd") > 0.0 && found("acceleration_m_s2_sd") > 0.0, "{said}");
     }
+    let runs = printed(&["runs", "--runs", folder_name]);
+    assert_eq!(runs.matches(" completed ").count(), 2, "{runs}");
     assert_nothing_left("response");
 }
 

@@ -48,7 +48,7 @@ impl Footprint {
             return Err("the robot's origin, between its wheels, must lie at least 0.01 m inside");
         }
         assert!(footprint.inscribed_m() <= footprint.circumscribed_m() + 1e-9);
-        assert!(footprint.half_width_m() >= footprint.inscribed_m() - 1e-9);
+        assert!(footprint.half_widths_m()[0] >= footprint.inscribed_m() - 1e-9);
         Ok(footprint)
     }
 
@@ -68,10 +68,14 @@ impl Footprint {
         -self.sides().map(|(from, out)| -out.dot(from)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Returns the smaller of the extents to the left and to the right of x.
-    pub fn half_width_m(&self) -> f64 {
-        let aside = |side: f64| self.corners().iter().map(move |at| side * at.y);
-        aside(1.0).fold(0.0, f64::max).min(aside(-1.0).fold(0.0, f64::max))
+    /// Returns the smaller and the larger of the extents to the left and to the right of x.
+    ///
+    /// Obstacles grow by the smaller, so that no passage in which the body fits closes; the planner
+    /// then checks the outline itself. The body sweeps ground up to the larger.
+    pub fn half_widths_m(&self) -> [f64; 2] {
+        let aside = |side: f64| self.corners().iter().map(|at| side * at.y).fold(0.0, f64::max);
+        let [left, right] = [1.0, -1.0].map(aside);
+        [left.min(right), left.max(right)]
     }
 
     /// Returns points of the outline at most `step_m` apart.
@@ -173,6 +177,9 @@ mod tests {
         let mut corners = LONG.corners().to_vec();
         assert_eq!(Footprint::new(&corners), Ok(*LONG));
         assert!((LONG.inscribed_m() - 0.1).abs() < 1e-12);
+        assert_eq!(LONG.half_widths_m(), [0.1, 0.1]);
+        let aside = [[-0.2, -0.3], [0.3, -0.3], [0.3, 0.1], [-0.2, 0.1]].map(DVec2::from);
+        assert_eq!(Footprint::new(&aside).map(|it| it.half_widths_m()), Ok([0.1, 0.3]));
         assert!((LONG.circumscribed_m() - 0.1_f64.hypot(0.3)).abs() < 1e-12);
         corners.reverse();
         assert!(Footprint::new(&corners).is_ok());

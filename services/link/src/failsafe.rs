@@ -159,7 +159,7 @@ rules! {
     InfraredSilent, Slow, streams, WithCondition, None,
         "one infrared ranger has given no valid reading for three times `robot.command_limit_s`; `link.log` names it. It looks to the side or back, or into the cone of a sonar that the mission uses";
     BaseSlow, Slow, base, WithCondition, None,
-        "the wheels show that the base answers later or accelerates more slowly than `robot.response` states; `link.log` gives the values. This ends when planner and controller use the found response. With the paper's method or an external planner it ends with the next mission";
+        "the wheels show that the base answers later or accelerates more slowly than `robot.response` states; `link.log` gives the values. The robot goes slowly until planner and controller use the measured response. With the paper's method or an external planner, it goes slowly to the end of the mission";
     BatteryLow, Slow, battery, WithCondition, None,
         "the boards' or the motors' battery falls below its `robot.low_battery_v`, until it exceeds that by 0.3 V";
 }

@@ -58,7 +58,7 @@ impl Evidential {
         let disc = mission.body().radius_m;
         let [body, radius] = mission
             .outline()
-            .map_or([disc; 2], |outline| [outline.half_width_m(), outline.inscribed_m()]);
+            .map_or([disc; 2], |outline| [outline.half_widths_m()[0], outline.inscribed_m()]);
         // A position is up to half a cell off the cell's centre.
         let reach = body + mission.mapper.clearance_m + grid.resolution_m / 2.0;
         let lasers = mission.lasers().into_iter().filter(|(_, laser)| laser.used);

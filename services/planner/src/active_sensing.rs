@@ -62,7 +62,7 @@ impl ActiveSensing {
         let (radius, outline) = (mission.body().radius_m, mission.outline());
         Self {
             radius,
-            ground_m: outline.map_or(radius, |it| it.half_width_m()),
+            ground_m: outline.map_or(radius, |it| it.half_widths_m()[1]),
             outline: outline.map(|it| Outline::new(mission, &it)),
             speed,
             turn: mission.turn_rad_s(),

@@ -125,7 +125,7 @@ impl Evasion {
     /// Returns `None` for a robot that cannot detect movers or turn on the spot.
     pub(crate) fn new(mission: &Mission) -> Option<Self> {
         let body = mission.body();
-        let half_width = mission.outline().map_or(body.radius_m, |it| it.half_width_m());
+        let half_width = mission.outline().map_or(body.radius_m, |it| it.half_widths_m()[0]);
         let lags = (mission.speed_m_s() / FADED_M_S).ln() - 1.0;
         (mission.looks_first() && mission.used(SensorKind::Scan) > 0).then(|| Self {
             radius: body.radius_m,

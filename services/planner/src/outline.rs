@@ -117,10 +117,11 @@ struct Reached {
 impl Outline {
     pub(crate) fn new(mission: &Mission, footprint: &Footprint) -> Self {
         let (body, hurry) = (mission.body(), mission.hurry());
-        assert!(footprint.half_width_m() > 0.0 && footprint.half_width_m() <= body.radius_m + 1e-5);
+        let [smaller, larger] = footprint.half_widths_m();
+        assert!(smaller > 0.0 && larger <= body.radius_m + 1e-5);
         Self {
             points: footprint.outline(mission.grid_frame().resolution_m).collect(),
-            half_width: footprint.half_width_m(),
+            half_width: footprint.half_widths_m()[0],
             covers: body.radius_m,
             speed: mission.speed_m_s().min(NARROW_M_S),
             turn: mission.turn_rad_s(),

@@ -138,9 +138,17 @@ impl Seen {
         let battery = battery_v.map_or(String::new(), |volts| {
             format!("# - battery: {volts:.1} V; robot.low_battery_v, by default 6.6, says when it is low\n")
         });
+        let unasked = match self.protocol {
+            Protocol::Ros2 => {
+                "ROS 2; MEASURE on the robot: `echo $ROS_DOMAIN_ID` is the number in address (nothing: 0), `ros2 topic hz /odom` and `/scan` are rate_hz here and in the sensor's row"
+            }
+            _ => {
+                "an RPLIDAR with its own serial line; `firsthand help arduino-robot` has its row; MEASURE its scan rate with `firsthand topic hz scan`, the row's rate_hz"
+            }
+        };
         let words = &self.words;
         let mut text = format!(
-            "# Written by `firsthand init`. MEASURE and PLACEHOLDER mark what the robot at {address:?} cannot say: correct these lines.\n# - protocol: {name}\n# - reports of motion: {ticks_hz:.1} a second (0: only when it is asked)\n# - words or sensors that were heard: {words:?}\n{battery}target = [2.0, 0.0]              # PLACEHOLDER: metres ahead of where it starts, and to its left\ncontroller.speed_m_s = 0.25\n\n[perimeter]                      # PLACEHOLDER: the square that it does not leave\nwidth_m = 6.0\ncentre = [1.0, 0.0]\n\n[robot]\nprotocol = \"{name}\"\naddress = {address:?}\nrate_hz = {rate_hz:.1}                   # reports a second\n{gyro}{keys}"
+            "# Written by `firsthand init`. MEASURE and PLACEHOLDER mark what the robot at {address:?} cannot say: correct these lines.\n# - protocol: {name}\n# - reports of motion: {ticks_hz:.1} a second (0: only when it is asked)\n# - words or sensors that were heard: {words:?}\n# - not asked: {unasked}\n{battery}target = [2.0, 0.0]              # PLACEHOLDER: metres ahead of where it starts, and to its left\ncontroller.speed_m_s = 0.25\n\n[perimeter]                      # PLACEHOLDER: the square that it does not leave\nwidth_m = 6.0\ncentre = [1.0, 0.0]\n\n[robot]\nprotocol = \"{name}\"\naddress = {address:?}\nrate_hz = {rate_hz:.1}                   # reports a second\n{gyro}{keys}"
         );
         let mut row = |of: &str, name: &str, keys: &str| {
             text += &format!("\n[[robot.{of}]]\nname = {name:?}\n{keys}");

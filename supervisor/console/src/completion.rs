@@ -62,8 +62,8 @@ fn completer(argument: &Arg, pages: fn() -> Vec<String>) -> Option<ArgValueCompl
     let robot = ValueParser::new(|name: &str| name.parse::<RobotName>()).type_id();
     if argument.get_value_parser().type_id() == robot {
         return Some(named(|| {
-            let robots = robots::own().into_iter();
-            robots.map(|robot| robot.name.to_string()).collect()
+            let (running, killed) = robots::own();
+            running.iter().chain(&killed).map(|robot| robot.name.to_string()).collect()
         }));
     }
     Some(match argument.get_id().as_str() {

@@ -153,8 +153,7 @@ fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
     if let Some(user) = users.find(|user| *user != own) {
         return Some(format!("robot {robot} of user {user} runs here; its owner may stop it"));
     }
-    let running = robots::own().into_iter().filter(|robot| robot.supervisor.is_some());
-    let names: Vec<_> = running.map(|robot| robot.name.to_string()).collect();
+    let names: Vec<_> = robots::own().0.iter().map(|robot| robot.name.to_string()).collect();
     (!names.is_empty()).then(|| format!("{error}; these run here: {}", names.join(", ")))
 }
 

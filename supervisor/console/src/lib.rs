@@ -1,5 +1,6 @@
 //! Command line code that all executables share.
 
+pub mod addresses;
 pub mod completion;
 pub mod consent;
 pub mod executable;

@@ -26,19 +26,17 @@ impl Robot {
     }
 }
 
-/// Returns this user's robots by name, including those with a killed supervisor.
-pub fn own() -> Vec<Robot> {
+/// Returns this user's robots by name: those that run, and those whose supervisor was killed. The
+/// files of the latter remain until their next run.
+pub fn own() -> (Vec<Robot>, Vec<Robot>) {
     // All robots of a user share one directory.
-    let Ok(any) = "any".parse() else {
-        return Vec::new();
-    };
-    let domain = Domain::of(any);
-    let mut robots: Vec<_> = domain.directory().parent().map_or(Vec::new(), |directory| {
-        let names = entries(directory).filter_map(|entry| entry.file_name().to_str()?.parse().ok());
-        names.map(Robot::find).collect()
-    });
-    robots.sort_by(|one, other| one.name.cmp(&other.name));
-    robots
+    let any = "any".parse().ok().map(Domain::of);
+    let shared = any.as_ref().and_then(|any| any.directory().parent());
+    let entries = shared.into_iter().flat_map(entries);
+    let names = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<RobotName>().ok());
+    let mut names: Vec<_> = names.collect();
+    names.sort();
+    names.into_iter().map(Robot::find).partition(|robot| robot.supervisor.is_some())
 }
 
 /// Returns the readable entries of `directory`.

@@ -43,6 +43,11 @@ impl Stream {
         self.ended
     }
 
+    /// Waits for [`LOOK_EVERY`], or for a signal.
+    pub fn pause(&self) -> io::Result<bool> {
+        poll::is_readable(&self.signals, LOOK_EVERY)
+    }
+
     /// Drops the rest if the command must end.
     pub fn write(&mut self, text: &str) -> io::Result<()> {
         let mut stdout = io::stdout();

@@ -41,7 +41,7 @@ pub(crate) struct BusEndpoints {
     /// Id and answer of the newest request; id 0 before the first.
     pub last_request: (u64, RequestAnswer),
     published: Option<Instant>,
-    /// A reader of `complaints` is new since the last publication.
+    /// A consumer is new since the last publication.
     pub misses_trouble: bool,
     // The bus is dropped last.
     pub bus: Rc<Bus>,
@@ -93,10 +93,9 @@ impl BusEndpoints {
     /// Returns whether the last publication is a `period` old, or a new consumer waits for a
     /// roster or the newest trouble.
     pub(crate) fn is_due(&mut self, period: Duration) -> bool {
-        let old = self.published.is_none_or(|last| last.elapsed() >= period);
-        // A consumer opens one reader after the other.
-        self.misses_trouble |= self.complaints.has_new_reader();
-        self.roster.has_new_reader() || self.misses_trouble || old
+        // A consumer opens the roster last.
+        self.misses_trouble |= self.roster.has_new_reader();
+        self.misses_trouble || self.published.is_none_or(|last| last.elapsed() >= period)
     }
 
     pub(crate) fn publish_state(

@@ -19,7 +19,8 @@ macro_rules! samples {
         #[derive(Clone, Debug, PartialEq)]
         pub enum Sample { $($name($($part),+)),* }
 
-        /// Topics to read. A link sample ends a tick, so the link comes last.
+        /// Topics to read. A link sample ends a tick, so the link follows the tick's topics. The
+        /// supervisor repeats trouble to a new reader of the roster, so the roster comes last.
         pub static TOPICS: &[&dyn AnyTopic] = &[$(&topics::$topic),*];
 
         impl Sample {
@@ -55,7 +56,6 @@ samples! {
     Grid(GridHeader, Vec<u8>): GRID by slice,
     Field(FieldHeader, Vec<FieldCell>): FIELD by slice,
     Mirror(MirrorSample): MIRROR by one,
-    Roster(RosterHeader, Vec<RosterEntry>): ROSTER by slice,
     Death(DeathSample): DEATHS by one,
     Directive(DirectiveSample): DIRECTIVE by one,
     Stall(StallSample): STALLS by one,
@@ -63,6 +63,7 @@ samples! {
     Fault(FaultSample): FAULTS by one,
     Complaint(ComplaintSample): COMPLAINTS by one,
     Link(LinkSample): LINK by one,
+    Roster(RosterHeader, Vec<RosterEntry>): ROSTER by slice,
 }
 
 struct OneTopic {

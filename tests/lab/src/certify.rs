@@ -19,6 +19,7 @@ use crate::{
 /// Test robots with signals and faults, and write attempts and failures to a page, with 95 %
 /// bounds.
 #[derive(Debug, Args)]
+#[command(override_usage = "firsthand-lab certify [OPTIONS]")]
 pub struct Arguments {
     /// Directory of the page and of `rows.csv`, which is appended to.
     #[arg(long, default_value = "certificate")]

@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Write a NumPy array with the fields of u (mantissa, exponent) and the guidance (ex, ey).
     #[arg(long, value_name = "F.npy")]
     out: Option<PathBuf>,
-    /// Draw level sets of log u and lines of the guidance.
+    /// Draw level sets of log u, u the potential, and lines of the guidance.
     #[arg(long, value_name = "F.svg")]
     picture: Option<PathBuf>,
     /// Print only one line of JSON, at the end, on standard output.

@@ -35,7 +35,7 @@ fn the_words_of_a_json_robot_become_a_mission_with_its_sensors_and_its_rate() {
     assert_eq!((mission.robot.rate_hz, mission.robot.gyro()), (20.0, true));
     assert_eq!(mission.lasers()[0].1.beams, 3);
     let text = seen.mission_at(ADDRESS);
-    for told in ["20.0 a second", "12.4 V", "\"heard\"", "MEASURE", "PLACEHOLDER"] {
+    for told in ["20.0 a second", "12.4 V", "\"heard\"", "RPLIDAR", "PLACEHOLDER"] {
         assert!(text.contains(told), "{told}: {text}");
     }
 }
@@ -49,8 +49,10 @@ fn a_robot_that_only_answers_or_says_nothing_of_sensors_has_a_valid_mission() {
         let seen = Seen::new(protocol).unwrap();
         assert!(!seen.is_known());
         let address = if protocol == Protocol::Ros2 { "ros2:7" } else { ADDRESS };
-        let mission = Mission::parse(&seen.mission_at(address), Path::new("m.toml")).unwrap();
+        let text = seen.mission_at(address);
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
         assert_eq!(mission.robot.protocol(), protocol);
+        assert_eq!(text.contains("ROS_DOMAIN_ID"), protocol == Protocol::Ros2);
     }
 }
 

@@ -73,7 +73,7 @@ pub fn main(arguments: &Arguments) -> Result {
         )?;
     }
     let Carried { directory, .. } = arguments.setting.carry_out(&mission, "bring-up")?;
-    let trace = Trace::read(&named, &Recording::open(&directory.join("recording.mcap"))?)?;
+    let trace = Trace::read(&named, &Recording::open(&directory)?)?;
     let (found, seen) = findings(&named, &trace, arguments.lifted);
     let picture = directory.join("bring-up.svg");
     fs::write(&picture, points_svg(TITLE, DESCRIPTION, &seen))
@@ -98,7 +98,7 @@ pub fn main(arguments: &Arguments) -> Result {
     {
         let text = written::with_keys(&Mission::read(file.as_ref())?, &keys)?;
         replace(file.as_ref(), text).map_err(FileError::of("write", file.as_ref()))?;
-        say(format_args!("{} keys were written to {file}", keys.len()));
+        say(format_args!("keys written to {file}: {}", keys.len()));
     }
     judged(&found)
 }

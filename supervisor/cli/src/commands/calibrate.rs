@@ -26,7 +26,7 @@ use console::{
 ///
 /// Put the robot 0.5 to 2 m in front of the middle of a flat wall 3 m wide. It faces the wall, with
 /// 3 m of free floor behind it. The robot drives loops until the values are precise enough.
-/// `calibrate` writes them to a file. A mission names the file as robot.calibration.
+/// `calibrate` writes the values to a file. A mission names the file as robot.calibration.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Mission whose robot to calibrate.

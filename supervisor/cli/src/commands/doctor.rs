@@ -11,7 +11,13 @@ use std::{
 
 use clap::Args;
 use common::{VERSION, clock::monotonic_ns, domain::Domain};
-use console::{failure::Result, missions, output::print_line, robots};
+use console::{
+    addresses,
+    failure::Result,
+    missions,
+    output::print_line,
+    robots::{self, Robot},
+};
 use processes::{DomainError, domain, executable};
 use rustix::{
     fs::{Access, access},
@@ -53,9 +59,8 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     for (part, found) in domain::check_machine(&Domain::of("any".parse()?), cells) {
         tell(part, needed(found))?;
     }
-    for (viewer, number) in [("page", 8080), ("foxglove", 8765)] {
-        let is_free = TcpListener::bind(("127.0.0.1", number)).is_ok();
-        tell(&format!("port {number}"), port(viewer, is_free))?;
+    for (viewer, address) in [("page", addresses::PAGE), ("foxglove", addresses::FOXGLOVE)] {
+        tell(address, port(viewer, TcpListener::bind(address).is_ok()))?;
     }
     for entry in fs::read_dir("/dev")?.flatten() {
         let name = entry.path().display().to_string();
@@ -73,8 +78,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         let version_of = path.and_then(|path| printed(Command::new(path).arg("--version")));
         tell(name, version(version_of.as_deref()))?;
     }
-    let own = robots::own().into_iter().filter(|robot| robot.supervisor.is_none());
-    tell("other robots", others(own.count(), &robots::other_users()))?;
+    tell("other robots", others(&robots::own().1, &robots::other_users()))?;
     let (now_s, went_s) = clocks_s();
     let timesync = Path::new("/run/systemd/timesync");
     let is_synchronised = timesync.exists().then(|| timesync.join("synchronized").exists());
@@ -151,15 +155,16 @@ fn version(printed: Option<&str>) -> Verdict {
     }
 }
 
-/// Takes the number of killed supervisors' robots, and other users with robots.
-fn others(killed: usize, users: &[u32]) -> Verdict {
-    if killed == 0 && users.is_empty() {
+/// Takes the robots of killed supervisors, and other users with robots.
+pub fn others(killed: &[Robot], users: &[u32]) -> Verdict {
+    let killed: Vec<_> = killed.iter().map(|robot| robot.name.to_string()).collect();
+    if killed.is_empty() && users.is_empty() {
         return ("ok", "no killed run, no other user's robot".to_owned());
     }
     (
         "note",
         format!(
-            "killed runs: {killed}, cleared by the next run of the same robot; other users with robots: {users:?}, listed by `sudo -u '#USER' firsthand status --all`"
+            "robots with a killed supervisor: {killed:?}, cleared by their next `firsthand run`; users with other robots: {users:?}, listed by `sudo -u '#USER' firsthand status --all`"
         ),
     )
 }
@@ -187,9 +192,9 @@ mod tests {
             (version(Some(&own)), "ok", VERSION),
             (version(Some("firsthand-page 0.0.9")), "problem", "0.0.9"),
             (version(Some("")), "problem", "install both"),
-            (others(0, &[]), "ok", "no killed run"),
-            (others(2, &[]), "note", "killed runs: 2"),
-            (others(0, &[1000]), "note", "1000"),
+            (others(&[], &[]), "ok", "no killed run"),
+            (others(&[Robot::find("x80".parse().unwrap())], &[]), "note", "[\"x80\"], cleared by"),
+            (others(&[], &[1000]), "note", "1000"),
         ] {
             assert_eq!(verdict, expected, "{text}");
             assert!(text.contains(says), "{says}: {text}");

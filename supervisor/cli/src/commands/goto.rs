@@ -1,6 +1,6 @@
 mod follow;
 
-use std::{path::Path, process::ExitCode, thread, time::Duration};
+use std::{path::Path, process::ExitCode, thread};
 
 use clap::Args;
 use common::{domain::RobotName, samples::TargetPoint};
@@ -11,10 +11,8 @@ use console::{
     output::print_line,
     robots::Robot,
     runs::{Results, Target},
+    stream::LOOK_EVERY,
 };
-
-/// Interval of checks for the result of a target.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Send a driving robot to one or more other targets.
 ///

@@ -29,18 +29,21 @@ use serde::{
 /// For each of three protocols.
 const LISTENS: Duration = Duration::from_secs(4);
 
-/// Write a mission file for the robot that answers at ADDRESS: its protocol, sensors and rates. The robot is asked, and never moved.
+/// Write a mission file for the robot that answers at ADDRESS: its protocol, sensors and rates. The
+/// robot is asked, and never moved.
 ///
-/// MEASURE and PLACEHOLDER mark what a robot cannot say. `init` tries JSON lines, then frames of an X80, then ROSArduinoBridge, 4 s each.
-/// `init` sends nothing to a ROS 2 robot.
+/// MEASURE and PLACEHOLDER mark what a robot cannot say. `init` tries JSON lines, then frames of an
+/// X80, then ROSArduinoBridge, 4 s each. `init` sends nothing to a ROS 2 robot.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// The robot's address: udp://192.168.0.20:5600, tcp://HOST:PORT, serial:///dev/ttyUSB0, ros2:0.
+    /// The robot's address: udp://192.168.0.20:5600, tcp://HOST:PORT, serial:///dev/ttyUSB0,
+    /// ros2:0.
     address: Address<String>,
     /// The mission file to write, which must not exist.
     #[arg(long, value_name = "FILE", default_value = "robot.toml")]
     out: PathBuf,
-    /// Ask the robot nothing, and write a file to complete for this protocol: json, x80, arduino or ros2.
+    /// Ask the robot nothing, and write a file to complete for this protocol: json, x80, arduino or
+    /// ros2.
     #[arg(long, value_parser = protocol)]
     protocol: Option<Protocol>,
     /// The name that the robot gets on this machine.
@@ -77,7 +80,7 @@ pub fn main(Arguments { address, out, protocol, robot }: &Arguments) -> Result {
 fn heard(address: &Address<String>) -> Result<Seen> {
     let refused = |code, why: String| refuse(code, format!("{address}: {why}"));
     let resolved = address.resolve()?;
-    let mut runs = robots::own().into_iter().filter_map(|robot| Run::load(&robot.run?).ok());
+    let mut runs = robots::own().0.into_iter().filter_map(|robot| Run::load(&robot.run?).ok());
     if let Some(Run { robot, .. }) = runs.find(|run| run.address == resolved) {
         return refused(
             "address-in-use",

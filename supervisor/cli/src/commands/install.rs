@@ -17,7 +17,7 @@ use console::{
 
 /// Make this executable a systemd service: units, user, configuration.
 ///
-/// Names each file before writing it. Enables and starts nothing.
+/// `install` names each file before it writes it. `install` enables and starts no unit.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Only print the path and the content of each file.

@@ -1,9 +1,6 @@
 mod merged;
 
-use std::{
-    path::{Path, PathBuf},
-    thread,
-};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use common::{domain::RobotName, follower::Event};
@@ -14,7 +11,7 @@ use console::{
     operator,
     robots::Robot,
     runs,
-    stream::{LOOK_EVERY, Stream},
+    stream::Stream,
     waiting::Waiting,
 };
 
@@ -44,21 +41,16 @@ pub fn main(arguments: &Arguments) -> Result {
     if arguments.follow {
         return follow(arguments, &mut stream);
     }
-    let directory = match &arguments.run {
-        Some(directory) => directory.clone(),
-        None => newest(arguments).ok_or_else(|| {
-            let (robot, runs) = (&arguments.robot, arguments.runs.display());
-            format!("robot {robot} has no run now and none in {runs}; name its directory with --run, or see `firsthand runs`")
-        })?,
-    };
+    let robot = &arguments.robot;
+    let current = || Robot::find(robot.clone()).run;
+    let newest = || Some(runs::newest(&arguments.runs, robot)?.directory);
+    let found = arguments.run.clone().or_else(current).or_else(newest);
+    let directory = found.ok_or_else(|| {
+        let runs = arguments.runs.display();
+        format!("robot {robot} has no run now and none in {runs}; name its directory with --run, or see `firsthand runs`")
+    })?;
     let mut logs = opened(arguments, &directory)?;
     Ok(print_round(&mut logs, &mut stream)?)
-}
-
-fn newest(arguments: &Arguments) -> Option<PathBuf> {
-    let robot = &arguments.robot;
-    let current = Robot::find(robot.clone()).run;
-    current.or_else(|| Some(runs::newest(&arguments.runs, robot)?.directory))
 }
 
 fn opened(arguments: &Arguments, directory: &Path) -> Result<Logs> {
@@ -97,12 +89,10 @@ fn follow(arguments: &Arguments, stream: &mut Stream) -> Result {
                 let logs = Logs::of(&directory, arguments.stage.as_deref());
                 followed = Some((directory, logs));
             }
-            Some(_) => thread::sleep(LOOK_EVERY),
-            None => {
-                waiting.tell(&Event::<()>::Disconnected, &arguments.robot);
-                thread::sleep(LOOK_EVERY);
-            }
+            Some(_) => {}
+            None => waiting.tell(&Event::<()>::Disconnected, &arguments.robot),
         }
+        stream.pause()?;
     }
     Ok(())
 }

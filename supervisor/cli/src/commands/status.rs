@@ -40,7 +40,7 @@ pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// List all of this user's robots on this machine instead.
+    /// List the running robots of this user on this machine instead.
     #[arg(long, conflicts_with = "robot")]
     all: bool,
     /// Print a status after each change, until Ctrl-C.
@@ -177,16 +177,16 @@ pub fn main(arguments: &Arguments) -> Result {
     }
 }
 
-/// Topics of a status. The target precedes the roster.
+/// Topics of a status. The roster comes last, as in [`robot_state::TOPICS`].
 static WANTED: [&dyn AnyTopic; 8] = [
-    &topics::ROSTER,
-    &topics::LINK,
-    &topics::POWER,
     &topics::FOLLOWING,
     &topics::MIRROR,
     &topics::COMPLAINTS,
     &topics::TARGET,
     &topics::POSE,
+    &topics::POWER,
+    &topics::LINK,
+    &topics::ROSTER,
 ];
 
 /// Returns whether `robot` is complete, or [`LINK_PATIENCE`] is over; link, batteries and pose may
@@ -207,7 +207,7 @@ fn print_one(arguments: &Arguments) -> Result {
     let bus = roster::join(&domain, "status")?;
     let mut feed = Feed::open(&bus, &WANTED)?;
     let mut waiter = Waiter::default();
-    for topic in &WANTED[..3] {
+    for topic in &WANTED[5..] {
         waiter.on(bus.wakeup(*topic)?);
     }
     let began = Instant::now();
@@ -250,8 +250,8 @@ fn print_guarded(arguments: &Arguments) -> Result {
 fn follow(arguments: &Arguments) -> Result {
     let mut stream = Stream::with_usual_priority()?;
     let domain = arguments.robot.domain();
-    let mut follower = Follower::new(domain, "status", WANTED[0], |bus| Feed::open(bus, &WANTED))
-        .also_on(WANTED[1..3].iter().copied());
+    let mut follower = Follower::new(domain, "status", WANTED[7], |bus| Feed::open(bus, &WANTED))
+        .also_on(WANTED[5..7].iter().copied());
     let (mut robot, mut waiting) = (RobotState::default(), Waiting::default());
     let (mut began, mut shown) = (Instant::now(), None::<Instant>);
     while !stream.has_ended() {
@@ -382,7 +382,7 @@ impl fmt::Display for Status<'_> {
             self.robot, self.supervisor_pid, self.order, self.mission_time_s
         )?;
         if let Some(MirrorStatus { of, age_s }) = &self.mirror {
-            writeln!(f, "a mirror of the robot at {of}; this is at most {age_s:.1} s old")?;
+            writeln!(f, "a mirror of the robot at {of}; its samples are at most {age_s:.1} s old")?;
         }
         if let Some(TargetStatus { number, last, x_m, y_m, to_go_m }) = &self.target {
             write!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;

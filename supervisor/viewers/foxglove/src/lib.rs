@@ -13,7 +13,9 @@ use std::{net::SocketAddr, process::ExitCode};
 use self::live::Live;
 use clap::Parser;
 use common::{domain::RobotName, signals::Signals};
-use console::{executable, failure::Failure, output::print_text, stream::let_stages_go_first};
+use console::{
+    addresses, executable, failure::Failure, output::print_text, stream::let_stages_go_first,
+};
 
 /// Serve a robot live to Foxglove or Lichtblick.
 ///
@@ -29,7 +31,7 @@ pub struct Arguments {
     ///
     /// Everyone who reaches the address can watch the robot without authentication. Clients cannot
     /// send it anything.
-    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8765")]
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = addresses::FOXGLOVE)]
     listen: SocketAddr,
     /// Allowed origin of a web page, such as `https://lichtblick.example`.
     ///

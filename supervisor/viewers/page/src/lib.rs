@@ -25,7 +25,9 @@ use std::{net::SocketAddr, process::ExitCode, sync::Arc};
 use clap::Parser;
 use common::{domain::RobotName, signals::Signals};
 
-use console::{executable, failure::Result, output::print_line, stream::let_stages_go_first};
+use console::{
+    addresses, executable, failure::Result, output::print_line, stream::let_stages_go_first,
+};
 
 use self::{access::host_name, serving::Page};
 
@@ -43,7 +45,7 @@ pub struct Arguments {
     /// Loopback address and port to listen on.
     ///
     /// Other machines connect through an SSH tunnel or a proxy.
-    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080")]
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = addresses::PAGE)]
     listen: SocketAddr,
     /// Host name of a local proxy, for https://NAME/.
     ///

@@ -89,7 +89,7 @@ impl Reading {
         let mut shown = shared.lock();
         if let Some(link) = &collector.state.link {
             let says = format!("the link says: {}", failsafe_in_words(link));
-            shown.link = (link.cause() == Cause::OperatorStop, says);
+            shared.link.send_replace((link.cause() == Cause::OperatorStop, says));
         }
         rows.iter().for_each(|row| shown.rows.push(row));
         for event in events {

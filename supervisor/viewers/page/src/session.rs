@@ -163,10 +163,7 @@ async fn perform(asked: Asked, role: Role, context: Arc<Context>, answers: mpsc:
         Some(why) => Err(why.to_owned()),
         None => done(order, &context).await,
     };
-    let (ok, text) = match done {
-        Ok(text) => (true, text),
-        Err(text) => (false, text),
-    };
+    let (ok, Ok(text) | Err(text)) = (done.is_ok(), done);
     let answer = json!({"answer": {"id": id, "ok": ok, "text": text}});
     let _ = answers.send(Told::Answer(answer.to_string())).await;
 }
@@ -189,15 +186,8 @@ async fn done(order: Order, context: &Arc<Context>) -> Result<String, String> {
 }
 
 async fn resumed(context: &Arc<Context>) -> Result<String, String> {
-    let began = Instant::now();
-    loop {
-        let (stopped, says) = context.shared.lock().link.clone();
-        if !stopped {
-            return Ok(says);
-        }
-        if began.elapsed() >= GOES_WITHIN {
-            return Err(says);
-        }
-        tokio::time::sleep(SEND_EVERY).await;
-    }
+    let mut link = context.shared.link.subscribe();
+    let goes = timeout(GOES_WITHIN, link.wait_for(|(stopped, _)| !stopped)).await.is_ok();
+    let says = link.borrow().1.clone();
+    if goes { Ok(says) } else { Err(says) }
 }

@@ -11,6 +11,7 @@ use std::{
 
 use axum::body::Bytes;
 use serde_json::Value;
+use tokio::sync::watch;
 
 /// Most items of a series: rows of ten minutes at 10 Hz.
 const MOST: usize = 6000;
@@ -65,8 +66,6 @@ pub struct Shown {
     about: Option<Arc<str>>,
     pub connected: bool,
     pub simulated: bool,
-    /// Whether an operator stopped the robot, and the link's action in words.
-    pub link: (bool, String),
     pub rows: Ring,
     pub events: Ring,
     pub results: Ring,
@@ -95,6 +94,8 @@ impl Shown {
 #[derive(Debug, Default)]
 pub struct Shared {
     shown: Mutex<Shown>,
+    /// Whether an operator stopped the robot, and the link's action in words.
+    pub link: watch::Sender<(bool, String)>,
     watching: AtomicUsize,
 }
 

@@ -87,11 +87,11 @@ enum Id {
 /// See `firsthand help nav2-planner`. Names without a leading slash are below the namespace.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
-    /// Topic of the map: a Nav2 costmap, or a static map. Updates come on the topic with
-    /// `_updates`.
+    /// Topic of the map: a Nav2 costmap, or a static map. The topic of its updates has `_updates`
+    /// appended.
     #[arg(long, value_name = "TOPIC", default_value = "global_costmap/costmap")]
     map: String,
-    /// Topic of transforms. Static ones come on the topic with `_static`.
+    /// Topic of transforms. The topic of static ones has `_static` appended.
     #[arg(long, value_name = "TOPIC", default_value = "tf")]
     tf: String,
     /// Frame of the robot.

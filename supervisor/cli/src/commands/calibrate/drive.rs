@@ -4,12 +4,14 @@ use clap::Args;
 use common::{
     clock::Pace,
     domain::RobotName,
+    file::{FileError, replace},
     mission::{CalibrationPlan, Mission, Procedure, Sensors},
     samples::PoseSample,
 };
 use glam::DVec2;
-use mission_control::{Options, Progress, outcome::Outcome};
+use mission_control::{Options, Progress, outcome::Outcome, recovery::SUMMARY};
 use processes::Starter;
+use serde_json::json;
 
 use console::{
     failure::{Result, refuse},
@@ -20,6 +22,9 @@ use console::{
 };
 
 use crate::commands::run::recorder::RunRecorder;
+
+/// Outcome of a procedure that was driven to its end.
+const COMPLETED: &str = "completed";
 
 /// Options that every calibration procedure takes.
 #[derive(Debug, Args)]
@@ -46,8 +51,7 @@ pub struct Setting {
 
 impl Setting {
     pub fn log(&self, name: &str) -> Result {
-        fs::create_dir_all(&self.runs)
-            .map_err(|error| format!("cannot make {}: {error}", self.runs.display()))?;
+        fs::create_dir_all(&self.runs).map_err(FileError::of("make", &self.runs))?;
         Ok(logging::to_file(&self.runs.join(name))?)
     }
 
@@ -132,27 +136,29 @@ impl Setting {
             return Err("THE ROBOT MOVES although every stop method was tried".into());
         }
         let truth = finished.truth.last().map(|truth| DVec2::new(truth.x, truth.y));
-        let ending = &finished.ending;
-        match ending.outcome {
+        let (ending, seconds) = (&finished.ending, finished.duration_s);
+        let outcome = match ending.outcome {
             // Uncalibrated wheels may end anywhere. A failed planner stores the reason in its
             // checkpoint.
             Outcome::Reached
             | Outcome::WrongPlace
             | Outcome::ReachedUnsure
-            | Outcome::Unreachable => {
-                let counts = |pose: &PoseSample| [pose.left_counts, pose.right_counts];
-                let counts = finished.record.poses.iter().map(counts).collect();
-                let seconds = finished.duration_s;
-                Ok(Carried { directory: options.directory, seconds, counts, truth })
-            }
-            outcome => {
-                let (outcome, reason) = (outcome.as_str(), &ending.reason);
-                let message = format!(
-                    "nothing was written: the run ended in {outcome}, {reason}; see {place}"
-                );
-                refuse("not-calibrated", message)
-            }
+            | Outcome::Unreachable => COMPLETED,
+            outcome => outcome.as_str(),
+        };
+        // Without a summary, the run counts as cut off.
+        let summary = options.directory.join(SUMMARY);
+        replace(&summary, json!({ "outcome": outcome, "mission_time_s": seconds }).to_string())
+            .map_err(FileError::of("write", &summary))?;
+        if outcome != COMPLETED {
+            let reason = &ending.reason;
+            let message =
+                format!("nothing was written: the run ended in {outcome}, {reason}; see {place}");
+            return refuse("not-calibrated", message);
         }
+        let counts = |pose: &PoseSample| [pose.left_counts, pose.right_counts];
+        let counts = finished.record.poses.iter().map(counts).collect();
+        Ok(Carried { directory: options.directory, seconds, counts, truth })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::{
     io::{self, BufRead as _, IsTerminal as _, Read as _},
-    time::Duration,
+    os::fd::AsFd as _,
 };
 
 use common::{poll, signals::Signals};
@@ -12,8 +12,6 @@ use console::{failure::Result, output::write_stderr};
 
 const LONGEST_LINE: u64 = 200;
 const FARTHEST_M: f64 = 10.0;
-/// Interval of checks for a signal while a person measures.
-const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// Waits until a person has put the robot on its mark, unless standard input is a file.
 pub fn await_robot(title: &str, signals: &mut Signals) -> Result {
@@ -39,10 +37,9 @@ pub fn next(title: &str, signals: &mut Signals) -> Result<DVec2> {
 
 fn line(signals: &mut Signals) -> Result<String> {
     let mut line = String::new();
-    while !poll::is_readable(io::stdin(), LOOK_EVERY)? {
-        if signals.came() {
-            return Err("stopped; nothing was written".into());
-        }
+    poll::readable(&[io::stdin().as_fd(), signals.as_fd()], None)?;
+    if signals.came() {
+        return Err("stopped; nothing was written".into());
     }
     if io::stdin().lock().take(LONGEST_LINE).read_line(&mut line)? == 0 {
         return Err("the ends of the squares are missing; nothing was written".into());

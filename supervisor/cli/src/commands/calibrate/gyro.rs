@@ -16,13 +16,12 @@ pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> R
     if !(mission.robot.gyro() || mission.robot.ros2.imu.is_some()) {
         return Err("this robot has no gyro; if its JSON lines report a gyro angle, set `gyro = true` below [robot]; if a ROS 2 topic carries the angle, name the topic as robot.ros2.imu; or calibrate before a wall or along squares".into());
     }
-    let carried = arguments.setting.carry_out(&mission, "calibration")?;
-    let Carried { directory, seconds, .. } = carried;
-    let recording = Recording::open(&directory.join("recording.mcap"))?;
+    let Carried { directory, seconds, .. } =
+        arguments.setting.carry_out(&mission, "calibration")?;
     let before = std::mem::take(&mut mission.robot.odometry);
     // Nominal distances are those of uncalibrated wheels.
     mission.robot.odometry = Odometry::default();
-    let trace = Trace::read(&mission, &recording)?;
+    let trace = Trace::read(&mission, &Recording::open(&directory)?)?;
     let (at_rest, motions) = motions(&mission, &trace).map_err(refused)?;
     let estimate =
         checked(&at_rest, &motions, scale_sd, mission.body().track_m).map_err(refused)?;

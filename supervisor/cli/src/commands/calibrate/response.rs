@@ -16,8 +16,7 @@ pub fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result {
     let mission = arguments.mission(plan)?;
     let body = mission.body();
     let Carried { directory, .. } = arguments.setting.carry_out(&mission, "turns")?;
-    let recording = Recording::open(&directory.join("recording.mcap"))?;
-    let trace = Trace::read(&mission, &recording)?;
+    let trace = Trace::read(&mission, &Recording::open(&directory)?)?;
     let turn = |(at, [left, right]): &(f64, [f64; 2])| (*at, (right - left) / body.track_m);
     let [told, turned] =
         [&trace.told, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());

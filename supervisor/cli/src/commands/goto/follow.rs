@@ -14,14 +14,12 @@ use common::{
 use console::{
     failure::{Result, refuse},
     output::print_line,
+    stream::LOOK_EVERY,
 };
 use glam::DVec2;
 use mission_control::operator;
 
 use super::Arguments;
-
-/// Longest time until a signal ends the command.
-const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 struct Own {
     following: Reader<FollowingSample>,
@@ -57,13 +55,12 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
     let mut own = Follower::new(robot.domain(), "follow", &topics::FOLLOWING, open);
     let (mut newest, mut pose) = (None::<FollowingSample>, PoseSample::default());
     while !signals.came() {
-        let seen = match &mut other {
-            Some(other) => match other.wait(LOOK_EVERY)? {
-                Event::Samples(poses) => poses.newest()?,
-                _ => None,
-            },
-            None => None,
-        };
+        let mut seen = None;
+        if let Some(other) = &mut other
+            && let Event::Samples(poses) = other.wait(LOOK_EVERY)?
+        {
+            seen = poses.newest()?;
+        }
         // Wakes on the other robot's pose, or else on the own supervisor.
         let patience = if other.is_some() { Duration::ZERO } else { LOOK_EVERY };
         if matches!(own.wait(patience)?, Event::Disconnected) {
@@ -80,14 +77,11 @@ pub fn main(arguments: &Arguments, followed: Option<&RobotName>) -> Result {
         }
     }
     let ended = newest.is_some_and(|newest| newest.state() == FollowState::Ended);
-    if !ended && own.topics().is_some() {
+    if !ended && let Some(Own { following, .. }) = own.topics() {
         operator::end_follow(robot)?;
-        if let Some(Own { following, .. }) = own.topics() {
-            newest = following.newest()?.or(newest);
-        }
+        newest = following.newest()?.or(newest);
     }
-    let result = newest.unwrap_or_default().result();
-    print_line(result)
+    print_line(newest.unwrap_or_default().result())
 }
 
 /// Returns the beacon for a robot at `own` from the other's pose `seen`, stamped with the time of

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-const LOG: &str = "log";
+const LOG: &str = ".log";
 /// Bytes at which a line of any length is cut.
 const LONGEST_LINE: u64 = 64 << 10;
 /// Length of a time such as 2026-11-21T06:04:22.729158Z.
@@ -58,13 +58,9 @@ impl Logs {
     pub fn processes(directory: &Path) -> io::Result<Vec<String>> {
         let mut processes = Vec::new();
         for entry in fs::read_dir(directory)? {
-            let path = entry?.path();
-            let name = path.file_stem().and_then(|name| name.to_str());
-            if let Some(name) = name
-                && path.extension().is_some_and(|end| end == LOG)
-            {
-                processes.push(name.to_owned());
-            }
+            let file = entry?.file_name();
+            processes
+                .extend(file.to_str().and_then(|file| file.strip_suffix(LOG)).map(str::to_owned));
         }
         processes.sort();
         Ok(processes)
@@ -75,7 +71,7 @@ impl Logs {
         for process in Self::processes(&self.directory)? {
             let wanted = self.process.as_ref().is_none_or(|only| *only == process);
             if wanted && self.logs.iter().all(|log| log.process != process) {
-                let file = File::open(self.directory.join(&process).with_extension(LOG))?;
+                let file = File::open(self.directory.join(format!("{process}{LOG}")))?;
                 self.logs.push(Log::new(process, file));
             }
         }

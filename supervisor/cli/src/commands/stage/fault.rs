@@ -30,7 +30,7 @@ pub struct Arguments {
     /// Name of the robot.
     #[arg(long, default_value = "x80")]
     robot: RobotName,
-    /// Break a real robot, which may then drive anywhere.
+    /// Allow the fault on a real robot, which may then drive anywhere.
     ///
     /// Clear its surroundings first.
     #[arg(long)]

@@ -4,6 +4,7 @@ use std::{path::PathBuf, thread};
 
 use common::{
     bus::BusError,
+    domain::RobotName,
     roster::{self, Roster},
     topics,
 };
@@ -11,16 +12,18 @@ use serde::Serialize;
 
 use console::{
     failure::Result,
-    output::{json_lines, print_text, say},
+    output::{print_rows, say},
     robots::{self, Robot},
     table::Table,
     words,
 };
 use mission_control::operator::PATIENCE;
 
+use crate::commands::doctor::others;
+
 #[derive(Serialize)]
 struct Listed {
-    robot: String,
+    robot: RobotName,
     supervisor_pid: Option<u32>,
     state: &'static str,
     mission_time_s: Option<f64>,
@@ -31,67 +34,59 @@ struct Listed {
 }
 
 pub fn print(json: bool) -> Result {
+    let (running, killed) = robots::own();
     // A frozen supervisor delays only its own row.
     let listed: Vec<_> = thread::scope(|scope| {
-        let asked = robots::own().into_iter().map(|robot| scope.spawn(|| listed(robot)));
+        let asked = running.into_iter().map(|robot| scope.spawn(|| listed(robot)));
         let asked: Vec<_> = asked.collect();
         asked.into_iter().filter_map(|listed| listed.join().ok()).collect()
     });
-    if json {
-        return print_text(json_lines(&listed)?);
-    }
-    if listed.is_empty() {
+    if listed.is_empty() && !json {
         say("no robot runs here for this user; start one with `firsthand run`");
     } else {
-        print_text(table(&listed))?;
+        print_rows(&listed, json, table(&listed))?;
     }
-    let others: Vec<_> = robots::other_users().iter().map(u32::to_string).collect();
-    if !others.is_empty() {
-        let others = others.join(", ");
-        say(format_args!(
-            "users {others} have, or had, robots here: `sudo -u '#USER' firsthand status --all`"
-        ));
+    if let ("note", others) = others(&killed, &robots::other_users()) {
+        say(others);
     }
     Ok(())
 }
 
-fn listed(robot: Robot) -> Listed {
-    let roster = robot.supervisor.map(|_| roster(&robot));
-    let (state, mission_time_s, simulated, age_s) = match roster {
-        None => ("its supervisor was killed", None, None, None),
-        Some(Ok(Some(roster))) => roster,
-        Some(Err(BusError::OtherVersion { .. })) => ("it runs another version", None, None, None),
+fn listed(Robot { name, supervisor, run }: Robot) -> Listed {
+    let mut listed = Listed {
+        robot: name,
+        supervisor_pid: supervisor,
         // The supervisor is frozen, or its bus is not complete yet.
-        Some(_) => ("no answer", None, None, None),
+        state: "no answer",
+        mission_time_s: None,
+        simulated: None,
+        age_s: None,
+        run,
     };
-    Listed {
-        robot: robot.name.to_string(),
-        supervisor_pid: robot.supervisor,
-        state,
-        mission_time_s,
-        simulated,
-        age_s,
-        run: robot.run,
+    if let Err(BusError::OtherVersion { .. }) = listed.ask() {
+        listed.state = "it runs another version";
     }
+    listed
 }
 
-/// Order, mission time, whether simulated, age of a mirror.
-type RosterFacts = (&'static str, Option<f64>, Option<bool>, Option<f64>);
-
-fn roster(robot: &Robot) -> Result<Option<RosterFacts>, BusError> {
-    let domain = robot.name.domain();
-    let bus = roster::join(&domain, "list")?;
-    let (is_mirror, mut ages, mut age_s) =
-        (domain.mirrors().is_some(), bus.reader(&topics::MIRROR)?, None);
-    Roster::open(&bus)?.find(PATIENCE, |header, _| {
-        age_s = ages.newest().ok().flatten().map(|mirror| mirror.age_s()).or(age_s);
-        if is_mirror && age_s.is_none() {
-            return None;
-        }
-        let order = words::order(header);
-        let time_s = header.stamp.seconds();
-        Some((order, Some(time_s), Some(header.simulated == 1), age_s))
-    })
+impl Listed {
+    fn ask(&mut self) -> Result<(), BusError> {
+        let domain = self.robot.domain();
+        let bus = roster::join(&domain, "list")?;
+        let (is_mirror, mut ages) = (domain.mirrors().is_some(), bus.reader(&topics::MIRROR)?);
+        Roster::open(&bus)?.find(PATIENCE, |header, _| {
+            let age_s = ages.newest().ok().flatten().map(|mirror| mirror.age_s());
+            self.age_s = age_s.or(self.age_s);
+            if is_mirror && self.age_s.is_none() {
+                return None;
+            }
+            self.state = words::order(header);
+            self.mission_time_s = Some(header.stamp.seconds());
+            self.simulated = Some(header.simulated == 1);
+            Some(())
+        })?;
+        Ok(())
+    }
 }
 
 fn table(listed: &[Listed]) -> String {
@@ -124,7 +119,7 @@ mod tests {
     fn a_mirror_is_listed_as_elsewhere_with_its_age_and_no_robot_of_here_is() {
         let shown = |age_s| {
             table(&[Listed {
-                robot: "x80".to_owned(),
+                robot: "x80".parse().unwrap(),
                 supervisor_pid: Some(7),
                 state: "drive",
                 mission_time_s: Some(3.0),
