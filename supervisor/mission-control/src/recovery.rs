@@ -1,9 +1,9 @@
 //! State from which another supervisor resumes a run.
 //!
-//! Stages and simulated robot have their own checkpoints. Without a supervisor, mission time and
-//! robot stand still.
+//! Stages and simulated robot have their own checkpoints. Without a supervisor the robot comes to
+//! rest, and then mission time stands still.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, time::Duration};
 
 use common::{
     checkpoint::{Checkpoint, CheckpointError},
@@ -26,6 +26,9 @@ const CAPACITY: usize = 18 << 10;
 /// Summary of a finished run, in its run directory.
 pub const SUMMARY: &str = "summary.json";
 const SIMULATOR: &str = "x80-sim";
+/// Time for a robot to come to rest after its supervisor's end. It counts as mission time, in which
+/// the wheels may turn.
+const COMES_TO_REST: Duration = Duration::from_secs(10);
 
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct SupervisorState {
@@ -88,8 +91,14 @@ impl RecoveredRun {
             return Err(ResumeError::NoRobot { directory: named() });
         }
         let newest = saved_state(directory)?.and_then(|state| state.newest());
-        let (first_tick, time) =
+        let (first_tick, saved) =
             newest.map_or((0, MissionTime::default()), |(tick, time)| (tick + 1, time));
+        // After a restart of the machine its clock says nothing.
+        let latest = MissionTime(saved.0 + COMES_TO_REST.as_nanos() as u64);
+        let time = match run.clock {
+            MissionClock::Ticks { .. } => saved,
+            wall => wall.at(0, monotonic_ns()).clamp(saved, latest),
+        };
         Ok(Self { run, first_tick, time })
     }
 

@@ -17,6 +17,9 @@ const MOST: usize = 8;
 /// Time in which they begin.
 const WITHIN: Duration = Duration::from_secs(14);
 
+/// Time at which an operator resumes whatever stands.
+const RESUMED: Duration = Duration::from_secs(50);
+
 pub(crate) fn load(random: &mut Random) -> Load {
     let loads = [Load::IDLE, Load::IDLE, Load::BUSY, Load::OVERLOADED];
     loads[random.below(loads.len())]
@@ -33,6 +36,8 @@ pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Distur
         let at = WITHIN.mul_f64(random.share());
         one(random, mission, at, &mut all);
     }
+    // A robot that an operator has stopped would wait for ever.
+    all.push(Disturbance { at: RESUMED, what: What::Ask(Request::Resume) });
     all
 }
 
