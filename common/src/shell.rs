@@ -258,14 +258,11 @@ struct Simulation<P> {
 }
 
 /// Starts a stage's process on a simulated machine.
-pub fn simulate<P: Process>(
+pub fn simulate<P: Process + 'static>(
     generation: Generation,
     run: Run,
     bus: Bus,
-) -> Result<Box<dyn Simulated>>
-where
-    P: 'static,
-{
+) -> Result<Box<dyn Simulated>> {
     let (host, roster) = Host::announce::<P>(generation, run, bus, Waiter::default())?;
     Ok(Box::new(Simulation::<P> { host, starting: Some((roster, Instant::now())), work: None }))
 }

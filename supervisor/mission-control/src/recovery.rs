@@ -123,6 +123,8 @@ impl RecoveredRun {
 #[cfg(test)]
 mod tests {
     use common::{
+        address::Address,
+        domain::RobotName,
         mission::{MOST_CORNERS, MOST_ZONES, Mission},
         samples::{CommandSample, MOST_TARGETS, TargetPoint},
     };
@@ -148,5 +150,25 @@ mod tests {
         let zone = Zone { points: vec![DVec2::splat(1.5); MOST_CORNERS] };
         state.zones = Some((1 << 40, vec![zone; MOST_ZONES]));
         checkpoint.save(&state).unwrap();
+    }
+
+    #[test]
+    fn mission_time_goes_on_while_a_robot_without_a_supervisor_may_roll_and_no_longer() {
+        let directory = tempfile::tempdir().unwrap();
+        let mut mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        mission.robot.address = Some("127.0.0.1:5990".to_owned());
+        let resumed_at = |began_ago_s: i64| {
+            let epoch_ns = monotonic_ns().saturating_add_signed(-began_ago_s * 1_000_000_000);
+            let run = Run {
+                robot: RobotName::default(),
+                address: Address::Ros2(None),
+                clock: MissionClock::Wall { epoch_ns, rate: 1.0 },
+                mission: mission.clone(),
+            };
+            run.save(directory.path()).unwrap();
+            RecoveredRun::load(directory.path()).unwrap().time.seconds().round()
+        };
+        // After a restart of the machine the epoch is ahead.
+        assert_eq!([4, 3_000, -1_000].map(resumed_at), [4.0, 10.0, 0.0]);
     }
 }

@@ -116,7 +116,7 @@ pub fn run<'a>(
     let cells = options.mission.grid_frame().area();
     let lock = lock.insert(DomainLock::acquire(domain.clone(), cells)?);
     let mut surroundings = Real { domain, lock, signals, consumer };
-    let (finished, moving) = conduct(options, &mut surroundings, turns, listener, show)?;
+    let (finished, moving) = conduct(options, &mut surroundings, &turns, listener, show)?;
     let signals = surroundings.signals;
     Ok((finished, moving.map(|supervisor| StillMoving { supervisor, signals })))
 }
@@ -125,7 +125,7 @@ pub fn run<'a>(
 pub(crate) fn conduct<'a>(
     options: &'a Options,
     surroundings: &mut dyn Surroundings,
-    turns: Turns,
+    turns: &Turns,
     listener: Listener,
     show: &mut dyn FnMut(&Progress<'_>),
 ) -> Result<(Finished, Option<Supervisor<'a>>)> {
@@ -197,6 +197,6 @@ pub(crate) fn conduct<'a>(
 /// Conducts a run on a simulated machine.
 pub fn simulate(options: &Options, surroundings: &mut dyn Surroundings) -> Result<Finished> {
     let listener: Listener = Box::new(|_| {});
-    let conducted = conduct(options, surroundings, Turns::default(), listener, &mut |_| {});
+    let conducted = conduct(options, surroundings, &Turns::default(), listener, &mut |_| {});
     conducted.map(|(finished, _)| finished)
 }

@@ -17,6 +17,9 @@ const MOST: usize = 8;
 /// Time in which they begin.
 const WITHIN: Duration = Duration::from_secs(14);
 
+/// Greatest mean delay of a wire. A command that is under way for seconds moves a robot that was
+/// already seen at rest, which nobody can promise to prevent.
+const LONGEST_DELAY: Duration = Duration::from_millis(200);
 /// Time at which an operator resumes whatever stands.
 const RESUMED: Duration = Duration::from_secs(50);
 
@@ -63,7 +66,7 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
                 _ => 1.0,
             };
             let (lost, doubled, reordered) = (share(), share(), share());
-            let delay = lasts.mul_f64(0.1 * share());
+            let delay = LONGEST_DELAY.mul_f64(share());
             let way = if share() > 0.0 { Way::ToRobot } else { Way::ToHost };
             add(Duration::ZERO, What::Wire(way, Quality { lost, doubled, reordered, delay }));
             add(lasts, What::Wire(way, Quality::default()));

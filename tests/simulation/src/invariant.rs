@@ -218,7 +218,7 @@ impl Invariants {
             holds(age(self.told) < TOLD_EVERY, "a robot that moves is told", || {
                 format!("it moves at {:.2} m/s and hears nothing since {:?}", truth.v, self.told)
             })?;
-            let calm = self.wire_is_calm && age(Some(self.wire_changed)) > RESTS_WITHIN;
+            let calm = self.wire_is_calm && age(Some(self.wire_changed)) > 2 * RESTS_WITHIN;
             let stands = age(self.moved) > RESTS_WITHIN;
             holds(!(calm && stands), "a robot that is told to stand stands", || {
                 format!("it moves at {:.2} m/s since {:?}", truth.v, self.moved)

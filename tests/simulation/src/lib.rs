@@ -85,16 +85,24 @@ impl Scenario {
         }
     }
 
-    /// Draws a run in wall-clock time, whose robot outlives its supervisor.
-    pub fn draw(mission: &Mission, seed: u64) -> Self {
-        let mut random = Random::new(seed, 3);
+    /// Returns the undisturbed run in wall-clock time of a robot that outlives its supervisor, on
+    /// an idle machine.
+    pub fn calm(mission: &Mission) -> Self {
         let mut mission = mission.clone();
-        mission.seed = seed;
-        draw::robot(&mut random, &mut mission);
         mission.robot.address = Some(ADDRESS.to_owned());
-        let load = draw::load(&mut random);
-        let disturbances = draw::disturbances(&mut random, &mission);
-        Self { seed, mission, pace: Pace::Rate(1.0), load, disturbances }
+        let (seed, pace) = (mission.seed, Pace::Rate(1.0));
+        Self { seed, mission, pace, load: Load::IDLE, disturbances: Vec::new() }
+    }
+
+    /// Draws the robot, the load and the disturbances of such a run.
+    pub fn draw(mission: &Mission, seed: u64) -> Self {
+        let mut drawn = Self::calm(mission);
+        let mut random = Random::new(seed, 3);
+        (drawn.seed, drawn.mission.seed) = (seed, seed);
+        draw::robot(&mut random, &mut drawn.mission);
+        drawn.load = draw::load(&mut random);
+        drawn.disturbances = draw::disturbances(&mut random, &drawn.mission);
+        drawn
     }
 
     /// Runs the scenario.
@@ -220,5 +228,64 @@ impl Ran {
     /// Returns a broken invariant that shows after the run.
     pub fn broken_at_end(&self, invariant: &'static str, detail: String) -> Broken {
         Broken { invariant, detail, event: self.events, at: self.simulated }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        path::Path,
+        time::{SystemTime, UNIX_EPOCH},
+    };
+
+    use super::*;
+
+    fn mission() -> Mission {
+        let text =
+            "target = [3, 0]\ntimeout_s = 120\nworld.drum = [{at = [1.5, 0.1], radius_m = 0.2}]";
+        Mission::parse(text, Path::new("simulation.toml")).unwrap()
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_events_and_another_others() {
+        let run = |seed| {
+            let ran = Scenario::draw(&mission(), seed).run();
+            assert!(ran.broken.is_none(), "seed {seed:#x}: {:?}", ran.broken);
+            (ran.events, ran.truth)
+        };
+        assert_eq!(run(7), run(7));
+        assert_ne!(run(7), run(8));
+    }
+
+    #[test]
+    fn an_undisturbed_run_in_lockstep_arrives() {
+        let finished = Scenario::lockstep(&mission()).run().finished.unwrap();
+        assert_eq!(finished.ending.outcome.as_str(), "reached", "{}", finished.ending.reason);
+        assert_eq!(finished.restarts.values().sum::<u32>(), 0);
+    }
+
+    /// `firsthand-lab simulate --seed S` repeats a failure, with this mission as a file.
+    #[test]
+    fn new_seeds_break_no_invariant() {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+        let first = since.as_nanos() as u64;
+        for seed in (0..40).map(|nth| first.wrapping_add(nth)) {
+            let broken = Scenario::draw(&mission(), seed).run().broken;
+            assert!(broken.is_none(), "simulation: seed {seed:#x}: {}", broken.unwrap());
+        }
+    }
+
+    #[test]
+    fn a_wire_that_doubles_every_datagram_starts_no_storm() {
+        let doubled = Quality { doubled: 1.0, ..Quality::default() };
+        let ways = [Way::ToRobot, Way::ToHost].map(|way| What::Wire(way, doubled));
+        let at = Duration::from_secs(2);
+        let stop = Disturbance { at: 2 * at, what: What::Ask(Request::Stop) };
+        let resume = Disturbance { at: 3 * at, what: What::Ask(Request::Resume) };
+        let mut disturbances = vec![stop, resume];
+        disturbances.extend(ways.map(|what| Disturbance { at, what }));
+        let ran = Scenario { disturbances, ..Scenario::calm(&mission()) }.run();
+        assert!(ran.broken.is_none(), "{:?}", ran.broken);
+        assert!(ran.events < 20_000, "{} events", ran.events);
     }
 }

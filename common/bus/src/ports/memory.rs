@@ -196,7 +196,6 @@ impl Listener {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
 
     use super::*;
     use crate::{
@@ -244,6 +243,5 @@ mod tests {
             assert_eq!(slice[..], cells[..length]);
         }
         assert!(reader.next_slice().unwrap().is_none());
-        let _ = Duration::ZERO;
     }
 }

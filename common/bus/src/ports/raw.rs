@@ -124,12 +124,14 @@ pub(super) enum RawSample {
 
 /// Wakes the readers of a topic.
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "a simulation may waste the space")]
 pub(crate) enum Notifier {
     Shared(SharedNotifier),
     Memory(Rc<memory::Topic>),
 }
 
 #[derive(Debug)]
+#[allow(clippy::large_enum_variant, reason = "a simulation may waste the space")]
 pub(crate) enum Listener {
     Shared(SharedListener),
     Memory(Rc<memory::Listener>),
@@ -507,10 +509,11 @@ impl Listener {
     /// Returns the descriptor that a notification makes readable; none in memory.
     pub(crate) fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         match self {
-            // SAFETY: the descriptor stays open until the listener is dropped, after the borrow
-            // has ended.
             Self::Shared(listener) => {
-                Some(unsafe { BorrowedFd::borrow_raw(listener.file_descriptor().native_handle()) })
+                let descriptor = listener.file_descriptor();
+                // SAFETY: the descriptor stays open until the listener is dropped, after the
+                // borrow has ended.
+                Some(unsafe { BorrowedFd::borrow_raw(descriptor.native_handle()) })
             }
             Self::Memory(_) => None,
         }

@@ -31,20 +31,20 @@ use crate::{
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.Test")]
 #[repr(C)]
-struct Test {
-    stamp: Stamp,
-    number: f64,
-    small: u32,
-    rest: u32,
+pub(super) struct Test {
+    pub(super) stamp: Stamp,
+    pub(super) number: f64,
+    pub(super) small: u32,
+    pub(super) rest: u32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("firsthand.TestCell")]
 #[repr(C)]
-struct Cell {
-    first: f32,
-    second: u32,
-    third: f32,
+pub(super) struct Cell {
+    pub(super) first: f32,
+    pub(super) second: u32,
+    pub(super) third: f32,
 }
 
 layouts! {
@@ -72,8 +72,8 @@ const fn spec(name: &'static str) -> Spec {
     }
 }
 
-static STRUCTS: Topic<Test> = Topic::new(&spec("structs"));
-static SLICES: Topic<Test, Cell> = Topic::new(&spec("slices"));
+pub(super) static STRUCTS: Topic<Test> = Topic::new(&spec("structs"));
+pub(super) static SLICES: Topic<Test, Cell> = Topic::new(&spec("slices"));
 static BYTES: Topic<Test, u8> = Topic::new(&spec("bytes"));
 
 fn with_bus(robot: &str, test: impl FnOnce(&Bus)) {
