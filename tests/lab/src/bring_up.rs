@@ -16,10 +16,11 @@ use processes::process::Process;
 use serde::Deserialize;
 use serde_json::Value;
 
+use simulation::Random;
+
 use crate::{
     error::{OrCannot as _, Result},
     missions::runner::in_parallel,
-    random::Random,
     robot,
     ros2_robot::Ros2Robot,
 };

@@ -13,7 +13,6 @@ mod evaluate;
 mod experiments;
 mod field;
 mod missions;
-mod random;
 mod robot;
 mod ros2_robot;
 mod simulate;

@@ -2,7 +2,7 @@
 
 use std::{
     cell::RefCell,
-    path::{Path, PathBuf},
+    path::PathBuf,
     process::ExitCode,
     rc::Rc,
     time::{Instant, SystemTime},
@@ -73,7 +73,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         if arguments.verbose {
             show(&scenario)?;
             let outcome = ran.finished.as_ref().map(|finished| &finished.ending);
-            print_line(format!("seed {seed:#x}: {outcome:?} after {} events", ran.events))?;
+            print_line(format!("seed {seed}: {outcome:?} after {} events", ran.events))?;
         }
         if let Some(broken) = ran.broken {
             failures += 1;
@@ -81,7 +81,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         }
     }
     print_line(format!(
-        "{} runs from seed {first:#x}: {failures} broke an invariant; {events} events in {simulated_s:.0} s of mission, {supervisors} supervisors killed, {:.1} s",
+        "{} runs from seed {first}: {failures} broke an invariant; {events} events in {simulated_s:.0} s of mission, {supervisors} supervisors killed, {:.1} s",
         arguments.count,
         began.elapsed().as_secs_f64()
     ))?;
@@ -96,9 +96,11 @@ fn run(scenario: &Scenario, arguments: &Arguments) -> Result<Ran> {
     let directory = tempfile::tempdir().or_cannot("make a directory for recordings")?;
     let replayed = directory.path().join("recording.mcap");
     let out = arguments.out.as_ref().unwrap_or(&replayed);
-    let tape = Rc::new(RefCell::new(Some(Recorder::new(out)?)));
-    let mut ran = scenario.run_before(Some(Box::new(Shared(Rc::clone(&tape)))));
-    if let Some(tape) = tape.take() {
+    let tape = Tape::new(&Scenario::robot(), Scenario::directory(), out.clone());
+    let recorder = Rc::new(RefCell::new(Recorder { tape, failed: Ok(()) }));
+    let mut ran = scenario.run_before(Some(Box::new(Shared(Rc::clone(&recorder)))));
+    if let Some(Recorder { tape, failed }) = Rc::into_inner(recorder).map(RefCell::into_inner) {
+        failed?;
         tape.finish()?;
     }
     if arguments.replay && ran.broken.is_none() {
@@ -119,30 +121,22 @@ struct Recorder {
 }
 
 impl Recorder {
-    fn new(out: &Path) -> Result<Self> {
-        let tape = Tape::new(&Scenario::robot(), Scenario::directory(), out.to_path_buf());
-        Ok(Self { tape, failed: Ok(()) })
-    }
-
-    fn finish(self) -> Result {
-        self.failed?;
-        Ok(self.tape.finish()?)
+    fn record(&mut self, act: impl FnOnce(&mut Tape) -> std::result::Result<(), RecordingError>) {
+        if self.failed.is_ok() {
+            self.failed = act(&mut self.tape);
+        }
     }
 }
 
-struct Shared(Rc<RefCell<Option<Recorder>>>);
+struct Shared(Rc<RefCell<Recorder>>);
 
 impl Observer for Shared {
     fn on_bus(&mut self, bus: &Bus) {
-        if let Some(Recorder { tape, failed: failed @ Ok(()) }) = &mut *self.0.borrow_mut() {
-            *failed = tape.attach(bus);
-        }
+        self.0.borrow_mut().record(|tape| tape.attach(bus));
     }
 
     fn observe(&mut self) {
-        if let Some(Recorder { tape, failed: failed @ Ok(()) }) = &mut *self.0.borrow_mut() {
-            *failed = tape.take();
-        }
+        self.0.borrow_mut().record(Tape::take);
     }
 }
 
@@ -155,7 +149,7 @@ fn show(scenario: &Scenario) -> Result {
 }
 
 fn report(scenario: &Scenario, broken: &Broken, arguments: &Arguments) -> Result {
-    print_line(format!("simulation: seed {:#x} at {VERSION}: {broken}", scenario.seed))?;
+    print_line(format!("simulation: seed {} at {VERSION}: {broken}", scenario.seed))?;
     if arguments.shrink {
         show(&scenario.shrink(broken))?;
     }

@@ -15,7 +15,9 @@ use common::{
 use console::output::print_text;
 use recording::log_files::Tail;
 
-use crate::{error::Result, random::Random};
+use simulation::Random;
+
+use crate::error::Result;
 
 /// Publish the measurements of a camera and a gyro of a simulated robot, until its run ends.
 #[derive(Debug, Args)]

@@ -13,10 +13,11 @@ mod shapes;
 mod traps;
 
 use self::{ends::Ends, rooms::Doors};
+use simulation::Random;
+
 use crate::{
     error::Result,
     missions::trial::{Rules, Scene, Trial},
-    random::Random,
 };
 
 /// Failed draws in a row after which a kind of world counts as unsolvable.

@@ -1,6 +1,6 @@
 //! What holds after every event, whatever was disturbed.
 
-use std::{collections::VecDeque, fmt, rc::Rc, time::Duration};
+use std::{rc::Rc, time::Duration};
 
 use common::{
     bus::{Bus, BusError, Memory, Reader},
@@ -87,14 +87,14 @@ pub(crate) struct Invariants {
     wire_is_calm: bool,
     wire_changed: Duration,
     /// Stages that were disturbed, and when.
-    disturbed: VecDeque<(&'static str, Duration)>,
+    disturbed: Vec<(&'static str, Duration)>,
     command: u64,
     /// Newest compared version of the map.
     compared: u64,
     joins: u64,
 }
 
-type Checked = Result<(), (&'static str, String)>;
+pub(crate) type Checked = Result<(), (&'static str, String)>;
 
 fn holds(holds: bool, invariant: &'static str, detail: impl FnOnce() -> String) -> Checked {
     if holds { Ok(()) } else { Err((invariant, detail())) }
@@ -114,7 +114,7 @@ impl Invariants {
             moved: None,
             wire_is_calm: true,
             wire_changed: Duration::ZERO,
-            disturbed: VecDeque::new(),
+            disturbed: Vec::new(),
             command: 0,
             compared: 0,
             joins: 0,
@@ -132,7 +132,7 @@ impl Invariants {
             | What::KillAfter(stage, _)
             | What::Freeze(stage)
             | What::Thaw(stage)
-            | What::Hang(stage) => self.disturbed.push_back((stage, now)),
+            | What::Hang(stage) => self.disturbed.push((stage, now)),
             What::Wire(Way::ToRobot, quality) => {
                 self.wire_is_calm = *quality == Quality::default();
                 self.wire_changed = now;
@@ -184,17 +184,8 @@ impl Invariants {
     }
 
     /// Checks every invariant after an event.
-    pub(crate) fn check(&mut self, machine: &SimulatedMachine) -> Result<(), Broken> {
+    pub(crate) fn check(&mut self, machine: &SimulatedMachine) -> Checked {
         let now = machine.now();
-        self.check_now(machine, now).map_err(|(invariant, detail)| Broken {
-            invariant,
-            detail,
-            event: machine.events(),
-            at: now,
-        })
-    }
-
-    fn check_now(&mut self, machine: &SimulatedMachine, now: Duration) -> Checked {
         let sent = self.sent.take();
         // A link reads its orders before it sends, so the order before this event counts.
         let may_move = self.order.is_none_or(|order| order == Order::Drive);
@@ -240,8 +231,7 @@ impl Invariants {
             // Frames may be late, so the counts find the truth of a pose.
             let truth = machine.truth_of(&pose);
             let off_m = truth.map_or(0.0, |truth| truth.pose_error_m(&pose));
-            let variance = (pose.covariance[0] + pose.covariance[3]).max(0.0);
-            let most_m = 4.0 * variance.sqrt() + POSE_SLACK_M;
+            let most_m = pose_bound_m(&pose);
             holds(off_m <= most_m, "a pose is where the robot was", || {
                 format!("{off_m:.2} m off, at most {most_m:.2} m, at tick {}", pose.stamp.tick)
             })?;
@@ -290,39 +280,26 @@ impl Invariants {
         machine: &SimulatedMachine,
         mission: &Mission,
         finished: &Finished,
-    ) -> Result<(), Broken> {
-        let checked = || {
-            let targets = &finished.targets;
-            let numbers: Vec<_> = targets.iter().map(|target| target.number).collect();
-            let mut once = numbers.clone();
-            once.dedup();
-            holds(once == numbers, "every target has one result", || format!("{numbers:?}"))?;
-            let truth = machine.truth();
-            if let (Outcome::Reached, Some(truth)) = (finished.ending.outcome, truth) {
-                let target =
-                    targets.last().map_or(mission.target.into(), |last| [last.x_m, last.y_m]);
-                let off_m = (truth.x - target[0]).hypot(truth.y - target[1]);
-                let sure_m = finished.record.pose.map_or(0.0, |pose| {
-                    4.0 * (pose.covariance[0] + pose.covariance[3]).max(0.0).sqrt()
-                });
-                let most_m = mission.arrival_tolerance_m + sure_m + POSE_SLACK_M;
-                holds(off_m <= most_m, "reached is true", || {
-                    format!("{off_m:.2} m from the target, {most_m:.2} m at most")
-                })?;
-            }
-            Ok(())
+    ) -> Checked {
+        let targets = &finished.targets;
+        let numbers: Vec<_> = targets.iter().map(|target| target.number).collect();
+        let mut once = numbers.clone();
+        once.dedup();
+        holds(once == numbers, "every target has one result", || format!("{numbers:?}"))?;
+        let (Outcome::Reached, Some(truth)) = (finished.ending.outcome, machine.truth()) else {
+            return Ok(());
         };
-        checked().map_err(|(invariant, detail)| Broken {
-            invariant,
-            detail,
-            event: machine.events(),
-            at: machine.now(),
+        let target = targets.last().map_or(mission.target.into(), |last| [last.x_m, last.y_m]);
+        let off_m = (truth.x - target[0]).hypot(truth.y - target[1]);
+        let pose = finished.record.pose.unwrap_or_default();
+        let most_m = mission.arrival_tolerance_m + pose_bound_m(&pose);
+        holds(off_m <= most_m, "reached is true", || {
+            format!("{off_m:.2} m from the target, {most_m:.2} m at most")
         })
     }
 }
 
-impl fmt::Debug for Invariants {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Invariants").finish_non_exhaustive()
-    }
+/// Returns the greatest error of a pose that knows how wrong it may be, metres.
+fn pose_bound_m(pose: &PoseSample) -> f64 {
+    4.0 * pose.position_rms_m() + POSE_SLACK_M
 }

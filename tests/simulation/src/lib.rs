@@ -20,6 +20,7 @@ mod guard;
 mod invariant;
 mod load;
 mod machine;
+mod process;
 mod random;
 mod robot;
 mod surroundings;
@@ -37,11 +38,11 @@ pub use self::{
     disturbance::{Disturbance, Request, What},
     invariant::Broken,
     load::Load,
+    random::Random,
     wire::{Quality, Way},
 };
 use self::{
-    invariant::Invariants, machine::SimulatedMachine, random::Random, robot::Robot,
-    surroundings::Simulated,
+    invariant::Invariants, machine::SimulatedMachine, robot::Robot, surroundings::Simulated,
 };
 
 /// Directory of the run, which exists only on the simulated machine.
@@ -250,7 +251,7 @@ mod tests {
     fn a_seed_gives_the_same_events_and_another_others() {
         let run = |seed| {
             let ran = Scenario::draw(&mission(), seed).run();
-            assert!(ran.broken.is_none(), "seed {seed:#x}: {:?}", ran.broken);
+            assert!(ran.broken.is_none(), "seed {seed}: {:?}", ran.broken);
             (ran.events, ran.truth)
         };
         assert_eq!(run(7), run(7));
@@ -271,7 +272,7 @@ mod tests {
         let first = since.as_nanos() as u64;
         for seed in (0..40).map(|nth| first.wrapping_add(nth)) {
             let broken = Scenario::draw(&mission(), seed).run().broken;
-            assert!(broken.is_none(), "simulation: seed {seed:#x}: {}", broken.unwrap());
+            assert!(broken.is_none(), "simulation: seed {seed}: {}", broken.unwrap());
         }
     }
 

@@ -22,11 +22,7 @@ use common::{
     start::Generation,
 };
 use mission_control::Finished;
-use processes::{
-    activity::{Activity, State},
-    process::ExitCause,
-    stages,
-};
+use processes::{activity::Activity, process::ExitCause, stages};
 use rustix::process::Signal;
 use x80_sim::SimError;
 
@@ -34,8 +30,9 @@ use crate::{
     Observer,
     disturbance::{Disturbance, What},
     guard::Guard,
-    invariant::{Broken, Invariants},
+    invariant::{Broken, Checked, Invariants},
     load::Load,
+    process::{Process, killed_by},
     random::Random,
     robot::Robot,
     wire::{HostEnd, Port, Way, Wires},
@@ -55,39 +52,6 @@ const RECENT_TICKS: usize = 400;
 const MOST_EVENTS: u64 = 200_000;
 /// Time of a supervisor's turn: even one that never waits lets time pass.
 const LEAST_WAIT: Duration = Duration::from_micros(20);
-
-/// A stage's process.
-struct Process {
-    stage: &'static str,
-    /// Until its first turn.
-    starts: Option<(Generation, Run)>,
-    turns: Option<Box<dyn Simulated>>,
-    /// Next turn without input.
-    due_ns: u64,
-    /// Turn for an input that has come.
-    woken_ns: Option<u64>,
-    /// End of the last turn.
-    busy_until_ns: u64,
-    frozen: bool,
-    /// Start of a computation that never ends.
-    spins_since_ns: Option<u64>,
-    is_terminated: bool,
-    exit: Option<ExitCause>,
-    ran: Duration,
-    starved: Duration,
-}
-
-impl Process {
-    fn is_live(&self) -> bool {
-        self.exit.is_none()
-    }
-
-    /// Returns the time of the next turn.
-    fn next_ns(&self) -> Option<u64> {
-        let runs = self.is_live() && !self.frozen && self.spins_since_ns.is_none();
-        runs.then(|| self.woken_ns.map_or(self.due_ns, |woken| woken.min(self.due_ns)))
-    }
-}
 
 enum Event {
     Disturbance,
@@ -188,7 +152,7 @@ impl SimulatedMachine {
         self.robot.take().map(|robot| robot.truth).unwrap_or_default()
     }
 
-    /// Copies the ground truth from the `known`-th tick on.
+    /// Copies the ground truth that `to` does not have yet.
     pub(crate) fn add_truth(&self, to: &mut Vec<GroundTruthTick>) {
         if let Some(robot) = &*self.robot.borrow() {
             to.extend_from_slice(robot.truth.get(to.len()..).unwrap_or_default());
@@ -214,9 +178,7 @@ impl SimulatedMachine {
 
     pub(crate) fn check_end(&self, mission: &Mission, finished: &Finished) {
         let checked = self.invariants.borrow().check_end(self, mission, finished);
-        if let Err(broken) = checked {
-            self.end_by(broken);
-        }
+        self.judge(checked);
     }
 
     /// Begins the life of a supervisor, with a new bus. Returns the bus.
@@ -264,23 +226,8 @@ impl SimulatedMachine {
             self.guard.borrow_mut().on_link_started(&run);
         }
         let due_ns = self.now_ns.get() + self.lateness().0;
-        self.processes.borrow_mut().insert(
-            process,
-            Process {
-                stage: generation.stage,
-                starts: Some((generation.clone(), run)),
-                turns: None,
-                due_ns,
-                woken_ns: None,
-                busy_until_ns: due_ns,
-                frozen: false,
-                spins_since_ns: None,
-                is_terminated: false,
-                exit: None,
-                ran: Duration::ZERO,
-                starved: Duration::ZERO,
-            },
-        );
+        let started = Process::new(generation, run, due_ns);
+        self.processes.borrow_mut().insert(process, started);
         process
     }
 
@@ -306,22 +253,11 @@ impl SimulatedMachine {
         ended.then(|| processes.remove(&process)).flatten()?.exit
     }
 
-    /// Returns the time that a process ran and starved, and its state.
+    /// Returns the activity of a live process since its start.
     pub(crate) fn activity(&self, process: u32) -> Option<Activity> {
-        let (processes, now_ns) = (self.processes.borrow(), self.now_ns.get());
+        let processes = self.processes.borrow();
         let process = processes.get(&process).filter(|process| process.is_live())?;
-        let since = |ns: u64| Duration::from_nanos(now_ns.saturating_sub(ns));
-        let state = match process {
-            Process { frozen: true, .. } => State::Stopped,
-            Process { spins_since_ns: Some(_), .. } => State::Ready,
-            Process { woken_ns: Some(woken), .. } if *woken > now_ns => State::Ready,
-            _ => State::Asleep,
-        };
-        Some(Activity {
-            ran: process.ran + process.spins_since_ns.map_or(Duration::ZERO, since),
-            starved: process.starved,
-            state,
-        })
+        Some(process.activity(self.now_ns.get()))
     }
 
     /// Draws the time from a wakeup to its turn, and which part of it the process starves.
@@ -427,9 +363,7 @@ impl SimulatedMachine {
             observer.observe();
         }
         let checked = self.invariants.borrow_mut().check(self);
-        if let Err(broken) = checked {
-            self.end_by(broken);
-        }
+        self.judge(checked);
         self.running.set(before);
     }
 
@@ -450,14 +384,16 @@ impl SimulatedMachine {
         self.wires.borrow_mut().send(Way::ToRobot, from, bytes, self.now_ns.get());
     }
 
-    /// Ends the simulation.
-    pub(crate) fn break_off(&self, invariant: &'static str, detail: String) {
-        let (event, at) = (self.events.get(), self.now());
-        self.end_by(Broken { invariant, detail, event, at });
+    fn judge(&self, checked: Checked) {
+        if let Err((invariant, detail)) = checked {
+            self.break_off(invariant, detail);
+        }
     }
 
     /// Ends the simulation: the supervisor fails whatever it does next.
-    fn end_by(&self, broken: Broken) {
+    pub(crate) fn break_off(&self, invariant: &'static str, detail: String) {
+        let (event, at) = (self.events.get(), self.now());
+        let broken = Broken { invariant, detail, event, at };
         self.broken.borrow_mut().get_or_insert(broken);
         self.doomed.borrow_mut().insert(self.supervisor.get(), 0);
     }
@@ -578,10 +514,6 @@ impl SimulatedMachine {
             self.guard.borrow_mut().on_link_ended(self.now_ns.get());
         }
     }
-}
-
-const fn killed_by(signal: Signal) -> ExitCause {
-    ExitCause::Signalled { signal: signal.as_raw(), core: false }
 }
 
 fn is_killed(doomed: &BTreeMap<u32, u32>, process: u32) -> bool {

@@ -18,10 +18,11 @@ use console::missions::SHIPPED;
 use link::step::{Entry, Event, Link, State};
 use recording::Recording;
 
+use simulation::Random;
+
 use crate::{
     chaos::Judged,
     error::{OrCannot as _, Result},
-    random::Random,
 };
 
 /// Inputs from coverage-guided fuzzing, and a recording's first bytes.

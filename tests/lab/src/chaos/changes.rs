@@ -14,7 +14,9 @@ use mission_control::target_list::{TargetOutcome, TargetResult};
 use serde::Serialize;
 use summary::Summary;
 
-use crate::{random::Random, robot::firsthand};
+use simulation::Random;
+
+use crate::robot::firsthand;
 
 const MOST_CHANGES: usize = 6;
 const PAUSE_S: [f64; 2] = [0.8, 3.0];

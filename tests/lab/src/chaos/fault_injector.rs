@@ -5,7 +5,9 @@ use std::{collections::VecDeque, time::Duration};
 use common::{json_wire::Report, mission::Protocol, wire::COUNT_CYCLE};
 
 use self::words::{COUNT_RAD, Effect, Said, Words};
-use crate::{chaos::robot_fault::RobotFault, random::Random};
+use simulation::Random;
+
+use crate::chaos::robot_fault::RobotFault;
 
 mod words;
 

@@ -26,9 +26,10 @@ use crate::chaos::{
     robot_fault::{Promise, RobotFault},
     stop_time_table::{Entry, StopTimeTable},
 };
+use simulation::Random;
+
 use crate::{
     error::{OrCannot as _, Result},
-    random::Random,
     robot::{Run, command_lines, firsthand},
     ros2_robot::Ros2Robot,
 };

@@ -6,7 +6,7 @@ use processes::stages::TABLE;
 use rustix::process::Signal;
 use serde::{Deserialize, Serialize};
 
-use crate::random::Random;
+use simulation::Random;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 use glam::DVec2;
 
 use super::shapes::{heading, wall, walls};
-use crate::{missions::trial::Scene, random::Random};
+use simulation::Random;
+
+use crate::missions::trial::Scene;
 
 pub fn straight(random: &mut Random) -> Scene {
     let length = random.within(4.0, 8.0);

@@ -14,10 +14,11 @@ use super::{
     ends::{self, Ends},
     floor::Floor,
 };
+use simulation::Random;
+
 use crate::{
     error::{Failure, Result},
     missions::trial::{Rules, Scene, Trial},
-    random::Random,
 };
 
 const DRAWN: usize = 10;

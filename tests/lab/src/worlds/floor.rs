@@ -10,7 +10,9 @@ use glam::DVec2;
 use maps::{MOST_BOXES, MapError, PlacedMap};
 
 use super::{ends::Ends, files::malformed, shapes::boxes};
-use crate::{error::Result, random::Random};
+use simulation::Random;
+
+use crate::error::Result;
 
 /// Maximum side of a map: that of the check whether it can be crossed.
 const LARGEST_M: f64 = 95.0;

@@ -7,7 +7,9 @@ use common::geometry::{Box2, Drum, Shapes, Wall};
 use glam::DVec2;
 
 use super::shapes::{Room, block, boxes, heading, walls};
-use crate::{missions::trial::Scene, random::Random};
+use simulation::Random;
+
+use crate::missions::trial::Scene;
 
 /// Objects per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.16, 0.22];

@@ -21,10 +21,9 @@ use super::{
     barn,
     shapes::{block, boxes, drum, drums},
 };
-use crate::{
-    missions::trial::{Rules, Scene},
-    random::Random,
-};
+use simulation::Random;
+
+use crate::missions::trial::{Rules, Scene};
 
 const START: DVec2 = DVec2::new(11.0, 0.0);
 const GOAL: DVec2 = DVec2::new(-9.0, 0.0);

@@ -4,7 +4,9 @@ use common::mission::Person;
 use glam::DVec2;
 
 use super::shapes::{Room, heading};
-use crate::{missions::trial::Scene, random::Random};
+use simulation::Random;
+
+use crate::missions::trial::Scene;
 
 const PEOPLE: [usize; 2] = [3, 10];
 const SPEEDS_M_S: [f64; 2] = [0.5, 1.5];

@@ -13,10 +13,9 @@ use common::geometry::{Light, Shapes, Wall};
 use glam::DVec2;
 
 use super::shapes::{Room, block, drum, heading, wall, walls};
-use crate::{
-    missions::trial::{Scene, points},
-    random::Random,
-};
+use simulation::Random;
+
+use crate::missions::trial::{Scene, points};
 
 /// Objects per square metre of floor: sparse, usual, dense.
 const DENSITIES: [f64; 3] = [0.10, 0.18, 0.26];

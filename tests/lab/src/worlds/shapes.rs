@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use common::geometry::{Box2, Drum, Shapes, Wall};
 use glam::DVec2;
 
-use crate::random::Random;
+use simulation::Random;
 
 pub fn drum(at: DVec2, radius_m: f64) -> Drum {
     Drum { at, radius_m, ..Drum::default() }

@@ -3,7 +3,9 @@
 use glam::DVec2;
 
 use super::shapes::{drum, drums, wall, walls};
-use crate::{missions::trial::Scene, random::Random};
+use simulation::Random;
+
+use crate::missions::trial::Scene;
 
 /// Distance from the start to the bottom of the U.
 const BOTTOM_M: f64 = 2.4;
