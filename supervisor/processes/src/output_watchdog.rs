@@ -69,7 +69,7 @@ impl OutputWatchdog {
 
     /// Returns the first stage in pipeline order with an overdue answer.
     ///
-    /// Each stage's `now` excludes its waits for a processor.
+    /// Each stage's `now` is its last beat, without its waits for a processor.
     pub(crate) fn stale(&mut self, now: impl Fn(&str) -> Now) -> Option<&'static str> {
         let published: Vec<_> = self.0.iter().map(|it| (it.stage.name, it.published)).collect();
         let published = |writer: &str| published.iter().find(|(name, _)| *name == writer)?.1;

@@ -134,7 +134,7 @@ impl StageProcesses {
         let stages = &self.stages;
         let unstarved = |stage: &str| {
             let stage = stages.iter().find(|it| it.stage.name == stage);
-            stage.map_or(now, |stage| stage.unstarved(now))
+            stage.map_or(now, StageProcess::unstarved)
         };
         if let Some(stage) = self.watchdog.stale(unstarved) {
             tracing::warn!(stage, "the stage sends heartbeats but does not answer its inputs");
