@@ -1,47 +1,13 @@
-//! Tests of robots whose wheels are blocked by an undetected obstacle, or by an object in the
-//! wheels.
+//! A robot whose wheels are held by an obstacle that no sensor detects, on the wall clock.
 
 use serde_json::Value;
 
 use crate::support::{Run, assert_ended, assert_nothing_left, records, wire::Robot};
 
-const ON_THE_WALL: [&str; 2] = ["--pace", "2"];
-
 fn stalls(directory: &std::path::Path) -> Vec<(String, String)> {
     let text = |value: &Value| value.as_str().unwrap().to_owned();
     let stalls = records(&directory.join("run").join("stalls.jsonl"));
     stalls.iter().map(|stall| (text(&stall["cause"]), text(&stall["recovery"]))).collect()
-}
-
-fn blocked(
-    robot: &str,
-    blocks: &str,
-    pace: &[&str],
-) -> (Option<i32>, Value, Vec<(String, String)>) {
-    let set = format!("simulation.block=[{blocks}]");
-    let run = Run::start(robot, "open-room", &[&["--set", &set], pace].concat());
-    let (code, summary, directory) = run.finish_in();
-    assert_nothing_left(robot);
-    (code, summary, stalls(directory.path()))
-}
-
-#[test]
-fn a_robot_with_a_wheel_blocked_for_5_s_gets_a_fresh_planner_and_arrives_at_any_pace() {
-    for (robot, pace) in [("blocked", &ON_THE_WALL[..]), ("blocked-max", &[])] {
-        let block = "{wheels='left',from_s=7,until_s=12}";
-        let (code, summary, stalls) = blocked(robot, block, pace);
-        assert_ended(code, &summary, 0, "reached");
-        assert_eq!(stalls[0], ("held".to_owned(), "replan".to_owned()), "{stalls:?}");
-    }
-}
-
-#[test]
-fn a_robot_whose_wheels_are_held_for_ever_is_unreachable_and_its_odometry_is_not_blamed() {
-    let (code, summary, stalls) = blocked("held", "{wheels='both',from_s=7}", &ON_THE_WALL);
-    assert_ended(code, &summary, 3, "unreachable");
-    assert!(summary["reason"].as_str().unwrap().contains("held fast"), "{summary}");
-    assert!(stalls.iter().all(|(cause, _)| cause == "held"), "{stalls:?}");
-    assert!(summary["replans"].as_u64() > Some(1), "{summary}");
 }
 
 #[test]

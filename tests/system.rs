@@ -38,7 +38,6 @@ mod recording;
 mod repeatability;
 mod replaced_bus;
 mod report;
-mod robot_faults;
 mod screen;
 mod services;
 mod starting;

@@ -151,40 +151,27 @@ mod tests {
 
     #[test]
     fn each_form_is_read_and_datagrams_are_the_default() {
-        let read = |text: &str| text.parse::<Address<String>>().unwrap();
-        let host = || "192.168.0.201:10001".to_owned();
-        assert_eq!(read("192.168.0.201:10001"), Address::Udp(host()));
-        assert_eq!(read("udp://192.168.0.201:10001"), Address::Udp(host()));
-        assert_eq!(read("tcp://192.168.0.201:10001"), Address::Tcp(host()));
-        assert_eq!(read("tcp://[::1]:7"), Address::Tcp("[::1]:7".to_owned()));
-        assert_eq!(read("x80.local:7"), Address::Udp("x80.local:7".to_owned()));
-        assert_eq!(read("ros2"), Address::Ros2(None));
-        assert_eq!(read("ros2:7"), Address::Ros2(Some(7)));
-        assert_eq!(read("ros2://7"), Address::Ros2(Some(7)));
-        assert_eq!(read("ros2.local:7"), Address::Udp("ros2.local:7".to_owned()));
-        assert_eq!(read("serial:///dev/ttyUSB0"), Address::Serial("/dev/ttyUSB0".into()));
+        use Address::{Ros2, Serial, Tcp, Udp};
+        for (text, address) in [
+            ("192.168.0.201:10001", Udp("192.168.0.201:10001".to_owned())),
+            ("udp://192.168.0.201:10001", Udp("192.168.0.201:10001".to_owned())),
+            ("tcp://192.168.0.201:10001", Tcp("192.168.0.201:10001".to_owned())),
+            ("tcp://[::1]:7", Tcp("[::1]:7".to_owned())),
+            ("x80.local:7", Udp("x80.local:7".to_owned())),
+            ("ros2", Ros2(None)),
+            ("ros2:7", Ros2(Some(7))),
+            ("ros2://7", Ros2(Some(7))),
+            ("ros2.local:7", Udp("ros2.local:7".to_owned())),
+            ("serial:///dev/ttyUSB0", Serial("/dev/ttyUSB0".into())),
+        ] {
+            assert_eq!(text.parse::<Address<String>>().unwrap(), address);
+        }
     }
 
     #[test]
     fn what_is_no_address_is_named_with_the_forms_there_are() {
-        for bad in [
-            "",
-            "not an address",
-            "192.168.0.201",
-            "host:0",
-            "host:99999",
-            ":10001",
-            "two hosts:1",
-            "::1:7",
-            "http://host:80",
-            "udp://host",
-            "tcp://host:1/path",
-            "serial://ttyUSB0",
-            "serial://",
-            "ros2:",
-            "ros2:233",
-            "ros2:-1",
-        ] {
+        let bad = "|not an address|192.168.0.201|host:0|host:99999|:10001|two hosts:1|::1:7|http://host:80|udp://host|tcp://host:1/path|serial://ttyUSB0|serial://|ros2:|ros2:233|ros2:-1";
+        for bad in bad.split('|') {
             let error = bad.parse::<Address<String>>().unwrap_err().to_string();
             let named = error.contains(&format!("{bad:?}")) && error.contains(FORMS);
             assert!(named, "{bad:?} gave {error:?}");

@@ -298,13 +298,17 @@ mod tests {
                 ..Box2::default()
             }],
         };
-        assert_eq!(shapes.clearance(DVec2::ZERO), 1.0, "the wall is nearest");
-        assert_eq!(shapes.clearance(DVec2::new(1.0, 0.0)), 0.5, "the drum is");
-        assert_eq!(shapes.clearance(DVec2::new(2.0, 0.0)), -0.5, "in the drum");
-        let above = shapes.clearance(DVec2::new(0.0, 2.5));
-        assert!((above - 0.5).abs() < 1e-12, "the turned box is 2 m tall: {above}");
-        let inside = shapes.clearance(DVec2::new(0.0, 4.0));
-        assert!((inside + 0.5).abs() < 1e-12, "inside the box: {inside}");
+        for (x, y, clearance, what) in [
+            (0.0, 0.0, 1.0, "the wall is nearest"),
+            (1.0, 0.0, 0.5, "the drum is"),
+            (2.0, 0.0, -0.5, "in the drum"),
+            (0.0, 2.5, 0.5, "the turned box is 2 m tall"),
+            (0.0, 4.0, -0.5, "inside the box"),
+        ] {
+            let found = shapes.clearance(DVec2::new(x, y));
+            assert!((found - clearance).abs() < 1e-12, "{what}: {found}");
+        }
+        assert_eq!(Shapes::default().clearance(DVec2::ZERO), f64::INFINITY);
     }
 
     #[test]
@@ -355,15 +359,10 @@ mod tests {
     }
 
     #[test]
-    fn nothing_standing_is_infinitely_clear() {
-        assert_eq!(Shapes::default().clearance(DVec2::ZERO), f64::INFINITY);
-    }
-
-    #[test]
     fn angles_wrap_to_the_half_open_turn() {
         use std::f64::consts::PI;
-        assert!((wrap_angle(3.0 * PI) - PI).abs() < 1e-12);
-        assert!((wrap_angle(-PI / 2.0) + PI / 2.0).abs() < 1e-12);
-        assert!((wrap_angle(1.5 * PI) + PI / 2.0).abs() < 1e-12);
+        for (half_turns, wrapped) in [(3.0, 1.0), (-0.5, -0.5), (1.5, -0.5)] {
+            assert!((wrap_angle(half_turns * PI) - wrapped * PI).abs() < 1e-12, "{half_turns}");
+        }
     }
 }

@@ -133,21 +133,22 @@ impl Lead {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
+    use crate::testing::mission;
 
     fn lead(text: &str) -> Option<Lead> {
-        let text = format!(
-            "target = [3, 0]\ncontroller.speed_m_s = 0.5\nrobot.top_speed_m_s = 0.5\n{text}"
-        );
-        Lead::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+        let speeds = "controller.speed_m_s = 0.5\nrobot.top_speed_m_s = 0.5";
+        Lead::new(&mission(&format!("{speeds}\n{text}")))
+    }
+
+    fn late() -> Lead {
+        lead("robot.response = { delay_s = 0.4, lag_s = 0.1 }").unwrap()
     }
 
     #[test]
     fn a_late_base_is_foreseen_on_the_curve_of_the_commands_that_it_has_not_answered_yet() {
         assert!(lead("").is_none());
-        let mut lead = lead("robot.response = { delay_s = 0.4, lag_s = 0.1 }").unwrap();
+        let mut lead = late();
         let at = |lead: &mut Lead, now_s| lead.foresee(Pose2::default(), now_s).0;
         assert_eq!(at(&mut lead, 0.0), Pose2::default());
         lead.command(Twist { v: 0.2, omega: 0.5 }, 0.0);
@@ -165,7 +166,7 @@ mod tests {
 
     #[test]
     fn a_robot_that_is_on_its_way_when_the_model_begins_goes_on() {
-        let mut lead = lead("robot.response = { delay_s = 0.4, lag_s = 0.1 }").unwrap();
+        let mut lead = late();
         let at = |x| Pose2 { position: glam::DVec2::new(x, 0.0), heading: 0.0 };
         lead.foresee(at(0.0), 1.0);
         let (pose, twist) = lead.foresee(at(0.03), 1.1);
@@ -174,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_time_that_is_ages_ahead_is_not_followed_step_by_step() {
-        let mut lead = lead("robot.response = { delay_s = 0.4, lag_s = 0.1 }").unwrap();
+        let mut lead = late();
         lead.foresee(Pose2::default(), 0.0);
         lead.command(Twist { v: 0.2, omega: 0.0 }, 0.0);
         let (pose, twist) = lead.foresee(Pose2::default(), 1.8e10);

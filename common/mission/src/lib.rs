@@ -62,6 +62,8 @@ mod ros2;
 mod sensor;
 mod simulation;
 pub mod sonar;
+#[cfg(test)]
+mod testing;
 mod touch;
 
 use std::{f64::consts::FRAC_PI_4, path::PathBuf};

@@ -240,8 +240,7 @@ mod tests {
     fn a_base_of_which_nobody_stated_how_it_answers_is_trusted_little_and_an_x80_with_what_it_does()
     {
         let trusted = |text: &str| {
-            let text = format!("target = [3, 0]\n{text}");
-            let mission = crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
+            let mission = crate::testing::mission(text);
             let Response { delay_s, acceleration_m_s2, .. } = mission.trusted_response();
             (mission.states_response(), delay_s, acceleration_m_s2)
         };

@@ -419,16 +419,13 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use glam::DVec2;
 
     use super::*;
-    use crate::{Mission, kinematics::Pose2};
-
-    fn mission(extra: &str) -> Mission {
-        Mission::parse(&format!("target = [1, 0]\n{extra}"), Path::new("test.toml")).unwrap()
-    }
+    use crate::{
+        kinematics::Pose2,
+        testing::{laser, mission, read_back},
+    };
 
     fn used(extra: &str) -> Vec<String> {
         let table = mission(extra).sensor_table();
@@ -472,7 +469,7 @@ mod tests {
 
     #[test]
     fn written_rows_replace_the_table_and_the_key_sensors_selects_from_them() {
-        let table = mission(ROWS).sensor_table();
+        let table = read_back(ROWS).sensor_table();
         let [nose, eye] = &table[..] else {
             panic!("{table:?}");
         };
@@ -499,9 +496,7 @@ mod tests {
     #[test]
     fn a_laser_upside_down_has_its_beams_mirrored_on_the_middle_one() {
         let mirrored = |keys: &str, beams: usize| {
-            let row = format!(
-                "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = 180\nbeams = {beams}\n{keys}"
-            );
+            let row = laser("laser", &format!("roll_deg = 180\nbeams = {beams}\n{keys}"));
             let (_, laser) = mission(&format!("robot.protocol = 'json'\n{row}")).laser().unwrap();
             let mut numbers: Vec<_> = (0..beams).collect();
             laser.mirror(&mut numbers);
@@ -514,20 +509,10 @@ mod tests {
 
     #[test]
     fn of_several_lasers_the_first_with_the_widest_view_that_is_used_says_where_the_robot_is() {
-        let laser = |name: &str, view_deg: u32| {
-            format!(
-                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0.1\nbearing_deg = 0\nfield_of_view_deg = {view_deg}\n"
-            )
-        };
-        let rows = [laser("narrow", 90), laser("wide", 180), laser("other", 180)].concat();
+        let rows = [("narrow", 90), ("wide", 180), ("other", 180)]
+            .map(|(name, view_deg)| laser(name, &format!("field_of_view_deg = {view_deg}")));
+        let rows = rows.concat();
         let mission = mission(&format!("robot.protocol = 'json'\n{rows}"));
         assert_eq!((mission.laser().unwrap().0, mission.lasers().len()), (1, 3));
-    }
-
-    #[test]
-    fn a_mission_with_rows_survives_its_run_file() {
-        let written = mission(ROWS);
-        let again = Mission::parse(&toml::to_string(&written).unwrap(), Path::new("run.toml"));
-        assert_eq!(again.unwrap().robot.sensors, written.robot.sensors);
     }
 }

@@ -8,10 +8,17 @@ fn bytes(hex: &str) -> Vec<u8> {
     hex.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect()
 }
 
-fn command(hex: &str) -> Result<Command, MessageError> {
+fn encoded(encode: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+    let mut out = Vec::new();
+    encode(&mut out);
+    out
+}
+
+/// Applies `parse` to the one sound frame in `bytes`.
+fn decoded<T>(bytes: &[u8], parse: impl FnOnce(&Frame<'_>) -> T) -> T {
     let mut decoder = Decoder::default();
-    decoder.push(&bytes(hex));
-    Command::parse(&decoder.next_frame().expect("one sound frame"))
+    decoder.push(bytes);
+    parse(&decoder.next_frame().expect("one sound frame"))
 }
 
 fn wheels(first: i16, second: i16, limit_ms: Option<u16>) -> Command {
@@ -38,23 +45,15 @@ fn every_worked_frame_is_written_and_read() {
         (pid, "5e 02 01 00 07 0b 08 00 01 0f 00 02 00 00 03 00 00 27 5e 0d"),
     ];
     for (meant, hex) in worked {
-        let mut out = Vec::new();
-        meant.encode(Addressing::Numbered, &mut out);
-        assert_eq!(out, bytes(hex), "{meant:?}");
-        assert_eq!(command(hex), Ok(meant), "{hex}");
+        let worked = bytes(hex);
+        let out = encoded(|out| meant.encode(Addressing::Numbered, out));
+        assert_eq!(out, worked, "{meant:?}");
+        assert_eq!(decoded(&worked, Command::parse), Ok(meant), "{hex}");
     }
-}
-
-#[test]
-fn the_worked_acknowledgement_of_the_robot_is_written_and_read() {
     let ack = Report::System(SystemSignal::Ack);
-    let hex = bytes("5e 02 00 00 ff 01 01 48 5e 0d");
-    let mut out = Vec::new();
-    ack.encode(Addressing::Numbered, &mut out);
-    assert_eq!(out, hex);
-    let mut decoder = Decoder::default();
-    decoder.push(&hex);
-    assert_eq!(Report::parse(&decoder.next_frame().unwrap()), Ok(ack));
+    let worked = bytes("5e 02 00 00 ff 01 01 48 5e 0d");
+    assert_eq!(encoded(|out| ack.encode(Addressing::Numbered, out)), worked);
+    assert_eq!(decoded(&worked, Report::parse), Ok(ack));
 }
 
 fn parsed(did: u8, data: &[u8]) -> Result<Command, MessageError> {
@@ -62,45 +61,28 @@ fn parsed(did: u8, data: &[u8]) -> Result<Command, MessageError> {
 }
 
 #[test]
-fn timed_commands_are_taken_with_14_and_with_15_bytes() {
-    let six = bytes("90 01 70 fe 00 80 00 80 00 80 00 80");
-    let timed = Ok(wheels(400, -400, Some(1000)));
-    assert_eq!(parsed(27, &[&six[..], &[0xe8, 0x03]].concat()), timed);
-    assert_eq!(parsed(27, &[&six[..], &[28, 0xe8, 0x03]].concat()), timed);
-    assert_eq!(parsed(27, &[&six[..], &[0xe8, 0x03, 0]].concat()), timed);
-}
-
-#[test]
-fn both_ways_to_leave_a_channel_alone_are_taken() {
-    let other = bytes("90 01 70 fe 01 80 01 80 00 80 01 80");
-    assert_eq!(parsed(27, &other), Ok(wheels(400, -400, None)));
-    let no_channel = Ok(Command::Motion(Motion {
-        quantity: Quantity::Velocity,
-        targets: Targets::All([None; 6]),
-        limit_ms: None,
-    }));
-    assert_eq!(parsed(26, &[1, 0x01, 0x80]), no_channel);
-}
-
-#[test]
-fn a_single_channel_is_set_with_and_without_time() {
-    let meant = |limit_ms| {
-        Ok(Command::Motion(Motion {
-            quantity: Quantity::Position,
-            targets: Targets::One { channel: 1, value: -2 },
-            limit_ms,
-        }))
-    };
-    assert_eq!(parsed(3, &[1, 0xfe, 0xff]), meant(None));
-    assert_eq!(parsed(3, &[1, 0xfe, 0xff, 28, 10, 1]), meant(Some(266)));
-    assert_eq!(parsed(3, &[1, 0xfe, 0xff, 10, 1]), meant(Some(266)));
-}
-
-#[test]
-fn a_stream_asked_for_255_times_is_continuous() {
-    let start = Ok(Command::Stream { stream: Stream::All, request: Request::Start });
-    assert_eq!(parsed(127, &[255]), start);
-    assert_eq!(parsed(127, &[]), start);
+fn commands_are_taken_in_every_form_that_hosts_send() {
+    let all = |limit_ms| wheels(400, -400, limit_ms);
+    let motion =
+        |quantity, targets, limit_ms| Command::Motion(Motion { quantity, targets, limit_ms });
+    let one =
+        |limit_ms| motion(Quantity::Position, Targets::One { channel: 1, value: -2 }, limit_ms);
+    let start = Command::Stream { stream: Stream::All, request: Request::Start };
+    for (did, data, meant) in [
+        (27, "90 01 70 fe 00 80 00 80 00 80 00 80 e8 03", all(Some(1000))),
+        (27, "90 01 70 fe 00 80 00 80 00 80 00 80 1c e8 03", all(Some(1000))),
+        (27, "90 01 70 fe 00 80 00 80 00 80 00 80 e8 03 00", all(Some(1000))),
+        // Both ways to leave a channel alone.
+        (27, "90 01 70 fe 01 80 01 80 00 80 01 80", all(None)),
+        (26, "01 01 80", motion(Quantity::Velocity, Targets::All([None; 6]), None)),
+        (3, "01 fe ff", one(None)),
+        (3, "01 fe ff 1c 0a 01", one(Some(266))),
+        (3, "01 fe ff 0a 01", one(Some(266))),
+        (127, "ff", start),
+        (127, "", start),
+    ] {
+        assert_eq!(parsed(did, &bytes(data)), Ok(meant), "{did}: {data}");
+    }
 }
 
 #[test]
@@ -132,8 +114,7 @@ fn the_motor_frame_lies_as_the_notes_say() {
             Encoder { position: 0x0708, speed: 0x090a, positive: false },
         ],
     };
-    let mut out = Vec::new();
-    Report::Motor(sensors).encode(Addressing::Lettered, &mut out);
+    let out = encoded(|out| Report::Motor(sensors).encode(Addressing::Lettered, out));
     assert_eq!(out[2..6], [0xb8, 0, 123, 33]);
     let data = &out[6..39];
     assert_eq!(data[..2], [0x02, 0x01]);
@@ -207,13 +188,10 @@ proptest! {
         meant in any_command(),
         addressing in prop::sample::select(vec![Addressing::Numbered, Addressing::Lettered]),
     ) {
-        let mut out = Vec::new();
-        meant.encode(addressing, &mut out);
-        let mut decoder = Decoder::default();
-        decoder.push(&out);
-        let frame = decoder.next_frame().expect("it was encoded whole");
-        prop_assert_eq!(Addressing::of_robot(frame.rid), Some(addressing));
-        prop_assert_eq!(Command::parse(&frame), Ok(meant));
+        let out = encoded(|out| meant.encode(addressing, out));
+        let (rid, came) = decoded(&out, |frame| (frame.rid, Command::parse(frame)));
+        prop_assert_eq!(Addressing::of_robot(rid), Some(addressing));
+        prop_assert_eq!(came, Ok(meant));
     }
 
     #[test]
@@ -224,18 +202,12 @@ proptest! {
         let frame = Frame { rid: 0, sn: 0, did, data: &data };
         // A report keeps all of its data except the frame's unused bytes.
         if let Ok(report) = Report::parse(&frame) {
-            let mut out = Vec::new();
-            report.encode(Addressing::Numbered, &mut out);
-            let mut decoder = Decoder::default();
-            decoder.push(&out);
-            prop_assert_eq!(Report::parse(&decoder.next_frame().expect("whole")), Ok(report));
+            let out = encoded(|out| report.encode(Addressing::Numbered, out));
+            prop_assert_eq!(decoded(&out, Report::parse), Ok(report));
         }
         if let Ok(command) = Command::parse(&frame) {
-            let mut out = Vec::new();
-            command.encode(Addressing::Numbered, &mut out);
-            let mut decoder = Decoder::default();
-            decoder.push(&out);
-            prop_assert_eq!(Command::parse(&decoder.next_frame().expect("whole")), Ok(command));
+            let out = encoded(|out| command.encode(Addressing::Numbered, out));
+            prop_assert_eq!(decoded(&out, Command::parse), Ok(command));
         }
     }
 }

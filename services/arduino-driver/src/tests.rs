@@ -41,6 +41,21 @@ fn round(driver: &mut Arduino, answers: &str) -> Heard {
     heard(driver, answers)
 }
 
+fn is_refused(heard: &Heard, why: &str) -> bool {
+    heard.refused.as_ref().is_some_and(|refused| refused.to_string().contains(why))
+}
+
+fn says_nothing(heard: &Heard) -> bool {
+    heard.motion.is_none() && heard.readings.is_empty()
+}
+
+/// Answers a round with these counts. Returns them, and the speeds.
+fn turned(driver: &mut Arduino, [left, right]: [i32; 2]) -> ([u16; 2], [i32; 2]) {
+    let said = round(driver, &format!("1\r\n1\r\n{left} {right}\r\n"));
+    let wheels = said.motion.unwrap().wheels;
+    (counts(&said).unwrap(), [wheels.left_counts_per_s, wheels.right_counts_per_s])
+}
+
 fn counts(heard: &Heard) -> Option<[u16; 2]> {
     heard.motion.map(|motion| [motion.wheels.left_counts, motion.wheels.right_counts])
 }
@@ -75,15 +90,6 @@ fn answers_come_in_any_pieces_and_commands_are_answered_between_them() {
 }
 
 #[test]
-fn nothing_is_asked_while_a_round_is_unanswered() {
-    let mut driver = driver();
-    assert_eq!(polled(&mut driver), ROUND);
-    assert_eq!([polled(&mut driver), polled(&mut driver)], ["", ""]);
-    assert!(heard(&mut driver, "1\r\n1\r\n1 1\r\n").motion.is_some());
-    assert_eq!(polled(&mut driver), ROUND);
-}
-
-#[test]
 fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
     for (bad, why) in [
         // A lost answer: pin 5's stands in for pin 4's.
@@ -96,29 +102,18 @@ fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
     ] {
         let mut driver = driver();
         let said = round(&mut driver, bad);
-        assert!(said.motion.is_none() && said.readings.is_empty(), "{bad:?}: {said:?}");
-        assert!(
-            said.refused.as_ref().is_some_and(|refused| refused.to_string().contains(why)),
-            "{said:?}"
-        );
+        assert!(says_nothing(&said) && is_refused(&said, why), "{bad:?}: {said:?}");
         // Late answers, and an unrequested baud rate.
         let late = heard(&mut driver, "77\r\n88\r\n9 9\r\n57600\r\n");
-        assert!(late.motion.is_none() && late.readings.is_empty(), "{late:?}");
+        assert!(says_nothing(&late), "{late:?}");
         assert_eq!(polled(&mut driver), "\rb\r");
         let late = heard(&mut driver, "77\r\n88\r\n9 9\r\nInvalid Command\r\n");
-        assert!(late.motion.is_none() && late.readings.is_empty() && !late.anything, "{late:?}");
+        assert!(says_nothing(&late) && !late.anything, "{late:?}");
         assert!(heard(&mut driver, "57600\r\n").anything);
         let said = round(&mut driver, "10\r\n20\r\n3 4\r\n");
         let taken: Vec<_> = ranges(&said).iter().map(|range| (range.0, range.2)).collect();
         assert_eq!((counts(&said), taken), (Some([3, 4]), vec![(0, 0.1), (1, 0.2)]));
     }
-}
-
-#[test]
-fn a_line_that_nobody_asked_for_is_refused_too() {
-    let mut driver = driver();
-    assert!(heard(&mut driver, "12\r\n").refused.is_some());
-    assert_eq!(polled(&mut driver), "\rb\r");
 }
 
 #[test]
@@ -129,10 +124,12 @@ fn a_round_that_is_overdue_is_dropped_and_its_late_answers_are_no_answers_of_the
     assert_eq!([polled(&mut driver), polled(&mut driver)], ["", ""]);
     assert_eq!(polled(&mut driver), "\rb\r");
     let late = heard(&mut driver, "22\r\n1 2\r\n");
-    assert!(late.motion.is_none() && late.readings.is_empty(), "{late:?}");
-    assert!(late.refused.is_some_and(|why| why.to_string().contains("`p 5` is overdue")));
+    assert!(says_nothing(&late) && is_refused(&late, "`p 5` is overdue"), "{late:?}");
     assert!(heard(&mut driver, "57600\r\n").anything);
     assert!(round(&mut driver, "1\r\n1\r\n1 2\r\n").motion.is_some());
+    // A line that nobody asked for is refused too.
+    assert!(heard(&mut driver, "12\r\n").refused.is_some());
+    assert_eq!(polled(&mut driver), "\rb\r");
 }
 
 #[test]
@@ -162,39 +159,33 @@ fn a_wire_that_opens_again_begins_anew() {
 fn counts_that_wrap_at_32_bits_go_on_and_their_speeds_are_those_of_the_interval_before() {
     let mut driver = driver();
     // 10 counts per tick of 0.1 s.
-    let before_wrap = i32::MAX - 4;
-    let mut sampled = Vec::new();
-    for tick in 0..4 {
-        let turned = before_wrap.wrapping_add(10 * tick);
-        let said = round(&mut driver, &format!("1\r\n1\r\n{turned} {}\r\n", -10 * tick));
-        let wheels = said.motion.unwrap().wheels;
-        sampled.push((wheels.left_counts, wheels.left_counts_per_s, wheels.right_counts_per_s));
+    for (tick, counts, speeds) in
+        [(0, 32_763, [0, 0]), (1, 5, [0, 0]), (2, 15, [100, -100]), (3, 25, [100, -100])]
+    {
+        let left = (i32::MAX - 4).wrapping_add(10 * tick);
+        let ([left, _], by) = turned(&mut driver, [left, -10 * tick]);
+        assert_eq!((left, by), (counts, speeds), "{tick}");
     }
-    assert_eq!(sampled[..2], [(32_763, 0, 0), (5, 0, 0)]);
-    assert_eq!(sampled[2..], [(15, 100, -100), (25, 100, -100)]);
 }
 
 #[test]
 fn the_speed_across_polls_without_a_round_is_by_the_time_between() {
     let mut driver = driver();
-    round(&mut driver, "1\r\n1\r\n0 0\r\n");
+    turned(&mut driver, [0, 0]);
     assert_eq!(polled(&mut driver), ROUND);
     assert_eq!(polled(&mut driver), "");
     heard(&mut driver, "1\r\n1\r\n10 10\r\n");
     // A poll without a request precedes this round.
-    round(&mut driver, "1\r\n1\r\n30 30\r\n");
-    let said = round(&mut driver, "1\r\n1\r\n30 30\r\n");
-    assert_eq!(said.motion.unwrap().wheels.left_counts_per_s, 100);
+    turned(&mut driver, [30, 30]);
+    assert_eq!(turned(&mut driver, [30, 30]).1[0], 100);
 }
 
 #[test]
 fn counts_that_begin_anew_are_said_as_they_are_and_their_jump_is_no_speed() {
     let mut driver = driver();
-    for turned in [20_000, 20_010, 0, 5] {
-        let said = round(&mut driver, &format!("1\r\n1\r\n{turned} {turned}\r\n"));
-        let wheels = said.motion.unwrap().wheels;
-        assert_eq!(i32::from(wheels.left_counts), turned);
-        assert!(wheels.left_counts_per_s.abs() <= 100, "{wheels:?}");
+    for counts in [20_000_u16, 20_010, 0, 5] {
+        let (said, speeds) = turned(&mut driver, [counts.into(); 2]);
+        assert!(said == [counts; 2] && speeds[0].abs() <= 100, "{said:?} {speeds:?}");
     }
 }
 

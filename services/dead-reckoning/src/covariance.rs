@@ -169,8 +169,12 @@ mod tests {
     use common::mission::Mission;
     use std::path::Path;
 
-    fn model(settings: &str) -> ErrorModel {
-        let text = format!("target = [3, 0]\n[robot.odometry]\n{settings}");
+    /// Deviations in thousandths.
+    fn model(thousandths: [u8; 4]) -> ErrorModel {
+        let [slip, ratio, track, distance] = thousandths.map(|it| f64::from(it) * 1e-3);
+        let text = format!(
+            "target = [3, 0]\n[robot.odometry]\nslip = {slip}\ndiameter_ratio_sd = {ratio}\ntrack_scale_sd = {track}\ndistance_scale_sd = {distance}"
+        );
         let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
         ErrorModel::new(&mission.robot.odometry, &mission.body())
     }
@@ -196,46 +200,31 @@ mod tests {
     }
 
     #[test]
-    fn slip_on_a_straight_way_by_hand() {
-        // Variances: heading 2 q s / W^2, sideways its integral q s^3 2 / (3 W^2), ahead q s / 2.
-        let model =
-            model("slip = 0.01\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0\ndistance_scale_sd = 0");
-        let [xx, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
+    fn each_error_of_the_wheels_is_in_the_covariance_by_hand() {
+        // Variances of slip: heading 2 q s / W^2, sideways its integral q s^3 2 / (3 W^2), ahead
+        // q s / 2.
+        let [xx, _, _, yy, _, heading] = drive(&model([10, 0, 0, 0]), 1000, AHEAD);
         let per_metre = 2.0 * 1e-4 / (0.26 * 0.26);
         close(heading, per_metre * 2.0);
         close(yy, per_metre * 8.0 / 3.0);
         close(xx, 1e-4 * 2.0 / 2.0);
-    }
-
-    #[test]
-    fn unequal_wheels_bend_a_straight_way_into_a_circle() {
-        // Errors: heading e s / W, sideways e s^2 / 2 W.
-        let model =
-            model("slip = 0\ndiameter_ratio_sd = 0.006\ntrack_scale_sd = 0\ndistance_scale_sd = 0");
-        let [_, _, _, yy, _, heading] = drive(&model, 1000, AHEAD);
+        // Errors of unequal wheels: heading e s / W, sideways e s^2 / 2 W.
+        let [_, _, _, yy, _, heading] = drive(&model([0, 6, 0, 0]), 1000, AHEAD);
         let variance = 0.006 * 0.006;
         close(heading, variance * (2.0_f64 / 0.26).powi(2));
         close(yy, variance * (4.0_f64 / 2.0 / 0.26).powi(2));
-    }
-
-    #[test]
-    fn wheels_that_are_larger_than_known_drive_farther_and_turn_farther() {
-        let model =
-            model("slip = 0\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0\ndistance_scale_sd = 0.01");
-        let [xx, .., yy, _, _] = drive(&model, 1000, AHEAD);
+        // Larger wheels drive and turn farther.
+        let larger = model([0, 0, 0, 10]);
+        let [xx, .., yy, _, _] = drive(&larger, 1000, AHEAD);
         close(xx, 1e-4 * 4.0);
         assert!(yy < 1e-18);
-        let [.., heading] = drive(&model, 50, Twist { v: 0.0, omega: 0.02 });
-        close(heading, 1e-4);
+        close(drive(&larger, 50, Twist { v: 0.0, omega: 0.02 })[5], 1e-4);
     }
 
     #[test]
     fn an_uncertain_track_is_undone_by_turning_back() {
-        let model =
-            model("slip = 0\ndiameter_ratio_sd = 0\ntrack_scale_sd = 0.01\ndistance_scale_sd = 0");
-        let there = Twist { v: 0.0, omega: 0.02 };
-        let [.., heading] = drive(&model, 50, there);
-        close(heading, 1e-4);
+        let model = model([0, 0, 10, 0]);
+        close(drive(&model, 50, Twist { v: 0.0, omega: 0.02 })[5], 1e-4);
         let (mut covariance, mut pose) = (model.start(), Pose2::default());
         for omega in [0.02; 50].into_iter().chain([-0.02; 50]) {
             covariance = after(&model, &covariance, pose, Twist { v: 0.0, omega });

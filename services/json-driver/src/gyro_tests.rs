@@ -1,18 +1,14 @@
 //! Gyro turns of a JSON robot.
 
-use std::path::Path;
+use common::driver::Base as _;
 
-use common::{driver::Base as _, mission::Mission};
-
-use crate::{Driver as _, Json};
+use crate::{Driver as _, tests::driver};
 
 /// Returns ticks' turns, by sequence and angle, and any refusal. Wheels turn the robot by 0.1 rad a
 /// tick; its gyro reports `said`.
 fn told(said: &[Option<f64>]) -> (Vec<(u64, f64)>, Option<String>) {
-    let text = "target = [3, 0]\nrobot.protocol = 'json'";
-    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-    let mut driver = Json::new(&mission);
-    let body = mission.body();
+    let mut driver = driver();
+    let body = driver.body;
     let (mut turns, mut refused) = (Vec::new(), None);
     for (tick, gyro) in said.iter().enumerate() {
         let side = 0.05 * tick as f64 * body.track_m / body.wheel_radius_m;
@@ -42,8 +38,6 @@ fn a_gyro_in_degrees_or_clockwise_is_not_used_and_named() {
         assert!(turns.is_empty(), "{turns:?}");
         assert!(refused.unwrap().contains("in the unit of the protocol"));
     }
-    let mission =
-        Mission::parse("target = [3, 0]\nrobot.protocol = 'json'", Path::new("m")).unwrap();
-    let heard = Json::new(&mission).hear(b"{\"gyro\":1}\n");
+    let heard = driver().hear(b"{\"gyro\":1}\n");
     assert!(heard.refused.unwrap().to_string().contains("send both"));
 }

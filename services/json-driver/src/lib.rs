@@ -260,9 +260,23 @@ mod tests {
 
     use super::*;
 
-    fn driver() -> Json {
-        let text = "target = [3, 0]\nrobot.protocol = 'json'\nrobot.counts_per_turn = 3600";
-        Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap())
+    fn driver_of(text: &str) -> Json {
+        let text = format!("target = [3, 0]\n{text}");
+        Json::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+    }
+
+    pub(crate) fn driver() -> Json {
+        driver_of("robot.protocol = 'json'\nrobot.counts_per_turn = 3600")
+    }
+
+    fn refuses(heard: &Heard, why: &str) -> bool {
+        heard.refused.as_ref().is_some_and(|refused| refused.to_string().contains(why))
+    }
+
+    fn laser(name: &str, keys: &str) -> String {
+        format!(
+            "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n{keys}\n"
+        )
     }
 
     fn heard(driver: &mut Json, line: &str) -> Heard {
@@ -304,10 +318,7 @@ mod tests {
         ] {
             let heard = heard(&mut driver(), said);
             assert!(!heard.anything && heard.motion.is_none(), "{said}");
-            assert!(
-                heard.refused.is_some_and(|refused| refused.to_string().contains(why)),
-                "{said}"
-            );
+            assert!(refuses(&heard, why), "{said}");
         }
     }
 
@@ -323,8 +334,8 @@ mod tests {
 
     #[test]
     fn a_line_of_16384_beams_with_all_digits_is_taken_and_a_laser_upside_down_is_mirrored() {
-        let row = "target = [3, 0]\nrobot.protocol = 'json'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 16384\nroll_deg = 180";
-        let mut driver = Json::new(&Mission::parse(row, Path::new("m.toml")).unwrap());
+        let row = laser("laser", "beams = 16384\nroll_deg = 180");
+        let mut driver = driver_of(&format!("robot.protocol = 'json'\n{row}"));
         let range = |beam: u16| 1.000_000_000_000_123_4 + f64::from(beam) * 1e-4;
         let beams: Vec<_> = (0..16_384).map(|beam| range(beam).to_string()).collect();
         let heard = heard(&mut driver, &format!("{{\"scan\":[{}]}}", beams.join(",")));
@@ -350,8 +361,7 @@ mod tests {
 
     #[test]
     fn a_beam_beyond_twice_the_reach_is_no_reading() {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
-        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut driver = driver_of("robot.model = 'kobuki'");
         let mut beams = vec!["null"; 360];
         beams[1] = "1e308";
         let scan =
@@ -372,11 +382,8 @@ mod tests {
         let most = format!("{{\"heard\":0}}\n{{\"heard\":1}}\n{{\"heard\":{}}}", u64::MAX);
         let many = format!("{most}\n{most}");
         assert_eq!(heard(&mut driver, &many).acknowledged, 64);
-    }
-
-    #[test]
-    fn a_robot_whose_count_of_orders_begins_anew_has_restarted_and_one_old_line_is_no_restart() {
-        let mut driver = driver();
+        // One old line is no restart.
+        let mut driver = self::driver();
         for (count, restarted) in
             [(90, false), (60, false), (91, false), (0, false), (2, true), (3, false)]
         {
@@ -387,8 +394,7 @@ mod tests {
 
     #[test]
     fn a_scan_is_as_old_and_took_as_long_as_the_robot_says_and_neither_if_it_says_nothing() {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
-        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut driver = driver_of("robot.model = 'kobuki'");
         let mut sweep = |words: &str| {
             let line = format!("{{\"scan\":[{}]{words}}}", vec!["1"; 360].join(","));
             heard(&mut driver, &line).scans.pop().map(|scan| scan.sweep)
@@ -404,8 +410,7 @@ mod tests {
     #[test]
     fn a_robot_that_says_its_clock_has_its_wheels_and_scans_stamped_by_it_and_one_that_no_clock_says_is_refused()
      {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
-        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut driver = driver_of("robot.model = 'kobuki'");
         let mut stamps = |words: &str| {
             let beams = vec!["1"; 360].join(",");
             let line = format!("{{\"wheels\":[0,0],\"speeds\":[0,0],\"scan\":[{beams}]{words}}}");
@@ -422,14 +427,8 @@ mod tests {
 
     #[test]
     fn scans_of_several_lasers_are_told_apart_by_the_names_of_their_rows() {
-        let row = |name: &str| {
-            format!(
-                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 3\n"
-            )
-        };
-        let text =
-            format!("target = [3, 0]\nrobot.protocol = 'json'\n{}{}", row("front"), row("back"));
-        let mut driver = Json::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
+        let rows = ["front", "back"].map(|name| laser(name, "beams = 3")).concat();
+        let mut driver = driver_of(&format!("robot.protocol = 'json'\n{rows}"));
         let said =
             r#"{"scans":{"back":{"ranges":[1,2,3],"age_s":0.2},"front":{"ranges":[4,5,6]}}}"#;
         let scans = heard(&mut driver, said).scans;
@@ -443,20 +442,17 @@ mod tests {
             (r#"{"scans":{"left":{"ranges":[1,2,3]}}}"#, "no laser is named \"left\""),
             (r#"{"scans":{"back":{"ranges":[1,2]}}}"#, "\"back\" has 3"),
         ] {
-            let refused = heard(&mut driver, said).refused.unwrap().to_string();
-            assert!(refused.contains(why), "{refused}");
+            assert!(refuses(&heard(&mut driver, said), why), "{said}");
         }
     }
 
     #[test]
     fn what_bumpers_feel_is_told_by_the_names_of_their_rows() {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'";
-        let mut driver = Json::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut driver = driver_of("robot.model = 'kobuki'");
         let said = r#"{"touched":{"bumper-right":true,"cliff-left":false}}"#;
         assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
-        let refused =
-            heard(&mut driver, r#"{"touched":{"nose":true}}"#).refused.unwrap().to_string();
-        assert!(refused.contains("no row of robot.touch is named \"nose\""), "{refused}");
+        let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#);
+        assert!(refuses(&refused, "no row of robot.touch is named \"nose\""), "{refused:?}");
     }
 
     #[test]
@@ -474,11 +470,9 @@ mod tests {
     #[test]
     fn the_first_beam_of_a_sweep_is_the_first_in_time_of_an_upside_down_laser_too() {
         for (wide_deg, roll_deg, first) in [(90, 0, 0), (90, 180, 3), (360, 0, 0), (360, 180, 0)] {
-            let row = format!(
-                "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nbeams = 4\nfield_of_view_deg = {wide_deg}\nroll_deg = {roll_deg}"
-            );
-            let text = format!("target = [3, 0]\nrobot.protocol = 'json'\n{row}");
-            let mut driver = Json::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
+            let keys = format!("beams = 4\nfield_of_view_deg = {wide_deg}\nroll_deg = {roll_deg}");
+            let row = laser("laser", &keys);
+            let mut driver = driver_of(&format!("robot.protocol = 'json'\n{row}"));
             let said = r#"{"wheels":[0,0],"speeds":[0,0],"scan":[1,2,3,4],"scan_time_s":0.4}"#;
             let LaserScan { beams, sweep, .. } = heard(&mut driver, said).scans.remove(0);
             let times = (0..4).map(|beam| (sweep.beam_time_ns(beam, 4), beams[beam]));

@@ -17,6 +17,8 @@ mod speed_trim;
 pub mod stage;
 pub mod step;
 pub mod stop_guard;
+#[cfg(test)]
+mod testing;
 pub mod transport;
 mod wheel_speeds;
 pub mod wire_owner;

@@ -97,17 +97,16 @@ impl SpeedTrim {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use common::wire::COUNT_CYCLE;
 
     use super::*;
+    use crate::testing::{mission, near};
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
     fn found(reached: f64, ticks: usize, command: impl Fn(usize) -> [f64; 2]) -> f64 {
-        let mut trim =
-            SpeedTrim::new(&Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap());
+        let mut trim = SpeedTrim::new(&mission(""));
         let mut rolled = [0.0; 2];
         for tick in 0..ticks {
             let counts = rolled.map(|counts: f64| counts.rem_euclid(COUNT_CYCLE.into()) as u16);
@@ -123,9 +122,9 @@ mod tests {
 
     #[test]
     fn slow_wheels_are_made_good_within_seconds_forward_and_on_the_spot() {
-        assert!((found(0.78, 28, |_| [600.0, 600.0]) - 0.78).abs() < 0.02);
-        assert!((found(0.78, 28, |_| [-600.0, 600.0]) - 0.78).abs() < 0.02);
-        assert!((found(1.0, 28, |_| [600.0, 600.0]) - 1.0).abs() < 0.01);
+        near(found(0.78, 28, |_| [600.0, 600.0]), 0.78, 0.02);
+        near(found(0.78, 28, |_| [-600.0, 600.0]), 0.78, 0.02);
+        near(found(1.0, 28, |_| [600.0, 600.0]), 1.0, 0.01);
     }
 
     #[test]

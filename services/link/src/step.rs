@@ -114,6 +114,9 @@ pub struct Link {
     stop_sent_ns: Option<u64>,
     /// Motor frames due in lockstep, one per command and ping.
     due: u32,
+    /// Order to wait in lockstep, until the given tick is answered: whether it comes before or
+    /// after the tick's command must not decide where the robot comes to rest.
+    waits: Option<(Order, HoldReason)>,
     /// Counts of commands and repetitions; the other values are unset.
     pub tally: LinkSample,
     refused_ns: Option<u64>,
@@ -151,6 +154,7 @@ impl Link {
             stood: None,
             stop_sent_ns: None,
             due: 0,
+            waits: None,
             tally: LinkSample::default(),
             refused_ns: None,
             stamped: None,
@@ -409,10 +413,19 @@ impl Link {
             if self.in_ticks() {
                 self.state.next_tick += 1;
             }
+            if let Some((order, reason)) = self.waits.take() {
+                self.take_order(order, reason);
+            }
         }
     }
 
     fn take_order(&mut self, order: Order, reason: HoldReason) {
+        let is_given = self.open.as_ref().is_some_and(|open| open.given_ns.is_some());
+        let waits = reason == HoldReason::Waiting && self.ordered_to_drive();
+        self.waits = (self.in_ticks() && is_given && waits).then_some((order, reason));
+        if self.waits.is_some() {
+            return;
+        }
         let drives = order == Order::Drive && !self.ordered_to_drive();
         if drives && self.failsafe.monitors.orders.by_operator() {
             self.observe(Observation::Resumed);

@@ -78,52 +78,45 @@ fn whole(counts: f64) -> i16 {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use common::{kinematics::Twist, wire::COUNT_CYCLE};
 
     use super::*;
+    use crate::testing::mission;
 
     /// Returns a car's speeds if its steering encoder reads `counts`, at 7 Hz with 3600 counts per
     /// turn.
     fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
-        let text = "target = [3, 0]\nrobot.model = 'car'";
-        let speeds = WheelSpeeds::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let speeds = WheelSpeeds::new(&mission("robot.model = 'car'"));
         let command = CommandSample { left_rad_s, right_rad_s: angle, ..CommandSample::default() };
         let wheels = WheelSample { right_counts: counts, ..WheelSample::default() };
         speeds.of(&command, share, &wheels)
     }
 
     #[test]
-    fn a_cars_steering_is_driven_towards_its_angle() {
-        // 5 degrees are 50 counts; a tick turns 0.6 of the remaining angle.
-        let five = 5_f64.to_radians();
-        assert_eq!(counts(0.0, five, 1.0, 0), [0, 210]);
-        assert_eq!(counts(0.0, five, 1.0, 50), [0, 0]);
-        assert_eq!(counts(0.0, -five, 1.0, COUNT_CYCLE - 25), [0, -105]);
-    }
-
-    #[test]
-    fn a_cars_steering_is_limited_in_angle_and_rate_and_no_number_holds_it() {
-        // The rate limit is 1200 counts/s; 30 degrees are 300 counts.
-        assert_eq!(counts(0.0, 1.5, 1.0, 0), [0, 1200]);
-        assert_eq!(counts(0.0, 1.5, 1.0, 300), [0, 0]);
-        assert_eq!(counts(f64::NAN, f64::NAN, 1.0, 7), [0, 0]);
-    }
-
-    #[test]
-    fn a_slowed_car_keeps_its_curve() {
+    fn a_cars_steering_is_driven_towards_its_angle_within_its_limits_and_a_slowed_car_keeps_its_curve()
+     {
+        // 5 degrees are 50 counts; a tick turns 0.6 of the remaining angle. The rate limit is 1200
+        // counts/s; 30 degrees are 300 counts.
         let five = 5_f64.to_radians();
         let tau = std::f64::consts::TAU;
-        assert_eq!(counts(tau, five, 1.0, 0), [600, 210]);
-        assert_eq!(counts(tau, five, 0.5, 0), [300, 210]);
+        for (left_rad_s, angle, share, at, expected) in [
+            (0.0, five, 1.0, 0, [0, 210]),
+            (0.0, five, 1.0, 50, [0, 0]),
+            (0.0, -five, 1.0, COUNT_CYCLE - 25, [0, -105]),
+            (0.0, 1.5, 1.0, 0, [0, 1200]),
+            (0.0, 1.5, 1.0, 300, [0, 0]),
+            (f64::NAN, f64::NAN, 1.0, 7, [0, 0]),
+            (tau, five, 1.0, 0, [600, 210]),
+            (tau, five, 0.5, 0, [300, 210]),
+        ] {
+            assert_eq!(counts(left_rad_s, angle, share, at), expected, "{angle} {at}");
+        }
     }
 
     #[test]
     fn wheels_that_would_be_too_fast_keep_the_curve_of_a_robot_of_another_protocol() {
         for (protocol, ratio) in [("json", 0.8), ("x80", 1.0)] {
-            let text = format!("target = [3, 0]\nrobot.protocol = '{protocol}'");
-            let speeds = WheelSpeeds::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
+            let speeds = WheelSpeeds::new(&mission(&format!("robot.protocol = '{protocol}'")));
             let top = speeds.body.top_rad_s();
             let command = CommandSample {
                 left_rad_s: 0.8 * top,
@@ -138,8 +131,7 @@ mod tests {
     #[test]
     fn a_kobuki_gains_no_more_speed_in_a_tick_than_it_can_on_the_curve_that_is_wanted_and_loses_it_at_once()
      {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.rate_hz = 10";
-        let mut speeds = WheelSpeeds::new(&Mission::parse(text, Path::new("m.toml")).unwrap());
+        let mut speeds = WheelSpeeds::new(&mission("robot.model = 'kobuki'\nrobot.rate_hz = 10"));
         let drive = speeds.body.drive();
         let mut tell = |v: f64, omega: f64| {
             let [left_rad_s, right_rad_s] = drive.inputs(Twist { v, omega });
@@ -150,19 +142,22 @@ mod tests {
             let (r, w) = (speeds.body.wheel_radius_m, speeds.body.track_m);
             [(right + left) * r / 2.0, (right - left) * r / w]
         };
-        let mut is = |said: [f64; 2], done: [f64; 2]| {
-            let [v, omega] = tell(said[0], said[1]);
-            assert!((v - done[0]).abs() < 1e-3 && (omega - done[1]).abs() < 5e-3, "{v} {omega}");
+        // Hundredths of m/s and rad/s.
+        let mut is = |said: [i32; 2], done: [i32; 2]| {
+            let [[v, omega], done] = [said, done].map(|it| it.map(|it| f64::from(it) / 100.0));
+            let [v, omega] = tell(v, omega);
+            let is_near = (v - done[0]).abs() < 1e-3 && (omega - done[1]).abs() < 5e-3;
+            assert!(is_near, "{said:?}: {v} {omega}");
         };
         // 1 m/s^2 and 2 rad/s^2 are 0.1 m/s and 0.2 rad/s per tick.
-        is([0.5, 0.0], [0.1, 0.0]);
-        is([0.5, 0.1], [0.2, 0.1]);
+        is([50, 0], [10, 0]);
+        is([50, 10], [20, 10]);
         // The curve of 0.5 m/s and 1 rad/s, at the turn rate reached.
-        is([0.5, 1.0], [0.15, 0.3]);
-        is([0.5, -1.0], [0.1, -0.2]);
-        is([0.1, 0.0], [0.1, 0.0]);
-        is([0.0, 1.0], [0.0, 0.2]);
-        is([0.0, 0.0], [0.0, 0.0]);
-        is([f64::NAN, 0.0], [0.0, 0.0]);
+        is([50, 100], [15, 30]);
+        is([50, -100], [10, -20]);
+        is([10, 0], [10, 0]);
+        is([0, 100], [0, 20]);
+        is([0, 0], [0, 0]);
+        assert_eq!(tell(f64::NAN, 0.0), [0.0; 2]);
     }
 }

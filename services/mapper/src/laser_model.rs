@@ -317,19 +317,22 @@ mod tests {
     ) -> EvidenceGrid {
         let mut grid = EvidenceGrid::new(Ground { lattice: LATTICE, radius: 0.2 });
         for beams in scans {
-            let (first_rad, step_rad) = (0.0, 1_f64.to_radians());
-            let fan = Fan {
-                origin: DVec2::ZERO,
-                first_rad,
-                step_rad,
-                reach_m: 8.0,
-                noise: (0.0, 0.0),
-                clears_from_m,
-                beams,
-            };
+            let fan = Fan { clears_from_m, ..fan(DVec2::ZERO, 1.0, beams) };
             grid.take_scan(&fan, DVec2::ZERO, seen);
         }
         grid
+    }
+
+    fn fan(origin: DVec2, step_deg: f64, beams: &[f32]) -> Fan<'_> {
+        Fan {
+            origin,
+            first_rad: 0.0,
+            step_rad: step_deg.to_radians(),
+            reach_m: 8.0,
+            noise: (0.0, 0.0),
+            clears_from_m: 0.0,
+            beams,
+        }
     }
 
     fn index(x: f64, y: f64) -> usize {
@@ -416,17 +419,7 @@ mod tests {
             if post { 1.0 } else { wall as f32 }
         };
         let beams: Vec<f32> = (0..1440).map(beam).collect();
-        let origin = DVec2::new(0.013, -0.021);
-        let (first_rad, step_rad) = (0.0, 0.25_f64.to_radians());
-        let fan = Fan {
-            origin,
-            first_rad,
-            step_rad,
-            reach_m: 8.0,
-            noise: (0.0, 0.0),
-            clears_from_m: 0.0,
-            beams: &beams,
-        };
+        let fan = fan(DVec2::new(0.013, -0.021), 0.25, &beams);
         let mut scan = Scan::new(&LATTICE, &fan).unwrap();
         scan.pass(5.0, PASSED);
         let mut passed = vec![false; LATTICE.area()];

@@ -18,3 +18,5 @@ pub mod shell;
 mod sonar_model;
 pub mod stage;
 pub mod step;
+#[cfg(test)]
+mod testing;

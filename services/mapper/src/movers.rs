@@ -438,11 +438,10 @@ impl Difference {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use common::{bus::Stamp, clock::MissionTime, mission::Mission};
+    use common::{bus::Stamp, clock::MissionTime};
 
     use super::*;
+    use crate::testing::mission;
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
@@ -456,8 +455,7 @@ mod tests {
 
     impl Room {
         fn new(discs: &[(DVec2, DVec2, f64)]) -> Self {
-            let text = "target = [3, 0]\nrobot.model = 'kobuki'";
-            let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+            let mission = mission("target = [3, 0]\nrobot.model = 'kobuki'");
             Self { rows: Rows::new(&mission), movers: Movers::default(), discs: discs.to_vec() }
         }
 
@@ -501,8 +499,7 @@ mod tests {
 
     #[test]
     fn a_mover_is_hidden_right_behind_a_laser_too_and_not_where_the_laser_sees_through() {
-        let text = "target = [3, 0]\nrobot.model = 'jackal'";
-        let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+        let mission = mission("target = [3, 0]\nrobot.model = 'jackal'");
         let (rows, beams) = (Rows::new(&mission), mission.laser().unwrap().1.beams);
         let is_hidden = |x_m: f64, range_m: f32| {
             let beams = vec![range_m; beams];

@@ -416,9 +416,10 @@ fn variances([place, heading]: [f64; 2]) -> DMat3 {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
+    use std::sync::LazyLock;
 
     use super::*;
+    use crate::testing::mission;
 
     struct Matcher(ScanMatcher, Rows);
 
@@ -449,17 +450,18 @@ mod tests {
         }
     }
 
-    fn matcher() -> (Mission, Matcher) {
-        let text = "target = [3, 0]\nrobot.model = 'turtlebot3-waffle'\nrobot.rate_hz = 10";
-        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-        let matcher = Matcher(ScanMatcher::new(&mission), Rows::new(&mission));
-        (mission, matcher)
+    static MISSION: LazyLock<Mission> = LazyLock::new(|| {
+        mission("target = [3, 0]\nrobot.model = 'turtlebot3-waffle'\nrobot.rate_hz = 10")
+    });
+
+    fn matcher() -> Matcher {
+        Matcher(ScanMatcher::new(&MISSION), Rows::new(&MISSION))
     }
 
     /// Returns the scan of a robot at `pose` in a room of 6 m by 4 m, or in an endless corridor
     /// along x.
-    fn scan(mission: &Mission, pose: Pose2, corridor: bool) -> Vec<f32> {
-        let mount = mission.sensor_table()[0].mount.on(pose);
+    fn scan(pose: Pose2, corridor: bool) -> Vec<f32> {
+        let mount = MISSION.sensor_table()[0].mount.on(pose);
         (0..360)
             .map(|beam| {
                 let angle = mount.heading - std::f64::consts::PI + f64::from(beam).to_radians();
@@ -477,13 +479,13 @@ mod tests {
 
     #[test]
     fn a_scan_says_where_the_robot_is_though_its_wheels_say_otherwise() {
-        let (mission, matcher) = matcher();
+        let matcher = matcher();
         let mut reference = None;
         let start = Pose2::default();
-        assert_eq!(matcher.step(&mut reference, start, &scan(&mission, start, false)), None);
+        assert_eq!(matcher.step(&mut reference, start, &scan(start, false)), None);
         let truth = Pose2 { position: DVec2::new(0.3, 0.1), heading: 0.2 };
         let wheels = Pose2 { position: DVec2::new(0.36, 0.05), heading: 0.17 };
-        let seen = scan(&mission, truth, false);
+        let seen = scan(truth, false);
         let fix = matcher.by_unsure(&mut reference, (wheels, 0.1), &seen).unwrap();
         let off = DVec2::new(fix.x_m, fix.y_m).distance(truth.position);
         assert!(off < 0.01 && (fix.heading_rad - 0.2).abs() < 0.005, "{fix:?}");
@@ -506,23 +508,23 @@ mod tests {
 
     #[test]
     fn along_a_corridor_the_wheels_are_believed() {
-        let (mission, matcher) = matcher();
+        let matcher = matcher();
         let mut reference = None;
         let start = Pose2::default();
-        matcher.step(&mut reference, start, &scan(&mission, start, true));
+        matcher.step(&mut reference, start, &scan(start, true));
         let wheels = Pose2 { position: DVec2::new(0.3, 0.05), heading: 0.02 };
-        let fix = matcher.step(&mut reference, wheels, &scan(&mission, start, true)).unwrap();
+        let fix = matcher.step(&mut reference, wheels, &scan(start, true)).unwrap();
         assert!((fix.x_m - 0.3).abs() < 0.01 && fix.y_m.abs() < 0.01, "{fix:?}");
         assert!(fix.covariance[0] > 100.0 * fix.covariance[3], "{fix:?}");
     }
 
     #[test]
     fn a_robot_that_is_sure_of_its_place_does_not_take_a_thing_for_another_one() {
-        let (mission, matcher) = matcher();
+        let matcher = matcher();
         let start = Pose2::default();
         // The corridor ends ahead.
         let ends_at = |x: f64| {
-            let mut beams = scan(&mission, start, true);
+            let mut beams = scan(start, true);
             for (beam, range) in beams.iter_mut().enumerate().take(200).skip(161) {
                 *range = ((x + 0.064) / (beam as f64 - 180.0).to_radians().cos()) as f32;
             }
@@ -538,10 +540,10 @@ mod tests {
     }
 
     /// Returns scans as [`scan`] does, with the noise of the laser's model.
-    fn noisy(mission: &Mission) -> impl FnMut(Pose2) -> Vec<f32> + use<'_> {
+    fn noisy() -> impl FnMut(Pose2) -> Vec<f32> {
         let mut random = 1_u32;
         move |pose| {
-            let mut beams = scan(mission, pose, false);
+            let mut beams = scan(pose, false);
             for range in &mut beams {
                 // A sum of twelve uniform numbers is nearly normal.
                 let noise: f64 = (0..12)
@@ -550,7 +552,7 @@ mod tests {
                         f64::from(random) / f64::from(u32::MAX) - 0.5
                     })
                     .sum();
-                let (least_m, share) = mission.sensor_table()[0].model.beam_noise();
+                let (least_m, share) = MISSION.sensor_table()[0].model.beam_noise();
                 let exact = f64::from(*range);
                 *range = (exact + noise * (least_m + share * exact)) as f32;
             }
@@ -560,8 +562,8 @@ mod tests {
 
     #[test]
     fn a_new_reference_is_laid_where_the_next_scan_is_by_the_one_before() {
-        let (mission, matcher) = matcher();
-        let mut noisy = noisy(&mission);
+        let matcher = matcher();
+        let mut noisy = noisy();
         let at = |x| Pose2 { position: DVec2::new(x, 0.0), heading: 0.0 };
         let mut reference = None;
         matcher.step(&mut reference, at(-1.0), &noisy(at(-1.0)));
@@ -582,8 +584,8 @@ mod tests {
 
     #[test]
     fn a_laser_of_great_noise_is_matched_with_its_reference_and_says_how_well() {
-        let (mission, matcher) = matcher();
-        let mut noisy = noisy(&mission);
+        let matcher = matcher();
+        let mut noisy = noisy();
         let (mut reference, start) = (None, Pose2::default());
         matcher.step(&mut reference, start, &noisy(start));
         let (mut squares, mut stated) = (0.0, 0.0);
@@ -600,14 +602,14 @@ mod tests {
 
     #[test]
     fn a_reference_without_its_lines_matches_as_with_them() {
-        let (mission, matcher) = matcher();
+        let matcher = matcher();
         let (start, there) =
             (Pose2::default(), Pose2 { position: DVec2::new(0.1, 0.0), heading: 0.1 });
         let mut reference = None;
-        matcher.step(&mut reference, start, &scan(&mission, start, false));
+        matcher.step(&mut reference, start, &scan(start, false));
         let mut restored = reference.clone();
         restored.as_mut().unwrap().lines.clear();
-        let beams = scan(&mission, there, false);
+        let beams = scan(there, false);
         let fixes = [&mut reference, &mut restored].map(|held| matcher.step(held, start, &beams));
         assert_eq!(fixes[0], fixes[1]);
         assert_eq!(reference, restored);

@@ -160,12 +160,22 @@ impl Body {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::{f64::consts::FRAC_PI_2, path::Path};
+    use crate::testing::{mission, near};
+    use std::f64::consts::FRAC_PI_2;
 
     fn at_start(text: &str) -> (Body, World) {
-        let text = format!("target = [0, -5]\n{text}");
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let mission = mission(text);
         (Body::new(&mission, &World::new(&mission), 1.0), World::new(&mission))
+    }
+
+    /// Rolls in steps of 5 mm, into nothing. Returns the way of the left wheel.
+    fn roll(body: &mut Body, world: &World, steps: i32) -> f64 {
+        let step = |_| {
+            let way = body.roll([0.005 * f64::from(steps.signum()); 2], world)[0];
+            assert!(body.clearance >= 0.0, "it went into something");
+            way
+        };
+        (0..steps.abs()).map(step).sum()
     }
 
     #[test]
@@ -173,49 +183,31 @@ mod tests {
         let (mut body, world) = at_start("robot.track_m = 0.25");
         let quarter = FRAC_PI_2 * 0.25 / 2.0;
         body.roll([-quarter, quarter], &world);
-        assert!((body.pose.heading - FRAC_PI_2).abs() < 1e-12);
+        near(body.pose.heading, FRAC_PI_2, 1e-12);
         assert!(body.pose.position.length() < 1e-12);
     }
 
     #[test]
     fn a_wall_holds_the_body_and_its_wheels_and_is_one_contact() {
         let (mut body, world) = at_start("world.wall = [{ points = [[1, -2], [1, 2]] }]");
-        let mut rolled = 0.0;
-        for _ in 0..400 {
-            rolled += body.roll([0.005; 2], &world)[0];
-            assert!(body.clearance >= 0.0, "it went into the wall");
-        }
-        assert!((body.pose.position.x - 0.81).abs() < 1e-6);
-        assert!((rolled - 0.81).abs() < 1e-6, "the wheels went {rolled} m");
+        let rolled = roll(&mut body, &world, 400);
+        near(body.pose.position.x, 0.81, 1e-6);
+        near(rolled, 0.81, 1e-6);
         assert_eq!(body.contacts, 1);
-        for _ in 0..40 {
-            body.roll([-0.005; 2], &world);
-        }
-        for _ in 0..80 {
-            body.roll([0.005; 2], &world);
-        }
+        roll(&mut body, &world, -40);
+        roll(&mut body, &world, 80);
         assert_eq!(body.contacts, 2, "it came back");
     }
 
     #[test]
-    fn an_oblique_wall_lets_the_body_slide_along_it() {
+    fn an_oblique_wall_lets_the_body_slide_along_it_and_a_corner_halts_it() {
         let (mut body, world) = at_start("world.wall = [{ points = [[0.3, -1], [2.3, 1]] }]");
-        for _ in 0..600 {
-            body.roll([0.005; 2], &world);
-            assert!(body.clearance >= 0.0, "it went into the wall");
-        }
+        roll(&mut body, &world, 600);
         assert!(body.pose.position.y > 0.1, "it slid to {:?}", body.pose);
         assert_eq!(body.contacts, 1);
-    }
-
-    #[test]
-    fn a_corner_halts_the_body() {
         let (mut body, world) =
             at_start("world.wall = [{ points = [[0.2, -1.5], [1.2, 0], [0.2, 1.5]] }]");
-        for _ in 0..600 {
-            body.roll([0.005; 2], &world);
-            assert!(body.clearance >= 0.0, "it went into the corner");
-        }
+        roll(&mut body, &world, 600);
         assert!(body.pose.position.x < 1.0);
     }
 
@@ -225,11 +217,9 @@ mod tests {
     fn a_long_body_drives_through_a_gap_that_its_circle_does_not_fit_and_touches_nothing() {
         let walls = "world.wall = [{ points = [[0.5, 0.15], [3, 0.15]] }, { points = [[0.5, -0.15], [3, -0.15]] }]";
         let (mut body, world) = at_start(&format!("{LONG}{walls}"));
-        for _ in 0..400 {
-            body.roll([0.005; 2], &world);
-        }
+        roll(&mut body, &world, 400);
         assert!((body.pose.position.x - 2.0).abs() < 1e-9 && body.contacts == 0);
-        assert!((body.clearance - 0.05).abs() < 1e-9, "{}", body.clearance);
+        near(body.clearance, 0.05, 1e-9);
     }
 
     #[test]

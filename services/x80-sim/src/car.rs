@@ -105,21 +105,18 @@ impl Car {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use common::{
         ground_truth::GroundTruthTick,
-        mission::Mission,
         wire::{Addressing, Command, Decoder, counts_between},
     };
 
-    use crate::robot::Robot;
+    use crate::{
+        robot::Robot,
+        testing::{ideal, near},
+    };
 
     fn car(extra: &str) -> Robot {
-        let text = format!(
-            "target = [3, 0]\nrobot.model = 'car'\nsimulation.realism = 'laboratory'\n{extra}"
-        );
-        Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+        Robot::new(&ideal(&format!("robot.model = 'car'\n{extra}")))
     }
 
     /// Drives `ticks` at these counts/s: the wheel forward, the steering left.
@@ -141,22 +138,14 @@ mod tests {
     }
 
     #[test]
-    fn a_car_does_not_turn_on_the_spot() {
-        let truth = drive(&mut car(""), 0, 1000, 14);
-        assert_eq!((truth.x, truth.y, truth.heading), (0.0, 0.0, 0.0));
-        assert!(steering_counts(&truth) > 0);
-    }
-
-    #[test]
-    fn the_steering_takes_its_time_and_ends_at_its_stop() {
-        let mut robot = car("[simulation.wheels]\nlag_s = 0");
+    fn the_steering_takes_its_time_ends_at_its_stop_and_turns_no_standing_car() {
+        let mut robot = car("simulation.wheels.lag_s = 0");
         // 120 degrees/s are 1200 counts/s, the limit of any request; 30 degrees are 300 counts.
-        let truth = drive(&mut robot, 0, 5000, 1);
-        assert!((steering_counts(&truth) - 171).abs() <= 1, "{truth:?}");
-        let truth = drive(&mut robot, 0, 5000, 14);
-        assert_eq!(steering_counts(&truth), 300);
-        let truth = drive(&mut robot, 0, -5000, 14);
-        assert_eq!(steering_counts(&truth), -300);
+        for (steering, ticks, counts) in [(5000, 1, 171), (5000, 14, 300), (-5000, 14, -300)] {
+            let truth = drive(&mut robot, 0, steering, ticks);
+            assert!((steering_counts(&truth) - counts).abs() <= 1, "{truth:?}");
+            assert_eq!((truth.x, truth.y, truth.heading), (0.0, 0.0, 0.0));
+        }
     }
 
     #[test]
@@ -167,8 +156,8 @@ mod tests {
         let counts = f64::from(counts_between(start.left_counts, end.left_counts));
         let arc = counts * std::f64::consts::TAU * 0.04 / 600.0;
         let radius = 0.18 / 30_f64.to_radians().tan();
-        assert!((end.heading - arc / radius).abs() < 0.01, "{end:?}");
-        assert!((end.omega - end.v / radius).abs() < 1e-9, "{end:?}");
+        near(end.heading, arc / radius, 0.01);
+        near(end.omega, end.v / radius, 1e-9);
     }
 
     #[test]
@@ -179,10 +168,10 @@ mod tests {
             drive(&mut robot, 300, 0, 7).heading
         };
         let ratio = heading("") / heading("simulation.wheels.track_scale = 1.1");
-        assert!((ratio - 1.1).abs() < 1e-9, "{ratio}");
+        near(ratio, 1.1, 1e-9);
         let mut robot = car("world.wall = [{ points = [[1, -2], [1, 2]] }]");
         let truth = drive(&mut robot, 1200, 0, 28);
-        assert!((truth.x - 0.76).abs() < 1e-6, "{truth:?}");
+        near(truth.x, 0.76, 1e-6);
         assert_eq!(truth.contacts, 1);
     }
 }

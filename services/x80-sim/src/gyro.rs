@@ -46,18 +46,17 @@ impl Gyro {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use super::*;
+    use crate::testing::mission;
 
     #[test]
     fn a_gyro_is_off_by_its_bias_and_scale_and_by_noise_that_grows_with_the_root_of_time() {
         let read = |seed: u64, [noise, bias, scale]: [f64; 3]| {
-            let text = format!(
-                "target = [3, 0]\nseed = {seed}\n[simulation.gyro]\nnoise_deg_sqrt_s = {noise:?}\n\
+            let mission = mission(&format!(
+                "seed = {seed}\n[simulation.gyro]\nnoise_deg_sqrt_s = {noise:?}\n\
                  bias_spread_deg_s = {bias:?}\nscale_spread = {scale:?}"
-            );
-            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+            ));
             let mut gyro = Gyro::new(&mission, seed);
             (0..=1000).for_each(|tick| {
                 gyro.read(f64::from(tick) / 10.0, f64::from(tick) / 100.0);

@@ -180,54 +180,58 @@ fn end(solid: &Solid, origin: DVec2, along: DVec2) -> Option<(f64, Light)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
+    use crate::testing::{mission, near};
+
+    fn scan(laser: &mut Laser, mission: &Mission) -> Vec<Option<f64>> {
+        let scan = laser.scan(&World::new(mission), Pose2::default(), 0.0);
+        scan.into_iter().map(|range| range.map(f64::from)).collect()
+    }
+
+    /// Returns the scan of the mission's first laser at the origin.
+    fn seen(text: &str) -> Vec<Option<f64>> {
+        let mission = mission(text);
+        scan(&mut Laser::all(&mission, 1)[0], &mission)
+    }
 
     #[test]
     fn a_beam_ends_at_the_first_thing_in_reach_that_is_as_high_as_the_laser() {
-        let mission = Mission::parse(
-            "target = [0, -5]\nrobot.model = 'turtlebot3-waffle'\nworld.wall = [{ points = [[2, -1], [2, 1]] }]\nworld.drum = [{ at = [0, 2], radius_m = 0.5 }]\nworld.box = [{ at = [1, 0], size_m = [0.2, 0.2], top_m = 0.02 }]",
-            Path::new("m.toml"),
-        )
-        .unwrap();
-        let mut laser = Laser::all(&mission, 1).remove(0);
-        let scan = laser.scan(&World::new(&mission), Pose2::default(), 0.0);
+        let scan = seen(
+            "robot.model = 'turtlebot3-waffle'\nworld.wall = [{ points = [[2, -1], [2, 1]] }]\nworld.drum = [{ at = [0, 2], radius_m = 0.5 }]\nworld.box = [{ at = [1, 0], size_m = [0.2, 0.2], top_m = 0.02 }]",
+        );
         assert_eq!(scan.len(), 360);
         // The first beam looks back. The laser is 64 mm behind the centre; its deviation is 5 cm at
         // 2 m.
-        let at = |degrees: usize| scan[(degrees + 180) % 360];
-        assert!((at(0).unwrap() - 2.064).abs() < 0.25, "{:?}", at(0));
-        assert!((at(90).unwrap() - 1.5).abs() < 0.2, "{:?}", at(90));
-        assert_eq!(at(180), None);
+        is_near(scan[180], 2.064, 0.25);
+        is_near(scan[270], 1.5, 0.2);
+        assert_eq!(scan[0], None);
     }
 
     #[test]
     fn a_laser_that_is_turned_and_off_the_centre_measures_from_where_it_is_and_its_middle_beam_looks_where_it_is_turned()
      {
-        let text = "target = [0, -5]\nrobot.model = 'turtlebot4'\nworld.wall = [{ points = [[-2, 1], [2, 1]] }, { points = [[2, -2], [2, 2]] }]\n";
-        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-        let mut laser = Laser::all(&mission, 1).remove(0);
-        let scan = laser.scan(&World::new(&mission), Pose2::default(), 0.0);
+        let scan = seen(
+            "robot.model = 'turtlebot4'\nworld.wall = [{ points = [[-2, 1], [2, 1]] }, { points = [[2, -2], [2, 2]] }]\n",
+        );
         // The middle beam looks left. The laser is 40 mm behind the centre; its deviation is 1.5 cm
         // at 2 m.
-        let at = |degrees: usize| f64::from(scan[(degrees + 180 + 270) % 360].unwrap());
-        assert!((at(90) - 1.0).abs() < 0.05, "{}", at(90));
-        assert!((at(0) - 2.04).abs() < 0.08, "{}", at(0));
-        assert!((at(135) - 1.0 / 0.5_f64.sqrt()).abs() < 0.07, "{}", at(135));
+        for (degrees, want, most) in
+            [(90, 1.0, 0.05), (0, 2.04, 0.08), (135, 1.0 / 0.5_f64.sqrt(), 0.07)]
+        {
+            is_near(scan[(degrees + 180 + 270) % 360], want, most);
+        }
     }
 
     #[test]
     fn a_laser_upside_down_gives_the_beams_of_an_upright_one_in_the_other_order() {
-        let scan = |roll_deg: f64| {
-            let text = format!(
-                "target = [0, -5]\nrobot.protocol = 'json'\nworld.wall = [{{ points = [[-2, 1], [2, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = {roll_deg}\n"
-            );
-            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-            Laser::all(&mission, 1).remove(0).scan(&World::new(&mission), Pose2::default(), 0.0)
+        let scan = |roll_deg: i32| {
+            seen(&format!(
+                "robot.protocol = 'json'\nworld.wall = [{{ points = [[-2, 1], [2, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nroll_deg = {roll_deg}\n"
+            ))
         };
-        let mut turned = scan(180.0);
+        let mut turned = scan(180);
         assert!(turned[180].is_some() && turned[900].is_none());
         turned.reverse();
-        assert_eq!(turned, scan(0.0));
+        assert_eq!(turned, scan(0));
     }
 
     #[test]
@@ -237,13 +241,12 @@ mod tests {
                 "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0.2\nbeams = 3\n{keys}\n"
             )
         };
-        let text = format!(
-            "target = [0, -5]\nrobot.protocol = 'json'\nworld.wall = [{{ points = [[2, -9], [2, 9]] }}, {{ points = [[-1, -9], [-1, 9]] }}]\nworld.box = [{{ at = [1, 0], size_m = [0.2, 2], top_m = 0.12 }}]\n{}{}{}",
+        let mission = mission(&format!(
+            "robot.protocol = 'json'\nworld.wall = [{{ points = [[2, -9], [2, 9]] }}, {{ points = [[-1, -9], [-1, 9]] }}]\nworld.box = [{{ at = [1, 0], size_m = [0.2, 2], top_m = 0.12 }}]\n{}{}{}",
             row("low", "bearing_deg = 0\nheight_m = 0.05"),
             row("high", "bearing_deg = 0"),
             row("back", "bearing_deg = 180")
-        );
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        ));
         let world = World::new(&mission);
         let ahead = |laser: &mut Laser| {
             laser.measure(&world, Pose2::default(), (0, 0.0));
@@ -257,15 +260,16 @@ mod tests {
 
     #[test]
     fn a_late_laser_that_turns_measures_each_beam_from_where_the_robot_was_then() {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nworld.wall = [{ points = [[5, -9], [5, 9]] }]\n\
-            simulation.laser = { delay_s = 0.2, sweep_s = 0.1 }\n";
-        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+        let mission = mission(
+            "robot.model = 'kobuki'\nworld.wall = [{ points = [[5, -9], [5, 9]] }]\n\
+            simulation.laser = { delay_s = 0.2, sweep_s = 0.1 }\n",
+        );
         let mut laser = Laser::all(&mission, 1).remove(0);
         let at = |time: f64| Pose2 { position: DVec2::new(time, 0.0), heading: 0.0 };
         (0..=300).map(|step| f64::from(step) / 100.0).for_each(|s| laser.follow(s, at(s)));
         let scan = laser.scan(&World::new(&mission), at(3.0), 3.0);
         // Beam 180 of 360 looks ahead: it was measured 0.25 s before, from 64 mm behind the centre.
-        assert!((scan[180].unwrap() - (5.0 - 2.75 + 0.064)).abs() < 0.15, "{:?}", scan[180]);
+        is_near(scan[180].map(f64::from), 5.0 - 2.75 + 0.064, 0.15);
         assert!(laser.poses.len() < 40);
         laser.measure(&World::new(&mission), at(3.0), (0, 3.0));
         let Scan { age_s: Some(age_s), time_s: Some(time_s), .. } = laser.said().unwrap() else {
@@ -278,71 +282,56 @@ mod tests {
     fn a_depth_camera_sees_what_is_low_or_hangs_and_is_touched_from_where_its_picture_shows_it_and_nothing_near()
      {
         let ahead = |x: f64, heights: &str| {
-            let text = format!(
-                "target = [0, -5]\nrobot.model = 'turtlebot2'\nworld.box = [{{ at = [{}, 0], size_m = [0.2, 2], {heights} }}]",
+            let mission = mission(&format!(
+                "robot.model = 'turtlebot2'\nworld.box = [{{ at = [{}, 0], size_m = [0.2, 2], {heights} }}]",
                 x + 0.2
-            );
-            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-            let mut camera = Laser::all(&mission, 1).remove(1);
-            camera.scan(&World::new(&mission), Pose2::default(), 0.0)[87]
+            ));
+            scan(&mut Laser::all(&mission, 1)[1], &mission)[87]
         };
         // The camera is 0.1 m ahead of the robot's centre; the face is as far ahead of the box's.
-        is_near(ahead(1.0, "top_m = 0.05"), 1.0);
-        is_near(ahead(1.0, "bottom_m = 0.24"), 1.0);
+        is_near(ahead(1.0, "top_m = 0.05"), 1.0, 0.1);
+        is_near(ahead(1.0, "bottom_m = 0.24"), 1.0, 0.1);
         assert_eq!(ahead(1.0, "top_m = 0.02"), None, "a sill is not touched");
         assert_eq!(ahead(1.0, "bottom_m = 0.3"), None, "a table top is not touched");
         assert_eq!(ahead(0.2, "top_m = 0.25"), Some(-1.0), "nearer than 0.3 m it reads nothing");
         assert_eq!(ahead(3.5, "top_m = 0.25"), None, "too far away");
     }
 
-    /// Returns the readings of a UST-10LX on a Jackal at the origin by beam angle, degrees from
-    /// ahead.
-    fn reading(shapes: &str) -> impl Fn(f64) -> Option<f32> + use<> {
-        let text = format!("target = [0, -5]\nrobot.model = 'jackal'\n{shapes}");
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        let mut laser = Laser::all(&mission, 1).remove(0);
-        let forward_m = laser.sensor.mount.forward_m;
-        let scan = laser.scan(
-            &World::new(&mission),
-            Pose2 { position: DVec2::new(-forward_m, 0.0), heading: 0.0 },
-            0.0,
-        );
-        move |degrees| scan[540 + (degrees * 4.0) as usize]
-    }
-
     #[track_caller]
-    fn is_near(range: Option<f32>, want: f32) {
-        assert!((range.unwrap() - want).abs() < 0.1, "{range:?} instead of {want} m");
+    fn is_near(range: Option<f64>, want: f64, most: f64) {
+        near(range.unwrap(), want, most);
     }
 
     #[test]
-    fn a_pane_of_glass_is_measured_square_on_and_at_a_slant_what_stands_behind_it() {
-        let pane = "points = [[2, -3], [2, 3]], light = 'glass'";
-        let seen =
-            reading(&format!("world.wall = [{{ {pane} }}, {{ points = [[4, -9], [4, 9]] }}]"));
-        is_near(seen(0.0), 2.0);
-        is_near(seen(4.0), 2.0);
-        is_near(seen(6.0), 4.02);
-        is_near(seen(30.0), 4.62);
-        let alone = reading(&format!("world.wall = [{{ {pane} }}]"));
-        assert_eq!(alone(30.0), None, "nothing stands behind");
-    }
-
-    #[test]
-    fn a_column_of_glass_is_measured_in_its_middle() {
-        let seen = reading("world.drum = [{ at = [2, 0], radius_m = 0.5, light = 'glass' }]");
-        is_near(seen(0.0), 1.5);
-        assert_eq!(seen(8.0), None);
-    }
-
-    #[test]
-    fn a_black_wall_is_measured_from_near_and_hides_what_stands_behind_it_from_far() {
-        let seen = |x: f64| {
-            let wall = |x: f64, light: &str| format!("{{ points = [[{x}, -9], [{x}, 9]]{light} }}");
-            let [black, white] = [wall(x, ", light = 'black'"), wall(x + 1.0, "")];
-            reading(&format!("world.wall = [{black}, {white}]"))
+    fn glass_is_measured_square_on_and_at_a_slant_what_stands_behind_it_and_black_from_near() {
+        let wall = |x: f64, light: &str| format!("{{ points = [[{x}, -9], [{x}, 9]]{light} }}");
+        let pane = wall(2.0, ", light = 'glass'");
+        let black = |x: f64| {
+            format!("world.wall = [{}, {}]", wall(x, ", light = 'black'"), wall(x + 1.0, ""))
         };
-        is_near(seen(3.8)(0.0), 3.8);
-        assert_eq!(seen(4.2)(0.0), None);
+        let before_wall = format!("world.wall = [{pane}, {}]", wall(4.0, ""));
+        let column = "world.drum = [{ at = [2, 0], radius_m = 0.5, light = 'glass' }]";
+        for (shapes, seen_m) in [
+            (
+                &before_wall,
+                &[(0, Some(2.0)), (4, Some(2.0)), (6, Some(4.02)), (30, Some(4.62))][..],
+            ),
+            (&format!("world.wall = [{pane}]"), &[(30, None)]),
+            (&column.to_owned(), &[(0, Some(1.5)), (8, None)]),
+            (&black(3.8), &[(0, Some(3.8))]),
+            (&black(4.2), &[(0, None)]),
+        ] {
+            // A UST-10LX on a Jackal; its middle beam is 540, and 4 beams are a degree.
+            let mission = mission(&format!("robot.model = 'jackal'\n{shapes}"));
+            let mut laser = Laser::all(&mission, 1).remove(0);
+            let position = DVec2::new(-laser.sensor.mount.forward_m, 0.0);
+            let pose = Pose2 { position, heading: 0.0 };
+            let scan = laser.scan(&World::new(&mission), pose, 0.0);
+            for &(degrees, want) in seen_m {
+                let range = scan[540 + degrees * 4].map(f64::from);
+                let off = range.unwrap_or(99.0) - want.unwrap_or(99.0);
+                assert!(off.abs() < 0.1, "{shapes} {degrees}: {range:?}");
+            }
+        }
     }
 }

@@ -48,6 +48,8 @@ pub mod shell;
 mod silence;
 pub mod sonar;
 mod streams;
+#[cfg(test)]
+mod testing;
 mod transport;
 pub mod wheel_errors;
 pub mod world;

@@ -61,6 +61,7 @@ impl Noise {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::near;
 
     #[test]
     fn the_stream_of_a_seed_never_changes() {
@@ -81,6 +82,6 @@ mod tests {
         let sd = (normal.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / f64::from(n)).sqrt();
         assert!(mean.abs() < 0.05 && (sd - 2.0).abs() < 0.05, "{mean} {sd}");
         let mean = (0..n).map(|_| noise.exponential(0.5)).sum::<f64>() / f64::from(n);
-        assert!((mean - 0.5).abs() < 0.02, "{mean}");
+        near(mean, 0.5, 0.02);
     }
 }

@@ -93,18 +93,17 @@ impl Rplidar {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use rplidar_protocol::{Decoder, Said};
 
     use super::*;
+    use crate::testing::mission;
 
     /// A wall 2 m to the right and a shorter one 1 m ahead.
     fn at_the_walls(model: &str) -> (Rplidar, World) {
-        let text = format!(
-            "target = [0, -1]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nworld.wall = [{{ points = [[-9, -2], [9, -2]] }}, {{ points = [[1, -1], [1, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = '{model}'\nforward_m = 0\nbearing_deg = 0\n"
-        );
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let mission = mission(&format!(
+            "robot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nworld.wall = [{{ points = [[-9, -2], [9, -2]] }}, {{ points = [[1, -1], [1, 1]] }}]\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = '{model}'\nforward_m = 0\nbearing_deg = 0\n"
+        ));
         let mut laser = Rplidar::new(&mission, 1).unwrap();
         laser.laser.follow(0.0, Pose2::default());
         (laser, World::new(&mission))

@@ -203,7 +203,10 @@ impl SimClock {
 
 #[cfg(test)]
 mod tests {
+    use std::{net::UdpSocket, os::unix::net::UnixStream};
+
     use super::*;
+    use crate::testing::near;
 
     #[test]
     fn mission_time_runs_at_its_rate_and_waits_for_a_process_that_was_held_up() {
@@ -214,7 +217,27 @@ mod tests {
         clock.forgive(2.95, 2_500_000_000);
         assert_eq!(clock.now(2_500_000_000), Some(3.0), "half a period is caught up");
         clock.forgive(1.0, 2_500_000_000);
-        assert!((clock.now(2_500_000_000).unwrap() - 1.0).abs() < 1e-6);
+        near(clock.now(2_500_000_000).unwrap(), 1.0, 1e-6);
+    }
+
+    #[test]
+    fn a_robot_whose_truth_nobody_reads_goes_on() {
+        let (reader, writer) = UnixStream::pair().unwrap();
+        drop(reader);
+        let mut lines = TruthLines(Some(Box::new(writer)));
+        lines.write(&"a tick");
+        assert!(lines.0.is_none());
+        lines.write(&"the next");
+    }
+
+    #[test]
+    fn a_port_in_use_is_named_with_its_remedy() {
+        let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let listen = taken.local_addr().unwrap();
+        let error = Way::open(Transport::Udp, listen, false).err().unwrap();
+        assert!(matches!(error, SimError::Bind { address, .. } if address == listen));
+        let text = error.to_string();
+        assert!(text.contains(&listen.to_string()) && text.contains("port 0"), "{text}");
     }
 
     #[test]

@@ -45,6 +45,7 @@ impl Silence {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::near;
     use common::mission::Realism;
 
     #[test]
@@ -67,7 +68,7 @@ mod tests {
         }
         let share = f64::from(silent) / (6.0 * f64::from(readings));
         let mean_s = 0.14 * f64::from(silent) / f64::from(runs);
-        assert!((share - 0.1).abs() < 0.005, "{share}");
-        assert!((mean_s - 0.7).abs() < 0.03, "{mean_s} s");
+        near(share, 0.1, 0.005);
+        near(mean_s, 0.7, 0.03);
     }
 }

@@ -34,11 +34,10 @@ impl WheelErrors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
+    use crate::testing::mission;
 
     fn errors(text: &str) -> WheelErrors {
-        let text = format!("target = [3, 0]\n{text}");
-        WheelErrors::of(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+        WheelErrors::of(&mission(text))
     }
 
     #[test]

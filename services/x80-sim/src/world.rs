@@ -267,7 +267,7 @@ fn offset_at(moves: &[Move], time: f64) -> DVec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
+    use crate::testing::mission;
 
     impl World {
         /// Returns metres to the nearest touchable surface; infinite without one.
@@ -277,8 +277,7 @@ mod tests {
     }
 
     fn world(text: &str) -> World {
-        let text = format!("target = [0, -5]\n{text}");
-        World::new(&Mission::parse(&text, Path::new("m.toml")).unwrap())
+        World::new(&mission(text))
     }
 
     #[test]

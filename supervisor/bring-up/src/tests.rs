@@ -16,7 +16,9 @@ use super::*;
 const BEAMS: usize = 180;
 const RATE_HZ: f64 = 10.0;
 
-#[derive(Clone, Copy)]
+type Wires = [(usize, f64); 2];
+
+#[derive(Clone, Copy, Debug)]
 struct Robot {
     yaw_rad: f64,
     mirrored: bool,
@@ -30,15 +32,8 @@ struct Robot {
     laser_m: f64,
 }
 
-type Wires = [(usize, f64); 2];
-
 const AS_STATED: Wires = [(0, 1.0), (1, 1.0)];
 const SWAPPED: Wires = [(1, 1.0), (0, 1.0)];
-
-fn through(wires: Wires, values: [f64; 2]) -> [f64; 2] {
-    wires.map(|(from, sign)| sign * values[from])
-}
-
 const RIGHT: Robot = Robot {
     yaw_rad: 0.0,
     mirrored: false,
@@ -50,6 +45,10 @@ const RIGHT: Robot = Robot {
     motors: AS_STATED,
     laser_m: 0.05,
 };
+
+fn through(wires: Wires, values: [f64; 2]) -> [f64; 2] {
+    wires.map(|(from, sign)| sign * values[from])
+}
 
 fn mission() -> Mission {
     let text = "target = [1, 0]\n[robot]\nmodel = 'kobuki'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\nbeams = 180";
@@ -69,29 +68,19 @@ fn with_sonars() -> Mission {
 /// Range from `at` along `along` to the nearest wall: 1.4 m ahead, 1.9 m behind, 1.6 m left, 1.2 m
 /// right.
 fn range(at: DVec2, along: DVec2) -> f64 {
-    let walls = [
-        (1.4, at.x, along.x),
-        (1.9, -at.x, -along.x),
-        (1.6, at.y, along.y),
-        (1.2, -at.y, -along.y),
-    ];
-    let ends =
-        walls.into_iter().filter(|wall| wall.2 > 1e-9).map(|(wall, at, along)| (wall - at) / along);
-    ends.fold(f64::INFINITY, f64::min)
+    let end = |ahead: f64, behind: f64, at: f64, along: f64| {
+        let wall = if along > 0.0 { ahead } else { -behind };
+        if along.abs() > 1e-9 { (wall - at) / along } else { f64::INFINITY }
+    };
+    end(1.4, 1.9, at.x, along.x).min(end(1.6, 1.2, at.y, along.y))
 }
 
 fn trace(mission: &Mission, robot: Robot) -> Trace {
     let track_m = mission.body().track_m;
     let turn = |side: f64| [-side * 0.12, side * 0.12];
-    let mut legs = vec![
-        (2.5, [0.0; 2]),
-        (8.0, turn(1.0)),
-        (1.0, [0.0; 2]),
-        (8.0, turn(-1.0)),
-        (1.0, [0.0; 2]),
-        (2.0, [0.15; 2]),
-        (1.0, [0.0; 2]),
-    ];
+    let rest = (1.0, [0.0; 2]);
+    let mut legs = vec![(2.5, [0.0; 2]), (8.0, turn(1.0)), rest, (8.0, turn(-1.0)), rest];
+    legs.extend([(2.0, [0.15; 2]), rest]);
     legs.extend((0..8).map(|leg| (1.6, turn(if leg % 2 == 0 { 1.0 } else { -1.0 }))));
     let table = mission.sensor_table();
     let (first, step) = (-TAU / 2.0, TAU / BEAMS as f64);
@@ -147,87 +136,93 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
     trace
 }
 
-fn without_gyro(mut trace: Trace) -> Trace {
-    trace.gyro.clear();
-    trace
+/// Returns the findings about `robot`, without its gyro unless asked.
+fn found(mission: &Mission, robot: Robot, has_gyro: bool) -> Vec<Finding> {
+    let mut trace = trace(mission, robot);
+    if !has_gyro {
+        trace.gyro.clear();
+    }
+    findings(mission, &trace, false).0
 }
 
-fn wrong_of(mission: &Mission, trace: &Trace) -> Vec<String> {
-    let (found, _) = findings(mission, trace, false);
-    found.into_iter().filter(|it| it.verdict == Verdict::Wrong).map(|it| it.part).collect()
+fn wrong(found: &[Finding]) -> Vec<&str> {
+    found.iter().filter(|it| it.verdict == Verdict::Wrong).map(|it| it.part.as_str()).collect()
 }
 
-fn wrong(robot: Robot) -> Vec<String> {
-    wrong_of(&mission(), &trace(&mission(), robot))
-}
-
-fn key(robot: Robot, name: &str) -> f64 {
-    let (found, _) = findings(&mission(), &trace(&mission(), robot), false);
-    let keys = found.iter().flat_map(|it| &it.keys);
-    keys.filter(|it| it.0 == name).map(|it| it.1.parse().unwrap()).next().unwrap()
-}
-
-#[test]
-fn nothing_is_wrong_with_a_robot_that_is_as_stated() {
-    assert_eq!(wrong(RIGHT), Vec::<String>::new());
+fn key(found: &[Finding], name: &str) -> Option<f64> {
+    let mut keys = found.iter().flat_map(|it| &it.keys);
+    keys.find(|it| it.0 == name).map(|it| it.1.parse().unwrap())
 }
 
 #[test]
-fn a_laser_that_is_turned_mirrored_or_late_is_named_with_the_keys_that_mend_it() {
-    let turned = Robot { yaw_rad: 0.3, ..RIGHT };
-    assert_eq!(wrong(turned), ["laser"]);
-    assert!((key(turned, "robot.sensor.laser.turned_deg") - 0.3_f64.to_degrees()).abs() < 1.5);
-    let mirrored = Robot { mirrored: true, ..RIGHT };
-    assert_eq!(key(mirrored, "robot.sensor.laser.roll_deg"), 180.0);
-    // The motors may be swapped instead.
-    let (found, _) = findings(&mission(), &without_gyro(trace(&mission(), mirrored)), false);
-    assert!(found.iter().any(|it| it.part == "laser" && it.verdict == Verdict::Wrong));
-    assert!(found.iter().all(|it| it.keys.is_empty()), "{found:?}");
-    assert_eq!(wrong(Robot { late_s: 0.2, ..RIGHT }), ["laser"]);
+fn what_is_wrong_is_named_with_the_keys_that_mend_it() {
+    let (mission, body) = (mission(), mission().body());
+    let [turned, forward] =
+        ["turned_deg", "forward_m"].map(|key| format!("robot.sensor.laser.{key}"));
+    let roll = "robot.sensor.laser.roll_deg";
+    let ratio = "robot.odometry.diameter_ratio";
+    for (robot, parts, keys) in [
+        (RIGHT, &[][..], &[][..]),
+        (Robot { yaw_rad: 0.3, ..RIGHT }, &["laser"], &[(&*turned, 17.2, 1.5)]),
+        (Robot { mirrored: true, ..RIGHT }, &["laser"], &[(roll, 180.0, 0.1)]),
+        (Robot { late_s: 0.2, ..RIGHT }, &["laser"], &[]),
+        (
+            Robot { track: 1.15, ..RIGHT },
+            &["track"],
+            &[("robot.track_m", 1.15 * body.track_m, 0.007)],
+        ),
+        (
+            Robot { wheel: 0.9, ..RIGHT },
+            &["wheel size"],
+            &[("robot.wheel_radius_m", 0.9 * body.wheel_radius_m, 0.001)],
+        ),
+        // A laser upside down sees the larger wheel on the other side.
+        (
+            Robot { ratio: 1.06, mirrored: true, ..RIGHT },
+            &["laser", "wheel ratio"],
+            &[(ratio, 1.06, 0.02)],
+        ),
+        (Robot { laser_m: -0.1, ..RIGHT }, &["laser"], &[(&*forward, -0.1, 0.02)]),
+        (Robot { encoders: [(0, 0.0), (1, 1.0)], ..RIGHT }, &["wheels", "gyro"], &[]),
+    ] {
+        let found = found(&mission, robot, true);
+        assert_eq!(wrong(&found), parts, "{robot:?}: {found:?}");
+        for &(name, value, within) in keys {
+            let off = key(&found, name).unwrap() - value;
+            assert!(off.abs() <= within, "{robot:?}, {name}: {off}");
+        }
+        // The keys of a laser behind the centre do not turn it.
+        let looks = ["bearing_deg", "turned_deg"];
+        if robot.laser_m < 0.0 {
+            let looks = looks.map(|it| key(&found, &format!("robot.sensor.laser.{it}")).unwrap());
+            assert!((looks[0] + looks[1]).abs() < 1.5, "{looks:?}");
+        }
+    }
 }
 
 #[test]
-fn the_sizes_of_track_and_wheels_are_found() {
-    let body = mission().body();
-    let track = key(Robot { track: 1.15, ..RIGHT }, "robot.track_m") / body.track_m;
-    assert!((track - 1.15).abs() < 0.03, "{track}");
-    let wheel = key(Robot { wheel: 0.9, ..RIGHT }, "robot.wheel_radius_m") / body.wheel_radius_m;
-    assert!((wheel - 0.9).abs() < 0.03, "{wheel}");
+fn without_a_gyro_a_laser_upside_down_may_as_well_be_swapped_motors_and_no_key_is_given() {
+    for (ratio, part) in [(1.0, "laser"), (1.06, "wheel ratio")] {
+        let found = found(&mission(), Robot { mirrored: true, ratio, ..RIGHT }, false);
+        assert!(wrong(&found).contains(&part), "{found:?}");
+        let named = found.iter().filter(|it| ratio == 1.0 || it.part == part);
+        assert!(named.clone().all(|it| it.keys.is_empty()), "{found:?}");
+    }
 }
 
 #[test]
 fn the_keys_of_a_robot_of_ros_2_mend_what_its_odometry_says() {
-    let robot = Robot { wheel: 0.9, track: 1.15, ..RIGHT };
     let mut mission = mission();
     mission.robot.protocol = Some(Protocol::Ros2);
-    let mut trace = trace(&mission, robot);
+    let mut trace = trace(&mission, Robot { wheel: 0.9, track: 1.15, ..RIGHT });
     let (found, _) = findings(&mission, &trace, false);
-    let key = |name: &str| {
-        let keys = found.iter().flat_map(|it| &it.keys);
-        keys.filter(|it| it.0 == name).map(|it| it.1.parse().unwrap()).next().unwrap()
-    };
-    mission.robot.odometry.distance_scale = key("robot.odometry.distance_scale");
-    mission.robot.odometry.track_scale = key("robot.odometry.track_scale");
+    let odometry = &mut mission.robot.odometry;
+    odometry.distance_scale = key(&found, "robot.odometry.distance_scale").unwrap();
+    odometry.track_scale = key(&found, "robot.odometry.track_scale").unwrap();
     for (_, rolled) in &mut trace.rolled {
-        *rolled = rolled.map(|it| it * mission.robot.odometry.distance_scale);
+        *rolled = rolled.map(|it| it * odometry.distance_scale);
     }
-    assert_eq!(wrong_of(&mission, &trace), Vec::<String>::new());
-}
-
-#[test]
-fn a_laser_upside_down_sees_a_larger_wheel_on_the_other_side() {
-    let robot = Robot { ratio: 1.06, mirrored: true, ..RIGHT };
-    let ratio = key(robot, "robot.odometry.diameter_ratio");
-    assert!((ratio - 1.06).abs() < 0.02, "{ratio}");
-    // With swapped motors the deviation is on this side.
-    let (found, _) = findings(&mission(), &without_gyro(trace(&mission(), robot)), false);
-    let ratio = found.iter().find(|it| it.part == "wheel ratio").unwrap();
-    assert!(ratio.verdict == Verdict::Wrong && ratio.keys.is_empty(), "{found:?}");
-}
-
-#[test]
-fn an_encoder_that_counts_nothing_is_named() {
-    assert_eq!(wrong(Robot { encoders: [(0, 0.0), (1, 1.0)], ..RIGHT })[0], "wheels");
+    assert_eq!(wrong(&findings(&mission, &trace, false).0), [""; 0]);
 }
 
 fn all_wires() -> impl Iterator<Item = Wires> {
@@ -257,11 +252,10 @@ fn expected(robot: Robot, mission: &Mission, is_told: bool) -> (Vec<&'static str
 }
 
 fn with_keys(mission: &Mission, found: &[Finding]) -> Vec<Channel> {
-    let keys: Vec<_> = found.iter().flat_map(|it| &it.keys).collect();
     let of = |side: &str, stated: Channel| {
         let value = |key: &str| {
             let key = format!("robot.{side}.{key}");
-            keys.iter().find(|it| it.0 == key).map(|it| it.1.as_str())
+            found.iter().flat_map(|it| &it.keys).find(|it| it.0 == key).map(|it| it.1.as_str())
         };
         Channel {
             channel: value("channel").map_or(stated.channel, |it| it.parse().unwrap()),
@@ -269,10 +263,6 @@ fn with_keys(mission: &Mission, found: &[Finding]) -> Vec<Channel> {
         }
     };
     vec![of("left", mission.robot.left), of("right", mission.robot.right)]
-}
-
-fn wrong_parts(found: &[Finding]) -> Vec<&str> {
-    found.iter().filter(|it| it.verdict == Verdict::Wrong).map(|it| it.part.as_str()).collect()
 }
 
 /// Returns whether a single wheel turns backwards, so that turning drives the body.
@@ -285,9 +275,9 @@ fn sonars_tell_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecide
     let mission = with_sonars();
     for (motors, encoders) in all_wires().flat_map(|it| all_wires().map(move |other| (it, other))) {
         let robot = Robot { motors, encoders, ..RIGHT };
-        let (found, _) = findings(&mission, &without_gyro(trace(&mission, robot)), false);
+        let found = found(&mission, robot, false);
         let (parts, channels) = expected(robot, &mission, !exchanges(motors));
-        assert_eq!(wrong_parts(&found), parts, "{motors:?} {encoders:?}: {found:?}");
+        assert_eq!(wrong(&found), parts, "{motors:?} {encoders:?}: {found:?}");
         assert_eq!(with_keys(&mission, &found), channels, "{motors:?} {encoders:?}: {found:?}");
     }
 }
@@ -310,7 +300,7 @@ fn a_laser_tells_all_swapped_and_reversed_motors_and_encoders_right_or_as_undeci
             if !is_told {
                 *parts.last_mut().unwrap() = "laser";
             }
-            assert_eq!(wrong_parts(&found), parts, "{motors:?} {encoders:?}: {found:?}");
+            assert_eq!(wrong(&found), parts, "{motors:?} {encoders:?}: {found:?}");
             assert!(
                 found.iter().all(|it| it.keys.is_empty()),
                 "{motors:?} {encoders:?}: {found:?}"
@@ -322,22 +312,14 @@ fn a_laser_tells_all_swapped_and_reversed_motors_and_encoders_right_or_as_undeci
 #[test]
 fn sonars_alone_tell_counts_per_turn_from_motors_that_are_swapped() {
     let mission = with_sonars();
-    let wrong = |robot| wrong_of(&mission, &without_gyro(trace(&mission, robot)));
-    assert_eq!(wrong(RIGHT), Vec::<String>::new());
-    assert_eq!(wrong(Robot { motors: SWAPPED, encoders: SWAPPED, ..RIGHT }), ["motors"]);
-    for wheel in [1.0 / 1.5, 1.5] {
-        assert_eq!(wrong(Robot { wheel, ..RIGHT }), ["wheel size"], "{wheel}");
+    for (robot, parts) in [
+        (RIGHT, &[][..]),
+        (Robot { motors: SWAPPED, encoders: SWAPPED, ..RIGHT }, &["motors"]),
+        (Robot { wheel: 1.0 / 1.5, ..RIGHT }, &["wheel size"]),
+        (Robot { wheel: 1.5, ..RIGHT }, &["wheel size"]),
+    ] {
+        assert_eq!(wrong(&found(&mission, robot, false)), parts, "{robot:?}");
     }
-}
-
-#[test]
-fn the_keys_of_a_laser_behind_the_centre_do_not_turn_it() {
-    let behind = Robot { laser_m: -0.1, ..RIGHT };
-    assert_eq!(wrong(behind), ["laser"]);
-    assert!((key(behind, "robot.sensor.laser.forward_m") + 0.1).abs() < 0.02);
-    let looks =
-        ["bearing_deg", "turned_deg"].map(|it| key(behind, &format!("robot.sensor.laser.{it}")));
-    assert!((looks[0] + looks[1]).abs() < 1.5, "{looks:?}");
 }
 
 #[test]
@@ -347,7 +329,7 @@ fn a_recording_that_begins_in_a_turn_is_no_finding() {
     late.told.retain(|it| it.0 > 5.0);
     late.scans.retain(|it| it.0 > 4.0);
     let (found, seen) = findings(&mission(), &late, false);
-    assert!(seen.is_empty() && found.iter().all(|it| it.verdict != Verdict::Wrong), "{found:?}");
+    assert!(seen.is_empty() && wrong(&found).is_empty(), "{found:?}");
     assert!(found.iter().any(|it| it.part == "recording"), "{found:?}");
 }
 

@@ -69,7 +69,10 @@ pub(crate) fn first(
     // Of two events in one tick, the first in the list counts.
     let events = [contact, arrival, late, stall];
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
-        return undecided(ending);
+        // The robot waits. How far it rolls after its newest tick depends on how its processes end.
+        let newest = poses.last().and_then(|pose| truth_of(pose, truth));
+        let truth_ticks = newest.map_or(truth.len(), |index| index + 1);
+        return Decided { truth_ticks, ..undecided(ending) };
     };
     let last_tick = match ending.outcome {
         // The arrival's command is the mission's last.

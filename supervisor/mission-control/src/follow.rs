@@ -40,7 +40,7 @@ impl Supervisor<'_> {
         let pose = record.pose;
         let arrival = record.sure_arrival(mission);
         self.end_following(TargetOutcome::Followed);
-        let now = self.beacon_time();
+        let now = self.pose_time();
         self.targets.follow(now.seconds(), arrival);
         let is_late = |it: &mut BeaconSample| now.since(MissionTime(it.capture_ns)) > SILENT;
         self.beacon.waiting.take_if(is_late);
@@ -62,7 +62,7 @@ impl Supervisor<'_> {
     /// Ends the following, if any, and lets the robot wait. Returns whether it did.
     pub(crate) fn end_following(&mut self, outcome: TargetOutcome) -> bool {
         let Some(following) = self.state.following.take() else { return false };
-        let (now, pose) = (self.beacon_time(), self.bus.observer.record.pose);
+        let (now, pose) = (self.pose_time(), self.bus.observer.record.pose);
         let followed = following.followed(now, pose.as_ref());
         self.targets.end_following((outcome, followed), following.place(), now.seconds());
         self.await_target();
@@ -89,7 +89,7 @@ impl Supervisor<'_> {
             }
             changed |= self.follow_to(&beacon);
         }
-        let now = self.beacon_time();
+        let now = self.pose_time();
         if let Some(following) = &mut self.state.following
             && following.loses(now)
         {
@@ -98,14 +98,6 @@ impl Supervisor<'_> {
         }
         self.tell_following();
         Ok(changed)
-    }
-
-    /// Returns the mission time; in lockstep the newest pose's.
-    fn beacon_time(&self) -> MissionTime {
-        match self.clock.in_ticks() {
-            true => self.clock.pose_time(self.bus.observer.record.pose.as_ref()),
-            false => self.mission_time(),
-        }
     }
 
     /// Returns whether, in lockstep, the stages have yet to answer the tick of `beacon`'s capture.
@@ -124,7 +116,7 @@ impl Supervisor<'_> {
     }
 
     fn follow_to(&mut self, beacon: &BeaconSample) -> bool {
-        let now = self.beacon_time();
+        let now = self.pose_time();
         let mission = &self.options.mission;
         let Some(following) = &mut self.state.following else { return false };
         let was_lost = following.is_lost;
@@ -168,7 +160,7 @@ impl Supervisor<'_> {
 
     fn tell_following(&mut self) {
         if let Some(following) = &self.state.following {
-            let now = self.beacon_time();
+            let now = self.pose_time();
             self.beacon.told = Some(following.sample(now, self.bus.observer.record.pose.as_ref()));
         }
     }

@@ -156,51 +156,56 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    fn at(x: f64) -> GroundTruthTick {
-        GroundTruthTick { x, ..GroundTruthTick::default() }
+    /// Returns the outcome of an ending that says this, of a robot with this covariance [xx, xy, yy]
+    /// that truly ended at `ended`.
+    fn outcome(
+        said: Outcome,
+        set: &str,
+        covariance: Option<[f64; 3]>,
+        ended: Option<f64>,
+    ) -> Outcome {
+        let text = format!("target = [3, 0]\n{set}");
+        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let ended = ended.map(|x| GroundTruthTick { x, ..GroundTruthTick::default() });
+        let pose = covariance.map(|[xx, xy, yy]| PoseSample {
+            x_m: 2.9,
+            covariance: [xx, xy, 0.0, yy, 0.0, 0.0],
+            ..PoseSample::default()
+        });
+        let ending = Ending::asked_for(said, "0.10 m from the target");
+        let checked = ending.checked(&mission, mission.target, ended.as_ref(), pose.as_ref());
+        let is_doubted = matches!(checked.outcome, Outcome::WrongPlace | Outcome::ReachedUnsure);
+        assert_eq!(checked.asked_for, !is_doubted);
+        checked.outcome
     }
 
     #[test]
-    fn reached_in_simulation_is_the_word_of_the_ground_truth_too() {
-        use Outcome::{Aborted, Reached, WrongPlace};
-        let outcome = |said, set: &str, ended: Option<f64>| {
-            let text = format!("target = [3, 0]\n{set}");
-            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-            let ended = ended.map(at);
-            let ending = Ending::asked_for(said, "0.08 m from the target");
-            let checked = ending.checked(&mission, mission.target, ended.as_ref(), None);
-            assert_eq!(checked.asked_for, checked.outcome != WrongPlace);
-            checked.outcome
-        };
-        assert_eq!(outcome(Reached, "", Some(2.6)), Reached);
-        assert_eq!(outcome(Reached, "", Some(2.4)), WrongPlace);
-        let wide = "arrival_tolerance_m = 0.8";
-        assert_eq!(outcome(Reached, wide, Some(2.3)), Reached);
-        assert_eq!(outcome(Reached, "", None), Reached, "a real robot");
-        assert_eq!(outcome(Aborted, "", Some(0.0)), Aborted);
-    }
-
-    #[test]
-    fn an_arrival_whose_pose_is_not_known_to_two_deviations_is_unsure() {
-        let outcome = |said, set: &str, [xx, xy, yy]: [f64; 3], ended: Option<f64>| {
-            let text = format!("target = [3, 0]\n{set}");
-            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-            let covariance = [xx, xy, 0.0, yy, 0.0, 0.0];
-            let pose = PoseSample { x_m: 2.9, covariance, ..PoseSample::default() };
-            let ending = Ending::asked_for(said, "0.10 m from the target");
-            ending.checked(&mission, mission.target, ended.map(at).as_ref(), Some(&pose)).outcome
-        };
+    fn reached_is_the_word_of_the_ground_truth_too_and_unsure_where_the_pose_is_not_known_to_two_deviations()
+     {
         use Outcome::{Aborted, Reached, ReachedUnsure, WrongPlace};
+        for (said, set, covariance, ended, want) in [
+            (Reached, "", None, Some(2.6), Reached),
+            (Reached, "", None, Some(2.4), WrongPlace),
+            (Reached, "arrival_tolerance_m = 0.8", None, Some(2.3), Reached),
+            // A real robot.
+            (Reached, "", None, None, Reached),
+            (Aborted, "", None, Some(0.0), Aborted),
+            (Reached, "sure_within_m = 0.3", Some([0.04, 0.0, 0.0]), None, ReachedUnsure),
+            (Reached, "", Some([0.3, 0.0, 0.3]), Some(3.0), ReachedUnsure),
+            (Reached, "", Some([0.3, 0.0, 0.3]), Some(2.0), WrongPlace),
+            (Aborted, "", Some([9.0, 0.0, 9.0]), None, Aborted),
+        ] {
+            assert_eq!(
+                outcome(said, set, covariance, ended),
+                want,
+                "{said:?} {set} {covariance:?}"
+            );
+        }
         for (deviation, want) in [(0.249_f64, Reached), (0.251, ReachedUnsure)] {
             let line = deviation.powi(2);
-            assert_eq!(outcome(Reached, "", [0.0, 0.0, line], None), want);
-            assert_eq!(outcome(Reached, "", [line / 2.0, line / 2.0, line / 2.0], None), want);
-            assert_eq!(outcome(Reached, "", [line, 0.0, line], None), want);
+            for covariance in [[0.0, 0.0, line], [line / 2.0; 3], [line, 0.0, line]] {
+                assert_eq!(outcome(Reached, "", Some(covariance), None), want, "{covariance:?}");
+            }
         }
-        let less = "sure_within_m = 0.3";
-        assert_eq!(outcome(Reached, less, [0.04, 0.0, 0.0], None), ReachedUnsure);
-        assert_eq!(outcome(Reached, "", [0.3, 0.0, 0.3], Some(3.0)), ReachedUnsure);
-        assert_eq!(outcome(Reached, "", [0.3, 0.0, 0.3], Some(2.0)), WrongPlace);
-        assert_eq!(outcome(Aborted, "", [9.0, 0.0, 9.0], None), Aborted);
     }
 }

@@ -166,10 +166,12 @@ impl Supervisor<'_> {
 
     fn replace_targets(&mut self, points: &[TargetPoint], first_tick: u64) {
         self.end_following(TargetOutcome::Followed);
-        let limit = self.recovery_steps.limit;
+        // In lockstep no tick begins while the robot waits.
+        let waits = self.decision.reason == HoldReason::Waiting;
+        let limit = self.recovery_steps.limit.filter(|_| !waits);
         let since_tick = limit.map_or(first_tick, |limit| limit.last_tick + 1);
         let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
-        self.targets.replace(points, (since_tick, self.mission_time().seconds()), arrival);
+        self.targets.replace(points, (since_tick, self.pose_time().seconds()), arrival);
         self.on_new_target();
     }
 
@@ -227,7 +229,7 @@ impl Supervisor<'_> {
         if !self.options.mission.stay || !ends {
             return false;
         }
-        let now_s = self.mission_time().seconds();
+        let now_s = self.pose_time().seconds();
         let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
         tracing::info!(
             number = self.targets.number,
@@ -238,7 +240,7 @@ impl Supervisor<'_> {
         if !self.end_following(TargetOutcome::Unreachable) {
             self.targets.settle(ending.outcome, now_s, arrival);
         }
-        self.stall_watch.settle();
+        self.stall_watch.settle(self.bus.observer.record.pose.map(|pose| pose.stamp.tick));
         self.await_target();
         true
     }

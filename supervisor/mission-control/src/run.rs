@@ -194,9 +194,12 @@ pub(crate) fn conduct<'a>(
     Ok((finished, (wheels == Wheels::Turning).then_some(supervisor)))
 }
 
-/// Conducts a run on a simulated machine.
-pub fn simulate(options: &Options, surroundings: &mut dyn Surroundings) -> Result<Finished> {
-    let listener: Listener = Box::new(|_| {});
+/// Conducts a run on a simulated machine. `listener` receives the samples that it reads.
+pub fn simulate(
+    options: &Options,
+    surroundings: &mut dyn Surroundings,
+    listener: Listener,
+) -> Result<Finished> {
     let conducted = conduct(options, surroundings, &Turns::default(), listener, &mut |_| {});
     conducted.map(|(finished, _)| finished)
 }

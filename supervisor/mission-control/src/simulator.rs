@@ -182,18 +182,52 @@ impl GroundTruth {
             return Ok(());
         };
         let rest = self.unfinished.split_off(end + 1);
-        if self.listening.is_some() {
-            self.file.take_if(|file| file.write_all(&self.unfinished).is_err());
-        }
-        for line in self.unfinished.split(|&byte| byte == b'\n') {
+        let mut written = 0;
+        for line in self.unfinished.split_inclusive(|&byte| byte == b'\n') {
             if self.listening.is_none() {
                 let header = serde_json::from_slice::<GroundTruthHeader>(line).ok();
                 self.listening = header.and_then(|header| header.listening.parse().ok());
+                // The first tick may come together with the header.
+                written += line.len();
             } else if let Ok(tick) = serde_json::from_slice(line) {
                 long_record::push(&mut self.ticks, tick);
             }
         }
+        let ticks = &self.unfinished[written..];
+        self.file.take_if(|file| file.write_all(ticks).is_err());
         self.unfinished = rest;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_file_has_every_tick_though_the_first_comes_together_with_the_header() {
+        let mut child = Command::new("true").stdout(Stdio::piped()).spawn().unwrap();
+        let pipe = child.stdout.take().unwrap();
+        child.wait().unwrap();
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join(GROUND_TRUTH);
+        let header = GroundTruthHeader { listening: "127.0.0.1:1".to_owned(), laser: None };
+        let line = |value: String| value + "\n";
+        let tick = |tick| {
+            let tick = GroundTruthTick { tick, ..GroundTruthTick::default() };
+            line(serde_json::to_string(&tick).unwrap())
+        };
+        let mut truth = GroundTruth {
+            pipe,
+            file: Some(append(&path).unwrap()),
+            unfinished: (line(serde_json::to_string(&header).unwrap()) + &tick(0)).into_bytes(),
+            listening: None,
+            ticks: Vec::new(),
+        };
+        truth.take_lines().unwrap();
+        truth.unfinished = tick(1).into_bytes();
+        truth.take_lines().unwrap();
+        assert_eq!(truth.ticks.len(), 2);
+        assert_eq!(fs::read_to_string(path).unwrap(), tick(0) + &tick(1));
     }
 }

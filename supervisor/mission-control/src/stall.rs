@@ -213,9 +213,10 @@ impl StallWatch {
         self.stalls.iter().skip(self.settled).find(is_last)
     }
 
-    /// Continues the run after a target was given up.
-    pub(crate) const fn settle(&mut self) {
+    /// Continues the run with another target. Ticks up to the `newest` belong to the last one.
+    pub(crate) fn settle(&mut self, newest: Option<u64>) {
         self.settled = self.stalls.len();
+        self.tick = self.tick.map(|tick| tick.max(newest.unwrap_or_default()));
     }
 
     pub(crate) const fn tick(&self) -> Option<u64> {

@@ -33,7 +33,12 @@ impl Supervisor<'_> {
             let published = self.bus.observer.record.published;
             match self.recovery_steps.next(published, Instant::now()) {
                 Next::Wait => break,
-                Next::Begin(step) => self.carry_out(step)?,
+                Next::Begin(step) => {
+                    self.carry_out(step)?;
+                    if let Some(ending) = self.given_up() {
+                        return Ok(Some(ending));
+                    }
+                }
                 Next::Check => match self.next_stall() {
                     Some(stall) => self.recovery_steps.on_stall(stall),
                     None => {
@@ -43,9 +48,6 @@ impl Supervisor<'_> {
                         break;
                     }
                 },
-            }
-            if let Some(ending) = self.given_up() {
-                return Ok(Some(ending));
             }
         }
         self.publish_tick_limit()?;

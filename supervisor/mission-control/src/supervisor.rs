@@ -328,6 +328,15 @@ impl<'a> Supervisor<'a> {
         self.clock.now(self.bus.observer.record.pose.as_ref(), self.robot.truth().last())
     }
 
+    /// Returns the mission time. In lockstep it is the newest pose's, because the ground truth comes
+    /// when its process is scheduled.
+    pub(crate) fn pose_time(&self) -> MissionTime {
+        match self.clock.in_ticks() {
+            true => self.clock.pose_time(self.bus.observer.record.pose.as_ref()),
+            false => self.mission_time(),
+        }
+    }
+
     /// Returns the current target's deadline; infinite while waiting or following.
     pub(crate) const fn deadline(&self) -> Deadline {
         let timeout_s = match self.targets.waits || self.targets.follows {

@@ -15,4 +15,5 @@ mod values;
 pub use self::{
     driver::{Options, replay},
     report::{Difference, Report, StageReport},
+    values::first_difference,
 };

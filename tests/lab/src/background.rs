@@ -1,4 +1,4 @@
-//! Threads beside a measurement: proxies of simulated robots, and consumers.
+//! Threads beside a measurement: programs of simulated robots, and consumers.
 
 use std::{
     io,
@@ -44,14 +44,9 @@ impl Drop for Turns {
     }
 }
 
-pub fn socket() -> io::Result<UdpSocket> {
+pub fn to_robot(robot: SocketAddr) -> io::Result<UdpSocket> {
     let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
     socket.set_nonblocking(true)?;
-    Ok(socket)
-}
-
-pub fn to_robot(robot: SocketAddr) -> io::Result<UdpSocket> {
-    let socket = socket()?;
     socket.connect(robot)?;
     Ok(socket)
 }

@@ -9,6 +9,7 @@ use std::{collections::BTreeMap, fs, path::PathBuf, sync::LazyLock, thread, time
 use clap::{Args, Parser as _, ValueEnum as _, builder::PossibleValuesParser};
 use console::output::{print_text, write_stderr};
 use serde::{Deserialize, Serialize};
+use simulation::RobotFault;
 
 use crate::{
     chaos::{self, Judged},
@@ -107,7 +108,7 @@ fn one(part: &Part, share: f64, number: u64) -> Result<Row> {
             format!("firsthand-lab certify --parts {FUZZ}, {many} of seed {seed}"),
         ),
         Some(options) => {
-            let faults = chaos::RobotFault::value_variants().len() as f64;
+            let faults = RobotFault::value_variants().len() as f64;
             let count = match options.contains("--robot-faults") {
                 true => format!("--missions {}", (many / faults).ceil()),
                 false => format!("--kills {many}"),

@@ -1,34 +1,33 @@
 //! `firsthand bench chaos`: random signals to stages at random times, as a test of the supervisor
-//! through real processes.
+//! through real processes; and faults of robots, each mission in one process.
 //!
-//! Each mission runs twice with one seed: undisturbed, then attacked. It must reach its target
-//! without contact, with about the pose error of the undisturbed run, and leave nothing on the
-//! machine.
+//! Each attacked mission runs twice with one seed: undisturbed, then attacked. It must reach its
+//! target without contact, with about the pose error of the undisturbed run, and leave nothing on
+//! the machine.
 
 mod attack;
 mod changes;
 pub mod consumers;
-mod fault_injector;
 mod leftovers;
 mod mission;
 mod options;
-mod proxy;
 mod replays;
 mod report;
-mod robot_fault;
 mod robot_faults;
 mod schedule;
 mod stop_time_table;
 
 pub use options::{Arguments, Options};
-pub use robot_fault::RobotFault;
 
 use std::{fs, process::ExitCode, time::Instant};
 
-use console::output::{print_text, write_stderr};
+use console::{
+    missions,
+    output::{print_text, write_stderr},
+};
 use serde::Serialize;
 
-use crate::error::Result;
+use crate::error::{OrCannot as _, Result};
 use report::Series;
 
 /// Exit code after a failed mission or a faulty robot that stopped late.
@@ -53,13 +52,18 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
 
 /// Keeps the missions' directory after a failure.
 pub fn judge(arguments: &Arguments) -> Result<Judged> {
+    if let Some(faults) = &arguments.robot_faults {
+        let mission = missions::load(&arguments.mission, &arguments.set)?;
+        let table = robot_faults::run(&mission, faults, arguments.seed, arguments.missions)?;
+        if let Some(directory) = &arguments.out {
+            fs::create_dir_all(directory).or_cannot_file("make", directory)?;
+            table.write(&arguments.robot.to_string(), &directory.join("stop_times.csv"))?;
+        }
+        return table.judged(arguments.json);
+    }
     let options = Options::of(arguments)?;
     let directory = options.directory.display();
-    let judged = match arguments.robot_faults {
-        Some(_) => robot_faults::run(&options).and_then(|table| table.judged(arguments.json)),
-        None => run(&options).and_then(|report| report.judged(arguments.json)),
-    };
-    match judged {
+    match run(&options).and_then(|report| report.judged(arguments.json)) {
         Ok(judged) if judged.lost == 0 => {
             fs::remove_dir_all(&options.directory)?;
             Ok(judged)

@@ -5,6 +5,7 @@
 
 mod background;
 mod baselines;
+mod both_ways;
 mod bring_up;
 mod certify;
 mod chaos;
@@ -44,6 +45,7 @@ enum Command {
     Field(field::Arguments),
     Certify(certify::Arguments),
     Simulate(simulate::Arguments),
+    BothWays(both_ways::Arguments),
     /// Measure tick latency; test a robot with random signals and faults.
     #[command(subcommand)]
     Bench(Bench),
@@ -85,6 +87,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
         Command::Experiments(arguments) => experiments::main(arguments),
         Command::Certify(arguments) => certify::main(arguments),
         Command::Simulate(arguments) => return simulate::main(arguments),
+        Command::BothWays(arguments) => return both_ways::main(arguments),
         Command::Field(arguments) => field::main(arguments),
         Command::Stage(arguments) => baselines::process::main(arguments),
         Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),

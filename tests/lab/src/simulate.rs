@@ -2,7 +2,7 @@
 
 use std::{
     cell::RefCell,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
     rc::Rc,
     time::{Instant, SystemTime},
@@ -96,13 +96,7 @@ fn run(scenario: &Scenario, arguments: &Arguments) -> Result<Ran> {
     let directory = tempfile::tempdir().or_cannot("make a directory for recordings")?;
     let replayed = directory.path().join("recording.mcap");
     let out = arguments.out.as_ref().unwrap_or(&replayed);
-    let tape = Tape::new(&Scenario::robot(), Scenario::directory(), out.clone());
-    let recorder = Rc::new(RefCell::new(Recorder { tape, failed: Ok(()) }));
-    let mut ran = scenario.run_before(Some(Box::new(Shared(Rc::clone(&recorder)))));
-    if let Some(Recorder { tape, failed }) = Rc::into_inner(recorder).map(RefCell::into_inner) {
-        failed?;
-        tape.finish()?;
-    }
+    let mut ran = record(scenario, out)?;
     if arguments.replay && ran.broken.is_none() {
         let report = replay(&Recording::open(out)?, &Options::default())?;
         let not_replayed = report.stages.values().flat_map(|stage| &stage.not_replayed);
@@ -110,6 +104,19 @@ fn run(scenario: &Scenario, arguments: &Arguments) -> Result<Ran> {
         let detail = report.difference.map(|difference| difference.to_string()).or(why);
         ran.broken =
             detail.map(|detail| ran.broken_at_end("a generation replays to the bit", detail));
+    }
+    Ok(ran)
+}
+
+/// Runs `scenario` and records it in `out`.
+pub fn record(scenario: &Scenario, out: &Path) -> Result<Ran> {
+    let tape = Tape::new(&Scenario::robot(), Scenario::directory(), out.to_path_buf());
+    let recorder = Rc::new(RefCell::new(Recorder { tape, failed: Ok(()) }));
+    let shared = Shared(Rc::clone(&recorder));
+    let ran = scenario.run_before(Some(Box::new(shared)));
+    if let Some(Recorder { tape, failed }) = Rc::into_inner(recorder).map(RefCell::into_inner) {
+        failed?;
+        tape.finish()?;
     }
     Ok(ran)
 }

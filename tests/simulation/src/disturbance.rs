@@ -11,6 +11,7 @@ use common::{
 
 use crate::{
     load::Load,
+    robot_fault::RobotFault,
     wire::{Quality, Way},
 };
 
@@ -37,6 +38,10 @@ pub enum What {
     Wire(Way, Quality),
     Load(Load),
     Ask(Request),
+    /// The robot becomes faulty, or is healthy again.
+    Fault(Option<RobotFault>),
+    /// Ends the simulation.
+    End,
 }
 
 /// Operator's request.

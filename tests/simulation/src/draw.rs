@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use clap::ValueEnum as _;
 use common::mission::Mission;
 use processes::stages;
 
@@ -9,6 +10,7 @@ use crate::{
     disturbance::{Disturbance, Request, What},
     load::Load,
     random::Random,
+    robot_fault::RobotFault,
     wire::{Quality, Way},
 };
 
@@ -23,8 +25,14 @@ const LONGEST_DELAY: Duration = Duration::from_millis(200);
 /// Time at which an operator resumes whatever stands.
 const RESUMED: Duration = Duration::from_secs(50);
 
+/// Draws the time without a supervisor after its death.
+pub(crate) fn absence(random: &mut Random) -> Duration {
+    let longest_s = if random.chance(0.2) { 30.0 } else { 3.0 };
+    Duration::from_secs_f64(random.within(0.1, longest_s))
+}
+
 pub(crate) fn load(random: &mut Random) -> Load {
-    let loads = [Load::IDLE, Load::IDLE, Load::BUSY, Load::OVERLOADED];
+    let loads = [Load::IDLE, Load::IDLE, Load::BUSY, Load::OVERLOADED, Load::STARVED];
     loads[random.below(loads.len())]
 }
 
@@ -39,7 +47,8 @@ pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Distur
         let at = WITHIN.mul_f64(random.share());
         one(random, mission, at, &mut all);
     }
-    // A robot that an operator has stopped would wait for ever.
+    // A robot that an operator has stopped, or that does not obey, would wait for ever.
+    all.push(Disturbance { at: RESUMED, what: What::Fault(None) });
     all.push(Disturbance { at: RESUMED, what: What::Ask(Request::Resume) });
     all
 }
@@ -50,7 +59,7 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
     let longest_s = if random.chance(0.2) { 30.0 } else { 3.0 };
     let lasts = Duration::from_secs_f64(random.within(0.05, longest_s));
     let mut add = |after: Duration, what| all.push(Disturbance { at: at + after, what });
-    match random.below(12) {
+    match random.below(14) {
         0..=2 => add(Duration::ZERO, What::Kill(stage)),
         3..=4 => add(Duration::ZERO, What::KillAfter(stage, operations)),
         5 => {
@@ -74,6 +83,14 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
         10 => {
             add(Duration::ZERO, What::Ask(Request::Stop));
             add(lasts, What::Ask(Request::Resume));
+        }
+        11..=12 => {
+            let faults = RobotFault::value_variants().iter().copied();
+            let faults: Vec<_> = faults.filter(|fault| fault.has_meaning(mission)).collect();
+            if let Some(fault) = faults.get(random.below(faults.len())) {
+                add(Duration::ZERO, What::Fault(Some(*fault)));
+                add(lasts, What::Fault(None));
+            }
         }
         _ => {
             let target = mission.target;

@@ -8,8 +8,8 @@ use common::{
     json_wire,
     mission::{Mission, Protocol},
     samples::{
-        CommandSample, DeathSample, DirectiveSample, GridHeader, LinkSample, Order, PoseSample,
-        name_str,
+        Cause, CommandSample, DeathSample, DirectiveSample, GridHeader, LinkSample, Order,
+        PoseSample, name_str,
     },
     topics,
     wire::{Command, Decoder, Quantity, Targets},
@@ -20,6 +20,7 @@ use thiserror::Error;
 use crate::{
     disturbance::What,
     machine::SimulatedMachine,
+    robot_fault::RobotFault,
     wire::{Quality, Way},
 };
 
@@ -78,14 +79,19 @@ pub(crate) struct Invariants {
     decoder: Decoder,
     /// Newest order of the supervisor that lives.
     order: Option<Order>,
-    link_stops: bool,
+    /// Why the link stops the robot, or that it does not, and since when.
+    causes: Vec<(Duration, Option<Cause>)>,
     /// Whether the newest motion command of this event moves.
     sent: Option<bool>,
     told: Option<Duration>,
     moved: Option<Duration>,
-    /// Whether the wire to the robot keeps what it carries, and since when.
+    /// Whether the wire to the robot keeps what it carries, whether the robot obeys, and when either
+    /// last changed.
     wire_is_calm: bool,
-    wire_changed: Duration,
+    obeys: bool,
+    obedience_changed: Duration,
+    /// Whether a fault has made the robot's reports untrue.
+    has_lied: bool,
     /// Stages that were disturbed, and when.
     disturbed: Vec<(&'static str, Duration)>,
     command: u64,
@@ -108,12 +114,14 @@ impl Invariants {
             observed: None,
             decoder: Decoder::default(),
             order: None,
-            link_stops: true,
+            causes: Vec::new(),
             sent: None,
             told: None,
             moved: None,
             wire_is_calm: true,
-            wire_changed: Duration::ZERO,
+            obeys: true,
+            obedience_changed: Duration::ZERO,
+            has_lied: false,
             disturbed: Vec::new(),
             command: 0,
             compared: 0,
@@ -135,10 +143,25 @@ impl Invariants {
             | What::Hang(stage) => self.disturbed.push((stage, now)),
             What::Wire(Way::ToRobot, quality) => {
                 self.wire_is_calm = *quality == Quality::default();
-                self.wire_changed = now;
+                self.obedience_changed = now;
             }
-            What::KillSupervisor(_) | What::Wire(..) | What::Load(_) | What::Ask(_) => {}
+            What::Fault(fault) => {
+                self.obeys = !fault.is_some_and(RobotFault::keeps_speed);
+                self.obedience_changed = now;
+                self.has_lied |= fault.is_some_and(RobotFault::lies);
+            }
+            What::KillSupervisor(_) | What::Wire(..) | What::Load(_) | What::Ask(_) | What::End => {
+            }
         }
+    }
+
+    pub(crate) const fn moved(&self) -> Option<Duration> {
+        self.moved
+    }
+
+    /// Takes what the link did, and from when on.
+    pub(crate) fn take_causes(&mut self) -> Vec<(Duration, Option<Cause>)> {
+        std::mem::take(&mut self.causes)
     }
 
     /// Notes what the link or its guard sends.
@@ -191,7 +214,8 @@ impl Invariants {
         let may_move = self.order.is_none_or(|order| order == Order::Drive);
         self.read(machine, now)?;
         if !self.in_ticks && sent == Some(true) {
-            holds(!self.link_stops, "zero command while held", || {
+            let drives = self.causes.last().is_some_and(|(_, cause)| cause.is_none());
+            holds(drives, "zero command while held", || {
                 "the link sends a motion command although its cause says stop".to_owned()
             })?;
             holds(may_move, "no command after the order to stop", || {
@@ -209,9 +233,10 @@ impl Invariants {
             holds(age(self.told) < TOLD_EVERY, "a robot that moves is told", || {
                 format!("it moves at {:.2} m/s and hears nothing since {:?}", truth.v, self.told)
             })?;
-            let calm = self.wire_is_calm && age(Some(self.wire_changed)) > 2 * RESTS_WITHIN;
+            let obeys = self.wire_is_calm && self.obeys;
+            let obeys = obeys && age(Some(self.obedience_changed)) > 2 * RESTS_WITHIN;
             let stands = age(self.moved) > RESTS_WITHIN;
-            holds(!(calm && stands), "a robot that is told to stand stands", || {
+            holds(!(obeys && stands), "a robot that is told to stand stands", || {
                 format!("it moves at {:.2} m/s since {:?}", truth.v, self.moved)
             })?;
         }
@@ -225,14 +250,17 @@ impl Invariants {
             self.order = Some(directive.order());
         }
         while let Some(link) = observed.link.next_sample().map_err(unread)? {
-            self.link_stops = link.stopped();
+            let cause = link.stopped().then(|| link.cause());
+            if self.causes.last().is_none_or(|(_, before)| *before != cause) {
+                self.causes.push((now, cause));
+            }
         }
         while let Some(pose) = observed.pose.next_sample().map_err(unread)? {
             // Frames may be late, so the counts find the truth of a pose.
             let truth = machine.truth_of(&pose);
             let off_m = truth.map_or(0.0, |truth| truth.pose_error_m(&pose));
             let most_m = pose_bound_m(&pose);
-            holds(off_m <= most_m, "a pose is where the robot was", || {
+            holds(self.has_lied || off_m <= most_m, "a pose is where the robot was", || {
                 format!("{off_m:.2} m off, at most {most_m:.2} m, at tick {}", pose.stamp.tick)
             })?;
         }
@@ -293,7 +321,7 @@ impl Invariants {
         let off_m = (truth.x - target[0]).hypot(truth.y - target[1]);
         let pose = finished.record.pose.unwrap_or_default();
         let most_m = mission.arrival_tolerance_m + pose_bound_m(&pose);
-        holds(off_m <= most_m, "reached is true", || {
+        holds(self.has_lied || off_m <= most_m, "reached is true", || {
             format!("{off_m:.2} m from the target, {most_m:.2} m at most")
         })
     }

@@ -5,8 +5,8 @@
 //! shared memory or clock. Bytes on the wire, samples and checkpoints are the real ones.
 //!
 //! A seed draws how late each process runs, what the wire loses, doubles, reorders and delays, which
-//! process is killed, frozen or hangs, and what operators ask. After every event the
-//! [invariants](invariant) are checked. The same seed of the same program gives the same events, so
+//! process is killed, frozen or hangs, what operators ask, and how the robot is faulty. After every
+//! event the [invariants](invariant) are checked. The same seed of the same program gives the same events, so
 //! a failure is a seed.
 //!
 //! # Limits
@@ -16,6 +16,7 @@
 
 mod disturbance;
 mod draw;
+mod fault_injector;
 mod guard;
 mod invariant;
 mod load;
@@ -23,22 +24,26 @@ mod machine;
 mod process;
 mod random;
 mod robot;
+mod robot_fault;
 mod surroundings;
 mod wire;
 
-use std::{path::PathBuf, rc::Rc, time::Duration};
+use std::{cell::RefCell, path::PathBuf, rc::Rc, time::Duration};
 
 use common::{
     bus::Bus, clock::Pace, domain::RobotName, ground_truth::GroundTruthTick, mission::Mission,
+    samples::Cause,
 };
-use mission_control::{Finished, Options, recovery::RecoveredRun};
+use mission_control::{Finished, Heard, Listener, Options, recovery::RecoveredRun};
 use processes::Starter;
+use summary::{Hearer, Summary};
 
 pub use self::{
     disturbance::{Disturbance, Request, What},
     invariant::Broken,
     load::Load,
     random::Random,
+    robot_fault::{Promise, RobotFault},
     wire::{Quality, Way},
 };
 use self::{
@@ -62,6 +67,9 @@ pub struct Scenario {
     pub pace: Pace,
     pub load: Load,
     pub disturbances: Vec<Disturbance>,
+    /// Given one by one whenever a robot that stays waits for a target. Then the run is asked to
+    /// end.
+    pub while_waiting: Vec<Request>,
 }
 
 impl Scenario {
@@ -83,6 +91,7 @@ impl Scenario {
             pace: Pace::Max,
             load: Load::NONE,
             disturbances: Vec::new(),
+            while_waiting: Vec::new(),
         }
     }
 
@@ -92,7 +101,14 @@ impl Scenario {
         let mut mission = mission.clone();
         mission.robot.address = Some(ADDRESS.to_owned());
         let (seed, pace) = (mission.seed, Pace::Rate(1.0));
-        Self { seed, mission, pace, load: Load::IDLE, disturbances: Vec::new() }
+        Self {
+            seed,
+            mission,
+            pace,
+            load: Load::IDLE,
+            disturbances: Vec::new(),
+            while_waiting: Vec::new(),
+        }
     }
 
     /// Draws the robot, the load and the disturbances of such a run.
@@ -113,26 +129,34 @@ impl Scenario {
 
     /// Runs the scenario before an observer.
     pub fn run_before(&self, observer: Option<Box<dyn Observer>>) -> Ran {
+        let (heard, listener) = Hearer::with_listener();
         let in_ticks = self.pace == Pace::Max;
         let invariants = Invariants::new(&self.mission, in_ticks);
-        let machine =
-            SimulatedMachine::new(self.seed, self.load, self.disturbances.clone(), invariants);
+        let machine = SimulatedMachine::new(self, invariants);
         machine.show_to(observer);
         let finished = common::machine::simulate(Rc::<SimulatedMachine>::clone(&machine), || {
-            self.conduct(&machine)
+            self.conduct(&machine, &Rc::new(RefCell::new(listener)))
         });
+        let summarize = |finished| Summary::new(&self.mission, finished, &heard.borrow());
         Ran {
+            summary: finished.as_ref().map(summarize),
             finished,
             broken: machine.broken(),
             events: machine.events(),
             simulated: machine.now(),
             supervisors: machine.supervisors(),
             truth: machine.take_truth(),
+            moved: machine.moved(),
+            causes: machine.take_causes(),
         }
     }
 
     /// Conducts the run to its end, with a new supervisor for each that is killed.
-    fn conduct(&self, machine: &Rc<SimulatedMachine>) -> Option<Finished> {
+    fn conduct(
+        &self,
+        machine: &Rc<SimulatedMachine>,
+        listener: &Rc<RefCell<Listener>>,
+    ) -> Option<Finished> {
         match Robot::start(&self.mission, self.pace) {
             Ok(robot) => machine.place(robot),
             Err(error) => {
@@ -145,7 +169,9 @@ impl Scenario {
         let mut random = Random::new(self.seed, 4);
         let mut recovered = None;
         loop {
-            let mut surroundings = Simulated::new(machine);
+            let mut surroundings = Simulated::new(machine, &self.while_waiting);
+            let listener = Rc::clone(listener);
+            let hear = move |heard: Heard<'_>| (*listener.borrow_mut())(heard);
             let options = Options {
                 mission: self.mission.clone(),
                 robot: Self::robot(),
@@ -156,12 +182,12 @@ impl Scenario {
                 stands: false,
                 place: None,
             };
-            let conducted = mission_control::simulate(&options, &mut surroundings);
-            if machine.broken().is_some() {
+            let conducted = mission_control::simulate(&options, &mut surroundings, Box::new(hear));
+            if machine.is_over() {
                 return None;
             }
             if machine.supervisor_is_killed() {
-                machine.pass(Duration::from_secs_f64(random.within(0.1, 3.0)));
+                machine.pass(draw::absence(&mut random));
                 recovered = match RecoveredRun::load(&directory) {
                     Ok(run) => Some(run),
                     Err(error) => {
@@ -215,14 +241,19 @@ pub trait Observer {
 
 /// What came of a run.
 pub struct Ran {
-    /// `None` if an invariant broke.
+    /// `None` if an invariant broke or the scenario ended.
     pub finished: Option<Finished>,
+    pub summary: Option<Summary>,
     pub broken: Option<Broken>,
     pub events: u64,
     pub simulated: Duration,
     /// Number of supervisors, one more than were killed.
     pub supervisors: u32,
     pub truth: Vec<GroundTruthTick>,
+    /// Time of the last command that moves the robot.
+    pub moved: Option<Duration>,
+    /// Why the link stops the robot, or that it does not, and since when.
+    pub causes: Vec<(Duration, Option<Cause>)>,
 }
 
 impl Ran {
@@ -287,6 +318,6 @@ mod tests {
         disturbances.extend(ways.map(|what| Disturbance { at, what }));
         let ran = Scenario { disturbances, ..Scenario::calm(&mission()) }.run();
         assert!(ran.broken.is_none(), "{:?}", ran.broken);
-        assert!(ran.events < 20_000, "{} events", ran.events);
+        assert!(ran.events < 40_000, "{} events", ran.events);
     }
 }

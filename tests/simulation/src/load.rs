@@ -37,4 +37,10 @@ impl Load {
         work: Duration::from_millis(1),
         starved: (0.2, Duration::from_millis(40)),
     };
+    /// A machine on which processes wait for a processor for longer than a stage's deadline.
+    pub const STARVED: Self = Self {
+        latency: Duration::from_millis(3),
+        work: Duration::from_millis(1),
+        starved: (0.1, Duration::from_millis(300)),
+    };
 }

@@ -17,7 +17,7 @@ use common::{
     machine::{Files, Machine, MachineWire},
     mission::Mission,
     run::Run,
-    samples::PoseSample,
+    samples::{Cause, PoseSample},
     shell::Simulated,
     start::Generation,
 };
@@ -27,8 +27,9 @@ use rustix::process::Signal;
 use x80_sim::SimError;
 
 use crate::{
-    Observer,
-    disturbance::{Disturbance, What},
+    Observer, Scenario,
+    disturbance::{Disturbance, Request, What},
+    fault_injector::FaultInjector,
     guard::Guard,
     invariant::{Broken, Checked, Invariants},
     load::Load,
@@ -76,6 +77,8 @@ pub(crate) struct SimulatedMachine {
     memory: RefCell<Rc<Memory>>,
     wires: Rc<RefCell<Wires>>,
     robot: RefCell<Option<Robot>>,
+    /// `None` for a robot that stays healthy.
+    faults: Option<RefCell<FaultInjector>>,
     guard: RefCell<Guard>,
     processes: RefCell<BTreeMap<u32, Process>>,
     random: RefCell<Random>,
@@ -85,19 +88,21 @@ pub(crate) struct SimulatedMachine {
     invariants: RefCell<Invariants>,
     observer: RefCell<Option<Box<dyn Observer>>>,
     broken: RefCell<Option<Broken>>,
+    is_ended: Cell<bool>,
     events: Cell<u64>,
     /// Second of the clock, and the events before it.
     second: Cell<(u64, u64)>,
 }
 
 impl SimulatedMachine {
-    pub(crate) fn new(
-        seed: u64,
-        load: Load,
-        mut disturbances: Vec<Disturbance>,
-        invariants: Invariants,
-    ) -> Rc<Self> {
+    pub(crate) fn new(scenario: &Scenario, invariants: Invariants) -> Rc<Self> {
+        let Scenario { seed, load, .. } = *scenario;
+        let mut disturbances = scenario.disturbances.clone();
         disturbances.sort_by_key(|disturbance| std::cmp::Reverse(disturbance.at));
+        let is_fault = |it: &Disturbance| matches!(it.what, What::Fault(Some(_)));
+        let protocol = scenario.mission.robot.protocol();
+        let faults = disturbances.iter().any(is_fault);
+        let faults = faults.then(|| RefCell::new(FaultInjector::new(protocol, seed)));
         Rc::new_cyclic(|own| Self {
             own: own.clone(),
             now_ns: Cell::new(BEGIN_NS),
@@ -111,6 +116,7 @@ impl SimulatedMachine {
             memory: RefCell::default(),
             wires: Rc::new(RefCell::new(Wires::new(seed))),
             robot: RefCell::default(),
+            faults,
             guard: RefCell::default(),
             processes: RefCell::default(),
             random: RefCell::new(Random::new(seed, 0)),
@@ -119,6 +125,7 @@ impl SimulatedMachine {
             invariants: RefCell::new(invariants),
             observer: RefCell::default(),
             broken: RefCell::default(),
+            is_ended: Cell::new(false),
             events: Cell::new(0),
             second: Cell::new((0, 0)),
         })
@@ -174,6 +181,21 @@ impl SimulatedMachine {
 
     pub(crate) fn broken(&self) -> Option<Broken> {
         self.broken.borrow().clone()
+    }
+
+    /// Returns whether the scenario has ended or an invariant is broken.
+    pub(crate) fn is_over(&self) -> bool {
+        self.is_ended.get() || self.broken.borrow().is_some()
+    }
+
+    /// Returns the time of the last command that moves the robot.
+    pub(crate) fn moved(&self) -> Option<Duration> {
+        self.invariants.borrow().moved()
+    }
+
+    /// Takes what the link did, and from when on.
+    pub(crate) fn take_causes(&self) -> Vec<(Duration, Option<Cause>)> {
+        self.invariants.borrow_mut().take_causes()
     }
 
     pub(crate) fn check_end(&self, mission: &Mission, finished: &Finished) {
@@ -300,28 +322,24 @@ impl SimulatedMachine {
     /// Runs events until `deadline_ns`, or until `is_ready`, whose turn comes late like others'.
     fn run_until(&self, deadline_ns: u64, is_ready: &mut dyn FnMut() -> bool) {
         let mut until_ns = None;
-        while self.broken.borrow().is_none() {
+        while !self.is_over() {
             if until_ns.is_none() && is_ready() {
                 until_ns = Some((self.now_ns.get() + self.lateness().0).min(deadline_ns));
             }
-            let until = until_ns.unwrap_or(deadline_ns);
-            match self.next() {
-                Some((at_ns, event)) if at_ns <= until => {
-                    self.now_ns.set(self.now_ns.get().max(at_ns));
-                    if self.now_ns.get() > self.ends_ns.get() {
-                        self.break_off(
-                            "a run ends",
-                            "it outlasts its mission's timeout".to_owned(),
-                        );
-                    }
-                    self.execute(&event);
-                }
-                _ => {
-                    self.now_ns.set(self.now_ns.get().max(until));
-                    return;
-                }
+            let due = self.next().filter(|(at_ns, _)| *at_ns <= until_ns.unwrap_or(deadline_ns));
+            let Some((at_ns, event)) = due else { break };
+            self.pass_to(at_ns);
+            if self.now_ns.get() > self.ends_ns.get() {
+                self.break_off("a run ends", "it outlasts its mission's timeout".to_owned());
             }
+            self.execute(&event);
         }
+        // Time passes after the last event, too, so that the supervisor does what ends it.
+        self.pass_to(until_ns.unwrap_or(deadline_ns));
+    }
+
+    fn pass_to(&self, time_ns: u64) {
+        self.now_ns.set(self.now_ns.get().max(time_ns));
     }
 
     fn execute(&self, event: &Event) {
@@ -342,7 +360,10 @@ impl SimulatedMachine {
             }
             Event::ToRobot => {
                 let datagram = self.wires.borrow_mut().take_for_robot();
-                if let Some((from, bytes)) = datagram {
+                if let Some((from, mut bytes)) = datagram {
+                    if let Some(faults) = &self.faults {
+                        bytes = faults.borrow_mut().order(&bytes);
+                    }
                     self.with_robot(|robot| robot.hear(from, &bytes));
                 }
             }
@@ -375,7 +396,13 @@ impl SimulatedMachine {
         }
         let mut wires = self.wires.borrow_mut();
         for (to, datagram) in robot.sent() {
-            wires.send(Way::ToHost, to, &datagram, self.now_ns.get());
+            let Some(faults) = &self.faults else {
+                wires.send(Way::ToHost, to, &datagram, self.now_ns.get());
+                continue;
+            };
+            for late in faults.borrow_mut().report(&datagram, self.now()) {
+                wires.send(Way::ToHost, to, &late.bytes, BEGIN_NS + late.at.as_nanos() as u64);
+            }
         }
     }
 
@@ -395,7 +422,11 @@ impl SimulatedMachine {
         let (event, at) = (self.events.get(), self.now());
         let broken = Broken { invariant, detail, event, at };
         self.broken.borrow_mut().get_or_insert(broken);
-        self.doomed.borrow_mut().insert(self.supervisor.get(), 0);
+        self.kill_supervisor(0);
+    }
+
+    fn kill_supervisor(&self, operations: u32) {
+        self.doomed.borrow_mut().insert(self.supervisor.get(), operations);
     }
 
     /// Gives every process whose input has come a turn.
@@ -405,18 +436,31 @@ impl SimulatedMachine {
             let woken = process.turns.as_ref().is_some_and(|turns| turns.is_woken())
                 || mail && process.stage == LINK && process.turns.is_some();
             if woken && process.woken_ns.is_none() {
-                let (late_ns, starved) = self.lateness();
-                process.starved += starved;
-                let from_ns = self.now_ns.get().max(process.busy_until_ns);
-                process.woken_ns = Some(from_ns + late_ns);
+                self.make_ready(process);
             }
         }
     }
 
+    /// Lets a process wait for a processor.
+    fn make_ready(&self, process: &mut Process) {
+        let (late_ns, starved) = self.lateness();
+        process.starves = starved;
+        let from_ns = self.now_ns.get().max(process.busy_until_ns);
+        process.woken_ns = Some(from_ns + late_ns);
+    }
+
     fn turn(&self, number: u32) {
+        if let Some(process) = self.processes.borrow_mut().get_mut(&number)
+            && process.woken_ns.is_none()
+            && process.turns.is_some()
+        {
+            self.make_ready(process);
+            return;
+        }
         let Some(mut process) = self.processes.borrow_mut().remove(&number) else { return };
         self.running.set(number);
         process.woken_ns = None;
+        process.starved += std::mem::take(&mut process.starves);
         let turned = match (&mut process.turns, process.starts.take()) {
             (_, Some((generation, run))) => self.open(generation, run).and_then(|mut turns| {
                 let turned = turns.turn();
@@ -476,9 +520,7 @@ impl SimulatedMachine {
                     self.doomed.borrow_mut().insert(process, *operations);
                 }
             }
-            What::KillSupervisor(operations) => {
-                self.doomed.borrow_mut().insert(self.supervisor.get(), *operations);
-            }
+            What::KillSupervisor(operations) => self.kill_supervisor(*operations),
             What::Freeze(stage) => self.with(stage, |process| process.frozen = true),
             What::Thaw(stage) => self.with(stage, |process| {
                 process.frozen = false;
@@ -489,14 +531,31 @@ impl SimulatedMachine {
             }
             What::Wire(way, quality) => self.wires.borrow_mut().set_quality(*way, *quality),
             What::Load(load) => self.load.set(*load),
-            What::Ask(request) => {
-                self.running.set(OPERATOR);
-                let bus = Bus::in_memory(Rc::clone(&self.memory.borrow()), None);
-                // Nobody hears an operator while there is no supervisor.
-                let _ = request.publish(&bus);
-                self.running.set(OBSERVER);
+            What::Ask(request) => self.ask(*request),
+            What::Fault(fault) => {
+                if let Some(faults) = &self.faults {
+                    faults.borrow_mut().set(*fault);
+                }
+            }
+            What::End => {
+                self.is_ended.set(true);
+                self.kill_supervisor(0);
             }
         }
+    }
+
+    /// Publishes an operator's request.
+    pub(crate) fn ask(&self, request: Request) {
+        // Nobody hears an operator while there is no supervisor.
+        let _ = self.as_operator(|bus| request.publish(bus));
+    }
+
+    /// Acts as another process on the bus, whose operations are not counted as the running one's.
+    pub(crate) fn as_operator<T>(&self, act: impl FnOnce(&Bus) -> T) -> T {
+        let before = self.running.replace(OPERATOR);
+        let done = act(&Bus::in_memory(Rc::clone(&self.memory.borrow()), None));
+        self.running.set(before);
+        done
     }
 
     /// Changes the live process of a stage, if there is one.

@@ -15,9 +15,9 @@ pub(crate) struct Process {
     /// Until its first turn.
     pub starts: Option<(Generation, Run)>,
     pub turns: Option<Box<dyn Simulated>>,
-    /// Next turn without input.
+    /// End of the wait for input.
     pub due_ns: u64,
-    /// Turn for an input that has come.
+    /// Turn of a process that waits for a processor.
     pub woken_ns: Option<u64>,
     /// End of the last turn.
     pub busy_until_ns: u64,
@@ -28,6 +28,8 @@ pub(crate) struct Process {
     pub exit: Option<ExitCause>,
     pub ran: Duration,
     pub starved: Duration,
+    /// Part of the wait for a processor that counts when it ends.
+    pub starves: Duration,
 }
 
 impl Process {
@@ -45,6 +47,7 @@ impl Process {
             exit: None,
             ran: Duration::ZERO,
             starved: Duration::ZERO,
+            starves: Duration::ZERO,
         }
     }
 
@@ -52,10 +55,10 @@ impl Process {
         self.exit.is_none()
     }
 
-    /// Returns the time of the next turn.
+    /// Returns the time of the next turn, or of the wakeup before it.
     pub(crate) fn next_ns(&self) -> Option<u64> {
         let runs = self.is_live() && !self.frozen && self.spins_since_ns.is_none();
-        runs.then(|| self.woken_ns.map_or(self.due_ns, |woken| woken.min(self.due_ns)))
+        runs.then(|| self.woken_ns.unwrap_or(self.due_ns))
     }
 
     /// Returns the time that the process ran and starved since its start, and its state.

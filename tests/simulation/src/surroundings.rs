@@ -1,6 +1,7 @@
 //! Surroundings of a supervisor on a simulated machine.
 
 use std::{
+    collections::VecDeque,
     io,
     net::{Ipv4Addr, SocketAddr},
     os::fd::BorrowedFd,
@@ -10,7 +11,13 @@ use std::{
 };
 
 use common::{
-    address::Address, bus::Bus, ground_truth::GroundTruthTick, run::Run, start::Generation,
+    address::Address,
+    bus::{Bus, Reader},
+    ground_truth::GroundTruthTick,
+    run::Run,
+    samples::{DirectiveSample, HoldReason},
+    start::Generation,
+    topics,
 };
 use mission_control::{
     Options, SupervisorError,
@@ -24,16 +31,36 @@ use processes::{
 };
 use rustix::process::Signal;
 
-use crate::machine::SimulatedMachine;
+use crate::{disturbance::Request, machine::SimulatedMachine};
 
 pub(crate) struct Simulated {
     machine: Rc<SimulatedMachine>,
     bus: Rc<Bus>,
+    /// Of an operator at a robot that waits for a target.
+    requests: VecDeque<Request>,
+    directive: Option<Reader<DirectiveSample>>,
 }
 
 impl Simulated {
-    pub(crate) fn new(machine: &Rc<SimulatedMachine>) -> Self {
-        Self { machine: Rc::clone(machine), bus: Rc::new(machine.start_supervisor()) }
+    pub(crate) fn new(machine: &Rc<SimulatedMachine>, while_waiting: &[Request]) -> Self {
+        Self {
+            machine: Rc::clone(machine),
+            bus: Rc::new(machine.start_supervisor()),
+            requests: while_waiting.iter().copied().collect(),
+            directive: None,
+        }
+    }
+
+    /// Returns whether the newest directive says that the robot waits for a target.
+    fn waits(&mut self) -> bool {
+        let Self { machine, directive, .. } = self;
+        let newest = machine.as_operator(|bus| {
+            if directive.is_none() {
+                *directive = bus.reader(&topics::DIRECTIVE).ok();
+            }
+            directive.as_mut()?.newest().ok()?
+        });
+        newest.is_some_and(|directive| directive.reason() == HoldReason::Waiting)
     }
 }
 
@@ -44,6 +71,7 @@ impl Surroundings for Simulated {
 
     fn recreate_bus(&mut self) -> Result<(), SupervisorError> {
         self.bus = Rc::new(self.machine.new_bus());
+        self.directive = None;
         Ok(())
     }
 
@@ -65,7 +93,15 @@ impl Surroundings for Simulated {
     }
 
     fn take_request_to_end(&mut self) -> bool {
-        false
+        // The supervisor answers a request in its next turn, with another directive.
+        if !self.waits() {
+            return false;
+        }
+        let request = self.requests.pop_front();
+        request.is_none_or(|request| {
+            self.machine.ask(request);
+            false
+        })
     }
 }
 

@@ -27,13 +27,8 @@ impl Mission {
 
 #[cfg(test)]
 mod tests {
-    use crate::odometry::Provenance;
-
     use super::*;
-
-    fn parse(text: &str) -> Result<Mission, MissionError> {
-        Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml"))
-    }
+    use crate::{odometry::Provenance, testing::mission};
 
     fn calibrated() -> Odometry {
         Odometry {
@@ -52,15 +47,13 @@ mod tests {
 
     #[test]
     fn a_mission_takes_the_values_of_its_calibration_file_and_no_longer_needs_the_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("calibration.toml");
+        let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(&file, Calibration::new(calibrated()).to_text().unwrap()).unwrap();
-        let mission = parse(&format!("robot.calibration = {:?}", file.display())).unwrap();
-        let mission = mission.with_calibration().unwrap();
-        assert_eq!(mission.robot.odometry, calibrated());
-        std::fs::remove_file(&file).unwrap();
-        let copy = toml::to_string(&mission).unwrap();
-        let copy = Mission::parse(&copy, Path::new("run.toml")).unwrap();
+        let named = mission(&format!("robot.calibration = {:?}", file.path()));
+        let with_values = named.with_calibration().unwrap();
+        assert_eq!(with_values.robot.odometry, calibrated());
+        drop(file);
+        let copy = mission(&toml::to_string(&with_values).unwrap());
         assert_eq!(copy.with_calibration().unwrap().robot.odometry, calibrated());
     }
 
@@ -68,25 +61,20 @@ mod tests {
     fn a_calibration_file_that_cannot_be_used_is_refused_with_its_name() {
         let folder = tempfile::tempdir().unwrap();
         let whole = Calibration::new(calibrated()).to_text().unwrap();
-        let cases = [
+        for (name, text, said) in [
             ("missing", None, "missing"),
             ("empty", Some(String::new()), "robot"),
             ("unknown", Some(whole.replace("slip_sd", "slip_off")), "slip_off"),
             ("range", Some(whole.replace("1.004", "2.004")), "diameter_ratio"),
             ("half", Some("[robot.odometry]\nslip = 0.001".to_owned()), "calibrated"),
-        ];
-        for (name, text, said) in cases {
+        ] {
             let file = folder.path().join(name);
-            if let Some(text) = text {
-                std::fs::write(&file, text).unwrap();
-            }
-            let mission = parse(&format!("robot.calibration = {:?}", file.display())).unwrap();
-            let refusal = mission.with_calibration().unwrap_err();
-            assert!(
-                matches!(&refusal, MissionError::Calibration { file: its, .. } if *its == file),
-                "{refusal:?}"
-            );
-            assert!(refusal.to_string().contains(said), "{name}: {refusal}");
+            text.into_iter().for_each(|text| std::fs::write(&file, text).unwrap());
+            let named = mission(&format!("robot.calibration = {file:?}"));
+            let refusal = named.with_calibration().unwrap_err();
+            let says_file =
+                matches!(&refusal, MissionError::Calibration { file: it, .. } if *it == file);
+            assert!(says_file && refusal.to_string().contains(said), "{name}: {refusal:?}");
         }
     }
 
@@ -97,17 +85,5 @@ mod tests {
         let [left, right] = odometry.wheel_scales();
         assert!((right / left - 1.02).abs() < 1e-12);
         assert!((f64::midpoint(left, right) - 0.99).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_value_of_the_odometry_that_cannot_be_is_refused_with_line_and_key() {
-        let refusal = parse("[robot.odometry]\ntrack_scale = 3").unwrap_err().to_string();
-        assert!(refusal.starts_with("m.toml:3: robot.odometry.track_scale: "), "{refusal}");
-    }
-
-    #[test]
-    fn a_mission_that_has_values_and_a_calibration_file_is_told_that_the_file_wins() {
-        let text = "[robot]\ncalibration = 'c.toml'\n[robot.odometry]\nslip = 0.002";
-        assert!(parse(text).unwrap().remarks[0].contains("robot.calibration"));
     }
 }

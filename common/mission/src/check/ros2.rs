@@ -73,44 +73,33 @@ fn is_topic(name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::check::tests::refusal;
-
-    const ROBOT: &str =
-        "target = [3, 0]\nrobot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\n";
+    use crate::testing::{assert_refused, laser, mission};
 
     #[test]
-    fn a_robot_of_ros_needs_a_domain_and_other_robots_have_none() {
-        Mission::parse(&format!("{ROBOT}robot.address = 'ros2'"), Path::new("m.toml")).unwrap();
-        assert!(refusal(ROBOT).contains("ros2:0"));
-        assert!(refusal(&format!("{ROBOT}robot.address = '1.2.3.4:5'")).contains("ROS_DOMAIN_ID"));
-        assert!(refusal("target = [3, 0]\nrobot.address = 'ros2'").contains("robot.protocol"));
-        assert!(refusal("target = [3, 0]\nrobot.ros2.odom = '/o'").contains("robot.protocol"));
-    }
-
-    #[test]
-    fn topics_that_ros_does_not_have_and_sensors_without_a_topic_are_refused() {
-        let at = format!("{ROBOT}robot.address = 'ros2:3'\n");
+    fn a_robot_of_ros_has_a_domain_and_topics_with_names_of_ros_and_other_robots_have_none() {
+        let robot = "robot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\n";
+        let with = |keys: &str| format!("{robot}robot.address = 'ros2:3'\n{keys}\n");
+        let two = |keys: &str| with(keys) + &laser("front", "") + &laser("back", "");
+        mission(&format!("{robot}robot.address = 'ros2'"));
+        mission(&two("robot.ros2.ranges = { front = '/f', back = '/b' }"));
+        assert_refused([
+            (robot, "ros2:0"),
+            (&format!("{robot}robot.address = '1.2.3.4:5'"), "ROS_DOMAIN_ID"),
+            ("robot.address = 'ros2'", "robot.protocol"),
+            ("robot.ros2.odom = '/o'", "robot.protocol"),
+            (&with("robot.ros2.ranges = { nose = '/nose' }"), "\"nose\""),
+            (&two("robot.ros2.ranges = { front = '/f' }"), "sensor \"back\""),
+            (
+                &with("").replace("turtlebot3-burger", "x80"),
+                "no topic is set for the sensor \"front\"",
+            ),
+        ]);
         for bad in ["", "/", "/a//b", "/odom/", "/7", "/a b", &"x".repeat(201)] {
-            let refusal = refusal(&format!("{at}robot.ros2.odom = '{bad}'"));
-            assert!(refusal.contains("not a ROS topic name"), "{refusal}");
-            let refusal = self::refusal(&format!("{at}robot.ros2.imu = '{bad}'"));
-            assert!(refusal.contains("not a ROS topic name"), "{refusal}");
+            assert_refused(
+                ["odom", "imu"].map(|key| {
+                    (with(&format!("robot.ros2.{key} = '{bad}'")), "not a ROS topic name")
+                }),
+            );
         }
-        let named = refusal(&format!("{at}robot.ros2.ranges = {{ nose = '/nose' }}"));
-        assert!(named.contains("\"nose\""), "{named}");
-        let laser = |name: &str| {
-            format!(
-                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n"
-            )
-        };
-        let two = |set: &str| format!("{at}{set}\n{}{}", laser("front"), laser("back"));
-        assert!(refusal(&two("robot.ros2.ranges = { front = '/f' }")).contains("sensor \"back\""));
-        let named = two("robot.ros2.ranges = { front = '/f', back = '/b' }");
-        Mission::parse(&named, Path::new("m.toml")).unwrap();
-        let x80 = at.replace("turtlebot3-burger", "x80");
-        assert!(refusal(&x80).contains("no topic is set for the sensor \"front\""));
     }
 }

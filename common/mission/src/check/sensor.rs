@@ -195,18 +195,16 @@ fn channel(key: &'static str, kind: SensorKind, channel: u8) -> Result {
 
 #[cfg(test)]
 mod tests {
-    const FRONT: &str = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.19\nbearing_deg = 0\n";
+    use crate::testing::{assert_refused, laser, mission};
 
-    fn refusal(text: &str) -> String {
-        crate::check::tests::refusal(&format!("target = [3, 0]\n{text}"))
-    }
+    const FRONT: &str = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.19\nbearing_deg = 0\n";
 
     #[test]
     fn a_row_that_the_robot_cannot_have_is_refused_with_its_key() {
         let second = |set: &str| format!("{FRONT}{}{set}", FRONT.replace("'front'", "'second'"));
         let many: String =
             (0..17).map(|index| FRONT.replace("front", &format!("s{index}"))).collect();
-        for (text, problem) in [
+        assert_refused([
             (FRONT.replace("= 1", "= 6"), "channel 6"),
             (FRONT.replace("cone", "ray").replace("= 1", "= 7"), "channel 7"),
             (FRONT.replace("cone", "ray"), "no row is a cone"),
@@ -224,100 +222,71 @@ mod tests {
             (second("").replace("'second'", "'front'"), "two rows are named"),
             (second(""), "shares its channel"),
             (many, "17 rows"),
-        ] {
-            let refusal = refusal(&text);
-            assert!(refusal.starts_with("m.toml:2: robot.sensor: "), "{text}: {refusal}");
-            assert!(refusal.contains(problem), "{text}: {refusal}");
-        }
-        let both = refusal(&format!("sonar.index = 2\n{FRONT}"));
-        assert!(both.starts_with("m.toml:2: sonar: "), "{both}");
+            (second(""), "m.toml:2: robot.sensor: "),
+            (format!("sonar.index = 2\n{FRONT}"), "m.toml:2: sonar: "),
+            (format!("sensors = 'front+infrared'\n{FRONT}"), "m.toml:2: sensors: "),
+            (format!("sensors = 'three-front'\n{FRONT}"), "m.toml:2: sensors: "),
+        ]);
     }
 
     #[test]
-    fn a_laser_rolls_by_180_degrees_or_not_and_has_at_most_16384_beams() {
-        let laser = "robot.protocol = 'json'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n";
-        for bad in ["roll_deg = 90", "roll_deg = -180", "roll_deg = nan", "roll_deg = 181"] {
-            let refusal = refusal(&format!("{laser}{bad}"));
-            assert!(refusal.contains("upside down"), "{refusal}");
-        }
-        assert!(refusal(&format!("{laser}beams = 16385")).contains("beams"));
-        for good in ["roll_deg = 180\nbeams = 16384", "roll_deg = 0", "beams = 1440"] {
-            let text = format!("target = [3, 0]\n{laser}{good}");
-            crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
-        }
-    }
-
-    #[test]
-    fn a_robot_has_up_to_4_lasers_with_16384_beams_together_and_one_simulated_line_for_them() {
-        let laser = |name: &str, keys: &str| {
-            format!(
-                "[[robot.sensor]]\nname = '{name}'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n{keys}\n"
-            )
-        };
+    fn lasers_roll_by_180_degrees_or_not_and_up_to_4_have_16384_beams_together_and_one_simulated_line()
+     {
         let many = |count: usize, protocol: &str, keys: &str| {
             let rows: String = (0..count).map(|nth| laser(&format!("l{nth}"), keys)).collect();
             format!("robot.counts_per_turn = 1320\nrobot.protocol = '{protocol}'\n{rows}")
         };
-        for good in [many(4, "json", "height_m = 0.1"), many(1, "arduino", "model = 'rplidar-a1'")]
-        {
-            let text = format!("target = [3, 0]\n{good}");
-            crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
+        for good in ["roll_deg = 180\nbeams = 16384", "roll_deg = 0", "beams = 1440"] {
+            mission(&many(1, "json", good));
         }
-        for (text, problem) in [
+        mission(&many(4, "json", "height_m = 0.1"));
+        mission(&many(1, "arduino", "model = 'rplidar-a1'"));
+        assert_refused([
+            (many(1, "json", "roll_deg = 90"), "upside down"),
+            (many(1, "json", "roll_deg = -180"), "upside down"),
+            (many(1, "json", "roll_deg = nan"), "upside down"),
+            (many(1, "json", "roll_deg = 181"), "upside down"),
+            (many(1, "json", "beams = 16385"), "beams"),
             (many(5, "json", ""), "5 lasers exceed"),
             (many(2, "json", "beams = 9000"), "18000 beams"),
             (many(2, "arduino", "model = 'rplidar-a1'"), "2 lasers have their own wires"),
             (many(1, "json", "height_m = -1"), "height_m"),
-        ] {
-            let refusal = refusal(&text);
-            assert!(refusal.contains(problem), "{text}: {refusal}");
-        }
+        ]);
     }
 
     #[test]
     fn an_rplidar_has_an_address_of_its_own_beside_a_real_robot_and_none_beside_a_simulated_one() {
-        let mission = |robot: &str, row: &str| {
+        let with = |robot: &str, keys: &str| {
             let counts = if robot.contains("x80") { "" } else { "robot.counts_per_turn = 1320\n" };
-            let laser =
-                "[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\n";
-            let front = FRONT
-                .replace("channel = 1\n", if counts.is_empty() { "channel = 1\n" } else { "" });
-            let front = if robot.contains("arduino") { "" } else { &*front };
-            format!("target = [3, 0]\nrobot.protocol = {robot}\n{counts}{front}{laser}{row}")
+            let front = match robot {
+                _ if robot.contains("x80") => FRONT.to_owned(),
+                _ if robot.contains("arduino") => String::new(),
+                _ => FRONT.replace("channel = 1\n", ""),
+            };
+            format!("robot.protocol = {robot}\n{counts}{front}") + &laser("laser", keys)
         };
         let (real, a1) = ("'arduino'\nrobot.address = 'serial:///dev/a'", "model = 'rplidar-a1'\n");
         let at = |address: &str| format!("model = 'rplidar-c1'\naddress = '{address}'\n");
-        for (robot, row, own) in [
+        for (robot, keys, own) in [
             ("'arduino'", a1, true),
             ("'x80'", a1, true),
             (real, &*at("serial:///dev/b"), true),
             ("'json'", a1, false),
             ("'json'\nrobot.address = '1.2.3.4:5'", &*at("tcp://host:6"), true),
         ] {
-            let text = mission(robot, row);
-            let mission = crate::Mission::parse(&text, std::path::Path::new("m.toml")).unwrap();
-            assert_eq!(!mission.rplidars().is_empty(), own, "{text}");
+            assert_eq!(!mission(&with(robot, keys)).rplidars().is_empty(), own, "{robot} {keys}");
         }
-        for (robot, row, problem) in [
-            ("'x80'", "", "only RPLIDARs"),
-            (real, a1, "one is real"),
-            ("'arduino'", &*at("serial:///dev/b"), "one is real"),
-            (real, &*at("ros2"), "invalid as the address"),
-            (real, &*at("dev"), "invalid as the address"),
-            ("'arduino'", "model = 'rplidar-a1'\nfield_of_view_deg = 90", "view of 360 degrees"),
-            ("'json'", "address = 'serial:///dev/b'", "only RPLIDARs"),
-        ] {
-            let text = mission(robot, row).replace("target = [3, 0]\n", "");
-            let refusal = refusal(&text);
-            assert!(refusal.contains(problem), "{text}: {refusal}");
-        }
-    }
-
-    #[test]
-    fn a_set_that_the_rows_do_not_have_is_refused() {
-        for set in ["front+infrared", "three-front"] {
-            let refusal = refusal(&format!("sensors = '{set}'\n{FRONT}"));
-            assert!(refusal.starts_with("m.toml:2: sensors: "), "{refusal}");
-        }
+        assert_refused([
+            (with("'x80'", ""), "only RPLIDARs"),
+            (with(real, a1), "one is real"),
+            (with("'arduino'", &at("serial:///dev/b")), "one is real"),
+            (with(real, &at("ros2")), "invalid as the address"),
+            (with(real, &at("dev")), "invalid as the address"),
+            (
+                with("'arduino'", "model = 'rplidar-a1'\nfield_of_view_deg = 90"),
+                "view of 360 degrees",
+            ),
+            (with("'json'", "address = 'serial:///dev/b'"), "only RPLIDARs"),
+        ]);
     }
 }

@@ -97,37 +97,21 @@ fn ranger(ranger: &Ranger) -> Result {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use crate::{Mission, MissionError};
-
-    fn parse(text: &str) -> Result<Mission, MissionError> {
-        Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml"))
-    }
+    use crate::testing::{assert_refused, mission, read_back};
 
     #[test]
     fn a_written_key_overrides_its_preset_and_leaves_the_others() {
-        let mission = parse(
-            "[simulation]\nrealism = 'measured'\n[simulation.sonar]\nnoise_m = 0.02\n[simulation.wheels]\ngain = 1",
-        )
-        .unwrap();
-        let physics = mission.simulation.physics();
-        assert_eq!(physics.sonar.noise_m, 0.02);
-        assert_eq!(physics.sonar.wall_limit_deg, 22.5);
+        let measured = "[simulation]\nrealism = 'measured'\n[simulation.sonar]\nnoise_m = 0.02\n[simulation.wheels]\ngain = 1";
+        let physics = read_back(measured).simulation.physics();
+        assert_eq!((physics.sonar.noise_m, physics.sonar.wall_limit_deg), (0.02, 22.5));
         assert_eq!((physics.wheels.gain, physics.wheels.lag_s), (1.0, 0.08));
-        let written = toml::to_string(&mission).unwrap();
-        assert_eq!(Mission::parse(&written, Path::new("x")).unwrap(), mission);
-    }
-
-    #[test]
-    fn a_good_day_in_the_laboratory_is_the_default() {
-        let sonar = parse("").unwrap().simulation.physics().sonar;
+        let sonar = mission("").simulation.physics().sonar;
         assert_eq!((sonar.cone_deg, sonar.noise_m, sonar.noise_per_m), (15.0, 0.01, 0.005));
     }
 
     #[test]
     fn every_refusal_names_line_and_key() {
-        let cases = [
+        assert_refused([
             ("[simulation.sonar]\ncone_deg = 80", "m.toml:3: simulation.sonar.cone_deg: "),
             ("[simulation.wheels]\nlag_s = nan", "m.toml:3: simulation.wheels.lag_s: "),
             ("[simulation.radio]\noutage_share = 1", "m.toml:3: simulation.radio.outage_share: "),
@@ -170,10 +154,6 @@ mod tests {
                 "[[simulation.ring]]\nindex = 6\nforward_m = 0\nbearing_deg = 0",
                 "m.toml:2: simulation.ring: ",
             ),
-        ];
-        for (text, start) in cases {
-            let refusal = parse(text).expect_err(text).to_string();
-            assert!(refusal.starts_with(start), "{text:?} gave {refusal:?}");
-        }
+        ]);
     }
 }

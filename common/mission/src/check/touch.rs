@@ -39,26 +39,22 @@ pub(super) fn check(mission: &Mission) -> Result {
 
 #[cfg(test)]
 mod tests {
-    use crate::check::tests::refusal;
+    use crate::testing::{assert_refused, mission};
 
     #[test]
     fn a_bumper_that_nobody_reports_or_that_no_body_has_is_refused() {
         let row = "[[robot.touch]]\nname = 'nose'\nkind = 'bumper'\nbearing_deg = 0\n";
-        let robot = "target = [3, 0]\nrobot.model = 'kobuki'\n";
-        let ros2 = format!("{robot}robot.protocol = 'ros2'\nrobot.address = 'ros2'\n");
-        let good = format!("{ros2}robot.ros2.ranges = {{ nose = '/bump' }}\n{row}");
-        crate::Mission::parse(&good, std::path::Path::new("m.toml")).unwrap();
-        for (text, problem) in [
-            (format!("target = [3, 0]\n{row}"), "does not carry touch sensors"),
-            (format!("{ros2}{row}"), "no topic is set"),
-            (format!("{robot}{row}{row}"), "two rows are named"),
-            (format!("{robot}{}", row.replace("nose", "laser")), "two rows are named"),
-            (format!("{robot}{}", row.replace("nose", "a b")), "invalid as a sensor name"),
-            (format!("{robot}{row}wide_deg = 190"), "wide_deg"),
-            (format!("{robot}{}", row.repeat(17)), "17 rows"),
-        ] {
-            let refusal = refusal(&text);
-            assert!(refusal.contains(problem), "{text}: {refusal}");
-        }
+        let kobuki = |rows: &str| format!("robot.model = 'kobuki'\n{rows}");
+        let ros2 = |rows: &str| kobuki("robot.protocol = 'ros2'\nrobot.address = 'ros2'\n") + rows;
+        mission(&ros2(&format!("robot.ros2.ranges = {{ nose = '/bump' }}\n{row}")));
+        assert_refused([
+            (row.to_owned(), "does not carry touch sensors"),
+            (ros2(row), "no topic is set"),
+            (kobuki(&row.repeat(2)), "two rows are named"),
+            (kobuki(&row.replace("nose", "laser")), "two rows are named"),
+            (kobuki(&row.replace("nose", "a b")), "invalid as a sensor name"),
+            (kobuki(&format!("{row}wide_deg = 190")), "wide_deg"),
+            (kobuki(&row.repeat(17)), "17 rows"),
+        ]);
     }
 }

@@ -39,33 +39,16 @@ impl DifferentialDrive {
 mod tests {
     use super::*;
 
-    fn close(got: f64, want: f64) {
-        assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
-    }
-
     #[test]
-    fn equation_2_by_hand() {
+    fn equation_2_by_hand_and_its_inverse_which_keeps_the_curvature_at_the_wheels_limit() {
         // r = 0.1, W = 0.4: v = 0.05 (3 + 1) = 0.2, omega = 0.25 (3 - 1) = 0.5.
-        let drive = DifferentialDrive::new(0.1, 0.4, 100.0);
-        let twist = drive.twist([1.0, 3.0]);
-        close(twist.v, 0.2);
-        close(twist.omega, 0.5);
-    }
-
-    #[test]
-    fn equation_17_inverts_equation_2() {
-        let drive = DifferentialDrive::new(0.1, 0.4, 100.0);
-        let [left, right] = drive.wheels(Twist { v: 0.2, omega: 0.5 });
-        close(right, 3.0);
-        close(left, 1.0);
-    }
-
-    #[test]
-    fn saturation_keeps_the_curvature() {
-        // Unlimited: (3, 1) rad/s; the limit 1.5 halves both.
-        let drive = DifferentialDrive::new(0.1, 0.4, 1.5);
-        let [left, right] = drive.wheels(Twist { v: 0.2, omega: 0.5 });
-        close(right, 1.5);
-        close(left, 0.5);
+        for (limit, wheels) in [(100.0, [1.0, 3.0]), (1.5, [0.5, 1.5])] {
+            let drive = DifferentialDrive::new(0.1, 0.4, limit);
+            let Twist { v, omega } = drive.twist([1.0, 3.0]);
+            assert!((v - 0.2).abs() < 1e-12 && (omega - 0.5).abs() < 1e-12, "{v} {omega}");
+            let got = drive.wheels(Twist { v, omega });
+            let off = [0, 1].map(|wheel| (got[wheel] - wheels[wheel]).abs());
+            assert!(off[0] < 1e-12 && off[1] < 1e-12, "limit {limit}: {got:?}");
+        }
     }
 }

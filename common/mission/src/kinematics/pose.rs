@@ -47,24 +47,16 @@ mod tests {
     use super::*;
     use std::f64::consts::FRAC_PI_2;
 
-    fn close(got: f64, want: f64) {
-        assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
-    }
-
     #[test]
-    fn the_arc_of_a_quarter_circle_by_hand() {
-        // Radius 2, from the origin facing x: ends at (2, 2) facing y.
-        let end = Pose2::default().along_arc(FRAC_PI_2 * 2.0, FRAC_PI_2);
-        close(end.position.x, 2.0);
-        close(end.position.y, 2.0);
-        close(end.heading, FRAC_PI_2);
-    }
-
-    #[test]
-    fn equation_21_moves_along_the_old_heading() {
-        let end = Pose2 { heading: FRAC_PI_2, ..Pose2::default() }.along_euler(0.3, 0.2);
-        close(end.position.x, 0.0);
-        close(end.position.y, 0.3);
-        close(end.heading, FRAC_PI_2 + 0.2);
+    fn an_arc_is_exact_and_equation_21_moves_along_the_old_heading() {
+        let up = Pose2 { heading: FRAC_PI_2, ..Pose2::default() };
+        for (end, at, heading) in [
+            // A quarter circle of radius 2 from the origin facing x ends at (2, 2) facing y.
+            (Pose2::default().along_arc(FRAC_PI_2 * 2.0, FRAC_PI_2), DVec2::splat(2.0), FRAC_PI_2),
+            (up.along_euler(0.3, 0.2), DVec2::new(0.0, 0.3), FRAC_PI_2 + 0.2),
+        ] {
+            assert!(end.position.distance(at) < 1e-12, "{end:?}");
+            assert!((end.heading - heading).abs() < 1e-12, "{end:?}");
+        }
     }
 }

@@ -10,14 +10,17 @@ use std::{
     path::Path,
 };
 
+fn mission(text: &str) -> Mission {
+    Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("test.toml")).unwrap()
+}
+
 /// Returns a controller with vd = 0.4, wd = 0.8, Rc = 0.5, target (3, 0), r = 0.1, W = 0.4.
 fn controller(extra: &str) -> Controller {
-    let text = format!(
-        "target = [3, 0]\nmethod = 'paper'\narrival_tolerance_m = 0.1\n\
+    Controller::new(&mission(&format!(
+        "method = 'paper'\narrival_tolerance_m = 0.1\n\
          robot = {{ wheel_radius_m = 0.1, track_m = 0.4 }}\n\
          [controller]\nspeed_m_s = 0.4\nturn_rad_s = 0.8\nslow_radius_m = 0.5\ndead_zone = 0.05\n{extra}"
-    );
-    Controller::new(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+    )))
 }
 
 impl Controller {
@@ -26,10 +29,6 @@ impl Controller {
         let (x_m, y_m) = (position.x, position.y);
         self.command(&GuidanceSample { x_m, y_m, heading_rad: heading, ..*guidance })
     }
-}
-
-fn state(command: &CommandSample) -> CommandState {
-    command.state()
 }
 
 fn first(heading: f64) -> CommandSample {
@@ -69,60 +68,33 @@ fn equation_14_by_hand() {
 }
 
 #[test]
-fn equation_15_ahead_is_proportional_to_the_sine() {
-    let command = first(-FRAC_PI_3);
-    close(command.omega_rad_s, 0.8 * 3_f64.sqrt() / 2.0);
-}
-
-#[test]
-fn equation_15_behind_turns_full_towards_the_guidance() {
-    let left = first(-2.0);
-    close(left.omega_rad_s, 0.8);
-    let right = first(2.0);
-    close(right.omega_rad_s, -0.8);
-}
-
-#[test]
-fn equation_15_at_the_antipode_turns_left_first_and_then_keeps_its_side() {
+fn equation_15_by_hand() {
+    // Ahead it is proportional to the sine, behind full towards the guidance.
+    for (heading, omega) in [(-FRAC_PI_3, 0.8 * 3_f64.sqrt() / 2.0), (-2.0, 0.8), (2.0, -0.8)] {
+        close(first(heading).omega_rad_s, omega);
+    }
+    // At the antipode it turns left first, and then keeps its side.
     let mut controller = controller("");
-    close(controller.at(facing(PI - 0.01), &ahead()).omega_rad_s, 0.8);
-    controller.at(facing(2.0), &ahead());
-    close(controller.at(facing(-PI + 0.01), &ahead()).omega_rad_s, -0.8);
+    for (heading, omega) in [(PI - 0.01, 0.8), (2.0, -0.8), (-PI + 0.01, -0.8)] {
+        close(controller.at(facing(heading), &ahead()).omega_rad_s, omega);
+    }
 }
 
 #[test]
-fn equation_16_by_hand() {
+fn equations_16_and_17_by_hand() {
     // vc is vd aligned, 1 - sin 60 / 2 of it 60 degrees off, and 0 antipodal.
-    close(first(0.0).v_m_s, 0.4);
-    let off = first(FRAC_PI_3);
-    close(off.v_m_s, 0.4 * (1.0 - 3_f64.sqrt() / 4.0));
-    close(first(PI).v_m_s, 0.0);
-}
-
-#[test]
-fn equation_16_is_continuous_where_its_cases_meet() {
-    let just_ahead = first(FRAC_PI_2 - 1e-9).v_m_s;
-    let just_behind = first(FRAC_PI_2 + 1e-9).v_m_s;
-    assert!((just_ahead - just_behind).abs() < 1e-8);
-    assert!((just_ahead - 0.2).abs() < 1e-8);
-}
-
-#[test]
-fn near_the_target_slowing_down_multiplies_alignment() {
+    let off = 0.4 * (1.0 - 3_f64.sqrt() / 4.0);
+    for (heading, v) in [(0.0, 0.4), (FRAC_PI_3, off), (PI, 0.0)] {
+        close(first(heading).v_m_s, v);
+    }
+    // Its cases meet.
+    let [ahead_m_s, behind_m_s] = [-1e-9, 1e-9].map(|aside| first(FRAC_PI_2 + aside).v_m_s);
+    assert!((ahead_m_s - behind_m_s).abs() < 1e-8 && (ahead_m_s - 0.2).abs() < 1e-8);
     // At 0.25 m with Rc = 0.5, vc is half of the aligned speed.
     let pose = Pose2 { position: DVec2::new(2.75, 0.0), heading: FRAC_PI_3 };
-    let command = controller("").at(pose, &ahead());
-    close(command.v_m_s, 0.2 * (1.0 - 3_f64.sqrt() / 4.0));
-}
-
-#[test]
-fn without_modulation_the_speed_is_constant_up_to_rc() {
-    let mut controller = controller("modulated = false");
-    close(controller.at(facing(PI), &ahead()).v_m_s, 0.4);
-}
-
-#[test]
-fn equation_17_by_hand() {
+    close(controller("").at(pose, &ahead()).v_m_s, off / 2.0);
+    // Without modulation the speed is constant up to Rc.
+    close(controller("modulated = false").at(facing(PI), &ahead()).v_m_s, 0.4);
     // vc = 0.4 and wc = 0 turn both wheels at 4 rad/s.
     let command = first(0.0);
     close(command.left_rad_s, 4.0);
@@ -130,10 +102,10 @@ fn equation_17_by_hand() {
 }
 
 fn evidential() -> Controller {
-    let text = "target = [3, 0]\nrobot = { wheel_radius_m = 0.1, track_m = 0.4 }\n\
-                controller = { speed_m_s = 0.4, turn_rad_s = 0.8, look_rad_s = 1.4, \
-                slow_radius_m = 0.5 }";
-    Controller::new(&Mission::parse(text, Path::new("test.toml")).unwrap())
+    Controller::new(&mission(
+        "robot = { wheel_radius_m = 0.1, track_m = 0.4 }\n\
+         controller = { speed_m_s = 0.4, turn_rad_s = 0.8, look_rad_s = 1.4, slow_radius_m = 0.5 }",
+    ))
 }
 
 fn limited(speed_limit_m_s: f64) -> GuidanceSample {
@@ -165,22 +137,18 @@ fn an_evidential_robot_turns_on_the_spot_beyond_73_degrees_and_hurries_within_26
 }
 
 #[test]
-fn an_evidential_robot_goes_no_faster_than_its_guidance_allows() {
-    close(evidential().at(facing(0.0), &limited(0.1)).v_m_s, 0.1);
-    close(evidential().at(facing(0.4), &limited(0.0)).v_m_s, 0.0);
-}
-
-#[test]
-fn a_limit_of_0_is_0_however_well_the_robot_faces_its_way() {
-    for limit in [0.0, f64::NAN, 0.01, 0.039] {
+fn an_evidential_robot_goes_no_faster_than_its_guidance_allows_however_well_it_faces_its_way() {
+    for (limit, v) in
+        [(0.0, 0.0), (f64::NAN, 0.0), (0.01, 0.0), (0.039, 0.0), (0.04, 0.04), (0.1, 0.1)]
+    {
         let command = evidential().at(facing(0.0), &limited(limit));
-        assert_eq!(state(&command), CommandState::Halt);
-        assert_eq!((command.left_rad_s, command.right_rad_s), (0.0, 0.0), "{limit}");
+        close(command.v_m_s, v);
+        assert_eq!(command.state() == CommandState::Halt, v == 0.0, "{limit}");
+        let wheels = [command.left_rad_s, command.right_rad_s];
+        assert_eq!(wheels == [0.0; 2], v == 0.0, "{limit}");
         let turning = evidential().at(facing(0.4), &limited(limit));
-        assert_eq!(turning.v_m_s, 0.0, "{limit}");
-        assert!(turning.omega_rad_s < 0.0, "{limit}");
+        assert!(turning.omega_rad_s < 0.0 && (v > 0.0 || turning.v_m_s == 0.0), "{limit}");
     }
-    close(evidential().at(facing(0.0), &limited(0.04)).v_m_s, 0.04);
 }
 
 #[test]
@@ -191,24 +159,11 @@ fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
         for limit in [0.0, 0.01, 0.03, 0.05, 0.4] {
             let command = evidential().at(facing(f64::from(degrees).to_radians()), &limited(limit));
             let fastest = command.left_rad_s.abs().max(command.right_rad_s.abs());
-            let halts = state(&command) == CommandState::Halt;
-            assert!(
-                fastest > dead || halts && fastest == 0.0,
-                "{degrees} degrees, limit {limit}: {command:?}"
-            );
+            let halts = command.state() == CommandState::Halt;
+            let is_right = fastest > dead || halts && fastest == 0.0;
+            assert!(is_right, "{degrees} degrees, limit {limit}: {command:?}");
         }
     }
-}
-
-#[test]
-fn arrival_is_final() {
-    let mut controller = controller("");
-    let there = short(0.05);
-    let command = controller.at(there, &ahead());
-    assert_eq!(state(&command), CommandState::Arrived);
-    let back_off = controller.at(facing(0.0), &ahead());
-    assert_eq!(state(&back_off), CommandState::Arrived);
-    close(back_off.v_m_s, 0.0);
 }
 
 #[test]
@@ -217,7 +172,7 @@ fn without_guidance_the_robot_stands() {
     for guidance in [GuidanceSample::default(), told(Maneuver::Stand), nan] {
         for mut controller in [controller(""), evidential()] {
             let command = controller.at(facing(0.4), &guidance);
-            assert_eq!(state(&command), CommandState::Halt);
+            assert_eq!(command.state(), CommandState::Halt);
             close(command.v_m_s, 0.0);
             close(command.left_rad_s, 0.0);
         }
@@ -225,35 +180,32 @@ fn without_guidance_the_robot_stands() {
 }
 
 #[test]
-fn an_arrival_holds_for_its_target_alone() {
+fn an_arrival_is_final_and_holds_for_its_target_alone() {
     let mut controller = controller("");
-    let there = short(0.05);
-    let command = controller.at(there, &ahead());
-    assert_eq!((state(&command), command.target_number), (CommandState::Arrived, 1));
-    let next = GuidanceSample {
-        target_number: 2,
-        target: TargetPoint::at(DVec2::new(9.0, 0.0)),
-        ..ahead()
-    };
-    let command = controller.at(there, &next);
-    assert_eq!((state(&command), command.target_number), (CommandState::Driving, 2));
+    for pose in [short(0.05), facing(0.0)] {
+        let command = controller.at(pose, &ahead());
+        assert_eq!((command.state(), command.target_number), (CommandState::Arrived, 1));
+        close(command.v_m_s, 0.0);
+    }
+    let target = TargetPoint::at(DVec2::new(9.0, 0.0));
+    let next = GuidanceSample { target_number: 2, target, ..ahead() };
+    let command = controller.at(short(0.05), &next);
+    assert_eq!((command.state(), command.target_number), (CommandState::Driving, 2));
     close(command.distance_m, 6.05);
     let none = GuidanceSample { target_number: 0, ..ahead() };
-    assert_eq!(state(&controller.at(there, &none)), CommandState::Halt);
+    assert_eq!(controller.at(short(0.05), &none).state(), CommandState::Halt);
 }
 
 #[test]
 fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
     for method in ["paper", "evidential"] {
-        let text = format!("target = [3, 0]\nmethod = '{method}'");
-        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
-        let mut controller = Controller::new(&mission);
+        let mut controller = Controller::new(&mission(&format!("method = '{method}'")));
         let mut guidance = ahead();
         (guidance.target.heading_rad, guidance.target.has_heading) = (2.0 + 2.0 * PI, 1);
         let mut pose = short(0.05);
         let mut turned = 0;
         let mut command = controller.at(pose, &guidance);
-        while state(&command) == CommandState::Driving {
+        while command.state() == CommandState::Driving {
             close(command.v_m_s, 0.0);
             assert!(command.omega_rad_s > 0.0, "{method}: the shorter way");
             pose.heading += command.omega_rad_s / 7.0;
@@ -263,7 +215,7 @@ fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
             turned += 1;
             assert!(turned < 200, "{method}: it turns for ever");
         }
-        assert_eq!(state(&command), CommandState::Arrived, "{method}");
+        assert_eq!(command.state(), CommandState::Arrived, "{method}");
         assert!((pose.heading - 2.0).abs() <= 5_f64.to_radians(), "{method}: {}", pose.heading);
         assert!(turned > 3, "{method}: {turned}");
     }
@@ -285,7 +237,7 @@ fn a_robot_has_arrived_beside_a_target_that_is_not_free_if_it_is_within_half_a_m
     let beside = GuidanceSample { status: GuidanceStatus::AtTarget.into(), ..ahead() };
     for (short_m, has_arrived) in [(0.45, true), (0.55, false)] {
         let command = controller("").at(short(short_m), &beside);
-        assert_eq!(state(&command) == CommandState::Arrived, has_arrived, "{short_m}");
+        assert_eq!(command.state() == CommandState::Arrived, has_arrived, "{short_m}");
     }
 }
 
@@ -298,8 +250,7 @@ fn an_evidential_robot_slows_down_towards_its_target() {
 
 #[test]
 fn a_controller_goes_by_the_response_that_the_link_found_as_if_it_were_stated() {
-    let text = "target = [3, 0]\nmethod = 'evidential'";
-    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+    let mission = mission("method = 'evidential'");
     let mut told = Controller::new(&mission);
     let sample =
         BaseResponseSample { dead_time_s: 0.5, acceleration_m_s2: 0.3, ..Default::default() };
@@ -320,8 +271,7 @@ fn a_controller_goes_by_the_response_that_the_link_found_as_if_it_were_stated() 
 }
 
 fn jackal() -> Controller {
-    let text = "target = [3, 0]\nrobot.model = 'jackal'";
-    Controller::new(&Mission::parse(text, Path::new("test.toml")).unwrap())
+    Controller::new(&mission("robot.model = 'jackal'"))
 }
 
 #[test]

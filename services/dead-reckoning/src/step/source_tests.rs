@@ -13,11 +13,19 @@ struct Robot {
     counts: [f64; 2],
     tick: u64,
     seed: u64,
+    told_ratio: f64,
 }
 
 impl Robot {
     fn new(larger: f64) -> Self {
-        Self { truth: Pose2::default(), larger, counts: [0.0; 2], tick: 0, seed: 7 }
+        Self {
+            truth: Pose2::default(),
+            larger,
+            counts: [0.0; 2],
+            tick: 0,
+            seed: 7,
+            told_ratio: 1.0,
+        }
     }
 
     fn drive(&mut self, arc: f64, turn: f64) -> WheelSample {
@@ -31,7 +39,15 @@ impl Robot {
         let [left_counts, right_counts] =
             self.counts.map(|counts| (counts.round() as i64).rem_euclid(32_768) as u16);
         let stamp = Stamp { tick: self.tick, stamp_ns: self.tick * TICK_NS, ..Stamp::default() };
-        WheelSample { stamp, left_counts, right_counts, ..WheelSample::default() }
+        let (told_ratio, told_ratio_sd) = (self.told_ratio, 0.006);
+        WheelSample {
+            stamp,
+            left_counts,
+            right_counts,
+            told_ratio,
+            told_ratio_sd,
+            ..WheelSample::default()
+        }
     }
 
     fn wind(&mut self) -> WheelSample {
@@ -69,26 +85,49 @@ fn x80() -> DeadReckoning {
     reckoning_of("target = [3, 0]")
 }
 
-/// Returns the pose's RMS error over `ticks` with fixes of `source`.
-fn rms(
-    robot: &mut Robot,
-    reckoning: &mut DeadReckoning,
-    ticks: u64,
-    mut source: impl FnMut(&mut Robot) -> Vec<FixSample>,
-) -> f64 {
-    let mut sum = 0.0;
-    for _ in 0..ticks {
-        let wheels = robot.wind();
-        let fixes = source(robot);
-        let pose = reckoning.given(&wheels, &fixes, &[]).pose;
-        sum += robot.error_m(&pose).powi(2);
+struct Run {
+    robot: Robot,
+    reckoning: DeadReckoning,
+}
+
+fn run(larger: f64) -> Run {
+    Run { robot: Robot::new(larger), reckoning: x80() }
+}
+
+impl Run {
+    /// Winds for `ticks` with fixes of `source`. Returns what is reckoned, and its errors, metres.
+    fn wind(
+        &mut self,
+        ticks: u64,
+        mut source: impl FnMut(&mut Robot) -> Vec<FixSample>,
+    ) -> Vec<(Reckoned, f64)> {
+        let tick = |_| {
+            let wheels = self.robot.wind();
+            let fixes = source(&mut self.robot);
+            let reckoned = self.reckoning.given(&wheels, &fixes, &[]);
+            let error_m = self.robot.error_m(&reckoned.pose);
+            (reckoned, error_m)
+        };
+        (0..ticks).map(tick).collect()
     }
-    (sum / ticks as f64).sqrt()
+
+    fn rms(&mut self, ticks: u64, source: impl FnMut(&mut Robot) -> Vec<FixSample>) -> f64 {
+        let squares = self.wind(ticks, source).into_iter().map(|(_, error_m)| error_m.powi(2));
+        (squares.sum::<f64>() / ticks as f64).sqrt()
+    }
+
+    fn deviation_m(&self) -> f64 {
+        self.reckoning.sample().covariance[3].sqrt()
+    }
 }
 
 fn each_second(robot: &mut Robot) -> Vec<FixSample> {
     let fix = robot.fix();
     if robot.tick.is_multiple_of(10) { vec![fix] } else { Vec::new() }
+}
+
+fn moved(fix: FixSample, by: DVec2) -> FixSample {
+    FixSample { x_m: fix.x_m + by.x, y_m: fix.y_m + by.y, ..fix }
 }
 
 #[test]
@@ -105,27 +144,25 @@ fn a_tick_that_is_given_again_takes_no_fixes_so_that_the_next_one_has_them() {
 #[test]
 fn fixes_hold_the_pose_of_a_robot_with_unequal_wheels_and_teach_their_ratio() {
     let none = |_: &mut Robot| Vec::new();
-    let off = rms(&mut Robot::new(0.005), &mut x80(), 600, none);
-    let (mut robot, mut reckoning) = (Robot::new(0.005), x80());
-    let on = rms(&mut robot, &mut reckoning, 600, each_second);
+    let off = run(0.005).rms(600, none);
+    let mut run = run(0.005);
+    let on = run.rms(600, each_second);
     assert!(on < 0.06 && off > 1.0, "{on} with fixes, {off} without");
     // By now the wheels are known.
-    let covariance = reckoning.sample().covariance;
-    let later = rms(&mut robot, &mut reckoning, 300, none);
+    let sure = run.reckoning.sample().covariance;
+    let later = run.rms(300, none);
     assert!(later < 0.15, "{later} afterwards, {on} with fixes, {off} without");
-    let silent = reckoning.sample().covariance;
-    assert!(silent[0] > covariance[0] && silent[3] > covariance[3] && silent[5] > covariance[5]);
+    let silent = run.reckoning.sample().covariance;
+    assert!([0, 3, 5].into_iter().all(|entry| silent[entry] > sure[entry]));
 }
 
 #[test]
 fn no_number_of_fixes_makes_the_pose_surer_than_the_error_that_they_share() {
-    let (mut robot, mut reckoning) = (Robot::new(0.005), x80());
-    let deviation = |reckoning: &DeadReckoning| reckoning.sample().covariance[0].sqrt();
-    let shared = |robot: &mut Robot| vec![FixSample { shared: [0.04, 0.0], ..robot.fix() }];
-    rms(&mut robot, &mut reckoning, 200, shared);
-    assert!((deviation(&reckoning) - 0.2).abs() < 0.01, "{}", deviation(&reckoning));
-    rms(&mut robot, &mut reckoning, 200, |robot| vec![robot.fix()]);
-    assert!(deviation(&reckoning) < 0.05, "fixes of another source do");
+    let mut run = run(0.005);
+    run.wind(200, |robot| vec![FixSample { shared: [0.04, 0.0], ..robot.fix() }]);
+    assert!((run.deviation_m() - 0.2).abs() < 0.01, "{}", run.deviation_m());
+    run.wind(200, |robot| vec![robot.fix()]);
+    assert!(run.deviation_m() < 0.05, "fixes of another source do");
 }
 
 #[test]
@@ -149,26 +186,20 @@ fn a_fix_that_comes_late_counts_as_if_it_had_come_at_once() {
 
 #[test]
 fn the_pose_follows_a_fix_without_tearing_the_map_and_odometry_does_not_jump() {
-    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+    let Run { mut robot, mut reckoning } = run(0.0);
     let mut before = reckoning.given(&robot.wind(), &[], &[]).pose;
-    let mut lost = robot.drive(0.0, 0.0);
     // Counts are lost in motion, so the pose may be off.
-    lost.restarts = 1;
+    let lost = WheelSample { restarts: 1, ..robot.drive(0.0, 0.0) };
     robot.truth.position += dvec2(0.1, 0.08);
     let odometry = |pose: &PoseSample| {
         let [x, y, turn] = pose.map_from_odom;
         DVec2::from_angle(-turn).rotate(pose.pose().position - dvec2(x, y))
     };
-    before = {
-        reckoning.given(&lost, &[], &[]);
-        before
-    };
+    reckoning.given(&lost, &[], &[]);
     let mut reached = false;
     for tick in 0..40 {
-        let mut wheels = robot.drive(0.03, 0.0);
-        wheels.restarts = 1;
-        let mut fix = robot.fix();
-        fix.heading_rad = robot.truth.heading;
+        let wheels = WheelSample { restarts: 1, ..robot.drive(0.03, 0.0) };
+        let fix = FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
         let pose = reckoning.given(&wheels, &[fix], &[]).pose;
         let moved = before.pose().position.distance(pose.pose().position);
         let by_wheels = odometry(&pose).distance(odometry(&before));
@@ -183,25 +214,24 @@ fn the_pose_follows_a_fix_without_tearing_the_map_and_odometry_does_not_jump() {
 
 #[test]
 fn one_fix_in_twenty_that_is_off_by_a_metre_does_no_harm() {
-    let (mut robot, mut reckoning) = (Robot::new(0.005), x80());
+    let mut run = run(0.005);
     let mut count = 0;
-    let on = rms(&mut robot, &mut reckoning, 1000, |robot| {
-        let mut fixes = each_second(robot);
-        for fix in &mut fixes {
+    let on = run.rms(1000, |robot| {
+        let spoil = |fix| {
             count += 1;
-            let off = DVec2::from_angle(f64::from(count)) * f64::from(u8::from(count % 20 == 0));
-            (fix.x_m, fix.y_m) = (fix.x_m + off.x, fix.y_m + off.y);
-        }
-        fixes
+            let off_m = f64::from(u8::from(count % 20 == 0));
+            moved(fix, DVec2::from_angle(f64::from(count)) * off_m)
+        };
+        each_second(robot).into_iter().map(spoil).collect()
     });
     assert!(on < 0.07, "{on}");
-    assert_eq!((reckoning.state().fixes_refused, reckoning.state().relocations), (5, 0));
+    let state = run.reckoning.state();
+    assert_eq!((state.fixes_refused, state.relocations), (5, 0));
 }
 
 #[test]
 fn a_fix_that_cannot_be_used_is_refused_with_its_cause() {
     use FixRefusal::{Covariance, Far, Future, Late, NotFinite};
-    let good = |robot: &mut Robot| FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
     type Spoil = fn(&mut FixSample);
     let rows: [(FixRefusal, Spoil); 10] = [
         (FixRefusal::None, |_| {}),
@@ -216,10 +246,11 @@ fn a_fix_that_cannot_be_used_is_refused_with_its_cause() {
         (Far, |fix| fix.y_m += 1.0),
     ];
     for (want, spoil) in rows {
-        let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-        rms(&mut robot, &mut reckoning, 50, each_second);
+        let mut run = run(0.0);
+        run.wind(50, each_second);
+        let Run { mut robot, mut reckoning } = run;
         let wheels = robot.wind();
-        let mut fix = good(&mut robot);
+        let mut fix = FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
         spoil(&mut fix);
         let used = reckoning.state().fixes;
         let reckoned = reckoning.given(&wheels, &[fix], &[]);
@@ -230,92 +261,63 @@ fn a_fix_that_cannot_be_used_is_refused_with_its_cause() {
     }
 }
 
-/// Carries the robot after 10 s, and sees it from `source` for 20 s. Returns each relocation's
-/// seconds, and the error then.
-fn carried(source: impl Fn(&mut Robot, u64) -> FixSample) -> Vec<(u64, f64)> {
-    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-    rms(&mut robot, &mut reckoning, 100, each_second);
-    robot.truth = Pose2 { position: dvec2(-2.0, 3.0), heading: robot.truth.heading + 1.9 };
-    let mut relocated = Vec::new();
-    for tick in 0..200 {
-        let wheels = robot.wind();
-        let fix = source(&mut robot, tick);
-        let Reckoned { pose, relocated: now, .. } = reckoning.given(&wheels, &[fix], &[]);
-        relocated.extend(now.then(|| (tick / 10, robot.error_m(&pose))));
-    }
-    relocated
-}
-
 #[test]
 fn fixes_that_agree_for_three_seconds_relocate_a_robot_that_was_carried() {
-    let seen = carried(|robot, _| robot.fix());
-    let headed = carried(|robot, _| FixSample { heading_rad: robot.truth.heading, ..robot.fix() });
-    for relocated in [seen, headed] {
+    // The robot is carried after 10 s, and seen for 20 s.
+    let relocations = |source: fn(&mut Robot) -> FixSample| {
+        let mut run = run(0.0);
+        run.wind(100, each_second);
+        let heading = run.robot.truth.heading + 1.9;
+        run.robot.truth = Pose2 { position: dvec2(-2.0, 3.0), heading };
+        let all = run.wind(200, |robot| vec![source(robot)]).into_iter().enumerate();
+        let relocated = |(tick, (reckoned, error)): (usize, (Reckoned, f64))| {
+            reckoned.relocated.then_some((tick / 10, error))
+        };
+        all.filter_map(relocated).collect::<Vec<_>>()
+    };
+    let headed = |robot: &mut Robot| FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
+    for relocated in [relocations(Robot::fix), relocations(headed)] {
         let [(3, error)] = relocated[..] else { panic!("{relocated:?}") };
         assert!(error < 0.15, "{error}");
     }
-    let scattered = carried(|robot, tick| {
-        let off = DVec2::from_angle(tick as f64) * 2.0;
-        let fix = robot.fix();
-        FixSample { x_m: fix.x_m + off.x, y_m: fix.y_m + off.y, ..fix }
-    });
+    let scattered =
+        relocations(|robot| moved(robot.fix(), DVec2::from_angle(robot.tick as f64) * 2.0));
     assert_eq!(scattered, []);
-}
-
-/// Returns the largest error in 60 s of fixes all `aside_m` off, and the pose's deviation.
-fn aside(aside_m: f64) -> (f64, f64, u64) {
-    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-    let mut worst = 0.0_f64;
-    for _ in 0..600 {
-        let wheels = robot.wind();
-        let fix = robot.fix();
-        let fix = FixSample { y_m: fix.y_m + aside_m, ..fix };
-        let pose = reckoning.given(&wheels, &[fix], &[]).pose;
-        worst = worst.max(robot.error_m(&pose));
-    }
-    let sample = reckoning.sample();
-    (worst, sample.covariance[3].sqrt(), sample.relocations)
 }
 
 #[test]
 fn a_source_that_is_aside_moves_the_robot_no_farther_than_it_is_and_the_pose_keeps_the_doubt() {
     for aside_m in [0.3, 1.0, 3.0] {
-        let (worst, deviation, relocations) = aside(aside_m);
-        assert_eq!(relocations, 1, "{aside_m}");
+        let mut run = run(0.0);
+        let all = run.wind(600, |robot| vec![moved(robot.fix(), dvec2(0.0, aside_m))]);
+        let worst = all.into_iter().map(|(_, error_m)| error_m).fold(0.0, f64::max);
+        assert_eq!(run.reckoning.sample().relocations, 1, "{aside_m}");
         assert!(worst < 1.2 * aside_m + 0.1, "{worst} by a source {aside_m} aside");
+        let deviation = run.deviation_m();
         assert!(deviation > 0.8 * aside_m, "{deviation} by a source {aside_m} aside");
     }
 }
 
 #[test]
 fn a_source_that_contradicts_itself_moves_the_robot_twice_and_is_then_refused() {
-    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-    let (mut relocated, mut refused) = (0, Vec::new());
-    for tick in 0..1200 {
-        let wheels = robot.wind();
-        let fix = robot.fix();
-        let fix = FixSample { y_m: fix.y_m + [0.0, 3.0][tick / 100 % 2], ..fix };
-        let reckoned = reckoning.given(&wheels, &[fix], &[]);
-        relocated += u32::from(reckoned.relocated);
-        refused.extend(reckoned.refused);
-    }
-    assert_eq!(relocated, 2);
-    assert!(refused.contains(&FixRefusal::Contradicts), "{refused:?}");
+    let all = run(0.0).wind(1200, |robot| {
+        let aside_m = [0.0, 3.0][(robot.tick - 1) as usize / 100 % 2];
+        vec![moved(robot.fix(), dvec2(0.0, aside_m))]
+    });
+    assert_eq!(all.iter().filter(|(reckoned, _)| reckoned.relocated).count(), 2);
+    assert!(all.iter().any(|(reckoned, _)| reckoned.refused == Some(FixRefusal::Contradicts)));
 }
 
 #[test]
 fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_until_another_source_places_it()
  {
-    let deviation = |ratio: f64, by_others: bool| {
-        let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-        let mut told = 0;
-        for _ in 0..80 {
-            let told_ratio = ratio;
-            let wheels = WheelSample { told_ratio, told_ratio_sd: 0.006, ..robot.wind() };
-            let fixes = if by_others { vec![robot.fix()] } else { Vec::new() };
-            told += u32::from(reckoning.given(&wheels, &fixes, &[]).doubted.is_some());
-        }
-        (reckoning.sample().covariance[3].sqrt(), told)
+    let deviation = |told_ratio: f64, by_others: bool| {
+        let mut run = run(0.0);
+        run.robot.told_ratio = told_ratio;
+        let fixes = |robot: &mut Robot| if by_others { vec![robot.fix()] } else { Vec::new() };
+        let all = run.wind(80, fixes);
+        let told = all.iter().filter(|(reckoned, _)| reckoned.doubted.is_some()).count();
+        (run.deviation_m(), told)
     };
     let (even, _) = deviation(1.01, false);
     // In none of 20 missions with an encoder 5 % low is it nearer to 1.
@@ -328,39 +330,38 @@ fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_u
 
 #[test]
 fn a_doubt_of_the_wheels_is_settled_by_a_scan_that_says_where_the_robot_is_and_by_no_other() {
-    let deviation = |own: [f64; 2], contradicts: bool| {
-        let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-        for tick in 0..80 {
-            let wheels = WheelSample { told_ratio: 0.965, ..robot.wind() };
+    for (own, contradicts, is_settled) in [
+        ([0.05, 0.03], false, true),
+        // It may have restarted at the wheels' pose.
+        ([0.05, 0.03], true, false),
+        // An empty hall, and a round room.
+        ([0.3, 0.03], false, false),
+        ([0.05, 0.2], false, false),
+    ] {
+        let mut run = run(0.0);
+        run.robot.told_ratio = 0.965;
+        run.wind(80, |robot| {
             // All fixes share 1 cm and 0.01 rad.
-            let [place, heading] = own.map(|own| own * own + 1e-4);
+            let [place, heading] = own.map(|own: f64| own * own + 1e-4);
             let fix = FixSample {
                 heading_rad: robot.truth.heading,
                 covariance: [place, 0.0, 0.0, place, 0.0, heading],
                 shared: [1e-4; 2],
                 ..robot.fix()
             };
-            let aside_m = if contradicts && tick == 20 { 2.0 } else { 0.0 };
-            let fix = FixSample { x_m: fix.x_m + aside_m, ..fix };
-            reckoning.given(&wheels, &[fix], &[]);
-        }
-        reckoning.sample().covariance[3].sqrt()
-    };
-    assert!(deviation([0.05, 0.03], false) < 0.1);
-    // It may have restarted at the wheels' pose.
-    assert!(deviation([0.05, 0.03], true) > 0.5);
-    // An empty hall, and a round room.
-    for own in [[0.3, 0.03], [0.05, 0.2]] {
-        assert!(deviation(own, false) > 0.5, "{own:?}");
+            let aside_m = if contradicts && robot.tick == 21 { 2.0 } else { 0.0 };
+            vec![moved(fix, dvec2(aside_m, 0.0))]
+        });
+        let deviation = run.deviation_m();
+        assert!(if is_settled { deviation < 0.1 } else { deviation > 0.5 }, "{own:?} {deviation}");
     }
 }
 
 /// Returns the heading error after 20 s of rest and 60 s of driving; `gyro` gets ticks and biased
 /// increments.
 fn heading_error(bias: f64, mut gyro: impl FnMut(u64, f64) -> Vec<TurnSample>) -> f64 {
-    let (mut robot, mut reckoning) = (Robot::new(0.01), x80());
-    let mut turned = 0.0;
-    let mut pose = PoseSample::default();
+    let Run { mut robot, mut reckoning } = run(0.01);
+    let (mut turned, mut pose) = (0.0, PoseSample::default());
     for tick in 0..800 {
         let wheels = if tick < 200 { robot.drive(0.0, 0.0) } else { robot.wind() };
         let increment = robot.truth.heading - turned + bias * 0.1;
@@ -382,7 +383,7 @@ fn turn(tick: u64, turn_rad: f64) -> TurnSample {
 
 #[test]
 fn a_gyro_whose_increments_come_after_their_ticks_have_left_the_history_does_no_harm() {
-    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+    let Run { mut robot, mut reckoning } = run(0.0);
     // The source pauses for 4 s repeatedly, while the robot circles.
     let mut waiting = Vec::new();
     for _ in 0..400 {
@@ -423,10 +424,9 @@ fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
 #[test]
 fn what_counts_leave_open_is_not_taken_for_a_gyros_bias() {
     let off = |seed: u64| {
-        let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
+        let Run { mut robot, mut reckoning } = run(0.0);
         robot.seed = seed;
-        let mut turned = 0.0;
-        let mut pose = PoseSample::default();
+        let (mut turned, mut pose) = (0.0, PoseSample::default());
         for tick in 0..200 {
             // Drives, stands, turns, drives; readings are off by half a count.
             let (arc, rate) = [(0.04, 0.02), (0.0, 0.0), (0.0, -0.25), (0.05, 0.0)][tick / 5 % 4];
@@ -466,10 +466,8 @@ fn a_state_that_is_restored_between_fixes_goes_on_to_the_bit_and_fits_its_file()
 
 #[test]
 fn an_operator_sets_the_pose_once_with_its_deviations_and_the_way_goes_on_from_there() {
-    let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
-    for _ in 0..100 {
-        reckoning.reckon(&robot.wind(), &Sources::default(), MissionTime(robot.tick * TICK_NS));
-    }
+    let mut run = run(0.0);
+    run.wind(100, |_| Vec::new());
     let place = PlaceSample {
         number: 1,
         x_m: 7.0,
@@ -480,64 +478,54 @@ fn an_operator_sets_the_pose_once_with_its_deviations_and_the_way_goes_on_from_t
         ..PlaceSample::default()
     };
     let sources = Sources { place: Some(place), ..Sources::default() };
-    let mut reckoned = || {
-        let wheels = robot.drive(0.0, 0.0);
-        reckoning.reckon(&wheels, &sources, MissionTime(wheels.stamp.stamp_ns))
+    let mut reckoned = |arc| {
+        let wheels = run.robot.drive(arc, 0.0);
+        run.reckoning.reckon(&wheels, &sources, wheels.stamp.time())
     };
-    let first = reckoned();
-    assert!(first.placed);
-    let pose = first.pose;
-    assert_eq!((pose.x_m, pose.y_m, pose.relocations), (7.0, -2.0, 1));
+    let Reckoned { placed, pose, .. } = reckoned(0.0);
+    assert_eq!((placed, pose.x_m, pose.y_m, pose.relocations), (true, 7.0, -2.0, 1));
     assert!((wrapped(pose.heading_rad - 3.0)).abs() < 1e-9, "{pose:?}");
     assert_eq!([pose.covariance[0], pose.covariance[3]], [0.25; 2]);
     assert!((pose.covariance[5] - 0.04).abs() < 1e-9, "{pose:?}");
     // A repeated place changes nothing.
-    assert!(!reckoned().placed);
-    let mut pose = pose;
-    for _ in 0..25 {
-        let wheels = robot.drive(0.04, 0.0);
-        pose = reckoning.reckon(&wheels, &sources, MissionTime(wheels.stamp.stamp_ns)).pose;
-    }
-    let way = pose.pose().position - dvec2(7.0, -2.0);
+    assert!(!reckoned(0.0).placed);
+    let after = (0..25).map(|_| reckoned(0.04).pose).last().unwrap();
+    let way = after.pose().position - dvec2(7.0, -2.0);
     assert!((way - DVec2::from_angle(3.0)).length() < 0.02, "{way}");
+}
+
+/// Winds with a camera each second, and a scan matcher whose drift is `y_m`.
+fn beside_camera(run: &mut Run, ticks: u64, variance: f64, y_m: fn(u64) -> f64) -> f64 {
+    run.rms(ticks, |robot| {
+        let fix = robot.fix();
+        let matched = FixSample {
+            heading_rad: robot.truth.heading,
+            covariance: [variance, 0.0, 0.0, variance, 0.0, 0.02],
+            shared: [0.09, 0.01],
+            ..moved(fix, dvec2(0.0, y_m(robot.tick)))
+        };
+        let camera = robot.tick.is_multiple_of(10).then_some(fix);
+        camera.into_iter().chain([matched]).collect()
+    })
 }
 
 #[test]
 fn a_camera_holds_the_pose_that_a_scan_matcher_would_take_along_and_makes_it_sure() {
-    let mut robot = Robot::new(0.0);
-    let mut reckoning = x80();
-    let drifted = |robot: &mut Robot| {
-        let (fix, heading_rad) = (robot.fix(), robot.truth.heading);
-        let covariance = [0.18, 0.0, 0.0, 0.18, 0.0, 0.02];
-        let matched =
-            FixSample { y_m: fix.y_m + 0.3, heading_rad, covariance, shared: [0.09, 0.01], ..fix };
-        let camera = robot.tick.is_multiple_of(10).then_some(fix);
-        camera.into_iter().chain([matched]).collect()
-    };
-    rms(&mut robot, &mut reckoning, 100, drifted);
-    let off_m = rms(&mut robot, &mut reckoning, 200, drifted);
-    let [xx, _, _, yy, ..] = reckoning.sample().covariance;
+    let mut run = run(0.0);
+    let [_, off_m] = [100, 200].map(|ticks| beside_camera(&mut run, ticks, 0.18, |_| 0.3));
+    let [xx, _, _, yy, ..] = run.reckoning.sample().covariance;
     assert!(off_m < 0.1 && xx.max(yy) < 0.02, "{off_m} m off, {xx} {yy}");
 }
 
 #[test]
 fn a_camera_holds_the_pose_whose_scan_matcher_drifts_farther_than_it_says() {
-    let mut robot = Robot::new(0.0);
-    let mut reckoning = x80();
-    let drifting = |robot: &mut Robot| {
-        let (fix, heading_rad) = (robot.fix(), robot.truth.heading);
-        let covariance = [0.11, 0.0, 0.0, 0.11, 0.0, 0.02];
-        let y_m = fix.y_m + 0.002 * robot.tick as f64;
-        let matched = FixSample { y_m, heading_rad, covariance, shared: [0.09, 0.01], ..fix };
-        let camera = robot.tick.is_multiple_of(10).then_some(fix);
-        camera.into_iter().chain([matched]).collect()
-    };
-    rms(&mut robot, &mut reckoning, 700, drifting);
-    let off_m = rms(&mut robot, &mut reckoning, 100, drifting);
-    assert!(off_m < 0.1 && reckoning.sample().relocations == 0, "{off_m} m off");
+    let mut run = run(0.0);
+    let off_m = |run: &mut Run, ticks| beside_camera(run, ticks, 0.11, |tick| 0.002 * tick as f64);
+    let [_, drifted] = [700, 100].map(|ticks| off_m(&mut run, ticks));
     // A turn that no wheel saw, as while a process is replaced: matcher fixes contradict the pose
     // for a while.
-    robot.truth.heading += 0.55;
-    let off_m = rms(&mut robot, &mut reckoning, 100, drifting);
-    assert!(off_m < 0.15 && reckoning.sample().relocations == 0, "{off_m} m off after a turn");
+    run.robot.truth.heading += 0.55;
+    let turned = off_m(&mut run, 100);
+    assert!(drifted < 0.1 && turned < 0.15, "{drifted} m off, {turned} m after a turn");
+    assert_eq!(run.reckoning.sample().relocations, 0);
 }

@@ -57,8 +57,14 @@ fn close(got: f64, want: f64) {
     assert!((got - want).abs() < 1e-12, "got {got}, want {want}");
 }
 
+/// A sample of another generation of the link.
+fn by(generation: u32, mut sample: WheelSample) -> WheelSample {
+    sample.stamp.generation = generation;
+    sample
+}
+
 #[test]
-fn equation_20_straight_by_hand() {
+fn equation_20_by_hand() {
     let mut reckoning = begun("", 100, 200);
     // 500 counts are half a turn: pi * 0.1 m in 0.5 s.
     let pose = reckoning.take(1, 600, 700);
@@ -67,6 +73,10 @@ fn equation_20_straight_by_hand() {
     close(pose.v_m_s, 0.2 * PI);
     close(pose.omega_rad_s, 0.0);
     close(pose.travelled_m, 0.1 * PI);
+    // +-1000 counts are 2 pi 0.1 m a side over a track of 0.4 m: pi radians left on the spot.
+    let pose = begun("", 0, 0).take(1, COUNT_CYCLE - 1000, 1000);
+    close(pose.heading_rad, PI);
+    close(pose.x_m, 0.0);
 }
 
 /// As [`wheels`], without a counter.
@@ -132,82 +142,47 @@ fn a_recorded_state_and_entry_of_an_earlier_version_are_read_without_counts() {
 }
 
 #[test]
-fn equation_20_turns_left_when_the_right_wheel_leads() {
-    let mut reckoning = begun("", 0, 0);
-    // +-1000 counts are 2 pi 0.1 m a side over a track of 0.4 m: pi radians on the spot.
-    let pose = reckoning.take(1, COUNT_CYCLE - 1000, 1000);
-    close(pose.heading_rad, PI);
-    close(pose.x_m, 0.0);
-}
-
-#[test]
 fn the_arc_and_the_papers_euler_differ_as_they_should() {
     // Right wheel alone, 1000 counts: arc 0.1 pi, turn pi/2, radius 0.2.
-    let mut arc = begun("", 0, 0);
-    let pose = arc.take(1, 0, 1000);
-    close(pose.x_m, 0.2);
-    close(pose.y_m, 0.2);
-    let mut euler = begun("[dead_reckoning]\nintegration = 'euler'", 0, 0);
-    let pose = euler.take(1, 0, 1000);
-    close(pose.x_m, 0.1 * PI);
-    close(pose.y_m, 0.0);
-    close(pose.heading_rad, PI / 2.0);
-}
-
-#[test]
-fn counts_wrap_around_both_ways() {
-    let mut reckoning = begun("", COUNT_CYCLE - 200, COUNT_CYCLE - 200);
-    let pose = reckoning.take(1, 300, 300);
-    close(pose.x_m, 0.1 * PI);
-    let pose = reckoning.take(2, COUNT_CYCLE - 200, COUNT_CYCLE - 200);
-    close(pose.x_m, 0.0);
-}
-
-#[test]
-fn a_tick_given_twice_moves_once() {
-    let mut reckoning = begun("", 0, 0);
-    let first = reckoning.take(1, 100, 100);
-    assert_eq!(reckoning.take(1, 100, 100), first);
-}
-
-#[test]
-fn a_restored_state_goes_on_as_if_nothing_had_happened() {
-    let mut whole = reckoning("");
-    let mut killed = reckoning("");
-    for tick in 0..4 {
-        let sample = wheels(tick, tick as u16 * 50, tick as u16 * 90);
-        whole.alone(&sample);
-        killed.alone(&sample);
+    for (integration, x_m, y_m) in [("arc", 0.2, 0.2), ("euler", 0.1 * PI, 0.0)] {
+        let extra = format!("[dead_reckoning]\nintegration = '{integration}'");
+        let pose = begun(&extra, 0, 0).take(1, 0, 1000);
+        close(pose.x_m, x_m);
+        close(pose.y_m, y_m);
+        close(pose.heading_rad, PI / 2.0);
     }
-    let mut successor = reckoning("");
-    successor.restore(killed.state().clone()).unwrap();
-    let sample = wheels(4, 250, 400);
-    assert_eq!(successor.alone(&sample).pose, whole.alone(&sample).pose);
+}
+
+#[test]
+fn counts_wrap_around_both_ways_and_a_tick_given_twice_moves_once() {
+    let mut reckoning = begun("", COUNT_CYCLE - 200, COUNT_CYCLE - 200);
+    for _ in 0..2 {
+        close(reckoning.take(1, 300, 300).x_m, 0.1 * PI);
+    }
+    close(reckoning.take(2, COUNT_CYCLE - 200, COUNT_CYCLE - 200).x_m, 0.0);
 }
 
 #[test]
 fn no_speed_is_more_than_the_body_can_do_however_the_frames_come() {
     // A rim of at most 1 m/s is 5 rad/s on the spot.
     let mut reckoning = begun("", 0, 0);
-    let at = |tick, stamp_ns, left, right| {
+    let mut tick = 0;
+    let mut at = |stamp_ns: u64, left, right| {
+        tick += 1;
         let stamp = Stamp { tick, stamp_ns, ..Stamp::default() };
-        WheelSample { stamp, ..wheels(tick, left, right) }
+        reckoning.alone(&WheelSample { stamp, ..wheels(tick, left, right) }).pose
     };
-    for (tick, after_ns) in [(1, 0), (2, 1), (3, 100_000), (4, 20_000_000)] {
-        let now_ns = tick * 1_000_000_000 + after_ns;
-        let before = at(2 * tick, now_ns - after_ns, 0, 0);
-        reckoning.alone(&before);
-        let straight = reckoning.alone(&at(2 * tick + 1, now_ns, 400, 400)).pose;
-        close(straight.v_m_s, 1.0);
-        reckoning.alone(&at(100 + 2 * tick, now_ns + 400_000_000, 400, 400));
-        let turned = at(101 + 2 * tick, now_ns + 400_000_000 + after_ns, 0, 800);
-        close(reckoning.alone(&turned).pose.omega_rad_s, 5.0);
-        reckoning.alone(&at(102 + 2 * tick, now_ns + 900_000_000, 0, 0));
+    for (second, after_ns) in [(1, 0), (2, 1), (3, 100_000), (4, 20_000_000)] {
+        let now_ns = second * 1_000_000_000;
+        at(now_ns, 0, 0);
+        close(at(now_ns + after_ns, 400, 400).v_m_s, 1.0);
+        at(now_ns + 400_000_000, 400, 400);
+        close(at(now_ns + 400_000_000 + after_ns, 0, 800).omega_rad_s, 5.0);
+        at(now_ns + 900_000_000, 0, 0);
     }
     // Two 7 Hz ticks at once are not too fast a motion.
-    reckoning.alone(&at(200, 9_000_000_000, 0, 0));
-    let bunched = reckoning.alone(&at(201, 9_001_000_000, 50, 50)).pose;
-    close(bunched.v_m_s, 50.0 * 2e-4 * PI / (0.5 / 7.0));
+    at(9_000_000_000, 0, 0);
+    close(at(9_001_000_000, 50, 50).v_m_s, 50.0 * 2e-4 * PI / (0.5 / 7.0));
 }
 
 #[test]
@@ -228,52 +203,26 @@ fn a_motion_that_nobody_measured_is_in_the_covariance() {
 
 #[test]
 fn counters_that_restart_do_not_move_the_robot() {
-    let mut reckoning = begun("", 16_000, 16_000);
-    assert!(reckoning.alone(&wheels(1, 0, 0)).rejected);
-    close(reckoning.take(1, 0, 0).x_m, 0.0);
-    let pose = reckoning.take(2, 500, 500);
-    close(pose.x_m, 0.1 * PI);
-}
-
-#[test]
-fn a_robot_that_restarted_while_it_was_away_does_not_move() {
-    let mut reckoning = begun("", 600, 700);
-    // Wheels could have turned this far in the 5 s.
-    let after = WheelSample { restarts: 1, ..wheels(10, 0, 1) };
-    assert!(reckoning.alone(&after).rejected);
-    close(reckoning.alone(&after).pose.x_m, 0.0);
-    let on = WheelSample { restarts: 1, ..wheels(11, 500, 501) };
-    close(reckoning.alone(&on).pose.x_m, 0.1 * PI);
-}
-
-#[test]
-fn a_restart_between_two_generations_of_the_link_is_told_from_the_counts() {
-    let mut reckoning = reckoning("");
-    let by = |generation, mut sample: WheelSample| {
-        sample.stamp.generation = generation;
-        sample
-    };
-    reckoning.alone(&by(1, wheels(0, 600, 700)));
-    let pose = reckoning.alone(&by(2, wheels(1, 1100, 1200))).pose;
-    close(pose.x_m, 0.1 * PI);
-    let began_anew = by(3, wheels(9, 0, 0));
-    assert!(reckoning.alone(&began_anew).rejected);
-    close(reckoning.alone(&began_anew).pose.x_m, pose.x_m);
+    // At once, while the robot was away, or while the link was killed. Wheels could have turned this
+    // far in 5 s.
+    for (from, tick, restarts, generation) in [(16_000, 1, 0, 0), (600, 10, 1, 0), (600, 9, 0, 1)] {
+        let mut reckoning = begun("", from, from);
+        let sample =
+            |tick, counts| WheelSample { restarts, ..by(generation, wheels(tick, counts, counts)) };
+        assert!(reckoning.alone(&sample(tick, 0)).rejected, "{tick}");
+        close(reckoning.alone(&sample(tick, 0)).pose.x_m, 0.0);
+        close(reckoning.alone(&sample(tick + 1, 500)).pose.x_m, 0.1 * PI);
+    }
 }
 
 #[test]
 fn a_robot_that_turns_back_through_its_start_while_the_link_is_killed_loses_no_turn() {
-    let mut reckoning = reckoning("");
-    let by = |generation, mut sample: WheelSample| {
-        sample.stamp.generation = generation;
-        sample
-    };
-    reckoning.alone(&by(1, wheels(0, 0, 0)));
+    let mut reckoning = begun("", 0, 0);
     // The wheels roll a tenth of a turn oppositely, and back.
-    reckoning.alone(&by(1, wheels(1, COUNT_CYCLE - 100, 100)));
-    let back = by(2, wheels(2, COUNT_CYCLE - 3, 2));
-    assert!(!reckoning.alone(&back).rejected);
-    close(reckoning.alone(&back).pose.heading_rad, 5.0 * 2e-4 * PI / 0.4);
+    reckoning.take(1, COUNT_CYCLE - 100, 100);
+    let back = reckoning.alone(&by(1, wheels(2, COUNT_CYCLE - 3, 2)));
+    assert!(!back.rejected);
+    close(back.pose.heading_rad, 5.0 * 2e-4 * PI / 0.4);
 }
 
 #[test]

@@ -129,18 +129,18 @@ impl Deafness {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use super::*;
+    use crate::testing::mission;
 
-    /// Judges a ranger, row 3, with these readings, metres, on a robot that drives 0.05 m per
+    /// Judges a ranger, row 3, with these readings, centimetres, on a robot that drives 0.05 m per
     /// frame.
-    fn judged(ranges: impl Iterator<Item = Option<f64>>) -> [bool; 2] {
-        let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+    fn judged(ranges: impl Iterator<Item = Option<u8>>) -> [bool; 2] {
+        let mission = mission("");
         let mut deafness = Deafness::of(&mission);
         for range in ranges {
             let status = range.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
-            let range_m = range.unwrap_or_default();
+            let range_m = f64::from(range.unwrap_or_default()) / 100.0;
             let of = |sensor: u8| RangeReading { range_m, sensor, raw: 0, status: status.into() };
             deafness.take(&[of(3), of(4)]);
             deafness.went(0.05);
@@ -148,36 +148,33 @@ mod tests {
         [false, true].map(|sure| deafness.judged(sure).is_some())
     }
 
-    fn frames(range: Option<f64>, count: usize) -> impl Iterator<Item = Option<f64>> {
+    fn frames(range: Option<u8>, count: usize) -> impl Iterator<Item = Option<u8>> {
         std::iter::repeat_n(range, count)
     }
 
     #[test]
     fn rangers_whose_noise_at_the_end_of_their_scale_is_missing_are_doubted_and_then_surely_deaf() {
-        let after = |silent| judged(frames(Some(0.79), 60).chain(frames(None, silent)));
-        assert_eq!(after(2), [false, false]);
-        assert_eq!(after(4), [true, false]);
-        assert_eq!(after(8), [true, true]);
-    }
-
-    #[test]
-    fn a_robot_that_leaves_what_it_saw_for_open_ground_goes_slowly_after_its_sensors_reach_and_does_not_stand()
-     {
-        let after = |silent| judged(frames(Some(0.5), 60).chain(frames(None, silent)));
-        assert_eq!(after(50), [false, false]);
-        assert_eq!(after(500), [true, false]);
-    }
-
-    #[test]
-    fn a_robot_that_never_hears_anything_goes_slowly_and_does_not_stand() {
-        assert_eq!(judged(frames(None, 50)), [false, false]);
-        assert_eq!(judged(frames(None, 500)), [true, false]);
+        // A robot that leaves what it saw for open ground, or never hears anything, goes slowly after
+        // its sensors' reach, and does not stand.
+        for (heard, silent, judgement) in [
+            (Some(79), 2, [false, false]),
+            (Some(79), 4, [true, false]),
+            (Some(79), 8, [true, true]),
+            (Some(50), 50, [false, false]),
+            (Some(50), 500, [true, false]),
+            (None, 50, [false, false]),
+            (None, 500, [true, false]),
+        ] {
+            let before = if heard.is_some() { 60 } else { 0 };
+            let all = frames(heard, before).chain(frames(None, silent));
+            assert_eq!(judged(all), judgement, "{heard:?} {silent}");
+        }
     }
 
     #[test]
     fn sensors_that_hear_only_whenever_the_robot_stands_are_deaf_until_it_is_resumed() {
-        let spell = || frames(Some(0.79), 60).chain(frames(None, 9));
-        let hears = || frames(Some(0.5), 9);
+        let spell = || frames(Some(79), 60).chain(frames(None, 9));
+        let hears = || frames(Some(50), 9);
         assert_eq!(judged(spell().chain(spell()).chain(hears())), [false, false]);
         assert_eq!(judged(spell().chain(spell()).chain(spell()).chain(hears())), [true, true]);
     }

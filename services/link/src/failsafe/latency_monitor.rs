@@ -111,9 +111,8 @@ impl Monitor for LatencyMonitor {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
+    use crate::testing::mission;
 
     const MS: u64 = 1_000_000;
 
@@ -129,9 +128,7 @@ mod tests {
     /// Returns the monitor of a robot found at 10 s after commands every 70 ms, acknowledged after
     /// `delay_ms`. Then nothing is sent for `quiet_ms`.
     fn found(delay_ms: u64, quiet_ms: u64) -> LatencyMonitor {
-        let text = "target = [3, 0]";
-        let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
-        let mut monitor = LatencyMonitor::new(&mission);
+        let mut monitor = LatencyMonitor::new(&mission(""));
         observe(&mut monitor, Observation::Sent, 10_000);
         observe(&mut monitor, Observation::Found { again: true }, 10_000);
         let last_acknowledged = delay_ms.min(quiet_ms);
@@ -145,15 +142,12 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_whose_acknowledgements_come_in_time_may_go_after_the_window() {
-        assert!(may_be_late(&found(20, 300)), "not known yet");
-        assert!(!may_be_late(&found(20, 700)));
-        assert!(!may_be_late(&found(200, 700)));
-    }
-
-    #[test]
-    fn a_robot_that_acknowledges_what_was_sent_long_ago_is_late() {
-        assert!(may_be_late(&found(2000, 700)));
+    fn a_robot_may_go_after_the_window_if_its_acknowledgements_come_in_time() {
+        for (delay_ms, quiet_ms, is_late) in
+            [(20, 300, true), (20, 700, false), (200, 700, false), (2000, 700, true)]
+        {
+            assert_eq!(may_be_late(&found(delay_ms, quiet_ms)), is_late, "{delay_ms} {quiet_ms}");
+        }
     }
 
     #[test]

@@ -224,9 +224,8 @@ fn misses(echoes: &mut [Echo], listener: Listener) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
+    use crate::testing::mission;
 
     /// Judges two sonars that approach a post of 0.1 m radius at (1.2, 0.1). The robot drives 2 cm
     /// per tick, and turns to and fro by 0.3 rad. `is_heard` selects the ticks and sonars that hear
@@ -234,9 +233,7 @@ mod tests {
     fn judged(ticks: u32, is_heard: impl Fn(u32, u8) -> bool) -> [bool; 2] {
         let rows = "[[robot.sensor]]\nname = 'a'\nkind = 'cone'\nforward_m = 0.2\nbearing_deg = 10\n\
             [[robot.sensor]]\nname = 'b'\nkind = 'cone'\nforward_m = 0.2\nbearing_deg = -10\n";
-        let text =
-            format!("target = [3, 0]\nrobot.model = 'kobuki'\nrobot.protocol = 'json'\n{rows}");
-        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+        let mission = mission(&format!("robot.model = 'kobuki'\nrobot.protocol = 'json'\n{rows}"));
         let mut lost = LostEcho::of(&mission);
         for tick in 0..ticks {
             let position = DVec2::new(0.02 * f64::from(tick.min(30)), 0.0);
@@ -259,27 +256,20 @@ mod tests {
     }
 
     #[test]
-    fn sonars_that_hear_a_post_whenever_it_is_in_their_cones_are_not_doubted() {
-        assert_eq!(judged(150, |_, _| true), [false, false]);
-    }
-
-    #[test]
-    fn sonars_that_all_fall_deaf_before_what_they_heard_are_doubted_and_then_surely_deaf() {
-        let after = |silent: u32| judged(40 + silent, |tick, _| tick < 40);
-        assert_eq!(after(1), [false, false]);
-        assert_eq!(after(50), [true, true]);
-    }
-
-    #[test]
-    fn one_sonar_that_falls_deaf_beside_another_is_found_later() {
-        let after = |silent: u32| judged(40 + silent, |tick, sensor| sensor == 0 || tick < 40);
-        assert_eq!(after(5), [false, false]);
-        assert_eq!(after(100), [true, true]);
-    }
-
-    #[test]
-    fn sonars_that_hear_only_now_and_then_are_deaf_until_they_are_resumed() {
-        let now_and_then = |tick, _| tick < 40 || tick % 40 > 30;
-        assert_eq!(judged(231, now_and_then), [true, true]);
+    fn sonars_are_judged_deaf_that_do_not_hear_a_post_in_their_cones_as_before() {
+        type IsHeard = fn(u32, u8) -> bool;
+        let all_deaf: IsHeard = |tick, _| tick < 40;
+        let one_deaf: IsHeard = |tick, sensor| sensor == 0 || tick < 40;
+        let now_and_then: IsHeard = |tick, _| tick < 40 || tick % 40 > 30;
+        for (ticks, is_heard, are_deaf) in [
+            (150, (|_, _| true) as IsHeard, false),
+            (41, all_deaf, false),
+            (90, all_deaf, true),
+            (45, one_deaf, false),
+            (140, one_deaf, true),
+            (231, now_and_then, true),
+        ] {
+            assert_eq!(judged(ticks, is_heard), [are_deaf; 2], "{ticks}");
+        }
     }
 }

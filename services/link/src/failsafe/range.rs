@@ -348,31 +348,31 @@ impl Monitor for Range {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use common::clock::MissionTime;
 
     use super::*;
+    use crate::testing::{mission, near};
 
-    /// Returns the first tick at which a sonar with these readings is implausible, with wheel
-    /// travel per tick.
-    fn implausible_at(wheels_m: [f64; 2], reading: impl Fn(u32) -> u16) -> Option<u32> {
-        sensor_implausible_at(0, wheels_m, reading)
+    fn implausible_at(wheels_cm: [i16; 2], reading: impl Fn(u32) -> u16) -> Option<u32> {
+        sensor_implausible_at(0, wheels_cm, reading)
     }
 
-    /// As [`implausible_at`], for any row, in centimetres.
+    /// Returns the first tick at which a sensor with these readings, centimetres, is implausible,
+    /// with wheel travel per tick.
     fn sensor_implausible_at(
         sensor: u8,
-        wheels_m: [f64; 2],
+        wheels_cm: [i16; 2],
         reading: impl Fn(u32) -> u16,
     ) -> Option<u32> {
-        let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+        let mission = mission("");
         let mut monitor = Range::new(&mission);
         let per_count = mission.body().metres_per_count();
         (0..200).find(|&tick| {
             let time = MissionTime::from_seconds(f64::from(tick) / 7.0);
             let now = Moment { time, machine_ns: time.0 };
-            let turned = wheels_m.map(|way| (way * f64::from(tick) / per_count).round() as i32);
+            let turned = wheels_cm
+                .map(|way| (0.01 * f64::from(way) * f64::from(tick) / per_count).round() as i32);
             let counts = turned.map(|counts| counts.rem_euclid(32_768) as u16);
             monitor.observe(&Observation::Motor(counts.into(), Counts::Follow), now);
             let of = |sensor: u8, cm: u16| {
@@ -394,52 +394,58 @@ mod tests {
     fn a_reading_that_stays_while_the_robot_drives_0_4_m_or_turns_by_a_right_angle_is_implausible()
     {
         // 0.05 m per tick is 0.4 m in 8. A quarter turn rolls each wheel 0.204 m.
-        assert_eq!(implausible_at([0.05; 2], |_| 100), Some(8));
-        assert_eq!(implausible_at([-0.02, 0.02], |tick| 100 + (tick % 2) as u16), Some(11));
-        assert_eq!(implausible_at([0.1; 2], |_| 100), Some(7), "no fewer readings");
+        assert_eq!(implausible_at([5; 2], |_| 100), Some(8));
+        assert_eq!(implausible_at([-2, 2], |tick| 100 + (tick % 2) as u16), Some(11));
+        assert_eq!(implausible_at([10; 2], |_| 100), Some(7), "no fewer readings");
         let frozen_at = |tick: u32| if tick < 30 { 200 - 5 * tick as u16 } else { 55 };
-        assert_eq!(implausible_at([0.05; 2], frozen_at), Some(37));
+        assert_eq!(implausible_at([5; 2], frozen_at), Some(37));
     }
 
     #[test]
     fn readings_of_a_robot_that_stands_that_change_or_that_are_no_distances_are_plausible() {
-        assert_eq!(implausible_at([0.0; 2], |_| 100), None);
-        assert_eq!(implausible_at([0.05; 2], |tick| 100 + 8 * (tick % 2) as u16), None);
-        assert_eq!(implausible_at([0.05; 2], |_| 255), None);
-        assert_eq!(implausible_at([0.05; 2], |_| 254), None);
-        assert_eq!(implausible_at([0.05; 2], |tick| 240 - tick as u16), None);
+        type Reading = fn(u32) -> u16;
+        let cases: [(i16, Reading); 5] = [
+            (0, |_| 100),
+            (5, |tick| 100 + 8 * (tick % 2) as u16),
+            (5, |_| 255),
+            (5, |_| 254),
+            (5, |tick| 240 - tick as u16),
+        ];
+        for (case, (way_cm, reading)) in cases.into_iter().enumerate() {
+            assert_eq!(implausible_at([way_cm; 2], reading), None, "{case}");
+        }
     }
 
     #[test]
     fn a_sensor_that_looks_aside_is_stuck_if_its_reading_stays_while_the_robot_turns_on_the_spot() {
         for sensor in [1, 2, 3, 9] {
-            assert_eq!(sensor_implausible_at(sensor, [-0.02, 0.02], |_| 50), Some(11), "{sensor}");
+            assert_eq!(sensor_implausible_at(sensor, [-2, 2], |_| 50), Some(11), "{sensor}");
             // Along a wall, or around a drum.
-            assert_eq!(sensor_implausible_at(sensor, [0.05; 2], |_| 50), None);
-            assert_eq!(sensor_implausible_at(sensor, [0.03, 0.05], |_| 50), None);
+            assert_eq!(sensor_implausible_at(sensor, [5; 2], |_| 50), None);
+            assert_eq!(sensor_implausible_at(sensor, [3, 5], |_| 50), None);
         }
         // Infrared rangers with nothing in range stay silent at each heading.
-        assert_eq!(sensor_implausible_at(3, [-0.02, 0.02], |_| 255), None);
+        assert_eq!(sensor_implausible_at(3, [-2, 2], |_| 255), None);
     }
 
     #[test]
     fn a_reading_that_stays_within_3_cm_slows_the_robot_and_then_stops_it() {
         let near = |tick: u32| 100 + (tick * 5 % 7) as u16 - 3;
-        assert_eq!(implausible_at([0.05; 2], near), Some(15));
-        assert_eq!(implausible_at([0.05; 2], |tick| near(tick) + 2 * tick as u16), None);
+        assert_eq!(implausible_at([5; 2], near), Some(15));
+        assert_eq!(implausible_at([5; 2], |tick| near(tick) + 2 * tick as u16), None);
     }
 
     #[test]
     fn readings_that_do_not_follow_from_one_another_are_implausible_and_those_of_two_things_are_not()
      {
         let random = |tick: u32| 10 + (tick * tick * 37 % 240) as u16;
-        assert!(implausible_at([0.03; 2], random).is_some_and(|tick| tick < 60));
-        assert_eq!(implausible_at([0.0; 2], |tick| if tick % 3 == 0 { 200 } else { 90 }), None);
+        assert!(implausible_at([3; 2], random).is_some_and(|tick| tick < 60));
+        assert_eq!(implausible_at([0; 2], |tick| if tick % 3 == 0 { 200 } else { 90 }), None);
     }
 
     #[test]
     fn the_explanation_is_that_of_the_judge_that_holds_and_not_of_one_that_only_doubts() {
-        let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+        let mission = mission("");
         let mut monitor = Range::new(&mission);
         let now = Moment::default();
         let nothing = RangeReading { status: RangeStatus::Nothing.into(), ..Default::default() };
@@ -458,8 +464,7 @@ mod tests {
 
     #[test]
     fn a_car_turns_by_its_steering() {
-        let text = "target = [3, 0]\nrobot.model = 'car'";
-        let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+        let mission = mission("robot.model = 'car'");
         let mut monitor = Range::new(&mission);
         // A wheel of 0.04 m rolls half a turn. 300 of 3600 counts are 30 degrees right; the
         // wheelbase is 0.18 m.
@@ -468,7 +473,7 @@ mod tests {
         }
         let way_m = 0.04 * std::f64::consts::PI;
         let turn_rad = -way_m * 30_f64.to_radians().tan() / 0.18;
-        assert!((monitor.way_m - way_m).abs() < 1e-9);
-        assert!((monitor.pose.heading - turn_rad).abs() < 1e-9, "{}", monitor.pose.heading);
+        near(monitor.way_m, way_m, 1e-9);
+        near(monitor.pose.heading, turn_rad, 1e-9);
     }
 }

@@ -139,11 +139,12 @@ impl RangeMotion {
 
 #[cfg(test)]
 mod tests {
-    use std::{ops::Range, path::Path};
+    use std::ops::Range;
 
     use common::clock::MissionTime;
 
     use super::*;
+    use crate::testing::mission;
 
     /// Returns the least range in a field of view to the post at (1, 0) or the wall at y = 0.7.
     fn range(sensor: &Sensor, robot: Pose2) -> Option<f64> {
@@ -164,7 +165,7 @@ mod tests {
     /// Judges readings of these rows on a robot that drives to and fro before a post and turns.
     /// They are `late` ticks late for 20 s, then prompt.
     fn said(rows: Range<u8>, late: usize) -> Option<String> {
-        let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+        let mission = mission("");
         let table = mission.sensor_table();
         let mut motion = RangeMotion::of(&mission);
         let mut by_wheels = Poses::default();

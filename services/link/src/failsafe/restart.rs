@@ -153,95 +153,80 @@ fn since((before, then): Frame, (counts, now): Frame) -> ([f64; 2], f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
+    use crate::testing::mission;
+    use Counts::{Elsewhere, Follow, Implausible};
+
+    const RESTARTED: Counts = Counts::Restarted { was_away: false };
+
+    impl RestartWatch {
+        fn at(&mut self, ms: u64, counts: [u16; 2]) -> Counts {
+            self.step(counts, [0; 2], false, at(ms))
+        }
+
+        fn away(&mut self, ms: u64, counts: [u16; 2]) -> Counts {
+            self.away = true;
+            self.at(ms, counts)
+        }
+    }
+
+    fn at(ms: u64) -> MissionTime {
+        MissionTime(ms * 1_000_000)
+    }
 
     fn watch() -> RestartWatch {
         // 1 m/s is 2247 counts/s, 321 per tick.
-        RestartWatch::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
-    }
-
-    fn at(seconds: f64) -> MissionTime {
-        MissionTime::from_seconds(seconds)
+        RestartWatch::new(&mission(""))
     }
 
     #[test]
-    fn counts_that_begin_anew_after_an_absence_are_a_restart() {
+    fn counts_that_begin_anew_after_an_absence_are_a_restart_and_counts_that_go_on_are_none() {
         let mut watch = watch();
-        assert_eq!(
-            watch.step([32_168, 600], [0; 2], false, at(0.0)),
-            Counts::Follow,
-            "the first frame"
-        );
-        watch.away = true;
-        assert_eq!(
-            watch.step([0, 1], [0; 2], false, at(3.0)),
-            Counts::Restarted { was_away: false }
-        );
-        assert_eq!(
-            watch.step([32_700, 68], [0; 2], false, at(3.1)),
-            Counts::Follow,
-            "it drives on"
-        );
+        assert_eq!(watch.at(0, [32_168, 600]), Follow, "the first frame");
+        let mut goes_on = watch.clone();
+        assert_eq!(watch.away(3000, [0, 1]), RESTARTED);
+        assert_eq!(watch.at(3100, [32_700, 68]), Follow, "it drives on");
         assert_eq!(watch.restarts, 1);
-    }
-
-    #[test]
-    fn a_robot_that_comes_back_with_its_counts_is_no_restart() {
-        let mut watch = watch();
-        watch.step([32_168, 600], [0; 2], false, at(0.0));
-        watch.away = true;
-        assert_eq!(watch.step([32_000, 768], [0; 2], false, at(3.0)), Counts::Follow);
-        watch.away = true;
-        // The robot stood at its start.
-        watch.step([3, 32_765], [0; 2], false, at(6.0));
-        watch.away = true;
-        assert_eq!(watch.step([0, 0], [0; 2], false, at(9.0)), Counts::Follow);
+        assert_eq!(goes_on.away(3000, [32_000, 768]), Follow);
+        goes_on.away(6000, [3, 32_765]);
+        assert_eq!(goes_on.away(9000, [0, 0]), Follow, "it stood at its start");
     }
 
     #[test]
     fn a_robot_that_turns_back_through_its_start_is_no_restart() {
         let mut watch = watch();
-        watch.step([300, 300], [0; 2], false, at(0.0));
-        assert_eq!(watch.step([2, 1], [0; 2], false, at(0.143)), Counts::Follow);
-        watch.step([800, 900], [0; 2], false, at(0.5));
-        assert_eq!(
-            watch.step([0, 0], [0; 2], false, at(0.643)),
-            Counts::Restarted { was_away: false },
-            "nothing turns so fast"
-        );
+        watch.at(0, [300, 300]);
+        assert_eq!(watch.at(143, [2, 1]), Follow);
+        watch.at(500, [800, 900]);
+        assert_eq!(watch.at(643, [0, 0]), RESTARTED, "nothing turns so fast");
     }
 
     #[test]
     fn an_old_frame_between_good_ones_is_implausible_and_the_next_are_not_compared_with_it() {
         let mut watch = watch();
-        for tick in 0..7 {
-            let now = at(0.143 * f64::from(tick));
-            watch.step([1000 + 112 * tick as u16, 5000], [0; 2], false, now);
+        for tick in 0..7_u16 {
+            watch.at(143 * u64::from(tick), [1000 + 112 * tick, 5000]);
         }
-        assert_eq!(watch.step([31_000, 2000], [0; 2], false, at(0.95)), Counts::Implausible);
-        assert_eq!(watch.step([1784, 5000], [0; 2], false, at(1.0)), Counts::Follow);
+        assert_eq!(watch.at(950, [31_000, 2000]), Implausible);
+        assert_eq!(watch.at(1000, [1784, 5000]), Follow);
         assert_eq!(watch.restarts, 0);
     }
 
     #[test]
-    fn counts_that_go_on_elsewhere_are_plausible_from_the_third_on() {
-        let mut watch = watch();
-        watch.step([1000, 1000], [0; 2], false, at(0.0));
-        assert_eq!(watch.step([9000, 17_000], [0; 2], false, at(0.143)), Counts::Implausible);
-        assert_eq!(watch.step([9100, 17_100], [0; 2], false, at(0.286)), Counts::Implausible);
-        assert_eq!(watch.step([9200, 17_200], [0; 2], false, at(0.429)), Counts::Elsewhere);
-        assert_eq!(watch.step([9300, 17_300], [0; 2], false, at(0.571)), Counts::Follow);
-        assert_eq!(watch.restarts, 1, "the step between them is no motion");
-    }
-
-    #[test]
-    fn counts_that_jump_about_are_implausible_one_by_one() {
-        let mut watch = watch();
-        watch.step([0, 0], [0; 2], false, at(0.0));
+    fn counts_that_go_on_elsewhere_are_plausible_from_the_third_on_and_those_that_jump_about_never()
+    {
+        let mut elsewhere = watch();
+        elsewhere.at(0, [1000, 1000]);
+        for (tick, want) in (1_u16..).zip([Implausible, Implausible, Elsewhere, Follow]) {
+            let counts = [9000, 17_000].map(|counts| counts + 100 * tick);
+            assert_eq!(elsewhere.at(143 * u64::from(tick), counts), want, "{tick}");
+        }
+        assert_eq!(elsewhere.restarts, 1, "the step between them is no motion");
+        let mut about = watch();
+        about.at(0, [0, 0]);
         for tick in 1..5_u16 {
             let jump = tick.wrapping_mul(9973) % 32_768;
-            let are = watch.step([jump, 32_767 - jump], [0; 2], false, at(0.143 * f64::from(tick)));
-            assert_eq!(are, Counts::Implausible, "{tick}");
+            let are = about.at(143 * u64::from(tick), [jump, 32_767 - jump]);
+            assert_eq!(are, Implausible, "{tick}");
         }
     }
 
@@ -250,48 +235,34 @@ mod tests {
         // 0.3 m/s are 674 counts/s, 96 per tick. A look around turns the wheels oppositely.
         for (driven, start) in [([674, 674], [300, 300]), ([-580, 580], [32_568, 200])] {
             let mut watch = watch();
-            let speeds = driven.map(i32::from);
-            let tick = |watch: &mut RestartWatch, first: [u16; 2], tick: i16, time: f64| {
-                let turned = driven.map(|speed: i16| (i32::from(speed) * i32::from(tick)) / 7);
-                let count =
-                    |wheel: usize| (i32::from(first[wheel]) + turned[wheel]).rem_euclid(32_768);
-                watch.commanded(driven, at(time));
-                watch.step([count(0) as u16, count(1) as u16], speeds, false, at(time))
-            };
-            for number in 0..5 {
-                let are = tick(&mut watch, start, number, 0.143 * f64::from(number));
-                assert_eq!(are, Counts::Follow, "{driven:?}");
-            }
-            for (number, want) in
-                [Counts::Implausible, Counts::Implausible, Counts::Elsewhere, Counts::Follow]
-                    .into_iter()
-                    .enumerate()
-            {
-                let time = 0.143 * (5.0 + number as f64);
-                assert_eq!(
-                    tick(&mut watch, [20, 20], number as i16, time),
-                    want,
-                    "{driven:?} {number}"
-                );
+            let anew = [Implausible, Implausible, Elsewhere, Follow].map(|want| ([20, 20], want));
+            let frames =
+                [(start, Follow); 5].into_iter().enumerate().chain(anew.into_iter().enumerate());
+            for (number, (ticks, (first, want))) in frames.enumerate() {
+                let now = at(143 * number as u64);
+                let count = |wheel: usize| {
+                    let turned = i32::from(driven[wheel]) * ticks as i32 / 7;
+                    (first[wheel] + turned).rem_euclid(32_768) as u16
+                };
+                watch.commanded(driven, now);
+                let speeds = driven.map(i32::from);
+                let are = watch.step([count(0), count(1)], speeds, false, now);
+                assert_eq!(are, want, "{driven:?} {number}");
             }
         }
     }
 
     #[test]
     fn wheels_that_follow_their_commands_are_plausible_also_backwards_and_bunched() {
-        let mut watch = watch();
-        let mut counts = [20_000_i32; 2];
+        let (mut watch, mut count) = (watch(), 20_000);
         // Wheels count the wrong way, start and stop, and every third frame comes with the next.
-        for number in 0..60_i32 {
+        for number in 0..60 {
             let speed = if number / 10 % 2 == 1 { 1100 } else { 0 };
-            watch.commanded([speed; 2], at(0.143 * f64::from(number)));
-            let late = if number % 3 == 0 { 0.142 } else { 0.0 };
-            counts = counts
-                .map(|count| count - if number % 10 == 0 { 79 } else { i32::from(speed) / 7 });
-            let now = at(0.143 * f64::from(number) + late);
-            let are =
-                watch.step(counts.map(|count| count.rem_euclid(32_768) as u16), [0; 2], false, now);
-            assert_eq!(are, Counts::Follow, "{number}");
+            watch.commanded([speed; 2], at(143 * number));
+            let late = if number % 3 == 0 { 142 } else { 0 };
+            count -= if number % 10 == 0 { 79 } else { i32::from(speed) / 7 };
+            let are = watch.at(143 * number + late, [count.rem_euclid(32_768) as u16; 2]);
+            assert_eq!(are, Follow, "{number}");
         }
     }
 }

@@ -155,11 +155,9 @@ impl ScanMotion {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use common::mission::Mission;
 
     use super::*;
+    use crate::testing::mission;
 
     fn range(at: DVec2, bearing: f64) -> f64 {
         let axis = DVec2::from_angle(bearing);
@@ -171,8 +169,7 @@ mod tests {
     /// Judges 10 Hz scans for 6 s of alternate driving and turning; `seen` maps the present index
     /// to the scan sent.
     fn said(speed_m_s: f64, seen: impl Fn(usize) -> usize) -> Option<String> {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.protocol = 'json'";
-        let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+        let mission = mission("robot.model = 'kobuki'\nrobot.protocol = 'json'");
         let (row, sensor) = mission.laser().unwrap();
         let (first_rad, step_rad) = sensor.fan();
         let (mut motion, mut poses) = (ScanMotion::new(row, sensor.clone()), Poses::default());

@@ -44,13 +44,11 @@ pub fn from_faults(mission: &Mission) -> Vec<(Cause, Stop)> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
+    use crate::testing::near;
 
     fn mission(text: &str) -> Mission {
-        let text = format!("target = [3, 0]\ncontroller.turn_rad_s = 0.8\n{text}");
-        Mission::parse(&text, Path::new("m.toml")).unwrap()
+        crate::testing::mission(&format!("controller.turn_rad_s = 0.8\n{text}"))
     }
 
     fn stale(text: &str) -> Stop {
@@ -74,11 +72,11 @@ mod tests {
     {
         let way = |text| stale(text).way_m;
         let usual = way("controller.speed_m_s = 0.4");
-        assert!((usual - 0.4 * (0.25 + 0.15)).abs() < 1e-9, "{usual}");
+        near(usual, 0.4 * (0.25 + 0.15), 1e-9);
         assert!(way("controller.speed_m_s = 0.6") > usual);
         assert!(way("controller.speed_m_s = 0.4\nrobot.command_limit_s = 0.5") > usual);
         let heavy = way("controller.speed_m_s = 0.4\nrobot.response.acceleration_m_s2 = 0.6");
-        assert!((heavy - usual - 0.4 * 0.4 / 1.2).abs() < 1e-9, "{heavy}");
+        near(heavy - usual, 0.4 * 0.4 / 1.2, 1e-9);
     }
 
     #[test]
@@ -87,11 +85,11 @@ mod tests {
             stale(&format!("controller.speed_m_s = 0.4\nrobot.response = {{ {response} }}")).rest_s
         };
         let light = rest("delay_s = 0.1, lag_s = 0.0");
-        assert!((light - 0.35).abs() < 1e-9, "{light}");
-        assert!((rest("delay_s = 0.3, lag_s = 0.0") - light - 0.2).abs() < 1e-9);
+        near(light, 0.35, 1e-9);
+        near(rest("delay_s = 0.3, lag_s = 0.0") - light, 0.2, 1e-9);
         // The speed falls to a fortieth.
-        assert!((rest("delay_s = 0.1, lag_s = 0.1") - light - 0.1 * 40_f64.ln()).abs() < 1e-9);
+        near(rest("delay_s = 0.1, lag_s = 0.1") - light, 0.1 * 40_f64.ln(), 1e-9);
         let heavy = rest("delay_s = 0.1, lag_s = 0.0, acceleration_m_s2 = 0.5");
-        assert!((heavy - light - 0.8).abs() < 1e-9, "{heavy}");
+        near(heavy - light, 0.8, 1e-9);
     }
 }

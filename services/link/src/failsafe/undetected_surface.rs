@@ -113,57 +113,49 @@ impl UndetectedSurface {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
+    use crate::testing::mission;
 
     fn watch(extra: &str) -> Option<UndetectedSurface> {
-        let text = format!("target = [3, 0]\n{extra}");
-        UndetectedSurface::of(&Mission::parse(&text, Path::new("test.toml")).unwrap())
+        UndetectedSurface::of(&mission(extra))
     }
 
-    /// Returns readings of the front sonar and of the rangers at 11.25 and -11.25 degrees.
-    fn readings(front: Option<f64>, left: Option<f64>, right: Option<f64>) -> [RangeReading; 3] {
+    /// Returns readings, centimetres, of the front sonar and of the rangers at 11.25 and -11.25 degrees.
+    fn readings(front: Option<u8>, left: Option<u8>, right: Option<u8>) -> [RangeReading; 3] {
         [(0, front), (4, left), (5, right)].map(|(sensor, range)| {
             let status = range.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
-            let range_m = range.unwrap_or_default();
+            let range_m = f64::from(range.unwrap_or_default()) / 100.0;
             RangeReading { range_m, sensor, status: status.into(), ..RangeReading::default() }
-        })
-    }
-
-    fn implausible_after(left: f64, right: f64) -> Option<usize> {
-        let mut watch = watch("").unwrap();
-        (1..50).find(|_| {
-            watch.take(&readings(None, Some(left), Some(right)));
-            watch.is_implausible()
         })
     }
 
     #[test]
     fn a_sonar_that_hears_nothing_of_a_near_surface_square_ahead_is_implausible_after_4_readings() {
-        assert_eq!(implausible_after(0.3, 0.3), Some(5));
-        assert_eq!(implausible_after(0.44, 0.44), Some(5));
-    }
-
-    #[test]
-    fn a_surface_that_is_far_aslant_or_not_before_both_rangers_proves_nothing() {
-        assert_eq!(implausible_after(0.46, 0.44), None);
-        // The points are 0.19 m apart, so 12 degrees are 4 cm in depth.
-        assert_eq!(implausible_after(0.3, 0.33), Some(5));
-        assert_eq!(implausible_after(0.3, 0.36), None);
-        let mut watch = watch("").unwrap();
-        for _ in 0..50 {
-            watch.take(&readings(None, Some(0.3), None));
+        // The rangers' points are 0.19 m apart, so 12 degrees are 4 cm in depth. A surface that is
+        // far, aslant or not before both proves nothing.
+        for (left, right, is_implausible) in [
+            (30, Some(30), true),
+            (44, Some(44), true),
+            (30, Some(33), true),
+            (46, Some(44), false),
+            (30, Some(36), false),
+            (30, None, false),
+        ] {
+            let mut watch = watch("").unwrap();
+            let first = (1..50).find(|_| {
+                watch.take(&readings(None, Some(left), right));
+                watch.is_implausible()
+            });
+            assert_eq!(first, is_implausible.then_some(5), "{left} {right:?}");
         }
-        assert!(!watch.is_implausible());
     }
 
     #[test]
     fn it_is_over_with_an_echo_or_without_the_surface() {
-        for over in [readings(Some(0.3), Some(0.3), Some(0.3)), readings(None, None, Some(0.3))] {
+        for over in [readings(Some(30), Some(30), Some(30)), readings(None, None, Some(30))] {
             let mut watch = watch("").unwrap();
             for _ in 0..6 {
-                watch.take(&readings(None, Some(0.3), Some(0.3)));
+                watch.take(&readings(None, Some(30), Some(30)));
             }
             assert!(watch.is_implausible());
             watch.take(&over);

@@ -218,59 +218,62 @@ impl WheelShares {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
 
     use super::*;
+    use crate::testing::{mission, near};
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
-    /// Returns the ratio after 16 s of wheels that reach `reached` of their speeds and count
-    /// `counted` of that.
-    fn ratio(reached: f64, counted: [f64; 2], told: impl Fn(usize) -> [i16; 2]) -> WheelRatio {
-        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
-        let mut shares = WheelShares::new(&mission);
-        let mut wheels = shares.wheels.clone().unwrap();
+    /// Returns the shares after `ticks` of wheels that turn as `rolls(tick, told)`, counts per tick.
+    fn shares(
+        mut shares: WheelShares,
+        ticks: usize,
+        told: impl Fn(usize) -> [i16; 2],
+        mut rolls: impl FnMut(f64, [f64; 2]) -> [f64; 2],
+    ) -> WheelRatio {
         let mut rolled = [0.0; 2];
-        for tick in 0..112 {
+        for tick in 0..ticks {
             let now_s = tick as f64 * PERIOD_S;
-            shares.rolled(WheelCounts::Endless(rolled.map(f64::round)), now_s);
+            shares.rolled(WheelCounts::Endless(rolled), now_s);
             let told = told(tick);
             shares.told(told, now_s);
-            wheels.command(now_s, told.map(f64::from));
-            for (wheel, way) in wheels.go_on(now_s + PERIOD_S).into_iter().enumerate() {
-                rolled[wheel] += way * reached * counted[wheel];
+            for (rolled, way) in rolled.iter_mut().zip(rolls(now_s, told.map(f64::from))) {
+                *rolled += way;
             }
         }
         shares.ratio()
+    }
+
+    /// Returns the ratio of wheels with a stated response that reach and count these shares.
+    fn ratio(text: &str, reached: [f64; 2], told: impl Fn(usize) -> [i16; 2]) -> WheelRatio {
+        let told_shares = WheelShares::new(&mission(text));
+        let mut wheels = told_shares.wheels.clone().unwrap();
+        shares(told_shares, 200, told, |now_s, told| {
+            wheels.command(now_s, told);
+            let ways = wheels.go_on(now_s + PERIOD_S);
+            [0, 1].map(|wheel| ways[wheel] * reached[wheel])
+        })
     }
 
     #[test]
     fn a_wheel_that_counts_another_share_than_the_other_is_told_from_wheels_that_are_both_slow() {
         let winding = |tick: usize| if tick % 20 < 10 { [600, 450] } else { [450, 600] };
         for reached in [1.0, 0.78] {
-            let even = ratio(reached, [1.0; 2], winding);
-            assert!((even.ratio - 1.0).abs() < 0.01, "{even:?}");
-            let low = ratio(reached, [0.95, 1.0], winding);
+            let even = ratio("", [reached; 2], winding);
+            near(even.ratio, 1.0, 0.01);
+            let low = ratio("", [0.95 * reached, reached], winding);
             assert!((low.ratio - 1.0 / 0.95).abs() < 0.01 && low.deviation < 0.01, "{low:?}");
         }
+        // Nothing is known of wheels that were told to stand.
+        assert_eq!(ratio("", [0.9, 1.0], |_| [0; 2]), WheelRatio::UNKNOWN);
     }
 
     #[test]
     fn wheels_that_answer_sooner_than_stated_are_even_though_their_curve_narrows_all_the_time() {
-        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
-        let mut shares = WheelShares::new(&mission);
-        let mut rolled = [0.0; 2];
-        for tick in 0..112 {
-            let now_s = f64::from(tick) * PERIOD_S;
-            shares.rolled(WheelCounts::Endless(rolled), now_s);
-            let told = [600, 600 - 3 * tick];
-            shares.told(told, now_s);
-            for (rolled, told) in rolled.iter_mut().zip(told) {
-                *rolled += f64::from(told) * PERIOD_S;
-            }
-        }
-        let WheelRatio { ratio, deviation } = shares.ratio();
-        assert!((ratio - 1.0).abs() < 0.003, "{ratio} with a deviation of {deviation}");
+        let narrowing = |tick: usize| [600, 600 - 3 * tick as i16];
+        let at_once = |_, told: [f64; 2]| told.map(|told| told * PERIOD_S);
+        let found = shares(WheelShares::new(&mission("")), 112, narrowing, at_once);
+        near(found.ratio, 1.0, 0.003);
     }
 
     #[test]
@@ -281,7 +284,7 @@ mod tests {
 
     /// Returns the remembered travel, metres, if each command is sent `says` times.
     fn turned_aside(says: usize) -> f64 {
-        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        let mission = mission("");
         let Response { delay_s, lag_s, .. } = mission.body().response;
         let mut shares = WheelShares::new(&mission);
         let mut acts = [(); 2].map(|()| ModelledSpeed::new(delay_s, f64::INFINITY));
@@ -316,33 +319,10 @@ mod tests {
 
     #[test]
     fn equal_wheels_that_gain_speed_slowly_and_fall_short_alike_are_even() {
-        let text = "target = [3, 0]\nrobot.response.acceleration_m_s2 = 0.3";
-        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-        let mut shares = WheelShares::new(&mission);
-        let mut wheels = shares.wheels.clone().unwrap();
-        let mut rolled = [0.0; 2];
-        for tick in 0..200 {
-            let now_s = f64::from(tick) * PERIOD_S;
-            shares.rolled(WheelCounts::Endless(rolled.map(f64::round)), now_s);
-            let told = match tick / 9 % 4 {
-                0 => [600, 600],
-                1 => [300, 700],
-                2 => [700, 600],
-                _ => [700, 250],
-            };
-            shares.told(told, now_s);
-            // Stated acceleration, but less speed.
-            wheels.command(now_s, told.map(|counts| 0.78 * f64::from(counts)));
-            for (rolled, way) in rolled.iter_mut().zip(wheels.go_on(now_s + PERIOD_S)) {
-                *rolled += way;
-            }
-        }
-        let WheelRatio { ratio, deviation } = shares.ratio();
+        let turns = |tick: usize| [[600, 600], [300, 700], [700, 600], [700, 250]][tick / 9 % 4];
+        // Stated acceleration, but less speed.
+        let found = ratio("robot.response.acceleration_m_s2 = 0.3", [0.78; 2], turns);
+        let WheelRatio { ratio, deviation } = found;
         assert!((ratio - 1.0).abs() < 0.01 + 3.0 * deviation, "{ratio} +- {deviation}");
-    }
-
-    #[test]
-    fn nothing_is_known_of_wheels_that_were_told_to_stand() {
-        assert_eq!(ratio(1.0, [0.9, 1.0], |_| [0; 2]), WheelRatio::UNKNOWN);
     }
 }

@@ -1,5 +1,6 @@
 use super::*;
-use std::path::Path;
+
+use std::f64::consts::TAU;
 
 use common::{
     clock::{MissionTime, Pace},
@@ -8,44 +9,43 @@ use common::{
         RangeStatus, Stamp, WheelSample,
     },
     wire::{
-        Addressing, Command, CustomSensors, Decoder, Mode, MotorSensors, Parameter, Report,
-        StandardSensors, SystemSignal,
+        Addressing, COUNT_CYCLE, Command, CustomSensors, Decoder, Mode, MotorSensors, Parameter,
+        Report, StandardSensors, SystemSignal,
     },
 };
 
+use crate::testing::mission;
+
 const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 142_857_142;
+const STAND: [Option<i16>; 2] = [Some(0); 2];
+/// One turn per second, 1200 counts/s.
+const TURN: f64 = TAU;
+const PING: Command = Command::System(SystemSignal::Ping);
+const FOUND: Effect = Effect::Connected(true);
+const LOST: Effect = Effect::Connected(false);
 
-fn mission() -> Mission {
-    // X80: 1200 counts per turn, left wheel on channel 0, reversed, right wheel on channel 1.
-    let text = "target = [3, 0]\nsensors = 'front'";
-    Mission::parse(text, Path::new("test.toml")).unwrap()
+/// X80: 1200 counts per turn, left wheel on channel 0, reversed, right wheel on channel 1.
+fn x80() -> Mission {
+    mission("sensors = 'front'")
+}
+
+fn started(mission: &Mission, pace: Pace, next_tick: u64) -> Link {
+    let mut link = Link::new(mission);
+    link.restore(State { pace, next_tick });
+    link
 }
 
 fn in_ticks() -> Link {
-    from_tick(0)
-}
-
-fn from_tick(next_tick: u64) -> Link {
-    let mut link = Link::new(&mission());
-    let pace = Pace::Max;
-    link.restore(State { pace, next_tick });
-    link
+    started(&x80(), Pace::Max, 0)
 }
 
 fn on_the_wall() -> Link {
-    let mut link = Link::new(&mission());
-    let (pace, next_tick) = (Pace::Rate(1.0), 0);
-    link.restore(State { pace, next_tick });
-    link
+    started(&x80(), Pace::Rate(1.0), 0)
 }
 
 /// Events at machine-clock readings; wall-clock missions begin at 0.
-trait At {
-    fn at(&mut self, event: Event<'_>, machine_ns: u64) -> Vec<Effect>;
-}
-
-impl At for Link {
+impl Link {
     fn at(&mut self, event: Event<'_>, machine_ns: u64) -> Vec<Effect> {
         let now = match self.state.pace {
             Pace::Max => self.state.next_tick * PERIOD_NS,
@@ -53,35 +53,96 @@ impl At for Link {
         };
         self.step(Entry { event, machine_ns, now: MissionTime(now) })
     }
+
+    fn quiet(&mut self, ms: u64) -> Vec<Effect> {
+        self.at(Event::Quiet, ms * MS)
+    }
+
+    fn hears(&mut self, bytes: &[u8], ms: u64) -> Vec<Effect> {
+        self.at(Event::Datagram(bytes), ms * MS)
+    }
+
+    /// Hears a robot at its start.
+    fn still(&mut self, ms: u64) -> Vec<Effect> {
+        self.hears(&datagram(255, [0; 2]), ms)
+    }
+
+    fn drive(&mut self, ms: u64) -> Vec<Effect> {
+        self.at(Event::Order(Order::Drive, HoldReason::None), ms * MS)
+    }
+
+    fn hold(&mut self, reason: HoldReason, ms: u64) -> Vec<Effect> {
+        self.at(Event::Order(Order::Hold, reason), ms * MS)
+    }
+
+    /// Takes a command, 1 ms after its tick of `ms`.
+    fn told(&mut self, tick: u64, ms: u64, speeds: [f64; 2]) -> Vec<Effect> {
+        self.at(Event::Command(command(tick, ms * MS, speeds)), (ms + 1) * MS)
+    }
+
+    /// Answers a tick of lockstep.
+    fn answer(&mut self, tick: u64, machine_ns: u64) -> Vec<Effect> {
+        self.at(Event::Command(command(tick, tick * PERIOD_NS, [TURN; 2])), machine_ns)
+    }
 }
 
-fn datagram(sonar: u8, channel_0: u16, channel_1: u16) -> Vec<u8> {
-    let mut standard = StandardSensors::default();
-    standard.ultrasonic[1] = sonar;
-    let mut motor = MotorSensors::default();
-    motor.encoders[0].position = channel_0;
-    motor.encoders[1].position = channel_1;
+fn encoded(reports: impl IntoIterator<Item = Report>) -> Vec<u8> {
     let mut bytes = Vec::new();
-    Report::Standard(standard).encode(Addressing::default(), &mut bytes);
-    Report::Motor(motor).encode(Addressing::default(), &mut bytes);
+    for report in reports {
+        report.encode(Addressing::default(), &mut bytes);
+    }
     bytes
 }
 
-fn command(tick: u64, time_ns: u64, left: f64, right: f64) -> CommandSample {
+fn motor(channels: [u16; 2]) -> Report {
+    let mut motor = MotorSensors::default();
+    for (encoder, position) in motor.encoders.iter_mut().zip(channels) {
+        encoder.position = position;
+    }
+    Report::Motor(motor)
+}
+
+fn standard(sonar: u8) -> StandardSensors {
+    let mut standard = StandardSensors::default();
+    standard.ultrasonic[1] = sonar;
+    standard
+}
+
+fn datagram(sonar: u8, channels: [u16; 2]) -> Vec<u8> {
+    encoded([Report::Standard(standard(sonar)), motor(channels)])
+}
+
+/// Frames of a robot that rolled ahead by `counts`.
+fn rolled(counts: u16) -> Vec<u8> {
+    datagram(255, [(COUNT_CYCLE - counts) % COUNT_CYCLE, counts])
+}
+
+fn ack() -> Vec<u8> {
+    encoded([Report::System(SystemSignal::Ack)])
+}
+
+fn command(tick: u64, time_ns: u64, [left_rad_s, right_rad_s]: [f64; 2]) -> CommandSample {
     CommandSample {
         stamp: Stamp { tick, stamp_ns: time_ns, ..Stamp::default() },
         pose_ns: time_ns,
         guidance_ns: time_ns,
-        left_rad_s: left,
-        right_rad_s: right,
+        left_rad_s,
+        right_rad_s,
         state: CommandState::Driving.into(),
         ..CommandSample::default()
     }
 }
 
 fn driving(mut link: Link) -> Link {
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
-    link.at(Event::Order(Order::Drive, HoldReason::None), 0);
+    link.still(0);
+    link.drive(0);
+    link
+}
+
+/// Returns a link whose tick 0 began at 10 ms.
+fn ticking() -> Link {
+    let mut link = driving(on_the_wall());
+    link.still(10);
     link
 }
 
@@ -92,19 +153,27 @@ fn sent(effects: &[Effect]) -> Vec<Command> {
             decoder.push(bytes);
         }
     }
-    let mut commands = Vec::new();
-    while let Some(frame) = decoder.next_frame() {
-        commands.push(Command::parse(&frame).unwrap());
-    }
-    commands
+    let parsed = || Some(Command::parse(&decoder.next_frame()?).unwrap());
+    std::iter::from_fn(parsed).collect()
 }
 
-fn velocities(effects: &[Effect]) -> Vec<[Option<i16>; 2]> {
+/// Returns targets and time limits of velocity commands.
+fn timed(effects: &[Effect]) -> Vec<([Option<i16>; 2], Option<u16>)> {
     let motion = |command: Command| match command {
-        Command::Motion(motion) => Some([motion.targets.of(0), motion.targets.of(1)]),
+        Command::Motion(motion) => {
+            Some(([0, 1].map(|wheel| motion.targets.of(wheel)), motion.limit_ms))
+        }
         _ => None,
     };
     sent(effects).into_iter().filter_map(motion).collect()
+}
+
+fn velocities(effects: &[Effect]) -> Vec<[Option<i16>; 2]> {
+    timed(effects).into_iter().map(|(velocity, _)| velocity).collect()
+}
+
+fn stands(effects: &[Effect]) -> bool {
+    velocities(effects).iter().all(|velocity| *velocity == STAND)
 }
 
 fn decided(effects: &[Effect]) -> Vec<(Action, Cause)> {
@@ -113,6 +182,10 @@ fn decided(effects: &[Effect]) -> Vec<(Action, Cause)> {
         _ => None,
     };
     effects.iter().filter_map(decision).collect()
+}
+
+fn causes(effects: &[Effect]) -> impl Iterator<Item = Cause> {
+    decided(effects).into_iter().map(|(_, cause)| cause)
 }
 
 fn ticks(effects: &[Effect]) -> Vec<(u64, Vec<RangeReading>, WheelSample)> {
@@ -126,330 +199,199 @@ fn ticks(effects: &[Effect]) -> Vec<(u64, Vec<RangeReading>, WheelSample)> {
 #[test]
 fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
     let mut link = on_the_wall();
-    let ping = Command::System(SystemSignal::Ping);
-    let first = sent(&link.at(Event::Quiet, 0));
-    assert_eq!((first.len(), &first[0]), (1 + STOPS as usize, &ping), "{first:?}");
-    assert_eq!(sent(&link.at(Event::Quiet, 100 * MS)), []);
-    let again = sent(&link.at(Event::Quiet, 200 * MS));
+    let first = sent(&link.quiet(0));
+    assert_eq!((first.len(), &first[0]), (1 + STOPS as usize, &PING), "{first:?}");
+    assert_eq!(sent(&link.quiet(100)), []);
+    let again = sent(&link.quiet(200));
     // A silent robot may still receive.
-    assert_eq!((again.len(), &again[0]), (2, &ping), "{again:?}");
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 201 * MS);
-    assert!(effects.contains(&Effect::Connected(true)));
-    let setup = sent(&effects);
-    assert_eq!(setup.len(), 9 + STOPS as usize, "{setup:?}");
-    let later = sent(&link.at(Event::Quiet, 400 * MS));
-    assert!(!later.contains(&ping), "{later:?}");
+    assert_eq!((again.len(), &again[0]), (2, &PING), "{again:?}");
+    let effects = link.still(201);
+    assert!(effects.contains(&FOUND));
+    assert_eq!(sent(&effects).len(), 9 + STOPS as usize, "{effects:?}");
+    assert!(!sent(&link.quiet(400)).contains(&PING));
 }
 
 #[test]
 fn a_wire_that_goes_down_is_a_robot_lost_and_nothing_is_sent_until_it_is_back() {
     let mut link = driving(on_the_wall());
-    let half = &datagram(80, 0, 0)[..20];
-    link.at(Event::Datagram(half), 10 * MS);
-    let effects = link.at(Event::Wire(false), 11 * MS);
-    assert!(effects.contains(&Effect::Connected(false)));
-    assert_eq!(link.at(Event::Quiet, 1000 * MS), []);
+    link.hears(&datagram(80, [0; 2])[..20], 10);
+    assert!(link.at(Event::Wire(false), 11 * MS).contains(&LOST));
+    assert_eq!(link.quiet(1000), []);
     let effects = link.at(Event::Wire(true), 1001 * MS);
-    assert_eq!(sent(&effects)[0], Command::System(SystemSignal::Ping));
-    assert_eq!(velocities(&effects), [[Some(0), Some(0)]; STOPS as usize]);
-    let effects = link.at(Event::Datagram(&datagram(80, 0, 0)), 1002 * MS);
-    assert!(effects.contains(&Effect::Connected(true)));
+    assert_eq!(sent(&effects)[0], PING);
+    assert_eq!(velocities(&effects), [STAND; STOPS as usize]);
+    let effects = link.hears(&datagram(80, [0; 2]), 1002);
+    assert!(effects.contains(&FOUND));
     assert_eq!(ticks(&effects)[0].1[0].raw, 80, "{effects:?}");
 }
 
 #[test]
 fn a_robot_that_stays_away_is_pinged_ever_less_often_and_heard_at_once() {
     let mut link = on_the_wall();
-    let ping = Command::System(SystemSignal::Ping);
-    let mut pings = Vec::new();
-    for now in (0..8000).step_by(20) {
-        if sent(&link.at(Event::Quiet, now * MS)).contains(&ping) {
-            pings.push(now);
-        }
-    }
+    let is_pinged = |now: &u64| sent(&link.quiet(*now)).contains(&PING);
+    let pings: Vec<_> = (0..8000).step_by(20).filter(is_pinged).collect();
     assert_eq!(pings, [0, 200, 600, 1400, 3000, 5000, 7000]);
-    let absence = link.absence(7900 * MS);
     let expected = Absence { lost_ns: 7900 * MS, pings: 7, next_ping_ns: 1100 * MS };
-    assert_eq!(absence, expected);
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 7950 * MS);
-    assert!(effects.contains(&Effect::Connected(true)));
+    assert_eq!(link.absence(7900 * MS), expected);
+    assert!(link.still(7950).contains(&FOUND));
     assert_eq!(link.absence(7960 * MS), Absence::default());
     // A robot lost again is pinged at once and often.
-    let effects = link.at(Event::Quiet, 8700 * MS);
-    assert!(effects.contains(&Effect::Connected(false)) && sent(&effects).contains(&ping));
-    assert!(sent(&link.at(Event::Quiet, 8900 * MS)).contains(&ping));
+    let effects = link.quiet(8700);
+    assert!(effects.contains(&LOST) && sent(&effects).contains(&PING));
+    assert!(sent(&link.quiet(8900)).contains(&PING));
     assert_eq!(link.losses(), 1);
 }
 
 #[test]
 fn a_robot_that_restarted_its_counts_is_noticed_and_set_up_again() {
-    let mut link = driving(on_the_wall());
-    let effects = link.at(Event::Datagram(&datagram(255, 32_368, 400)), 10 * MS);
-    assert_eq!(ticks(&effects)[0].2.restarts, 0);
-    link.at(Event::Quiet, 1000 * MS);
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3000 * MS);
-    assert!(effects.contains(&Effect::Restarted));
-    assert_eq!(ticks(&effects)[0].2.restarts, 1);
-    assert_eq!(link.restarts(), 1);
+    for (counts, restarts) in [([0, 0], 1), ([32_300, 468], 0)] {
+        let mut link = driving(on_the_wall());
+        assert_eq!(ticks(&link.hears(&rolled(400), 10))[0].2.restarts, 0);
+        let effects = link.quiet(1000);
+        assert!(effects.contains(&LOST) && sent(&effects).contains(&PING));
+        let effects = link.hears(&datagram(255, counts), 3000);
+        assert!(effects.contains(&FOUND));
+        assert_eq!(effects.contains(&Effect::Restarted), restarts == 1, "{counts:?}");
+        // The mission goes on with the next tick.
+        let (tick, _, wheels) = ticks(&effects)[0];
+        assert_eq!((tick, wheels.restarts, link.restarts()), (1, restarts, restarts));
+    }
     // The same after an unnoticed absence.
-    link.at(Event::Datagram(&datagram(255, 31_168, 1600)), 3500 * MS);
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 3600 * MS);
-    assert!(effects.contains(&Effect::Restarted));
-    let mode = |command: &Command| {
-        let velocity = Parameter::Mode(Mode::Velocity);
-        matches!(command, Command::Parameter { parameter, .. } if *parameter == velocity)
-    };
-    let setup = sent(&effects);
-    assert_eq!(setup.iter().filter(|command| mode(command)).count(), 2);
-}
-
-#[test]
-fn a_robot_that_comes_back_with_its_counts_has_not_restarted() {
     let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 32_168, 600)), 10 * MS);
-    link.at(Event::Quiet, 1000 * MS);
-    let effects = link.at(Event::Datagram(&datagram(255, 32_100, 668)), 3000 * MS);
-    assert!(effects.contains(&Effect::Connected(true)));
-    assert_eq!(ticks(&effects)[0].2.restarts, 0);
-}
-
-/// Returns channel 1's target and the time limit of velocity commands.
-fn timed(effects: &[Effect]) -> Vec<(Option<i16>, Option<u16>)> {
-    let motion = |command: Command| match command {
-        Command::Motion(motion) => Some((motion.targets.of(1), motion.limit_ms)),
-        _ => None,
-    };
-    sent(effects).into_iter().filter_map(motion).collect()
+    link.hears(&rolled(1600), 500);
+    let effects = link.still(600);
+    assert!(effects.contains(&Effect::Restarted));
+    let velocity = Parameter::Mode(Mode::Velocity);
+    let mode = |command: &Command| matches!(command, Command::Parameter { parameter, .. } if *parameter == velocity);
+    assert_eq!(sent(&effects).into_iter().filter(mode).count(), 2);
 }
 
 #[test]
 fn a_command_is_sent_again_once_halfway_to_the_next_tick_with_what_remains_of_its_time() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    let turn = std::f64::consts::TAU;
-    let effects = link.at(Event::Command(command(0, 10 * MS, turn, turn)), 12 * MS);
-    assert_eq!(timed(&effects), [(Some(1200), Some(250))]);
+    let mut link = ticking();
+    let sent = |limit_ms: u16| [([Some(-1200), Some(1200)], Some(limit_ms))];
+    assert_eq!(timed(&link.told(0, 10, [TURN; 2])), sent(250));
     // Repeated half of 142.9 ms after the tick.
-    assert_eq!(timed(&link.at(Event::Quiet, 81 * MS)), []);
-    let effects = link.at(Event::Quiet, 90 * MS);
-    assert_eq!(timed(&effects), [(Some(1200), Some(170))]);
-    assert_eq!(timed(&link.at(Event::Quiet, 140 * MS)), [], "once");
+    assert_eq!(timed(&link.quiet(81)), []);
+    assert_eq!(timed(&link.quiet(90)), sent(170));
+    assert_eq!(timed(&link.quiet(140)), [], "once");
     assert_eq!((link.tally.commands_out, link.tally.repeated_commands), (1, 1));
 }
 
 #[test]
-fn a_command_whose_successor_is_due_is_not_sent_again() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.at(Event::Command(command(0, 10 * MS, 1.0, 1.0)), 12 * MS);
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 75 * MS);
-    assert_eq!(timed(&link.at(Event::Quiet, 90 * MS)), []);
-}
-
-#[test]
-fn a_command_that_no_longer_holds_is_not_sent_again() {
+fn a_command_that_no_longer_holds_or_whose_successor_is_due_is_not_sent_again() {
     for (event, at) in [
         (Event::Order(Order::Hold, HoldReason::Operator), 20),
         (Event::Wire(false), 20),
         (Event::Quiet, 270),
+        (Event::Datagram(&rolled(0)), 75),
     ] {
-        let mut link = driving(on_the_wall());
-        link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-        link.at(Event::Command(command(0, 10 * MS, 1.0, 1.0)), 12 * MS);
+        let mut link = ticking();
+        link.told(0, 10, [1.0; 2]);
         link.at(event, at * MS);
-        let effects = link.at(Event::Quiet, (at + 70) * MS);
-        let moves = |(target, _): &(Option<i16>, _)| *target != Some(0);
-        assert!(!timed(&effects).iter().any(moves), "{event:?}");
+        assert!(stands(&link.quiet(at + 70)), "{event:?}");
     }
 }
 
 #[test]
 fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
-    let mut link = on_the_wall();
-    let mut bytes = datagram(255, 0, 0);
-    let custom = CustomSensors::default();
-    Report::Custom(custom).encode(Addressing::default(), &mut bytes);
-    let effects = link.at(Event::Datagram(&bytes), 0);
-    for reported in [
-        |effect: &Effect| matches!(effect, Effect::Infrared(_)),
-        |effect: &Effect| matches!(effect, Effect::Power(_)),
-        |effect: &Effect| matches!(effect, Effect::Surroundings(_)),
-    ] {
-        assert_eq!(effects.iter().filter(|effect| reported(effect)).count(), 1);
-    }
+    let custom = Report::Custom(CustomSensors::default());
+    let effects = on_the_wall().hears(&[rolled(0), encoded([custom])].concat(), 0);
+    let told = |effect: &&Effect| {
+        matches!(effect, Effect::Infrared(_) | Effect::Power(_) | Effect::Surroundings(_))
+    };
+    assert_eq!(effects.iter().filter(told).count(), 3, "{effects:?}");
     assert!(ticks(&effects).is_empty());
 }
 
 #[test]
-fn a_tick_has_the_infrared_counts_that_came_with_it_and_the_next_without_any_has_none() {
+fn a_tick_has_the_readings_that_came_with_it_and_forward_counts_and_one_without_readings_has_none()
+{
     let mut link = driving(on_the_wall());
-    let mut bytes = Vec::new();
     let custom = CustomSensors { ad: [0, 0, 602, 603, 604, 605, 606, 607], io: 0 };
-    Report::Custom(custom).encode(Addressing::default(), &mut bytes);
-    let standard = StandardSensors { infrared: 601, ..StandardSensors::default() };
-    Report::Standard(standard).encode(Addressing::default(), &mut bytes);
-    Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
-    let given = ticks(&link.at(Event::Datagram(&bytes), 10 * MS));
-    let counts =
-        |ranges: &[RangeReading]| ranges[3..].iter().map(|reading| reading.raw).collect::<Vec<_>>();
-    assert_eq!(counts(&given[0].1), [601, 602, 603, 604, 605, 606, 607]);
-    let given = ticks(&link.at(Event::Datagram(&datagram(255, 0, 0)), 150 * MS));
-    assert_eq!(counts(&given[0].1), [0; 7]);
+    let standard = StandardSensors { infrared: 601, ..standard(80) };
+    // Channel 0 counts down driving forward: 32768 - 100 is 100 counts forward.
+    let motor = motor([32_668, 250]);
+    let frames = encoded([Report::Custom(custom), Report::Standard(standard), motor]);
+    let (tick, ranges, wheels) = &ticks(&link.hears(&frames, 10))[0];
+    assert_eq!((*tick, wheels.left_counts, wheels.right_counts), (0, 100, 250));
+    assert_eq!((ranges[0].range_m, ranges[0].status()), (0.8, RangeStatus::Measured));
+    let raw =
+        |ranges: &[RangeReading]| ranges.iter().map(|reading| reading.raw).collect::<Vec<_>>();
+    assert_eq!(raw(ranges), [80, 0, 0, 601, 602, 603, 604, 605, 606, 607]);
+    let (_, ranges, _) = &ticks(&link.hears(&encoded([motor]), 150))[0];
+    assert_eq!((raw(ranges), ranges[0].status()), (vec![0; 10], RangeStatus::Absent));
 }
 
 #[test]
 fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
     // The previous link was killed, and the robot ignores its last command's limit.
     let mut link = on_the_wall();
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 0);
-    assert_eq!(velocities(&effects), [[Some(0), Some(0)]; STOPS as usize]);
-    assert!(velocities(&link.at(Event::Order(Order::Drive, HoldReason::None), MS)).is_empty());
-    let effects = link.at(Event::Quiet, 201 * MS);
-    assert_eq!(velocities(&effects), [[Some(0), Some(0)]]);
+    assert_eq!(velocities(&link.still(0)), [STAND; STOPS as usize]);
+    assert_eq!(velocities(&link.drive(1)), [STAND; 0]);
+    assert_eq!(velocities(&link.quiet(201)), [STAND]);
 }
 
 #[test]
-fn a_command_older_than_the_newest_is_ignored() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 150 * MS);
-    link.at(Event::Command(command(1, 150 * MS, 1.0, 1.0)), 151 * MS);
-    let old = command(0, 10 * MS, -1.0, -1.0);
-    assert!(link.at(Event::Command(old), 152 * MS).is_empty());
+fn a_command_that_is_older_than_the_newest_or_from_the_future_moves_nothing() {
+    let mut link = ticking();
+    let future = Event::Command(command(0, 900 * MS, [1.0; 2]));
+    assert!(stands(&link.at(future, 11 * MS)));
+    let mut link = ticking();
+    assert_eq!(ticks(&link.still(150))[0].0, 1, "after an abandoned tick");
+    link.told(1, 150, [1.0; 2]);
+    let old = Event::Command(command(0, 10 * MS, [-1.0; 2]));
+    assert_eq!(link.at(old, 152 * MS), []);
 }
 
 #[test]
-fn a_command_from_the_future_moves_nothing() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    let future = command(0, 900 * MS, 1.0, 1.0);
-    let moves = |velocity: &[Option<i16>; 2]| *velocity != [Some(0), Some(0)];
-    let effects = link.at(Event::Command(future), 11 * MS);
-    assert!(!velocities(&effects).iter().any(moves), "{effects:?}");
-}
-
-#[test]
-fn a_tick_carries_the_newest_sonar_and_forward_counts() {
-    let mut link = driving(on_the_wall());
-    // Channel 0 counts down driving forward: 32768 - 100 is 100 counts forward.
-    let effects = link.at(Event::Datagram(&datagram(80, 32_668, 250)), 10 * MS);
-    let [(tick, ranges, wheels)] = &ticks(&effects)[..] else {
-        panic!("{effects:?}");
-    };
-    assert_eq!((*tick, wheels.left_counts, wheels.right_counts), (0, 100, 250));
-    assert_eq!((ranges[0].range_m, ranges[0].raw), (0.8, 80));
-    assert_eq!(ranges[0].status(), RangeStatus::Measured);
-}
-
-#[test]
-fn a_motor_frame_alone_makes_a_tick_without_a_reading() {
-    let mut link = driving(on_the_wall());
-    let mut bytes = Vec::new();
-    Report::Motor(MotorSensors::default()).encode(Addressing::default(), &mut bytes);
-    link.at(Event::Datagram(&datagram(80, 0, 0)), MS);
-    let effects = link.at(Event::Datagram(&bytes), 2 * MS);
-    assert_eq!(ticks(&effects)[0].1[0].status(), RangeStatus::Absent);
-}
-
-#[test]
-fn a_command_reaches_the_wheels_signed_timed_and_in_counts() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    // One turn per second: 1200 counts/s, below the top speed of 2247.
-    let turn = std::f64::consts::TAU;
-    let effects = link.at(Event::Command(command(0, 10 * MS, turn, -0.5 * turn)), 11 * MS);
-    assert_eq!(velocities(&effects), [[Some(-1200), Some(-600)]]);
-    assert!(effects.contains(&Effect::Answered { began_ns: 10 * MS }));
-    let Command::Motion(motion) = sent(&effects)[0] else {
-        panic!();
-    };
-    assert_eq!(motion.limit_ms, Some(250));
-}
-
-#[test]
-fn no_number_moves_no_wheel() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    let effects = link.at(Event::Command(command(0, 10 * MS, f64::NAN, 1e300)), 11 * MS);
-    // NaN becomes 0; other speeds are limited to 1 m/s.
-    assert_eq!(velocities(&effects), [[Some(0), Some(2247)]]);
+fn a_command_reaches_the_wheels_signed_and_in_counts_and_no_number_moves_no_wheel() {
+    // The top speed of 1 m/s is 2247 counts/s.
+    for (speeds, counts) in [([TURN, -0.5 * TURN], [-1200, -600]), ([f64::NAN, 1e300], [0, 2247])] {
+        let effects = ticking().told(0, 10, speeds);
+        assert_eq!(velocities(&effects), [counts.map(Some)], "{speeds:?}");
+        assert!(effects.contains(&Effect::Answered { began_ns: 10 * MS }));
+    }
 }
 
 #[test]
 fn a_stale_command_stops_the_robot_three_times_and_keeps_telling() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.at(Event::Command(command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
-    let again = velocities(&link.at(Event::Quiet, 200 * MS));
-    assert_eq!(again.len(), 1, "the command once more");
-    assert!(link.at(Event::Quiet, 260 * MS).is_empty(), "not yet over 250 ms");
-    let effects = link.at(Event::Quiet, 261 * MS);
-    assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
+    let mut link = ticking();
+    link.told(0, 10, [1.0; 2]);
+    assert_eq!(velocities(&link.quiet(200)).len(), 1, "the command once more");
+    assert_eq!(link.quiet(260), [], "not yet over 250 ms");
+    let effects = link.quiet(261);
+    assert_eq!(velocities(&effects), [STAND; 3]);
     assert_eq!(decided(&effects), [(Action::Stop, Cause::CommandStale)]);
-    assert!(link.at(Event::Quiet, 262 * MS).is_empty(), "said");
-    assert_eq!(velocities(&link.at(Event::Quiet, 462 * MS)), [[Some(0), Some(0)]]);
-}
-
-#[test]
-fn the_supervisors_stop_stops_the_robot_and_later_commands_do_not_move_it() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.at(Event::Command(command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
-    let effects = link.at(Event::Order(Order::Stop, HoldReason::Ending), 20 * MS);
-    assert_eq!(velocities(&effects), [[Some(0), Some(0)]; 3]);
-    let effects = link.at(Event::Command(command(1, 20 * MS, 1.0, 1.0)), 21 * MS);
-    assert!(velocities(&effects).is_empty());
-}
-
-#[test]
-fn a_silent_robot_is_lost_told_to_stand_and_pinged() {
-    let mut link = driving(on_the_wall());
-    link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    link.at(Event::Command(command(0, 10 * MS, 1.0, 1.0)), 11 * MS);
-    let effects = link.at(Event::Quiet, 800 * MS);
-    assert!(effects.contains(&Effect::Connected(false)));
-    assert!(sent(&effects).contains(&Command::System(SystemSignal::Ping)));
-    let effects = link.at(Event::Datagram(&datagram(255, 0, 0)), 900 * MS);
-    assert!(effects.contains(&Effect::Connected(true)));
-    assert_eq!(ticks(&effects)[0].0, 1, "the mission goes on with the next tick");
+    assert_eq!(link.quiet(262), [], "said");
+    assert_eq!(velocities(&link.quiet(462)), [STAND]);
 }
 
 #[test]
 fn a_robot_that_another_host_commands_is_told_to_stand_after_each_acknowledgement_of_its_commands()
 {
     let mut link = driving(on_the_wall());
-    let mut acknowledged = Vec::new();
-    Report::System(SystemSignal::Ack).encode(Addressing::default(), &mut acknowledged);
-    let mut causes = Vec::new();
+    let (mut found, ack) = (Vec::new(), ack());
     // The robot, found at 0 s, acknowledges another host's commands too from 5 s on.
-    for (tick, ms) in (0..100).map(|tick| (tick, 100 * (tick + 1))) {
-        let mut effects = link.at(Event::Datagram(&datagram(255, 0, 0)), ms * MS);
-        effects.extend(link.at(Event::Order(Order::Drive, HoldReason::None), ms * MS));
-        effects.extend(link.at(Event::Command(command(tick, ms * MS, 0.0, 0.0)), ms * MS));
-        causes.extend(decided(&effects).into_iter().map(|(_, cause)| (ms, cause)));
-        for _ in sent(&effects) {
-            link.at(Event::Datagram(&acknowledged), ms * MS);
-        }
-        if ms >= 5000 {
-            let stops = causes.last().is_some_and(|(_, cause)| *cause == Cause::AnotherCommander);
-            let effects = link.at(Event::Datagram(&acknowledged), ms * MS + MS);
-            assert!(!stops || !velocities(&effects).is_empty(), "it obeys the newest command");
-            causes.extend(decided(&effects).into_iter().map(|(_, cause)| (ms, cause)));
-            for _ in sent(&effects) {
-                link.at(Event::Datagram(&acknowledged), ms * MS + MS);
+    for tick in 0..100 {
+        let ms = 100 * (tick + 1);
+        let mut effects = link.still(ms);
+        effects.extend(link.drive(ms));
+        effects.extend(link.told(tick, ms, [0.0; 2]));
+        for is_other in [false, true] {
+            if is_other && ms >= 5000 {
+                let stops = link.decision.cause == Cause::AnotherCommander;
+                effects = link.hears(&ack, ms + 1);
+                assert!(!stops || !velocities(&effects).is_empty(), "it obeys the newest command");
+            }
+            found.extend(causes(&effects).map(|cause| (ms, cause)));
+            for _ in sent(&std::mem::take(&mut effects)) {
+                link.hears(&ack, ms + 1);
             }
         }
     }
-    let at = causes.iter().find(|(_, cause)| *cause == Cause::AnotherCommander);
-    assert!(at.is_some_and(|(ms, _)| *ms >= 5000), "{causes:?}");
-}
-
-#[test]
-fn an_abandoned_tick_does_not_keep_the_next_from_starting() {
-    let mut link = driving(on_the_wall());
-    let first = link.at(Event::Datagram(&datagram(255, 0, 0)), 10 * MS);
-    let second = link.at(Event::Datagram(&datagram(255, 0, 0)), 150 * MS);
-    assert_eq!((ticks(&first)[0].0, ticks(&second)[0].0), (0, 1));
+    let at = found.iter().find(|(_, cause)| *cause == Cause::AnotherCommander);
+    assert!(at.is_some_and(|(ms, _)| *ms >= 5000), "{found:?}");
 }
 
 mod arduino;

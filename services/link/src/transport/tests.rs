@@ -1,16 +1,12 @@
 use std::{
-    cell::Cell,
-    collections::VecDeque,
     io::{Read, Write},
     net::{SocketAddr, TcpListener, TcpStream, UdpSocket},
     os::fd::{AsFd, OwnedFd},
     path::{Path, PathBuf},
-    rc::Rc,
     time::Duration,
 };
 
 use common::{
-    machine::{Files, Machine, simulate},
     poll,
     wire::{Addressing, Command, Decoder},
 };
@@ -23,9 +19,10 @@ use rustix::{
 use tempfile::TempDir;
 
 use super::*;
+use crate::testing::{ARDUINO, mission};
 
-fn open_at(address: &Address) -> Result<Transport, TransportError> {
-    Transport::open(address, super::Line { baud: BAUD, lowers_dtr: false })
+fn open_at(address: &Address) -> Transport {
+    Transport::open(address, super::Line { baud: BAUD, lowers_dtr: false }).unwrap()
 }
 
 const MS: u64 = 1_000_000;
@@ -64,7 +61,7 @@ fn expect_closing(transport: &mut Transport, now_ns: u64) {
 fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_kept() {
     let robot = UdpSocket::bind("127.0.0.1:0").unwrap();
     let other = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let mut transport = open_at(&Address::Udp(robot.local_addr().unwrap())).unwrap();
+    let mut transport = open_at(&Address::Udp(robot.local_addr().unwrap()));
     transport.send(b"where?").unwrap();
     let (_, link) = robot.recv_from(&mut [0; 16]).unwrap();
     other.send_to(b"go left", link).unwrap();
@@ -84,7 +81,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
 fn a_wire_that_cannot_be_opened_says_why_with_the_remedy_until_bytes_come() {
     let (listener, address) = listener();
     drop(listener);
-    let mut transport = open_at(&Address::Tcp(address)).unwrap();
+    let mut transport = open_at(&Address::Tcp(address));
     while transport.trouble().is_none() {
         transport.maintain(0).unwrap();
     }
@@ -105,32 +102,29 @@ fn listener() -> (TcpListener, SocketAddr) {
     (listener, address)
 }
 
+/// Returns a robot that listens, the open transport to it, and its connection.
+fn connection() -> (TcpListener, Transport, TcpStream) {
+    let (listener, address) = listener();
+    let mut transport = open_at(&Address::Tcp(address));
+    let robot = connected(&listener, &mut transport, 0);
+    (listener, transport, robot)
+}
+
 fn connected(listener: &TcpListener, transport: &mut Transport, now_ns: u64) -> TcpStream {
     maintain_until(transport, true, now_ns);
     listener.accept().unwrap().0
 }
 
 #[test]
-fn a_connection_carries_bytes_both_ways() {
-    let (listener, address) = listener();
-    let mut transport = open_at(&Address::Tcp(address)).unwrap();
-    let mut robot = connected(&listener, &mut transport, 0);
+fn a_connection_carries_bytes_both_ways_and_is_made_anew_when_it_ends() {
+    let (listener, mut transport, mut robot) = connection();
     transport.send(b"ping").unwrap();
     let mut heard = [0; 4];
     robot.read_exact(&mut heard).unwrap();
     assert_eq!(&heard, b"ping");
-    robot.write_all(b"ack").unwrap();
-    expect(&mut transport, b"ack", 0);
-    assert_eq!(transport.attempts(0), None);
-}
-
-#[test]
-fn a_connection_that_ends_is_told_and_made_anew() {
-    let (listener, address) = listener();
-    let mut transport = open_at(&Address::Tcp(address)).unwrap();
-    let mut robot = connected(&listener, &mut transport, 0);
     robot.write_all(b"here").unwrap();
     expect(&mut transport, b"here", 0);
+    assert_eq!(transport.attempts(0), None);
     drop(robot);
     expect_closing(&mut transport, MS);
     let mut robot = connected(&listener, &mut transport, 2 * MS);
@@ -142,7 +136,7 @@ fn a_connection_that_ends_is_told_and_made_anew() {
 fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
     let (listener, address) = listener();
     drop(listener);
-    let mut transport = open_at(&Address::Tcp(address)).unwrap();
+    let mut transport = open_at(&Address::Tcp(address));
     assert_eq!(transport.maintain(0).unwrap(), Some(false));
     let (mut now, mut pauses) = (0, Vec::new());
     for _ in 0..7 {
@@ -162,9 +156,7 @@ fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
 
 #[test]
 fn a_connection_without_a_word_is_taken_for_dead() {
-    let (listener, address) = listener();
-    let mut transport = open_at(&Address::Tcp(address)).unwrap();
-    let _robot = connected(&listener, &mut transport, 0);
+    let (listener, mut transport, _robot) = connection();
     assert_eq!(transport.maintain(4999 * MS).unwrap(), None);
     assert_eq!(transport.maintain(5000 * MS).unwrap(), Some(false));
     connected(&listener, &mut transport, 5000 * MS);
@@ -202,9 +194,7 @@ fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) ->
 
 #[test]
 fn a_connection_that_takes_no_more_loses_whole_frames_only() {
-    let (listener, address) = listener();
-    let mut transport = open_at(&Address::Tcp(address)).unwrap();
-    let mut robot = connected(&listener, &mut transport, 0);
+    let (_, mut transport, mut robot) = connection();
     robot.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
     overfill(&mut transport, |buffer| robot.read(buffer).ok());
 }
@@ -233,6 +223,14 @@ fn line() -> Line {
     Line { robot: plug_in(&name), name, _directory: Some(directory) }
 }
 
+/// Returns a line and the open transport to it.
+fn open_line() -> (Line, Transport) {
+    let line = line();
+    let mut transport = open_at(&Address::Serial(line.name.clone()));
+    maintain_until(&mut transport, true, 0);
+    (line, transport)
+}
+
 fn read_from(robot: &OwnedFd, length: usize) -> Vec<u8> {
     let mut heard = Vec::new();
     let mut buffer = [0; 256];
@@ -248,28 +246,19 @@ fn read_from(robot: &OwnedFd, length: usize) -> Vec<u8> {
 }
 
 #[test]
-fn a_serial_line_carries_every_byte_as_it_is() {
-    let line = line();
-    let mut transport = open_at(&Address::Serial(line.name.clone())).unwrap();
-    maintain_until(&mut transport, true, 0);
-    let bytes: Vec<u8> = (0..=255).collect();
-    transport.send(&bytes).unwrap();
-    assert_eq!(read_from(&line.robot, 256), bytes);
-    write(&line.robot, &bytes).unwrap();
-    expect(&mut transport, &bytes, 0);
-}
-
-#[test]
-fn a_serial_line_is_set_to_115200_8n1() {
-    let line = line();
-    let mut transport = open_at(&Address::Serial(line.name.clone())).unwrap();
-    maintain_until(&mut transport, true, 0);
+fn a_serial_line_is_set_to_115200_8n1_and_carries_every_byte_as_it_is() {
+    let (line, mut transport) = open_line();
     let settings = tcgetattr(&line.robot).unwrap();
     assert_eq!(settings.output_speed(), 115_200);
     let character = settings.control_modes
         & (ControlModes::CSIZE | ControlModes::PARENB | ControlModes::CSTOPB);
     assert_eq!(character, ControlModes::CS8);
     assert!(!settings.local_modes.contains(LocalModes::ECHO));
+    let bytes: Vec<u8> = (0..=255).collect();
+    transport.send(&bytes).unwrap();
+    assert_eq!(read_from(&line.robot, 256), bytes);
+    write(&line.robot, &bytes).unwrap();
+    expect(&mut transport, &bytes, 0);
 }
 
 #[test]
@@ -279,8 +268,7 @@ fn a_line_to_an_arduino_has_the_boards_speed_and_is_closed_without_a_hangup_that
     let mut settings = tcgetattr(&line.robot).unwrap();
     settings.control_modes.insert(ControlModes::HUPCL);
     tcsetattr(&line.robot, OptionalActions::Now, &settings).unwrap();
-    let text = "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\nrobot.arduino.sonars = { front = 4 }\n[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n";
-    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let mission = mission(ARDUINO);
     let mut transport = Transport::of_base(&Address::Serial(line.name.clone()), &mission).unwrap();
     maintain_until(&mut transport, true, 0);
     let settings = tcgetattr(&line.robot).unwrap();
@@ -290,9 +278,7 @@ fn a_line_to_an_arduino_has_the_boards_speed_and_is_closed_without_a_hangup_that
 
 #[test]
 fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
-    let mut line = line();
-    let mut transport = open_at(&Address::Serial(line.name.clone())).unwrap();
-    maintain_until(&mut transport, true, 0);
+    let (mut line, mut transport) = open_line();
     write(&line.robot, b"here").unwrap();
     expect(&mut transport, b"here", 0);
     std::fs::remove_file(&line.name).unwrap();
@@ -312,10 +298,8 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
 
 #[test]
 fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
-    let line = line();
-    let mut first = open_at(&Address::Serial(line.name.clone())).unwrap();
-    maintain_until(&mut first, true, 0);
-    let mut second = open_at(&Address::Serial(line.name.clone())).unwrap();
+    let (line, first) = open_line();
+    let mut second = open_at(&Address::Serial(line.name.clone()));
     assert_eq!(second.maintain(0).unwrap(), Some(false));
     // Another process holds the line, as a simulated robot does.
     let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
@@ -325,9 +309,7 @@ fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
 
 #[test]
 fn a_line_that_takes_no_more_loses_whole_frames_only() {
-    let line = line();
-    let mut transport = open_at(&Address::Serial(line.name.clone())).unwrap();
-    maintain_until(&mut transport, true, 0);
+    let (line, mut transport) = open_line();
     overfill(&mut transport, |buffer| {
         let came = poll::is_readable(&line.robot, Duration::from_millis(200)).unwrap();
         came.then(|| read(&line.robot, buffer).unwrap())
@@ -336,75 +318,8 @@ fn a_line_that_takes_no_more_loses_whole_frames_only() {
 
 #[test]
 fn a_file_that_is_no_serial_line_is_never_written_to() {
-    let mut transport = open_at(&Address::Serial("/dev/null".into())).unwrap();
+    let mut transport = open_at(&Address::Serial("/dev/null".into()));
     assert_eq!(transport.maintain(0).unwrap(), Some(false));
     transport.send(b"ping").unwrap();
     assert_eq!(transport.tally().unsent, 1);
-}
-
-/// Machine with a device that sends each datagram back.
-#[derive(Default)]
-struct Echoes {
-    files: Files,
-    is_killed: Cell<bool>,
-}
-
-#[derive(Debug, Default)]
-struct Echo(VecDeque<Vec<u8>>);
-
-impl MachineWire for Echo {
-    fn receive(&mut self) -> Option<Vec<u8>> {
-        self.0.pop_front()
-    }
-
-    fn send(&mut self, bytes: &[u8]) {
-        self.0.push_back(bytes.to_vec());
-    }
-}
-
-impl Machine for Echoes {
-    fn monotonic_ns(&self) -> u64 {
-        0
-    }
-
-    fn process(&self) -> u32 {
-        1
-    }
-
-    fn wait(&self, _: Duration, is_ready: &dyn Fn() -> bool) -> bool {
-        is_ready()
-    }
-
-    fn is_killed(&self) -> bool {
-        self.is_killed.get()
-    }
-
-    fn files(&self) -> &Files {
-        &self.files
-    }
-
-    fn wire(&self, address: &str) -> Box<dyn MachineWire> {
-        assert_eq!(address, "udp://127.0.0.1:9");
-        Box::new(Echo::default())
-    }
-}
-
-#[test]
-fn a_wire_of_a_simulated_machine_carries_datagrams_without_a_socket_until_its_process_is_killed() {
-    let machine = Rc::new(Echoes::default());
-    simulate(machine.clone(), || {
-        let address = Address::Udp("127.0.0.1:9".parse().unwrap());
-        let mut transport = open_at(&address).unwrap();
-        assert!(transport.descriptor().is_none());
-        assert_eq!(transport.maintain(0).unwrap(), Some(true));
-        for datagram in [b"one", b"two"] {
-            transport.send(datagram).unwrap();
-        }
-        assert_eq!(transport.receive(0).unwrap(), Some(&b"one"[..]));
-        assert_eq!(transport.receive(0).unwrap(), Some(&b"two"[..]));
-        assert_eq!(transport.receive(0).unwrap(), None);
-        machine.is_killed.set(true);
-        assert!(transport.send(b"three").is_err());
-        assert_eq!(transport.receive(0).unwrap(), None);
-    });
 }

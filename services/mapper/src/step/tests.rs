@@ -3,8 +3,10 @@ mod fault;
 mod laser;
 
 use super::*;
+use crate::testing::mission;
+use CellState::{Free, Known, Margin, Perimeter, Scanned, Sensed};
 use common::samples::{RangeStatus, Stamp};
-use std::{f64::consts::FRAC_PI_2, path::Path};
+use std::f64::consts::FRAC_PI_2;
 
 impl Mapper {
     fn give(&mut self, tick: Tick) -> Window {
@@ -35,13 +37,24 @@ impl Mapper {
         self.step(Input::Reset { epoch }, MissionTime(0)) == Change::Whole
     }
 
-    fn state_at(&self, x: f64, y: f64) -> CellState {
-        let cell = self.frame.cell_at(DVec2::new(x, y)).unwrap();
+    /// Returns the state at a place in centimetres.
+    fn state_at(&self, x_cm: i32, y_cm: i32) -> CellState {
+        let place = DVec2::new(x_cm.into(), y_cm.into()) / 100.0;
+        let cell = self.frame.cell_at(place).unwrap();
         CellState::from_byte(self.belief.cells[self.frame.index(cell)])
     }
 
-    fn is_hazard(&self, x: f64, y: f64) -> bool {
-        self.state_at(x, y).is_hazard()
+    /// Returns the state at this x, centimetres, and y = 0.
+    fn ahead(&self, x_cm: i32) -> CellState {
+        self.state_at(x_cm, 0)
+    }
+
+    fn hazard_ahead(&self, x_cm: i32) -> bool {
+        self.ahead(x_cm).is_hazard()
+    }
+
+    fn is_hazard(&self, x_cm: i32, y_cm: i32) -> bool {
+        self.state_at(x_cm, y_cm).is_hazard()
     }
 
     fn hazards(&self) -> usize {
@@ -50,8 +63,8 @@ impl Mapper {
     }
 }
 
-fn mapper_of(mission: &str) -> Mapper {
-    Mapper::new(&Mission::parse(mission, Path::new("test.toml")).unwrap())
+fn mapper_of(text: &str) -> Mapper {
+    Mapper::new(&mission(text))
 }
 
 /// D = 5 m, N = 50: Delta = 0.1 m, the origin in cell (25, 25). The sensor is 0.2 m ahead.
@@ -78,6 +91,10 @@ fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
     }
 }
 
+fn still(tick: u64) -> PoseSample {
+    at(tick, 0.0, 0.0, 0.0)
+}
+
 fn reading(status: RangeStatus, range_m: f64) -> RangeReading {
     RangeReading { range_m, status: status.into(), ..RangeReading::default() }
 }
@@ -89,7 +106,7 @@ fn echo(range_m: f64) -> RangeReading {
 fn sensed(mapper: &Mapper) -> Vec<(u32, u32)> {
     let cells = mapper.frame().cells;
     let marked = |(index, _): (usize, _)| (index as u32 % cells, index as u32 / cells);
-    let is_sensed = |(_, cell): &(usize, &u8)| **cell == CellState::Sensed as u8;
+    let is_sensed = |(_, cell): &(usize, &u8)| **cell == Sensed as u8;
     let all = mapper.state().cells.iter().enumerate();
     all.filter(is_sensed).map(marked).collect()
 }
@@ -116,14 +133,11 @@ fn equation_19_by_hand() {
 #[test]
 fn equation_19_takes_the_sensors_offset_along_its_bearing() {
     // From the origin facing x, S + offset = 0.8 + 0.2 along the bearing.
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    for (bearing_deg, hit) in
-        [(0, DVec2::new(1.0, 0.0)), (45, DVec2::new(half, half)), (-90, DVec2::new(0.0, -1.0))]
-    {
+    for bearing_deg in [0, 45, -90] {
         let set = format!("sonar.bearing_deg = {bearing_deg}\nmapper.margin_m = 0.0");
         let mut mapper = of(&set, 0.02);
-        let heard = echo(0.8);
-        mapper.sense(at(0, 0.0, 0.0, 0.0), &[heard]);
+        mapper.sense(still(0), &[echo(0.8)]);
+        let hit = DVec2::from_angle(f64::from(bearing_deg).to_radians());
         let cell = mapper.frame().cell_at(hit).unwrap();
         assert_eq!(sensed(&mapper), [(cell.col, cell.row)], "{bearing_deg}");
     }
@@ -147,22 +161,27 @@ fn a_hit_just_outside_the_map_marks_the_part_of_its_margin_that_is_inside() {
 #[test]
 fn a_reading_that_shows_nothing_leaves_the_map_alone() {
     let mut mapper = mapper("");
-    for (tick, status) in
-        [RangeStatus::Nothing, RangeStatus::Invalid, RangeStatus::Absent].into_iter().enumerate()
-    {
-        mapper.sense(at(tick as u64, 0.0, 0.0, 0.0), &[reading(status, 0.5)]);
+    let shows_nothing = [RangeStatus::Nothing, RangeStatus::Invalid, RangeStatus::Absent];
+    let readings = shows_nothing.map(|status| reading(status, 0.5));
+    let far = [echo(2.1)];
+    let all = readings.iter().map(std::slice::from_ref).chain([&[][..], &far]);
+    for (tick, readings) in (0..).zip(all) {
+        mapper.sense(still(tick), readings);
     }
-    mapper.sense(at(8, 0.0, 0.0, 0.0), &[]);
-    mapper.sense(at(9, 0.0, 0.0, 0.0), &[echo(2.1)]);
     assert_eq!(sensed(&mapper), []);
     assert_eq!(mapper.state().version, 1);
 }
 
 #[test]
-fn four_centimetres_or_nearer_is_mapped_just_ahead() {
+fn four_centimetres_or_nearer_is_mapped_just_ahead_and_never_under_the_robot() {
     let mut mapper = mapper("");
-    mapper.sense(at(0, 0.0, 0.0, 0.0), &[reading(RangeStatus::AtContact, 0.0)]);
-    assert!(sensed(&mapper).contains(&(27, 25)), "{:?}", sensed(&mapper));
+    mapper.sense(still(0), &[reading(RangeStatus::AtContact, 0.0)]);
+    let marked = sensed(&mapper);
+    assert!(marked.contains(&(27, 25)), "{marked:?}");
+    for (col, row) in marked {
+        let centre = mapper.frame().centre_of(Cell { col, row });
+        assert!(centre.length() > 0.19, "({col}, {row}) lies under the robot");
+    }
 }
 
 #[test]
@@ -174,22 +193,11 @@ fn the_targets_cell_is_never_marked() {
 }
 
 #[test]
-fn the_robots_own_cells_are_never_marked() {
-    let mut mapper = mapper("");
-    mapper.sense(at(0, 0.0, 0.0, 0.0), &[reading(RangeStatus::AtContact, 0.0)]);
-    let radius = 0.19;
-    for (col, row) in sensed(&mapper) {
-        let centre = mapper.frame().centre_of(Cell { col, row });
-        assert!(centre.length() > radius, "({col}, {row}) lies under the robot");
-    }
-}
-
-#[test]
 fn the_border_stays_border_when_a_margin_falls_on_it() {
     let mut mapper = mapper("");
     mapper.sense(at(0, 1.9, 0.0, 0.0), &[echo(0.2)]);
     let cells = &mapper.state().cells;
-    assert_eq!(cells[25 * 50 + 49], CellState::Perimeter as u8);
+    assert_eq!(cells[25 * 50 + 49], Perimeter as u8);
 }
 
 #[test]
@@ -197,12 +205,12 @@ fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
     let mut mapper = mapper("[[known.drum]]\nat = [1.0, 1.0]\nradius_m = 0.2");
     let known = |mapper: &Mapper| {
         let cells = &mapper.state().cells;
-        cells.iter().filter(|&&cell| cell == CellState::Known as u8).count()
+        cells.iter().filter(|&&cell| cell == Known as u8).count()
     };
     let before = known(&mapper);
     // A disc of 0.2 + 0.15 m has about pi 3.5^2 = 38 cells.
     assert!((34..=42).contains(&before), "{before} cells");
-    mapper.sense(at(0, 0.0, 0.0, 0.0), &[echo(0.5)]);
+    mapper.sense(still(0), &[echo(0.5)]);
     assert!(mapper.reset(1) && !mapper.reset(1));
     assert_eq!((known(&mapper), sensed(&mapper).len()), (before, 0));
 }
@@ -210,7 +218,7 @@ fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
 #[test]
 fn a_tick_given_twice_is_one_safety_event() {
     let mut mapper = mapper("");
-    let (pose, range) = (at(3, 0.0, 0.0, 0.0), echo(0.5));
+    let (pose, range) = (still(3), echo(0.5));
     mapper.sense(pose, &[range]);
     assert_eq!(mapper.sense(pose, &[range]).area(), 0);
     assert_eq!(mapper.state().safety_events, 1);
@@ -224,10 +232,10 @@ fn without_sensing_nothing_that_the_sonar_gives_is_mapped_by_either_method() {
         );
         let mut mapper = mapper_of(&text);
         let before = mapper.state().cells.to_vec();
-        assert!(before.contains(&(CellState::Known as u8)), "{method}");
+        assert!(before.contains(&(Known as u8)), "{method}");
         let echo = echo(0.5);
         for tick in 0..10 {
-            mapper.sense(at(tick, 0.0, 0.0, 0.0), &[echo]);
+            mapper.sense(still(tick), &[echo]);
         }
         assert_eq!(mapper.state().cells, before, "{method}");
         assert_eq!(mapper.state().safety_events, 0, "{method}");
@@ -238,12 +246,12 @@ fn without_sensing_nothing_that_the_sonar_gives_is_mapped_by_either_method() {
 fn a_contact_is_hazard_where_the_body_touches_by_the_papers_method() {
     let mut mapper = mapper("");
     mapper.touch(FRAC_PI_2);
-    assert!(mapper.is_hazard(0.0, 0.3));
-    assert!(!mapper.is_hazard(0.0, -0.3) && !mapper.is_hazard(0.0, 0.0));
+    assert!(mapper.is_hazard(0, 30));
+    assert!(!mapper.is_hazard(0, -30) && !mapper.hazard_ahead(0));
 }
 
 fn send(mapper: &mut Mapper, tick: u64, x: f64) -> usize {
-    let (pose, target) = (at(tick, 0.0, 0.0, 0.0), Some(DVec2::new(x, 0.0)));
+    let (pose, target) = (still(tick), Some(DVec2::new(x, 0.0)));
     mapper.give(Tick { pose, target, ..Tick::default() }).area()
 }
 
@@ -254,17 +262,16 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
         let text = format!("target = [1.5, 0.0]\nmethod = '{method}'\n{drum}");
         let mut mapper = mapper_of(&text);
         // Listed targets may lie in a drum's margin.
-        let margin = -1.25;
-        assert_eq!(mapper.state_at(margin, 0.0), CellState::Known, "{method}");
+        assert_eq!(mapper.ahead(-125), Known, "{method}");
         let version = mapper.state().version;
-        assert_eq!(send(&mut mapper, 1, margin), 1, "{method}");
-        assert!(!mapper.is_hazard(margin, 0.0), "{method}");
+        assert_eq!(send(&mut mapper, 1, -1.25), 1, "{method}");
+        assert!(!mapper.hazard_ahead(-125), "{method}");
         assert_eq!(mapper.state().version, version + 1, "{method}");
         let mut restored = mapper.clone();
         restored.restore(mapper.state().clone()).unwrap();
-        assert_eq!(restored.state().target, DVec2::new(margin, 0.0));
+        assert_eq!(restored.state().target, DVec2::new(-1.25, 0.0));
         assert_eq!(send(&mut restored, 2, 1.5), 1, "{method}");
-        assert_eq!(restored.state_at(margin, 0.0), CellState::Known, "{method}");
+        assert_eq!(restored.ahead(-125), Known, "{method}");
     }
 }
 
@@ -280,30 +287,25 @@ fn zones_are_hazard_by_either_method_and_what_was_sensed_shows_again_without_the
              [[zone]]\npoints = [[-1.0, -1.0], [-0.5, -1.0], [-0.5, -0.5], [-1.0, -0.5]]"
         ));
         let fresh = mapper.clone();
-        assert_eq!(mapper.state_at(-0.75, -0.75), CellState::Known);
-        assert_eq!(mapper.state_at(-1.0, -0.4), CellState::Known, "the body has a radius");
-        assert!(!mapper.is_hazard(0.0, 0.0));
+        assert_eq!(mapper.state_at(-75, -75), Known);
+        assert_eq!(mapper.state_at(-100, -40), Known, "the body has a radius");
+        assert!(!mapper.hazard_ahead(0));
         let set = |mapper: &mut Mapper, zones| mapper.step(Input::Zones(zones), MissionTime(0));
         assert_eq!(set(&mut mapper, vec![zone(1.0)]), Change::Whole);
-        assert!(!mapper.is_hazard(-0.75, -0.75), "{method}");
-        assert_eq!(mapper.state_at(1.25, -0.75), CellState::Known);
+        assert!(!mapper.is_hazard(-75, -75), "{method}");
+        assert_eq!(mapper.state_at(125, -75), Known);
         // The target moves away from the zone, and its cell becomes hazard again.
         let tick = |target| Tick { target: Some(target), ..Tick::default() };
         mapper.give(tick(DVec2::new(1.25, -0.45)));
-        assert!(!mapper.is_hazard(1.25, -0.45));
+        assert!(!mapper.is_hazard(125, -45));
         mapper.give(tick(DVec2::new(1.5, 1.0)));
-        assert_eq!(mapper.state_at(1.25, -0.45), CellState::Known);
+        assert_eq!(mapper.state_at(125, -45), Known);
         assert!(mapper.reset(1));
-        assert_eq!(mapper.state_at(1.25, -0.75), CellState::Known, "a reset forgets no zone");
+        assert_eq!(mapper.state_at(125, -75), Known, "a reset forgets no zone");
         set(&mut mapper, vec![zone(-1.0)]);
-        let hazards = |mapper: &Mapper| {
-            mapper
-                .belief
-                .cells
-                .iter()
-                .map(|cell| CellState::from_byte(*cell).is_hazard())
-                .collect::<Vec<_>>()
-        };
+        let is_hazard = |cell: &u8| CellState::from_byte(*cell).is_hazard();
+        let hazards =
+            |mapper: &Mapper| mapper.belief.cells.iter().map(is_hazard).collect::<Vec<_>>();
         assert_eq!(hazards(&mapper), hazards(&fresh), "{method}");
     }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use GuidanceStatus::{Along, Look, Unreachable, Waiting, WayOut};
 use common::{
     bus::Stamp,
     grid::{CellState, Part},
@@ -6,15 +7,23 @@ use common::{
 };
 use std::path::Path;
 
+fn parse(text: &str) -> Mission {
+    Mission::parse(text, Path::new("test.toml")).unwrap()
+}
+
 fn mission() -> Mission {
     mission_of(40)
 }
 
 fn mission_of(cells: u32) -> Mission {
-    let text = format!(
+    parse(&format!(
         "target = [1.5, 0]\nmethod = 'paper'\nperimeter = {{ width_m = 4, cells = {cells} }}"
-    );
-    Mission::parse(&text, Path::new("test.toml")).unwrap()
+    ))
+}
+
+/// Returns the mission of a robot that this line describes, by the default method.
+fn mission_with(robot: &str) -> Mission {
+    parse(&format!("target = [1.5, 0]\nperimeter = {{ width_m = 4, cells = 40 }}\n{robot}"))
 }
 
 impl Planner {
@@ -47,6 +56,14 @@ fn keyframe_of(
     (header, cells.collect())
 }
 
+/// Returns a keyframe whose free cells were all scanned.
+fn scanned_of(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> (GridHeader, Vec<u8>) {
+    let (header, mut cells) = keyframe_of(mission.grid_frame(), 1, hazard);
+    let free = cells.iter_mut().filter(|cell| **cell == CellState::Free as u8);
+    free.for_each(|cell| *cell = CellState::Scanned as u8);
+    (header, cells)
+}
+
 fn in_room(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> Planner {
     let mut planner = sent(mission);
     let (header, cells) = keyframe_of(mission.grid_frame(), 1, hazard);
@@ -54,12 +71,13 @@ fn in_room(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> Planner {
     planner
 }
 
-fn status(sample: &GuidanceSample) -> GuidanceStatus {
-    sample.status()
-}
-
 fn at(x_m: f64, y_m: f64) -> PoseSample {
     PoseSample { x_m, y_m, ..PoseSample::default() }
+}
+
+fn after(seconds: f64) -> PoseSample {
+    let stamp_ns = (seconds * 1e9) as u64;
+    PoseSample { stamp: Stamp { stamp_ns, ..Stamp::default() }, ..PoseSample::default() }
 }
 
 fn solve(job: &Job) -> Solved {
@@ -81,17 +99,28 @@ fn a_screening_length_in_metres_is_the_same_on_any_grid() {
 #[test]
 fn before_the_first_keyframe_there_is_no_guidance() {
     let mut planner = sent(&mission());
-    assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Waiting);
+    assert_eq!(planner.ask(&at(0.0, 0.0)).status(), Waiting);
     assert!(planner.snapshot().is_none());
 }
 
 #[test]
-fn an_empty_room_is_crossed_straight() {
-    let mut planner = in_room(&mission(), |_| false);
-    let guidance = planner.ask(&at(0.0, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Along);
-    assert!(guidance.ex > 0.999 && guidance.ey.abs() < 0.03, "{guidance:?}");
-    assert_eq!(guidance.distance_m, 1.5);
+fn the_status_and_direction_of_a_place_are_those_of_the_map_around_it() {
+    let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
+    let block = |at: DVec2| at.x.abs() < 0.25 && at.y.abs() < 0.45;
+    let aside = DVec2::new(1.0, -1.0).normalize();
+    for (name, hazard, from, status, direction) in [
+        ("an empty room", &(|_| false) as &dyn Fn(DVec2) -> bool, [0.0, 0.0], Along, DVec2::X),
+        ("in the target's cell", &|_| false, [1.48, 0.02], Along, aside),
+        ("walled in", &ring, [0.0, 0.0], Unreachable, DVec2::ZERO),
+        ("on a hazard, left of its middle", &block, [-0.15, 0.0], WayOut, DVec2::NEG_X),
+    ] {
+        let guidance = in_room(&mission(), hazard).ask(&at(from[0], from[1]));
+        assert_eq!(guidance.status(), status, "{name}");
+        let off = direction.distance(DVec2::new(guidance.ex, guidance.ey));
+        assert!(off < 0.03, "{name}: {guidance:?}");
+        let left = (mission().target - DVec2::from(from)).length();
+        assert!((guidance.distance_m - left).abs() < 1e-9, "{name}: {guidance:?}");
+    }
 }
 
 /// Planner with the field of an empty room, and the keyframe of a wall that is open only above y =
@@ -125,31 +154,8 @@ fn a_wall_that_appears_on_the_way_ahead_is_solved_for_in_the_tick() {
     let (header, cells) = wall(2);
     planner.take_grid(&header, &cells).unwrap();
     let guidance = planner.ask(&at(0.45, 0.0));
-    assert_eq!((status(&guidance), guidance.full_solves), (GuidanceStatus::Along, 2));
+    assert_eq!((guidance.status(), guidance.full_solves), (Along, 2));
     assert!(guidance.ex < 0.0 && guidance.ey > 0.3, "{guidance:?}");
-}
-
-#[test]
-fn a_robot_walled_in_hears_that_the_target_is_unreachable() {
-    let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
-    let mut planner = in_room(&mission(), ring);
-    assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
-}
-
-#[test]
-fn a_robot_on_a_hazard_cell_is_shown_the_way_out() {
-    let block = |at: DVec2| at.x.abs() < 0.25 && at.y.abs() < 0.45;
-    let mut planner = in_room(&mission(), block);
-    let guidance = planner.ask(&at(-0.15, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::WayOut);
-    assert!(guidance.ex < -0.9, "the nearest free cell lies to the left: {guidance:?}");
-}
-
-#[test]
-fn in_the_targets_cell_the_rest_is_straight() {
-    let mut planner = in_room(&mission(), |_| false);
-    let guidance = planner.ask(&at(1.48, 0.02));
-    assert!((guidance.ex - 0.5_f64.sqrt()).abs() < 1e-9, "{guidance:?}");
 }
 
 fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
@@ -186,7 +192,7 @@ fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
     // Only the ground to the left of the way ahead is unscanned.
     let mut planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
     let guidance = planner.ask(&at(0.0, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Look);
+    assert_eq!(guidance.status(), Look);
     assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
     assert_eq!(guidance.maneuver(), Maneuver::Turn);
 }
@@ -196,7 +202,7 @@ fn an_evidential_robot_without_sensing_does_not_look_first() {
     let mission = Mission { method: Method::Evidential, sensing: false, ..mission() };
     let mut planner = in_room(&mission, |_| false);
     let guidance = planner.ask(&at(0.0, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert_eq!(guidance.status(), Along);
     assert_eq!(guidance.speed_limit_m_s, f64::INFINITY);
 }
 
@@ -206,7 +212,7 @@ fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() 
     let mut planner = evidential(|_| true);
     planner.belief.clear_beam_count = 1;
     let guidance = planner.ask(&at(0.0, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Look);
+    assert_eq!(guidance.status(), Look);
     let to_the_side = guidance.ey.atan2(guidance.ex).to_degrees().abs();
     assert!((45.0..=90.0).contains(&to_the_side), "{to_the_side}");
 }
@@ -214,20 +220,18 @@ fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() 
 #[test]
 fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
     let guidance = evidential(|_| true).ask(&at(0.0, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert_eq!(guidance.status(), Along);
     assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
 }
 
 #[test]
 fn a_robot_that_senses_beside_it_turns_from_a_drum_before_the_field_does() {
     let drum = |at: DVec2| at.distance(DVec2::new(0.8, 0.05)) < 0.3;
-    let text = "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 40 }\nrobot.model = 'kobuki'";
-    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
-    let mut planner = evidential_in(&mission, drum, |_| true);
+    let mut planner = evidential_in(&mission_with("robot.model = 'kobuki'"), drum, |_| true);
     let asked = at(0.1, 0.0);
     let (_, field) = planner.follow_field(&asked.pose()).unwrap();
     let guidance = planner.ask(&asked);
-    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert_eq!(guidance.status(), Along);
     let [field, aimed] = [field.to_angle(), guidance.ey.atan2(guidance.ex)].map(f64::to_degrees);
     assert!(field < 0.0 && (-90.0..field - 5.0).contains(&aimed), "{field} {aimed}");
 }
@@ -250,28 +254,24 @@ fn a_robot_whose_base_was_found_to_stop_late_goes_no_faster_than_it_can_stop() {
 #[test]
 fn a_robot_goes_slower_before_what_it_has_not_seen_as_long_as_nobody_knows_how_it_answers() {
     let limit = |robot: &str| {
-        let text = format!("target = [1.5, 0]\nperimeter = {{ width_m = 4, cells = 40 }}\n{robot}");
-        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
-        evidential_in(&mission, |_| false, |at| at.x < 0.7).ask(&at(0.0, 0.0)).speed_limit_m_s
+        evidential_in(&mission_with(robot), |_| false, |at| at.x < 0.7)
+            .ask(&at(0.0, 0.0))
+            .speed_limit_m_s
     };
-    let unknown = limit("robot.protocol = 'json'");
     let stated =
         "robot = { protocol = 'json', response = { delay_s = 0.07, acceleration_m_s2 = 1000.0 } }";
-    assert!(unknown > 0.0 && unknown < 0.7 * limit(stated), "{unknown} {}", limit(stated));
-    assert!((limit(stated) - limit("")).abs() < 0.01, "{} {}", limit(stated), limit(""));
+    let [unknown, stated, x80] = ["robot.protocol = 'json'", stated, ""].map(limit);
+    assert!(unknown > 0.0 && unknown < 0.7 * stated, "{unknown} {stated}");
+    assert!((stated - x80).abs() < 0.01, "{stated} {x80}");
 }
 
 #[test]
 fn a_late_base_is_guided_for_the_place_where_it_will_act() {
-    let text =
-        "target = [1.5, 0]\nperimeter = { width_m = 4, cells = 40 }\nrobot.response.delay_s = 0.4";
-    let mission = Mission::parse(text, Path::new("test.toml")).unwrap();
+    let mission = mission_with("robot.response.delay_s = 0.4");
     let advice = |commanded: &[CommandSample], from: f64| {
         let mut planner = evidential_in(&mission, |_| false, |at| at.x < 0.9);
         commanded.iter().for_each(|command| _ = planner.take_command(command));
-        let mut asked = at(from, 0.0);
-        asked.stamp.stamp_ns = 480_000_000;
-        planner.ask(&asked)
+        planner.ask(&PoseSample { x_m: from, ..after(0.48) })
     };
     let driving = CommandSample {
         v_m_s: 0.5,
@@ -299,7 +299,7 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
         let guidance = planner.ask(&at(0.0, 0.0));
         let limit = guidance.speed_limit_m_s;
         assert_eq!(limit > 0.0, may_go, "{clear_m} m: {guidance:?}");
-        let ahead = planner.advise(&Pose2::default(), GuidanceStatus::WayOut, DVec2::X);
+        let ahead = planner.advise(&Pose2::default(), WayOut, DVec2::X);
         assert_eq!(ahead.limit > 0.0, may_go, "on the way out of a hazard, {clear_m} m");
     }
 }
@@ -309,7 +309,7 @@ fn a_scan_goes_on_in_a_planner_that_was_restarted() {
     let scanned = |at: DVec2| at.x < 0.2 || at.y < 0.1;
     let (mut one, mut other) = (evidential(scanned), evidential(scanned));
     for heading in [0.0, 0.2, 0.4] {
-        let pose = PoseSample { heading_rad: heading, ..at(0.0, 0.0) };
+        let pose = PoseSample { heading_rad: heading, ..PoseSample::default() };
         assert_eq!(one.ask(&pose), other.ask(&pose));
     }
 }
@@ -366,19 +366,23 @@ impl LargeRoom {
     }
 
     fn status_at(&mut self, x: f64, y: f64) -> GuidanceStatus {
-        status(&self.planner.ask(&at(x, y)))
+        self.planner.ask(&at(x, y)).status()
     }
 }
 
 #[test]
 fn on_a_large_map_a_change_on_the_way_ahead_makes_the_robot_wait_until_the_field_is_solved() {
     let mut room = LargeRoom::new();
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Along);
+    assert_eq!(room.status_at(0.0, 0.0), Along);
     room.block_post(0.2, 0.1);
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
-    room.solve();
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Along);
-    assert_eq!(room.status_at(0.2, 0.1), GuidanceStatus::WayOut);
+    assert_eq!(room.status_at(0.0, 0.0), Waiting);
+    let solved = solve(&room.planner.begin_job().unwrap());
+    let other = Solved { number: solved.number + 1, field: solved.field.clone(), took_ns: 0 };
+    assert_eq!(room.planner.swap_in(other).unwrap(), Work::None, "no field waits for it");
+    assert_eq!(room.status_at(0.0, 0.0), Waiting);
+    assert_eq!(room.planner.swap_in(solved).unwrap(), Work::SwappedIn);
+    assert_eq!(room.status_at(0.0, 0.0), Along);
+    assert_eq!(room.status_at(0.2, 0.1), WayOut);
 }
 
 #[test]
@@ -388,20 +392,10 @@ fn on_a_large_map_a_robot_goes_on_where_nothing_changed_on_its_way_ahead() {
     room.close_near_gap();
     let after = room.planner.ask(&at(0.0, 0.0));
     assert_eq!((after.ex, after.ey), (before.ex, before.ey), "far from the gap");
-    assert_eq!(room.status_at(0.5, 0.0), GuidanceStatus::Waiting, "at the gap");
+    assert_eq!(room.status_at(0.5, 0.0), Waiting, "at the gap");
     room.solve();
     let guidance = room.planner.ask(&at(0.5, 0.0));
     assert!(guidance.ey > 0.4, "to the other gap: {guidance:?}");
-}
-
-#[test]
-fn a_result_that_no_field_waits_for_changes_nothing() {
-    let mut room = LargeRoom::new();
-    room.close_near_gap();
-    let mut solved = solve(&room.planner.begin_job().unwrap());
-    solved.number += 1;
-    assert_eq!(room.planner.swap_in(solved).unwrap(), Work::None);
-    assert_eq!(room.status_at(0.6, 0.0), GuidanceStatus::Waiting);
 }
 
 #[test]
@@ -415,11 +409,11 @@ fn a_change_while_a_job_runs_is_in_the_field_of_the_job_after() {
     assert_eq!(version(&room), 1);
     room.planner.swap_in(solve(&first)).unwrap();
     assert_eq!(version(&room), 2);
-    assert_eq!(room.status_at(0.4, 0.4), GuidanceStatus::Waiting);
+    assert_eq!(room.status_at(0.4, 0.4), Waiting);
     room.solve();
     assert_eq!(version(&room), 3);
-    assert_eq!(room.status_at(0.4, 0.4), GuidanceStatus::Along);
-    assert_eq!(room.status_at(0.4, 0.6), GuidanceStatus::WayOut);
+    assert_eq!(room.status_at(0.4, 0.4), Along);
+    assert_eq!(room.status_at(0.4, 0.6), WayOut);
     assert!(room.planner.begin_job().is_none(), "the field is current");
 }
 
@@ -428,11 +422,11 @@ fn a_robot_cut_off_on_a_large_map_hears_so_only_from_a_field_of_the_newest_map()
     let mut room = LargeRoom::new();
     room.block(|at| (at.x - 0.8).abs() < 0.03);
     room.solve();
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Unreachable);
+    assert_eq!(room.status_at(0.0, 0.0), Unreachable);
     room.block_post(-1.0, -1.0);
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
+    assert_eq!(room.status_at(0.0, 0.0), Waiting);
     room.solve();
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Unreachable);
+    assert_eq!(room.status_at(0.0, 0.0), Unreachable);
 }
 
 #[test]
@@ -473,7 +467,7 @@ fn a_new_target_is_solved_for_on_the_same_map_within_the_tick() {
     planner.take_grid(&header, &cells).unwrap();
     assert_eq!(planner.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Stale);
     let guidance = planner.ask(&at(0.3, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert_eq!(guidance.status(), Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
     assert_eq!((guidance.target_number, guidance.distance_m), (2, 1.8));
     let mut fresh = Planner::new(&mission());
@@ -490,22 +484,18 @@ fn a_planner_that_knows_no_target_gives_no_direction() {
     let (header, cells) = keyframe(1, |_| false);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::None);
     let guidance = planner.ask(&at(0.0, 0.0));
-    assert_eq!((status(&guidance), guidance.target_number), (GuidanceStatus::Waiting, 0));
+    assert_eq!((guidance.status(), guidance.target_number), (Waiting, 0));
     assert_eq!(planner.take_target(&sample(1, 1.5, 0.0)).unwrap(), Work::Solved);
-    assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Along);
+    assert_eq!(planner.ask(&at(0.0, 0.0)).status(), Along);
 }
 
 #[test]
 fn a_target_in_hazard_or_outside_ends_no_planner() {
-    let mut planner = sent(&mission());
-    let (header, cells) = keyframe(1, |at| at.x < -0.5);
-    planner.take_grid(&header, &cells).unwrap();
+    let mut planner = in_room(&mission(), |at| at.x < -0.5);
     planner.take_target(&sample(2, -1.5, 0.0)).unwrap();
-    assert_eq!(status(&planner.ask(&at(0.0, 0.0))), GuidanceStatus::Unreachable);
+    assert_eq!(planner.ask(&at(0.0, 0.0)).status(), Unreachable);
     // The mapper's next map still has hazard there.
-    let (mut header, _) = keyframe(2, |_| true);
-    header.part.version = 2;
-    let (_, cells) = keyframe(2, |at| at.x < -0.4);
+    let (header, cells) = keyframe(2, |at| at.x < -0.4);
     planner.take_grid(&header, &cells).unwrap();
     for (x, y) in [(9.0, 0.0), (1.99, 0.0), (f64::NAN, 0.0)] {
         assert_eq!(planner.take_target(&sample(3, x, y)).unwrap(), Work::None, "{x}");
@@ -516,16 +506,16 @@ fn a_target_in_hazard_or_outside_ends_no_planner() {
 #[test]
 fn on_a_large_map_the_robot_waits_until_the_field_leads_to_its_new_target() {
     let mut room = LargeRoom::new();
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Along);
+    assert_eq!(room.status_at(0.0, 0.0), Along);
     room.block_post(-1.0, -1.0);
     let before = room.planner.begin_job().unwrap();
     assert_eq!(room.planner.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Stale);
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
+    assert_eq!(room.status_at(0.0, 0.0), Waiting);
     assert_eq!(room.planner.swap_in(solve(&before)).unwrap(), Work::None);
-    assert_eq!(room.status_at(0.0, 0.0), GuidanceStatus::Waiting);
+    assert_eq!(room.status_at(0.0, 0.0), Waiting);
     room.solve();
     let guidance = room.planner.ask(&at(0.0, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Along);
+    assert_eq!(guidance.status(), Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
 }
 
@@ -535,12 +525,9 @@ fn long_in_room(target: &str, hazard: impl Fn(DVec2) -> bool) -> (Planner, GridH
         "{target}\nrobot.model = 'jackal'\nperimeter = {{ width_m = 4, cells = 80 }}\n\
          robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]"
     );
-    let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
+    let mission = parse(&text);
     let mut planner = sent(&mission);
-    let (header, mut cells) = keyframe_of(mission.grid_frame(), 1, hazard);
-    for cell in cells.iter_mut().filter(|cell| **cell == CellState::Free as u8) {
-        *cell = CellState::Scanned as u8;
-    }
+    let (header, cells) = scanned_of(&mission, hazard);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
     (planner, header, cells)
 }
@@ -561,7 +548,7 @@ fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
         planner.end_tick().unwrap();
         led = planner.ask(&start);
     }
-    assert!(led.ey < -0.5 && status(&led) != GuidanceStatus::Unreachable, "{led:?}");
+    assert!(led.ey < -0.5 && led.status() != Unreachable, "{led:?}");
     let reset = GridHeader { epoch: 1, part: Part { version: 2, ..header.part }, ..header };
     planner.take_grid(&reset, &cells).unwrap();
     assert_eq!(planner.ask(&start).speed_limit_m_s, 0.0, "the refusal is forgotten");
@@ -585,23 +572,17 @@ fn a_long_body_is_not_turned_to_a_targets_heading_where_it_would_touch() {
 }
 
 /// Robot at the origin that drives at 0.4 m/s along x in a wide, scanned hall, beside a mover.
-fn guidance_beside(at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
-    guidance_of("kobuki", at, velocity)
-}
-
-fn guidance_of(model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
+fn guidance_beside(model: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
     guidance_between(6.0, model, at, velocity)
 }
 
 /// Same hall with two walls at `wall_m` metres from the robot's way.
-fn guidance_between(wall_m: f64, model: &str, at: DVec2, velocity: DVec2) -> (GuidanceSample, f64) {
-    let mut hall = Hall::new(wall_m, model);
+fn guidance_between(wall_m: f64, model: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
     let pose = PoseSample { v_m_s: 0.4, ..PoseSample::default() };
-    (hall.guidance(&pose, at, velocity), hall.mission.speed_m_s())
+    Hall::new(wall_m, model).guidance(&pose, at, velocity)
 }
 
 struct Hall {
-    mission: Mission,
     planner: Planner,
     header: GridHeader,
     cells: Vec<u8>,
@@ -610,100 +591,75 @@ struct Hall {
 impl Hall {
     fn new(wall_m: f64, model: &str) -> Self {
         let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
-        let text = format!("{hall}\nrobot.model = '{model}'");
-        let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
-        let (header, mut cells) = keyframe_of(mission.grid_frame(), 1, |at| at.y.abs() > wall_m);
-        let free = cells.iter_mut().filter(|cell| **cell == CellState::Free as u8);
-        free.for_each(|cell| *cell = CellState::Scanned as u8);
-        Self { planner: sent(&mission), mission, header, cells }
+        let mission = parse(&format!("{hall}\nrobot.model = '{model}'"));
+        let (header, cells) = scanned_of(&mission, |at| at.y.abs() > wall_m);
+        Self { planner: sent(&mission), header, cells }
     }
 
-    fn guidance(&mut self, pose: &PoseSample, at: DVec2, velocity: DVec2) -> GuidanceSample {
-        self.header.movers[0] = Mover {
-            x_m: at.x as f32,
-            y_m: at.y as f32,
-            vx_m_s: velocity.x as f32,
-            vy_m_s: velocity.y as f32,
-            radius_m: 0.3,
-            ..Mover::default()
-        };
+    fn guidance(&mut self, pose: &PoseSample, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
+        let ([x_m, y_m], [vx_m_s, vy_m_s]) = (at.map(|x| x as f32), velocity.map(|v| v as f32));
+        let mover = Mover { x_m, y_m, vx_m_s, vy_m_s, radius_m: 0.3, ..Mover::default() };
+        self.header.movers[0] = mover;
         self.header.mover_count = 1;
         self.planner.take_grid(&self.header, &self.cells).unwrap();
         self.planner.ask(pose)
+    }
+
+    /// Returns the guidance while something comes along x from `x_m`.
+    fn comes(&mut self, second: u8, x_m: f64) -> GuidanceSample {
+        self.guidance(&after(second.into()), [x_m, 0.1], [-1.2, 0.0])
     }
 }
 
 #[test]
 fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time_and_steps_aside_no_more()
  {
-    let mut hall = Hall::new(6.0, "jackal");
-    let mut guidance = |second: u64, x_m: f64| {
-        let stamp = Stamp { stamp_ns: second * 1_000_000_000, ..Stamp::default() };
-        let pose = PoseSample { stamp, ..PoseSample::default() };
-        hall.guidance(&pose, DVec2::new(x_m, 0.1), DVec2::new(-1.2, 0.0))
-    };
-    let first: Vec<_> = (1..=16).map(|second| guidance(second, 4.5)).collect();
-    assert!(first.iter().all(|it| it.ey.abs() > 0.3), "{first:?}");
-    guidance(17, 4.5);
-    let (far, near) = (guidance(18, 4.5), guidance(19, 1.0));
-    assert!(far.ex > 0.99 && far.signed_limit_m_s() > 0.0, "{far:?}");
-    assert_eq!(status(&near), GuidanceStatus::Waiting, "{near:?}");
-}
-
-#[test]
-fn a_robot_that_insisted_evades_again_after_the_encounter_and_for_its_next_target() {
-    let comes = |hall: &mut Hall, second: u64, x_m: f64| {
-        let stamp = Stamp { stamp_ns: second * 1_000_000_000, ..Stamp::default() };
-        let pose = PoseSample { stamp, ..PoseSample::default() };
-        hall.guidance(&pose, DVec2::new(x_m, 0.1), DVec2::new(-1.2, 0.0)).ey.abs() > 0.3
-    };
+    let aside = |guidance: GuidanceSample| guidance.ey.abs() > 0.3;
     let insisting = || {
         let mut hall = Hall::new(6.0, "jackal");
-        (1..=17).for_each(|second| _ = comes(&mut hall, second, 4.5));
-        assert!(!comes(&mut hall, 18, 4.5), "it insists");
+        (1..=16).for_each(|second| assert!(aside(hall.comes(second, 4.5)), "{second} s"));
+        hall.comes(17, 4.5);
+        let far = hall.comes(18, 4.5);
+        assert!(far.ex > 0.99 && far.signed_limit_m_s() > 0.0, "{far:?}");
         hall
     };
+    assert_eq!(insisting().comes(19, 1.0).status(), Waiting);
     let mut alone = insisting();
-    (19..=35).for_each(|second| _ = comes(&mut alone, second, 100.0));
-    assert!(comes(&mut alone, 36, 4.5), "nothing moved near it");
+    (19..=35).for_each(|second| _ = alone.comes(second, 100.0));
+    assert!(aside(alone.comes(36, 4.5)), "nothing moved near it");
     let mut sent = insisting();
-    let target = TargetPoint::at(DVec2::new(4.0, 0.2));
-    let target = TargetSample { number: 2, last: 2, target, ..Default::default() };
-    sent.planner.take_target(&target).unwrap();
-    assert!(comes(&mut sent, 19, 4.5), "it has another target");
+    sent.planner.take_target(&sample(2, 4.0, 0.2)).unwrap();
+    assert!(aside(sent.comes(19, 4.5)), "it has another target");
 }
 
 #[test]
 fn what_goes_away_or_passes_far_off_changes_no_guidance() {
+    let speed = mission_with("robot.model = 'kobuki'").speed_m_s();
     for (at, velocity) in [([1.5, 0.0], [1.5, 0.0]), ([0.0, 3.0], [1.0, 0.0])] {
-        let (guidance, speed) = guidance_beside(at.into(), velocity.into());
-        assert_eq!(status(&guidance), GuidanceStatus::Along);
+        let guidance = guidance_beside("kobuki", at, velocity);
+        assert_eq!(guidance.status(), Along);
         assert!(guidance.ex > 0.99 && guidance.signed_limit_m_s() >= speed, "{guidance:?}");
     }
 }
 
 #[test]
-fn a_robot_gets_out_of_the_way_of_what_comes() {
-    let (at, velocity) = (DVec2::new(2.5, 0.1), DVec2::new(-0.8, 0.0));
-    let (guidance, speed) = guidance_of("jackal", at, velocity);
-    let aside = guidance.ey.abs() > 0.3 || guidance.maneuver() == Maneuver::Back;
-    assert!(aside && status(&guidance) == GuidanceStatus::Along, "{speed}: {guidance:?}");
-}
-
-#[test]
-fn a_robot_steps_aside_while_what_comes_is_far_off() {
+fn a_robot_gets_out_of_the_way_of_what_comes_early_or_stands() {
+    let near = guidance_beside("jackal", [2.5, 0.1], [-0.8, 0.0]);
+    let aside = near.ey.abs() > 0.3 || near.maneuver() == Maneuver::Back;
+    assert!(aside && near.status() == Along, "{near:?}");
     // A Jackal cannot back up, because its laser does not cover the rear.
-    let (guidance, _) = guidance_of("jackal", DVec2::new(4.5, 0.1), DVec2::new(-1.2, 0.0));
-    assert!(status(&guidance) == GuidanceStatus::Along && guidance.ey.abs() > 0.3, "{guidance:?}");
+    let far = guidance_beside("jackal", [4.5, 0.1], [-1.2, 0.0]);
+    assert!(far.status() == Along && far.ey.abs() > 0.3, "{far:?}");
+    let late = guidance_beside("kobuki", [1.2, 0.0], [-1.5, 0.0]);
+    assert_eq!(late.status(), Waiting, "{late:?}");
 }
 
 #[test]
 fn a_robot_does_not_take_a_wall_beside_what_comes_for_its_trace_and_does_not_step_aside_into_it() {
-    let slowly = DVec2::new(-0.4, 0.0);
     let aside = |wall_m| {
         (13..19).any(|decimetres| {
-            let at = DVec2::new(0.1 * f64::from(decimetres), 0.0);
-            let guidance = guidance_between(wall_m, "jackal", at, slowly).0;
+            let at = [0.1 * f64::from(decimetres), 0.0];
+            let guidance = guidance_between(wall_m, "jackal", at, [-0.4, 0.0]);
             guidance.ey.abs() > 0.3 && guidance.signed_limit_m_s() > 0.0
         })
     };
@@ -714,31 +670,22 @@ fn a_robot_does_not_take_a_wall_beside_what_comes_for_its_trace_and_does_not_ste
 fn a_robot_backs_only_where_a_laser_looks() {
     let backs = |model| {
         (2..30).any(|decimetres| {
-            let at = DVec2::new(0.1 * f64::from(decimetres), 0.0);
-            guidance_of(model, at, DVec2::new(-0.8, 0.0)).0.maneuver() == Maneuver::Back
+            let at = [0.1 * f64::from(decimetres), 0.0];
+            guidance_beside(model, at, [-0.8, 0.0]).maneuver() == Maneuver::Back
         })
     };
     assert_eq!(["kobuki", "jackal"].map(backs), [true, false]);
 }
 
 #[test]
-fn a_robot_that_cannot_get_out_of_the_way_of_what_comes_stands() {
-    let (guidance, _) = guidance_beside(DVec2::new(1.2, 0.0), DVec2::new(-1.5, 0.0));
-    assert_eq!(status(&guidance), GuidanceStatus::Waiting, "{guidance:?}");
-}
-
-#[test]
 fn a_robot_with_a_laser_stands_for_half_a_second_at_first_to_see_what_moves_and_others_do_not() {
-    let answer = |robot: &str, stamp_ns| {
-        let text = format!("target = [1, 0]\n{robot}");
-        let mut planner = sent(&Mission::parse(&text, Path::new("test.toml")).unwrap());
-        let (header, cells) = keyframe(1, |_| false);
-        planner.take_grid(&header, &cells).unwrap();
-        let stamp = Stamp { stamp_ns, ..Stamp::default() };
-        status(&planner.answer(&PoseSample { stamp, ..PoseSample::default() }).unwrap().1)
-    };
-    let (early, later) = (300_000_000, 600_000_000);
-    assert_eq!(answer("robot.model = 'kobuki'", early), GuidanceStatus::Waiting);
-    assert_ne!(answer("robot.model = 'kobuki'", later), GuidanceStatus::Waiting);
-    assert_ne!(answer("", early), GuidanceStatus::Waiting);
+    for (robot, seconds, waits) in [
+        ("robot.model = 'kobuki'", 0.3, true),
+        ("robot.model = 'kobuki'", 0.6, false),
+        ("", 0.3, false),
+    ] {
+        let mut planner = in_room(&mission_with(robot), |_| false);
+        let status = planner.answer(&after(seconds)).unwrap().1.status();
+        assert_eq!(status == Waiting, waits, "{robot} after {seconds} s");
+    }
 }

@@ -3,6 +3,7 @@
 use common::mission::Realism;
 
 use super::*;
+use crate::testing::near;
 
 fn radio(change: impl Fn(&mut mission::Radio)) -> Radio<u8> {
     let mut settings = mission::Radio::preset(Realism::Laboratory);
@@ -10,10 +11,12 @@ fn radio(change: impl Fn(&mut mission::Radio)) -> Radio<u8> {
     Radio::new(settings, 5)
 }
 
-fn arrivals(radio: &mut Radio<u8>, times: &[f64]) -> Vec<(f64, Vec<u8>)> {
+/// Sends 100 datagrams, 10 ms apart. Returns arrivals and their times.
+fn arrivals(change: impl Fn(&mut mission::Radio)) -> Vec<(f64, Vec<u8>)> {
+    let mut radio = radio(change);
     let mut arrived = Vec::new();
-    for (number, &time) in times.iter().enumerate() {
-        radio.send(time, 0, &[number as u8, 0xee]);
+    for number in 0..100_u8 {
+        radio.send(f64::from(number) * 0.01, 0, &[number, 0xee]);
     }
     while let Some(due) = radio.next_due() {
         arrived.extend(radio.arrived(due).map(|(_, bytes)| (due, bytes)));
@@ -42,53 +45,36 @@ fn it_is_out_for_its_share_of_the_time_and_never_longer_than_its_longest() {
         }
         let ground_truth = radio.ground_truth(f64::from(datagrams) * 0.05);
         let lost = ground_truth.lost as f64 / ground_truth.sent as f64;
-        assert!((lost - share).abs() < 0.03, "{lost} lost of {share}");
+        near(lost, share, 0.03);
         let longest = ground_truth.longest_outage_s;
         assert!((1.9..=2.0 + 1e-9).contains(&longest), "{longest} s");
     }
 }
 
 #[test]
-fn delay_and_jitter_keep_the_order() {
-    let mut radio = radio(|r| {
-        r.delay_s = 0.02;
-        r.jitter_s = 0.1;
-    });
-    let times: Vec<f64> = (0..100).map(|n| f64::from(n) * 0.01).collect();
-    let arrived = arrivals(&mut radio, &times);
-    let order: Vec<u8> = arrived.iter().map(|(_, bytes)| bytes[0]).collect();
-    assert_eq!(order, (0..100).collect::<Vec<u8>>());
-    assert!(arrived.iter().zip(&times).all(|((due, _), sent)| *due >= sent + 0.02));
-}
-
-#[test]
-fn a_reordered_datagram_comes_behind_the_next() {
-    let mut radio = radio(|r| r.reorder_share = 0.3);
-    let times: Vec<f64> = (0..100).map(|n| f64::from(n) * 0.01).collect();
-    let order: Vec<u8> = arrivals(&mut radio, &times).iter().map(|(_, bytes)| bytes[0]).collect();
-    let mut sorted = order.clone();
-    sorted.sort_unstable();
-    assert_eq!(sorted, (0..100).collect::<Vec<u8>>(), "none is lost");
+fn delay_and_jitter_keep_the_order_and_a_reordered_datagram_comes_behind_the_next() {
+    let arrived = arrivals(|r| (r.delay_s, r.jitter_s) = (0.02, 0.1));
+    for (number, (due, bytes)) in arrived.iter().enumerate() {
+        assert_eq!(usize::from(bytes[0]), number);
+        assert!(*due >= number as f64 * 0.01 + 0.02);
+    }
+    let reordered = arrivals(|r| r.reorder_share = 0.3);
+    let mut order: Vec<u8> = reordered.iter().map(|(_, bytes)| bytes[0]).collect();
     assert!(order.windows(2).filter(|pair| pair[0] > pair[1]).count() > 10);
+    order.sort_unstable();
+    assert!(arrived.len() == 100 && order.into_iter().eq(0..100), "none is lost");
 }
 
 #[test]
 fn merging_splitting_and_duplicating_lose_no_byte() {
-    let mut merging = radio(|r| r.merge_share = 0.5);
-    let times: Vec<f64> = (0..100).map(|n| f64::from(n) * 0.01).collect();
-    let arrived = arrivals(&mut merging, &times);
-    assert!(arrived.len() < 80, "{} datagrams", arrived.len());
-    let bytes: usize = arrived.iter().map(|(_, bytes)| bytes.len()).sum();
-    assert_eq!(bytes, 200);
-
-    let mut splitting = radio(|r| r.split_share = 1.0);
-    let arrived = arrivals(&mut splitting, &times);
-    let bytes: Vec<u8> = arrived.into_iter().flat_map(|(_, bytes)| bytes).collect();
+    let bytes = |arrived: &[(f64, Vec<u8>)]| {
+        arrived.iter().flat_map(|(_, bytes)| bytes.clone()).collect::<Vec<_>>()
+    };
+    let merged = arrivals(|r| r.merge_share = 0.5);
+    assert!(merged.len() < 80 && bytes(&merged).len() == 200, "{} datagrams", merged.len());
     let whole: Vec<u8> = (0..100).flat_map(|n| [n, 0xee]).collect();
-    assert_eq!(bytes, whole);
-
-    let mut twice = radio(|r| r.duplicate_share = 1.0);
-    assert_eq!(arrivals(&mut twice, &times).len(), 200);
+    assert_eq!(bytes(&arrivals(|r| r.split_share = 1.0)), whole);
+    assert_eq!(arrivals(|r| r.duplicate_share = 1.0).len(), 200);
 }
 
 #[test]

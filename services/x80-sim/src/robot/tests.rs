@@ -1,28 +1,16 @@
 //! Tests of the robot as a state machine.
 
-use std::path::Path;
-
-use common::mission::Realism;
 use common::wire::{COUNT_CYCLE, Decoder, Quantity, Request, Stream, Targets, counts_between};
 
 use proptest::prelude::*;
 
 use super::*;
+use crate::testing::{ideal, near};
 
 mod realism;
 
-/// Returns a mission with ideal sensors and wheels, unless `text` names a realism.
-fn mission(text: &str) -> Mission {
-    let mut mission =
-        Mission::parse(&format!("target = [3, 0]\n{text}"), Path::new("m.toml")).unwrap();
-    if !text.contains("realism") {
-        mission.simulation.realism = Realism::Laboratory;
-    }
-    mission
-}
-
 fn robot(text: &str) -> Robot {
-    Robot::new(&mission(text))
+    Robot::new(&ideal(text))
 }
 
 /// Returns the command's meaning to the robot, and the answer.
@@ -58,6 +46,10 @@ fn streamed(robot: &mut Robot) -> (Vec<(u8, u8)>, Vec<Report>) {
     (ids, reports)
 }
 
+fn dids(robot: &mut Robot) -> Vec<u8> {
+    streamed(robot).0.into_iter().map(|(_, did)| did).collect()
+}
+
 fn motor(robot: &mut Robot) -> MotorSensors {
     match streamed(robot).1.last() {
         Some(Report::Motor(sensors)) => *sensors,
@@ -65,63 +57,70 @@ fn motor(robot: &mut Robot) -> MotorSensors {
     }
 }
 
-#[test]
-fn all_three_streams_run_from_boot_and_the_motor_frame_comes_last() {
-    let mut robot = robot("");
-    assert_eq!(streamed(&mut robot).0, [(0, 125), (0, 124), (0, 123)]);
+fn standard(robot: &mut Robot) -> StandardSensors {
+    match streamed(robot).1.first() {
+        Some(Report::Standard(sensors)) => *sensors,
+        other => panic!("the first frame was {other:?}"),
+    }
+}
+
+/// Goes on for `ticks`.
+fn after(robot: &mut Robot, ticks: u32) -> GroundTruthTick {
+    for _ in 0..ticks {
+        robot.advance_to_next_tick();
+    }
+    robot.ground_truth()
 }
 
 #[test]
-fn streams_stop_start_and_count() {
+fn streams_run_from_boot_with_the_motor_frame_last_and_stop_start_and_count() {
     let mut robot = robot("");
+    assert_eq!(streamed(&mut robot).0, [(0, 125), (0, 124), (0, 123)]);
     let request = |stream, request| Command::Stream { stream, request };
     send(&mut robot, request(Stream::All, Request::Stop));
     send(&mut robot, request(Stream::Standard, Request::Count(2)));
-    let dids = |robot: &mut Robot| -> Vec<u8> {
-        streamed(robot).0.into_iter().map(|(_, did)| did).collect()
-    };
-    assert_eq!(dids(&mut robot), [125]);
-    assert_eq!(dids(&mut robot), [125]);
-    assert!(dids(&mut robot).is_empty());
+    assert_eq!([0; 3].map(|_| dids(&mut robot)), [vec![125], vec![125], vec![]]);
     send(&mut robot, request(Stream::Motor, Request::Start));
     assert_eq!(dids(&mut robot), [123]);
 }
 
 #[test]
-fn everything_but_an_acknowledgement_is_acknowledged() {
+fn everything_to_the_robot_but_an_acknowledgement_is_acknowledged() {
     let mut robot = robot("");
     let ack: &[u8] = &[0x5e, 0x02, 0, 0, 0xff, 1, 1, 0x48, 0x5e, 0x0d];
-    let commands = [
+    for command in [
         Command::System(SystemSignal::Ping),
         forward(100, None),
         Command::Enable { on: false, channel: Some(3) },
-    ];
-    for command in commands {
+    ] {
         assert_eq!(send(&mut robot, command).1, ack, "{command:?}");
     }
-    let (heard, replies) = send(&mut robot, Command::System(SystemSignal::Ack));
-    assert_eq!((heard, replies.len()), (Heard::Ack, 0));
+    let none = send(&mut robot, Command::System(SystemSignal::Ack));
+    assert_eq!(none, (Heard::Ack, Vec::new()));
+    let mut answer = |frame: Frame<'_>| {
+        let mut replies = Vec::new();
+        (robot.on_frame(&frame, &mut replies), replies)
+    };
     let unknown = Frame { rid: 8, sn: 0, did: 99, data: &[1] };
-    let mut replies = Vec::new();
-    assert_eq!(robot.on_frame(&unknown, &mut replies), Heard::Other);
-    assert_eq!(replies, ack);
+    assert_eq!(answer(unknown), (Heard::Other, ack.to_vec()));
+    // A frame that speaks to a host is none of its business.
+    let reflected = Frame { rid: 0, sn: 0, did: 255, data: &[0] };
+    assert_eq!(answer(reflected), (Heard::Foreign, Vec::new()));
 }
 
 #[test]
 fn the_multimedia_board_acknowledges_and_moves_nothing() {
     let mut robot = robot("");
     let mut velocity = Vec::new();
-    Command::velocity([Some(400), Some(400)], None).encode(Addressing::Numbered, &mut velocity);
-    let frame = Frame { rid: 8, sn: 0, did: velocity[4], data: &velocity[6..18] };
-    let mut replies = Vec::new();
-    assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Other);
-    assert_eq!(replies.len(), 10, "an acknowledgement");
-    robot.advance_to(1.0);
-    assert_eq!(robot.motors[0].turned, 0.0);
-    let frame = Frame { rid: 1, ..frame };
-    assert_eq!(robot.on_frame(&frame, &mut replies), Heard::Motion);
-    robot.advance_to(2.0);
-    assert!(robot.motors[0].turned > 0.0);
+    forward(400, None).encode(Addressing::Numbered, &mut velocity);
+    for (rid, heard, moves) in [(8, Heard::Other, false), (1, Heard::Motion, true)] {
+        let frame = Frame { rid, sn: 0, did: velocity[4], data: &velocity[6..18] };
+        let mut replies = Vec::new();
+        assert_eq!(robot.on_frame(&frame, &mut replies), heard);
+        assert_eq!(replies.len(), 10, "an acknowledgement");
+        robot.advance_to(robot.time + 1.0);
+        assert_eq!(robot.motors[1].turned > 0.0, moves);
+    }
 }
 
 #[test]
@@ -136,33 +135,18 @@ fn one_is_answered_in_the_form_one_is_addressed_in() {
 }
 
 #[test]
-fn frames_that_speak_to_a_host_are_none_of_its_business() {
-    let mut robot = robot("");
-    let mut replies = Vec::new();
-    let reflected = Frame { rid: 0, sn: 0, did: 255, data: &[0] };
-    assert_eq!(robot.on_frame(&reflected, &mut replies), Heard::Foreign);
-    assert!(replies.is_empty());
-}
-
-#[test]
 fn counts_come_from_real_motion_on_the_wired_channels_and_wrap() {
     let mut robot = robot("[simulation.wheels]\nlag_s = 0\n[perimeter]\nwidth_m = 100");
     send(&mut robot, forward(1000, None));
-    for _ in 0..7 {
-        robot.advance_to_next_tick();
-    }
+    let truth = after(&mut robot, 7);
     // In one second the wheels turn 1000 counts of 2 pi 0.085 / 1200 m. Channel 0 is reversed and
     // wraps below 0.
     let sensors = motor(&mut robot);
     assert_eq!(sensors.encoders.map(|e| e.position), [32_768 - 1000, 1000]);
     assert_eq!(sensors.encoders.map(|e| e.velocity()), [-1000, 1000]);
-    let ground_truth = robot.ground_truth();
-    assert_eq!((ground_truth.left_counts, ground_truth.right_counts), (1000, 1000));
-    assert!((ground_truth.x - 0.445_059).abs() < 1e-6, "{}", ground_truth.x);
-    for _ in 0..7 * 32 {
-        robot.advance_to_next_tick();
-    }
-    assert_eq!(robot.ground_truth().left_counts, 33_000 - 32_768);
+    assert_eq!((truth.left_counts, truth.right_counts), (1000, 1000));
+    near(truth.x, 0.445_059, 1e-6);
+    assert_eq!(after(&mut robot, 7 * 32).left_counts, 33_000 - 32_768);
 }
 
 #[test]
@@ -171,8 +155,7 @@ fn wheels_may_be_wired_the_other_way_round() {
         "[robot]\nleft = { channel = 1, reversed = false }\nright = { channel = 0, reversed = true }\n[simulation.wheels]\nlag_s = 0",
     );
     send(&mut robot, Command::velocity([Some(-500), None], None));
-    robot.advance_to_next_tick();
-    let ground_truth = robot.ground_truth();
+    let ground_truth = after(&mut robot, 1);
     assert!(ground_truth.heading > 0.0 && ground_truth.omega > 0.0);
     assert_eq!((ground_truth.left_counts, ground_truth.right_counts), (0, 71));
 }
@@ -182,9 +165,7 @@ fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
     let moved = |text: &str| {
         let mut robot = robot(text);
         send(&mut robot, forward(700, 100));
-        robot.advance_to_next_tick();
-        robot.advance_to_next_tick();
-        robot.ground_truth().right_counts
+        after(&mut robot, 2).right_counts
     };
     assert_eq!(moved("[simulation.wheels]\nlag_s = 0"), 70);
     assert_eq!(moved("[simulation]\nignores_time = true\n[simulation.wheels]\nlag_s = 0"), 200);
@@ -201,16 +182,13 @@ fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
             send(&mut robot, forward(562, 250));
             robot.advance_to_next_tick();
         }
-        for _ in 0..30 {
-            robot.advance_to_next_tick();
-        }
-        robot.ground_truth().stopping_time_s
+        after(&mut robot, 30).stopping_time_s
     };
     let obeyed = stopping_time("");
-    assert!((obeyed - 0.25 - coasting).abs() < 0.02, "{obeyed}");
+    near(obeyed - 0.25, coasting, 0.02);
     let own_limit = "simulation = { ignores_time = true, stops_when_silent_s = 0.2 }";
     let ignored = stopping_time(own_limit);
-    assert!((ignored - 0.2 - coasting).abs() < 0.02, "{ignored}");
+    near(ignored - 0.2, coasting, 0.02);
     assert!(stopping_time("simulation = { ignores_time = true }") > 4.0);
 }
 
@@ -220,14 +198,10 @@ fn a_silent_host_stops_the_motors_only_where_the_mission_says_so() {
         let mut robot = robot(text);
         send(&mut robot, forward(500, None));
         robot.advance_to(3.0);
-        motor_speed(&robot)
+        robot.motors[1].speed
     };
     assert!(speed("") > 499.0, "it keeps going");
     assert_eq!(speed("[simulation]\nstops_when_silent_s = 1.5"), 0.0);
-}
-
-fn motor_speed(robot: &Robot) -> f64 {
-    robot.motors[1].speed
 }
 
 #[test]
@@ -242,22 +216,17 @@ fn enabling_and_a_speed_reach_their_channel() {
         limit_ms: None,
     };
     send(&mut robot, Command::Motion(other));
-    robot.advance_to_next_tick();
-    assert_eq!(robot.ground_truth().v, 0.0, "channel 4 drives no wheel");
+    assert_eq!(after(&mut robot, 1).v, 0.0, "channel 4 drives no wheel");
 }
 
 #[test]
 fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
     let mut robot = robot("world.wall = [{ points = [[0.5, -1], [0.5, 1]] }]");
-    assert!((robot.ground_truth().clearance_m - 0.31).abs() < 1e-12);
+    near(robot.ground_truth().clearance_m, 0.31, 1e-12);
     send(&mut robot, forward(2000, None));
-    robot.advance_to_next_tick();
-    let first = robot.ground_truth();
+    let first = after(&mut robot, 1);
     assert!(first.clearance_m < 0.31 && first.contacts == 0);
-    for _ in 0..7 {
-        robot.advance_to_next_tick();
-    }
-    let ground_truth = robot.ground_truth();
+    let ground_truth = after(&mut robot, 7);
     assert_eq!(ground_truth.contacts, 1);
     assert!((0.0..1e-6).contains(&ground_truth.clearance_m), "{ground_truth:?}");
     assert_eq!(ground_truth.v, 0.0, "the wall holds it");
@@ -272,32 +241,22 @@ fn a_line_of_truth_has_the_names_that_its_readers_know() {
 }
 
 #[test]
-fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says() {
-    let mut robot = robot(
-        "[sonar]\nindex = 3\n[simulation.sonar]\nnoise_m = 0\nnoise_per_m = 0\n[[world.wall]]\npoints = [[1, -1], [1, 1]]\n[[world.drum]]\nat = [0, 1]\nradius_m = 0.5",
-    );
-    let Some(Report::Standard(sensors)) = streamed(&mut robot).1.first().copied() else {
-        panic!("no standard frame");
-    };
+fn the_front_ranger_and_its_neighbours_fill_the_bytes_the_mission_says_and_hear_each_other() {
+    let sonar = "[simulation.sonar]\nnoise_m = 0\nnoise_per_m = 0\n";
+    let mut robot = robot(&format!(
+        "[sonar]\nindex = 3\n{sonar}[[world.wall]]\npoints = [[1, -1], [1, 1]]\n[[world.drum]]\nat = [0, 1]\nradius_m = 0.5"
+    ));
     // A wall is 1 - 0.1915 m ahead. The drum is 45 degrees off the left ranger, which hears its
     // flank or nothing. The right ranger meets only the wall's end.
-    assert_eq!(sensors.ultrasonic[3], 81);
-    assert_eq!(sensors.ultrasonic[0], 255);
-    assert_eq!(sensors.ultrasonic[1], 255);
-    assert_eq!(sensors.ultrasonic[5], 255);
-    assert_ne!(sensors.ultrasonic[4], 255);
+    let [first, second, _, front, left, right] = standard(&mut robot).ultrasonic;
+    assert_eq!([first, second, front, right], [255, 255, 81, 255]);
+    assert_ne!(left, 255);
     assert_eq!(robot.ground_truth().sonar_cm, 81);
-}
-
-#[test]
-fn with_crosstalk_a_ranger_hears_its_neighbours_answer() {
-    let sonar = "[simulation.sonar]\nnoise_m = 0\nnoise_per_m = 0\ncrosstalk_share = 1";
     // Only the left ranger, at 45 degrees, has an obstacle in its cone: a drum 1 m from the centre.
-    let mut robot = robot(&format!("{sonar}\n[[world.drum]]\nat = [1, 1]\nradius_m = 0.414213562"));
-    let Some(Report::Standard(sensors)) = streamed(&mut robot).1.first().copied() else {
-        panic!("no standard frame");
-    };
-    assert_eq!(sensors.ultrasonic[..3], [81, 81, 255]);
+    let crosstalk = self::robot(&format!(
+        "{sonar}crosstalk_share = 1\n[[world.drum]]\nat = [1, 1]\nradius_m = 0.414213562"
+    ));
+    assert_eq!(standard(&mut { crosstalk }).ultrasonic[..3], [81, 81, 255]);
 }
 
 #[test]
@@ -315,15 +274,11 @@ fn reading_the_frames_again_draws_nothing() {
 #[test]
 fn batteries_drain_as_the_mission_says() {
     let mut robot = robot("[simulation.battery]\nstart_v = 8\ndrain_v_per_min = 1");
-    let volts = |robot: &mut Robot| match streamed(robot).1.first() {
-        Some(Report::Standard(sensors)) => common::wire::volts(sensors.board_battery, 9.0),
-        other => panic!("{other:?}"),
-    };
-    assert!((volts(&mut robot) - 8.0).abs() < 0.01);
-    for _ in 0..7 * 60 {
-        robot.advance_to_next_tick();
+    for want in [8.0, 7.0] {
+        let volts = common::wire::volts(standard(&mut robot).board_battery, 9.0);
+        near(volts, want, 0.01);
+        after(&mut robot, 7 * 60);
     }
-    assert!((volts(&mut robot) - 7.0).abs() < 0.01);
 }
 
 #[test]
@@ -331,15 +286,12 @@ fn a_thing_that_moves_into_the_robot_pushes_it_and_is_a_contact() {
     let mut robot = robot(
         "[[simulation.thing]]\nshape.drum = [{ at = [2, 0], radius_m = 0.3 }]\nmoves = [{ at_s = 0, by = [0, 0] }, { at_s = 2, by = [-2, 0] }]",
     );
-    for _ in 0..21 {
-        robot.advance_to_next_tick();
-    }
-    let ground_truth = robot.ground_truth();
+    let ground_truth = after(&mut robot, 21);
     assert!((ground_truth.x + 0.49).abs() < 0.01, "{ground_truth:?}");
     assert_eq!(ground_truth.contacts, 1);
     let back = 0.49 / (std::f64::consts::TAU * 0.085 / 1200.0);
     let counted = 32_768.0 - f64::from(ground_truth.left_counts);
-    assert!((counted - back).abs() < 25.0, "{counted} counts for {back}");
+    near(counted, back, 25.0);
 }
 
 proptest! {
@@ -391,14 +343,12 @@ fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_it
     assert!(driving.v > 0.2, "{driving:?}");
     first.come_to_rest(|_| ());
     let saved = first.saved_state();
-    let mission = mission("simulation.realism = 'measured'");
-    let mut next = Robot::restored(&mission, &saved);
+    let mut next = Robot::restored(&ideal("simulation.realism = 'measured'"), &saved);
     assert_eq!(next.saved_state(), saved);
     let stands = next.ground_truth();
     assert!(stands.x > driving.x + 0.05, "it rolled on: {stands:?}");
     assert_eq!(stands.v, 0.0);
-    next.advance_to_next_tick();
-    let later = next.ground_truth();
+    let later = after(&mut next, 1);
     assert_eq!((later.x, later.y), (stands.x, stands.y), "it stands");
     assert!(later.time_s > driving.time_s && later.tick > driving.tick);
     // Restarted counts would show zero.
@@ -406,50 +356,44 @@ fn a_robot_left_driving_comes_to_rest_and_its_next_process_goes_on_there_with_it
     assert!((50..600).contains(&rolled), "{rolled} counts");
 }
 
-#[test]
-fn a_robot_that_speaks_lines_of_json_says_that_its_wheels_are_held_before_a_wall_and_not_as_they_roll()
- {
-    use common::json_wire::{Report, parse};
-    let wall = "robot.model = 'kobuki'\nworld.wall = [{ points = [[1, -2], [1, 2]] }]";
-    let mut robot = robot(wall);
+/// Drives a Kobuki for 20 ticks at these speeds, rad/s. Returns what it says of each.
+fn kobuki(world: &str, wheels: [f64; 2]) -> Vec<common::json_wire::Report> {
+    let mut robot = robot(&format!("robot.model = 'kobuki'\n{world}"));
     robot.on_order(&Order::Hello { rate_hz: 7.0 }, &mut Vec::new());
-    let mut held = Vec::new();
-    for _ in 0..20 {
-        // 16 rad/s are 0.56 m/s.
-        let drive = Order::Drive { wheels: [16.0; 2], twist: [0.56, 0.0], for_s: 0.25 };
+    let said = |_| {
+        let drive = Order::Drive { wheels, twist: [0.0; 2], for_s: 0.5 };
         robot.on_order(&drive, &mut Vec::new());
         robot.advance_to_next_tick();
         let mut line = Vec::new();
         robot.stream(&mut line);
-        held.push(parse::<Report>(&line).unwrap().held);
-    }
-    assert_eq!(held[1..8], [Some([false; 2]); 7], "it rolls");
-    assert_eq!(held[19], Some([true; 2]), "it stands before the wall");
+        common::json_wire::parse(&line).unwrap()
+    };
+    (0..20).map(said).collect()
+}
+
+#[test]
+fn a_robot_that_speaks_lines_of_json_says_that_its_wheels_are_held_before_a_wall_and_not_as_they_roll()
+ {
+    // 16 rad/s are 0.56 m/s.
+    let said = kobuki("world.wall = [{ points = [[1, -2], [1, 2]] }]", [16.0; 2]);
+    let held = |tick: usize| said[tick].held;
+    assert!((1..8).all(|tick| held(tick) == Some([false; 2])), "it rolls");
+    assert_eq!(held(19), Some([true; 2]), "it stands before the wall");
 }
 
 #[test]
 fn a_bumper_feels_what_the_body_touches_on_its_side_and_a_cliff_sensor_where_there_is_no_floor() {
-    let felt = |world: &str, wheels: [f64; 2]| {
-        let text = format!("target = [0, -5]\nrobot.model = 'kobuki'\n{world}");
-        let mut robot = Robot::new(&Mission::parse(&text, Path::new("m.toml")).unwrap());
-        let mut said = Vec::new();
-        robot.on_order(&Order::Hello { rate_hz: 7.0 }, &mut said);
-        for _ in 0..14 {
-            let drive = Order::Drive { wheels, twist: [0.0; 2], for_s: 0.5 };
-            robot.on_order(&drive, &mut said);
-            robot.advance_to_next_tick();
-        }
-        said.clear();
-        robot.stream(&mut said);
-        let report: common::json_wire::Report = common::json_wire::parse(&said).unwrap();
-        let names = report.touched.into_iter().filter(|(_, feels)| *feels).map(|(name, _)| name);
-        names.collect::<Vec<_>>().join(" ")
-    };
     let board = "world.box = [{ at = [0.5, 0], size_m = [0.2, 2], top_m = 0.1 }]";
-    assert_eq!(felt(board, [8.0, 8.0]), "bumper-center");
-    assert_eq!(felt(board, [0.0, 0.0]), "");
     let post = "world.drum = [{ at = [0.4, 0.17], radius_m = 0.05 }]";
-    assert_eq!(felt(post, [8.0, 8.0]), "bumper-left");
     let hole = "simulation.hole = [{ at = [0.4, 0], size_m = [0.4, 0.1] }]";
-    assert_eq!(felt(hole, [2.0, 2.0]), "cliff-center");
+    for (world, speed, felt) in [
+        (board, 8.0, "bumper-center"),
+        (board, 0.0, ""),
+        (post, 8.0, "bumper-left"),
+        (hole, 2.0, "cliff-center"),
+    ] {
+        let touched = kobuki(world, [speed; 2]).swap_remove(13).touched.into_iter();
+        let names: Vec<_> = touched.filter(|(_, feels)| *feels).map(|(name, _)| name).collect();
+        assert_eq!(names.join(" "), felt, "{world}");
+    }
 }

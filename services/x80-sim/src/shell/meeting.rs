@@ -250,11 +250,12 @@ impl Meeting {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::mission;
     use std::{os::unix::net::UnixStream, path::Path};
 
     /// Returns two robots that meet; `waits` is in lockstep.
     fn pair(folder: &Path, waits: bool) -> [Meeting; 2] {
-        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        let mission = mission("");
         let sockets = ["one", "two"].map(|robot| folder.join(robot));
         // Waits end at once, because the other end is closed.
         let (stop, _) = UnixStream::pair().unwrap();

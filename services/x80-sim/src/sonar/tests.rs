@@ -1,121 +1,92 @@
 //! Tests with hand-computed ranges, in the laboratory and with smooth walls.
 
-use std::path::Path;
-
-use common::mission::{Mission, Realism};
+use common::mission::Realism;
 
 use super::*;
 use crate::noise::Source;
+use crate::testing::{mission, near};
 
-fn heard_in(text: &str, physics: &SonarPhysics, heading_deg: f64) -> f64 {
-    let text = format!("target = [0, -5]\n{text}");
-    let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-    let pose = Pose2 { position: DVec2::ZERO, heading: heading_deg.to_radians() };
+fn heard_in(text: &str, physics: &SonarPhysics, heading_deg: i32) -> f64 {
+    let heading = f64::from(heading_deg).to_radians();
+    let pose = Pose2 { position: DVec2::ZERO, heading };
     let mut noise = Noise::new(1, Source::Sonar);
-    listen(&World::new(&mission), pose.position, pose, physics, &mut noise)
+    listen(&World::new(&mission(text)), pose.position, pose, physics, &mut noise)
 }
 
-fn laboratory(text: &str, heading_deg: f64) -> f64 {
-    let physics = SonarPhysics::preset(Realism::Laboratory);
-    heard_in(text, &physics, heading_deg)
+/// Asserts the range in the laboratory.
+#[track_caller]
+fn laboratory(text: &str, heading_deg: i32, want: f64) {
+    close(heard_in(text, &SonarPhysics::preset(Realism::Laboratory), heading_deg), want);
 }
 
-/// Returns the range with measured reflections but no random errors.
-fn smooth(text: &str, heading_deg: f64) -> f64 {
-    let physics = SonarPhysics {
+/// Measured reflections, and no random errors.
+fn reflections() -> SonarPhysics {
+    SonarPhysics {
         edge_share: 0.0,
         multipath_share: 0.0,
         dropout_share: 0.0,
         weak_dropout_share: 0.0,
         false_echo_share: 0.0,
         ..SonarPhysics::preset(Realism::Measured)
-    };
-    heard_in(text, &physics, heading_deg)
+    }
 }
 
+fn smooth(text: &str, heading_deg: i32) -> f64 {
+    heard_in(text, &reflections(), heading_deg)
+}
+
+#[track_caller]
 fn close(got: f64, want: f64) {
-    assert!((got - want).abs() < 1e-9, "heard {got} m, want {want} m");
+    assert!(got == want || (got - want).abs() < 1e-9, "heard {got} m, want {want} m");
 }
 
 const WALL: &str = "world.wall = [{ points = [[1.5, -3], [1.5, 3]] }]";
 const DRUM: &str = "world.drum = [{ at = [2, 0], radius_m = 0.5 }]";
 
-#[test]
-fn the_nearest_point_in_the_cone_answers() {
-    close(laboratory(WALL, 0.0), 1.5);
-    close(laboratory(WALL, 10.0), 1.5);
-    // The axis is 40 degrees off the normal; the cone's near edge meets the wall at 25 degrees.
-    close(laboratory(WALL, 40.0), 1.5 / 25_f64.to_radians().cos());
-    close(laboratory(DRUM, 14.0), 1.5);
-    assert_eq!(laboratory(DRUM, 32.0), f64::INFINITY, "out of the cone");
-}
+const NOTHING: f64 = f64::INFINITY;
 
 #[test]
-fn a_drum_half_out_of_the_cone_answers_with_its_flank() {
+fn the_nearest_point_in_the_cone_and_in_reach_answers_and_hides_what_is_behind_it_unless_it_is_low()
+{
+    laboratory(WALL, 0, 1.5);
+    laboratory(WALL, 10, 1.5);
+    // The axis is 40 degrees off the normal; the cone's near edge meets the wall at 25 degrees.
+    laboratory(WALL, 40, 1.5 / 25_f64.to_radians().cos());
+    laboratory(DRUM, 14, 1.5);
+    laboratory(DRUM, 32, NOTHING);
     // The cone's edge passes 5 degrees beside a centre at 20 degrees: 2 cos 5 - sqrt(.25 - (2 sin
     // 5)^2).
     let (sin, cos) = 5_f64.to_radians().sin_cos();
-    let want = 2.0 * cos - (0.25 - 4.0 * sin * sin).sqrt();
-    close(laboratory(DRUM, 20.0), want);
+    laboratory(DRUM, 20, 2.0 * cos - (0.25 - 4.0 * sin * sin).sqrt());
+    let post = format!("{WALL}\nworld.drum = [{{ at = [1, 0], radius_m = 0.1 }}]");
+    laboratory(&post, 0, 0.9);
+    let end_of_wall = DVec2::new(1.0, 0.1).length();
+    laboratory("world.wall = [{ points = [[1, 0.1], [1, 3]] }]", 0, end_of_wall);
+    laboratory("world.wall = [{ points = [[2.56, -1], [2.56, 1]] }]", 0, NOTHING);
+    // A hard thing thicker than a post is heard as far as the ranger reaches.
+    laboratory("world.drum = [{ at = [2.564, 0], radius_m = 0.015 }]", 0, 2.549);
+    // The cone meets an object 0.05 m high from 0.13 m / tan(15 degrees) = 0.49 m on.
+    let low =
+        format!("{WALL}\nworld.box = [{{ at = [0.35, 0], size_m = [0.1, 2], top_m = 0.05 }}]");
+    laboratory(&low, 0, 1.5);
 }
 
 #[test]
-fn a_post_before_a_wall_hides_it_and_the_end_of_a_wall_is_heard() {
-    close(
-        laboratory(&format!("{WALL}\nworld.drum = [{{ at = [1, 0], radius_m = 0.1 }}]"), 0.0),
-        0.9,
-    );
-    close(
-        laboratory("world.wall = [{ points = [[1, 0.1], [1, 3]] }]", 0.0),
-        DVec2::new(1.0, 0.1).length(),
-    );
-}
-
-#[test]
-fn nothing_beyond_the_reach_is_heard() {
-    assert_eq!(
-        laboratory("world.wall = [{ points = [[2.56, -1], [2.56, 1]] }]", 0.0),
-        f64::INFINITY
-    );
-}
-
-#[test]
-fn a_smooth_wall_answers_square_on_and_not_when_oblique() {
-    close(smooth(WALL, 0.0), 1.5);
-    close(smooth("world.wall = [{ points = [[0.5, -3], [0.5, 3]] }]", 20.0), 0.5);
-    assert_eq!(smooth(WALL, 24.0), f64::INFINITY);
-    assert_eq!(smooth(WALL, 45.0), f64::INFINITY);
-}
-
-#[test]
-fn an_oblique_smooth_wall_hides_what_stands_behind_it() {
-    // The wall crosses the axis at 45 degrees; the drum behind it is square on.
-    let scene = "world.wall = [{ points = [[0, -1], [2, 1]] }]\nworld.drum = [{ at = [2, 0], radius_m = 0.5 }]";
-    assert_eq!(smooth(scene, 0.0), f64::INFINITY);
-}
-
-#[test]
-fn a_drum_answers_over_a_wider_angle_than_a_wall() {
-    // Both are 24 degrees off the axis of a ranger at 0.5 m.
+fn a_smooth_wall_answers_square_on_and_not_when_oblique_though_it_hides_what_stands_behind_it() {
     let near_wall = "world.wall = [{ points = [[0.5, -3], [0.5, 3]] }]";
-    let near_drum = "world.drum = [{ at = [0.7, 0], radius_m = 0.2 }]";
-    assert_eq!(smooth(near_wall, 24.0), f64::INFINITY);
-    assert!(smooth(near_drum, 24.0) < 0.55);
-}
-
-#[test]
-fn an_oblique_wall_throws_the_beam_on_to_a_square_one() {
-    // The path is 1.8 m: 1 m to a wall at 45 degrees ahead, then 0.8 m to a wall on the left.
-    let scene =
+    let behind = "world.wall = [{ points = [[0, -1], [2, 1]] }]\nworld.drum = [{ at = [2, 0], radius_m = 0.5 }]";
+    close(smooth(WALL, 0), 1.5);
+    close(smooth(near_wall, 20), 0.5);
+    for (oblique, heading_deg) in [(WALL, 24), (WALL, 45), (behind, 0), (near_wall, 24)] {
+        close(smooth(oblique, heading_deg), NOTHING);
+    }
+    // A drum answers over a wider angle.
+    assert!(smooth("world.drum = [{ at = [0.7, 0], radius_m = 0.2 }]", 24) < 0.55);
+    // The beam goes on: 1 m to a wall at 45 degrees ahead, then 0.8 m to a wall on the left.
+    let thrown =
         "world.wall = [{ points = [[0.9, -0.1], [1.3, 0.3]] }, { points = [[0, 0.8], [3, 0.8]] }]";
-    let physics = SonarPhysics {
-        multipath_share: 1.0,
-        edge_share: 0.0,
-        dropout_share: 0.0,
-        false_echo_share: 0.0,
-        ..SonarPhysics::preset(Realism::Measured)
-    };
-    close(heard_in(scene, &physics, 0.0), 1.8);
+    let physics = SonarPhysics { multipath_share: 1.0, ..reflections() };
+    close(heard_in(thrown, &physics, 0), 1.8);
 }
 
 #[test]
@@ -125,8 +96,7 @@ fn answers_are_lost_and_invented_as_often_as_the_mission_says() {
         false_echo_share: 0.05,
         ..SonarPhysics::preset(Realism::Laboratory)
     };
-    let mission = Mission::parse(&format!("target = [0, -5]\n{WALL}"), Path::new("m")).unwrap();
-    let world = World::new(&mission);
+    let world = World::new(&mission(WALL));
     let mut noise = Noise::new(2, Source::Sonar);
     let pings = 20_000;
     let heard: Vec<f64> = (0..pings)
@@ -136,7 +106,7 @@ fn answers_are_lost_and_invented_as_often_as_the_mission_says() {
         heard.iter().filter(|range| want(**range)).count() as f64 / f64::from(pings)
     };
     let lost = share(|range| range > REACH_M);
-    assert!((lost - 0.1 * 0.95).abs() < 0.01, "{lost} were lost");
+    near(lost, 0.1 * 0.95, 0.01);
     let short = share(|range| range < 1.499);
     // The range that replaces a lost echo may be beyond the wall.
     assert!((0.04..=0.055).contains(&short), "{short} were short");
@@ -150,8 +120,8 @@ fn the_byte_has_the_noise_of_its_range_and_whole_centimetres() {
     let mean = bytes.iter().sum::<f64>() / bytes.len() as f64;
     let sd = (bytes.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / bytes.len() as f64).sqrt();
     // 1 cm + 0.5 % of 2 m is 2 cm; rounding adds 1/12 cm^2.
-    assert!((mean - 200.0).abs() < 0.1, "{mean}");
-    assert!((sd - (4.0_f64 + 1.0 / 12.0).sqrt()).abs() < 0.05, "{sd}");
+    near(mean, 200.0, 0.1);
+    near(sd, (4.0_f64 + 1.0 / 12.0).sqrt(), 0.05);
     assert_eq!(byte(f64::INFINITY, &physics, &mut noise), 255);
 }
 
@@ -162,7 +132,7 @@ fn reach_of(radius_m: f64, echo: f64) -> f64 {
         let scene = format!(
             "world.drum = [{{ at = [{at}, 0], radius_m = {radius_m}, echo = {echo} }}]\nrobot.radius_m = 0.01"
         );
-        smooth(&scene, 0.0).is_finite()
+        smooth(&scene, 0).is_finite()
     };
     f64::from((5..=255).rev().find(is_heard).unwrap_or(0)) / 100.0
 }
@@ -178,37 +148,18 @@ fn a_thin_post_is_heard_less_far_than_a_drum_and_a_soft_one_less_far_still() {
 }
 
 #[test]
-fn in_the_laboratory_every_hard_thing_thicker_than_a_post_is_heard_as_far_as_the_ranger_reaches() {
-    let leg = "world.drum = [{ at = [2.564, 0], radius_m = 0.015 }]";
-    close(laboratory(leg, 0.0), 2.549);
-}
-
-#[test]
-fn what_is_low_hides_nothing_that_is_higher() {
-    let scene =
-        format!("{WALL}\nworld.box = [{{ at = [0.35, 0], size_m = [0.1, 2], top_m = 0.05 }}]");
-    // The cone meets an object 0.05 m high from 0.13 m / tan(15 degrees) = 0.49 m on.
-    close(laboratory(&scene, 0.0), 1.5);
-}
-
-#[test]
 fn a_sensor_at_or_within_the_bodys_edge_never_looks_through_a_wall_that_the_body_touches() {
     // A body of 0.19 m with its centre at x = 1 touches the wall at x = 1.19; another wall is 2.33
     // m behind.
-    let text = "target = [0, -5]\nworld.wall = [{ points = [[1.19, -3], [1.19, 3]] }, { points = [[3.52, -3], [3.52, 3]] }]";
-    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-    let world = World::new(&mission);
+    let world = World::new(&mission(
+        "world.wall = [{ points = [[1.19, -3], [1.19, 3]] }, { points = [[3.52, -3], [3.52, 3]] }]",
+    ));
     let mut noise = Noise::new(1, Source::Sonar);
     for realism in [Realism::Laboratory, Realism::Measured] {
         let physics = SonarPhysics::preset(realism);
-        for forward_m in [0.19, 0.1915, 0.2] {
+        for (forward_m, want) in [(0.19, 0.0), (0.1915, 0.0), (0.2, 0.0), (0.1, 0.09)] {
             let pose = Pose2 { position: DVec2::new(1.0 + forward_m, 0.0), heading: 0.0 };
-            let range = listen(&world, DVec2::X, pose, &physics, &mut noise);
-            close(range, 0.0);
+            close(listen(&world, DVec2::X, pose, &physics, &mut noise), want);
         }
     }
-    let within = Pose2 { position: DVec2::new(1.1, 0.0), heading: 0.0 };
-    let physics = SonarPhysics::preset(Realism::Laboratory);
-    let range = listen(&world, DVec2::X, within, &physics, &mut noise);
-    close(range, 0.09);
 }

@@ -3,27 +3,21 @@
 use common::{
     clock::Pace,
     ground_truth::GroundTruthTick,
-    wire::{Addressing, Command, Decoder, Report},
+    wire::{Decoder, Report},
 };
 
-use crate::support::{Sim, receive};
-
-fn forward(counts: i16) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    Command::velocity([Some(-counts), Some(counts)], 150).encode(Addressing::Numbered, &mut bytes);
-    bytes
-}
+use crate::support::{Sim, forward, receive, reports};
 
 /// Drives in lockstep for `rounds` of `at_once` commands. Returns received bytes and ground truth.
 fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<GroundTruthTick>) {
-    let mut sim = Sim::start(mission, Pace::Max);
+    let sim = Sim::start(mission, Pace::Max);
     let host = sim.host();
     let mut bytes = Vec::new();
     let mut motor_frames = 0;
     let mut decoder = Decoder::default();
     for _ in 0..rounds {
         for _ in 0..at_once {
-            host.send(&forward(400)).unwrap();
+            host.send(&forward(400, 150)).unwrap();
         }
         let before = motor_frames;
         while motor_frames < before + at_once {
@@ -36,8 +30,7 @@ fn lock_step(mission: &str, rounds: usize, at_once: usize) -> (Vec<u8>, Vec<Grou
         }
     }
     // Ground truth is written before a tick's frames.
-    sim.finish();
-    (bytes, std::iter::from_fn(|| sim.last_truth()).collect())
+    (bytes, sim.truth())
 }
 
 const OUT_HALF_THE_TIME: &str = "robot.rate_hz = 20\nperimeter.width_m = 200\n[simulation.radio]\noutage_share = 0.5\noutage_mean_s = 0.7\nsplit_share = 0.2\ndelay_s = 0.005\njitter_s = 0.003";
@@ -62,12 +55,8 @@ fn in_lock_step_a_lost_command_is_not_acknowledged_and_moves_nothing() {
     let mission =
         "perimeter.width_m = 200\nsimulation.wheels.lag_s = 0\nsimulation.radio.loss_share = 0.3";
     let (bytes, ground_truth) = lock_step(mission, 200, 1);
-    let mut decoder = Decoder::default();
-    decoder.push(&bytes);
-    let mut acks: u16 = 0;
-    while let Some(frame) = decoder.next_frame() {
-        acks += u16::from(matches!(Report::parse(&frame), Ok(Report::System(_))));
-    }
+    let is_ack = |report: &Report| matches!(report, Report::System(_));
+    let acks = reports(&bytes).into_iter().filter(is_ack).count() as u16;
     assert!((120..160).contains(&acks), "{acks} of 200 commands were acknowledged");
     // The wheel turns 400 counts/s for the period of 1/7 s, or for all of the 150 ms if no command
     // follows.
@@ -114,7 +103,7 @@ fn in_an_outage_a_robot_that_obeys_time_or_minds_silence_is_soon_at_rest() {
 
 #[test]
 fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
-    let mut sim = Sim::start(
+    let sim = Sim::start(
         "robot.rate_hz = 50\n[simulation.radio]\nloss_share = 0.1\ndelay_s = 0.02\njitter_s = 0.02\nduplicate_share = 0.1\nreorder_share = 0.1\nsplit_share = 0.1\nmerge_share = 0.1",
         Pace::Rate(5.0),
     );
@@ -124,7 +113,7 @@ fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
     while motor_frames < 100 {
         // Without a peer, the robot sends nothing until a command arrives.
         host.set_read_timeout(Some(std::time::Duration::from_millis(20))).unwrap();
-        host.send(&forward(0)).unwrap();
+        host.send(&forward(0, 150)).unwrap();
         let mut buffer = [0; 4096];
         let Ok(length) = host.recv(&mut buffer) else {
             continue;
@@ -135,8 +124,7 @@ fn at_a_rate_every_frame_that_comes_through_the_worst_radio_is_sound() {
             motor_frames += usize::from(matches!(report, Report::Motor(_)));
         }
     }
-    sim.finish();
-    let last = std::iter::from_fn(|| sim.last_truth()).last().unwrap();
+    let last = sim.truth().pop().unwrap();
     assert!(last.tick < 400, "100 motor frames of {} ticks", last.tick);
     assert!(last.radio.unwrap().lost > 0);
 }

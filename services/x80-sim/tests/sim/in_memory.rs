@@ -12,12 +12,12 @@ use common::{
     ground_truth::GroundTruthTick,
     json_wire::{Order, line},
     machine::{Files, Machine, MachineWire, simulate},
-    wire::{Addressing, Command, SystemSignal},
+    wire::{Command, SystemSignal},
 };
 use rplidar_protocol::START;
 use x80_sim::InMemory;
 
-use crate::support::{Sim, mission};
+use crate::support::{Sim, encoded, forward, mission};
 
 const fn wire(port: u16) -> SocketAddr {
     SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::LOCALHOST, port))
@@ -26,16 +26,6 @@ const fn wire(port: u16) -> SocketAddr {
 const HOST: SocketAddr = wire(7);
 const LASER: SocketAddr = wire(8);
 
-fn x80(command: Command) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    command.encode(Addressing::Numbered, &mut bytes);
-    bytes
-}
-
-fn forward() -> Vec<u8> {
-    x80(Command::velocity([Some(-400), Some(400)], 250))
-}
-
 #[test]
 fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
     let world =
@@ -43,19 +33,19 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
     let radio = format!("{world}\n[simulation.radio]\nloss_share = 0.2\nsplit_share = 0.3");
     let json = format!("robot.model = 'turtlebot3-waffle'\n{world}");
     let drive = line(&Order::Drive { wheels: [4.0, 3.0], twist: [0.1, 0.1], for_s: 0.25 });
-    let ping = x80(Command::System(SystemSignal::Ping));
+    let ping = encoded(Command::System(SystemSignal::Ping));
     let json_ping = line(&Order::Ping {});
     let arduino = format!(
         "robot.protocol = 'arduino'\nrobot.counts_per_turn = 1320\n{world}\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0\nbearing_deg = 0"
     );
     let requests = [b"e\rm 30 20\r".to_vec(), vec![START, 0x20]];
     for (text, orders) in [
-        (world, [forward(), ping.clone()]),
-        (&radio, [forward(), ping]),
+        (world, [forward(400, 250), ping.clone()]),
+        (&radio, [forward(400, 250), ping]),
         (&json, [drive, json_ping]),
         (&arduino, requests),
     ] {
-        let mut sim = Sim::start(text, Pace::Max);
+        let sim = Sim::start(text, Pace::Max);
         let hosts = [(HOST, sim.host()), (LASER, sim.host())];
         let mut robot = InMemory::start(&mission(text), Pace::Max, None).unwrap();
         assert_eq!(robot.next_due_ns(), None);
@@ -70,13 +60,10 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
                 assert!(datagram == buffer[..length], "{text}");
             }
         }
-        sim.finish();
         let as_told = |tick: GroundTruthTick| -> GroundTruthTick {
             serde_json::from_str(&serde_json::to_string(&tick).unwrap()).unwrap()
         };
-        let process =
-            std::iter::once(sim.next_truth()).chain(std::iter::from_fn(|| sim.last_truth()));
-        let process: Vec<_> = process.collect();
+        let process = sim.truth();
         assert!(process.len() > 30, "{text}");
         assert_eq!(robot.truth().map(as_told).collect::<Vec<_>>(), process, "{text}");
     }
@@ -125,7 +112,7 @@ fn at_a_rate_it_lives_by_the_machines_clock_and_the_next_one_starts_where_it_cam
     simulate(clock.clone(), || {
         let mission = mission("robot.rate_hz = 7");
         let mut robot = InMemory::start(&mission, Pace::Rate(3.0), None).unwrap();
-        robot.hear(HOST, &forward()).unwrap();
+        robot.hear(HOST, &forward(400, 250)).unwrap();
         let mut truth: Vec<_> = robot.truth().collect();
         while truth.len() <= 21 {
             turn(&mut robot);
@@ -136,7 +123,7 @@ fn at_a_rate_it_lives_by_the_machines_clock_and_the_next_one_starts_where_it_cam
         let last = truth[21];
         assert!(last.x > 0.02 && last.v == 0.0 && last.time_s == 3.0, "{last:?}");
 
-        robot.hear(HOST, &forward()).unwrap();
+        robot.hear(HOST, &forward(400, 250)).unwrap();
         turn(&mut robot);
         let mut robot =
             InMemory::start(&mission, Pace::Rate(3.0), Some(&robot.end().unwrap())).unwrap();

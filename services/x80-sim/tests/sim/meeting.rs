@@ -6,14 +6,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use common::{
-    clock::Pace,
-    ground_truth::GroundTruthTick,
-    wire::{Addressing, Command},
-};
+use common::{clock::Pace, ground_truth::GroundTruthTick};
 use x80_sim::Transport;
 
-use crate::support::{Sim, receive};
+use crate::support::{Sim, forward, receive};
 
 const DIAMETER_M: f64 = 0.38;
 
@@ -30,10 +26,7 @@ fn pair(folder: &Path, text: &str) -> [(Sim, UdpSocket); 2] {
 }
 
 fn tick((sim, host): &mut (Sim, UdpSocket), counts: i16) -> GroundTruthTick {
-    let mut bytes = Vec::new();
-    let command = Command::velocity([Some(-counts), Some(counts)], 250);
-    command.encode(Addressing::Numbered, &mut bytes);
-    host.send(&bytes).unwrap();
+    host.send(&forward(counts, 250)).unwrap();
     receive(host);
     sim.next_truth()
 }

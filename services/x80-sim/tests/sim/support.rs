@@ -14,6 +14,7 @@ use common::{
     clock::Pace,
     ground_truth::{GroundTruthHeader, GroundTruthTick},
     mission::{Mission, Realism},
+    wire::{Addressing, Command, Decoder, Report},
 };
 use x80_sim::{SimError, SimOptions, Transport, run};
 
@@ -28,6 +29,22 @@ pub(crate) fn mission(text: &str) -> Mission {
         mission.simulation.realism = Realism::Laboratory;
     }
     mission
+}
+
+pub(crate) fn encoded(command: Command) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    command.encode(Addressing::Numbered, &mut bytes);
+    bytes
+}
+
+pub(crate) fn forward(counts: i16, limit_ms: u16) -> Vec<u8> {
+    encoded(Command::velocity([Some(-counts), Some(counts)], limit_ms))
+}
+
+pub(crate) fn reports(bytes: &[u8]) -> Vec<Report> {
+    let mut decoder = Decoder::default();
+    decoder.push(bytes);
+    std::iter::from_fn(|| Some(Report::parse(&decoder.next_frame()?).unwrap())).collect()
 }
 
 pub(crate) struct Sim {
@@ -90,10 +107,10 @@ impl Sim {
         self.thread.take().unwrap().join().unwrap().unwrap();
     }
 
-    /// Returns the next tick of a finished robot.
-    pub(crate) fn last_truth(&mut self) -> Option<GroundTruthTick> {
-        let line = self.ground_truth.recv().ok()?;
-        Some(serde_json::from_str(&line).unwrap())
+    /// Finishes, and returns the unread ticks.
+    pub(crate) fn truth(mut self) -> Vec<GroundTruthTick> {
+        self.finish();
+        self.ground_truth.iter().map(|line| serde_json::from_str(&line).unwrap()).collect()
     }
 
     pub(crate) fn host(&self) -> UdpSocket {
@@ -101,11 +118,6 @@ impl Sim {
         socket.connect(&self.listening).unwrap();
         socket.set_read_timeout(Some(PATIENCE)).unwrap();
         socket
-    }
-
-    pub(crate) fn stop(mut self) -> Result<(), SimError> {
-        drop(self.stop.take());
-        self.thread.take().unwrap().join().unwrap()
     }
 }
 

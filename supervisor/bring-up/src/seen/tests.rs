@@ -18,8 +18,11 @@ fn said(line: &str, times: u32) -> Seen {
 }
 
 fn mission_of(seen: &Seen) -> Mission {
-    let text = seen.mission_at(ADDRESS);
-    Mission::parse(&text, Path::new("m.toml")).unwrap_or_else(|error| panic!("{error}\n{text}"))
+    parsed(&seen.mission_at(ADDRESS)).unwrap()
+}
+
+fn parsed(text: &str) -> Result<Mission, String> {
+    Mission::parse(text, Path::new("m.toml")).map_err(|error| format!("{error}\n{text}"))
 }
 
 #[test]
@@ -50,7 +53,7 @@ fn a_robot_that_only_answers_or_says_nothing_of_sensors_has_a_valid_mission() {
         assert!(!seen.is_known());
         let address = if protocol == Protocol::Ros2 { "ros2:7" } else { ADDRESS };
         let text = seen.mission_at(address);
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let mission = parsed(&text).unwrap();
         assert_eq!(mission.robot.protocol(), protocol);
         assert_eq!(text.contains("ROS_DOMAIN_ID"), protocol == Protocol::Ros2);
     }
@@ -59,15 +62,15 @@ fn a_robot_that_only_answers_or_says_nothing_of_sensors_has_a_valid_mission() {
 #[test]
 fn hostile_names_are_refused_as_names_and_few_are_kept() {
     let hostile = said(r#"{"ranges":{"a\"\n[robot]\n":1}}"#, 1).mission_at(ADDRESS);
-    let refused = Mission::parse(&hostile, Path::new("m.toml")).unwrap_err().to_string();
+    let refused = parsed(&hostile).unwrap_err();
     assert!(refused.contains("invalid as a sensor name"), "{refused}");
     let mut seen = Seen::new(Protocol::Json).unwrap();
     for name in 0..1000 {
         seen.hear(format!("{{\"ranges\":{{\"n{name}\":1e300}}}}\n").as_bytes(), 0.0);
     }
     assert_eq!(seen.report.ranges.len(), MOST);
-    let refused = Mission::parse(&seen.mission_at(ADDRESS), Path::new("m.toml")).unwrap_err();
-    assert!(refused.to_string().contains("33 rows"), "{refused}");
+    let refused = parsed(&seen.mission_at(ADDRESS)).unwrap_err();
+    assert!(refused.contains("33 rows"), "{refused}");
 }
 
 #[test]

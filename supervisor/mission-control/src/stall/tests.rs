@@ -14,12 +14,9 @@ fn watch() -> StallWatch {
 }
 
 fn pose(seconds: f64, travelled_m: f64) -> PoseSample {
+    let time = MissionTime::from_seconds(seconds).0;
     PoseSample {
-        stamp: Stamp {
-            tick: MissionTime::from_seconds(seconds).0,
-            stamp_ns: MissionTime::from_seconds(seconds).0,
-            ..Stamp::default()
-        },
+        stamp: Stamp { tick: time, stamp_ns: time, ..Stamp::default() },
         travelled_m,
         ..PoseSample::default()
     }
@@ -37,111 +34,93 @@ fn parts(stall: &StallSample) -> (StallCause, RecoveryStep, u64) {
     (stall.cause(), stall.recovery(), stall.epoch)
 }
 
-#[test]
-fn a_robot_that_moves_is_left_alone() {
-    let mut watch = watch();
-    for tick in (0..100).map(f64::from) {
-        let driving = PoseSample { x_m: tick * 0.05, ..pose(tick, tick * 0.05) };
-        assert_eq!(step(&mut watch, driving, guidance(Along, 0)), None);
+/// Returns the time of each stall until one gives up, and what it says, of a robot in `poses`,
+/// led alike.
+fn stalls(
+    watch: &mut StallWatch,
+    status: GuidanceStatus,
+    poses: impl Iterator<Item = PoseSample>,
+) -> Vec<(f64, StallCause, RecoveryStep, u64)> {
+    let mut stalls = Vec::new();
+    for pose in poses {
+        let along = GuidanceSample { distance_m: 3.0, ..guidance(status, watch.epoch()) };
+        if let Some(stall) = step(watch, pose, along) {
+            let (cause, recovery, epoch) = parts(&stall);
+            stalls.push((pose.stamp.tick as f64 / 1e9, cause, recovery, epoch));
+            if recovery == GiveUp {
+                break;
+            }
+        }
     }
+    stalls
+}
+
+/// Returns poses in every second, of a robot that stands.
+fn standing(seconds: std::ops::Range<u32>) -> impl Iterator<Item = PoseSample> {
+    seconds.map(|second| pose(second.into(), 0.0))
+}
+
+#[test]
+fn a_robot_that_moves_scans_waits_or_was_held_is_not_stalled() {
+    let moving =
+        (0..100).map(f64::from).map(|it| PoseSample { x_m: it * 0.05, ..pose(it, it * 0.05) });
+    assert_eq!(stalls(&mut watch(), Along, moving), []);
+    let scanning = (0..75).map(|tick| f64::from(tick) * 0.2);
+    let scanning = scanning.map(|it| PoseSample { heading_rad: it.sin(), ..pose(it, 0.0) });
+    assert_eq!(stalls(&mut watch(), Look, scanning), []);
+    let mut held = watch();
+    for pose in standing(0..20) {
+        assert_eq!(held.step(&pose, &guidance(Along, 0), true, false), None, "held by another");
+    }
+    let mut without_ticks = watch();
+    assert_eq!(step(&mut without_ticks, pose(0.0, 0.0), guidance(Along, 0)), None);
+    without_ticks.forget_motion();
+    assert_eq!(step(&mut without_ticks, pose(20.0, 0.0), guidance(Along, 0)), None);
+    let waits_s = (FIELD_WITHIN + STALLED_AFTER).as_secs_f64();
+    let waiting = stalls(&mut watch(), Waiting, standing(0..300));
+    // The next recovery step takes as long again.
+    assert!(waiting[0].0 == waits_s && waiting[1].0 > waits_s + 5.0, "{waiting:?}");
 }
 
 #[test]
 fn a_stalled_robot_gets_a_fresh_planner_twice_then_a_fresh_belief() {
-    let mut watch = watch();
-    let along = guidance(Along, 0);
-    let stalls: Vec<_> = (0..=10)
-        .filter_map(|second| step(&mut watch, pose(f64::from(second), 0.0), along))
-        .map(|stall| parts(&stall))
-        .collect();
+    let stalls = stalls(&mut watch(), Along, standing(0..11));
+    let stalls: Vec<_> = stalls.into_iter().map(|it| (it.1, it.2, it.3)).collect();
     assert_eq!(stalls, [(Still, Replan, 0), (Still, Replan, 0), (Still, Reset, 1)]);
-}
-
-#[test]
-fn a_robot_held_by_something_else_is_not_stalled() {
-    let mut watch = watch();
-    let along = guidance(Along, 0);
-    for second in 0..20 {
-        assert_eq!(watch.step(&pose(f64::from(second), 0.0), &along, true, false), None);
-    }
-}
-
-#[test]
-fn a_robot_that_was_held_without_a_tick_is_not_stalled_at_the_next_one() {
-    let mut watch = watch();
-    let along = guidance(Along, 0);
-    assert_eq!(step(&mut watch, pose(0.0, 0.0), along), None);
-    watch.forget_motion();
-    assert_eq!(step(&mut watch, pose(20.0, 0.0), along), None);
-}
-
-#[test]
-fn a_robot_that_waits_for_a_field_is_not_stalled_until_that_takes_too_long() {
-    let mut watch = watch();
-    let waiting = guidance(Waiting, 0);
-    let first = (0..300).find(|&second| {
-        let pose = pose(f64::from(second), 0.0);
-        step(&mut watch, pose, waiting).is_some()
-    });
-    let least = FIELD_WITHIN.as_secs() as i32;
-    assert_eq!(first, Some(least + STALLED_AFTER.as_secs() as i32));
-    // The next recovery step takes as long again.
-    let second = pose(f64::from(least) + 10.0, 0.0);
-    assert_eq!(step(&mut watch, second, waiting), None);
 }
 
 #[test]
 fn what_a_robot_did_while_it_was_not_to_drive_is_no_stall() {
     let mut watch = watch();
-    let along = guidance(Along, 0);
-    let cut_off = guidance(Unreachable, 0);
-    assert_eq!(step(&mut watch, pose(0.0, 0.0), along), None);
-    assert_eq!(step(&mut watch, pose(0.5, 0.0), cut_off), None);
-    let resumed = pose(20.0, 0.0);
-    watch.hold(resumed.stamp.tick);
-    assert_eq!(watch.tick(), Some(resumed.stamp.tick));
-    assert_eq!(step(&mut watch, pose(20.2, 0.0), cut_off), None);
-    assert_eq!(step(&mut watch, pose(20.4, 0.0), along), None);
+    let said = |watch: &mut StallWatch, seconds, status| {
+        step(watch, pose(seconds, 0.0), guidance(status, 0))
+    };
+    assert_eq!(said(&mut watch, 0.0, Along), None);
+    assert_eq!(said(&mut watch, 0.5, Unreachable), None);
+    let resumed = pose(20.0, 0.0).stamp.tick;
+    watch.hold(resumed);
+    assert_eq!(watch.tick(), Some(resumed));
+    assert_eq!(said(&mut watch, 20.2, Unreachable), None);
+    assert_eq!(said(&mut watch, 20.4, Along), None);
 }
 
 #[test]
 fn a_robot_cut_off_forgets_three_times_and_gives_up() {
-    let mut watch = watch();
-    let mut stalls = Vec::new();
-    for tick in 0..100 {
-        let cut_off = guidance(Unreachable, watch.epoch());
-        let pose = pose(f64::from(tick) * 0.5, f64::from(tick));
-        stalls.extend(step(&mut watch, pose, cut_off).map(|stall| parts(&stall)));
-        if matches!(stalls.last(), Some((_, GiveUp, _))) {
-            break;
-        }
-    }
+    let poses = (0..100).map(f64::from).map(|it| pose(it * 0.5, it));
+    let stalls = stalls(&mut watch(), Unreachable, poses);
     let steps = [(Reset, 1), (Reset, 2), (Reset, 3), (GiveUp, 3)];
+    let stalls: Vec<_> = stalls.into_iter().map(|it| (it.1, it.2, it.3)).collect();
     assert_eq!(stalls, steps.map(|(step, epoch)| (CutOff, step, epoch)));
 }
 
 #[test]
 fn a_robot_cut_off_by_the_evidential_method_looks_around_before_its_belief_is_blamed() {
     let mission = mission("");
-    let mut watch = StallWatch::new(&mission);
-    let cut_off = guidance(Unreachable, 0);
-    let turning = |second: f64| PoseSample { heading_rad: second, ..pose(second, 0.0) };
+    let turning = (0..100).map(f64::from);
+    let turning = turning.map(|it| PoseSample { heading_rad: it, ..pose(it, 0.0) });
+    let first = stalls(&mut StallWatch::new(&mission), Unreachable, turning)[0].0;
     let turn = TAU / mission.hurry().look_rad_s;
-    let first = (0..100)
-        .map(f64::from)
-        .find(|&second| step(&mut watch, turning(second), cut_off).is_some());
-    assert!(first > Some(turn) && first < Some(5.0 * turn), "{first:?}");
-}
-
-#[test]
-fn a_scan_is_no_stall() {
-    let mut watch = watch();
-    let look = guidance(Look, 0);
-    for tick in 0..75 {
-        let seconds = f64::from(tick) * 0.2;
-        let scanning = PoseSample { heading_rad: seconds.sin(), ..pose(seconds, 0.0) };
-        assert_eq!(step(&mut watch, scanning, look), None);
-    }
+    assert!(first > turn && first < 5.0 * turn, "{first}");
 }
 
 #[test]
@@ -154,24 +133,27 @@ fn an_answer_from_before_the_reset_does_not_reset_again() {
     assert_eq!(step(&mut watch, pose(2.5, 0.1), old), None);
 }
 
-fn rock(watch: &mut StallWatch, seconds: std::ops::Range<u32>) -> Vec<StallSample> {
-    let along = guidance(Along, 0);
-    let rocking = seconds.filter_map(|second| {
-        let seconds = f64::from(second);
-        let rocking = PoseSample {
-            x_m: 0.05 * seconds.sin(),
-            heading_rad: seconds,
-            ..pose(seconds, 0.05 * seconds)
-        };
-        step(watch, rocking, along)
+/// Returns the recovery steps of a robot that rocks.
+fn rock(watch: &mut StallWatch, seconds: std::ops::Range<u32>) -> Vec<RecoveryStep> {
+    let rocking = seconds.map(f64::from).map(|it| PoseSample {
+        x_m: 0.05 * it.sin(),
+        heading_rad: it,
+        ..pose(it, 0.05 * it)
     });
-    rocking.collect()
+    let stalls = stalls(watch, Along, rocking);
+    assert!(stalls.iter().all(|it| it.1 == Pinned), "{stalls:?}");
+    stalls.into_iter().map(|it| it.2).collect()
 }
 
 #[test]
 fn a_robot_that_moves_and_stays_where_it_is_gets_a_fresh_planner_twice_then_a_fresh_belief() {
-    let stalls: Vec<_> = rock(&mut watch(), 0..60).iter().map(parts).collect();
-    assert_eq!(stalls, [(Pinned, Replan, 0), (Pinned, Replan, 0), (Pinned, Reset, 1)]);
+    assert_eq!(rock(&mut watch(), 0..60), [Replan, Replan, Reset]);
+    let mut watch = watch();
+    assert_eq!(rock(&mut watch, 0..40), [Replan, Replan]);
+    let elsewhere = PoseSample { x_m: 1.0, ..pose(40.0, 3.0) };
+    step(&mut watch, elsewhere, guidance(Along, 0));
+    assert_eq!(rock(&mut watch, 41..85), [Replan, Replan], "a place that was left does not count");
+    assert_eq!(watch.recoveries(None).0, 4);
 }
 
 #[test]
@@ -204,34 +186,19 @@ fn a_robot_that_circles_what_it_should_stand_on_is_pinned_and_one_that_crawls_to
 }
 
 #[test]
-fn a_place_that_was_left_does_not_count() {
-    let mut watch = watch();
-    assert_eq!(rock(&mut watch, 0..40).len(), 2);
-    let elsewhere = PoseSample { x_m: 1.0, ..pose(40.0, 3.0) };
-    step(&mut watch, elsewhere, guidance(Along, 0));
-    let recoveries: Vec<_> = rock(&mut watch, 41..85).iter().map(StallSample::recovery).collect();
-    assert_eq!(recoveries, [Replan, Replan]);
-    assert_eq!(watch.recoveries(None).0, 4);
-}
-
-#[test]
 fn a_robot_that_drives_far_in_hazard_forgets_and_one_that_gets_out_does_not() {
-    let way_out = guidance(WayOut, 0);
-    let drive = |watch: &mut StallWatch, metres: std::ops::Range<u32>| {
-        let mut driving = metres.map(|tenths| PoseSample {
-            x_m: f64::from(tenths) * 0.1,
-            ..pose(f64::from(tenths), f64::from(tenths) * 0.1)
-        });
-        let stall = driving.find_map(|pose| step(watch, pose, way_out));
-        stall.map(|stall| parts(&stall))
+    let drive = |watch: &mut StallWatch, tenths: std::ops::Range<u32>| {
+        let driving =
+            tenths.map(f64::from).map(|it| PoseSample { x_m: it * 0.1, ..pose(it, it * 0.1) });
+        stalls(watch, WayOut, driving)
     };
-    let want = (InsideHazard, Reset, 1);
-    assert_eq!(drive(&mut watch(), 0..12), Some(want));
+    let (_, cause, recovery, epoch) = drive(&mut watch(), 0..12)[0];
+    assert_eq!((cause, recovery, epoch), (InsideHazard, Reset, 1));
     let mut watch = watch();
-    assert_eq!(drive(&mut watch, 0..8), None);
+    assert_eq!(drive(&mut watch, 0..8), []);
     let out = PoseSample { x_m: 0.8, ..pose(8.0, 0.8) };
     step(&mut watch, out, guidance(Along, 0));
-    assert_eq!(drive(&mut watch, 9..17), None);
+    assert_eq!(drive(&mut watch, 9..17), []);
 }
 
 #[test]
@@ -239,20 +206,13 @@ fn a_car_that_circles_on_its_tightest_circle_is_pinned_and_the_reason_names_the_
     let car = mission("robot.model = 'car'");
     let mut watch = StallWatch::new(&car);
     let radius = car.body().ackermann().unwrap().least_turning_radius();
-    let along = guidance(Along, 0);
-    let stall = (0..600).map(f64::from).find_map(|tick| {
-        let (seconds, travelled) = (tick / 7.0, tick / 7.0 * 0.125);
+    let circling = (0..600).map(|tick| f64::from(tick) / 7.0).map(|seconds| {
+        let travelled = seconds * 0.125;
         let turned = travelled / radius;
-        let circling = PoseSample {
-            x_m: radius * turned.sin(),
-            y_m: radius * (1.0 - turned.cos()),
-            heading_rad: turned,
-            ..pose(seconds, travelled)
-        };
-        step(&mut watch, circling, along)
+        let (x_m, y_m) = (radius * turned.sin(), radius * (1.0 - turned.cos()));
+        PoseSample { x_m, y_m, heading_rad: turned, ..pose(seconds, travelled) }
     });
-    let cause = stall.map(|stall| stall.cause());
-    assert_eq!(cause, Some(Pinned));
+    assert_eq!(stalls(&mut watch, Along, circling)[0].1, Pinned);
     let reason = words(Pinned, &car.body());
     assert!(reason.contains("least turning radius of 0.31 m"), "{reason}");
     assert!(!words(Pinned, &mission("").body()).contains("turning radius"));
@@ -311,19 +271,14 @@ fn a_robot_that_drives_three_times_as_far_as_its_target_was_away_forgets_and_in_
 
 #[test]
 fn a_robot_with_a_laser_wanders_where_it_has_been_and_not_where_it_has_not() {
-    let kobuki = mission("robot.model = 'kobuki'");
-    let first = |x_m: fn(f64) -> f64| {
-        let mut watch = StallWatch::new(&kobuki);
-        (0..200).find(|&metre| {
-            let metre = f64::from(metre);
-            let pose = PoseSample { x_m: x_m(metre), ..pose(2.0 * metre, metre) };
-            let guidance = GuidanceSample { distance_m: 3.0, ..guidance(Along, 0) };
-            step(&mut watch, pose, guidance).is_some()
-        })
-    };
-    assert_eq!(first(|metre| metre), None);
     // The limit is 12 m, plus 3 m for each of four squares.
-    assert_eq!(first(|metre| metre % 4.0), Some(24));
+    for (round_m, want) in [(1e9, None), (4.0, Some(24.0))] {
+        let mut watch = StallWatch::new(&mission("robot.model = 'kobuki'"));
+        let poses = (0..200).map(f64::from);
+        let poses = poses.map(|it| PoseSample { x_m: it % round_m, ..pose(2.0 * it, it) });
+        let first = stalls(&mut watch, Along, poses).first().map(|it| it.0 / 2.0);
+        assert_eq!(first, want, "rounds of {round_m} m");
+    }
 }
 
 #[test]
@@ -376,4 +331,15 @@ fn a_fresh_planner_that_knows_no_target_yet_does_not_make_the_next_stall_the_fir
     });
     let steps: Vec<_> = steps.collect();
     assert_eq!(steps[..3], [Replan, Replan, Reset], "{steps:?}");
+}
+
+#[test]
+fn ticks_before_another_target_are_not_checked_for_it() {
+    let mut watch = watch();
+    watch.settle(Some(3));
+    assert_eq!(watch.tick(), None, "the first tick counts the relocations");
+    step(&mut watch, PoseSample::default(), guidance(Along, 0));
+    watch.settle(Some(4));
+    watch.settle(None);
+    assert_eq!(watch.tick(), Some(4));
 }

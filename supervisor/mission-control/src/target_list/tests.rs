@@ -112,27 +112,27 @@ fn every_reason_against_a_target_has_its_answer() {
     let calibrates = mission("planner.calibration = { procedure = 'wall' }");
     let faces = TargetPoint { has_heading: 1, ..at(2.0, 0.0) };
     let nowhere = at(f64::NAN, 0.0);
+    use HoldReason::{Ending, None as Drives, Operator, StageHeld, Starting};
     #[rustfmt::skip]
     let rows = [
-        (&plain, HoldReason::None, Some(at(2.0, 0.0)), None),
-        (&plain, HoldReason::StageHeld, Some(faces), None),
-        (&plain, HoldReason::Starting, Some(at(2.0, 0.0)), Some(NotRunning)),
-        (&plain, HoldReason::Ending, Some(at(2.0, 0.0)), Some(NotRunning)),
-        (&plain, HoldReason::Operator, Some(at(2.0, 0.0)), Some(Stopped)),
-        (&plain, HoldReason::None, None, Some(Malformed)),
-        (&plain, HoldReason::None, Some(nowhere), Some(Malformed)),
-        (&plain, HoldReason::None, Some(at(9.0, 0.0)), Some(Outside)),
-        (&plain, HoldReason::None, Some(at(3.99, 0.0)), Some(Outside)),
-        (&plain, HoldReason::None, Some(at(1.0, 1.0)), Some(InHazard)),
-        (&car, HoldReason::None, Some(faces), Some(NoHeading)),
-        (&calibrates, HoldReason::None, Some(at(2.0, 0.0)), Some(FixedTarget)),
+        (&plain, Drives, Some(at(2.0, 0.0)), None),
+        (&plain, StageHeld, Some(faces), None),
+        (&plain, Starting, Some(at(2.0, 0.0)), Some(NotRunning)),
+        (&plain, Ending, Some(at(2.0, 0.0)), Some(NotRunning)),
+        (&plain, Operator, Some(at(2.0, 0.0)), Some(Stopped)),
+        (&plain, Drives, None, Some(Malformed)),
+        (&plain, Drives, Some(nowhere), Some(Malformed)),
+        (&plain, Drives, Some(at(9.0, 0.0)), Some(Outside)),
+        (&plain, Drives, Some(at(3.99, 0.0)), Some(Outside)),
+        (&plain, Drives, Some(at(1.0, 1.0)), Some(InHazard)),
+        (&car, Drives, Some(faces), Some(NoHeading)),
+        (&calibrates, Drives, Some(at(2.0, 0.0)), Some(FixedTarget)),
     ];
     for (mission, reason, point, want) in rows {
-        let points = point.as_slice();
-        let points = (!points.is_empty()).then_some(points);
+        let points = point.as_ref().map(std::slice::from_ref);
         assert_eq!(refusal(points, reason, mission, &record), want, "{reason:?} {point:?}");
     }
-    let unmapped = refusal(Some(&[at(2.0, 0.0)]), HoldReason::None, &plain, &Record::default());
+    let unmapped = refusal(Some(&[at(2.0, 0.0)]), Drives, &plain, &Record::default());
     assert_eq!(unmapped, Some(NotRunning));
 }
 

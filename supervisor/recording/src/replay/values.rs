@@ -4,7 +4,7 @@ use common::{bus::Value, topics::AnyTopic};
 
 /// Returns the first field in which two messages of `topic` differ, with both values, except fields
 /// that end with one of `left_out`.
-pub(crate) fn first_difference(
+pub fn first_difference(
     topic: &dyn AnyTopic,
     messages: [&[u8]; 2],
     left_out: &[&str],

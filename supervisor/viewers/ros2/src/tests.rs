@@ -48,6 +48,12 @@ const MARKERS: &str = "00010000020000000c0000000065cd1d040000006d617000010000000
 
 const AT_NS: u64 = 12_500_000_000;
 
+const FRAME: GridFrame = GridFrame { cells: 10, resolution_m: 0.1, centre: DVec2::ZERO };
+
+fn mission(text: &str) -> Mission {
+    Mission::parse(text, Path::new("m.toml")).unwrap()
+}
+
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -145,7 +151,7 @@ fn state(goals: &Server, id: u8) -> Option<i8> {
 /// Returns a server with goal 1 to (1, 2), as target number 5.
 fn with_a_goal() -> Server {
     let mut goals = Server::default();
-    goals.target(&TargetSample { number: 4, ..TargetSample::default() });
+    goals.target(&target(4));
     goals.accept(sent(1), goals.newest_target, 7);
     goals.target(&target(5));
     goals
@@ -154,6 +160,10 @@ fn with_a_goal() -> Server {
 fn target(number: u64) -> TargetSample {
     let target = TargetPoint::at(DVec2::new(1.0, 2.0));
     TargetSample { number, last: number, target, ..TargetSample::default() }
+}
+
+fn directive(reason: HoldReason) -> DirectiveSample {
+    DirectiveSample { reason: reason.into(), ..DirectiveSample::default() }
 }
 
 fn arrival(target_number: u64) -> CommandSample {
@@ -178,7 +188,7 @@ fn a_place_is_taken_with_the_deviations_of_its_covariance() {
 #[test]
 fn a_twist_is_a_stick_in_shares_of_the_missions_speeds_and_one_that_is_no_number_is_refused() {
     let text = "controller = { speed_m_s = 0.4, turn_rad_s = 1.6 }\nstay = true";
-    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let mission = mission(text);
     let stick =
         |ahead, left| asked::stick(&twist([ahead, left]).encode(), &mission).map(<[f64; 2]>::from);
     assert_eq!(stick(0.2, 0.8), Ok([0.5, 0.5]));
@@ -188,23 +198,25 @@ fn a_twist_is_a_stick_in_shares_of_the_missions_speeds_and_one_that_is_no_number
 }
 
 #[test]
-fn a_goal_of_the_action_is_reached_with_its_own_target_only() {
-    let mut goals = with_a_goal();
-    goals.command(&arrival(4));
-    assert_eq!(state(&goals, 1), None);
-    goals.command(&arrival(5));
-    assert_eq!(state(&goals, 1), Some(Status::Succeeded as i8));
-    assert_eq!(state(&goals, 9), Some(0), "an unknown goal has an unknown state");
-}
-
-#[test]
-fn a_goal_of_the_action_ends_when_the_robot_is_sent_elsewhere() {
-    let mut goals = with_a_goal();
-    goals.target(&TargetSample { number: 6, ..TargetSample::default() });
-    assert_eq!(state(&goals, 1), Some(Status::Aborted as i8));
-    let mut goals = with_a_goal();
-    goals.accept(sent(2), goals.newest_target, 8);
-    assert_eq!((state(&goals, 1), state(&goals, 2)), (Some(Status::Aborted as i8), None));
+fn a_goal_of_the_action_ends_with_its_own_target_or_when_the_robot_is_sent_elsewhere_or_waits() {
+    type Said = fn(&mut Server);
+    let waits: Said = |it| it.directive(&directive(HoldReason::Waiting));
+    let arrives: Said = |it| it.command(&arrival(5));
+    for (what, said, want) in [
+        ("another target's arrival", &[(|it| it.command(&arrival(4))) as Said][..], None),
+        ("its arrival", &[arrives], Some(Status::Succeeded)),
+        ("another target", &[|it| it.target(&target(6))], Some(Status::Aborted)),
+        ("a newer goal", &[|it| it.accept(sent(2), it.newest_target, 8)], Some(Status::Aborted)),
+        ("a wait, whose arrival may still be read", &[waits], None),
+        ("a run that stays without it", &[waits, waits], Some(Status::Aborted)),
+        ("an arrival within a wait", &[waits, arrives, waits], Some(Status::Succeeded)),
+    ] {
+        let mut goals = with_a_goal();
+        said.iter().for_each(|said| said(&mut goals));
+        assert_eq!(state(&goals, 1), want.map(|status| status as i8), "{what}");
+        assert!([None, Some(0)].contains(&state(&goals, 2)), "{what}");
+        assert_eq!(state(&goals, 9), Some(0), "an unknown goal has an unknown state");
+    }
 }
 
 #[test]
@@ -221,8 +233,7 @@ fn a_goal_that_is_refused_has_nav2s_error_code_and_words_and_the_one_before_goes
 
 #[test]
 fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target() {
-    let waits =
-        DirectiveSample { reason: HoldReason::Waiting.into(), ..DirectiveSample::default() };
+    let waits = directive(HoldReason::Waiting);
     for (outcome, status, code, words) in [
         ("unreachable", Status::Aborted, 208, "no path"),
         ("timed_out", Status::Aborted, 9003, "did not arrive"),
@@ -258,27 +269,7 @@ fn a_goal_of_an_earlier_bridge_has_the_result_of_its_target_that_came_meanwhile(
 }
 
 #[test]
-fn a_goal_of_the_action_whose_target_is_given_up_ends_though_the_run_stays() {
-    let waits =
-        DirectiveSample { reason: HoldReason::Waiting.into(), ..DirectiveSample::default() };
-    let mut goals = with_a_goal();
-    goals.directive(&waits);
-    assert_eq!(state(&goals, 1), None, "its arrival may still be read");
-    goals.directive(&waits);
-    assert_eq!(state(&goals, 1), Some(Status::Aborted as i8));
-    let mut goals = with_a_goal();
-    goals.directive(&waits);
-    goals.command(&arrival(5));
-    goals.directive(&waits);
-    assert_eq!(state(&goals, 1), Some(Status::Succeeded as i8));
-}
-
-#[test]
 fn goals_of_the_action_are_reached_one_after_the_other_in_a_run_that_stays() {
-    let directive = |reason: HoldReason| DirectiveSample {
-        reason: reason.into(),
-        ..DirectiveSample::default()
-    };
     let (waits, drives) = (directive(HoldReason::Waiting), directive(HoldReason::None));
     let mut goals = Server::default();
     for nth in 1..=20 {
@@ -313,7 +304,7 @@ fn a_goal_that_is_canceled_stays_canceled_although_the_robot_arrives() {
 }
 
 fn shown() -> Shown {
-    Shown::new("x80".to_owned(), Mission::parse("target = [4, 0]", Path::new("m.toml")).unwrap())
+    Shown::new("x80".to_owned(), mission("target = [4, 0]"))
 }
 
 fn published(show: impl FnOnce(&mut dyn FnMut(Id, Vec<u8>))) -> Vec<(Id, Vec<u8>)> {
@@ -445,8 +436,7 @@ fn ranges_too_far_too_near_and_not_measured_are_those_of_rep_117() {
 
 #[test]
 fn a_scan_is_stamped_when_its_first_beam_was_measured_and_says_the_time_between_beams() {
-    let text = "target = [4, 0]\nrobot.model = 'turtlebot4'";
-    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let mission = mission("target = [4, 0]\nrobot.model = 'turtlebot4'");
     let (row, laser) = mission.laser().unwrap();
     let mut shown = Shown::new("tb4".to_owned(), mission);
     let mut told = |pace, first_beam, beam_ns| {
@@ -482,8 +472,7 @@ fn what_happens_is_logged_with_its_severity_and_clocks_are_mission_time() {
 
 #[test]
 fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_frame() {
-    let text = "target = [4, 0]\nrobot.model = 'turtlebot4'";
-    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+    let mission = mission("target = [4, 0]\nrobot.model = 'turtlebot4'");
     let (row, laser) = mission.laser().unwrap();
     let mut shown = Shown::new("tb4".to_owned(), mission);
     let sent = published(|sink| shown.mounting(0, sink));
@@ -511,8 +500,7 @@ fn the_scan_of_a_single_laser_is_the_topic_scan_and_those_of_several_have_the_na
     ] {
         let rows: String = names.iter().map(|name| row(name)).collect();
         let text = format!("target = [4, 0]\nrobot.protocol = 'json'\n{rows}");
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-        let shown = Shown::new("r".to_owned(), mission);
+        let shown = Shown::new("r".to_owned(), mission(&text));
         let named = shown.sensor_topics().map(|(id, sensor)| {
             let name = crate::endpoints::topic_name(crate::topics::spec(id).unwrap(), sensor);
             crate::node::full_name("r", &name)
@@ -523,14 +511,13 @@ fn the_scan_of_a_single_laser_is_the_topic_scan_and_those_of_several_have_the_na
 
 #[test]
 fn a_map_is_published_whole_and_then_by_what_changes_and_says_what_nobody_looked_at() {
-    let frame = GridFrame { cells: 10, resolution_m: 0.1, centre: DVec2::ZERO };
     let mut cells = vec![CellState::Free as u8; 100];
     cells[..4].copy_from_slice(
         &[CellState::Scanned, CellState::Margin, CellState::Sensed, CellState::Perimeter]
             .map(|state| state as u8),
     );
     let mut shown = shown();
-    let whole = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
+    let whole = GridHeader { part: Part::whole(FRAME, 1), ..GridHeader::default() };
     assert!(published(|sink| shown.sample(&Sample::Grid(whole, cells), 0, sink)).is_empty());
     let [(Id::Map, map), (Id::Diagnostics, _)] = &published(|sink| shown.tick(0, sink))[..] else {
         panic!("no map");
@@ -538,7 +525,7 @@ fn a_map_is_published_whole_and_then_by_what_changes_and_says_what_nobody_looked
     let occupied = &map[map.len() - 100..];
     assert_eq!(occupied[..6], [0, 99, 100, 100, 255, 255]);
     let window = common::grid::Window { col: 3, row: 4, width: 2, height: 1 };
-    let part = GridHeader { part: Part::of(frame, window, 2), ..GridHeader::default() };
+    let part = GridHeader { part: Part::of(FRAME, window, 2), ..GridHeader::default() };
     let scanned = Sample::Grid(part, vec![CellState::Scanned as u8; 2]);
     let [(Id::MapUpdates, update)] = &published(|sink| shown.sample(&scanned, 1, sink))[..] else {
         panic!("no update");
@@ -552,7 +539,7 @@ fn a_map_is_published_whole_and_then_by_what_changes_and_says_what_nobody_looked
 
 #[test]
 fn a_path_leads_along_the_field_and_ends_where_there_is_no_direction() {
-    let frame = GridFrame { cells: 20, resolution_m: 0.1, centre: DVec2::ZERO };
+    let frame = GridFrame { cells: 20, ..FRAME };
     let ahead = FieldCell { ex: 1.0, ..FieldCell::default() };
     let path = |cells: &[FieldCell]| {
         let mut shown = shown();
@@ -576,10 +563,7 @@ fn a_path_leads_along_the_field_and_ends_where_there_is_no_direction() {
 #[test]
 fn what_moves_is_markers_of_its_disc_doubt_and_way_and_they_are_deleted_when_it_is_gone() {
     let mut shown = shown();
-    let mut header = GridHeader {
-        part: Part::whole(GridFrame { cells: 10, resolution_m: 0.1, centre: DVec2::ZERO }, 1),
-        ..GridHeader::default()
-    };
+    let mut header = GridHeader { part: Part::whole(FRAME, 1), ..GridHeader::default() };
     let mut published_of = |header: &GridHeader| {
         let sample = Sample::Grid(*header, vec![CellState::Free as u8; 100]);
         published(|sink| shown.sample(&sample, 0, sink))

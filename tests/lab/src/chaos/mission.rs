@@ -27,7 +27,7 @@ use summary::Summary;
 /// A mission takes half a minute of wall-clock time.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-pub fn command(options: &Options, seed: u64, pace: Pace, out: &Path) -> Command {
+fn command(options: &Options, seed: u64, pace: Pace, out: &Path) -> Command {
     let Arguments { mission, robot, set, .. } = &options.asked;
     let mut command = robot::mission("run", mission, robot, set);
     command.args(["--pace", &pace.to_string(), "--seed", &seed.to_string(), "--out"]).arg(out);
@@ -50,8 +50,7 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).or_cannot("make a directory")?;
     let directory = files.join("run");
-    let mut robot =
-        asked.include_supervisor.then(|| robot(options, seed, &files, false)).transpose()?;
+    let mut robot = asked.include_supervisor.then(|| robot(options, seed, &files)).transpose()?;
     let mut start = command(options, seed, asked.pace, &directory);
     if let Some(robot) = &robot {
         let address = robot.address();
@@ -142,8 +141,7 @@ fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
     body.metres_per_count() * (f64::from(kills) + target / body.track_m) + slip_m
 }
 
-pub fn robot(options: &Options, seed: u64, files: &Path, ignores_time: bool) -> Result<Simulator> {
-    let mut mission = Mission { seed, ..options.loaded.clone() };
-    mission.simulation.ignores_time |= ignores_time;
+fn robot(options: &Options, seed: u64, files: &Path) -> Result<Simulator> {
+    let mission = Mission { seed, ..options.loaded.clone() };
     robot::simulated(&files.join("robot"), &mission, options.asked.pace)
 }

@@ -3,14 +3,12 @@
 use std::{env, fs, path::PathBuf, process};
 
 use clap::Args;
-use common::{
-    clock::Pace,
-    domain::RobotName,
-    mission::{Mission, Protocol},
-};
+use common::{clock::Pace, domain::RobotName, mission::Mission};
 use console::missions;
 
-use super::{consumers::Consumer, robot_fault::RobotFault};
+use simulation::RobotFault;
+
+use super::consumers::Consumer;
 use crate::error::{OrCannot as _, Result};
 
 /// Send random signals to random stages at random times, mission after mission, and report.
@@ -56,15 +54,15 @@ pub struct Arguments {
     /// Set a mission key; repeatable.
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
-    /// Write a row per signal to DIR/signals.csv.
-    #[arg(long, value_name = "DIR", conflicts_with = "robot_faults")]
+    /// Write a row per signal to DIR/signals.csv, or per robot fault to DIR/stop_times.csv.
+    #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Name of the robot and of its shared memory.
+    /// Name of the robot and of its shared memory; first column of stop_times.csv.
     #[arg(long, default_value = "chaos")]
     pub robot: RobotName,
-    /// Instead of signals, put a fault into the robot's frames from a random moment on: all faults
-    /// in turn, or those named. The final stop-time table has the time from each fault to the last
-    /// moving command and to wheels at rest.
+    /// Instead of signals, let the robot become faulty at a random moment, with each fault in turn
+    /// or those named. Each mission runs in one process. The final stop-time table has the time from
+    /// each fault to the last moving command and to wheels at rest.
     #[arg(
         long, value_name = "FAULT,...", num_args = 0.., require_equals = true, value_delimiter = ',',
         conflicts_with_all = ["kills", "include_startup", "include_supervisor", "pace"]
@@ -73,10 +71,6 @@ pub struct Arguments {
     /// Number of missions per fault.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..), requires = "robot_faults")]
     pub missions: u32,
-    /// Let the mission's robot, which speaks JSON lines, speak ROS 2 to its link. The faults are in
-    /// the JSON lines that its ROS 2 program reads.
-    #[arg(long, requires = "robot_faults")]
-    pub ros2: bool,
     /// Print one line of JSON.
     #[arg(long)]
     pub json: bool,
@@ -103,20 +97,8 @@ impl Options {
             asked.set.insert(0, LONG_TIMEOUT.to_owned());
         }
         let loaded = missions::load(&asked.mission, &asked.set)?;
-        let faulty = asked.robot_faults.is_some();
-        if (asked.include_supervisor || faulty) && loaded.robot.address.is_some() {
+        if asked.include_supervisor && loaded.robot.address.is_some() {
             return Err("chaos simulates its own robot; remove robot.address".into());
-        }
-        if faulty && loaded.body().steering.is_some() {
-            return Err(
-                "robot faults need a robot with two driven wheels; remove robot.model = 'car'"
-                    .into(),
-            );
-        }
-        if asked.ros2 && loaded.robot.protocol() != Protocol::Json {
-            return Err(
-                "--ros2 needs a simulated JSON robot; give --set robot.model='kobuki'".into()
-            );
         }
         if asked.pace == Pace::Max {
             return Err(
@@ -124,16 +106,12 @@ impl Options {
                     .into(),
             );
         }
-        if asked.include_supervisor || faulty {
+        if asked.include_supervisor {
             asked.pace = Pace::Rate(1.0);
         }
         let name = format!("firsthand-chaos-{}-{}", process::id(), asked.robot);
         let directory = env::temp_dir().join(name);
         fs::create_dir(&directory).or_cannot_file("make", &directory)?;
         Ok(Self { asked, loaded, directory })
-    }
-
-    pub fn protocol(&self) -> Protocol {
-        if self.asked.ros2 { Protocol::Ros2 } else { self.loaded.robot.protocol() }
     }
 }

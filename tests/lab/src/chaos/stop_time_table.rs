@@ -1,17 +1,30 @@
 //! Stop-time table: how long robots moved after their fault.
 
+use std::{fmt::Display, path::Path};
+
 use console::table::Table;
 use serde::Serialize;
 
-use super::{
-    Judged,
-    robot_fault::{Promise, RobotFault},
-};
+use simulation::{Promise, RobotFault};
+
+use super::Judged;
 use crate::error::Result;
 
 /// Minimum time between the last tick with a turning wheel and the end of a mission that ends at
 /// rest.
 const AT_REST_BEFORE_S: f64 = 0.15;
+
+/// Headings of the table; `>` aligns to the right.
+const HEADINGS: [&str; 8] = [
+    "robot fault",
+    ">last command",
+    ">at rest",
+    ">promised",
+    ">way",
+    ">touches",
+    ">kept",
+    "outcome: reason",
+];
 
 #[derive(Debug, Serialize)]
 pub struct Entry {
@@ -69,32 +82,40 @@ impl StopTimeTable {
         })
     }
 
-    fn text(&self) -> String {
-        let mut table = Table::new([
-            "robot",
-            ">last command",
-            ">at rest",
-            ">promised",
-            ">way",
-            ">touches",
-            ">kept",
-            "outcome: reason",
-        ]);
-        for entries in self.entries.chunk_by(|one, next| one.fault == next.fault) {
+    /// Writes the table to `file`, with `section` in the first column.
+    pub fn write(&self, section: &str, file: &Path) -> Result {
+        let mut writer = csv::Writer::from_path(file)?;
+        let headings = HEADINGS.map(|heading| heading.trim_start_matches('>'));
+        writer.write_record(["section"].iter().chain(&headings))?;
+        for row in self.rows() {
+            writer.write_record([section].into_iter().chain(row.iter().map(String::as_str)))?;
+        }
+        Ok(writer.flush()?)
+    }
+
+    fn rows(&self) -> impl Iterator<Item = [String; HEADINGS.len()]> {
+        self.entries.chunk_by(|one, next| one.fault == next.fault).map(|entries| {
             let kept = entries.iter().filter(|entry| entry.is_kept()).count();
             let way = entries.iter().map(|entry| entry.way_m).fold(0.0, f64::max);
             let told = entries.iter().find(|entry| !entry.is_kept()).unwrap_or(&entries[0]);
             let reason = if told.reason.is_empty() { "no reason" } else { &told.reason };
-            table.row([
-                &told.fault.row().name,
-                &longest(entries, |entry| entry.last_moving_s),
-                &longest(entries, |entry| entry.rest_s),
-                &told.promised_s.map_or("-".to_owned(), |seconds| format!("{seconds:.2} s")),
-                &format!("{way:.2} m"),
-                &entries.iter().map(|entry| entry.collisions).sum::<u64>(),
-                &format!("{kept} of {}", entries.len()),
-                &format!("{}: {reason}", told.outcome),
-            ]);
+            [
+                told.fault.row().name.clone(),
+                longest(entries, |entry| entry.last_moving_s),
+                longest(entries, |entry| entry.rest_s),
+                told.promised_s.map_or("-".to_owned(), |seconds| format!("{seconds:.2} s")),
+                format!("{way:.2} m"),
+                entries.iter().map(|entry| entry.collisions).sum::<u64>().to_string(),
+                format!("{kept} of {}", entries.len()),
+                format!("{}: {reason}", told.outcome),
+            ]
+        })
+    }
+
+    fn text(&self) -> String {
+        let mut table = Table::new(HEADINGS);
+        for row in self.rows() {
+            table.row(row.each_ref().map(|cell| cell as &dyn Display));
         }
         format!("{table}Times and ways are maxima per fault, counted from the fault.\n")
     }

@@ -3,8 +3,7 @@
 use super::*;
 
 fn car(extra: &str) -> Mission {
-    let text = format!("target = [3, 0]\nrobot.model = 'car'\n{extra}");
-    Mission::parse(&text, Path::new("m.toml")).unwrap()
+    mission(&format!("robot.model = 'car'\n{extra}"))
 }
 
 /// Returns the command at the origin, facing x, under guidance at `angle` radians.
@@ -14,15 +13,8 @@ fn command(
     angle: f64,
     speed_limit_m_s: f64,
 ) -> CommandSample {
-    let guidance = GuidanceSample {
-        ex: angle.cos(),
-        ey: angle.sin(),
-        speed_limit_m_s,
-        maneuver: maneuver.into(),
-        target_number: 1,
-        target: TargetPoint::at(mission.target),
-        ..GuidanceSample::default()
-    };
+    let (ex, ey) = (angle.cos(), angle.sin());
+    let guidance = GuidanceSample { ex, ey, speed_limit_m_s, ..told(maneuver) };
     Controller::new(mission).command(&guidance)
 }
 

@@ -1,10 +1,10 @@
 use super::*;
-use std::path::Path;
+use crate::testing::mission;
 
 const LIMITS: BatteryLimits = BatteryLimits { board: 6.6, motor: 11.0, servo: 0.0 };
 
 fn batteries(limits: BatteryLimits) -> Batteries {
-    let mut mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
+    let mut mission = mission("");
     mission.robot.low_battery_v = limits;
     Batteries::new(&mission)
 }
@@ -21,41 +21,44 @@ impl Batteries {
 #[test]
 fn a_low_battery_is_said_once_and_gives_enough_again_only_clearly_above_its_limit() {
     let mut batteries = batteries(LIMITS);
-    let mut at = |board| {
+    // At 6.8 V it recovers while nothing turns.
+    for (board, is_low, said) in [
+        (6.7, false, None),
+        (6.5, true, Some(Charge::Low)),
+        (6.4, true, None),
+        (6.8, true, None),
+        (7.0, false, Some(Charge::Enough)),
+    ] {
         let ([low, ..], changes) = batteries.at(0.0, [board, 12.0, 1.2]);
-        (low, changes)
-    };
-    assert_eq!(at(6.7), (false, vec![]));
-    assert_eq!(at(6.5), (true, vec![("board", Charge::Low)]));
-    assert_eq!(at(6.4), (true, vec![]));
-    assert_eq!(at(6.8), (true, vec![]), "it recovers while nothing turns");
-    assert_eq!(at(7.0), (false, vec![("board", Charge::Enough)]));
+        let expected: Vec<_> = said.map(|charge| ("board", charge)).into_iter().collect();
+        assert_eq!((low, changes), (is_low, expected), "{board}");
+    }
 }
 
 #[test]
 fn each_battery_has_its_own_limit_and_one_that_is_not_there_is_not_low() {
     let mut batteries = batteries(LIMITS);
-    let (low, _) = batteries.at(0.0, [7.2, 10.9, 1.2]);
-    assert_eq!(low, [false, true, false]);
-    let (low, _) = batteries.at(0.0, [7.2, 0.2, 1.2]);
-    assert_eq!(low, [false; 3]);
+    for (motor, is_low) in [(10.9, true), (0.2, false)] {
+        assert_eq!(batteries.at(0.0, [7.2, motor, 1.2]).0, [false, is_low, false]);
+    }
 }
 
 #[test]
 fn a_battery_that_stays_sunk_is_empty_for_good_and_one_that_dips_is_only_low() {
     let mut batteries = batteries(LIMITS);
-    let mut at = |seconds, motor| {
+    // Low below 11 V, empty below 10 V; a dip, and recovery at rest.
+    for (seconds, motor, charge) in [
+        (0.0, 12.0, Charge::Enough),
+        (1.0, 9.9, Charge::Low),
+        (2.9, 10.1, Charge::Low),
+        (3.0, 9.9, Charge::Low),
+        (4.9, 9.9, Charge::Low),
+        (5.0, 9.9, Charge::Empty),
+        (6.0, 12.0, Charge::Empty),
+    ] {
         batteries.at(seconds, [7.2, motor, 1.2]);
-        batteries.charge()
-    };
-    // Low below 11 V, empty below 10 V.
-    assert_eq!(at(0.0, 12.0), Charge::Enough);
-    assert_eq!(at(1.0, 9.9), Charge::Low);
-    assert_eq!(at(2.9, 10.1), Charge::Low, "a dip");
-    assert_eq!(at(3.0, 9.9), Charge::Low);
-    assert_eq!(at(4.9, 9.9), Charge::Low);
-    assert_eq!(at(5.0, 9.9), Charge::Empty);
-    assert_eq!(at(6.0, 12.0), Charge::Empty, "it recovers at rest");
+        assert_eq!(batteries.charge(), charge, "{seconds}");
+    }
 }
 
 #[test]

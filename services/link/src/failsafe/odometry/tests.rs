@@ -1,6 +1,6 @@
 use super::*;
+use crate::testing::{mission, near};
 use common::samples::{ContactSample, HoldReason};
-use std::path::Path;
 
 /// Frame period at 7 Hz, seconds.
 const PERIOD: f64 = 1.0 / 7.0;
@@ -9,7 +9,11 @@ const TURN: i16 = 1200;
 
 fn odometry() -> Odometry {
     // 1 m/s is 2247 counts/s.
-    Odometry::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
+    Odometry::new(&mission(""))
+}
+
+fn at(seconds: f64) -> MissionTime {
+    MissionTime::from_seconds(seconds)
 }
 
 fn suspicion(odometry: &Odometry) -> Option<Suspicion> {
@@ -55,6 +59,25 @@ impl Wheels {
 
 const COUNTS: u16 = common::wire::COUNT_CYCLE;
 
+type Suspected = Option<(f64, Suspicion)>;
+
+/// Takes a frame that says `says` of the wheels' counts, and commands. Returns the suspicion.
+fn turn(
+    (odometry, wheels): (&mut Odometry, &mut Wheels),
+    time: f64,
+    says: impl FnOnce([u16; 2]) -> [u16; 2],
+    tells: [i16; 2],
+) -> Suspected {
+    wheels.roll_to(time);
+    odometry.plausible(says(wheels.counts()), at(time));
+    let suspicion = suspicion(odometry);
+    if suspicion.is_none() {
+        odometry.commanded(tells, at(time));
+        wheels.tell(tells);
+    }
+    suspicion.map(|suspicion| (time, suspicion))
+}
+
 /// Runs a robot with commands `tells(tick)`, out of reach where `out`; `says` maps wheel counts to
 /// frames. Returns the first suspicion, in seconds after the first command.
 fn drive(
@@ -62,54 +85,40 @@ fn drive(
     tells: impl Fn(u32) -> [i16; 2],
     mut out: impl FnMut(u32) -> bool,
     mut says: impl FnMut(u32, [u16; 2]) -> [u16; 2],
-) -> Option<(f64, Suspicion)> {
-    let mut odometry = odometry();
-    let mut wheels = Wheels::default();
-    for tick in 0..ticks {
+) -> Suspected {
+    let mut robot = (odometry(), Wheels::default());
+    (0..ticks).filter(|tick| !out(*tick)).find_map(|tick| {
         let time = f64::from(tick) * PERIOD;
-        wheels.roll_to(time);
-        if out(tick) {
-            continue;
-        }
-        let now = MissionTime::from_seconds(time);
-        odometry.plausible(says(tick, wheels.counts()), now);
-        if let Some(suspicion) = suspicion(&odometry) {
-            return Some((time, suspicion));
-        }
-        odometry.commanded(tells(tick), now);
-        wheels.tell(tells(tick));
-    }
-    None
-}
-
-fn never(_: u32) -> bool {
-    false
+        turn((&mut robot.0, &mut robot.1), time, |counts| says(tick, counts), tells(tick))
+    })
 }
 
 fn honest(_: u32, counts: [u16; 2]) -> [u16; 2] {
     counts
 }
 
+fn ahead(_: u32) -> [i16; 2] {
+    [TURN; 2]
+}
+
 /// Asserts rest within 1.5 s of the first motion, including 0.2 s to stop and a frame's jitter.
-fn in_time(suspected: Option<(f64, Suspicion)>, why: Suspicion) {
+#[track_caller]
+fn in_time(suspected: Suspected, why: Suspicion) {
     let (after, suspicion) = suspected.unwrap();
     assert!(after <= 1.15 && suspicion == why, "{suspicion:?} after {after} s");
 }
 
 #[test]
 fn an_honest_robot_is_not_suspected_whatever_it_is_told() {
-    let straight = |_| [TURN, TURN];
-    let turning = |_| [-TURN / 2, TURN / 2];
-    let slow = |_| [70, 70];
     let reversing = |tick: u32| {
         if (tick / 2).is_multiple_of(2) { [TURN, -TURN] } else { [-TURN, TURN] }
     };
     let curves = |tick: u32| [900 + 300 * (tick % 3) as i16, 1200 - 300 * (tick % 4) as i16];
     let stop_and_go = |tick: u32| if tick % 7 < 3 { [0, 0] } else { [TURN, 80] };
-    for tells in
-        [&straight as &dyn Fn(u32) -> [i16; 2], &turning, &slow, &reversing, &curves, &stop_and_go]
-    {
-        assert_eq!(drive(400, tells, never, honest), None);
+    let tells: [&dyn Fn(u32) -> [i16; 2]; 6] =
+        [&ahead, &|_| [-TURN / 2, TURN / 2], &|_| [70, 70], &reversing, &curves, &stop_and_go];
+    for (case, tells) in tells.into_iter().enumerate() {
+        assert_eq!(drive(400, tells, |_| false, honest), None, "{case}");
     }
 }
 
@@ -145,99 +154,82 @@ fn wheels_held_for_half_a_second_are_not_suspected() {
         if tick == 21 {
             held = counts[0];
         }
-        match tick {
-            21..=24 => [held; 2],
-            _ => counts,
-        }
+        if (21..=24).contains(&tick) { [held; 2] } else { counts }
     };
-    assert_eq!(drive(60, |_| [TURN, TURN], never, says), None);
+    assert_eq!(drive(60, ahead, |_| false, says), None);
 }
 
 #[test]
-fn the_same_frame_for_ever_is_suspected_in_time() {
+fn encoders_that_repeat_die_are_late_reversed_or_swapped_are_suspected_in_time_and_named() {
+    use Suspicion::{Left, Right, Turn};
+    let suspected = |tells: &dyn Fn(u32) -> [i16; 2], says: &dyn Fn(u32, [u16; 2]) -> [u16; 2]| {
+        drive(40, tells, |_| false, says)
+    };
     let same = |_, _| [32_767; 2];
-    in_time(drive(40, |_| [TURN, TURN], never, same), Suspicion::Left);
-    in_time(drive(40, |_| [-80, 80], never, same), Suspicion::Left);
-}
-
-#[test]
-fn one_dead_encoder_is_suspected_in_time_and_named() {
+    in_time(suspected(&ahead, &same), Left);
+    in_time(suspected(&|_| [-80, 80], &same), Left);
     let dead = |_, [left, _]: [u16; 2]| [left, 0];
-    in_time(drive(40, |_| [TURN, TURN], never, dead), Suspicion::Right);
-}
-
-#[test]
-fn a_dead_encoder_is_suspected_though_the_direction_changes_with_every_tick_and_a_live_one_is_not()
-{
-    let to_and_fro = |tick: u32| {
-        if tick.is_multiple_of(2) { [400, -400] } else { [-400, 400] }
-    };
-    let dead = drive(40, to_and_fro, never, |_, [left, _]| [left, 0]);
-    assert!(matches!(dead, Some((after_s, Suspicion::Right)) if after_s < 1.5), "{dead:?}");
-    assert_eq!(drive(200, to_and_fro, never, honest), None);
-}
-
-#[test]
-fn wheels_that_are_reversed_or_swapped_are_suspected_in_time() {
+    in_time(suspected(&ahead, &dead), Right);
     let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
-    in_time(drive(40, |_| [TURN, TURN], never, reversed), Suspicion::Left);
+    in_time(suspected(&ahead, &reversed), Left);
     // Commands for a robot that turns away from the target.
     let chatter = |tick: u32| [if (tick / 2).is_multiple_of(2) { 584 } else { -584 }; 2];
-    in_time(drive(40, chatter, never, reversed), Suspicion::Left);
+    in_time(suspected(&chatter, &reversed), Left);
     let swapped = |_, [left, right]: [u16; 2]| [right, left];
-    in_time(drive(40, |_| [-TURN, TURN], never, swapped), Suspicion::Left);
+    in_time(suspected(&|_| [-TURN, TURN], &swapped), Left);
     // In a curve both wheels roll forward, but the robot turns the other way.
-    let curve = drive(40, |_| [TURN / 2, TURN], never, swapped);
-    in_time(curve, Suspicion::Turn);
-}
-
-#[test]
-fn frames_that_are_two_seconds_late_are_suspected_in_time() {
+    in_time(suspected(&|_| [TURN / 2, TURN], &swapped), Turn);
     let mut said = VecDeque::from([[0; 2]; 14]);
-    let late = move |_, counts| {
+    let late = |_, counts| {
         said.push_back(counts);
         said.pop_front().unwrap()
     };
-    in_time(drive(40, |_| [TURN, TURN], never, late), Suspicion::Left);
+    in_time(drive(40, ahead, |_| false, late), Left);
+    // The direction changes with every tick.
+    let to_and_fro = |tick: u32| {
+        if tick.is_multiple_of(2) { [400, -400] } else { [-400, 400] }
+    };
+    let dead = suspected(&to_and_fro, &dead);
+    assert!(matches!(dead, Some((after_s, Right)) if after_s < 1.5), "{dead:?}");
+    assert_eq!(drive(200, to_and_fro, |_| false, honest), None);
 }
 
 #[test]
 fn a_robot_that_is_suspected_is_given_up_after_10_s_or_plausible_again_when_an_operator_has_looked()
 {
-    let at = MissionTime::from_seconds;
     let mut odometry = odometry();
-    for tick in 0..8 {
+    for tick in 0..80 {
         let now = at(f64::from(tick) * PERIOD);
         odometry.plausible([5, 5], now);
-        odometry.commanded([TURN, TURN], now);
+        if tick < 8 {
+            odometry.commanded([TURN, TURN], now);
+        }
+        assert!(tick < 8 || suspicion(&odometry).is_some());
     }
     let given_up = |odometry: &Odometry, seconds| {
         let now = Moment { time: at(seconds), machine_ns: 0 };
         odometry.condition(Cause::OdometryGivenUp, now) == Condition::Holds
     };
-    assert!(suspicion(&odometry).is_some());
-    for tick in 8..80 {
-        odometry.plausible([5, 5], at(f64::from(tick) * PERIOD));
-    }
-    assert!(!given_up(&odometry, 10.8));
     assert!(!given_up(&odometry, 11.0), "no stage waits for it");
     let drive = Observation::Directive(Order::Drive, HoldReason::None);
     odometry.observe(&drive, Moment::default());
-    assert!(!given_up(&odometry, 10.8));
-    assert!(given_up(&odometry, 11.0));
+    assert_eq!([10.8, 11.0].map(|seconds| given_up(&odometry, seconds)), [false, true]);
     odometry.observe(&Observation::Resumed, Moment::default());
     assert!(suspicion(&odometry).is_none() && !given_up(&odometry, 11.0));
 }
 
 #[test]
 fn three_jumps_within_two_seconds_are_suspected_until_two_seconds_without_twice_at_most() {
-    let at = MissionTime::from_seconds;
+    let mut now_and_then = odometry();
+    for frame in 0..20 {
+        now_and_then.implausible(at(2.0 * f64::from(frame)));
+        assert_eq!(suspicion(&now_and_then), None);
+    }
     let mut odometry = odometry();
-    for round in 0..3 {
-        let start = 10.0 * f64::from(round);
+    for start in [0.0, 10.0, 20.0] {
         for jump in 0..3 {
             assert_eq!(suspicion(&odometry), None);
-            odometry.implausible(at(start + 0.143 * f64::from(jump)));
+            odometry.implausible(at(start + PERIOD * f64::from(jump)));
         }
         assert_eq!(suspicion(&odometry), Some(Suspicion::Jumps));
         odometry.plausible([5, 5], at(start + 2.2));
@@ -247,44 +239,44 @@ fn three_jumps_within_two_seconds_are_suspected_until_two_seconds_without_twice_
     assert_eq!(suspicion(&odometry), Some(Suspicion::Jumps), "the third time");
 }
 
-#[test]
-fn an_old_frame_now_and_then_is_not_suspected() {
-    let mut odometry = odometry();
-    for frame in 0..20 {
-        odometry.implausible(MissionTime::from_seconds(2.0 * f64::from(frame)));
-        assert_eq!(suspicion(&odometry), None);
-    }
-}
-
-type Suspected = Option<(f64, Suspicion)>;
 /// Current of a rolling and of a held wheel.
 const ROLLS_AD: u16 = 260;
 const HELD_AD: u16 = 1520;
 
-/// Drives a robot whose wheels are always held and draw `current(told to stand)`. The robot stands
-/// while they are known to be held. Returns the contacts, and the suspicion with its seconds.
-fn held(current: impl Fn(bool) -> [u16; 2]) -> (Vec<(f64, ContactSample)>, Suspected) {
+/// Drives a robot of which these wheels are held; wheels draw `current(held, told to stand)`. The
+/// robot stands while they are known to be held. Returns the contacts, and the suspicion, with
+/// seconds.
+fn held(
+    held: [bool; 2],
+    tells: [i16; 2],
+    current: impl Fn(bool, bool) -> u16,
+) -> (Vec<(f64, ContactSample)>, Suspected) {
     let mut odometry = odometry();
-    let (mut contacts, mut told_to_stand) = (Vec::new(), true);
+    let (mut contacts, mut stands, mut rolled) = (Vec::new(), true, [0.0; 2]);
     for tick in 0..40 {
         let time = f64::from(tick) * PERIOD;
-        let now = MissionTime::from_seconds(time);
-        odometry.contacts.take_currents(current(told_to_stand));
-        odometry.plausible([7, 7], now);
+        odometry.contacts.take_currents(held.map(|held| current(held, stands)));
+        let counts = rolled.map(|rolled: f64| rolled.rem_euclid(f64::from(COUNTS)) as u16);
+        odometry.plausible(counts, at(time));
         contacts.extend(odometry.contacts.new.take().map(|contact| (time, contact)));
         if let Some(suspicion) = suspicion(&odometry) {
             return (contacts, Some((time, suspicion)));
         }
-        let moment = Moment { time: now, machine_ns: 0 };
-        told_to_stand = odometry.condition(Cause::WheelsHeld, moment) == Condition::Holds;
-        odometry.commanded(if told_to_stand { [0, 0] } else { [TURN, TURN] }, now);
+        let moment = Moment { time: at(time), machine_ns: 0 };
+        stands = odometry.condition(Cause::WheelsHeld, moment) == Condition::Holds;
+        let told = if stands { [0, 0] } else { tells };
+        odometry.commanded(told, at(time));
+        for wheel in [0, 1].into_iter().filter(|wheel| !held[*wheel]) {
+            rolled[wheel] += f64::from(told[wheel]) * PERIOD;
+        }
     }
     (contacts, None)
 }
 
 #[test]
 fn wheels_that_draw_the_current_of_held_ones_are_a_contact_ahead_and_no_suspicion() {
-    let (contacts, suspicion) = held(|stands| [if stands { 20 } else { HELD_AD }; 2]);
+    let current = |_: bool, stands| if stands { 20 } else { HELD_AD };
+    let (contacts, suspicion) = held([true; 2], [TURN; 2], current);
     assert_eq!(suspicion, None);
     let (first_s, first) = contacts[0];
     assert!(first_s < 1.0, "{first_s}");
@@ -294,111 +286,62 @@ fn wheels_that_draw_the_current_of_held_ones_are_a_contact_ahead_and_no_suspicio
 }
 
 #[test]
-fn a_dead_encoder_is_suspected_in_time_by_a_current_that_is_no_sign() {
-    let repeated = |_: bool| [HELD_AD; 2];
-    let beyond_the_range = |_: bool| [u16::MAX; 2];
-    let rolls = |_: bool| [ROLLS_AD; 2];
-    for current in [&repeated as &dyn Fn(bool) -> [u16; 2], &beyond_the_range, &rolls] {
-        let (_, suspicion) = held(current);
-        in_time(suspicion, Suspicion::Left);
+fn a_current_that_repeats_is_beyond_the_range_low_or_high_on_rolling_wheels_is_no_sign_of_held_ones()
+ {
+    for current in [HELD_AD, u16::MAX, ROLLS_AD] {
+        in_time(held([true; 2], [TURN; 2], |_, _| current).1, Suspicion::Left);
     }
-}
-
-#[test]
-fn a_current_that_is_high_on_rolling_wheels_is_no_sign_of_held_ones() {
     let mut odometry = odometry();
     let mut wheels = Wheels::default();
-    let mut suspected = None;
-    for tick in 0..60 {
-        let time = f64::from(tick) * PERIOD;
-        wheels.roll_to(time);
-        let now = MissionTime::from_seconds(time);
+    let suspected = (0..60).find_map(|tick| {
         odometry.contacts.take_currents([HELD_AD; 2]);
+        let time = f64::from(tick) * PERIOD;
         // The encoders die after 5 s.
-        if tick <= 35 {
-            odometry.plausible(wheels.counts(), now);
-        } else {
-            odometry.plausible([0; 2], now);
-        }
-        assert_eq!(odometry.contacts.new.take().map(|contact| contact.left), None);
-        if suspicion(&odometry).is_some() {
-            suspected.get_or_insert(time);
-        }
-        odometry.commanded([TURN, TURN], now);
-        wheels.tell([TURN, TURN]);
-    }
-    assert!(suspected.unwrap() < 6.2, "{suspected:?}");
+        let says = |counts: [u16; 2]| if tick <= 35 { counts } else { [0; 2] };
+        let suspected = turn((&mut odometry, &mut wheels), time, says, [TURN; 2]);
+        assert!(odometry.contacts.new.is_none());
+        suspected
+    });
+    assert!(suspected.unwrap().0 < 6.2, "{suspected:?}");
 }
 
 #[test]
 fn one_held_wheel_is_a_contact_at_its_side_and_behind_a_robot_that_backs() {
     use std::f64::consts::{FRAC_PI_2, PI};
-    let at = |held: [bool; 2], told: [i16; 2]| {
-        let mut odometry = odometry();
-        let mut turned = [0_u16; 2];
-        for tick in 0..12 {
-            let now = MissionTime::from_seconds(f64::from(tick) * PERIOD);
-            let current = held.map(|held| if held { HELD_AD } else { ROLLS_AD });
-            odometry.contacts.take_currents(current);
-            odometry.plausible(turned, now);
-            if let Some(contact) = odometry.contacts.new.take() {
-                return contact;
-            }
-            odometry.commanded(told, now);
-            for wheel in [0, 1] {
-                let counts = f64::from(told[wheel]) * PERIOD;
-                let rolled = if held[wheel] { 0.0 } else { counts };
-                turned[wheel] =
-                    (f64::from(turned[wheel]) + rolled).rem_euclid(f64::from(COUNTS)) as u16;
-            }
-        }
-        panic!("no contact");
-    };
-    let left = at([true, false], [TURN, TURN]);
+    let contact =
+        |wheels, tells| held(wheels, tells, |held, _| if held { HELD_AD } else { ROLLS_AD }).0[0].1;
+    let left = contact([true, false], [TURN, TURN]);
     assert!(left.bearing_rad > 0.0 && left.bearing_rad < FRAC_PI_2, "{left:?}");
-    let right = at([false, true], [TURN, TURN]);
+    let right = contact([false, true], [TURN, TURN]);
     assert_eq!((right.left, right.right, right.bearing_rad), (0, 1, -left.bearing_rad));
-    let behind = at([true, true], [-TURN, -TURN]);
-    assert!((behind.bearing_rad - PI).abs() < 1e-9, "{behind:?}");
+    let behind = contact([true, true], [-TURN, -TURN]);
+    near(behind.bearing_rad, PI, 1e-9);
     // A turn on the spot may touch anywhere.
-    assert_eq!(at([true, true], [-TURN, TURN]).half_width_rad, 0.0);
-}
-
-fn beside_another(tells: [i16; 2], other: [i16; 2], hertz: f64) -> Option<(f64, Suspicion)> {
-    let mut odometry = odometry();
-    let mut wheels = Wheels::default();
-    let mut told_s = 0.0;
-    for tick in 0..140 {
-        let time = f64::from(tick) * PERIOD;
-        while told_s < time {
-            wheels.roll_to(told_s);
-            wheels.tell(other);
-            told_s += 1.0 / hertz;
-        }
-        wheels.roll_to(time);
-        let now = MissionTime::from_seconds(time);
-        odometry.plausible(wheels.counts(), now);
-        if let Some(suspicion) = suspicion(&odometry) {
-            return Some((time, suspicion));
-        }
-        odometry.commanded(tells, now);
-        wheels.tell(tells);
-    }
-    None
+    assert_eq!(contact([true, true], [-TURN, TURN]).half_width_rad, 0.0);
 }
 
 #[test]
 fn a_robot_that_another_host_turns_or_speeds_is_suspected_and_the_words_name_that() {
-    for (other, hertz) in [
-        ([-TURN / 2, TURN / 2], 20.0),
-        ([TURN / 2, -TURN / 2], 10.0),
-        ([TURN, TURN], 20.0),
-        ([-TURN / 2, -TURN / 2], 20.0),
+    for (other, hertz, is_named) in [
+        ([-TURN / 2, TURN / 2], 20.0, false),
+        ([TURN / 2, -TURN / 2], 10.0, false),
+        ([TURN, TURN], 20.0, true),
+        ([-TURN / 2, -TURN / 2], 20.0, false),
     ] {
-        let suspected = beside_another([TURN / 3, TURN / 3], other, hertz);
-        assert!(suspected.is_some_and(|(after_s, _)| after_s < 5.0), "{other:?}: {suspected:?}");
+        let (mut odometry, mut wheels) = (odometry(), Wheels::default());
+        let mut told_s = 0.0;
+        let suspected = (0..140).find_map(|tick| {
+            let time = f64::from(tick) * PERIOD;
+            while told_s < time {
+                wheels.roll_to(told_s);
+                wheels.tell(other);
+                told_s += 1.0 / hertz;
+            }
+            turn((&mut odometry, &mut wheels), time, |counts| counts, [TURN / 3; 2])
+        });
+        let (after_s, suspicion) = suspected.unwrap();
+        assert!(after_s < 5.0, "{other:?}: {suspected:?}");
+        assert!(!is_named || suspicion == Suspicion::Untold, "{suspected:?}");
     }
-    let pushed = beside_another([TURN / 3, TURN / 3], [TURN, TURN], 20.0);
-    assert!(matches!(pushed, Some((_, Suspicion::Untold))), "{pushed:?}");
     assert!(Suspicion::Untold.words().contains("another host commands"));
 }

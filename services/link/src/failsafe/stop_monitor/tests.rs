@@ -1,63 +1,49 @@
 use super::*;
-use crate::failsafe::{monitor::Clears, rule};
-use std::path::Path;
+use crate::failsafe::rule;
+use crate::testing::mission;
 
 /// Frame period at 7 Hz, seconds.
 const PERIOD: f64 = 1.0 / 7.0;
 
 fn stop_monitor() -> StopMonitor {
-    StopMonitor::new(&Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap())
+    StopMonitor::new(&mission(""))
 }
 
-struct Watch {
-    monitor: StopMonitor,
-    clears: Clears,
-    does_not_stop: bool,
+/// Time of a frame.
+fn at(frame: impl Into<f64>) -> MissionTime {
+    MissionTime::from_seconds(PERIOD * frame.into())
 }
 
-fn last() -> MissionTime {
-    MissionTime::from_seconds(41.0 * PERIOD)
+fn does_not_stop(monitor: &StopMonitor) -> Condition {
+    monitor.condition(Cause::RobotDoesNotStop, Moment::default())
 }
 
-/// Stops a robot at 1 s whose wheels then turn at `speed(seconds since)` counts/s. Returns when the
-/// monitor found that it does not stop, seconds.
-fn told_to_stand(speed: impl Fn(f64) -> f64) -> (Watch, Option<f64>) {
-    let mut watch = Watch {
-        monitor: stop_monitor(),
-        clears: rule(Cause::RobotDoesNotStop).unwrap().clears,
-        does_not_stop: false,
-    };
-    let (mut rolled, mut first) = (0.0, None);
-    watch.monitor.commanded([900, 900], MissionTime::default());
-    for tick in 0..42 {
-        let time = f64::from(tick) * PERIOD;
-        rolled += PERIOD * if time <= 1.0 { 700.0 } else { speed(time - 1.0) };
-        let now = MissionTime::from_seconds(time);
-        watch.monitor.heard([rolled as u16; 2], now);
-        if time >= 1.0 {
-            watch.monitor.commanded([0, 0], now);
+#[test]
+fn a_robot_obeys_that_comes_to_rest_in_half_a_second_and_one_that_rolls_on_does_when_it_rests() {
+    for (rolls_for_s, disobeys, rest) in
+        [(0.5, false, Rest::AtRest), (3.0, true, Rest::AtRest), (9.0, true, Rest::Moving)]
+    {
+        let mut monitor = stop_monitor();
+        let clears = rule(Cause::RobotDoesNotStop).unwrap().clears;
+        let (mut rolled, mut first, mut applies) = (0.0, None, false);
+        monitor.commanded([900, 900], MissionTime::default());
+        for tick in 0..42 {
+            let since_s = f64::from(tick) * PERIOD - 1.0;
+            let speed = if since_s <= 0.0 { 700.0 } else { 560.0 };
+            rolled += PERIOD * if since_s < rolls_for_s { speed } else { 0.0 };
+            monitor.heard([rolled as u16; 2], at(tick));
+            if since_s >= 0.0 {
+                monitor.commanded([0, 0], at(tick));
+            }
+            applies = clears.applies(applies, does_not_stop(&monitor));
+            if applies {
+                first.get_or_insert(since_s);
+            }
         }
-        let condition = watch.monitor.condition(Cause::RobotDoesNotStop, Moment::default());
-        watch.does_not_stop = watch.clears.applies(watch.does_not_stop, condition);
-        if watch.does_not_stop {
-            first.get_or_insert(time - 1.0);
-        }
+        assert_eq!((first.is_some(), monitor.rest(at(41))), (disobeys, rest), "{rolls_for_s}");
+        assert_eq!(applies, rest == Rest::Moving, "{rolls_for_s}");
+        assert!(first.is_none_or(|first_s| first_s < 1.5), "{first:?}");
     }
-    (watch, first)
-}
-
-#[test]
-fn a_robot_that_comes_to_rest_half_a_second_after_it_was_told_to_obeys() {
-    let (watch, did_not_stop) = told_to_stand(|since| if since < 0.5 { 560.0 } else { 0.0 });
-    assert_eq!(did_not_stop, None);
-    assert_eq!(watch.monitor.rest(last()), Rest::AtRest);
-}
-
-#[test]
-fn a_robot_that_rolls_on_disobeys_within_one_and_a_half_seconds_and_is_not_at_rest() {
-    let (watch, did_not_stop) = told_to_stand(|_| 560.0);
-    assert!(did_not_stop.unwrap() < 1.5, "{did_not_stop:?}");
-    assert_eq!(watch.monitor.rest(last()), Rest::Moving);
 }
 
 #[test]
@@ -69,11 +55,10 @@ fn a_robot_that_does_not_stop_is_not_taken_for_a_base_that_brakes_slowly_before_
     let mut after = |speed: f64, ticks: std::ops::Range<u32>, monitor: &mut StopMonitor| {
         for tick in ticks {
             rolled += PERIOD * speed;
-            let now = MissionTime::from_seconds(f64::from(tick) * PERIOD);
-            monitor.heard([rolled as u16; 2], now);
-            monitor.commanded([0, 0], now);
+            monitor.heard([rolled as u16; 2], at(tick));
+            monitor.commanded([0, 0], at(tick));
         }
-        monitor.condition(Cause::RobotDoesNotStop, Moment::default())
+        does_not_stop(monitor)
     };
     after(700.0, 0..4, &mut monitor);
     monitor.observe(&Observation::Responds(slow), Moment::default());
@@ -81,13 +66,6 @@ fn a_robot_that_does_not_stop_is_not_taken_for_a_base_that_brakes_slowly_before_
     assert_eq!(monitor.response, Response::X80);
     after(0.0, 11..15, &mut monitor);
     assert_eq!(monitor.response, slow);
-}
-
-#[test]
-fn a_robot_that_did_not_obey_does_when_it_has_been_seen_at_rest() {
-    let (watch, did_not_stop) = told_to_stand(|since| if since < 3.0 { 560.0 } else { 0.0 });
-    assert!(did_not_stop.is_some() && !watch.does_not_stop);
-    assert_eq!(watch.monitor.rest(last()), Rest::AtRest);
 }
 
 #[test]
@@ -114,16 +92,14 @@ fn a_robot_that_is_stopped_before_it_obeys_a_command_to_drive_is_not_at_rest_unt
 #[test]
 fn encoders_that_tremble_are_at_rest() {
     let mut stop_monitor = stop_monitor();
-    for tick in 0..4 {
-        let now = MissionTime::from_seconds(f64::from(tick) * PERIOD);
-        stop_monitor.heard([10 + 3 * (tick % 2) as u16, 7], now);
+    for tick in 0..4_u16 {
+        stop_monitor.heard([10 + 3 * (tick % 2), 7], at(tick));
     }
-    assert_eq!(stop_monitor.rest(MissionTime::from_seconds(3.0 * PERIOD)), Rest::AtRest);
+    assert_eq!(stop_monitor.rest(at(3)), Rest::AtRest);
 }
 
 #[test]
 fn whether_a_robot_rests_or_moves_is_not_known_without_two_new_frames_that_can_be_used() {
-    let at = |frame: i32| MissionTime::from_seconds(f64::from(frame) * PERIOD);
     for (speed, seen) in [(0, Rest::AtRest), (100, Rest::Moving)] {
         let mut monitor = stop_monitor();
         assert_eq!(monitor.rest(at(0)), Rest::Unknown, "before any frame");
@@ -175,9 +151,8 @@ fn a_robot_that_another_host_moves_and_whose_frames_it_takes_does_not_stop() {
     let mut monitor = stop_monitor();
     monitor.commanded([0, 0], MissionTime::default());
     for frame in 0..8_u16 {
-        let now = MissionTime::from_seconds(4.0 * PERIOD * f64::from(frame));
-        monitor.heard([100 * frame; 2], now);
-        assert_ne!(monitor.rest(now), Rest::AtRest);
+        monitor.heard([100 * frame; 2], at(4 * frame));
+        assert_ne!(monitor.rest(at(4 * frame)), Rest::AtRest);
     }
-    assert_eq!(monitor.condition(Cause::RobotDoesNotStop, Moment::default()), Condition::Holds);
+    assert_eq!(does_not_stop(&monitor), Condition::Holds);
 }

@@ -1,20 +1,22 @@
 use super::*;
+use crate::testing::{mission, near};
 use common::samples::RangeReading;
-use std::path::Path;
 
 const MS: u64 = 1_000_000;
 
 fn streams(text: &str) -> Streams {
-    let text = format!("target = [3, 0]\nsensors = 'front'\n{text}");
-    let mut streams = Streams::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
+    let mut streams = Streams::new(&mission(&format!("sensors = 'front'\n{text}")));
     streams.observe(&Observation::Found { again: false }, Moment::default());
     streams
 }
 
+fn at(machine_ns: u64) -> Moment {
+    Moment { time: MissionTime(machine_ns), machine_ns }
+}
+
 fn range(streams: &mut Streams, machine_ns: u64) {
     let front = RangeReading { status: RangeStatus::Nothing.into(), ..RangeReading::default() };
-    let now = Moment { time: MissionTime(machine_ns), machine_ns };
-    streams.observe(&Observation::Readings(&[front]), now);
+    streams.observe(&Observation::Readings(&[front]), at(machine_ns));
 }
 
 /// Takes motor frames at these intervals, milliseconds. Returns the last time.
@@ -51,9 +53,8 @@ fn three_frames_a_second_are_told_with_their_rate_and_a_fading_radio_is_not() {
     let Motor::Slow(hz) = slow.motor_frames(last) else {
         panic!();
     };
-    assert!((hz - 3.0).abs() < 0.01, "{hz}");
-    let now = Moment { time: MissionTime(last), machine_ns: last };
-    let words = slow.explain(Cause::FramesSlow, now).unwrap();
+    near(hz, 3.0, 0.01);
+    let words = slow.explain(Cause::FramesSlow, at(last)).unwrap();
     assert!(words.contains("3.0 motor frames") && words.contains("raise robot.command_limit_s"));
     let mut fading = streams("");
     let last = frames(&mut fading, [143, 700, 500, 143, 600, 400, 143, 500, 600]);
@@ -72,32 +73,34 @@ fn a_front_sonar_without_readings_is_missed_by_a_mission_that_senses_only() {
     }
 }
 
-/// Returns the cause and explanation while the `silent` of ten sensors give no valid reading.
+/// Returns streams with readings of ten sensors, of which the `silent` give no valid one.
+fn heard(text: &str, silent: &[u8]) -> Streams {
+    let mut streams = Streams::new(&mission(text));
+    let reading = |sensor| {
+        let is_silent = silent.contains(&sensor);
+        let status = if is_silent { RangeStatus::Invalid } else { RangeStatus::Nothing };
+        RangeReading { sensor, status: status.into(), ..RangeReading::default() }
+    };
+    let readings: Vec<_> = (0..10).map(reading).collect();
+    streams.observe(&Observation::Readings(&readings), at(900 * MS));
+    streams
+}
+
+/// Returns the cause and explanation while the `silent` give no valid reading.
 fn without(text: &str, silent: &[u8]) -> (Option<Cause>, String) {
-    let text = format!("target = [3, 0]\n{text}");
-    let mut streams = Streams::new(&Mission::parse(&text, Path::new("test.toml")).unwrap());
-    let readings: Vec<_> = (0..10)
-        .map(|sensor| {
-            let is_silent = silent.contains(&sensor);
-            let status = if is_silent { RangeStatus::Invalid } else { RangeStatus::Nothing };
-            RangeReading { sensor, status: status.into(), ..RangeReading::default() }
-        })
-        .collect();
-    let now = Moment { time: MissionTime(900 * MS), machine_ns: 900 * MS };
-    streams.observe(&Observation::Readings(&readings), now);
-    let causes = [Cause::RangeSilent, Cause::InfraredSilent];
-    let mut holding =
-        causes.into_iter().filter(|&it| streams.condition(it, now) == Condition::Holds);
-    let cause = holding.next();
-    assert_eq!(holding.next(), None);
+    let (streams, now) = (heard(text, silent), at(900 * MS));
+    let holds = |it: &Cause| streams.condition(*it, now) == Condition::Holds;
+    let holding: Vec<_> =
+        [Cause::RangeSilent, Cause::InfraredSilent].into_iter().filter(holds).collect();
+    assert!(holding.len() < 2);
+    let cause = holding.first().copied();
     (cause, cause.and_then(|cause| streams.explain(cause, now)).unwrap_or_default())
 }
 
 #[test]
 fn each_sensor_that_the_mission_uses_must_give_valid_readings_and_the_one_that_does_not_is_named() {
-    let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
     assert_eq!(without("", &[]).0, None);
-    for (row, sensor) in (0..).zip(mission.sensor_table()) {
+    for (row, sensor) in (0..).zip(mission("").sensor_table()) {
         let (cause, told) = without("", &[row]);
         // X80 infrared rangers look aside, back, or into a sonar's cone.
         let stands = sensor.kind == SensorKind::Cone;
@@ -114,30 +117,16 @@ fn without_a_second_sensor_or_a_ranger_whose_ground_no_sonar_covers_the_robot_st
     assert!(told.contains("infrared-1") && told.contains("infrared-4"), "{told}");
     // Without side sonars, only the front cone and the sides are covered.
     let infrared = "sensors = 'front+infrared'";
-    for (ranger, cause) in [
-        (3, Cause::RangeSilent),
-        (4, Cause::InfraredSilent),
-        (5, Cause::InfraredSilent),
-        (6, Cause::RangeSilent),
-        (7, Cause::InfraredSilent),
-        (8, Cause::InfraredSilent),
-    ] {
+    for ranger in 3..9 {
+        let stands = [3, 6].contains(&ranger);
+        let cause = if stands { Cause::RangeSilent } else { Cause::InfraredSilent };
         assert_eq!(without(infrared, &[ranger]).0, Some(cause), "{ranger}");
     }
 }
 
 #[test]
 fn a_ranger_without_which_the_robot_goes_on_is_not_asked_for() {
-    let mission = Mission::parse("target = [3, 0]", Path::new("test.toml")).unwrap();
-    let mut streams = Streams::new(&mission);
-    let valid = |sensor| RangeReading {
-        sensor,
-        status: RangeStatus::Nothing.into(),
-        ..RangeReading::default()
-    };
-    let readings: Vec<_> = (0..10).filter(|sensor| *sensor != 4).map(valid).collect();
-    let now = Moment { time: MissionTime(9000 * MS), machine_ns: 9000 * MS };
-    streams.observe(&Observation::Readings(&readings), now);
-    streams.motor(now.time, now.machine_ns);
-    assert!(!streams.wants_request(now.machine_ns));
+    let mut streams = heard("", &[4]);
+    streams.motor(MissionTime(900 * MS), 900 * MS);
+    assert!(!streams.wants_request(900 * MS));
 }

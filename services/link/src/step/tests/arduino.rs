@@ -1,17 +1,10 @@
 //! Tests of a robot that sends only on request: polls, and late or missing answers.
 
 use super::*;
+use crate::testing::ARDUINO;
 
 const POLL_MS: u64 = 100;
 const ROUND: &str = "p 4\re\r";
-
-fn mission() -> Mission {
-    let front = "[[robot.sensor]]\nname = 'front'\nkind = 'cone'\nchannel = 1\nforward_m = 0.1\nbearing_deg = 0\n";
-    let text = format!(
-        "target = [3, 0]\nrobot.protocol = 'arduino'\nrobot.counts_per_turn = 1200\nrobot.rate_hz = 10\nrobot.arduino.sonars = {{ front = 4 }}\n{front}"
-    );
-    Mission::parse(&text, Path::new("test.toml")).unwrap()
-}
 
 /// Board that answers after a delay, its link and clock.
 struct Scene {
@@ -29,11 +22,9 @@ struct Scene {
 
 impl Scene {
     fn at(pace: Pace) -> Self {
-        let mut link = Link::new(&mission());
-        link.restore(State { pace, next_tick: 0 });
         let rate = if let Pace::Rate(rate) = pace { rate } else { 1.0 };
         Self {
-            link,
+            link: started(&mission(ARDUINO), pace, 0),
             rate,
             ms: 0,
             delay_ms: Some(5),
@@ -106,7 +97,7 @@ impl Scene {
                 self.event(Event::Datagram(answer.as_bytes()));
                 if let Some(&tick) = self.ticks.get(ticks) {
                     let now_ns = (self.ms as f64 * self.rate) as u64 * MS;
-                    self.event(Event::Command(command(tick, now_ns, 2.0, 2.0)));
+                    self.event(Event::Command(command(tick, now_ns, [2.0; 2])));
                 }
             }
             self.event(Event::Quiet);

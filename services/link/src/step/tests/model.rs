@@ -106,12 +106,11 @@ struct World {
 }
 
 /// Read once, as that takes longer than a step.
-static MISSION: LazyLock<Mission> = LazyLock::new(mission);
+static MISSION: LazyLock<Mission> = LazyLock::new(x80);
 
 fn started(now_ns: u64, next_tick: u64) -> Link {
-    let mut link = Link::new(&MISSION);
+    let mut link = super::started(&MISSION, Pace::Rate(1.0), next_tick);
     link.now = MissionTime(now_ns);
-    link.restore(State { pace: Pace::Rate(1.0), next_tick });
     link
 }
 
@@ -204,10 +203,7 @@ impl World {
             assert!(decision.stops(), "{:?} holds: {decision:?}, {:?}", self.cause, self.history);
         }
         if !self.has(Cause::RobotLost) {
-            let mut acknowledged = Vec::new();
-            for _ in sent(&effects) {
-                Report::System(SystemSignal::Ack).encode(Addressing::default(), &mut acknowledged);
-            }
+            let acknowledged = ack().repeat(sent(&effects).len());
             if !acknowledged.is_empty() {
                 self.give(Event::Datagram(&acknowledged));
             }
@@ -266,25 +262,19 @@ impl World {
         }
         self.pass(1);
         if !self.has(Cause::RobotLost) {
-            let mut standard = StandardSensors::default();
-            standard.ultrasonic[1] = 255;
-            standard.board_battery = if self.has(Cause::BatteryEmpty) { 2000 } else { 3900 };
-            let mut bytes = Vec::new();
-            Report::Standard(standard).encode(Addressing::default(), &mut bytes);
+            let board_battery = if self.has(Cause::BatteryEmpty) { 2000 } else { 3900 };
+            let mut reports =
+                vec![Report::Standard(StandardSensors { board_battery, ..standard(255) })];
             if !self.has(Cause::FramesSilent) {
-                let mut motor = MotorSensors::default();
-                let cycle = f64::from(common::wire::COUNT_CYCLE);
-                let [left, right] = self.counts.map(|counts| counts.rem_euclid(cycle) as u16);
-                motor.encoders[0].position =
-                    (common::wire::COUNT_CYCLE - left) % common::wire::COUNT_CYCLE;
-                motor.encoders[1].position = right;
-                Report::Motor(motor).encode(Addressing::default(), &mut bytes);
+                let [left, right] = self.counts;
+                let cycle = f64::from(COUNT_CYCLE);
+                reports.push(motor([-left, right].map(|counts| counts.rem_euclid(cycle) as u16)));
             }
-            let effects = self.give(Event::Datagram(&bytes));
+            let effects = self.give(Event::Datagram(&encoded(reports)));
             for (tick, ..) in ticks(&effects) {
                 if !self.has(Cause::CommandStale) {
                     // Below 0.03 m/s at the rim, so no monitor judges it.
-                    let command = command(tick, self.now_ns, 0.3, 0.3);
+                    let command = command(tick, self.now_ns, [0.3; 2]);
                     self.newest = Some(command);
                     self.give(Event::Command(command));
                 }

@@ -34,21 +34,19 @@ impl Driver for Laser {
 
 #[test]
 fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign_of_the_robot() {
-    let text = "target = [3, 0]\nrobot.model = 'kobuki'";
-    let mut link = Link::new(&Mission::parse(text, Path::new("test.toml")).unwrap());
+    let mut link = started(&mission("robot.model = 'kobuki'"), Pace::Rate(1.0), 0);
     link.drivers.push(Box::new(Laser));
-    link.restore(State { pace: Pace::Rate(1.0), next_tick: 0 });
     let greeted = link.at(Event::SensorWire(0, true), 0);
     assert!(greeted.contains(&Effect::SendSensor(0, b"scan".to_vec())), "{greeted:?}");
     link.at(Event::Sensor(0, &[10]), MS);
     assert!(!link.connected());
     let wheels = b"{\"wheels\":[0,0],\"speeds\":[0,0]}\n";
-    link.at(Event::Datagram(wheels), 10 * MS);
-    link.at(Event::Order(Order::Drive, HoldReason::None), 11 * MS);
+    link.hears(wheels, 10);
+    link.drive(11);
     link.at(Event::Sensor(0, &[20]), 50 * MS);
     // No such sensor.
     link.at(Event::Sensor(7, &[30]), 60 * MS);
-    let effects = link.at(Event::Datagram(wheels), 110 * MS);
+    let effects = link.hears(wheels, 110);
     let scans = effects.iter().filter_map(|effect| match effect {
         Effect::Tick { ranges, scans, .. } => Some((ranges[0].range_m, scans.clone())),
         _ => None,
@@ -60,6 +58,6 @@ fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign
     let refused = link.at(Event::Sensor(0, &[0]), 120 * MS);
     assert!(refused.contains(&Effect::Refused("no scan".into())));
     // The laser falls silent.
-    let again = (3..30).flat_map(|tick| link.at(Event::Datagram(wheels), 50 * tick * MS));
+    let again = (3..30).flat_map(|tick| link.hears(wheels, 50 * tick));
     assert!(again.filter(|effect| matches!(effect, Effect::SendSensor(..))).count() > 0);
 }

@@ -11,25 +11,29 @@ fn mapper(extra: &str) -> Mapper {
 }
 
 impl Mapper {
-    fn hear(&mut self, tick: u64, x: f64, heading: f64, heard: Option<f64>) {
+    fn hear(&mut self, tick: u64, heading: f64, heard: Option<f64>) {
+        self.hear_from(tick, 0.0, heading, heard);
+    }
+
+    fn hear_from(&mut self, tick: u64, x: f64, heading: f64, heard: Option<f64>) {
         let heard = heard.map_or(reading(RangeStatus::Nothing, 0.0), echo);
         self.sense(at(tick, x, 0.0, heading), &[heard]);
     }
 
     fn see(&mut self, tick: u64, infrared_ad: [u16; 7]) {
-        self.sense(at(tick, 0.0, 0.0, 0.0), &rays(infrared_ad));
+        self.sense(still(tick), &rays(infrared_ad));
     }
 }
 
 #[test]
 fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, 0.0, Some(0.7));
+    mapper.hear(0, 0.0, Some(0.7));
     // The hit is at 0.9. Body and clearance reach 0.22 m and half a cell around it.
-    assert!(mapper.is_hazard(0.9, 0.0));
-    assert_eq!(mapper.state_at(0.7, 0.0), CellState::Margin);
-    assert_eq!(mapper.state_at(0.5, 0.0), CellState::Scanned);
-    assert_eq!(mapper.state_at(0.5, 0.5), CellState::Free);
+    assert!(mapper.hazard_ahead(90));
+    assert_eq!(mapper.ahead(70), Margin);
+    assert_eq!(mapper.ahead(50), Scanned);
+    assert_eq!(mapper.state_at(50, 50), Free);
     assert_eq!(mapper.state().safety_events, 1);
 }
 
@@ -39,10 +43,10 @@ fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
     // The map ends at x = 2.45. A wall stands at 2.5, 0.5 m ahead of the sensor. The body reaches
     // 0.22 m and half a cell.
     for tick in 0..3 {
-        mapper.hear(tick, 1.8, 0.0, Some(0.5));
+        mapper.hear_from(tick, 1.8, 0.0, Some(0.5));
     }
-    assert!(mapper.is_hazard(2.3, 0.0));
-    assert!(!mapper.is_hazard(2.2, 0.0));
+    assert!(mapper.hazard_ahead(230));
+    assert!(!mapper.hazard_ahead(220));
 }
 
 fn rays(infrared_ad: [u16; 7]) -> Vec<RangeReading> {
@@ -71,39 +75,22 @@ fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
     let mut mapper = mapper(INFRARED);
     mapper.see(0, rear(0.6));
     // The echo is at -0.79. Body and clearance reach 0.22 m and half a cell around it.
-    assert_eq!(mapper.state_at(-0.4, 0.0), CellState::Scanned);
-    assert!(mapper.is_hazard(-0.8, 0.0));
-    assert!(!mapper.is_hazard(-0.5, 0.0));
-    assert_eq!(mapper.state_at(-1.2, 0.0), CellState::Free);
-    assert_eq!(mapper.state_at(-0.4, 0.3), CellState::Free, "it is thin");
+    assert_eq!(mapper.ahead(-40), Scanned);
+    assert!(mapper.hazard_ahead(-80));
+    assert!(!mapper.hazard_ahead(-50));
+    assert_eq!(mapper.ahead(-120), Free);
+    assert_eq!(mapper.state_at(-40, 30), Free, "it is thin");
     assert_eq!(mapper.state().safety_events, 1);
 }
 
 #[test]
 fn an_infrared_ranger_that_sees_nothing_frees_ground_only_if_it_is_live() {
-    let mut live = mapper(INFRARED);
-    live.see(0, rear(0.81));
-    assert_eq!(live.state_at(-0.8, 0.0), CellState::Scanned);
-    assert_eq!(live.state().safety_events, 0);
-    let mut dead = mapper(INFRARED);
-    dead.see(0, [0; 7]);
-    let mut saturated = mapper(INFRARED);
-    saturated.see(0, [4095; 7]);
-    for mapper in [dead, saturated] {
-        assert_eq!(mapper.state_at(-0.4, 0.0), CellState::Free);
+    for (counts, state) in [(rear(0.81), Scanned), ([0; 7], Free), ([4095; 7], Free)] {
+        let mut mapper = mapper(INFRARED);
+        mapper.see(0, counts);
+        assert_eq!([-40, -80].map(|x| mapper.ahead(x)), [state; 2], "{counts:?}");
         assert_eq!(mapper.state().safety_events, 0);
     }
-}
-
-#[test]
-fn an_infrared_reading_nearer_than_10_cm_frees_nothing() {
-    let mut near = mapper(INFRARED);
-    near.see(0, rear(0.81));
-    assert_eq!(near.state_at(-0.5, 0.0), CellState::Scanned);
-    let mut nearer = mapper(INFRARED);
-    nearer.see(0, rear(0.09));
-    assert!(nearer.is_hazard(-0.3, 0.0));
-    assert_eq!(nearer.state_at(-0.5, 0.0), CellState::Sensed);
 }
 
 #[test]
@@ -114,91 +101,74 @@ fn silence_of_the_sonar_does_not_take_back_what_infrared_saw() {
     counts[1] = infrared_ad(0.5);
     mapper.see(0, counts);
     for tick in 1..9 {
-        mapper.hear(tick, 0.0, 11.25_f64.to_radians(), None);
+        mapper.hear(tick, 11.25_f64.to_radians(), None);
     }
-    assert!(mapper.is_hazard(0.7, 0.15));
+    assert!(mapper.is_hazard(70, 15));
 }
 
 #[test]
 fn without_infrared_among_the_sensors_its_readings_are_not_mapped() {
     let mut mapper = mapper("sensors = 'front'");
     mapper.see(0, rear(0.6));
-    assert_eq!(mapper.state_at(-0.4, 0.0), CellState::Free);
+    assert_eq!(mapper.ahead(-40), Free);
     assert_eq!(mapper.state().safety_events, 0);
 }
 
 #[test]
 fn a_false_echo_is_gone_after_a_look_without_an_echo_at_it() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, 0.0, Some(0.4));
-    assert!(mapper.is_hazard(0.6, 0.0));
+    mapper.hear(0, 0.0, Some(0.4));
+    assert!(mapper.hazard_ahead(60));
     for tick in 1..=9 {
         let heading = 0.1 * (tick as f64 - 5.0);
-        mapper.hear(tick, 0.0, heading, None);
+        mapper.hear(tick, heading, None);
     }
-    assert_eq!(mapper.state_at(0.6, 0.0), CellState::Scanned);
+    assert_eq!(mapper.ahead(60), Scanned);
 }
 
 #[test]
 fn no_echo_at_a_slant_does_not_take_back_what_was_heard_squarely() {
     let mut mapper = mapper("");
     for tick in 0..3 {
-        mapper.hear(tick, 0.0, 0.0, Some(0.7));
+        mapper.hear(tick, 0.0, Some(0.7));
     }
     // The beam comes from the other side, where a smooth wall would give no echo.
     for tick in 3..30 {
-        mapper.hear(tick, 1.9, std::f64::consts::PI, None);
+        mapper.hear_from(tick, 1.9, std::f64::consts::PI, None);
     }
-    assert!(mapper.is_hazard(0.9, 0.0));
+    assert!(mapper.hazard_ahead(90));
 }
 
 #[test]
 fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
     let mut mapper = mapper("");
     for tick in 0..4 {
-        mapper.hear(tick, 0.0, 0.0, Some(0.7));
+        mapper.hear(tick, 0.0, Some(0.7));
     }
     let before = mapper.hazards();
     // After half the arc's turn, its edge meets the object, its middle nothing new.
-    mapper.hear(4, 0.0, 0.25, Some(0.7));
+    mapper.hear(4, 0.25, Some(0.7));
     assert_eq!(mapper.hazards(), before);
 }
 
 #[test]
 fn an_echo_beyond_reach_is_not_mapped() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, 0.0, Some(1.4));
+    mapper.hear(0, 0.0, Some(1.4));
     assert_eq!(mapper.state().safety_events, 0);
-    assert_eq!(mapper.state_at(1.0, 0.0), CellState::Scanned);
+    assert_eq!(mapper.ahead(100), Scanned);
 }
 
 #[test]
 fn scanned_ground_grows_stale_as_the_wheels_roll() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, 0.0, None);
-    assert_eq!(mapper.state_at(0.9, 0.0), CellState::Scanned);
+    mapper.hear(0, 0.0, None);
+    assert_eq!(mapper.ahead(90), Scanned);
     // Six turns on the spot roll each wheel 4.9 m; the beam finally looks the other way.
     let heading = 13.0 * std::f64::consts::PI;
-    mapper.hear(1, 0.0, heading, None);
-    assert_eq!(mapper.state_at(0.9, 0.0), CellState::Free);
-    assert_eq!(mapper.state_at(-0.9, 0.0), CellState::Scanned);
-}
-
-#[test]
-fn a_mapper_that_was_killed_goes_on_to_the_bit() {
-    let mut first = mapper("");
-    for tick in 0..5 {
-        first.hear(tick, 0.0, 0.1 * tick as f64, Some(0.6));
-    }
-    let mut successor = mapper("");
-    successor.restore(first.state().clone()).unwrap();
-    for tick in 5..9 {
-        let echo = (tick % 2 == 0).then_some(0.5);
-        for mapper in [&mut first, &mut successor] {
-            mapper.hear(tick, 0.02, -0.1 * tick as f64, echo);
-        }
-    }
-    assert_eq!(first.state(), successor.state());
+    mapper.hear(1, heading, None);
+    assert_eq!(mapper.ahead(90), Free);
+    assert_eq!(mapper.ahead(-90), Scanned);
 }
 
 #[test]
@@ -210,22 +180,21 @@ fn a_belief_of_the_other_method_is_refused() {
 #[test]
 fn what_is_forgotten_first_is_what_is_not_near_and_then_all_of_it() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, 0.0, Some(0.9));
-    mapper.hear(1, 0.0, 2.0, Some(0.3));
+    mapper.hear(0, 0.0, Some(0.9));
+    mapper.hear(1, 2.0, Some(0.3));
     assert!(mapper.reset(1) && !mapper.reset(1));
-    assert!(!mapper.is_hazard(1.1, 0.0));
-    let near = DVec2::from_angle(2.0) * 0.5;
-    assert!(mapper.is_hazard(near.x, near.y));
+    assert!(!mapper.hazard_ahead(110));
+    assert!(mapper.is_hazard(-21, 45));
     assert!(mapper.reset(2));
-    assert!(!mapper.is_hazard(near.x, near.y));
+    assert!(!mapper.is_hazard(-21, 45));
 }
 
 #[test]
 fn the_targets_cell_is_never_hazard() {
     let mut mapper = mapper("");
-    mapper.hear(0, 1.3, 0.0, Some(0.5));
-    assert!(mapper.is_hazard(1.9, 0.0));
-    assert!(!mapper.is_hazard(2.0, 0.0));
+    mapper.hear_from(0, 1.3, 0.0, Some(0.5));
+    assert!(mapper.hazard_ahead(190));
+    assert!(!mapper.hazard_ahead(200));
 }
 
 #[test]
@@ -235,8 +204,8 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
         header.clear_beams().to_vec()
     };
     let mut mapper = mapper("sensors = 'front'");
-    mapper.hear(0, 0.0, 0.0, Some(0.7));
-    mapper.hear(1, 0.0, 0.5, None);
+    mapper.hear(0, 0.0, Some(0.7));
+    mapper.hear(1, 0.5, None);
     let [echo, silence] = beams(&mapper)[..] else {
         panic!("{:?}", beams(&mapper));
     };
@@ -244,7 +213,7 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     assert!((0.6..0.7).contains(&echo.clear_m), "{echo:?}");
     assert!(silence.bearing_rad == 0.5 && silence.clear_m >= 1.5, "{silence:?}");
     for tick in 2..200 {
-        mapper.hear(tick, 0.0, 0.5 + tick as f64, None);
+        mapper.hear(tick, 0.5 + tick as f64, None);
     }
     assert!(beams(&mapper).len() < 50, "{}", beams(&mapper).len());
     // A wrong pose may be the cause of a reset.
@@ -257,8 +226,8 @@ fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_
     let mut mapper = mapper(INFRARED);
     mapper.touch(0.0);
     let touched = |mapper: &Mapper| {
-        assert!(!mapper.is_hazard(-0.4, 0.0), "behind it is free");
-        mapper.is_hazard(0.2, 0.0) && mapper.is_hazard(0.4, 0.0)
+        assert!(!mapper.hazard_ahead(-40), "behind it is free");
+        mapper.hazard_ahead(20) && mapper.hazard_ahead(40)
     };
     assert!(touched(&mapper));
     // The ranger looks over the object.
@@ -269,31 +238,25 @@ fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_
         mapper.sense(at(tick, -0.3, 0.0, 0.0), &readings);
     }
     assert!(touched(&mapper));
-    mapper.hear(40, 0.2, 0.0, None);
-    assert!(!mapper.is_hazard(0.2, 0.0));
+    mapper.hear_from(40, 0.2, 0.0, None);
+    assert!(!mapper.hazard_ahead(20));
 }
 
 #[test]
-fn three_sonars_have_room_for_as_many_ticks_of_readings_as_one() {
-    for (sensors, readings) in [("front", 128), ("three-front", 384)] {
+fn three_sonars_have_room_for_as_many_ticks_of_readings_as_one_and_map_what_is_at_45_degrees() {
+    let left = RangeReading { sensor: 1, ..echo(0.5) };
+    for (sensors, readings) in [("front", 128), ("three-front", 384), ("all", 384)] {
         let mut mapper = mapper(&format!("sensors = '{sensors}'"));
+        let mut beside = mapper.clone();
+        beside.sense(still(0), &[left]);
+        assert_eq!(beside.is_hazard(49, 49), sensors != "front", "{sensors}");
+        assert!(!beside.is_hazard(49, -49));
         let heard = |sensor| RangeReading { sensor, ..reading(RangeStatus::Nothing, 0.0) };
         for tick in 0..200 {
-            mapper.sense(at(tick, 0.0, 0.0, 0.0), &[0, 1, 2].map(heard));
+            mapper.sense(still(tick), &[0, 1, 2].map(heard));
         }
-        assert_eq!(mapper.header(Part::default()).clear_beams().len(), readings);
-    }
-}
-
-#[test]
-fn the_sonars_beside_the_front_one_map_what_is_at_45_degrees() {
-    let there = DVec2::from_angle(std::f64::consts::FRAC_PI_4) * (0.194 + 0.5);
-    let left = RangeReading { sensor: 1, ..echo(0.5) };
-    for (sensors, is_mapped) in [("front", false), ("three-front", true), ("all", true)] {
-        let mut mapper = mapper(&format!("sensors = '{sensors}'"));
-        mapper.sense(PoseSample::default(), &[left]);
-        assert_eq!(mapper.is_hazard(there.x, there.y), is_mapped, "{sensors}");
-        assert!(!mapper.is_hazard(there.x, -there.y));
+        let kept = mapper.header(Part::default()).clear_beams().len();
+        assert!(kept == readings || sensors == "all", "{sensors}: {kept}");
     }
 }
 
@@ -310,7 +273,7 @@ fn a_reading_that_no_sensor_can_give_is_ignored() {
 fn evidence_that_nothing_renews_is_weaker_with_time_and_gone_when_it_should_be() {
     let seconds = |tick: u64| tick * 1_000_000_000;
     let hear = |mapper: &mut Mapper, tick, heard: Option<f64>| {
-        let pose = at(tick, 0.0, 0.0, 0.0);
+        let pose = still(tick);
         let stamp = Stamp { stamp_ns: seconds(tick), ..pose.stamp };
         let readings = heard.map(echo);
         mapper.sense(PoseSample { stamp, ..pose }, readings.as_slice());
@@ -322,16 +285,16 @@ fn evidence_that_nothing_renews_is_weaker_with_time_and_gone_when_it_should_be()
         for tick in 0..echoes {
             hear(&mut mapper, tick, Some(0.7));
         }
-        assert!(mapper.is_hazard(0.9, 0.0) && mapper.state_at(0.5, 0.0) == CellState::Scanned);
+        assert!(mapper.hazard_ahead(90) && mapper.ahead(50) == Scanned);
         let gone = (echoes..400).find(|tick| {
             hear(&mut mapper, *tick, None);
-            !mapper.is_hazard(0.9, 0.0)
+            !mapper.hazard_ahead(90)
         });
-        (gone, mapper.state_at(0.5, 0.0))
+        (gone, mapper.ahead(50))
     };
     let forgets = "forget_after_s = 120";
     // Three echoes reach the maximum weight, one a third of it.
-    assert_eq!(gone_after(forgets, 3), (Some(120), CellState::Free));
-    assert_eq!(gone_after(forgets, 1), (Some(40), CellState::Scanned));
-    assert_eq!(gone_after("", 3), (None, CellState::Scanned));
+    assert_eq!(gone_after(forgets, 3), (Some(120), Free));
+    assert_eq!(gone_after(forgets, 1), (Some(40), Scanned));
+    assert_eq!(gone_after("", 3), (None, Scanned));
 }

@@ -14,17 +14,15 @@ fn stand(mapper: &mut Mapper, tick: u64, x_m: f64) {
 
 fn is_connected(mapper: &Mapper) -> bool {
     let frame = mapper.frame();
-    let free =
-        |cell: Cell| !CellState::from_byte(mapper.state().cells[frame.index(cell)]).is_hazard();
     let mut seen = vec![false; frame.area()];
     let mut next = vec![frame.cell_at(DVec2::ZERO).unwrap()];
-    while let Some(Cell { col, row }) = next.pop() {
-        let beside = [(col - 1, row), (col + 1, row), (col, row - 1), (col, row + 1)];
-        for (col, row) in beside {
-            let cell = Cell { col, row };
-            if free(cell) && !std::mem::replace(&mut seen[frame.index(cell)], true) {
-                next.push(cell);
-            }
+    while let Some(cell) = next.pop() {
+        let at = frame.index(cell);
+        let is_free = !CellState::from_byte(mapper.state().cells[at]).is_hazard();
+        if is_free && !std::mem::replace(&mut seen[at], true) {
+            let Cell { col, row } = cell;
+            let beside = [(col - 1, row), (col + 1, row), (col, row - 1), (col, row + 1)];
+            next.extend(beside.map(|(col, row)| Cell { col, row }));
         }
     }
     seen[frame.index(frame.cell_at(DVec2::new(1.5, 0.0)).unwrap())]
@@ -36,13 +34,13 @@ fn a_robot_inside_a_false_hazard_takes_it_along_until_the_belief_is_forgotten() 
         let mut mapper = mapper(method);
         mapper.step(Input::Fault(FaultKind::HazardAroundRobot), MissionTime(0));
         stand(&mut mapper, 0, 0.0);
-        assert!(mapper.is_hazard(0.0, 0.0) && !mapper.is_hazard(0.7, 0.0));
+        assert!(mapper.hazard_ahead(0) && !mapper.hazard_ahead(70));
         stand(&mut mapper, 1, 0.3);
-        assert!(mapper.is_hazard(0.7, 0.0));
+        assert!(mapper.hazard_ahead(70));
         assert!(mapper.reset(1));
-        assert!(!mapper.is_hazard(0.3, 0.0) && !mapper.is_hazard(0.7, 0.0));
+        assert!(!mapper.hazard_ahead(30) && !mapper.hazard_ahead(70));
         stand(&mut mapper, 2, 0.3);
-        assert!(!mapper.is_hazard(0.3, 0.0), "{method}");
+        assert!(!mapper.hazard_ahead(30), "{method}");
     }
 }
 

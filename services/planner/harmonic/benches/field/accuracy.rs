@@ -1,7 +1,7 @@
 //! Angles between computed and exact directions, after solves from scratch on thousands of maps.
 
-use crate::support::{Angles, Kind, Map};
-use harmonic::{Cancellation, Screening, Solver, solve_exactly};
+use crate::support::{Angles, Kind, Map, solve};
+use harmonic::solve_exactly;
 
 /// Maps per kind and screening.
 const MAPS: u64 = 100;
@@ -35,14 +35,9 @@ pub(crate) fn angle_table() {
             let mut worst = Angles::default();
             let (mut residual, mut tile, mut method) = (0.0_f64, 0.0_f64, "");
             for seed in 0..MAPS {
-                let domain = Map::generate(kind, SIDE, SIDE, seed)
-                    .domain()
-                    .and_then(|it| it.with_screening(&Screening::cells(length)))
-                    .expect("a valid map");
-                let field =
-                    Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
-                let exact = solve_exactly(&domain).expect("a field");
-                let angles = Angles::between(&field, &exact);
+                let domain = Map::generate(kind, SIDE, SIDE, seed).screened(length);
+                let field = solve(&domain);
+                let angles = Angles::between(&field, &solve_exactly(&domain).expect("a field"));
                 worst.p50 = worst.p50.max(angles.p50);
                 worst.p99 = worst.p99.max(angles.p99);
                 worst.max = worst.max.max(angles.max);

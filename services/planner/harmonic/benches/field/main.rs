@@ -29,8 +29,8 @@ mod wavefront;
 
 use std::{path::Path, time::Instant};
 
-use crate::support::{Kind, Map};
-use harmonic::{Cancellation, Cell, Change, Domain, Solver};
+use crate::support::{Kind, Map, solve_with};
+use harmonic::{Cell, Change, Domain, Solver};
 
 /// Returns the milliseconds of the fastest of `runs` calls.
 fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
@@ -110,7 +110,7 @@ fn full_table(quick: bool) {
             if n > 512 && narrow {
                 continue;
             }
-            let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");
+            let domain = Map::generate(kind, n, n, 1).domain();
             full_row(&format!("{kind:?}"), &domain, n <= 1024);
         }
     }
@@ -125,30 +125,28 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
     let rows = domain.blocked().chunks_exact(width).rev();
     let blocked = rows.flatten().copied().collect();
     let target = Cell::new(domain.target().col, height - 1 - domain.target().row);
-    let upside_down = Domain::new(width, height, blocked, target);
-    let drums = Map::generate(Kind::Drums, width, height, 2).domain();
-    [upside_down, drums].map(|it| it.expect("a valid map"))
+    let upside_down = support::domain(width, height, blocked, target);
+    [upside_down, Map::generate(Kind::Drums, width, height, 2).domain()]
 }
 
 fn full_row(name: &str, domain: &Domain, with_dijkstra: bool) {
     let cells = domain.blocked().len();
-    let cancellation = Cancellation::new();
     let (width, height) = (domain.width(), domain.height());
     let others = others_than(domain);
     let mut solver = Solver::default();
     let mut scratch = f64::INFINITY;
     for _ in 0..runs(cells).min(12) {
         for other in &others {
-            solver.solve(other, &cancellation).expect("a field");
+            solve_with(&mut solver, other);
         }
         scratch = scratch.min(fastest(1, || {
-            solver.solve(domain, &cancellation).expect("a field");
+            solve_with(&mut solver, domain);
         }));
     }
     let target = fastest(runs(cells), || {
-        solver.solve(domain, &cancellation).expect("a field");
+        solve_with(&mut solver, domain);
     });
-    let field = solver.solve(domain, &cancellation).expect("a field");
+    let field = solve_with(&mut solver, domain);
     let (wavefront, reached) = wavefront::time(domain, runs(cells));
     assert_eq!(reached, field.verification().reachable, "cells reached");
     let dijkstra = with_dijkstra.then(|| others::dijkstra(domain));

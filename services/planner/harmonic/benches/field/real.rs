@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use harmonic::{Cell, Domain};
 
+use crate::support::domain;
+
 /// Threshold of the ROS map_server; darker cells are not free.
 const FREE_FROM: u8 = 206;
 
@@ -37,7 +39,7 @@ fn load(file: &Path) -> Domain {
     let target =
         (0..blocked.len()).filter(|&at| !blocked[at]).min_by_key(from_middle).expect("a free cell");
     let target = Cell::new(target % width, target / width);
-    Domain::new(width, height, blocked, target).expect("a valid map")
+    domain(width, height, blocked, target)
 }
 
 fn moving_ai(bytes: &[u8]) -> (usize, usize, Vec<bool>) {

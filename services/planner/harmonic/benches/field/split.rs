@@ -3,7 +3,7 @@
 use std::process::Command;
 use std::time::Instant;
 
-use crate::support::{Kind, Map};
+use crate::support::{Kind, Map, solve, solve_with};
 use harmonic::{Cancellation, Domain, Phase, Solver};
 
 use crate::{others_than, runs, wavefront};
@@ -36,8 +36,7 @@ fn least(domain: &Domain) -> (Split, &'static str) {
     let mut best = (Split::default(), "");
     for run in 0..runs(domain.blocked().len()).min(12) {
         for other in &others {
-            let solved = solver.solve(other, &Cancellation::new());
-            solved.expect("a field");
+            solve_with(&mut solver, other);
         }
         let here = split(&mut solver, domain);
         if run == 0 || here.0.total < best.0.total {
@@ -57,7 +56,7 @@ pub(crate) fn growth_table() {
     );
     for kind in [Kind::Drums, Kind::Office] {
         for n in [128, 256, 512, 1024, 2048, 4096] {
-            let domain = Map::generate(kind, n, n, 1).domain().expect("a valid map");
+            let domain = Map::generate(kind, n, n, 1).domain();
             let bytes = bytes_of_a_process(&format!("{kind:?}:{n}"));
             let (split, method) = least(&domain);
             let (wavefront, _) = wavefront::time(&domain, runs(n * n).min(12));
@@ -86,7 +85,7 @@ pub(crate) fn print_bytes() {
     let map = std::env::args().next_back().unwrap_or_default();
     let domain = [Kind::Drums, Kind::Office].into_iter().find_map(|kind| {
         let n = map.strip_prefix(&format!("{kind:?}:"))?.parse().ok()?;
-        Map::generate(kind, n, n, 1).domain().ok()
+        Some(Map::generate(kind, n, n, 1).domain())
     });
     if let Some(bytes) = domain.and_then(|domain| most_bytes(&domain)) {
         println!("{bytes}");
@@ -99,7 +98,7 @@ fn most_bytes(domain: &Domain) -> Option<f64> {
     // Resets the peak to the present size.
     std::fs::write("/proc/self/clear_refs", "5").ok()?;
     let before = status("VmRSS:")?;
-    Solver::default().solve(domain, &Cancellation::new()).ok()?;
+    solve(domain);
     Some((status("VmHWM:")? - before).max(0.0))
 }
 

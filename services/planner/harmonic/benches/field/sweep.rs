@@ -1,8 +1,8 @@
 //! Sweep over the map shapes that decide the cost of a solve: corridor and door width, obstacle
 //! density, depth of u.
 
-use crate::support::{Kind, Map};
-use harmonic::{Cancellation, Domain, Screening, Solver};
+use crate::support::{Kind, Map, solve_with};
+use harmonic::{Domain, Solver};
 
 use crate::split::split;
 use crate::{others_than, wavefront};
@@ -42,12 +42,6 @@ fn kinds() -> Vec<(String, Kind, f64)> {
     kinds.into_iter().map(named).collect()
 }
 
-fn domain(kind: Kind, length: f64, side: usize, seed: u64) -> Domain {
-    let domain = Map::generate(kind, side, side, seed).domain();
-    let domain = domain.and_then(|it| it.with_screening(&Screening::cells(length)));
-    domain.expect("a valid map")
-}
-
 /// Returns whether the words after `only` on the command line, if any, select `name`.
 fn chosen(name: &str) -> bool {
     let mut only = std::env::args().skip_while(|word| word != "only").skip(1).peekable();
@@ -57,8 +51,11 @@ fn chosen(name: &str) -> bool {
 /// Prints times of each map and of a wavefront measured in turn, worst ratio first.
 pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
     let generated = kinds().into_iter().filter(|it| chosen(&it.0));
-    let mut rows: Vec<_> =
-        generated.map(|(name, kind, length)| row(&name, &domain(kind, length, SIDE, 1))).collect();
+    let mut rows: Vec<_> = generated
+        .map(|(name, kind, length)| {
+            row(&name, &Map::generate(kind, SIDE, SIDE, 1).screened(length))
+        })
+        .collect();
     rows.extend(real.into_iter().flatten().map(|(name, domain)| row(&name, &domain)));
     rows.sort_by(|a, b| b.0.total_cmp(&a.0));
     println!(
@@ -80,7 +77,7 @@ fn row(name: &str, domain: &Domain) -> (f64, String) {
     let (mut best, mut waves) = (None, f64::INFINITY);
     for _ in 0..RUNS {
         for other in &others {
-            solver.solve(other, &Cancellation::new()).expect("a field");
+            solve_with(&mut solver, other);
         }
         let (split, method) = split(&mut solver, domain);
         if best.is_none_or(|(least, _): (crate::split::Split, _)| split.total < least.total) {
@@ -89,7 +86,7 @@ fn row(name: &str, domain: &Domain) -> (f64, String) {
         waves = waves.min(wavefront::time(domain, 2).0);
     }
     let (split, method) = best.expect("at least one run");
-    let field = solver.solve(domain, &Cancellation::new()).expect("a field");
+    let field = solve_with(&mut solver, domain);
     let ratio = split.total / waves;
     let line = format!(
         "{name:<28} {ratio:>6.2} {:>9.2} {:>7.1} {method:<28} {:>6} {:>6} {:>9.1}",

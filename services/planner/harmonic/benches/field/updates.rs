@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use crate::support::{Kind, Map, Random};
-use harmonic::{Cancellation, Cell, Screening, Solver};
+use crate::support::{Kind, Map, Random, solve_near, solve_with};
+use harmonic::{Cell, Solver};
 
 use crate::block;
 
@@ -25,13 +25,9 @@ pub(crate) fn table(quick: bool) {
 }
 
 fn row(kind: Kind, n: usize, length: f64) {
-    let mut domain = Map::generate(kind, n, n, 1)
-        .domain()
-        .and_then(|it| it.with_screening(&Screening::cells(length)))
-        .expect("a valid map");
+    let mut domain = Map::generate(kind, n, n, 1).screened(length);
     let mut solver = Solver::default();
-    let cancellation = Cancellation::new();
-    let mut field = solver.solve(&domain, &cancellation).expect("a field");
+    let mut field = solve_with(&mut solver, &domain);
     let mut random = Random::new(9);
     let mut times = Vec::new();
     while times.len() < if n <= 1024 { UPDATES } else { UPDATES / 10 } {
@@ -44,7 +40,7 @@ fn row(kind: Kind, n: usize, length: f64) {
             changes.iter_mut().for_each(|change| change.blocked = blocked);
             let start = Instant::now();
             domain.apply(&changes).expect("valid changes");
-            field = solver.solve_near(&domain, &field, &cancellation).expect("a field");
+            field = solve_near(&mut solver, &domain, &field);
             times.push(start.elapsed().as_secs_f64() * 1e6);
         }
     }

@@ -1,7 +1,7 @@
 //! Tests that solves from the previous field give the directions of a solve from scratch.
 
-use crate::support::{Angles, Kind, Map, Random, follow};
-use harmonic::{Cancellation, Cell, Change, Domain, Field, Solver, solve_exactly};
+use crate::support::{Angles, Kind, Map, Random, follow, solve_near, solve_with};
+use harmonic::{Cell, Change, Domain, Field, Solver, solve_exactly};
 
 struct Case {
     solver: Solver,
@@ -11,18 +11,14 @@ struct Case {
 
 impl Case {
     fn new(map: &Map) -> Self {
-        let domain = map.domain().expect("a valid map");
-        let mut solver = Solver::default();
-        let field = solver.solve(&domain, &Cancellation::new()).expect("the map has a field");
+        let (domain, mut solver) = (map.domain(), Solver::default());
+        let field = solve_with(&mut solver, &domain);
         Self { solver, domain, field }
     }
 
     fn change(&mut self, changes: &[Change]) {
         self.domain.apply(changes).expect("valid changes");
-        self.field = self
-            .solver
-            .solve_near(&self.domain, &self.field, &Cancellation::new())
-            .expect("the map has a field");
+        self.field = solve_near(&mut self.solver, &self.domain, &self.field);
     }
 
     fn block(&self, (col, row): (usize, usize), (width, height): (usize, usize)) -> Vec<Change> {
@@ -37,8 +33,7 @@ impl Case {
     }
 
     fn angles(&self) -> Angles {
-        let exact = solve_exactly(&self.domain).expect("a field");
-        Angles::between(&self.field, &exact)
+        Angles::between(&self.field, &solve_exactly(&self.domain).expect("a field"))
     }
 }
 

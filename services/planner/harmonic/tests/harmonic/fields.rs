@@ -1,120 +1,103 @@
 //! Tests that full solves are right in every cell of every kind of map.
 
-use crate::support::{Angles, Kind, Map, Reference, follow};
+use crate::support::{
+    Angles, Kind, Map, Reference, angle, domain, follow, screened, solve, solve_near, solve_with,
+};
 use harmonic::{
     Cancellation, Cell, Domain, Field, Method, Screening, Settings, SolveError, Solver,
     solve_exactly,
 };
 
-fn solve(domain: &Domain) -> Field {
-    Solver::default().solve(domain, &Cancellation::new()).expect("the map has a field")
+/// Returns the screening length of coefficient `k`: u is the mean of the four neighbours over 1 + k.
+fn length(k: f64) -> f64 {
+    0.5 / k.sqrt()
 }
 
-/// Returns the screening of coefficient `k`: u is the mean of the four neighbours over 1 + k.
-fn screening(k: f64) -> Screening {
-    Screening::cells(0.5 / k.sqrt())
-}
-
-fn assert_right(map: &Map, name: &str) {
-    let domain = map.domain().expect("a valid map");
-    let field = solve(&domain);
-    let reference = Reference::solve(&domain);
-    assert!(
-        reference.worst_residual < 1e-11,
-        "{name}: the reference itself is off by {}",
-        reference.worst_residual
-    );
+fn assert_right(domain: &Domain, name: &str) -> Field {
+    let (field, reference) = (solve(domain), Reference::solve(domain));
+    let residual = reference.worst_residual;
+    assert!(residual < 1e-11, "{name}: the reference itself is off by {residual}");
     assert_eq!(follow(&field), 1.0, "{name}: some cell does not lead to the target");
     let (off, worst) = reference.compare(&field);
     assert!(off <= 1e-3, "{name}: {off} of the directions are off by more than a degree");
     assert!(worst <= 1.0, "{name}: a clear direction is off by {worst} degrees");
+    field
 }
 
 #[test]
 fn directions_are_within_a_degree_of_the_reference_on_every_kind_of_map() {
-    for seed in 0..3 {
-        for kind in [
-            Kind::Empty,
-            Kind::Drums,
-            Kind::Office,
-            Kind::Maze { corridor: 1 },
-            Kind::Maze { corridor: 4 },
-            Kind::Serpentine { corridor: 3 },
-            Kind::Trap,
-            Kind::Noise { density: 0.3 },
-        ] {
-            assert_right(&Map::generate(kind, 60, 75, seed), &format!("{kind:?}, seed {seed}"));
+    use Kind::*;
+    let maze = |corridor| Maze { corridor };
+    let every = [
+        Empty,
+        Drums,
+        Office,
+        Trap,
+        maze(1),
+        maze(4),
+        Serpentine { corridor: 3 },
+        Noise { density: 0.3 },
+    ];
+    let screened = [Drums, Office, Trap, maze(4)];
+    for (kinds, [width, height], seeds, k) in [
+        (&every[..], [60, 75], 0..3, 0.0),
+        // Large enough to solve coarse levels twice.
+        (&every[..4], [100, 260], 1..2, 0.0),
+        // With enough passages to factorise in slabs.
+        (&[maze(1), maze(2), maze(4)], [170, 150], 2..3, 0.0),
+        (&screened, [60, 75], 1..2, 0.002),
+        (&screened, [60, 75], 1..2, 0.02),
+        (&screened, [60, 75], 1..2, 0.5),
+    ] {
+        for (seed, &kind) in seeds.flat_map(|seed| kinds.iter().map(move |kind| (seed, kind))) {
+            let name = format!("{kind:?}, {width} x {height}, seed {seed}, k = {k}");
+            let domain = Map::generate(kind, width, height, seed).screened(length(k));
+            let method = assert_right(&domain, &name).verification().method;
+            assert!(width != 170 || method == Method::Multifrontal, "{name}: {method:?}");
         }
-    }
-}
-
-#[test]
-fn directions_are_within_a_degree_on_maps_large_enough_to_solve_coarse_levels_twice() {
-    for kind in [Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap] {
-        assert_right(&Map::generate(kind, 100, 260, 1), &format!("{kind:?} of 260 rows"));
-    }
-}
-
-#[test]
-fn directions_are_within_a_degree_in_mazes_with_enough_passages_to_factorise_in_slabs() {
-    for corridor in [1, 2, 4] {
-        let map = Map::generate(Kind::Maze { corridor }, 170, 150, 2);
-        assert_eq!(
-            solve(&map.domain().expect("a valid map")).verification().method,
-            Method::Multifrontal
-        );
-        assert_right(&map, &format!("a maze with corridors of {corridor}"));
     }
 }
 
 #[test]
 fn the_field_holds_down_to_ten_to_the_minus_twenty_thousand() {
     let map = Map::generate(Kind::Serpentine { corridor: 2 }, 40, 4200, 0);
-    let field = solve(&map.domain().expect("a valid map"));
-    assert!(field.log10_u_min() < -20_000.0, "only down to 1e{}", field.log10_u_min());
-    assert_right(&map, "a serpentine of 4200 rows");
+    let least = assert_right(&map.domain(), "a serpentine of 4200 rows").log10_u_min();
+    assert!(least < -20_000.0, "only down to 1e{least}");
 }
 
 #[test]
-fn a_strip_of_one_cell_falls_by_two_minus_root_three_a_cell() {
-    // u_i = (u_(i-1) + u_(i+1)) / 4 has the decaying solution (2 - sqrt 3)^i.
-    let domain = Domain::new(9000, 1, vec![false; 9000], Cell::new(0, 0)).expect("a valid map");
-    let field = solve(&domain);
-    let expected = 4000.0 * (2.0 - 3.0_f64.sqrt()).log10();
-    assert!((field.u(Cell::new(4000, 0)).log10() - expected).abs() < 1e-6);
-}
-
-#[test]
-fn invalid_domains_are_refused_with_the_reason() {
-    let at = Cell::new(0, 0);
-    assert!(matches!(Domain::new(0, 3, vec![], at), Err(SolveError::MapEmpty { .. })));
-    assert!(matches!(Domain::new(20_000, 1, vec![], at), Err(SolveError::MapTooLarge { .. })));
-    assert!(matches!(Domain::new(2, 2, vec![false; 3], at), Err(SolveError::WrongLength { .. })));
-    assert!(matches!(
-        Domain::new(2, 2, vec![false; 4], Cell::new(2, 0)),
-        Err(SolveError::Outside { .. })
-    ));
-    assert!(matches!(Domain::new(1, 1, vec![true], at), Err(SolveError::TargetBlocked { .. })));
-    for length in [0.0, -3.0, 1e-4, f64::NAN] {
-        let domain = Domain::new(2, 2, vec![false; 4], at).expect("a valid map");
-        assert!(
-            matches!(
-                domain.with_screening(&Screening::cells(length)),
-                Err(SolveError::ScreeningLength { .. })
-            ),
-            "{length}"
-        );
+fn a_strip_of_one_cell_falls_as_its_difference_equation_does() {
+    // u_i = (u_(i-1) + u_(i+1)) / (4 (1 + k)) has the decaying solution (a - sqrt(a^2 - 1))^i, a =
+    // 2 (1 + k).
+    for (k, at, tolerance) in [(0.0, 4000, 1e-6), (0.3, 300, 1e-3)] {
+        let strip = domain(9000, 1, vec![false; 9000], Cell::new(0, 0));
+        let a = 2.0 * (1.0 + k);
+        let expected = at as f64 * (a - (a * a - 1.0_f64).sqrt()).log10();
+        let found = solve(&screened(strip, length(k))).u(Cell::new(at, 0)).log10();
+        assert!((found - expected).abs() < tolerance, "k = {k}: {found}, not {expected}");
     }
 }
 
 #[test]
-fn costs_are_refused_that_are_too_few_or_no_amounts() {
-    let domain = Domain::new(2, 2, vec![false; 4], Cell::new(0, 0)).expect("a valid map");
-    let domain = domain.with_screening(&Screening::cells(9.0)).expect("a valid screening");
-    let refused = |costs: Vec<f32>| domain.clone().with_costs(costs).unwrap_err();
-    assert!(matches!(refused(vec![1.0; 3]), SolveError::WrongLength { .. }));
+fn invalid_domains_screenings_and_costs_are_refused_with_the_reason() {
+    use SolveError::*;
+    let at = Cell::new(0, 0);
+    let refused = |width, height, blocked, at| Domain::new(width, height, blocked, at).unwrap_err();
+    assert!(matches!(refused(0, 3, vec![], at), MapEmpty { .. }));
+    assert!(matches!(refused(20_000, 1, vec![], at), MapTooLarge { .. }));
+    assert!(matches!(refused(2, 2, vec![false; 3], at), WrongLength { .. }));
+    assert!(matches!(refused(2, 2, vec![false; 4], Cell::new(2, 0)), Outside { .. }));
+    assert!(matches!(refused(1, 1, vec![true], at), TargetBlocked { .. }));
+    let valid = domain(2, 2, vec![false; 4], at);
+    for length in [0.0, -3.0, 1e-4, f64::NAN] {
+        let refused = valid.clone().with_screening(&Screening::cells(length));
+        assert!(matches!(refused, Err(ScreeningLength { .. })), "{length}");
+    }
+    let valid = screened(valid, 9.0);
+    let refused = |costs: Vec<f32>| valid.clone().with_costs(costs).unwrap_err();
+    assert!(matches!(refused(vec![1.0; 3]), WrongLength { .. }));
     for wrong in [-1.0, f32::NAN, f32::INFINITY, 1e9] {
-        assert!(matches!(refused(vec![1.0, wrong, 1.0, 1.0]), SolveError::ScreeningLength { .. }));
+        assert!(matches!(refused(vec![1.0, wrong, 1.0, 1.0]), ScreeningLength { .. }), "{wrong}");
     }
 }
 
@@ -124,8 +107,7 @@ fn a_field_leads_round_cells_that_cost_more_than_the_way_round() {
     let (n, target) = (80, Cell::new(40, 10));
     let dear = |i: usize| (36..44).contains(&(i / n)) && i % n < 55;
     for (cost, through_gap) in [(1.0, false), (8.0, true)] {
-        let domain = Domain::new(n, n, vec![false; n * n], target).expect("a valid map");
-        let domain = domain.with_screening(&Screening::cells(6.0)).expect("a valid screening");
+        let domain = screened(domain(n, n, vec![false; n * n], target), 6.0);
         let costs = (0..n * n).map(|i| if dear(i) { cost } else { 1.0 }).collect();
         let field = solve(&domain.with_costs(costs).expect("valid costs"));
         let path = field.path(Cell::new(40, 70)).expect("a path");
@@ -138,19 +120,8 @@ fn a_field_leads_round_cells_that_cost_more_than_the_way_round() {
 fn a_cancelled_solve_says_so() {
     let cancellation = Cancellation::new();
     cancellation.clone().cancel();
-    let domain = Domain::new(3, 3, vec![false; 9], Cell::new(1, 1)).expect("a valid map");
+    let domain = domain(3, 3, vec![false; 9], Cell::new(1, 1));
     assert_eq!(Solver::default().solve(&domain, &cancellation).err(), Some(SolveError::Cancelled));
-}
-
-#[test]
-fn a_screened_strip_falls_as_its_difference_equation_does() {
-    // u_i = (u_(i-1) + u_(i+1)) / (4 (1 + k)) has the decaying solution (a - sqrt(a^2 - 1))^i, a =
-    // 2 (1 + k).
-    let domain = Domain::new(600, 1, vec![false; 600], Cell::new(0, 0)).expect("a valid map");
-    let domain = domain.with_screening(&screening(0.3)).expect("a valid screening");
-    let a = 2.6_f64;
-    let expected = 300.0 * (a - (a * a - 1.0).sqrt()).log10();
-    assert!((solve(&domain).u(Cell::new(300, 0)).log10() - expected).abs() < 1e-3);
 }
 
 #[test]
@@ -158,8 +129,7 @@ fn in_a_disc_u_falls_like_the_logarithm_and_all_directions_lead_to_the_centre() 
     let (n, centre, radius) = (161_usize, 80.0, 75.0);
     let from_centre = |i: usize| ((i % n) as f64 - centre, (i / n) as f64 - centre);
     let blocked = (0..n * n).map(|i| from_centre(i).0.hypot(from_centre(i).1) >= radius).collect();
-    let domain = Domain::new(n, n, blocked, Cell::new(80, 80)).expect("a valid map");
-    let field = solve(&domain);
+    let field = solve(&domain(n, n, blocked, Cell::new(80, 80)));
     let u = |r: usize| field.u(Cell::new(80 + r, 80)).relative_to(0);
     for r in [20, 30, 50] {
         let expected = (radius / r as f64).ln() / (radius / 10.0).ln();
@@ -169,37 +139,17 @@ fn in_a_disc_u_falls_like_the_logarithm_and_all_directions_lead_to_the_centre() 
         let (x, y) = from_centre(i);
         if (10.0..60.0).contains(&x.hypot(y)) {
             let direction = field.direction(Cell::new(i % n, i / n)).expect("free space");
-            assert!(crate::support::angle(direction, [-x, -y]) < 1.5, "at {x}, {y}");
-        }
-    }
-}
-
-#[test]
-fn screening_keeps_directions_within_a_degree_of_the_reference() {
-    for k in [0.002, 0.02, 0.5] {
-        for kind in [Kind::Drums, Kind::Office, Kind::Trap, Kind::Maze { corridor: 4 }] {
-            let domain = Map::generate(kind, 60, 75, 1).domain().expect("a valid map");
-            let domain = domain.with_screening(&screening(k)).expect("a valid screening");
-            let (off, worst) = Reference::solve(&domain).compare(&solve(&domain));
-            assert!(
-                off <= 1e-3 && worst <= 1.0,
-                "{kind:?}, k = {k}: {off} off, worst {worst} degrees"
-            );
+            assert!(angle(direction, [-x, -y]) < 1.5, "at {x}, {y}");
         }
     }
 }
 
 #[test]
 fn a_wide_map_with_strong_screening_is_right_beyond_the_range_of_f64() {
-    let map = Map::generate(Kind::Empty, 60, 800, 1);
-    let domain = map.domain().expect("a valid map");
-    let domain = domain.with_screening(&screening(5.0)).expect("a valid screening");
-    let field = solve(&domain);
+    let domain = Map::generate(Kind::Empty, 60, 800, 1).screened(length(5.0));
+    let field = assert_right(&domain, "a wide map");
     assert!(field.log10_u_min() < -700.0, "only down to 1e{}", field.log10_u_min());
     assert_eq!(field.verification().method, Method::MultigridBands);
-    assert_eq!(follow(&field), 1.0);
-    let (off, worst) = Reference::solve(&domain).compare(&field);
-    assert!(off <= 1e-3 && worst <= 1.0, "{off} off, worst {worst} degrees");
 }
 
 #[test]
@@ -211,16 +161,13 @@ fn a_hall_with_a_long_passage_one_cell_wide_is_not_factorised_and_right_in_the_p
         map.fill(columns, rows, true);
     }
     map.fill(1..8, 120..140, false);
-    let domain = map.domain().expect("a valid map");
-    let domain = domain.with_screening(&Screening::cells(7.0)).expect("a valid screening");
-    let field = solve(&domain);
+    let domain = map.screened(7.0);
+    let field = assert_right(&domain, "a hall");
     assert!(field.log10_u_min() < -200.0, "only down to 1e{}", field.log10_u_min());
-    assert_eq!(field.verification().method, Method::MultigridAndMultifrontal);
-    assert_eq!(follow(&field), 1.0);
-    let (off, worst) = Reference::solve(&domain).compare(&field);
-    assert!(off <= 1e-3 && worst <= 1.0, "{off} off, worst {worst} degrees");
-    let again = Solver::default().solve_near(&domain, &field, &Cancellation::new()).unwrap();
-    assert_eq!(again.verification().method, Method::MultigridAndMultifrontal);
+    let again = solve_near(&mut Solver::default(), &domain, &field);
+    for field in [field, again] {
+        assert_eq!(field.verification().method, Method::MultigridAndMultifrontal);
+    }
 }
 
 #[test]
@@ -231,8 +178,7 @@ fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
     map.fill(15..1505, 21..22, true);
     map.fill(15..1505, 23..25, true);
     map.aim((5, 12));
-    let domain = map.domain().expect("a valid map");
-    let field = solve(&domain);
+    let field = solve(&map.domain());
     assert_eq!(follow(&field), 1.0);
     let toward = |col: usize| field.direction(Cell::new(col, 22)).expect("a direction")[0].signum();
     assert_eq!((toward(100), toward(1400)), (-1.0, 1.0));
@@ -245,9 +191,9 @@ fn a_narrow_passage_beside_a_wide_one_is_right_where_its_far_end_takes_over() {
 fn double_precision_solves_what_fails_verification_in_single_precision_and_has_no_memory_to_be_factorised()
  {
     let noise = Kind::Noise { density: 0.198_829_310_110_751_3 };
-    let domain = Map::generate(noise, 299, 261, 1236).domain().expect("a valid map");
+    let domain = Map::generate(noise, 299, 261, 1236).domain();
     let mut solver = Solver::new(Settings { memory_limit: 16 << 20, ..Settings::default() });
-    let field = solver.solve(&domain, &Cancellation::new()).expect("the map has a field");
+    let field = solve_with(&mut solver, &domain);
     assert_eq!(field.verification().method, Method::MultigridDouble);
     assert_eq!(follow(&field), 1.0);
     let angles = Angles::between(&field, &solve_exactly(&domain).expect("a field"));

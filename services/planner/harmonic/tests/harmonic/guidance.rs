@@ -1,14 +1,10 @@
 //! Tests of the guidance at any position of a solved map.
 
-use crate::support::{Kind, Map, Random, angle};
-use harmonic::{Cancellation, Cell, Domain, Field, Guidance, Solver};
-
-fn solve(domain: &Domain) -> Field {
-    Solver::default().solve(domain, &Cancellation::new()).expect("the map has a field")
-}
+use crate::support::{Kind, Map, Random, angle, solve};
+use harmonic::{Cell, Domain, Field, Guidance};
 
 fn generated(kind: Kind, seed: u64) -> (Domain, Field) {
-    let domain = Map::generate(kind, 40, 30, seed).domain().expect("a valid map");
+    let domain = Map::generate(kind, 40, 30, seed).domain();
     let field = solve(&domain);
     (domain, field)
 }
@@ -140,7 +136,7 @@ fn at_a_saddle_point_the_better_neighbour_decides() {
     map.fill(7..8, 1..2, false);
     map.fill(7..8, 7..8, false);
     map.aim((10, 4));
-    let field = solve(&map.domain().expect("a valid map"));
+    let field = solve(&map.domain());
     for col in 1..7 {
         assert!(
             matches!(field.guidance(col as f64, 4.0), Guidance::Along(d) if d[0].hypot(d[1]) > 0.999),
@@ -155,7 +151,7 @@ fn every_position_gets_its_typed_answer() {
     map.fill(6..12, 0..12, true);
     map.fill(8..10, 4..6, false);
     map.aim((2, 2));
-    let field = solve(&map.domain().expect("a valid map"));
+    let field = solve(&map.domain());
     assert_eq!(field.guidance(2.4, 1.7), Guidance::AtTarget);
     assert_eq!(field.guidance(8.0, 5.0), Guidance::Unreachable);
     assert_eq!(field.guidance(f64::NAN, 5.0), Guidance::Unreachable);
@@ -165,18 +161,26 @@ fn every_position_gets_its_typed_answer() {
 }
 
 #[test]
-fn the_direction_of_a_cell_is_the_guidance_at_its_centre() {
-    for kind in KINDS {
-        let domain = Map::generate(kind, 60, 45, 3).domain().expect("a valid map");
-        let field = solve(&domain);
-        for row in 0..45 {
-            for col in 0..60 {
+fn the_direction_of_a_cell_is_the_guidance_at_its_centre_and_the_policy_of_its_row() {
+    let large = (Kind::Noise { density: 0.12 }, 200, 200);
+    for (kind, width, height) in KINDS.map(|kind| (kind, 60, 45)).into_iter().chain([large]) {
+        let field = solve(&Map::generate(kind, width, height, 3).domain());
+        for row in 0..height {
+            let mut policies = Vec::new();
+            field.policy_of_row(row, |policy| policies.push(policy));
+            assert_eq!(policies.len(), width);
+            for (col, policy) in policies.iter().enumerate() {
                 let at_centre = match field.guidance(col as f64, row as f64) {
                     Guidance::Along(direction) => Some(direction),
                     _ => None,
                 };
                 let cell = Cell::new(col, row);
-                assert_eq!(field.direction(cell), at_centre, "{kind:?} {cell:?}");
+                let direction = field.direction(cell);
+                assert_eq!(direction, at_centre, "{kind:?} {cell:?}");
+                let direction = direction.unwrap_or_default();
+                let off = [0, 1].map(|axis| (direction[axis] - policy.direction[axis]).abs());
+                assert!(off[0] < 1e-12 && off[1] < 1e-12, "{kind:?} {cell:?}: {off:?}");
+                assert_eq!(policy.log2_u, field.u(cell).log2(), "{kind:?} {cell:?}");
             }
         }
     }

@@ -1,25 +1,27 @@
 //! Tests on any map: an answer exists, every number is valid, and every reachable cell leads to the
 //! target.
 
-use crate::support::{Kind, Map, Reference, follow};
-use harmonic::{Cancellation, Cell, Change, Domain, Field, Guidance, Screening, Settings, Solver};
+use crate::support::{
+    Kind, Map, Random, Reference, angle, around, domain, follow, screened, solve, solve_near,
+    solve_with,
+};
+use harmonic::{Cell, Change, Domain, Field, Guidance, Settings, Solver};
 use proptest::prelude::*;
 
 /// Generates grids of up to 48 x 48 cells with any free target, any screening, with or without
 /// costs.
 fn any_domain() -> impl Strategy<Value = Domain> {
     // Lengths for screening coefficients of 0, of 0 .. 0.1 and of 0 .. 2.
-    let screened = |most: f64| (0.0..most).prop_map(|k| Screening::cells(0.5 / k.sqrt()));
-    let screening = prop_oneof![3 => Just(Screening::None), 1 => screened(0.1), 1 => screened(2.0)];
-    (1_usize..48, 1_usize..48, 0.0..0.7, any::<u64>(), screening).prop_map(
-        |(width, height, density, seed, screening)| {
-            let mut random = crate::support::Random::new(seed);
+    let length = |most: f64| (0.0..most).prop_map(|k| 0.5 / k.sqrt());
+    let length = prop_oneof![3 => Just(f64::INFINITY), 1 => length(0.1), 1 => length(2.0)];
+    (1_usize..48, 1_usize..48, 0.0..0.7, any::<u64>(), length).prop_map(
+        |(width, height, density, seed, length)| {
+            let mut random = Random::new(seed);
             let target = Cell::new(random.below(width), random.below(height));
             let mut blocked: Vec<bool> =
                 (0..width * height).map(|_| random.unit() < density).collect();
             blocked[target.row * width + target.col] = false;
-            let domain = Domain::new(width, height, blocked, target).expect("a valid map");
-            let domain = domain.with_screening(&screening).expect("a valid screening");
+            let domain = screened(domain(width, height, blocked, target), length);
             if seed % 2 == 0 {
                 return domain;
             }
@@ -32,19 +34,22 @@ fn any_domain() -> impl Strategy<Value = Domain> {
 fn reachable(domain: &Domain) -> Vec<bool> {
     let (width, height) = (domain.width(), domain.height());
     let mut seen = vec![false; width * height];
-    let mut stack = vec![domain.target()];
+    let mut stack = vec![domain.target().row * width + domain.target().col];
     while let Some(cell) = stack.pop() {
-        if domain.is_blocked(cell)
-            || std::mem::replace(&mut seen[cell.row * width + cell.col], true)
-        {
-            continue;
+        if !domain.blocked()[cell] && !std::mem::replace(&mut seen[cell], true) {
+            stack.extend(around(width, height, cell).into_iter().flatten());
         }
-        stack.push(Cell::new(cell.col + 1, cell.row));
-        stack.push(Cell::new(cell.col, cell.row + 1));
-        stack.push(Cell::new(cell.col.wrapping_sub(1), cell.row));
-        stack.push(Cell::new(cell.col, cell.row.wrapping_sub(1)));
     }
     seen
+}
+
+/// Asserts that two fields have the same numbers in every cell.
+fn assert_same(a: &Field, b: &Field, name: &str) {
+    assert_eq!(a.verification(), b.verification(), "{name}");
+    for index in 0..a.width() * a.height() {
+        let cell = Cell::new(index % a.width(), index / a.width());
+        assert_eq!(a.u(cell), b.u(cell), "{name}, {cell:?}");
+    }
 }
 
 fn assert_sound(domain: &Domain, field: &Field) {
@@ -71,13 +76,8 @@ proptest! {
 
     #[test]
     fn any_grid_gets_a_field_that_leads_to_the_target_from_every_cell_that_can_reach_it(domain in any_domain()) {
-        let field = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
+        let field = solve(&domain);
         assert_sound(&domain, &field);
-    }
-
-    #[test]
-    fn any_grid_is_within_a_degree_of_the_reference(domain in any_domain()) {
-        let field = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
         let reference = Reference::solve(&domain);
         prop_assume!(reference.worst_residual < 1e-9);
         let (off, worst) = reference.compare(&field);
@@ -102,9 +102,9 @@ proptest! {
         ],
         changes in prop::collection::vec((0_usize..150, 0_usize..150, any::<bool>()), 1..30),
     ) {
-        let mut domain = Map::generate(kind, 150, 150, seed).domain().expect("a valid map");
+        let mut domain = Map::generate(kind, 150, 150, seed).domain();
         let mut solver = Solver::default();
-        let mut field = solver.solve(&domain, &Cancellation::new()).expect("a field");
+        let mut field = solve_with(&mut solver, &domain);
         for chunk in changes.chunks(3) {
             let chunk: Vec<Change> = chunk
                 .iter()
@@ -112,7 +112,7 @@ proptest! {
                 .filter(|change| change.cell != domain.target())
                 .collect();
             domain.apply(&chunk).expect("valid changes");
-            field = solver.solve_near(&domain, &field, &Cancellation::new()).expect("a field");
+            field = solve_near(&mut solver, &domain, &field);
             assert_sound(&domain, &field);
         }
     }
@@ -125,60 +125,43 @@ fn a_set_up_that_was_patched_gives_the_same_field_bit_for_bit() {
     for step in 0..12 {
         map.fill(40 + 9 * step..43 + 9 * step, 60..64, step % 3 != 0);
         map.aim((30 + 5 * step, 100));
-        let mut domain = map.domain().expect("a valid map");
+        let mut domain = map.domain();
         if step >= 4 {
             let mut costs = vec![1.0; 200 * 170];
             costs[step * 2000..][..2400].fill(3.0);
-            domain = domain.with_screening(&Screening::cells(30.0)).expect("a valid screening");
-            domain = domain.with_costs(costs).expect("valid costs");
+            domain = map.screened(30.0).with_costs(costs).expect("valid costs");
         }
-        let patched = solver.solve(&domain, &Cancellation::new()).expect("a field");
-        let fresh = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
-        assert_eq!(patched.verification(), fresh.verification());
-        for index in 0..200 * 170 {
-            let cell = Cell::new(index % 200, index / 200);
-            assert_eq!(patched.u(cell), fresh.u(cell), "step {step}, {cell:?}");
-        }
+        let patched = solve_with(&mut solver, &domain);
+        assert_same(&patched, &solve(&domain), &format!("step {step}"));
     }
 }
 
 #[test]
 fn more_threads_give_the_same_field_and_verification() {
-    let domain = Map::generate(Kind::Drums, 900, 800, 3).domain().expect("a valid map");
+    let domain = Map::generate(Kind::Drums, 900, 800, 3).domain();
     let solve = |threads| {
         let threads = std::num::NonZeroUsize::new(threads).expect("at least one");
-        Solver::new(Settings { threads, ..Settings::default() })
-            .solve(&domain, &Cancellation::new())
-            .expect("a field")
+        solve_with(&mut Solver::new(Settings { threads, ..Settings::default() }), &domain)
     };
-    let (one, three) = (solve(1), solve(3));
-    assert_eq!(one.verification(), three.verification());
-    assert!(
-        (0..900 * 800)
-            .all(|i| one.u(Cell::new(i % 900, i / 900)) == three.u(Cell::new(i % 900, i / 900)))
-    );
+    assert_same(&solve(1), &solve(3), "three threads");
 }
 
 #[test]
 fn starting_from_the_field_of_a_similar_map_gives_the_same_directions() {
     for length in [f64::INFINITY, 2.236] {
         let mut map = Map::generate(Kind::Office, 200, 200, 2);
-        let domain = |map: &Map| {
-            let domain = map.domain().expect("a valid map");
-            domain.with_screening(&Screening::cells(length)).expect("a valid screening")
-        };
         let mut solver = Solver::default();
-        let before = solver.solve(&domain(&map), &Cancellation::new()).expect("a field");
+        let before = solve_with(&mut solver, &map.screened(length));
         map.fill(90..96, 110..114, true);
         map.fill(20..23, 150..156, false);
-        let domain = domain(&map);
-        let near = solver.solve_near(&domain, &before, &Cancellation::new()).expect("a field");
-        let fresh = Solver::default().solve(&domain, &Cancellation::new()).expect("a field");
+        let domain = map.screened(length);
+        let near = solve_near(&mut solver, &domain, &before);
+        let fresh = solve(&domain);
         assert_sound(&domain, &near);
         for index in 0..200 * 200 {
             let cell = Cell::new(index % 200, index / 200);
             if let (Some(a), Some(b)) = (near.direction(cell), fresh.direction(cell)) {
-                assert!(crate::support::angle(a, b) < 2.0, "{cell:?}: {a:?}, {b:?}");
+                assert!(angle(a, b) < 2.0, "{length}, {cell:?}: {a:?}, {b:?}");
             }
         }
     }

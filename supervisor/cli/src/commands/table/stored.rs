@@ -24,7 +24,6 @@ static FILES: &[(&str, &str)] = stored! {
     "experiments" in "results/experiments.csv",
     "claims" in "results/claims.csv",
     "stop-times" in "results/stop_times.csv",
-    "stop-ways" in "results/stop_ways.csv",
     "tick" in "results/tick.csv",
     "tick-at-7-hz" in "results/tick_at_7_hz.csv",
     "field" in "results/field.csv",

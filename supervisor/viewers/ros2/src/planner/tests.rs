@@ -37,6 +37,11 @@ fn map(grid: &Grid) -> Arc<Costmap> {
     Arc::new(Costmap::read(&grid.message()).unwrap())
 }
 
+/// Plans from (1, 4) to (9, 1) by a new planner.
+fn plan_across(map: &Arc<Costmap>) -> Vec<Pose> {
+    plan(&mut planner(), map, at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap()
+}
+
 /// Makes two rooms of 5 m x 5 m with a door of 1.5 m at the top, and a closed box in the left one.
 fn rooms() -> Grid {
     let mut grid = Grid::new(200, 100);
@@ -119,7 +124,7 @@ fn a_long_path_has_as_many_poses_as_an_answer_carries_and_all_of_its_goals() {
 
 #[test]
 fn a_path_begins_at_the_start_ends_in_the_goals_pose_and_looks_ahead_a_cell_at_a_time() {
-    let path = plan(&mut planner(), &map(&rooms()), at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap();
+    let path = plan_across(&map(&rooms()));
     assert_eq!((path[0][..2].to_vec(), path.last()), (vec![1.0, 4.0], Some(&[9.0, 1.0, 0.5])));
     for pair in path.windows(2) {
         let [from, to] = [pair[0], pair[1]].map(|[x, y, _]| DVec2::new(x, y));
@@ -133,7 +138,7 @@ fn a_path_begins_at_the_start_ends_in_the_goals_pose_and_looks_ahead_a_cell_at_a
 
 #[test]
 fn a_map_that_is_turned_gives_the_path_that_is_turned() {
-    let straight = plan(&mut planner(), &map(&rooms()), at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap();
+    let straight = plan_across(&map(&rooms()));
     let turn = DAffine2::from_angle_translation(FRAC_PI_2, DVec2::ZERO);
     let mut grid = OccupancyGrid::decode(&rooms().message()).unwrap();
     grid.info.origin = [0.0, 0.0, FRAC_PI_2].into();
@@ -218,7 +223,7 @@ fn a_change_of_the_map_changes_the_field_of_a_goal_as_a_new_solve_would() {
         Arc::make_mut(&mut newest).update(&update(window.0, window.1, 100)).unwrap();
     }
     let changed = plan(&mut changing, &newest, ends.0, &ends.1).unwrap();
-    let anew = plan(&mut planner(), &map(&grid), ends.0, &ends.1).unwrap();
+    let anew = plan_across(&map(&grid));
     for (a, b) in changed.iter().zip(&anew) {
         assert!(DVec2::new(a[0], a[1]).distance(DVec2::new(b[0], b[1])) < 0.05, "{a:?} {b:?}");
     }
@@ -274,31 +279,30 @@ fn a_map_or_update_that_is_cut_or_false_is_refused_whole() {
     assert!(map.blocked_and_costs(&BODY, 1.0).0.iter().all(|blocked| !blocked));
 }
 
-fn transforms(of: &[(&str, &str, Pose)]) -> Vec<u8> {
-    crate::messages::transforms(0, of)
-}
-
 #[test]
 fn a_frame_is_found_in_another_by_way_of_the_one_above_both_unless_a_transform_is_old_or_missing() {
     let mut frames = Frames::default();
     let now = Instant::now();
+    let take = |frames: &mut Frames, of: &[(&str, &str, Pose)], at| {
+        frames.take(&crate::messages::transforms(0, of), at).unwrap();
+    };
     let find = |frames: &Frames, frame, since| frames.find(frame, "map", since);
-    frames.take(&transforms(&[("/odom", "base_link", [2.0, 0.0, 0.5])]), Some(now)).unwrap();
+    take(&mut frames, &[("/odom", "base_link", [2.0, 0.0, 0.5])], Some(now));
     assert!(find(&frames, "base_link", None).unwrap_err().contains("\"odom\""));
-    frames.take(&transforms(&[("map", "odom", [1.0, 2.0, FRAC_PI_2])]), None).unwrap();
+    let odom = ("map", "odom", [1.0, 2.0, FRAC_PI_2]);
+    take(&mut frames, &[odom, ("map", "mast", [1.0, 0.0, 0.0])], None);
     let pose = find(&frames, "base_link", Some(now)).unwrap();
     assert!(pose.translation.distance(DVec2::new(1.0, 4.0)) < 1e-12);
     assert!((pose.matrix2.x_axis.to_angle() - 0.5 - FRAC_PI_2).abs() < 1e-12);
     assert_eq!(find(&frames, "map", None), Ok(DAffine2::IDENTITY));
-    let later = now + Duration::from_secs(1);
-    assert!(find(&frames, "base_link", Some(later)).unwrap_err().contains("outdated"));
-    assert!(find(&frames, "odom", Some(later)).is_ok(), "it stays");
+    let later = Some(now + Duration::from_secs(1));
+    assert!(find(&frames, "base_link", later).unwrap_err().contains("outdated"));
+    assert!(find(&frames, "odom", later).is_ok(), "it stays");
     let down = frames.find("map", "odom", None).unwrap();
     assert!(down.transform_point2(DVec2::new(1.0, 4.0)).distance(DVec2::new(2.0, 0.0)) < 1e-12);
-    frames.take(&transforms(&[("map", "mast", [1.0, 0.0, 0.0])]), None).unwrap();
     let aside = frames.find("mast", "odom", None).unwrap();
     assert!(aside.translation.distance(DVec2::new(-2.0, 0.0)) < 1e-12);
-    frames.take(&transforms(&[("a", "b", [0.0; 3]), ("b", "a", [0.0; 3])]), None).unwrap();
+    take(&mut frames, &[("a", "b", [0.0; 3]), ("b", "a", [0.0; 3])], None);
     assert!(find(&frames, "a", None).unwrap_err().contains("loop"));
 }
 

@@ -1,7 +1,9 @@
 //! Generated maps: typical places of a ground robot, and those that break solvers.
 
 use super::random::Random;
-use harmonic::{Cell, Domain, SolveError};
+use harmonic::{Cell, Domain};
+
+use super::{around, domain, screened};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {
@@ -37,7 +39,7 @@ pub(crate) struct Map {
 impl Map {
     /// Generates a map with a blocked rim and a free target.
     pub(crate) fn generate(kind: Kind, width: usize, height: usize, seed: u64) -> Self {
-        let mut random = Random::new(seed);
+        let random = &mut Random::new(seed);
         let mut map =
             Self { width, height, blocked: vec![false; width * height], target: Cell::new(0, 0) };
         let wanted = match kind {
@@ -51,29 +53,30 @@ impl Map {
         };
         match kind {
             Kind::Empty => {}
-            Kind::Drums => map.drums(&mut random),
-            Kind::Office => map.office(&mut random),
-            Kind::Maze { corridor } => map.maze(corridor.max(1), &mut random),
-            Kind::Serpentine { corridor } => map.serpentine(corridor.max(1)),
-            Kind::Spiral { corridor } => map.spiral(corridor.max(1)),
-            Kind::Rooms { side, door } => map.rooms(side.max(1), door, &mut random),
+            Kind::Drums => map.drums(random),
+            Kind::Office => map.office(random),
+            Kind::Maze { corridor } => map.maze(corridor, random),
+            Kind::Serpentine { corridor } => map.serpentine(corridor),
+            Kind::Spiral { corridor } => map.spiral(corridor),
+            Kind::Rooms { side, door } => map.rooms(side, door, random),
             Kind::Trap => map.trap(),
-            Kind::Noise { density } => {
-                for cell in &mut map.blocked {
-                    *cell = random.unit() < density;
-                }
-            }
+            Kind::Noise { density } => map.blocked.fill_with(|| random.unit() < density),
         }
         map.fill(0..width, 0..1, true);
-        map.fill(0..width, height.saturating_sub(1)..height, true);
+        map.fill(0..width, height - 1..height, true);
         map.fill(0..1, 0..height, true);
-        map.fill(width.saturating_sub(1)..width, 0..height, true);
+        map.fill(width - 1..width, 0..height, true);
         map.aim(wanted);
         map
     }
 
-    pub(crate) fn domain(&self) -> Result<Domain, SolveError> {
-        Domain::new(self.width, self.height, self.blocked.clone(), self.target)
+    pub(crate) fn domain(&self) -> Domain {
+        domain(self.width, self.height, self.blocked.clone(), self.target)
+    }
+
+    /// Returns the domain with a screening length in cells.
+    pub(crate) fn screened(&self, length: f64) -> Domain {
+        screened(self.domain(), length)
     }
 
     pub(crate) fn fill(
@@ -177,7 +180,7 @@ impl Map {
         let (mut at, mut step, mut turns) = ((0_usize, 0_usize), (1_isize, 0_isize), 0);
         let mut seen = vec![false; wide * high];
         let mut pairs = Vec::new();
-        while turns < 2 && !seen.is_empty() {
+        while turns < 2 {
             seen[at.1 * wide + at.0] = true;
             let next = (at.0.wrapping_add_signed(step.0), at.1.wrapping_add_signed(step.1));
             if next.0 < wide && next.1 < high && !seen[next.1 * wide + next.0] {
@@ -196,30 +199,21 @@ impl Map {
             (0..wide * high).map(|room| ((room % wide, room / wide), (room % wide, room / wide)));
         self.carve(side, rooms);
         for (a, b) in spanning_tree(wide, high, 0.5, random) {
-            let at = 1 + random.below(side - door.min(side) + 1);
+            let at = 1 + random.below(side - door + 1);
             let (col, row) = (a.0.max(b.0) * pitch, a.1.max(b.1) * pitch);
             if a.0 == b.0 {
-                self.fill(col + at..col + at + door.min(side), row..row + 1, false);
+                self.fill(col + at..col + at + door, row..row + 1, false);
             } else {
-                self.fill(col..col + 1, row + at..row + at + door.min(side), false);
+                self.fill(col..col + 1, row + at..row + at + door, false);
             }
         }
     }
 
     fn serpentine(&mut self, corridor: usize) {
-        for (turn, row) in
-            (corridor + 1..self.height.saturating_sub(1)).step_by(corridor + 1).enumerate()
-        {
+        for (turn, row) in (corridor + 1..self.height - 1).step_by(corridor + 1).enumerate() {
             self.fill(0..self.width, row..row + 1, true);
-            if turn % 2 == 0 {
-                self.fill(
-                    self.width.saturating_sub(1 + corridor)..self.width - 1,
-                    row..row + 1,
-                    false,
-                );
-            } else {
-                self.fill(1..1 + corridor, row..row + 1, false);
-            }
+            let left = if turn % 2 == 0 { self.width - 1 - corridor } else { 1 };
+            self.fill(left..left + corridor, row..row + 1, false);
         }
     }
 
@@ -240,21 +234,19 @@ type Pair = ((usize, usize), (usize, usize));
 /// `more`.
 fn spanning_tree(wide: usize, high: usize, more: f64, random: &mut Random) -> Vec<Pair> {
     let mut seen = vec![false; wide * high];
+    let place = |room: usize| (room % wide, room / wide);
     let mut doors = Vec::new();
-    let mut path = Vec::new();
-    if !seen.is_empty() {
-        seen[0] = true;
-        path.push((0, 0));
-    }
+    let mut path = vec![0];
+    seen[0] = true;
     while let Some(&room) = path.last() {
-        let open: Vec<_> =
-            neighbours(room, wide, high).filter(|n| !seen[n.1 * wide + n.0]).collect();
+        let mut open: Vec<_> = around(wide, high, room).into_iter().flatten().collect();
+        open.retain(|&next| !seen[next]);
         if open.is_empty() {
             path.pop();
         } else {
             let next = open[random.below(open.len())];
-            seen[next.1 * wide + next.0] = true;
-            doors.push((room, next));
+            seen[next] = true;
+            doors.push((place(room), place(next)));
             path.push(next);
         }
     }
@@ -268,15 +260,4 @@ fn spanning_tree(wide: usize, high: usize, more: f64, random: &mut Random) -> Ve
         }
     }
     doors
-}
-
-fn neighbours(
-    room: (usize, usize),
-    wide: usize,
-    high: usize,
-) -> impl Iterator<Item = (usize, usize)> {
-    let (col, row) = room;
-    [(col.wrapping_sub(1), row), (col + 1, row), (col, row.wrapping_sub(1)), (col, row + 1)]
-        .into_iter()
-        .filter(move |n| n.0 < wide && n.1 < high)
 }

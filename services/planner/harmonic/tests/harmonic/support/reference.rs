@@ -5,6 +5,8 @@
 
 use harmonic::{Cell, Domain, Field, Scaled};
 
+use super::around;
+
 /// u of every cell to a relative error of about 1e-12.
 pub(crate) struct Reference {
     domain: Domain,
@@ -28,16 +30,16 @@ impl Reference {
         let mut right = vec![Scaled::ZERO; cells];
         for i in (0..cells).filter(|&i| free(i) && i != target) {
             diagonal[i] = 4.0 * (1.0 + domain.screening_of(i));
-            let [_, east, _, south] = neighbours(domain, i);
+            let [_, east, _, south] = around(domain.width(), domain.height(), i);
             for next in [east, south].into_iter().flatten().filter(|&n| free(n) && n != target) {
                 coupling[i * width + (next - i - 1)] += 1.0;
             }
-            if neighbours(domain, i).contains(&Some(target)) {
+            if around(domain.width(), domain.height(), i).contains(&Some(target)) {
                 right[i] = Scaled::ONE;
             }
         }
         for i in (0..cells).filter(|&i| free(i) && i != target) {
-            let row: Vec<f64> = coupling[i * width..(i + 1) * width].to_vec();
+            let row = coupling[i * width..(i + 1) * width].to_vec();
             for (a, &weight) in row.iter().enumerate().filter(|(_, w)| **w > 0.0) {
                 let j = i + 1 + a;
                 let share = weight / diagonal[i];
@@ -50,13 +52,10 @@ impl Reference {
         }
         let mut u = vec![Scaled::ZERO; cells];
         for i in (0..cells).rev().filter(|&i| free(i)) {
-            let row = &coupling[i * width..(i + 1) * width];
-            let terms = row
-                .iter()
-                .enumerate()
+            let row = coupling[i * width..(i + 1) * width].iter().enumerate();
+            let total = row
                 .filter(|(_, w)| **w > 0.0)
-                .map(|(a, &w)| scale(u[i + 1 + a], w));
-            let total = terms.fold(right[i], |total, term| sum(&[total, term]));
+                .fold(right[i], |total, (a, &w)| sum(&[total, scale(u[i + 1 + a], w)]));
             u[i] = if i == target { Scaled::ONE } else { scale(total, 1.0 / diagonal[i]) };
         }
         let mut reference = Self { domain: domain.clone(), u, worst_residual: f64::INFINITY };
@@ -71,12 +70,11 @@ impl Reference {
     fn gradient(&self, cell: Cell) -> Option<[f64; 2]> {
         let i = cell.row * self.domain.width() + cell.col;
         let [west, east, north, south] = self.around(i);
-        let largest = [west, east, north, south, self.u[i]]
-            .into_iter()
-            .fold(Scaled::ZERO, |a, b| if b > a { b } else { a });
         if self.u[i].is_zero() {
             return None;
         }
+        let larger = |a, b| if b > a { b } else { a };
+        let largest = [west, east, north, south].into_iter().fold(self.u[i], larger);
         let relative = |u: Scaled| u.relative_to(largest.exponent) / largest.mantissa;
         Some([relative(east) - relative(west), relative(south) - relative(north)])
     }
@@ -94,10 +92,7 @@ impl Reference {
             let Some(gradient) = gradient.filter(|_| cell != self.domain.target()) else {
                 continue;
             };
-            let error = match field.direction(cell) {
-                Some(direction) => angle(gradient, direction),
-                None => 180.0,
-            };
+            let error = field.direction(cell).map_or(180.0, |it| angle(gradient, it));
             seen += 1;
             off += usize::from(error > 1.0);
             if gradient[0].hypot(gradient[1]) > 1e-4 {
@@ -109,45 +104,25 @@ impl Reference {
 
     /// Returns u of the west, east, north and south neighbours.
     fn around(&self, index: usize) -> [Scaled; 4] {
-        let around = neighbours(&self.domain, index);
+        let around = around(self.domain.width(), self.domain.height(), index);
         around.map(|there| there.map_or(Scaled::ZERO, |there| self.u[there]))
     }
 
     /// Runs two Gauss-Seidel passes and returns the largest relative change of the second.
     fn polish(&mut self) -> f64 {
         let target = self.domain.target().row * self.domain.width() + self.domain.target().col;
-        let mut worst = 0.0_f64;
-        let order: Vec<usize> = (0..self.u.len()).collect();
-        for (pass, order) in
-            [order.clone(), order.into_iter().rev().collect()].into_iter().enumerate()
-        {
-            for i in order {
-                if self.u[i].is_zero() || i == target {
-                    continue;
-                }
-                let weight = 0.25 / (1.0 + self.domain.screening_of(i));
-                let mean = scale(sum(&self.around(i)), weight);
-                if pass == 1 {
-                    let ratio = mean.relative_to(self.u[i].exponent) / self.u[i].mantissa;
-                    worst = worst.max((ratio - 1.0).abs());
-                }
-                self.u[i] = mean;
-            }
-        }
-        worst
+        let cells: Vec<usize> =
+            (0..self.u.len()).filter(|&i| !self.u[i].is_zero() && i != target).collect();
+        let mut polish = |i: usize| {
+            let weight = 0.25 / (1.0 + self.domain.screening_of(i));
+            let mean = scale(sum(&self.around(i)), weight);
+            let ratio = mean.relative_to(self.u[i].exponent) / self.u[i].mantissa;
+            self.u[i] = mean;
+            (ratio - 1.0).abs()
+        };
+        cells.iter().for_each(|&i| _ = polish(i));
+        cells.into_iter().rev().map(polish).fold(0.0, f64::max)
     }
-}
-
-/// Returns the indices of the west, east, north and south neighbours inside the map.
-fn neighbours(domain: &Domain, index: usize) -> [Option<usize>; 4] {
-    let (width, height) = (domain.width(), domain.height());
-    let (col, row) = (index % width, index / width);
-    [
-        (col > 0).then(|| index - 1),
-        (col + 1 < width).then(|| index + 1),
-        (row > 0).then(|| index - width),
-        (row + 1 < height).then(|| index + width),
-    ]
 }
 
 /// Returns the angle between two vectors, degrees.
@@ -174,18 +149,11 @@ pub(crate) fn follow(field: &Field) -> f64 {
             // proven.
             arrives[here] = Some(false);
             path.push(here);
-            let Cell { col, row } = cell(here);
-            let around = [
-                Cell::new(col + 1, row),
-                Cell::new(col.wrapping_sub(1), row),
-                Cell::new(col, row + 1),
-                Cell::new(col, row.wrapping_sub(1)),
-            ];
-            let next = around
+            let u = |index: usize| field.u(cell(index));
+            here = around(width, field.height(), here)
                 .into_iter()
-                .reduce(|best, next| if field.u(next) > field.u(best) { next } else { best })
-                .expect("four neighbours");
-            here = next.row * width + next.col;
+                .flatten()
+                .fold(here, |best, next| if u(next) > u(best) { next } else { best });
         };
         for index in path {
             arrives[index] = Some(result);

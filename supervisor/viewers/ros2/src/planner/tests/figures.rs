@@ -10,7 +10,6 @@ use std::{
     io::{BufReader, Read as _, Write as _},
     process::{Child, ChildStdout, Command, Stdio},
     sync::Arc,
-    time::Duration,
 };
 
 use glam::{DAffine2, DVec2};
@@ -162,10 +161,7 @@ impl Grid {
             for next in self.beside(cell).into_iter().flatten() {
                 let cost = cost(next);
                 let at = |cell: Option<usize>| {
-                    cell.map_or(
-                        f64::INFINITY,
-                        |cell| if done[cell] { found[cell] } else { f64::INFINITY },
-                    )
+                    cell.filter(|&cell| done[cell]).map_or(f64::INFINITY, |cell| found[cell])
                 };
                 let [east, west, north, south] = self.beside(next).map(at);
                 let (across, along) = (east.min(west), north.min(south));
@@ -185,6 +181,10 @@ impl Grid {
         found
     }
 
+    fn place(&self, cell: usize) -> DVec2 {
+        DVec2::new((cell % self.width) as f64, (cell / self.width) as f64)
+    }
+
     fn beside(&self, cell: usize) -> [Option<usize>; 4] {
         let (col, row) = (cell % self.width, cell / self.width);
         [
@@ -198,8 +198,6 @@ impl Grid {
     /// Descends a front from `from` as NavFn does: along bilinear gradients, and cell by cell
     /// beside blocked cells.
     fn descend(&self, front: &[f64], from: usize) -> Vec<DVec2> {
-        let place =
-            |cell: usize| DVec2::new((cell % self.width) as f64, (cell / self.width) as f64);
         let at = |col: i64, row: i64| {
             let is_inside =
                 (0..self.width as i64).contains(&col) && (0..self.height as i64).contains(&row);
@@ -208,7 +206,7 @@ impl Grid {
         let slope = |col: i64, row: i64| {
             DVec2::new(at(col - 1, row) - at(col + 1, row), at(col, row - 1) - at(col, row + 1))
         };
-        let mut way = vec![place(from)];
+        let mut way = vec![self.place(from)];
         let mut here = way[0];
         for _ in 0..20 * self.width * self.height {
             let (col, row) = (here.x.round() as i64, here.y.round() as i64);
@@ -272,7 +270,7 @@ fn shares(numbers: &[f64]) -> [f64; 4] {
 fn distances(grid: &Grid) -> Vec<f64> {
     let sources = (0..grid.occupied.len()).filter(|&cell| grid.occupied[cell]);
     let mut nearest: Vec<Option<usize>> = vec![None; grid.occupied.len()];
-    let place = |cell: usize| DVec2::new((cell % grid.width) as f64, (cell / grid.width) as f64);
+    let place = |cell| grid.place(cell);
     let mut waiting = BinaryHeap::new();
     sources.for_each(|cell| waiting.push((Reverse(0_u64), cell, cell)));
     while let Some((_, cell, source)) = waiting.pop() {
@@ -343,27 +341,12 @@ fn maps() -> Vec<Grid> {
     if let Ok(count) = named.parse() {
         return (0..count).map(Grid::random).collect();
     }
-    let folder = named;
     let mut grids = Vec::new();
-    for file in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+    for file in std::fs::read_dir(named).unwrap().map(|entry| entry.unwrap().path()) {
         if file.extension().is_some_and(|end| end == "pgm") {
-            let bytes = std::fs::read(&file).unwrap();
-            let (mut at, mut words) = (0, Vec::new());
-            while words.len() < 4 {
-                let end =
-                    at + bytes[at..].iter().position(|byte| byte.is_ascii_whitespace()).unwrap();
-                if bytes[at] == b'#' {
-                    at += bytes[at..].iter().position(|&byte| byte == b'\n').unwrap() + 1;
-                    continue;
-                }
-                words.push(String::from_utf8_lossy(&bytes[at..end]).into_owned());
-                at = end + 1;
-            }
-            let (width, height) = (words[1].parse().unwrap(), words[2].parse().unwrap());
-            let occupied = bytes[at..].iter().map(|&grey| grey < 210).collect();
-            for _ in 0..20 {
-                grids.push(Grid { width, height, occupied: Vec::clone(&occupied) });
-            }
+            let map = maps::load(&file).unwrap();
+            let grid = Grid { width: map.cols, height: map.rows, occupied: map.blocked };
+            grids.extend(vec![grid; 20]);
         }
     }
     grids
@@ -377,18 +360,10 @@ impl Drop for Nav2 {
     }
 }
 
-/// CPU time of this thread, independent of other load.
-struct Processor(Duration);
-
-impl Processor {
-    fn now() -> Self {
-        let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-        Self(Duration::new(now.tv_sec as u64, now.tv_nsec as u32))
-    }
-
-    fn elapsed(&self) -> f64 {
-        (Self::now().0 - self.0).as_secs_f64() * 1e3
-    }
+/// CPU time of this thread in milliseconds, independent of other load.
+fn processor_ms() -> f64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    now.tv_sec as f64 * 1e3 + now.tv_nsec as f64 * 1e-6
 }
 
 fn named(name: &str) -> Option<f64> {
@@ -468,8 +443,7 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
         let mut random = Random(seed + 1);
         let mut any = || free[random.below(free.len())];
         let cells = [any(), any()];
-        let place =
-            |cell: usize| DVec2::new((cell % grid.width) as f64, (cell / grid.width) as f64);
+        let place = |cell| grid.place(cell);
         let [from, to] =
             cells.map(|cell| DAffine2::from_translation(map.place.transform_point2(place(cell))));
         let plain = grid.front(&[cells[1]], |cell| if blocked[cell] { f64::INFINITY } else { 1.0 });
@@ -488,14 +462,14 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
                 ways.extend(found.map(|(name, (way, took))| (name, way, took)));
             }
             None => {
-                let began = Processor::now();
+                let began = processor_ms();
                 let cost = |cell: usize| match costs[cell] {
                     253.. => f64::INFINITY,
                     cost => (50.0 + 0.8 * f64::from(cost)) / 50.0,
                 };
                 let front = grid.front(&[cells[1]], cost);
                 let way = if exists { grid.descend(&front, cells[0]) } else { vec![] };
-                ways.push(("NavFn", way, began.elapsed()));
+                ways.push(("NavFn", way, processor_ms() - began));
             }
         }
         // Values of a published costmap.
@@ -527,9 +501,9 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
             let maps = messages.map(|message| Arc::new(Costmap::read(&message).unwrap()));
             let mut planner = Planner::new(body, screening);
             for (name, map) in names.into_iter().zip([&maps[0], &maps[1], &maps[1]]) {
-                let began = Processor::now();
+                let began = processor_ms();
                 let planned = planner.plan(map, from, &[to], &Cancellation::default());
-                let took = began.elapsed();
+                let took = processor_ms() - began;
                 let (blocked, _) = map.blocked_and_costs(&body, 1.0);
                 let path = planned.unwrap_or_else(|failure| {
                     assert_eq!(failure.0, Reason::NoPath, "{seed}: {}", failure.1);

@@ -4,10 +4,8 @@ use std::sync::LazyLock;
 
 use clap::ValueEnum;
 use common::mission::{Mission, Protocol};
-use link::failsafe::stop_distance::{Stop, from_faults};
+use link::failsafe::stop_distance::from_faults;
 use serde::{Deserialize, Serialize};
-
-use super::fault_injector::LATE;
 
 /// Time until some faults show. Counts of 0 first look like a restart of the robot, and swapped
 /// encoders show in turns. A robot that believes stuck ranges drives slowly, and slow frames leave
@@ -17,10 +15,8 @@ const SHOWS_AFTER_S: f64 = 2.0;
 #[derive(Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Promise {
-    /// The robot rests as soon as its base can, stays at rest, and touches nothing.
-    RestsAtOnce,
-    /// As [`Promise::RestsAtOnce`], with a reason, and as soon as the failsafe's rule for the cause
-    /// allows.
+    /// The robot rests with a reason as soon as the failsafe's rule for the cause allows, stays at
+    /// rest, and touches nothing.
     Rests,
     /// As [`Promise::Rests`], but [`SHOWS_AFTER_S`] later.
     RestsLater,
@@ -68,9 +64,6 @@ pub enum RobotFault {
     DoesNotStop,
     FramesSlow,
     IgnoresZero,
-    LinkKilled,
-    SupervisorKilled,
-    AllKilled,
     RangeSilent,
     RangeFrozen,
     LateFromBoot,
@@ -83,8 +76,10 @@ pub enum RobotFault {
     Garbage,
 }
 
-static TABLE: LazyLock<Vec<Row>> =
-    LazyLock::new(|| crate::rows(include_str!("robot_faults.csv").as_bytes()).unwrap_or_default());
+static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
+    let rows = csv::Reader::from_reader(include_str!("robot_faults.csv").as_bytes());
+    rows.into_deserialize().collect::<csv::Result<_>>().unwrap_or_default()
+});
 
 impl Row {
     /// Returns the maximum seconds from the fault to rest, including one frame; none if the robot
@@ -95,7 +90,6 @@ impl Row {
             Some(causes.find(|(cause, _)| self.cause.as_deref() == Some(cause.name()))?.1.rest_s)
         };
         let rest_s = match self.promise {
-            Promise::RestsAtOnce => Stop::known_after(0.0, mission).rest_s,
             Promise::Rests => by_cause()?,
             Promise::RestsLater => by_cause()? + SHOWS_AFTER_S,
             Promise::Unharmed | Promise::EndsAtRest => return None,
@@ -105,36 +99,42 @@ impl Row {
 }
 
 impl RobotFault {
-    /// Returns whether processes are killed while a robot that ignores time limits drives.
-    pub const fn is_kill(self) -> bool {
-        matches!(self, Self::LinkKilled | Self::SupervisorKilled | Self::AllKilled)
-    }
-
     pub fn row(self) -> &'static Row {
         &TABLE[self as usize]
     }
 
-    pub fn has_meaning(self, protocol: Protocol) -> bool {
+    /// Returns whether a robot of this kind can have the fault. Cars and Arduinos have none.
+    pub fn has_meaning(self, mission: &Mission) -> bool {
         let row = self.row();
-        match protocol {
-            Protocol::X80 => row.x80 != NOTHING,
-            // In ROS 2, only speed 0 stops a robot.
-            Protocol::Ros2 if matches!(self, Self::DoesNotStop | Self::IgnoresZero) => false,
-            Protocol::Json | Protocol::Ros2 => row.json != NOTHING,
-            Protocol::Arduino => false,
-        }
+        let effect = match mission.robot.protocol() {
+            Protocol::X80 => &row.x80,
+            Protocol::Json => &row.json,
+            Protocol::Arduino | Protocol::Ros2 => NOTHING,
+        };
+        effect != NOTHING && mission.body().steering.is_none()
     }
 
-    /// Returns the maximum seconds from the fault to lasting rest; none if the robot may go on.
-    pub fn rest_within_s(self, mission: &Mission, protocol: Protocol) -> Option<f64> {
-        let promised_s = self.row().rest_within_s(mission)?;
-        if (self, protocol) != (Self::FramesLate, Protocol::Ros2) {
-            return Some(promised_s);
-        }
-        // Late messages have fresh stamps in ROS 2. The robot rests while none come, and continues
-        // when they do. They then show wheels that ignore commands, as with a dead encoder.
-        let follows_not_s = Self::EncoderDead.row().rest_within_s(mission)?;
-        Some(promised_s + LATE.as_secs_f64() + follows_not_s)
+    /// Returns whether the robot says what is not so, and not only late, seldom or not at all.
+    pub(crate) const fn lies(self) -> bool {
+        use RobotFault as F;
+        !matches!(
+            self,
+            F::Silence
+                | F::StreamsStop
+                | F::FramesLate
+                | F::FramesSlow
+                | F::LateFromBoot
+                | F::LateMidway
+                | F::Garbage
+                | F::HeldWheels
+                | F::DoesNotStop
+                | F::IgnoresZero
+        )
+    }
+
+    /// Returns whether the robot keeps its speed when it is told to stand.
+    pub(crate) const fn keeps_speed(self) -> bool {
+        matches!(self, Self::DoesNotStop | Self::IgnoresZero)
     }
 }
 
@@ -163,27 +163,13 @@ mod tests {
     }
 
     #[test]
-    fn a_robot_whose_late_frames_have_fresh_stamps_is_given_the_time_in_which_they_come_and_are_found_out()
-     {
-        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
-        let within_s = |fault: RobotFault, protocol| fault.rest_within_s(&mission, protocol);
-        let [json, ros2] = [Protocol::Json, Protocol::Ros2]
-            .map(|protocol| within_s(RobotFault::FramesLate, protocol).unwrap());
-        assert!((json + 3.0..json + 4.0).contains(&ros2), "{json} {ros2}");
-        let silence = within_s(RobotFault::Silence, Protocol::Ros2);
-        assert_eq!(silence, within_s(RobotFault::Silence, Protocol::Json));
-        assert_eq!(within_s(RobotFault::RangeLate, Protocol::Ros2), None);
-    }
-
-    #[test]
     fn every_fault_has_its_row_in_the_guides_table_too() {
-        let guide = include_str!("../../../../supervisor/guide/tables.md");
+        let guide = include_str!("../../../supervisor/guide/tables.md");
         assert_eq!(TABLE.len(), RobotFault::value_variants().len());
         for fault in RobotFault::value_variants() {
             let Row { name, promise, cause, x80, json } = fault.row();
             assert_eq!(fault.to_possible_value().unwrap().get_name(), name);
             let promise = match promise {
-                Promise::RestsAtOnce => "rests at once",
                 Promise::Rests => "rests",
                 Promise::RestsLater => "rests later",
                 Promise::Unharmed => "unharmed",

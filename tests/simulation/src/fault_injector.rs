@@ -1,17 +1,15 @@
-//! Injector of robot faults into the bytes between robot and link. Pure.
+//! Changes the bytes between robot and link as a faulty robot would.
 
 use std::{collections::VecDeque, time::Duration};
 
 use common::{json_wire::Report, mission::Protocol, wire::COUNT_CYCLE};
 
 use self::words::{COUNT_RAD, Effect, Said, Words};
-use simulation::Random;
-
-use crate::chaos::robot_fault::RobotFault;
+use crate::{random::Random, robot_fault::RobotFault};
 
 mod words;
 
-pub(super) const LATE: Duration = Duration::from_secs(2);
+const LATE: Duration = Duration::from_secs(2);
 /// Delays of late but received frames, seconds; each mission draws one from such a range.
 const A_LITTLE_LATE_S: [f64; 2] = [0.25, 1.0];
 const RANGE_LATE_S: [f64; 2] = [0.3, 2.0];
@@ -33,15 +31,14 @@ const FROZEN_M: f64 = 1.5;
 const MOST_KEPT: usize = 1024;
 
 #[derive(Debug)]
-pub struct Late {
+pub(crate) struct Late {
     pub at: Duration,
     pub bytes: Vec<u8>,
 }
 
-/// Injector that passes bytes unchanged until its fault begins.
-pub struct FaultInjector {
-    fault: RobotFault,
-    faulty: bool,
+/// Passes bytes unchanged while no fault acts.
+pub(crate) struct FaultInjector {
+    fault: Option<RobotFault>,
     /// Time of the first wheel message that the fault changed.
     began: Option<Duration>,
     chance: Random,
@@ -59,17 +56,13 @@ pub struct FaultInjector {
 }
 
 impl FaultInjector {
-    pub fn new(fault: RobotFault, protocol: Protocol, seed: u64) -> Self {
-        let mut chance = Random::new(seed, 13);
-        let channel = chance.below(2);
-        let size = chance.share();
+    pub(crate) fn new(protocol: Protocol, seed: u64) -> Self {
         Self {
-            fault,
-            faulty: false,
+            fault: None,
             began: None,
-            chance,
-            channel,
-            size,
+            chance: Random::new(seed, 13),
+            channel: 0,
+            size: 0.0,
             words: Words::of(protocol),
             base: None,
             newest: Report::default(),
@@ -81,28 +74,30 @@ impl FaultInjector {
         }
     }
 
-    pub const fn begin(&mut self) {
-        self.faulty = true;
+    /// Draws the size of `fault` and the wheel that it affects. The fault acts until the next one
+    /// or, without a fault, ends.
+    pub(crate) fn set(&mut self, fault: Option<RobotFault>) {
+        (self.fault, self.began) = (fault, None);
+        (self.channel, self.size) = (self.chance.below(2), self.chance.share());
     }
 
     /// Converts the robot's bytes into those for the host.
-    pub fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
+    pub(crate) fn report(&mut self, bytes: &[u8], now: Duration) -> Vec<Late> {
         let mut out = Vec::new();
         for said in self.words.said(bytes) {
             if said.stream().is_some() {
                 self.kept.push_back((now, said.clone()));
                 self.kept.drain(..self.kept.len().saturating_sub(MOST_KEPT));
             }
-            if self.faulty {
-                out.extend(self.changed(said, now));
-            } else {
-                self.note(said);
+            match self.fault {
+                Some(fault) => out.extend(self.changed(fault, said, now)),
+                None => self.note(said),
             }
         }
-        if !self.faulty {
+        let Some(fault) = self.fault else {
             return vec![Late { at: now, bytes: bytes.to_vec() }];
-        }
-        let late = match self.fault {
+        };
+        let late = match fault {
             RobotFault::FramesLate => LATE,
             RobotFault::LateFromBoot | RobotFault::LateMidway => {
                 Duration::from_secs_f64(self.drawn(A_LITTLE_LATE_S))
@@ -110,7 +105,7 @@ impl FaultInjector {
             _ => Duration::ZERO,
         };
         let mut passed = vec![Late { at: now + late, bytes: out }];
-        if self.fault == RobotFault::OldFrames && now >= self.next_again {
+        if fault == RobotFault::OldFrames && now >= self.next_again {
             self.next_again = now + AGAIN_EVERY;
             let old = self.old(now, OLD, |said| said.report.wheels.is_some());
             passed.extend(old.map(|old| Late { at: now, bytes: old.bytes() }));
@@ -128,17 +123,14 @@ impl FaultInjector {
         old.map(|(_, said)| said)
     }
 
-    /// Converts the host's bytes into those for the robot. Calls `moves` for each command that
-    /// moves wheels.
-    pub fn order(&mut self, bytes: &[u8], moves: &mut dyn FnMut()) -> Vec<u8> {
-        let is_faulty = |fault| self.faulty && self.fault == fault;
-        let holds_wheels = is_faulty(RobotFault::HeldWheels);
-        let keeps_speed = is_faulty(RobotFault::DoesNotStop) || is_faulty(RobotFault::IgnoresZero);
+    /// Converts the host's bytes into those for the robot.
+    pub(crate) fn order(&mut self, bytes: &[u8]) -> Vec<u8> {
+        let holds_wheels = self.fault == Some(RobotFault::HeldWheels);
+        let keeps_speed = self.fault.is_some_and(RobotFault::keeps_speed);
         let mut out = Vec::new();
         for (mut bytes, effect) in self.words.ordered(bytes) {
             match effect {
                 Effect::Moves { stand } => {
-                    moves();
                     (self.moving, self.pushes) = (Some(bytes.clone()), true);
                     if holds_wheels {
                         bytes = stand;
@@ -167,9 +159,9 @@ impl FaultInjector {
         }
     }
 
-    fn changed(&mut self, mut said: Said, now: Duration) -> Vec<u8> {
+    fn changed(&mut self, fault: RobotFault, mut said: Said, now: Duration) -> Vec<u8> {
         use RobotFault as F;
-        match self.fault {
+        match fault {
             F::Silence => return Vec::new(),
             F::StreamsStop if said.stream().is_some() => return Vec::new(),
             F::FramesSlow => {
@@ -209,8 +201,8 @@ impl FaultInjector {
             | F::RangeFrozen
             | F::RangeNear
             | F::RangeRandom
-            | F::RangeDeaf => self.misread(&mut said),
-            _ => self.miscount(&mut said, now),
+            | F::RangeDeaf => self.misread(fault, &mut said),
+            _ => self.miscount(fault, &mut said, now),
         }
         said.bytes()
     }
@@ -220,10 +212,10 @@ impl FaultInjector {
         speeds.is_some_and(|speeds| speeds != [0.0; 2])
     }
 
-    fn misread(&mut self, said: &mut Said) {
+    fn misread(&mut self, fault: RobotFault, said: &mut Said) {
         use RobotFault as F;
         let near_m = self.drawn(NEAR_M);
-        let (fault, chance) = (self.fault, &mut self.chance);
+        let chance = &mut self.chance;
         let [stuck_m, least_m] = said.stuck_and_least_m();
         let Report { ranges, scan, scans, .. } = &mut said.report;
         if matches!(fault, F::RangeFrozen | F::RangeNear) {
@@ -254,12 +246,12 @@ impl FaultInjector {
     }
 
     /// Changes the wheels of `said`, relative to those before the fault.
-    fn miscount(&mut self, said: &mut Said, now: Duration) {
+    fn miscount(&mut self, fault: RobotFault, said: &mut Said, now: Duration) {
         use RobotFault as F;
         let Some(mut angles) = said.report.wheels else { return };
         let mut speeds = said.report.speeds.unwrap_or_default();
         let base = self.base.get_or_insert_with(|| said.clone());
-        if self.fault == F::MotorRepeated {
+        if fault == F::MotorRepeated {
             *said = base.clone();
             return;
         }
@@ -272,7 +264,7 @@ impl FaultInjector {
             angles[channel] = before[channel] + share * turned[channel];
             speeds[channel] *= share;
         };
-        match self.fault {
+        match fault {
             F::EncoderDead => counts_share(0.0),
             F::EncoderReversed => counts_share(-1.0),
             F::EncoderLow => counts_share(low),

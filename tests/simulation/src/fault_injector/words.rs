@@ -15,29 +15,28 @@ use common::{
 const HELD_AD: u16 = 1520;
 const LONGEST_ECHO_M: f64 = 2.54;
 const MOTOR_BYTES: usize = 33;
-pub const COUNT_RAD: f64 = TAU / 1200.0;
+pub(super) const COUNT_RAD: f64 = TAU / 1200.0;
 
-pub enum Words {
+pub(super) enum Words {
     X80 { robot: Decoder, host: Decoder, encoders: [Encoder; 2], counts: [f64; 2] },
     Json { robot: Lines, host: Lines },
 }
 
 impl Words {
-    pub fn of(protocol: Protocol) -> Self {
+    pub(super) fn of(protocol: Protocol) -> Self {
         match protocol {
             Protocol::X80 => {
                 let (encoders, counts) = Default::default();
                 let (robot, host) = Default::default();
                 Self::X80 { robot, host, encoders, counts }
             }
-            // ROS 2 robots are simulated with JSON; Arduinos have no wire faults.
             Protocol::Json | Protocol::Arduino | Protocol::Ros2 => {
                 Self::Json { robot: Lines::default(), host: Lines::default() }
             }
         }
     }
 
-    pub fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
+    pub(super) fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
         match self {
             Self::X80 { robot, encoders, counts, .. } => {
                 let said = frames(robot, bytes, |frame| Said::of_frame(frame, encoders, counts));
@@ -50,7 +49,7 @@ impl Words {
         }
     }
 
-    pub fn ordered(&mut self, bytes: &[u8]) -> Vec<(Vec<u8>, Effect)> {
+    pub(super) fn ordered(&mut self, bytes: &[u8]) -> Vec<(Vec<u8>, Effect)> {
         match self {
             Self::X80 { host, .. } => frames(host, bytes, |frame| {
                 let mut bytes = Vec::new();
@@ -76,9 +75,9 @@ fn frames<T>(decoder: &mut Decoder, bytes: &[u8], mut of: impl FnMut(&Frame<'_>)
 
 /// Message of the robot, in JSON terms for every protocol.
 #[derive(Clone)]
-pub struct Said {
+pub(super) struct Said {
     /// Report; an X80's wheels are its channels, its ranges those of its sonars by number.
-    pub report: json_wire::Report,
+    pub(super) report: json_wire::Report,
     frame: Option<(Addressing, Report)>,
 }
 
@@ -111,7 +110,7 @@ impl Said {
         Some(Self { report, frame: Some((Addressing::of_host(frame.rid)?, parsed)) })
     }
 
-    pub fn bytes(&self) -> Vec<u8> {
+    pub(super) fn bytes(&self) -> Vec<u8> {
         let Some((addressing, mut frame)) = self.frame else { return line(&self.report) };
         let json_wire::Report { wheels, speeds, held, ranges, .. } = &self.report;
         match &mut frame {
@@ -147,34 +146,34 @@ impl Said {
         bytes
     }
 
-    pub const fn is_frame(&self) -> bool {
+    pub(super) const fn is_frame(&self) -> bool {
         self.frame.is_some()
     }
 
     /// Returns the stuck range, and the minimum random one, metres.
-    pub const fn stuck_and_least_m(&self) -> [f64; 2] {
+    pub(super) const fn stuck_and_least_m(&self) -> [f64; 2] {
         if self.is_frame() { [0.08, 0.04] } else { [0.3, 0.2] }
     }
 
-    pub fn readings(&self) -> [bool; 3] {
+    pub(super) fn readings(&self) -> [bool; 3] {
         let json_wire::Report { ranges, scan, scans, .. } = &self.report;
         let has_further = matches!(self.frame, Some((_, Report::Custom(_))));
         [!ranges.is_empty(), scan.is_some() || !scans.is_empty(), has_further]
     }
 
-    pub fn stream(&self) -> Option<usize> {
+    pub(super) fn stream(&self) -> Option<usize> {
         let has_wheels = self.report.wheels.is_some();
         std::iter::once(has_wheels).chain(self.readings()).position(|has| has)
     }
 
-    pub fn with_readings_of(self, other: Self) -> Self {
+    pub(super) fn with_readings_of(self, other: Self) -> Self {
         let json_wire::Report { ranges, scan, scans, .. } = other.report;
         let report = json_wire::Report { ranges, scan, scans, ..self.report };
         Self { report, frame: other.frame }
     }
 
     /// Sets every data byte of a wheel message to `byte`; in JSON, the wheels become 0.
-    pub fn with_data(mut self, byte: u8) -> Vec<u8> {
+    pub(super) fn with_data(mut self, byte: u8) -> Vec<u8> {
         if self.report.wheels.is_some() {
             if let Some((addressing, _)) = self.frame {
                 let (rid, mut bytes) = (addressing.host(), Vec::new());
@@ -188,7 +187,7 @@ impl Said {
     }
 }
 
-pub enum Effect {
+pub(super) enum Effect {
     /// Turning wheels; the bytes make them stand instead.
     Moves {
         stand: Vec<u8>,

@@ -1,0 +1,254 @@
+//! `both-ways`: the same mission in one process and through real processes, equal to the bit.
+//!
+//! Both runs are undisturbed and in lockstep. Compared are the summary, the ground truth and the
+//! recorded topics. The summary's wall-clock measurements and starvation are left out.
+
+mod recordings;
+
+use std::{
+    fs,
+    num::NonZero,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    thread,
+    time::{Duration, Instant},
+};
+
+use clap::Args;
+use common::{
+    ground_truth::GROUND_TRUTH, mission::Waypoint, poll, samples::Cause::SupervisorSilent,
+};
+use console::{missions, output::print_line};
+use mission_control::recovery::SUMMARY;
+use processes::records;
+use recording::Recording;
+use rustix::process::Signal;
+use serde_json::{Map, Value};
+use simulation::{Request, Scenario};
+
+use crate::{
+    error::{OrCannot as _, Result},
+    missions::{
+        runner::in_parallel,
+        trial::{Trial, swept_m},
+    },
+    robot::{self, Run},
+    simulate,
+    worlds::{self, Asked},
+};
+
+const ONE_PROCESS: &str = "one-process.mcap";
+/// Directory of the run through processes.
+const PROCESSES: &str = "processes";
+/// Targets of a mission whose robot stays.
+const TARGETS: usize = 2;
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// Drive missions in one process and through real processes in lockstep, and compare all that they
+/// publish.
+///
+/// Exits with 1 if any mission differs, and names its first difference.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Worlds, as for `evaluate`.
+    #[arg(long, default_value = "rooms")]
+    worlds: String,
+    /// Number of worlds; default: as for `evaluate`.
+    #[arg(long)]
+    count: Option<usize>,
+    /// Seed of the worlds; the first world's noise has the same.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Let each robot stay: it drives to the target and back to its start, is sent to the target
+    /// again while it waits, and is asked to end while it waits again.
+    #[arg(long)]
+    stay: bool,
+    /// Set a key of every mission; repeatable.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Number of missions at once; by default one per processor.
+    #[arg(long)]
+    jobs: Option<NonZero<usize>>,
+    /// Directory that keeps missions and runs.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub fn main(arguments: &Arguments) -> Result<ExitCode> {
+    let Arguments { count, seed, .. } = *arguments;
+    let robot = missions::parsed("target = [1, 0]", "its missions", &arguments.set)?;
+    let asked = Asked { count, seed, ends: None, swept_m: swept_m(&robot) };
+    let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
+    if found.trials.iter().any(|trial| trial.oncoming.is_some()) {
+        return Err("two robots meet in these worlds; give worlds with one robot".into());
+    }
+    let own = tempfile::tempdir().or_cannot("make a directory for runs")?;
+    let directory = arguments.out.as_deref().unwrap_or(own.path());
+    let jobs: Vec<_> = (0..).zip(found.trials).collect();
+    let all = jobs.len();
+    let threads = arguments.jobs.or(thread::available_parallelism().ok()).map_or(1, NonZero::get);
+    let began = Instant::now();
+    let mut differ = 0;
+    let drive = |(number, trial): &(u64, Trial), thread| {
+        let seed = seed.wrapping_add(*number);
+        let targets = arguments.stay.then_some(TARGETS);
+        let job = Job { arguments, directory, trial, seed, targets, thread };
+        let compared = job.compare().map_err(|error| error.to_string());
+        (trial.mission.name.clone(), compared)
+    };
+    in_parallel(jobs, threads, drive, |(world, compared)| {
+        if let Some(difference) = compared.map_err(|error| format!("{world}: {error}"))? {
+            differ += 1;
+            print_line(format!("{world}: {difference}"))?;
+        }
+        Ok(())
+    })?;
+    print_line(format!(
+        "{all} missions in {}, in one process and through real ones: {differ} differ, {:.0} s",
+        arguments.worlds,
+        began.elapsed().as_secs_f64()
+    ))?;
+    Ok(if differ == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+struct Job<'a> {
+    arguments: &'a Arguments,
+    directory: &'a Path,
+    trial: &'a Trial,
+    seed: u64,
+    /// Number of the mission's targets, if the robot stays.
+    targets: Option<usize>,
+    thread: usize,
+}
+
+impl Job<'_> {
+    /// Returns the first difference of both ways.
+    fn compare(&self) -> Result<Option<String>> {
+        let mut mission = self.trial.mission.clone();
+        let directory = self.directory.join(&mission.name);
+        fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
+        mission.seed = self.seed;
+        let mut sent_to = Vec::new();
+        if self.targets.is_some() {
+            let waypoint = |at| Waypoint { at, heading_deg: None };
+            mission.stay = true;
+            mission.targets = [mission.target, mission.start.at].map(waypoint).to_vec();
+            sent_to.push(mission.target.into());
+        }
+        let file = directory.join("world.toml");
+        fs::write(&file, toml::to_string(&mission)?).or_cannot_file("write", &file)?;
+        let one = self.in_one_process(&file, &directory, &sent_to)?;
+        let many = self.through_processes(&file, &directory.join(PROCESSES), &sent_to)?;
+        let mut difference = one.difference(&many);
+        if difference.is_none() {
+            let one_process = Recording::open(&directory.join(ONE_PROCESS))?;
+            let processes = Recording::open(&directory.join(PROCESSES))?;
+            difference = recordings::difference([&one_process, &processes], one.ticks())?;
+        }
+        if difference.is_none() && self.arguments.out.is_none() {
+            let _ = fs::remove_dir_all(&directory);
+        }
+        Ok(difference)
+    }
+
+    fn in_one_process(&self, file: &Path, directory: &Path, sent_to: &[[f64; 2]]) -> Result<Way> {
+        let mission = missions::load(&file.to_string_lossy(), &self.arguments.set)?;
+        let while_waiting = sent_to.iter().copied().map(Request::Goto).collect();
+        let scenario = Scenario { while_waiting, ..Scenario::lockstep(&mission) };
+        let ran = simulate::record(&scenario, &directory.join(ONE_PROCESS))?;
+        let broken = ran.broken.map_or(String::new(), |broken| broken.to_string());
+        let (finished, summary) = ran.finished.zip(ran.summary).ok_or(broken)?;
+        let lines: Result<_, _> = finished.truth.iter().map(serde_json::to_string).collect();
+        Ok(Way { summary: numbers(&serde_json::to_string(&summary)?)?, truth: lines? })
+    }
+
+    fn through_processes(
+        &self,
+        file: &Path,
+        directory: &Path,
+        sent_to: &[[f64; 2]],
+    ) -> Result<Way> {
+        let name = format!("both-ways{}-{}", std::process::id(), self.thread);
+        let mut command = robot::mission("run", file, &name, &self.arguments.set);
+        command.args(["--pace", "max", "--out"]).arg(directory);
+        let mut run = Run::start(command, directory, true)?;
+        let (mut sent_to, mut targets) = (sent_to.iter(), self.targets);
+        while run.process.try_reap().or_cannot("reap a mission")?.is_none() {
+            if targets.is_some_and(|targets| results(directory) >= targets) {
+                targets = match sent_to.next() {
+                    // The robot has another target, unless it refused this one.
+                    Some(place) => targets.map(|it| it + usize::from(send(&name, place))),
+                    None => {
+                        run.process.signal(Signal::TERM);
+                        None
+                    }
+                };
+            }
+            poll::is_readable(&run.process, LOOK_EVERY)?;
+        }
+        run.summary()?;
+        let read = |name: &str| {
+            let file = directory.join(name);
+            fs::read_to_string(&file).or_cannot_file("read", &file)
+        };
+        let truth = read(GROUND_TRUTH)?.lines().map(str::to_owned).collect();
+        Ok(Way { summary: numbers(&read(SUMMARY)?)?, truth })
+    }
+}
+
+/// Returns the number of targets with a result.
+fn results(run: &Path) -> usize {
+    fs::read_to_string(run.join(records::TARGETS)).map_or(0, |text| text.lines().count())
+}
+
+/// Sends a robot to another target. Returns whether it took it.
+fn send(robot: &str, [x, y]: &[f64; 2]) -> bool {
+    let [x, y] = [x, y].map(f64::to_string);
+    let sent = robot::firsthand(&["goto", "--robot", robot, &x, &y]).output();
+    sent.is_ok_and(|sent| sent.status.success())
+}
+
+/// Returns a summary without what a machine's clock and load decide.
+fn numbers(summary: &str) -> Result<Map<String, Value>> {
+    let mut summary: Map<String, Value> = serde_json::from_str(summary)?;
+    for measured in ["tick_latency_us", "full_solve_us"] {
+        summary.remove(measured);
+    }
+    // A supervisor that is not scheduled for 2 s. Robot and mission time then stand.
+    if let Some(Value::Object(stops)) = summary.get_mut("stops") {
+        stops.remove(SupervisorSilent.name());
+    }
+    Ok(summary)
+}
+
+/// What came of a mission, besides its recording.
+struct Way {
+    summary: Map<String, Value>,
+    /// Ground truth, a line for each tick.
+    truth: Vec<String>,
+}
+
+impl Way {
+    /// Returns the number of ticks up to the event that decided the mission. What follows depends
+    /// on how soon the supervisor sees it.
+    fn ticks(&self) -> u64 {
+        self.summary.get("ticks").and_then(Value::as_u64).unwrap_or_default()
+    }
+
+    /// Returns the first difference from `other`, whose ground truth may go on for longer.
+    fn difference(&self, other: &Self) -> Option<String> {
+        let keys = self.summary.keys().chain(other.summary.keys());
+        let values = keys.map(|key| (key, self.summary.get(key), other.summary.get(key)));
+        for (key, one, many) in values {
+            if one != many {
+                let [one, many] = [one, many].map(|it| it.unwrap_or(&Value::Null));
+                return Some(format!("summary, {key}: {one} and {many}"));
+            }
+        }
+        let missing = String::new();
+        let lines = (0..self.truth.len())
+            .map(|at| (at, &self.truth[at], other.truth.get(at).unwrap_or(&missing)));
+        let mut unequal = lines.filter(|(_, one, many)| one != many);
+        unequal.next().map(|(at, one, many)| format!("ground truth {at}: {one} and {many}"))
+    }
+}

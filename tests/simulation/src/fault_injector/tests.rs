@@ -1,0 +1,265 @@
+use clap::ValueEnum as _;
+use common::{
+    json_wire::{Order, line, parse},
+    wire::{
+        Addressing, Command, Decoder, DecoderTally, Encoder, MotorSensors, Report as Frame,
+        StandardSensors, SystemSignal,
+    },
+};
+
+use super::*;
+use RobotFault as F;
+
+fn at(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds)
+}
+
+/// Returns what an X80 says in a tick.
+fn tick(counts: [u16; 2], sonar: u8) -> Vec<u8> {
+    let encoder = |position| Encoder { position, speed: 300, positive: true };
+    let motor = MotorSensors { encoders: counts.map(encoder), ..MotorSensors::default() };
+    let ultrasonic = [sonar; 6];
+    let standard = StandardSensors { ultrasonic, human: [2048; 4], ..StandardSensors::default() };
+    let mut bytes = Vec::new();
+    for frame in [Frame::Motor(motor), Frame::Standard(standard), Frame::System(SystemSignal::Ack)]
+    {
+        frame.encode(Addressing::Numbered, &mut bytes);
+    }
+    bytes
+}
+
+/// Returns the frames that passed, all of them valid.
+fn frames(passed: &[Late]) -> Vec<Frame> {
+    let mut decoder = Decoder::default();
+    let mut all = Vec::new();
+    for late in passed {
+        decoder.push(&late.bytes);
+        while let Some(frame) = decoder.next_frame() {
+            all.push(Frame::parse(&frame).unwrap());
+        }
+    }
+    let frames = all.len() as u64;
+    assert_eq!(decoder.tally(), DecoderTally { frames, ..DecoderTally::default() });
+    all
+}
+
+fn counts(passed: &[Late]) -> Option<[u16; 2]> {
+    frames(passed).into_iter().find_map(|frame| match frame {
+        Frame::Motor(motor) => Some(motor.encoders.map(|encoder| encoder.position)),
+        _ => None,
+    })
+}
+
+fn sonar(passed: &[Late]) -> Option<u8> {
+    frames(passed).into_iter().find_map(|frame| match frame {
+        Frame::Standard(standard) => Some(standard.ultrasonic[1]),
+        _ => None,
+    })
+}
+
+/// Returns an injector whose robot said `before` at 1 s, unchanged, and then became faulty.
+fn faulty(fault: F, protocol: Protocol, seed: u64, before: &[u8]) -> FaultInjector {
+    let mut injector = FaultInjector::new(protocol, seed);
+    let passed = injector.report(before, at(1.0));
+    assert_eq!((passed[0].at, &*passed[0].bytes), (at(1.0), before));
+    injector.set(Some(fault));
+    injector
+}
+
+/// Returns an X80 with a fault since it had counted 100 and 200 before an echo at 90 cm.
+fn x80(fault: F, seed: u64) -> FaultInjector {
+    faulty(fault, Protocol::X80, seed, &tick([100, 200], 90))
+}
+
+#[test]
+fn every_frame_of_a_faulty_robot_is_valid_until_its_fault_ends() {
+    let all = F::value_variants().iter().copied();
+    for fault in all.filter(|fault| *fault != F::Garbage) {
+        let mut injector = x80(fault, 1);
+        for number in 0..50 {
+            let passed = injector.report(&tick([110, 210], 90), at(1.1 + 0.1 * f64::from(number)));
+            let acknowledged = frames(&passed).contains(&Frame::System(SystemSignal::Ack));
+            assert_eq!(acknowledged, fault != F::Silence, "{fault:?}");
+        }
+        injector.set(None);
+        let bytes = tick([120, 220], 90);
+        assert_eq!(injector.report(&bytes, at(9.0))[0].bytes, bytes, "{fault:?}");
+    }
+}
+
+#[test]
+fn encoders_and_sonars_lie_as_the_table_says() {
+    let said = |fault| x80(fault, 1).report(&tick([150, 190], 40), at(1.1));
+    for (fault, told) in [
+        (F::MotorOnes, &[[0x7fff; 2]][..]),
+        (F::MotorZeros, &[[0, 0]]),
+        (F::MotorRepeated, &[[100, 200]]),
+        (F::EncodersSwapped, &[[90, 250]]),
+        (F::CountsReset, &[[50, 32_758]]),
+        (F::RangeStuck, &[[150, 190]]),
+        (F::EncoderDead, &[[100, 190], [150, 200]]),
+        (F::EncoderReversed, &[[50, 190], [150, 210]]),
+    ] {
+        let counts = counts(&said(fault)).unwrap();
+        assert!(told.contains(&counts), "{fault:?}: {counts:?}");
+    }
+    assert_eq!([F::StreamsStop, F::Silence].map(|fault| counts(&said(fault))), [None, None]);
+    for (fault, told) in [
+        (F::RangeInvalid, Some(0..=0)),
+        (F::RangeMissing, None),
+        (F::RangeStuck, Some(8..=8)),
+        (F::EncoderDead, Some(40..=40)),
+        (F::RangeSilent, Some(255..=255)),
+        (F::RangeFrozen, Some(90..=90)),
+        (F::RangeNear, Some(85..=95)),
+        (F::RangeRandom, Some(3..=254)),
+        (F::RangeDeaf, Some(255..=255)),
+    ] {
+        let sonar = sonar(&said(fault));
+        let fits = told.map_or(sonar.is_none(), |told| told.contains(&sonar.unwrap()));
+        assert!(fits, "{fault:?}: {sonar:?}");
+    }
+    let mut random = x80(F::CountsRandom, 1);
+    let [first, second] =
+        [1.1, 1.2].map(|time_s| counts(&random.report(&tick([150, 190], 90), at(time_s))));
+    assert_ne!(first, second);
+}
+
+#[test]
+fn frames_are_late_old_or_rare_as_the_table_says() {
+    let late = |fault| x80(fault, 1).report(&tick([150, 190], 90), at(1.1))[0].at;
+    assert_eq!(late(F::FramesLate), at(1.1) + LATE);
+    assert!((at(1.35)..at(2.1)).contains(&late(F::LateFromBoot)));
+
+    let mut old = FaultInjector::new(Protocol::X80, 1);
+    for number in 0..40 {
+        old.report(&tick([number, 200], 90), at(0.1 * f64::from(number)));
+    }
+    old.set(Some(F::OldFrames));
+    let passed = old.report(&tick([40, 200], 90), at(4.0));
+    let told = [&passed[..1], &passed[1..]].map(counts);
+    assert_eq!(told, [Some([40, 200]), Some([10, 200])], "one of 3 s ago, too");
+    assert_eq!(old.report(&tick([41, 200], 90), at(4.1)).len(), 1, "the next one comes in 2 s");
+
+    let mut slow = x80(F::FramesSlow, 1);
+    let came = (0..30).filter(|&number| {
+        let passed = slow.report(&tick([number, 200], 90), at(1.1 + 0.1 * f64::from(number)));
+        counts(&passed).is_some()
+    });
+    assert!((7..=9).contains(&came.count()), "in 3 s");
+
+    let mut ranges = x80(F::RangeLate, 1);
+    let age_s = ranges.drawn(RANGE_LATE_S);
+    for (after_s, told) in [(-0.1, 80), (0.1, 90)] {
+        let passed = ranges.report(&tick([150, 190], 80), at(1.0 + age_s + after_s));
+        assert_eq!((counts(&passed), sonar(&passed)), (Some([150, 190]), Some(told)));
+    }
+}
+
+/// Returns what a JSON robot says in a tick, and its answer to a command.
+fn lines(wheels: [f64; 2], beam: f32) -> Vec<u8> {
+    let report = Report {
+        wheels: Some(wheels),
+        speeds: Some([1.0, 2.0]),
+        ranges: [("front".to_owned(), Some(f64::from(beam)))].into(),
+        scan: Some(vec![Some(beam), None]),
+        ..Report::default()
+    };
+    [line(&report), line(&Report { heard: Some(1), ..Report::default() })].concat()
+}
+
+/// Returns the lines of a JSON robot with a fault since its wheels had turned by 1 and 2 rad.
+fn json(fault: F, seed: u64, wheels: [f64; 2]) -> Vec<Report> {
+    let mut injector = faulty(fault, Protocol::Json, seed, &lines([1.0, 2.0], 0.5));
+    let passed = injector.report(&lines(wheels, 0.75), at(1.1));
+    let lines = passed.iter().flat_map(|late| late.bytes.split(|byte| *byte == b'\n'));
+    lines.filter_map(|line| parse(line).ok()).collect()
+}
+
+#[test]
+fn a_json_robot_lies_as_the_table_says() {
+    for (fault, told) in [
+        (F::MotorZeros, &[[0.0, 0.0]][..]),
+        (F::EncodersSwapped, &[[2.0, 5.0]]),
+        (F::CountsReset, &[[3.0, 1.0]]),
+        (F::EncoderDead, &[[1.0, 3.0], [4.0, 2.0]]),
+        (F::EncoderReversed, &[[-2.0, 3.0], [4.0, 1.0]]),
+        (F::MotorRepeated, &[[1.0, 2.0]]),
+    ] {
+        let wheels = json(fault, 1, [4.0, 3.0])[0].wheels.unwrap();
+        let wheels = wheels.map(|angle| (angle * 1e6).round() / 1e6);
+        assert!(told.contains(&wheels), "{fault:?}: {wheels:?}");
+    }
+    for (fault, beam, rest) in [
+        (F::RangeInvalid, Some(-1.0), Some(-1.0)),
+        (F::RangeStuck, Some(0.3), Some(0.3)),
+        (F::RangeSilent, None, None),
+        (F::RangeFrozen, Some(0.5), None),
+    ] {
+        let line = &json(fault, 1, [4.0, 3.0])[0];
+        assert_eq!(line.scan, Some(vec![beam, rest]), "{fault:?}");
+        assert_eq!(line.ranges["front"].map(|range| range as f32), beam, "{fault:?}");
+        assert_eq!(line.wheels, Some([4.0, 3.0]), "{fault:?}");
+    }
+    let missing = &json(F::RangeMissing, 1, [4.0, 3.0])[0];
+    assert!(missing.scan.is_none() && missing.ranges.is_empty() && missing.wheels.is_some());
+    for (fault, answers) in [(F::StreamsStop, 1), (F::Silence, 0), (F::Garbage, 0)] {
+        let lines = json(fault, 1, [4.0, 3.0]);
+        assert_eq!(lines.len(), answers, "{fault:?}");
+        assert!(lines.iter().all(|line| line.heard == Some(1)), "{fault:?}");
+    }
+}
+
+#[test]
+fn a_robot_keeps_its_speed_until_it_is_disabled_or_stands_where_it_is_held() {
+    let command = |command: Command| {
+        let mut bytes = Vec::new();
+        command.encode(Addressing::Numbered, &mut bytes);
+        bytes
+    };
+    let drive =
+        |speed| line(&Order::Drive { wheels: [speed; 2], twist: [speed, 0.0], for_s: 0.25 });
+    let x80 = [
+        command(Command::velocity([Some(-400), Some(400)], 250)),
+        command(Command::velocity([Some(0); 2], 250)),
+        command(Command::Enable { on: false, channel: None }),
+    ];
+    let json = [drive(2.0), drive(0.0), line(&Order::Brake {})];
+    for (protocol, [go, stand, off]) in [(Protocol::X80, x80), (Protocol::Json, json)] {
+        let mut keeps = FaultInjector::new(protocol, 1);
+        let healthy = [&*go, &stand].concat();
+        assert_eq!(keeps.order(&healthy), healthy, "{protocol:?}");
+        keeps.set(Some(F::DoesNotStop));
+        assert_eq!(keeps.order(&stand), go, "{protocol:?}");
+        let disabled = [&*off, &stand].concat();
+        assert_eq!(keeps.order(&disabled), disabled, "{protocol:?}");
+        let mut held = FaultInjector::new(protocol, 1);
+        held.set(Some(F::HeldWheels));
+        assert_eq!(held.order(&go), stand, "{protocol:?}");
+    }
+    let mut held = FaultInjector::new(Protocol::Json, 1);
+    held.set(Some(F::HeldWheels));
+    held.order(&drive(2.0));
+    let passed = held.report(&lines([1.0, 2.0], 0.5), at(1.0));
+    let report: Report =
+        parse(passed[0].bytes.split(|byte| *byte == b'\n').next().unwrap()).unwrap();
+    assert_eq!(report.held, Some([true; 2]));
+}
+
+#[test]
+fn the_size_of_a_fault_is_drawn_by_the_seed_from_between_the_tables_numbers() {
+    let late_s = |seed| {
+        let passed = x80(F::LateMidway, seed).report(&tick([100, 200], 90), at(1.1));
+        passed[0].at.as_secs_f64() - 1.1
+    };
+    let mut sizes: Vec<f64> = (0..50).map(late_s).collect();
+    assert_eq!(late_s(7), sizes[7]);
+    sizes.sort_by(f64::total_cmp);
+    let (least, most) = (sizes[0], sizes[49]);
+    assert!((0.25..0.35).contains(&least) && (0.9..1.0).contains(&most), "{sizes:?}");
+    for seed in 0..50 {
+        let wheels = json(F::EncoderLow, seed, [2.0, 3.0])[0].wheels.unwrap();
+        let share = (wheels[0] - 1.0).min(wheels[1] - 2.0);
+        assert!((0.9..=0.97).contains(&share), "{share}");
+    }
+}

@@ -1,0 +1,188 @@
+//! Whole missions in lockstep, in one process.
+
+use std::path::Path;
+
+use common::mission::Mission;
+use console::missions;
+use mission_control::outcome::Outcome;
+use simulation::Scenario;
+use summary::Summary;
+
+/// Settings under which every arrival is sure, in a time that suffices for every robot.
+const SURE: [&str; 2] = ["sure_within_m=9", "timeout_s=900"];
+const PAPER: &str = "method='paper'";
+/// Speed below which a car, or a robot by the paper's method, touches nothing with any seed.
+const SLOW: &str = "controller.speed_m_s=0.2";
+const CAR: &str = "robot.model='car'";
+
+/// Drives a shipped mission with further settings.
+fn drive(mission: &str, settings: &[&str]) -> Summary {
+    let settings: Vec<_> = SURE.iter().chain(settings).map(ToString::to_string).collect();
+    summary_of(&missions::load(mission, &settings).unwrap())
+}
+
+fn summary_of(mission: &Mission) -> Summary {
+    let ran = Scenario::lockstep(mission).run();
+    assert!(ran.broken.is_none(), "{}: {:?}", mission.name, ran.broken);
+    ran.summary.unwrap()
+}
+
+#[track_caller]
+fn ends(mission: &str, settings: &[&str], outcome: Outcome) -> Summary {
+    let summary = drive(mission, settings);
+    assert_eq!(summary.outcome, outcome, "{mission}, {settings:?}: {summary:?}");
+    summary
+}
+
+#[track_caller]
+fn arrives_untouched(mission: &str, settings: &[&str]) -> Summary {
+    let summary = ends(mission, settings, Outcome::Reached);
+    assert_eq!(summary.collisions, Some(0), "{mission}, {settings:?}");
+    summary
+}
+
+fn seeds(last: u64) -> impl Iterator<Item = String> {
+    (1..=last).map(|seed| format!("seed={seed}"))
+}
+
+#[test]
+fn the_default_mission_and_a_hall_with_five_people_are_crossed_untouched_for_seeds_1_to_10() {
+    for seed in seeds(10) {
+        arrives_untouched("obstacle-course", &[&seed]);
+        arrives_untouched("walkers", &[&seed]);
+    }
+}
+
+#[test]
+fn by_the_papers_method_it_does_for_seeds_1_to_8() {
+    // The path is twice as long, so with measured wheels the arrival would be unsure. Laboratory
+    // wheels are better.
+    let wheels = ["robot.odometry.diameter_ratio_sd=0", "robot.odometry.slip=0.001"];
+    for seed in seeds(8) {
+        arrives_untouched("obstacle-course", &[PAPER, SLOW, wheels[0], wheels[1], &seed]);
+    }
+}
+
+#[test]
+fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
+    let fading = ["simulation.radio.outage_share=0.2", "simulation.radio.outage_mean_s=0.5"];
+    for seed in seeds(8) {
+        let settings = ["simulation.realism='measured'", fading[0], fading[1], &seed];
+        let summary = drive("obstacle-course", &settings);
+        // Measured wheels drift, and this test ignores the error of the believed target.
+        let arrived = [Outcome::Reached, Outcome::ReachedUnsure, Outcome::WrongPlace];
+        assert!(arrived.contains(&summary.outcome), "{seed}: {summary:?}");
+        assert_eq!(summary.collisions, Some(0), "{seed}");
+    }
+}
+
+#[test]
+fn a_robot_with_a_gyro_and_wheels_that_nobody_calibrated_knows_its_place() {
+    // These settings replace the mission's own, which are for calibrated wheels.
+    let wheels = ["robot.odometry={}", "simulation.wheels={}"];
+    for seed in seeds(6) {
+        let gyro = ["robot.protocol='json'", "robot.gyro=true"];
+        let settings = [wheels[0], wheels[1], gyro[0], gyro[1], &seed];
+        let summary = arrives_untouched("obstacle-course", &settings);
+        assert!(summary.pose_error_m < Some(0.3), "{seed}: {summary:?}");
+    }
+}
+
+#[test]
+fn mission_time_and_timeout_count_the_time_in_which_nobody_hears_the_robot() {
+    let out = "simulation.radio.outage_share=0.2";
+    let silent_share = |summary: &Summary| {
+        let heard_s = (summary.ticks as f64 - 1.0) / 7.0;
+        1.0 - heard_s / summary.mission_time_s
+    };
+    let silent = silent_share(&drive("obstacle-course", &[out]));
+    assert!((0.1..0.3).contains(&silent), "{silent}");
+    let late = ends("obstacle-course", &[out, "timeout_s=8"], Outcome::Timeout);
+    assert!((7.5..=8.0).contains(&late.mission_time_s), "{late:?}");
+    let never = silent_share(&drive("obstacle-course", &[]));
+    assert!(never.abs() < 1e-4, "{never}");
+}
+
+#[test]
+fn a_finer_grid_is_no_more_dangerous() {
+    for cells in ["perimeter.cells=100", "perimeter.cells=256", "perimeter.cells=512"] {
+        for seed in seeds(2) {
+            arrives_untouched("obstacle-course", &[cells, &seed]);
+        }
+    }
+}
+
+#[test]
+fn the_trap_is_left_from_every_heading_by_either_method() {
+    for heading in ["start.heading_deg=0", "start.heading_deg=90", "start.heading_deg=180"] {
+        for seed in seeds(2) {
+            arrives_untouched("trap", &[heading, &seed]);
+            arrives_untouched("trap", &[PAPER, heading, &seed]);
+        }
+    }
+}
+
+#[test]
+fn a_car_crosses_the_course_untouched_for_seeds_1_to_5() {
+    for seed in seeds(5) {
+        arrives_untouched("obstacle-course", &[CAR, SLOW, &seed]);
+    }
+}
+
+#[test]
+fn a_car_that_faces_a_wall_too_near_to_turn_ends_with_its_turning_radius() {
+    // The pocket is open behind, and a robot that turns on the spot leaves it.
+    let wall = "world.wall=[{points=[[0.5,0.6],[0.5,-0.6]]},{points=[[0.5,0.6],[-0.3,0.6]]},\
+                {points=[[0.5,-0.6],[-0.3,-0.6]]}]";
+    let long = "timeout_s=600";
+    arrives_untouched("open-room", &[wall, long]);
+    let summary = ends("open-room", &[CAR, wall, long], Outcome::Unreachable);
+    assert_eq!(summary.collisions, Some(0), "{summary:?}");
+    assert!(summary.reason.contains("0.31 m"), "{summary:?}");
+}
+
+#[test]
+fn an_empty_room_or_hall_is_crossed_straight_ahead_and_without_a_safety_event() {
+    let summary = arrives_untouched("open-room", &[]);
+    assert_eq!(summary.safety_events, 0, "{summary:?}");
+    let detour = |summary: &Summary| summary.path_length_m / summary.straight_m;
+    assert!(detour(&summary) < 1.01, "{summary:?}");
+    let turned = arrives_untouched("open-room", &["start.heading_deg=90"]);
+    assert!(detour(&turned) < 1.1, "{turned:?}");
+    let hall = "target = [7, 0]\nsensors = 'front'\nsure_within_m = 9\n\
+                perimeter = { width_m = 20, centre = [3.5, 0] }\n\
+                simulation.realism = 'laboratory'";
+    let hall = summary_of(&Mission::parse(hall, Path::new("hall.toml")).unwrap());
+    assert_eq!((hall.outcome, hall.collisions), (Outcome::Reached, Some(0)), "{hall:?}");
+}
+
+#[test]
+fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
+    let known = "known.drum=[{at=[1.7,0.2],radius_m=0.35},{at=[3.7,-0.7],radius_m=0.4},\
+                 {at=[2.3,-1.7],radius_m=0.3},{at=[3.9,1.2],radius_m=0.3}]";
+    let laboratory = "simulation.realism='laboratory'";
+    let sensing = drive("obstacle-course", &[PAPER, SLOW, laboratory]);
+    let knowing = ends("obstacle-course", &[PAPER, SLOW, laboratory, known], Outcome::Reached);
+    assert!(knowing.mission_time_s < sensing.mission_time_s, "{knowing:?} against {sensing:?}");
+}
+
+#[test]
+fn a_target_behind_closed_walls_is_called_unreachable() {
+    let walls = "world.wall=[{points=[[2.4,-3.4],[2.4,3.4]]},{points=[[-1.9,1.4],[2.6,1.4]]},\
+                 {points=[[-1.9,-1.4],[2.6,-1.4]]},{points=[[-1.7,-1.6],[-1.7,1.6]]}]";
+    ends("open-room", &[walls], Outcome::Unreachable);
+    ends("open-room", &[walls, PAPER, "mapper.margin_m=0.35"], Outcome::Unreachable);
+}
+
+#[test]
+fn a_wheel_that_is_blocked_for_5_s_costs_a_fresh_planner_and_for_ever_the_target() {
+    let block = "simulation.block=[{wheels='left',from_s=7,until_s=12}]";
+    let blocked = ends("open-room", &[SLOW, block], Outcome::Reached);
+    assert!(blocked.replans > 0, "{blocked:?}");
+    let held = ends(
+        "open-room",
+        &[SLOW, "simulation.block=[{wheels='both',from_s=7}]"],
+        Outcome::Unreachable,
+    );
+    assert!(held.reason.contains("held fast") && held.replans > 1, "{held:?}");
+}
