@@ -71,7 +71,6 @@ impl Checkpoint {
         slot * (HEADER + self.capacity) as u64
     }
 
-    /// Returns `None` for an unwritten or torn slot.
     fn read_slot<T: DeserializeOwned>(
         &self,
         slot: u64,
@@ -82,7 +81,6 @@ impl Checkpoint {
             .map_err(|problem| CheckpointError::Foreign { file: self.path.clone(), problem })
     }
 
-    /// Saves `state` over the older one.
     pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), CheckpointError> {
         let sequence = self.sequence + 1;
         let mut bytes = std::mem::take(&mut self.buffer);

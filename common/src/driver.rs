@@ -17,10 +17,8 @@ use crate::samples::{
 
 /// Protocol of one device; sufficient for a sensor.
 pub trait Driver: fmt::Debug {
-    /// Decodes `bytes`, together with an earlier incomplete message.
     fn hear(&mut self, bytes: &[u8]) -> Heard;
 
-    /// Discards an incomplete message.
     fn reset(&mut self);
 
     fn tally(&self) -> WireTally;
@@ -38,7 +36,7 @@ pub trait Base: Driver {
     /// positive. The robot stops by itself after `limit`.
     fn velocity(&self, counts: [i16; 2], limit: Duration) -> Vec<u8>;
 
-    /// Returns the turn since the last tick by the robot's own gyro.
+    /// By the robot's own gyro.
     fn turn_for_tick(&mut self) -> Option<Turn> {
         None
     }
@@ -49,7 +47,7 @@ pub trait Base: Driver {
         Vec::new()
     }
 
-    /// Returns a request for any answer, for a robot that neither publishes nor is polled.
+    /// For a robot that neither publishes nor is polled.
     fn ping(&self) -> Vec<u8> {
         Vec::new()
     }
@@ -132,7 +130,6 @@ impl WireTally {
         is_taken
     }
 
-    /// Adds bytes dropped before decoding.
     pub const fn with_dropped(self, bytes: u64) -> Self {
         Self { bytes_dropped: self.bytes_dropped + bytes, ..self }
     }
@@ -197,12 +194,12 @@ pub struct Heard {
     pub anything: bool,
     pub pinged: bool,
     pub acknowledged: usize,
-    /// Motion; begins a tick.
+    /// Begins a tick.
     pub motion: Option<Motion>,
-    /// Readings by row of the mission's sensor table; others are ignored.
+    /// Of the mission's sensor table; others are ignored.
     pub readings: Vec<RangeReading>,
     pub scans: Vec<LaserScan>,
-    /// Rows of [`crate::mission::Mission::touches`] with their state.
+    /// Rows of [`crate::mission::Mission::touches`].
     pub touched: Vec<(usize, bool)>,
     /// Voltages; the link sets the low flags.
     pub power: Option<PowerSample>,
@@ -212,12 +209,11 @@ pub struct Heard {
     pub jumped: bool,
     /// Whether it counts orders from 0 again: it restarted and lost its settings.
     pub restarted: bool,
-    /// Time of its newest odometry by its own clock, if stated.
+    /// By its own clock.
     pub stamp_ns: Option<i64>,
     pub commander: Option<Commander>,
     /// Numbers of two nodes that both publish its odometry, and the remedy.
     pub two_publishers: Option<String>,
-    /// Reason why the newest refused message is invalid.
     pub refused: Option<Refusal>,
 }
 
@@ -252,7 +248,7 @@ pub struct Motion {
     pub wheels: WheelSample,
     /// Counts of `wheels` without wraparound, for a robot that reports angles or odometry.
     pub endless: Option<CountsSample>,
-    /// Measurement time by the robot's clock.
+    /// By the robot's clock.
     pub stamp_ns: Option<i64>,
     /// AD counts of the left and the right wheel.
     pub currents: [u16; 2],

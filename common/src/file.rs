@@ -56,7 +56,6 @@ impl Store {
         }
     }
 
-    /// Returns at most `most` bytes from `at` on.
     pub(crate) fn read(&self, at: u64, most: u64) -> io::Result<Vec<u8>> {
         match self {
             Self::System(file) => {
@@ -125,7 +124,6 @@ pub fn append_bytes(file: &Path, bytes: &[u8]) -> io::Result<u64> {
     Ok(file.metadata()?.len())
 }
 
-/// Returns the whole text of a file.
 pub fn read_text(file: &Path) -> io::Result<String> {
     let Some(machine) = machine::simulated() else { return fs::read_to_string(file) };
     if !machine.files().exists(file) {
@@ -143,7 +141,6 @@ pub fn exists(path: &Path) -> bool {
     }
 }
 
-/// Creates an empty file at `path`.
 pub fn create(path: &Path) -> io::Result<()> {
     match machine::simulated() {
         Some(machine) => killed().map(|()| drop(machine.files().open(path))),
@@ -151,7 +148,6 @@ pub fn create(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Removes the file at `path`, if there is one.
 pub fn remove(path: &Path) -> io::Result<()> {
     if let Some(machine) = machine::simulated() {
         return killed().map(|()| machine.files().remove(path));
@@ -162,7 +158,6 @@ pub fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Returns the first `most` bytes of a text file.
 pub fn text(file: &Path, most: u64) -> Option<String> {
     if machine::is_simulated() {
         return read_text(file).ok();

@@ -20,8 +20,7 @@ pub struct FoundResponse {
 }
 
 impl FoundResponse {
-    /// Returns the mission with the response in `newer`, if it differs; `stated` is the original
-    /// mission.
+    /// Returns `None` if it does not differ; `stated` is the original mission.
     pub fn changed(&mut self, newer: &Self, stated: &Mission) -> Option<Mission> {
         let [dead_time_s, acceleration] = newer.response.filter(|_| newer != self)?;
         *self = *newer;

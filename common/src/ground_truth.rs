@@ -5,13 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::samples::PoseSample;
 
-/// File in the run directory with the lines of ticks.
 pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundTruthHeader {
     pub listening: String,
-    /// Wire of a laser that has a separate line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser: Option<String>,
 }

@@ -42,7 +42,6 @@ pub struct Journal {
     path: PathBuf,
     end: u64,
     number: u64,
-    /// First entry after the snapshot.
     first: u64,
     snapshot_after: u64,
 }
@@ -50,7 +49,7 @@ pub struct Journal {
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Restored<S, E> {
     pub state: Option<S>,
-    /// Entries after the state, oldest first.
+    /// Oldest first.
     pub entries: Vec<E>,
 }
 
@@ -139,7 +138,7 @@ impl Journal {
         self.number - self.first >= self.snapshot_after
     }
 
-    /// Saves `state`, the fold of all entries, and empties the journal.
+    /// Takes the fold of all entries.
     pub fn snapshot<S: Serialize>(&mut self, state: &S) -> Result<(), CheckpointError> {
         self.snapshots.save(&Snapshot { next: self.number, state })?;
         self.first = self.number;
@@ -153,7 +152,6 @@ fn snapshot_after(capacity: usize) -> u64 {
     (capacity as u64 / BYTES_FOR_AN_ENTRY).clamp(soonest, latest)
 }
 
-/// Returns the first entry's number, version and body, and the bytes after it.
 fn entry(bytes: &[u8]) -> Option<(u64, u8, &[u8], &[u8])> {
     let number = u64::from_le_bytes(bytes.get(..8)?.try_into().ok()?);
     let &[low, middle, high, version] = bytes.get(8..12)? else { return None };

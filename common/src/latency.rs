@@ -31,7 +31,6 @@ impl Histogram {
         self.counts.iter().map(|&count| u64::from(count)).sum()
     }
 
-    /// Adds another histogram, for example of another generation.
     pub fn add(&mut self, counts: &[u32; BUCKETS], max_ns: u64) {
         for (own, other) in self.counts.iter_mut().zip(counts) {
             *own = own.saturating_add(*other);

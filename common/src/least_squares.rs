@@ -11,7 +11,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// Adds a pair after scaling the previous sums by `left`.
+    /// `left` scales the previous sums.
     pub fn add(&mut self, left: f64, x: f64, y: f64) {
         assert!((0.0..=1.0).contains(&left));
         for (sum, term) in [(&mut self.xx, x * x), (&mut self.xy, x * y), (&mut self.yy, y * y)] {
@@ -30,7 +30,6 @@ impl Line {
 /// Fit of y = a x + b z.
 #[derive(Clone, Copy, Debug)]
 pub struct Two {
-    /// Factor with its standard deviation.
     pub a: [f64; 2],
     pub b: [f64; 2],
     /// Residual sum of squares.

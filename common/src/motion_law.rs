@@ -19,7 +19,7 @@ const LEAST_TURN_RAD_S: f64 = 0.25;
 /// where every mission starts.
 #[derive(Clone, Copy, Debug)]
 pub struct Alignment {
-    /// eta_d: cosine of the angle to the guidance.
+    /// eta_d.
     pub cosine: f64,
     /// eta_c: its sine, positive for guidance to the left. The printed sign turns away.
     pub sine: f64,

@@ -20,13 +20,11 @@ pub(crate) enum Saved {
     #[default]
     Nothing,
     State(Checkpoint),
-    /// Inputs since a snapshot.
     Journal(Journal),
 }
 
 #[derive(Default)]
 pub struct Outputs {
-    /// Tick and mission time of the next output.
     pub at: Progress,
     writers: Vec<(&'static str, Box<dyn AnyWriter>)>,
     /// `None` in a replay, and for a process whose inputs are not recorded.
@@ -72,7 +70,6 @@ impl Outputs {
         self.replayed.as_ref().is_none_or(|replayed| replayed.has_field)
     }
 
-    /// Opens the topics that follow each robot frame.
     pub(crate) fn open_late(&mut self, context: &mut Context) -> Result {
         self.open(context, 0, true)
     }
@@ -108,7 +105,7 @@ impl Outputs {
         self.inputs.as_mut().map_or(Ok(()), |inputs| inputs.publish(self.at))
     }
 
-    /// Publishes a sample, unless it is `None`.
+    /// Does nothing for `None`.
     pub fn publish<H: Stamped>(
         &mut self,
         topic: &'static Topic<H>,

@@ -11,7 +11,7 @@ pub fn field(process: &str, field: &str) -> Option<String> {
     Some(value.trim().to_owned())
 }
 
-/// Returns a field in kibibytes, such as `VmRSS`.
+/// For example `VmRSS`.
 pub fn kibibytes(process: &str, field: &str) -> Option<u64> {
     self::field(process, field)?.strip_suffix(" kB")?.trim().parse().ok()
 }

@@ -10,7 +10,6 @@ use crate::{
     run::Run,
 };
 
-/// Sample that a generation published, or must have published.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     pub topic: &'static str,
@@ -55,7 +54,6 @@ pub trait Replay {
 #[derive(Clone, Copy, Debug)]
 pub struct Beginning<'a> {
     pub run: &'a Run,
-    /// Body of the first input entry.
     pub start: &'a [u8],
     /// Whether `field` samples are compared, which takes longer than all else.
     pub fields: bool,

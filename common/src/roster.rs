@@ -43,7 +43,6 @@ pub fn join(domain: &Domain, name: &str) -> Result<Bus, BusError> {
     Ok(bus)
 }
 
-/// Returns the processes of all rosters since the last call.
 fn names(mut rosters: Reader<RosterHeader, RosterEntry>) -> Names {
     Box::new(move || {
         let mut all: Option<Vec<_>> = None;
@@ -76,7 +75,6 @@ impl Roster {
         Ok(first.map(|stages| writers.name(stages)).is_some())
     }
 
-    /// Admits the processes in rosters from now on.
     #[cfg(feature = "stage")]
     pub(crate) fn admit(self, bus: &Bus) {
         if let Some(writers) = bus.writers() {

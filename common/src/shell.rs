@@ -59,7 +59,6 @@ impl Context {
         self.bus.writers().cloned()
     }
 
-    /// Opens the checkpoint and returns the state of the stage's last process.
     pub fn saved_state<T: DeserializeOwned>(&mut self) -> Result<Option<T>> {
         let Persists::State(bytes) = self.wiring.persists else {
             return Ok(None);
@@ -69,8 +68,7 @@ impl Context {
         Ok(state)
     }
 
-    /// Opens the journal of a state of at most `bytes`, and returns what the stage's last process
-    /// saved.
+    /// Returns what the stage's last process saved. The state has at most `bytes`.
     pub fn saved_journal<S: DeserializeOwned, E: DeserializeOwned>(
         &mut self,
         bytes: usize,
@@ -89,7 +87,6 @@ impl Context {
 /// Current tick of a stage, which its heartbeats carry in their stamps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
-    /// Last processed tick.
     pub tick: u64,
     pub time: MissionTime,
 }
@@ -188,7 +185,7 @@ pub fn main<P: Process>() -> ExitCode {
     }
 }
 
-/// Writes the error to standard error. If that fails, the exit code still reports it.
+/// If that fails, the exit code still reports it.
 fn complain(error: &dyn fmt::Display) {
     let _ = writeln!(io::stderr(), "{error}");
 }
@@ -243,10 +240,9 @@ pub trait Simulated {
     /// process hangs by request.
     fn turn(&mut self) -> Result<Option<Duration>>;
 
-    /// Returns whether an input waits. The wires of the link wake it apart from this.
+    /// The wires of the link wake it apart from this.
     fn is_woken(&self) -> bool;
 
-    /// Ends the process in order.
     fn stop(&mut self) -> Result;
 }
 
@@ -257,7 +253,6 @@ struct Simulation<P> {
     work: Option<Work<P>>,
 }
 
-/// Starts a stage's process on a simulated machine.
 pub fn simulate<P: Process + 'static>(
     generation: Generation,
     run: Run,
@@ -327,7 +322,6 @@ impl StopRequest {
     }
 }
 
-/// What a stage's process has besides the stage.
 struct Host {
     context: Context,
     heartbeat: Heartbeat,
@@ -373,7 +367,6 @@ impl Host {
     }
 }
 
-/// Work of an open process, turn by turn.
 struct Work<P> {
     process: P,
     progress: Progress,
@@ -403,7 +396,6 @@ impl<P: Process> Work<P> {
         host.heartbeat.beat(HealthState::Stopping, self.progress)
     }
 
-    /// Takes the first turn and announces readiness.
     fn begin(&mut self, host: &mut Host) -> Result {
         self.progress = self.process.turn()?;
         if host.ticks_follow_at_once() {
@@ -419,7 +411,6 @@ impl<P: Process> Work<P> {
         Ok(())
     }
 
-    /// Returns the longest wait for input before the next turn.
     fn patience(&self, host: &Host) -> Duration {
         let pause = (self.busy && self.process.has_idle_work()).then_some(TICK_OVER);
         let waits = [pause, self.process.looks_again_after()];

@@ -42,7 +42,6 @@ impl Signals {
         Ok(())
     }
 
-    /// Catches the signals that ask a process to end.
     pub fn that_end() -> io::Result<Self> {
         Self::catch(&[SIGINT, SIGTERM, SIGHUP])
     }

@@ -106,7 +106,7 @@ impl<S: Stage> Runner<S> {
         Ok(Self { stage, out })
     }
 
-    /// Opens the topics that follow each robot frame. Call it after the first ready heartbeat.
+    /// Call it after the first ready heartbeat.
     pub fn open_late(&mut self, context: &mut Context) -> Result {
         self.out.open_late(context)
     }
@@ -184,7 +184,7 @@ pub trait Answering: Sized + 'static {
 pub trait Further: Default + Serialize + DeserializeOwned + Debug + 'static {
     type Readers: Readers;
 
-    /// Takes the pending samples, up to a limit.
+    /// Takes no more than a limit.
     fn take_samples(readers: &mut Self::Readers) -> Result<Self, BusError>;
 }
 

@@ -44,7 +44,6 @@ pub fn arguments(called: &str, generation: &Generation, supervisor: u32) -> Vec<
     ]
 }
 
-/// Parses the `arguments` after the name of an executable that has only `stage`.
 pub fn start(
     stage: &'static str,
     arguments: impl IntoIterator<Item = OsString>,

@@ -120,7 +120,7 @@ impl AsFd for StopSocket {
     }
 }
 
-/// Binds a socket at `path` and recreates its directory if necessary.
+/// Recreates its directory if necessary.
 fn bind(path: &Path) -> io::Result<UnixDatagram> {
     if let Some(directory) = path.parent() {
         make_directory(directory)?;
@@ -229,7 +229,6 @@ impl OwedStop {
         file::exists(&self.0.owed_stop())
     }
 
-    /// Sets or clears the mark for the robot of the run in `directory`.
     pub fn set(&self, owed: bool, directory: &Path) -> io::Result<()> {
         if !owed {
             return file::remove(&self.0.owed_stop());

@@ -16,14 +16,13 @@ impl From<Reader<TargetSample>> for TargetReader {
 }
 
 impl TargetReader {
-    /// Returns the target that holds in `tick`, if it differs from the last returned one.
+    /// Returns a new target that holds in `tick`.
     pub fn next(&mut self, tick: u64) -> Result<Option<TargetSample>> {
         self.newest = self.samples.newest()?.or(self.newest);
         Ok(self.newest.filter(|newest| takes(&mut self.taken, newest, tick)))
     }
 }
 
-/// Returns whether to take `newest`; `taken` is the number of the last taken target.
 fn takes(taken: &mut Option<u64>, newest: &TargetSample, tick: u64) -> bool {
     // A new generation takes any target, because it has none.
     let is_due = |number| newest.number > number && tick >= newest.since_tick;

@@ -25,7 +25,6 @@ pub struct Wiring {
     /// Input topics whose writers start after it: those that close the loop, and those that
     /// consumers write.
     pub feedback: Topics,
-    /// Topics that start an iteration of its work loop.
     pub wakes: Topics,
     /// Topics that it alone writes. The last one published in each tick answers the tick. Topics
     /// that follow each robot frame are opened after the first ready heartbeat.
@@ -58,7 +57,6 @@ impl Readers for () {
     }
 }
 
-/// Declares a struct of readers, or of values made from one, each with its topic.
 #[macro_export]
 macro_rules! readers {
     ($(#[$meta:meta])* $vis:vis struct $name:ident {

@@ -26,7 +26,7 @@ pub trait AnyTopic: Sync {
     #[doc(hidden)]
     fn carried(&self) -> Carried;
     fn any_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>>;
-    /// Opens a reader of all generations with a recorder's buffer.
+    /// With a recorder's buffer, of all generations.
     fn recorder_reader(&self, bus: &Bus) -> Result<Box<dyn AnyReader>>;
     fn any_writer(&self, bus: &Bus, generation: u32, longest: usize) -> Result<Box<dyn AnyWriter>>;
     /// Returns the processes that have the topic open.
@@ -144,7 +144,6 @@ impl Bus {
         Self::make_services(domain, name, table.iter().map(|topic| (topic.spec(), topic.carried())))
     }
 
-    /// Opens a wakeup for publications on `topic`.
     pub fn wakeup(&self, topic: &dyn AnyTopic) -> Result<Wakeup> {
         Wakeup::open(self, topic.spec())
     }

@@ -24,7 +24,7 @@ pub struct Author {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ignored {
     pub samples: u64,
-    /// Author of the last one; 0 for none.
+    /// 0 for none.
     pub process: u32,
 }
 
@@ -43,7 +43,7 @@ struct Named {
     /// Processes of each stage, the newest last.
     stages: BTreeMap<String, VecDeque<Author>>,
     source: Option<Names>,
-    /// Deadline for the first list of `source`; samples of stages wait until then.
+    /// Samples of stages wait until then for the first list.
     names_come_by: Option<Instant>,
     ignored: Ignored,
 }

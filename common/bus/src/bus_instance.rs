@@ -39,7 +39,7 @@ impl BusInstance {
         Self { domain: domain.clone(), name: name.collect() }
     }
 
-    /// Returns the current instance; fails if the robot has no bus.
+    /// Fails if the robot has no bus.
     pub fn current(domain: &Domain) -> io::Result<Self> {
         let link = domain.middleware_config();
         let config = fs::read_link(&link)?;

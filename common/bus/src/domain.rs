@@ -43,7 +43,6 @@ impl FromStr for RobotName {
     }
 }
 
-/// Name of a robot that nobody names.
 impl Default for RobotName {
     fn default() -> Self {
         Self("x80".to_owned())
@@ -194,7 +193,6 @@ macro_rules! files {
 }
 
 files! {
-    /// Returns the lock that the supervisor holds exclusively.
     lock_file: "lock",
     /// Returns the lock that consumers share while they join. The supervisor holds it exclusively
     /// to create or remove a bus, so no consumer recreates its files.
@@ -208,7 +206,7 @@ files! {
     /// Returns the link whose text names the robot's machine, if this domain is a mirror.
     mirror_link: "mirror",
     stop_socket: "stop",
-    /// Returns the socket of the stop guard, which orders the stop after its link ended.
+    /// Returns the socket of the stop guard.
     guard_socket: "guard",
     /// Returns the link to the run directory of a robot that may be moving.
     owed_stop: "owed-stop",

@@ -69,7 +69,7 @@ pub enum Kind {
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Structure {
-    /// Name in all languages, for example `firsthand.Pose`.
+    /// For example `firsthand.Pose`.
     pub name: &'static str,
     pub size: usize,
     pub fields: Vec<Field>,
@@ -78,7 +78,6 @@ pub struct Structure {
 #[derive(Clone, PartialEq, Eq)]
 pub struct Field {
     pub name: &'static str,
-    /// Bytes from the start of the struct.
     pub offset: usize,
     pub kind: Kind,
     /// Field comment, lines joined; empty for none.

@@ -55,7 +55,7 @@ fn unfilled_for(entry: &DirEntry) -> Option<Duration> {
     unfilled.then(|| file.modified().ok()?.elapsed().ok()).map(Option::unwrap_or_default)
 }
 
-/// Removes the node files in `nodes` of the process `ended`, which must have ended.
+/// The process `ended` must have ended.
 pub(super) fn remove_nodes(nodes: &Path, ended: u32) -> io::Result<()> {
     for entry in fs::read_dir(nodes)? {
         let entry = entry?;

@@ -13,10 +13,9 @@ use std::{
 
 /// A simulated machine.
 pub trait Machine {
-    /// Returns the monotonic clock, nanoseconds.
+    /// Nanoseconds.
     fn monotonic_ns(&self) -> u64;
 
-    /// Returns the number of the running process.
     fn process(&self) -> u32;
 
     /// Runs the other processes until `is_ready`, or until `timeout` has passed. Returns the last
@@ -41,7 +40,6 @@ pub trait MachineWire: std::fmt::Debug {
     fn send(&mut self, bytes: &[u8]);
 }
 
-/// Content of a simulated file.
 pub type Content = Rc<RefCell<Vec<u8>>>;
 
 /// Files of a simulated machine, by path. There are no directories.
@@ -67,7 +65,6 @@ thread_local! {
     static SIMULATED: RefCell<Option<Rc<dyn Machine>>> = const { RefCell::new(None) };
 }
 
-/// Runs `work` on a simulated machine.
 pub fn simulate<T>(machine: Rc<dyn Machine>, work: impl FnOnce() -> T) -> T {
     let before = SIMULATED.replace(Some(machine));
     let done = work();
@@ -75,7 +72,7 @@ pub fn simulate<T>(machine: Rc<dyn Machine>, work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// Returns the simulated machine of this thread; `None` in a real process.
+/// Returns `None` in a real process.
 pub fn simulated() -> Option<Rc<dyn Machine>> {
     SIMULATED.with_borrow(Clone::clone)
 }
@@ -84,7 +81,6 @@ pub fn is_simulated() -> bool {
     SIMULATED.with_borrow(Option::is_some)
 }
 
-/// Returns the number of this process.
 pub fn process() -> u32 {
     simulated().map_or_else(std::process::id, |machine| machine.process())
 }

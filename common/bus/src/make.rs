@@ -38,7 +38,6 @@ pub struct Bus {
     pub(super) medium: Medium,
     /// Processes whose samples are read; `None` without named authors.
     pub(super) writers: Option<Writers>,
-    /// Whether the process may take the places that consumers leave free.
     pub(super) is_stage: bool,
     pub(super) lost: Rc<Cell<u64>>,
 }
@@ -95,7 +94,6 @@ impl Bus {
         }
     }
 
-    /// Rewrites the configuration for joining processes.
     pub fn restore_config(&self) -> Result {
         let Medium::Shared { instance, .. } = &self.medium else { return Ok(()) };
         Self::write_config(instance)?;

@@ -14,7 +14,6 @@ use iceoryx2_bb_elementary::package_version::PackageVersion;
 
 use crate::{bus_instance::BusInstance, domain::SHARED_MEMORY};
 
-/// Suffix of the middleware's count of nodes.
 const COUNT_OF_NODES: &str = ".global_mgmt";
 /// Middleware's name of the count's type: the SHA-1 of
 /// `iceoryx2::node::global_management_segment::State`.

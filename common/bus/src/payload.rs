@@ -45,7 +45,6 @@ impl Stamp {
         MissionTime(self.stamp_ns)
     }
 
-    /// Returns the mission time, seconds.
     pub fn seconds(&self) -> f64 {
         self.time().seconds()
     }
@@ -70,7 +69,6 @@ pub fn encode_sample<H: Layout>(sample: &H, bytes: &mut Vec<u8>) {
     encode_slice::<H, ()>(sample, &[], bytes);
 }
 
-/// Decodes a header and slice.
 pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H, Vec<E>)> {
     let mut from = Decoder::new(message)?;
     let header = H::decode(&mut from)?;
@@ -87,7 +85,6 @@ pub fn decode_slice<H: Layout, E: Layout + Default>(message: &[u8]) -> Option<(H
     Some((header, slice))
 }
 
-/// Decodes a header.
 pub fn decode_sample<H: Layout>(message: &[u8]) -> Option<H> {
     Some(decode_slice::<H, ()>(message)?.0)
 }

@@ -22,7 +22,6 @@ const PLACES_FREED_WITHIN: Duration = Duration::from_secs(4);
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 impl Bus {
-    /// Opens a reader of `topic`.
     pub fn reader<H: Stamped, E: Payload>(&self, topic: &Topic<H, E>) -> Result<Reader<H, E>> {
         self.reader_that_keeps(topic, topic.spec.limits.buffer)
     }
@@ -109,7 +108,7 @@ impl<H: Stamped> Reader<H> {
         Ok(self.next_slice()?.map(|sample| *sample.header()))
     }
 
-    /// Takes all samples and returns the newest.
+    /// Takes all samples.
     pub fn newest(&mut self) -> Result<Option<H>> {
         let mut newest = None;
         while let Some(sample) = self.next_sample()? {

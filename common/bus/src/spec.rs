@@ -74,7 +74,6 @@ impl Spec {
 pub struct Limits {
     /// Samples buffered for a reader; beyond this the oldest are dropped.
     pub buffer: usize,
-    /// Samples buffered for a recorder.
     pub recorder_buffer: usize,
     /// Samples that a reader may hold at once.
     pub borrowed: usize,

@@ -23,7 +23,7 @@ pub struct Report {
     /// Wheel angles since the start. They begin a tick.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheels: Option<[f64; 2]>,
-    /// Wheel speeds, rad/s.
+    /// Rad/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speeds: Option<[f64; 2]>,
     /// Robot's clock, with its own zero, at the reading of `wheels` or `odometry`. It dates
@@ -40,7 +40,7 @@ pub struct Report {
     /// Whether each wheel is blocked: its motor draws its stall current.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held: Option<[bool; 2]>,
-    /// Readings by the row names of the mission; null for nothing in reach.
+    /// Null for nothing in reach.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub ranges: BTreeMap<String, Option<f64>>,
     /// Beams counter-clockwise; null for nothing in reach, negative for no reading.
@@ -53,7 +53,6 @@ pub struct Report {
     /// Duration of the scan, from its first beam to its last.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scan_time_s: Option<f64>,
-    /// Scans by the row names of the mission, for several lasers.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scans: BTreeMap<String, Scan>,
     /// Bumper and cliff sensor states by the row names of the mission. An omitted one keeps its

@@ -13,9 +13,9 @@ pub const FORMS: &str = "give \"host:port\", \"udp://host:port\", \"tcp://host:p
 /// Robot address; `Host` is text in a mission and a socket address once resolved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address<Host = SocketAddr> {
-    /// Datagrams, the default: `host:port` or `udp://host:port`.
+    /// The default: `host:port` or `udp://host:port`.
     Udp(Host),
-    /// TCP connection: `tcp://host:port`.
+    /// `tcp://host:port`.
     Tcp(Host),
     /// Serial line, 8N1, with 115200 baud or the mission's `robot.arduino.baud`:
     /// `serial:///dev/ttyUSB0`.
@@ -115,7 +115,7 @@ impl Address<String> {
     }
 }
 
-/// Returns the domain in `ROS_DOMAIN_ID`, by default 0; fails on an invalid one.
+/// From `ROS_DOMAIN_ID`, by default 0.
 pub fn domain_of_environment() -> Result<u16, AddressError> {
     let Some(text) = std::env::var_os("ROS_DOMAIN_ID").filter(|text| !text.is_empty()) else {
         return Ok(0);

@@ -6,11 +6,9 @@ pub const LEAST_BAUD: u32 = 19_200;
 
 keys! {
     ArduinoBoard {
-        /// Bits per second.
         baud: u32 = 57_600,
-        /// Rate of the speed loop, Hz. Speeds are encoder counts per run of the loop.
+        /// Speeds are encoder counts per run of the loop.
         pid_rate_hz: f64 = 30.0,
-        /// Sonar pins by row name.
         sonars: BTreeMap<String, u8>,
     }
 }

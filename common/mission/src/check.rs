@@ -401,7 +401,6 @@ fn zones(mission: &Mission) -> Result {
 /// Greatest body radius in tracks; a greater one suggests a wrong unit.
 const MOST_TRACKS: f64 = 5.0;
 
-/// Rejects a start inside a hazard.
 fn start_is_free(mission: &Mission) -> Result {
     let radius = mission.body().radius_m;
     let track = mission.body().track_m;

@@ -48,11 +48,8 @@ macro_rules! shape {
             $name {
                 $($(#[$doc])* $field: $type,)*
                 bottom_m: Option<f64>,
-                /// Defaults to a shape higher than the robot.
                 top_m: Option<f64>,
-                /// Defaults to a hard shape.
                 echo: Option<f64>,
-                /// Defaults to matt.
                 light: Option<Light>,
             }
         }
@@ -244,7 +241,6 @@ fn bounds(corners: &[DVec2]) -> (DVec2, DVec2) {
     corners.iter().fold(nothing, wider)
 }
 
-/// Returns the edges of a polygon.
 pub(crate) fn ring(corners: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> + '_ {
     corners.iter().zip(corners.iter().cycle().skip(1)).map(|(from, to)| (*from, *to))
 }
@@ -270,7 +266,7 @@ pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
     (variances.map(|variance| variance.max(0.0).sqrt()), 0.5 * xy.atan2(half))
 }
 
-/// Wraps an angle to (-pi, pi], radians.
+/// To (-pi, pi], radians.
 pub fn wrap_angle(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let turned = angle.rem_euclid(TAU);

@@ -15,7 +15,6 @@ use crate::{
 /// Product of gain and dead time up to which a proportional law is well damped; from pi / 2 on it
 /// oscillates without end.
 const DAMPED: f64 = 0.5;
-/// Integration step, seconds.
 const STEP_S: f64 = 0.02;
 
 /// Longest time that is integrated in steps, seconds.
@@ -28,7 +27,7 @@ pub struct Lead {
     drive: DifferentialDrive,
     base: Base,
     pub(crate) dead_time_s: f64,
-    /// Pending commands with their times of effect.
+    /// With their times of effect.
     pending: VecDeque<(f64, Twist)>,
     wanted: Twist,
     twist: Twist,

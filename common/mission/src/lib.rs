@@ -98,32 +98,23 @@ use crate::{
 keys! {
     /// Every key except `target` has a default; a mission with `stay` needs no key at all.
     Mission {
-        /// Defaults to the file's name.
         name: String,
-        /// One line for `firsthand missions`.
         description: String,
         /// X_T, metres.
         target: DVec2 = DVec2::NAN,
-        /// Places to visit in order; [`Mission::target`] is the first of them.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         targets: Vec<Waypoint>,
         method: Method,
-        /// Adds sonar readings to the map; without them the robot knows only [`Mission::known`].
         sensing: bool = true,
-        /// Sensor rows used for mapping; by default [`Mission::sensor_set`].
         sensors: Option<Sensors>,
         /// Distance within which the target counts as reached.
         arrival_tolerance_m: f64 = 0.15,
-        /// Limit of two standard deviations of the position along the worst axis; beyond it an
-        /// arrival is unsure. A simulated robot farther off is in the wrong place.
+        /// A simulated robot farther off than this is in the wrong place.
         sure_within_m: f64 = 0.5,
         timeout_s: f64 = 180.0,
-        /// Keeps the run alive after the last target, or from the start without one, and waits for
-        /// the next.
         stay: bool,
         /// Whether a service resumes by itself; see `firsthand run --resume-last`.
         resume: Resume,
-        /// Random seed of the simulation.
         seed: u64 = 1,
         start: Start,
         /// Pi: the permitted area and the grid over it.
@@ -258,7 +249,6 @@ keys! {
         /// N along each side. By default a cell has 0.05 m, a quarter of the X80's body, if
         /// [`Mission::looks_first`], else 0.1 m.
         cells: Option<u32>,
-        /// Metres.
         centre: DVec2,
     }
 }
@@ -269,13 +259,11 @@ impl Perimeter {
 }
 
 keys! {
-    /// Dead reckoning; [`Odometry`] holds the wheel parameters.
     DeadReckoning {
         integration: Integration,
     }
 }
 
-/// Integration of (20) into (21).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integration {
@@ -290,24 +278,18 @@ keys! {
     Mapper {
         /// Paper: radius marked around a hit; [`Mission::margin_cells`] is Im of (19).
         margin_m: f64 = 0.25,
-        /// Evidential: free distance between the body and a hit.
         clearance_m: f64 = 0.03,
-        /// Greatest distance of hits that enter the map; by default [`Mission::map_within_m`].
         map_within_m: Option<f64>,
-        /// Evidential: time in which the strongest evidence decays linearly to zero; by default
-        /// never.
         forget_after_s: Option<f64>,
     }
 }
 
 keys! {
     Planner {
-        /// Evidential: time for a stop before believed hazards and unscanned ground, including the
-        /// base's dead time; by default that of [`Mission::hurry`]. Bases that brake slowly get a
-        /// lower speed: [`Response::speed_to_stop_within`].
+        /// Includes the base's dead time. Bases that brake slowly get a lower speed:
+        /// [`Response::speed_to_stop_within`].
         stops_within_s: Option<f64>,
-        /// Lambda of laplacian u = u / lambda^2. By default none with the paper's method, exactly
-        /// (11), and [`Planner::EVIDENTIAL_SCREENING_M`] with the evidential one.
+        /// Lambda of laplacian u = u / lambda^2.
         screening_m: Option<f64>,
         /// Planner in place of `firsthand`'s own, with the command line of `common::stage_command`;
         /// absolute in a run file.
@@ -334,20 +316,15 @@ keys! {
     Controller {
         /// vd; by default [`Mission::speed_m_s`].
         speed_m_s: Option<f64>,
-        /// wd; by default [`Mission::turn_rad_s`].
+        /// wd.
         turn_rad_s: Option<f64>,
-        /// Evidential: greatest heading error at full speed; by default that of [`Mission::hurry`].
         full_speed_within_deg: Option<f64>,
-        /// Evidential: heading error beyond which the robot turns on the spot; below it the speed
-        /// falls with the cosine. By default that of [`Mission::hurry`].
         turns_beyond_deg: Option<f64>,
-        /// Evidential: greatest turn rate on the spot; by default that of [`Mission::hurry`].
         look_rad_s: Option<f64>,
-        /// Rc: distance from the target at which slowing begins.
+        /// Rc.
         slow_radius_m: f64 = 0.4,
-        /// |eta_c| below which an antipodal robot keeps its turning side.
+        /// Of |eta_c|.
         dead_zone: f64 = 0.05,
-        /// Modulates the speed by alignment (16); without it the speed is constant up to Rc.
         modulated: bool = true,
     }
 }
@@ -443,7 +420,7 @@ impl Mission {
         })
     }
 
-    /// Returns the sensor table. A reading names its sensor by its row here.
+    /// A reading names its sensor by its row here.
     pub fn sensor_table(&self) -> Vec<Sensor> {
         let RobotConfig { sensors, rate_hz, .. } = &self.robot;
         let rows = match &self.robot.preset().sensors {
@@ -464,7 +441,6 @@ impl Mission {
         }
     }
 
-    /// Returns the ROS topic of [`ros2::Ros2Topics::hazards`].
     pub fn hazards_topic(&self) -> Option<String> {
         let preset = &self.robot.preset().ros2;
         self.robot.ros2.hazards.as_ref().or(preset.hazards.as_ref()).cloned()
@@ -475,7 +451,7 @@ impl Mission {
         rows.filter(|(_, sensor)| sensor.kind == SensorKind::Scan).collect()
     }
 
-    /// Returns the laser used for localisation: of the used lasers, the first with the widest view.
+    /// Of the used lasers, the first with the widest view; for localisation.
     pub fn laser(&self) -> Option<(usize, Sensor)> {
         self.lasers().into_iter().rev().max_by(|(_, a), (_, b)| {
             a.used.cmp(&b.used).then(a.field_of_view_deg.total_cmp(&b.field_of_view_deg))
@@ -544,8 +520,7 @@ impl Mission {
         Lead::new(self).map_or(within_s, |lead| (within_s - lead.dead_time_s).max(0.0))
     }
 
-    /// Returns wd: `controller.turn_rad_s`, by default 2.4 for a robot that looks first, else the
-    /// paper's 0.8.
+    /// By default 2.4 for a robot that looks first, else the paper's 0.8.
     pub fn turn_rad_s(&self) -> f64 {
         let default = if self.looks_first() { 2.4 } else { 0.8 };
         self.controller.turn_rad_s.unwrap_or(default)
@@ -564,7 +539,7 @@ impl Mission {
         self.mapper.map_within_m.unwrap_or(default)
     }
 
-    /// Returns `planner.screening_m`, by default that of the method; `None` is exactly (11).
+    /// `None` is exactly (11).
     pub fn screening_length_m(&self) -> Option<f64> {
         let default = match self.method {
             // The grid limits the resolvable length.
@@ -585,12 +560,11 @@ impl Mission {
         self.target.distance(self.start.at)
     }
 
-    /// Returns the shapes of the world at the body's height.
+    /// At the body's height.
     pub fn obstacles(&self) -> Shapes {
         self.simulation.physics().heights.touched(&self.world)
     }
 
-    /// Returns the simulated wheels: `simulation.wheels`, then the robot's response.
     pub fn wheel_physics(&self) -> WheelPhysics {
         let (written, stated) = (&self.simulation.wheels, &self.robot.response);
         let preset = self.simulation.physics().wheels;

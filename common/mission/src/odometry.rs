@@ -10,13 +10,10 @@ keys! {
     /// times its nominal distance. The right one rolls 2 s rho / (1 + rho) times. The track on the
     /// ground is `track_scale` times the nominal one.
     Odometry {
-        /// Right diameter over left.
         diameter_ratio: f64 = 1.0,
         diameter_ratio_sd: f64 = 0.005,
-        /// Track on the ground over the nominal one.
         track_scale: f64 = 1.0,
         track_scale_sd: f64 = 0.015,
-        /// Mean diameter over the nominal one.
         distance_scale: f64 = 1.0,
         distance_scale_sd: f64 = 0.01,
         /// Standard deviation of the distance lost or gained, metres per square root of a metre.
@@ -33,7 +30,6 @@ rows! {
         robot: String,
         /// `wall`, `squares` or `gyro`.
         method: String,
-        /// Mean distance rolled by the wheels.
         metres: f64,
         /// Sum of squared residuals over their variances, per degree of freedom.
         chi2_per_dof: f64,
@@ -58,11 +54,8 @@ pub enum Procedure {
     Wall,
     LeftSquare,
     RightSquare,
-    /// Turns to and fro on the spot.
     Turns,
-    /// Ahead, around, back and around, for a gyro.
     Gyro,
-    /// All checks of `firsthand bring-up`.
     BringUp,
 }
 

@@ -38,7 +38,6 @@ pub struct Response {
     /// Time from a command to its first effect in the odometry at the link, seconds. It includes
     /// network delay.
     pub delay_s: f64,
-    /// Time constant of the speed loop, seconds.
     pub lag_s: f64,
     /// Limit of acceleration and braking; infinite for a base that the lag alone describes.
     pub acceleration_m_s2: f64,
@@ -139,7 +138,7 @@ pub struct ModelledSpeed {
     delay_s: f64,
     /// Per second.
     most_change: f64,
-    /// Pending commands with their times of effect.
+    /// With their times of effect.
     pending: VecDeque<(f64, f64)>,
     target: f64,
     speed: f64,

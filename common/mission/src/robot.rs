@@ -68,7 +68,6 @@ impl Protocol {
 rows! {
     #[derive(Copy, Eq)]
     Channel {
-        /// Encoder channel, 0 or 1.
         channel: u8,
         /// Counts fall when the robot drives forward.
         reversed: bool,
@@ -77,23 +76,21 @@ rows! {
 
 keys! {
     RobotConfig {
-        /// Preset of all unwritten values.
         model: Model,
         /// Defaults to the model's: [`RobotConfig::protocol`].
         protocol: Option<Protocol>,
-        /// Address in the form of [`crate::address::Address`]. Without it the run starts a
-        /// simulated robot.
+        /// In the form of [`crate::address::Address`].
         address: Option<String>,
         rate_hz: f64 = 7.0,
         /// r of (2).
         wheel_radius_m: Option<f64>,
         /// W of (2); unused by a car.
         track_m: Option<f64>,
-        /// L of (3); for cars only, like the other steering keys.
+        /// L of (3).
         wheelbase_m: Option<f64>,
         steering_limit_deg: Option<f64>,
         steering_rate_deg_s: Option<f64>,
-        /// Counts per full turn of the steering; 0 is straight ahead.
+        /// 0 is straight ahead.
         steering_counts_per_turn: Option<f64>,
         counts_per_turn: Option<f64>,
         radius_m: Option<f64>,
@@ -101,25 +98,16 @@ keys! {
         #[serde(skip_serializing_if = "Vec::is_empty")]
         footprint: Vec<DVec2>,
         top_speed_m_s: Option<f64>,
-        /// Left wheel; on a car the driven axle.
         left: Channel = Channel { channel: 0, reversed: true },
-        /// Right wheel; on a car the steering, positive to the left.
+        /// A car's steering is positive to the left.
         right: Channel = Channel { channel: 1, reversed: false },
-        /// Compensates wheels that turn slower than commanded; by default
-        /// [`crate::Mission::speed_trim`].
         speed_trim: Option<bool>,
-        /// Declares a gyro, which `firsthand check` relies on and the simulated robot then has. A
-        /// JSON robot or an Arduino may report its angle without this key.
         gyro: Option<bool>,
-        /// Age at which a command expires.
         command_limit_s: f64 = 0.25,
         low_battery_v: BatteryLimits,
-        /// Least motor current of a blocked wheel. A wheel that fails to turn and draws less counts
-        /// as having a dead encoder; with 0 every such wheel does. Defaults to the simulated
-        /// robot's value; no X80 was measured.
+        /// Defaults to the simulated robot's value; no X80 was measured.
         held_current_ad: u16 = 1000,
-        /// Calibration file whose values replace `odometry` before a run starts:
-        /// [`crate::Mission::with_calibration`].
+        /// Read by [`crate::Mission::with_calibration`].
         calibration: Option<PathBuf>,
         #[serde(skip_serializing_if = "crate::is_default")]
         response: ResponseKeys,
@@ -128,7 +116,6 @@ keys! {
         arduino: ArduinoBoard,
         #[serde(skip_serializing_if = "crate::is_default")]
         ros2: Ros2Topics,
-        /// Up to [`crate::MOST_SENSORS`] rows; by default those of the model.
         #[serde(rename = "sensor", skip_serializing_if = "Vec::is_empty")]
         sensors: Vec<SensorRow>,
         /// Up to [`crate::MOST_TOUCHES`] bumpers and cliff sensors; by default those of the model:
@@ -250,7 +237,6 @@ impl Body {
     }
 }
 
-/// Presets of `robot.model`, as `[robot]` tables.
 static MODELS: LazyLock<BTreeMap<Model, RobotConfig>> =
     LazyLock::new(|| toml::from_str(include_str!("models.toml")).unwrap_or_default());
 

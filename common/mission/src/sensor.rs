@@ -201,33 +201,23 @@ rows! {
     SensorRow {
         name: String,
         kind: SensorKind,
-        /// Channel of an X80. A cone has the sonar's index in the standard frame (0 to 5), a ray the
-        /// infrared ranger (0 to 6). Other protocols have no channels.
+        /// The X80's alone.
         channel: Option<u8>,
-        /// Distance from the robot's centre along the bearing.
         forward_m: f64,
-        /// delta of (19), counter-clockwise from the robot's axis.
+        /// delta of (19).
         bearing_deg: f64,
-        /// Angle from the bearing to a laser's middle beam, counter-clockwise; 0 looks outward.
+        /// Counter-clockwise; 0 looks outward.
         #[serde(default, skip_serializing_if = "crate::is_default")]
         turned_deg: f64,
-        /// 180 for a laser mounted upside down, otherwise 0.
         #[serde(default, skip_serializing_if = "crate::is_default")]
         roll_deg: f64,
-        /// Height of a laser above the ground, for the simulator only; by default
-        /// `simulation.heights.infrared_m`.
         height_m: Option<f64>,
-        /// Defaults to the model's; a ray has none.
         field_of_view_deg: Option<f64>,
-        /// Defaults to the model's.
         reach_m: Option<f64>,
-        /// Beams, evenly spaced over the field of view; by default the model's.
         beams: Option<u16>,
-        /// Measurement rate, if below the frame rate. Frames in between are ignored.
+        /// Frames in between are ignored.
         rate_hz: Option<f64>,
-        /// Defaults to the X80's.
         model: Option<SensorModel>,
-        /// Address of an RPLIDAR with its own line, in the form of the robot's address.
         address: Option<String>,
     }
 }
@@ -235,11 +225,10 @@ rows! {
 keys! {
     /// Front sonar of a robot without `[[robot.sensor]]`.
     SonarConfig {
-        /// Index among the six of the standard frame.
         index: u8 = 1,
-        /// Distance from the robot's centre along the bearing; W/2 in the paper.
+        /// W/2 in the paper.
         forward_m: f64 = 0.1915,
-        /// delta of (19), from the robot's axis.
+        /// delta of (19).
         bearing_deg: f64,
     }
 }

@@ -17,12 +17,10 @@ rows! {
     TouchRow {
         name: String,
         kind: TouchKind,
-        /// Counter-clockwise from the robot's axis, to the middle of a bumper's arc.
+        /// Counter-clockwise from the robot's axis.
         bearing_deg: f64,
-        /// Width of a bumper's arc.
         #[serde(default = "wide_deg")]
         wide_deg: f64,
-        /// Distance of a cliff sensor from the robot's centre; by default the body's radius.
         forward_m: Option<f64>,
     }
 }

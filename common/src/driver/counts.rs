@@ -65,7 +65,7 @@ impl From<[u16; 2]> for WheelCounts {
     }
 }
 
-/// Returns the sample of both wheels' counts and speeds, counts/s.
+/// Takes speeds in counts/s.
 pub fn wheel_sample(counts: [u16; 2], counts_per_s: [i32; 2]) -> WheelSample {
     let [left_counts, right_counts] = counts;
     let [left_counts_per_s, right_counts_per_s] = counts_per_s;

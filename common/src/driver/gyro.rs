@@ -109,7 +109,7 @@ impl Angle {
         Some(format!("gyro: {why}; send its angle counter-clockwise, in the unit of the protocol"))
     }
 
-    /// Returns the turn of a tick. After a gap it only marks where the next one begins.
+    /// After a gap it only marks where the next one begins.
     pub fn for_tick(&mut self, rate_hz: f64) -> Option<Turn> {
         let now = self.newest.filter(|_| self.compared.agrees).map(|(angle, _)| angle);
         let (sequence, before) = self.turns.until(now)?;

@@ -128,12 +128,11 @@ pub fn motion(body: &Body, turned: [f64; 2], speeds: [f64; 2], held: [bool; 2]) 
     }
 }
 
-/// Converts wheel speeds, counts/s.
+/// Takes counts/s.
 pub fn twist(body: &Body, counts: [i16; 2]) -> Twist {
     body.unlimited().twist(wheel_speeds(body, counts))
 }
 
-/// Converts counts/s to rad/s.
 pub fn wheel_speeds(body: &Body, counts: [i16; 2]) -> [f64; 2] {
     counts.map(|counts| f64::from(counts) * TAU / body.counts_per_turn)
 }

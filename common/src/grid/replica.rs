@@ -4,11 +4,10 @@ use super::part::Part;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
-    /// A first keyframe, without a map to compare it with.
     Whole,
     /// Changed window; an empty one is no change.
     Window(Window),
-    /// Missing version or unsuitable cells: the map stays until the next keyframe.
+    /// The map stays until the next keyframe.
     Missed,
 }
 

@@ -36,7 +36,7 @@ impl Quantity {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Targets {
-    /// Channel 0 to 5.
+    /// 0 to 5.
     One { channel: u8, value: i16 },
     /// `None` leaves a channel unchanged.
     All([Option<i16>; CHANNELS]),

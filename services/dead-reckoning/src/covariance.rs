@@ -77,7 +77,7 @@ impl ErrorModel {
         ])))
     }
 
-    /// Corrects nominal arc and turn by `shares` (ratio, track, distance).
+    /// The shares are of ratio, track and distance.
     pub(crate) fn corrected(&self, by_counts: Twist, shares: [f64; 3]) -> Twist {
         let [ratio, track, distance] = shares;
         let (v, omega) = (by_counts.v * (1.0 + distance), by_counts.omega * (1.0 + distance));

@@ -54,9 +54,9 @@ pub(crate) enum Cause {
     Late(f64),
     /// Mounted further left than stated, radians.
     Turned(f64),
-    /// Distance by fixes over that by wheels.
+    /// By fixes over that by wheels.
     Way(f64),
-    /// Turn by fixes over that by wheels.
+    /// By fixes over that by wheels.
     Turn(f64),
     /// Right wheel's travel over the left's, for equal counts.
     Uneven(f64),

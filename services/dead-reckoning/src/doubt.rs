@@ -73,7 +73,7 @@ impl Doubt {
         [aside * aside, turn * turn]
     }
 
-    /// Returns variances of position and heading, m^2 and rad^2.
+    /// Of position and heading, m^2 and rad^2.
     pub(crate) fn variances(&self, track_m: f64) -> [f64; 2] {
         let [place, heading] = self.of_wheels(track_m);
         [place + self.relocated[0], heading + self.relocated[1]]

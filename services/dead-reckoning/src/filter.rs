@@ -449,7 +449,7 @@ impl History {
     }
 }
 
-/// Refusal of a fix, with the pose at its time if the fix contradicts it.
+/// Has the pose at the time of the fix, if the fix contradicts it.
 #[derive(Clone, Copy)]
 pub(crate) struct Refused {
     pub why: FixRefusal,

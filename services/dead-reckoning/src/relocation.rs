@@ -27,7 +27,7 @@ const NO_TURN: f64 = 3.0;
 pub(crate) struct Contradictions(VecDeque<(Pose2, Fix)>);
 
 impl Contradictions {
-    /// Adds `fix`, measured at `there`. Returns the relocated estimate if the newest fixes agree.
+    /// Returns the relocated estimate if the newest fixes agree.
     pub(crate) fn add(&mut self, there: Pose2, fix: &Fix, estimate: &Filter) -> Option<Filter> {
         let time = |(_, fix): &(Pose2, Fix)| fix.time;
         let last = self.0.back().map_or(MissionTime(0), time);

@@ -104,7 +104,6 @@ pub struct Reckoned {
     pub placed: bool,
     /// Reason of a refusal; none if repeated.
     pub refused: Option<FixRefusal>,
-    /// New cause of disagreement.
     pub(crate) disagree: Option<Cause>,
     /// Doubt of the wheels, once.
     pub(crate) doubted: Option<String>,

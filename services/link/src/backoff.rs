@@ -34,7 +34,7 @@ impl Backoff {
         *self = Self::new(self.first, self.longest);
     }
 
-    /// Returns the nanoseconds until the next attempt; 0 when it is due.
+    /// Returns 0 when it is due.
     pub fn wait_ns(&self, now_ns: u64) -> u64 {
         self.next_ns.map_or(0, |next| next.saturating_sub(now_ns))
     }

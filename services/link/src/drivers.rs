@@ -20,7 +20,6 @@ pub struct SensorWire {
     pub driver: Box<dyn Driver>,
 }
 
-/// Returns the base's driver, and the baud rate of its serial line.
 pub fn base(mission: &Mission) -> (Box<dyn Base>, u32) {
     match mission.robot.protocol() {
         Protocol::X80 => (Box::new(X80::new(mission)), BAUD),

@@ -77,7 +77,6 @@ monitors! {
 #[derive(Debug)]
 pub struct Rule {
     pub cause: Cause,
-    /// Condition in words, for the documentation.
     pub when: &'static str,
     pub action: Action,
     pub clears: Clears,
@@ -232,7 +231,7 @@ impl Failsafe {
         Decision::of(self.applying(lockstep, then))
     }
 
-    /// Returns which rows of [`TABLE`] apply; None where the monitor is skipped.
+    /// Returns None where the monitor is skipped.
     fn applying(&self, lockstep: bool, now: Moment) -> [Option<bool>; TABLE.len()] {
         let judges_frames = !lockstep && self.monitors.presence.connected;
         std::array::from_fn(|row| {

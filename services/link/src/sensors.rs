@@ -22,7 +22,6 @@ const BLIND_ONE_IN: usize = 20;
 pub(crate) struct Sensors {
     body: Body,
     table: Vec<Sensor>,
-    /// Newest reading of each row, for one tick.
     newest: Vec<RangeReading>,
     lasers: Vec<Laser>,
     ticks: u64,
@@ -121,7 +120,7 @@ fn absent(table: &[Sensor]) -> Vec<RangeReading> {
 struct Laser {
     row: usize,
     sensor: Sensor,
-    /// Newest scan that differed, and the wheels' angles then.
+    /// The newest that differed, and the wheels' angles then.
     newest_scan: (Vec<f32>, [f64; 2]),
     /// Near beams of the newest scan with any, and the wheels' angles then.
     near: (usize, [f64; 2]),

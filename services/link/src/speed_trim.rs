@@ -20,7 +20,6 @@ const LEAST_COUNTS_S: f64 = 250.0;
 const WEIGHT: f64 = 0.1;
 /// Plausible shares; others show slip, a held wheel or a faulty encoder.
 const SHARES: std::ops::RangeInclusive<f64> = 0.6..=1.15;
-/// Least compensated share.
 const LEAST_SHARE: f64 = 0.7;
 
 #[derive(Clone, Debug)]
@@ -54,7 +53,7 @@ impl SpeedTrim {
         self.share
     }
 
-    /// Takes sent speeds, counts/s.
+    /// Takes counts/s.
     pub(crate) fn told(&mut self, counts: [i16; 2]) {
         self.told.rotate_left(1);
         self.told[STEADY - 1] = counts.map(f64::from);

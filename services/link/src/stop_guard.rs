@@ -51,7 +51,6 @@ pub(crate) struct StopGuard {
 }
 
 impl StopGuard {
-    /// Starts the guard.
     pub(crate) fn start(directory: &Path, link: Identity) -> io::Result<Self> {
         let (ended, pipe) = io::pipe()?;
         let process = spawn("/proc/self/exe".into(), directory, &link, ended.into())?;
@@ -192,7 +191,6 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// Takes the wire of the run's robot.
     pub fn open(run: &Run) -> Result<Self, StageError> {
         let transport = Transport::of_base(&run.address, &run.mission)?;
         let mut link = Link::new(&run.mission);
@@ -200,7 +198,7 @@ impl Orders {
         Ok(Self { transport, link, clock: run.clock })
     }
 
-    /// Orders the stop, takes the robot's datagrams, and returns the rest by the encoders.
+    /// Returns the rest by the encoders.
     ///
     /// # Errors
     /// If the wire is unusable.

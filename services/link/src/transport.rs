@@ -42,11 +42,9 @@ impl From<TransportError> for StageError {
     }
 }
 
-/// Bits per second by default.
 pub const BAUD: u32 = 115_200;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Line {
-    /// Bits per second.
     pub baud: u32,
     /// Whether the device needs DTR low. Opening the line raises it.
     pub lowers_dtr: bool,
@@ -71,7 +69,7 @@ trait Wire: fmt::Debug {
     /// Returns the next length; none when all were taken.
     fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> io::Result<Option<usize>>;
 
-    /// Sends bytes, or loses them if not accepted now.
+    /// Loses bytes that are not accepted now.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
     fn tally(&self) -> Tally;
@@ -91,7 +89,6 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// Opens the base's wire.
     pub fn of_base(address: &Address, mission: &Mission) -> Result<Self, TransportError> {
         match address {
             Address::Ros2(domain) if !machine::is_simulated() => {
@@ -101,7 +98,6 @@ impl Transport {
         }
     }
 
-    /// Creates a wire, which [`Transport::maintain`] opens.
     pub fn open(address: &Address, line: Line) -> Result<Self, TransportError> {
         let wire = match address {
             _ if let Some(machine) = machine::simulated() => {

@@ -23,7 +23,6 @@ pub(crate) struct ClearBeams {
     rays: Vec<Dated>,
 }
 
-/// Reading with the wheel travel at its time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Dated {
     beam: ClearBeam,

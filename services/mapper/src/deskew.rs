@@ -35,7 +35,7 @@ pub(crate) struct Poses {
 }
 
 impl Poses {
-    /// Adds a tick's pose; repeats have no effect.
+    /// Repeats have no effect.
     pub(crate) fn add(&mut self, pose: &PoseSample) {
         let ns = time_ns(pose);
         if self.held.back().is_some_and(|(newest_ns, _)| *newest_ns >= ns) {

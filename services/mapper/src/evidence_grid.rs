@@ -34,7 +34,6 @@ pub(crate) const STEP_M: f64 = sonar::SCANNED_FOR_M / (SCANNED - POINTED_ENOUGH)
 /// Steps of [`SCANNED`] per step of weight: both expire together.
 const LOOKS_FOR_A_STEP: u8 = (SCANNED - POINTED_ENOUGH) / sonar::MOST as u8 + 1;
 
-/// Flag: occupied by an obstacle.
 const OCCUPIED: u8 = 1;
 /// Flag: seen by an infrared ranger. The sonar may miss it.
 const SEEN: u8 = 2;
@@ -60,7 +59,6 @@ pub(crate) struct Flip {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ground {
     pub lattice: GridFrame,
-    /// Body radius, metres.
     pub radius: f64,
 }
 
@@ -72,7 +70,6 @@ pub(crate) struct News {
     pub window: Window,
 }
 
-/// Byte layers, row-major.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct EvidenceGrid {
     /// Weights of the sonar model, offset by 128.
@@ -156,7 +153,6 @@ impl EvidenceGrid {
         }
     }
 
-    /// Weakens all evidence by `steps`, also of scanned ground.
     pub(crate) fn forget(&mut self, steps: i8) {
         assert!((1..=sonar::MOST).contains(&steps));
         for cell in self.ground.lattice.whole().cells() {

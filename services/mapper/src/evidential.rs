@@ -175,7 +175,6 @@ impl Evidential {
         self.follow(map)
     }
 
-    /// Returns the window that may have changed.
     pub(crate) fn touch(&self, map: &mut EvidenceMap, touch: &Touch) -> Window {
         map.evidence.touch(touch);
         self.follow(map).0
@@ -186,7 +185,7 @@ impl Evidential {
         self.follow(map).0
     }
 
-    /// Inflates flipped cells. Returns as [`Evidential::take`].
+    /// Returns the same as [`Evidential::take`].
     fn follow(&self, map: &mut EvidenceMap) -> (Window, bool) {
         let (mut window, mut is_new) = (Window::default(), false);
         let news: Vec<_> = map.grids().map(|grid| std::mem::take(&mut grid.news)).collect();

@@ -4,12 +4,10 @@ use common::samples::FaultKind;
 use glam::DVec2;
 
 const AROUND_M: f64 = 0.5;
-/// Radius of the wall around the target.
 const WALL_M: f64 = 0.5;
-/// Thickness of the wall, which no step to a neighbouring cell crosses.
+/// No step to a neighbouring cell crosses it.
 const WALL_CELLS: f64 = 1.5;
 
-/// Returns whether a cell of `side` metres at `at` is a hazard of `fault`.
 pub(crate) fn covers(fault: FaultKind, at: DVec2, side: f64, robot: DVec2, target: DVec2) -> bool {
     match fault {
         FaultKind::HazardAroundRobot => at.distance(robot) <= AROUND_M,

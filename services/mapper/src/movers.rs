@@ -82,7 +82,6 @@ struct Thing {
     mean: DVec2,
     nearest_m: f64,
     half_width_m: f64,
-    /// Deviation of a visible middle.
     noise_m: f64,
     came: bool,
 }

@@ -84,7 +84,7 @@ impl Rows {
         })
     }
 
-    /// Returns infrared readings without dead rays.
+    /// Without dead rays.
     pub(crate) fn rays(
         &self,
         robot: Pose2,
@@ -99,7 +99,7 @@ impl Rows {
     }
 }
 
-/// Returns S of (19), if the reading has a distance.
+/// Returns S of (19).
 fn safety_distance(reading: &RangeReading) -> Option<f64> {
     match reading.status() {
         RangeStatus::Measured if reading.range_m >= 0.0 => Some(reading.range_m),
@@ -109,7 +109,7 @@ fn safety_distance(reading: &RangeReading) -> Option<f64> {
 }
 
 pub(crate) struct Reading {
-    /// Sensor position, mission frame.
+    /// In the mission frame.
     pub origin: DVec2,
     /// Unit vector.
     pub axis: DVec2,
@@ -119,7 +119,7 @@ pub(crate) struct Reading {
 }
 
 pub(crate) struct Ray {
-    /// Sensor position, mission frame.
+    /// In the mission frame.
     pub origin: DVec2,
     /// Unit vector.
     pub axis: DVec2,
@@ -128,7 +128,7 @@ pub(crate) struct Ray {
 
 #[derive(Clone, Copy)]
 pub(crate) struct Fan<'a> {
-    /// Laser position, mission frame.
+    /// In the mission frame.
     pub origin: DVec2,
     pub first_rad: f64,
     pub step_rad: f64,
@@ -142,7 +142,6 @@ pub(crate) struct Fan<'a> {
 }
 
 impl Fan<'_> {
-    /// Returns each beam's unit vector and range.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (DVec2, f64)> + '_ {
         let step = DVec2::from_angle(self.step_rad);
         let first = DVec2::from_angle(self.first_rad);
@@ -150,7 +149,6 @@ impl Fan<'_> {
         along.zip(self.beams.iter().map(|range| f64::from(*range)))
     }
 
-    /// Returns beam ends; none for beams without one.
     pub(crate) fn ends(&self) -> impl Iterator<Item = Option<DVec2>> + '_ {
         self.iter().map(|(along, range)| {
             (range >= 0.0 && range <= self.reach_m).then(|| self.origin + range * along)
@@ -172,7 +170,7 @@ pub(crate) struct Touch {
     pub robot: DVec2,
     /// Middle of the touched arc, a unit vector.
     pub axis: DVec2,
-    /// Half the arc, radians.
+    /// Radians.
     pub half_width: f64,
     /// Whether a bumper or a cliff sensor touched, rather than held wheels.
     pub is_felt: bool,

@@ -118,7 +118,6 @@ impl Scatter {
         self.off = off;
     }
 
-    /// Returns the ratio of scatter to point-based variance.
     fn scale(&self) -> f64 {
         let [least, most] = SCALES;
         (OF_SCATTER * self.seen / self.stated).clamp(least, most)
@@ -138,11 +137,9 @@ impl Scatter {
     }
 }
 
-/// Line in the mission frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     point: DVec2,
-    /// Unit vector.
     normal: DVec2,
 }
 

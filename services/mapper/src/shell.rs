@@ -27,7 +27,6 @@ use crate::{
     step::{Input, Mapper, Scan, Tick},
 };
 
-/// Mission time between keyframes.
 const KEYFRAME_EVERY: Duration = Duration::from_secs(1);
 
 readers! {
@@ -69,7 +68,6 @@ pub struct Shell {
     inputs: Inputs,
     runner: Runner<Mapper>,
     ranges: OfTick<Vec<RangeReading>>,
-    /// Scans of the newest tick, with their ticks.
     scans: Vec<(u64, Scan)>,
     contact: OfTick<Option<ContactSample>>,
     last_keyframe: Option<MissionTime>,
@@ -174,7 +172,6 @@ impl Process for Shell {
 }
 
 impl Shell {
-    /// Returns whether anything was published.
     fn step(&mut self, input: Input) -> Result<bool, StageError> {
         self.take(Entry::Step(input, self.runner.out.at))
     }

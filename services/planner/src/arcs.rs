@@ -17,9 +17,7 @@ use crate::view::View;
 
 /// Arcs to either side of straight ahead.
 const ARCS_A_SIDE: i32 = 8;
-/// Distance between checked points of an arc, metres.
 const STEP_M: f64 = 0.05;
-/// Length of an arc, metres.
 const AHEAD_M: f64 = 0.8;
 /// Time until the car brakes, seconds: sonar period, radio period and wheel lag.
 const STOPS_WITHIN_S: f64 = 0.6;

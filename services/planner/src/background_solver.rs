@@ -10,7 +10,6 @@ use crate::{
     step::{Job, Solved},
 };
 
-/// Solver that starts from its previous field.
 #[derive(Default)]
 pub(crate) struct Worker {
     solver: Solver,

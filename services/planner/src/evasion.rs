@@ -58,7 +58,7 @@ const ALIKE_M: f64 = 0.25;
 const ALIKE_M_S: f64 = 0.3;
 /// Standing time at the start of a run to detect movers.
 const WATCHES_S: f64 = 0.5;
-/// Speed below which lagging wheels count as at rest, m/s.
+/// Lagging wheels below it count as at rest.
 const FADED_M_S: f64 = 0.05;
 /// Distance beyond which a mover is harmless, metres.
 const FAR_M: f64 = 1.5;
@@ -104,7 +104,6 @@ enum Near {
 
 #[derive(Clone, Copy)]
 struct Way {
-    /// First and newest leg.
     first: Advice,
     last: Advice,
     /// Whether the robot rests without a touch if it brakes after the next tick.
@@ -144,7 +143,7 @@ impl Evasion {
         (self.kept_s, self.insists) = (0.0, false);
     }
 
-    /// Returns the field's `advice`, or other advice because of `movers`.
+    /// Returns other advice because of `movers`.
     pub(crate) fn advise(
         &mut self,
         view: &View<'_>,
@@ -356,7 +355,6 @@ impl<'a> Scene<'a> {
         false
     }
 
-    /// Updates contact and danger of `way` after `at_s` seconds.
     fn meet(&self, way: &mut Way, at_s: f64, moves: bool) {
         let at = way.now.pose.position;
         for disc in &self.discs {

@@ -144,7 +144,6 @@ impl FieldPublisher {
         Some((part, at))
     }
 
-    /// Returns what becomes readable when a policy is ready.
     pub(crate) fn descriptor(&self) -> Option<BorrowedFd<'_>> {
         self.thread.descriptor()
     }

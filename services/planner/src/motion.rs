@@ -11,7 +11,6 @@ use common::{
 };
 use glam::DVec2;
 
-/// Guidance from which a motion follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Advice {
     pub status: GuidanceStatus,

@@ -51,13 +51,12 @@ const MOST_POSES: usize = 5_000;
 /// Motion of the body for a field direction.
 #[derive(Clone, Debug)]
 pub(crate) enum Passage {
-    /// Follow the field with this speed limit, m/s.
+    /// In m/s.
     Follow(f64),
-    /// Turn on the spot to this unit vector.
     Turn(DVec2),
-    /// Drive along this unit vector with this limit, m/s.
+    /// Limit in m/s.
     Drive(DVec2, f64),
-    /// Drive back along the axis with this limit, m/s.
+    /// In m/s, along the axis.
     Back(f64),
     /// Refuse these cells; none if the body cannot move.
     Refused(Vec<Cell>),
@@ -75,7 +74,7 @@ pub(crate) struct Outline {
     turns: f64,
     response: Response,
     brakes_within_s: f64,
-    /// Rest of the plan, next step last.
+    /// Next step last.
     plan: Vec<Planned>,
 }
 
@@ -153,7 +152,6 @@ impl Outline {
         self.touching(view, pose, -apart_m.min(self.half_width)).next().is_some()
     }
 
-    /// Returns whether the covering circle does not fit.
     pub(crate) fn is_narrow(&self, view: &View<'_>, at: DVec2) -> bool {
         view.has_hazard(at, self.covers - self.half_width)
     }

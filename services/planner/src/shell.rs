@@ -183,7 +183,6 @@ impl Shell {
         Ok(())
     }
 
-    /// Returns whether an answer is due.
     fn follow_grid(&mut self) -> Result<bool, StageError> {
         let mut asked = false;
         while let Some(grid) = self.inputs.grid.next_slice()? {
@@ -201,7 +200,7 @@ impl Shell {
         Ok(asked)
     }
 
-    /// Answers the pose of the tick, which is published before the grid.
+    /// The tick's pose is published before its grid.
     fn answer(&mut self) -> Result<(), StageError> {
         self.latest_pose = self.inputs.pose.newest()?.or(self.latest_pose);
         // A keyframe for new readers may belong to a past tick.

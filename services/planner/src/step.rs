@@ -39,9 +39,9 @@ const WAY_OUT_M_S: f64 = 0.08;
 enum Advisor {
     /// Paper's method, and any method without sensing.
     Follow,
-    /// Evidential method: requires that the sonar has looked ahead.
+    /// Requires that the sonar has looked ahead.
     LookFirst(ActiveSensing),
-    /// Evidential method of a car: requires a drivable arc.
+    /// Requires a drivable arc.
     Steer(Arcs),
 }
 

@@ -74,7 +74,7 @@ impl View<'_> {
         self.refused.get(self.frame.index(cell)).is_some_and(|it| *it)
     }
 
-    /// Returns the centres of unscanned free and sensed cells within `radius`.
+    /// Free and sensed cells within `radius`.
     pub(crate) fn unscanned(&self, at: DVec2, radius: f64) -> impl Iterator<Item = DVec2> {
         let step = (GRAIN_M / self.frame.resolution_m).max(1.0) as usize;
         self.cells_within(at, radius, step)

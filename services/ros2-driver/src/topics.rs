@@ -10,7 +10,6 @@ pub enum Content {
     Battery,
     Range(usize),
     Imu,
-    /// Row of a bumper or cliff sensor.
     Touch(usize),
     /// All triggered bumpers and cliff sensors.
     Hazards,

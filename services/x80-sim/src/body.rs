@@ -30,7 +30,6 @@ pub struct Body {
 }
 
 impl Body {
-    /// Scales the nominal track to the true one.
     pub fn new(mission: &Mission, world: &World, track_scale: f64) -> Self {
         let body = mission.body();
         let track = body.track_m * track_scale;
@@ -60,7 +59,7 @@ impl Body {
         self.touching = self.clearance <= RELEASE_M;
     }
 
-    /// Returns the bearing of a touched obstacle, radians counter-clockwise from the body's axis.
+    /// Radians counter-clockwise from the body's axis.
     pub fn touched_at(&self, world: &World) -> Option<f64> {
         let is_near = self.clearance <= RELEASE_M;
         let (_, outward) = is_near.then(|| self.nearest(world)).flatten()?;

@@ -52,7 +52,7 @@ impl Car {
         self.steered.channel == channel
     }
 
-    /// Returns counts per second.
+    /// In counts per second.
     pub(crate) fn top_steering_counts(&self) -> f64 {
         self.steering.counts(self.steering.rate_rad_s)
     }
@@ -67,7 +67,6 @@ impl Car {
         self.drive.twist([wheel, self.angle(motors)])
     }
 
-    /// Moves `body` as the motors ask and `world` permits.
     pub(crate) fn step(
         &self,
         motors: &mut [Motor; 6],

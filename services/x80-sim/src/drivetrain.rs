@@ -39,7 +39,7 @@ impl OnChannel {
     }
 }
 
-/// Returns a timed command for `wheels` in counts/s.
+/// Takes counts/s.
 pub(crate) fn velocity(wheels: [OnChannel; 2], counts: [f64; 2], limit_ms: u16) -> Command {
     let mut channels = [None; 2];
     for (OnChannel { channel, sign }, counts) in wheels.into_iter().zip(counts) {
@@ -49,7 +49,7 @@ pub(crate) fn velocity(wheels: [OnChannel; 2], counts: [f64; 2], limit_ms: u16) 
     Command::velocity(channels, limit_ms)
 }
 
-/// Two wheels, left first.
+/// Left first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drivetrain {
     on: [OnChannel; 2],
@@ -104,14 +104,14 @@ impl Drivetrain {
         }
     }
 
-    /// Returns m/s, forward positive.
+    /// In m/s, forward positive.
     pub(crate) fn rim_speeds(&self, motors: &[Motor; 6]) -> [f64; 2] {
         self.rims(self.on.map(|OnChannel { channel, sign }| {
             sign * motors[channel].speed * self.metres_per_count
         }))
     }
 
-    /// Returns counts that grow forward.
+    /// Counts grow forward.
     pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> [u16; 2] {
         self.on.map(|OnChannel { channel, sign }| {
             let position = encoders[channel].position;

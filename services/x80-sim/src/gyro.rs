@@ -10,7 +10,6 @@ pub(crate) struct Gyro {
     bias_rad_s: f64,
     scale: f64,
     noise: Noise,
-    /// Time and true heading of the newest reading.
     newest: Option<(f64, f64)>,
     pub angle: f64,
 }
@@ -32,7 +31,6 @@ impl Gyro {
         }
     }
 
-    /// Returns the new angle.
     pub(crate) fn read(&mut self, time_s: f64, heading: f64) -> f64 {
         if let Some((before_s, before)) = self.newest.replace((time_s, heading)) {
             let passed_s = time_s - before_s;

@@ -12,7 +12,7 @@ use crate::{noise::Noise, world::World};
 /// Reading without an obstacle in reach.
 const NOTHING_M: f64 = 0.81;
 
-/// Returns the rangers' AD counts; 0 without a mount.
+/// AD counts; 0 without a mount.
 pub fn read(
     world: &World,
     pose: Pose2,

@@ -39,7 +39,6 @@ impl JsonWords {
         }
     }
 
-    /// Counts the order as accepted.
     pub(crate) fn commands(&mut self, order: &Order) -> Vec<Command> {
         self.heard += 1;
         let channels = self.wheels.map(|wheel| wheel.channel as u8);
@@ -114,7 +113,6 @@ impl JsonWords {
     }
 }
 
-/// Unwraps the encoder's counts.
 fn turned(sensors: &MotorSensors, motors: &[Motor; 6], channel: usize) -> f64 {
     let cycle = f64::from(common::wire::COUNT_CYCLE);
     let (read, true_counts) =

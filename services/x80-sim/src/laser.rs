@@ -35,7 +35,6 @@ const FASTEST_M_S: f64 = 5.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Laser {
     sensor: Sensor,
-    /// Height above the floor.
     height_m: f64,
     timing: LaserTiming,
     /// Recent poses by time in seconds, as far back as a scan goes.
@@ -94,7 +93,6 @@ impl Laser {
         self.poses.push_back((time, pose));
     }
 
-    /// Returns the body's pose at the time of `beam` in a scan sent at `time`.
     fn pose_of_beam(&self, time: f64, beam: usize) -> Option<Pose2> {
         let LaserTiming { delay_s, sweep_s, .. } = self.timing;
         let left = 1.0 - self.sensor.mirrored(beam) as f64 / self.sensor.beams.max(1) as f64;

@@ -31,14 +31,13 @@ const MOST_PENDING: usize = 1024;
 #[derive(Clone, Debug)]
 pub struct Motor {
     physics: WheelPhysics,
-    /// Counts per second.
     top_speed: f64,
     /// Counts per second squared.
     acceleration: f64,
     pub enabled: bool,
     mode: Mode,
     order: Option<Order>,
-    /// Target changes with their times, before the delay.
+    /// With their times, before the delay.
     pending: VecDeque<(f64, f64)>,
     target: f64,
     /// Counts per second.
@@ -73,7 +72,7 @@ impl Motor {
         }
     }
 
-    /// Limits the acceleration, counts per second squared.
+    /// Counts per second squared.
     #[must_use]
     pub fn accelerating(self, acceleration: f64) -> Self {
         Self { acceleration, ..self }
@@ -90,7 +89,7 @@ impl Motor {
         self.order = Some(Order { quantity, value, until });
     }
 
-    /// Enables or suspends the motor. Suspending discards the order.
+    /// Suspending discards the order.
     pub fn enable(&mut self, on: bool) {
         self.enabled = on;
         if !on {
@@ -102,7 +101,7 @@ impl Motor {
         self.order = None;
     }
 
-    /// Applies a mode. Gains and feedback have no effect: the loop follows measurements.
+    /// Gains and feedback have no effect: the loop follows measurements.
     pub fn configure(&mut self, parameter: Parameter) {
         if let Parameter::Mode(mode) = parameter {
             if mode != self.mode {

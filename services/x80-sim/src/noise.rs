@@ -23,12 +23,11 @@ impl Noise {
         Self::of_nth(seed, source, 0)
     }
 
-    /// Creates the stream of one of several sources of a kind.
     pub fn of_nth(seed: u64, source: Source, nth: usize) -> Self {
         Self(Pcg64::new(u128::from(seed) | (nth as u128) << 64, source as u128))
     }
 
-    /// Returns a number in [0, 1).
+    /// In [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }

@@ -43,7 +43,7 @@ const MOST_S: f64 = 60.0;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct People {
     walkers: Vec<Walker>,
-    /// Time, seconds, and the robot's position then.
+    /// Seconds.
     now: Option<(f64, DVec2)>,
 }
 
@@ -53,7 +53,6 @@ struct Walker {
     at: DVec2,
     velocity: DVec2,
     goal: usize,
-    /// Time until the goal is given up.
     left_s: f64,
 }
 

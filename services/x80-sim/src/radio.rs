@@ -123,7 +123,6 @@ impl<W: Copy + PartialEq> Radio<W> {
         .all(|share| *share == 0.0)
     }
 
-    /// Counts a datagram and returns whether it is lost.
     pub fn loses(&mut self, now: f64) -> bool {
         self.sent += 1;
         let out = self.fading.is_out(now, &mut self.noise);

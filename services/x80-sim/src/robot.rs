@@ -110,11 +110,9 @@ pub struct Robot {
     standard: StandardSensors,
     custom: CustomSensors,
     motor: MotorSensors,
-    /// JSON protocol; none for an X80.
     json: Option<JsonWords>,
     gyro: Option<Gyro>,
     arduino: Option<ArduinoWords>,
-    /// Lasers whose scans come with the robot's frames.
     lasers: Vec<Laser>,
     pub(crate) rplidar: Option<Rplidar>,
     touches: Vec<TouchRow>,
@@ -322,7 +320,7 @@ impl Robot {
         Said::Request(request).kind()
     }
 
-    /// Reboots an Arduino, as opening its line does.
+    /// Opening its line reboots an Arduino.
     pub fn on_opened(&mut self) {
         if let Some(arduino) = &mut self.arduino {
             self.motors.iter_mut().for_each(Motor::halt);
@@ -452,7 +450,7 @@ impl Robot {
         }
     }
 
-    /// Takes all readings; sensor noise is drawn only here.
+    /// Sensor noise is drawn only here.
     fn measure(&mut self) {
         let noise = self.physics.wheels.count_noise;
         for (channel, encoder) in self.motor.encoders.iter_mut().enumerate() {
@@ -479,7 +477,7 @@ impl Robot {
         self.write(due, out);
     }
 
-    /// Appends the frames again, uncounted.
+    /// Frames are not counted again.
     pub fn repeat(&self, out: &mut Vec<u8>) {
         self.write(self.streams.running(), out);
     }

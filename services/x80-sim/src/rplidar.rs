@@ -23,7 +23,6 @@ pub(crate) struct Rplidar {
 }
 
 impl Rplidar {
-    /// Returns `None` without a laser with its own wire.
     pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
         let (_, sensor, product) = mission.rplidars().into_iter().next()?;
         let laser = Laser::with_own_wire(sensor, mission, seed);

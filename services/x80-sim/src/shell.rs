@@ -57,7 +57,6 @@ pub struct SimOptions {
     /// Each is a JSON line in one write. The robot waits for a slow reader and continues without a
     /// vanished one.
     pub ground_truth: Option<Box<dyn Write + Send>>,
-    /// Sockets for exchanging poses with the world's other robot.
     pub meeting: Option<[PathBuf; 2]>,
 }
 
@@ -153,7 +152,7 @@ fn wait(session: &Session, stop: &impl AsFd) -> Result<[bool; 2]> {
     Ok([came.contains(&true), stopped])
 }
 
-/// Mission clock; lockstep has none.
+/// None in lockstep.
 #[derive(Clone, Copy, Debug)]
 struct SimClock {
     /// Machine time at mission time 0, and mission seconds per machine second.

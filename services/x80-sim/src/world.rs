@@ -102,7 +102,6 @@ fn solids_of(shapes: &Shapes) -> Vec<Solid> {
     drums.chain(walls).chain(shapes.boxes.iter().flat_map(boxes)).collect()
 }
 
-/// The world's other robot at `time_s`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Other {
     pub time_s: f64,

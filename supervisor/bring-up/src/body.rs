@@ -11,7 +11,6 @@ pub(crate) struct Moves {
     /// Whether it turns, or drives, in reverse; `None` if undetermined.
     pub turns_back: Option<bool>,
     pub drives_back: Option<bool>,
-    /// Whether turning and driving are exchanged.
     pub exchanged: bool,
     /// True turn and distance, relative to the wheels'; `None` if undetermined.
     pub turn: Option<f64>,

@@ -136,7 +136,7 @@ impl Trace {
         Ok(trace)
     }
 
-    /// Returns the legs in order. The first begins with the trace.
+    /// The first begins with the trace.
     pub fn legs(&self) -> Vec<Leg> {
         let begins = self.rolled.first().map_or(0.0, |(at, _)| *at);
         let ends = self.rolled.last().map_or(0.0, |(at, _)| *at);
@@ -153,7 +153,6 @@ impl Trace {
         legs
     }
 
-    /// Returns whether the trace begins at rest.
     pub fn begins_at_rest(&self) -> bool {
         let until = self.rest_until_s();
         let (first, last) = (self.rolled.first(), self.rolled.iter().rfind(|it| it.0 < until));

@@ -32,7 +32,6 @@ pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
     }
 }
 
-/// Dependence of each wheel's counts on each command.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct Wheels {
     /// Rows are counting wheels, columns commanded wheels; left and right.

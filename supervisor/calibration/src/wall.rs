@@ -61,7 +61,6 @@ pub struct Wall {
     is_measured: bool,
     facing: f64,
     phase: Phase,
-    /// Midpoint distance at the start of this phase.
     phase_from_m: f64,
     /// Midpoint distance at the start of the drive away, its length, and the previous sweep's
     /// range.

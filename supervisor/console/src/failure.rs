@@ -157,7 +157,7 @@ fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
     (!names.is_empty()).then(|| format!("{error}; these run here: {}", names.join(", ")))
 }
 
-/// Returns the users with files of `robot` in `shared` memory, by file name prefix.
+/// By file name prefix in `shared` memory.
 fn users<'a>(shared: &Path, robot: &'a str) -> impl Iterator<Item = u32> + use<'a> {
     robots::entries(shared).filter_map(move |entry| {
         let name = entry.file_name();

@@ -39,7 +39,7 @@ pub fn shipped(name: &str) -> Option<&'static str> {
     found.map(|(_, text)| *text)
 }
 
-/// Loads the shipped mission or the file `name`, with `KEY=VALUE` assignments and its calibration.
+/// Applies `KEY=VALUE` assignments, and the mission's calibration.
 pub fn load(name: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     let file = Path::new(name);
     match shipped(name) {
@@ -66,7 +66,6 @@ pub fn complete(mission: Mission) -> Result<Mission, LookupError> {
     Ok(mission)
 }
 
-/// Parses `text`, which is named `origin`.
 pub fn parsed(text: &str, origin: &str, assignments: &[String]) -> Result<Mission, LookupError> {
     let as_written = Mission::parse(text, Path::new(origin));
     // Validation follows all assignments, which may depend on each other.

@@ -54,7 +54,6 @@ pub(crate) fn unless_closed(written: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Error of a write to a closed terminal.
 const CLOSED_TERMINAL: i32 = rustix::io::Errno::IO.raw_os_error();
 
 #[cfg(test)]

@@ -82,7 +82,6 @@ impl TopicRates {
         counts.longest_gap = counts.longest_gap.max(gap);
     }
 
-    /// Reports and restarts the counts.
     pub fn report(&mut self, now: Instant) -> Report {
         let counts = std::mem::take(&mut self.counts);
         let over = now.saturating_duration_since(self.since).as_secs_f64();

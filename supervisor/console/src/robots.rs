@@ -39,7 +39,6 @@ pub fn own() -> (Vec<Robot>, Vec<Robot>) {
     names.into_iter().map(Robot::find).partition(|robot| robot.supervisor.is_some())
 }
 
-/// Returns the readable entries of `directory`.
 pub fn entries(directory: &Path) -> impl Iterator<Item = fs::DirEntry> + use<> {
     fs::read_dir(directory).into_iter().flatten().flatten()
 }

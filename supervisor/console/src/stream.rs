@@ -43,7 +43,6 @@ impl Stream {
         self.ended
     }
 
-    /// Waits for [`LOOK_EVERY`], or for a signal.
     pub fn pause(&self) -> io::Result<bool> {
         poll::is_readable(&self.signals, LOOK_EVERY)
     }

@@ -16,7 +16,7 @@ pub const fn order(header: &RosterHeader) -> &'static str {
     }
 }
 
-/// Converts nanoseconds, with `u64::MAX` for never.
+/// `u64::MAX` is never.
 pub fn seconds(nanoseconds: u64) -> Option<f64> {
     (nanoseconds != u64::MAX).then_some(nanoseconds as f64 * 1e-9)
 }

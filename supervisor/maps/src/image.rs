@@ -19,7 +19,6 @@ const LONGEST: u64 = (MAX_SIDE as u64).pow(2) * 8 + (1 << 20);
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lightness {
-    /// Whether dark means free.
     pub negate: bool,
     /// Darkness below which a pixel is free, 0 to 1.
     pub free_thresh: f64,

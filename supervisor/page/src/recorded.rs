@@ -37,7 +37,7 @@ impl Recorded {
         self.add(1, message);
     }
 
-    /// Adds a message with its length, and a byte that is 0 for text.
+    /// A `kind` of 0 is text.
     fn add(&mut self, kind: u8, message: &[u8]) {
         let length = message.len() as u32;
         let _ = self.packed.write_all(&length.to_le_bytes());

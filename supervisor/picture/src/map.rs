@@ -50,7 +50,6 @@ const LINES: streamlines::Style = streamlines::Style {
 
 /// Field and map, row-major, the first row at the top.
 pub struct FieldOnMap<'a> {
-    /// Columns and rows.
     pub size: (usize, usize),
     pub blocked: &'a [bool],
     /// E along columns and rows; log2 u is negative infinity where blocked or cut off.

@@ -9,7 +9,6 @@ use super::{
     scene::{Scene, Trail},
 };
 
-/// Least duration of a drawn track, seconds.
 const LEAST_S: f64 = 1.0;
 /// Most tracks drawn, the longest of a run.
 const MOST_WAYS: usize = 24;

@@ -31,7 +31,7 @@ pub(super) const MISSION: Style = Style {
 
 /// Distance to another line at which a line ends, in spacings.
 const MERGED: f64 = 0.5;
-/// Shortest line, in spacings.
+/// In spacings.
 const SHORTEST: f64 = 1.4;
 /// Distance of arrowheads along a line, in spacings.
 const ARROWS_APART: f64 = 6.0;
@@ -171,7 +171,7 @@ impl Tracer<'_> {
         below.lerp(above, part.y).try_normalize()
     }
 
-    /// Adds and returns the line through `seed`; `None` without room.
+    /// Returns `None` without room.
     fn line_through(&mut self, seed: DVec2) -> Option<Vec<DVec2>> {
         if self.is_crowded(seed, 0.98) || self.direction(seed).is_none() {
             return None;

@@ -17,7 +17,6 @@ pub(super) enum Outline {
     Full,
     /// Lower than that, or above the floor.
     Partial,
-    /// Glass, as high as the robot.
     Glass,
     /// Sound-absorbing, as high as the robot.
     Soft,

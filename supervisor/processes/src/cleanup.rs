@@ -30,7 +30,7 @@ impl Default for Cleanup {
 }
 
 impl Cleanup {
-    /// Records deaths of stages, whose successors have already started.
+    /// Their successors have already started.
     pub fn on_deaths(&mut self, deaths: &[Death], bus: &Bus) {
         if deaths.is_empty() {
             return;
@@ -55,7 +55,7 @@ impl Cleanup {
         }
     }
 
-    /// Frees the resources of ended processes. Leftovers only slow the bus.
+    /// Leftovers only slow the bus.
     fn run(&mut self, bus: &Bus) {
         self.done = Instant::now();
         self.deaths.0 = 0;

@@ -100,7 +100,7 @@ fn nanoseconds(seconds: f64) -> u64 {
     Duration::try_from_secs_f64(seconds).map_or(u64::MAX, |time| time.as_nanos() as u64)
 }
 
-/// Returns the end of a stage's log in whole lines; empty without a log.
+/// In whole lines; empty without a log.
 pub fn log_tail(log: &Path, since: u64) -> String {
     let read = || -> io::Result<Vec<u8>> {
         let mut file = File::open(log)?;

@@ -89,7 +89,6 @@ impl DomainLock {
         Ok(())
     }
 
-    /// Removes the bus. Stages can join again once there is a new one.
     fn clear(&mut self) -> Result<(), DomainError> {
         self.bus = None;
         // A cleaner of temporary files may have removed the directory.
@@ -175,7 +174,6 @@ impl Drop for DomainLock {
     }
 }
 
-/// Removes all files of a domain without running stages, for a hung supervisor.
 pub(crate) fn remove_all(domain: &Domain) {
     let _ = wipe(domain);
     remove_directory_of(domain);

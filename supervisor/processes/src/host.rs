@@ -26,10 +26,9 @@ pub trait Watched {
 
     fn signal(&self, signal: Signal);
 
-    /// Returns the cause if the process has ended.
     fn try_reap(&mut self) -> io::Result<Option<ExitCause>>;
 
-    /// Ends the process, by force after `grace`.
+    /// By force after `grace`.
     fn end(&mut self, grace: Duration);
 
     /// Returns what becomes readable at the end of the process; none on a simulated machine.
@@ -39,7 +38,6 @@ pub trait Watched {
     /// counted.
     fn times(&self) -> Option<Times>;
 
-    /// Returns the activity since `then`.
     fn activity(&self, then: Times) -> Option<Activity>;
 
     /// Returns the end of what the process has logged, in whole lines.

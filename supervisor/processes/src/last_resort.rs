@@ -73,7 +73,7 @@ impl Turns {
     }
 }
 
-/// Returns the time that `thread` waited for a processor; zero if uncounted.
+/// Returns zero if uncounted.
 fn processor_awaited(thread: Pid) -> Duration {
     scheduled(&format!("self/task/{thread}")).map_or(Duration::ZERO, |[_, awaited]| awaited)
 }

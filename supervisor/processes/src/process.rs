@@ -102,7 +102,7 @@ impl fmt::Display for ExitCause {
 }
 
 impl ExitCause {
-    /// Returns the cause and its code, as in a death sample.
+    /// As in a death sample.
     pub(crate) const fn coded(&self) -> (DeathCause, i32) {
         match *self {
             Self::Exited(code) => (DeathCause::Exited, code),

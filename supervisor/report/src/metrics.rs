@@ -109,7 +109,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
     ]
 }
 
-/// Returns the wheel speeds' range; `None` for a car, with one wheel speed and a steering angle.
+/// Returns `None` for a car, with one wheel speed and a steering angle.
 fn wheel_range(content: &Content) -> Option<f64> {
     if content.mission.body().steering.is_some() {
         return None;

@@ -9,7 +9,6 @@ use serde_json::{Map, Value};
 /// Greatest size of a summary, bytes; real ones take 2 kB.
 const LARGEST_SUMMARY: u64 = 1 << 20;
 
-/// Returns the default directory of the report of `run`, which begins with `file`.
 pub(crate) fn default_out(run: &Path, file: &Path) -> PathBuf {
     if run.is_dir() {
         return file.with_file_name("report");

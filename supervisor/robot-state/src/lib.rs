@@ -22,7 +22,6 @@ pub use self::{
     words::{death_in_words, failsafe_in_words, guidance_in_words, words},
 };
 
-/// Returns the newest run of the robot of `domain` and its directory, if any.
 pub fn newest_run(domain: &Domain) -> Option<(PathBuf, Run)> {
     // The link changes when the next run begins.
     let directory = domain.run_directory().canonicalize().ok()?;

@@ -124,7 +124,6 @@ impl RobotState {
         self.events.log(process, line);
     }
 
-    /// Returns the processes of the stages, then of the supervisor.
     pub fn processes(&self) -> Vec<u32> {
         let stages = self.stages.iter().map(|entry| entry.pid);
         stages.chain([self.supervisor.unwrap_or_default().supervisor_pid]).collect()

@@ -96,8 +96,7 @@ impl Hearer {
         &self.trails.0
     }
 
-    /// Returns all planners' full solves until the newest answer, or until the `last` one that
-    /// counts.
+    /// Counts those of all planners. `last` is the last that counts.
     pub fn solves_until(&self, last: Option<&GuidanceSample>) -> u64 {
         let (newest, its) =
             last.map_or((u32::MAX, None), |last| (last.stamp.generation, Some(last.full_solves)));
@@ -105,7 +104,7 @@ impl Hearer {
         before + its.or(self.solves.get(&newest).copied()).unwrap_or_default()
     }
 
-    /// Returns the range of both wheels' commanded speeds until `tick`, rad/s.
+    /// In rad/s.
     pub fn wheel_range_rad_s(&self, tick: u64) -> Option<f64> {
         self.wheels.at(tick).range_rad_s()
     }

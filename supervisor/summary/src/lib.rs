@@ -106,7 +106,6 @@ pub struct Summary {
     pub full_solve_us: Quantiles,
 }
 
-/// Distance after which a robot has departed, metres.
 const DEPARTED_M: f64 = 0.1;
 /// Distance d_safe of MRPB, metres; nominal, because MRPB leaves it to its user.
 pub const SAFE_M: f64 = 0.3;

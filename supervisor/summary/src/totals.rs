@@ -14,7 +14,7 @@ pub(crate) struct Totals<T> {
 }
 
 impl<T: Copy + Default> Totals<T> {
-    /// Adds the totals of `tick`. A repeated tick counts once.
+    /// A repeated tick counts once.
     pub(crate) fn add(&mut self, tick: u64, add: impl FnOnce(T) -> T) {
         let (last, totals) = match self.newest.back() {
             Some(&(last, totals)) => (Some(last), totals),

@@ -25,9 +25,7 @@ const FITTED_V: f64 = 1.0;
 pub enum Charge {
     #[default]
     Enough,
-    /// Low: the robot drives slowly.
     Low,
-    /// Empty: the robot cannot drive.
     Empty,
 }
 

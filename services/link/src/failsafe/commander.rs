@@ -74,7 +74,6 @@ pub struct OtherCommander {
     /// Expected frames per window of a robot that answers its last sender; 0 for others.
     stated: f64,
     half_period: Duration,
-    /// Evidence of another commander.
     shows: Option<&'static str>,
     /// Whether an unowed acknowledgement came.
     pub(crate) is_told: bool,

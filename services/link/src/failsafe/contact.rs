@@ -35,7 +35,6 @@ pub(crate) struct Contacts {
     limit_ad: u16,
     currents: [u16; 2],
     high_and_rolls_s: [f64; 2],
-    /// Held wheels, and since when.
     held: Option<([bool; 2], MissionTime)>,
     pub new: Option<ContactSample>,
 }

@@ -28,7 +28,6 @@ enum State {
     Late(u64),
 }
 
-/// Latency monitor, by machine time.
 #[derive(Clone, Debug, Default)]
 pub struct LatencyMonitor {
     command_limit: Duration,

@@ -113,8 +113,6 @@ impl Listener {
         off_m.abs() < SAME_M && self.sees(place, self.outer)
     }
 
-    /// Returns whether an echo last heard from `heard_from` must be heard at `place`, if nearer
-    /// than `nearer_m`.
     fn must_hear(&self, place: DVec2, heard_from: DVec2, nearer_m: f64) -> bool {
         let turned = (place - heard_from).angle_to(place - self.from.position);
         place.distance(self.from.position) < nearer_m
@@ -144,7 +142,7 @@ impl LostEcho {
         self.sonars.values_mut().for_each(|(_, missing)| *missing = Missing::default());
     }
 
-    /// Takes readings at a time, seconds, with the pose by the wheels.
+    /// Takes seconds, and the pose by the wheels.
     pub(super) fn take(&mut self, readings: &[RangeReading], robot: Pose2, at_s: f64) {
         self.echoes.retain(|echo| (0.0..FORGOTTEN_S).contains(&(at_s - echo.at_s)));
         let is_silent = readings.iter().all(|it| it.status() != RangeStatus::Measured);

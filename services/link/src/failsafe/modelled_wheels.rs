@@ -50,7 +50,6 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// Converts wheels to limited axes.
     pub(super) fn axes(self, [left, right]: [f64; 2]) -> [f64; 2] {
         if self.are_apart { [(left + right) / 2.0, (right - left) / 2.0] } else { [left, right] }
     }
@@ -79,17 +78,14 @@ impl ModelledWheels {
         self.axes[1].command(at_s, other);
     }
 
-    /// Advances both axes; see [`ModelledSpeed::go_on`].
     pub(crate) fn go_on(&mut self, until_s: f64) -> [f64; 2] {
         self.limits.wheels(self.axes.each_mut().map(|axis| axis.go_on(until_s)))
     }
 
-    /// Applies `of` to each axis, and returns wheels.
     pub(crate) fn each(&self, of: impl Fn(&ModelledSpeed) -> f64) -> [f64; 2] {
         self.limits.wheels(self.axes.each_ref().map(of))
     }
 
-    /// Returns pending commands; see [`ModelledSpeed::pending`].
     pub(crate) fn pending(&self) -> impl Iterator<Item = (f64, [f64; 2])> {
         let both = self.axes[0].pending().zip(self.axes[1].pending());
         debug_assert_eq!(self.axes[0].pending().count(), self.axes[1].pending().count());

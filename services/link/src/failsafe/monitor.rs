@@ -12,7 +12,6 @@ use common::{
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moment {
     pub time: MissionTime,
-    /// Machine's monotonic clock, nanoseconds.
     pub machine_ns: u64,
 }
 
@@ -59,7 +58,7 @@ pub enum Counts {
     Follow,
     /// The robot restarted; the difference is not motion.
     Restarted {
-        /// Whether the robot was silent until now.
+        /// The robot was silent until now.
         was_away: bool,
     },
     /// An impossible step from which later frames continue; not motion.
@@ -134,7 +133,6 @@ pub trait Monitor {
     /// Returns whether the condition of `cause`, one of its own, holds.
     fn condition(&self, cause: Cause, now: Moment) -> Condition;
 
-    /// Explains the cause and its remedy.
     fn explain(&self, cause: Cause, now: Moment) -> Option<String> {
         let _ = (cause, now);
         None

@@ -46,11 +46,9 @@ use super::{
 
 /// Slowest judged rim speed, m/s.
 const LEAST_M_S: f64 = 0.03;
-/// Least judged difference of the wheels, m/s.
 const LEAST_TURN_M_S: f64 = 0.1;
 /// Least judged difference as a share of the mean speed. Two motors differ by some hundredths.
 const LEAST_TURN_SHARE: f64 = 0.25;
-/// Least plausible share of a command.
 const LEAST_SHARE: f64 = 0.25;
 const ROLLS_SHARE: f64 = 0.5;
 /// Evidence that raises a suspicion. A radio that delivers frames loses commands for less time.
@@ -134,9 +132,8 @@ struct Evidence {
     asked: [f64; 2],
     since: MissionTime,
     against_s: f64,
-    /// Commanded time without counts.
     still_s: f64,
-    /// Commanded time without motion, at a high current.
+    /// At a high current.
     held_s: f64,
 }
 

@@ -207,7 +207,6 @@ pub struct Range {
     sensing: bool,
     body: Body,
     counts: Option<WheelCounts>,
-    /// Pose by the wheels, and recent ones.
     pose: Pose2,
     poses: Poses,
     way_m: f64,

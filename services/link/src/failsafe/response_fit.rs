@@ -83,7 +83,6 @@ pub(super) struct Alike {
     pub are_told_apart: bool,
 }
 
-/// Returns whether deviation `unlike` is far better than `other`.
 fn is_far_better(unlike: f64, other: f64) -> bool {
     other > (unlike + LEAST_BETTER).max(BETTER * (unlike + NOISE))
 }
@@ -401,7 +400,6 @@ impl ResponseFit {
         [all, judged_all]
     }
 
-    /// Returns the driving wheels' motion, and its factor.
     fn of_wheels(&self, [left, right, _]: &[Motion; CHANNELS]) -> (Motion, f64) {
         let wheels = if self.judged() == 1 { *left } else { left.with(right) };
         (wheels, wheels.factor())

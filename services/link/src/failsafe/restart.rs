@@ -20,7 +20,6 @@ const PERIODS: f64 = 6.0;
 /// Consistent frames that make implausible counts accepted.
 const FOLLOW_EACH_OTHER: u32 = 3;
 
-/// Counts and their time.
 type Frame = (WheelCounts, MissionTime);
 
 #[derive(Clone, Debug, Default)]
@@ -28,7 +27,6 @@ pub struct RestartWatch {
     last: Option<Frame>,
     /// Reported and counted speeds at the last plausible counts, counts/s.
     turned: [[f64; 2]; 2],
-    /// Two newest commands, counts/s, and the time of the newest nonzero one.
     commanded: [[f64; 2]; 2],
     driven: Option<MissionTime>,
     /// Newest implausible counts, their time, and the number of consistent frames.
@@ -54,7 +52,7 @@ impl RestartWatch {
         }
     }
 
-    /// Takes a command, counts/s.
+    /// Takes counts/s.
     pub fn commanded(&mut self, counts: [i16; 2], now: MissionTime) {
         self.commanded = [self.commanded[1], counts.map(f64::from)];
         if counts != [0, 0] {

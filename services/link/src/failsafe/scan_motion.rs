@@ -30,7 +30,6 @@ const TELLS_M: f64 = 0.005;
 const FACTOR: f64 = 1.2;
 const BETTER: [f64; 2] = [0.016, 0.03];
 
-/// Recent poses by the wheels.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Poses(VecDeque<(f64, Pose2)>);
 

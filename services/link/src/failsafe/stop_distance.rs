@@ -29,7 +29,7 @@ impl Stop {
         }
     }
 
-    /// Returns the stop by `cause`; none if unbounded.
+    /// None if unbounded.
     pub fn by(cause: Cause, mission: &Mission) -> Option<Self> {
         let known_s = rule(cause)?.known_within_s?(mission);
         Some(Self::known_after(known_s, mission))

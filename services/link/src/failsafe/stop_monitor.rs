@@ -16,7 +16,6 @@ use super::monitor::{Condition, Counts, Moment, Monitor, Observation};
 const STOPS_ARE_LOST_S: f64 = 0.45;
 /// Motion past the due rest that shows a robot which does not stop. A repeated stop acts sooner.
 pub(crate) const DOES_NOT_STOP_AFTER: Duration = Duration::from_millis(500);
-/// Rim speed of a moving wheel.
 const MOVES_M_S: f64 = 0.03;
 /// Rest: this rim speed, or [`RESTS_COUNTS`] between frames, because resting encoders vary.
 const RESTS_M_S: f64 = 0.01;

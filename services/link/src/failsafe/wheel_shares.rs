@@ -21,9 +21,7 @@ use common::{
 
 use super::modelled_wheels::{Axle, ModelledWheels};
 
-/// Weight left after each metre: a memory of 3 m.
 const LEFT_AFTER_A_METRE: f64 = 0.72;
-/// Least commanded travel, metres.
 const LEAST_M: f64 = 1.0;
 /// Share of commanded travel below which a wheel is held or dead, for other monitors to judge.
 const TURNS: f64 = 0.25;
@@ -135,7 +133,7 @@ impl WheelShares {
         shares
     }
 
-    /// Takes sent speeds, counts/s.
+    /// Takes counts/s.
     pub(crate) fn told(&mut self, counts: [i16; 2], now_s: f64) {
         if let Some(wheels) = &mut self.wheels {
             wheels.command(now_s, counts.map(f64::from));

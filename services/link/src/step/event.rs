@@ -57,10 +57,8 @@ pub enum Event<'a> {
     Wire(bool),
     /// Bytes from a sensor, by its number in [`crate::drivers::sensors`].
     Sensor(u8, #[serde(with = "serde_bytes")] &'a [u8]),
-    /// Whether a sensor's wire is open.
     SensorWire(u8, bool),
     Command(#[serde(with = "inputs::sample")] CommandSample),
-    /// Supervisor's order, and why not to drive.
     Order(Order, HoldReason),
     /// Supervisor's limit in lockstep: last tick allowed, and current target.
     TickLimit {
@@ -69,11 +67,9 @@ pub enum Event<'a> {
     },
     /// Time passed without input.
     Quiet,
-    /// Operator's request at the link.
     Operator(Request),
     /// Driver state of the previous link.
     Remember(Memory),
-    /// Time to publish the newest telemetry.
     Telemetry,
     End,
 }
@@ -81,7 +77,6 @@ pub enum Event<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Effect {
     Send(Vec<u8>),
-    /// Bytes for a sensor, by number.
     SendSensor(u8, Vec<u8>),
     /// Start of a tick. `ranges` come first, since `wheels` wakes the pipeline.
     Tick {

@@ -8,7 +8,7 @@ use super::Link;
 use crate::failsafe::monitor::Moment;
 
 impl Link {
-    /// Returns mission time until the next poll or repeat; none if neither is pending.
+    /// None if neither is pending.
     pub(crate) fn until_due(&self, now: MissionTime) -> Option<Duration> {
         let polls = self.polls_by_time().then(|| self.polls.until_next(now));
         let repeat = self.repeat.map(|repeat| repeat.due.since(now));

@@ -43,7 +43,7 @@ impl Link {
         }
     }
 
-    /// Sends speeds, counts/s.
+    /// In counts/s.
     pub(super) fn tell(&mut self, counts: [i16; 2], limit: Duration) {
         if self.failsafe.monitors.stop.method > 0 && counts != [0, 0] {
             // Another stop method may have changed the robot's settings.

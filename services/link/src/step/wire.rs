@@ -173,7 +173,6 @@ impl Link {
         }
     }
 
-    /// Takes readings, which came at `own_wire` if apart from the robot's motion.
     fn take_readings(&mut self, heard: &mut Heard, own_wire: Option<MissionTime>) {
         if let Some(stamp_ns) = heard.motion.and_then(|motion| motion.stamp_ns) {
             self.stamped = Some((stamp_ns, self.now));

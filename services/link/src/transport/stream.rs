@@ -34,7 +34,6 @@ pub(super) trait Dial: fmt::Debug {
     /// Silence of a dead stream; none if the system reports that.
     const SILENCE: Option<Duration>;
 
-    /// Starts opening without waiting.
     fn dial(&self) -> io::Result<OwnedFd>;
 
     /// Checks that a writable `descriptor` is connected.

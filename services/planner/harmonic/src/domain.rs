@@ -9,9 +9,8 @@ pub struct Domain {
     width: usize,
     height: usize,
     blocked: Vec<bool>,
-    /// Screening coefficient k of cells with cost 1.
     screening: f64,
-    /// Cost of each cell; empty if all costs are 1.
+    /// Empty if all costs are 1.
     costs: Vec<f32>,
     target: Cell,
 }

@@ -127,7 +127,7 @@ impl Field {
         (self.width, self.height, self.target) == (domain.width(), domain.height(), domain.target())
     }
 
-    /// Returns u at a signed column and row; 0 outside the map.
+    /// Returns 0 outside the map.
     pub(crate) fn u_at(&self, col: i64, row: i64) -> Scaled {
         match (usize::try_from(col), usize::try_from(row)) {
             (Ok(col), Ok(row)) => self.u(Cell { col, row }),

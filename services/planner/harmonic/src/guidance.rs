@@ -127,7 +127,7 @@ impl Field {
         sum
     }
 
-    /// Returns the central difference of u at `there`, which adjoins `here`, in units of u(here).
+    /// In units of u(here).
     fn central_difference(&self, here: (i64, i64), there: (i64, i64)) -> [f64; 2] {
         let own = self.u_at(there.0, there.1);
         assert!(!own.is_zero(), "the cell is reachable");
@@ -204,8 +204,6 @@ impl Field {
         allowed
     }
 
-    /// Returns the direction to the centre of the neighbour with the largest u.
-    ///
     /// Two adjacent cells are convex together, so the straight way is free from anywhere in `here`.
     fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
         debug_assert!(!self.u_at(here.0, here.1).is_zero());
@@ -213,7 +211,6 @@ impl Field {
         unit([here.0 as f64 + dc - position[0], here.1 as f64 + dr - position[1]], 0.0)
     }
 
-    /// Searches growing rings for the nearest reachable cell.
     fn way_out(&self, col: f64, row: f64) -> Guidance {
         let (width, height) = (self.width() as i64, self.height() as i64);
         // Far outside, the search starts at the rim of the map.

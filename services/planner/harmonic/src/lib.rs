@@ -76,14 +76,7 @@
 //!
 //! # Errors
 //!
-//! [`SolveError`] covers two groups:
-//!
-//! - Invalid maps: [`MapEmpty`](SolveError::MapEmpty), [`MapTooLarge`](SolveError::MapTooLarge),
-//!   [`WrongLength`](SolveError::WrongLength), [`Outside`](SolveError::Outside),
-//!   [`TargetBlocked`](SolveError::TargetBlocked) and
-//!   [`ScreeningLength`](SolveError::ScreeningLength).
-//! - Solves without a field: [`Cancelled`](SolveError::Cancelled),
-//!   [`TooCostly`](SolveError::TooCostly) and [`Unverified`](SolveError::Unverified).
+//! [`SolveError`] covers invalid maps and solves without a field.
 //!
 //! Every position gets an answer: [`Guidance`] names the reason where a direction is missing.
 //!

@@ -28,13 +28,9 @@ pub(crate) use gauss_seidel::relax;
 pub(crate) use tree::Tree;
 pub(crate) use workspace::Workspace;
 
-/// Cells in the order of a breadth-first pass, and the tree of their fronts.
 pub(crate) type Ordered = (BreadthFirst, Tree);
 
-/// Orders the cells of `domain` from its target.
-///
-/// # Errors
-/// [`SolveError::Cancelled`] and [`SolveError::TooCostly`].
+/// Orders the cells from the target.
 pub(crate) fn order(
     domain: &Domain,
     budget: &Budget,
@@ -63,7 +59,6 @@ pub(crate) fn solve(
     solved
 }
 
-/// Slot of a cell outside the front.
 const NOWHERE: u32 = u32::MAX;
 
 fn factor(

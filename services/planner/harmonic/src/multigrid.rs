@@ -159,8 +159,6 @@ impl<R: Real> Multigrid<R> {
         self.start_from_sources();
     }
 
-    /// Makes `target` the only inflow.
-    ///
     /// `guess` writes a row, with 2^TOP at the target.
     pub(crate) fn start_near(&mut self, target: Cell, mut guess: impl FnMut(usize, &mut [R])) {
         self.corrects = false;
@@ -243,14 +241,9 @@ impl<R: Real> Multigrid<R> {
         }
     }
 
-    /// Runs cycles until every cell has settled and `after` finds no fault, or `most` cycles are
-    /// done.
-    ///
-    /// After each cycle, `after` receives whether to check the field. It returns the largest
-    /// residual as a multiple of its limit, if that is too large.
-    ///
-    /// # Errors
-    /// [`SolveError::Cancelled`].
+    /// Runs until every cell has settled and `after` finds no fault, or for `most` cycles. After
+    /// each cycle, `after` receives whether to check the field. It returns the largest residual as
+    /// a multiple of its limit, if that is too large.
     pub(crate) fn converge(
         &mut self,
         (first_check, most): (usize, usize),

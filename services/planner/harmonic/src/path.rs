@@ -2,7 +2,6 @@
 
 use crate::{Cell, Field, Guidance};
 
-/// Length of a step, in cells.
 const STEP: f64 = 0.25;
 /// Limit of steps within one cell; six steps cross it.
 const MOST_STEPS: usize = 8;

@@ -111,7 +111,7 @@ impl Solver {
         self.run(domain, Some(near), cancellation, &mut |_| {})
     }
 
-    /// Solves `domain` and calls `observe` at the end of each phase.
+    /// Calls `observe` at the end of each phase.
     ///
     /// # Errors
     /// See [`solve`](Self::solve).
@@ -134,7 +134,6 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Verifies a field that was just computed.
     fn check(&mut self, store: &Store) -> Check {
         (self.observe)(Phase::Solved);
         let check = verification::check(self.domain, store, self.threads);
@@ -143,7 +142,6 @@ impl Task<'_> {
     }
 }
 
-/// Computed field with the result of its check, and the method that computed it.
 type Solved = (Store, Check, Method);
 
 #[derive(Debug, Default)]

@@ -32,7 +32,6 @@ impl From<Vec<f32>> for Store {
     }
 }
 
-/// Takes values of u times 2^TOP.
 impl From<Vec<f64>> for Store {
     fn from(values: Vec<f64>) -> Self {
         let exponent = -f64::TOP;
@@ -55,8 +54,7 @@ impl Store {
         Scaled::new(value, exponent)
     }
 
-    /// Reads u of a range of cells in units of 2^`reference`; 0 if the result is below the range of
-    /// `R`.
+    /// In units of 2^`reference`; 0 if the result is below the range of `R`.
     pub(crate) fn read_row_as<R: Real>(&self, cells: Range<usize>, reference: i32, into: &mut [R]) {
         assert_eq!(into.len(), cells.len());
         if let Self::Single { values, exponent } = self

@@ -39,7 +39,7 @@ const AT_CELL_M: f64 = 0.12;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     Current,
-    /// Map changed, and no solve of it has begun.
+    /// No solve of it has begun.
     Stale,
     /// Background solver runs `job` on `version`; `changed` says whether the map changed since.
     Solving {
@@ -55,7 +55,6 @@ pub(super) struct Live {
     pub map: Domain,
     /// Field of `map` or of an older one; shared with its snapshots.
     pub field: Arc<Field>,
-    /// Version of an outdated field.
     field_version: u64,
     /// Whether the field leads to the previous target and must not be followed.
     leads_elsewhere: bool,
@@ -110,7 +109,6 @@ impl Live {
         Some(Job { number, domain })
     }
 
-    /// Takes the result of a job and returns whether it was awaited.
     pub(super) fn take(&mut self, solved: Solved) -> Result<bool, SolveError> {
         match self.state {
             State::Solving { job, version, changed } if job == solved.number => {
@@ -125,7 +123,6 @@ impl Live {
         }
     }
 
-    /// Follows the field of the newest map.
     pub(super) fn follow(&mut self, field: Arc<Field>) {
         self.field = field;
         self.leads_elsewhere = false;
@@ -189,7 +186,6 @@ impl Live {
         self.refuse_again()
     }
 
-    /// Blocks the refused cells in a new `map`.
     pub(super) fn refuse_again(&mut self) -> Result<(), SolveError> {
         let refused = self.refused.iter().enumerate().filter(|(_, refused)| **refused);
         let side = self.frame.cells as usize;

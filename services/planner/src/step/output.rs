@@ -17,7 +17,6 @@ pub enum Work {
     Solved,
     /// Field belongs to an older map now.
     Stale,
-    /// Background result replaced the field.
     SwappedIn,
     Broken,
     /// Grid version is missing; the field stays until a keyframe arrives.

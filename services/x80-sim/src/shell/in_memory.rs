@@ -45,12 +45,12 @@ impl InMemory {
         self.pass()
     }
 
-    /// Takes the time that passed. Does nothing in lockstep.
+    /// Does nothing in lockstep.
     pub fn pass(&mut self) -> Result {
         self.session.catch_up()
     }
 
-    /// Returns the time of the next [`InMemory::pass`] on the monotonic clock; none in lockstep.
+    /// On the monotonic clock; none in lockstep.
     pub fn next_due_ns(&self) -> Option<u64> {
         let after = self.session.patience()?;
         Some(monotonic_ns() + after.as_nanos() as u64)
@@ -61,12 +61,11 @@ impl InMemory {
         self.sent.try_iter()
     }
 
-    /// Returns the ground truth since the last call, one of each tick.
     pub fn truth(&mut self) -> impl Iterator<Item = GroundTruthTick> {
         self.truth.try_iter()
     }
 
-    /// Ends all commands: the robot comes to rest, where the next one starts.
+    /// The robot comes to rest, where the next one starts.
     pub fn end(self) -> Result<SavedState> {
         self.session.end()
     }

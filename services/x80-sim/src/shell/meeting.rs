@@ -183,7 +183,7 @@ impl Meeting {
         !self.later.is_empty() || self.newest.as_ref().is_some_and(has)
     }
 
-    /// Takes received places; those after `now_s` wait.
+    /// Those after `now_s` wait.
     fn take(&mut self, now_s: f64) {
         let mut bytes = [0; LONGEST];
         while self.later.len() < MOST_AT_ONCE
@@ -206,7 +206,7 @@ impl Meeting {
         }
     }
 
-    /// Sends this robot's pose. A contact ends its mission, and it stays there.
+    /// A contact ends its mission, and it stays there.
     pub(super) fn tell(&mut self, truth: &GroundTruthTick, ended: bool) {
         if self.own.ended {
             return;

@@ -51,10 +51,9 @@ pub(super) struct Session {
     strangers: u64,
     /// Decoders of the peer and one other source: partial frames must stay apart.
     decoders: Vec<(Source, Words)>,
-    /// Transport of the RPLIDAR; none if it uses the robot's address.
+    /// None if it uses the robot's address.
     laser_way: Option<Way>,
     laser_peer: Option<Source>,
-    /// Mission time of the newest RPLIDAR message.
     gathered_s: f64,
     protocol: Protocol,
     ground_truth: Box<dyn FnMut(GroundTruthTick)>,
@@ -118,7 +117,7 @@ impl Session {
         Ok(())
     }
 
-    /// Ends the process and all commands: the robot comes to rest. Returns its state there.
+    /// The robot comes to rest. Returns its state there.
     pub(super) fn end(mut self) -> Result<SavedState> {
         // The other robot sees the same path to rest, regardless of late commands.
         let Self { robot, meeting, .. } = &mut self;
@@ -147,7 +146,6 @@ impl Session {
         self.robot.next_tick_s()
     }
 
-    /// Returns the mission time of the next self-triggered event.
     fn next_due_s(&self) -> f64 {
         let flight = self.radio.as_ref().and_then(Radio::next_due);
         let scanning = self.robot.rplidar.as_ref().filter(|rplidar| rplidar.is_scanning());
@@ -177,7 +175,7 @@ impl Session {
         }
     }
 
-    /// Takes received pieces, up to a limit.
+    /// Up to a limit.
     pub(super) fn listen(&mut self, buffer: &mut [u8]) -> Result {
         while let Some((source, bytes)) =
             self.laser_way.as_mut().map(|way| way.receive(buffer)).transpose()?.flatten()
@@ -196,7 +194,6 @@ impl Session {
         Ok(())
     }
 
-    /// Takes a received piece.
     pub(super) fn take(&mut self, source: Source, bytes: &[u8]) -> Result {
         let opened = self.way.take_opened();
         // Messages of the robot protocols begin differently.
@@ -228,7 +225,6 @@ impl Session {
         Ok(())
     }
 
-    /// Processes everything due by the clock.
     pub(super) fn catch_up(&mut self) -> Result {
         if let Some(now) = self.clock.now(monotonic_ns()) {
             self.pass(now)?;
@@ -237,7 +233,6 @@ impl Session {
         Ok(())
     }
 
-    /// Processes everything due by mission time `now`.
     fn pass(&mut self, now: f64) -> Result {
         self.meet()?;
         // The clock waits, so a delay beyond a period is dropped.
@@ -260,7 +255,6 @@ impl Session {
         Ok(())
     }
 
-    /// Advances to the next tick, writes its ground truth and sends its frames.
     fn tick(&mut self) -> Result {
         let frames = self.measured()?;
         self.peer = self.way.connected()?.or(self.peer);

@@ -60,7 +60,7 @@ struct Serving {
 }
 
 impl Live {
-    /// Listens for pages of these origins and other programs. Returns the actual address.
+    /// Returns the actual address.
     pub fn open(
         robot: &RobotName,
         address: SocketAddr,

@@ -47,7 +47,6 @@ impl fmt::Debug for Token {
 #[derive(Debug)]
 pub struct Access {
     scheme: &'static str,
-    /// Host names that a request may use.
     hosts: Vec<String>,
     pub watch: Token,
     pub drive: Token,
@@ -67,7 +66,7 @@ impl Access {
         Ok(Self { scheme, hosts, watch: Token::new()?, drive: Token::new()? })
     }
 
-    /// Returns the page's addresses and tokens, for the operator alone.
+    /// For the operator alone.
     pub fn addresses(&self) -> String {
         let host = self.hosts.first().map(String::as_str).unwrap_or_default();
         let line =

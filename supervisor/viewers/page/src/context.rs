@@ -6,7 +6,7 @@ pub struct Context {
     pub access: Arc<Access>,
     pub shared: Arc<Shared>,
     pub operator: Operator,
-    /// Places for browsers that watch, and for those that drive.
+    /// For browsers that watch, and for those that drive.
     pub watching: Places,
     pub driving: Places,
 }

@@ -30,11 +30,10 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 const PACK_EVERY: Duration = Duration::from_millis(500);
 const LOGS_EVERY: Duration = Duration::from_millis(500);
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
-/// Most bytes of ground truth read at once. Further bytes are skipped.
+/// Further bytes are skipped.
 const TRUTH_AT_ONCE: u64 = 1 << 16;
 /// Most bytes of results loaded for a run in progress.
 const LARGEST_RESULTS: u64 = 1 << 20;
-/// Most map cells for a target preview.
 const PREVIEW_MOST_CELLS: usize = 512 * 512;
 
 struct Reading {
@@ -42,7 +41,6 @@ struct Reading {
     processes: Processes,
     logs: LogFiles,
     logs_read: Instant,
-    /// Ground truth file of a simulated robot.
     truth: (PathBuf, Tail),
     results: Results,
     packed: Option<Instant>,
@@ -113,7 +111,6 @@ impl Reading {
     }
 }
 
-/// Solves the field to `target` on the believed map.
 fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
     let (header, cells) = collector.belief()?;
     let frame = header.part.frame();

@@ -128,7 +128,6 @@ async fn session(context: &Arc<Context>, request: Request, place: Place) -> Resp
     })
 }
 
-/// Returns the value of a header that occurs once.
 fn single<'a>(headers: &'a HeaderMap, name: &header::HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let value = values.next()?;

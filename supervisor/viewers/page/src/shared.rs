@@ -29,7 +29,6 @@ impl<T: Clone> Newest<T> {
         (self.number, self.value) = (self.number + 1, Some(value));
     }
 
-    /// Returns the value if it is new for a browser at `cursor`.
     fn after(&self, cursor: &mut u64) -> Option<T> {
         let is_new = std::mem::replace(cursor, self.number) != self.number;
         self.value.clone().filter(|_| is_new)
@@ -74,12 +73,12 @@ pub struct Shown {
     pub field: Newest<Bytes>,
     pub preview: Newest<Bytes>,
     pub wanted: Option<[f64; 2]>,
-    /// Reason why the robot cannot be shown, or empty.
+    /// Empty if the robot can be shown.
     pub problem: String,
 }
 
 impl Shown {
-    /// Begins a run and drops the data of the last one.
+    /// Drops the data of the last one.
     pub fn begin(&mut self, about: &Value, simulated: bool) {
         *self = Self {
             run: self.run + 1,
@@ -109,7 +108,6 @@ impl Shared {
     }
 }
 
-/// Data of a run that a browser has received.
 #[derive(Debug, Default)]
 struct Sent {
     run: Option<u64>,

@@ -78,7 +78,7 @@ pub fn list(arguments: &Arguments) -> Result {
     print_rows(&listed, arguments.json, table)
 }
 
-/// Collects the answers over `session`, which may not be connected yet.
+/// The session may not be connected yet.
 fn robots(session: &Session) -> Result<Vec<Hello>> {
     let began = Instant::now();
     let mut robots: Vec<Hello> = Vec::new();

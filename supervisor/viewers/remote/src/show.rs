@@ -127,7 +127,6 @@ fn sent(sample: &Sample) -> Option<Sent> {
     Sent::decoded(&sample.attachment()?.to_bytes())
 }
 
-/// One request at a time.
 struct Asker<'a> {
     session: &'a Session,
     robot: &'a RobotName,
@@ -168,7 +167,7 @@ impl<'a> Asker<'a> {
         Ok(hello)
     }
 
-    /// Returns the robot's run, if it arrives and is compatible.
+    /// Returns `None` if it does not arrive or is incompatible.
     fn run(&self) -> Result<Option<Run>> {
         let reply = self.ask("run")?.recv().ok();
         let run = reply.and_then(|reply| checked(&String::from_utf8(payload(&reply)?).ok()?));
@@ -183,7 +182,7 @@ fn payload(reply: &Reply) -> Option<Vec<u8>> {
     Some(reply.result().ok()?.payload().to_bytes().into_owned())
 }
 
-/// Parses a run and validates its mission, which sets the mirror's memory.
+/// The mission sets the mirror's memory.
 pub fn checked(text: &str) -> Option<Run> {
     let run: Run = toml::from_str(text).ok()?;
     Mission::parse(&toml::to_string(&run.mission).ok()?, Path::new("the run file")).ok()?;

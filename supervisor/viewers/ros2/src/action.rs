@@ -56,7 +56,7 @@ impl<T: ToString> From<T> for Refusal {
 #[derive(Default, Serialize, Deserialize)]
 pub struct Server {
     pub goals: Goals<Aim>,
-    /// Number of the newest target, which the next goal follows. Each run counts from 1.
+    /// The next goal follows it. Each run counts from 1.
     #[serde(skip)]
     pub newest_target: u64,
 }
@@ -68,7 +68,7 @@ pub struct Sent {
 }
 
 impl Server {
-    /// Returns a goal's id, and its target or the refusal. Fails on a malformed payload.
+    /// Fails on a malformed payload.
     pub fn read_goal(payload: &[u8]) -> Result<(Uuid, Result<TargetPoint, Refusal>), Malformed> {
         let NavigateToPoseSendGoalRequest { goal_id, goal } = Cdr::decode(payload)?;
         Ok((goal_id.uuid, goal_of(&goal.pose.header, &goal.pose.pose)))
@@ -158,7 +158,6 @@ impl Server {
         }
     }
 
-    /// Forgets targets of earlier goals, whose results cannot arrive any more.
     pub fn forget_targets(&mut self) {
         self.goals.aborted().for_each(|goal| goal.known.number = None);
     }

@@ -12,7 +12,6 @@ use crate::{action::Refusal, shown::MAP};
 /// Least deviations of a place, metres and radians.
 const LEAST_SIGMA: f64 = 0.05;
 
-/// Returns the target of a `geometry_msgs/PoseStamped`.
 pub fn goal(payload: &[u8]) -> Result<TargetPoint, String> {
     let PoseStamped { header, pose } = PoseStamped::decode(payload)?;
     goal_of(&header, &pose).map_err(|why| why.text)
@@ -32,8 +31,7 @@ pub fn goal_of(header: &Header, pose: &msg::Pose) -> Result<TargetPoint, Refusal
     Ok(TargetPoint { x_m, y_m, heading_rad, has_heading: 1 })
 }
 
-/// Returns the place of a `geometry_msgs/PoseWithCovarianceStamped`, with deviations in metres and
-/// radians.
+/// With deviations in metres and radians.
 pub fn place(payload: &[u8]) -> Result<(TargetPoint, [f64; 2]), String> {
     let PoseWithCovarianceStamped { header, pose } = PoseWithCovarianceStamped::decode(payload)?;
     let place = goal_of(&header, &pose.pose).map_err(|why| why.text)?;

@@ -75,7 +75,6 @@ struct Bridge<'a> {
     orders: Orders,
     shown: Option<Shown>,
     server: Server,
-    /// Directory of the run, with the results of its targets.
     run: Option<(PathBuf, Results)>,
     stored: String,
     goals_file: PathBuf,
@@ -193,7 +192,7 @@ impl Bridge<'_> {
         Ok(())
     }
 
-    /// Restores the goals of an earlier bridge, whose clients still wait.
+    /// Their clients still wait.
     fn restore(&mut self, domain: &Domain) {
         self.goals_file = domain.run_directory().with_file_name(GOALS);
         let text = fs::read_to_string(&self.goals_file).unwrap_or_default();

@@ -67,7 +67,6 @@ fn write_to(node: &mut Node<Id>, (row, id, name): Published) -> io::Result<()> {
     node.write_to(id, [&name, row.type_name], quality)
 }
 
-/// Row, id and name of a published topic.
 pub type Published = (&'static Spec, Id, String);
 
 /// Returns the published topics of a robot with these sensors, named below `namespace`.
@@ -84,7 +83,6 @@ pub fn published<'a>(
     })
 }
 
-/// Returns the topic's name with that of the sensor in letters, digits and `_`.
 pub fn topic_name(row: &Spec, sensor: &str) -> String {
     let sensor = sensor.replace(|letter: char| !letter.is_ascii_alphanumeric(), "_");
     row.name.replace("SENSOR", &sensor).trim_end_matches('/').to_owned()

@@ -14,7 +14,7 @@ const MOST_FRAMES: usize = 1024;
 struct Place {
     parent: String,
     pose: DAffine2,
-    /// Arrival time, or `None` for a static frame.
+    /// `None` for a static frame.
     heard: Option<Instant>,
 }
 

@@ -34,11 +34,10 @@ impl Status {
     }
 }
 
-/// Accepted goal, with data of its action.
 #[derive(Serialize, Deserialize)]
 pub struct Goal<T> {
     pub id: Uuid,
-    /// Time of acceptance, nanoseconds since 1970.
+    /// Nanoseconds since 1970.
     pub at_ns: u64,
     pub status: Status,
     pub known: T,
@@ -50,7 +49,7 @@ impl<T> Goal<T> {
     }
 }
 
-/// Returns the reply to a goal, at `now_ns` since 1970.
+/// In nanoseconds since 1970.
 pub fn reply_to_goal(accepted: bool, now_ns: u64) -> Vec<u8> {
     NavigateToPoseSendGoalResponse { accepted, stamp: now_ns.into() }.encode()
 }
@@ -58,7 +57,6 @@ pub fn reply_to_goal(accepted: bool, now_ns: u64) -> Vec<u8> {
 #[derive(Default, Serialize, Deserialize)]
 pub struct Goals<T> {
     goals: VecDeque<Goal<T>>,
-    /// Whether states have changed since their last publication.
     is_changed: bool,
     waiting: Vec<(Request, Uuid)>,
 }
@@ -92,7 +90,7 @@ impl<T> Goals<T> {
         self.goals.iter_mut().rev().find(|goal| !goal.status.is_final())
     }
 
-    /// Takes a cancel request. Returns the reply, and whether a goal is canceled.
+    /// Returns the reply, and whether a goal is canceled.
     pub fn cancel(&mut self, payload: &[u8]) -> Result<(Vec<u8>, bool), Malformed> {
         let GoalInfo { goal_id: UUID { uuid: id }, stamp } =
             CancelGoalRequest::decode(payload)?.goal_info;
@@ -127,7 +125,7 @@ impl<T> Goals<T> {
         Ok(())
     }
 
-    /// Returns the state of an ended goal and its data. An unknown goal has state 0.
+    /// An unknown goal has state 0.
     pub fn over(&self, id: Uuid) -> Option<(i8, Option<&T>)> {
         match self.goals.iter().find(|goal| goal.id == id) {
             Some(goal) if !goal.status.is_final() => None,

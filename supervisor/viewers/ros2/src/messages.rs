@@ -11,7 +11,7 @@ use ros2::{
     parts::Pose,
 };
 
-/// Encodes transforms of parent, child and pose.
+/// Takes parent, child and pose.
 pub fn transforms(ns: u64, transforms: &[(&str, &str, Pose)]) -> Vec<u8> {
     let transform = |&(parent, child, pose): &(&str, &str, Pose)| TransformStamped {
         header: Header::at(ns, parent),

@@ -81,7 +81,6 @@ fn heading(view: &View) -> Line<'static> {
     Line::from(vec![Span::styled(robot, TITLE), Span::raw(kind), Span::raw(state), age])
 }
 
-/// Returns a line of signs, each with its meaning.
 fn explained(
     signs: impl IntoIterator<Item = (impl ToString, Style, &'static str)>,
 ) -> Line<'static> {

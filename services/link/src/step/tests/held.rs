@@ -68,14 +68,14 @@ fn in_lockstep_no_tick_follows_an_arrival_before_there_is_another_target() {
 #[test]
 fn in_lockstep_a_given_tick_is_answered_alike_before_and_after_the_order_to_wait() {
     let wait = || Event::Order(Order::Hold, HoldReason::Waiting);
-    let answer = || Event::Command(command(0, 0, TURN, TURN));
+    let answer = || Event::Command(command(0, 0, [TURN; 2]));
     let outcome = |events: [Event<'static>; 2]| {
         let mut link = in_ticks();
         link.at(limit(9), 0);
         let mut link = driving(link);
-        link.at(Event::Datagram(&datagram(255, 0, 0)), MS);
+        link.at(Event::Datagram(&datagram(255, [0; 2])), MS);
         let sent = events.map(|event| velocities(&link.at(event, 2 * MS))).concat();
-        let later = link.at(Event::Datagram(&datagram(255, 0, 0)), 3 * MS);
+        let later = link.at(Event::Datagram(&datagram(255, [0; 2])), 3 * MS);
         assert!(!later.iter().any(|it| matches!(it, Effect::Tick { .. })), "{later:?}");
         (sent, link.state.next_tick, link.decision)
     };

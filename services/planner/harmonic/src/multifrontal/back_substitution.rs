@@ -10,12 +10,7 @@ const PLAIN_SPAN: i32 = 300;
 /// Smallest plain `f64` sum that loses no terms to underflow.
 const PLAIN_LEAST: f64 = 1e-180;
 
-/// Computes u of every cell of `domain`.
-///
 /// The first cells of `pass` take u from `known`, or 1 at the target.
-///
-/// # Errors
-/// [`SolveError::Cancelled`].
 pub(super) fn substitute(
     domain: &Domain,
     (pass, tree): &Ordered,
@@ -77,8 +72,6 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Computes a front with one common exponent.
-///
 /// Returns false, with nothing written, if the range of the front is too wide.
 fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut Vec<f64>) -> bool {
     let own = rows.lengths.len();
@@ -104,7 +97,6 @@ fn in_plain_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>, plain: &mut V
     true
 }
 
-/// Computes a front with an exponent per term.
 fn in_extended_range(u: &mut [Scaled], cells: &[u32], rows: Rows<'_>) {
     for (row, weights) in rows.backwards() {
         let terms = weights.iter().zip(&cells[row + 1..]).map(|(&weight, &place)| {

@@ -21,10 +21,6 @@ pub(crate) struct BreadthFirst {
 }
 
 impl BreadthFirst {
-    /// Visits `domain` from its target.
-    ///
-    /// # Errors
-    /// [`SolveError::Cancelled`] and [`SolveError::TooCostly`].
     pub(crate) fn from_target(
         domain: &Domain,
         budget: &Budget,
@@ -35,9 +31,6 @@ impl BreadthFirst {
     }
 
     /// Visits the cells with unknown u from those that `is_known`, by row-major index.
-    ///
-    /// # Errors
-    /// [`SolveError::Cancelled`] and [`SolveError::TooCostly`].
     pub(crate) fn from_known(
         domain: &Domain,
         is_known: impl Fn(usize) -> bool,

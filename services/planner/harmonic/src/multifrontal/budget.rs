@@ -21,12 +21,10 @@ impl Budget {
         Self { operations, ..self }
     }
 
-    /// Returns [`SolveError::TooCostly`] if `operations` exceed the limit.
     pub(super) fn ask_operations(&self, operations: f64) -> Result<(), SolveError> {
         if operations <= self.operations { Ok(()) } else { self.ask(u64::MAX) }
     }
 
-    /// Returns [`SolveError::TooCostly`] if `needed` bytes exceed the limit.
     pub(super) fn ask(&self, needed: u64) -> Result<(), SolveError> {
         let Self { allowed, width, height, .. } = *self;
         if needed <= allowed {

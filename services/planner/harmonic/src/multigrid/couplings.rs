@@ -20,7 +20,6 @@ pub(super) const SOUTH_WEST: usize = 3;
 pub(super) type Place = (usize, usize);
 
 pub(super) trait Couplings<R>: Copy {
-    /// Returns the coupling of cell `x` times `value`.
     fn times(self, x: usize, value: R) -> R;
 }
 

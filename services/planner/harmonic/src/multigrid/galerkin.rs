@@ -30,11 +30,10 @@ type Rows<R, const COUNT: usize> = [Vec<R>; COUNT];
 #[derive(Debug)]
 pub(super) struct Products<R> {
     n: usize,
-    /// Interpolation weights of the odd-odd cells: row above, this row.
+    /// Row above, this row.
     corner: [Rows<R, 4>; 2],
-    /// Product rows of the odd-even cells.
     odd_even: Rows<R, 6>,
-    /// Product rows of the even-odd cells: row above, this row.
+    /// Row above, this row.
     even_odd: [Rows<R, 6>; 2],
     /// Even-even products: diagonal, then the four stored directions.
     even_even: Rows<R, 5>,

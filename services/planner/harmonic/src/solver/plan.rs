@@ -43,11 +43,7 @@ fn cycles(decades: f64) -> f64 {
     6.0 + decades / 3.5
 }
 
-/// Plans the methods for `domain`: returns the order of a factorisation that costs less than
-/// multigrid.
-///
-/// # Errors
-/// [`SolveError::Cancelled`].
+/// Returns the order of a factorisation that costs less than multigrid.
 pub(super) fn plan(
     domain: &Domain,
     budget: &Budget,
@@ -97,12 +93,8 @@ fn if_cheaper(
     Ok(unless_too_costly(tree)?.map(|tree| (pass, tree)))
 }
 
-/// Returns the order of the cells with u below the range of single precision.
-///
-/// Returns `None` if multigrid in bands costs less.
-///
-/// # Errors
-/// [`SolveError::Cancelled`].
+/// Covers the cells with u below the range of single precision. Returns `None` if multigrid in
+/// bands costs less.
 pub(super) fn beyond_single(
     domain: &Domain,
     store: &Store,

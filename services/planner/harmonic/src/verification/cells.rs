@@ -2,7 +2,6 @@
 
 use crate::real::Real;
 
-/// Limit of the relative residual of a cell in a published field.
 pub(super) const RESIDUAL_LIMIT: f64 = 2e-5;
 
 /// Limit of [`Verification::worst_tile`](super::Verification::worst_tile) in a published field.
@@ -10,9 +9,7 @@ pub(super) const TILE_LIMIT: f64 = 0.01;
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Check {
-    /// See [`Verification`](super::Verification).
     pub worst_residual: f64,
-    /// See [`Verification`](super::Verification).
     pub worst_tile: f64,
     /// Cells with u > 0, except the target, that no neighbour exceeds.
     pub local_maxima: usize,

@@ -88,7 +88,6 @@ impl ScaledRows {
 }
 
 impl Window<f64> for ScaledRows {
-    /// Mantissas and exponents.
     type Row<'f> = (&'f [f64], &'f [i32]);
 
     #[inline(always)]

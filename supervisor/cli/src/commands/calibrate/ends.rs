@@ -22,7 +22,6 @@ pub fn await_robot(title: &str, signals: &mut Signals) -> Result {
     Ok(())
 }
 
-/// Asks for an end until the answer is valid.
 pub fn next(title: &str, signals: &mut Signals) -> Result<DVec2> {
     loop {
         write_stderr(&format!(
@@ -47,7 +46,7 @@ fn line(signals: &mut Signals) -> Result<String> {
     Ok(line.trim().to_owned())
 }
 
-/// Parses two numbers, metres.
+/// In metres.
 fn end(line: &str) -> Option<DVec2> {
     let separated = line.replace(',', " ");
     let mut words = separated.split_whitespace().map(str::parse::<f64>);

@@ -19,7 +19,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// Prints the calibration and replaces the file atomically.
+    /// Replaces the file atomically.
     pub fn write(&self, arguments: &Arguments) -> Result {
         let (file, setting) = (&arguments.out, &arguments.setting);
         let it = &self.estimate;

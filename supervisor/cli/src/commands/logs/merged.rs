@@ -24,7 +24,6 @@ struct Log {
     file: BufReader<File>,
     end: u64,
     position: u64,
-    /// Line whose end is not written yet.
     unfinished: Vec<u8>,
     head: Option<Line>,
     time: String,
@@ -34,7 +33,6 @@ struct Log {
 pub struct Line {
     /// UTC time, as written, or that of the previous line.
     pub time: String,
-    /// Stage, `supervisor` or `x80-sim`.
     pub process: String,
     pub text: String,
 }

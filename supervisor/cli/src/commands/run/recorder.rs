@@ -58,7 +58,7 @@ impl<'a> RunRecorder<'a> {
         Process::spawn(command)
     }
 
-    /// Waits for output of the recorder. Returns whether any came.
+    /// Returns whether any came.
     fn hear(&mut self, within: Duration, signals: &Signals) -> io::Result<bool> {
         let Some((_, said)) = &mut self.pipes else {
             return Ok(false);
@@ -70,7 +70,7 @@ impl<'a> RunRecorder<'a> {
 }
 
 impl Consumer for RunRecorder<'_> {
-    /// Starts the recorder. A failure is only logged.
+    /// A failure is only logged.
     fn attach(&mut self, signals: &Signals) {
         let attached = self.spawn().and_then(|mut process| {
             self.pipes = process.take_stdin().zip(process.take_stdout());
