@@ -29,13 +29,13 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     let (first, _) = rows.trim_end().rsplit_once('\n').unwrap();
     // State of an evaluation killed while it wrote the last row.
     std::fs::write(out.join("rows.csv"), format!("{first}\nrooms-5-0001,6,evid")).unwrap();
-    let resumed = evaluate(name, &["--seed", "5", "--resume"]);
+    let resumed = evaluate(name, &["--seed", "5", "--resume", "--processes"]);
     assert_eq!(resumed["count"], 2, "{resumed}");
     assert_eq!(resumed["success"], whole["success"]);
     let again = std::fs::read_to_string(out.join("rows.csv")).unwrap();
     assert_eq!(again, rows, "the rows follow from the seed");
     let latencies = std::fs::read_to_string(out.join("latencies.csv")).unwrap();
-    assert_eq!(latencies.lines().count(), 3, "{latencies}");
+    assert!(latencies.lines().count() > 1, "the resumed mission was driven by processes");
 
     let again = two_rooms(name, &["--seed", "5"]);
     refused(&again, "results-there", &["--resume"]);

@@ -10,7 +10,7 @@ use recording::Recording;
 use rustix::process::Signal;
 
 use crate::support::{
-    Run, STAGES, printed, replayed, run,
+    Run, STAGES, printed, replayed,
     wire::{Proxy, Robot},
 };
 
@@ -84,80 +84,4 @@ fn a_robot_of_json_one_of_whose_two_lasers_dies_stands_by_its_name_and_goes_on_w
     assert!(run.link_logged(&["WARN", "no valid reading from back;"]));
     dead.store(false, Ordering::Relaxed);
     run.arrives();
-}
-
-#[test]
-fn by_its_laser_a_robot_whose_wheels_are_not_what_they_should_be_knows_where_it_is() {
-    for seed in ["1", "2", "3"] {
-        let robot = ["--set", "robot.model='kobuki'", "--set", "robot.rate_hz=10", "--seed", seed];
-        let harsh = ["--set", "simulation.realism='harsh'", "--set", "controller.speed_m_s=0.5"];
-        let (code, summary) = run("laser-harsh", "obstacle-course", &[&robot[..], &harsh].concat());
-        assert_eq!(code, Some(0), "{summary}");
-        assert!(summary["pose_error_m"].as_f64().unwrap() < 0.12, "seed {seed}: {summary}");
-    }
-}
-
-#[test]
-fn a_laser_that_is_late_and_turns_slowly_and_says_so_places_the_robot_like_a_prompt_one() {
-    for late in [["0.2", "0"], ["0", "0.2"], ["0.3", "0.2"]] {
-        let [delay, sweep] = late;
-        let times = [
-            format!("simulation.laser.delay_s={delay}"),
-            format!("simulation.laser.sweep_s={sweep}"),
-        ];
-        let robot = ["--set", "robot.model='kobuki'", "--seed", "2"];
-        let arguments = [&robot[..], &["--set", &times[0], "--set", &times[1]]].concat();
-        let (code, summary) = run("laser-late", "obstacle-course", &arguments);
-        assert_eq!(code, Some(0), "{summary}");
-        assert!(summary["pose_error_m"].as_f64().unwrap() < 0.1, "{late:?}: {summary}");
-    }
-}
-
-/// Runs a robot of 0.9 by 0.4 m with a laser in a room of 8 m, with these targets and walls.
-fn long_robot(robot: &str, targets: &str, walls: &str) -> (Option<i32>, serde_json::Value) {
-    let text = format!(
-        "targets = {targets}\nperimeter = {{ width_m = 8, centre = [1.5, 0] }}\nworld.wall = {walls}\n\
-         [robot]\nmodel = 'jackal'\n\
-         footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]"
-    );
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("long.toml");
-    std::fs::write(&file, text).unwrap();
-    run(robot, file.to_str().unwrap(), &["--seed", "3"])
-}
-
-#[test]
-fn a_long_robot_passes_a_gap_narrower_than_its_length_and_turns_behind_it() {
-    let wall = "[{ points = [[1, -4], [1, -0.35]] }, { points = [[1, 0.35], [1, 4]] }]";
-    let (code, summary) = long_robot("long-gap", "[[2.5, 0.5, 90]]", wall);
-    assert_eq!((code, &summary["collisions"]), (Some(0), &0.into()), "{summary}");
-}
-
-#[test]
-fn a_heavy_rectangle_passes_the_loose_end_of_a_wall_untouched_as_stated_and_as_found() {
-    let text = "target = [7.05, -0.44]\nstart.heading_deg = -76.5\ntimeout_s = 144\n\
-        perimeter = { width_m = 10.7, centre = [3.53, 0.12] }\nrobot.model = 'jackal'\n\
-        simulation.wheels = { acceleration_m_s2 = 0.3, delay_s = 0.1 }\n\
-        [world]\ndrum = [{ at = [2.604, -0.51], radius_m = 0.254 }, { at = [3.682, -0.471], radius_m = 0.234 }]\n\
-        wall = [{ points = [[-1.2, -1.897], [8.25, -1.897], [8.25, 1.897], [-1.2, 1.897], [-1.2, -1.897]] },\n\
-                { points = [[1.894, 0.466], [2.344, 2.141]] }]";
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("heavy.toml");
-    std::fs::write(&file, text).unwrap();
-    let stated = ["--set", "robot.response={delay_s=0.1,acceleration_m_s2=0.3}"];
-    for (robot, more) in [("heavy-stated", &stated[..]), ("heavy-found", &[])] {
-        let arguments = [&["--seed", "3"], more].concat();
-        let (code, summary) = run(robot, file.to_str().unwrap(), &arguments);
-        assert_eq!((code, &summary["collisions"]), (Some(0), &0.into()), "{summary}");
-    }
-}
-
-#[test]
-fn a_long_robot_refuses_to_turn_to_its_heading_in_a_corridor_and_touches_nothing() {
-    let walls = "[{ points = [[0.8, 0.4], [3.2, 0.4], [3.2, -0.4], [0.8, -0.4]] }]";
-    let (_, summary) = long_robot("long-corridor", "[[2.2, 0, 90]]", walls);
-    assert_eq!(summary["outcome"], "unreachable", "{summary}");
-    assert_eq!(summary["collisions"], 0, "{summary}");
-    let (code, summary) = long_robot("long-return", "[[2.2, 0], [-0.5, 0, 180]]", walls);
-    assert_eq!((code, &summary["collisions"]), (Some(0), &0.into()), "{summary}");
 }

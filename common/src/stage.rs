@@ -20,7 +20,7 @@
 //!
 //! | stage | entry | output | state |
 //! |---|---|---|---|
-//! | `link` | datagram, open or closed wire, command, directive, passing time | datagrams, samples, decisions | next tick |
+//! | `link` | datagram, open or closed wire, command, directive, passing time | datagrams, samples, decisions | counts of a robot that does not count itself |
 //! | `dead-reckoning` | wheel counts | pose | pose and the counts it was computed at |
 //! | `mapper` | pose with range, reset, fault | the window of the grid that changed | the whole belief |
 //! | `planner` | grid part, pose, solved job, fault | guidance, job for the background solver | none: the next keyframe has all |

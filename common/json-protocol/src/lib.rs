@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize, de::IgnoredAny};
+use serde::{Deserialize, Deserializer, Serialize, de::IgnoredAny};
 
 /// Most bytes of a line. A scan of 16,384 beams takes 100 kB in millimetres, 360 kB with all
 /// digits.
@@ -44,7 +44,7 @@ pub struct Report {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub ranges: BTreeMap<String, Option<f64>>,
     /// Beams counter-clockwise; null for nothing in reach, negative for no reading.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "scan")]
     pub scan: Option<Vec<Option<f32>>>,
     /// Age of the scan's first beam when this line is sent, at most 2 s; by default that of the
     /// wheels.
@@ -63,9 +63,24 @@ pub struct Report {
     pub battery_v: Option<f64>,
 }
 
+/// Narrows beams to single precision, in which one that is too long is infinite. Read as such, it
+/// would be an error of its line.
+fn narrowed(beams: Vec<Option<f64>>) -> Vec<Option<f32>> {
+    beams.into_iter().map(|beam| beam.map(|beam| beam as f32)).collect()
+}
+
+fn beams<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Option<f32>>, D::Error> {
+    Vec::deserialize(from).map(narrowed)
+}
+
+fn scan<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Vec<Option<f32>>>, D::Error> {
+    Ok(Option::deserialize(from)?.map(narrowed))
+}
+
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scan {
+    #[serde(deserialize_with = "beams")]
     pub ranges: Vec<Option<f32>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_s: Option<f64>,

@@ -90,6 +90,9 @@ pub struct Arguments {
     /// Number of missions at once; by default one per processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
+    /// Drive each mission through real processes, which also measures latencies, not in one process.
+    #[arg(long)]
+    processes: bool,
     /// Directory of rows, worlds, pictures and the page.
     #[arg(long, value_name = "DIR", default_value = "evaluation")]
     out: PathBuf,
@@ -134,6 +137,7 @@ pub fn main(arguments: &Arguments) -> Result {
         pace: arguments.pace,
         pictured_seed: None,
         calibrates: arguments.calibrate,
+        processes: arguments.processes,
     };
     runner::run(&plan, &mut results, "evaluation")?;
     results.sort()?;

@@ -36,6 +36,9 @@ pub struct Arguments {
     /// Number of missions at once; by default one per processor.
     #[arg(long)]
     jobs: Option<NonZero<usize>>,
+    /// Drive each mission through real processes, which also measures latencies, not in one process.
+    #[arg(long)]
+    processes: bool,
     /// Directory of rows, missions, pictures and the page.
     #[arg(long, value_name = "DIR", default_value = "experiments")]
     out: PathBuf,
@@ -77,6 +80,7 @@ pub fn main(arguments: &Arguments) -> Result {
         let plan = Plan {
             pace: Pace::Max,
             calibrates: false,
+            processes: arguments.processes,
             trials: its.map(|it| it.trial()).collect::<Result<_>>()?,
             settings: vec![Setting { name: method.to_owned(), planner: HARMONIC.to_owned(), set }],
             repeats: *seeds,

@@ -2,6 +2,7 @@
 
 use std::{
     cell::RefCell,
+    env,
     path::{Path, PathBuf},
     process::ExitCode,
     rc::Rc,
@@ -16,6 +17,7 @@ use recording::{
     replay::{Options, replay},
 };
 use simulation::{Broken, Observer, Ran, Scenario};
+use tracing::subscriber::{DefaultGuard, NoSubscriber, set_default};
 
 use crate::error::{OrCannot as _, Result};
 
@@ -52,7 +54,14 @@ pub struct Arguments {
     set: Vec<String>,
 }
 
+/// Keeps what simulated processes log from the terminal, unless `FIRSTHAND_LOG` asks for it.
+pub fn quietly() -> Option<DefaultGuard> {
+    let is_asked = env::var_os("FIRSTHAND_LOG").is_some();
+    (!is_asked).then(|| set_default(NoSubscriber::default()))
+}
+
 pub fn main(arguments: &Arguments) -> Result<ExitCode> {
+    let _quiet = quietly();
     let mission = missions::load(&arguments.mission, &arguments.set)?;
     let first = arguments.seed.unwrap_or_else(|| {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);

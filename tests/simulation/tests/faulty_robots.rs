@@ -1,5 +1,7 @@
 //! Robots with a fault for some time, in one process.
 
+#![allow(clippy::unwrap_used)]
+
 use std::{path::Path, time::Duration};
 
 use common::{mission::Mission, samples::Cause};
@@ -29,7 +31,7 @@ fn a_robot_whose_encoders_cannot_be_true_stands_and_its_mission_ends_with_the_re
         let ran = ran("", &[at(3.0, What::Fault(Some(fault)))]);
         let ending = ran.finished.unwrap().ending;
         assert_eq!(ending.outcome.as_str(), "aborted", "{fault:?}: {ending:?}");
-        assert_eq!(ending.cause.as_deref(), Some("odometry implausible for long"), "{fault:?}");
+        assert_eq!(ending.cause, Some("odometry implausible for long"), "{fault:?}");
         let moved_s = ran.moved.unwrap().as_secs_f64() - 3.0;
         assert!(moved_s < 1.5, "{fault:?}: told to move for {moved_s} s");
     }

@@ -1,5 +1,7 @@
 //! Whole missions in lockstep, in one process.
 
+#![allow(clippy::unwrap_used)]
+
 use std::path::Path;
 
 use common::mission::Mission;
@@ -19,6 +21,12 @@ const CAR: &str = "robot.model='car'";
 fn drive(mission: &str, settings: &[&str]) -> Summary {
     let settings: Vec<_> = SURE.iter().chain(settings).map(ToString::to_string).collect();
     summary_of(&missions::load(mission, &settings).unwrap())
+}
+
+/// Drives a mission file.
+fn drive_text(text: &str) -> Summary {
+    let text = format!("sure_within_m = 9\nseed = 3\n{text}");
+    summary_of(&Mission::parse(&text, Path::new("text.toml")).unwrap())
 }
 
 fn summary_of(mission: &Mission) -> Summary {
@@ -149,10 +157,10 @@ fn an_empty_room_or_hall_is_crossed_straight_ahead_and_without_a_safety_event() 
     assert!(detour(&summary) < 1.01, "{summary:?}");
     let turned = arrives_untouched("open-room", &["start.heading_deg=90"]);
     assert!(detour(&turned) < 1.1, "{turned:?}");
-    let hall = "target = [7, 0]\nsensors = 'front'\nsure_within_m = 9\n\
-                perimeter = { width_m = 20, centre = [3.5, 0] }\n\
-                simulation.realism = 'laboratory'";
-    let hall = summary_of(&Mission::parse(hall, Path::new("hall.toml")).unwrap());
+    let hall = drive_text(
+        "target = [7, 0]\nsensors = 'front'\nperimeter = { width_m = 20, centre = [3.5, 0] }\n\
+         simulation.realism = 'laboratory'",
+    );
     assert_eq!((hall.outcome, hall.collisions), (Outcome::Reached, Some(0)), "{hall:?}");
 }
 
@@ -185,4 +193,61 @@ fn a_wheel_that_is_blocked_for_5_s_costs_a_fresh_planner_and_for_ever_the_target
         Outcome::Unreachable,
     );
     assert!(held.reason.contains("held fast") && held.replans > 1, "{held:?}");
+}
+
+#[test]
+fn by_its_laser_a_robot_whose_wheels_are_not_what_they_should_be_knows_where_it_is() {
+    for seed in seeds(3) {
+        let robot = ["robot.model='kobuki'", "robot.rate_hz=10", "controller.speed_m_s=0.5"];
+        let settings = [robot[0], robot[1], robot[2], "simulation.realism='harsh'", &seed];
+        let summary = ends("obstacle-course", &settings, Outcome::Reached);
+        assert!(summary.pose_error_m < Some(0.12), "{seed}: {summary:?}");
+    }
+}
+
+#[test]
+fn a_laser_that_is_late_and_turns_slowly_and_says_so_places_the_robot_like_a_prompt_one() {
+    for [delay_s, sweep_s] in [[0.2, 0.0], [0.0, 0.2], [0.3, 0.2]] {
+        let laser = format!("simulation.laser={{delay_s={delay_s:?},sweep_s={sweep_s:?}}}");
+        let settings = ["robot.model='kobuki'", "seed=2", &laser];
+        let summary = ends("obstacle-course", &settings, Outcome::Reached);
+        assert!(summary.pose_error_m < Some(0.1), "{laser}: {summary:?}");
+    }
+}
+
+#[test]
+fn a_long_robot_turns_behind_a_gap_narrower_than_its_length_and_refuses_to_in_a_corridor() {
+    let gap = "[{ points = [[1, -4], [1, -0.35]] }, { points = [[1, 0.35], [1, 4]] }]";
+    let corridor = "[{ points = [[0.8, 0.4], [3.2, 0.4], [3.2, -0.4], [0.8, -0.4]] }]";
+    for (targets, walls, outcome) in [
+        ("[[2.5, 0.5, 90]]", gap, Outcome::Reached),
+        ("[[2.2, 0, 90]]", corridor, Outcome::Unreachable),
+        ("[[2.2, 0], [-0.5, 0, 180]]", corridor, Outcome::Reached),
+    ] {
+        let summary = drive_text(&format!(
+            "targets = {targets}\nperimeter = {{ width_m = 8, centre = [1.5, 0] }}\n\
+             world.wall = {walls}\n[robot]\nmodel = 'jackal'\n\
+             footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]"
+        ));
+        let found = (summary.outcome, summary.collisions);
+        assert_eq!(found, (outcome, Some(0)), "{targets}: {summary:?}");
+    }
+}
+
+#[test]
+fn a_heavy_rectangle_passes_the_loose_end_of_a_wall_untouched_as_stated_and_as_found() {
+    for stated in ["robot.response = { delay_s = 0.1, acceleration_m_s2 = 0.3 }", ""] {
+        let summary = drive_text(&format!(
+            "target = [7.05, -0.44]\nstart.heading_deg = -76.5\ntimeout_s = 144\n{stated}\n\
+             perimeter = {{ width_m = 10.7, centre = [3.53, 0.12] }}\nrobot.model = 'jackal'\n\
+             simulation.wheels = {{ acceleration_m_s2 = 0.3, delay_s = 0.1 }}\n\
+             world.drum = [{{ at = [2.604, -0.51], radius_m = 0.254 }},\
+                           {{ at = [3.682, -0.471], radius_m = 0.234 }}]\n\
+             world.wall = [{{ points = [[-1.2, -1.897], [8.25, -1.897], [8.25, 1.897],\
+                                        [-1.2, 1.897], [-1.2, -1.897]] }},\
+                           {{ points = [[1.894, 0.466], [2.344, 2.141]] }}]"
+        ));
+        let found = (summary.outcome, summary.collisions);
+        assert_eq!(found, (Outcome::Reached, Some(0)), "{stated}: {summary:?}");
+    }
 }

@@ -9,7 +9,7 @@ use mission_control::outcome::RIGHT_PLACE_M;
 use simulation::{Disturbance, Promise, Random, Request, RobotFault, Scenario, What};
 
 use super::stop_time_table::{Entry, StopTimeTable};
-use crate::error::Result;
+use crate::{error::Result, simulate::quietly};
 
 /// Least time from the departure to the fault, and width of the random range.
 const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
@@ -40,6 +40,7 @@ pub fn run(
         }
         write_stderr(&format!("skipped: {left_out}\n"));
     }
+    let _quiet = quietly();
     let mut table = StopTimeTable::default();
     for fault in faults {
         let seeds = (0..u64::from(missions)).map(|number| seed + number);

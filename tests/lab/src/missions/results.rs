@@ -20,7 +20,7 @@ fn command() -> Result<String> {
     let mut given = env::args().skip(1);
     while let Some(word) = given.next() {
         match &*word {
-            "--resume" | "--json" => {}
+            "--resume" | "--json" | "--processes" => {}
             "--jobs" => drop(given.next()),
             jobs if jobs.starts_with("--jobs=") => {}
             _ => words.push(word),

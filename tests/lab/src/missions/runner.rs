@@ -1,4 +1,4 @@
-//! Missions of an evaluation, each its own `firsthand run`, several at a time.
+//! Missions of an evaluation, several at a time: each in one process or its own `firsthand run`.
 
 use std::{
     collections::BTreeSet,
@@ -12,11 +12,12 @@ use std::{
 };
 
 use common::clock::Pace;
-use console::{output::write_stderr, progress_line::ProgressLine};
+use console::{missions, output::write_stderr, progress_line::ProgressLine};
+use simulation::Scenario;
 use summary::Summary;
 
 use super::{
-    Setting,
+    HARMONIC, Setting,
     results::Results,
     row::{Latency, Outcome, Row},
     trial::Trial,
@@ -41,6 +42,8 @@ pub struct Plan {
     pub pace: Pace,
     /// After a failed calibration the mission runs uncalibrated.
     pub calibrates: bool,
+    /// Whether every mission is driven by real processes.
+    pub processes: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -223,6 +226,20 @@ impl Robot<'_> {
         Ok(())
     }
 
+    /// Drives the mission in one process, which is equal to real processes in lockstep. Returns
+    /// `None` for a mission that needs those.
+    fn in_one_process(&self) -> Result<Option<Summary>> {
+        let Job { plan, trial, setting, directory, .. } = *self.job;
+        let needs_processes = plan.processes || plan.pace != Pace::Max;
+        if needs_processes || trial.oncoming.is_some() || setting.planner != HARMONIC {
+            return Ok(None);
+        }
+        let file = world_file(directory, &self.trial.mission.name);
+        let mut mission = missions::load(&file.to_string_lossy(), &self.set)?;
+        mission.seed = self.seed;
+        Ok(Scenario::lockstep(&mission).run().summary)
+    }
+
     fn start(&self, records: bool) -> Result<Run> {
         let mut command = self.firsthand("run");
         command.args(["--pace", &self.job.plan.pace.to_string(), "--out"]).arg(&self.directory);
@@ -252,6 +269,16 @@ impl Job<'_> {
         }
         if plan.calibrates {
             robots.iter_mut().try_for_each(Robot::calibrate)?;
+        }
+        // A failed or pictured mission runs again through processes, for its picture and page.
+        if let [robot] = &robots[..]
+            && plan.pictured_seed != Some(seed)
+            && let Some(summary) = robot.in_one_process()?
+        {
+            let row = Row::new(robot.trial, robot.seed, setting, &summary);
+            if row.is_success() {
+                return Ok(vec![(row, None)]);
+            }
         }
         let run = |records| -> Result<Vec<Run>> {
             let started: Result<Vec<_>> = robots.iter().map(|robot| robot.start(records)).collect();
