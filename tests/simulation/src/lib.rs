@@ -100,15 +100,7 @@ impl Scenario {
     pub fn calm(mission: &Mission) -> Self {
         let mut mission = mission.clone();
         mission.robot.address = Some(ADDRESS.to_owned());
-        let (seed, pace) = (mission.seed, Pace::Rate(1.0));
-        Self {
-            seed,
-            mission,
-            pace,
-            load: Load::IDLE,
-            disturbances: Vec::new(),
-            while_waiting: Vec::new(),
-        }
+        Self { pace: Pace::Rate(1.0), load: Load::IDLE, ..Self::lockstep(&mission) }
     }
 
     /// Draws the robot, the load and the disturbances of such a run.

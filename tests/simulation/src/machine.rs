@@ -455,7 +455,9 @@ impl SimulatedMachine {
             && process.turns.is_some()
         {
             self.make_ready(process);
-            return;
+            if process.woken_ns > Some(self.now_ns.get()) {
+                return;
+            }
         }
         let Some(mut process) = self.processes.borrow_mut().remove(&number) else { return };
         self.running.set(number);

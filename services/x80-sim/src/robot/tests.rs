@@ -103,7 +103,7 @@ fn everything_to_the_robot_but_an_acknowledgement_is_acknowledged() {
     };
     let unknown = Frame { rid: 8, sn: 0, did: 99, data: &[1] };
     assert_eq!(answer(unknown), (Heard::Other, ack.to_vec()));
-    // A frame that speaks to a host is none of its business.
+    // The robot ignores a frame that is addressed to a host.
     let reflected = Frame { rid: 0, sn: 0, did: 255, data: &[0] };
     assert_eq!(answer(reflected), (Heard::Foreign, Vec::new()));
 }

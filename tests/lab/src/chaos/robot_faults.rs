@@ -42,18 +42,20 @@ pub fn run(
     }
     let _quiet = quietly();
     let mut table = StopTimeTable::default();
+    // Until its fault, each robot drives as the healthy one of its seed.
+    let seeds = (0..u64::from(missions)).map(|number| seed + number);
+    let healthy: Vec<_> = seeds.map(|seed| Healthy::drive(mission, seed)).collect();
     for fault in faults {
-        let seeds = (0..u64::from(missions)).map(|number| seed + number);
-        table.entries.extend(seeds.map(|seed| one(mission, fault, seed)));
+        table.entries.extend(healthy.iter().map(|healthy| one(healthy, fault)));
     }
     Ok(table)
 }
 
-fn one(mission: &Mission, fault: RobotFault, seed: u64) -> Entry {
-    let mut scenario = Scenario::calm(&Mission { seed, ..mission.clone() });
+fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
+    let mut scenario = healthy.scenario.clone();
     let at = match fault {
         RobotFault::LateFromBoot => Some(Duration::ZERO),
-        _ => onset(&scenario, fault, seed),
+        _ => healthy.onset(fault),
     };
     let watched = match fault.row().promise {
         Promise::Unharmed | Promise::EndsAtRest => WATCHED_ON_ITS_WAY,
@@ -68,6 +70,7 @@ fn one(mission: &Mission, fault: RobotFault, seed: u64) -> Entry {
         add(at + watched, What::End);
     }
     let ran = scenario.run();
+    let Scenario { seed, mission, .. } = &scenario;
     let truth = &ran.truth;
     let (mut outcome, mut reason) = match &ran.finished {
         Some(finished) => {
@@ -98,7 +101,7 @@ fn one(mission: &Mission, fault: RobotFault, seed: u64) -> Entry {
     let since = |then: Option<f64>| then.map_or(0.0, |then_s| (then_s - began_s).max(0.0));
     Entry {
         fault,
-        seed,
+        seed: *seed,
         promised_s: fault.row().rest_within_s(mission),
         fault_began: at.is_some(),
         last_moving_s: at.map(|_| since(ran.moved.map(|moved| moved.as_secs_f64()))),
@@ -111,14 +114,31 @@ fn one(mission: &Mission, fault: RobotFault, seed: u64) -> Entry {
     }
 }
 
-/// Draws the time of the fault, a while after the departure of the healthy robot.
-fn onset(healthy: &Scenario, fault: RobotFault, seed: u64) -> Option<Duration> {
-    let ran = healthy.run();
-    let departed = ran.truth.iter().find(|tick| tick.x.hypot(tick.y) >= DEPARTED_M)?;
-    let (least, more) = FAULT_AFTER_S;
-    let after_s = least + more * Random::new(seed, 17 + fault as u128).share();
-    let at = Duration::from_secs_f64(departed.time_s + after_s);
-    ran.truth.last().filter(|last| last.time_s > at.as_secs_f64()).map(|_| at)
+/// A robot without a fault.
+struct Healthy {
+    scenario: Scenario,
+    departed_s: Option<f64>,
+    ended_s: f64,
+}
+
+impl Healthy {
+    fn drive(mission: &Mission, seed: u64) -> Self {
+        let scenario = Scenario::calm(&Mission { seed, ..mission.clone() });
+        let truth = scenario.run().truth;
+        let departed = truth.iter().find(|tick| tick.x.hypot(tick.y) >= DEPARTED_M);
+        let departed_s = departed.map(|tick| tick.time_s);
+        let ended_s = truth.last().map_or(0.0, |tick| tick.time_s);
+        Self { scenario, departed_s, ended_s }
+    }
+
+    /// Draws the time of the fault, a while after the departure. Returns `None` if the mission ends
+    /// before.
+    fn onset(&self, fault: RobotFault) -> Option<Duration> {
+        let (least, more) = FAULT_AFTER_S;
+        let after_s = least + more * Random::new(self.scenario.seed, 17 + fault as u128).share();
+        let at_s = self.departed_s? + after_s;
+        (at_s < self.ended_s).then(|| Duration::from_secs_f64(at_s))
+    }
 }
 
 fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {

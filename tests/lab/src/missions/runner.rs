@@ -271,6 +271,7 @@ impl Job<'_> {
             robots.iter_mut().try_for_each(Robot::calibrate)?;
         }
         // A failed or pictured mission runs again through processes, for its picture and page.
+        let mut records = plan.pace != Pace::Max;
         if let [robot] = &robots[..]
             && plan.pictured_seed != Some(seed)
             && let Some(summary) = robot.in_one_process()?
@@ -279,13 +280,14 @@ impl Job<'_> {
             if row.is_success() {
                 return Ok(vec![(row, None)]);
             }
+            records = true;
         }
         let run = |records| -> Result<Vec<Run>> {
             let started: Result<Vec<_>> = robots.iter().map(|robot| robot.start(records)).collect();
             started?.into_iter().map(|run| run.wait(LINE_EVERY, || ())).collect()
         };
         let mut rows = Vec::new();
-        for (robot, run) in robots.iter().zip(run(plan.pace != Pace::Max)?) {
+        for (robot, run) in robots.iter().zip(run(records)?) {
             let summary = run.summary();
             let has_summary = summary.is_ok();
             let summary = summary.unwrap_or_else(|reason| {
@@ -304,7 +306,7 @@ impl Job<'_> {
             .zip(&rows)
             .filter(|(_, (row, _))| !matches!(row.outcome, Outcome::Success | Outcome::Aborted));
         // Recording every mission would take too much space; in lockstep a rerun is bit-equal.
-        if plan.pace == Pace::Max && paged.clone().next().is_some() {
+        if !records && paged.clone().next().is_some() {
             for robot in &robots {
                 let _ = fs::remove_dir_all(&robot.directory);
             }
