@@ -3,6 +3,7 @@
 use std::{
     cell::RefCell,
     env,
+    fs::File,
     path::{Path, PathBuf},
     process::ExitCode,
     rc::Rc,
@@ -49,10 +50,72 @@ pub struct Arguments {
     /// Replay every generation of every stage, which must give the same samples to the bit.
     #[arg(long)]
     replay: bool,
+    /// Append a row of totals to a CSV file.
+    #[arg(long, value_name = "FILE")]
+    rows: Option<PathBuf>,
     /// Set a mission key; repeatable.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
+
+/// Totals of all runs.
+#[derive(Default)]
+struct Totals {
+    broken: u64,
+    events: u64,
+    simulated_s: f64,
+    /// Disturbances that fell into the runs.
+    disturbances: usize,
+    supervisors_killed: u32,
+}
+
+impl Totals {
+    fn add(&mut self, scenario: &Scenario, ran: &Ran) {
+        let drawn = scenario.disturbances.iter();
+        self.broken += u64::from(ran.broken.is_some());
+        self.events += ran.events;
+        self.simulated_s += ran.simulated.as_secs_f64();
+        self.disturbances += drawn.filter(|drawn| drawn.at < ran.simulated).count();
+        self.supervisors_killed += ran.supervisors - 1;
+    }
+
+    /// Appends a row to `file`, and the header if the file is new.
+    fn append(&self, arguments: &Arguments, first: u64, minutes: f64, file: &Path) -> Result {
+        let is_new = !file.exists();
+        let file =
+            File::options().create(true).append(true).open(file).or_cannot("open the rows")?;
+        let mut writer = csv::Writer::from_writer(file);
+        if is_new {
+            writer.write_record(HEADINGS)?;
+        }
+        writer.write_record([
+            "seeds",
+            &arguments.mission,
+            &first.to_string(),
+            &arguments.count.to_string(),
+            &self.broken.to_string(),
+            &self.disturbances.to_string(),
+            &self.supervisors_killed.to_string(),
+            &self.events.to_string(),
+            &format!("{:.1}", self.simulated_s / 3600.0),
+            &format!("{minutes:.1}"),
+        ])?;
+        Ok(writer.flush()?)
+    }
+}
+
+const HEADINGS: [&str; 10] = [
+    "section",
+    "mission",
+    "first seed",
+    "runs",
+    "broken",
+    "disturbances",
+    "supervisors killed",
+    "events",
+    "hours of mission",
+    "minutes",
+];
 
 /// Keeps what simulated processes log from the terminal, unless `FIRSTHAND_LOG` asks for it.
 pub fn quietly() -> Option<DefaultGuard> {
@@ -68,33 +131,36 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         now.map_or(0, |since| since.as_nanos() as u64)
     });
     let began = Instant::now();
-    let mut failures = 0_u64;
-    let (mut events, mut simulated_s, mut supervisors) = (0, 0.0, 0);
+    let mut totals = Totals::default();
     for seed in (0..arguments.count).map(|nth| first.wrapping_add(nth)) {
         let scenario = match arguments.undisturbed {
             true => Scenario::lockstep(&mission),
             false => Scenario::draw(&mission, seed),
         };
         let ran = run(&scenario, arguments)?;
-        events += ran.events;
-        simulated_s += ran.simulated.as_secs_f64();
-        supervisors += ran.supervisors - 1;
+        totals.add(&scenario, &ran);
         if arguments.verbose {
             show(&scenario)?;
             let outcome = ran.finished.as_ref().map(|finished| &finished.ending);
             print_line(format!("seed {seed}: {outcome:?} after {} events", ran.events))?;
         }
         if let Some(broken) = ran.broken {
-            failures += 1;
             report(&scenario, &broken, arguments)?;
         }
     }
+    let seconds = began.elapsed().as_secs_f64();
     print_line(format!(
-        "{} runs from seed {first}: {failures} broke an invariant; {events} events in {simulated_s:.0} s of mission, {supervisors} supervisors killed, {:.1} s",
+        "{} runs from seed {first}: {} broke an invariant; {} events in {:.0} s of mission, {} supervisors killed, {seconds:.1} s",
         arguments.count,
-        began.elapsed().as_secs_f64()
+        totals.broken,
+        totals.events,
+        totals.simulated_s,
+        totals.supervisors_killed,
     ))?;
-    Ok(if failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    if let Some(file) = &arguments.rows {
+        totals.append(arguments, first, seconds / 60.0, file)?;
+    }
+    Ok(if totals.broken == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Runs `scenario`; records and replays it if asked.

@@ -90,7 +90,7 @@ pub(crate) struct Invariants {
     wire_is_calm: bool,
     obeys: bool,
     obedience_changed: Duration,
-    /// Whether a fault has made the robot's reports untrue.
+    /// Whether a fault or a touch has made the robot's reports untrue.
     has_lied: bool,
     /// Stages that were disturbed, and when.
     disturbed: Vec<(&'static str, Duration)>,
@@ -258,6 +258,8 @@ impl Invariants {
         while let Some(pose) = observed.pose.next_sample().map_err(unread)? {
             // Frames may be late, so the counts find the truth of a pose.
             let truth = machine.truth_of(&pose);
+            // What touches the robot pushes it past its wheels.
+            self.has_lied |= truth.is_some_and(|truth| truth.contacts > 0);
             let off_m = truth.map_or(0.0, |truth| truth.pose_error_m(&pose));
             let most_m = pose_bound_m(&pose);
             holds(self.has_lied || off_m <= most_m, "a pose is where the robot was", || {
