@@ -217,10 +217,8 @@ impl DeadReckoning {
             let counted = self.moved(last, counts, wheels, elapsed);
             rejected = counted.is_none();
             let Twist { v: arc, omega: turn } = counted.unwrap_or_default();
-            // Without ticks there are no commands, so the wheels soon rest.
-            let lost_s = if rejected { elapsed.min(self.turns_on_s) } else { 0.0 };
-            assert!(elapsed >= 0.0 && (0.0..=self.turns_on_s).contains(&lost_s));
-            let lost_m = self.body.top_speed_m_s * lost_s;
+            assert!(elapsed >= 0.0);
+            let lost_m = if rejected { self.lost_m(last, counts, elapsed) } else { 0.0 };
             tick = Tick { seconds: elapsed, arc, turn, lost_m, ..tick };
             motion = self.state.history.newest.moved(&self.motions, &tick);
         }
@@ -352,6 +350,22 @@ impl DeadReckoning {
         };
     }
 
+    /// Returns the longest way behind counts that are left out. The step may be motion whose frames
+    /// came late, all at once.
+    fn lost_m(&self, last: Last, counts: WheelCounts, elapsed: f64) -> f64 {
+        let [left, right] = counts.since(self.counts_at(last));
+        let step_m = left.abs().max(right.abs()) * self.body.metres_per_count();
+        let [possible_m, most_m] = [elapsed, self.turns_on_s].map(|s| self.body.top_speed_m_s * s);
+        // Without ticks there are no commands, so the wheels soon rest.
+        step_m.max(possible_m).min(most_m)
+    }
+
+    fn counts_at(&self, last: Last) -> WheelCounts {
+        self.state.counts.map_or(WheelCounts::Cyclic([last.left, last.right]), |it| {
+            WheelCounts::Endless([it.left_counts, it.right_counts])
+        })
+    }
+
     /// Returns metres and radians; none if wheels cannot turn so.
     fn moved(
         &self,
@@ -360,9 +374,7 @@ impl DeadReckoning {
         wheels: &WheelSample,
         elapsed: f64,
     ) -> Option<Twist> {
-        let before = self.state.counts.map_or(WheelCounts::Cyclic([last.left, last.right]), |it| {
-            WheelCounts::Endless([it.left_counts, it.right_counts])
-        });
+        let before = self.counts_at(last);
         let [left, right] = counts.since(before);
         let per_count = std::f64::consts::TAU / self.body.counts_per_turn;
         let top = self.body.top_speed_m_s / self.body.metres_per_count();

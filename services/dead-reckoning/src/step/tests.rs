@@ -202,6 +202,19 @@ fn a_motion_that_nobody_measured_is_in_the_covariance() {
 }
 
 #[test]
+fn a_step_that_is_left_out_is_in_the_covariance_although_its_frames_came_at_once() {
+    let mut reckoning = begun("", 600, 600);
+    let before = reckoning.take(1, 600, 600);
+    let mut late = WheelSample { restarts: 1, ..wheels(2, 1600, 1600) };
+    late.stamp.stamp_ns = before.stamp.stamp_ns;
+    let after = reckoning.alone(&late);
+    assert!(after.rejected);
+    // A wheel turn is 0.2 pi metres, more than the 0.594 m in which the wheels rest.
+    let lost = (1.0 / 7.0 + 0.45_f64).powi(2) / 3.0;
+    close(after.pose.covariance[0] - before.covariance[0], lost / 2.0);
+}
+
+#[test]
 fn counters_that_restart_do_not_move_the_robot() {
     // At once, while the robot was away, or while the link was killed. Wheels could have turned this
     // far in 5 s.
