@@ -173,9 +173,11 @@ impl Observer {
         while let Some(link) = self.link.next_sample()? {
             listener(Heard::Link(&link));
             record.link = Some(link);
-            // Without motor frames the link begins no tick that a stage could answer.
             if link.at_rest() != Rest::Unknown {
-                stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
+                // Before its first tick, which it begins with motor frames, the link states 0 too.
+                if link.stamp.tick > 0 {
+                    stages.on_output(topics::LINK.spec().writer, link.stamp.tick);
+                }
                 record.rest_read = Some(Instant::now());
             }
         }
