@@ -24,11 +24,21 @@ pub fn scheduled(task: &str) -> Option<[Duration; 2]> {
     Some([times.next()?, times.next()?])
 }
 
+/// Returns whether a thread waits for a disk. `task` is its path below `/proc`.
+pub fn waits_for_disk(task: &str) -> bool {
+    stat(task).is_some_and(|fields| fields.starts_with('D'))
+}
+
+/// Returns the fields after the name, from the state on.
+fn stat(task: &str) -> Option<String> {
+    let stat = fs::read_to_string(format!("/proc/{task}/stat")).ok()?;
+    // The name in parentheses may contain any characters.
+    Some(stat.rsplit_once(") ")?.1.to_owned())
+}
+
 pub fn processor_time(process: u32) -> Option<Duration> {
-    let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The name in parentheses may contain any characters; numbers follow.
-    let (_, numbers) = stat.rsplit_once(") ")?;
-    let mut times = numbers.split_ascii_whitespace().skip(11);
+    let fields = stat(&process.to_string())?;
+    let mut times = fields.split_ascii_whitespace().skip(11);
     let mut time = || times.next()?.parse::<u64>().ok();
     let ticks = time()?.saturating_add(time()?);
     Some(Duration::from_secs_f64(ticks as f64 / clock_ticks_per_second() as f64))

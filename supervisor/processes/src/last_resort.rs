@@ -17,7 +17,7 @@ use std::{
 
 use common::{
     domain::Domain,
-    process_status::scheduled,
+    process_status::{scheduled, waits_for_disk},
     signals::{Signals, exit_at_once},
 };
 use rustix::{
@@ -54,28 +54,36 @@ impl Turns {
     }
 
     fn await_stuck(&self, thread: Pid) {
-        let (mut seen, mut stuck, mut waited) = (0, Duration::ZERO, processor_awaited(thread));
+        let task = task(thread);
+        let (mut seen, mut stuck, mut waited) = (0, Duration::ZERO, processor_awaited(&task));
         loop {
             let now = self.count.load(Ordering::Relaxed);
             if now != seen || self.rests.load(Ordering::Relaxed) {
-                (seen, stuck, waited) = (now, Duration::ZERO, processor_awaited(thread));
+                (seen, stuck, waited) = (now, Duration::ZERO, processor_awaited(&task));
             }
             // A starved loop is alive.
-            let waits = processor_awaited(thread).saturating_sub(waited);
+            let waits = processor_awaited(&task).saturating_sub(waited);
             if stuck.saturating_sub(waits) >= STUCK {
                 return;
             }
             let began = Instant::now();
             thread::park_timeout(LOOK_EVERY);
-            // If this thread has to wait, so does the loop.
-            stuck += began.elapsed().min(2 * LOOK_EVERY);
+            // If this thread has to wait, so does the loop. A save to a busy disk is no hang either.
+            if !waits_for_disk(&task) {
+                stuck += began.elapsed().min(2 * LOOK_EVERY);
+            }
         }
     }
 }
 
+/// Returns the path of a thread below `/proc`.
+fn task(thread: Pid) -> String {
+    format!("self/task/{thread}")
+}
+
 /// Returns zero if uncounted.
-fn processor_awaited(thread: Pid) -> Duration {
-    scheduled(&format!("self/task/{thread}")).map_or(Duration::ZERO, |[_, awaited]| awaited)
+fn processor_awaited(task: &str) -> Duration {
+    scheduled(task).map_or(Duration::ZERO, |[_, awaited]| awaited)
 }
 
 pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
