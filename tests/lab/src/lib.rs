@@ -9,6 +9,7 @@ mod both_ways;
 mod bring_up;
 mod certify;
 mod chaos;
+mod corpus;
 mod error;
 mod evaluate;
 mod experiments;
@@ -46,6 +47,7 @@ enum Command {
     Certify(certify::Arguments),
     Simulate(simulate::Arguments),
     BothWays(both_ways::Arguments),
+    Corpus(corpus::Arguments),
     /// Measure tick latency; test a robot with random signals and faults.
     #[command(subcommand)]
     Bench(Bench),
@@ -88,6 +90,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
         Command::Certify(arguments) => certify::main(arguments),
         Command::Simulate(arguments) => return simulate::main(arguments),
         Command::BothWays(arguments) => return both_ways::main(arguments),
+        Command::Corpus(arguments) => corpus::main(arguments),
         Command::Field(arguments) => field::main(arguments),
         Command::Stage(arguments) => baselines::process::main(arguments),
         Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),

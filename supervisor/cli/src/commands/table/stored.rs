@@ -24,6 +24,7 @@ static FILES: &[(&str, &str)] = stored! {
     "experiments" in "results/experiments.csv",
     "claims" in "results/claims.csv",
     "stop-times" in "results/stop_times.csv",
+    "corpus" in "results/corpus.csv",
     "tick" in "results/tick.csv",
     "tick-at-7-hz" in "results/tick_at_7_hz.csv",
     "field" in "results/field.csv",

@@ -1,0 +1,398 @@
+//! `corpus`: residuals of healthy missions, tick by tick, from which thresholds of suspicion come.
+//!
+//! A residual is what a source says less what the others predict. Robots, realism, sensors, radio
+//! and load are drawn. Nothing is faulty, so every residual is one that a monitor has to accept.
+
+use std::{
+    cell::RefCell,
+    collections::{BTreeMap, HashMap},
+    num::NonZero,
+    path::{Path, PathBuf},
+    rc::Rc,
+    thread,
+};
+
+use clap::Args;
+use common::{
+    bus::{Bus, BusError, Reader},
+    ground_truth::GroundTruthTick,
+    mission::{Mission, ModelledSpeed, Sensor, SensorKind},
+    samples::{
+        CommandSample, FixSample, PoseSample, RangeReading, RangeStatus, RangesHeader, TurnSample,
+    },
+    topics,
+    wire::COUNT_CYCLE,
+};
+use console::{missions, output::print_line};
+use glam::{DMat2, DVec2};
+use simulation::{Load, Observer, Random, Scenario};
+
+use crate::{
+    error::{OrCannot as _, Result},
+    missions::{runner::in_parallel, trial::swept_m},
+    simulate,
+    worlds::{self, Asked},
+};
+
+/// Stream of the drawn robots.
+const STREAM: u64 = 20;
+const WORLDS: [&str; 6] = ["rooms", "doors", "furnished", "corridors", "glazed", "people"];
+/// Keys of each robot.
+const ROBOTS: [(&str, &[&str]); 8] = [
+    ("X80", &["robot.model='x80'"]),
+    ("X80SV", &["robot.model='x80sv'"]),
+    ("JSON, sonars and gyro", &["robot.protocol='json'", "robot.gyro=true"]),
+    ("Jackal", &["robot.model='jackal'"]),
+    ("Kobuki", &["robot.model='kobuki'"]),
+    ("Create 3", &["robot.model='create3'"]),
+    ("TurtleBot 4", &["robot.model='turtlebot4'"]),
+    ("TurtleBot3 Burger", &["robot.model='turtlebot3-burger'"]),
+];
+const REALISMS: [&str; 3] = ["laboratory", "measured", "harsh"];
+const OUTAGES: [f64; 4] = [0.0, 0.0, 0.0, 0.1];
+/// Longest interval of poses over which a residual is taken, seconds.
+const LONGEST_S: f64 = 1.0;
+/// Largest turn between two echoes of the same surface, rad.
+const SAME_SURFACE_RAD: f64 = 0.02;
+/// Largest change of an echo's distance on the same surface, metres.
+const SAME_SURFACE_M: f64 = 0.3;
+
+/// Drive healthy missions of drawn robots in one process, and measure how far what each source
+/// says is from what the others predict.
+///
+/// Writes `corpus.csv`, a row per robot and residual, and `residuals.csv`, a row per residual.
+#[derive(Debug, Args)]
+pub struct Arguments {
+    /// Number of missions.
+    #[arg(long, default_value_t = 2000)]
+    count: u64,
+    /// Seed of robots, worlds and noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Directory of the tables.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Number of missions at once; by default one per processor.
+    #[arg(long)]
+    jobs: Option<NonZero<usize>>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+enum Source {
+    Way,
+    Turn,
+    Gyro,
+    Echo,
+    ScanFix,
+    Interval,
+    Pose,
+}
+
+impl Source {
+    /// Returns the residual in words, with its unit.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Way => "way of the wheels less that of the stated response, m per tick",
+            Self::Turn => "turn of the wheels less that of the stated response, rad per tick",
+            Self::Gyro => "turn of the gyro less that of the wheels, rad per tick",
+            Self::Echo => "echo less the last one and the way between, m",
+            Self::ScanFix => "scan fix less pose, squared over both variances",
+            Self::Interval => "interval of ticks less the nominal one, s",
+            Self::Pose => "pose less ground truth, squared over its variance",
+        }
+    }
+}
+
+struct Residual {
+    source: Source,
+    tick: u64,
+    value: f64,
+}
+
+struct Drawn {
+    number: u64,
+    robot: &'static str,
+    scenario: Scenario,
+}
+
+pub fn main(arguments: &Arguments) -> Result {
+    let Arguments { count, seed, .. } = *arguments;
+    let directory = &arguments.out;
+    std::fs::create_dir_all(directory).or_cannot_file("make", directory)?;
+    let mut rows = csv::Writer::from_path(directory.join("residuals.csv"))?;
+    rows.write_record(["mission", "robot", "residual", "tick", "value"])?;
+    let threads = arguments.jobs.or(thread::available_parallelism().ok()).map_or(1, NonZero::get);
+    let mut all: BTreeMap<(&str, Source), Vec<f64>> = BTreeMap::new();
+    let drive = |&number: &u64, _: usize| {
+        let _quiet = simulate::quietly();
+        let driven = draw(seed, number).and_then(|drawn| {
+            let residuals = residuals(&drawn)?;
+            Ok((drawn.number, drawn.robot, residuals))
+        });
+        driven.map_err(|error| error.to_string())
+    };
+    in_parallel((0..count).collect(), threads, drive, |driven| {
+        let (number, robot, residuals) = driven?;
+        for Residual { source, tick, value } in residuals {
+            let name = format!("{source:?}");
+            let [number, tick] = [number, tick].map(|it| it.to_string());
+            rows.write_record([&number, robot, &name, &tick, &format!("{value:.6}")])?;
+            all.entry((robot, source)).or_default().push(value);
+        }
+        Ok(())
+    })?;
+    rows.flush()?;
+    summarize(all, &directory.join("corpus.csv"))?;
+    print_line(format!("{count} missions from seed {seed}; see {}", directory.display()))?;
+    Ok(())
+}
+
+fn summarize(all: BTreeMap<(&str, Source), Vec<f64>>, file: &Path) -> Result {
+    let mut summary = csv::Writer::from_path(file)?;
+    summary.write_record([
+        "section", "residual", "robot", "ticks", "mean", "median", "99 %", "99.9 %", "largest",
+    ])?;
+    for ((robot, source), values) in all {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let mut sizes: Vec<_> = values.iter().map(|value| value.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let at = |share: f64| sizes[((sizes.len() - 1) as f64 * share) as usize];
+        let figures = [mean, at(0.5), at(0.99), at(0.999), at(1.0)];
+        let count = values.len().to_string();
+        let figures = figures.map(|figure| format!("{figure:.4}"));
+        let row = ["corpus", source.name(), robot, &count].into_iter();
+        summary.write_record(row.chain(figures.iter().map(String::as_str)))?;
+    }
+    Ok(summary.flush()?)
+}
+
+/// Draws a mission.
+fn draw(seed: u64, number: u64) -> Result<Drawn> {
+    let random = &mut Random::of_world(seed, STREAM, number);
+    let (robot, keys) = ROBOTS[random.below(ROBOTS.len())];
+    let mut keys: Vec<String> = keys.iter().map(ToString::to_string).collect();
+    keys.push(format!("simulation.realism='{}'", REALISMS[random.below(REALISMS.len())]));
+    let outage = OUTAGES[random.below(OUTAGES.len())];
+    keys.push(format!("simulation.radio.outage_share={outage}"));
+    let body = missions::parsed("target = [1, 0]", "corpus", &keys)?;
+    let asked = Asked { count: Some(1), seed: random.bits(), ends: None, swept_m: swept_m(&body) };
+    let mut found = worlds::find(WORLDS[random.below(WORLDS.len())], asked)?;
+    let world = toml::to_string(&found.trials.swap_remove(0).mission)?;
+    let mut mission = missions::parsed(&world, "corpus", &keys)?;
+    mission.seed = random.bits() >> 1;
+    let loads = [Load::IDLE, Load::BUSY, Load::OVERLOADED];
+    let load = loads[random.below(loads.len())];
+    Ok(Drawn { number, robot, scenario: Scenario { load, ..Scenario::calm(&mission) } })
+}
+
+fn residuals(drawn: &Drawn) -> Result<Vec<Residual>> {
+    let mission = &drawn.scenario.mission;
+    let watch = Rc::new(RefCell::new(Watch::new(mission)));
+    let ran = drawn.scenario.run_before(Some(Box::new(Watcher(Rc::clone(&watch)))));
+    if let Some(broken) = ran.broken {
+        return Err(format!("mission {}: {broken}", drawn.number).into());
+    }
+    let watch = Rc::into_inner(watch).map(RefCell::into_inner);
+    let mut watch = watch.ok_or("the simulation still watches a run that has ended")?;
+    watch.failed.take().map_or(Ok(()), Err).or_cannot("read the bus of a simulation")?;
+    watch.judge_poses(&ran.truth);
+    Ok(watch.found)
+}
+
+struct Watcher(Rc<RefCell<Watch>>);
+
+impl Observer for Watcher {
+    fn on_bus(&mut self, bus: &Bus) {
+        let mut watch = self.0.borrow_mut();
+        match Readers::open(bus) {
+            Ok(readers) => watch.readers = Some(readers),
+            Err(error) => watch.failed = Some(error),
+        }
+    }
+
+    fn observe(&mut self) {
+        let mut watch = self.0.borrow_mut();
+        if let Some(mut readers) = watch.readers.take() {
+            if let Err(error) = watch.take(&mut readers) {
+                watch.failed = Some(error);
+            }
+            watch.readers = Some(readers);
+        }
+    }
+}
+
+struct Readers {
+    command: Reader<CommandSample>,
+    pose: Reader<PoseSample>,
+    turn: Reader<TurnSample>,
+    fix: Reader<FixSample>,
+    ranges: Reader<RangesHeader, RangeReading>,
+}
+
+impl Readers {
+    fn open(bus: &Bus) -> std::result::Result<Self, BusError> {
+        Ok(Self {
+            command: bus.reader(&topics::COMMAND)?,
+            pose: bus.reader(&topics::POSE)?,
+            turn: bus.reader(&topics::IMU_TURN)?,
+            fix: bus.reader(&topics::SCAN_FIX)?,
+            ranges: bus.reader(&topics::RANGES)?,
+        })
+    }
+}
+
+/// Residuals of a run.
+struct Watch {
+    readers: Option<Readers>,
+    failed: Option<BusError>,
+    found: Vec<Residual>,
+    sensors: Vec<Sensor>,
+    metres_per_count: f64,
+    wheel_radius_m: f64,
+    track_m: f64,
+    tick_s: f64,
+    /// Forward speed and turn rate by the stated response.
+    base: [ModelledSpeed; 2],
+    poses: Vec<PoseSample>,
+    /// Turn by the gyro that ends at a mission time, rad.
+    gyro: HashMap<u64, f64>,
+    /// Last echo of a sensor, with the index of its pose.
+    echoes: HashMap<u8, (usize, f64)>,
+}
+
+impl Watch {
+    fn new(mission: &Mission) -> Self {
+        let body = mission.body();
+        let response = body.response;
+        let axis = |most| ModelledSpeed::new(response.dead_time_s(), most);
+        Self {
+            readers: None,
+            failed: None,
+            found: Vec::new(),
+            sensors: mission.sensor_table(),
+            metres_per_count: body.metres_per_count(),
+            wheel_radius_m: body.wheel_radius_m,
+            track_m: body.track_m,
+            tick_s: 1.0 / mission.robot.rate_hz,
+            base: [response.acceleration_m_s2, response.turn_acceleration_rad_s2].map(axis),
+            poses: Vec::new(),
+            gyro: HashMap::new(),
+            echoes: HashMap::new(),
+        }
+    }
+
+    fn find(&mut self, source: Source, tick: u64, value: f64) {
+        if value.is_finite() {
+            self.found.push(Residual { source, tick, value });
+        }
+    }
+
+    fn take(&mut self, readers: &mut Readers) -> std::result::Result<(), BusError> {
+        while let Some(command) = readers.command.next_sample()? {
+            let at_s = seconds(command.stamp.stamp_ns);
+            let [left, right] = [command.left_rad_s, command.right_rad_s];
+            self.base[0].command(at_s, self.wheel_radius_m * f64::midpoint(left, right));
+            self.base[1].command(at_s, self.wheel_radius_m * (right - left) / self.track_m);
+        }
+        while let Some(pose) = readers.pose.next_sample()? {
+            self.on_pose(pose);
+        }
+        while let Some(turn) = readers.turn.next_sample()? {
+            self.gyro.insert(turn.capture_ns, turn.turn_rad);
+        }
+        while let Some(fix) = readers.fix.next_sample()? {
+            let mut poses = self.poses.iter().rev();
+            if let Some(pose) = poses.find(|pose| pose.stamp.stamp_ns == fix.capture_ns) {
+                let off = DVec2::new(fix.x_m - pose.x_m, fix.y_m - pose.y_m);
+                let variance = of_place(&fix.covariance) + of_place(&pose.covariance);
+                self.find(Source::ScanFix, fix.stamp.tick, squared_over(off, variance));
+            }
+        }
+        while let Some(slice) = readers.ranges.next_slice()? {
+            let tick = slice.header().stamp.tick;
+            for reading in slice.iter() {
+                self.on_echo(tick, reading);
+            }
+        }
+        Ok(())
+    }
+
+    fn on_pose(&mut self, pose: PoseSample) {
+        let at_s = seconds(pose.stamp.stamp_ns);
+        let [way, turn] = self.base.each_mut().map(|axis| axis.go_on(at_s));
+        if let Some(before) = self.poses.last() {
+            let for_s = at_s - seconds(before.stamp.stamp_ns);
+            let tick = pose.stamp.tick;
+            let left = self.metres(before.left_counts, pose.left_counts);
+            let right = self.metres(before.right_counts, pose.right_counts);
+            let wheels = (right - left) / self.track_m;
+            self.find(Source::Interval, tick, for_s - self.tick_s);
+            if for_s < LONGEST_S {
+                if let Some(gyro) = self.gyro.remove(&pose.stamp.stamp_ns) {
+                    self.find(Source::Gyro, tick, gyro - wheels);
+                }
+                self.find(Source::Way, tick, f64::midpoint(left, right) - way);
+                self.find(Source::Turn, tick, wheels - turn);
+            }
+        }
+        self.poses.push(pose);
+    }
+
+    fn metres(&self, from: u16, to: u16) -> f64 {
+        let cycle = i32::from(COUNT_CYCLE);
+        let counts = (i32::from(to) - i32::from(from)).rem_euclid(cycle);
+        let signed = if counts > cycle / 2 { counts - cycle } else { counts };
+        f64::from(signed) * self.metres_per_count
+    }
+
+    /// Compares an echo with the last one of its sensor.
+    fn on_echo(&mut self, tick: u64, reading: &RangeReading) {
+        let Some(sensor) = self.sensors.get(usize::from(reading.sensor)) else { return };
+        let is_echo = sensor.kind == SensorKind::Cone && reading.status() == RangeStatus::Measured;
+        let Some(now) = self.poses.len().checked_sub(1).filter(|_| is_echo) else { return };
+        let axis = sensor.mount.bearing_rad + sensor.mount.turned_rad;
+        let last = self.echoes.insert(reading.sensor, (now, reading.range_m));
+        let Some((before, range_m)) = last else { return };
+        let [before, now] = [before, now].map(|at| &self.poses[at]);
+        let moved = DVec2::new(now.x_m - before.x_m, now.y_m - before.y_m);
+        let nearer_m = moved.dot(DVec2::from_angle(now.heading_rad + axis));
+        let off_m = reading.range_m - (range_m - nearer_m);
+        let turned_rad = (now.heading_rad - before.heading_rad).abs();
+        if turned_rad < SAME_SURFACE_RAD && off_m.abs() < SAME_SURFACE_M {
+            self.find(Source::Echo, tick, off_m);
+        }
+    }
+
+    /// Compares poses with the ground truth of their counts. A robot that something touches is not
+    /// healthy from then on.
+    fn judge_poses(&mut self, truth: &[GroundTruthTick]) {
+        let mut rest = truth;
+        for pose in std::mem::take(&mut self.poses) {
+            let Some(at) = rest.iter().position(|truth| truth.is_of(&pose)) else { continue };
+            rest = &rest[at..];
+            if rest[0].contacts > 0 {
+                self.found.retain(|residual| residual.tick < pose.stamp.tick);
+                break;
+            }
+            let off = DVec2::new(pose.x_m - rest[0].x, pose.y_m - rest[0].y);
+            let error = squared_over(off, of_place(&pose.covariance));
+            self.find(Source::Pose, pose.stamp.tick, error);
+        }
+    }
+}
+
+fn seconds(nanoseconds: u64) -> f64 {
+    nanoseconds as f64 * 1e-9
+}
+
+/// Returns the covariance of x and y, of which a millimetre each is not asked.
+fn of_place(covariance: &[f64; 6]) -> DMat2 {
+    let [xx, xy, _, yy, ..] = *covariance;
+    DMat2::from_cols(DVec2::new(xx + 1e-6, xy), DVec2::new(xy, yy + 1e-6))
+}
+
+/// Returns the square of `off` over its variance, per dimension: 1 in the mean if the variance is
+/// true.
+fn squared_over(off: DVec2, variance: DMat2) -> f64 {
+    off.dot(variance.inverse() * off) / 2.0
+}
