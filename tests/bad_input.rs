@@ -1,14 +1,14 @@
 //! Tests that bad input gives an error code, the input's name, a remedy and a non-zero exit, and
 //! leaves no process.
 
-use std::net::UdpSocket;
+use std::{fs, net::UdpSocket, path::Path, process::Command};
 
 use crate::support::{
     Run, assert_nothing_left, assert_refused, json_of, output, refused, wait_for_status,
 };
 
 #[test]
-fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike() {
+fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_and_not_tried_again() {
     let cases = [
         ("target = [99, 0]", "1: target: ", "perimeter.width_m"),
         ("target = [3, 0]\n[perimeter]\ncells = 3", "3: perimeter.cells: ", "10 to 2048"),
@@ -21,7 +21,7 @@ fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike
     let file = directory.path().join("bad.toml");
     let path = file.to_str().unwrap();
     for (content, place, remedy) in cases {
-        std::fs::write(&file, content).unwrap();
+        fs::write(&file, content).unwrap();
         let place = format!("{path}:{place}");
         let check = output(&["check", path]);
         let exit = assert_refused(&check, "mission", &[&place, remedy]);
@@ -29,22 +29,41 @@ fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_alike
         let run = output(&["run", path, "--robot", "bad"]);
         assert_eq!(check, run, "{content:?}");
     }
+    let pipe = directory.path().join("pipe.toml");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    refused(&["check", pipe.to_str().unwrap()], "mission", &["pipe.toml"]);
+    let run = ["run", "open-room", "--robot", "bad", "--set"];
+    for (setting, code) in [
+        ("robot.address='nowhere'", "mission"),
+        ("planner.executable='/no/such/planner'", "planner-executable"),
+    ] {
+        assert_eq!(refused(&[&run[..], &[setting]].concat(), code, &[]), Some(78));
+    }
+    for unit in ["firsthand", "firsthand-watch"] {
+        let file = format!("{}/../systemd/{unit}.service", env!("CARGO_MANIFEST_DIR"));
+        let unit = fs::read_to_string(&file).unwrap();
+        let setting = |key: &str| unit.lines().find_map(|line| line.strip_prefix(key));
+        let never = setting("RestartPreventExitStatus=").unwrap();
+        assert!(never.split(' ').any(|code| code == "78"), "{file}: {never}");
+        assert!(setting("ExecStopPost=").unwrap().contains(" stop --robot "), "{file}");
+        assert!(setting("ExecStart=").unwrap().contains(" --keep "), "{file}");
+        assert_eq!(setting("LimitCORE="), None, "{file}");
+    }
     assert_nothing_left("bad");
 }
 
 #[test]
 fn status_names_the_trouble_of_a_stage_that_cannot_start() {
     let laser = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-arduino/laser.toml");
-    let text = std::fs::read_to_string(laser).unwrap();
+    let text = fs::read_to_string(laser).unwrap();
     let model = "model = \"rplidar-a1\"";
     let nowhere = format!("{model}\naddress = \"tcp://no-such-host.invalid:1\"");
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("laser.toml");
-    std::fs::write(&file, text.replace(model, &nowhere)).unwrap();
+    fs::write(&file, text.replace(model, &nowhere)).unwrap();
     let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = format!("robot.address='udp://{}'", silent.local_addr().unwrap());
-    let mission = file.to_str().unwrap();
-    let run = Run::start("no-host", mission, &["--set", &address]);
+    let run = Run::start("no-host", file.to_str().unwrap(), &["--set", &address]);
     let named = |status: &serde_json::Value| {
         status["complaint"].to_string().contains("no-such-host.invalid")
     };
@@ -57,17 +76,11 @@ fn status_names_the_trouble_of_a_stage_that_cannot_start() {
     assert_nothing_left("no-host");
 }
 
-#[cfg(not(feature = "ros2"))]
-#[test]
-fn a_robot_of_ros_2_is_refused_without_the_feature_that_speaks_it() {
-    let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-ros2-robot/robot.toml");
-    assert_refused(&output(&["run", robot, "--robot", "bad"]), "mission", &["--features ros2"]);
-    assert_nothing_left("bad");
-}
-
 #[test]
 fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
-    let cases: [(&[&str], _, &[&str]); 21] = [
+    let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let taken = taken.local_addr().unwrap().to_string();
+    let cases: [(&[&str], _, &[&str]); 24] = [
         (&["run", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
         (&["record", "--robot", "bad", "--out", "/proc/x"], "", &["cannot write /proc/x"]),
         (&["check", "/no/such/file.toml"], "mission", &["/no/such/file.toml"]),
@@ -88,6 +101,7 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
             "no-device",
             &["/dev/no-such-tty", "/dev/serial/by-id"],
         ),
+        (&["sim", "open-room", "--listen", &taken], "address-in-use", &[&taken]),
         (&["stage", "restart", "wheel"], "unknown-stage", &["dead-reckoning"]),
         (&["stage", "fault", "wheel", "spin"], "unknown-stage", &["dead-reckoning"]),
         (
@@ -96,6 +110,7 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
             &["hazard-around-robot", "spin"],
         ),
         (&["stage", "fault", "mapper", "spin", "--robot", "ghost"], "not-running", &["ghost"]),
+        (&["stage", "mapper", "--robot", "ghost"], "", &["ghost", "--watch-only"]),
         (&["stop", "--robot", "ghost"], "not-running", &["ghost"]),
         (&["status", "--robot", "ghost"], "not-running", &["ghost", "firsthand run"]),
         (&["goto", "1", "1", "--robot", "ghost"], "not-running", &["ghost"]),
@@ -108,6 +123,11 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
         (&["run", "--robot", "../x"], "usage", &["../x"]),
         (&["bench", "chaos", "--robot-faults=honest"], "usage", &["honest", "encoder-dead"]),
         (&["evaluate", "--set", "robot={model"], "mission", &["robot={model", "inline table"]),
+        (
+            &["evaluate", "--planner", "./no-planner", "--out", "/proc/x"],
+            "planner-executable",
+            &["./no-planner"],
+        ),
         (&["experiments", "--only", "6"], "unknown-experiment", &["5-modulated"]),
     ];
     for (arguments, code, names) in cases {
@@ -118,35 +138,42 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
     assert_refused(&output, "mission", &["--set perimeter.cells=3"]);
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(!said.contains("trap.toml:"), "{said}");
+    if cfg!(not(feature = "ros2")) {
+        let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-ros2-robot/robot.toml");
+        refused(&["run", robot, "--robot", "bad"], "mission", &["--features ros2"]);
+    }
+    // File with the name of this user's bus, except for the user's number.
+    let bus = Path::new("/dev/shm/fh54321_bad-whose_bus");
+    fs::create_dir_all(bus).unwrap();
+    refused(&["status", "--robot", "bad-whose"], "not-running", &["54321"]);
+    fs::remove_dir(bus).unwrap();
+    assert_nothing_left("bad");
 }
 
 #[test]
-fn a_second_supervisor_of_a_robot_is_refused_and_the_first_goes_on() {
+fn a_second_supervisor_or_stage_of_a_robot_is_refused_and_the_first_goes_on() {
     let first = Run::under_way("second", "obstacle-course", &["--pace", "1"], 0.3);
     let runs = tempfile::tempdir().unwrap();
     let runs = runs.path().to_str().unwrap();
     let pid = first.pid().to_string();
     let second = ["run", "--robot", "second", "--runs", runs];
     refused(&second, "supervised", &[&pid, "--robot"]);
+    let mapper = ["stage", "mapper", "--robot", "second"];
+    assert_eq!(refused(&mapper, "", &["second", "--watch-only"]), Some(1));
     assert!(first.status().is_some());
     first.stop();
 }
 
 #[test]
-fn a_port_in_use_is_named() {
-    let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let address = taken.local_addr().unwrap().to_string();
-    let sim = ["sim", "open-room", "--listen", &address];
-    refused(&sim, "address-in-use", &[&address]);
-}
-
-#[test]
 fn results_of_an_earlier_run_are_not_overwritten_and_a_run_that_ended_is_not_resumed() {
-    let (_, directory) = Run::start("bi-again", "open-room", &[]).arrives_in();
+    let (_, directory) = Run::start("bi-again", "open-room", &["--no-record"]).arrives_in();
     let out = directory.path().join("run");
+    assert!(!out.join("report").exists());
     let out = out.to_str().unwrap();
     let second = ["run", "open-room", "--robot", "bi-again", "--out", out];
     refused(&second, "results-there", &[out]);
     refused(&["run", "--resume", out], "ended", &[out]);
     refused(&["run", "--resume", "/no/such/run"], "no-run", &["/no/such/run"]);
+    // A run without a recording has no report.
+    refused(&["report", out], "no-recording", &[]);
 }

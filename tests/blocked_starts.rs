@@ -62,8 +62,9 @@ fn assert_bus_was_recreated(summary: &Value) {
 }
 
 #[test]
-fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
-    let mut run = Run::start("block-own", "open-room", &PACE);
+fn what_a_killed_stage_left_half_made_blocks_no_start_and_is_removed() {
+    let slow = [&PACE[..], &["--set", "controller.speed_m_s=0.1"]].concat();
+    let mut run = Run::start("block-own", "open-room", &slow);
     let status = run.wait_until_under_way(1.0);
     let bus = bus_instance("block-own");
     let mapper = pid(&status, "mapper");
@@ -73,7 +74,30 @@ fn a_connection_half_made_by_a_stage_that_was_killed_blocks_no_start() {
         id.parse().ok().filter(|id| process_of(*id) == mapper)
     });
     half_make_connection(&bus, port.unwrap());
-    run.kill_and_await("mapper", Signal::KILL, &status);
+    let nodes = bus.root().join("nodes");
+    // Hundreds of processes killed while joining leave such files. Only the process in an id
+    // matters.
+    for counter in 1_000..1_300_u128 {
+        let id = (counter << 96) | (u128::from(mapper) << 64);
+        fs::create_dir(nodes.join(id.to_string())).unwrap();
+        let monitor = format!("{}{id}.node_monitor_context", bus.shared_memory_prefix());
+        fs::write(nodes.join(monitor), [0; 16]).unwrap();
+    }
+    // State of a generation killed after it created its node's directory and before it registered
+    // the node.
+    let cut_off = nodes.join(((1_u128 << 96) | (u128::from(mapper) << 64) | 1).to_string());
+    fs::create_dir(&cut_off).unwrap();
+    fs::write(cut_off.join(format!("{}node.details", bus.shared_memory_prefix())), "").unwrap();
+    let status = run.kill_and_await("mapper", Signal::KILL, &status);
+    let began = Instant::now();
+    while !nodes_of(&bus, mapper).is_empty() || cut_off.exists() {
+        assert!(began.elapsed() < PATIENCE, "node files stay");
+        run.status();
+    }
+    for stage in STAGES {
+        let process = pid(&status, stage);
+        assert_eq!(nodes_of(&bus, process).len(), 1, "of a running process");
+    }
     let summary = assert_arrives(run);
     // A blocked start would have been aborted and repeated.
     assert_eq!(summary["restarts"]["mapper"], 1, "{summary}");
@@ -148,58 +172,4 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
         std::mem::forget((places, joined));
         assert_bus_was_recreated(&assert_arrives(run));
     });
-}
-
-#[test]
-fn node_files_of_processes_that_ended_are_removed() {
-    let mut run = Run::start("block-nodes", "open-room", &PACE);
-    let status = run.wait_until_under_way(1.0);
-    let bus = bus_instance("block-nodes");
-    let mapper = pid(&status, "mapper");
-    let nodes = bus.root().join("nodes");
-    // Hundreds of processes killed while joining leave such files. Only the process in an id
-    // matters.
-    for counter in 1_000..1_300_u128 {
-        let id = (counter << 96) | (u128::from(mapper) << 64);
-        fs::create_dir(nodes.join(id.to_string())).unwrap();
-        let monitor = format!("{}{id}.node_monitor_context", bus.shared_memory_prefix());
-        fs::write(nodes.join(monitor), [0; 16]).unwrap();
-    }
-    let status = run.kill_and_await("mapper", Signal::KILL, &status);
-    let running: Vec<_> = STAGES.iter().map(|stage| pid(&status, stage)).collect();
-    let began = Instant::now();
-    while !nodes_of(&bus, mapper).is_empty() {
-        assert!(began.elapsed() < PATIENCE, "node files stay");
-        run.status();
-    }
-    for pid in running {
-        assert_eq!(nodes_of(&bus, pid).len(), 1, "of a running process");
-    }
-    assert_arrives(run);
-}
-
-#[test]
-fn what_a_stage_killed_in_its_start_left_on_the_bus_is_removed() {
-    let slow = [&PACE[..], &["--set", "controller.speed_m_s=0.02"]].concat();
-    let mut run = Run::start("block-cut-off", "open-room", &slow);
-    let status = run.wait_until_under_way(1.0);
-    let bus = bus_instance("block-cut-off");
-    let node = nodes_of(&bus, pid(&status, "mapper")).remove(0);
-    let id: u128 = node.file_name().unwrap().to_str().unwrap().parse().unwrap();
-    // State of a generation killed after it created its node's directory and before it registered
-    // the node.
-    let cut_off = bus.root().join("nodes").join((id + (1 << 96)).to_string());
-    fs::create_dir(&cut_off).unwrap();
-    let details = format!("{}node.details", bus.shared_memory_prefix());
-    fs::write(cut_off.join(details), "").unwrap();
-    run.kill_and_await("mapper", Signal::KILL, &status);
-    let is_left = |entry: fs::DirEntry| {
-        let name = entry.file_name().into_string().unwrap();
-        name.contains(&id.to_string()) || entry.path() == cut_off
-    };
-    run.wait_until("the nodes are removed", |_| {
-        let left = fs::read_dir(bus.root().join("nodes")).unwrap().flatten();
-        !left.into_iter().any(is_left)
-    });
-    run.stop();
 }

@@ -6,9 +6,7 @@ use std::fs;
 use common::domain::SUITE_VARIABLE;
 use serde_json::Value;
 
-use crate::support::{
-    self, assert_nothing_left, firsthand, json_of, output, refused, start_quietly,
-};
+use crate::support::{self, assert_nothing_left, firsthand, json_of, output, start_quietly};
 
 /// Returns the report of chaos on a mission that completes on a loaded machine too.
 fn chaos(robot: &str, arguments: &[&str]) -> Value {
@@ -42,42 +40,18 @@ fn processes(mark: &str) -> Vec<String> {
 }
 
 #[test]
-fn each_signal_of_chaos_is_a_row_of_its_table() {
+fn chaos_hits_stages_and_consumers_without_changing_the_outcome_and_each_signal_is_a_row() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("results");
-    let kills = ["--kills", "12", "--include-startup", "--out", out.to_str().unwrap()];
-    let report = chaos("chd-rows", &kills);
-    let table = fs::read_to_string(out.join("signals.csv")).unwrap();
-    let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
-    let header = rows.next().unwrap();
-    assert_eq!(header[..4], ["mission", "time_s", "stage", "kind"]);
-    let rows: Vec<_> = rows.collect();
-    assert_eq!(rows.len() as u64, sum(&report["kills"]), "{table}");
-    for (stage, kinds) in report["kills"].as_object().unwrap() {
-        for (kind, count) in kinds.as_object().unwrap() {
-            let its = rows.iter().filter(|row| row[2] == stage && row[3] == kind);
-            assert_eq!(its.count() as u64, number(count), "{stage} {kind}: {table}");
-        }
-    }
-    let column = |name| header.iter().position(|it| *it == name).unwrap();
-    let measured = |name| {
-        let cells = rows.iter().filter_map(|row| row[column(name)].parse::<f64>().ok());
-        cells.count()
-    };
-    // A signal before the first pose has no mission time.
-    let timed = rows.iter().skip_while(|row| row[column("time_s")].is_empty());
-    assert_eq!(timed.count(), measured("time_s"), "{table}");
-    assert!(measured("time_s") >= rows.len() / 2, "{table}");
-    for name in ["noticed_ms", "ready_ms", "first_output_ms"] {
-        assert!(measured(name) >= rows.len() / 2, "{name}: {table}");
-    }
-}
-
-#[test]
-fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_nothing() {
     let given = format!("'{}' topic echo pose --robot chd-hit", env!("CARGO_BIN_EXE_firsthand"));
-    let kills = ["--kills", "30", "--include-consumers", "--replay", "--consumer", &given];
-    let report = chaos("chd-hit", &kills);
+    let report = chaos(
+        "chd-hit",
+        &[
+            &["--kills", "30", "--include-consumers", "--include-startup", "--replay"][..],
+            &["--consumer", &given, "--out", out.to_str().unwrap()],
+        ]
+        .concat(),
+    );
     assert_eq!(report["reached"], report["missions"], "{report}");
     assert_eq!(report["leftovers"].as_array().map(Vec::len), Some(0), "{report}");
     let consumers = &report["consumers"];
@@ -88,23 +62,28 @@ fn consumers_that_are_killed_and_frozen_do_not_change_the_outcome_and_leave_noth
     }
     let hit = |counts: &Value| number(&counts["killed"]) + number(&counts["frozen"]);
     let hits: u64 = consumers.as_object().unwrap().values().map(hit).sum();
-    assert!(hits >= 5, "{report}");
-    assert!(hits + sum(&report["kills"]) >= 30, "{report}");
+    assert!(hits >= 5 && hits + sum(&report["kills"]) >= 30, "{report}");
     // The recorded part of such recordings was replayed, and the missing part is reported.
     let partial = &report["replays"]["partial"];
-    assert!(number(&partial["equal"]) > 0, "{report}");
-    assert!(partial["not_replayed"].is_u64(), "{report}");
+    assert!(number(&partial["equal"]) > 0 && partial["not_replayed"].is_u64(), "{report}");
     assert_eq!(processes("chd-hit"), Vec::<String>::new());
-}
 
-#[test]
-fn a_robot_whose_targets_change_while_stages_and_supervisor_are_killed_reaches_each_or_tells() {
-    let kills = ["--kills", "12", "--targets", "--replay", "--include-supervisor"];
-    let report = chaos("chd-targets", &kills);
-    assert_eq!(report["collisions"], 0, "{report}");
-    let targets = &report["targets"];
-    assert!(number(&targets["taken"]) >= 2 && number(&targets["reached"]) >= 1, "{report}");
-    assert_eq!(report["wrong"].as_array().map(Vec::len), Some(0), "{report}");
+    let table = fs::read_to_string(out.join("signals.csv")).unwrap();
+    let mut rows = table.lines().map(|row| row.split(',').collect::<Vec<_>>());
+    let header = rows.next().unwrap();
+    assert_eq!(header[..4], ["mission", "time_s", "stage", "kind"]);
+    let rows: Vec<_> = rows.collect();
+    for (stage, kinds) in report["kills"].as_object().unwrap() {
+        for (kind, count) in kinds.as_object().unwrap() {
+            let its = rows.iter().filter(|row| row[2] == stage && row[3] == kind);
+            assert_eq!(its.count() as u64, number(count), "{stage} {kind}: {table}");
+        }
+    }
+    for name in ["noticed_ms", "ready_ms", "first_output_ms"] {
+        let column = header.iter().position(|it| *it == name).unwrap();
+        let measured = rows.iter().filter(|row| row[column].parse::<f64>().is_ok()).count() as u64;
+        assert!(measured >= sum(&report["kills"]) / 2, "{name}: {table}");
+    }
 }
 
 #[test]
@@ -126,17 +105,4 @@ fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     let marks = ["chd-cut", left.to_str().unwrap()];
     support::wait_until("all have ended", || marks.iter().all(|mark| processes(mark).is_empty()));
     fs::remove_dir_all(left).unwrap();
-}
-
-#[test]
-fn a_consumer_that_cannot_be_started_and_results_that_are_there_are_refused_with_the_remedy() {
-    let unknown = ["bench", "chaos", "--consumer", "no-such-logger x80"];
-    refused(&unknown, "usage", &["no-such-logger x80", "PATH"]);
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("signals.csv");
-    fs::write(&file, "of before\n").unwrap();
-    let out = directory.path().to_str().unwrap();
-    let chaos = ["bench", "chaos", "--robot", "chd-there", "--out", out];
-    assert_eq!(refused(&chaos, "", &["signals.csv"]), Some(1));
-    assert_eq!(fs::read_to_string(&file).unwrap(), "of before\n");
 }

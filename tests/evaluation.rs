@@ -18,7 +18,8 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("rooms");
     let name = out.to_str().unwrap();
-    let whole = evaluate(name, &["--seed", "5"]);
+    let seed = ["--seed", "5", "--sensors", "front+infrared"];
+    let whole = evaluate(name, &seed);
     assert_eq!(whole["count"], 2, "{whole}");
     let shares = ["success", "collision", "timeout", "wrong_place", "unreachable", "aborted"];
     let sum: f64 = shares.iter().map(|share| whole[share].as_f64().unwrap()).sum();
@@ -26,10 +27,11 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     assert!(out.join("index.html").exists());
 
     let rows = std::fs::read_to_string(out.join("rows.csv")).unwrap();
+    assert!(rows.contains("evidential front+infrared"), "{rows}");
     let (first, _) = rows.trim_end().rsplit_once('\n').unwrap();
     // State of an evaluation killed while it wrote the last row.
     std::fs::write(out.join("rows.csv"), format!("{first}\nrooms-5-0001,6,evid")).unwrap();
-    let resumed = evaluate(name, &["--seed", "5", "--resume", "--processes"]);
+    let resumed = evaluate(name, &[&seed[..], &["--resume", "--processes"]].concat());
     assert_eq!(resumed["count"], 2, "{resumed}");
     assert_eq!(resumed["success"], whole["success"]);
     let again = std::fs::read_to_string(out.join("rows.csv")).unwrap();
@@ -37,7 +39,7 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     let latencies = std::fs::read_to_string(out.join("latencies.csv")).unwrap();
     assert!(latencies.lines().count() > 1, "the resumed mission was driven by processes");
 
-    let again = two_rooms(name, &["--seed", "5"]);
+    let again = two_rooms(name, &seed);
     refused(&again, "results-there", &["--resume"]);
     let other = two_rooms(name, &["--seed", "6", "--resume"]);
     refused(&other, "other-results", &[name]);
@@ -46,25 +48,23 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
 #[test]
 fn two_robots_that_meet_have_a_row_each_and_the_same_rows_twice() {
     let directory = tempfile::tempdir().unwrap();
-    let rows = |name: &str, more: &[&str]| {
-        let out = directory.path().join(name);
+    let out = directory.path().join("rooms");
+    let rows = |more: &[&str]| {
         let robots = ["--robot", "turtlebot2", "--set", "robot.rate_hz=10", "--seed", "3"];
         let meeting = ["evaluate", "--json", "--worlds", "meeting", "--count", "2", "--out"];
         printed(&[&meeting[..], &[out.to_str().unwrap()], &robots, more].concat());
         std::fs::read_to_string(out.join("rows.csv")).unwrap()
     };
-    let first = rows("first", &[]);
+    let first = rows(&[]);
     let worlds = ["0000", "0000-oncoming", "0001", "0001-oncoming"];
     let named = first.lines().skip(1).map(|row| row.split(',').next().unwrap());
     assert!(named.eq(worlds.map(|world| format!("meeting-3-{world}"))), "{first}");
     assert_eq!(first.matches(",success,").count(), 4, "{first}");
-    assert_eq!(first, rows("second", &[]));
-
     // One robot's row is lost, so both drive again.
     let kept = first.lines().filter(|row| !row.contains("0001-oncoming"));
     let kept: String = kept.map(|row| format!("{row}\n")).collect();
-    std::fs::write(directory.path().join("first/rows.csv"), kept).unwrap();
-    assert_eq!(first, rows("first", &["--resume"]));
+    std::fs::write(out.join("rows.csv"), kept).unwrap();
+    assert_eq!(first, rows(&["--resume"]));
 }
 
 #[test]
@@ -84,56 +84,4 @@ fn a_failure_of_an_evaluation_is_opened_as_the_page_of_its_run() {
         let file = page.file_name().unwrap().to_str().unwrap();
         assert!(index.contains(&format!("href=\"failures/{file}\"")), "{index}");
     }
-}
-
-#[test]
-fn with_infrared_the_same_seed_gives_the_same_rows_twice_and_their_setting_names_the_sensors() {
-    let directory = tempfile::tempdir().unwrap();
-    let rows = |name: &str| {
-        let out = directory.path().join(name);
-        let sensors = ["--seed", "5", "--sensors", "front+infrared"];
-        evaluate(out.to_str().unwrap(), &sensors);
-        std::fs::read_to_string(out.join("rows.csv")).unwrap()
-    };
-    let first = rows("first");
-    assert!(first.contains("evidential front+infrared"), "{first}");
-    assert_eq!(first, rows("second"));
-}
-
-#[test]
-fn a_robot_drives_through_a_ros_map_from_a_start_to_a_target_of_the_map() {
-    let folder = tempfile::tempdir().unwrap();
-    // Hall of 6 m by 3 m with a wall across its lower half, and its corner at (-10, 20).
-    let (cols, rows) = (60, 30);
-    let grey = |at: usize| {
-        let (col, row) = (at % cols, at / cols);
-        let rim = col == 0 || row == 0 || col + 1 == cols || row + 1 == rows;
-        if rim || (col == 30 && row > 15) { 0 } else { 254 }
-    };
-    let mut image = format!("P5 {cols} {rows} 255\n").into_bytes();
-    image.extend((0..cols * rows).map(grey));
-    std::fs::write(folder.path().join("hall.pgm"), image).unwrap();
-    let map = folder.path().join("hall.yaml");
-    let yaml = "image: hall.pgm\nresolution: 0.1\norigin: [-10, 20, 0]";
-    std::fs::write(&map, yaml).unwrap();
-    let out = folder.path().join("out");
-    let (map, out) = (map.to_str().unwrap(), out.to_str().unwrap());
-    let common = ["evaluate", "--worlds", map, "--out", out, "--json"];
-    let ends = ["--start", "-9,21,0", "--target", "-5,21"];
-    let more = ["--realism", "laboratory"];
-    let found = printed(&[&common[..], &ends, &more].concat());
-    let found: Value = serde_json::from_str(&found).unwrap();
-    assert_eq!((&found["count"], &found["success"]), (&1.into(), &1.0.into()), "{found}");
-    assert!(found["median_k"].as_f64() > Some(1.05), "around the wall: {found}");
-
-    let refused = |arguments: &[&str], code, name| {
-        refused(&[&["evaluate"], arguments].concat(), code, &[name]);
-    };
-    let other = folder.path().join("other");
-    let other = ["--out", other.to_str().unwrap()];
-    let drawn = [&ends[..], &["--worlds", "rooms"], &other].concat();
-    refused(&drawn, "", "--start");
-    refused(&["--worlds", map, "--start", "1,2,3"], "usage", "--target");
-    let words = ["--worlds", map, "--start", "here", "--target", "1,2"];
-    refused(&words, "usage", "here");
 }

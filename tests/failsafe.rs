@@ -6,12 +6,11 @@ use std::{
 };
 
 use crate::support::{
-    self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, operate,
+    self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left,
     wire::{Proxy, Robot},
 };
 use common::wire::{Command, Decoder};
 use rustix::process::Signal;
-use serde_json::Value;
 
 /// Duration of a command: `robot.command_limit_s`.
 const LIMIT: Duration = Duration::from_millis(250);
@@ -171,62 +170,26 @@ fn ignores(signal: Signal) -> bool {
 }
 
 #[test]
-fn ctrl_c_sigterm_and_a_closed_terminal_end_a_run_in_order_and_its_last_command_is_zero() {
-    for signal in [Signal::INT, Signal::TERM, Signal::HUP] {
-        if ignores(signal) {
-            support::not_run("ctrl_c_sigterm_and_a_closed_terminal", "nohup: no SIGHUP");
+fn a_run_that_a_signal_ends_or_kills_leaves_the_command_zero_and_no_process() {
+    for signal in [Signal::INT, Signal::TERM, Signal::HUP, Signal::KILL] {
+        if signal == Signal::HUP && ignores(signal) {
+            support::not_run("a_run_that_a_signal_ends_or_kills", "nohup: no SIGHUP");
             continue;
         }
         let (_body, tap, mut run) = tapped("tap-end");
         tap.next_that(|heard| heard.moving);
         run.wait_until_under_way(0.3);
         run.signal(signal);
-        let (code, summary) = run.finish();
-        assert_ended(code, &summary, 0, "aborted");
+        if signal == Signal::KILL {
+            run.reap();
+            support::wait_until_all_ended("tap-end");
+        } else {
+            let (code, summary) = run.finish();
+            assert_ended(code, &summary, 0, "aborted");
+            assert_nothing_left("tap-end");
+        }
         tap.assert_last_is_zero();
-        assert_nothing_left("tap-end");
     }
-}
-
-#[test]
-fn stages_end_with_their_supervisor_that_is_killed_and_the_last_command_is_zero() {
-    let (_body, tap, mut run) = tapped("tap-orphan");
-    tap.next_that(|heard| heard.moving);
-    run.kill();
-    support::wait_until_all_ended("tap-orphan");
-    tap.assert_last_is_zero();
-    // The files of the run do not hinder the next run, and are removed with it.
-    Run::start("tap-orphan", "open-room", &[]).arrives();
-}
-
-#[test]
-fn an_operators_stop_is_named_by_the_link() {
-    let mut run = Run::under_way("named", "obstacle-course", &["--pace", "4"], 0.5);
-    operate("named", &["stop"]);
-    run.wait_until("the link says why", |status| {
-        status["link"]["cause"] == "stopped by an operator" && status["link"]["robot"] == "stands"
-    });
-    operate("named", &["resume"]);
-    run.wait_until("the robot goes on", |status| {
-        status["link"]["cause"].is_null() && status["link"]["robot"] == "goes"
-    });
-    run.stop();
-}
-
-#[test]
-fn on_a_low_battery_the_mission_takes_longer_and_arrives_on_an_empty_one_it_ends_with_the_reason() {
-    let with = |volts: &str| {
-        let start = format!("simulation.battery.start_v={volts}");
-        support::run("charge", "open-room", &["--set", &start])
-    };
-    let time = |summary: &Value| summary["mission_time_s"].as_f64().unwrap();
-    let (_, full) = with("7.8");
-    let (code, low) = with("6.5");
-    assert_reached(code, &low);
-    assert!(time(&low) > 1.5 * time(&full), "{low} against {full}");
-    let (code, empty) = with("5.9");
-    assert_ended(code, &empty, 6, "aborted");
-    assert_eq!(empty["cause"], "battery empty", "{empty}");
-    assert!((1.9..3.0).contains(&time(&empty)), "{empty}");
-    assert_nothing_left("charge");
+    // The files of the killed run do not hinder the next run, and are removed with it.
+    Run::start("tap-end", "open-room", &[]).arrives();
 }

@@ -31,14 +31,6 @@ fn write_map(directory: &Path) -> PathBuf {
     file
 }
 
-fn write_image(directory: &Path) -> PathBuf {
-    let file = directory.join("rooms.pgm");
-    let pixels: Vec<u8> =
-        rooms().concat().bytes().map(|cell| if cell == b'.' { 254 } else { 0 }).collect();
-    std::fs::write(&file, [b"P5\n24 16\n255\n".as_slice(), &pixels].concat()).unwrap();
-    file
-}
-
 fn report(map: &Path, arguments: &[&str]) -> Value {
     let field = ["field", map.to_str().unwrap(), "--json"];
     serde_json::from_str(&printed(&[&field, arguments].concat())).unwrap()
@@ -76,105 +68,45 @@ fn values(file: &Path) -> Vec<(f64, i32, f32, f32)> {
         .collect()
 }
 
-/// Solves the rooms and returns (u, ex, ey) per cell from the file.
-fn solved(screening: &[&str]) -> Vec<(f64, f64, f64)> {
-    let directory = tempfile::tempdir().unwrap();
-    let out = directory.path().join("rooms.npy");
-    let mut arguments = vec!["--target-cell", "3,12", "--out", out.to_str().unwrap()];
-    arguments.extend(screening);
-    report(&write_map(directory.path()), &arguments);
-    let cell = |(mantissa, exponent, ex, ey): (f64, i32, f32, f32)| {
-        (mantissa * f64::from(exponent).exp2(), ex.into(), ey.into())
-    };
-    values(&out).into_iter().map(cell).collect()
-}
-
 const TARGET: usize = 12 * 24 + 3;
 const CLOSET: usize = 9 * 24 + 19;
 
 #[test]
-fn u_in_the_file_is_the_mean_of_its_neighbours_over_1_plus_k() {
+fn the_field_of_a_map_is_written_with_the_means_and_directions_and_reported() {
+    let directory = tempfile::tempdir().unwrap();
+    let [out, picture] = ["rooms.npy", "rooms.svg"].map(|name| directory.path().join(name));
+    let files = ["--out", out.to_str().unwrap(), "--picture", picture.to_str().unwrap()];
+    let map = write_map(directory.path());
+    let free: Vec<bool> = rooms().concat().bytes().map(|cell| cell == b'.').collect();
     // A screening length of 2.5 cells gives k = (1 / (2 x 2.5))^2.
     let screened = ["--screening-cells", "2.5"];
     for (screening, k) in [(&[][..], 0.0), (&screened[..], 0.04)] {
-        let cells = solved(screening);
-        let free: Vec<bool> = rooms().concat().bytes().map(|cell| cell == b'.').collect();
-        for (at, &(u, ..)) in cells.iter().enumerate() {
-            if !free[at] || at == CLOSET {
-                assert_eq!(u, 0.0, "cell {at}");
-            } else if at == TARGET {
-                assert_eq!(u, 1.0);
-            } else {
-                let around = [at - 1, at + 1, at - 24, at + 24].map(|near| cells[near].0);
-                let mean = around.iter().sum::<f64>() / 4.0 / (1.0 + k);
-                assert!((mean / u - 1.0).abs() < 1e-3, "cell {at}: {u}, mean {mean}");
+        let report = report(&map, &[&["--target-cell", "3,12"], &files[..], screening].concat());
+        let cells = values(&out).into_iter().map(|(mantissa, exponent, ex, ey)| {
+            (mantissa * f64::from(exponent).exp2(), f64::from(ex), f64::from(ey))
+        });
+        let cells: Vec<_> = cells.collect();
+        for (at, &(u, ex, ey)) in cells.iter().enumerate() {
+            if !free[at] || at == CLOSET || at == TARGET {
+                let expected = if at == TARGET { 1.0 } else { 0.0 };
+                assert_eq!((u, ex, ey), (expected, 0.0, 0.0), "cell {at}");
+                continue;
             }
+            let around = [at - 1, at + 1, at - 24, at + 24].map(|near| cells[near].0);
+            let mean = around.iter().sum::<f64>() / 4.0 / (1.0 + k);
+            assert!((mean / u - 1.0).abs() < 1e-3, "cell {at}: {u}, mean {mean}");
+            // Uphill, with y down.
+            let rise = (around[1] - around[0]) * ex + (around[3] - around[2]) * ey;
+            assert!(rise > 0.0 && (ex.hypot(ey) - 1.0).abs() < 1e-5, "cell {at}");
         }
+        // All but the closet.
+        let reachable = free.iter().filter(|free| **free).count() - 1;
+        let found = ["rows", "cols", "reachable", "target"].map(|key| report[key].clone());
+        let expected = serde_json::json!([16, 24, reachable, [3, 12]]);
+        assert_eq!(Value::from(found.to_vec()), expected, "{report}");
+        assert!(report["worst_residual"].as_f64() < Some(1e-2), "{report}");
     }
-}
-
-#[test]
-fn guidance_in_the_file_is_uphill_with_y_down_and_of_unit_length() {
-    let cells = solved(&[]);
-    for (at, &(u, ex, ey)) in cells.iter().enumerate() {
-        if u == 0.0 || at == TARGET {
-            assert_eq!((ex, ey), (0.0, 0.0), "cell {at}");
-            continue;
-        }
-        assert!((ex.hypot(ey) - 1.0).abs() < 1e-5, "cell {at}");
-        let rise =
-            (cells[at + 1].0 - cells[at - 1].0) * ex + (cells[at + 24].0 - cells[at - 24].0) * ey;
-        assert!(rise > 0.0, "cell {at} leads downhill");
-    }
-}
-
-#[test]
-fn the_report_tells_size_reach_method_and_time() {
-    let directory = tempfile::tempdir().unwrap();
-    let map = write_map(directory.path());
-    let report = report(&map, &["--target-cell", "3,12"]);
-    let free = rooms().concat().matches('.').count() as u64;
-    assert_eq!(report["rows"], 16);
-    assert_eq!(report["cols"], 24);
-    assert_eq!(report["reachable"], free - 1, "all but the closet");
-    assert_eq!(report["target"], serde_json::json!([3, 12]));
-    assert!(!report["method"].as_str().unwrap().is_empty());
-    assert!(report["solve_ms"].as_f64().unwrap() > 0.0);
-    assert!(report["worst_residual"].as_f64().unwrap() < 1e-2);
-    assert!(report["log10_u_min"].as_f64().unwrap() < 0.0);
-    assert!(report["peak_memory_bytes"].as_u64().unwrap() > 100_000);
-}
-
-#[test]
-fn every_format_of_one_map_gives_one_field() {
-    let directory = tempfile::tempdir().unwrap();
-    let image = write_image(directory.path());
-    let yaml = directory.path().join("rooms.yaml");
-    std::fs::write(
-        &yaml,
-        "image: rooms.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
-    )
-    .unwrap();
-    let [first, image, yaml] = [write_map(directory.path()), image, yaml].map(|map| {
-        let out = directory.path().join("out.npy");
-        report(&map, &["--target-cell", "3,12", "--out", out.to_str().unwrap()]);
-        values(&out)
-    });
-    assert_eq!(first, image);
-    assert_eq!(first, yaml);
-}
-
-#[test]
-fn the_picture_is_of_a_size_to_look_at() {
-    let directory = tempfile::tempdir().unwrap();
-    let picture = directory.path().join("rooms.svg");
-    report(
-        &write_map(directory.path()),
-        &["--target-cell", "3,12", "--picture", picture.to_str().unwrap()],
-    );
-    let svg = std::fs::read_to_string(picture).unwrap();
-    let width = svg.split("width=\"").nth(1).unwrap().split('"').next().unwrap();
-    assert!((900..=2500).contains(&width.parse::<u32>().unwrap()), "{width} pixels wide");
+    assert!(std::fs::read_to_string(picture).unwrap().starts_with("<svg"));
 }
 
 #[test]

@@ -12,38 +12,27 @@ use crate::support::{Run, domain, json_of, output, printed, refused, wire::Robot
 const SLOW: [&str; 6] =
     ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
 
-/// The text of the mission that `firsthand init` writes for `robot`, after `firsthand check` accepted it.
-fn mission_of(robot: &Robot, address: &str) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("robot.toml");
-    let out = file.to_str().unwrap();
-    let said = printed(&["init", &format!("{address}{}", robot.listening), "--out", out]);
-    assert!(said.contains(&format!("firsthand bring-up {out}")), "{said}");
-    printed(&["check", out]);
-    let text = std::fs::read_to_string(&file).unwrap();
-    assert!(text.contains("MEASURE") && text.contains("PLACEHOLDER"), "{text}");
-    refused(&["init", "127.0.0.1:9", "--out", out], "file-exists", &[out]);
-    text
-}
-
 #[test]
-fn init_writes_a_mission_that_check_accepts_for_a_json_robot_and_moves_it_nowhere() {
-    let json = ["--set", "robot.model='kobuki'"];
-    let robot = Robot::start_with("obstacle-course", &json);
-    let text = mission_of(&robot, "udp://");
-    for row in ["protocol = \"json\"", "name = \"laser\"", "beams = 360", "name = \"bumper-left\""]
-    {
-        assert!(text.contains(row), "{row}: {text}");
+fn init_writes_a_mission_that_check_accepts_for_a_json_robot_or_an_x80_and_moves_it_nowhere() {
+    let json = Robot::start_with("obstacle-course", &["--set", "robot.model='kobuki'"]);
+    let x80 = Robot::start("obstacle-course", "tcp", "127.0.0.1:0");
+    let json_rows =
+        ["protocol = \"json\"", "name = \"laser\"", "beams = 360", "name = \"bumper-left\""];
+    let x80_rows = ["protocol = \"x80\"", "front-left"];
+    for (robot, scheme, rows) in [(json, "udp://", &json_rows[..]), (x80, "tcp://", &x80_rows)] {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("robot.toml");
+        let out = file.to_str().unwrap();
+        let said = printed(&["init", &format!("{scheme}{}", robot.listening), "--out", out]);
+        assert!(said.contains(&format!("firsthand bring-up {out}")), "{said}");
+        printed(&["check", out]);
+        let text = std::fs::read_to_string(&file).unwrap();
+        for row in rows.iter().chain(&["MEASURE", "PLACEHOLDER"]) {
+            assert!(text.contains(row), "{row}: {text}");
+        }
+        refused(&["init", "127.0.0.1:9", "--out", out], "file-exists", &[out]);
+        assert_eq!(robot.kill(), 0.0);
     }
-    assert_eq!(robot.kill(), 0.0);
-}
-
-#[test]
-fn init_writes_a_mission_that_check_accepts_for_an_x80_and_moves_it_nowhere() {
-    let robot = Robot::start("obstacle-course", "tcp", "127.0.0.1:0");
-    let text = mission_of(&robot, "tcp://");
-    assert!(text.contains("protocol = \"x80\"") && text.contains("front-left"), "{text}");
-    assert_eq!(robot.kill(), 0.0);
 }
 
 #[test]

@@ -1,9 +1,7 @@
-//! Robots that speak JSON lines: the simulated one, and the guide's independent example in Python.
+//! The guide's independent example of a robot of JSON lines, in Python.
 
 use std::{
-    fs,
     io::{BufRead as _, BufReader},
-    path::Path,
     process::{Child, Command, Stdio},
     thread::{self, JoinHandle},
 };
@@ -11,7 +9,7 @@ use std::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{Run, assert_ended, assert_no_restart, assert_reached, replayed_in};
+use crate::support::{Run, assert_ended, assert_no_restart, assert_reached};
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
@@ -25,16 +23,9 @@ struct PythonRobot {
 
 impl PythonRobot {
     fn start() -> Self {
-        Self::start_with(&[])
-    }
-
-    /// Starts a robot. `options` are the acceleration of its wheels, m/s^2, and their delay,
-    /// seconds.
-    fn start_with(options: &[&str]) -> Self {
         let mut process = Command::new("setpriv")
             .args(["--pdeathsig", "KILL", "--", "python3"])
             .args([&format!("{EXAMPLE}/robot.py"), "0"])
-            .args(options)
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
@@ -46,11 +37,7 @@ impl PythonRobot {
         Self { process, last, port: first["port"].as_u64().unwrap() }
     }
 
-    fn run(&self, robot: &str) -> Run {
-        self.run_with(robot, &[])
-    }
-
-    fn run_with(&self, robot: &str, set: &[&str]) -> Run {
+    fn run(&self, robot: &str, set: &[&str]) -> Run {
         let address = format!("robot.address='udp://127.0.0.1:{}'", self.port);
         let fast = "controller.speed_m_s=0.5";
         let near = "target=[3, 0]";
@@ -66,8 +53,15 @@ impl PythonRobot {
     }
 }
 
-#[track_caller]
-fn assert_at_its_target_untouched(truth: &Value) {
+#[test]
+fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
+    let robot = PythonRobot::start();
+    let mut run = robot.run("json-kills", &[]);
+    run.wait_until_under_way(0.3);
+    run.kill_each(Signal::KILL);
+    let (code, summary) = run.finish();
+    assert_reached(code, &summary);
+    let truth = robot.end();
     let [x, y] = ["x", "y"].map(|axis| truth[axis].as_f64().unwrap());
     assert!((x - 3.0).hypot(y) < 0.5, "{truth}");
     assert_eq!(truth["touches"], 0, "{truth}");
@@ -75,62 +69,12 @@ fn assert_at_its_target_untouched(truth: &Value) {
 }
 
 #[test]
-fn a_robot_in_python_is_driven_past_drums_to_its_target() {
-    let robot = PythonRobot::start();
-    let (code, summary) = robot.run("json-py").finish();
-    assert_reached(code, &summary);
-    assert_at_its_target_untouched(&robot.end());
-}
-
-#[test]
-fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
-    let robot = PythonRobot::start();
-    let mut run = robot.run("json-kills");
-    run.wait_until_under_way(0.3);
-    run.kill_each(Signal::KILL);
-    let (code, summary) = run.finish();
-    assert_reached(code, &summary);
-    assert_at_its_target_untouched(&robot.end());
-}
-
-#[test]
 fn a_run_whose_robot_names_a_sensor_otherwise_ends_with_both_names_and_blames_no_stage() {
     let robot = PythonRobot::start();
     let nose = "robot.sensor=[{name='nose',kind='cone',forward_m=0.2,bearing_deg=0}]";
-    let (code, summary) = robot.run_with("json-nose", &["--set", nose]).finish();
+    let (code, summary) = robot.run("json-nose", &["--set", nose]).finish();
     assert_ended(code, &summary, 6, "aborted");
     let reason = summary["reason"].as_str().unwrap();
     assert!(reason.contains("no sensor is named \"front\"; rename it to one of nose"), "{summary}");
     assert_no_restart(&summary);
-}
-
-/// Returns whether the link of a run reports that the base responds otherwise than stated.
-fn names_the_response(run: &Path) -> bool {
-    let log = fs::read_to_string(run.join("link.log")).unwrap();
-    assert!(!log.contains("counts do not follow"), "{log}");
-    log.contains("the base answers after")
-}
-
-#[test]
-fn a_heavy_late_robot_arrives_untouched_as_stated_and_is_named_where_nothing_is_stated() {
-    let stated = ["--set", "robot.response={delay_s=0.3,acceleration_m_s2=0.6}"];
-    let robots = [("json-stated", &stated[..], false), ("json-heavy", &[], true)];
-    let runs = robots.map(|(robot, set, named)| {
-        let python = PythonRobot::start_with(&["0.6", "0.3"]);
-        let unsure = ["--set", "sure_within_m=2"];
-        let run = python.run_with(robot, &[set, &unsure].concat());
-        (python, run, named)
-    });
-    for (python, run, named) in runs {
-        let (summary, directory) = run.arrives_in();
-        assert_eq!(names_the_response(&directory.path().join("run")), named, "{summary}");
-        assert_at_its_target_untouched(&python.end());
-    }
-}
-
-#[test]
-fn a_simulated_robot_that_speaks_json_arrives_and_replays_to_the_bit() {
-    let protocol = ["--pace", "4", "--set", "robot.protocol='json'"];
-    let (_, directory) = Run::start("json-sim", "obstacle-course", &protocol).arrives_in();
-    assert_eq!(replayed_in(&directory).equal(), 5);
 }

@@ -1,55 +1,20 @@
-use serde_json::Value;
+//! Test of the latency of ticks, which needs processes.
 
-use crate::support::{self, Run, assert_ended, assert_nothing_left, printed, run};
+use std::{fs, os::unix::fs::MetadataExt as _};
 
-#[track_caller]
-fn ends(robot: &str, mission: &str, arguments: &[&str], code: i32, outcome: &str) -> Value {
-    let (found, summary) = run(robot, mission, arguments);
-    assert_ended(found, &summary, code, outcome);
-    assert_nothing_left(robot);
-    summary
-}
-
-const PAPER: [&str; 2] = ["--set", "method=\"paper\""];
+use crate::support::{self, Run, assert_nothing_left, json_lines, printed};
 
 #[test]
-fn a_mission_that_takes_too_long_ends_in_time() {
-    ends("late", "obstacle-course", &["--timeout", "5"], 4, "timeout");
-}
-
-#[test]
-fn a_touch_ends_the_mission_as_a_collision() {
-    // The robot is blind, because hits beyond 5 cm are not mapped.
-    let blind = [&PAPER[..], &["--set", "mapper.map_within_m=0.05"]].concat();
-    let summary = ends("blind", "obstacle-course", &blind, 5, "collision");
-    assert!(summary["collisions"].as_u64() > Some(0));
-}
-
-#[test]
-fn every_run_leaves_a_picture_a_summary_and_logs() {
-    let (summary, directory) = Run::start("picture", "open-room", &[]).arrives_in();
-    let directory = directory.path().join("run");
-    let picture = std::fs::read_to_string(directory.join("picture.svg")).unwrap();
-    assert!(picture.starts_with("<svg") && picture.ends_with("</svg>\n"));
-    let written = support::records(&directory.join("summary.json"));
-    assert_eq!(written, [summary]);
-    for process in support::STAGES.iter().copied().chain(["x80-sim"]) {
-        assert!(support::logged(&directory, process, &[]) > 0, "{process}");
-    }
-}
-
-/// Returns the reports of `bench tick` with these arguments, one per regime. The mission lasts a
-/// few seconds.
-fn latency(robot: &str, arguments: &[&str]) -> Vec<Value> {
-    let short = ["bench", "tick", "--rounds", "1", "--set", "timeout_s=5", "--json"];
-    let printed = printed(&[&short[..], &["--robot", robot], arguments].concat());
-    assert_nothing_left(robot);
-    printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
-}
-
-#[test]
-fn latency_measures_ticks_beside_hops_in_both_regimes_and_leaves_nothing() {
-    let reports = latency("hops", &["--busy", "1", "--set", "robot.rate_hz=20"]);
+fn latency_is_measured_beside_hops_at_each_rate_and_leaves_nothing_but_what_was_there() {
+    // Another robot of this user, with its directory below the removed one.
+    let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
+    let run = Run::under_way("hops-beside", "open-room", &slow, 0.3);
+    let measured = |robot: &str, arguments: &[&str]| {
+        let short = ["bench", "tick", "--rounds", "1", "--set", "timeout_s=5", "--json"];
+        json_lines(&printed(&[&short[..], &["--robot", robot], arguments].concat()))
+    };
+    let reports = measured("hops", &["--busy", "1", "--set", "robot.rate_hz=20"]);
+    assert_nothing_left("hops");
     let regimes: Vec<_> = reports.iter().map(|report| &report["regime"]).collect();
     assert_eq!(regimes, ["back to back", "at 20 Hz"]);
     for report in &reports {
@@ -60,14 +25,12 @@ fn latency_measures_ticks_beside_hops_in_both_regimes_and_leaves_nothing() {
         }
         assert!(report["ratio"].as_f64() > Some(0.0), "{report}");
     }
-}
-
-#[test]
-fn latency_at_a_rate_is_measured_at_that_rate_alone() {
-    let reports = latency(
-        "hops-30hz",
-        &["--rate", "30", "--set", "timeout_s=12", "--no-record", "--consumers", "0"],
-    );
+    let at_30_hz = ["--rate", "30", "--set", "timeout_s=12", "--no-record", "--consumers", "0"];
+    let reports = measured(support::suite(), &at_30_hz);
     assert_eq!(reports.len(), 1, "{reports:?}");
     assert_eq!(reports[0]["regime"], "at 30 Hz");
+    let root = fs::metadata(support::domain("hops-beside").directory()).unwrap();
+    assert!(root.is_dir() && root.uid() == rustix::process::geteuid().as_raw());
+    assert!(run.status().is_some());
+    run.stop();
 }

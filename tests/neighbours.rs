@@ -4,16 +4,16 @@ use std::{
     fs,
     mem::MaybeUninit,
     net::UdpSocket,
-    os::unix::fs::{MetadataExt as _, PermissionsExt as _},
-    path::Path,
+    os::unix::fs::PermissionsExt as _,
+    path::{Path, PathBuf},
     process::Stdio,
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
 use crate::support::{
-    self, PATIENCE, Run, assert_nothing_left, assert_refused, bus_instance, domain, find,
-    firsthand, in_own_process, json_of, pid, signal_process,
+    self, PATIENCE, Run, assert_nothing_left, assert_reached, assert_refused, domain, firsthand,
+    in_own_process, json_of, pid, signal_process,
 };
 use common::{
     address::Address,
@@ -38,60 +38,14 @@ use rustix::{
 /// Longest time from a signal to the end of a run with a damaged bus: 3 s, and machine load.
 const ENDS_WITHIN: Duration = Duration::from_secs(20);
 
-fn shared(robot: &str) -> Vec<std::path::PathBuf> {
-    support::shared_memory(&domain(robot).shared_memory_prefix())
-}
-
 #[test]
-fn a_second_controller_and_a_second_supervisor_are_ignored_counted_and_told_with_their_process() {
+fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and_told() {
     in_own_process(|| {
-        let run = Run::under_way("two-masters", "open-room", &["--pace", "4"], 0.3);
-        let bus = Bus::join(&domain("two-masters"), "second").unwrap();
-        let mut commands = bus.writer(&topics::COMMAND, u32::MAX).unwrap();
-        let mut orders = bus.writer(&topics::DIRECTIVE, u32::MAX).unwrap();
-        let backwards = CommandSample {
-            pose_ns: u64::MAX,
-            guidance_ns: u64::MAX,
-            left_rad_s: -5.0,
-            right_rad_s: -5.0,
-            v_m_s: -0.4,
-            state: CommandState::Driving.into(),
-            ..CommandSample::default()
-        };
-        let stop = DirectiveSample {
-            epoch: u64::MAX,
-            order: Order::Stop.into(),
-            ..DirectiveSample::default()
-        };
-        let began = Instant::now();
-        let own = u64::from(std::process::id());
-        loop {
-            let forged = MissionTime(u64::MAX);
-            commands.publish(u64::MAX, forged, backwards).unwrap();
-            orders.publish(u64::MAX, forged, stop).unwrap();
-            let link = run.status().map(|status| status["link"].clone());
-            if link.is_some_and(|link| {
-                link["ignored_writer"] == own && link["ignored_samples"].as_u64() > Some(3)
-            }) {
-                break;
-            }
-            assert!(began.elapsed() < PATIENCE, "nothing is told");
-        }
-        drop((commands, orders, bus));
-        let (code, summary) = run.finish();
-        assert_eq!((code, &summary["outcome"]), (Some(0), &"reached".into()), "{summary}");
-        assert_eq!(summary["collisions"], 0, "{summary}");
-        support::assert_no_restart(&summary);
-        assert_eq!(summary["resets"], 0, "{summary}");
-    });
-}
-
-#[test]
-fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_whatever_their_topic() {
-    in_own_process(|| {
-        let run = Run::under_way("forged", "open-room", &["--pace", "4"], 0.3);
+        let robot = "forged";
+        let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.1"];
+        let run = Run::under_way(robot, "open-room", &slow, 0.3);
         let echo = |topic| {
-            let mut echo = firsthand(&["topic", "echo", topic, "--robot", "forged", "--json"]);
+            let mut echo = firsthand(&["topic", "echo", topic, "--robot", robot, "--json"]);
             echo.args(["--number", "40"]).stdout(Stdio::piped()).spawn().unwrap()
         };
         let mut echoes = [echo("pose"), echo("guidance")];
@@ -99,13 +53,14 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_what
             let printed = echo.stdout.as_ref().unwrap();
             assert!(poll::is_readable(printed, PATIENCE).unwrap(), "nothing is shown");
         }
-        let bus = Bus::join(&domain("forged"), "forger").unwrap();
+        let bus = Bus::join(&domain(robot), "forger").unwrap();
         macro_rules! forge {
             ($($topic:ident),*) => {
                 ($(bus.writer(&topics::$topic, u32::MAX).unwrap()),*)
             };
         }
         let (mut wheels, mut pose, mut guidance, mut link) = forge!(WHEELS, POSE, GUIDANCE, LINK);
+        let (mut commands, mut orders) = forge!(COMMAND, DIRECTIVE);
         let mut ranges = bus.slice_writer(&topics::RANGES, u32::MAX, 1).unwrap();
         let mut grid = bus.slice_writer(&topics::GRID, u32::MAX, 1).unwrap();
         for tick in [0, u64::MAX] {
@@ -122,6 +77,30 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_what
             let told = || support::logged(&run.directory(), reader, &["WARN", &own]) == 1;
             support::wait_until("a warning names the forger", told);
         }
+        let backwards = CommandSample {
+            pose_ns: u64::MAX,
+            guidance_ns: u64::MAX,
+            left_rad_s: -5.0,
+            right_rad_s: -5.0,
+            v_m_s: -0.4,
+            state: CommandState::Driving.into(),
+            ..CommandSample::default()
+        };
+        let stop = DirectiveSample {
+            epoch: u64::MAX,
+            order: Order::Stop.into(),
+            ..DirectiveSample::default()
+        };
+        support::wait_until("the commander is told", || {
+            let forged = MissionTime(u64::MAX);
+            commands.publish(u64::MAX, forged, backwards).unwrap();
+            orders.publish(u64::MAX, forged, stop).unwrap();
+            run.status().is_some_and(|status| {
+                let link = &status["link"];
+                link["ignored_writer"] == u64::from(std::process::id())
+                    && link["ignored_samples"].as_u64() > Some(3)
+            })
+        });
         for echo in echoes {
             let ended = pidfd_open(Pid::from_child(&echo), PidfdFlags::empty()).unwrap();
             assert!(poll::is_readable(&ended, PATIENCE).unwrap(), "the echo ends");
@@ -129,7 +108,7 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_what
             let forged = shown.iter().filter(|sample| sample["stamp"]["generation"] != 1);
             assert_eq!((status.code(), shown.len(), forged.count()), (Some(0), 40, 0));
         }
-        drop((ranges, wheels, pose, grid, guidance, link, bus));
+        drop((ranges, wheels, pose, grid, guidance, link, commands, orders, bus));
         let (summary, directory) = run.arrives_in();
         let recording = Recording::open(&directory.path().join("run")).unwrap();
         let poses: Vec<_> = recording.samples(&topics::POSE).unwrap().map(Result::unwrap).collect();
@@ -138,6 +117,7 @@ fn samples_that_seem_newer_than_all_others_wedge_no_mission_and_no_consumer_what
             poses.windows(2).all(|pair| pair[0].sample.stamp.tick <= pair[1].sample.stamp.tick);
         assert!(in_order && poses.len() > 40, "{}", poses.len());
         support::assert_no_restart(&summary);
+        assert_eq!(summary["resets"], 0, "{summary}");
     });
 }
 
@@ -193,42 +173,17 @@ fn race(prefix: &str, over: &AtomicBool) -> (usize, usize) {
 }
 
 #[test]
-fn a_directory_of_another_user_with_the_name_of_this_users_blocks_no_start() {
-    let test = "a_directory_of_another_user_with_the_name_of_this_users_blocks_no_start";
-    let as_user = ["setpriv", "--reuid=54322", "--regid=54322", "--clear-groups"];
-    if !rustix::process::geteuid().is_root() || !support::can_run(&as_user) {
-        return support::not_run(test, "only root can act as another user");
-    }
-    let home = tempfile::tempdir().unwrap();
-    std::os::unix::fs::chown(home.path(), Some(54322), Some(54322)).unwrap();
-    let squatted = Path::new("/tmp/firsthand-54322");
-    fs::create_dir_all(squatted).unwrap();
-    let start = |arguments: &[&str]| {
-        let mut command = support::firsthand_under(&as_user, arguments);
-        command.env("HOME", home.path()).env_remove("FIRSTHAND_SUITE").current_dir(home.path());
-        command
-    };
-    let slowly = ["run", "open-room", "--robot", "squatted", "--pace", "1", "--json"];
-    let mut run = start(&slowly).stdout(Stdio::piped()).spawn().unwrap();
-    // Another process of the user finds the robot and stops it.
-    support::wait_until("it is found", || {
-        let status = start(&["status", "--robot", "squatted", "--json"]).output().unwrap();
-        status.status.success() && home.path().join(".firsthand/squatted/lock").exists()
-    });
-    signal_process(run.id(), Signal::TERM);
-    let code = run.wait().unwrap().code();
-    let taken = fs::read_dir(squatted).unwrap().count();
-    fs::remove_dir(squatted).unwrap();
-    assert_eq!((code, taken), (Some(0), 0));
-}
-
-#[test]
-fn datagrams_of_another_user_do_not_drive_the_simulated_robot_of_a_run() {
+fn files_and_datagrams_of_another_user_neither_block_nor_drive_a_run() {
+    let test = "files_and_datagrams_of_another_user_neither_block_nor_drive_a_run";
     if !rustix::process::geteuid().is_root() {
-        let test = "datagrams_of_another_user_do_not_drive_the_simulated_robot_of_a_run";
         return support::not_run(test, "only root can act as another user");
     }
     in_own_process(|| {
+        let prefix = domain("driven").shared_memory_prefix();
+        let planted = &Path::new("/dev/shm").join(prefix + "9204_node.0_10_0.global_mgmt");
+        fs::write(planted, "").unwrap();
+        fs::set_permissions(planted, fs::Permissions::from_mode(0o666)).unwrap();
+        std::os::unix::fs::chown(planted, Some(65534), Some(65534)).unwrap();
         let run = Run::under_way("driven", "open-room", &["--pace", "4"], 0.3);
         let robot = common::run::Run::load(&run.directory()).unwrap().address;
         let Address::Udp(robot) = robot else { panic!("{robot}") };
@@ -244,60 +199,13 @@ fn datagrams_of_another_user_do_not_drive_the_simulated_robot_of_a_run() {
                 std::thread::park_timeout(Duration::from_millis(5));
             }
         });
-        let summary = run.arrives();
+        let (code, summary) = run.finish();
+        let there = planted.exists();
+        let _ = fs::remove_file(planted);
+        assert_reached(code, &summary);
         assert_eq!(summary["safety_events"], 0, "{summary}");
-    });
-}
-
-#[test]
-fn no_file_of_a_run_is_open_to_other_users() {
-    let run = Run::under_way("closed", "open-room", &["--pace", "1"], 0.3);
-    let robot = domain("closed");
-    for path in shared("closed").into_iter().chain([robot.directory().to_owned()]) {
-        // A removed file cannot be opened by others.
-        if let Ok(found) = fs::symlink_metadata(&path) {
-            assert_eq!(found.mode() & 0o077, 0, "{}", path.display());
-        }
-    }
-    run.stop();
-}
-
-#[test]
-fn a_file_of_another_user_with_a_name_of_the_robots_blocks_no_start() {
-    if !rustix::process::geteuid().is_root() {
-        let test = "a_file_of_another_user_with_a_name_of_the_robots_blocks_no_start";
-        return support::not_run(test, "only root can make a file of another user");
-    }
-    let prefix = domain("planted").shared_memory_prefix();
-    let planted = &Path::new("/dev/shm").join(prefix + "9204_node.0_10_0.global_mgmt");
-    fs::write(planted, "").unwrap();
-    fs::set_permissions(planted, fs::Permissions::from_mode(0o666)).unwrap();
-    std::os::unix::fs::chown(planted, Some(65534), Some(65534)).unwrap();
-    let run = Run::start("planted", "open-room", &[]);
-    let (code, summary) = run.finish();
-    let there = planted.exists();
-    let _ = fs::remove_file(planted);
-    assert_eq!(code, Some(0), "{summary}");
-    assert!(there, "the robot keeps a file of another user");
-    assert_nothing_left("planted");
-}
-
-#[test]
-fn a_bus_whose_count_of_nodes_is_empty_is_not_joined_and_the_message_says_so() {
-    in_own_process(|| {
-        let run = Run::under_way("emptied", "open-room", &["--pace", "1"], 0.3);
-        let count = shared("emptied").into_iter();
-        let count = count.filter(|path| path.to_string_lossy().ends_with(".global_mgmt"));
-        for path in count {
-            fs::File::create(path).unwrap();
-        }
-        let refused = Bus::join(&domain("emptied"), "late").unwrap_err();
-        assert!(matches!(refused, BusError::Join { .. }), "{refused}");
-        run.signal(Signal::TERM);
-        let began = Instant::now();
-        run.finish();
-        assert!(began.elapsed() < ENDS_WITHIN, "{:?}", began.elapsed());
-        assert_nothing_left("emptied");
+        assert!(there, "the robot keeps a file of another user");
+        assert_nothing_left("driven");
     });
 }
 
@@ -317,44 +225,43 @@ fn a_signal_goes_to_who_holds_the_supervisors_lock_and_not_to_the_number_in_its_
     fs::remove_dir_all(robot.directory()).unwrap();
 }
 
-#[test]
-fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_seconds() {
-    // Sockets and directories can only be removed.
-    for (robot, remove) in [("truncated", false), ("removed", true)] {
-        let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
-        let status = run.wait_until_under_way(0.3);
-        let supervisor = status["supervisor_pid"].as_u64().unwrap() as u32;
-        let root = bus_instance(robot).root();
-        for path in shared(robot).into_iter().filter(|path| *path != root) {
-            let _ = if remove { fs::remove_file(path) } else { fs::File::create(path).map(drop) };
-        }
-        if remove {
-            fs::remove_dir_all(root).unwrap();
-        }
-        // A stage that joins finds these files.
-        signal_process(pid(&status, "mapper"), Signal::KILL);
-        std::thread::park_timeout(Duration::from_millis(500));
-        if Path::new(&format!("/proc/{supervisor}")).exists() {
-            signal_process(supervisor, Signal::TERM);
-        }
-        let began = Instant::now();
-        run.reap();
-        let took = began.elapsed();
-        println!("{robot}: ended {took:?} after SIGTERM");
-        assert!(took < ENDS_WITHIN, "{robot}: {took:?}");
-        Run::start(robot, "open-room", &[]).arrives();
+/// Runs into damage. Asserts that the run ends soon after SIGTERM, and that the next one arrives.
+fn ends_after(robot: &str, damage: impl Fn(&[PathBuf])) {
+    let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
+    let status = run.wait_until_under_way(0.3);
+    damage(&support::shared_memory(&domain(robot).shared_memory_prefix()));
+    // A stage that joins finds these files.
+    signal_process(pid(&status, "mapper"), Signal::KILL);
+    std::thread::park_timeout(Duration::from_millis(500));
+    if run.is_running() {
+        run.signal(Signal::TERM);
     }
+    let began = Instant::now();
+    run.reap();
+    assert!(began.elapsed() < ENDS_WITHIN, "{robot}: {:?}", began.elapsed());
+    Run::start(robot, "open-room", &[]).arrives();
 }
 
 #[test]
-fn two_robots_on_one_machine_do_not_see_each_other() {
-    let mut one = Run::start("one", "open-room", &["--pace", "4"]);
-    let mut two = Run::at_own_speed("two", "trap", &["--pace", "4"]);
-    let status = one.wait_until_under_way(1.0);
-    two.wait_until_under_way(1.0);
-    let other = two.status().unwrap();
-    assert_ne!(find(&status, "mapper")["pid"], find(&other, "mapper")["pid"]);
-    one.kill_and_await_successor("mapper", Signal::KILL);
-    assert_eq!(one.arrives()["restarts"]["mapper"], 1);
-    assert_eq!(two.arrives()["restarts"]["mapper"], 0);
+fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_seconds() {
+    in_own_process(|| {
+        let truncate = |path: &PathBuf| drop(fs::File::create(path));
+        std::thread::scope(|scope| {
+            scope.spawn(|| ends_after("truncated", |shared| shared.iter().for_each(truncate)));
+            scope.spawn(|| {
+                ends_after("removed", |shared| {
+                    for path in shared {
+                        let _ = fs::remove_file(path).or_else(|_| fs::remove_dir_all(path));
+                    }
+                });
+            });
+            // A bus without its count of nodes is not joined.
+            ends_after("emptied", |shared| {
+                let counts = |path: &&PathBuf| path.to_string_lossy().ends_with(".global_mgmt");
+                shared.iter().filter(counts).for_each(truncate);
+                let refused = Bus::join(&domain("emptied"), "late").unwrap_err();
+                assert!(matches!(refused, BusError::Join { .. }), "{refused}");
+            });
+        });
+    });
 }

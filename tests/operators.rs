@@ -1,56 +1,10 @@
-//! Tests of an operator's actions on a running robot: stop and resume, kill, hold and release.
-
-use common::clock::monotonic_ns;
+//! Test of a stage that is held until an operator releases it.
 
 use crate::support::{Run, find, operate};
 
-const PACE: [&str; 2] = ["--pace", "4"];
-
-#[test]
-fn a_robot_told_to_stop_stands_until_it_is_told_to_go_on() {
-    let mut run = Run::under_way("halt", "open-room", &PACE, 2.0);
-    operate("halt", &["stop"]);
-    let stopped =
-        run.wait_until("it is stopped", |status| status["order"] == "stopped by an operator");
-    // A stopped robot continues its ticks, because it may be carried.
-    let tick = stopped["tick"].as_u64().unwrap();
-    let later = run.wait_until("some ticks have passed", |status| {
-        status["tick"].as_u64().unwrap() > tick + 10
-    });
-    assert_eq!(later["link"]["stopped"], true, "{later}");
-    operate("halt", &["resume"]);
-    run.arrives();
-}
-
-#[test]
-fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot_again() {
-    let run = Run::under_way("late-stop", "open-room", &PACE, 2.0);
-    let asked_ns = monotonic_ns().to_string();
-    operate("late-stop", &["stop"]);
-    operate("late-stop", &["resume"]);
-    operate("late-stop", &["stop", "--through-supervisor", &asked_ns]);
-    run.arrives();
-}
-
-#[test]
-fn an_operators_stop_uses_up_no_mission_time_and_is_no_stall() {
-    // Time in which a busy machine starts the stages.
-    let (pace, timeout_s) = (4.0, 100.0);
-    let set = format!("timeout_s={timeout_s}");
-    let arguments = ["--pace", "4", "--set", &set, "--set", "controller.speed_m_s=0.5"];
-    let mut run = Run::under_way("stop-time", "open-room", &arguments, 2.0);
-    operate("stop-time", &["stop"]);
-    let stopped = std::time::Instant::now();
-    run.wait_until("the stop has lasted for the mission's time limit", |_| {
-        stopped.elapsed().as_secs_f64() * pace > timeout_s
-    });
-    operate("stop-time", &["resume"]);
-    assert_eq!(run.arrives()["replans"], 0);
-}
-
 #[test]
 fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
-    let mut run = Run::under_way("held", "open-room", &PACE, 1.0);
+    let mut run = Run::under_way("held", "open-room", &["--pace", "4"], 1.0);
     // The next generation fails at its start.
     let checkpoint = run.directory().join("mapper.checkpoint");
     std::fs::remove_file(&checkpoint).unwrap();

@@ -9,8 +9,8 @@ use rustix::process::Signal;
 use serde_json::json;
 
 use crate::support::{
-    Browser, Run, assert_nothing_left, firsthand, has_browser, not_run, operate as operate_robot,
-    printed, refused, signal_process,
+    Browser, Run, assert_nothing_left, firsthand, golden, has_browser, not_run,
+    operate as operate_robot, printed, refused, signal_process,
 };
 
 struct Page {
@@ -60,7 +60,6 @@ const IS_THERE: &str = "!document.body.classList.contains('lost')";
 const GOES: &str = "document.getElementById('status').textContent.startsWith('the robot goes')";
 const RESTS: &str = "document.getElementById('status').textContent.includes('at rest')";
 
-const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
 const TITLES: &str =
     "return [...document.querySelectorAll('figcaption')].map((it) => it.textContent.split(',')[0])";
 const CHARTS: [&str; 9] = [
@@ -79,10 +78,14 @@ fn says(id: &str, text: &str) -> String {
     format!("document.getElementById('{id}').textContent.includes('{text}')")
 }
 
-/// Watches a live run in a window of that width, and acts as an operator.
-fn operate(robot: &str, width: u32) {
+#[test]
+fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_server() {
+    if !has_browser() {
+        return not_run("the page on a phone", "chromium and chromedriver are missing");
+    }
+    let robot = "page-phone";
     let page = Page::start(robot, "127.0.0.1:0");
-    let browser = Browser::open(width);
+    let browser = Browser::open(390);
     browser.go(&page.drive);
     browser.wait_until(&says("status", "no robot runs"));
     assert_eq!(browser.run("return location.hash"), "", "the token is not shown");
@@ -158,14 +161,6 @@ fn operate(robot: &str, width: u32) {
     assert_nothing_left(robot);
 }
 
-#[test]
-fn a_robot_is_watched_stopped_and_resumed_in_a_browser_that_loses_and_regains_its_server() {
-    if !has_browser() {
-        return not_run("the page in a window of a desk", "chromium and chromedriver are missing");
-    }
-    operate("page-desk", 1280);
-}
-
 /// Script that lists elements whose middle is outside the window or covered.
 const SEEN: &str = "const hidden = ids.filter((id) => {
   const box = document.getElementById(id).getBoundingClientRect();
@@ -200,10 +195,15 @@ fn actions_and_answers_are_in_view_at_every_size_without_scrolling() {
         browser.tap("map", 20, -30);
         browser.wait_until("!document.getElementById('go').disabled");
         seen(&["stop", "go", "waypoint", "clear", "chosen"], "0", "after a choice");
+        if (width, height) == (1280, 720) {
+            browser.tap("go", 0, 0);
+            browser.wait_until(&says("answer", "target: the supervisor sends the robot there"));
+        }
         browser.tap("stop", 0, 0);
         browser.wait_until(&says("answer", "stop: the robot rests"));
         seen(&["stop", "answer", "status", "go"], "0", "after a stop");
         seen(&["stop", "answer", "status"], "document.body.scrollHeight", "scrolled down");
+        browser.assert_legible();
         browser.tap("resume", 0, 0);
         browser.wait_until(GOES);
         browser.tap("clear", 0, 0);
@@ -213,94 +213,71 @@ fn actions_and_answers_are_in_view_at_every_size_without_scrolling() {
 }
 
 #[test]
-fn a_robot_is_watched_stopped_and_resumed_on_a_phone() {
-    if !has_browser() {
-        return not_run("the page on a phone", "chromium and chromedriver are missing");
-    }
-    operate("page-phone", 390);
-}
-
-#[test]
-fn a_recorded_run_is_scrubbed_and_played_in_windows_of_both_widths() {
+fn a_recorded_run_is_scrubbed_played_and_printed_with_what_moved_in_windows_of_both_widths() {
     if !has_browser() {
         return not_run("a recorded page", "chromium and chromedriver are missing");
     }
+    let (code, summary, directory) = Run::at_own_speed("page-movers", "walkers", &[]).finish_in();
+    assert_eq!(code, Some(0), "{summary}");
+    let page = directory.path().join("run/report/report.html");
     let out = tempfile::tempdir().unwrap();
-    let page = printed(&["report", GOLDEN, "--out", out.path().to_str().unwrap()]);
+    let golden = golden().path;
+    let golden = ["report", golden.to_str().unwrap(), "--out", out.path().to_str().unwrap()];
+    let golden = printed(&golden);
+    let has_metrics = "document.querySelectorAll('#metrics tr').length > 10";
+    let time = "document.getElementById('time')";
+    let ends = format!("{time}.value === {time}.max");
     let picture = "return document.getElementById('map').toDataURL()";
     for width in [1280, 390] {
         let browser = Browser::open(width);
-        browser.go(&format!("file://{}", page.trim_end()));
-        browser.wait_until("document.querySelectorAll('#metrics tr').length > 10");
-        browser.wait_until("document.querySelectorAll('#figures canvas').length >= 5");
-        browser.wait_until(
-            "document.getElementById('time').value === document.getElementById('time').max",
-        );
-        browser.wait_until("document.getElementById('status').className === 'good'");
+        browser.go(&format!("file://{}", golden.trim_end()));
+        browser.wait_until(has_metrics);
         assert_eq!(browser.run(TITLES), json!(CHARTS));
+        browser.go(&format!("file://{}", page.display()));
+        browser.wait_until(has_metrics);
+        browser.wait_until("document.querySelectorAll('#figures canvas').length >= 5");
+        browser.wait_until(&ends);
+        browser.wait_until("document.getElementById('status').className === 'good'");
         browser.assert_legible();
         let at_the_end = browser.run(picture);
-        let scrub = "const time = document.getElementById('time'); time.value = 1; time.dispatchEvent(new Event('input'))";
-        browser.run(scrub);
-        browser.wait_until("document.getElementById('now').textContent === '1.0 s'");
+        let scrub = |at: &str| {
+            browser.run(&format!("{time}.value = {at}; {time}.dispatchEvent(new Event('input'))"));
+            let shown = "document.getElementById('now').textContent";
+            browser.wait_until(&format!("{shown} === Number({at}).toFixed(1) + ' s'"));
+        };
+        scrub(&format!("{time}.min"));
+        assert_eq!(browser.run(MOVERS), 0, "nothing is known yet");
+        scrub("5");
+        assert!(browser.run(MOVERS).as_u64() > Some(50), "five people walk");
+        assert!(browser.text("legend").contains("moving"));
         assert_ne!(browser.run(picture), at_the_end, "the map shows another time");
         browser.run("document.getElementById('speed').value = '10'");
         browser.tap("play", 0, 0);
-        browser.wait_until(
-            "document.getElementById('time').value === document.getElementById('time').max",
-        );
+        browser.wait_until(&ends);
         browser.wait_until(&says("play", "Play"));
         let there =
             browser.run("return getComputedStyle(document.getElementById('urgent')).display");
         assert_eq!(there, "none", "a recording has no stop button");
+        if width == 1280 {
+            assert_dark_is_printed_in_light(&browser);
+        }
     }
 }
 
-#[test]
-fn what_moves_is_drawn_on_a_page_that_is_played_once_it_is_known() {
-    if !has_browser() {
-        return not_run("movers on a recorded page", "chromium and chromedriver are missing");
-    }
-    let (code, summary, directory) = Run::at_own_speed("page-movers", "walkers", &[]).finish_in();
-    assert_eq!(code, Some(0), "{summary}");
-    let browser = Browser::open(1280);
-    let page = directory.path().join("run/report/report.html");
-    browser.go(&format!("file://{}", page.display()));
-    browser.wait_until("document.querySelectorAll('#metrics tr').length > 10");
-    let drawn = |at: &str| {
-        browser.run(&format!("const time = document.getElementById('time'); time.value = {at}; time.dispatchEvent(new Event('input'))"));
-        browser.wait_until(&format!(
-            "document.getElementById('now').textContent === Number({at}).toFixed(1) + ' s'"
-        ));
-        let pixels = browser.run("const map = document.getElementById('map');
-            const { data } = map.getContext('2d').getImageData(0, 0, map.width, map.height);
-            const hex = getComputedStyle(document.documentElement).getPropertyValue('--mover').trim();
-            const colour = [1, 3, 5].map((from) => parseInt(hex.slice(from, from + 2), 16));
-            let count = 0;
-            for (let from = 0; from < data.length; from += 4) {
-              if (colour.every((part, at) => Math.abs(part - data[from + at]) < 12)) count++;
-            }
-            return count");
-        pixels.as_u64().unwrap()
-    };
-    assert_eq!(drawn("document.getElementById('time').min"), 0, "nothing is known yet");
-    assert!(drawn("5") > 50, "five people walk");
-    assert!(browser.text("legend").contains("moving"));
-    browser.assert_legible();
+/// Script that counts pixels in the colour of movers.
+const MOVERS: &str = "const map = document.getElementById('map');
+const { data } = map.getContext('2d').getImageData(0, 0, map.width, map.height);
+const hex = getComputedStyle(document.documentElement).getPropertyValue('--mover').trim();
+const colour = [1, 3, 5].map((from) => parseInt(hex.slice(from, from + 2), 16));
+let count = 0;
+for (let from = 0; from < data.length; from += 4) {
+  if (colour.every((part, at) => Math.abs(part - data[from + at]) < 12)) count++;
 }
+return count";
 
-#[test]
-fn a_page_of_dark_colours_is_printed_in_light_ones() {
-    if !has_browser() {
-        return not_run("a printed page", "chromium and chromedriver are missing");
-    }
-    let out = tempfile::tempdir().unwrap();
-    let page = printed(&["report", GOLDEN, "--out", out.path().to_str().unwrap()]);
-    let browser = Browser::open(1280);
+fn assert_dark_is_printed_in_light(browser: &Browser) {
     let features = json!([{"name": "prefers-color-scheme", "value": "dark"}]);
     browser.command("Emulation.setEmulatedMedia", &json!({"features": features}));
-    browser.go(&format!("file://{}", page.trim_end()));
-    browser.wait_until("document.querySelectorAll('#metrics tr').length > 10");
     let corner = "document.getElementById('map').getContext('2d').getImageData(2, 2, 1, 1).data[0]";
     browser.wait_until(&format!("{corner} === 23"));
     browser.run(&format!("addEventListener('beforeprint', () => (window.paper = {corner}))"));
@@ -311,7 +288,7 @@ fn a_page_of_dark_colours_is_printed_in_light_ones() {
 }
 
 #[test]
-fn a_page_for_others_than_this_machine_is_refused_because_it_does_not_encrypt() {
+fn a_page_for_others_than_this_machine_is_refused_and_one_without_a_robot_ends_on_request() {
     let listen = ["page", "--robot", "page-far", "--listen"];
     refused(
         &[&listen[..], &["0.0.0.0:0"]].concat(),
@@ -319,10 +296,6 @@ fn a_page_for_others_than_this_machine_is_refused_because_it_does_not_encrypt() 
         &["0.0.0.0", "--behind-proxy"],
     );
     refused(&[&listen[..], &["here"]].concat(), "usage", &["--listen"]);
-}
-
-#[test]
-fn a_page_ends_on_request_without_a_robot() {
     let mut page = Page::start("page-none", "127.0.0.1:0");
     page.signal(Signal::TERM);
     assert!(page.child.wait().unwrap().success());

@@ -3,12 +3,7 @@
 
 use std::{fs, os::unix::fs::PermissionsExt as _, path::Path, process::Stdio};
 
-use rustix::process::Signal;
-
-use crate::support::{
-    self, Run, assert_nothing_left, assert_reached, directory_of, find, firsthand, json_of, pid,
-    printed, refused, signal_process, start_quietly,
-};
+use crate::support::{Run, STAGES, firsthand, json_lines, pid, printed, refused, signal_process};
 
 /// Drum known beforehand, so the path around it is the same in every run.
 const DRUM: [&str; 6] = [
@@ -42,36 +37,11 @@ fn a_mission_with_a_planner_of_its_own_arrives_though_the_planner_is_killed_on_t
     // At 0.25 m/s the robot is then on its way around the drum.
     let status = run.wait_until_under_way(6.0);
     // The summary counts the restart even if the run ends early.
-    signal_process(pid(&status, "planner"), Signal::KILL);
+    signal_process(pid(&status, "planner"), rustix::process::Signal::KILL);
     let summary = run.arrives();
     assert_eq!(summary["restarts"]["planner"], 1, "{summary}");
     // The harmonic planner would have solved its field.
     assert_eq!(summary["full_solves"], 0, "{summary}");
-}
-
-#[test]
-fn a_run_with_a_planner_named_by_a_relative_path_is_resumed_from_elsewhere() {
-    let robot = "elsewhere";
-    let directory = directory_of(robot);
-    let folder = directory.path();
-    own_planner(&folder.join("planner"));
-    let mut first = firsthand(&["run", "open-room", "--robot", robot, "--pace", "4"]);
-    first.args(["--out", "run", "--set", &planner("./planner")]);
-    let mut first = start_quietly(first.current_dir(folder));
-    support::wait_for_status(robot, |status| {
-        status["order"] == "driving" && find(status, "planner")["state"] == "running"
-    });
-    first.kill().unwrap();
-    first.wait().unwrap();
-    let resumed = firsthand(&["run", "--json", "--resume"])
-        .arg(folder.join("run"))
-        .current_dir("/")
-        .output()
-        .unwrap();
-    let (exit, summary) = json_of(&resumed);
-    assert_reached(exit.code(), &summary[0]);
-    assert_eq!(summary[0]["full_solves"], 0, "{summary:?}");
-    assert_nothing_left(robot);
 }
 
 #[test]
@@ -93,38 +63,15 @@ fn becomes_the_planner(robot: &str, named: &str) {
         let mut command = firsthand(&["stage", stage, "--robot", robot]);
         command.stderr(Stdio::null()).spawn().unwrap()
     };
-    let stages: Vec<_> = support::STAGES.iter().map(start).collect();
+    let stages: Vec<_> = STAGES.iter().map(start).collect();
     let status = run.wait_until_driving();
     let pid = pid(&status, "planner");
     let words = fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap();
     assert!(words.contains("stage\0wavefront\0"), "{words:?}");
-    run.signal(Signal::TERM);
-    assert_eq!(run.finish().0, Some(0));
+    run.arrives();
     for mut stage in stages {
         stage.wait().unwrap();
     }
-    assert_nothing_left(robot);
-}
-
-#[test]
-fn a_planner_that_cannot_be_started_is_refused_by_name_before_anything_starts() {
-    let directory = tempfile::tempdir().unwrap();
-    let runs = directory.path().to_str().unwrap();
-    let plain = directory.path().join("plain");
-    fs::write(&plain, "").unwrap();
-    let plain = plain.to_str().unwrap();
-    for named in ["./no-such-planner", plain] {
-        let set = planner(named);
-        let run = ["run", "--robot", "no-plan", "--runs", runs, "--set", &set];
-        let evaluate = ["evaluate", "--planner", named, "--out", runs];
-        for arguments in [&run[..], &evaluate] {
-            let exit = refused(arguments, "planner-executable", &[named]);
-            assert_eq!(exit, Some(78), "{arguments:?}");
-        }
-    }
-    let left = fs::read_dir(directory.path()).unwrap();
-    assert_eq!(left.count(), 1, "only the plain file is left");
-    assert_nothing_left("no-plan");
 }
 
 #[test]
@@ -134,7 +81,7 @@ fn planners_are_compared_on_the_same_worlds_and_every_row_names_its_planner() {
     let out = out.to_str().unwrap();
     let planners = ["--planner", "harmonic,wavefront", "--count", "1", "--out", out];
     let compared = printed(&[&["evaluate", "--json"], &planners[..]].concat());
-    let object: serde_json::Value = serde_json::from_str(&compared).unwrap();
+    let object = &json_lines(&compared)[0];
     assert_eq!(object["setting"], "harmonic", "{object}");
     assert_eq!(object["versus"][0]["totals"]["setting"], "wavefront", "{object}");
     assert_eq!(object["versus"][0]["pairs"], 1, "{object}");

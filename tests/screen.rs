@@ -124,7 +124,7 @@ impl Drop for Screen {
 }
 
 #[test]
-fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
+fn top_does_what_its_keys_say_ends_with_its_terminal_and_on_a_signal_and_the_mission_arrives() {
     let robot = "con-top";
     let mut screen = Screen::start(robot);
     screen.wait_for("is not running here");
@@ -138,6 +138,17 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
     screen.press("s");
     screen.wait_for("stop: done");
     run.wait_until("it stands", |status| status["order"] == "stopped by an operator");
+    let mut closed = Screen::start(robot);
+    closed.wait_for("controller");
+    closed.terminal = None;
+    assert_eq!(closed.end().0, Some(0));
+    let mut signalled = Screen::start(robot);
+    signalled.wait_for("controller");
+    signal_process(signalled.child.id(), Signal::TERM);
+    let (code, written) = signalled.end();
+    assert_eq!(code, Some(0), "{written:?}");
+    assert!(written.contains("\x1b[?1049l"), "{written:?}");
+    refused(&["top", "--robot", robot], "no-terminal", &["firsthand status"]);
     // The planner is the fourth stage.
     screen.press("\x1b[B\x1b[B\x1b[Bk");
     screen.wait_for("kill planner: done");
@@ -170,22 +181,4 @@ fn the_keys_of_top_do_what_they_say_and_the_mission_arrives() {
         assert!(written.contains(restored), "{written:?}");
     }
     run.arrives();
-}
-
-#[test]
-fn top_ends_when_its_terminal_is_closed_and_on_a_signal_and_needs_one() {
-    let robot = "con-top-end";
-    let run = Run::under_way(robot, "open-room", &["--pace", "1"], 0.5);
-    let mut closed = Screen::start(robot);
-    closed.wait_for("controller");
-    closed.terminal = None;
-    assert_eq!(closed.end().0, Some(0));
-    let mut signalled = Screen::start(robot);
-    signalled.wait_for("controller");
-    signal_process(signalled.child.id(), Signal::TERM);
-    let (code, written) = signalled.end();
-    assert_eq!(code, Some(0), "{written:?}");
-    assert!(written.contains("\x1b[?1049l"), "{written:?}");
-    refused(&["top", "--robot", robot], "no-terminal", &["firsthand status"]);
-    run.stop();
 }

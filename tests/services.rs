@@ -16,8 +16,8 @@ use std::{
 use crate::{
     failsafe::Tap,
     support::{
-        self, PATIENCE, Run, assert_nothing_left, assert_reached, find, firsthand, signal_process,
-        wire::Robot,
+        self, PATIENCE, Run, STAGES, assert_nothing_left, assert_reached, find, firsthand,
+        signal_process, wire::Robot,
     },
 };
 use rustix::process::Signal;
@@ -55,36 +55,32 @@ impl Manager {
         text.lines().map(str::to_owned).collect()
     }
 
-    /// Returns all lines up to the message with `line`.
-    fn hear_until(&self, line: &str) -> Vec<String> {
+    fn hear_until(&self, line: &str) {
+        self.hear_until_that(|heard| heard == line);
+    }
+
+    fn hear_until_that(&self, is_it: impl Fn(&str) -> bool) {
         let began = Instant::now();
-        let mut heard = Vec::new();
-        loop {
-            let lines = self.hear();
-            let done = lines.iter().any(|said| said == line);
-            heard.extend(lines);
-            if done {
-                return heard;
-            }
-            assert!(began.elapsed() < PATIENCE, "no {line} in {heard:?}");
+        while !self.hear().iter().any(|line| is_it(line)) {
+            assert!(began.elapsed() < PATIENCE, "it is not heard");
         }
     }
 }
 
-fn mission(robot: &str, directory: &TempDir) -> Command {
-    let mut command = firsthand(&["run", "open-room", "--robot", robot, "--pace", "1", "--out"]);
-    command.arg(directory.path().join("run"));
-    command.stdout(Stdio::null()).stderr(Stdio::null());
-    command
-}
-
 #[test]
-fn systemd_hears_ready_a_status_the_watchdog_at_half_its_time_and_stopping() {
+fn systemd_hears_of_a_run_and_its_journal_of_deaths_and_a_frozen_supervisor_feeds_no_watchdog() {
+    let robot = "notify";
     let manager = Manager::new();
-    let directory = support::directory_of("notify");
-    let mut command = mission("notify", &directory);
-    manager.adopt(&mut command);
-    let mut run = command.spawn().unwrap();
+    let directory = support::directory_of(robot);
+    let run = directory.path().join("run");
+    let journal = directory.path().join("journal");
+    let file = fs::File::create(&journal).unwrap();
+    let found = file.metadata().unwrap();
+    let mut command = firsthand(&["run", "open-room", "--robot", robot, "--pace", "1", "--out"]);
+    manager.adopt(command.arg(&run).stdout(Stdio::null()).stderr(file));
+    command.args(["--set", "controller.speed_m_s=0.05"]);
+    command.env("JOURNAL_STREAM", format!("{}:{}", found.dev(), found.ino()));
+    let mut supervisor = command.spawn().unwrap();
     manager.hear_until("READY=1");
     // A loop that is late by half of the limit would be killed, so that much must be left.
     let mut fed = Instant::now();
@@ -93,38 +89,14 @@ fn systemd_hears_ready_a_status_the_watchdog_at_half_its_time_and_stopping() {
         assert!(fed.elapsed() < WATCHDOG, "{:?}", fed.elapsed());
         fed = Instant::now();
     }
-    let heard = manager.hear_until_status();
-    assert!(heard.contains("5/5"), "{heard}");
-    signal_process(run.id(), Signal::TERM);
-    manager.hear_until("STOPPING=1");
-    assert_eq!(run.wait().unwrap().code(), Some(0));
-    assert_nothing_left("notify");
-}
+    manager.hear_until_that(|line| {
+        line.starts_with("STATUS=") && line.contains("to go") && line.contains("5/5")
+    });
+    let status = support::wait_for_status(robot, |status| status["order"] == "driving");
+    signal_process(support::pid(&status, "mapper"), Signal::KILL);
+    support::wait_for_status(robot, |status| find(status, "mapper")["generation"] == 2);
 
-impl Manager {
-    /// Returns the status line of a driving robot.
-    fn hear_until_status(&self) -> String {
-        let began = Instant::now();
-        loop {
-            let lines = self.hear();
-            let mut statuses = lines.iter().filter_map(|line| line.strip_prefix("STATUS="));
-            if let Some(status) = statuses.find(|status| status.contains("to go")) {
-                return status.to_owned();
-            }
-            assert!(began.elapsed() < PATIENCE, "no status");
-        }
-    }
-}
-
-#[test]
-fn a_frozen_supervisor_does_not_feed_the_watchdog() {
-    let manager = Manager::new();
-    let directory = support::directory_of("hang");
-    let mut command = mission("hang", &directory);
-    manager.adopt(&mut command);
-    let mut run = command.spawn().unwrap();
-    manager.hear_until("READY=1");
-    signal_process(run.id(), Signal::STOP);
+    signal_process(supervisor.id(), Signal::STOP);
     // Messages from before the freeze.
     manager.socket.set_nonblocking(true).unwrap();
     let mut message = [0; 4096];
@@ -132,44 +104,22 @@ fn a_frozen_supervisor_does_not_feed_the_watchdog() {
     manager.socket.set_nonblocking(false).unwrap();
     manager.socket.set_read_timeout(Some(WATCHDOG)).unwrap();
     assert!(manager.socket.recv(&mut message).is_err(), "it speaks");
-    // systemd would kill it. The stages then end, too, and the next run is not hindered.
-    signal_process(run.id(), Signal::KILL);
-    run.wait().unwrap();
-    Run::start("hang", "open-room", &[]).arrives();
-}
+    manager.socket.set_read_timeout(Some(PATIENCE)).unwrap();
+    signal_process(supervisor.id(), Signal::CONT);
+    signal_process(supervisor.id(), Signal::TERM);
+    manager.hear_until("STOPPING=1");
+    assert_eq!(supervisor.wait().unwrap().code(), Some(0));
 
-#[test]
-fn in_a_journal_a_stages_death_has_its_priority() {
-    let directory = support::directory_of("journal");
-    let journal = fs::File::create(directory.path().join("journal")).unwrap();
-    let found = journal.metadata().unwrap();
-    let mut run = mission("journal", &directory)
-        .env("JOURNAL_STREAM", format!("{}:{}", found.dev(), found.ino()))
-        .stderr(journal)
-        .spawn()
-        .unwrap();
-    let status = support::wait_for_status("journal", |status| status["order"] == "driving");
-    let mapper = find(&status, "mapper")["pid"].as_u64().unwrap();
-    signal_process(mapper as u32, Signal::KILL);
-    support::wait_for_status("journal", |status| find(status, "mapper")["generation"] == 2);
-    let journal = || fs::read_to_string(directory.path().join("journal")).unwrap();
-    support::wait_until("the title is shown", || {
-        journal().lines().any(|line| !line.starts_with('<'))
-    });
-    signal_process(run.id(), Signal::TERM);
-    run.wait().unwrap();
-    let text = journal();
+    let text = fs::read_to_string(journal).unwrap();
     let is_death = |line: &&str| line.contains("stage=\"mapper\"") && line.contains("cause=");
-    let death = text.lines().find(is_death).unwrap();
-    assert!(death.starts_with("<4>"), "{text}");
+    assert!(text.lines().find(is_death).unwrap().starts_with("<4>"), "{text}");
     // Only the mission's title has no priority.
     let bare = text.lines().filter(|line| !line.starts_with('<'));
     assert_eq!(bare.count(), 1, "{text}");
     // The run directory also records the death. Stages log to files, without priorities.
-    let run = directory.path().join("run");
-    let death = ["WARN", "stage=\"mapper\"", "cause="];
-    assert_eq!(support::logged(&run, "supervisor", &death), 1);
+    assert_eq!(support::logged(&run, "supervisor", &["WARN", "stage=\"mapper\"", "cause="]), 1);
     assert_eq!(support::logged(&run, "mapper", &["<6>"]), 0);
+    assert_nothing_left(robot);
 }
 
 /// Stages that this test starts and restarts, like systemd with `Restart=always`.
@@ -189,7 +139,7 @@ impl Units {
             let keeper = thread::spawn(move || keep_up(robot, stage, &log, &over));
             (stage, keeper)
         };
-        Self { keepers: support::STAGES.map(keep).into(), over, directory }
+        Self { keepers: STAGES.map(keep).into(), over, directory }
     }
 
     /// Waits until all stages have ended in order. A busy supervisor may kill a stopped one before
@@ -230,7 +180,7 @@ impl Drop for Units {
     /// Waits for the stages to end with their supervisor. A failed test prints their logs.
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
-        for stage in support::STAGES.iter().filter(|_| thread::panicking()) {
+        for stage in STAGES.iter().filter(|_| thread::panicking()) {
             let log = fs::read_to_string(self.directory.path().join(stage));
             eprintln!("{stage}: {}", log.unwrap_or_default());
         }
@@ -250,111 +200,54 @@ fn watching_with(robot: &'static str, arguments: &[&str]) -> (Run, Units) {
 }
 
 #[test]
-fn external_stages_drive_and_survive_kills_under_a_supervisor_that_only_watches() {
-    let (mut run, mut units) = watching("units");
-    run.wait_until_under_way(2.0);
+fn external_stages_survive_kills_and_freezes_and_those_that_systemd_stops_are_no_deaths() {
+    let robot = "units";
+    let (mut run, mut units) = watching(robot);
+    run.wait_until_under_way(1.0);
     run.kill_each(Signal::KILL);
-    let (code, summary) = run.finish();
-    assert_reached(code, &summary);
-    for stage in support::STAGES {
-        assert!(summary["restarts"][stage].as_u64() >= Some(1), "{summary}");
-    }
-    units.assert_all_leave();
-    assert_nothing_left("units");
-}
-
-#[test]
-fn a_frozen_external_stage_is_ended_by_the_supervisor_that_only_watches() {
-    let (mut run, mut units) = watching("unit-hang");
-    let status = run.wait_until_under_way(1.0);
-    run.kill_and_await("mapper", Signal::STOP, &status);
-    run.signal(Signal::TERM);
-    assert_eq!(run.finish().0, Some(0));
-    units.assert_all_leave();
-    assert_nothing_left("unit-hang");
-}
-
-#[test]
-fn external_stages_that_systemd_stops_before_their_supervisor_are_no_deaths() {
-    let (mut run, mut units) = watching("unit-order");
-    let status = run.wait_until_under_way(1.0);
-    let status = run.kill_and_await("planner", Signal::KILL, &status);
+    let status = run.kill_and_await_successor("mapper", Signal::STOP);
+    let holder = support::pid(&status, "planner").to_string();
+    let second = ["stage", "planner", "--robot", robot];
+    assert_eq!(support::refused(&second, "", &["planner", &holder]), Some(1));
+    run.wait_until_driving();
     // systemd does not restart a unit that it stops.
     units.over.store(true, Ordering::Relaxed);
-    for stage in support::STAGES.iter().rev() {
+    let deaths = run.records("deaths.jsonl").len();
+    assert!(deaths > STAGES.len());
+    for stage in STAGES.iter().rev() {
         signal_process(support::pid(&status, stage), Signal::TERM);
     }
     run.wait_until("all have ended", |status| {
-        let stages = status["stages"].as_array().unwrap();
-        stages.iter().all(|stage| stage["state"] == "down")
+        STAGES.iter().all(|stage| find(status, stage)["state"] == "down")
     });
-    let deaths = run.records("deaths.jsonl");
-    let stages: Vec<_> = deaths.iter().map(|death| &death["stage"]).collect();
-    assert_eq!(stages, ["planner"], "{deaths:?}");
-    run.signal(Signal::TERM);
-    assert_eq!(run.finish().0, Some(0));
+    assert_eq!(run.records("deaths.jsonl").len(), deaths);
+    run.stop();
     units.assert_all_leave();
-    assert_nothing_left("unit-order");
 }
 
 #[test]
-fn external_stages_stop_the_robot_and_end_when_the_supervisor_is_killed() {
+fn external_stages_stop_the_robot_and_end_with_a_killed_supervisor_and_a_frozen_one_with_the_next()
+{
     let robot = "unit-orphan";
     let body = Robot::on_the_course();
     let tap = Tap::before(&body);
     let address = tap.proxy.as_robot();
     let (mut run, mut units) = watching_with(robot, &["--set", &address]);
-    run.wait_until_under_way(1.0);
+    let status = run.wait_until_under_way(1.0);
+    // The kernel wakes a stage of the supervisor when its parent ends, but an external one stays
+    // frozen.
+    let (_, mapper) = units.keepers.remove(2);
+    signal_process(support::pid(&status, "mapper"), Signal::STOP);
     run.kill();
     units.assert_all_leave();
     tap.assert_last_is_zero();
     Run::start(robot, "open-room", &[]).arrives();
-}
-
-#[test]
-fn a_frozen_external_stage_that_outlives_its_supervisor_does_not_hinder_the_next() {
-    // The kernel wakes a stage of the supervisor when its parent ends, but an external one stays
-    // frozen.
-    let robot = "frozen-orphan";
-    let mut watching = Run::start(robot, "obstacle-course", &["--watch-only"]);
-    watching.wait_until("there is a bus", |_| true);
-    let mut mapper = firsthand(&["stage", "mapper", "--robot", robot]);
-    let mut mapper = mapper.spawn().unwrap();
-    watching.wait_until("the mapper runs", |status| find(status, "mapper")["state"] == "running");
-    signal_process(mapper.id(), Signal::STOP);
-    watching.kill();
-    Run::start(robot, "open-room", &[]).arrives();
-    let ended = mapper.try_wait().unwrap();
-    mapper.kill().unwrap();
-    mapper.wait().unwrap();
-    assert!(ended.is_some(), "the frozen stage is still there");
-}
-
-#[test]
-fn a_stage_without_a_place_is_refused_with_the_remedy() {
-    let mapper_is_refused = |robot: &str, names: &[&str]| {
-        let mapper = ["stage", "mapper", "--robot", robot];
-        assert_eq!(support::refused(&mapper, "", names), Some(1));
-    };
-    mapper_is_refused("nobody", &["nobody", "--watch-only"]);
-
-    let mut own = Run::start("own", "open-room", &["--pace", "1"]);
-    own.wait_until_driving();
-    mapper_is_refused("own", &["own", "--watch-only"]);
-    own.stop();
-
-    let (mut run, units) = watching("taken");
-    let status = run.wait_until_under_way(0.5);
-    let holder = support::pid(&status, "mapper").to_string();
-    mapper_is_refused("taken", &["mapper", &holder]);
-    run.signal(Signal::TERM);
-    run.finish();
-    drop(units);
+    mapper.join().unwrap();
 }
 
 /// Returns the command that starts a service with `--resume-last`, each time in the same directory
 /// of runs.
-fn service(robot: &'static str, more: &'static [&'static str]) -> (TempDir, impl Fn() -> Command) {
+fn service<'a>(robot: &'a str, more: &'a [&'a str]) -> (TempDir, impl Fn() -> Command + 'a) {
     let directory = support::directory_of(robot);
     let runs = directory.path().to_path_buf();
     let service = move || {
@@ -375,19 +268,14 @@ fn kill_while_it_drives(robot: &str, service: &mut Command) {
 }
 
 #[test]
-fn a_service_whose_mission_says_so_goes_on_by_itself_after_it_was_killed() {
-    let (_runs, service) = service("goes-on", &["--set", "resume='automatic'"]);
-    kill_while_it_drives("goes-on", &mut service());
-    let (exit, summary) = support::json_of(&service().output().unwrap());
-    assert_reached(exit.code(), &summary[0]);
-    assert_eq!(summary[0]["resumes"], 1, "{summary:?}");
-    assert_nothing_left("goes-on");
-}
-
-#[test]
 fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_told() {
-    let (_runs, service) = service("cut", &[]);
+    let (runs, service) = service("cut", &[]);
     kill_while_it_drives("cut", &mut service());
+    // The run is not another robot's.
+    let mut other = firsthand(&["run", "open-room", "--resume-last", "--robot", "cut-other"]);
+    let mut other = support::start_quietly(other.arg("--runs").arg(runs.path()));
+    other.wait().unwrap();
+    assert_eq!(fs::read_dir(runs.path()).unwrap().count(), 2);
     let again = service().stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let stands = |status: &serde_json::Value| status["order"] == "stopped by an operator";
     support::wait_for_status("cut", stands);
@@ -405,11 +293,14 @@ fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_
 }
 
 #[test]
-fn a_service_begins_anew_after_a_run_of_another_version_and_says_so() {
+fn a_service_goes_on_by_itself_if_its_mission_says_so_and_begins_anew_after_another_version() {
     let robot = "updated";
     let (runs, service) = service(robot, &["--set", "resume='automatic'"]);
     kill_while_it_drives(robot, &mut service());
-    for entry in fs::read_dir(runs.path().join("open-room-001")).unwrap().flatten() {
+    // It goes on.
+    kill_while_it_drives(robot, &mut service());
+    let directory = runs.path().join("open-room-001");
+    for entry in fs::read_dir(&directory).unwrap().flatten() {
         let mut bytes = fs::read(entry.path()).unwrap();
         for at in 0..bytes.len().saturating_sub(4) {
             if bytes[at..].starts_with(b"FHC") {
@@ -418,6 +309,9 @@ fn a_service_begins_anew_after_a_run_of_another_version_and_says_so() {
         }
         fs::write(entry.path(), bytes).unwrap();
     }
+    assert_eq!(fs::read_dir(runs.path()).unwrap().count(), 1);
+    let resume = ["run", "--resume", directory.to_str().unwrap()];
+    support::refused(&resume, "other-version", &[".checkpoint"]);
     let again = service().output().unwrap();
     let said = String::from_utf8_lossy(&again.stderr);
     assert!(said.contains("the last run ends here") && said.contains("version 1, not"), "{said}");
@@ -429,11 +323,9 @@ fn a_service_begins_anew_after_a_run_of_another_version_and_says_so() {
 
 #[test]
 fn a_service_that_stays_begins_where_it_stood_when_it_was_stopped_and_waits() {
-    const STAYS: [&str; 6] = ["--stay", "--pace", "2", "--set", "perimeter.width_m=8.0", "--set"];
-    let (_runs, service) = service(
-        "begins",
-        &[STAYS[0], STAYS[1], STAYS[2], STAYS[3], STAYS[4], STAYS[5], "target=[0.9, 0.3]"],
-    );
+    let place = ["perimeter.width_m=8.0", "target=[0.9, 0.3]"];
+    let stays = ["--stay", "--pace", "2", "--set", place[0], "--set", place[1]];
+    let (_runs, service) = service("begins", &stays);
     let mut first = support::start_quietly(&mut service());
     let waits = |status: &serde_json::Value| status["order"] == "waiting for a target";
     support::wait_for_status("begins", waits);

@@ -1,19 +1,20 @@
 //! Tests of signals during the start of a run: it ends with a summary, and leaves nothing.
 
-use std::{fs, path::Path, process::Stdio};
+use std::{fs, path::Path, process::Stdio, thread};
 
 use rustix::process::Signal;
 
 use crate::support::{
-    assert_nothing_left, directory_of, domain, firsthand, processes, processes_of, signal_process,
-    wait_until,
+    all_run, assert_nothing_left, directory_of, domain, firsthand, processes_with, signal_process,
+    status_of, wait_until,
 };
 
 /// Ends a run when `is_there` is true for its directory of runs.
-fn ends(robot: &str, is_there: impl Fn(&Path) -> bool) {
+fn ends(robot: &str, arguments: &[&str], is_there: impl Fn(&Path) -> bool) {
     let runs = directory_of(robot);
     let mut run = firsthand(&["run", "open-room", "--robot", robot, "--pace", "1", "--runs"]);
-    let run = run.arg(runs.path()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    run.arg(runs.path()).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let run = run.spawn().unwrap();
     wait_until("it is there", || is_there(runs.path()));
     signal_process(run.id(), Signal::TERM);
     let output = run.wait_with_output().unwrap();
@@ -28,33 +29,39 @@ fn ends(robot: &str, is_there: impl Fn(&Path) -> bool) {
 }
 
 fn process(robot: &str, word: &str) -> Option<u32> {
-    let lines = processes_of(robot);
-    let line = lines.iter().find(|line| line.contains(word))?;
-    processes(line).first().map(|(pid, _)| *pid)
+    processes_with(robot, word).first().copied()
 }
 
 #[test]
 fn a_signal_at_any_moment_of_a_start_ends_the_run_with_a_summary_and_leaves_nothing() {
-    ends("st-log", |runs| runs.join("open-room-001/supervisor.log").exists());
-    ends("st-claim", |_| domain("st-claim").is_supervised());
-    ends("st-bus", |_| domain("st-bus").middleware_config().exists());
-    ends("st-robot", |_| process("st-robot", "x80-sim.checkpoint").is_some());
-    ends("st-recorder", |_| process("st-recorder", "firsthand record").is_some());
-    ends("st-stage", |_| process("st-stage", "stage planner").is_some());
+    ends("st-log", &[], |runs| runs.join("open-room-001/supervisor.log").exists());
+    ends("st-claim", &[], |_| domain("st-claim").is_supervised());
+    ends("st-bus", &[], |_| domain("st-bus").middleware_config().exists());
+    ends("st-robot", &[], |_| process("st-robot", "x80-sim.checkpoint").is_some());
+    ends("st-recorder", &[], |_| process("st-recorder", "firsthand record").is_some());
+    ends("st-stage", &[], |_| process("st-stage", "stage planner").is_some());
+    // The robot is off.
+    let nowhere = ["--set", "robot.address='127.0.0.1:9'"];
+    ends("st-off", &nowhere, |_| status_of("st-off").is_some_and(|status| all_run(&status)));
 }
 
 #[test]
 fn a_signal_ends_a_run_whose_robot_or_recorder_gets_no_processor_while_it_starts() {
     let [simulator, recorder] = ["x80-sim.checkpoint", "firsthand record"];
     // The recorder starts once the robot listens.
-    for (robot, appears, frozen) in [
+    let cases = [
         ("st-no-robot", simulator, simulator),
         ("st-listens", recorder, simulator),
         ("st-no-rec", recorder, recorder),
-    ] {
-        ends(robot, |_| {
-            let child = process(robot, appears).and_then(|_| process(robot, frozen));
-            child.inspect(|&child| signal_process(child, Signal::STOP)).is_some()
-        });
-    }
+    ];
+    thread::scope(|scope| {
+        for (robot, appears, frozen) in cases {
+            scope.spawn(move || {
+                ends(robot, &[], |_| {
+                    let child = process(robot, appears).and_then(|_| process(robot, frozen));
+                    child.inspect(|&child| signal_process(child, Signal::STOP)).is_some()
+                });
+            });
+        }
+    });
 }

@@ -3,62 +3,38 @@
 
 use std::{
     fs,
-    path::PathBuf,
-    sync::atomic::{AtomicBool, Ordering},
-    time::Instant,
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicU8, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
 };
 
-use common::wire::{Command, Decoder, Motion};
+use common::wire::{Addressing, Command, Decoder, Motion, Report};
 use rustix::process::Signal;
-use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::support::{
-    PATIENCE, Run, domain, find, logged, operate, output, pid, refused, shared_memory,
-    signal_process, wait_until,
+    PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, domain, find, logged, mission_file,
+    operate, output, pid, printed, processes_with, refused, shared_memory, signal_process,
+    wait_until,
     wire::{Pass, Proxy, Robot},
 };
 
-/// Writes a mission of a robot that ignores command time limits, with its target `target_m` ahead.
-fn mission(target_m: f64) -> (TempDir, PathBuf) {
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("straight.toml");
-    let text = format!("target = [{target_m}, 0]\n[simulation]\nignores_time = true");
-    fs::write(&file, text).unwrap();
-    (directory, file)
+fn mission(target_m: f64) -> (TempDir, String) {
+    mission_file(&format!("target = [{target_m}, 0]\n[simulation]\nignores_time = true"))
 }
 
 /// Starts a robot on a wire and a run, and waits until it is under way.
 fn under_way(name: &str, transport: &str) -> (TempDir, Robot, Run) {
     let (directory, mission) = mission(5.0);
-    let mission = mission.to_str().unwrap();
-    let mut robot = Robot::start(mission, transport, "127.0.0.1:0");
-    let scheme = match transport {
-        "udp" => "",
-        "tcp" => "tcp://",
-        _ => "serial://",
-    };
-    let address = format!("robot.address=\"{scheme}{}\"", robot.listening);
-    let mut run = Run::start(name, mission, &["--set", &address]);
+    let mut robot = Robot::start(&mission, transport, "127.0.0.1:0");
+    let mut run = Run::start(name, &mission, &["--set", &robot.as_robot()]);
     run.wait_until_driving();
     robot.wait_until_driven(0.3);
     (directory, robot, run)
-}
-
-fn guards(run: &Run) -> Vec<u32> {
-    let directory = run.directory();
-    let is_guard = |id: &u32| {
-        let line = fs::read_to_string(format!("/proc/{id}/cmdline")).unwrap_or_default();
-        let words: Vec<_> = line.split('\0').collect();
-        words.contains(&"stop-guard") && words.contains(&directory.to_str().unwrap())
-    };
-    let entries = fs::read_dir("/proc").unwrap().flatten();
-    entries.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).filter(is_guard).collect()
-}
-
-fn stages(status: &Value) -> Vec<u32> {
-    let stages = status["stages"].as_array().unwrap();
-    stages.iter().map(|stage| pid(status, stage["name"].as_str().unwrap())).collect()
 }
 
 fn stands_after_kills(transport: &str) {
@@ -77,90 +53,108 @@ fn stands_after_kills(transport: &str) {
     // systemd does this with a unit: it kills all processes at once, then runs ExecStopPost.
     let (_directory, mut robot, mut run) = under_way(&format!("sa-{transport}"), transport);
     let status = run.status().unwrap();
-    let mut all = guards(&run);
+    let mut all = processes_with(&run.robot, "stop-guard");
     assert_eq!(all.len(), 1, "a guard for the link");
-    all.extend(stages(&status));
+    all.extend(STAGES.map(|stage| pid(&status, stage)));
     run.signal(Signal::KILL);
     for process in all {
         signal_process(process, Signal::KILL);
     }
     run.reap();
-    let stopped = output(&["stop", "--robot", &run.robot]);
+    printed(&["stop", "--robot", &run.robot]);
     robot.wait_until_at_rest();
-    assert!(stopped.status.success(), "{stopped:?}");
 }
 
 #[test]
-fn a_robot_on_datagrams_stands_after_kills_of_its_link_its_supervisor_or_all() {
-    stands_after_kills("udp");
-}
-
-#[test]
-fn a_robot_on_a_connection_stands_after_kills_of_its_link_its_supervisor_or_all() {
-    stands_after_kills("tcp");
-}
-
-#[test]
-fn a_robot_on_a_serial_line_stands_after_kills_of_its_link_its_supervisor_or_all() {
-    stands_after_kills("pty");
-}
-
-/// Forwards the host's bytes without the commands that `ignored` selects.
-fn without(ignored: fn(&Command) -> bool) -> Box<Pass> {
-    let mut decoder = Decoder::default();
-    Box::new(move |bytes| {
-        decoder.push(bytes);
-        let mut passed = Vec::new();
-        while let Some(frame) = decoder.next_frame() {
-            if !Command::parse(&frame).is_ok_and(|command| ignored(&command)) {
-                frame.encode(&mut passed);
-            }
+fn a_robot_on_any_wire_stands_after_kills_of_its_link_its_supervisor_or_all() {
+    thread::scope(|scope| {
+        for transport in ["udp", "tcp", "pty"] {
+            scope.spawn(move || stands_after_kills(transport));
         }
-        passed
-    })
-}
-
-fn stands(motion: &Motion) -> bool {
-    [0, 1].into_iter().all(|channel| motion.targets.of(channel).is_none_or(|target| target == 0))
-}
-
-fn is_velocity_0(command: &Command) -> bool {
-    matches!(command, Command::Motion(motion) if stands(motion))
+    });
 }
 
 fn is_any_stop(command: &Command) -> bool {
-    let slows = matches!(command, Command::Motion(motion) if motion.limit_ms.is_none());
-    slows || is_velocity_0(command) || matches!(command, Command::Enable { on: false, .. })
+    let stands = |motion: &Motion| {
+        [0, 1].into_iter().all(|channel| motion.targets.of(channel).is_none_or(|it| it == 0))
+    };
+    match command {
+        Command::Motion(motion) => motion.limit_ms.is_none() || stands(motion),
+        Command::Enable { on, .. } => !on,
+        _ => false,
+    }
 }
 
-/// Starts a run to a close target with a robot that ignores some commands.
-fn disobedient(name: &str, ignored: fn(&Command) -> bool) -> (TempDir, Robot, Proxy, Run) {
-    let (directory, mission) = mission(0.6);
-    let mission = mission.to_str().unwrap();
-    let robot = Robot::start(mission, "udp", "127.0.0.1:0");
-    let proxy = Proxy::before(&robot, without(ignored), Box::new(<[u8]>::to_vec));
-    let run = Run::start(name, mission, &["--set", &proxy.as_robot()]);
-    (directory, robot, proxy, run)
+/// Fault of a wire, which a test changes.
+#[derive(Clone, Copy, PartialEq)]
+enum Fault {
+    None,
+    /// No stop reaches the robot.
+    NoStop,
+    /// No motor frame reaches the link.
+    NoFrame,
+    /// The encoders count at random.
+    Random,
 }
 
-#[test]
-fn no_mission_ends_before_a_robot_rests_that_ignores_velocity_0_and_obeys_disable() {
-    let (_directory, mut robot, _proxy, run) = disobedient("sd-disable", is_velocity_0);
-    let (code, summary) = run.finish();
-    assert!(robot.is_at_rest(), "{summary}");
-    let outcome = summary["outcome"].as_str().unwrap();
-    assert!(["reached", "wrong_place"].contains(&outcome), "{summary}");
-    assert_eq!(code, Some(if outcome == "reached" { 0 } else { 9 }), "{summary}");
+struct Wire {
+    proxy: Proxy,
+    fault: Arc<AtomicU8>,
 }
 
-/// Whether the robot of the next test gets no stop.
-static IS_DEAF: AtomicBool = AtomicBool::new(true);
+impl Wire {
+    fn before(robot: &Robot, fault: Fault) -> Self {
+        let shared = Arc::new(AtomicU8::new(fault as u8));
+        let (out, back) = (Arc::clone(&shared), Arc::clone(&shared));
+        let is = |shared: &AtomicU8, fault| shared.load(Ordering::Relaxed) == fault as u8;
+        let mut decoder = Decoder::default();
+        let to_robot: Box<Pass> = Box::new(move |bytes| {
+            decoder.push(bytes);
+            let mut passed = Vec::new();
+            while let Some(frame) = decoder.next_frame() {
+                let stops = || Command::parse(&frame).is_ok_and(|command| is_any_stop(&command));
+                if !(is(&out, Fault::NoStop) && stops()) {
+                    frame.encode(&mut passed);
+                }
+            }
+            passed
+        });
+        let (mut decoder, mut frames) = (Decoder::default(), 0_u16);
+        let to_link: Box<Pass> = Box::new(move |bytes| {
+            decoder.push(bytes);
+            let mut passed = Vec::new();
+            while let Some(frame) = decoder.next_frame() {
+                let Ok(mut report) = Report::parse(&frame) else { continue };
+                if let Report::Motor(sensors) = &mut report {
+                    if is(&back, Fault::NoFrame) {
+                        continue;
+                    }
+                    frames = frames.wrapping_add(1);
+                    if is(&back, Fault::Random) {
+                        let random = |factor| frames.wrapping_mul(factor) % 32_768;
+                        sensors.encoders[0].position = random(9973);
+                        sensors.encoders[1].position = random(20_011);
+                    }
+                }
+                report.encode(Addressing::default(), &mut passed);
+            }
+            passed
+        });
+        Self { proxy: Proxy::before(robot, to_robot, to_link), fault: shared }
+    }
+
+    fn set(&self, fault: Fault) {
+        self.fault.store(fault as u8, Ordering::Relaxed);
+    }
+}
 
 #[test]
 fn a_robot_that_gets_no_stop_has_an_outcome_of_its_own_and_a_guard_that_stops_it_after_the_run() {
     let name = "sd-nothing";
-    let (_directory, mut robot, _proxy, mut run) =
-        disobedient(name, |command| IS_DEAF.load(Ordering::Relaxed) && is_any_stop(command));
+    let (_directory, mission) = mission(0.6);
+    let mut robot = Robot::start(&mission, "udp", "127.0.0.1:0");
+    let wire = Wire::before(&robot, Fault::NoStop);
+    let mut run = Run::start(name, &mission, &["--set", &wire.proxy.as_robot()]);
     let directory = run.directory();
     let began = Instant::now();
     while !fs::metadata(directory.join("summary.json")).is_ok_and(|file| file.len() > 2) {
@@ -177,27 +171,47 @@ fn a_robot_that_gets_no_stop_has_an_outcome_of_its_own_and_a_guard_that_stops_it
     run.keeps_guard = true;
     run.signal(Signal::TERM);
     let (code, summary) = run.finish();
-    assert_eq!(summary["outcome"], "could_not_be_stopped", "{summary}");
-    assert_eq!(code, Some(10), "{summary}");
+    assert_ended(code, &summary, 10, "could_not_be_stopped");
     refused(&stop, "not-at-rest", &["it moves"]);
     let status = output(&["status", "--robot", name]);
     assert!(String::from_utf8_lossy(&status.stdout).contains("it moves"), "{status:?}");
-    IS_DEAF.store(false, Ordering::Relaxed);
+    wire.set(Fault::None);
     robot.wait_until_at_rest();
     wait_until("the guard leaves", || !domain(name).directory().exists());
 }
 
-fn stops_without_middleware(name: &str, damage: impl Fn(&Run)) {
-    let (_directory, mut robot, run) = under_way(name, "udp");
-    damage(&run);
-    let stopped = output(&["stop", "--robot", name]);
-    assert!(stopped.status.success(), "{stopped:?}");
-    assert!(robot.is_at_rest(), "{stopped:?}");
-}
+/// Longest time from a signal to the end of a run without wheel reports, including machine load.
+const ENDS_WITHIN: Duration = Duration::from_secs(15);
 
 #[test]
-fn an_operator_stops_a_robot_whose_supervisor_is_frozen() {
-    stops_without_middleware("so-frozen", |run| run.signal(Signal::STOP));
+fn a_robot_without_usable_motor_frames_is_said_to_be_unknown_and_the_first_signal_ends_its_run() {
+    let ends = |robot: &str, before: Fault, fault: Fault| {
+        let mut body = Robot::on_the_course();
+        let wire = Wire::before(&body, before);
+        let mut run = Run::start(robot, "obstacle-course", &["--set", &wire.proxy.as_robot()]);
+        if before == Fault::None {
+            body.wait_until_driven(0.1);
+            wire.set(fault);
+        }
+        run.wait_until("the link stands", |status| {
+            let link = &status["link"];
+            link["connected"] == true && link["stopped"] == true && link["at_rest"] == false
+        });
+        refused(&["stop", "--robot", robot], "not-at-rest", &["whether it rests is unknown"]);
+        run.signal(Signal::INT);
+        let began = Instant::now();
+        let (code, summary) = run.finish();
+        assert!(began.elapsed() < ENDS_WITHIN, "{robot}: {:?}", began.elapsed());
+        assert_ended(code, &summary, 0, "aborted");
+        let reason = summary["reason"].as_str().unwrap();
+        assert!(reason.contains("whether it rests is unknown: no usable motor fr"), "{reason}");
+        assert_nothing_left(robot);
+    };
+    thread::scope(|scope| {
+        scope.spawn(|| ends("fi-unheard", Fault::NoFrame, Fault::NoFrame));
+        scope.spawn(|| ends("fi-lost", Fault::None, Fault::NoFrame));
+        scope.spawn(|| ends("fi-useless", Fault::None, Fault::Random));
+    });
 }
 
 fn remove_directory_of(robot: &str) {
@@ -205,11 +219,46 @@ fn remove_directory_of(robot: &str) {
     wait_until("it is removed", || fs::remove_dir_all(domain(robot).directory()).is_ok());
 }
 
+/// Truncates or removes the robot's files of the middleware.
+fn damage_bus(robot: &str, damage: fn(&Path)) {
+    shared_memory(&domain(robot).shared_memory_prefix()).iter().for_each(|path| damage(path));
+}
+
+fn remove(path: &Path) {
+    let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    removed.unwrap();
+}
+
+fn truncate(path: &Path) {
+    if path.is_file() {
+        fs::File::options().write(true).open(path).unwrap().set_len(0).unwrap();
+    }
+}
+
 #[test]
-fn an_operator_stops_a_robot_whose_directory_was_removed_and_its_supervisor_frozen() {
-    stops_without_middleware("so-directory", |run| {
-        run.signal(Signal::STOP);
-        remove_directory_of(&run.robot);
+fn an_operator_stops_a_robot_whose_supervisor_is_frozen_or_whose_files_are_damaged() {
+    let is_stopped = |name: &str, damage: &dyn Fn(&Run)| {
+        let (_directory, mut robot, run) = under_way(name, "udp");
+        damage(&run);
+        operate(name, &["stop"]);
+        assert!(robot.is_at_rest(), "{name}");
+        run
+    };
+    let frozen: [(_, fn(&str)); 3] = [
+        ("so-frozen", |_| ()),
+        ("so-directory", remove_directory_of),
+        ("so-truncated", |robot| damage_bus(robot, truncate)),
+    ];
+    thread::scope(|scope| {
+        for (name, damage) in frozen {
+            scope.spawn(move || {
+                is_stopped(name, &|run| {
+                    run.signal(Signal::STOP);
+                    damage(&run.robot);
+                });
+            });
+        }
+        is_stopped("so-removed", &|run| damage_bus(&run.robot, remove)).stop();
     });
 }
 
@@ -239,45 +288,6 @@ fn a_robot_whose_directory_is_removed_again_and_again_is_stopped_resumed_sent_an
 }
 
 #[test]
-fn a_robot_without_its_files_of_the_middleware_is_stopped_and_its_run_leaves_nothing() {
-    let robot = "so-memory";
-    let (_directory, mut body, run) = under_way(robot, "udp");
-    for path in shared_memory(&domain(robot).shared_memory_prefix()) {
-        let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-        removed.unwrap();
-    }
-    let stopped = output(&["stop", "--robot", robot]);
-    assert!(stopped.status.success(), "{stopped:?}");
-    assert!(body.is_at_rest());
-    run.stop();
-}
-
-#[test]
-fn an_operator_stops_a_robot_whose_bus_is_damaged() {
-    let files = |run: &Run| {
-        let user = rustix::process::geteuid().as_raw();
-        let prefix = format!("fh{user}_{}_", run.robot);
-        let files = fs::read_dir("/dev/shm").unwrap().flatten();
-        files.filter(move |file| file.file_name().to_str().unwrap().starts_with(&prefix))
-    };
-    stops_without_middleware("so-truncated", |run| {
-        run.signal(Signal::STOP);
-        for file in files(run).filter(|file| file.file_type().unwrap().is_file()) {
-            fs::File::options().write(true).open(file.path()).unwrap().set_len(0).unwrap();
-        }
-    });
-    stops_without_middleware("so-removed", |run| {
-        for file in files(run) {
-            let removed = match file.file_type().unwrap().is_dir() {
-                true => fs::remove_dir_all(file.path()),
-                false => fs::remove_file(file.path()),
-            };
-            removed.unwrap();
-        }
-    });
-}
-
-#[test]
 fn a_second_ctrl_c_ends_a_run_that_draws_its_picture() {
     let mut run = Run::under_way("drawing", "open-room", &["--pace", "1"], 0.5);
     // A write into a pipe without a reader blocks forever.
@@ -292,5 +302,5 @@ fn a_second_ctrl_c_ends_a_run_that_draws_its_picture() {
         !run.is_running()
     });
     let (code, summary) = run.finish();
-    assert_eq!((code, summary["outcome"].as_str()), (Some(0), Some("aborted")));
+    assert_ended(code, &summary, 0, "aborted");
 }

@@ -2,108 +2,88 @@
 
 use std::{
     collections::BTreeSet,
-    fs,
     path::{Path, PathBuf},
     process::Command,
 };
 
+use serde_json::Value;
+
 fn root() -> PathBuf {
-    fs::canonicalize(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap()
+    std::fs::canonicalize(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).unwrap()
 }
 
-/// Returns the crates that `arguments` of `cargo tree` select, with all linked crates.
-fn linked(arguments: &[&str]) -> BTreeSet<String> {
-    let fixed = ["tree", "--offline", "--locked", "--edges", "normal", "--prefix", "none"];
-    let output = Command::new(env!("CARGO"))
-        .args(fixed)
-        .args(["--format", "{p}"])
-        .args(arguments)
-        .current_dir(root())
-        .output()
-        .unwrap();
+fn cargo(arguments: &[&str]) -> String {
+    let mut command = Command::new(env!("CARGO"));
+    let output = command.args(arguments).args(["--offline", "--locked"]).current_dir(root());
+    let output = output.output().unwrap();
     assert!(output.status.success(), "{output:?}");
-    let tree = String::from_utf8(output.stdout).unwrap();
-    tree.lines().filter_map(|line| Some(line.split_once(' ')?.0.to_owned())).collect()
+    String::from_utf8(output.stdout).unwrap()
 }
 
-fn manifest(folder: &Path) -> toml::Table {
-    fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap()
+fn list<'a>(of: &'a Value, key: &str) -> &'a [Value] {
+    of[key].as_array().unwrap()
 }
 
-fn dependencies(folder: &Path) -> Vec<String> {
-    let manifest = manifest(folder);
-    let named = manifest.get("dependencies").and_then(toml::Value::as_table);
-    named.into_iter().flat_map(toml::Table::keys).cloned().collect()
+fn packages() -> Vec<Value> {
+    let metadata = cargo(&["metadata", "--no-deps", "--format-version", "1"]);
+    let metadata: Value = serde_json::from_str(&metadata).unwrap();
+    list(&metadata, "packages").to_vec()
 }
 
-fn members() -> Vec<(String, PathBuf)> {
-    let arguments = ["metadata", "--offline", "--locked", "--no-deps", "--format-version", "1"];
-    let output = Command::new(env!("CARGO")).args(arguments).current_dir(root()).output().unwrap();
-    let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let packages = metadata["packages"].as_array().unwrap().iter();
-    let member = |package: &serde_json::Value| {
-        let manifest = Path::new(package["manifest_path"].as_str().unwrap());
-        // Dependents use the library's name, which differs for publishable packages.
-        let mut targets = package["targets"].as_array().unwrap().iter();
-        let library = targets.find(|target| target["kind"][0] == "lib").map(|it| &it["name"]);
-        let name = library.unwrap_or(&package["name"]).as_str().unwrap().replace('_', "-");
-        (name, manifest.parent().unwrap().to_owned())
-    };
-    packages.map(member).collect()
+fn folder(package: &Value) -> &Path {
+    Path::new(package["manifest_path"].as_str().unwrap()).parent().unwrap()
 }
 
 #[test]
-fn the_middleware_is_named_in_one_place() {
-    for (name, folder) in members().iter().filter(|(name, _)| name != "bus") {
-        let named = dependencies(folder).into_iter().find(|name| name.starts_with("iceoryx2"));
-        assert_eq!(named, None, "{name} depends on it");
-    }
-}
-
-#[test]
-fn no_stage_knows_another_nor_the_supervisor() {
-    let services = root().join("services");
-    let members = members();
-    let below = |folder: &Path, name: &str| {
-        members.iter().any(|(its, at)| its == name && at.starts_with(folder))
+fn the_middleware_is_named_in_one_place_and_no_stage_knows_another_nor_the_supervisor() {
+    let packages = packages();
+    let [services, supervisor, tests] =
+        ["services", "supervisor", "tests"].map(|at| root().join(at));
+    let below = |top: &Path, name: &str| {
+        packages.iter().any(|package| package["name"] == name && folder(package).starts_with(top))
     };
-    for (stage, folder) in members.iter().filter(|(_, folder)| folder.starts_with(&services)) {
-        for name in dependencies(folder) {
+    for package in &packages {
+        let member = package["name"].as_str().unwrap();
+        let used = list(package, "dependencies").iter().filter(|used| used["kind"].is_null());
+        for name in used.map(|used| used["name"].as_str().unwrap()) {
+            let is_bus = member == "firsthand-bus";
+            assert!(is_bus || !name.starts_with("iceoryx2"), "{member} depends on it");
             // The link has its drivers, and the planner its solver.
-            let own = stage == "link" && name.ends_with("-driver") || below(folder, &name);
-            let foreign = below(&services, &name) && !own
-                || ["supervisor", "tests"].iter().any(|top| below(&root().join(top), &name));
-            assert!(!foreign, "{stage} depends on {name}");
+            let own = member == "link" && name.ends_with("-driver") || below(folder(package), name);
+            let foreign = below(&services, name) && !own
+                || [&supervisor, &tests].iter().any(|top| below(top, name));
+            let is_stage = folder(package).starts_with(&services);
+            assert!(!(is_stage && foreign), "{member} depends on {name}");
         }
     }
 }
 
 #[test]
-fn what_watches_a_robot_contains_no_pictures_no_file_formats_and_no_chance() {
-    let names = linked(&["--package", "mission-control"]);
-    assert!(names.contains("firsthand-common"), "{names:?}");
-    for tool in ["png", "mcap", "csv", "rand_pcg", "picture", "x80-sim", "clap"] {
-        assert!(!names.contains(tool), "{tool}");
-    }
-}
-
-#[test]
-fn the_robots_executable_contains_no_viewer_and_no_laboratory() {
-    let names = linked(&["--package", "firsthand"]);
-    assert!(names.contains("planner") && names.contains("x80-sim"), "{names:?}");
-    for tool in ["tokio", "axum", "ratatui", "foxglove", "rustdds", "firsthand-lab"] {
-        assert!(!names.contains(tool), "{tool}");
+fn the_robots_executable_contains_no_viewer_and_what_watches_it_no_pictures_files_or_chance() {
+    for (package, there, tools) in [
+        ("mission-control", "firsthand-common", "png mcap csv rand_pcg picture x80-sim clap"),
+        ("firsthand", "x80-sim", "tokio axum ratatui foxglove rustdds firsthand-lab"),
+    ] {
+        let linked = ["tree", "--package", package, "--edges", "normal", "--prefix", "none"];
+        let linked = cargo(&[&linked[..], &["--format", "{p}"]].concat());
+        let names: BTreeSet<_> =
+            linked.lines().filter_map(|line| Some(line.split_once(' ')?.0)).collect();
+        assert!(names.contains(there), "{names:?}");
+        let found = tools.split(' ').find(|tool| names.contains(tool));
+        assert_eq!(found, None, "{package}");
     }
 }
 
 #[test]
 fn a_library_whose_documentation_is_not_tested_has_no_code_there() {
-    for (_, folder) in members() {
-        if manifest(&folder).get("lib").is_some_and(|lib| lib.get("doctest").is_some()) {
+    for package in packages() {
+        let mut targets = list(&package, "targets").iter();
+        if targets.any(|target| target["kind"][0] == "lib" && target["doctest"] == false) {
             let fences = ["-rhE", "^ *//[/!] ```"];
-            let found = Command::new("grep").args(fences).arg(folder.join("src")).output().unwrap();
+            let source = folder(&package).join("src");
+            let found = Command::new("grep").args(fences).arg(&source).output().unwrap();
             let found = String::from_utf8(found.stdout).unwrap();
-            assert!(found.lines().step_by(2).all(|line| line.ends_with("text")), "{folder:?}");
+            assert!(found.lines().step_by(2).all(|line| line.ends_with("text")), "{source:?}");
         }
     }
 }

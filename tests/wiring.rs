@@ -1,49 +1,113 @@
-//! Tests that the topics that each process opens on the bus match the table of stages.
+//! Tests of the bus as a process that joins it sees it.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, fs, os::unix::fs::MetadataExt as _};
 
 use common::{
-    bus::{Bus, OpenedBy},
+    VERSION,
+    bus::{Bus, BusError, OpenedBy, Topic},
+    samples::WheelSample,
     topics,
     wiring::{EVERY_STAGE_READS, EVERY_STAGE_WRITES, Topics},
 };
 use processes::stages;
-use rustix::process::Signal;
+use serde_json::Value;
 
-use crate::support::{Run, domain, in_own_process, pid};
+use crate::support::{
+    Run, assert_no_restart, bus_instance, domain, in_own_process, json_lines, logged, operate, pid,
+    printed, refused, shared_memory,
+};
 
 fn names(lists: &[Topics]) -> BTreeSet<&'static str> {
     let listed = lists.iter().copied().flatten();
     listed.map(|topic| topic.spec().name).collect()
 }
 
-#[test]
-fn every_stage_has_open_what_its_row_lists_and_nothing_else() {
-    in_own_process(|| {
-        let mut run = Run::start("wiring", "obstacle-course", &["--pace", "1"]);
-        let status = run.wait_until_under_way(0.3);
-        let bus = Bus::join(&domain("wiring"), "test").unwrap();
-        let opened: Vec<_> = topics::TABLE
-            .iter()
-            .map(|topic| (topic.spec().name, topic.opened_by(&bus).unwrap()))
-            .collect();
-        for stage in stages::TABLE {
-            let pid = pid(&status, stage.name);
-            let found = |has: &dyn Fn(&OpenedBy) -> bool| -> BTreeSet<_> {
-                let has = opened.iter().filter(|(_, opened)| has(opened));
-                has.map(|(name, _)| *name).collect()
-            };
-            let wiring = stage.wiring;
-            let reads = names(&[wiring.inputs, wiring.feedback, EVERY_STAGE_READS]);
-            let writes = names(&[wiring.outputs, EVERY_STAGE_WRITES]);
-            let name = stage.name;
-            assert_eq!(found(&|opened| opened.readers.contains(&pid)), reads, "{name}");
-            assert_eq!(found(&|opened| opened.writers.contains(&pid)), writes, "{name}");
-            let woken = found(&|opened| opened.woken.contains(&pid));
-            assert_eq!(woken, names(&[wiring.wakes]), "{name}");
+fn assert_each_stage_has_open_what_its_row_lists_and_nothing_else(bus: &Bus, status: &Value) {
+    let opened: Vec<_> = topics::TABLE
+        .iter()
+        .map(|topic| (topic.spec().name, topic.opened_by(bus).unwrap()))
+        .collect();
+    for stage in stages::TABLE {
+        let (name, pid, wiring) = (stage.name, pid(status, stage.name), stage.wiring);
+        let found = |has: &dyn Fn(&OpenedBy) -> bool| -> BTreeSet<_> {
+            let has = opened.iter().filter(|(_, opened)| has(opened));
+            has.map(|(name, _)| *name).collect()
+        };
+        let reads = names(&[wiring.inputs, wiring.feedback, EVERY_STAGE_READS]);
+        let writes = names(&[wiring.outputs, EVERY_STAGE_WRITES]);
+        assert_eq!(found(&|opened| opened.readers.contains(&pid)), reads, "{name}");
+        assert_eq!(found(&|opened| opened.writers.contains(&pid)), writes, "{name}");
+        let woken = found(&|opened| opened.woken.contains(&pid));
+        assert_eq!(woken, names(&[wiring.wakes]), "{name}");
+    }
+}
+
+fn assert_no_file_is_open_to_other_users(robot: &str) {
+    let domain = domain(robot);
+    let shared = shared_memory(&domain.shared_memory_prefix());
+    for path in shared.into_iter().chain([domain.directory().to_owned()]) {
+        // A removed file cannot be opened by others.
+        if let Ok(found) = fs::symlink_metadata(&path) {
+            assert_eq!(found.mode() & 0o077, 0, "{}", path.display());
         }
+    }
+}
+
+#[test]
+fn a_bus_is_wired_as_its_table_says_closed_to_other_users_and_to_other_payloads() {
+    in_own_process(|| {
+        let low = ["--pace", "2", "--set", "simulation.battery.start_v=6.4"];
+        let mut run = Run::start("wiring", "obstacle-course", &low);
+        let status = run
+            .wait_until("the battery is known to be low", |status| status["power"]["low"] == true);
+        let volts = status["power"]["motor_v"].as_f64().unwrap();
+        assert!((volts - 6.4).abs() < 0.01, "{status}");
+        let status = run.wait_until_under_way(1.0);
+        let bus = Bus::join(&domain("wiring"), "test").unwrap();
+        assert_each_stage_has_open_what_its_row_lists_and_nothing_else(&bus, &status);
+        assert_no_file_is_open_to_other_users("wiring");
+        let echoed = |topic| {
+            let echo = ["topic", "echo", topic, "--robot", "wiring", "--json", "-n", "1"];
+            json_lines(&printed(&echo)).remove(0)
+        };
+        let all = |list: &Value, is_so: fn(f64) -> bool| {
+            list.as_array().unwrap().iter().all(|value| is_so(value.as_f64().unwrap()))
+        };
+        let infrared = echoed("infrared");
+        assert!(all(&infrared["range_m"], |range| (0.09..=0.81).contains(&range)), "{infrared}");
+        assert!(all(&infrared["raw_ad"], |ad| ad > 0.0), "{infrared}");
+        let power = echoed("power");
+        assert!(power["current_ad"][1].as_u64() > Some(0), "{power}");
+        assert!(power["board_v"].as_f64() < Some(6.41) && power["board_low"] == 1, "{power}");
+        let around = echoed("surroundings");
+        assert!((around["temperature_c"].as_f64().unwrap() - 22.8).abs() < 0.1, "{around}");
+        let pose_as_wheels = Topic::<WheelSample>::new(topics::POSE.spec());
+        let error = bus.reader(&pose_as_wheels).unwrap_err();
+        assert!(matches!(error, BusError::Incompatible { topic: "pose" }), "{error}");
         drop(bus);
-        run.signal(Signal::TERM);
-        run.finish();
+        run.wait_until_under_way(2.0);
+        // Each battery is told once.
+        for pack in ["board", "motor", "servo"] {
+            let told = ["WARN", &format!("pack=\"{pack}\"")];
+            assert_eq!(logged(&run.directory(), "link", &told), 1, "{pack}");
+        }
+        assert_no_restart(&run.stop());
     });
+}
+
+#[test]
+fn a_robot_of_another_version_is_named_and_can_be_stopped() {
+    let robot = "foreign-vers";
+    let run = Run::under_way(robot, "obstacle-course", &["--pace", "1"], 0.3);
+    let file = bus_instance(robot).config();
+    let config = fs::read_to_string(&file).unwrap();
+    fs::write(&file, config.replacen(VERSION, "99.0.0", 1)).unwrap();
+    for command in [&["status"][..], &["goto", "1", "1"], &["stage", "kill", "planner"]] {
+        let command = [command, &["--robot", robot]].concat();
+        refused(&command, "other-version", &["99.0.0", VERSION]);
+    }
+    assert!(printed(&["status", "--all"]).contains("it runs another version"));
+    operate(robot, &["stop"]);
+    fs::write(&file, config).unwrap();
+    run.stop();
 }

@@ -170,22 +170,15 @@ mod tests {
         Checkpoint::open(path, CAPACITY).unwrap()
     }
 
-    #[test]
-    fn the_newest_state_comes_back() {
+    fn file() -> (tempfile::TempDir, PathBuf) {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("pose");
-        let (mut checkpoint, none) = open(&path);
-        assert_eq!(none, None);
-        for last in 1..=5_u32 {
-            checkpoint.save(&vec![last; 3]).unwrap();
-            assert_eq!(open(&path).1, Some(vec![last; 3]));
-        }
+        (directory, path)
     }
 
     #[test]
     fn a_save_cut_after_any_byte_leaves_the_old_state_or_the_new_one() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("pose");
+        let (_directory, path) = file();
         let (mut checkpoint, _) = open(&path);
         let (old, new) = (vec![7_u32; 4], vec![9_u32; 4]);
         checkpoint.save(&vec![1_u32; 6]).unwrap();
@@ -210,8 +203,7 @@ mod tests {
 
     #[test]
     fn the_newest_state_comes_back_of_processes_that_each_save_a_few_times() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("pose");
+        let (_directory, path) = file();
         let mut newest = None;
         for process in 0..6_u32 {
             let (mut checkpoint, restored) = open(&path);
@@ -225,8 +217,7 @@ mod tests {
 
     #[test]
     fn a_state_with_any_bit_changed_after_its_version_is_not_restored() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("pose");
+        let (_directory, path) = file();
         let (mut checkpoint, _) = open(&path);
         checkpoint.save(&vec![7_u32; 4]).unwrap();
         checkpoint.save(&vec![9_u32; 4]).unwrap();
@@ -242,16 +233,14 @@ mod tests {
 
     #[test]
     fn a_file_of_noise_is_no_state() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("pose");
+        let (_directory, path) = file();
         std::fs::write(&path, [0xA5; 300]).unwrap();
         assert_eq!(open(&path).1, None);
     }
 
     #[test]
     fn a_whole_state_of_another_type_or_version_is_refused_and_not_taken_for_none() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("pose");
+        let (_directory, path) = file();
         let (mut checkpoint, _) = open(&path);
         checkpoint.save(&vec![1_u32]).unwrap();
         let refused = || Checkpoint::open::<[String; 3]>(&path, CAPACITY).unwrap_err();
@@ -267,8 +256,7 @@ mod tests {
     #[test]
     fn room_for_both_slots_is_reserved_at_opening() {
         use std::os::unix::fs::MetadataExt as _;
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("map");
+        let (_directory, path) = file();
         let (_checkpoint, _) = Checkpoint::open::<Vec<u32>>(&path, 1 << 20).unwrap();
         let reserved = std::fs::metadata(&path).unwrap().blocks() * 512;
         assert!(reserved >= 2 << 20, "{reserved} bytes are reserved");
@@ -276,8 +264,7 @@ mod tests {
 
     #[test]
     fn a_state_that_does_not_fit_is_refused_and_the_old_one_stays() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("pose");
+        let (_directory, path) = file();
         let (mut checkpoint, _) = open(&path);
         checkpoint.save(&vec![1_u32]).unwrap();
         assert!(matches!(

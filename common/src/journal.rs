@@ -174,6 +174,14 @@ mod tests {
         Journal::open(path, 64, 4_592).unwrap()
     }
 
+    /// Returns the paths of a snapshot and of its journal.
+    fn files() -> (tempfile::TempDir, PathBuf, PathBuf) {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("map.checkpoint");
+        let file = path.with_extension("journal");
+        (directory, path, file)
+    }
+
     /// Returns the state as a new process restores it.
     fn folded(path: &Path) -> Sum {
         let restored = open(path).1;
@@ -182,8 +190,7 @@ mod tests {
 
     #[test]
     fn a_new_process_folds_the_entries_into_the_snapshot() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("map.checkpoint");
+        let (_directory, path, _) = files();
         let mut sum = 0;
         for restart in 0..5 {
             let (mut journal, _) = open(&path);
@@ -200,9 +207,7 @@ mod tests {
 
     #[test]
     fn an_append_cut_after_any_byte_loses_that_entry_at_most() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("map.checkpoint");
-        let file = path.with_extension("journal");
+        let (_directory, path, file) = files();
         let (mut journal, _) = open(&path);
         journal.append(&100_u64).unwrap();
         let before = std::fs::read(&file).unwrap().len() - HEADER;
@@ -221,9 +226,7 @@ mod tests {
 
     #[test]
     fn an_entry_with_any_bit_changed_is_not_folded() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("map.checkpoint");
-        let file = path.with_extension("journal");
+        let (_directory, path, file) = files();
         let (mut journal, _) = open(&path);
         journal.append(&100_u64).unwrap();
         let last = std::fs::read(&file).unwrap().len() - END.len();
@@ -239,20 +242,19 @@ mod tests {
 
     #[test]
     fn a_whole_entry_of_another_version_or_type_is_refused_and_not_cut_off() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("map.checkpoint");
+        let (_directory, path, file) = files();
         open(&path).0.append(&100_u64).unwrap();
         let refused = Journal::open::<Sum, [String; 3]>(&path, 64, 4_592).unwrap_err().to_string();
         assert!(
             refused.contains("map.journal") && refused.contains("cannot be decoded"),
             "{refused}"
         );
-        let mut bytes = std::fs::read(path.with_extension("journal")).unwrap();
+        let mut bytes = std::fs::read(&file).unwrap();
         bytes[11] = b'1';
         let end = bytes.len() - END.len();
         let crc = checksum(&bytes[..end], 12).to_le_bytes();
         bytes[12..16].copy_from_slice(&crc);
-        std::fs::write(path.with_extension("journal"), bytes).unwrap();
+        std::fs::write(file, bytes).unwrap();
         let refused = Journal::open::<Sum, u64>(&path, 64, 4_592).unwrap_err().to_string();
         assert!(
             refused.contains("map.journal") && refused.contains("version 1, not 3"),
@@ -262,9 +264,7 @@ mod tests {
 
     #[test]
     fn entries_the_snapshot_holds_are_not_folded_twice() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("map.checkpoint");
-        let file = path.with_extension("journal");
+        let (_directory, path, file) = files();
         let (mut journal, _) = open(&path);
         for entry in 1..=4_u64 {
             journal.append(&entry).unwrap();
@@ -280,8 +280,8 @@ mod tests {
 
     #[test]
     fn a_snapshot_is_due_after_so_many_entries_and_not_before() {
-        let directory = tempfile::tempdir().unwrap();
-        let (mut journal, _) = open(&directory.path().join("map.checkpoint"));
+        let (_directory, path, _) = files();
+        let (mut journal, _) = open(&path);
         for entry in 0..snapshot_after(64) {
             assert!(!journal.is_long(), "after {entry}");
             journal.append(&entry).unwrap();
@@ -293,9 +293,8 @@ mod tests {
 
     #[test]
     fn a_journal_of_noise_is_no_entry() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("map.checkpoint");
-        std::fs::write(path.with_extension("journal"), [0xA5; 300]).unwrap();
+        let (_directory, path, file) = files();
+        std::fs::write(file, [0xA5; 300]).unwrap();
         assert_eq!(folded(&path), 0);
     }
 }

@@ -44,10 +44,13 @@ pub fn printed(arguments: &[&str]) -> String {
 
 /// Returns a command's exit status and its JSON lines.
 pub fn json_of(output: &Output) -> (ExitStatus, Vec<Value>) {
-    let text = String::from_utf8_lossy(&output.stdout);
-    let values: Result<_, _> = text.lines().map(serde_json::from_str).collect();
-    let values = values.unwrap_or_else(|error| panic!("{error}: {output:?}"));
-    (output.status, values)
+    (output.status, json_lines(&String::from_utf8_lossy(&output.stdout)))
+}
+
+#[track_caller]
+pub fn json_lines(text: &str) -> Vec<Value> {
+    let line = |line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{error}: {text}"));
+    text.lines().map(line).collect()
 }
 
 /// Asserts success.

@@ -224,6 +224,12 @@ pub fn pids_of(robot: &str) -> Vec<u32> {
     found.map(|(pid, _)| pid).collect()
 }
 
+/// Returns the processes of `robot` whose command line contains `word`.
+pub fn processes_with(robot: &str, word: &str) -> Vec<u32> {
+    let found = processes(&mark(robot)).into_iter();
+    found.filter(|(_, line)| line.contains(word)).map(|(pid, _)| pid).collect()
+}
+
 pub fn wait_until_all_ended(robot: &str) {
     wait_until("all have ended", || pids_of(robot).is_empty());
 }

@@ -5,6 +5,7 @@ use std::{
     process::{Child, Stdio},
 };
 
+use common::{samples::PoseSample, topics};
 use recording::{
     Recording,
     replay::{Options, Report, replay},
@@ -14,7 +15,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use super::{
-    commands::firsthand,
+    commands::{firsthand, json_lines},
     robot::{
         STAGES, all_run, assert_nothing_left, directory_of, follow_status, generation, pid,
         signal_process, status_of,
@@ -232,9 +233,7 @@ pub fn assert_no_restart(summary: &Value) {
 
 /// Reads a file of records, one JSON value per line. A missing file has none.
 pub fn records(file: &Path) -> Vec<Value> {
-    let text = fs::read_to_string(file).unwrap_or_default();
-    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
-    lines.collect()
+    json_lines(&fs::read_to_string(file).unwrap_or_default())
 }
 
 /// Counts the lines of a process's log in a run's directory that contain all `parts`, a level and
@@ -264,6 +263,35 @@ pub fn replayed(recording: &Recording) -> Report {
     assert_eq!(report.difference, None, "{report}");
     assert_eq!(report.not_replayed(), 0, "{report}");
     report
+}
+
+/// Writes a mission file.
+pub fn mission_file(text: &str) -> (TempDir, String) {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("mission.toml");
+    fs::write(&file, text).unwrap();
+    (directory, file.to_str().unwrap().to_owned())
+}
+
+/// Replays what the recordings of a run hold, killed or not. Returns the poses.
+#[track_caller]
+pub fn replayed_poses(run: &Path) -> Vec<PoseSample> {
+    let files = fs::read_dir(run).unwrap().map(|file| file.unwrap().path());
+    let mut poses = Vec::new();
+    for file in files.filter(|file| file.extension().is_some_and(|it| it == "mcap")) {
+        let recording = Recording::open(&file).unwrap();
+        let report = replay(&recording, &Options::default()).unwrap();
+        assert!(report.difference.is_none() && report.equal() > 0, "{report}");
+        poses.extend(recording.samples(&topics::POSE).unwrap().map(|pose| pose.unwrap().sample));
+    }
+    assert!(!poses.is_empty());
+    poses
+}
+
+/// Returns the outcome of each target.
+pub fn outcomes(summary: &Value) -> Vec<&str> {
+    let targets = summary["targets"].as_array().unwrap();
+    targets.iter().map(|target| target["outcome"].as_str().unwrap()).collect()
 }
 
 /// Opens the committed recording of the first seconds of a mission.

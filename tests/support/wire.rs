@@ -20,6 +20,7 @@ use super::{PATIENCE, firsthand};
 /// Simulated robot, which runs until dropped.
 pub struct Robot {
     process: Child,
+    scheme: &'static str,
     pub listening: String,
     pub laser: Option<String>,
     /// Ground truth records, received at once because the robot waits for a slow reader.
@@ -34,7 +35,20 @@ impl Robot {
     }
 
     pub fn start(mission: &str, transport: &str, listen: &str) -> Self {
-        Self::start_with(mission, &["--transport", transport, "--listen", listen])
+        let arguments = ["--transport", transport, "--listen", listen];
+        let scheme = match transport {
+            "tcp" => "tcp://",
+            "pty" => "serial://",
+            _ => "udp://",
+        };
+        let mut robot = Self::start_with(mission, &arguments);
+        robot.scheme = scheme;
+        robot
+    }
+
+    /// Returns the mission assignment that makes this the robot.
+    pub fn as_robot(&self) -> String {
+        format!("robot.address=\"{}{}\"", self.scheme, self.listening)
     }
 
     /// Starts a simulated robot with further arguments of `firsthand sim`.
@@ -55,6 +69,7 @@ impl Robot {
         let header: Value = truth.recv_timeout(PATIENCE).unwrap();
         Self {
             process,
+            scheme: "udp://",
             listening: header["listening"].as_str().unwrap().to_owned(),
             laser: header["laser"].as_str().map(str::to_owned),
             truth,

@@ -345,16 +345,6 @@ mod tests {
     }
 
     #[test]
-    fn what_a_shape_does_to_light_survives_a_file() {
-        let text = "wall = [{ points = [[0, 0], [1, 0]], light = 'glass' }, { points = [[0, 1], [1, 1]] }]";
-        let shapes: Shapes = toml::from_str(text).unwrap();
-        let lights = shapes.walls.iter().map(|wall| wall.profile().light);
-        assert_eq!(lights.collect::<Vec<_>>(), [Light::Glass, Light::Matt]);
-        let written = toml::to_string(&shapes).unwrap();
-        assert_eq!(toml::from_str::<Shapes>(&written).unwrap(), shapes);
-    }
-
-    #[test]
     fn angles_wrap_to_the_half_open_turn() {
         use std::f64::consts::PI;
         for (half_turns, wrapped) in [(3.0, 1.0), (-0.5, -0.5), (1.5, -0.5)] {

@@ -39,25 +39,6 @@ impl Mount {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn equation_19_by_hand_at_bearings_0_45_and_minus_90() {
-        let robot = Pose2 { position: DVec2::new(1.0, 2.0), heading: 0.0 };
-        // W/2 = 0.2, S = 0.8: 1 m from the centre along the bearing.
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        for (bearing_deg, hit) in [
-            (0.0, DVec2::new(2.0, 2.0)),
-            (45.0, DVec2::new(1.0 + half, 2.0 + half)),
-            (-90.0, DVec2::new(1.0, 1.0)),
-        ] {
-            let bearing_rad = f64::to_radians(bearing_deg);
-            let mount = Mount { forward_m: 0.2, bearing_rad, turned_rad: 0.0 };
-            let got = mount.hit(robot, 0.8);
-            assert!(got.distance(hit) < 1e-12, "{bearing_deg} degrees: {got}");
-            let ranger = mount.on(robot);
-            assert!((ranger.position - robot.position).length() - 0.2 < 1e-12);
-        }
-    }
     #[test]
     fn a_ranger_that_is_turned_stays_where_it_is_and_looks_elsewhere() {
         let robot = Pose2 { position: DVec2::new(1.0, 2.0), heading: std::f64::consts::FRAC_PI_2 };

@@ -20,15 +20,3 @@ fn the_papers_method_has_no_screening_unless_the_mission_says_so() {
         assert_eq!(mission(text).screening_length_m(), length_m, "{text}");
     }
 }
-
-#[test]
-fn the_sets_of_sensors_have_these_names() {
-    for (name, set) in [
-        ("front", Sensors::Front),
-        ("front+infrared", Sensors::FrontInfrared),
-        ("three-front", Sensors::ThreeFront),
-        ("all", Sensors::All),
-    ] {
-        assert_eq!(mission(&format!("sensors = '{name}'")).sensor_set(), set);
-    }
-}

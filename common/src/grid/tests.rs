@@ -6,76 +6,39 @@ fn frame(cells: u32) -> GridFrame {
 }
 
 #[test]
-fn a_replica_follows_windows_and_waits_for_a_keyframe_when_one_is_missing() {
+fn a_replica_follows_windows_waits_for_a_keyframe_when_one_is_missing_and_tells_what_that_changed()
+{
     let frame = frame(4);
+    let of = |width| Window { col: 1, row: 2, width, height: 1 };
+    let (none, one, two) = (Window::default(), of(1), of(2));
+    let part = |window, version| Part::of(frame, window, version);
+    let whole = |version| Part::whole(frame, version);
+    let cells = |first, second| {
+        let mut cells = [0_u8; 16];
+        [cells[9], cells[10]] = [first, second];
+        cells
+    };
+    let without_cells = Part::whole(self::frame(0), u64::MAX);
     let mut replica = Replica::default();
-    let part = Window { col: 1, row: 2, width: 2, height: 1 };
-    let change = |version| Part::of(frame, part, version);
-    assert_eq!(replica.apply(&change(2), &[1, 1]), Applied::Missed);
-    let whole = Part::whole(frame, 1);
-    assert_eq!(replica.apply(&whole, &[0_u8; 16]), Applied::Whole);
-    assert_eq!(replica.apply(&change(2), &[1, 2]), Applied::Window(part));
-    assert_eq!(replica.cells()[8..12], [0, 1, 2, 0]);
-    assert_eq!(replica.apply(&change(4), &[1, 1]), Applied::Missed);
-}
-
-#[test]
-fn a_part_without_a_change_after_a_missed_window_is_a_gap() {
-    let frame = frame(4);
-    let mut replica = Replica::default();
-    replica.apply(&Part::whole(frame, 1), &[0_u8; 16]);
-    let unchanged = |version| Part::of(frame, Window::default(), version);
-    let nothing = Applied::Window(Window::default());
-    assert_eq!(replica.apply(&unchanged(1), &[]), nothing);
-    assert_eq!(replica.apply(&unchanged(2), &[]), Applied::Missed);
-}
-
-#[test]
-fn a_keyframe_after_a_missed_window_tells_that_window() {
-    let frame = frame(4);
-    let one = Window { col: 1, row: 2, width: 1, height: 1 };
-    let mut cells = [0_u8; 16];
-    let [mut complete, mut gap] = [(); 2].map(|()| Replica::default());
-    for replica in [&mut complete, &mut gap] {
-        replica.apply(&Part::whole(frame, 1), &cells);
+    for (nth, (part, cells, applied)) in [
+        (part(two, 2), &[1, 1][..], Applied::Missed),
+        (without_cells, &[], Applied::Missed),
+        (without_cells, &[], Applied::Missed),
+        (whole(1), &cells(0, 0), Applied::Whole),
+        (whole(1), &cells(0, 0), Applied::Window(none)),
+        (part(two, 2), &[1, 2], Applied::Window(two)),
+        (part(none, 2), &[], Applied::Window(none)),
+        (part(Window { width: u32::MAX, ..one }, 3), &[0], Applied::Missed),
+        (part(none, 4), &[], Applied::Missed),
+        (part(two, 5), &[1, 1], Applied::Missed),
+        (whole(5), &cells(5, 2), Applied::Window(one)),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        assert_eq!(replica.apply(&part, cells), applied, "part {nth}");
     }
-    cells[9] = 1;
-    let told = complete.apply(&Part::of(frame, one, 2), &[1]);
-    assert_eq!(gap.apply(&Part::of(frame, Window::default(), 2), &[]), Applied::Missed);
-    assert_eq!(gap.apply(&Part::whole(frame, 2), &cells), told);
-    assert_eq!((gap.cells(), gap.version()), (complete.cells(), complete.version()));
-}
-
-#[test]
-fn a_keyframe_that_changes_one_cell_is_told_as_that_window() {
-    let frame = frame(4);
-    let mut replica = Replica::default();
-    let keyframe = |version| Part::whole(frame, version);
-    let mut cells = [0_u8; 16];
-    assert_eq!(replica.apply(&keyframe(1), &cells), Applied::Whole);
-    let nothing = Applied::Window(Window::default());
-    assert_eq!(replica.apply(&keyframe(1), &cells), nothing);
-    cells[9] = 1;
-    let one = Window { col: 1, row: 2, width: 1, height: 1 };
-    assert_eq!(replica.apply(&keyframe(2), &cells), Applied::Window(one));
-}
-
-#[test]
-fn a_map_without_cells_is_refused() {
-    let none = Part::whole(frame(0), u64::MAX);
-    let mut replica = Replica::<u8>::default();
-    for _ in 0..2 {
-        assert_eq!(replica.apply(&none, &[]), Applied::Missed);
-    }
-}
-
-#[test]
-fn a_window_that_does_not_fit_is_refused() {
-    let frame = frame(4);
-    let mut replica = Replica::default();
-    let window = Window { col: 3, row: 0, width: u32::MAX, height: 1 };
-    let outside = Part::of(frame, window, 1);
-    assert_eq!(replica.apply(&outside, &[0_u8; 1]), Applied::Missed);
+    assert_eq!((replica.cells(), replica.version()), (&cells(5, 2)[..], 5));
 }
 
 #[test]

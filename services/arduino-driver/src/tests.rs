@@ -226,13 +226,6 @@ fn a_command_is_said_in_counts_of_the_speed_loop_and_the_slowest_turns_a_wheel()
 }
 
 #[test]
-fn all_that_a_poll_and_a_stop_send_fits_into_the_boards_buffer() {
-    // An Arduino buffers 63 unread bytes; at most six sonars have a row.
-    let (round, stops) = ("p 255\r".len() * 6 + "e\r".len(), "m 0 0\r".len() * 3);
-    assert!(round + stops < 63);
-}
-
-#[test]
 fn a_board_acknowledges_each_velocity_and_owes_nothing_for_what_it_is_asked() {
     let mut driver = driver();
     assert_eq!(heard(&mut driver, "OK\r\nOK\r\n").acknowledged, 2);

@@ -43,26 +43,3 @@ impl Backoff {
 pub(crate) fn has_passed(since_ns: u64, now_ns: u64, span: Duration) -> bool {
     now_ns.saturating_sub(since_ns) >= span.as_nanos() as u64
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pauses_double_to_the_longest_and_a_success_begins_anew() {
-        let mut backoff = Backoff::new(Duration::from_nanos(100), Duration::from_nanos(300));
-        let (mut now, mut pauses) = (1000, Vec::new());
-        for _ in 0..4 {
-            assert!(backoff.is_due(now));
-            backoff.attempted(now);
-            let wait = backoff.wait_ns(now);
-            assert!(!backoff.is_due(now + wait - 1));
-            pauses.push(wait);
-            now += wait;
-        }
-        assert_eq!(pauses, [100, 200, 300, 300]);
-        assert_eq!(backoff.attempts, 4);
-        backoff.reset();
-        assert!(backoff.is_due(0) && backoff.attempts == 0);
-    }
-}

@@ -475,21 +475,6 @@ mod tests {
     }
 
     #[test]
-    fn a_scan_says_where_the_robot_is_though_its_wheels_say_otherwise() {
-        let matcher = matcher();
-        let mut reference = None;
-        let start = Pose2::default();
-        assert_eq!(matcher.step(&mut reference, start, &scan(start, false)), None);
-        let truth = Pose2 { position: DVec2::new(0.3, 0.1), heading: 0.2 };
-        let wheels = Pose2 { position: DVec2::new(0.36, 0.05), heading: 0.17 };
-        let seen = scan(truth, false);
-        let fix = matcher.by_unsure(&mut reference, (wheels, 0.1), &seen).unwrap();
-        let off = DVec2::new(fix.x_m, fix.y_m).distance(truth.position);
-        assert!(off < 0.01 && (fix.heading_rad - 0.2).abs() < 0.005, "{fix:?}");
-        assert!(fix.covariance[0] < 10.0 * 1e-3, "{fix:?}");
-    }
-
-    #[test]
     fn the_variance_of_matches_follows_how_they_scatter_within_bounds() {
         let scale = |off: f64| {
             let mut scatter = Scatter::default();

@@ -214,20 +214,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_scan_turns_to_the_nearer_side_and_there_to_its_far_end() {
-        let at = |degrees: f64| DVec2::from_angle(degrees.to_radians());
-        let unseen = [at(20.0), at(50.0), at(35.0), at(-30.0), at(-80.0)];
-        let there = scan(DVec2::X, unseen.into_iter(), &mut None);
-        assert_eq!(there, Some(at(50.0)));
-        assert_eq!(scan(DVec2::X, std::iter::empty(), &mut Some(0)), None);
-    }
-
-    #[test]
-    fn a_scan_keeps_its_side_until_nothing_is_unseen_there() {
+    fn a_scan_turns_to_the_far_end_of_the_nearer_side_until_nothing_is_unseen_there() {
         let at = |degrees: f64| DVec2::from_angle(degrees.to_radians());
         let mut side = None;
         let mut turn = |unseen: &[f64]| scan(DVec2::X, unseen.iter().copied().map(at), &mut side);
-        assert_eq!(turn(&[-40.0, 30.0]), Some(at(30.0)));
+        assert_eq!(turn(&[20.0, 50.0, 35.0, -30.0, -80.0]), Some(at(50.0)));
         assert_eq!(turn(&[-10.0, 60.0]), Some(at(60.0)), "the other side is nearer now");
         assert_eq!(turn(&[-10.0, -20.0]), Some(at(-20.0)), "nothing is left on this side");
         assert_eq!(turn(&[-20.0, 10.0]), Some(at(-20.0)));

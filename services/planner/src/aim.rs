@@ -82,14 +82,13 @@ mod tests {
     }
 
     #[test]
-    fn a_free_target_is_aimed_at_itself() {
-        assert_eq!(aim(DVec2::new(0.5, 0.0), |_| false), Some(DVec2::new(0.5, 0.0)));
-    }
-
-    #[test]
-    fn a_target_in_a_wall_is_approached_from_the_side_that_is_nearer() {
-        let aim = aim(DVec2::new(0.5, 0.0), |at| (0.43..0.72).contains(&at.x)).unwrap();
-        assert!(aim.distance(DVec2::new(0.35, 0.0)) < 1e-6, "{aim}");
+    fn a_target_is_aimed_at_itself_unless_a_free_side_of_its_wall_is_near() {
+        let target = DVec2::new(0.5, 0.0);
+        let wall = |at: DVec2| (0.43..0.72).contains(&at.x);
+        assert!(aim(target, wall).unwrap().distance(DVec2::new(0.35, 0.0)) < 1e-6);
+        assert_eq!(aim(target, |_| false), Some(target));
+        assert_eq!(aim(target, |at| at.distance(target) < 0.6), Some(target), "deep inside");
+        assert_eq!(aim(DVec2::new(5.0, 0.0), |_| false), None, "off the map");
     }
 
     #[test]
@@ -105,12 +104,5 @@ mod tests {
             let off = FRAME.centre_of(cell).distance(target);
             assert!((off - off_m).abs() < 1e-6, "{off} m within {reach_m} m");
         }
-    }
-
-    #[test]
-    fn a_target_deep_inside_stays_where_it_is_and_one_off_the_map_is_none() {
-        let target = DVec2::new(0.5, 0.0);
-        assert_eq!(aim(target, |at| at.distance(target) < 0.6), Some(target));
-        assert_eq!(aim(DVec2::new(5.0, 0.0), |_| false), None);
     }
 }

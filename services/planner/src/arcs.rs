@@ -112,6 +112,3 @@ impl View<'_> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -204,22 +204,6 @@ mod tests {
     }
 
     #[test]
-    fn a_heavy_base_brakes_before_it_turns_on_the_spot() {
-        let look = Advice::new(GuidanceStatus::Look, DVec2::Y, 0.0);
-        let rests = |v| motion(0.3).rests(moving(v, 0.0), (look, 0.1), |_, _| false);
-        assert!(!rests(0.3) && rests(0.02));
-    }
-
-    #[test]
-    fn a_robot_is_predicted_to_slow_down_before_its_target() {
-        let v = |target_m| {
-            let start = Moving { target: target_m * DVec2::X, ..moving(0.0, 0.0) };
-            motion(20.0).next(start, 1.0, Some(Advice::along(DVec2::X, f64::INFINITY))).twist.v
-        };
-        assert!(v(0.1) > 0.0 && v(0.1) < 0.5 * v(9.0), "{} {}", v(0.1), v(9.0));
-    }
-
-    #[test]
     fn wheels_that_have_to_turn_the_robot_gain_less_speed() {
         let motion = motion(0.6);
         let limit = |omega| {

@@ -246,43 +246,39 @@ mod tests {
         header
     }
 
-    /// Angles of the normals that no reading excludes, degrees, for a body at the origin that moves
-    /// along x.
-    fn undetected(beams: &[ClearBeam]) -> Vec<i32> {
-        undetected_by(beams, &[])
-    }
-
-    fn undetected_by(beams: &[ClearBeam], rays: &[ClearBeam]) -> Vec<i32> {
+    fn undetected(beams: &[ClearBeam], rays: &[ClearBeam]) -> Vec<i32> {
         let surfaces = UndetectedSurfaces::new(&belief(beams, rays), BODY_M, DVec2::ZERO, 0.0);
         let normals = surfaces.normals(DVec2::ZERO, DVec2::X);
         normals.map(|normal| normal.to_angle().to_degrees().round() as i32).collect()
     }
 
     #[test]
-    fn a_silent_beam_excludes_only_surfaces_square_to_it() {
-        assert_eq!(undetected(&[]).len(), 11);
-        assert_eq!(undetected(&[beam(0.0, 0.0, 2.0)]), [-75, -60, -45, -30, 30, 45, 60, 75]);
-        assert_eq!(undetected(&[beam(0.0, 45.0, 2.0)]), [-75, -60, -45, -30, -15, 0, 15, 75]);
-    }
-
-    #[test]
-    fn a_scan_to_both_sides_excludes_all_surfaces() {
+    fn a_silent_beam_excludes_only_surfaces_square_to_it_and_a_scan_or_a_ring_of_rays_all() {
+        assert_eq!(undetected(&[], &[]).len(), 11);
+        assert_eq!(undetected(&[beam(0.0, 0.0, 2.0)], &[]), [-75, -60, -45, -30, 30, 45, 60, 75]);
+        assert_eq!(undetected(&[beam(0.0, 45.0, 2.0)], &[]), [-75, -60, -45, -30, -15, 0, 15, 75]);
         let scan: Vec<_> = (-4..=4).map(|step| beam(-0.3, f64::from(step) * 16.0, 2.0)).collect();
-        assert_eq!(undetected(&scan), [0; 0]);
+        assert_eq!(undetected(&scan, &[]), [0; 0]);
+        assert_eq!(undetected(&[], &ring(0.25, 0.7)), [0; 0]);
     }
 
     #[test]
-    fn a_beam_excludes_nothing_beyond_its_echo() {
-        // The sonar is 0.5 m behind the body's centre; the body with its margin extends 0.21 m
-        // ahead.
-        assert!(!undetected(&[beam(-0.5, 0.0, 0.72)]).contains(&0));
-        assert!(undetected(&[beam(-0.5, 0.0, 0.70)]).contains(&0));
-    }
-
-    #[test]
-    fn a_surface_is_supposed_to_extend_no_farther_than_a_metre() {
-        assert!(!undetected(&[beam(-0.9, 75.0, 2.0)]).contains(&75));
-        assert!(undetected(&[beam(-1.1, 75.0, 2.0)]).contains(&75));
+    fn a_reading_excludes_no_surface_beyond_its_echo_or_too_far_aside() {
+        let (echo, silence) = (beam(0.0, 0.0, 0.15), beam(0.0, 0.0, 2.0));
+        for (what, beams, rays, degrees, detected) in [
+            // The body with its margin extends 0.21 m ahead.
+            ("a surface before the echo", &[beam(-0.5, 0.0, 0.72)][..], &[][..], 0, true),
+            ("a surface at the echo", &[beam(-0.5, 0.0, 0.70)], &[], 0, false),
+            ("a surface that extends for a metre", &[beam(-0.9, 75.0, 2.0)], &[], 75, true),
+            ("a surface that would extend farther", &[beam(-1.1, 75.0, 2.0)], &[], 75, false),
+            ("a silence beside an echo", &[echo, silence], &[], 0, true),
+            ("a lost ping among echoes", &[echo, silence, echo], &[], 0, false),
+            // The ray at 11.25 degrees meets a surface square ahead after 0.28 m.
+            ("a surface beyond the rays", &[], &ring(0.25, 0.25), 0, false),
+            ("a ray 0.5 m aside", &[], &[ClearBeam { y_m: 0.5, ..beam(0.0, 0.0, 0.7) }], 0, false),
+        ] {
+            assert_eq!(!undetected(beams, rays).contains(&degrees), detected, "{what}");
+        }
     }
 
     /// Front four rays of the ring, free for `clear_m`, on a robot `behind` metres behind the
@@ -295,29 +291,6 @@ mod tests {
                 ..beam(BODY_M * cos - behind, bearing_deg, clear_m)
             }
         })
-    }
-
-    #[test]
-    fn infrared_rays_exclude_surfaces_at_any_angle_as_far_as_they_are_free() {
-        assert_eq!(undetected_by(&[], &ring(0.25, 0.7)), [0; 0]);
-        // The ray at 11.25 degrees meets a surface square ahead after 0.28 m.
-        let unseen = undetected_by(&[], &ring(0.25, 0.25));
-        assert!(unseen.contains(&0), "{unseen:?}");
-    }
-
-    #[test]
-    fn a_ray_does_not_exclude_a_surface_that_it_meets_far_from_the_body() {
-        // The parallel ray, 0.5 m beside the way, meets the surface 0.5 m from the point of touch.
-        let ray = ClearBeam { y_m: 0.5, ..beam(0.0, 0.0, 0.7) };
-        assert!(undetected_by(&[], &[ray]).contains(&0));
-    }
-
-    #[test]
-    fn a_lost_ping_does_not_outweigh_the_echoes_beside_it() {
-        let echo = beam(0.0, 0.0, 0.15);
-        let silence = beam(0.0, 0.0, 2.0);
-        assert!(!undetected(&[echo, silence]).contains(&0));
-        assert!(undetected(&[echo, silence, echo]).contains(&0));
     }
 
     #[test]

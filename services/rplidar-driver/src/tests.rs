@@ -57,23 +57,23 @@ fn a_turn_is_a_scan_counter_clockwise_and_no_quality_no_range_and_one_too_short_
         270 => 3.0,
         _ => 2.0,
     };
-    let mut heard = scanning("").hear(&[turn(range), next()].concat());
-    let scan = heard.scans.pop().unwrap();
+    let seen = |set: &str, nodes: Vec<u8>| {
+        scanning(set).hear(&[nodes, next()].concat()).scans.pop().unwrap()
+    };
+    let scan = seen("", turn(range));
     // 90 degrees clockwise is on the right.
     assert_eq!([at(&scan, 270), at(&scan, 90), at(&scan, 30)], [1.0, 3.0, 2.0]);
     assert!(at(&scan, 0).is_nan() && at(&scan, 180).is_nan());
-    let mut heard = scanning("roll_deg = 180").hear(&[turn(range), next()].concat());
-    let turned = heard.scans.pop().unwrap();
+    let turned = seen("roll_deg = 180", turn(range));
     assert_eq!([at(&turned, 270), at(&turned, 90)], [3.0, 1.0]);
     assert_eq!(turned.sweep, Sweep { beam_ns: -scan.sweep.beam_ns, ..scan.sweep });
     let open = |degrees| if degrees > 180 { 0.0 } else { 2.0 };
-    let mut heard = scanning("").hear(&[turn(open), next()].concat());
-    let scan = heard.scans.pop().unwrap();
+    let scan = seen("", turn(open));
     // Nothing is in reach on the left, except beside ended beams.
     assert!(at(&scan, 90) == f32::INFINITY && at(&scan, 10).is_nan() && at(&scan, 170).is_nan());
     let silent = Node { is_first: false, quality: 0, angle_q6: 64, distance_q2: 400 }.encode();
-    let mut heard = scanning("").hear(&[&node(0, 0.0), &silent[..], &next()].concat());
-    assert!(heard.scans.pop().unwrap().beams.iter().all(|beam| !beam.is_finite()));
+    let scan = seen("", [&node(0, 0.0), &silent[..]].concat());
+    assert!(scan.beams.iter().all(|beam| !beam.is_finite()));
 }
 
 #[test]

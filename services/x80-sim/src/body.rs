@@ -160,7 +160,6 @@ impl Body {
 mod tests {
     use super::*;
     use crate::testing::{mission, near};
-    use std::f64::consts::FRAC_PI_2;
 
     fn at_start(text: &str) -> (Body, World) {
         let mission = mission(text);
@@ -175,15 +174,6 @@ mod tests {
             way
         };
         (0..steps.abs()).map(step).sum()
-    }
-
-    #[test]
-    fn wheels_turn_the_body_by_the_track() {
-        let (mut body, world) = at_start("robot.track_m = 0.25");
-        let quarter = FRAC_PI_2 * 0.25 / 2.0;
-        body.roll([-quarter, quarter], &world);
-        near(body.pose.heading, FRAC_PI_2, 1e-12);
-        assert!(body.pose.position.length() < 1e-12);
     }
 
     #[test]

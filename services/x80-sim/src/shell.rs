@@ -238,11 +238,4 @@ mod tests {
         let text = error.to_string();
         assert!(text.contains(&listen.to_string()) && text.contains("port 0"), "{text}");
     }
-
-    #[test]
-    fn at_the_pace_of_the_commands_there_is_nothing_to_wait_for() {
-        let clock = SimClock::new(Pace::Max, 0.1, 0.0);
-        assert_eq!(clock.wait_for(5.0, 0), None);
-        assert_eq!(clock.now(9), None);
-    }
 }

@@ -41,12 +41,6 @@ mod tests {
     }
 
     #[test]
-    fn wheels_in_the_laboratory_are_exactly_the_nominal_ones() {
-        let exact = WheelErrors { diameter: [1.0; 2], track: 1.0, slip_share: 0.0 };
-        assert_eq!(errors("seed = 7\nsimulation.realism = 'laboratory'"), exact);
-    }
-
-    #[test]
     fn each_seed_has_wheels_of_its_own_within_the_spread_and_no_bias_is_common_to_all() {
         let robots = (1..=200)
             .map(|seed| errors(&format!("seed = {seed}\nsimulation.realism = 'measured'")));

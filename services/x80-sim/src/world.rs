@@ -280,23 +280,6 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_stops_at_the_first_surface_by_hand() {
-        let world = world(
-            "world.drum = [{ at = [3, 0], radius_m = 0.5 }]\nworld.wall = [{ points = [[2, -1], [2, 1]] }]",
-        );
-        let (range, _) = world.first_hit(DVec2::ZERO, DVec2::X, 0.2).unwrap();
-        assert_eq!(range, 2.0, "the wall hides the drum");
-        let (range, _) = world.first_hit(DVec2::new(4.0, 0.0), DVec2::NEG_X, 0.2).unwrap();
-        assert_eq!(range, 0.5, "from behind, the drum");
-        assert_eq!(world.first_hit(DVec2::ZERO, DVec2::Y, 0.2), None);
-        assert_eq!(
-            world.first_hit(DVec2::ZERO, DVec2::NEG_X, 0.2),
-            None,
-            "a ray does not look back"
-        );
-    }
-
-    #[test]
     fn a_thing_comes_moves_in_a_straight_line_and_goes() {
         let mut world = world(
             "[[simulation.thing]]\nfrom_s = 1\nuntil_s = 9\nshape.drum = [{ at = [0, 5], radius_m = 1 }]\nmoves = [{ at_s = 2, by = [0, 0] }, { at_s = 4, by = [0, -2] }]",

@@ -114,26 +114,6 @@ mod tests {
     }
 
     #[test]
-    fn the_stage_where_a_tick_ends_is_blamed_and_nobody_behind_it() {
-        for until in 1..=TABLE.len() {
-            let tick = |index| 7 - u64::from(index >= until);
-            let outputs = TABLE.iter().enumerate().map(|(index, stage)| (stage.name, tick(index)));
-            let want = TABLE.get(until).map(|stage| stage.name);
-            assert_eq!(blamed(&mut published(&outputs.collect::<Vec<_>>())), want);
-        }
-    }
-
-    #[test]
-    fn a_stage_without_input_is_never_blamed() {
-        assert_eq!(blamed(&mut published(&[])), None);
-        let mut watchdog = published(&[("dead-reckoning", 9), ("planner", 0), ("controller", 0)]);
-        let blamed = blamed(&mut watchdog);
-        for stage in ["mapper", "planner", "controller"] {
-            assert_ne!(blamed, Some(stage));
-        }
-    }
-
-    #[test]
     fn a_stage_is_blamed_when_its_time_is_over_and_not_before() {
         let all = |tick| TABLE.iter().map(move |stage| (stage.name, tick));
         for stage in TABLE.iter().filter(|stage| stage.name != "link") {
@@ -149,19 +129,6 @@ mod tests {
             }
             let late = MINUTE + stage.deadlines.answers;
             assert_eq!(watchdog.stale(|_| late), Some(stage.name));
-        }
-    }
-
-    #[test]
-    fn a_stage_that_lags_but_answers_is_left_alone() {
-        let mut watchdog = OutputWatchdog::new(0);
-        for tick in 1..100 {
-            for stage in TABLE {
-                let ahead = u64::from(stage.name == "link");
-                watchdog.on_output(stage.name, tick + ahead);
-            }
-            let now = Duration::from_millis(900) * tick as u32;
-            assert_eq!(watchdog.stale(|_| now), None);
         }
     }
 

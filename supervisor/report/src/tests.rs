@@ -15,8 +15,13 @@ mod recorded_page;
 use recorded_page::messages;
 
 fn golden() -> Content {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
-    Content::read(&recording::files(Path::new(file)).unwrap()).unwrap()
+    golden_of("open-room")
+}
+
+fn golden_of(name: &str) -> Content {
+    let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden");
+    let file = format!("{golden}/{name}.mcap");
+    Content::read(&recording::files(Path::new(&file)).unwrap()).unwrap()
 }
 
 #[test]
@@ -46,6 +51,18 @@ fn a_page_has_every_tick_the_maps_a_field_and_the_metrics() {
     assert!(blobs > 3, "{blobs} maps and fields");
     let metrics = messages.last().unwrap()["metrics"].as_array().unwrap();
     assert!(metrics.iter().any(|metric| metric[2] == "mission_time_s"), "{metrics:?}");
+}
+
+#[test]
+fn a_report_tells_of_a_stage_that_was_killed_and_refers_to_nothing() {
+    let page = html(golden_of("stall-and-kill"));
+    assert!(!page.contains("src=\"") && !page.contains("href=\"/"), "it refers to something");
+    let (messages, _) = messages(&page);
+    let told = messages.iter().filter_map(|message| message["events"].as_array()).flatten();
+    let told: Vec<_> = told.map(|event| format!("{} {}", event["of"], event["text"])).collect();
+    for event in ["\"mapper\" \"generation 1 died (signal 9)", "\"mapper\" \"generation 2 runs\""] {
+        assert!(told.iter().any(|it| it.starts_with(event)), "{told:?}");
+    }
 }
 
 #[test]

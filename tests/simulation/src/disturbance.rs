@@ -5,7 +5,10 @@ use std::{fmt, time::Duration};
 use common::{
     bus::{Bus, BusError},
     clock::{MissionTime, monotonic_ns},
-    samples::{MOST_TARGETS, RequestKind, RequestSample, TargetPoint},
+    samples::{
+        BeaconSample, FaultKind, FaultSample, MOST_TARGETS, RequestKind, RequestSample,
+        TargetPoint, name,
+    },
     topics,
 };
 
@@ -38,6 +41,10 @@ pub enum What {
     Wire(Way, Quality),
     Load(Load),
     Ask(Request),
+    /// Injects a fault into a stage.
+    Break(&'static str, FaultKind),
+    /// The followed beacon says its place.
+    Beacon([f64; 2]),
     /// The robot becomes faulty, or is healthy again.
     Fault(Option<RobotFault>),
     /// Ends the simulation.
@@ -48,10 +55,16 @@ pub enum What {
 #[derive(Clone, Copy, Debug)]
 pub enum Request {
     Stop,
+    /// A stop asked before all else, of which the supervisor hears only now.
+    LateStop,
     Resume,
     Goto([f64; 2]),
     Append([f64; 2]),
     Restart(&'static str),
+    /// Pushes the joystick ahead and to the left.
+    Hand([f64; 2]),
+    Follow,
+    EndFollow,
 }
 
 impl Request {
@@ -62,19 +75,22 @@ impl Request {
             points
         };
         let (kind, points, count) = match self {
-            Self::Stop => (RequestKind::Stop, None, 0),
+            Self::Stop | Self::LateStop => (RequestKind::Stop, None, 0),
             Self::Resume => (RequestKind::Resume, None, 0),
             Self::Goto(at) => (RequestKind::Goto, Some(target(at)), 1),
             Self::Append(at) => (RequestKind::Append, Some(target(at)), 1),
             Self::Restart(_) => (RequestKind::Restart, None, 0),
+            Self::Hand(stick) => (RequestKind::Hand, Some(target(stick)), 1),
+            Self::Follow => (RequestKind::Follow, None, 0),
+            Self::EndFollow => (RequestKind::EndFollow, None, 0),
         };
         let stage = match self {
-            Self::Restart(stage) => common::samples::name(stage),
+            Self::Restart(stage) => name(stage),
             _ => Default::default(),
         };
         let sample = RequestSample {
             id: monotonic_ns() | 1,
-            asked_ns: monotonic_ns(),
+            asked_ns: if matches!(self, Self::LateStop) { 1 } else { monotonic_ns() },
             kind: kind.into(),
             stage,
             targets: points.unwrap_or_default(),
@@ -83,6 +99,21 @@ impl Request {
         };
         bus.writer(&topics::REQUESTS, 1)?.publish(0, MissionTime::default(), sample)
     }
+}
+
+/// Breaks a stage of any robot.
+pub(crate) fn inject(bus: &Bus, stage: &str, kind: FaultKind) -> Result<(), BusError> {
+    let (id, stage, kind) = (monotonic_ns() | 1, name(stage), kind.into());
+    let sample = FaultSample { id, stage, kind, although_real: 1, ..FaultSample::default() };
+    bus.writer(&topics::FAULTS, 1)?.publish(0, MissionTime::default(), sample)
+}
+
+/// Says where the beacon is at the time of the newest pose.
+pub(crate) fn say_beacon(bus: &Bus, [x_m, y_m]: [f64; 2]) -> Result<(), BusError> {
+    let pose = bus.reader(&topics::POSE)?.newest()?.unwrap_or_default();
+    let (capture_ns, source, deviation_m) = (pose.stamp.stamp_ns, name("walker"), 0.02);
+    let sample = BeaconSample { capture_ns, source, x_m, y_m, deviation_m, ..Default::default() };
+    bus.writer(&topics::BEACON, 1)?.publish(pose.stamp.tick, pose.stamp.time(), sample)
 }
 
 impl fmt::Display for Disturbance {

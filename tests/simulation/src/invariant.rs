@@ -9,17 +9,17 @@ use common::{
     mission::{Mission, Protocol},
     samples::{
         Cause, CommandSample, DeathSample, DirectiveSample, GridHeader, LinkSample, Order,
-        PoseSample, name_str,
+        PoseSample, RosterEntry, RosterHeader, name_str,
     },
     topics,
     wire::{Command, Decoder, Quantity, Targets},
 };
-use mission_control::{Finished, outcome::Outcome};
+use mission_control::{Finished, outcome::Outcome, target_list::TargetOutcome};
 use thiserror::Error;
 
 use crate::{
     disturbance::What,
-    machine::SimulatedMachine,
+    machine::{LINK, SimulatedMachine},
     robot_fault::RobotFault,
     wire::{Quality, Way},
 };
@@ -51,6 +51,9 @@ struct Observed {
     pose: Reader<PoseSample>,
     command: Reader<CommandSample>,
     deaths: Reader<DeathSample>,
+    /// The supervisor states its roster again for a new reader, so a viewer of the roster, such as a
+    /// recorder, would change the run. There is always one.
+    _roster: Reader<RosterHeader, RosterEntry>,
     /// Two readers of the map: one from the start, one that joins again and again.
     grids: [(Reader<GridHeader, u8>, Replica<u8>); 2],
     bus: Bus,
@@ -66,6 +69,7 @@ impl Observed {
             pose: bus.reader(&topics::POSE)?,
             command: bus.reader(&topics::COMMAND)?,
             deaths: bus.reader(&topics::DEATHS)?,
+            _roster: bus.reader(&topics::ROSTER)?,
             grids: [grid()?, grid()?],
             bus,
         })
@@ -85,6 +89,8 @@ pub(crate) struct Invariants {
     sent: Option<bool>,
     told: Option<Duration>,
     moved: Option<Duration>,
+    /// First order to stand after the last one to move.
+    stood: Option<Duration>,
     /// Whether the wire to the robot keeps what it carries, whether the robot obeys, and when either
     /// last changed.
     wire_is_calm: bool,
@@ -118,6 +124,7 @@ impl Invariants {
             sent: None,
             told: None,
             moved: None,
+            stood: None,
             wire_is_calm: true,
             obeys: true,
             obedience_changed: Duration::ZERO,
@@ -140,7 +147,8 @@ impl Invariants {
             | What::KillAfter(stage, _)
             | What::Freeze(stage)
             | What::Thaw(stage)
-            | What::Hang(stage) => self.disturbed.push((stage, now)),
+            | What::Hang(stage)
+            | What::Break(stage, _) => self.disturbed.push((stage, now)),
             What::Wire(Way::ToRobot, quality) => {
                 self.wire_is_calm = *quality == Quality::default();
                 self.obedience_changed = now;
@@ -150,8 +158,12 @@ impl Invariants {
                 self.obedience_changed = now;
                 self.has_lied |= fault.is_some_and(RobotFault::lies);
             }
-            What::KillSupervisor(_) | What::Wire(..) | What::Load(_) | What::Ask(_) | What::End => {
-            }
+            What::KillSupervisor(_)
+            | What::Wire(..)
+            | What::Load(_)
+            | What::Ask(_)
+            | What::Beacon(_)
+            | What::End => {}
         }
     }
 
@@ -169,7 +181,9 @@ impl Invariants {
         let Some(moves) = self.moves(bytes) else { return };
         (self.sent, self.told) = (Some(moves), Some(now));
         if moves {
-            self.moved = Some(now);
+            (self.moved, self.stood) = (Some(now), None);
+        } else {
+            self.stood.get_or_insert(now);
         }
     }
 
@@ -202,7 +216,12 @@ impl Invariants {
                     _ => moves,
                 })
             }
-            Protocol::Arduino | Protocol::Ros2 => None,
+            Protocol::Arduino => {
+                let text = std::str::from_utf8(bytes).ok()?;
+                let mut speeds = text.split('\r').filter_map(|line| line.strip_prefix("m "));
+                speeds.next_back().map(|speeds| speeds != "0 0")
+            }
+            Protocol::Ros2 => None,
         }
     }
 
@@ -210,12 +229,15 @@ impl Invariants {
     pub(crate) fn check(&mut self, machine: &SimulatedMachine) -> Checked {
         let now = machine.now();
         let sent = self.sent.take();
-        // A link reads its orders before it sends, so the order before this event counts.
-        let may_move = self.order.is_none_or(|order| order == Order::Drive);
+        // The supervisor gives orders between events, so the link may have read the newest one.
+        let drives = |order: Option<Order>| order.is_none_or(|order| order == Order::Drive);
+        let before = self.order;
         self.read(machine, now)?;
+        let may_move = drives(before) || drives(self.order);
         if !self.in_ticks && sent == Some(true) {
             let drives = self.causes.last().is_some_and(|(_, cause)| cause.is_none());
-            holds(drives, "zero command while held", || {
+            // A link that was killed in this turn sent, but did not publish why.
+            holds(drives || !machine.is_open(LINK), "zero command while held", || {
                 "the link sends a motion command although its cause says stop".to_owned()
             })?;
             holds(may_move, "no command after the order to stop", || {
@@ -235,9 +257,9 @@ impl Invariants {
             })?;
             let obeys = self.wire_is_calm && self.obeys;
             let obeys = obeys && age(Some(self.obedience_changed)) > 2 * RESTS_WITHIN;
-            let stands = age(self.moved) > RESTS_WITHIN;
-            holds(!(obeys && stands), "a robot that is told to stand stands", || {
-                format!("it moves at {:.2} m/s since {:?}", truth.v, self.moved)
+            let is_told = self.stood.is_some_and(|stood| age(Some(stood)) > RESTS_WITHIN);
+            holds(!(obeys && is_told), "a robot that is told to stand stands", || {
+                format!("it moves at {:.2} m/s, told to stand at {:?}", truth.v, self.stood)
             })?;
         }
         Ok(())
@@ -268,7 +290,9 @@ impl Invariants {
         }
         while let Some(command) = observed.command.next_sample().map_err(unread)? {
             let tick = command.stamp.tick;
-            holds(tick + 1 >= self.command, "ticks do not go back", || {
+            // A successor of the link continues from the newest tick that the supervisor has read.
+            let continues = tick + 1 >= self.command || is_recent(&self.disturbed, LINK, now);
+            holds(continues, "ticks do not go back", || {
                 format!("tick {tick} is commanded after tick {}", self.command)
             })?;
             self.command = self.command.max(tick);
@@ -294,12 +318,11 @@ impl Invariants {
         }
         while let Some(death) = observed.deaths.next_sample().map_err(unread)? {
             let stage = name_str(&death.stage);
-            let caused = self.disturbed.iter().any(|(disturbed, at)| {
-                *disturbed == stage && now.saturating_sub(*at) < Duration::from_secs(20)
-            });
-            holds(death.hung == 0 || caused, "no stage is ended without cause", || {
-                format!("{stage} was ended as hung")
-            })?;
+            holds(
+                death.hung == 0 || is_recent(&self.disturbed, stage, now),
+                "no stage is ended without cause",
+                || format!("{stage} was ended as hung"),
+            )?;
         }
         Ok(())
     }
@@ -319,7 +342,13 @@ impl Invariants {
         let (Outcome::Reached, Some(truth)) = (finished.ending.outcome, machine.truth()) else {
             return Ok(());
         };
-        let target = targets.last().map_or(mission.target.into(), |last| [last.x_m, last.y_m]);
+        // A hand's target has no result.
+        let last = targets.last().filter(|last| last.outcome != TargetOutcome::Replaced);
+        let target = match last {
+            Some(last) => [last.x_m, last.y_m],
+            None if targets.is_empty() => mission.target.into(),
+            None => return Ok(()),
+        };
         let off_m = (truth.x - target[0]).hypot(truth.y - target[1]);
         let pose = finished.record.pose.unwrap_or_default();
         let most_m = mission.arrival_tolerance_m + pose_bound_m(&pose);
@@ -327,6 +356,12 @@ impl Invariants {
             format!("{off_m:.2} m from the target, {most_m:.2} m at most")
         })
     }
+}
+
+/// Returns whether a stage was disturbed in the last 20 s.
+fn is_recent(disturbed: &[(&'static str, Duration)], stage: &str, now: Duration) -> bool {
+    let mut of_stage = disturbed.iter().filter(|(disturbed, _)| *disturbed == stage);
+    of_stage.any(|(_, at)| now.saturating_sub(*at) < Duration::from_secs(20))
 }
 
 /// Returns the greatest error of a pose that knows how wrong it may be, metres.

@@ -262,6 +262,8 @@ mod tests {
         time::{SystemTime, UNIX_EPOCH},
     };
 
+    use common::topics;
+
     use super::*;
 
     fn mission() -> Mission {
@@ -279,6 +281,28 @@ mod tests {
         };
         assert_eq!(run(7), run(7));
         assert_ne!(run(7), run(8));
+    }
+
+    struct Viewer(Vec<Box<dyn std::any::Any>>);
+
+    impl Observer for Viewer {
+        fn on_bus(&mut self, bus: &Bus) {
+            self.0.push(Box::new(bus.reader(&topics::ROSTER).unwrap()));
+            self.0.push(Box::new(bus.reader(&topics::GRID).unwrap()));
+            self.0.push(Box::new(bus.reader(&topics::FIELD).unwrap()));
+        }
+
+        fn observe(&mut self) {}
+    }
+
+    #[test]
+    fn who_watches_a_run_changes_none_of_its_events() {
+        for seed in 7..10 {
+            let scenario = Scenario::draw(&mission(), seed);
+            let watched = scenario.run_before(Some(Box::new(Viewer(Vec::new()))));
+            let alone = scenario.run();
+            assert_eq!((watched.events, watched.truth), (alone.events, alone.truth), "{seed}");
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ use x80_sim::SimError;
 
 use crate::{
     Observer, Scenario,
-    disturbance::{Disturbance, Request, What},
+    disturbance::{Disturbance, Request, What, inject, say_beacon},
     fault_injector::FaultInjector,
     guard::Guard,
     invariant::{Broken, Checked, Invariants},
@@ -46,7 +46,7 @@ const FIRST_PROCESS: u32 = 1000;
 const OPERATOR: u32 = 1;
 const OBSERVER: u32 = 2;
 const GUARD: u32 = 3;
-const LINK: &str = "link";
+pub(crate) const LINK: &str = "link";
 /// Ticks that a pose may be late.
 const RECENT_TICKS: usize = 400;
 /// Most events of a second; in lockstep a run takes little more.
@@ -534,6 +534,13 @@ impl SimulatedMachine {
             What::Wire(way, quality) => self.wires.borrow_mut().set_quality(*way, *quality),
             What::Load(load) => self.load.set(*load),
             What::Ask(request) => self.ask(*request),
+            // Nobody hears either while there is no bus.
+            What::Break(stage, kind) => {
+                let _ = self.as_operator(|bus| inject(bus, stage, *kind));
+            }
+            What::Beacon(place) => {
+                let _ = self.as_operator(|bus| say_beacon(bus, *place));
+            }
             What::Fault(fault) => {
                 if let Some(faults) = &self.faults {
                     faults.borrow_mut().set(*fault);

@@ -6,7 +6,10 @@ use std::path::Path;
 
 use common::mission::Mission;
 use console::missions;
-use mission_control::outcome::Outcome;
+use mission_control::{
+    outcome::Outcome,
+    target_list::{TargetOutcome, TargetResult},
+};
 use simulation::Scenario;
 use summary::Summary;
 
@@ -16,6 +19,9 @@ const PAPER: &str = "method='paper'";
 /// Speed below which a car, or a robot by the paper's method, touches nothing with any seed.
 const SLOW: &str = "controller.speed_m_s=0.2";
 const CAR: &str = "robot.model='car'";
+const KOBUKI: [&str; 2] = ["robot.model='kobuki'", "robot.rate_hz=10"];
+const ARDUINO: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../supervisor/guide/example-arduino/");
 
 /// Drives a shipped mission with further settings.
 fn drive(mission: &str, settings: &[&str]) -> Summary {
@@ -175,6 +181,19 @@ fn by_the_papers_method_a_known_course_is_crossed_faster_than_an_unknown_one() {
 }
 
 #[test]
+fn a_touch_ends_the_mission_as_a_collision() {
+    // The robot is blind, because hits beyond 5 cm are not mapped.
+    let summary = ends("obstacle-course", &[PAPER, "mapper.map_within_m=0.05"], Outcome::Collision);
+    assert!(summary.collisions > Some(0), "{summary:?}");
+}
+
+#[test]
+fn a_target_where_the_robot_stands_is_reached_in_a_finite_ratio() {
+    let printed = ends("open-room", &["target=[0,0]"], Outcome::Reached).to_string();
+    assert!(!printed.contains("NaN") && !printed.contains("inf"), "{printed}");
+}
+
+#[test]
 fn a_target_behind_closed_walls_is_called_unreachable() {
     let walls = "world.wall=[{points=[[2.4,-3.4],[2.4,3.4]]},{points=[[-1.9,1.4],[2.6,1.4]]},\
                  {points=[[-1.9,-1.4],[2.6,-1.4]]},{points=[[-1.7,-1.6],[-1.7,1.6]]}]";
@@ -198,8 +217,8 @@ fn a_wheel_that_is_blocked_for_5_s_costs_a_fresh_planner_and_for_ever_the_target
 #[test]
 fn by_its_laser_a_robot_whose_wheels_are_not_what_they_should_be_knows_where_it_is() {
     for seed in seeds(3) {
-        let robot = ["robot.model='kobuki'", "robot.rate_hz=10", "controller.speed_m_s=0.5"];
-        let settings = [robot[0], robot[1], robot[2], "simulation.realism='harsh'", &seed];
+        let fast = "controller.speed_m_s=0.5";
+        let settings = [KOBUKI[0], KOBUKI[1], fast, "simulation.realism='harsh'", &seed];
         let summary = ends("obstacle-course", &settings, Outcome::Reached);
         assert!(summary.pose_error_m < Some(0.12), "{seed}: {summary:?}");
     }
@@ -221,6 +240,9 @@ fn a_long_robot_turns_behind_a_gap_narrower_than_its_length_and_refuses_to_in_a_
     let corridor = "[{ points = [[0.8, 0.4], [3.2, 0.4], [3.2, -0.4], [0.8, -0.4]] }]";
     for (targets, walls, outcome) in [
         ("[[2.5, 0.5, 90]]", gap, Outcome::Reached),
+        ("[[2.5, 0]]\nstart.heading_deg = 90", gap, Outcome::Reached),
+        ("[[2.5, 0]]\nstart = [0, 1.2, -135]", gap, Outcome::Reached),
+        ("[[2.5, 0]]\nstart = [0, -1.2, 180]", gap, Outcome::Reached),
         ("[[2.2, 0, 90]]", corridor, Outcome::Unreachable),
         ("[[2.2, 0], [-0.5, 0, 180]]", corridor, Outcome::Reached),
     ] {
@@ -249,5 +271,71 @@ fn a_heavy_rectangle_passes_the_loose_end_of_a_wall_untouched_as_stated_and_as_f
         ));
         let found = (summary.outcome, summary.collisions);
         assert_eq!(found, (Outcome::Reached, Some(0)), "{stated}: {summary:?}");
+    }
+}
+
+#[test]
+fn a_robot_that_bumps_into_a_low_board_or_comes_to_a_hole_marks_it_and_goes_around() {
+    for (world, touches) in [
+        ("world.box=[{at=[2,0],size_m=[0.3,0.8],top_m=0.1}]", true),
+        ("simulation.hole=[{at=[2,0],size_m=[0.4,0.8]}]", false),
+    ] {
+        let settings = [KOBUKI[0], KOBUKI[1], SLOW, "simulation.goes_on_after_contact=true", world];
+        let summary = ends("open-room", &settings, Outcome::Reached);
+        let found = (summary.collisions > Some(0), summary.replans, summary.resets);
+        assert_eq!(found, (touches, 0, 0), "no wheel goes over the hole: {summary:?}");
+    }
+}
+
+#[test]
+fn two_lasers_of_half_a_circle_cross_the_course_untouched() {
+    let lasers = [("front", 0), ("back", 180)].map(|(name, bearing_deg)| {
+        format!(
+            "{{name='{name}',kind='scan',forward_m=0.1,bearing_deg={bearing_deg},\
+             field_of_view_deg=180,beams=91}}"
+        )
+    });
+    let sensors = format!("robot.sensor=[{}]", lasers.join(","));
+    arrives_untouched("obstacle-course", &[KOBUKI[0], KOBUKI[1], &sensors]);
+}
+
+#[test]
+fn a_low_battery_doubles_the_time_and_an_empty_one_ends_the_mission_with_the_reason() {
+    let at = |volts: &str, outcome| {
+        ends("open-room", &[&format!("simulation.battery.start_v={volts}")], outcome)
+    };
+    let full = at("7.8", Outcome::Reached);
+    let low = at("6.5", Outcome::Reached);
+    assert!(low.mission_time_s > 1.5 * full.mission_time_s, "{low:?} against {full:?}");
+    let empty = at("5.9", Outcome::Aborted);
+    assert_eq!(empty.cause.as_deref(), Some("battery empty"), "{empty:?}");
+    assert!((1.9..3.0).contains(&empty.mission_time_s), "{empty:?}");
+}
+
+#[test]
+fn the_targets_of_a_list_are_reached_in_turn_and_each_has_its_time_and_truth() {
+    let summary = drive_text(
+        "targets = [[1.5, -1.0], [2.5, 0.5, 180], [0.5, 0.8]]\n\
+         world.drum = [{ at = [2.0, 0.0], radius_m = 0.2 }]",
+    );
+    let targets = &summary.targets;
+    assert!(targets.len() == 3 && targets.is_sorted_by_key(|it| it.at_s), "{summary:?}");
+    let is_there = |it: &TargetResult| {
+        it.outcome == TargetOutcome::Reached && it.truth_m.is_some_and(|off_m| off_m < 0.5)
+    };
+    assert!(targets.iter().all(is_there), "{summary:?}");
+    let legs = 1.5_f64.hypot(1.0) + 1.0_f64.hypot(1.5) + 2.0_f64.hypot(0.3);
+    assert!((summary.straight_m - legs).abs() < 1e-9, "{summary:?}");
+}
+
+#[test]
+fn an_arduino_arrives_by_sonars_by_an_rplidar_and_by_the_gyro_of_wheels_nobody_calibrated() {
+    for mission in ["robot.toml", "laser.toml"] {
+        arrives_untouched(&format!("{ARDUINO}{mission}"), &[]);
+    }
+    for seed in seeds(6) {
+        let settings = ["robot.gyro=true", "simulation.realism='measured'", &seed];
+        let summary = arrives_untouched(&format!("{ARDUINO}robot.toml"), &settings);
+        assert!(summary.pose_error_m < Some(0.15), "{seed}: {summary:?}");
     }
 }

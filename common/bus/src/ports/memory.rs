@@ -201,8 +201,7 @@ mod tests {
     use crate::{
         Bus,
         clock::MissionTime,
-        ports::tests::{Cell as TestCell, SLICES, STRUCTS, Test},
-        waiter::Waiter,
+        ports::tests::{STRUCTS, Test},
     };
 
     const TIME: MissionTime = MissionTime(7);
@@ -226,22 +225,5 @@ mod tests {
             (late.author().generation, late.header().stamp.sequence),
             (3, buffer as u32 + 1)
         );
-    }
-
-    #[test]
-    fn slices_are_read_as_they_were_written_and_events_wake_once() {
-        let bus = Bus::in_memory(Rc::default(), None);
-        let mut waiter = Waiter::default();
-        waiter.on(bus.wakeup(&SLICES).unwrap());
-        let mut reader = bus.reader(&SLICES).unwrap();
-        let mut writer = bus.slice_writer(&SLICES, 1, 9).unwrap();
-        let cells = [1, 2, 3].map(|second| TestCell { second, ..TestCell::default() });
-        for length in [3, 0, 1] {
-            writer.publish_slice(0, TIME, Test::default(), &cells[..length]).unwrap();
-            assert!(waiter.is_woken());
-            let slice = reader.next_slice().unwrap().unwrap();
-            assert_eq!(slice[..], cells[..length]);
-        }
-        assert!(reader.next_slice().unwrap().is_none());
     }
 }

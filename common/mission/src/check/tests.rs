@@ -7,7 +7,9 @@ fn a_target_is_all_a_mission_needs() {
     assert_eq!(mission.name, "short");
     assert_eq!(mission.grid_frame().resolution_m, 0.05);
     assert_eq!(mission.body().counts_per_turn, 1200.0);
-    read_back("[[world.drum]]\nat = [1.5, 1]\nradius_m = 0.3\n[robot]\nmodel = 'x80sv'");
+    let wall = "[[world.wall]]\npoints = [[1, 2], [2, 2]]\nlight = 'glass'";
+    let drum = "[[world.drum]]\nat = [1.5, 1]\nradius_m = 0.3";
+    read_back(&format!("{wall}\n{drum}\n[robot]\nmodel = 'x80sv'"));
 }
 
 #[test]

@@ -64,19 +64,37 @@ fn by(generation: u32, mut sample: WheelSample) -> WheelSample {
 }
 
 #[test]
-fn equation_20_by_hand() {
-    let mut reckoning = begun("", 100, 200);
-    // 500 counts are half a turn: pi * 0.1 m in 0.5 s.
-    let pose = reckoning.take(1, 600, 700);
-    close(pose.x_m, 0.1 * PI);
-    close(pose.y_m, 0.0);
-    close(pose.v_m_s, 0.2 * PI);
-    close(pose.omega_rad_s, 0.0);
-    close(pose.travelled_m, 0.1 * PI);
-    // +-1000 counts are 2 pi 0.1 m a side over a track of 0.4 m: pi radians left on the spot.
-    let pose = begun("", 0, 0).take(1, COUNT_CYCLE - 1000, 1000);
-    close(pose.heading_rad, PI);
-    close(pose.x_m, 0.0);
+fn the_pose_after_a_tick_is_that_of_equations_20_and_3_and_the_calibration_by_hand() {
+    let on = |method: &str| format!("[dead_reckoning]\nintegration = '{method}'");
+    let (arc, euler) = (on("arc"), on("euler"));
+    // L = 0.5 m; 45 degrees of steering are 450 of 3600 counts.
+    let car = "model = 'car'\nwheelbase_m = 0.5\nsteering_limit_deg = 60";
+    let calibrated =
+        "odometry = { diameter_ratio = 1.02, distance_scale = 0.98, track_scale = 1.1 }";
+    // Half a wheel turn is 0.1 pi metres.
+    let (half, left) = (0.1 * PI, 0.1 * PI * 0.98 / 1.01);
+    let turn = half / 0.5;
+    for (keys, from, to, [x, y, heading, travelled]) in [
+        ("", [100, 200], [600, 700], [half, 0.0, 0.0, half]),
+        // +-1000 counts are 2 pi 0.1 m a side over a track of 0.4 m: pi radians left on the spot.
+        ("", [0, 0], [COUNT_CYCLE - 1000, 1000], [0.0, 0.0, PI, 0.0]),
+        // Right wheel alone, 1000 counts: turn pi/2, radius 0.2.
+        (&arc, [0, 0], [0, 1000], [0.2, 0.2, PI / 2.0, half]),
+        (&euler, [0, 0], [0, 1000], [half, 0.0, PI / 2.0, half]),
+        // On a circle of 0.5 m radius to the left.
+        (car, [100, 450], [600, 450], [0.5 * turn.sin(), 0.5 * (1.0 - turn.cos()), turn, half]),
+        // From 45 degrees left to 45 right the mean is straight.
+        (car, [100, 450], [600, COUNT_CYCLE - 450], [half, 0.0, 0.0, half]),
+    ] {
+        let pose = begun(keys, from[0], from[1]).take(1, to[0], to[1]);
+        let got = [pose.x_m, pose.y_m, pose.heading_rad, pose.travelled_m];
+        let off = [0, 1, 2, 3].map(|part| got[part] - [x, y, heading, travelled][part]);
+        assert!(off.iter().all(|off| off.abs() < 1e-12), "{keys} {to:?}: {got:?}");
+    }
+    let pose = begun(calibrated, 0, 0).take(1, 500, 500);
+    // The right wheel rolls 1.02 times as far as the left.
+    close(pose.travelled_m, left * 1.01);
+    close(pose.heading_rad, left * 0.02 / (0.4 * 1.1));
 }
 
 /// As [`wheels`], without a counter.
@@ -139,18 +157,6 @@ fn a_recorded_state_and_entry_of_an_earlier_version_are_read_without_counts() {
     // The last byte says: no counts.
     let earlier = postcard::from_bytes::<State>(&state[..state.len() - 1]).unwrap();
     assert_eq!(&earlier, reckoning.state());
-}
-
-#[test]
-fn the_arc_and_the_papers_euler_differ_as_they_should() {
-    // Right wheel alone, 1000 counts: arc 0.1 pi, turn pi/2, radius 0.2.
-    for (integration, x_m, y_m) in [("arc", 0.2, 0.2), ("euler", 0.1 * PI, 0.0)] {
-        let extra = format!("[dead_reckoning]\nintegration = '{integration}'");
-        let pose = begun(&extra, 0, 0).take(1, 0, 1000);
-        close(pose.x_m, x_m);
-        close(pose.y_m, y_m);
-        close(pose.heading_rad, PI / 2.0);
-    }
 }
 
 #[test]
@@ -239,25 +245,6 @@ fn a_robot_that_turns_back_through_its_start_while_the_link_is_killed_loses_no_t
 }
 
 #[test]
-fn equation_3_of_a_car_by_hand() {
-    // r = 0.1 m, 1000 counts per turn; L = 0.5 m; 45 degrees of steering are 450 of 3600 counts.
-    let car = "model = 'car'\nwheelbase_m = 0.5\nsteering_limit_deg = 60";
-    let mut steered = begun(car, 100, 450);
-    // Half a wheel turn is 0.1 pi metres, on a circle of 0.5 m radius to the left.
-    let pose = steered.take(1, 600, 450);
-    let turn = 0.1 * PI / 0.5;
-    close(pose.heading_rad, turn);
-    close(pose.x_m, 0.5 * turn.sin());
-    close(pose.y_m, 0.5 * (1.0 - turn.cos()));
-    close(pose.travelled_m, 0.1 * PI);
-    // From 45 degrees left to 45 right the mean is straight.
-    let mut swung = begun(car, 100, 450);
-    let pose = swung.take(1, 600, COUNT_CYCLE - 450);
-    close(pose.heading_rad, 0.0);
-    close(pose.x_m, 0.1 * PI);
-}
-
-#[test]
 fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose() {
     let mut killed = begun("", 0, 0);
     killed.take(1, 90, 110);
@@ -277,16 +264,4 @@ fn a_successor_of_one_killed_between_publishing_and_saving_goes_on_with_its_pose
     close(got.heading_rad, want.heading_rad);
     close(got.travelled_m, want.travelled_m);
     assert!((got.x_m - want.x_m).hypot(got.y_m - want.y_m) < 2e-3);
-}
-
-#[test]
-fn counts_are_ways_of_the_wheels_as_they_were_calibrated() {
-    let calibrated =
-        "odometry = { diameter_ratio = 1.02, distance_scale = 0.98, track_scale = 1.1 }";
-    let mut reckoning = begun(calibrated, 0, 0);
-    let pose = reckoning.take(1, 500, 500);
-    // left = counts * s * 2 / (1 + rho), right = rho * left, turn = (right - left) / (W tau).
-    let left = 0.1 * PI * 0.98 * 2.0 / 2.02;
-    close(pose.travelled_m, left * 1.01);
-    close(pose.heading_rad, left * 0.02 / (0.4 * 1.1));
 }

@@ -148,18 +148,4 @@ mod tests {
             assert_eq!(may_be_late(&found(delay_ms, quiet_ms)), is_late, "{delay_ms} {quiet_ms}");
         }
     }
-
-    #[test]
-    fn a_late_robot_is_tested_again_and_taken_for_timely_when_nothing_late_comes() {
-        let mut monitor = found(2000, 700);
-        assert!(!monitor.is_testing());
-        observe(&mut monitor, Observation::Time, 13_000);
-        assert!(monitor.is_testing());
-        observe(&mut monitor, Observation::Acknowledged, 13_400);
-        observe(&mut monitor, Observation::Time, 13_700);
-        assert!(may_be_late(&monitor));
-        observe(&mut monitor, Observation::Time, 16_000);
-        observe(&mut monitor, Observation::Time, 16_700);
-        assert!(!may_be_late(&monitor));
-    }
 }

@@ -160,11 +160,6 @@ mod tests {
         fn at(&mut self, ms: u64, counts: [u16; 2]) -> Counts {
             self.step(counts, [0; 2], false, at(ms))
         }
-
-        fn away(&mut self, ms: u64, counts: [u16; 2]) -> Counts {
-            self.away = true;
-            self.at(ms, counts)
-        }
     }
 
     fn at(ms: u64) -> MissionTime {
@@ -174,19 +169,6 @@ mod tests {
     fn watch() -> RestartWatch {
         // 1 m/s is 2247 counts/s, 321 per tick.
         RestartWatch::new(&mission(""))
-    }
-
-    #[test]
-    fn counts_that_begin_anew_after_an_absence_are_a_restart_and_counts_that_go_on_are_none() {
-        let mut watch = watch();
-        assert_eq!(watch.at(0, [32_168, 600]), Follow, "the first frame");
-        let mut goes_on = watch.clone();
-        assert_eq!(watch.away(3000, [0, 1]), RESTARTED);
-        assert_eq!(watch.at(3100, [32_700, 68]), Follow, "it drives on");
-        assert_eq!(watch.restarts, 1);
-        assert_eq!(goes_on.away(3000, [32_000, 768]), Follow);
-        goes_on.away(6000, [3, 32_765]);
-        assert_eq!(goes_on.away(9000, [0, 0]), Follow, "it stood at its start");
     }
 
     #[test]

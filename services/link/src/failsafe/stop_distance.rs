@@ -56,18 +56,6 @@ mod tests {
     }
 
     #[test]
-    fn each_fault_that_a_time_bounds_ends_at_rest_after_it_is_known_and_later_on_a_heavier_base() {
-        let light = from_faults(&mission("controller.speed_m_s = 0.4"));
-        let heavy = "controller.speed_m_s = 0.4\nrobot.response.acceleration_m_s2 = 0.6";
-        let heavy = from_faults(&mission(heavy));
-        assert!(light.len() > 10 && light.len() == heavy.len(), "{light:?}");
-        for ((cause, light), (_, heavy)) in light.into_iter().zip(heavy) {
-            assert!(light.known_s > 0.0 && light.rest_s > light.known_s, "{cause:?}: {light:?}");
-            assert!(heavy.rest_s > light.rest_s && heavy.way_m > light.way_m, "{cause:?}");
-        }
-    }
-
-    #[test]
     fn the_way_from_a_fault_to_rest_grows_with_the_speed_the_limit_of_commands_and_a_heavier_base()
     {
         let way = |text| stale(text).way_m;

@@ -46,26 +46,3 @@ impl RobotTime {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_was_stamped_between_two_ticks_has_its_share_of_the_time_between_whenever_they_came() {
-        let ms = |ms: i64| ms * 1_000_000;
-        let time = |ms: u64| MissionTime(ms * 1_000_000);
-        let mut robot = RobotTime::default();
-        assert_eq!(robot.since_tick_ns(ms(70_000)), None);
-        // The second tick came late, right before the third.
-        for (stamp, at) in [(70_000, 5_000), (70_100, 5_180), (70_200, 5_200)] {
-            robot.tick(ms(stamp), time(at));
-        }
-        let since = |stamp| robot.since_tick_ns(ms(stamp)).unwrap();
-        assert_eq!([70_200, 70_100, 70_000].map(since), [0, ms(-20), ms(-200)]);
-        assert_eq!([70_150, 70_050].map(since), [ms(-10), ms(-110)]);
-        assert_eq!([70_230, 69_990].map(since), [ms(30), ms(-210)], "by the stamps alone");
-        robot.tick(ms(10), time(5_300));
-        assert_eq!(robot.since_tick_ns(ms(0)), Some(ms(-10)), "the robot's clock was set");
-    }
-}

@@ -95,7 +95,15 @@ fn a_stamped_scan_is_placed_by_the_clocks_of_ticks_and_by_its_age_alone_once_the
         let now = MissionTime(ns(tick[1]) as u64);
         sensors.for_tick(&motion, now).1[0].sweep.first_beam_ns / 1_000_000
     };
-    assert_eq!(placed_ms([70_000, 5_000], 70_000), 0);
-    assert_eq!(placed_ms([70_100, 5_200], 70_050), -100);
-    assert_eq!(placed_ms([10, 5_300], 70_190), -30, "the clock was set");
+    // The second tick comes late, right before the third; the clock is set before the last.
+    for (tick, scan_ms, expected_ms) in [
+        ([70_000, 5_000], 70_000, 0),
+        ([70_100, 5_180], 70_050, -90),
+        ([70_200, 5_200], 70_050, -110),
+        ([70_300, 5_300], 70_330, 30),
+        ([70_400, 5_400], 69_990, -410),
+        ([10, 5_500], 70_390, -30),
+    ] {
+        assert_eq!(placed_ms(tick, scan_ms), expected_ms, "{tick:?}");
+    }
 }

@@ -1,5 +1,5 @@
 use std::{
-    io::{Read, Write},
+    io::Write,
     net::{SocketAddr, TcpListener, TcpStream, UdpSocket},
     os::fd::{AsFd, OwnedFd},
     path::{Path, PathBuf},
@@ -78,18 +78,27 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
 }
 
 #[test]
-fn a_wire_that_cannot_be_opened_says_why_with_the_remedy_until_bytes_come() {
+fn a_wire_that_cannot_be_opened_is_tried_ever_less_often_and_says_why_with_the_remedy_until_bytes_come()
+ {
     let (listener, address) = listener();
     drop(listener);
     let mut transport = open_at(&Address::Tcp(address));
-    while transport.trouble().is_none() {
-        transport.maintain(0).unwrap();
+    assert_eq!(transport.maintain(0).unwrap(), Some(false));
+    let (mut later_ns, mut pauses) = (0, Vec::new());
+    for _ in 0..7 {
+        // Refused at once or a moment later; the wire stays closed.
+        while transport.attempts(later_ns).unwrap().next_ns == 0 {
+            assert_eq!(transport.maintain(later_ns).unwrap(), None);
+        }
+        let wait = transport.attempts(later_ns).unwrap().next_ns;
+        pauses.push(wait / MS);
+        later_ns += wait;
     }
+    assert_eq!(pauses, [100, 200, 400, 800, 1600, 2000, 2000]);
     let trouble = transport.trouble().unwrap();
     assert_eq!(trouble.input, format!("tcp://{address}"));
     assert!(trouble.what.contains("refused") && trouble.remedy.contains("robot.address"));
     let listener = TcpListener::bind(address).unwrap();
-    let later_ns = 60_000 * MS;
     let mut robot = connected(&listener, &mut transport, later_ns);
     robot.write_all(b"hello").unwrap();
     expect(&mut transport, b"hello", later_ns);
@@ -113,45 +122,6 @@ fn connection() -> (TcpListener, Transport, TcpStream) {
 fn connected(listener: &TcpListener, transport: &mut Transport, now_ns: u64) -> TcpStream {
     maintain_until(transport, true, now_ns);
     listener.accept().unwrap().0
-}
-
-#[test]
-fn a_connection_carries_bytes_both_ways_and_is_made_anew_when_it_ends() {
-    let (listener, mut transport, mut robot) = connection();
-    transport.send(b"ping").unwrap();
-    let mut heard = [0; 4];
-    robot.read_exact(&mut heard).unwrap();
-    assert_eq!(&heard, b"ping");
-    robot.write_all(b"here").unwrap();
-    expect(&mut transport, b"here", 0);
-    assert_eq!(transport.attempts(0), None);
-    drop(robot);
-    expect_closing(&mut transport, MS);
-    let mut robot = connected(&listener, &mut transport, 2 * MS);
-    robot.write_all(b"again").unwrap();
-    expect(&mut transport, b"again", 2 * MS);
-}
-
-#[test]
-fn a_robot_that_is_off_is_called_ever_less_often_and_for_ever() {
-    let (listener, address) = listener();
-    drop(listener);
-    let mut transport = open_at(&Address::Tcp(address));
-    assert_eq!(transport.maintain(0).unwrap(), Some(false));
-    let (mut now, mut pauses) = (0, Vec::new());
-    for _ in 0..7 {
-        // Refused at once or a moment later; the wire stays closed.
-        while transport.attempts(now).unwrap().next_ns == 0 {
-            assert_eq!(transport.maintain(now).unwrap(), None);
-        }
-        let wait = transport.attempts(now).unwrap().next_ns;
-        pauses.push(wait / MS);
-        now += wait;
-    }
-    assert_eq!(pauses, [100, 200, 400, 800, 1600, 2000, 2000]);
-    // The robot is switched on.
-    let listener = TcpListener::bind(address).unwrap();
-    connected(&listener, &mut transport, now);
 }
 
 #[test]
@@ -190,13 +160,6 @@ fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) ->
     assert_eq!(decoder.tally().bad_crc, 0, "half a frame went out");
     // The last one is in flight.
     assert_eq!(frames + 1, sent - transport.tally().unsent);
-}
-
-#[test]
-fn a_connection_that_takes_no_more_loses_whole_frames_only() {
-    let (_, mut transport, mut robot) = connection();
-    robot.set_read_timeout(Some(Duration::from_millis(200))).unwrap();
-    overfill(&mut transport, |buffer| robot.read(buffer).ok());
 }
 
 /// Robot's end of a serial line, and a stable path to the other.

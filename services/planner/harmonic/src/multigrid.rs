@@ -13,8 +13,6 @@ mod galerkin;
 mod grid;
 mod kernels;
 mod sources;
-#[cfg(test)]
-mod tests;
 
 use std::ops::Range;
 

@@ -42,11 +42,6 @@ fn pose(x: f64, y: f64, heading_deg: f64) -> Pose2 {
     Pose2 { position: DVec2::new(x, y), heading: heading_deg.to_radians() }
 }
 
-/// Returns the distance from a wall at x = 0.3 with a gap of 0.6 m.
-fn gap(at: DVec2) -> f64 {
-    DVec2::new((at.x - 0.3).abs(), (0.3 - at.y.abs()).max(0.0)).length()
-}
-
 #[test]
 fn an_outline_touches_what_is_nearer_than_the_margin_and_nothing_else() {
     let (mission, outline) = long();
@@ -81,79 +76,4 @@ fn a_long_body_turns_in_the_open_and_not_between_walls() {
     assert!(outline.turns(&between, &along, 0.1) && !outline.turns(&between, &along, PI));
     let empty = room(&mission, |_| f64::INFINITY);
     assert!(outline.turns(&view(&mission, &empty), &along, PI));
-}
-
-fn drive(mission: &Mission, map: &(Vec<u8>, Field), outline: &Outline, start: Pose2) -> Pose2 {
-    let mut outline = outline.clone();
-    let (view, mut at) = (view(mission, map), start);
-    for _ in 0..300 {
-        let direction = view.along(at.position);
-        if at.position.distance(mission.target) < 0.1 || direction == DVec2::ZERO {
-            break;
-        }
-        let (there, way) = match outline.pass(&view, &at, direction) {
-            Passage::Follow(_) if at.axis().dot(direction) < outline.turns => (direction, 0.0),
-            Passage::Follow(_) => (direction, 0.03),
-            Passage::Turn(there) => (there, 0.0),
-            Passage::Drive(there, _) => (there, 0.03),
-            Passage::Back(_) => (at.axis(), -0.03),
-            Passage::Refused(_) => break,
-        };
-        let angle = at.axis().angle_to(there);
-        let turn = if way == 0.0 { angle.clamp(-0.1, 0.1) } else { 4.8 * angle.sin() * way };
-        at = at.along_arc(way, if way < 0.0 { 0.0 } else { turn });
-        assert!(!outline.touches(&view, &at), "at {at:?}");
-    }
-    at
-}
-
-#[test]
-fn a_long_body_passes_a_gap_narrower_than_its_length_from_any_side_and_touches_nothing() {
-    let (mission, outline) = long();
-    let map = room(&mission, gap);
-    assert!(outline.is_narrow(&view(&mission, &map), DVec2::new(0.3, 0.0)));
-    for (start, y) in [(0.0, 0.0), (90.0, 0.0), (-135.0, 0.9), (180.0, 0.0), (60.0, -1.2)] {
-        let end = drive(&mission, &map, &outline, pose(-1.0, y, start));
-        assert!(end.position.distance(mission.target) < 0.2, "{start}: {end:?}");
-    }
-}
-
-#[test]
-fn a_long_body_that_faces_a_dead_end_backs_out() {
-    let (mission, outline) = long();
-    // A corridor 0.7 m wide, closed ahead and open behind.
-    let pocket = |at: DVec2| {
-        let aside = DVec2::new((-0.3 - at.x).max(0.0).max(at.x - 1.0), at.y.abs() - 0.35);
-        let end = DVec2::new(at.x - 1.0, (at.y.abs() - 0.35).max(0.0)).length();
-        aside.length().min(end)
-    };
-    let map = room(&mission, pocket);
-    let start = pose(0.3, 0.0, 0.0);
-    let passage = outline.clone().pass(&view(&mission, &map), &start, DVec2::NEG_X);
-    assert!(matches!(passage, Passage::Back(_)), "{passage:?}");
-    let end = drive(&mission, &map, &outline, start);
-    assert!(end.position.distance(mission.target) < 0.2, "{end:?}");
-}
-
-#[test]
-fn narrow_cells_where_a_long_body_cannot_turn_are_refused() {
-    let (mission, outline) = long();
-    // A second wall 0.6 m behind the gap has its gap 1.2 m aside, so the body would have to turn
-    // between them.
-    let bend = |at: DVec2| {
-        let beside = DVec2::new((at.x - 0.9).abs(), (0.3 - (at.y - 1.2).abs()).max(0.0));
-        gap(at).min(beside.length())
-    };
-    let map = room(&mission, bend);
-    let view = view(&mission, &map);
-    let start = pose(-0.3, 0.0, 0.0);
-    let passage = outline.clone().pass(&view, &start, view.along(start.position));
-    let Passage::Refused(cells) = passage else {
-        panic!("the body does not get through: {passage:?}");
-    };
-    assert!(!cells.is_empty());
-    for cell in cells {
-        let at = view.frame.centre_of(cell);
-        assert!(outline.is_narrow(&view, at) && at.distance(start.position) > NEAR_M, "{at}");
-    }
 }

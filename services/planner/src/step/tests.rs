@@ -86,17 +86,6 @@ fn solve(job: &Job) -> Solved {
 }
 
 #[test]
-fn a_screening_length_in_metres_is_the_same_on_any_grid() {
-    for cells in [40, 200] {
-        let mut mission = mission_of(cells);
-        mission.planner.screening_m = Some(0.5);
-        let cell = 4.0 / f64::from(cells);
-        let expected = Screening::Uniform { length: 0.5, cell };
-        assert_eq!(screening(&mission), expected);
-    }
-}
-
-#[test]
 fn before_the_first_keyframe_there_is_no_guidance() {
     let mut planner = sent(&mission());
     assert_eq!(planner.ask(&at(0.0, 0.0)).status(), Waiting);
@@ -304,16 +293,6 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
     }
 }
 
-#[test]
-fn a_scan_goes_on_in_a_planner_that_was_restarted() {
-    let scanned = |at: DVec2| at.x < 0.2 || at.y < 0.1;
-    let (mut one, mut other) = (evidential(scanned), evidential(scanned));
-    for heading in [0.0, 0.2, 0.4] {
-        let pose = PoseSample { heading_rad: heading, ..PoseSample::default() };
-        assert_eq!(one.ask(&pose), other.ask(&pose));
-    }
-}
-
 /// Cells per side of a map for the background solver.
 const LARGE: u32 = 600;
 
@@ -470,12 +449,6 @@ fn a_new_target_is_solved_for_on_the_same_map_within_the_tick() {
     assert_eq!(guidance.status(), Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
     assert_eq!((guidance.target_number, guidance.distance_m), (2, 1.8));
-    let mut fresh = Planner::new(&mission());
-    fresh.take_target(&sample(2, -1.5, 0.0)).unwrap();
-    fresh.take_grid(&header, &cells).unwrap();
-    let fresh = fresh.ask(&at(0.3, 0.0));
-    let of = |guidance: &GuidanceSample| (guidance.ex, guidance.ey, guidance.target);
-    assert_eq!(of(&guidance), of(&fresh), "as a planner that knew no other target");
 }
 
 #[test]
@@ -552,23 +525,6 @@ fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
     let reset = GridHeader { epoch: 1, part: Part { version: 2, ..header.part }, ..header };
     planner.take_grid(&reset, &cells).unwrap();
     assert_eq!(planner.ask(&start).speed_limit_m_s, 0.0, "the refusal is forgotten");
-}
-
-#[test]
-fn a_long_body_is_not_turned_to_a_targets_heading_where_it_would_touch() {
-    let between = |at: DVec2| at.y.abs() > 0.06;
-    for (hazard, refuses) in [(&between as &dyn Fn(DVec2) -> bool, true), (&|_| false, false)] {
-        let (mut planner, ..) = long_in_room("target = [1.0, 0]", hazard);
-        let turned = TargetPoint {
-            heading_rad: std::f64::consts::FRAC_PI_2,
-            has_heading: 1,
-            ..TargetPoint::at(DVec2::new(1.0, 0.0))
-        };
-        let target = TargetSample { number: 1, last: 1, target: turned, ..Default::default() };
-        planner.take_target(&target).unwrap();
-        let guidance = planner.ask(&at(1.0, 0.0));
-        assert_eq!(guidance.maneuver() == Maneuver::Stand, refuses, "{guidance:?}");
-    }
 }
 
 /// Robot at the origin that drives at 0.4 m/s along x in a wide, scanned hall, beside a mover.

@@ -90,6 +90,17 @@ fn a_smooth_wall_answers_square_on_and_not_when_oblique_though_it_hides_what_sta
 }
 
 #[test]
+fn the_edge_of_what_is_low_is_heard_at_middle_ranges_only() {
+    let physics = SonarPhysics { edge_share: 1.0, ..reflections() };
+    // Beyond 1.2 m it is too weak. Below 0.08 m / tan(15 degrees) = 0.3 m the beam passes above it.
+    for (ahead_m, is_heard) in [(0.2, false), (0.4, true), (1.1, true), (1.3, false)] {
+        let low =
+            format!("world.wall = [{{ points = [[{ahead_m}, -1], [{ahead_m}, 1]], top_m = 0.1 }}]");
+        assert_eq!(heard_in(&low, &physics, 0).is_finite(), is_heard, "{ahead_m}");
+    }
+}
+
+#[test]
 fn answers_are_lost_and_invented_as_often_as_the_mission_says() {
     let physics = SonarPhysics {
         dropout_share: 0.1,

@@ -1,17 +1,11 @@
-//! Robot without a process: it has the bytes of one, and the clock of a simulated machine.
+//! Robot without a process: it has the bytes of one.
 
-use std::{
-    cell::Cell,
-    net::{Ipv4Addr, SocketAddr, SocketAddrV4},
-    rc::Rc,
-    time::Duration,
-};
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 
 use common::{
     clock::Pace,
     ground_truth::GroundTruthTick,
     json_wire::{Order, line},
-    machine::{Files, Machine, MachineWire, simulate},
     wire::{Command, SystemSignal},
 };
 use rplidar_protocol::START;
@@ -67,69 +61,4 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
         assert!(process.len() > 30, "{text}");
         assert_eq!(robot.truth().map(as_told).collect::<Vec<_>>(), process, "{text}");
     }
-}
-
-#[derive(Default)]
-struct Clock {
-    now_ns: Cell<u64>,
-    files: Files,
-}
-
-impl Machine for Clock {
-    fn monotonic_ns(&self) -> u64 {
-        self.now_ns.get()
-    }
-
-    fn process(&self) -> u32 {
-        1
-    }
-
-    fn wait(&self, _: Duration, _: &dyn Fn() -> bool) -> bool {
-        false
-    }
-
-    fn is_killed(&self) -> bool {
-        false
-    }
-
-    fn files(&self) -> &Files {
-        &self.files
-    }
-
-    fn wire(&self, address: &str) -> Box<dyn MachineWire> {
-        panic!("no process opens {address}");
-    }
-}
-
-#[test]
-fn at_a_rate_it_lives_by_the_machines_clock_and_the_next_one_starts_where_it_came_to_rest() {
-    let clock = Rc::new(Clock::default());
-    let turn = |robot: &mut InMemory| {
-        let due_ns = robot.next_due_ns().unwrap();
-        assert!(due_ns > clock.now_ns.replace(due_ns), "time stands still");
-        robot.pass().unwrap();
-    };
-    simulate(clock.clone(), || {
-        let mission = mission("robot.rate_hz = 7");
-        let mut robot = InMemory::start(&mission, Pace::Rate(3.0), None).unwrap();
-        robot.hear(HOST, &forward(400, 250)).unwrap();
-        let mut truth: Vec<_> = robot.truth().collect();
-        while truth.len() <= 21 {
-            turn(&mut robot);
-            truth.extend(robot.truth());
-        }
-        assert!(clock.now_ns.get().abs_diff(1_000_000_000) < 10, "{clock:?}", clock = clock.now_ns);
-        assert_eq!(robot.sent().count(), 1 + 21, "an answer, and a datagram each tick");
-        let last = truth[21];
-        assert!(last.x > 0.02 && last.v == 0.0 && last.time_s == 3.0, "{last:?}");
-
-        robot.hear(HOST, &forward(400, 250)).unwrap();
-        turn(&mut robot);
-        let mut robot =
-            InMemory::start(&mission, Pace::Rate(3.0), Some(&robot.end().unwrap())).unwrap();
-        let first = robot.truth().next().unwrap();
-        assert!(first.x > last.x + 0.02 && first.v == 0.0 && first.tick > last.tick, "{first:?}");
-        turn(&mut robot);
-        assert_eq!(robot.truth().map(|tick| tick.tick).collect::<Vec<_>>(), [first.tick + 1]);
-    });
 }

@@ -7,7 +7,6 @@ use std::{
 };
 
 use common::{clock::Pace, ground_truth::GroundTruthTick};
-use x80_sim::Transport;
 
 use crate::support::{Sim, forward, receive};
 
@@ -19,7 +18,7 @@ fn pair(folder: &Path, text: &str) -> [(Sim, UdpSocket); 2] {
     [("start = [0, 0, 0]", [0, 1]), ("start = [2, 0, 180]", [1, 0])].map(|(start, order)| {
         let meeting = order.map(|at| sockets[at].clone());
         let text = format!("{start}\n{text}");
-        let sim = Sim::start_with(&text, Pace::Max, Transport::Udp, Some(meeting));
+        let sim = Sim::start_with(&text, Pace::Max, Some(meeting));
         let host = sim.host();
         (sim, host)
     })

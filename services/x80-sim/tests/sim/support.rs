@@ -57,27 +57,18 @@ pub(crate) struct Sim {
 
 impl Sim {
     pub(crate) fn start(text: &str, pace: Pace) -> Self {
-        Self::start_on(text, pace, Transport::Udp)
-    }
-
-    pub(crate) fn start_on(text: &str, pace: Pace, transport: Transport) -> Self {
-        Self::start_with(text, pace, transport, None)
+        Self::start_with(text, pace, None)
     }
 
     /// Starts a robot in a world with another one; the sockets are its own and the other's.
-    pub(crate) fn start_with(
-        text: &str,
-        pace: Pace,
-        transport: Transport,
-        meeting: Option<[PathBuf; 2]>,
-    ) -> Self {
+    pub(crate) fn start_with(text: &str, pace: Pace, meeting: Option<[PathBuf; 2]>) -> Self {
         let (truth_reader, truth_writer) = UnixStream::pair().unwrap();
         let (stop, stopped) = UnixStream::pair().unwrap();
         let options = SimOptions {
             mission: mission(text),
             pace,
             listen: SocketAddr::from(([127, 0, 0, 1], 0)),
-            transport,
+            transport: Transport::Udp,
             own_user_only: false,
             keep: None,
             ground_truth: Some(Box::new(truth_writer)),

@@ -70,20 +70,6 @@ fn ratio_and_track_are_found_within_their_stated_deviations() {
 }
 
 #[test]
-fn the_slip_of_the_floor_is_found() {
-    for slip in [0.001, 0.005] {
-        let found: Vec<f64> = (1..=20)
-            .map(|seed| {
-                let loops = drawn(seed, 12, 1.0, 1.0, slip);
-                Estimate::by_loops(&loops, NORMAL_SD, TRACK_M).unwrap().slip
-            })
-            .collect();
-        let mean = found.iter().sum::<f64>() / 20.0;
-        assert!((0.7..1.4).contains(&(mean / slip)), "{slip}: {mean}");
-    }
-}
-
-#[test]
 fn loops_that_agree_pass_and_a_held_out_pair_that_contradicts_is_refused() {
     let loops = drawn(3, 8, 1.004, 1.01, 0.001);
     let (estimate, used) = checked(&loops, NORMAL_SD, TRACK_M).unwrap();

@@ -32,20 +32,18 @@ struct Robot {
     ratio: f64,
     track: f64,
     ways: [f64; 2],
-    wall: bool,
 }
 
 impl Robot {
     fn new(ratio: f64, track: f64) -> Self {
         let pose = Pose2 { heading: 0.1, ..Pose2::default() };
-        Self { pose, ratio, track, ways: [0.0; 2], wall: true }
+        Self { pose, ratio, track, ways: [0.0; 2] }
     }
 
     fn echo(&self) -> Option<f64> {
         let aside = (self.pose.heading + PI).rem_euclid(TAU) - PI;
         let range = WALL_M - self.pose.position.x - 0.19 * aside.cos();
-        (self.wall && aside.abs() < 0.384 && range < 2.55)
-            .then_some((range * 100.0).round() / 100.0)
+        (aside.abs() < 0.384 && range < 2.55).then_some((range * 100.0).round() / 100.0)
     }
 
     fn obey(&mut self, order: &Order) {
@@ -98,17 +96,6 @@ fn loops_go_to_either_side_in_turn_and_end_after_the_most_if_the_values_are_not_
     assert_eq!((wall.state(), wall.loops.len()), (State::Finished, 7));
     let turns: Vec<f64> = wall.loops.iter().map(|it| it.turns).collect();
     assert_eq!(turns[..4], [1.0, -1.0, 4.0, -4.0]);
-}
-
-#[test]
-fn without_a_wall_it_fails_and_the_run_ends() {
-    let mut robot = Robot::new(1.0, 1.0);
-    robot.wall = false;
-    // Free ground for a robot without a wall.
-    robot.pose.position.x = -4.0;
-    let wall = run(&mut robot, CalibrationPlan::default());
-    assert_eq!(wall.state(), State::Failed(Fault::NoWall));
-    assert_eq!(wall.order(0.0, None).status, GuidanceStatus::AtTarget, "the run ends");
 }
 
 #[test]

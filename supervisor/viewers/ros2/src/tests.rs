@@ -232,7 +232,7 @@ fn a_goal_that_is_refused_has_nav2s_error_code_and_words_and_the_one_before_goes
 }
 
 #[test]
-fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target() {
+fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target_to_a_later_bridge_too() {
     let waits = directive(HoldReason::Waiting);
     for (outcome, status, code, words) in [
         ("unreachable", Status::Aborted, 208, "no path"),
@@ -249,23 +249,15 @@ fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target() {
         let (is, was, text) = told(&goals, 1);
         assert_eq!((is, was), (status as i8, code), "{outcome}");
         assert!(text.contains(words), "{text}");
-    }
-    let mut goals = with_a_goal();
-    goals.accept(sent(2), goals.newest_target, 8);
-    assert_eq!(told(&goals, 1).2, "a newer goal replaced it");
-}
-
-#[test]
-fn a_goal_of_an_earlier_bridge_has_the_result_of_its_target_that_came_meanwhile() {
-    for (outcome, status) in
-        [("reached", Status::Succeeded), ("missed", Status::Aborted), ("replaced", Status::Aborted)]
-    {
         let stored = serde_json::to_string(&with_a_goal()).unwrap();
         let mut later: Server = serde_json::from_str(&stored).unwrap();
         assert_eq!(state(&later, 1), None, "it is not over");
         later.recorded(5, outcome);
         assert_eq!(state(&later, 1), Some(status as i8), "{outcome}");
     }
+    let mut goals = with_a_goal();
+    goals.accept(sent(2), goals.newest_target, 8);
+    assert_eq!(told(&goals, 1).2, "a newer goal replaced it");
 }
 
 #[test]
@@ -313,6 +305,10 @@ fn published(show: impl FnOnce(&mut dyn FnMut(Id, Vec<u8>))) -> Vec<(Id, Vec<u8>
     sent
 }
 
+fn shows(shown: &mut Shown, sample: &Sample) -> Vec<(Id, Vec<u8>)> {
+    published(|sink| shown.sample(sample, 0, sink))
+}
+
 #[test]
 fn odometry_and_its_origin_make_up_the_pose() {
     let pose = PoseSample {
@@ -322,7 +318,7 @@ fn odometry_and_its_origin_make_up_the_pose() {
         map_from_odom: [0.5, -0.5, 0.25],
         ..PoseSample::default()
     };
-    let sent = published(|sink| shown().sample(&Sample::Pose(pose), 0, sink));
+    let sent = shows(&mut shown(), &Sample::Pose(pose));
     let ids: Vec<_> = sent.iter().map(|(id, _)| *id).collect();
     assert_eq!(ids, [Id::Tf, Id::Pose, Id::Odom, Id::Clock]);
     let odometry = Odometry::decode(&sent[2].1).unwrap();
@@ -348,12 +344,12 @@ fn where_another_node_has_the_robot_in_odom_the_map_alone_is_told_so_that_both_m
     };
     let mut shown = shown();
     shown.others_odom = Some(None);
-    let sent = published(|sink| shown.sample(&sample(1.0, 0.75), 0, sink));
+    let sent = shows(&mut shown, &sample(1.0, 0.75));
     assert!(sent.iter().all(|(id, _)| *id != Id::Tf), "the other node has not said it yet");
     for (x_m, heading) in [(1.0, 0.75), (-3.0, 2.5)] {
         let robot = DAffine2::from_angle_translation(-0.5, DVec2::new(7.0, -4.0));
         shown.others_odom = Some(Some(robot));
-        let sent = published(|sink| shown.sample(&sample(x_m, heading), 0, sink));
+        let sent = shows(&mut shown, &sample(x_m, heading));
         let (names, (at, turned)) = only_transform(&sent[0].1);
         assert_eq!(names, ["map", "odom"]);
         let both = DAffine2::from_angle_translation(turned, at.into()) * robot;
@@ -375,7 +371,7 @@ fn the_covariance_of_odometry_grows_with_the_way_and_is_large_on_what_no_wheel_m
     let mut drive = |tick: u64| {
         let mut pose = PoseSample { x_m: 0.01 * tick as f64, v_m_s: 0.1, ..PoseSample::default() };
         (pose.stamp.tick, pose.stamp.stamp_ns) = (tick, tick * 100_000_000);
-        let sent = published(|sink| shown.sample(&Sample::Pose(pose), 0, sink));
+        let sent = shows(&mut shown, &Sample::Pose(pose));
         read_odometry(&sent.iter().find(|(id, _)| *id == Id::Odom).unwrap().1)
     };
     let start = drive(0).0;
@@ -400,11 +396,11 @@ fn speeds_are_in_the_time_of_the_stamps_at_every_pace() {
     let mut shown = shown();
     shown.pace = 4.0;
     let pose = PoseSample { v_m_s: 0.1, omega_rad_s: -0.2, ..PoseSample::default() };
-    let sent = published(|sink| shown.sample(&Sample::Pose(pose), 0, sink));
+    let sent = shows(&mut shown, &Sample::Pose(pose));
     let (_, speeds, fast) = read_odometry(&sent[2].1);
     assert_eq!((speeds[0], speeds[1]), (0.4, -0.8));
     shown.pace = 1.0;
-    let sent = published(|sink| shown.sample(&Sample::Pose(pose), 0, sink));
+    let sent = shows(&mut shown, &Sample::Pose(pose));
     let slow = read_odometry(&sent[2].1).2;
     assert!((fast[0] / slow[0] - 16.0).abs() < 1e-9 && fast[14] == slow[14]);
 }
@@ -427,7 +423,7 @@ fn ranges_too_far_too_near_and_not_measured_are_those_of_rep_117() {
         let reading =
             RangeReading { range_m: 1.5, status: status.into(), ..RangeReading::default() };
         let ranges = Sample::Ranges(RangesHeader::default(), vec![reading]);
-        let sent = published(|sink| shown.sample(&ranges, 0, sink));
+        let sent = shows(&mut shown, &ranges);
         let told = sent.first().map(|(_, payload)| payload[payload.len() - 8..].to_vec());
         let told = told.map(|last| f32::from_le_bytes(last[..4].try_into().unwrap()));
         assert_eq!(told, is);
@@ -482,7 +478,7 @@ fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_fr
     // The first of 360 beams points to the robot's right, which is behind the laser.
     let header = ScanHeader::of(row, &laser);
     assert!((header.first_rad + FRAC_PI_2).abs() < 1e-12);
-    let sent = published(|sink| shown.sample(&Sample::Scan(header, vec![1.0; 360]), 0, sink));
+    let sent = shows(&mut shown, &Sample::Scan(header, vec![1.0; 360]));
     assert!((LaserScan::decode(&sent[0].1).unwrap().angle_min + PI as f32).abs() < 1e-6);
 }
 
@@ -518,7 +514,7 @@ fn a_map_is_published_whole_and_then_by_what_changes_and_says_what_nobody_looked
     );
     let mut shown = shown();
     let whole = GridHeader { part: Part::whole(FRAME, 1), ..GridHeader::default() };
-    assert!(published(|sink| shown.sample(&Sample::Grid(whole, cells), 0, sink)).is_empty());
+    assert!(shows(&mut shown, &Sample::Grid(whole, cells)).is_empty());
     let [(Id::Map, map), (Id::Diagnostics, _)] = &published(|sink| shown.tick(0, sink))[..] else {
         panic!("no map");
     };
@@ -547,7 +543,7 @@ fn a_path_leads_along_the_field_and_ends_where_there_is_no_direction() {
         let header =
             FieldHeader { part: Part::whole(frame, 1), target_x_m, ..FieldHeader::default() };
         let field = Sample::Field(header, cells.to_vec());
-        let sent = published(|sink| shown.sample(&field, 0, sink));
+        let sent = shows(&mut shown, &field);
         PathMessage::decode(&sent[0].1).unwrap().poses.last().unwrap().pose.at()
     };
     let mut cells = vec![ahead; 400];
@@ -566,7 +562,7 @@ fn what_moves_is_markers_of_its_disc_doubt_and_way_and_they_are_deleted_when_it_
     let mut header = GridHeader { part: Part::whole(FRAME, 1), ..GridHeader::default() };
     let mut published_of = |header: &GridHeader| {
         let sample = Sample::Grid(*header, vec![CellState::Free as u8; 100]);
-        published(|sink| shown.sample(&sample, 0, sink))
+        shows(&mut shown, &sample)
     };
     assert!(published_of(&header).is_empty(), "no robot without a laser has the topic");
     let mover = Mover { x_m: 3.0, vy_m_s: 0.5, radius_m: 0.25, doubt_m: 0.1, ..Mover::default() };

@@ -77,14 +77,6 @@ mod tests {
     use crate::baselines::testing::{pose, sent};
 
     #[test]
-    fn a_robot_without_a_way_is_told_so_and_looks_around() {
-        let baseline = sent([1.0, 0.0]);
-        let guidance = baseline.along(Way::None, &pose([0.0, 0.0]));
-        assert_eq!(guidance.status, u8::from(GuidanceStatus::Unreachable));
-        assert_eq!((guidance.ex, guidance.ey), (0.0, 1.0));
-    }
-
-    #[test]
     fn without_a_map_the_robot_waits() {
         let guidance = sent([0.3, 0.0]).guidance(&pose([0.0, 0.0]));
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));

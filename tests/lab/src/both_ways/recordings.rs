@@ -156,7 +156,7 @@ fn unequal(topic: &dyn AnyTopic, both: &[Vec<Vec<u8>>; 2], left_out: &[&str]) ->
 mod tests {
     use common::{
         bus::{encode_sample, encode_slice},
-        samples::{GuidanceSample, PoseSample},
+        samples::PoseSample,
     };
 
     use super::*;
@@ -180,20 +180,6 @@ mod tests {
         let said = found(&one, &last_bit).unwrap();
         assert_eq!(said, "tick 1, x_m: 0.7 and 0.7000000000000001");
         assert_eq!(found(&one, &one[..1]).unwrap(), "2 samples and 1");
-    }
-
-    #[test]
-    fn only_the_time_of_a_solve_may_differ_in_the_guidance() {
-        let sample = |ex, full_solve_ns| {
-            let mut sample = Vec::new();
-            let guidance = GuidanceSample { ex, full_solve_ns, ..GuidanceSample::default() };
-            encode_sample(&guidance, &mut sample);
-            vec![sample]
-        };
-        let Compared::Samples(left_out) = compared(&topics::GUIDANCE) else { panic!() };
-        let found = |one, many| unequal(&topics::GUIDANCE, &[one, many], left_out);
-        assert_eq!(found(sample(1.0, 5), sample(1.0, 6)), None);
-        assert!(found(sample(1.0, 5), sample(0.0, 5)).is_some());
     }
 
     #[test]

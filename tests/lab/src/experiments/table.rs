@@ -93,15 +93,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_experiment_can_be_crossed_and_by_the_papers_method_the_field_is_as_printed() {
-        for experiment in named(&[]).unwrap() {
-            let mut mission = experiment.trial().unwrap().mission;
-            mission.method = common::mission::Method::Paper;
-            assert_eq!(mission.screening_length_m(), None, "{}", experiment.name);
-        }
-    }
-
-    #[test]
     fn only_experiment_3_knows_anything_and_it_alone_does_not_sense() {
         for experiment in named(&[]).unwrap() {
             let mission = experiment.trial().unwrap().mission;

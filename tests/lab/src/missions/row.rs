@@ -245,17 +245,22 @@ mod tests {
         }
     }
 
+    fn row(trial: &Trial, outcome: Reported, true_distance_m: f64) -> Row {
+        Row::new(trial, 1, &setting(), &summary(outcome, true_distance_m))
+    }
+
     #[test]
     fn success_is_what_the_ground_truth_says() {
-        let outcome = |said, distance| {
-            Row::new(&trial(None), 1, &setting(), &summary(said, distance)).outcome
-        };
-        assert_eq!(outcome(Reported::Reached, 0.4), Outcome::Success);
-        assert_eq!(outcome(Reported::Reached, 0.6), Outcome::WrongPlace);
-        assert_eq!(outcome(Reported::ReachedUnsure, 0.4), Outcome::Success);
-        assert_eq!(outcome(Reported::ReachedUnsure, 0.6), Outcome::WrongPlace);
-        assert_eq!(outcome(Reported::Collision, 0.1), Outcome::Collision);
-        assert_eq!(outcome(Reported::Timeout, 0.1), Outcome::Timeout);
+        for (said, distance, outcome) in [
+            (Reported::Reached, 0.4, Outcome::Success),
+            (Reported::Reached, 0.6, Outcome::WrongPlace),
+            (Reported::ReachedUnsure, 0.4, Outcome::Success),
+            (Reported::ReachedUnsure, 0.6, Outcome::WrongPlace),
+            (Reported::Collision, 0.1, Outcome::Collision),
+            (Reported::Timeout, 0.1, Outcome::Timeout),
+        ] {
+            assert_eq!(row(&trial(None), said, distance).outcome, outcome, "{said:?} {distance}");
+        }
     }
 
     #[test]
@@ -265,23 +270,21 @@ mod tests {
             Row::new(&trial(None), 1, &setting(), &summary).is_at_fault()
         };
         assert_eq!([Some(0.0), Some(0.5), None].map(is_at_fault), [false, true, true]);
-        assert!(
-            !Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1)).is_at_fault()
-        );
+        assert!(!row(&trial(None), Reported::Reached, 0.1).is_at_fault());
     }
 
     #[test]
     fn metrics_are_those_of_their_definitions() {
-        let row = Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1));
-        assert_eq!((row.k, row.spl, row.barn_score), (1.25, 0.8, None));
-        let lost = Row::new(&trial(None), 1, &setting(), &summary(Reported::Timeout, 3.0));
+        let won = row(&trial(None), Reported::Reached, 0.1);
+        assert_eq!((won.k, won.spl, won.barn_score), (1.25, 0.8, None));
+        let lost = row(&trial(None), Reported::Timeout, 3.0);
         assert_eq!(lost.spl, 0.0);
     }
 
     #[test]
     fn rows_from_before_a_column_was_added_are_read() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let row = Row::new(&trial(None), 1, &setting(), &summary(Reported::Reached, 0.1));
+        let row = row(&trial(None), Reported::Reached, 0.1);
         Table::open(file.path().to_path_buf()).unwrap().add(row.clone()).unwrap();
         let written = fs::read_to_string(file.path()).unwrap();
         let former = written.replacen(",p_o,f_ps_m2,f_vs_m_s2", "", 1).replacen(",,,", "", 1);
@@ -291,14 +294,11 @@ mod tests {
     }
 
     #[test]
-    fn the_barn_clock_starts_with_the_motion_and_the_score_is_clipped() {
-        let row = |optimal| {
-            Row::new(&trial(Some(optimal)), 1, &setting(), &summary(Reported::Reached, 0.1))
-        };
-        assert_eq!(row(6.0).time_s, 24.0);
-        assert_eq!(row(6.0).barn_score, Some(0.25));
-        assert_eq!(row(1.0).barn_score, Some(0.125), "eight optimal times and more");
-        assert_eq!(row(20.0).barn_score, Some(0.5), "two optimal times and less");
+    fn the_barn_clock_starts_with_the_motion_and_the_score_is_between_an_eighth_and_a_half() {
+        for (optimal_s, score) in [(6.0, 0.25), (1.0, 0.125), (20.0, 0.5)] {
+            let row = row(&trial(Some(optimal_s)), Reported::Reached, 0.1);
+            assert_eq!((row.time_s, row.barn_score), (24.0, Some(score)), "{optimal_s} s");
+        }
     }
 
     #[test]
@@ -307,7 +307,7 @@ mod tests {
         let row = |most_s| {
             let mut trial = trial(None);
             trial.rules = Rules { most_s, scored: true, ..trial.rules };
-            Row::new(&trial, 1, &setting(), &summary(Reported::Reached, 0.1))
+            row(&trial, Reported::Reached, 0.1)
         };
         let time_s = row(None).time_s;
         assert_eq!(row(Some(time_s)).outcome, Outcome::Success);

@@ -1,6 +1,6 @@
 use super::*;
 use crate::testing::{mission, near};
-use common::samples::{ContactSample, HoldReason};
+use common::samples::ContactSample;
 
 /// Frame period at 7 Hz, seconds.
 const PERIOD: f64 = 1.0 / 7.0;
@@ -192,30 +192,6 @@ fn encoders_that_repeat_die_are_late_reversed_or_swapped_are_suspected_in_time_a
     let dead = suspected(&to_and_fro, &dead);
     assert!(matches!(dead, Some((after_s, Right)) if after_s < 1.5), "{dead:?}");
     assert_eq!(drive(200, to_and_fro, |_| false, honest), None);
-}
-
-#[test]
-fn a_robot_that_is_suspected_is_given_up_after_10_s_or_plausible_again_when_an_operator_has_looked()
-{
-    let mut odometry = odometry();
-    for tick in 0..80 {
-        let now = at(f64::from(tick) * PERIOD);
-        odometry.plausible([5, 5], now);
-        if tick < 8 {
-            odometry.commanded([TURN, TURN], now);
-        }
-        assert!(tick < 8 || suspicion(&odometry).is_some());
-    }
-    let given_up = |odometry: &Odometry, seconds| {
-        let now = Moment { time: at(seconds), machine_ns: 0 };
-        odometry.condition(Cause::OdometryGivenUp, now) == Condition::Holds
-    };
-    assert!(!given_up(&odometry, 11.0), "no stage waits for it");
-    let drive = Observation::Directive(Order::Drive, HoldReason::None);
-    odometry.observe(&drive, Moment::default());
-    assert_eq!([10.8, 11.0].map(|seconds| given_up(&odometry, seconds)), [false, true]);
-    odometry.observe(&Observation::Resumed, Moment::default());
-    assert!(suspicion(&odometry).is_none() && !given_up(&odometry, 11.0));
 }
 
 #[test]

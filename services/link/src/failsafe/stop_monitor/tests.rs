@@ -130,23 +130,6 @@ fn whether_a_robot_rests_or_moves_is_not_known_without_two_new_frames_that_can_b
 }
 
 #[test]
-fn every_method_is_tried_in_turn_while_the_robot_does_not_stop() {
-    let mut stop_monitor = stop_monitor();
-    let mut tried = |from_ms: u64, to_ms: u64, does_not_stop| {
-        let times = (from_ms..to_ms).step_by(20);
-        let tried = times.filter_map(|ms| {
-            let now = MissionTime(ms * 1_000_000);
-            let takes = stop_monitor.takes_next_method(does_not_stop, now);
-            takes.then_some((ms, stop_monitor.method))
-        });
-        tried.collect::<Vec<_>>()
-    };
-    assert_eq!(tried(0, 1000, true), [(0, 1), (300, 2), (600, 3), (900, 4)]);
-    assert_eq!(tried(1000, 1100, false), []);
-    assert_eq!(tried(1100, 1120, true), [(1100, 5)]);
-}
-
-#[test]
 fn a_robot_that_another_host_moves_and_whose_frames_it_takes_does_not_stop() {
     let mut monitor = stop_monitor();
     monitor.commanded([0, 0], MissionTime::default());

@@ -164,19 +164,6 @@ fn answers_later_than_a_command_lasts_begin_no_tick_and_the_robot_stands() {
 }
 
 #[test]
-fn one_garbled_line_costs_three_ticks_and_no_more() {
-    let mut scene = Scene::driving();
-    let before = scene.ticks.len();
-    scene.run(1000);
-    let usual = scene.ticks.len() - before;
-    scene.event(Event::Datagram(b"1#\r\n"));
-    let before = scene.ticks.len();
-    scene.run(1000);
-    assert!(usual - (scene.ticks.len() - before) <= 3, "{usual}");
-    assert_eq!(scene.link.decision, Decision::GO);
-}
-
-#[test]
 fn in_lockstep_each_command_and_ping_is_followed_by_one_poll_and_one_tick() {
     let mut scene = Scene::at(Pace::Max);
     scene.event(Event::Order(Order::Drive, HoldReason::None));

@@ -4,22 +4,8 @@ use super::*;
 
 const AHEAD: [[Option<i16>; 2]; 1] = [[Some(-1200), Some(1200)]];
 
-fn tick_by(link: &mut Link, frames: &[u8], command: CommandSample) -> Vec<Effect> {
-    let now_ns = command.stamp.stamp_ns;
-    let mut effects = link.at(Event::Datagram(frames), now_ns);
-    effects.extend(link.at(Event::Command(command), now_ns + MS));
-    effects
-}
-
 const fn limit(last_tick: u64) -> Event<'static> {
     Event::TickLimit { last_tick, target_number: 1 }
-}
-
-fn powered(volts: f64) -> Vec<u8> {
-    let ad = |scale: f64| (volts / scale * 4095.0).round() as u16;
-    let [board_battery, motor_battery, servo_battery] = [9.0, 24.0, 9.0].map(ad);
-    let standard = StandardSensors { board_battery, motor_battery, servo_battery, ..standard(0) };
-    encoded([Report::Standard(standard), motor([0; 2])])
 }
 
 #[test]
@@ -34,18 +20,6 @@ fn in_lockstep_a_hold_lets_no_command_pass_and_the_run_goes_on_where_it_was() {
     assert_eq!(sent(&link.drive(2002)), []);
     assert_eq!(ticks(&link.quiet(2101))[0].0, 1, "the same tick again");
     assert_eq!(velocities(&link.answer(1, 2102 * MS)), AHEAD);
-}
-
-#[test]
-fn on_a_low_battery_the_robot_goes_the_same_way_at_half_speed() {
-    let mut link = driving(on_the_wall());
-    for (number, volts, told) in [(0, 6.5, [-600, 300]), (1, 7.2, [-1200, 600])] {
-        let curve = command(number, (number * 143 + 1) * MS, [TURN, 0.5 * TURN]);
-        let effects = tick_by(&mut link, &powered(volts), curve);
-        assert_eq!(velocities(&effects), [told.map(Some)], "{volts}");
-        let is_low = decided(&effects).contains(&(Action::Slow, Cause::BatteryLow));
-        assert_eq!(is_low, number == 0);
-    }
 }
 
 #[test]

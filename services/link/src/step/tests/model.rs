@@ -75,7 +75,7 @@ const CAUSES: [(Cause, u64); 6] = [
     (Cause::BatteryEmpty, 2000 + 2 * TICK_MS),
 ];
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Supervisor {
     process: u32,
     is_starting: bool,
@@ -151,15 +151,7 @@ impl Clone for World {
 
 impl World {
     fn new(cause: (Cause, u64)) -> Self {
-        let supervisor = Supervisor {
-            process: 1,
-            is_starting: true,
-            operator_stop: false,
-            resumed_ns: 0,
-            asked_stop: None,
-            asked_resume: None,
-            said: None,
-        };
+        let supervisor = Supervisor { process: 1, is_starting: true, ..Supervisor::default() };
         let mut world = Self {
             link: started(BEGAN_NS, 0),
             admitted: admitted(1),
@@ -319,13 +311,15 @@ impl World {
             },
             LinkRestarts => self.restart_link(),
             SupervisorRestarts => {
-                let supervisor = &mut self.supervisor;
-                supervisor.process += 1;
-                supervisor.is_starting = true;
-                supervisor.resumed_ns = 0;
-                // Its bus and link restart.
-                (supervisor.asked_stop, supervisor.asked_resume) = (None, None);
-                self.admitted = admitted(supervisor.process);
+                // Its bus and link restart, and it remembers the operator's stop alone.
+                let Supervisor { process, operator_stop, .. } = self.supervisor;
+                self.supervisor = Supervisor {
+                    process: process + 1,
+                    is_starting: true,
+                    operator_stop,
+                    ..Supervisor::default()
+                };
+                self.admitted = admitted(process + 1);
                 self.restart_link();
             }
             SecondSupervisor => {

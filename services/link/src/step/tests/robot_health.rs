@@ -66,16 +66,14 @@ fn counts_that_cannot_be_true_give_no_tick() {
 #[test]
 fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
     let mut link = driving(on_the_wall());
-    let (mut tried, mut seen) = (Vec::new(), None);
+    let mut tried = Vec::new();
     for number in 0..30 {
         let ms = number * PERIOD_MS;
         let rolled = (80 * number) as u16;
         let mut effects = link.hold(HoldReason::Operator, ms);
         effects.extend(link.hears(&datagram(255, [rolled, 32_000 - rolled]), ms));
         effects.extend(link.quiet(ms + 70));
-        if decided(&effects).contains(&(Action::Stop, Cause::RobotDoesNotStop)) {
-            seen.get_or_insert(ms);
-        }
+        assert!(tried.is_empty() || link.decision.cause == Cause::RobotDoesNotStop);
         for command in sent(&effects) {
             match command {
                 Command::Enable { on: false, channel } => tried.push(channel),
@@ -88,8 +86,8 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
             }
         }
         assert!(!link.is_at_rest());
+        assert!(ms < 1500 || !tried.is_empty());
     }
-    assert!(seen.unwrap() < 1500, "{seen:?}");
     assert_eq!(tried[..4], [Some(0), Some(1), Some(99), None]);
     // It rests, and drives only after its motors are enabled.
     let rests = datagram(255, [2320, 29_680]);
@@ -101,24 +99,6 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
     let go = sent(&tick(&mut link, 36, &rests, [TURN; 2]));
     assert!(go.iter().any(|it| matches!(it, Command::Enable { on: true, .. })), "{go:?}");
     assert!(matches!(go.last(), Some(Command::Motion(_))), "{go:?}");
-}
-
-#[test]
-fn a_robot_that_only_acknowledges_is_asked_for_its_streams_and_the_cause_is_named() {
-    let mut link = driving(on_the_wall());
-    let decisions = drive(&mut link, 0..3, |number| rolled((171 * number) as u16));
-    assert_eq!(decisions, [(0, Cause::None)]);
-    let (mut asked, mut found) = (0, Vec::new());
-    for number in 3..30 {
-        let mut effects = link.drive(number * PERIOD_MS);
-        effects.extend(link.hears(&ack(), number * PERIOD_MS));
-        found.extend(causes(&effects));
-        let streams = |command: &Command| matches!(command, Command::Stream { .. });
-        asked += sent(&effects).into_iter().filter(streams).count();
-        assert!(number == 3 || stands(&effects));
-    }
-    assert_eq!(found, [Cause::CommandStale, Cause::FramesSilent]);
-    assert_eq!(asked, 3 * 2, "three streams, twice in four seconds");
 }
 
 #[test]

@@ -1,9 +1,8 @@
 //! Tests of the failsafe with a robot that speaks ROS 2.
 
 use ::ros2::{
-    cdr::Cdr as _,
     messages::{self, COVARIANCE},
-    msg::{Header, Imu},
+    msg::Header,
 };
 use ros2_driver::{
     messages::write_twist,
@@ -15,7 +14,7 @@ use super::*;
 const FRAME_MS: u64 = 50;
 
 fn burger() -> Mission {
-    let text = "robot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2'\nrobot.rate_hz = 10\nrobot.ros2.imu = '/imu'\n";
+    let text = "robot.model = 'turtlebot3-burger'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2'\nrobot.rate_hz = 10";
     mission(text)
 }
 
@@ -34,9 +33,6 @@ struct Scene {
     scans: bool,
     /// Beams change.
     sees: bool,
-    /// Reached shares of commanded speeds, left and right.
-    shares: [f64; 2],
-    turns: Vec<TurnSample>,
     /// Speed of the robot's clock, and those reported.
     clock: f64,
     rates: Vec<f64>,
@@ -61,8 +57,6 @@ impl Scene {
             counts: true,
             scans: true,
             sees: true,
-            shares: [1.0; 2],
-            turns: Vec::new(),
             clock: 1.0,
             rates: Vec::new(),
             decided: Vec::new(),
@@ -93,12 +87,10 @@ impl Scene {
                     self.sent.push((self.ms, self.told));
                 }
                 Effect::Decided { now, .. } => self.decided.push((self.ms, now.cause)),
-                Effect::Tick { tick, time, wheels, turn, endless, .. } => {
+                Effect::Tick { tick, wheels, endless, .. } => {
                     let CountsSample { left_counts, right_counts, .. } = endless.unwrap();
                     self.endless = [left_counts, right_counts];
                     (self.tick, self.wheels) = (tick, wheels);
-                    assert!(turn.is_none_or(|turn| turn.capture_ns == time.0));
-                    self.turns.extend(turn);
                 }
                 Effect::ClockRate(rate) => self.rates.push(rate),
                 Effect::Refused(why) => self.refused.push(why.to_string()),
@@ -121,34 +113,23 @@ impl Scene {
         messages::scan(header, [0.0, TAU / 360.0], [0.12, 3.5], [0.0, 0.1], ranges)
     }
 
-    fn imu(&self) -> Vec<u8> {
-        let mut imu = Imu { header: Header::at(self.ms * MS, "imu"), ..Imu::default() };
-        imu.angular_velocity.z = self.told[1];
-        imu.encode()
-    }
-
-    /// Advances time with odometry and turn rate at 20 Hz and scans at 10 Hz; ticks are answered.
+    /// Advances time with odometry at 20 Hz and scans at 10 Hz; ticks are answered.
     fn run(&mut self, for_ms: u64) {
         for _ in 0..for_ms / FRAME_MS {
             self.ms += FRAME_MS;
             if self.ms.is_multiple_of(200) {
                 self.event(Event::Order(Order::Drive, HoldReason::None));
             }
-            let [ahead, turn] = self.told.map(|speed| speed * FRAME_MS as f64 / 1000.0);
             if self.counts {
-                self.pose[0] += ahead * self.pose[2].cos();
-                self.pose[1] += ahead * self.pose[2].sin();
-                self.pose[2] += turn;
+                self.pose[0] += self.told[0] * FRAME_MS as f64 / 1000.0;
             }
             if self.scans && self.ms.is_multiple_of(100) {
                 self.say(Content::Scan(0), &self.scan());
             }
             if self.odometry {
-                self.say(Content::Imu, &self.imu());
                 self.say(Content::Odometry, &self.odometry());
             }
-            let speeds = self.shares.map(|share| share * 0.15 / 0.033);
-            let command = command(self.tick, self.ms * MS, speeds);
+            let command = command(self.tick, self.ms * MS, [0.15 / 0.033; 2]);
             self.event(Event::Command(command));
             self.event(Event::Quiet);
         }
@@ -218,24 +199,6 @@ fn odometry_and_scans_that_end_or_stay_the_same_while_the_robot_drives_stop_it()
 }
 
 #[test]
-fn odometry_that_jumps_once_is_no_motion_and_a_restart_of_the_counts() {
-    let counts = |scene: &Scene| [scene.wheels.left_counts, scene.wheels.right_counts];
-    for jump in [[-1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [1.887, 0.0, 0.0], [0.0, 0.0, 2.0]] {
-        let mut scene = Scene::driving();
-        scene.run(100);
-        let before = counts(&scene);
-        let (after, restarts) = (before.map(|counts| counts + 1000), scene.wheels.restarts);
-        scene.pose = [0, 1, 2].map(|part| scene.pose[part] + jump[part]);
-        scene.run(100);
-        assert!(counts(&scene) >= before && counts(&scene) < after, "{jump:?}");
-        assert!(scene.refused[0].contains("odometry jumps"), "{:?}", scene.refused);
-        scene.run(1000);
-        assert_eq!((scene.link.decision, &scene.decided[..]), (Decision::GO, &[][..]));
-        assert_eq!(scene.wheels.restarts, restarts + 1, "{jump:?}");
-    }
-}
-
-#[test]
 fn what_a_robot_drove_while_the_network_was_down_is_its_motion_as_far_as_it_can_drive_in_that_time()
 {
     // Half a cycle of the counts is 0.94 m. What is too far to drive in that time is unknown.
@@ -296,21 +259,6 @@ fn while_odometry_jumps_again_and_again_the_robot_stands_and_two_nodes_that_publ
         scene.run(4000);
         assert_eq!(scene.link.decision, Decision::GO);
     }
-}
-
-#[test]
-fn a_tick_has_the_turn_of_the_robots_gyro_which_ends_with_it() {
-    let mut scene = Scene::driving();
-    assert_eq!(scene.turns, [], "gyro and odometry were not compared in a turn");
-    scene.shares = [0.7, 1.0];
-    scene.run(2000);
-    scene.turns.clear();
-    let from = scene.pose[2];
-    scene.run(1000);
-    assert_eq!((scene.turns.len(), scene.link.decision), (10, Decision::GO));
-    let turned: f64 = scene.turns.iter().map(|turn| turn.turn_rad).sum();
-    assert!((turned - (scene.pose[2] - from)).abs() < 0.01 && turned > 0.2, "{turned}");
-    assert!(scene.turns.windows(2).all(|pair| pair[1].sequence == pair[0].sequence + 1));
 }
 
 #[test]

@@ -94,20 +94,6 @@ fn what_one_laser_sees_is_hazard_though_another_looks_over_it_and_both_scan_grou
     assert!(!mapper.hazard_ahead(80) && mapper.hazard_ahead(-120));
 }
 
-#[test]
-fn what_a_bumper_felt_stays_though_the_laser_looks_over_it_and_the_pose_is_on_it_later() {
-    let mut mapper = mapper();
-    let contact = ContactSample { half_width_rad: 0.5, ..ContactSample::default() };
-    mapper.give(Tick { pose: still(0), contact: Some(contact), ..Tick::default() });
-    assert!(mapper.hazard_ahead(20));
-    for tick in 1..20 {
-        let scan = Scan { beams: vec![2.0; 360], ..Scan::default() };
-        let x = if tick < 10 { 0.15 } else { -0.5 };
-        mapper.give(Tick { pose: at(tick, x, 0.0, 0.0), scans: vec![scan], ..Tick::default() });
-    }
-    assert!(mapper.hazard_ahead(20) && !mapper.hazard_ahead(50));
-}
-
 /// Returns the least hazard y before the wall y = 1.25 for several x.
 ///
 /// The laser of `row` is mounted at `at`, ahead and left of the robot's centre; its middle beam

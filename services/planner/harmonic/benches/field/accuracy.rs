@@ -1,6 +1,6 @@
 //! Angles between computed and exact directions, after solves from scratch on thousands of maps.
 
-use crate::support::{Angles, Kind, Map, solve};
+use crate::support::{Angles, CLEAR, Kind, Map, solve};
 use harmonic::solve_exactly;
 
 /// Maps per kind and screening.
@@ -37,7 +37,8 @@ pub(crate) fn angle_table() {
             for seed in 0..MAPS {
                 let domain = Map::generate(kind, SIDE, SIDE, seed).screened(length);
                 let field = solve(&domain);
-                let angles = Angles::between(&field, &solve_exactly(&domain).expect("a field"));
+                let angles =
+                    Angles::between(&field, &solve_exactly(&domain).expect("a field"), CLEAR);
                 worst.p50 = worst.p50.max(angles.p50);
                 worst.p99 = worst.p99.max(angles.p99);
                 worst.max = worst.max.max(angles.max);

@@ -4,12 +4,11 @@
 //! Ratios hold only between times measured in turn in one run, so a custom harness replaces
 //! criterion. Every time is the least of several runs. Arguments after `--` select the
 //! measurements:
-//! - `quick` omits the large maps.
 //! - `updates` measures only updates.
 //! - `accuracy` measures angles instead of times.
 //! - `growth` measures time and memory by map size.
 //! - `sweep` measures widths of corridors and doors, densities and depths of u, worst first.
-//! - `--maps DIR` adds the PGM and MovingAI maps of a directory.
+//! - `--maps DIR` adds the PGM maps of a directory.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,
@@ -29,6 +28,7 @@ mod wavefront;
 
 use std::{path::Path, time::Instant};
 
+use crate::split::{Measured, measured};
 use crate::support::{Kind, Map, solve_with};
 use harmonic::{Cell, Change, Domain, Solver};
 
@@ -49,9 +49,8 @@ fn runs(cells: usize) -> usize {
 
 fn main() {
     let asked = |word: &str| std::env::args().any(|argument| argument == word);
-    let quick = asked("quick");
     if asked("updates") {
-        return updates::table(quick);
+        return updates::table();
     }
     if asked(split::BYTES) {
         return split::print_bytes();
@@ -66,20 +65,20 @@ fn main() {
     if asked("accuracy") {
         return accuracy::angle_table();
     }
-    full_table(quick);
+    full_table();
     if let Some(directory) = maps_directory() {
         for (name, domain) in real::load_all(Path::new(&directory)) {
-            full_row(&name, &domain, true);
+            full_row(&name, &domain);
         }
     }
-    updates::table(quick);
+    updates::table();
 }
 
 fn maps_directory() -> Option<String> {
     std::env::args().skip_while(|it| it != "--maps").nth(1)
 }
 
-fn full_table(quick: bool) {
+fn full_table() {
     println!(
         "\nFull solves without screening: set-up + solve + verification, ms, and as multiples of a wavefront's time"
     );
@@ -103,16 +102,8 @@ fn full_table(quick: bool) {
         Kind::Serpentine { corridor: 8 },
         Kind::Serpentine { corridor: 24 },
     ];
-    for n in if quick { vec![50, 512] } else { vec![50, 256, 512, 1024, 2048, 4096] } {
-        for kind in kinds {
-            let narrow = matches!(kind, Kind::Maze { .. } | Kind::Serpentine { .. });
-            // Each takes seconds and gigabytes and shows nothing new.
-            if n > 512 && narrow {
-                continue;
-            }
-            let domain = Map::generate(kind, n, n, 1).domain();
-            full_row(&format!("{kind:?}"), &domain, n <= 1024);
-        }
+    for kind in kinds {
+        full_row(&format!("{kind:?}"), &Map::generate(kind, 512, 512, 1).domain());
     }
 }
 
@@ -129,34 +120,21 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
     [upside_down, Map::generate(Kind::Drums, width, height, 2).domain()]
 }
 
-fn full_row(name: &str, domain: &Domain, with_dijkstra: bool) {
+fn full_row(name: &str, domain: &Domain) {
     let cells = domain.blocked().len();
-    let (width, height) = (domain.width(), domain.height());
-    let others = others_than(domain);
     let mut solver = Solver::default();
-    let mut scratch = f64::INFINITY;
-    for _ in 0..runs(cells).min(12) {
-        for other in &others {
-            solve_with(&mut solver, other);
-        }
-        scratch = scratch.min(fastest(1, || {
-            solve_with(&mut solver, domain);
-        }));
-    }
+    let Measured { split, wavefront, field } = measured(&mut solver, domain, runs(cells).min(12));
+    let scratch = split.total;
     let target = fastest(runs(cells), || {
         solve_with(&mut solver, domain);
     });
-    let field = solve_with(&mut solver, domain);
-    let (wavefront, reached) = wavefront::time(domain, runs(cells));
-    assert_eq!(reached, field.verification().reachable, "cells reached");
-    let dijkstra = with_dijkstra.then(|| others::dijkstra(domain));
+    let dijkstra = others::dijkstra(domain);
     println!(
-        "{name:<24} {:>9} {:<14} {scratch:>9.3} {target:>9.3} {wavefront:>9.3} {:>6.2} {:>6.2} {:>9} {:>9.1}",
-        format!("{width}x{height}"),
+        "{name:<24} {:>9} {:<14} {scratch:>9.3} {target:>9.3} {wavefront:>9.3} {:>6.2} {:>6.2} {dijkstra:>9.2} {:>9.1}",
+        format!("{}x{}", domain.width(), domain.height()),
         field.verification().method.name(),
         scratch / wavefront,
         target / wavefront,
-        dijkstra.map_or("-".to_owned(), |time| format!("{time:.2}")),
         field.log10_u_min(),
     );
 }

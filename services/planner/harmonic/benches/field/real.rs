@@ -12,9 +12,7 @@ const FREE_FROM: u8 = 206;
 pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
     let entries = std::fs::read_dir(directory).expect("a directory of maps");
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|file| {
-        file.extension().is_some_and(|extension| extension == "pgm" || extension == "map")
-    });
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "pgm"));
     files.sort();
     let named = |file: &PathBuf| {
         let name = file.file_stem().unwrap_or_default().to_string_lossy();
@@ -26,8 +24,7 @@ pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
 /// Loads a map; the target is the free cell nearest to the middle.
 fn load(file: &Path) -> Domain {
     let bytes = std::fs::read(file).expect("a map");
-    let (width, height, mut blocked) =
-        if bytes.starts_with(b"type ") { moving_ai(&bytes) } else { pgm(&bytes) };
+    let (width, height, mut blocked) = pgm(&bytes);
     for (at, blocked) in blocked.iter_mut().enumerate() {
         let (col, row) = (at % width, at / width);
         *blocked |= col == 0 || row == 0 || col == width - 1 || row == height - 1;
@@ -40,18 +37,6 @@ fn load(file: &Path) -> Domain {
         (0..blocked.len()).filter(|&at| !blocked[at]).min_by_key(from_middle).expect("a free cell");
     let target = Cell::new(target % width, target / width);
     domain(width, height, blocked, target)
-}
-
-fn moving_ai(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
-    let text = std::str::from_utf8(bytes).expect("a map in ASCII");
-    let (header, rows) = text.split_once("\nmap").expect("a map after its header");
-    let number = |name: &str| {
-        let mut words = header.split_whitespace().skip_while(|word| *word != name);
-        words.nth(1).and_then(|word| word.parse::<usize>().ok()).expect("a size")
-    };
-    let cells = rows.bytes().filter(|byte| !byte.is_ascii_whitespace());
-    let blocked = cells.map(|cell| !matches!(cell, b'.' | b'G' | b'S')).collect();
-    (number("width"), number("height"), blocked)
 }
 
 /// Reads a binary 8-bit PGM with comments on separate lines.

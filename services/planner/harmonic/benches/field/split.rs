@@ -4,7 +4,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use crate::support::{Kind, Map, solve, solve_with};
-use harmonic::{Cancellation, Domain, Phase, Solver};
+use harmonic::{Cancellation, Domain, Field, Phase, Solver};
 
 use crate::{others_than, runs, wavefront};
 
@@ -16,34 +16,42 @@ pub(crate) struct Split {
     pub checks: usize,
 }
 
-pub(crate) fn split(solver: &mut Solver, domain: &Domain) -> (Split, &'static str) {
+fn split(solver: &mut Solver, domain: &Domain) -> Split {
     let mut split = Split::default();
     let start = Instant::now();
-    let field = solver
+    solver
         .solve_observed(domain, &Cancellation::new(), &mut |phase| {
             split.cycles += usize::from(phase == Phase::Cycled);
             split.checks += usize::from(phase == Phase::Verified);
         })
         .expect("a field");
     split.total = start.elapsed().as_secs_f64() * 1e3;
-    (split, field.verification().method.name())
+    split
 }
 
-/// Returns the fastest of several solves from scratch.
-fn least(domain: &Domain) -> (Split, &'static str) {
+/// Fastest solve from scratch, milliseconds of the wavefront, and the field.
+pub(crate) struct Measured {
+    pub split: Split,
+    pub wavefront: f64,
+    pub field: Field,
+}
+
+/// Measures solves and wavefronts in turn.
+pub(crate) fn measured(solver: &mut Solver, domain: &Domain, runs: usize) -> Measured {
     let others = others_than(domain);
-    let mut solver = Solver::default();
-    let mut best = (Split::default(), "");
-    for run in 0..runs(domain.blocked().len()).min(12) {
+    let (mut best, mut wavefront, mut reached) = (None::<Split>, f64::INFINITY, 0);
+    for _ in 0..runs {
         for other in &others {
-            solve_with(&mut solver, other);
+            solve_with(solver, other);
         }
-        let here = split(&mut solver, domain);
-        if run == 0 || here.0.total < best.0.total {
-            best = here;
-        }
+        let here = split(solver, domain);
+        best = best.filter(|best| best.total <= here.total).or(Some(here));
+        let (time, cells) = wavefront::time(domain, 2);
+        (wavefront, reached) = (wavefront.min(time), cells);
     }
-    best
+    let field = solve_with(solver, domain);
+    assert_eq!(reached, field.verification().reachable, "cells reached");
+    Measured { split: best.expect("at least one run"), wavefront, field }
 }
 
 pub(crate) fn growth_table() {
@@ -58,8 +66,9 @@ pub(crate) fn growth_table() {
         for n in [128, 256, 512, 1024, 2048, 4096] {
             let domain = Map::generate(kind, n, n, 1).domain();
             let bytes = bytes_of_a_process(&format!("{kind:?}:{n}"));
-            let (split, method) = least(&domain);
-            let (wavefront, _) = wavefront::time(&domain, runs(n * n).min(12));
+            let Measured { split, wavefront, field } =
+                measured(&mut Solver::default(), &domain, runs(n * n).min(12));
+            let method = field.verification().method.name();
             println!(
                 "{:<8} {n:>6} {method:<14} {:>7} {:>16.2} {:>11.2} {:>13}",
                 format!("{kind:?}"),

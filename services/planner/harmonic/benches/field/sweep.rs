@@ -1,11 +1,10 @@
 //! Sweep over the map shapes that decide the cost of a solve: corridor and door width, obstacle
 //! density, depth of u.
 
-use crate::support::{Kind, Map, solve_with};
+use crate::support::{Kind, Map};
 use harmonic::{Domain, Solver};
 
-use crate::split::split;
-use crate::{others_than, wavefront};
+use crate::split::{Measured, measured};
 
 const SIDE: usize = 512;
 
@@ -42,16 +41,10 @@ fn kinds() -> Vec<(String, Kind, f64)> {
     kinds.into_iter().map(named).collect()
 }
 
-/// Returns whether the words after `only` on the command line, if any, select `name`.
-fn chosen(name: &str) -> bool {
-    let mut only = std::env::args().skip_while(|word| word != "only").skip(1).peekable();
-    only.peek().is_none() || only.any(|word| name.contains(&word))
-}
-
 /// Prints times of each map and of a wavefront measured in turn, worst ratio first.
 pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
-    let generated = kinds().into_iter().filter(|it| chosen(&it.0));
-    let mut rows: Vec<_> = generated
+    let mut rows: Vec<_> = kinds()
+        .into_iter()
         .map(|(name, kind, length)| {
             row(&name, &Map::generate(kind, SIDE, SIDE, 1).screened(length))
         })
@@ -72,26 +65,13 @@ pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
 
 fn row(name: &str, domain: &Domain) -> (f64, String) {
     let cells = domain.blocked().len() as f64;
-    let others = others_than(domain);
-    let mut solver = Solver::default();
-    let (mut best, mut waves) = (None, f64::INFINITY);
-    for _ in 0..RUNS {
-        for other in &others {
-            solve_with(&mut solver, other);
-        }
-        let (split, method) = split(&mut solver, domain);
-        if best.is_none_or(|(least, _): (crate::split::Split, _)| split.total < least.total) {
-            best = Some((split, method));
-        }
-        waves = waves.min(wavefront::time(domain, 2).0);
-    }
-    let (split, method) = best.expect("at least one run");
-    let field = solve_with(&mut solver, domain);
-    let ratio = split.total / waves;
+    let Measured { split, wavefront, field } = measured(&mut Solver::default(), domain, RUNS);
+    let ratio = split.total / wavefront;
     let line = format!(
-        "{name:<28} {ratio:>6.2} {:>9.2} {:>7.1} {method:<28} {:>6} {:>6} {:>9.1}",
+        "{name:<28} {ratio:>6.2} {:>9.2} {:>7.1} {:<28} {:>6} {:>6} {:>9.1}",
         split.total,
         split.total * 1e6 / cells,
+        field.verification().method.name(),
         split.cycles,
         split.checks,
         field.log10_u_min(),

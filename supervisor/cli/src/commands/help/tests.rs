@@ -199,22 +199,6 @@ fn every_command_line_in_readme_and_guide_is_understood() {
 }
 
 #[test]
-fn a_command_line_with_an_option_or_key_that_does_not_exist_is_found() {
-    let wrong = [
-        "firsthand run --sed 7",
-        "for s in $(seq 50); do firsthand runs --seed $s; done",
-        "sudo -u firsthand firsthand states",
-        "firsthand stage kill --signal ABRT",
-        "firsthand topic ehco pose",
-    ];
-    for line in wrong {
-        let found = commands(line);
-        let command = found.iter().find_map(|command| arguments(command)).unwrap();
-        assert!(understood(command).is_err(), "{line}");
-    }
-}
-
-#[test]
 fn every_link_and_path_in_readme_and_guide_exists() {
     let of_the_tree = ["common/", "services/", "supervisor/", "tests/", ".ci/"];
     for document in documents() {

@@ -10,8 +10,9 @@ pub(crate) struct Angles {
     pub p50: f64,
     pub p99: f64,
     pub max: f64,
-    /// Maximum away from saddle points: where u changes by at least [`CLEAR`] of itself between
-    /// cells.
+    /// Share of angles above one degree.
+    pub off: f64,
+    /// Maximum away from saddle points.
     pub clear_max: f64,
 }
 
@@ -19,10 +20,12 @@ pub(crate) struct Angles {
 ///
 /// Nearer to a saddle point, a change of u by a thousandth turns the direction by degrees in any
 /// solution.
-const CLEAR: f64 = 2e-3;
+pub(crate) const CLEAR: f64 = 2e-3;
 
 impl Angles {
-    pub(crate) fn between(field: &Field, right: &Field) -> Self {
+    /// Compares `field` with the `right` one, whose directions are clear where u changes by at least
+    /// `clear` of itself between cells.
+    pub(crate) fn between(field: &Field, right: &Field, clear: f64) -> Self {
         let mut angles = Vec::new();
         let mut clear_max = 0.0_f64;
         for row in 0..right.height() {
@@ -32,7 +35,7 @@ impl Angles {
                     continue;
                 };
                 let off = field.direction(cell).map_or(180.0, |it| angle(it, wanted));
-                if steepness(right, cell) >= CLEAR {
+                if steepness(right, cell) >= clear {
                     clear_max = clear_max.max(off);
                 }
                 angles.push(off);
@@ -43,7 +46,8 @@ impl Angles {
             return Self::default();
         };
         let at = |share: f64| angles[((angles.len() - 1) as f64 * share) as usize];
-        Self { p50: at(0.5), p99: at(0.99), max, clear_max }
+        let off = angles.iter().filter(|angle| **angle > 1.0).count() as f64 / angles.len() as f64;
+        Self { off, p50: at(0.5), p99: at(0.99), max, clear_max }
     }
 }
 

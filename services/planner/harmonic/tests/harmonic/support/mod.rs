@@ -1,4 +1,4 @@
-//! Generated maps of every kind, a slow reference solver, and angles between fields.
+//! Generated maps of every kind, independent checks, and angles between fields.
 #![allow(dead_code, unused_imports, reason = "tests and benchmark each use a part")]
 
 use harmonic::{Cancellation, Cell, Domain, Field, Screening, Solver};
@@ -8,10 +8,10 @@ mod maps;
 mod random;
 mod reference;
 
-pub(crate) use angles::Angles;
+pub(crate) use angles::{Angles, CLEAR};
 pub(crate) use maps::{Kind, Map};
 pub(crate) use random::Random;
-pub(crate) use reference::{Reference, angle, follow};
+pub(crate) use reference::{angle, follow, worst_residual};
 
 pub(crate) fn domain(width: usize, height: usize, blocked: Vec<bool>, target: Cell) -> Domain {
     Domain::new(width, height, blocked, target).expect("a valid map")

@@ -64,13 +64,16 @@ fn rows(name: &str) -> impl Iterator<Item = csv::StringRecord> {
 }
 
 #[test]
-fn every_capability_has_a_verdict_and_every_contract_tests_that_exist() {
+fn every_capability_has_a_verdict_and_every_contract_and_version_tests_that_exist() {
     let functions = test_functions();
     let rows: Vec<[String; 3]> =
         rows("capabilities").map(|row| [1, 2, 3].map(|at| row[at].to_owned())).collect();
     let flaws: Vec<_> = rows.iter().filter_map(|row| flaw(row, &functions)).collect();
     assert!(flaws.is_empty(), "{flaws:#?}");
     assert!(rows.len() > 90, "only {} rows were found", rows.len());
+    let versions: String = self::rows("versions").map(|row| row[4].to_owned() + " ").collect();
+    let lacks = versions.split_whitespace().find(|test| !functions.contains(*test));
+    assert!(!versions.is_empty() && lacks.is_none(), "there is no test {lacks:?}");
 }
 
 #[test]
@@ -94,38 +97,6 @@ fn every_default_in_the_table_of_mission_keys_is_the_default() {
         }
     }
     assert!(checked > 40, "only {checked} defaults were found");
-}
-
-#[test]
-fn every_row_of_the_table_of_versions_has_tests_that_exist() {
-    let functions = test_functions();
-    let tests: String = rows("versions").map(|row| row[4].to_owned() + " ").collect();
-    assert!(!tests.is_empty());
-    for test in tests.split_whitespace() {
-        assert!(functions.contains(test), "there is no test {test}");
-    }
-}
-
-#[test]
-fn a_contract_without_a_test_or_with_one_that_does_not_exist_is_found() {
-    let functions = BTreeSet::from(["it_holds".to_owned()]);
-    let row = |text: &str, verdict: &str, tests: &str| [text, verdict, tests].map(str::to_owned);
-    for right in [
-        row("", "Contract", "it_holds"),
-        row("it is done", "Smoke", ".ci/run"),
-        row("it is missing", "Gap", ""),
-    ] {
-        assert_eq!(flaw(&right, &functions), None);
-    }
-    for wrong in [
-        row("it holds", "Contract", ""),
-        row("it holds", "Contract", "it_holds it_held"),
-        row("it holds", "Smoke", "it_holds"),
-        row("it holds", "Gap", "it_holds"),
-        row("it holds", "Measured", ""),
-    ] {
-        assert!(flaw(&wrong, &functions).is_some(), "{wrong:?}");
-    }
 }
 
 /// Returns `text` with each table after `<!-- table NAME SECTION -->` reprinted.
@@ -188,15 +159,6 @@ fn documents_show_the_tables_that_are_printed() {
             path.display()
         );
     }
-}
-
-#[test]
-fn a_table_behind_its_marker_is_renewed_and_nothing_else() {
-    let print = |name: &str, section: Option<&str>| format!("- {name} {section:?}\n");
-    let page = "a\n\n<!-- table x y -->\n\n- old\n  old\n\nb\n";
-    let text = renewed(page, print);
-    assert_eq!(text, "a\n\n<!-- table x y -->\n\n- x Some(\"y\")\n\nb\n");
-    assert_eq!(renewed(&text, print), text);
 }
 
 /// Lists the workspace's crates with their descriptions.

@@ -1,12 +1,13 @@
-//! Figures of the guide's page: paths on random maps, compared with NavFn's.
+//! Paths on random maps, compared with NavFn's, as on the guide's page of results.
 //!
-//! `.ci/nav2-planners` prints them, with Nav2's code in the program NAV2_PLANNERS, else with a
-//! wavefront of NavFn's costs. MAPS may be a folder of map_server maps. BOUND=1 searches the
-//! clearest paths, SCREENING is the option.
+//! `.ci/nav2-planners` prints them, with Nav2's code in the program NAV2_PLANNERS. Without it, the
+//! shortest paths replace NavFn's. MAPS may be a folder of map_server maps. BOUND=1 adds the
+//! clearest paths.
 
 use std::{
     cmp::Reverse,
-    collections::{BTreeMap, BinaryHeap},
+    collections::{BTreeMap, BinaryHeap, VecDeque},
+    env,
     io::{BufReader, Read as _, Write as _},
     process::{Child, ChildStdout, Command, Stdio},
     sync::Arc,
@@ -30,7 +31,7 @@ const RADIUS_M: f64 = 0.22;
 const INFLATION_M: f64 = 0.7;
 const SCALING: f64 = 3.0;
 
-pub struct Random(u64);
+struct Random(u64);
 
 impl Random {
     fn below(&mut self, limit: usize) -> usize {
@@ -41,9 +42,9 @@ impl Random {
 
 #[derive(Clone)]
 pub struct Grid {
-    pub width: usize,
-    pub height: usize,
-    pub occupied: Vec<bool>,
+    width: usize,
+    height: usize,
+    occupied: Vec<bool>,
 }
 
 impl Grid {
@@ -59,75 +60,40 @@ impl Grid {
         }
     }
 
-    /// Makes drums, boxes, rooms with doors, or corridors.
+    /// Makes boxes, rooms with doors, or corridors.
     fn random(seed: u64) -> Self {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
         let side = 120 + random.below(280);
         let mut grid = Self::new(side, side);
-        match seed % 4 {
-            0 | 1 => {
+        let [room, door] = match seed % 4 {
+            2 => [60, 16],
+            3 => [24, 18],
+            _ => {
                 for _ in 0..side / 4 {
                     let size = [2 + random.below(16), 2 + random.below(16)];
                     grid.fill([random.below(side), random.below(side)], size, true);
                 }
+                return grid;
             }
-            kind => {
-                let room = if kind == 2 { 60 } else { 24 };
-                let door = if kind == 2 { 16 } else { 18 };
-                for wall in (room..side).step_by(room) {
-                    grid.fill([wall, 0], [2, side], true);
-                    grid.fill([0, wall], [side, 2], true);
-                }
-                for wall in (room..side).step_by(room) {
-                    for along in (0..side).step_by(room) {
-                        for is_upright in [true, false] {
-                            if random.below(4) > 0 {
-                                let at = along + 3 + random.below(room - door - 3);
-                                let (corner, size) = if is_upright {
-                                    ([wall, at], [2, door])
-                                } else {
-                                    ([at, wall], [door, 2])
-                                };
-                                grid.fill(corner, size, false);
-                            }
+        };
+        for wall in (room..side).step_by(room) {
+            grid.fill([wall, 0], [2, side], true);
+            grid.fill([0, wall], [side, 2], true);
+        }
+        for wall in (room..side).step_by(room) {
+            for along in (0..side).step_by(room) {
+                for is_upright in [true, false] {
+                    if random.below(4) > 0 {
+                        let at = along + 3 + random.below(room - door - 3);
+                        let (mut corner, mut size) = ([wall, at], [2, door]);
+                        if !is_upright {
+                            corner.reverse();
+                            size.reverse();
                         }
+                        grid.fill(corner, size, false);
                     }
                 }
             }
-        }
-        grid
-    }
-
-    /// Makes a maze with exactly one path between any two of its rooms, which are 1 m wide
-    /// including the wall.
-    pub fn maze(seed: u64, side: usize) -> Self {
-        const ROOM: usize = 20;
-        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-        let (mut grid, rooms) = (Self::new(side, side), side / ROOM);
-        grid.fill([0, 0], [side, side], true);
-        let (mut seen, mut trail) = (vec![false; rooms * rooms], vec![[0_usize, 0]]);
-        seen[0] = true;
-        grid.fill([2, 2], [ROOM - 4, ROOM - 4], false);
-        while let Some(&[col, row]) = trail.last() {
-            let beside = [
-                [col + 1, row],
-                [col, row + 1],
-                [col.wrapping_sub(1), row],
-                [col, row.wrapping_sub(1)],
-            ];
-            let fresh = |&[c, r]: &[usize; 2]| c < rooms && r < rooms && !seen[r * rooms + c];
-            let open: Vec<_> = beside.into_iter().filter(fresh).collect();
-            if open.is_empty() {
-                trail.pop();
-                continue;
-            }
-            let next = open[random.below(open.len())];
-            let corner = [col.min(next[0]) * ROOM + 2, row.min(next[1]) * ROOM + 2];
-            let size =
-                [col.abs_diff(next[0]), row.abs_diff(next[1])].map(|by| by * ROOM + ROOM - 4);
-            grid.fill(corner, size, false);
-            seen[next[1] * rooms + next[0]] = true;
-            trail.push(next);
         }
         grid
     }
@@ -146,144 +112,84 @@ impl Grid {
         OccupancyGrid { header: Header::at(0, "map"), info, data }.encode()
     }
 
-    /// Returns the least path cost from `sources` to every cell, in cells, given the `cost` per
-    /// cell.
-    fn front(&self, sources: &[usize], cost: impl Fn(usize) -> f64) -> Vec<f64> {
-        let mut found = vec![f64::INFINITY; self.occupied.len()];
-        let mut waiting: BinaryHeap<_> =
-            sources.iter().map(|&cell| (Reverse(0_u64), cell)).collect();
-        sources.iter().for_each(|&cell| found[cell] = 0.0);
-        let mut done = vec![false; found.len()];
-        while let Some((_, cell)) = waiting.pop() {
-            if std::mem::replace(&mut done[cell], true) {
-                continue;
-            }
-            for next in self.beside(cell).into_iter().flatten() {
-                let cost = cost(next);
-                let at = |cell: Option<usize>| {
-                    cell.filter(|&cell| done[cell]).map_or(f64::INFINITY, |cell| found[cell])
-                };
-                let [east, west, north, south] = self.beside(next).map(at);
-                let (across, along) = (east.min(west), north.min(south));
-                let gap = (across - along).abs();
-                let by = match gap < cost {
-                    true => {
-                        f64::midpoint(across, along) + 0.5 * (2.0 * cost * cost - gap * gap).sqrt()
-                    }
-                    false => across.min(along) + cost,
-                };
-                if by.is_finite() && by < found[next] {
-                    found[next] = by;
-                    waiting.push((Reverse((by * 1e6) as u64), next));
+    fn place(&self, cell: usize) -> DVec2 {
+        DVec2::new((cell % self.width) as f64, (cell / self.width) as f64)
+    }
+
+    fn beside(&self, cell: usize, by: usize) -> impl Iterator<Item = [usize; 2]> {
+        let (col, row) = (cell % self.width, cell / self.width);
+        let rows = row.saturating_sub(by)..self.height.min(row + by + 1);
+        let cols = col.saturating_sub(by)..self.width.min(col + by + 1);
+        rows.flat_map(move |row| cols.clone().map(move |col| [col, row]))
+    }
+
+    /// Returns the distance of every cell from an occupied one, in cells.
+    fn distances(&self) -> Vec<f64> {
+        let mut found = vec![1e3; self.occupied.len()];
+        let sources = (0..found.len()).filter(|&cell| self.occupied[cell]);
+        let mut waiting: VecDeque<_> = sources.map(|cell| (0.0, cell, cell)).collect();
+        while let Some((by, cell, source)) = waiting.pop_front() {
+            if by < found[cell] {
+                found[cell] = by;
+                for [col, row] in self.beside(cell, 1) {
+                    let next = row * self.width + col;
+                    waiting.push_back((
+                        self.place(next).distance(self.place(source)),
+                        next,
+                        source,
+                    ));
                 }
             }
         }
         found
     }
 
-    fn place(&self, cell: usize) -> DVec2 {
-        DVec2::new((cell % self.width) as f64, (cell / self.width) as f64)
-    }
-
-    fn beside(&self, cell: usize) -> [Option<usize>; 4] {
-        let (col, row) = (cell % self.width, cell / self.width);
-        [
-            (col + 1 < self.width).then(|| cell + 1),
-            (col > 0).then(|| cell - 1),
-            (row + 1 < self.height).then(|| cell + self.width),
-            (row > 0).then(|| cell - self.width),
-        ]
-    }
-
-    /// Descends a front from `from` as NavFn does: along bilinear gradients, and cell by cell
-    /// beside blocked cells.
-    fn descend(&self, front: &[f64], from: usize) -> Vec<DVec2> {
-        let at = |col: i64, row: i64| {
-            let is_inside =
-                (0..self.width as i64).contains(&col) && (0..self.height as i64).contains(&row);
-            if is_inside { front[row as usize * self.width + col as usize] } else { f64::INFINITY }
-        };
-        let slope = |col: i64, row: i64| {
-            DVec2::new(at(col - 1, row) - at(col + 1, row), at(col, row - 1) - at(col, row + 1))
-        };
-        let mut way = vec![self.place(from)];
-        let mut here = way[0];
-        for _ in 0..20 * self.width * self.height {
-            let (col, row) = (here.x.round() as i64, here.y.round() as i64);
-            if at(col, row) == 0.0 {
-                break;
+    /// Returns the cheapest way in steps to sixteen cells around, or none, given the cost per cell.
+    fn cheapest(&self, [from, to]: [usize; 2], cost: impl Fn(usize) -> f64) -> Vec<DVec2> {
+        let costs: Vec<f64> = (0..self.occupied.len()).map(cost).collect();
+        let (mut paid, mut next) = (vec![u64::MAX; costs.len()], vec![to; costs.len()]);
+        paid[to] = 0;
+        let mut waiting = BinaryHeap::from([(Reverse(0), to)]);
+        while let Some((Reverse(so_far), cell)) = waiting.pop() {
+            if so_far > paid[cell] {
+                continue;
             }
-            let low = here.floor();
-            let (c, r, part) = (low.x as i64, low.y as i64, here - low);
-            let ahead = slope(c, r)
-                .lerp(slope(c + 1, r), part.x)
-                .lerp(slope(c, r + 1).lerp(slope(c + 1, r + 1), part.x), part.y);
-            let near = (c - 1..=c + 2).all(|c| (r - 1..=r + 2).all(|r| at(c, r).is_finite()));
-            let next = here + 0.5 * ahead.normalize_or_zero();
-            if near && at(next.x.round() as i64, next.y.round() as i64) <= at(col, row) {
-                here = next;
-            } else {
-                let best = (-1..=1_i64).flat_map(|dc| (-1..=1_i64).map(move |dr| (dc, dr)));
-                let best = best.filter(|&(dc, dr)| {
-                    at(col + dc, row).is_finite() && at(col, row + dr).is_finite()
-                });
-                let steep = |&(dc, dr): &(i64, i64)| {
-                    (at(col, row) - at(col + dc, row + dr)) / (dc as f64).hypot(dr as f64).max(0.5)
-                };
-                let (dc, dr) = best.max_by(|a, b| steep(a).total_cmp(&steep(b))).unwrap();
-                here = DVec2::new((col + dc) as f64, (row + dr) as f64);
+            let [col, row] = [cell % self.width, cell / self.width];
+            for [c, r] in self.beside(cell, 2) {
+                let (across, along) = (c.abs_diff(col), r.abs_diff(row));
+                let passed = (c.min(col)..=c.max(col))
+                    .flat_map(|c| (r.min(row)..=r.max(row)).map(move |r| (c, r)))
+                    .map(|(c, r)| costs[r * self.width + c]);
+                let mean = passed.sum::<f64>() / ((across + 1) * (along + 1)) as f64;
+                let step = (mean * (across as f64).hypot(along as f64) * 1e6) as u64;
+                let (there, paid_there) = (r * self.width + c, so_far.saturating_add(step));
+                if paid_there < paid[there] {
+                    (paid[there], next[there]) = (paid_there, cell);
+                    waiting.push((Reverse(paid_there), there));
+                }
             }
-            way.push(here);
         }
-        way
+        let onward = |&cell: &usize| (cell != to).then(|| next[cell]);
+        let way = std::iter::successors((paid[from] < u64::MAX).then_some(from), onward);
+        way.map(|cell| self.place(cell)).collect()
     }
 }
 
-fn length(way: &[DVec2]) -> f64 {
-    way.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
-}
-
-/// Returns a path's length, and its mean and least clearance at points a quarter of a cell apart,
-/// all in cells.
+/// Returns a path's length, and its mean and least clearance, in cells.
 fn judge(grid: &Grid, distances: &[f64], way: &[DVec2]) -> [f64; 3] {
-    let (mut sum, mut count, mut least, mut next) = (0.0, 0.0, f64::INFINITY, 0.0);
+    let (mut sum, mut count, mut least, mut length) = (0.0, 0.0, f64::INFINITY, 0.0);
     for pair in way.windows(2) {
         let long = pair[0].distance(pair[1]);
-        while next <= long {
-            let at = if long > 0.0 { pair[0].lerp(pair[1], next / long) } else { pair[0] };
-            let clear = distances[at.y.round() as usize * grid.width + at.x.round() as usize];
-            (sum, count, least) = (sum + clear.min(1e3), count + 1.0, clear.min(least));
-            next += 0.25;
+        let steps = (4.0 * long).ceil();
+        for step in 0..steps as usize {
+            let at = pair[0].lerp(pair[1], step as f64 / steps).round();
+            let clear = distances[at.y as usize * grid.width + at.x as usize];
+            (sum, count, least) =
+                (sum + clear * long / steps, count + long / steps, clear.min(least));
         }
-        next -= long;
+        length += long;
     }
-    [length(way), sum / count, least]
-}
-
-/// Returns the 5 % quantile, the median, the 95 % quantile and the maximum.
-fn shares(numbers: &[f64]) -> [f64; 4] {
-    let mut numbers = numbers.to_vec();
-    numbers.sort_by(f64::total_cmp);
-    [0.05, 0.5, 0.95, 1.0].map(|share| numbers[((numbers.len() - 1) as f64 * share) as usize])
-}
-
-fn distances(grid: &Grid) -> Vec<f64> {
-    let sources = (0..grid.occupied.len()).filter(|&cell| grid.occupied[cell]);
-    let mut nearest: Vec<Option<usize>> = vec![None; grid.occupied.len()];
-    let place = |cell| grid.place(cell);
-    let mut waiting = BinaryHeap::new();
-    sources.for_each(|cell| waiting.push((Reverse(0_u64), cell, cell)));
-    while let Some((_, cell, source)) = waiting.pop() {
-        if nearest[cell].is_none() {
-            nearest[cell] = Some(source);
-            for next in grid.beside(cell).into_iter().flatten() {
-                let by = place(next).distance_squared(place(source)) as u64;
-                waiting.push((Reverse(by), next, source));
-            }
-        }
-    }
-    let each = nearest.iter().enumerate();
-    each.map(|(cell, near)| near.map_or(1e3, |near| place(cell).distance(place(near)))).collect()
+    [length, sum / count, least]
 }
 
 /// Returns the costs of Nav2's inflation layer, `computeCost`.
@@ -297,7 +203,18 @@ fn inflated(distances: &[f64]) -> Vec<u8> {
     distances.iter().map(cost).collect()
 }
 
-/// Nav2's planners in another process.
+/// Returns the values of a published costmap.
+fn published(costs: &[u8]) -> Vec<i8> {
+    let value = |&cost: &u8| match cost {
+        254 => 100,
+        253 => 99,
+        0 => 0,
+        cost => 1 + (97 * (u32::from(cost) - 1) / 251) as i8,
+    };
+    costs.iter().map(value).collect()
+}
+
+/// Nav2's planners in another process, which ends with its input.
 struct Nav2 {
     child: Child,
     from: BufReader<ChildStdout>,
@@ -305,7 +222,7 @@ struct Nav2 {
 
 impl Nav2 {
     fn start() -> Option<Self> {
-        let path = std::env::var_os("NAV2_PLANNERS")?;
+        let path = env::var_os("NAV2_PLANNERS")?;
         let started = Command::new(path).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
         let mut child = started.unwrap();
         let from = BufReader::new(child.stdout.take().unwrap());
@@ -337,7 +254,7 @@ impl Nav2 {
 }
 
 fn maps() -> Vec<Grid> {
-    let named = std::env::var("MAPS").unwrap_or("40".to_owned());
+    let named = env::var("MAPS").unwrap_or("40".to_owned());
     if let Ok(count) = named.parse() {
         return (0..count).map(Grid::random).collect();
     }
@@ -352,211 +269,140 @@ fn maps() -> Vec<Grid> {
     grids
 }
 
-impl Drop for Nav2 {
-    fn drop(&mut self) {
-        // The process ends with its input.
-        drop(self.child.stdin.take());
-        self.child.wait().unwrap();
-    }
-}
-
 /// CPU time of this thread in milliseconds, independent of other load.
 fn processor_ms() -> f64 {
     let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     now.tv_sec as f64 * 1e3 + now.tv_nsec as f64 * 1e-6
 }
 
-fn named(name: &str) -> Option<f64> {
-    std::env::var(name).ok().map(|text| text.parse().unwrap())
-}
-
-/// Paths of a planner relative to the reference: length, mean and least clearance, CPU time.
-#[derive(Default)]
-struct Judged {
-    ratios: [Vec<f64>; 4],
-    /// Pairs of places without a found path although one exists, and the reverse.
-    false_no: usize,
-    false_yes: usize,
-}
-
-impl Judged {
-    fn add(&mut self, found: [f64; 3], reference: [f64; 3], times: [f64; 2]) {
-        for part in 0..3 {
-            self.ratios[part].push(found[part] / reference[part]);
-        }
-        self.ratios[3].push(times[0] / times[1]);
-    }
-}
-
-/// Returns the clearest path at most 1.15 times as long as the reference, over wavefronts with
-/// several distance-dependent costs.
+/// Returns the clearest path at most as long as `most`, over several distance-dependent costs.
 fn clearest(
     grid: &Grid,
     distances: &[f64],
     blocked: &[bool],
     ends: [usize; 2],
     most: f64,
-) -> [f64; 3] {
+) -> Vec<DVec2> {
     let free = distances.iter().zip(blocked).filter(|it| !it.1);
     let widest = free.map(|it| *it.0).fold(0.0, f64::max);
-    let ramp = |cells: f64, weight: f64, reach_m: f64| {
-        let past = (cells * RESOLUTION_M - RADIUS_M).max(0.0);
-        1.0 + weight * (1.0 - past / reach_m).max(0.0)
+    let cost = |kind: usize, cells: f64| match kind {
+        0..4 => {
+            let [weight, reach_m] = [[10.0, 0.5], [10.0, 1.0], [10.0, 2.0], [50.0, 1.0]][kind];
+            let past = (cells * RESOLUTION_M - RADIUS_M).max(0.0);
+            1.0 + weight * (1.0 - past / reach_m).max(0.0)
+        }
+        4..6 => [1.01, 1.2][kind - 4] * widest - cells,
+        _ => cells.powf([-1.0, -1.5, -2.0, -3.0][kind - 6]),
     };
-    let judged = (0..10).map(|kind| {
-        let cost = |cell: usize| match (blocked[cell], distances[cell]) {
-            (true, _) => f64::INFINITY,
-            (_, cells) => match kind {
-                0 => ramp(cells, 10.0, 0.5),
-                1 => ramp(cells, 10.0, 1.0),
-                2 => ramp(cells, 10.0, 2.0),
-                3 => ramp(cells, 50.0, 1.0),
-                4 => 1.01 * widest - cells,
-                5 => 1.2 * widest - cells,
-                6 => cells.recip(),
-                7 => cells.powf(-1.5),
-                8 => cells.powi(-2),
-                _ => cells.powi(-3),
-            },
-        };
-        judge(grid, distances, &grid.descend(&grid.front(&[ends[1]], cost), ends[0]))
+    let ways = (0..10).map(|kind| {
+        let cost =
+            |cell: usize| if blocked[cell] { f64::INFINITY } else { cost(kind, distances[cell]) };
+        grid.cheapest(ends, cost)
     });
-    let short = judged.filter(|judged| judged[0] <= most);
-    short.fold([0.0; 3], |best, judged| if judged[1] > best[1] { judged } else { best })
+    let judged = ways.map(|way| (judge(grid, distances, &way), way));
+    let short = judged.filter(|it| it.0[0] <= most);
+    short.max_by(|a, b| a.0[1].total_cmp(&b.0[1])).map_or(vec![], |it| it.1)
 }
 
 #[test]
 fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_clear() {
-    let screening = named("SCREENING").unwrap_or(2.0);
     let alone = Body { radius_m: RADIUS_M, occupied: 99, enters_unknown: true };
-    let inflated_map = Body { radius_m: 0.0, ..alone };
     let mut nav2 = Nav2::start();
-    let mut table = BTreeMap::<&str, Judged>::new();
-    let (mut pairs, mut none) = (0, 0);
+    let (mut pairs, mut ratios) = (0, BTreeMap::<&str, [Vec<f64>; 4]>::new());
     for (seed, grid) in (0_u64..).zip(maps()) {
-        let map = Arc::new(Costmap::read(&grid.message()).unwrap());
+        let map = Costmap::read(&grid.message()).unwrap();
         let (blocked, _) = map.blocked_and_costs(&alone, 1.0);
         // NavFn treats the outermost cells of a map as blocked.
-        let inside = |cell: &usize| grid.beside(*cell).iter().all(Option::is_some);
-        let free = (0..blocked.len()).filter(|&cell| !blocked[cell]);
-        let free: Vec<usize> = free.filter(inside).collect();
+        let is_free = |&cell: &usize| !blocked[cell] && grid.beside(cell, 1).count() == 9;
+        let free: Vec<usize> = (0..blocked.len()).filter(is_free).collect();
         let mut random = Random(seed + 1);
         let mut any = || free[random.below(free.len())];
-        let cells = [any(), any()];
-        let place = |cell| grid.place(cell);
-        let [from, to] =
-            cells.map(|cell| DAffine2::from_translation(map.place.transform_point2(place(cell))));
-        let plain = grid.front(&[cells[1]], |cell| if blocked[cell] { f64::INFINITY } else { 1.0 });
-        let exists = plain[cells[0]].is_finite();
-        (pairs, none) = (pairs + 1, none + usize::from(!exists));
-        let distances = distances(&grid);
-        let costs = inflated(&distances);
-        let mut ways = vec![("shortest", vec![], 0.0)];
-        if exists {
-            ways[0].1 = grid.descend(&plain, cells[0]);
+        let ends = [any(), any()];
+        let [from, to] = ends
+            .map(|cell| DAffine2::from_translation(map.place.transform_point2(grid.place(cell))));
+        let shortest = grid.cheapest(ends, |cell| if blocked[cell] { f64::INFINITY } else { 1.0 });
+        let distances = grid.distances();
+        let mut ways = vec![("shortest", shortest.clone(), 0.0)];
+        if let Some(nav2) = &mut nav2 {
+            let found = nav2.plan(&grid, &inflated(&distances), ends);
+            let names = ["NavFn", "Theta*", "Smac 2D"];
+            ways.extend(names.into_iter().zip(found).map(|(name, (way, took))| (name, way, took)));
         }
-        match &mut nav2 {
-            Some(nav2) => {
-                let names = ["NavFn", "Theta*", "Smac 2D"];
-                let found = names.into_iter().zip(nav2.plan(&grid, &costs, cells));
-                ways.extend(found.map(|(name, (way, took))| (name, way, took)));
-            }
-            None => {
-                let began = processor_ms();
-                let cost = |cell: usize| match costs[cell] {
-                    253.. => f64::INFINITY,
-                    cost => (50.0 + 0.8 * f64::from(cost)) / 50.0,
-                };
-                let front = grid.front(&[cells[1]], cost);
-                let way = if exists { grid.descend(&front, cells[0]) } else { vec![] };
-                ways.push(("NavFn", way, processor_ms() - began));
-            }
-        }
-        // Values of a published costmap.
-        let published = |&cost: &u8| match cost {
-            254 => 100,
-            253 => 99,
-            0 => 0,
-            cost => 1 + (97 * (u32::from(cost) - 1) / 251) as i8,
-        };
-        let values: Vec<i8> = costs.iter().map(published).collect();
         let mut changed = grid.clone();
-        let away = |cell: &usize| cells.iter().all(|&end| place(end).distance(place(*cell)) > 12.0);
-        let block = std::iter::repeat_with(any).find(away).unwrap();
+        let is_away = |cell: &usize| {
+            ends.iter().all(|&end| grid.place(end).distance(grid.place(*cell)) > 12.0)
+        };
+        let block = std::iter::repeat_with(any).find(is_away).unwrap();
         changed.fill([block % grid.width, block / grid.width], [3, 3], true);
-        let changed_costs: Vec<i8> =
-            inflated(&self::distances(&changed)).iter().map(published).collect();
-        for (names, body, messages) in [
+        let costmap_of = |grid: &Grid| grid.message_of(published(&inflated(&grid.distances())));
+        for (names, radius_m, messages) in [
+            (["ours", "ours, map changed"], RADIUS_M, [grid.message(), changed.message()]),
             (
-                ["ours", "ours, map changed", "ours, same map"],
-                alone,
-                [grid.message(), changed.message()],
-            ),
-            (
-                ["ours on costmap", "ours on costmap, map changed", "ours on costmap, same map"],
-                inflated_map,
-                [grid.message_of(values), changed.message_of(changed_costs)],
+                ["ours on costmap", "ours on costmap, map changed"],
+                0.0,
+                [costmap_of(&grid), costmap_of(&changed)],
             ),
         ] {
-            let maps = messages.map(|message| Arc::new(Costmap::read(&message).unwrap()));
-            let mut planner = Planner::new(body, screening);
-            for (name, map) in names.into_iter().zip([&maps[0], &maps[1], &maps[1]]) {
+            let body = Body { radius_m, ..alone };
+            let mut planner = Planner::new(body, 2.0);
+            for (name, message) in names.into_iter().zip(messages) {
+                let map = Arc::new(Costmap::read(&message).unwrap());
                 let began = processor_ms();
-                let planned = planner.plan(map, from, &[to], &Cancellation::default());
+                let planned = planner.plan(&map, from, &[to], &Cancellation::default());
                 let took = processor_ms() - began;
-                let (blocked, _) = map.blocked_and_costs(&body, 1.0);
                 let path = planned.unwrap_or_else(|failure| {
                     assert_eq!(failure.0, Reason::NoPath, "{seed}: {}", failure.1);
                     vec![]
                 });
-                let place = |&[x, y, _]: &[f64; 3]| DVec2::new(x, y);
-                let way: Vec<DVec2> = path
-                    .iter()
-                    .map(|pose| map.place.inverse().transform_point2(place(pose)))
-                    .collect();
+                let (blocked, _) = map.blocked_and_costs(&body, 1.0);
+                let cells = map.place.inverse();
+                let at = |[x, y, _]: [f64; 3]| cells.transform_point2(DVec2::new(x, y));
+                let way: Vec<DVec2> = path.into_iter().map(at).collect();
                 for at in &way {
                     let cell = map.cell_at(*at).unwrap();
                     assert!(!blocked[cell.row * grid.width + cell.col], "{seed}: {name} {at}");
                 }
+                let is_same_map = !name.contains("changed");
+                let is_right = way.is_empty() == shortest.is_empty();
+                assert!(!is_same_map || is_right, "{seed}: {name} has {} poses", way.len());
                 ways.push((name, way, took));
             }
         }
-        for (name, way, _) in ways.iter().filter(|it| !it.0.contains("map")) {
-            let judged = table.entry(name).or_default();
-            judged.false_no += usize::from(exists && way.is_empty());
-            judged.false_yes += usize::from(!exists && !way.is_empty());
-        }
-        let navfn = &ways[1];
-        if plain[cells[0]] < 20.0 || !exists || navfn.1.is_empty() {
+        pairs += usize::from(!shortest.is_empty());
+        let (_, way, reference_took) = &ways[usize::from(nav2.is_some())];
+        let (reference, reference_took) = (judge(&grid, &distances, way), *reference_took);
+        if way.is_empty() || judge(&grid, &distances, &shortest)[0] < 20.0 {
             continue;
         }
-        let reference = judge(&grid, &distances, &navfn.1);
-        if named("BOUND").is_some() {
-            let best = clearest(&grid, &distances, &blocked, cells, 1.15 * reference[0]);
-            table.entry("clearest").or_default().add(best, reference, [0.0, 1.0]);
+        if env::var_os("BOUND").is_some() {
+            let way = clearest(&grid, &distances, &blocked, ends, 1.15 * reference[0]);
+            ways.push(("clearest", way, 0.0));
         }
         for (name, way, took) in ways.iter().filter(|it| !it.1.is_empty()) {
-            let judged = table.entry(name).or_default();
-            judged.add(judge(&grid, &distances, way), reference, [*took, navfn.2]);
+            let [length, mean, least] = judge(&grid, &distances, way);
+            let of = [
+                length / reference[0],
+                mean / reference[1],
+                least / reference[2],
+                took / reference_took,
+            ];
+            let table = ratios.entry(name).or_default();
+            table.iter_mut().zip(of).for_each(|(all, one)| all.push(one));
         }
     }
-    println!(
-        "{pairs} pairs of places, {none} without a way; over NavFn's, median (5 %, 95 %, most):"
-    );
-    println!("planner,n,falsely none,length,mean clearance,least clearance,time");
-    for (name, Judged { ratios, false_no, false_yes }) in &table {
-        assert_eq!(*false_yes, 0, "{name}");
-        print!("{name},{},{false_no}", ratios[0].len());
-        for ratios in ratios {
-            let [low, median, high, most] = shares(ratios);
-            print!(",\"{median:.2} ({low:.2}, {high:.2}, {most:.2})\"");
+    println!("{pairs} pairs of places with a way; over the reference, median (5 %, 95 %):");
+    println!("planner,n,length,mean clearance,least clearance,time");
+    for (name, ratios) in &mut ratios {
+        print!("{name},{}", ratios[0].len());
+        for ratios in &mut *ratios {
+            ratios.sort_by(f64::total_cmp);
+            let [low, median, high] =
+                [0.05, 0.5, 0.95].map(|share| ratios[((ratios.len() - 1) as f64 * share) as usize]);
+            print!(",\"{median:.2} ({low:.2}, {high:.2})\"");
         }
         println!();
-    }
-    for name in ["ours", "ours on costmap"] {
-        let Judged { ratios, false_no, .. } = &table[name];
-        assert_eq!(*false_no, 0);
-        let [length, mean, ..] = ratios.each_ref().map(|ratios| shares(ratios)[1]);
-        assert!(length < 1.1 && mean > 0.98, "{name}: {length} {mean}");
+        let [length, mean] = [0, 1].map(|part| ratios[part][(ratios[part].len() - 1) / 2]);
+        let is_good = length < 1.2 && mean > 1.0;
+        assert!(is_good || !name.starts_with("ours"), "{name}: {length} {mean}");
     }
 }

@@ -1,0 +1,310 @@
+//! Missions in wall-clock time that something disturbs, in one process.
+
+#![allow(clippy::unwrap_used)]
+
+use std::{path::Path, time::Duration};
+
+use common::{
+    mission::Mission,
+    samples::{Cause, FaultKind},
+};
+use mission_control::{outcome::Outcome, target_list::TargetOutcome};
+use processes::stages;
+use simulation::{Disturbance, Quality, Ran, Request, RobotFault, Scenario, Way, What};
+
+fn at(seconds: f64, what: What) -> Disturbance {
+    Disturbance { at: Duration::from_secs_f64(seconds), what }
+}
+
+/// Runs a mission to a target 4 m ahead, with further keys.
+fn ran(keys: &str, disturbances: &[Disturbance]) -> Ran {
+    let text = format!("target = [4, 0]\ntimeout_s = 120\n{keys}");
+    ran_text(&text, disturbances, &[])
+}
+
+/// Runs a mission file. At each wait for a target the operator makes the next request.
+fn ran_text(text: &str, disturbances: &[Disturbance], while_waiting: &[Request]) -> Ran {
+    let mission = Mission::parse(text, Path::new("disturbed.toml")).unwrap();
+    let (disturbances, while_waiting) = (disturbances.to_vec(), while_waiting.to_vec());
+    let ran = Scenario { disturbances, while_waiting, ..Scenario::calm(&mission) }.run();
+    assert!(ran.broken.is_none(), "{:?}", ran.broken);
+    ran
+}
+
+#[test]
+fn a_robot_whose_encoders_cannot_be_true_stands_and_its_mission_ends_with_the_reason() {
+    for fault in [
+        RobotFault::MotorRepeated,
+        RobotFault::EncoderDead,
+        RobotFault::EncoderReversed,
+        RobotFault::CountsRandom,
+    ] {
+        let ran = ran("", &[at(3.0, What::Fault(Some(fault)))]);
+        let ending = ran.finished.unwrap().ending;
+        assert_eq!(ending.outcome.as_str(), "aborted", "{fault:?}: {ending:?}");
+        assert_eq!(ending.cause, Some("odometry implausible for long"), "{fault:?}");
+        let moved_s = ran.moved.unwrap().as_secs_f64() - 3.0;
+        assert!(moved_s < 1.5, "{fault:?}: told to move for {moved_s} s");
+    }
+}
+
+#[test]
+fn a_robot_stands_for_the_time_of_its_fault_and_then_goes_on() {
+    for (fault, cause) in [
+        (RobotFault::RangeInvalid, Cause::RangeSilent),
+        (RobotFault::StreamsStop, Cause::FramesSilent),
+        (RobotFault::Silence, Cause::RobotLost),
+        (RobotFault::FramesSlow, Cause::FramesSlow),
+    ] {
+        let times = [(3.0, Some(fault)), (8.0, None)];
+        let ran =
+            ran("sure_within_m = 9", &times.map(|(time_s, fault)| at(time_s, What::Fault(fault))));
+        let stood = ran.causes.iter().find(|(_, it)| *it == Some(cause));
+        assert!(stood.is_some_and(|(at, _)| *at < Duration::from_secs(8)), "{:?}", ran.causes);
+        let ending = ran.finished.unwrap().ending;
+        assert_eq!(ending.outcome.as_str(), "reached", "{fault:?}: {ending:?}");
+    }
+}
+
+#[test]
+fn a_robot_whose_counts_jump_in_motion_stands_and_its_arrival_is_unsure() {
+    let ran = ran("sure_within_m = 0.5", &[at(4.0, What::Fault(Some(RobotFault::CountsReset)))]);
+    let stood = ran.causes.iter().any(|(_, it)| *it == Some(Cause::OdometryImplausible));
+    assert!(stood, "{:?}", ran.causes);
+    let ending = ran.finished.unwrap().ending;
+    assert_eq!(ending.outcome.as_str(), "reached_unsure", "{ending:?}");
+}
+
+#[test]
+fn a_robot_that_ignores_velocity_0_is_made_to_stand_by_other_means() {
+    let ran = ran(
+        "",
+        &[
+            at(3.0, What::Fault(Some(RobotFault::IgnoresZero))),
+            at(3.5, What::Ask(Request::Stop)),
+            at(8.0, What::End),
+        ],
+    );
+    let last = ran.truth.last().unwrap();
+    assert!(last.v.abs() < 0.01, "{} m/s", last.v);
+}
+
+const SURE: &str = "sure_within_m = 9";
+
+fn assert_reached(ran: &Ran) {
+    let summary = ran.summary.as_ref().unwrap();
+    assert_eq!(summary.outcome, Outcome::Reached, "{summary:?}");
+    assert_untouched(ran);
+}
+
+fn assert_untouched(ran: &Ran) {
+    assert_eq!(ran.truth.last().unwrap().contacts, 0);
+}
+
+fn outcomes(ran: &Ran) -> Vec<TargetOutcome> {
+    ran.finished.as_ref().unwrap().targets.iter().map(|target| target.outcome).collect()
+}
+
+fn stops(ran: &Ran) -> Vec<Cause> {
+    ran.causes.iter().filter_map(|(_, cause)| *cause).collect()
+}
+
+#[test]
+fn a_robot_that_a_broken_planner_or_map_holds_comes_free_by_a_new_planner_or_a_reset_map() {
+    for method in ["evidential", "paper"] {
+        for (stage, fault) in [
+            ("planner", FaultKind::Saddle),
+            ("planner", FaultKind::CorruptField),
+            ("mapper", FaultKind::HazardAroundRobot),
+        ] {
+            let keys = format!("method = '{method}'\n{SURE}");
+            let ran = ran(&keys, &[at(3.0, What::Break(stage, fault))]);
+            assert_reached(&ran);
+            let summary = ran.summary.unwrap();
+            let resets = summary.resets > 0;
+            assert_eq!(resets, stage == "mapper", "{method}, {fault:?}: {summary:?}");
+            assert!(resets || summary.replans > 0, "{method}, {fault:?}: {summary:?}");
+        }
+    }
+}
+
+#[test]
+fn a_robot_cut_off_for_good_resets_its_map_three_times_and_ends_unreachable() {
+    let summary = ran(SURE, &[at(3.0, What::Break("mapper", FaultKind::CutOff))]).summary.unwrap();
+    let found = (summary.outcome, summary.resets, summary.replans);
+    assert_eq!(found, (Outcome::Unreachable, 3, 0), "{summary:?}");
+}
+
+/// Kills each stage, or freezes it, one every two seconds.
+fn each_stage(what: fn(&'static str) -> What) -> Vec<Disturbance> {
+    let stages = stages::TABLE.iter().map(|stage| stage.name);
+    stages.enumerate().map(|(nth, stage)| at(4.0 + 2.0 * nth as f64, what(stage))).collect()
+}
+
+#[test]
+fn a_car_whose_stages_are_each_killed_or_frozen_arrives() {
+    for what in [What::Kill, What::Freeze] {
+        let keys = format!("robot.model = 'car'\ncontroller.speed_m_s = 0.2\n{SURE}");
+        assert_reached(&ran(&keys, &each_stage(what)));
+    }
+}
+
+#[test]
+fn a_stopped_robot_whose_stages_are_each_killed_or_frozen_stands_until_it_is_resumed() {
+    for what in [What::Kill, What::Freeze] {
+        let mut disturbances = each_stage(what);
+        disturbances.push(at(3.0, What::Ask(Request::Stop)));
+        disturbances.push(at(20.0, What::Ask(Request::Resume)));
+        let ran = ran(SURE, &disturbances);
+        assert!(stops(&ran).contains(&Cause::OperatorStop), "{:?}", ran.causes);
+        let place = |time_s: f64| {
+            let tick = ran.truth.iter().find(|tick| tick.time_s > time_s).unwrap();
+            (tick.x, tick.y)
+        };
+        assert_eq!(place(6.0), place(19.0));
+        assert_reached(&ran);
+        let summary = ran.summary.unwrap();
+        // The poses go on, so that the wait is no stall.
+        assert_eq!((summary.replans, summary.resets), (0, 0), "{summary:?}");
+    }
+}
+
+#[test]
+fn a_robot_that_is_sent_elsewhere_in_flight_goes_on_without_a_stop() {
+    let there = [at(3.0, What::Ask(Request::Goto([3.5, -1.0])))];
+    let ran = ran(SURE, &there);
+    assert_reached(&ran);
+    assert_eq!(outcomes(&ran), [TargetOutcome::Replaced, TargetOutcome::Reached]);
+    let mut after = ran.truth.iter().filter(|tick| (3.0..5.5).contains(&tick.time_s));
+    assert!(after.all(|tick| tick.v + tick.omega.abs() > 0.05));
+}
+
+#[test]
+fn a_robot_that_stays_has_a_result_for_each_target_and_no_target_ends_it() {
+    let text = format!(
+        "target = [1, 0]\nstay = true\n{SURE}\ntimeout_s = 120\nperimeter.width_m = 8\n\
+         world.wall = [{{ points = [[2.2, -0.4], [3, -0.4], [3, 0.4], [2.2, 0.4], [2.2, -0.4]] }}]"
+    );
+    let ran = ran_text(&text, &[], &[[1.0, -1.0], [2.6, 0.0], [0.5, 0.8]].map(Request::Goto));
+    use TargetOutcome::{Reached, Unreachable};
+    assert_eq!(outcomes(&ran), [Reached, Reached, Unreachable, Reached]);
+    assert_untouched(&ran);
+    let idle = ran_text("stay = true\nperimeter.width_m = 8", &[], &[]).summary.unwrap();
+    assert_eq!((idle.outcome, idle.targets.len()), (Outcome::Waited, 0));
+}
+
+#[test]
+fn a_hand_drives_a_robot_into_no_hazard_and_it_stands_when_the_hand_goes() {
+    let wall = "target = [4, 0]\nstay = true\nperimeter.width_m = 9\n\
+                world.wall = [{ points = [[3, -3], [3, 3]] }]";
+    let ahead = Request::Hand([1.0, 0.0]);
+    // In one run the hand lets go before the wall, in the other it pushes on.
+    for (pushes, waits, x_m) in [(5, 0, 1.0..2.2), (150, 30, 2.2..2.8)] {
+        let pushes: Vec<_> =
+            (0..pushes).map(|nth| at(3.0 + 0.1 * f64::from(nth), What::Ask(ahead))).collect();
+        let ran = ran_text(wall, &pushes, &vec![ahead; waits]);
+        assert_untouched(&ran);
+        let last = ran.truth.last().unwrap();
+        assert!(last.v.abs() < 0.01 && x_m.contains(&last.x), "{last:?}");
+    }
+}
+
+/// Returns the place of someone who walks 2.4 m at 0.3 m/s from 6 s on.
+fn walker(time_s: f64) -> [f64; 2] {
+    [1.0 + 0.3 * (time_s - 6.0).clamp(0.0, 8.0), -0.8]
+}
+
+#[test]
+fn a_robot_follows_a_walker_past_a_drum_and_stands_while_the_beacon_is_silent() {
+    let keys = "stay = true\nperimeter.width_m = 9\n\
+                world.drum = [{ at = [1.8, 0], radius_m = 0.3 }]\n\
+                [[simulation.thing]]\nshape.drum = [{ at = [1, -0.8], radius_m = 0.2 }]\n\
+                moves = [{ at_s = 6, by = [0, 0] }, { at_s = 14, by = [2.4, 0] }]";
+    // The beacon is silent from 9 to 13 s.
+    let heard = (5..130).map(|nth| f64::from(nth) * 0.2).filter(|at| !(9.0..13.0).contains(at));
+    let mut disturbances: Vec<_> =
+        heard.map(|time_s| at(time_s, What::Beacon(walker(time_s)))).collect();
+    disturbances.push(at(1.2, What::Ask(Request::Follow)));
+    disturbances.push(at(26.0, What::Ask(Request::EndFollow)));
+    let ran = ran(keys, &disturbances);
+    assert_untouched(&ran);
+    let tick = |time_s: f64| ran.truth.iter().find(|tick| tick.time_s > time_s).unwrap();
+    assert!(tick(12.0).v.abs() < 0.01, "{:?}", tick(12.0));
+    let [x, y] = walker(25.0);
+    let off_m = (tick(25.0).x - x).hypot(tick(25.0).y - y);
+    assert!((0.75..1.6).contains(&off_m), "{off_m} m from the walker");
+    let result = ran.finished.unwrap().targets.pop().unwrap();
+    assert_eq!(result.outcome, TargetOutcome::Followed, "{result:?}");
+    let followed = result.followed.unwrap();
+    assert!(followed.lost == 1 && followed.way_m > 1.5, "{result:?}");
+}
+
+#[test]
+fn a_robot_that_is_held_by_a_thing_that_no_sensor_notices_maps_it_and_goes_another_way() {
+    let shape = "[{at=[2,0],size_m=[0.3,0.8],top_m=0.1,echo=0}]";
+    for thing in [
+        format!("world.box = {shape}"),
+        format!("simulation.thing = [{{from_s=3,shape={{box={shape}}}}}]"),
+    ] {
+        let keys = format!("{SURE}\n{thing}\nsimulation.wheels = {{ contact_slip = 0 }}");
+        let summary = ran(&keys, &[]).summary.unwrap();
+        assert_eq!(summary.outcome, Outcome::Reached, "{summary:?}");
+        assert!(summary.replans > 0, "{summary:?}");
+    }
+}
+
+#[test]
+fn a_bump_stops_the_robot_and_lets_it_go_on() {
+    let keys = format!(
+        "{SURE}\nrobot.model = 'kobuki'\nworld.box = [{{at=[2,0],size_m=[0.3,0.8],top_m=0.1}}]"
+    );
+    let ran = ran(&keys, &[]);
+    assert!(stops(&ran).contains(&Cause::Felt), "{:?}", ran.causes);
+    assert_eq!(ran.summary.unwrap().outcome, Outcome::Reached);
+}
+
+#[test]
+fn an_arduino_that_falls_silent_stands_and_drives_on_when_it_answers_again() {
+    let text = include_str!("../../../supervisor/guide/example-arduino/robot.toml");
+    let deaf = Quality { lost: 1.0, ..Quality::default() };
+    let disturbances = [(4.0, deaf), (8.0, Quality::default())]
+        .map(|(time_s, quality)| at(time_s, What::Wire(Way::ToHost, quality)));
+    let ran = ran_text(&format!("{SURE}\n{text}"), &disturbances, &[]);
+    assert!(stops(&ran).contains(&Cause::RobotLost), "{:?}", ran.causes);
+    assert_reached(&ran);
+}
+
+#[test]
+fn no_mission_ends_before_a_robot_rests_that_ignores_velocity_0_and_obeys_disable() {
+    let ran = ran("sure_within_m = 9", &[at(3.0, What::Fault(Some(RobotFault::IgnoresZero)))]);
+    let outcome = ran.finished.unwrap().ending.outcome.as_str();
+    assert!(["reached", "wrong_place"].contains(&outcome), "{outcome}");
+    // The simulation goes on for 6 s after the run.
+    let end_s = ran.simulated.as_secs_f64() - 6.0;
+    let end = ran.truth.iter().rfind(|truth| truth.time_s <= end_s).unwrap();
+    assert!(end_s > 8.0 && end.v.abs() < 0.01, "{} m/s at {end_s} s", end.v);
+}
+
+/// Counts an operator's stops in a mission, whose time they must not use up.
+fn operator_stops(ran: &Ran) -> usize {
+    let summary = ran.summary.as_ref().unwrap();
+    assert_eq!((summary.outcome.as_str(), summary.replans), ("reached", 0), "{summary:?}");
+    ran.causes.iter().filter(|(_, cause)| *cause == Some(Cause::OperatorStop)).count()
+}
+
+#[test]
+fn an_operators_stop_holds_until_the_resume_uses_up_no_mission_time_and_is_no_stall() {
+    let asked = [at(5.0, What::Ask(Request::Stop)), at(125.0, What::Ask(Request::Resume))];
+    let ran = ran("sure_within_m = 9", &asked);
+    assert_eq!(operator_stops(&ran), 1, "{:?}", ran.causes);
+    let held = ran.truth.iter().filter(|truth| (8.0..125.0).contains(&truth.time_s));
+    let speeds: Vec<_> = held.map(|truth| truth.v.abs()).collect();
+    assert!(speeds.len() > 100 && speeds.iter().all(|&speed| speed < 0.01));
+}
+
+#[test]
+fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot_again() {
+    let asked = [(5.0, Request::Stop), (7.0, Request::Resume), (8.0, Request::LateStop)];
+    let ran = ran("sure_within_m = 9", &asked.map(|(time, what)| at(time, What::Ask(what))));
+    assert_eq!(operator_stops(&ran), 1, "{:?}", ran.causes);
+}
