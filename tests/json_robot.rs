@@ -1,4 +1,4 @@
-//! The guide's independent example of a robot of JSON lines, in Python.
+//! Tests of the guide's example robot in Python, which sends JSON lines.
 
 use std::{
     io::{BufRead as _, BufReader},

@@ -43,7 +43,7 @@ fn stages_are_not_taken_for_hung_when_the_supervisor_stood_still_with_them() {
     // A stage that starts while its supervisor has all its files open inherits none.
     let status = run.kill_and_await_successor("planner", Signal::KILL);
     let (own, supervisors) = (descriptors(pid(&status, "planner")), descriptors(run.pid()));
-    // A stage has 61 descriptors of its own. It would inherit 86 of its supervisor's some 200.
+    // A stage opens 61 descriptors. A leak would add 86 of the supervisor's approximately 200.
     assert!(2 * own < supervisors, "{own} of {supervisors}");
     run.stop();
 }

@@ -10,7 +10,6 @@ use std::{
     num::NonZero,
     path::{Path, PathBuf},
     process::ExitCode,
-    thread,
     time::{Duration, Instant},
 };
 
@@ -29,7 +28,7 @@ use simulation::{Request, Scenario};
 use crate::{
     error::{OrCannot as _, Result},
     missions::{
-        runner::in_parallel,
+        runner::{at_once, in_parallel},
         trial::{Trial, swept_m},
     },
     robot::{self, Run},
@@ -86,7 +85,6 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let directory = arguments.out.as_deref().unwrap_or(own.path());
     let jobs: Vec<_> = (0..).zip(found.trials).collect();
     let all = jobs.len();
-    let threads = arguments.jobs.or(thread::available_parallelism().ok()).map_or(1, NonZero::get);
     let began = Instant::now();
     let mut differ = 0;
     let drive = |(number, trial): &(u64, Trial), thread| {
@@ -96,7 +94,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         let compared = job.compare().map_err(|error| error.to_string());
         (trial.mission.name.clone(), compared)
     };
-    in_parallel(jobs, threads, drive, |(world, compared)| {
+    in_parallel(jobs, at_once(arguments.jobs), drive, |(world, compared)| {
         if let Some(difference) = compared.map_err(|error| format!("{world}: {error}"))? {
             differ += 1;
             print_line(format!("{world}: {difference}"))?;

@@ -9,7 +9,6 @@ use std::{
     num::NonZero,
     path::{Path, PathBuf},
     rc::Rc,
-    thread,
 };
 
 use clap::Args;
@@ -21,7 +20,7 @@ use common::{
         CommandSample, FixSample, PoseSample, RangeReading, RangeStatus, RangesHeader, TurnSample,
     },
     topics,
-    wire::COUNT_CYCLE,
+    wire::counts_between,
 };
 use console::{missions, output::print_line};
 use glam::{DMat2, DVec2};
@@ -29,7 +28,10 @@ use simulation::{Load, Observer, Random, Scenario};
 
 use crate::{
     error::{OrCannot as _, Result},
-    missions::{runner::in_parallel, trial::swept_m},
+    missions::{
+        runner::{at_once, in_parallel},
+        trial::swept_m,
+    },
     simulate,
     worlds::{self, Asked},
 };
@@ -110,7 +112,6 @@ struct Residual {
 }
 
 struct Drawn {
-    number: u64,
     robot: &'static str,
     scenario: Scenario,
 }
@@ -121,17 +122,14 @@ pub fn main(arguments: &Arguments) -> Result {
     std::fs::create_dir_all(directory).or_cannot_file("make", directory)?;
     let mut rows = csv::Writer::from_path(directory.join("residuals.csv"))?;
     rows.write_record(["mission", "robot", "residual", "tick", "value"])?;
-    let threads = arguments.jobs.or(thread::available_parallelism().ok()).map_or(1, NonZero::get);
     let mut all: BTreeMap<(&str, Source), Vec<f64>> = BTreeMap::new();
     let drive = |&number: &u64, _: usize| {
         let _quiet = simulate::quietly();
-        let driven = draw(seed, number).and_then(|drawn| {
-            let residuals = residuals(&drawn)?;
-            Ok((drawn.number, drawn.robot, residuals))
-        });
-        driven.map_err(|error| error.to_string())
+        let driven = draw(seed, number)
+            .and_then(|Drawn { robot, scenario }| Ok((number, robot, residuals(&scenario)?)));
+        driven.map_err(|error| format!("mission {number}: {error}"))
     };
-    in_parallel((0..count).collect(), threads, drive, |driven| {
+    in_parallel((0..count).collect(), at_once(arguments.jobs), drive, |driven| {
         let (number, robot, residuals) = driven?;
         for Residual { source, tick, value } in residuals {
             let name = format!("{source:?}");
@@ -182,15 +180,14 @@ fn draw(seed: u64, number: u64) -> Result<Drawn> {
     mission.seed = random.bits() >> 1;
     let loads = [Load::IDLE, Load::BUSY, Load::OVERLOADED];
     let load = loads[random.below(loads.len())];
-    Ok(Drawn { number, robot, scenario: Scenario { load, ..Scenario::calm(&mission) } })
+    Ok(Drawn { robot, scenario: Scenario { load, ..Scenario::calm(&mission) } })
 }
 
-fn residuals(drawn: &Drawn) -> Result<Vec<Residual>> {
-    let mission = &drawn.scenario.mission;
-    let watch = Rc::new(RefCell::new(Watch::new(mission)));
-    let ran = drawn.scenario.run_before(Some(Box::new(Watcher(Rc::clone(&watch)))));
+fn residuals(scenario: &Scenario) -> Result<Vec<Residual>> {
+    let watch = Rc::new(RefCell::new(Watch::new(&scenario.mission)));
+    let ran = scenario.run_before(Some(Box::new(Rc::clone(&watch))));
     if let Some(broken) = ran.broken {
-        return Err(format!("mission {}: {broken}", drawn.number).into());
+        return Err(broken.to_string().into());
     }
     let watch = Rc::into_inner(watch).map(RefCell::into_inner);
     let mut watch = watch.ok_or("the simulation still watches a run that has ended")?;
@@ -199,24 +196,20 @@ fn residuals(drawn: &Drawn) -> Result<Vec<Residual>> {
     Ok(watch.found)
 }
 
-struct Watcher(Rc<RefCell<Watch>>);
-
-impl Observer for Watcher {
+impl Observer for Watch {
     fn on_bus(&mut self, bus: &Bus) {
-        let mut watch = self.0.borrow_mut();
         match Readers::open(bus) {
-            Ok(readers) => watch.readers = Some(readers),
-            Err(error) => watch.failed = Some(error),
+            Ok(readers) => self.readers = Some(readers),
+            Err(error) => self.failed = Some(error),
         }
     }
 
     fn observe(&mut self) {
-        let mut watch = self.0.borrow_mut();
-        if let Some(mut readers) = watch.readers.take() {
-            if let Err(error) = watch.take(&mut readers) {
-                watch.failed = Some(error);
+        if let Some(mut readers) = self.readers.take() {
+            if let Err(error) = self.take(&mut readers) {
+                self.failed = Some(error);
             }
-            watch.readers = Some(readers);
+            self.readers = Some(readers);
         }
     }
 }
@@ -339,10 +332,7 @@ impl Watch {
     }
 
     fn metres(&self, from: u16, to: u16) -> f64 {
-        let cycle = i32::from(COUNT_CYCLE);
-        let counts = (i32::from(to) - i32::from(from)).rem_euclid(cycle);
-        let signed = if counts > cycle / 2 { counts - cycle } else { counts };
-        f64::from(signed) * self.metres_per_count
+        f64::from(counts_between(from, to)) * self.metres_per_count
     }
 
     /// Compares an echo with the last one of its sensor.
@@ -350,7 +340,7 @@ impl Watch {
         let Some(sensor) = self.sensors.get(usize::from(reading.sensor)) else { return };
         let is_echo = sensor.kind == SensorKind::Cone && reading.status() == RangeStatus::Measured;
         let Some(now) = self.poses.len().checked_sub(1).filter(|_| is_echo) else { return };
-        let axis = sensor.mount.bearing_rad + sensor.mount.turned_rad;
+        let axis = sensor.mount.looks_rad();
         let last = self.echoes.insert(reading.sensor, (now, reading.range_m));
         let Some((before, range_m)) = last else { return };
         let [before, now] = [before, now].map(|at| &self.poses[at]);

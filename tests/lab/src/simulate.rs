@@ -17,6 +17,7 @@ use recording::{
     Recording, RecordingError, Tape,
     replay::{Options, replay},
 };
+use serde::Serialize;
 use simulation::{Broken, Observer, Ran, Scenario};
 use tracing::subscriber::{DefaultGuard, NoSubscriber, set_default};
 
@@ -84,38 +85,39 @@ impl Totals {
         let is_new = !file.exists();
         let file =
             File::options().create(true).append(true).open(file).or_cannot("open the rows")?;
-        let mut writer = csv::Writer::from_writer(file);
-        if is_new {
-            writer.write_record(HEADINGS)?;
-        }
-        writer.write_record([
-            "seeds",
-            &arguments.mission,
-            &first.to_string(),
-            &arguments.count.to_string(),
-            &self.broken.to_string(),
-            &self.disturbances.to_string(),
-            &self.supervisors_killed.to_string(),
-            &self.events.to_string(),
-            &format!("{:.1}", self.simulated_s / 3600.0),
-            &format!("{minutes:.1}"),
-        ])?;
+        let mut writer = csv::WriterBuilder::new().has_headers(is_new).from_writer(file);
+        writer.serialize(Row {
+            section: "seeds",
+            mission: &arguments.mission,
+            first,
+            runs: arguments.count,
+            broken: self.broken,
+            disturbances: self.disturbances,
+            supervisors_killed: self.supervisors_killed,
+            events: self.events,
+            hours: format!("{:.1}", self.simulated_s / 3600.0),
+            minutes: format!("{minutes:.1}"),
+        })?;
         Ok(writer.flush()?)
     }
 }
 
-const HEADINGS: [&str; 10] = [
-    "section",
-    "mission",
-    "first seed",
-    "runs",
-    "broken",
-    "disturbances",
-    "supervisors killed",
-    "events",
-    "hours of mission",
-    "minutes",
-];
+#[derive(Serialize)]
+struct Row<'a> {
+    section: &'static str,
+    mission: &'a str,
+    #[serde(rename = "first seed")]
+    first: u64,
+    runs: u64,
+    broken: u64,
+    disturbances: usize,
+    #[serde(rename = "supervisors killed")]
+    supervisors_killed: u32,
+    events: u64,
+    #[serde(rename = "hours of mission")]
+    hours: String,
+    minutes: String,
+}
 
 /// Keeps what simulated processes log from the terminal, unless `FIRSTHAND_LOG` asks for it.
 pub fn quietly() -> Option<DefaultGuard> {
@@ -187,8 +189,7 @@ fn run(scenario: &Scenario, arguments: &Arguments) -> Result<Ran> {
 pub fn record(scenario: &Scenario, out: &Path) -> Result<Ran> {
     let tape = Tape::new(&Scenario::robot(), Scenario::directory(), out.to_path_buf());
     let recorder = Rc::new(RefCell::new(Recorder { tape, failed: Ok(()) }));
-    let shared = Shared(Rc::clone(&recorder));
-    let ran = scenario.run_before(Some(Box::new(shared)));
+    let ran = scenario.run_before(Some(Box::new(Rc::clone(&recorder))));
     if let Some(Recorder { tape, failed }) = Rc::into_inner(recorder).map(RefCell::into_inner) {
         failed?;
         tape.finish()?;
@@ -210,15 +211,13 @@ impl Recorder {
     }
 }
 
-struct Shared(Rc<RefCell<Recorder>>);
-
-impl Observer for Shared {
+impl Observer for Recorder {
     fn on_bus(&mut self, bus: &Bus) {
-        self.0.borrow_mut().record(|tape| tape.attach(bus));
+        self.record(|tape| tape.attach(bus));
     }
 
     fn observe(&mut self) {
-        self.0.borrow_mut().record(Tape::take);
+        self.record(Tape::take);
     }
 }
 

@@ -231,6 +231,17 @@ pub trait Observer {
     fn observe(&mut self);
 }
 
+/// A shared observer, which its owner reads after the run.
+impl<T: Observer> Observer for Rc<RefCell<T>> {
+    fn on_bus(&mut self, bus: &Bus) {
+        self.borrow_mut().on_bus(bus);
+    }
+
+    fn observe(&mut self) {
+        self.borrow_mut().observe();
+    }
+}
+
 /// What came of a run.
 pub struct Ran {
     /// `None` if an invariant broke or the scenario ended.

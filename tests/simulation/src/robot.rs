@@ -14,7 +14,7 @@ pub(crate) struct Robot {
 
 impl Robot {
     pub(crate) fn start(mission: &Mission, pace: Pace) -> Result<Self, SimError> {
-        let mut robot = Self { robot: InMemory::start(mission, pace, None)?, truth: Vec::new() };
+        let mut robot = Self { robot: InMemory::start(mission, pace)?, truth: Vec::new() };
         robot.observe();
         Ok(robot)
     }

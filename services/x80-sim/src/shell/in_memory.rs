@@ -14,7 +14,6 @@ use common::{
 use super::session::Session;
 use crate::{
     error::Result,
-    saved_state::SavedState,
     transport::{Source, Way},
 };
 
@@ -26,14 +25,13 @@ pub struct InMemory {
 }
 
 impl InMemory {
-    /// Starts the robot, at the place where an earlier one came to rest.
-    pub fn start(mission: &Mission, pace: Pace, earlier: Option<&SavedState>) -> Result<Self> {
+    pub fn start(mission: &Mission, pace: Pace) -> Result<Self> {
         let ((host, sent), (told, truth)) = (channel(), channel());
         // Without a reader, the ground truth is lost.
         let tell = Box::new(move |tick| {
             let _ = told.send(tick);
         });
-        let (robot, ways) = (super::robot(mission, earlier), (Way::to(host), None));
+        let (robot, ways) = (super::robot(mission, None), (Way::to(host), None));
         let session = Session::new(mission, robot, pace, ways, tell, (None, None))?;
         Ok(Self { session, sent, truth })
     }
@@ -63,10 +61,5 @@ impl InMemory {
 
     pub fn truth(&mut self) -> impl Iterator<Item = GroundTruthTick> {
         self.truth.try_iter()
-    }
-
-    /// The robot comes to rest, where the next one starts.
-    pub fn end(self) -> Result<SavedState> {
-        self.session.end()
     }
 }

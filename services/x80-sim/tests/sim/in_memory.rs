@@ -41,7 +41,7 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
     ] {
         let sim = Sim::start(text, Pace::Max);
         let hosts = [(HOST, sim.host()), (LASER, sim.host())];
-        let mut robot = InMemory::start(&mission(text), Pace::Max, None).unwrap();
+        let mut robot = InMemory::start(&mission(text), Pace::Max).unwrap();
         assert_eq!(robot.next_due_ns(), None);
         let mut buffer = vec![0; 65_536];
         for order in orders.iter().cycle().take(60) {

@@ -8,7 +8,7 @@ use super::*;
 
 const ADDRESS: &str = "udp://127.0.0.1:5600";
 
-/// A robot of JSON that has said `line` so often, twenty times a second.
+/// A JSON robot that has sent `line` `times` times, at 20 Hz.
 fn said(line: &str, times: u32) -> Seen {
     let mut seen = Seen::new(Protocol::Json).unwrap();
     for time in 0..times {

@@ -117,7 +117,7 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
         }
     }
     let first = all - left.len();
-    let threads = plan.jobs.or(thread::available_parallelism().ok()).map_or(1, NonZero::get);
+    let threads = at_once(plan.jobs);
     let (began, mut ended, mut line) = (Instant::now(), 0, ProgressLine::new(LINE_EVERY));
     let run = |job: &Job<'_>, thread| {
         let ended = match job.run(thread) {
@@ -153,6 +153,11 @@ fn noises(seed: u64) -> impl Iterator<Item = u64> {
 
 fn world_file(directory: &Path, world: &str) -> PathBuf {
     directory.join("worlds").join(format!("{world}.toml"))
+}
+
+/// Returns the number of missions at once; by default one per processor.
+pub fn at_once(jobs: Option<NonZero<usize>>) -> usize {
+    jobs.or(thread::available_parallelism().ok()).map_or(1, NonZero::get)
 }
 
 /// Runs `jobs` on numbered threads, and takes results in order of completion.
