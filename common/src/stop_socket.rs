@@ -141,6 +141,8 @@ impl Operator {
         // An abstract name leaves no file.
         let name = format!("firsthand-operator-{}-{}", std::process::id(), monotonic_ns());
         let socket = UnixDatagram::bind_addr(&SocketAddr::from_abstract_name(name)?)?;
+        // The queue of a frozen process is full after a few requests.
+        socket.set_nonblocking(true)?;
         match socket.connect(path) {
             Ok(()) => Ok(Some(Self { socket })),
             Err(error) => match error.kind() {
@@ -152,6 +154,15 @@ impl Operator {
 
     pub fn send(&self, request: Request) -> io::Result<()> {
         self.socket.send(&[request as u8]).map(drop)
+    }
+
+    /// Returns whether the process at the other end lives.
+    pub fn is_heard(&self) -> bool {
+        // A datagram without a byte is no request. A full queue has a reader.
+        matches!(
+            self.socket.send(&[]).map_err(|error| error.kind()),
+            Ok(_) | Err(io::ErrorKind::WouldBlock)
+        )
     }
 
     /// Waits up to `patience`. Fails if the link is gone.

@@ -112,15 +112,10 @@ pub fn stand(robot: &RobotName) -> Result<Untold> {
     let domain = robot.domain();
     refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
-    let link = Operator::connect(&domain.stop_socket())
-        .map_err(system("open a socket to the link"))?
-        .filter(|link| {
-            let answer = link.send(Request::Stop).and_then(|()| link.answer(LINK_ANSWERS));
-            matches!(answer, Ok(Some(_)))
-        });
+    let link = told_link(&domain)?;
     let run = Run::load(&domain.run_directory());
     if link.is_none() && run.is_err() && owes_stop(robot) {
-        return match rests_by(&guard(&domain)?) {
+        return match comes_to_rest(&domain, None)? {
             true => Ok(None),
             false => Err(not_at_rest(
                 robot,
@@ -133,14 +128,7 @@ pub fn stand(robot: &RobotName) -> Result<Untold> {
         return await_rest(robot, stopped_for_good).map(|()| None);
     }
     let supervisor = tell_supervisor(robot, asked_ns)?;
-    let rests = match (link, run) {
-        (Some(link), _) => rests_by(&link),
-        // An unresponsive link sends no commands.
-        (None, Ok(_)) if owes_stop(robot) => rests_by(&guard(&domain)?),
-        // The robot was seen at rest, without a later order to move.
-        (None, Ok(_)) => true,
-        (None, Err(_)) => false,
-    };
+    let rests = comes_to_rest(&domain, link)?;
     let told = told(supervisor);
     if rests {
         return Ok(told.err().map(|why| why.to_string()));
@@ -230,15 +218,46 @@ pub fn sign_off(robot: &RobotName) -> Result {
     Ok(())
 }
 
-fn rests_by(link: &Operator) -> bool {
-    let began = Instant::now();
+/// Tells the link to stop the robot. Returns `None` if no link answers, which then sends no
+/// commands either.
+fn told_link(domain: &Domain) -> Result<Option<Operator>> {
+    let link = Operator::connect(&domain.stop_socket());
+    let link = link.map_err(system("open a socket to the link"))?;
+    Ok(link.filter(|link| {
+        let answer = link.send(Request::Stop).and_then(|()| link.answer(LINK_ANSWERS));
+        matches!(answer, Ok(Some(_)))
+    }))
+}
+
+/// Waits until the robot rests, as `link` sees it, or as whoever follows a link that dies: the next
+/// link or the stop guard.
+fn comes_to_rest(domain: &Domain, mut link: Option<Operator>) -> Result<bool> {
     loop {
-        match link.answer(REST_PATIENCE.saturating_sub(began.elapsed())) {
-            Ok(Some(Answer::AtRest)) => return true,
+        let seen_by = match link {
+            Some(link) => link,
+            None if owes_stop(&domain.robot) => guard(domain)?,
+            // The robot was seen at rest, without a later order to move.
+            None => return Ok(true),
+        };
+        if let Some(rests) = rests_by(&seen_by) {
+            return Ok(rests);
+        }
+        link = told_link(domain)?;
+    }
+}
+
+/// Returns whether the robot rests; `None` if the process that sees it dies first.
+fn rests_by(seen_by: &Operator) -> Option<bool> {
+    let began = Instant::now();
+    while began.elapsed() < REST_PATIENCE {
+        match seen_by.answer(LINK_ANSWERS) {
+            Ok(Some(Answer::AtRest)) => return Some(true),
+            Ok(None) if seen_by.is_heard() => {}
+            Ok(None) | Err(_) => return None,
             Ok(Some(Answer::Heard | Answer::Sees(..))) => {}
-            Ok(None) | Err(_) => return false,
         }
     }
+    Some(false)
 }
 
 /// Returns this program, even if its file was replaced, or the one beside a viewer.
@@ -464,4 +483,21 @@ pub fn find<T>(
         );
         OperatorError::refused("no-answer", message)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use common::stop_socket::StopSocket;
+
+    use super::*;
+
+    #[test]
+    fn a_link_that_dies_after_it_heard_the_stop_leaves_the_answer_to_who_follows_it() {
+        let domain = Domain::of(format!("dies-{}", std::process::id()).parse().unwrap());
+        let link = StopSocket::bind(domain.stop_socket()).unwrap();
+        let told = Operator::connect(&domain.stop_socket()).unwrap().unwrap();
+        drop(link);
+        assert!(comes_to_rest(&domain, Some(told)).unwrap());
+        fs::remove_dir_all(domain.directory()).unwrap();
+    }
 }
