@@ -11,14 +11,15 @@ use crate::failsafe::{
 };
 
 impl Link {
+    /// Decides on all that is known now. Time alone may add a cause.
     pub(super) fn decide(&mut self) -> Decision {
+        self.observe(Observation::Time);
         self.failsafe.decide(self.in_ticks(), self.moment())
     }
 
     /// Stops the robot when it must not move. In lockstep the link only withholds commands: mission
     /// time stands still, so the run continues as if never held.
     pub(super) fn guard(&mut self) {
-        self.observe(Observation::Time);
         let now = self.decide();
         let before = std::mem::replace(&mut self.decision, now);
         if now.cause == Cause::AnotherCommander {
