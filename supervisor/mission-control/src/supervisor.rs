@@ -10,8 +10,8 @@ use common::{
     mission::Mission,
     run::Run,
     samples::{
-        DirectiveSample, HoldReason, Order, PlaceSample, RosterHeader, TickLimitSample, ZoneCorner,
-        ZonesHeader, name_str,
+        Cause, DirectiveSample, HoldReason, Order, PlaceSample, RosterHeader, TickLimitSample,
+        ZoneCorner, ZonesHeader, name_str,
     },
     topics,
 };
@@ -224,7 +224,12 @@ impl<'a> Supervisor<'a> {
         let first_tick = self.first_tick();
         let asked = self.take_requests(first_tick)?;
         let died = self.poll_processes(first_tick)?;
-        let driving = self.decision.order() == Order::Drive;
+        // Without frames, no later tick brings what a stage has missed of the newest one.
+        let frames_come =
+            self.bus.observer.record.link.is_some_and(|link| {
+                !matches!(link.cause(), Cause::RobotLost | Cause::FramesSilent)
+            });
+        let driving = self.decision.order() == Order::Drive && frames_come;
         self.stages.check_outputs(driving, first_tick);
         let simulator_ended = !self.robot.poll()?;
         if self.decide_order() || roster_changed || died || asked || next {
