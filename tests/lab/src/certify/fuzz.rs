@@ -26,7 +26,7 @@ use crate::{
 };
 
 /// Inputs from coverage-guided fuzzing, and a recording's first bytes.
-const X80: &str = include_str!("../../../../common/x80-protocol/fuzz/decoder-corpus.hex");
+const X80: &str = include_str!("../../../../common/wire/x80/fuzz/decoder-corpus.hex");
 const RECORDING: &[u8] = include_bytes!("../../../golden/open-room.mcap");
 const PGM: &str = "P5\n4 4\n255\n0123456789abcdef";
 const JSON: &str = "{\"clock_s\":12.5,\"wheels\":[1.5,2],\"speeds\":[0,1],\"ranges\":{\"front\":null,\"left\":1e308},\"scan\":[1,null,-1],\"scan_age_s\":0.1,\"scan_time_s\":0.1,\"heard\":1}\n{\"odometry\":[0,1,2],\"held\":[true,false],\"touched\":{\"bumper\":true},\"battery_v\":12,\"scans\":{\"a\":{\"ranges\":[1]}}}\n";

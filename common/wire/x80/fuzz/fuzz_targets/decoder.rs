@@ -1,5 +1,5 @@
 //! Fuzz target of the decoder. The lines of `decoder-corpus.hex` are the inputs that fuzzing found;
-//! in `common/x80-protocol/fuzz`, convert them to files for cargo-fuzz:
+//! in `common/wire/x80/fuzz`, convert them to files for cargo-fuzz:
 //!
 //! ```sh
 //! mkdir -p corpus/decoder

@@ -1,6 +1,6 @@
 //! Runs the decoder on the fuzzing corpus and on bounded random changes of it.
 //!
-//! The target in `common/x80-protocol/fuzz` describes the long run.
+//! The target in `common/wire/x80/fuzz` describes the long run.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test")]
 
 #[path = "../fuzz/oracle.rs"]

@@ -10,7 +10,7 @@ use recording::Recording;
 use crate::{content::Content, html};
 
 #[allow(unreachable_pub, reason = "the system tests share it")]
-#[path = "../../../tests/support/recorded_page.rs"]
+#[path = "../../../../tests/support/recorded_page.rs"]
 mod recorded_page;
 use recorded_page::messages;
 
@@ -19,7 +19,7 @@ fn golden() -> Content {
 }
 
 fn golden_of(name: &str) -> Content {
-    let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden");
+    let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/golden");
     let file = format!("{golden}/{name}.mcap");
     Content::read(&recording::files(Path::new(&file)).unwrap()).unwrap()
 }
@@ -80,7 +80,7 @@ fn text_of_a_recording_is_never_markup() {
 
 #[test]
 fn a_recording_that_is_cut_off_gives_a_report_that_says_so() {
-    let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/golden/open-room.mcap");
+    let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/golden/open-room.mcap");
     let bytes = std::fs::read(whole).unwrap();
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("cut.mcap");
