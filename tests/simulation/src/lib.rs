@@ -52,7 +52,7 @@ use self::{
 
 /// Directory of the run, which exists only on the simulated machine.
 const DIRECTORY: &str = "/simulation/run";
-/// Longest run, beyond the mission's timeout.
+/// Longest run, beyond the timeouts of its targets.
 const LATE: Duration = Duration::from_secs(120);
 /// Time that is watched after a run.
 const AFTERWARDS: Duration = Duration::from_secs(6);
@@ -156,7 +156,12 @@ impl Scenario {
                 return None;
             }
         }
-        machine.end_after(Duration::from_secs_f64(self.mission.timeout_s) + LATE);
+        // Each target has its own timeout.
+        let is_target =
+            |it: &&Disturbance| matches!(it.what, What::Ask(Request::Goto(_) | Request::Append(_)));
+        let asked = self.disturbances.iter().filter(is_target).count();
+        let targets = self.mission.targets.len().max(1) + asked;
+        machine.end_after(Duration::from_secs_f64(self.mission.timeout_s * targets as f64) + LATE);
         let directory = Self::directory();
         let mut random = Random::new(self.seed, 4);
         let mut recovered = None;
