@@ -284,7 +284,7 @@ fn sonars_tell_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecide
 #[test]
 fn a_laser_tells_all_swapped_and_reversed_motors_and_encoders_right_or_as_undecided() {
     let mission = mission();
-    for motors in all_wires() {
+    let tells = |motors: Wires| {
         for encoders in [motors.map(|(_, sign)| sign), [1.0, 1.0], [-1.0, 1.0]] {
             let encoders = [0, 1].map(|it| (motors[it].0, encoders[it]));
             let robot = Robot { motors, encoders, ..RIGHT };
@@ -305,7 +305,12 @@ fn a_laser_tells_all_swapped_and_reversed_motors_and_encoders_right_or_as_undeci
                 "{motors:?} {encoders:?}: {found:?}"
             );
         }
-    }
+    };
+    std::thread::scope(|threads| {
+        for motors in all_wires() {
+            threads.spawn(move || tells(motors));
+        }
+    });
 }
 
 #[test]

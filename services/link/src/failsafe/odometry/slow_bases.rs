@@ -6,7 +6,7 @@ use super::*;
 use crate::testing::mission;
 
 const PERIOD_S: f64 = 0.1;
-const SEEDS: u64 = 6;
+const SEEDS: u64 = 2;
 const COUNTS_PER_M: f64 = 7162.0;
 const MISSION: &str = "[robot]
 protocol = 'json'

@@ -1,4 +1,4 @@
-//! Model check of every history of twelve events around an operator's stop: the real step beside a
+//! Model check of every history of eleven events around an operator's stop: the real step beside a
 //! plain model of its peers.
 //!
 //! The search is breadth first, and continues equal states once. States are equal if everything
@@ -22,7 +22,7 @@ use crate::failsafe::{
 
 /// Least clock reading, above all other numbers.
 const BEGAN_NS: u64 = 1_000_000_000_000_000;
-const DEPTH: usize = 12;
+const DEPTH: usize = 11;
 const TICK_MS: u64 = 100;
 /// Longest deadline: greater ages are equal.
 const OLD_NS: u64 = 2_400_000_000;

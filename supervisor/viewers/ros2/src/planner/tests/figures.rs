@@ -254,7 +254,7 @@ impl Nav2 {
 }
 
 fn maps() -> Vec<Grid> {
-    let named = env::var("MAPS").unwrap_or("40".to_owned());
+    let named = env::var("MAPS").unwrap_or("12".to_owned());
     if let Ok(count) = named.parse() {
         return (0..count).map(Grid::random).collect();
     }
