@@ -93,7 +93,7 @@ impl Mission {
             remedy,
         })?;
         assert!(mission.target.is_finite() && mission.contains(mission.start.at));
-        assert!(mission.speed_m_s() >= 0.0 && mission.turn_rad_s() > 0.0);
+        assert!(mission.speed_m_s() > 0.0 && mission.turn_rad_s() > 0.0);
         Ok(mission)
     }
 
@@ -356,6 +356,12 @@ fn stages(mission: &Mission) -> Result {
         ("mapper.clearance_m", mapper.clearance_m, 0.0..=1.0, "m"),
         ("mapper.forget_after_s", mapper.forget_after_s.unwrap_or(1e3), 10.0..=1e7, "s"),
     ])?;
+    refuse_if(
+        mission.speed_m_s() < 0.001,
+        "controller.speed_m_s",
+        "no sensor looks beyond the body, so no speed lets the robot stop on seen ground",
+        "mount a sensor that looks ahead, or correct robot.radius_m",
+    )?;
     refuse_if(
         mapper.forget_after_s.is_some() && mission.method == Method::Paper,
         "mapper.forget_after_s",

@@ -174,7 +174,8 @@ impl Anchor {
         let (shared, stated) = (fix.shares(), fix.noise());
         let drift = self.drift(shared);
         let shrunk = SMatrix::from_diagonal(&SVector::from([0, 1, 2].map(|part| {
-            let all = stated[(part, part)];
+            // A fix without a heading states 0.
+            let all = stated[(part, part)].max(LEAST_VARIANCES[part]);
             ((all - shared[part] + drift[part]).max(LEAST_VARIANCES[part]) / all).sqrt()
         })));
         Fix { covariance: upper(shrunk * stated * shrunk), ..*fix }

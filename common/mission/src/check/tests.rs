@@ -144,6 +144,8 @@ fn no_robot_is_faster_than_it_rests_within_its_sight_and_one_that_is_to_be_is_re
         let mission = mission(keys);
         assert_eq!((mission.speed_m_s(), mission.remarks.len()), (speed_m_s, 0), "{keys}");
     }
+    let blind = "robot.radius_m = 3\nrobot.track_m = 1\ncontroller.speed_m_s = 0.2";
+    assert_refused([(blind, "looks beyond the body")]);
     assert_refused([(format!("{heavy} = 2"), "2 m/s is out of range")]);
 }
 

@@ -157,6 +157,9 @@ fn no_number_of_fixes_makes_the_pose_surer_than_the_error_that_they_share() {
     assert!((run.deviation_m() - 0.2).abs() < 0.01, "{}", run.deviation_m());
     run.wind(200, |robot| vec![robot.fix()]);
     assert!(run.deviation_m() < 0.05, "fixes of another source do");
+    let before = run.reckoning.sample().fixes;
+    run.wind(1, |robot| vec![FixSample { shared: [0.04, 0.0], ..robot.fix() }]);
+    assert_eq!(run.reckoning.sample().fixes, before + 1, "and those of the first stay in use");
 }
 
 #[test]

@@ -25,6 +25,7 @@ static FILES: &[(&str, &str)] = stored! {
     "claims" in "results/claims.csv",
     "stop-times" in "results/stop_times.csv",
     "corpus" in "results/corpus.csv",
+    "seeds" in "results/seeds.csv",
     "tick" in "results/tick.csv",
     "tick-at-7-hz" in "results/tick_at_7_hz.csv",
     "field" in "results/field.csv",
