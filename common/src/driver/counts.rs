@@ -32,7 +32,8 @@ impl WheelCounts {
         match self {
             Self::Cyclic(counts) => counts,
             Self::Endless(counts) => {
-                counts.map(|count| count.rem_euclid(COUNT_CYCLE.into()) as u16)
+                // A float slightly below 0 would round up to a whole cycle.
+                counts.map(|count| (count.floor() as i64).rem_euclid(COUNT_CYCLE.into()) as u16)
             }
         }
     }
@@ -91,6 +92,7 @@ mod tests {
         assert!(WheelCounts::Endless([3.0, -2.0]).restarted_since(after));
         let near = WheelCounts::Cyclic([32_760, 10]);
         assert_eq!(WheelCounts::Endless([2.0, 20.0]).since(near), [10.0, 10.0]);
+        assert_eq!(WheelCounts::Endless([-1e-20, 32_768.5]).cyclic(), [32_767, 0]);
         let hostile = CountsSample { left_counts: f64::NAN, ..CountsSample::default() };
         let counts = WheelCounts::of(&WheelSample::default(), Some(&hostile));
         assert_eq!(counts, WheelCounts::Cyclic([0; 2]));
