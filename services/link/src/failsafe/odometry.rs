@@ -428,7 +428,7 @@ impl Odometry {
         self.frame = None;
         self.shares.interrupt();
         self.clear_evidence();
-        self.fit.reset();
+        self.fit = ResponseFit::new(self.axle);
         self.contacts.reset();
         self.jumps.clear();
         self.recoveries = 0;

@@ -153,11 +153,6 @@ impl ResponseFit {
         self.axle.track_m.map_or(1, |_| CHANNELS)
     }
 
-    pub(super) fn reset(&mut self) {
-        self.commands.clear();
-        self.turned.clear();
-    }
-
     /// Returns the best response for both motion and suspicion, with the lag of `stated`. Wheels
     /// that do not drive are left out.
     pub(super) fn explain(&self, stated: Response, suspected: Suspected) -> Option<Response> {
@@ -561,8 +556,11 @@ mod tests {
             let dead = found.dead_time_s();
             assert!((dead - delay_s).abs() < 0.06, "{delay_s} {acceleration}: {found:?}");
             if acceleration < 1.0 {
-                let share = found.acceleration_m_s2 / acceleration;
-                assert!((0.7..=1.4).contains(&share), "{delay_s} {acceleration}: {found:?}");
+                // A rim of the turning robot is 0.15 m from its middle.
+                for rim in [found.acceleration_m_s2, 0.15 * found.turn_acceleration_rad_s2] {
+                    let share = rim / acceleration;
+                    assert!((0.7..=1.4).contains(&share), "{delay_s} {acceleration}: {found:?}");
+                }
             }
         }
         assert!(explained([0.2, 0.6], SLIPS).is_some());
@@ -611,6 +609,15 @@ mod tests {
             let is_right = |found: f64| is_found && (found - late_s).abs() < 0.11;
             assert!(found.map_or(!is_found, is_right), "{late_s}: {found:?}");
         }
+    }
+
+    #[test]
+    fn frames_of_one_time_add_up() {
+        let mut fit = ResponseFit::new(AXLE);
+        for _ in 0..2 {
+            fit.turned(Some([3.0, 5.0]), MissionTime::default());
+        }
+        assert_eq!(fit.turned, [(0.0, Some([6.0, 10.0]))]);
     }
 
     #[test]

@@ -179,12 +179,11 @@ impl Link {
         }
         for scan in &heard.scans {
             let came_s = own_wire.unwrap_or(self.now).seconds();
-            let Sweep { first_beam_ns, beam_ns, .. } = scan.sweep;
-            let (first_s, age_ns) = match (scan.stamp_ns, self.stamped) {
+            let (first_s, first_beam_ns) = match (scan.stamp_ns, self.stamped) {
                 (Some(scan_ns), Some((motion_ns, at))) => (at.seconds(), scan_ns - motion_ns),
-                _ => (came_s, first_beam_ns),
+                _ => (came_s, scan.sweep.first_beam_ns),
             };
-            let middle_ns = age_ns + beam_ns.abs() * scan.beams.len() as i64 / 2;
+            let middle_ns = Sweep { first_beam_ns, ..scan.sweep }.middle_ns(scan.beams.len());
             self.observe(Observation::Scan(scan, first_s + middle_ns as f64 * 1e-9));
         }
         let readings = self.sensors.take_heard(heard, own_wire);
