@@ -161,3 +161,23 @@ impl Stage for LinkStage {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mission;
+
+    #[test]
+    fn voltages_alone_are_telemetry() {
+        let mut stage = LinkStage::new(&mission(""));
+        stage.power = Some(PowerSample::default());
+        assert!(stage.has_telemetry());
+    }
+
+    #[test]
+    fn bytes_on_the_wire_have_the_time_of_the_machine() {
+        let mut stage = LinkStage::new(&mission(""));
+        stage.carry(Progress::default(), &[1], 7, Direction::Sent);
+        assert_eq!(stage.wire[0].1.machine_ns, 7);
+    }
+}

@@ -180,6 +180,12 @@ mod tests {
     }
 
     #[test]
+    fn an_ending_of_a_robot_that_is_silent_says_why() {
+        let ending = Ending::asked_for(Outcome::Reached, "").with(Wheels::Unknown("why".into()));
+        assert!(ending.asked_for && ending.reason.ends_with("why"), "{ending:?}");
+    }
+
+    #[test]
     fn reached_is_the_word_of_the_ground_truth_too_and_unsure_where_the_pose_is_not_known_to_two_deviations()
      {
         use Outcome::{Aborted, Reached, ReachedUnsure, WrongPlace};

@@ -113,3 +113,21 @@ fn is_answered(stall: &StallSample, before: &Published, now: &Published) -> bool
         RecoveryStep::GiveUp => true,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use common::samples::Stamp;
+
+    #[test]
+    fn a_stall_is_answered_by_a_new_planner_that_has_the_map_of_the_last_tick() {
+        let stamp = Stamp { tick: 10, ..Stamp::default() };
+        let recovery = RecoveryStep::Replan.into();
+        let stall = StallSample { stamp, recovery, ..StallSample::default() };
+        let published = |planner| Published { planner, ..Published::default() };
+        for (planner, answers) in [((1, 14), true), ((1, 13), false), ((0, 14), false)] {
+            let now = published(planner);
+            assert_eq!(is_answered(&stall, &published((0, 9)), &now), answers, "{planner:?}");
+        }
+    }
+}

@@ -272,6 +272,10 @@ impl Invariants {
             self.order = Some(directive.order());
         }
         while let Some(link) = observed.link.next_sample().map_err(unread)? {
+            let is_told = link.connected == 1 || link.attempts < 2 || link.lost_ns > 0;
+            holds(is_told, "the link says for how long it misses the robot", || {
+                format!("{link:?}")
+            })?;
             let cause = link.stopped().then(|| link.cause());
             if self.causes.last().is_none_or(|(_, before)| *before != cause) {
                 self.causes.push((now, cause));

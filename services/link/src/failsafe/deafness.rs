@@ -136,8 +136,14 @@ mod tests {
     /// Judges a ranger, row 3, with these readings, centimetres, on a robot that drives 0.05 m per
     /// frame.
     fn judged(ranges: impl Iterator<Item = Option<u8>>) -> [bool; 2] {
-        let mission = mission("");
-        let mut deafness = Deafness::of(&mission);
+        let mut deafness = Deafness::of(&mission(""));
+        let judgement = judge(&mut deafness, ranges);
+        deafness.reset();
+        assert_eq!(judge(&mut deafness, std::iter::empty()), [false; 2]);
+        judgement
+    }
+
+    fn judge(deafness: &mut Deafness, ranges: impl Iterator<Item = Option<u8>>) -> [bool; 2] {
         for range in ranges {
             let status = range.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
             let range_m = f64::from(range.unwrap_or_default()) / 100.0;

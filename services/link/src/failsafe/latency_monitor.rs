@@ -116,7 +116,8 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     fn observe(monitor: &mut LatencyMonitor, what: Observation<'_>, at_ms: u64) {
-        let now = Moment { machine_ns: at_ms * MS, ..Moment::default() };
+        // At half the pace of the clock.
+        let now = Moment { machine_ns: 2 * at_ms * MS, ..Moment::default() };
         monitor.observe(&what, now);
     }
 
@@ -128,6 +129,7 @@ mod tests {
     /// `delay_ms`. Then nothing is sent for `quiet_ms`.
     fn found(delay_ms: u64, quiet_ms: u64) -> LatencyMonitor {
         let mut monitor = LatencyMonitor::new(&mission(""));
+        observe(&mut monitor, Observation::Pace(Pace::Rate(0.5)), 10_000);
         observe(&mut monitor, Observation::Sent, 10_000);
         observe(&mut monitor, Observation::Found { again: true }, 10_000);
         let last_acknowledged = delay_ms.min(quiet_ms);

@@ -441,6 +441,18 @@ mod tests {
     }
 
     #[test]
+    fn the_words_count_the_readings_that_are_equal_and_not_those_that_come_near() {
+        let mut row = Row::of(0, mission("").sensor_table().remove(0), 0);
+        for tick in 0..12 {
+            let range_m = if tick == 0 { 1.05 } else { 1.0 };
+            let status = RangeStatus::Measured.into();
+            let reading = RangeReading { range_m, status, ..RangeReading::default() };
+            row.take(&reading, [0.05 * f64::from(tick), 0.0, 0.0], Moment::default());
+        }
+        assert!(row.words.contains("within 0 cm in 11 frames"), "{}", row.words);
+    }
+
+    #[test]
     fn readings_that_do_not_follow_from_one_another_are_implausible_and_those_of_two_things_are_not()
      {
         let random = |tick: u32| 10 + (tick * tick * 37 % 240) as u16;

@@ -233,6 +233,19 @@ mod tests {
     }
 
     #[test]
+    fn a_step_of_half_again_the_known_speed_and_0_06_m_follows_and_a_longer_one_is_implausible() {
+        // 674 counts/s for two ticks, and 135 counts.
+        for (step, want) in [(400, Follow), (450, Implausible)] {
+            let mut watch = watch();
+            for tick in 0..5 {
+                watch.commanded([674; 2], at(143 * tick));
+                watch.at(143 * tick, [96 * tick as u16; 2]);
+            }
+            assert_eq!(watch.at(715, [384 + step; 2]), want, "{step}");
+        }
+    }
+
+    #[test]
     fn wheels_that_follow_their_commands_are_plausible_also_backwards_and_bunched() {
         let (mut watch, mut count) = (watch(), 20_000);
         // Wheels count the wrong way, start and stop, and every third frame comes with the next.

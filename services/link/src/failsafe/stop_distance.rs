@@ -68,6 +68,14 @@ mod tests {
     }
 
     #[test]
+    fn a_robot_that_does_not_stop_is_known_after_lost_stops_its_braking_and_two_frames() {
+        let slow = mission("controller.speed_m_s = 0.4\nrobot.response.acceleration_m_s2 = 0.5");
+        let known_s = Stop::by(Cause::RobotDoesNotStop, &slow).unwrap().known_s;
+        let late_s = slow.trusted_response().dead_time_s();
+        near(known_s - late_s, 0.45 + 0.8 + 0.5 + 2.0 / 7.0, 1e-9);
+    }
+
+    #[test]
     fn the_time_from_a_fault_to_rest_grows_with_the_delay_the_lag_and_a_heavier_base() {
         let rest = |response: &str| {
             stale(&format!("controller.speed_m_s = 0.4\nrobot.response = {{ {response} }}")).rest_s

@@ -140,18 +140,18 @@ mod tests {
     fn a_robot_stands_at_a_touch_then_turns_and_backs_but_goes_no_nearer_until_it_is_over() {
         let mut touches = touches();
         assert_eq!(speeds(&touches, [2.0, 4.0], 0.0), [2.0, 4.0]);
-        touches.take(&[(0, false), (1, true)], at(1.0));
+        touches.take(&[(0, true), (1, false)], at(1.0));
         assert_eq!(speeds(&touches, [-2.0, -2.0], 1.1).map(f64::abs), [0.0; 2]);
         assert!(touches.take_contact(at(1.4)).is_none(), "it still slips");
         let contact = touches.take_contact(at(3.0)).unwrap();
-        assert_eq!((contact.bearing_rad, contact.left, contact.right), (0.0, 0, 0));
+        assert_eq!((contact.bearing_rad, contact.left, contact.right), (PI / 3.0, 0, 0));
         near(contact.half_width_rad, PI / 6.0, 1e-9);
         assert!(touches.take_contact(at(3.1)).is_none());
         assert_eq!(speeds(&touches, [2.0, 4.0], 3.1), [-1.0, 1.0]);
         assert_eq!(speeds(&touches, [-2.0, -2.0], 3.1), [-2.0; 2]);
-        touches.take(&[(1, true)], at(3.2));
+        touches.take(&[(0, true)], at(3.2));
         assert!(touches.take_contact(at(9.0)).is_none());
-        touches.take(&[(1, false), (9, true)], at(9.1));
+        touches.take(&[(0, false), (9, true)], at(9.1));
         touches.moves = false;
         touches.take(&[(3, true), (3, false)], at(9.1));
         assert_eq!(speeds(&touches, [2.0, 4.0], 9.1), [2.0, 4.0]);

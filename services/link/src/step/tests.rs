@@ -328,6 +328,12 @@ fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
 }
 
 #[test]
+fn a_link_that_stops_its_robot_looks_again_soon() {
+    let link = on_the_wall();
+    assert!(!link.is_calm_until(link.moment()));
+}
+
+#[test]
 fn a_command_that_is_older_than_the_newest_or_from_the_future_moves_nothing() {
     let mut link = ticking();
     let future = Event::Command(command(0, 900 * MS, [1.0; 2]));

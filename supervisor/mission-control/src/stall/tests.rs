@@ -57,7 +57,7 @@ fn stalls(
 
 /// Returns poses in every second, of a robot that stands.
 fn standing(seconds: std::ops::Range<u32>) -> impl Iterator<Item = PoseSample> {
-    seconds.map(|second| pose(second.into(), 0.0))
+    seconds.map(|second| pose(second.into(), 5.0))
 }
 
 #[test]

@@ -23,7 +23,7 @@ fn a_low_battery_is_said_once_and_gives_enough_again_only_clearly_above_its_limi
     let mut batteries = batteries(LIMITS);
     // At 6.8 V it recovers while nothing turns.
     for (board, is_low, said) in [
-        (6.7, false, None),
+        (6.6, false, None),
         (6.5, true, Some(Charge::Low)),
         (6.4, true, None),
         (6.8, true, None),
@@ -50,7 +50,7 @@ fn a_battery_that_stays_sunk_is_empty_for_good_and_one_that_dips_is_only_low() {
     for (seconds, motor, charge) in [
         (0.0, 12.0, Charge::Enough),
         (1.0, 9.9, Charge::Low),
-        (2.9, 10.1, Charge::Low),
+        (2.9, 10.0, Charge::Low),
         (3.0, 9.9, Charge::Low),
         (4.9, 9.9, Charge::Low),
         (5.0, 9.9, Charge::Empty),

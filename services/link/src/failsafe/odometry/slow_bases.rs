@@ -58,6 +58,7 @@ fn drive(base: Base, seed: u64, dies_s: f64) -> Suspected {
     let mut suspected = Vec::new();
     let mut command = [0.0; 2];
     let mut changes_s = 0.0;
+    let mut found = 0;
     for tick in 1..400 {
         let now = f64::from(tick) * PERIOD_S + 0.04 * random();
         let [one, other] = limited.each_mut().map(|speed| speed.go_on(now));
@@ -70,6 +71,7 @@ fn drive(base: Base, seed: u64, dies_s: f64) -> Suspected {
         let counts = rolled
             .map(|counts| (counts as i64).rem_euclid(i64::from(common::wire::COUNT_CYCLE)) as u16);
         odometry.plausible(counts, MissionTime::from_seconds(now));
+        found += u32::from(odometry.found.take().is_some());
         let is_suspected = odometry.suspicion.is_some();
         if suspected.last().is_some_and(|(_, before)| *before) != is_suspected {
             suspected.push((now, is_suspected));
@@ -95,6 +97,7 @@ fn drive(base: Base, seed: u64, dies_s: f64) -> Suspected {
             speed.command(heard, asked);
         }
     }
+    assert!(found < 20, "{base:?} {seed}: {found} responses");
     suspected
 }
 

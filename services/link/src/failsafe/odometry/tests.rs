@@ -160,6 +160,15 @@ fn wheels_held_for_half_a_second_are_not_suspected() {
 }
 
 #[test]
+fn a_command_after_a_lapse_is_judged_anew() {
+    let mut odometry = odometry();
+    for told in [0.0, 0.2, 10.0] {
+        odometry.commanded([TURN; 2], at(told));
+    }
+    assert_eq!(odometry.evidence[0].since, at(10.0));
+}
+
+#[test]
 fn encoders_that_repeat_die_are_late_reversed_or_swapped_are_suspected_in_time_and_named() {
     use Suspicion::{Left, Right, Turn};
     let suspected = |tells: &dyn Fn(u32) -> [i16; 2], says: &dyn Fn(u32, [u16; 2]) -> [u16; 2]| {
@@ -219,19 +228,19 @@ fn three_jumps_within_two_seconds_are_suspected_until_two_seconds_without_twice_
 const ROLLS_AD: u16 = 260;
 const HELD_AD: u16 = 1520;
 
-/// Drives a robot of which these wheels are held; wheels draw `current(held, told to stand)`. The
+/// Drives a robot of which these wheels are held; wheels draw `current(held, ticks at rest)`. The
 /// robot stands while they are known to be held. Returns the contacts, and the suspicion, with
 /// seconds.
 fn held(
     held: [bool; 2],
     tells: [i16; 2],
-    current: impl Fn(bool, bool) -> u16,
+    current: impl Fn(bool, u32) -> u16,
 ) -> (Vec<(f64, ContactSample)>, Suspected) {
     let mut odometry = odometry();
-    let (mut contacts, mut stands, mut rolled) = (Vec::new(), true, [0.0; 2]);
+    let (mut contacts, mut stood, mut rolled) = (Vec::new(), 1, [0.0; 2]);
     for tick in 0..40 {
         let time = f64::from(tick) * PERIOD;
-        odometry.contacts.take_currents(held.map(|held| current(held, stands)));
+        odometry.contacts.take_currents(held.map(|held| current(held, stood)));
         let counts = rolled.map(|rolled: f64| rolled.rem_euclid(f64::from(COUNTS)) as u16);
         odometry.plausible(counts, at(time));
         contacts.extend(odometry.contacts.new.take().map(|contact| (time, contact)));
@@ -239,7 +248,8 @@ fn held(
             return (contacts, Some((time, suspicion)));
         }
         let moment = Moment { time: at(time), machine_ns: 0 };
-        stands = odometry.condition(Cause::WheelsHeld, moment) == Condition::Holds;
+        let stands = odometry.condition(Cause::WheelsHeld, moment) == Condition::Holds;
+        stood = if stands { stood + 1 } else { 0 };
         let told = if stands { [0, 0] } else { tells };
         odometry.commanded(told, at(time));
         for wheel in [0, 1].into_iter().filter(|wheel| !held[*wheel]) {
@@ -251,7 +261,8 @@ fn held(
 
 #[test]
 fn wheels_that_draw_the_current_of_held_ones_are_a_contact_ahead_and_no_suspicion() {
-    let current = |_: bool, stands| if stands { 20 } else { HELD_AD };
+    // The current falls within 0.35 s.
+    let current = |_: bool, stood| if stood > 2 { 20 } else { HELD_AD };
     let (contacts, suspicion) = held([true; 2], [TURN; 2], current);
     assert_eq!(suspicion, None);
     let (first_s, first) = contacts[0];

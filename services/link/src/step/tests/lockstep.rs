@@ -54,6 +54,7 @@ fn in_lockstep_an_unanswered_tick_is_given_again_and_answered_once() {
     assert_eq!(ticks(&link.quiet(100)), first, "the same tick, to the bit");
     let answers = [101, 102].map(|ms| velocities(&link.answer(0, ms * MS)).len());
     assert_eq!(answers, [1, 0], "a tick given twice is answered once");
+    assert_eq!(link.tally.repeated_ticks, 1);
 }
 
 #[test]
