@@ -232,7 +232,9 @@ fn told_link(domain: &Domain) -> Result<Option<Operator>> {
 /// Waits until the robot rests, as `link` sees it, or as whoever follows a link that dies: the next
 /// link or the stop guard.
 fn comes_to_rest(domain: &Domain, mut link: Option<Operator>) -> Result<bool> {
-    loop {
+    let began = Instant::now();
+    // A guard that dies again and again keeps nobody waiting.
+    while began.elapsed() < PATIENCE {
         let seen_by = match link {
             Some(link) => link,
             None if owes_stop(&domain.robot) => guard(domain)?,
@@ -244,6 +246,7 @@ fn comes_to_rest(domain: &Domain, mut link: Option<Operator>) -> Result<bool> {
         }
         link = told_link(domain)?;
     }
+    Ok(false)
 }
 
 /// Returns whether the robot rests; `None` if the process that sees it dies first.
