@@ -8,7 +8,7 @@ use std::{
     fs::{self, File},
     os::fd::OwnedFd,
     path::PathBuf,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use rustix::process::{Pid, PidfdFlags, pidfd_open};
@@ -23,9 +23,11 @@ use crate::{
     start::{Generation, Joined, Result, StageError, enter, name_process, system},
 };
 
-/// Covers a few rosters, which come five times a second; the place of an ended process is free in
-/// the next.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Wait for the first roster. A starved supervisor is late.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Wait for a place, from the first roster on. Rosters come five times a second, and the place of
+/// an ended process is free in the next.
+const FREED_WITHIN: Duration = Duration::from_secs(1);
 
 pub fn mission(robot: &RobotName) -> Result<Mission> {
     let (directory, _stage_lock) = enter_run(&robot.domain())?;
@@ -73,28 +75,28 @@ struct Place {
 }
 
 fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place> {
-    let mut holder = None;
+    let mut first = None;
     let place = Roster::open(bus)?.find(PATIENCE, |header, entries| {
         if header.order() == Order::Stop {
             let error = StageError::Other("the robot is being stopped".to_owned());
             return Some(Err(error));
         }
-        let mut entries = entries.iter();
-        holder = entries.find(|entry| name_str(&entry.stage) == stage).map(|entry| entry.pid);
-        (holder == Some(0)).then(|| {
-            Ok(Place {
-                first_tick: header.stamp.tick + 1,
-                supervisor: watch(header.supervisor_pid)?,
-            })
+        let entry = entries.iter().find(|entry| name_str(&entry.stage) == stage)?;
+        if entry.pid == 0 {
+            let first_tick = header.stamp.tick + 1;
+            let place = |supervisor| Place { first_tick, supervisor };
+            return Some(watch(header.supervisor_pid).map(place));
+        }
+        let is_taken = first.get_or_insert_with(Instant::now).elapsed() >= FREED_WITHIN;
+        is_taken.then(|| {
+            let pid = entry.pid;
+            let taken = format!("{stage} already runs as process {pid}; end that process first");
+            Err(StageError::Other(taken))
         })
     })?;
     place.unwrap_or_else(|| {
-        Err(StageError::Other(match holder {
-            Some(pid) => format!("{stage} already runs as process {pid}; end that process first"),
-            None => {
-                "no supervisor publishes on the robot's bus; check whether it is frozen".to_owned()
-            }
-        }))
+        let silent = "no supervisor publishes on the robot's bus; check whether it is frozen";
+        Err(StageError::Other(silent.to_owned()))
     })
 }
 
