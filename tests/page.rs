@@ -175,7 +175,7 @@ fn actions_and_answers_are_in_view_at_every_size_without_scrolling() {
         return not_run("the page at four sizes", "chromium and chromedriver are missing");
     }
     let robot = "page-sizes";
-    let slow = ["--pace", "1", "--set", "timeout_s=600", "--set", "controller.speed_m_s=0.02"];
+    let slow = ["--pace", "1", "--timeout", "80000", "--set", "controller.speed_m_s=0.002"];
     let mut run = Run::start(robot, "open-room", &slow);
     run.wait_until_driving();
     let page = Page::start(robot, "127.0.0.1:0");
