@@ -5,6 +5,7 @@ use std::{fmt, time::Duration};
 use common::{
     bus::{Bus, BusError},
     clock::{MissionTime, monotonic_ns},
+    kinematics::Pose2,
     samples::{
         BeaconSample, FaultKind, FaultSample, MOST_TARGETS, RequestKind, RequestSample,
         TargetPoint, name,
@@ -17,6 +18,11 @@ use crate::{
     robot_fault::RobotFault,
     wire::{Quality, Way},
 };
+
+/// Half the side of a zone, metres.
+const ZONE_M: f64 = 0.2;
+/// Stated deviations of a placed robot, metres and radians.
+const PLACED: [f64; 2] = [0.05; 2];
 
 #[derive(Clone, Debug)]
 pub struct Disturbance {
@@ -65,25 +71,39 @@ pub enum Request {
     Hand([f64; 2]),
     Follow,
     EndFollow,
+    /// Says that the robot is where it is.
+    Place,
+    /// Adds a square zone around this place.
+    AddZone([f64; 2]),
+    RemoveZone([f64; 2]),
 }
 
 impl Request {
-    pub(crate) fn publish(self, bus: &Bus) -> Result<(), BusError> {
-        let target = |[x, y]: [f64; 2]| {
-            let mut points = [TargetPoint::default(); MOST_TARGETS];
-            points[0] = TargetPoint::at(glam::DVec2::new(x, y));
-            points
+    pub(crate) fn publish(self, bus: &Bus, here: Pose2) -> Result<(), BusError> {
+        let target = |at: [f64; 2]| vec![TargetPoint::at(at.into())];
+        let (kind, points) = match self {
+            Self::Stop | Self::LateStop => (RequestKind::Stop, vec![]),
+            Self::Resume => (RequestKind::Resume, vec![]),
+            Self::Goto(at) => (RequestKind::Goto, target(at)),
+            Self::Append(at) => (RequestKind::Append, target(at)),
+            Self::Restart(_) => (RequestKind::Restart, vec![]),
+            Self::Hand(stick) => (RequestKind::Hand, target(stick)),
+            Self::Follow => (RequestKind::Follow, vec![]),
+            Self::EndFollow => (RequestKind::EndFollow, vec![]),
+            Self::Place => {
+                let heading_rad = here.heading;
+                let at = TargetPoint { heading_rad, ..TargetPoint::at(here.position) };
+                (RequestKind::Place, vec![at])
+            }
+            Self::AddZone([x, y]) => {
+                let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+                let at = |(right, up)| [x + ZONE_M * right, y + ZONE_M * up];
+                (RequestKind::AddZone, corners.map(at).into_iter().flat_map(target).collect())
+            }
+            Self::RemoveZone(at) => (RequestKind::RemoveZone, target(at)),
         };
-        let (kind, points, count) = match self {
-            Self::Stop | Self::LateStop => (RequestKind::Stop, None, 0),
-            Self::Resume => (RequestKind::Resume, None, 0),
-            Self::Goto(at) => (RequestKind::Goto, Some(target(at)), 1),
-            Self::Append(at) => (RequestKind::Append, Some(target(at)), 1),
-            Self::Restart(_) => (RequestKind::Restart, None, 0),
-            Self::Hand(stick) => (RequestKind::Hand, Some(target(stick)), 1),
-            Self::Follow => (RequestKind::Follow, None, 0),
-            Self::EndFollow => (RequestKind::EndFollow, None, 0),
-        };
+        let mut targets = [TargetPoint::default(); MOST_TARGETS];
+        targets[..points.len()].copy_from_slice(&points);
         let stage = match self {
             Self::Restart(stage) => name(stage),
             _ => Default::default(),
@@ -93,8 +113,9 @@ impl Request {
             asked_ns: if matches!(self, Self::LateStop) { 1 } else { monotonic_ns() },
             kind: kind.into(),
             stage,
-            targets: points.unwrap_or_default(),
-            target_count: count,
+            targets,
+            target_count: points.len() as u8,
+            deviations: PLACED,
             ..RequestSample::default()
         };
         bus.writer(&topics::REQUESTS, 1)?.publish(0, MissionTime::default(), sample)

@@ -22,6 +22,9 @@ const WITHIN: Duration = Duration::from_secs(14);
 /// Greatest mean delay of a wire. A command that is under way for seconds moves a robot that was
 /// already seen at rest, which nobody can promise to prevent.
 const LONGEST_DELAY: Duration = Duration::from_millis(200);
+/// Share of robots that stay, and what is asked of each.
+const STAYS: f64 = 0.1;
+const ASKED: usize = 2;
 /// Time at which an operator resumes whatever stands.
 const RESUMED: Duration = Duration::from_secs(50);
 
@@ -36,9 +39,23 @@ pub(crate) fn load(random: &mut Random) -> Load {
     loads[random.below(loads.len())]
 }
 
-/// Draws how the robot takes commands: some keep the last one when none follows.
+/// Draws how the robot takes commands: some keep the last one when none follows. Some robots stay.
 pub(crate) fn robot(random: &mut Random, mission: &mut Mission) {
     mission.simulation.ignores_time |= random.chance(0.3);
+    mission.stay |= random.chance(STAYS);
+}
+
+/// Draws what an operator asks of a robot that stays and waits.
+pub(crate) fn while_waiting(random: &mut Random, mission: &Mission) -> Vec<Request> {
+    let mut ask = |_| match random.below(3) {
+        0 => Request::Hand([random.within(-1.0, 1.0), random.within(-1.0, 1.0)]),
+        _ => Request::Goto(on_the_way(random, mission)),
+    };
+    (0..if mission.stay { ASKED } else { 0 }).map(&mut ask).collect()
+}
+
+fn on_the_way(random: &mut Random, Mission { target, .. }: &Mission) -> [f64; 2] {
+    [target.x * random.share(), target.y * random.share()]
 }
 
 pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Disturbance> {
@@ -59,7 +76,7 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
     let longest_s = if random.chance(0.2) { 30.0 } else { 3.0 };
     let lasts = Duration::from_secs_f64(random.within(0.05, longest_s));
     let mut add = |after: Duration, what| all.push(Disturbance { at: at + after, what });
-    match random.below(14) {
+    match random.below(15) {
         0..=2 => add(Duration::ZERO, What::Kill(stage)),
         3..=4 => add(Duration::ZERO, What::KillAfter(stage, operations)),
         5 => {
@@ -82,6 +99,9 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
         }
         10 => {
             add(Duration::ZERO, What::Ask(Request::Stop));
+            if random.chance(0.5) {
+                add(lasts / 2, What::Ask(Request::Place));
+            }
             add(lasts, What::Ask(Request::Resume));
         }
         11..=12 => {
@@ -92,9 +112,13 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
                 add(lasts, What::Fault(None));
             }
         }
+        13 => {
+            let place = on_the_way(random, mission);
+            add(Duration::ZERO, What::Ask(Request::AddZone(place)));
+            add(lasts, What::Ask(Request::RemoveZone(place)));
+        }
         _ => {
-            let target = mission.target;
-            let place = [target.x * random.share(), target.y * random.share()];
+            let place = on_the_way(random, mission);
             let requests = [Request::Goto(place), Request::Append(place), Request::Restart(stage)];
             add(Duration::ZERO, What::Ask(requests[random.below(requests.len())]));
         }

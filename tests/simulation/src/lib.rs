@@ -111,6 +111,7 @@ impl Scenario {
         draw::robot(&mut random, &mut drawn.mission);
         drawn.load = draw::load(&mut random);
         drawn.disturbances = draw::disturbances(&mut random, &drawn.mission);
+        drawn.while_waiting = draw::while_waiting(&mut random, &drawn.mission);
         drawn
     }
 
@@ -159,7 +160,7 @@ impl Scenario {
         // Each target has its own timeout.
         let is_target =
             |it: &&Disturbance| matches!(it.what, What::Ask(Request::Goto(_) | Request::Append(_)));
-        let asked = self.disturbances.iter().filter(is_target).count();
+        let asked = self.disturbances.iter().filter(is_target).count() + self.while_waiting.len();
         let targets = self.mission.targets.len().max(1) + asked;
         machine.end_after(Duration::from_secs_f64(self.mission.timeout_s * targets as f64) + LATE);
         let directory = Self::directory();

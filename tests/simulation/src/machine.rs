@@ -14,6 +14,7 @@ use std::{
 use common::{
     bus::{Bus, Memory},
     ground_truth::GroundTruthTick,
+    kinematics::Pose2,
     machine::{Files, Machine, MachineWire},
     mission::Mission,
     run::Run,
@@ -555,8 +556,11 @@ impl SimulatedMachine {
 
     /// Publishes an operator's request.
     pub(crate) fn ask(&self, request: Request) {
+        let here = self
+            .truth()
+            .map(|truth| Pose2 { position: [truth.x, truth.y].into(), heading: truth.heading });
         // Nobody hears an operator while there is no supervisor.
-        let _ = self.as_operator(|bus| request.publish(bus));
+        let _ = self.as_operator(|bus| request.publish(bus, here.unwrap_or_default()));
     }
 
     /// Acts as another process on the bus, whose operations are not counted as the running one's.
