@@ -5,7 +5,7 @@ mod support;
 
 use processes::stages::find as find_stage;
 use rustix::process::Signal;
-use support::{Run, STAGES};
+use support::{ENDLESS, Run, STAGES};
 
 /// Longest time after its deadline until a freeze is noticed, seconds.
 const SLACK: f64 = 0.020;
@@ -13,9 +13,7 @@ const SLACK: f64 = 0.020;
 /// Freezes each stage `times` times in a mission at wall-clock pace, and prints the delay of each
 /// detection.
 fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
-    // The mission outlasts every freeze.
-    let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
-    let mut run = Run::under_way(robot, "open-room", &slow, 0.5);
+    let mut run = Run::under_way(robot, "open-room", &ENDLESS, 0.5);
     for _ in 0..times {
         run.kill_each(Signal::STOP);
     }

@@ -6,11 +6,7 @@ use std::{
     thread,
 };
 
-use crate::support::{Run, domain, json_of, output, printed, refused, wire::Robot};
-
-/// At this speed a mission takes longer than its test, which stops it.
-const SLOW: [&str; 6] =
-    ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
+use crate::support::{ENDLESS, Run, domain, json_of, output, printed, refused, wire::Robot};
 
 #[test]
 fn init_writes_a_mission_that_check_accepts_for_a_json_robot_or_an_x80_and_moves_it_nowhere() {
@@ -46,7 +42,7 @@ fn a_silent_address_a_foreign_protocol_and_a_robot_that_is_driven_are_refused_wi
         assert!(!out.exists());
     };
     init(&at, "no-answer", &["nothing answers", &at]);
-    let run = Run::under_way("init-used", "open-room", &SLOW, 0.3);
+    let run = Run::under_way("init-used", "open-room", &ENDLESS, 0.3);
     let address = common::run::Run::load(&run.directory()).unwrap().address.to_string();
     init(&address, "address-in-use", &["init-used"]);
     run.stop();

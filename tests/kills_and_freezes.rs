@@ -9,9 +9,9 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use crate::support::{
-    self, Run, STAGES, all_run, assert_ended, assert_nothing_left, assert_reached, find, firsthand,
-    operate, outcomes, output, pid, pids_of, processes, records, replayed_in, replayed_poses,
-    signal_process,
+    self, ENDLESS, Run, STAGES, all_run, assert_ended, assert_nothing_left, assert_reached, find,
+    firsthand, operate, outcomes, output, pid, pids_of, processes, records, replayed_in,
+    replayed_poses, signal_process,
 };
 
 /// Options for mission time at four times the wall clock: a mission takes ten seconds.
@@ -102,7 +102,7 @@ fn all_stages_killed_or_frozen_while_the_run_stops_it_ends_in_order() {
 
 #[test]
 fn a_frozen_stage_that_is_thawed_in_time_goes_on() {
-    let mut run = Run::under_way("kf-thaw", "open-room", &["--pace", "1"], 0.5);
+    let mut run = Run::under_way("kf-thaw", "open-room", &ENDLESS, 0.5);
     let beats = |status: &Value| {
         let controller = find(status, "controller");
         controller["state"] == "running" && controller["beat_age_s"].as_f64() < Some(0.1)

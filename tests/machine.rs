@@ -9,9 +9,9 @@ use std::{
 };
 
 use crate::support::{
-    self, Run, STAGES, all_run, assert_nothing_left, assert_reached, assert_refused, directory_of,
-    find, firsthand, firsthand_under, generation, json_of, on_small_disk, on_small_shared_memory,
-    pid, refused, signal_process, start_quietly,
+    self, ENDLESS, Run, STAGES, all_run, assert_nothing_left, assert_reached, assert_refused,
+    directory_of, find, firsthand, firsthand_under, generation, json_of, on_small_disk,
+    on_small_shared_memory, pid, refused, signal_process, start_quietly,
 };
 use rustix::process::Signal;
 use serde_json::Value;
@@ -22,9 +22,7 @@ fn descriptors(process: u32) -> usize {
 
 #[test]
 fn stages_are_not_taken_for_hung_when_the_supervisor_stood_still_with_them() {
-    // The mission outlasts its test, which stops it.
-    let slow = ["--pace", "1", "--set", "controller.speed_m_s=0.002", "--timeout", "80000"];
-    let mut run = Run::start("mach-still", "open-room", &slow);
+    let mut run = Run::start("mach-still", "open-room", &ENDLESS);
     let status = run.wait_until_under_way(0.5);
     let stages = STAGES.map(|stage| pid(&status, stage));
     for _ in 0..4 {

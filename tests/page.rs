@@ -9,7 +9,7 @@ use rustix::process::Signal;
 use serde_json::json;
 
 use crate::support::{
-    Browser, Run, assert_nothing_left, firsthand, golden, has_browser, not_run,
+    Browser, ENDLESS, Run, assert_nothing_left, firsthand, golden, has_browser, not_run,
     operate as operate_robot, printed, refused, signal_process,
 };
 
@@ -89,9 +89,7 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
     browser.go(&page.drive);
     browser.wait_until(&says("status", "no robot runs"));
     assert_eq!(browser.run("return location.hash"), "", "the token is not shown");
-    // The robot arrives only after the test, on a busy machine too.
-    let slow = ["--pace", "1", "--set", "timeout_s=600", "--set", "controller.speed_m_s=0.02"];
-    let mut run = Run::start(robot, "open-room", &slow);
+    let mut run = Run::start(robot, "open-room", &ENDLESS);
     run.wait_until_driving();
     browser.wait_until(GOES);
     browser.wait_until("document.querySelectorAll('#stages tr').length === 6");
@@ -175,8 +173,7 @@ fn actions_and_answers_are_in_view_at_every_size_without_scrolling() {
         return not_run("the page at four sizes", "chromium and chromedriver are missing");
     }
     let robot = "page-sizes";
-    let slow = ["--pace", "1", "--timeout", "80000", "--set", "controller.speed_m_s=0.002"];
-    let mut run = Run::start(robot, "open-room", &slow);
+    let mut run = Run::start(robot, "open-room", &ENDLESS);
     run.wait_until_driving();
     let page = Page::start(robot, "127.0.0.1:0");
     let browser = Browser::open(1400);
