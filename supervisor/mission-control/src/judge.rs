@@ -14,7 +14,7 @@ use processes::{policy::Now, records};
 
 use crate::outcome::{Ending, Outcome};
 
-/// Time without a tick after which an unheld pipeline is stuck. In lockstep mission time then
+/// Time without a tick, or the start of an external stage, after which an unheld pipeline is stuck. In lockstep mission time then
 /// stands still, so the mission's timeout cannot end the run.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 
@@ -32,7 +32,7 @@ pub(crate) struct Snapshot<'a> {
     pub time: MissionTime,
     pub deadline: Deadline,
     pub in_ticks: bool,
-    /// Time of the newest tick or change of order.
+    /// Time of the newest tick, start of an external stage, or change of order.
     pub progress: Now,
     pub has_ticked: bool,
     /// Input that a stage cannot use, with the remedy.
@@ -197,18 +197,19 @@ impl StopClock {
 }
 
 pub(crate) struct TickProgress {
-    tick: Option<u64>,
+    /// Newest tick, and number of external stages to be started.
+    seen: (Option<u64>, usize),
     since: Now,
 }
 
 impl TickProgress {
     pub(crate) const fn new(now: Now) -> Self {
-        Self { tick: None, since: now }
+        Self { seen: (None, 0), since: now }
     }
 
-    pub(crate) fn update(&mut self, tick: Option<u64>, now: Now) -> Now {
-        if tick != self.tick {
-            (self.tick, self.since) = (tick, now);
+    pub(crate) fn update(&mut self, seen: (Option<u64>, usize), now: Now) -> Now {
+        if seen != self.seen {
+            (self.seen, self.since) = (seen, now);
         }
         self.since
     }

@@ -17,6 +17,7 @@ use common::{
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     poll,
+    process_status::processor_time,
     roster::{self, Roster},
     run::Run,
     samples::{
@@ -36,6 +37,8 @@ use thiserror::Error;
 /// Timeout for a supervisor, whose roster comes at 5 Hz. With 25 busy processes per core, one took
 /// over 4 s.
 pub const PATIENCE: Duration = Duration::from_secs(10);
+/// Timeout for a supervisor that runs now and then, on a starved machine.
+const STARVED_PATIENCE: Duration = Duration::from_secs(60);
 /// Interval for repeating a request that a starting run refused.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 
@@ -494,13 +497,20 @@ pub fn find<T>(
     robot: &RobotName,
     find: impl Fn(&RosterHeader, &[RosterEntry]) -> Option<T>,
 ) -> Result<T> {
-    let found = roster.find(PATIENCE, find)?;
-    found.ok_or_else(|| {
-        let message = format!(
-            "the supervisor of robot {robot} does not answer; is it frozen? (`firsthand stage thaw supervisor`)"
-        );
-        OperatorError::refused("no-answer", message)
-    })
+    let (began, domain) = (Instant::now(), robot.domain());
+    let ran = || processor_time(domain.supervisor().ok()??);
+    loop {
+        let before = ran();
+        if let Some(found) = roster.find(PATIENCE, &find)? {
+            return Ok(found);
+        }
+        if ran() <= before || began.elapsed() >= STARVED_PATIENCE {
+            let message = format!(
+                "the supervisor of robot {robot} does not answer; is it frozen? (`firsthand stage thaw supervisor`)"
+            );
+            return refuse("no-answer", message);
+        }
+    }
 }
 
 #[cfg(test)]

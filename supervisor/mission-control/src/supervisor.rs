@@ -306,6 +306,8 @@ impl<'a> Supervisor<'a> {
         let time = self.mission_time();
         let stopped = self.decision.reason == HoldReason::Operator;
         self.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
+        let not_started = self.stages.not_started();
+        let seen = (record.newest_tick(), not_started.len());
         judge::Snapshot {
             arrival,
             link: record.link.as_ref(),
@@ -316,13 +318,13 @@ impl<'a> Supervisor<'a> {
             time,
             deadline: self.deadline(),
             in_ticks: self.clock.in_ticks(),
-            progress: self.tick_progress.update(record.newest_tick(), now),
+            progress: self.tick_progress.update(seen, now),
             // Other stages publish at tick 0 before the robot begins it.
             has_ticked: record.pose.is_some(),
             complaint: record.complaint().map(|complaint| complaint.to_string()),
             reason: self.decision.reason,
             held: self.stages.held(),
-            not_started: self.stages.not_started(),
+            not_started,
             robot: &self.options.robot,
             address: &self.robot.address,
         }

@@ -129,8 +129,13 @@ fn progress_is_when_a_tick_was_first_seen() {
     let start = Duration::ZERO;
     let at = |seconds| start + Duration::from_secs(seconds);
     let mut progress = TickProgress::new(start);
-    assert_eq!(progress.update(None, at(1)), start);
-    assert_eq!(progress.update(Some(7), at(2)), at(2));
-    assert_eq!(progress.update(Some(7), at(3)), at(2));
-    assert_eq!(progress.update(Some(8), at(4)), at(4));
+    for (tick, to_start, s, since) in [
+        (None, 0, 1, start),
+        (None, 5, 2, at(2)),
+        (None, 4, 3, at(3)),
+        (Some(7), 4, 4, at(4)),
+        (Some(7), 4, 5, at(4)),
+    ] {
+        assert_eq!(progress.update((tick, to_start), at(s)), since);
+    }
 }
