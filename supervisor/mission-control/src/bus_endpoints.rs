@@ -107,6 +107,7 @@ impl BusEndpoints {
         entries: &[RosterEntry],
     ) -> Result<(), BusError> {
         (self.published, self.misses_trouble) = (Some(Instant::now()), false);
+        assert_eq!(entries.len(), stages::TABLE.len());
         self.directive.publish(tick, time, directive)?;
         let (last_request, answer) = self.last_request;
         let header = RosterHeader { last_request, answer: answer.into(), ..header };

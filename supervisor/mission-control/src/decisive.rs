@@ -89,6 +89,7 @@ pub(crate) fn first(
             .and_then(|pose| truth_of(pose, truth))
             .map_or(truth.len(), |index| index + 1),
     };
+    assert!(truth_ticks <= truth.len());
     Decided { ending, last_tick: Some(last_tick), truth_ticks }
 }
 

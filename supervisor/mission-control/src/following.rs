@@ -88,6 +88,7 @@ impl Following {
         let taken = self.heard_by(beacon, now, mission);
         match taken {
             Ok(heard) => {
+                assert!(self.heard.is_none_or(|(before, _)| before <= heard.0));
                 (self.heard, self.is_lost) = (Some(heard), false);
                 assert!(heard.1.is_finite());
                 self.used += 1;
@@ -236,6 +237,7 @@ impl Around<'_> {
             }
             assert_eq!(cost, costs[index], "a cheaper way replaces the entry");
             let cell = Cell { col: (index % side) as u32, row: (index / side) as u32 };
+            debug_assert!(self.is_free_cell(cell));
             let at = self.frame.centre_of(cell);
             let off_m = at.distance(self.beacon);
             if off_m <= distance_m && self.sees(at) {

@@ -113,6 +113,7 @@ impl Snapshot<'_> {
     /// Accepts an arrival once the encoders report rest. In lockstep no command follows, so it
     /// counts at once.
     fn arrived(&self, now: Now) -> Option<Ending> {
+        const { assert!(RESTS_WITHIN.as_millis() < NO_PROGRESS.as_millis()) };
         let Arrival { distance_m, beside, since } = self.arrival?;
         let at_rest = self.link.is_some_and(|link| link.at_rest == 1);
         if self.in_ticks || at_rest {

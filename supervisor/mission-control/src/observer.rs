@@ -193,6 +193,7 @@ fn push<T>(items: &mut VecDeque<T>, item: T, most: usize) {
         items.pop_front();
     }
     items.push_back(item);
+    assert!(items.len() <= most);
 }
 
 impl Record {

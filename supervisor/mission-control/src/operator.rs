@@ -254,6 +254,8 @@ fn comes_to_rest(domain: &Domain, mut link: Option<Operator>) -> Result<bool> {
 
 /// Returns whether the robot rests; `None` if the process that sees it dies first.
 fn rests_by(seen_by: &Operator) -> Option<bool> {
+    const { assert!(LINK_ANSWERS.as_millis() < REST_PATIENCE.as_millis()) };
+    const { assert!(REST_PATIENCE.as_millis() < PATIENCE.as_millis()) };
     let began = Instant::now();
     while began.elapsed() < REST_PATIENCE {
         match seen_by.answer(LINK_ANSWERS) {
@@ -381,6 +383,7 @@ fn ask_with(robot: &RobotName, mut request: RequestSample, points: &[TargetPoint
     if points.len() > MOST_TARGETS {
         return Err(refused(robot, RequestAnswer::TooMany));
     }
+    const { assert!(MOST_TARGETS <= u8::MAX as usize) };
     request.target_count = points.len() as u8;
     request.targets[..points.len()].copy_from_slice(points);
     ask(robot, request)

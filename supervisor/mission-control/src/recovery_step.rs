@@ -13,7 +13,7 @@ use common::{
     samples::{RecoveryStep, StallSample, TickLimitSample},
 };
 
-use crate::observer::Published;
+use crate::{observer::Published, run::CAUGHT_UP_EVERY};
 
 /// Ticks that the link may be ahead: a stalled robot loses little time, and the link seldom waits.
 const AHEAD: u64 = 4;
@@ -45,6 +45,7 @@ pub(crate) struct RecoverySteps {
 impl RecoverySteps {
     /// Starts with all ticks from `first_tick` on unchecked; `None` in wall-clock time.
     pub(crate) fn new(first_tick: Option<u64>) -> Self {
+        const { assert!(AHEAD < CAUGHT_UP_EVERY) };
         let limit = first_tick.map(|first_tick| TickLimitSample {
             last_tick: first_tick + AHEAD,
             ..TickLimitSample::default()
@@ -60,6 +61,7 @@ impl RecoverySteps {
 
     /// Records a stall. Later ticks stay unchecked until the step takes effect.
     pub(crate) fn on_stall(&mut self, stall: StallSample) {
+        assert!(self.step.is_none());
         self.on_checked(stall.stamp.tick);
         self.step = Some(Step { stall, begun: None });
     }
@@ -93,6 +95,7 @@ impl RecoverySteps {
             return Next::Wait;
         }
         limit.holds_from_tick = published.tick.map_or(0, |tick| tick + 1);
+        debug_assert!(limit.epoch <= stall.epoch);
         limit.epoch = stall.epoch;
         self.step = None;
         Next::Check

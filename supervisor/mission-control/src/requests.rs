@@ -3,10 +3,10 @@
 use common::{
     clock::{Instant, monotonic_ns},
     geometry::Zone,
-    mission::MOST_ZONES,
+    mission::{MOST_CORNERS, MOST_ZONES},
     samples::{
-        Cause, DEAD_MAN, HoldReason, PlaceSample, RequestAnswer, RequestKind, RequestSample, Rest,
-        TargetPoint, TargetSample, name_str,
+        Cause, DEAD_MAN, HoldReason, MOST_TARGETS, PlaceSample, RequestAnswer, RequestKind,
+        RequestSample, Rest, TargetPoint, TargetSample, name_str,
     },
 };
 
@@ -112,6 +112,7 @@ impl Supervisor<'_> {
     }
 
     fn change_zones(&mut self, request: &RequestSample, adds: bool) -> RequestAnswer {
+        const { assert!(MOST_TARGETS <= MOST_CORNERS) };
         let mission = &self.options.mission;
         let points = request.targets().unwrap_or_default().iter();
         let points: Vec<_> = points.map(TargetPoint::position).collect();
@@ -240,6 +241,7 @@ impl Supervisor<'_> {
         if !self.end_following(TargetOutcome::Unreachable) {
             self.targets.settle(ending.outcome, now_s, arrival);
         }
+        assert!(self.targets.waits);
         self.stall_watch.settle(self.bus.observer.record.pose.map(|pose| pose.stamp.tick));
         self.await_target();
         true

@@ -24,6 +24,7 @@ impl RunClock {
     /// Starts the clock of a new run. The pace applies to `simulated` and to ROS 2 robots, which
     /// may be simulated elsewhere.
     pub(crate) fn begin(pace: Pace, robot: &RobotConfig, simulated: bool) -> Self {
+        assert!(robot.rate_hz > 0.0 && robot.rate_hz < 1e9);
         let has_pace = simulated || robot.protocol() == Protocol::Ros2;
         let clock = match pace {
             Pace::Max if simulated => {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use common::{
-    samples::{Action, LinkSample, Rest},
+    samples::{Action, LinkSample, Order, Rest},
     topics,
 };
 use processes::policy::Now;
@@ -73,6 +73,7 @@ impl Supervisor<'_> {
 
     /// Orders the robot to stand; waits briefly for the link's confirmation.
     fn stand(&mut self) -> Result {
+        assert_eq!(self.decision.order(), Order::Hold);
         self.publish_state()?;
         let began = self.stages.now();
         loop {
@@ -87,6 +88,8 @@ impl Supervisor<'_> {
 
     /// Orders the mission's end; waits until the encoders report rest or stay silent for too long.
     fn come_to_rest(&mut self) -> Result<Wheels> {
+        const { assert!(HEARD_WITHIN.as_millis() > NEW.as_millis()) };
+        assert_eq!(self.decision.order(), Order::Stop);
         self.publish_state()?;
         let began = self.stages.now();
         let mut heard = began;
@@ -154,7 +157,9 @@ impl Supervisor<'_> {
 
     fn stop_all(&mut self) -> Result {
         self.stop_stages(1)?;
-        self.stop_stages(0)
+        self.stop_stages(0)?;
+        assert!(self.stages.running().0 == 0 && !self.stages.any_starting());
+        Ok(())
     }
 
     /// Stops the stages from the `first` of the start order on, concurrently.

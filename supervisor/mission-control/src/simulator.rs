@@ -196,6 +196,7 @@ impl GroundTruth {
         let ticks = &self.unfinished[written..];
         self.file.take_if(|file| file.write_all(ticks).is_err());
         self.unfinished = rest;
+        debug_assert!(!self.unfinished.contains(&b'\n'));
         Ok(())
     }
 }

@@ -155,6 +155,7 @@ struct Place {
 
 impl StallWatch {
     pub(crate) fn new(mission: &Mission) -> Self {
+        const { assert!(MOVED_M < PLACE_M) };
         let seconds = STALLED_AFTER.as_secs_f64();
         let slowest_turn = TAU / mission.turn_rad_s().min(mission.hurry().look_rad_s);
         let at_a_place = TURNS_AT_A_PLACE * slowest_turn;
@@ -316,6 +317,8 @@ impl StallWatch {
             cause: cause.into(),
             recovery: recovery.into(),
         };
+        debug_assert!(!relocated || self.epoch.is_multiple_of(2));
+        debug_assert!(self.stalls.last().is_none_or(|last| last.epoch <= stall.epoch));
         self.stalls.push(stall);
         stall
     }

@@ -280,11 +280,13 @@ impl<'a> Supervisor<'a> {
             self.service.ready();
         }
         let changed = decision.reason != self.decision.reason;
+        let drives = decision.order() == Order::Drive;
+        assert!(!drives || decision.ready && !self.state.operator_stop && !self.targets.waits);
         if changed {
             tracing::info!(reason = ?decision.reason, "order");
             self.tick_progress = TickProgress::new(self.stages.now());
         }
-        self.drove |= decision.order() == Order::Drive;
+        self.drove |= drives;
         self.decision = decision;
         changed
     }
