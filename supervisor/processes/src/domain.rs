@@ -82,6 +82,7 @@ impl DomainLock {
 
     pub fn recreate_bus(&mut self) -> Result<(), DomainError> {
         self.clear()?;
+        assert!(self.stages_lock.is_some() && self.joining_lock.is_some());
         check_shared_memory(SHARED_MEMORY, self.cells)?;
         let (bus, services) = Bus::make(&self.domain, "supervisor", topics::TABLE)?;
         self.bus = Some((services, Rc::new(bus)));

@@ -54,6 +54,7 @@ impl Turns {
     }
 
     fn await_stuck(&self, thread: Pid) {
+        const { assert!(2 * LOOK_EVERY.as_millis() < STUCK.as_millis()) };
         let task = task(thread);
         let (mut seen, mut stuck, mut waited) = (0, Duration::ZERO, processor_awaited(&task));
         loop {

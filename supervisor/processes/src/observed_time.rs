@@ -30,9 +30,10 @@ impl ObservedTime {
     /// Of a longer wait [`TOLERANCE`] counts, so that a supervisor that is always late still misses
     /// deadlines.
     pub(crate) fn on_waited(&mut self, planned: Duration, now: Instant) {
-        let took = self.since(now);
+        let (took, before) = (self.since(now), self.at(now));
         self.observed += if took <= planned + TOLERANCE { took } else { TOLERANCE };
         self.until = now;
+        assert!(self.observed >= before);
     }
 
     fn since(&self, now: Instant) -> Duration {

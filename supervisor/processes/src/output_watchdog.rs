@@ -41,7 +41,9 @@ impl OutputWatchdog {
             excused: None,
             unanswered_since: None,
         };
-        Self(TABLE.iter().map(output).collect())
+        let outputs: Vec<_> = TABLE.iter().map(output).collect();
+        assert!(outputs.iter().all(|it| !it.reads.contains(&it.stage.name)));
+        Self(outputs)
     }
 
     pub(crate) fn on_output(&mut self, stage: &str, tick: u64) {

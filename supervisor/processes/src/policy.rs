@@ -176,7 +176,9 @@ impl Policy {
             (Phase::Starting { .. }, Event::StartFailed) => {
                 // A resource is used up, so the next start waits.
                 self.deaths = self.deaths.max(1);
-                self.record_death(Stability::NeverReady, now)
+                let next = self.record_death(Stability::NeverReady, now);
+                assert_eq!(next, None);
+                next
             }
 
             (Phase::Starting { .. }, Event::BeatReady) => {
@@ -280,6 +282,7 @@ impl Policy {
     /// Records the end of a generation that the bus may have blocked. The bus is recreated once per
     /// ready generation.
     fn record_blocked_start(&mut self, now: Now) -> Option<Action> {
+        const { assert!((BLOCKED_STARTS as usize) < HOLD_AFTER) };
         self.blocked_starts = self.blocked_starts.saturating_add(1);
         assert!(matches!(self.phase, Phase::Starting { .. } | Phase::Aborted { .. }));
         let next = self.record_death(Stability::NeverReady, now);
@@ -300,6 +303,7 @@ impl Policy {
         if self.recent.len() > HOLD_AFTER {
             self.recent.pop_front();
         }
+        assert!(self.recent.len() <= HOLD_AFTER);
         if self.recent.len() >= HOLD_AFTER || self.deaths >= HOLD_AFTER {
             self.phase = Phase::Held;
             return None;

@@ -95,6 +95,7 @@ impl StageProcess {
             return false;
         };
         self.policy.step(Event::Start, now);
+        assert!(matches!(self.phase(), Phase::Starting { .. }));
         (self.started, self.times) = (now, process.times());
         self.process = Some(process);
         self.generation = health.stamp.generation;
@@ -129,6 +130,7 @@ impl StageProcess {
         first_tick: u64,
         now: Now,
     ) {
+        assert!(self.process.is_none());
         let stage = self.stage.name;
         (self.started, self.hung, self.times) = (now, None, Some(Times::default()));
         let number = run::next_generation(directory, stage).map_err(io::Error::other);
@@ -188,6 +190,7 @@ impl StageProcess {
     }
 
     pub(crate) fn record_death(&mut self, cause: ExitCause, now: Now) -> Death {
+        assert!(self.process.is_some());
         let age = |then: Now| now.saturating_sub(then).as_secs_f64();
         let hung_after = |(hung, beat): (Now, Now)| hung.saturating_sub(beat).as_secs_f64();
         let death = Death {
@@ -209,6 +212,7 @@ impl StageProcess {
     }
 
     pub(crate) fn record_next(&self, death: &mut Death, now: Now) {
+        assert!(!self.is_running());
         death.deaths_in_window = self.policy.recent_deaths() as u32;
         death.next = match self.phase() {
             Phase::BackingOff { until } => {

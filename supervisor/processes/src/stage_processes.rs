@@ -198,6 +198,7 @@ impl StageProcesses {
     /// Stops all stages from the `first` of the start order on. Returns whether one has or awaits a
     /// process.
     pub fn stop_from(&mut self, first: usize) -> bool {
+        assert!(first < self.stages.len());
         let mut any = false;
         for index in first..self.stages.len() {
             let stage = &self.stages[index];
@@ -225,6 +226,7 @@ impl StageProcesses {
             Action::Start if self.ending || self.starter == Starter::External => {
                 stage.policy.step(Event::Stop, now);
                 stage.policy.step(Event::Exited, now);
+                assert_eq!(stage.phase(), Phase::Down);
             }
             Action::Start => {
                 self.watchdog.on_start(stage.stage.name);

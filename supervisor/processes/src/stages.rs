@@ -69,6 +69,7 @@ impl Stage {
     }
 
     pub fn deadlines_on(&self, cells: usize) -> Deadlines {
+        assert!(self.deadlines.heartbeat < self.deadlines.answers);
         let more = self.per_million_cells.mul_f64(cells as f64 * 1e-6);
         Deadlines {
             startup: self.deadlines.startup + more,
@@ -157,6 +158,7 @@ pub fn start_order() -> Vec<&'static Stage> {
         // In a circle of inputs, the remaining stages start in the table's order.
         order.extend(next.or(waiting.first()));
     }
+    assert_eq!(order[0].name, common::topics::LINK.spec().writer);
     order
 }
 
