@@ -59,11 +59,9 @@ pub(crate) struct Drivetrain {
 
 impl Drivetrain {
     pub(crate) fn new(mission: &Mission, diameter: [f64; 2]) -> Self {
-        Self {
-            on: OnChannel::left_and_right(&mission.robot),
-            metres_per_count: mission.body().metres_per_count(),
-            diameter,
-        }
+        let on = OnChannel::left_and_right(&mission.robot);
+        assert_ne!(on[0].channel, on[1].channel);
+        Self { on, metres_per_count: mission.body().metres_per_count(), diameter }
     }
 
     pub(crate) fn step(
@@ -115,6 +113,7 @@ impl Drivetrain {
     pub(crate) fn counts(&self, encoders: &[Encoder; 2]) -> [u16; 2] {
         self.on.map(|OnChannel { channel, sign }| {
             let position = encoders[channel].position;
+            assert!(position < COUNT_CYCLE);
             if sign < 0.0 { (COUNT_CYCLE - position) % COUNT_CYCLE } else { position }
         })
     }

@@ -61,6 +61,7 @@ impl Laser {
     }
 
     fn new(sensor: Sensor, physics: &Physics, (seed, nth): (u64, usize)) -> Self {
+        assert!(sensor.every_ticks > 0);
         let noise = Noise::of_nth(seed, Source::Laser, nth);
         let height_m = sensor.height_m.unwrap_or(physics.heights.infrared_m);
         let timing = physics.laser;

@@ -57,6 +57,7 @@ struct Order {
 impl Motor {
     /// Starts suspended, in PWM mode.
     pub fn new(physics: WheelPhysics, top_speed: f64) -> Self {
+        assert!(top_speed >= 0.0);
         Self {
             physics,
             top_speed,
@@ -132,6 +133,7 @@ impl Motor {
                 self.pending.pop_back();
             }
             self.pending.push_back((now, wanted));
+            assert!(self.pending.len() <= MOST_PENDING);
         }
         while let Some(&(since, target)) = self.pending.front() {
             if since + self.physics.delay_s > now + dt / 2.0 {
@@ -141,6 +143,7 @@ impl Motor {
             self.pending.pop_front();
         }
         let decay = if self.physics.lag_s > 0.0 { (-dt / self.physics.lag_s).exp() } else { 0.0 };
+        assert!((0.0..=1.0).contains(&decay));
         // An exponential approach covers its integral, not its final speed times dt.
         let behind = self.speed - self.target;
         let (before, most) = (self.speed, self.acceleration * dt);
@@ -166,6 +169,7 @@ impl Motor {
     /// The wheel loses the share `grip` of its own speed, 0 for free slip. A push adds no speed.
     /// The loop raises the torque until the wheel stalls or slips.
     pub fn hold(&mut self, speed: f64, grip: f64) {
+        assert!((0.0..=1.0).contains(&grip));
         let held = speed.clamp(self.speed.min(0.0), self.speed.max(0.0));
         if self.target != 0.0 {
             let lost = (1.0 - held / self.target).clamp(0.0, 1.0);
@@ -182,6 +186,7 @@ impl Motor {
         let asked = match order.quantity {
             Quantity::Velocity => value * self.physics.gain,
             Quantity::Pwm => {
+                const { assert!(PWM_DEAD_BAND < PWM_STOP) };
                 let duty = value - PWM_STOP;
                 let beyond = (duty.abs() - PWM_DEAD_BAND).max(0.0);
                 (beyond / (PWM_STOP - PWM_DEAD_BAND) * self.top_speed).copysign(duty)

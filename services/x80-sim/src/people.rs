@@ -81,6 +81,7 @@ impl People {
         if self.walkers.is_empty() || for_s == 0.0 {
             return;
         }
+        const { assert!(LONGEST_S < RELAXES_S) };
         let steps = (for_s / LONGEST_S).ceil();
         let dt = for_s / steps;
         let robot = Other { at: robot, velocity: (robot - from) / for_s, radius };
@@ -109,6 +110,7 @@ impl People {
 }
 
 fn patience_s(person: &Person, at: DVec2, goal: usize) -> f64 {
+    assert!(person.speed_m_s > 0.0);
     let far_m = person.goals.get(goal).map_or(0.0, |goal| goal.distance(at));
     PATIENCE.0 * far_m / person.speed_m_s + PATIENCE.1
 }

@@ -56,6 +56,7 @@ impl Fading {
             } else {
                 noise.exponential(self.mean_good).max(1e-3)
             };
+            assert!(self.until > self.since);
             if self.out && self.until <= now {
                 self.longest_seen = self.longest_seen.max(self.until - self.since);
             }
@@ -134,6 +135,7 @@ impl<W: Copy + PartialEq> Radio<W> {
     pub fn loses_tick(&mut self, now: f64) -> bool {
         let lost = self.loses(now);
         self.missed_ticks += u64::from(lost);
+        assert!(self.missed_ticks <= self.lost);
         lost
     }
 
@@ -148,6 +150,7 @@ impl<W: Copy + PartialEq> Radio<W> {
         }
         let inner = (first.len() - 1) as f64;
         let second = first.split_off(1 + (self.noise.uniform() * inner) as usize);
+        assert!(!second.is_empty());
         (first, second)
     }
 

@@ -132,6 +132,7 @@ impl Robot {
         let acceleration = physics.wheels.acceleration_m_s2 / size.metres_per_count();
         let top_counts = size.top_speed_m_s / size.metres_per_count();
         let longest_step = STEP_S.min(0.5 * size.radius_m / size.top_speed_m_s);
+        assert!(longest_step > 0.0);
         let world = World::new(mission);
         let wheel_errors = WheelErrors::of(mission);
         physics.wheels.slip_share = wheel_errors.slip_share;
@@ -352,6 +353,7 @@ impl Robot {
                 .chain(self.listens_at())
                 .filter(|moment| *moment > self.time)
                 .fold(end, f64::min);
+            assert!(until > self.time && until <= end);
             let span = until - self.time;
             let steps = (span / self.longest_step).ceil().max(1.0);
             let from = self.time;

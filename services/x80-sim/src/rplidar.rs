@@ -25,6 +25,7 @@ pub(crate) struct Rplidar {
 impl Rplidar {
     pub(crate) fn new(mission: &Mission, seed: u64) -> Option<Self> {
         let (_, sensor, product) = mission.rplidars().into_iter().next()?;
+        assert!(product.sample_us > 0 && product.turns_hz > 0.0);
         let laser = Laser::with_own_wire(sensor, mission, seed);
         Some(Self { laser, product, requests: Requests::default(), next_s: None, turn: 0.0 })
     }

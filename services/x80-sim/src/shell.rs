@@ -82,6 +82,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
             // The previous process may still be coming to rest.
             let lock =
                 lock(&file).map_err(|source| SimError::Lock { file: file.clone(), source })?;
+            const { assert!(size_of::<SavedState>() < saved_state::CAPACITY) };
             let (checkpoint, saved) = Checkpoint::open::<SavedState>(&file, saved_state::CAPACITY)?;
             (saved, Some(checkpoint), Some(lock))
         }

@@ -116,6 +116,7 @@ pub fn listen(
     if noise.chance(physics.false_echo_share) {
         range = 0.1 + noise.uniform() * (range.min(REACH_M) - 0.1).max(0.0);
     }
+    assert!(range >= 0.0);
     range
 }
 
@@ -134,6 +135,7 @@ fn bounced(world: &World, pose: Pose2, physics: &SonarPhysics, noise: &mut Noise
     let (there, Surface::Face { from, to }) = world.first_hit(pose.position, axis, height)? else {
         return None;
     };
+    const { assert!(NUDGE_M < HIDES_M) };
     let normal = (to - from).perp().try_normalize()?;
     let onward = axis - 2.0 * axis.dot(normal) * normal;
     let mirror = pose.position + axis * there;

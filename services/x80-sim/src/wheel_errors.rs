@@ -23,8 +23,10 @@ impl WheelErrors {
         let mut noise = Noise::new(mission.seed, Source::WheelErrors);
         let mut off = |spread: f64| spread * (2.0 * noise.uniform() - 1.0);
         let ratio = physics.diameter_ratio * (1.0 + off(physics.diameter_spread));
+        let diameter = [2.0, 2.0 * ratio].map(|share| share / (1.0 + ratio));
+        assert!((diameter[0] + diameter[1] - 2.0).abs() < 1e-9);
         Self {
-            diameter: [2.0, 2.0 * ratio].map(|share| share / (1.0 + ratio)),
+            diameter,
             track: physics.track_scale * (1.0 + off(physics.track_spread)),
             slip_share: physics.slip_share + off(physics.slip_share_spread),
         }

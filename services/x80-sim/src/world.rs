@@ -256,6 +256,7 @@ fn offset_at(moves: &[Move], time: f64) -> DVec2 {
     match (before, moves.get(next)) {
         (Some(before), Some(after)) => {
             let share = (time - before.at_s) / (after.at_s - before.at_s);
+            assert!((0.0..=1.0).contains(&share));
             before.by.lerp(after.by, share)
         }
         (Some(only), None) | (None, Some(only)) => only.by,

@@ -326,6 +326,7 @@ impl Session {
             self.decoders.remove(0);
         }
         self.decoders.push((source, words));
+        assert!(self.decoders.len() <= 2);
         Ok(())
     }
 
