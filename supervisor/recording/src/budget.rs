@@ -40,6 +40,7 @@ impl Budget {
             let _ = fs::remove_file(&oldest);
             total -= size;
         }
+        debug_assert_eq!(total, self.complete.iter().map(|(_, size)| size).sum::<u64>());
     }
 }
 

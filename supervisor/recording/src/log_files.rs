@@ -30,6 +30,8 @@ impl Tail {
         let is_endless = whole == 0 && self.partial.len() > AT_ONCE;
         let given = if is_endless { self.partial.len() } else { whole };
         let lines: Vec<u8> = self.partial.drain(..given).collect();
+        debug_assert!(!self.partial.contains(&b'\n'));
+        assert!(self.partial.len() <= AT_ONCE);
         String::from_utf8_lossy(&lines).into_owned()
     }
 

@@ -40,6 +40,7 @@ impl Losses {
         if spec.writer == OPERATOR {
             return true;
         }
+        const { assert!(STAMP.end - STAMP.start == size_of::<Stamp>()) };
         let stage = message.get(STAMP.end..).and_then(|rest| rest.first_chunk());
         let stage = stage.filter(|_| spec.writer == EVERY_STAGE);
         let key = (spec.name, stage.copied().unwrap_or_default(), stamp.generation);
@@ -65,6 +66,7 @@ impl Losses {
 
     /// Returns the losses by topic, if they grew since the last call.
     pub(crate) fn grown(&mut self) -> Option<&BTreeMap<&'static str, u64>> {
+        assert!(!self.changed || self.total() > 0);
         std::mem::take(&mut self.changed).then_some(&self.counts)
     }
 

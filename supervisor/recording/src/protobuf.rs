@@ -28,6 +28,7 @@ impl Message {
     }
 
     fn tag(&mut self, field: u64, kind: u64) {
+        debug_assert!(field > 0 && kind < 8);
         self.varint(field << 3 | kind);
     }
 

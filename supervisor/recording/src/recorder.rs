@@ -149,6 +149,7 @@ pub fn record(
     loop {
         let wish = wishes.next_wish();
         let stopped = wish == Wish::Stop;
+        const { assert!(LOOK_EVERY.as_millis() < READ_EVERY.as_millis()) };
         let patience = match wish {
             Wish::Record if current.is_some() && !joins => READ_EVERY,
             Wish::Record => LOOK_EVERY,

@@ -250,6 +250,7 @@ fn grid(frame: GridFrame, cells: &[u8], time: &Message) -> Message {
     let side = frame.cells as usize;
     let each = side.div_ceil(MOST_A_SIDE).max(1);
     let drawn = side.div_ceil(each);
+    assert!(drawn <= MOST_A_SIDE && cells.len() == frame.area());
     let mut data = Vec::with_capacity(drawn * drawn * CELL.len());
     for row in 0..drawn {
         for col in 0..drawn {
@@ -264,6 +265,7 @@ fn grid(frame: GridFrame, cells: &[u8], time: &Message) -> Message {
             data.extend(paint(state));
         }
     }
+    assert_eq!(data.len(), drawn * drawn * CELL.len());
     let cell_m = frame.resolution_m * each as f64;
     const UINT8: u64 = 1;
     let field = |(offset, name): (u32, &str)| {

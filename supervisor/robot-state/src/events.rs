@@ -82,6 +82,7 @@ impl Events {
         if self.waiting.len() == MOST_WAITING {
             self.waiting.pop_front();
         }
+        assert!(self.waiting.len() < MOST_WAITING);
         self.waiting.push_back(Event { t: self.at_s, of: of.to_owned(), kind, text });
     }
 

@@ -118,6 +118,7 @@ impl RobotState {
         }
         self.way_every_m = self.way_every_m.max(POINT_EVERY_M);
         self.way.push(position);
+        assert!(self.way.len() <= MOST_POINTS && self.way_every_m >= POINT_EVERY_M);
     }
 
     pub fn log(&mut self, process: &str, line: &str) {
@@ -235,11 +236,12 @@ impl RobotState {
 }
 
 pub fn drop_every_second<T>(items: &mut Vec<T>) {
-    let mut nth = 0;
+    let (mut nth, half) = (0, items.len().div_ceil(2));
     items.retain(|_| {
         nth += 1;
         nth % 2 == 1
     });
+    assert_eq!(items.len(), half);
 }
 
 #[cfg(test)]

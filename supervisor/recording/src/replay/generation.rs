@@ -128,6 +128,7 @@ impl<'a> Generation<'a> {
             self.last_inputs.pop_front();
         }
         self.last_inputs.push_back(Rc::new(body));
+        assert!(self.last_inputs.len() <= SHOWN_INPUTS);
         for output in outputs {
             if !self.setting.recorded.contains_key(output.topic) {
                 continue;
@@ -225,6 +226,7 @@ impl<'a> Generation<'a> {
         if !self.is_over() && !self.setting.cut {
             self.find_what_was_not_computed();
         }
+        assert!(self.not_replayed.is_none() || self.difference.is_none());
         let waiting = self.channels.values().map(|channel| channel.computed.len() as u64);
         self.unrecorded += waiting.sum::<u64>();
         report.inputs += self.inputs;

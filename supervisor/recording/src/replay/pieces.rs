@@ -55,6 +55,7 @@ impl Pieces {
         };
         let body = body.to_vec();
         self.given += 4 + length;
+        assert!(self.given <= self.bytes.len());
         Ok(Some(body))
     }
 }
