@@ -58,6 +58,7 @@ impl Named {
                 if known.len() > REMEMBERED {
                     known.pop_front();
                 }
+                assert!(known.len() <= REMEMBERED && known.back() == Some(&author));
             }
         }
     }

@@ -21,10 +21,12 @@ impl<'a> Encoder<'a> {
     }
 
     pub(super) fn number<const N: usize>(&mut self, number: [u8; N]) {
+        const { assert!(N.is_power_of_two() && N <= 8) };
         let past = (self.bytes.len() - self.origin) % N;
         if past != 0 {
             self.bytes.extend_from_slice(&[0; 8][..N - past]);
         }
+        debug_assert!((self.bytes.len() - self.origin).is_multiple_of(N));
         self.bytes.extend_from_slice(&number);
     }
 

@@ -265,6 +265,7 @@ fn places(user: &str) -> Vec<PathBuf> {
 /// Returns the place of `robot` among `places`, else the first usable one, else the first. This
 /// finds a running robot even if places changed since its start.
 fn place(places: &[PathBuf], user: u32, robot: &str) -> PathBuf {
+    const { assert!(LONGEST_PLACE + "/".len() + 16 + "/guard".len() < 108) };
     let is_own = |path: &Path| {
         fs::symlink_metadata(path).is_ok_and(|found| found.is_dir() && found.uid() == user)
     };

@@ -94,6 +94,7 @@ impl fmt::Debug for Field {
 
 impl Structure {
     pub fn of<P: ZeroCopySend>(fields: Vec<Field>) -> Kind {
+        debug_assert!(fields.is_sorted_by_key(|field| field.offset));
         Kind::Struct(Self { name: type_name::<P>(), size: size_of::<P>(), fields })
     }
 }

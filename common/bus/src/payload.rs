@@ -60,6 +60,7 @@ pub fn encode_slice<H: Layout, E: Layout>(header: &H, slice: &[E], bytes: &mut V
     let mut to = Encoder::new(bytes);
     header.encode(&mut to);
     if has_slice::<E>() {
+        debug_assert!(u32::try_from(slice.len()).is_ok());
         (slice.len() as u32).encode(&mut to);
         E::encode_all(slice, &mut to);
     }

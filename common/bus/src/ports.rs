@@ -84,6 +84,7 @@ impl<H: Payload, E: Payload> Publisher<H, E> {
                 return false;
             }
             slots.write_copy_of_slice(slice);
+            debug_assert!(place.is_multiple_of(align_of::<H>()));
             // SAFETY: the sample has an aligned `H` at this address, and is exclusive to this call
             // until it is sent.
             unsafe { ptr::with_exposed_provenance_mut::<H>(place).write(header) };

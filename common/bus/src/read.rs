@@ -40,6 +40,7 @@ impl Bus {
         topic: &Topic<H, E>,
         buffer: usize,
     ) -> Result<Reader<H, E>> {
+        assert!(buffer > 0 && buffer <= topic.spec.limits.recorder_buffer);
         let subscriber = self.once_freed(|| {
             let service = Service::open(&self.medium, topic.spec)?;
             self.leave_places(topic.spec, topic.spec.limits.readers, service.readers().len())?;
@@ -51,6 +52,7 @@ impl Bus {
     /// Opens an endpoint. A consumer waits for places of killed processes, which the supervisor
     /// frees about once a second.
     fn once_freed<T>(&self, open: impl Fn() -> Result<T>) -> Result<T> {
+        const { assert!(LOOK_EVERY.as_millis() < PLACES_FREED_WITHIN.as_millis()) };
         let began = Instant::now();
         loop {
             let held = self.hold()?;
@@ -66,6 +68,7 @@ impl Bus {
 
     /// Denies a consumer the last places, which stages may need.
     fn leave_places(&self, spec: &Spec, places: usize, taken: usize) -> Result {
+        assert!(Limits::KEPT_FREE < places);
         if !self.is_stage && taken + Limits::KEPT_FREE >= places {
             let topic = spec.name;
             return Err(BusError::NoPlace { topic, places });

@@ -89,6 +89,7 @@ pub(crate) struct Places {
 impl Places {
     /// Takes the addresses of the first two places.
     pub(crate) const fn of_segment([first, second]: [usize; 2]) -> Self {
+        assert!(first != second);
         Self { length: second.abs_diff(first), reserved: Cell::new(first) }
     }
 

@@ -8,6 +8,7 @@ use super::{
     make::Bus,
     payload::{Payload, Stamp, Stamped},
     ports::{Notifier, Publisher, Service},
+    spec::Limits,
     topic::Topic,
 };
 
@@ -86,6 +87,7 @@ impl<H: Stamped, E: Payload> Writer<H, E> {
         header: H,
         slice: &[E],
     ) -> Result {
+        const { assert!(8 * MOST_UNNOTICED as usize <= Limits::SMALL.recorder_buffer) };
         match self.send(tick, time, header, slice) {
             Err(BusError::NoMemory { .. }) => self.lost.set(self.lost.get() + 1),
             sent => sent?,

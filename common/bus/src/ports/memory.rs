@@ -162,6 +162,7 @@ impl Topic {
         if !fill(Loan { header: header.cast(), elements }) {
             return false;
         }
+        debug_assert!(sample.elements.0.len() * size_of::<u128>() >= bytes);
         let sample = Rc::new(sample);
         self.readers.borrow_mut().retain(|(_, queue)| {
             let Some(queue) = queue.upgrade() else { return false };
@@ -170,6 +171,7 @@ impl Topic {
                 samples.pop_front();
             }
             samples.push_back(Rc::clone(&sample));
+            assert!(samples.len() <= queue.buffer);
             true
         });
         writer.last.replace(Some(sample));

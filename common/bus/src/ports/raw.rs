@@ -198,6 +198,7 @@ fn samples(
     spec: &Spec,
     carried: &Carried,
 ) -> Result<Builder<Bytes, CustomHeaderMarker, ipc::Service>> {
+    const { assert!(Limits::WRITERS <= Limits::NODES && Limits::LISTENERS <= Limits::NODES) };
     let header = carried.header.detail(TypeVariant::FixedSize, spec)?;
     let element = carried.element.detail(carried.elements, spec)?;
     let builder = node
