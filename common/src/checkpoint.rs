@@ -82,12 +82,14 @@ impl Checkpoint {
     }
 
     pub fn save<T: Serialize>(&mut self, state: &T) -> Result<(), CheckpointError> {
+        const { assert!(HEADER == MAGIC.len() + 1 + 8 + 4 + 4) };
         let sequence = self.sequence + 1;
         let mut bytes = std::mem::take(&mut self.buffer);
         bytes.clear();
         bytes.resize(HEADER, 0);
         let mut bytes = encode_after(bytes, state, self.capacity, &self.path)?;
         let length = bytes.len() - HEADER;
+        assert!(length <= self.capacity);
         bytes[..3].copy_from_slice(&MAGIC);
         bytes[3] = VERSION;
         bytes[4..12].copy_from_slice(&sequence.to_le_bytes());

@@ -9,7 +9,7 @@ use std::{fmt, time::Duration};
 
 use serde::Serialize;
 
-use crate::mission::Sensor;
+use crate::mission::{MOST_SENSORS, Sensor};
 use crate::samples::{
     ComplaintSample, CountsSample, InfraredSample, PowerSample, RangeReading, RangeStatus,
     SurroundingsSample, Sweep, WheelSample, name, name_str, words,
@@ -268,6 +268,7 @@ pub fn range_reading(row: usize, sensor: &Sensor, range: Option<f64>) -> RangeRe
         Some(range) if range <= sensor.reach_m => (RangeStatus::Measured, range),
         _ => (RangeStatus::Nothing, 0.0),
     };
+    const { assert!(MOST_SENSORS <= 1 << u8::BITS) };
     let raw = (range_m * 100.0).round() as u16;
     RangeReading { sensor: row as u8, range_m, raw, status: status.into() }
 }

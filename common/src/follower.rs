@@ -150,6 +150,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
     }
 
     fn look(&mut self) -> Result<bool, BusError> {
+        assert!(self.joined.is_none() && !self.ending);
         let Ok(instance) = BusInstance::current(&self.domain) else {
             return Ok(false);
         };
@@ -165,6 +166,7 @@ impl<Topics, Open: FnMut(&Bus) -> Result<Topics, BusError>> Follower<Topics, Ope
                 Ok(true)
             }
             Err(error) => {
+                const { assert!(LOOK_EVERY.as_millis() < REFUSED_FOR.as_millis()) };
                 let since = match self.refused.take() {
                     Some((refused, since)) if refused == instance => since,
                     _ => Instant::now(),

@@ -58,6 +58,7 @@ impl InputLog {
         if self.unpublished.len() >= self.piece {
             self.publish(at)?;
         }
+        assert!(self.unpublished.len() < self.piece);
         Ok(())
     }
 

@@ -119,6 +119,7 @@ impl Journal {
     /// Fails if the entry is too long, or cannot be encoded or written.
     pub fn append<E: Serialize>(&mut self, entry: &E) -> Result<(), CheckpointError> {
         let mut bytes = encode_after(vec![0; HEADER], entry, LONGEST, &self.path)?;
+        const { assert!(LONGEST < 1 << 24 && HEADER == 8 + 3 + 1 + 4) };
         let length = bytes.len() - HEADER;
         bytes.extend_from_slice(&END);
         bytes[..8].copy_from_slice(&self.number.to_le_bytes());
@@ -148,6 +149,7 @@ impl Journal {
 }
 
 fn snapshot_after(capacity: usize) -> u64 {
+    const { assert!(0 < SNAPSHOT_AFTER.0 && SNAPSHOT_AFTER.0 < SNAPSHOT_AFTER.1) };
     let (soonest, latest) = SNAPSHOT_AFTER;
     (capacity as u64 / BYTES_FOR_AN_ENTRY).clamp(soonest, latest)
 }

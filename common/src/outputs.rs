@@ -75,8 +75,10 @@ impl Outputs {
     }
 
     fn open(&mut self, context: &mut Context, longest: usize, late: bool) -> Result {
+        assert!(self.replayed.is_none() && (late || self.writers.is_empty()));
         for topic in context.wiring.outputs {
             if (topic.spec().rate == Rate::EachFrame) == late {
+                debug_assert_eq!(topic.spec().writer, context.wiring.stage);
                 let number = context.generation.number;
                 let writer = topic.any_writer(&context.bus, number, longest)?;
                 self.writers.push((topic.spec().name, writer));

@@ -272,6 +272,7 @@ impl<P: Process> Simulated for Simulation<P> {
                 return Ok(Some(NAMED_WITHIN.saturating_sub(since.elapsed())));
             }
             roster.admit(&host.context.bus);
+            assert!(self.work.is_none());
             let work = self.work.insert(host.open::<P>()?);
             work.begin(host)?;
             return Ok(Some(work.patience(host)));
@@ -412,6 +413,7 @@ impl<P: Process> Work<P> {
     }
 
     fn patience(&self, host: &Host) -> Duration {
+        const { assert!(TICK_OVER.as_millis() < IDLE_WITHIN.as_millis()) };
         let pause = (self.busy && self.process.has_idle_work()).then_some(TICK_OVER);
         let waits = [pause, self.process.looks_again_after()];
         waits.into_iter().flatten().fold(host.heartbeat.time_to_beat(), Duration::min)
@@ -492,6 +494,8 @@ struct Heartbeat {
 
 impl Heartbeat {
     fn new(bus: &Bus, generation: &Generation, clock: MissionClock) -> Result<Self> {
+        let period = topics::HEALTH.spec().restated_every();
+        assert!(!period.is_zero());
         Ok(Self {
             writer: bus.writer(&topics::HEALTH, generation.number)?,
             sample: HealthSample {
@@ -500,7 +504,7 @@ impl Heartbeat {
                 ..HealthSample::default()
             },
             complaints: bus.writer(&topics::COMPLAINTS, generation.number)?,
-            period: topics::HEALTH.spec().restated_every(),
+            period,
             last: Instant::now(),
             tick: 0,
             clock,
