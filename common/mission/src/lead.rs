@@ -94,6 +94,7 @@ impl Lead {
             self.wanted = oldest;
         }
         self.pending.push_back((now_s + self.dead_time_s, twist));
+        assert!(self.pending.len() <= MOST_PENDING);
     }
 
     fn go_on(&mut self, mut pose: Pose2, until_s: f64) -> Pose2 {

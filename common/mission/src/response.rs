@@ -159,6 +159,7 @@ impl ModelledSpeed {
             self.target = oldest;
         }
         self.pending.push_back((at_s + self.delay_s, speed));
+        assert!(self.pending.len() <= MOST_PENDING);
     }
 
     pub const fn speed(&self) -> f64 {

@@ -298,6 +298,7 @@ impl Filter {
     fn correct(&mut self, error: &Error) {
         self.pose.position += DVec2::new(error[0], error[1]);
         self.pose.heading += error[2];
+        const { assert!(BIAS == 3 + 3 && PARTS == BIAS + 1) };
         for (share, error) in self.shares.iter_mut().zip(&error.as_slice()[3..]) {
             *share += error;
         }
@@ -382,6 +383,7 @@ impl History {
                 self.base.take(&fix, there);
             }
         }
+        assert!(self.ticks.len() <= MOST_TICKS);
     }
 
     pub(crate) fn turn(
@@ -446,6 +448,7 @@ impl History {
         let at = self.ticks[at].time;
         let place = self.fixes.partition_point(|(used, _)| *used <= at);
         self.fixes.insert(place, (at, fix));
+        assert!(self.fixes.len() <= MOST_FIXES);
         Ok(())
     }
 }

@@ -205,6 +205,7 @@ impl Link {
         self.guard();
         assert!(self.connected() || self.decision.stops(), "the link stops a lost robot");
         assert!(!self.decision.stops() || self.repeat.is_none());
+        assert!(self.waits.is_none() || self.in_ticks());
         let sent = self.effects.iter().filter_map(|effect| match effect {
             Effect::Send(bytes) => Some(self.base.owed(bytes)),
             _ => None,

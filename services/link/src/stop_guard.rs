@@ -229,6 +229,7 @@ impl Orders {
 
     /// Returns the longest time to the next turn. Datagrams and requests shorten it.
     pub fn pause(&self) -> Duration {
+        const { assert!(LOOKS_AGAIN.as_millis() < LOOKS_FOR_SILENT.as_millis()) };
         if self.link.connected() { LOOKS_AGAIN } else { LOOKS_FOR_SILENT }
     }
 }

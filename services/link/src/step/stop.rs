@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use common::{driver::StopMethod, samples::Cause};
 
-use super::{Effect, Link, STOP_AGAIN};
+use super::{Effect, Link, STOP_AGAIN, STOP_AGAINST_OTHERS};
 use crate::failsafe::{
     Decision,
     monitor::{Monitor as _, Observation},
@@ -80,6 +80,7 @@ impl Link {
 
     /// Returns whether a stop is due. A silent robot may receive, so it gets one with each ping.
     fn is_stop_due(&self) -> bool {
+        const { assert!(STOP_AGAINST_OTHERS.as_millis() < STOP_AGAIN.as_millis()) };
         match self.connected() {
             true => self.passed(self.stop_sent_ns, STOP_AGAIN),
             false => self.pinged_ns == Some(self.now_ns) && self.stop_sent_ns != Some(self.now_ns),

@@ -117,6 +117,7 @@ impl<D: Dial> Wire for Stream<D> {
                 Ok(descriptor) => {
                     let events = EventFlags::IN | EventFlags::OUT;
                     epoll::add(&self.epoll, &descriptor, EventData::new_u64(0), events)?;
+                    assert!(self.tail.is_empty());
                     self.connection =
                         Some(Connection { descriptor, is_open: false, since_ns: now_ns });
                 }
