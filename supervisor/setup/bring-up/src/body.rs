@@ -36,7 +36,9 @@ pub(crate) fn motors(turns_back: bool, drives_back: bool, exchanged: bool) -> Ma
     let sign = |back| if back { -1.0 } else { 1.0 };
     let signs = Matrix2::from_diagonal(&Vector2::new(sign(turns_back), sign(drives_back)));
     let goes = if exchanged { signs * Matrix2::new(0.0, 1.0, 1.0, 0.0) } else { signs };
-    sums * goes * sums / 2.0
+    let motors = sums * goes * sums / 2.0;
+    assert_eq!(motors * motors.transpose(), Matrix2::identity());
+    motors
 }
 
 /// Describes motor or encoder faults: one `part` for each row that differs from the identity.

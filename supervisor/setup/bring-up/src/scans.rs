@@ -261,6 +261,7 @@ impl<'a> Problem<'a> {
         unknowns: &mut Unknowns,
         (most_turn, half_m): (f64, f64),
     ) {
+        const { assert!(CURL + 1 == UNKNOWNS) };
         let now = self.residuals(hypothesis, unknowns, most_turn);
         let shifted: Vec<_> = (0..UNKNOWNS)
             .map(|it| {
@@ -269,6 +270,7 @@ impl<'a> Problem<'a> {
                 self.residuals(hypothesis, &shifted, most_turn)
             })
             .collect();
+        assert!(shifted.iter().all(|it| it.len() == now.len()));
         let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
         let mut right = Unknowns::zeros();
         for (point, residual) in now.iter().enumerate() {

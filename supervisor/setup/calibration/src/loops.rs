@@ -90,6 +90,7 @@ impl Wheels {
 
 /// Returns mean and standard deviation of the slip, given the log-likelihood.
 fn posterior_of_slip(ln_likelihood: impl Fn(f64) -> f64) -> (f64, f64) {
+    const { assert!(LEAST_SLIP < PRIOR_SLIP && PRIOR_SLIP < MOST_SLIP) };
     let step = (MOST_SLIP / LEAST_SLIP).ln() / f64::from(SLIPS - 1);
     let slips = (0..SLIPS).map(|index| LEAST_SLIP * (step * f64::from(index)).exp());
     let posterior: Vec<(f64, f64)> = slips
@@ -163,6 +164,7 @@ impl Rows {
     /// Each row has the factors of e and tau, the value, and the variance by slip.
     pub(crate) fn new(rows: &[([f64; 2], f64, f64)], otherwise: DMatrix<f64>) -> Self {
         let n = rows.len();
+        assert_eq!(otherwise.shape(), (n, n));
         let by_slip = DVector::from_fn(n, |row, _| rows[row].2);
         Self {
             design: DMatrix::from_fn(n, 2, |row, column| rows[row].0[column]),
@@ -336,6 +338,8 @@ pub fn checked(
         }
         used.remove(worst.0);
     }
+    const { assert!(HELD_OUT + 1 < FEWEST_LOOPS) };
+    assert_eq!(used.len() + accidents, loops.len());
     let (others, held_out) = used.split_at(used.len() - HELD_OUT);
     let by_others = Estimate::of(&by_loops(others))?;
     for held_out in held_out {

@@ -35,6 +35,7 @@ impl Leg {
     fn arc(&self) -> Option<Arc> {
         let mut ranges: Vec<f64> =
             self.0.iter().map(|(_, range)| *range).filter(|range| range.is_finite()).collect();
+        const { assert!(MARGIN > 0 && FEWEST + 2 * MARGIN < MOST) };
         if ranges.len() < FEWEST {
             return None;
         }

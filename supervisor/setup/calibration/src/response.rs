@@ -154,6 +154,7 @@ impl Fit {
             let as_much = |it: &Self| it.explained >= limited.explained - by.as_much();
             Some(simple.find(as_much).unwrap_or(limited))
         };
+        const { assert!(4.0 * DELAY_STEP_S >= COARSE_S && COARSE_S < LONGEST_DELAY_S) };
         let coarse = best(0..(LONGEST_DELAY_S / COARSE_S) as i32, 0.0, COARSE_S)?;
         best(-4..5, coarse.delay_s, DELAY_STEP_S)
     }

@@ -84,6 +84,7 @@ fn estimate(squares: &[Driven], track_m: f64) -> Result<Estimate, Refusal> {
     let mut found = Estimate::of(&rows(squares, wheels, track_m))?;
     let of_square = |pair: &[f64]| (pair.iter().map(|it| it * it).sum::<f64>() / 2.0).sqrt();
     found.residuals = found.residuals.chunks(2).map(of_square).collect();
+    assert_eq!(found.residuals.len(), squares.len());
     Ok(found)
 }
 

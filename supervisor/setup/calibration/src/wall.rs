@@ -132,6 +132,7 @@ pub(crate) fn echo_m(reading: &RangeReading) -> Option<f64> {
 
 /// Returns the ordered direction of a robot with `left` to turn on the spot, radians.
 pub(crate) fn direction_aside(left: f64, most: f64) -> f64 {
+    const { assert!(TURNED_RAD < SLOW_RAD && SLOW_RAD < FAST_RAD) };
     left.abs().clamp(SLOW_RAD, most) * left.signum()
 }
 
@@ -176,6 +177,7 @@ impl Wall {
     }
 
     fn advance(&mut self, heading: f64, echo_m: Option<f64>, body: &Body) {
+        const { assert!(STOP_M < AHEAD_M && AHEAD_M < NEAR_M && NEAR_M_S < SPEED_M_S) };
         let driven = (self.ways.arc_m() - self.phase_from_m).abs();
         let limit = if matches!(self.phase, Phase::Away(_)) { AHEAD_M } else { STOP_M };
         self.near = if echo_m.is_some_and(|echo| echo <= limit) { self.near + 1 } else { 0 };
