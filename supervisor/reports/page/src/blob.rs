@@ -16,7 +16,10 @@
 
 use std::io::Write as _;
 
-use common::{grid::GridFrame, samples::FieldCell};
+use common::{
+    grid::{GridFrame, MAX_CELLS},
+    samples::FieldCell,
+};
 use flate2::{Compression, write::DeflateEncoder};
 use glam::DVec2;
 
@@ -63,6 +66,7 @@ pub fn field(
         }
     }
     directions.append(&mut depths);
+    assert!(sent <= MOST_A_SIDE && directions.len() == 2 * sent * sent);
     let side_m = frame.resolution_m * every as f64;
     Header { shown, cells: sent, side_m, frame, time_s, target }.message(&directions)
 }
@@ -91,6 +95,7 @@ struct Header {
 
 impl Header {
     fn message(&self, cells: &[u8]) -> Vec<u8> {
+        const { assert!(MAX_CELLS <= u16::MAX as u32) };
         let first = common::grid::Cell { col: 0, row: 0 };
         let corner = self.frame.corner_of(first);
         let mut message = vec![self.shown as u8, 0];

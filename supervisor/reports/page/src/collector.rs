@@ -120,6 +120,7 @@ impl Collector {
         if self.ticks.len() >= MOST_TICKS {
             self.ticks.pop_first();
         }
+        assert!(self.ticks.len() < MOST_TICKS);
         self.ticks.entry(number).or_default()
     }
 
@@ -195,6 +196,7 @@ impl Collector {
             truth[1],
             truth[2],
         ];
+        assert_eq!(values.len(), COLUMNS.len());
         let ranges = self.newest.ranges.iter().flatten();
         let ranges = ranges.map(|range| range.map_or(Value::Null, rounded));
         let movers = self.newest.movers.as_ref().filter(|movers| !movers.is_empty());
@@ -210,6 +212,7 @@ impl Collector {
                 self.truths.pop_front();
             }
             self.truths.push_back(truth);
+            assert!(self.truths.len() <= MOST_TRUTHS);
         }
         self.truths.len() < MOST_TRUTHS
     }

@@ -116,6 +116,7 @@ enum Told {
 }
 
 async fn send(mut sender: Sender, mut cursor: Cursor, role: Role, mut told: mpsc::Receiver<Told>) {
+    const { assert!(SEND_EVERY.as_millis() < ALIVE_EVERY.as_millis()) };
     let mut ticks = interval(SEND_EVERY);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut sent = Instant::now();

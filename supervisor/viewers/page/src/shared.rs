@@ -48,6 +48,7 @@ impl Ring {
             self.first += 1;
         }
         self.items.push_back(item.to_string().into());
+        assert!(self.items.len() <= MOST);
     }
 
     /// Returns at most [`AT_ONCE`] items that are new for a browser at `cursor`.
@@ -55,6 +56,7 @@ impl Ring {
         let from = cursor.saturating_sub(self.first) as usize;
         let found: Vec<_> = self.items.iter().skip(from).take(AT_ONCE).cloned().collect();
         *cursor = self.first + from.min(self.items.len()) as u64 + found.len() as u64;
+        assert!(*cursor <= self.first + self.items.len() as u64);
         found
     }
 }
