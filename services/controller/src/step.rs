@@ -144,16 +144,20 @@ impl Controller {
         }
     }
 
-    /// Advances the progress, which never reverts: a robot at rest on the circle's edge stays for
-    /// one count. Beside a target in a hazard it has arrived too, if the planner sees no nearer
-    /// place.
+    /// Advances the progress. It reverts only beyond twice the tolerance: a robot at rest on the
+    /// circle's edge stays for one count, and one whose stop was lost drives back. Beside a target
+    /// in a hazard it has arrived too, if the planner sees no nearer place.
     fn arrival(&mut self, guidance: &GuidanceSample, distance: f64) -> Arrival {
         let number = guidance.target_number;
         if self.arrival.0 != number {
             self.arrival = (number, Arrival::OnTheWay);
         }
         let is_there = self.is_there(guidance, distance);
+        let rolled_on = !is_there && distance > 2.0 * self.mission.arrival_tolerance_m;
         let arrival = &mut self.arrival.1;
+        if *arrival == Arrival::Arrived && rolled_on {
+            *arrival = Arrival::OnTheWay;
+        }
         if *arrival == Arrival::OnTheWay && is_there && number != 0 {
             *arrival = Arrival::Turning;
         }

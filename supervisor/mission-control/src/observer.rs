@@ -132,10 +132,10 @@ impl Observer {
             record.published.tick = Some(command.stamp.tick);
             record.published.commands += 1;
             listener(Heard::Command(&command));
-            if command.state() == CommandState::Arrived
-                && command.target_number == record.target_number
-            {
-                record.arrival.get_or_insert(command);
+            if command.target_number == record.target_number {
+                // A robot that rolled on has not arrived.
+                let arrived = (command.state() == CommandState::Arrived).then_some(command);
+                record.arrival = arrived.and(record.arrival.or(arrived));
             }
         }
         while let Some(guidance) = self.guidance.next_sample()? {

@@ -298,6 +298,9 @@ impl<'a> Supervisor<'a> {
         let newest_m = record.pose.map(|pose| target.distance(pose.pose().position));
         // A robot that follows goes on with its beacon.
         let ends = self.targets.is_last() && !self.targets.follows;
+        if record.arrival.is_none() {
+            self.arrived = None;
+        }
         let arrival = record.arrival.filter(|_| ends).map(|command| Arrival {
             distance_m: newest_m.unwrap_or(command.distance_m),
             beside: record.beside(&command, self.options.mission.arrival_tolerance_m),

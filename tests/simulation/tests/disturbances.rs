@@ -308,3 +308,19 @@ fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot
     let ran = ran("sure_within_m = 9", &asked.map(|(time, what)| at(time, What::Ask(what))));
     assert_eq!(operator_stops(&ran), 1, "{:?}", ran.causes);
 }
+
+#[test]
+fn a_robot_whose_stop_is_lost_at_its_target_drives_back() {
+    let mut farthest = 0.0_f64;
+    for lost_s in [2.6, 2.8, 3.0, 3.2] {
+        let wire = |lost| What::Wire(Way::ToRobot, Quality { lost, ..Quality::default() });
+        let text = format!("target = [1.7, 0]\nsimulation.ignores_time = true\n{SURE}");
+        let disturbances = [at(lost_s, wire(1.0)), at(lost_s + 1.2, wire(0.0))];
+        let ran = ran_text(&text, &disturbances, &[]);
+        assert_reached(&ran);
+        let off_m = |x: f64| (x - 1.7).abs();
+        assert!(off_m(ran.truth.last().unwrap().x) < 0.3, "{lost_s}");
+        farthest = ran.truth.iter().map(|truth| truth.x - 1.7).fold(farthest, f64::max);
+    }
+    assert!(farthest > 0.4, "no robot rolled on: {farthest} m");
+}

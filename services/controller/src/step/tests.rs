@@ -180,12 +180,15 @@ fn without_guidance_the_robot_stands() {
 }
 
 #[test]
-fn an_arrival_is_final_and_holds_for_its_target_alone() {
+fn an_arrival_holds_for_its_target_alone_until_the_robot_has_rolled_on() {
     let mut controller = controller("");
-    for pose in [short(0.05), facing(0.0)] {
-        let command = controller.at(pose, &ahead());
-        assert_eq!((command.state(), command.target_number), (CommandState::Arrived, 1));
-        close(command.v_m_s, 0.0);
+    let (arrived, driving) = (CommandState::Arrived, CommandState::Driving);
+    for (short_m, state) in
+        [(0.05, arrived), (0.29, arrived), (0.31, driving), (0.16, driving), (0.14, arrived)]
+    {
+        let command = controller.at(short(short_m), &ahead());
+        assert_eq!((command.state(), command.target_number), (state, 1), "{short_m}");
+        assert_eq!(command.v_m_s > 0.0, state == driving);
     }
     let target = TargetPoint::at(DVec2::new(9.0, 0.0));
     let next = GuidanceSample { target_number: 2, target, ..ahead() };
