@@ -6,7 +6,6 @@
 //! the machine.
 
 mod attack;
-mod changes;
 pub mod consumers;
 mod leftovers;
 mod mission;

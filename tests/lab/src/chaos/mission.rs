@@ -11,7 +11,6 @@ use common::{clock::Pace, mission::Mission};
 
 use crate::chaos::{
     attack::{Attack, Death},
-    changes::Operator,
     consumers::Consumers,
     options::{Arguments, Options},
     report::Series,
@@ -58,8 +57,6 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     }
     let consumers = files.join("consumers");
     let consumers = Consumers::start(asked, consumers, &mut series.report)?;
-    let operator =
-        asked.targets.then(|| Operator::start(asked.robot.clone(), &options.loaded, seed));
     let mut attack = Attack::new(seed, consumers);
     let began = Instant::now();
     let summary = loop {
@@ -78,12 +75,11 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     attack.end(series)?;
     let report = &mut series.report;
     let kills = report.kills() - before;
-    let mut truth = &[][..];
     let mut collisions = summary.collisions.unwrap_or_default();
     let mut excess_m = summary.pose_error_m.unwrap_or_default();
     if let Some(robot) = &mut robot {
         robot.stop()?;
-        truth = robot.truth();
+        let truth = robot.truth();
         collisions = truth.last().map_or(0, |tick| tick.contacts);
         excess_m = attack.pose_error(truth).unwrap_or(f64::INFINITY);
     }
@@ -102,14 +98,10 @@ pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Resu
     let aborted = attack.healthy_aborted(&deaths(&directory));
     wrong.extend(aborted.iter().map(|stage| format!("healthy stage aborted: {stage}")));
     let allowance_m = pose_allowance_m(&options.loaded, kills, &summary);
-    // The undisturbed run keeps its target, so it takes another path.
-    if excess_m > allowance_m && !asked.targets {
+    if excess_m > allowance_m {
         wrong.push(format!(
             "pose error {excess_m:.4} m above the undisturbed run; the allowance is {allowance_m:.4} m"
         ));
-    }
-    if let Some(operator) = operator {
-        report.targets.get_or_insert_default().add(operator, &summary, truth, &mut wrong);
     }
     if asked.replay {
         let replays = report.replays.get_or_insert_default();

@@ -41,10 +41,6 @@ pub struct Arguments {
     /// machine stood still.
     #[arg(long)]
     pub freeze_all: bool,
-    /// Redirect the robot every few seconds. Each target must be reached by the ground truth, or
-    /// reported as replaced.
-    #[arg(long, conflicts_with = "robot_faults")]
-    pub targets: bool,
     /// Record the missions, and replay every generation of every stage, which must be bit-equal.
     #[arg(long)]
     pub replay: bool,

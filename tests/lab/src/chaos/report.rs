@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use super::{
     Judged,
-    changes::Changes,
     options::Options,
     replays::Replays,
     schedule::{Kind, Schedule},
@@ -40,8 +39,6 @@ pub struct Report {
     pub leftovers: Vec<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replays: Option<Replays>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub targets: Option<Changes>,
     pub took_s: f64,
 }
 
