@@ -115,7 +115,7 @@ impl Request {
             stage,
             targets,
             target_count: points.len() as u8,
-            deviations: PLACED,
+            deviations: if matches!(self, Self::Place) { PLACED } else { [0.0; 2] },
             ..RequestSample::default()
         };
         bus.writer(&topics::REQUESTS, 1)?.publish(0, MissionTime::default(), sample)

@@ -184,7 +184,7 @@ fn an_arrival_holds_for_its_target_alone_until_the_robot_has_rolled_on() {
     let mut controller = controller("");
     let (arrived, driving) = (CommandState::Arrived, CommandState::Driving);
     for (short_m, state) in
-        [(0.05, arrived), (0.29, arrived), (0.31, driving), (0.16, driving), (0.14, arrived)]
+        [(0.05, arrived), (0.19, arrived), (0.21, driving), (0.11, driving), (0.09, arrived)]
     {
         let command = controller.at(short(short_m), &ahead());
         assert_eq!((command.state(), command.target_number), (state, 1), "{short_m}");
