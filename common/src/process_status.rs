@@ -24,9 +24,10 @@ pub fn scheduled(task: &str) -> Option<[Duration; 2]> {
     Some([times.next()?, times.next()?])
 }
 
-/// Returns whether a thread waits for a disk. `task` is its path below `/proc`.
-pub fn waits_for_disk(task: &str) -> bool {
-    stat(task).is_some_and(|fields| fields.starts_with('D'))
+/// Returns the state of a thread: `R` runs or is runnable, `D` waits for a disk. `task` is its path
+/// below `/proc`.
+pub fn state(task: &str) -> Option<char> {
+    stat(task)?.chars().next()
 }
 
 /// Returns the fields after the name, from the state on.

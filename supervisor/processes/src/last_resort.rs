@@ -17,7 +17,7 @@ use std::{
 
 use common::{
     domain::Domain,
-    process_status::{scheduled, waits_for_disk},
+    process_status::{scheduled, state},
     signals::{Signals, exit_at_once},
 };
 use rustix::{
@@ -55,36 +55,33 @@ impl Turns {
 
     fn await_stuck(&self, thread: Pid) {
         const { assert!(2 * LOOK_EVERY.as_millis() < STUCK.as_millis()) };
-        let task = task(thread);
-        let (mut seen, mut stuck, mut waited) = (0, Duration::ZERO, processor_awaited(&task));
-        loop {
-            let now = self.count.load(Ordering::Relaxed);
-            if now != seen || self.rests.load(Ordering::Relaxed) {
-                (seen, stuck, waited) = (now, Duration::ZERO, processor_awaited(&task));
-            }
-            // A starved loop is alive.
-            let waits = processor_awaited(&task).saturating_sub(waited);
-            if stuck.saturating_sub(waits) >= STUCK {
-                return;
-            }
+        let task = format!("self/task/{thread}");
+        let (mut seen, mut stuck) = (0, Duration::ZERO);
+        let mut times = scheduled(&task).unwrap_or_default();
+        while stuck < STUCK {
             let began = Instant::now();
             thread::park_timeout(LOOK_EVERY);
-            // If this thread has to wait, so does the loop. A save to a busy disk is no hang either.
-            if !waits_for_disk(&task) {
-                stuck += began.elapsed().min(2 * LOOK_EVERY);
+            // If this thread has to wait, so does the loop.
+            let passed = began.elapsed().min(2 * LOOK_EVERY);
+            let [ran, awaited] =
+                std::mem::replace(&mut times, scheduled(&task).unwrap_or_default());
+            let now = self.count.load(Ordering::Relaxed);
+            if std::mem::replace(&mut seen, now) != now || self.rests.load(Ordering::Relaxed) {
+                stuck = Duration::ZERO;
+            }
+            // A starved loop is alive, and a save to a busy disk is no hang either. The kernel
+            // counts a wait for a processor when it ends; until then the loop is runnable and does
+            // not run.
+            let waits = match state(&task) {
+                Some('D') => true,
+                Some('R') => times[0] == ran,
+                _ => false,
+            };
+            if !waits {
+                stuck += passed.saturating_sub(times[1].saturating_sub(awaited));
             }
         }
     }
-}
-
-/// Returns the path of a thread below `/proc`.
-fn task(thread: Pid) -> String {
-    format!("self/task/{thread}")
-}
-
-/// Returns zero if uncounted.
-fn processor_awaited(task: &str) -> Duration {
-    scheduled(task).map_or(Duration::ZERO, |[_, awaited]| awaited)
 }
 
 pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
