@@ -71,8 +71,9 @@ impl fmt::Display for RobotName {
 
 pub const SHARED_MEMORY: &str = "/dev/shm";
 
-/// Wait for a supervisor that recreates its directory; it checks five times a second.
-const MADE_AGAIN: Duration = Duration::from_secs(2);
+/// Wait for a supervisor that recreates its directory. It checks five times a second, on a starved
+/// machine less often.
+const MADE_AGAIN: Duration = Duration::from_secs(10);
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
 /// Names of one robot's files on this machine, for one user.

@@ -5,7 +5,7 @@ use std::{fs::File, io, path::Path};
 use common::{
     domain::RobotName,
     lock_holders,
-    roster::Roster,
+    roster::{self, Roster},
     samples::{RosterEntry, name_str},
 };
 use mission_control::operator;
@@ -47,7 +47,7 @@ pub fn send(robot: &RobotName, stage: &str, signal: Signal) -> Result {
             .map_err(|error| cannot_signal(stage, pid, &error))?);
     }
     let stage = known(stage)?;
-    let bus = operator::join(&domain)?;
+    let bus = roster::join(&domain, "operator")?;
     let mut roster = Roster::open(&bus)?;
     let named = |entries: &[RosterEntry]| {
         let entry = entries.iter().find(|entry| name_str(&entry.stage) == stage);

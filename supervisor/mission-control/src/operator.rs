@@ -13,7 +13,7 @@ use std::{
 };
 
 use common::{
-    bus::{Bus, BusError},
+    bus::BusError,
     clock::{MissionTime, monotonic_ns},
     domain::{Domain, RobotName},
     poll,
@@ -311,7 +311,7 @@ fn told(mut teller: Child) -> Result {
 
 /// Waits until `rests` accepts a link sample.
 fn await_rest(robot: &RobotName, rests: impl Fn(&LinkSample) -> bool) -> Result {
-    let bus = join(&robot.domain())?;
+    let bus = roster::join(&robot.domain(), "operator")?;
     let mut links = bus.reader(&topics::LINK)?;
     let mut waiter = Waiter::default();
     waiter.on(bus.wakeup(&topics::LINK)?);
@@ -444,25 +444,10 @@ pub fn refuse_mirror(domain: &Domain) -> Result {
     refuse("mirror", message)
 }
 
-/// Joins a robot's bus. A supervisor that starts, or whose files were removed, is waited for.
-pub fn join(domain: &Domain) -> Result<Bus> {
-    let began = Instant::now();
-    loop {
-        match roster::join(domain, "operator") {
-            Err(BusError::NotRunning { .. })
-                if domain.is_supervised() && began.elapsed() < PATIENCE =>
-            {
-                thread::sleep(AGAIN_AFTER);
-            }
-            joined => return Ok(joined?),
-        }
-    }
-}
-
 fn ask(robot: &RobotName, request: RequestSample) -> Result {
     let domain = robot.domain();
     refuse_mirror(&domain)?;
-    let bus = join(&domain)?;
+    let bus = roster::join(&domain, "operator")?;
     // The roster is opened first, so that the answer is not missed.
     let mut roster = Roster::open(&bus)?;
     let mut requests = bus.writer(&topics::REQUESTS, 1)?;

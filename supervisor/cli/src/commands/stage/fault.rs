@@ -6,13 +6,13 @@ use common::{
     clock::MissionTime,
     domain::RobotName,
     faults,
-    roster::Roster,
+    roster::{self, Roster},
     samples::{FaultAnswer, FaultSample, name, name_str},
     topics,
     waiter::Waiter,
 };
 
-use mission_control::operator::{PATIENCE, find, join, new_id, refuse_mirror};
+use mission_control::operator::{PATIENCE, find, new_id, refuse_mirror};
 
 use console::{
     failure::{Refused, Result, refuse},
@@ -55,7 +55,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let robot = &arguments.robot;
     let domain = robot.domain();
     refuse_mirror(&domain)?;
-    let bus = join(&domain)?;
+    let bus = roster::join(&domain, "operator")?;
     let simulated = find(&mut Roster::open(&bus)?, robot, |header, _| Some(header.simulated == 1))?;
     if !simulated && !arguments.break_a_real_robot {
         return Err(real_robot(robot).into());
