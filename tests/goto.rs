@@ -17,7 +17,7 @@ fn a_target_is_refused_with_the_reason_and_the_robot_keeps_the_one_it_has() {
     to(&["1", "1"], "not-running", &[robot]);
     let known = ["--set", "known.drum=[{at=[2.0, 2.0], radius_m=0.3}]"];
     // It arrives only when it returns, on a starved machine too.
-    let slow = ["--set", "controller.speed_m_s=0.01", "--set", "timeout_s=1200"];
+    let slow = ["--set", "controller.speed_m_s=0.005", "--set", "timeout_s=2000"];
     let mut run = Run::under_way(robot, "open-room", &[&PACE[..], &known, &slow].concat(), 1.0);
     to(&["1"], "usage", &[]);
     to(&["1", "1", "2"], "no-target", &["2"]);
@@ -26,7 +26,7 @@ fn a_target_is_refused_with_the_reason_and_the_robot_keeps_the_one_it_has() {
     to(&["0"; 34], "too-many-targets", &["16"]);
     to(&["--follow"], "not-staying", &[]);
     // Each command in a row finds a place on the bus.
-    for _ in 0..20 {
+    for _ in 0..50 {
         to(&["9", "0"], "target-outside", &["perimeter"]);
     }
     operate(robot, &["stop"]);

@@ -261,11 +261,7 @@ pub fn replayed_in(directory: &TempDir) -> Report {
 pub fn replayed(recording: &Recording) -> Report {
     let report = replay(recording, &Options::default()).unwrap();
     assert_eq!(report.difference, None, "{report}");
-    // A starved recorder loses samples, and says so.
-    assert!(
-        report.not_replayed() == 0 || recording.lost.values().any(|lost| *lost > 0),
-        "{report}"
-    );
+    assert_eq!(report.not_replayed(), 0, "{report}");
     report
 }
 

@@ -14,8 +14,8 @@ use processes::{policy::Now, records};
 
 use crate::outcome::{Ending, Outcome};
 
-/// Time without a tick, or the start of an external stage, after which an unheld pipeline is stuck. In lockstep mission time then
-/// stands still, so the mission's timeout cannot end the run.
+/// Time without a tick, or the start of an external stage, after which an unheld pipeline is stuck.
+/// In lockstep mission time then stands still, so the mission's timeout cannot end the run.
 const NO_PROGRESS: Duration = Duration::from_secs(15);
 
 /// Time for the robot to come to rest. The link tries each stop method twice in it.

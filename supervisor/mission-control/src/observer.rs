@@ -133,9 +133,11 @@ impl Observer {
             record.published.commands += 1;
             listener(Heard::Command(&command));
             if command.target_number == record.target_number {
-                // A robot that rolled on has not arrived.
-                let arrived = (command.state() == CommandState::Arrived).then_some(command);
-                record.arrival = arrived.and(record.arrival.or(arrived));
+                record.arrival = match command.state() {
+                    CommandState::Arrived => record.arrival.or(Some(command)),
+                    // A robot that rolled on has not arrived.
+                    _ => None,
+                };
             }
         }
         while let Some(guidance) = self.guidance.next_sample()? {

@@ -6,7 +6,7 @@
 
 use std::{fs, time::Duration};
 
-use common::process_status::{field, scheduled};
+use common::process_status::{scheduled, state};
 
 /// Deadlines that a process may sleep before it counts as blocked. A slow disk takes more than one.
 pub(crate) const BLOCKED_DEADLINES: u32 = 4;
@@ -56,9 +56,9 @@ impl Times {
 
     pub(crate) fn activity(self, pid: u32) -> Option<Activity> {
         let now = Self::of(pid)?;
-        let state = match field(&pid.to_string(), "State")?.as_bytes().first()? {
-            b'R' => State::Ready,
-            b'T' | b't' => State::Stopped,
+        let state = match state(&pid.to_string())? {
+            'R' => State::Ready,
+            'T' | 't' => State::Stopped,
             _ => State::Asleep,
         };
         let ran = now.ran.saturating_sub(self.ran);

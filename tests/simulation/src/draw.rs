@@ -47,11 +47,12 @@ pub(crate) fn robot(random: &mut Random, mission: &mut Mission) {
 
 /// Draws what an operator asks of a robot that stays and waits.
 pub(crate) fn while_waiting(random: &mut Random, mission: &Mission) -> Vec<Request> {
-    let mut ask = |_| match random.below(3) {
+    let asked = if mission.stay { ASKED } else { 0 };
+    let ask = |_| match random.below(3) {
         0 => Request::Hand([random.within(-1.0, 1.0), random.within(-1.0, 1.0)]),
         _ => Request::Goto(on_the_way(random, mission)),
     };
-    (0..if mission.stay { ASKED } else { 0 }).map(&mut ask).collect()
+    (0..asked).map(ask).collect()
 }
 
 fn on_the_way(random: &mut Random, Mission { target, .. }: &Mission) -> [f64; 2] {

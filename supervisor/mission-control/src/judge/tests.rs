@@ -125,7 +125,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
 }
 
 #[test]
-fn progress_is_when_a_tick_was_first_seen() {
+fn progress_is_when_a_tick_or_the_start_of_a_stage_was_first_seen() {
     let start = Duration::ZERO;
     let at = |seconds| start + Duration::from_secs(seconds);
     let mut progress = TickProgress::new(start);
