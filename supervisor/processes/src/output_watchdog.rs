@@ -19,7 +19,7 @@ struct StageOutput {
     patience: Duration,
     reads: Vec<&'static str>,
     published: Option<u64>,
-    /// Newest tick of an earlier generation.
+    /// Newest tick from before this stage or one that it reads started anew.
     excused: Option<u64>,
     unanswered_since: Option<Now>,
 }
@@ -54,11 +54,14 @@ impl OutputWatchdog {
         }
     }
 
-    /// Records a new generation of `stage`; ticks in progress belong to an earlier one.
+    /// Records a new generation of `stage`; ticks in progress belong to an earlier one. Readers of
+    /// `stage` may miss what the earlier one published: they follow the roster to the new one.
     pub(crate) fn on_start(&mut self, stage: &str) {
         let newest = self.0.iter().filter_map(|output| output.published).max();
-        if let Some(output) = self.find(stage) {
-            (output.excused, output.unanswered_since) = (newest, None);
+        for output in &mut self.0 {
+            if output.stage.name == stage || output.reads.contains(&stage) {
+                (output.excused, output.unanswered_since) = (newest, None);
+            }
         }
     }
 
@@ -144,6 +147,17 @@ mod tests {
         assert_eq!(blamed(&mut watchdog), None);
         watchdog.on_output("link", 8);
         assert_eq!(blamed(&mut watchdog), Some("dead-reckoning"));
+    }
+
+    #[test]
+    fn readers_need_not_answer_a_generation_that_died() {
+        let mut watchdog = published(&[("link", 7), ("dead-reckoning", 7)]);
+        watchdog.stale(|_| Duration::ZERO);
+        watchdog.on_start("dead-reckoning");
+        assert_eq!(blamed(&mut watchdog), None);
+        watchdog.on_output("link", 8);
+        watchdog.on_output("dead-reckoning", 8);
+        assert_eq!(blamed(&mut watchdog), Some("mapper"));
     }
 
     #[test]
