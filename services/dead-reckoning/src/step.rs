@@ -12,7 +12,7 @@ use common::{
     samples::{CountsSample, FixRefusal, FixSample, PlaceSample, PoseSample, WheelSample},
     stage::{Answer, Answering, ForeignState},
     topics::{POSE, WHEELS},
-    wire::counts_between,
+    wire::{COUNT_CYCLE, counts_between},
     wiring::Persists,
 };
 use glam::DVec2;
@@ -218,7 +218,7 @@ impl DeadReckoning {
             rejected = counted.is_none();
             let Twist { v: arc, omega: turn } = counted.unwrap_or_default();
             assert!(elapsed >= 0.0);
-            let lost_m = if rejected { self.lost_m(last, counts, elapsed) } else { 0.0 };
+            let lost_m = if rejected { self.lost_m(last, counts, wheels, elapsed) } else { 0.0 };
             tick = Tick { seconds: elapsed, arc, turn, lost_m, ..tick };
             motion = self.state.history.newest.moved(&self.motions, &tick);
         }
@@ -352,12 +352,31 @@ impl DeadReckoning {
 
     /// Returns the longest way behind counts that are left out. The step may be motion whose frames
     /// came late, all at once.
-    fn lost_m(&self, last: Last, counts: WheelCounts, elapsed: f64) -> f64 {
+    fn lost_m(&self, last: Last, counts: WheelCounts, wheels: &WheelSample, elapsed: f64) -> f64 {
         let [left, right] = counts.since(self.counts_at(last));
         let step_m = left.abs().max(right.abs()) * self.body.metres_per_count();
-        let [possible_m, most_m] = [elapsed, self.turns_on_s].map(|s| self.body.top_speed_m_s * s);
-        // Without ticks there are no commands, so the wheels soon rest.
+        // Without ticks there are no commands, so the wheels of most robots soon rest.
+        let kept_on = self.is_ambiguous(last, counts, wheels, elapsed);
+        let turned_s = if kept_on { elapsed } else { self.turns_on_s };
+        let [possible_m, most_m] = [elapsed, turned_s].map(|s| self.body.top_speed_m_s * s);
         step_m.max(possible_m).min(most_m)
+    }
+
+    /// Returns whether counters may have wrapped: the robot still turns its wheels, so it may have
+    /// kept its speed.
+    fn is_ambiguous(
+        &self,
+        last: Last,
+        counts: WheelCounts,
+        wheels: &WheelSample,
+        elapsed: f64,
+    ) -> bool {
+        let [left, right] = [wheels.left_counts_per_s, wheels.right_counts_per_s];
+        let now = f64::from(left.unsigned_abs().max(right.unsigned_abs()));
+        let before_m_s = last.v.abs() + last.omega.abs() * self.body.track_m / 2.0;
+        let fastest = now.max(before_m_s / self.body.metres_per_count());
+        let is_cyclic = matches!(counts, WheelCounts::Cyclic(_));
+        is_cyclic && now > 0.0 && fastest * elapsed >= f64::from(COUNT_CYCLE / 2)
     }
 
     fn counts_at(&self, last: Last) -> WheelCounts {
@@ -386,7 +405,10 @@ impl DeadReckoning {
             true => last.restarts != wheels.restarts,
             false => elapsed >= BOOTS_IN_S && counts.restarted_since(before),
         };
-        if left.abs().max(right.abs()) > limit || restarted {
+        if left.abs().max(right.abs()) > limit
+            || restarted
+            || self.is_ambiguous(last, counts, wheels, elapsed)
+        {
             return None;
         }
         // (20) is linear: wheel angles give arc and turn as wheel speeds give v and omega.

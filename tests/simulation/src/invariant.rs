@@ -18,7 +18,7 @@ use mission_control::{Finished, outcome::Outcome, target_list::TargetOutcome};
 use thiserror::Error;
 
 use crate::{
-    disturbance::What,
+    disturbance::{Request, What},
     machine::{LINK, SimulatedMachine},
     robot_fault::RobotFault,
     wire::{Quality, Way},
@@ -148,7 +148,8 @@ impl Invariants {
             | What::Freeze(stage)
             | What::Thaw(stage)
             | What::Hang(stage)
-            | What::Break(stage, _) => self.disturbed.push((stage, now)),
+            | What::Break(stage, _)
+            | What::Ask(Request::Restart(stage)) => self.disturbed.push((stage, now)),
             What::Wire(Way::ToRobot, quality) => {
                 self.wire_is_calm = *quality == Quality::default();
                 self.obedience_changed = now;

@@ -221,6 +221,18 @@ fn a_step_that_is_left_out_is_in_the_covariance_although_its_frames_came_at_once
 }
 
 #[test]
+fn counts_that_may_have_wrapped_while_the_robot_kept_its_speed_are_lost() {
+    // A count is 0.63 mm, so half a cycle takes 10.3 s at 1 m/s.
+    for (speed, ticks, is_lost) in [(1592, 19, false), (1592, 22, true), (0, 22, false)] {
+        let mut reckoning = begun("", 0, 0);
+        let then = WheelSample { left_counts_per_s: speed, ..wheels(ticks, 100, 100) };
+        let Reckoned { pose, rejected, .. } = reckoning.alone(&then);
+        assert_eq!(rejected, is_lost, "{speed} {ticks}");
+        assert_eq!(pose.position_rms_m() > 5.0, is_lost, "{speed} {ticks}");
+    }
+}
+
+#[test]
 fn counters_that_restart_do_not_move_the_robot() {
     // At once, while the robot was away, or while the link was killed. Wheels could have turned this
     // far in 5 s.
