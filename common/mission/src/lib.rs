@@ -85,7 +85,8 @@ pub use sensor::{
 };
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, Hole, InfraredPhysics, LaserTiming, Move,
-    Person, Physics, Radio, Ranged, Ranger, Realism, Simulation, SonarPhysics, Thing, WheelPhysics,
+    Person, Physics, Radio, Ranged, Ranger, Realism, Shove, Simulation, SonarPhysics, Thing,
+    WheelPhysics,
 };
 pub use touch::{MOST_TOUCHES, TouchKind, TouchRow};
 

@@ -40,6 +40,8 @@ keys! {
         goes_on_after_contact: bool,
         #[serde(rename = "block", skip_serializing_if = "Vec::is_empty")]
         blocks: Vec<Block>,
+        #[serde(rename = "shove", skip_serializing_if = "Vec::is_empty")]
+        shoves: Vec<Shove>,
     }
 }
 
@@ -104,6 +106,28 @@ rows! {
         #[serde(default)]
         from_s: f64,
         until_s: Option<f64>,
+    }
+
+    /// Motion that the wheels do not measure, until an obstacle is in the way.
+    #[derive(Copy)]
+    Shove {
+        #[serde(default)]
+        from_s: f64,
+        until_s: Option<f64>,
+        /// Share of the wheels' travel lost, as on ice; 1 for a lifted robot.
+        #[serde(default)]
+        slip: f64,
+        /// In the mission frame.
+        #[serde(default)]
+        velocity_m_s: DVec2,
+        #[serde(default)]
+        turn_deg_s: f64,
+    }
+}
+
+impl Shove {
+    pub fn acts(&self, time_s: f64) -> bool {
+        time_s >= self.from_s && self.until_s.is_none_or(|until_s| time_s < until_s)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use common::{
     kinematics::{DifferentialDrive, Pose2, Twist},
-    mission::{Footprint, Mission},
+    mission::{Footprint, Mission, Shove},
 };
 use glam::DVec2;
 
@@ -93,6 +93,19 @@ impl Body {
         self.over_hole = over_hole;
         let middle = DVec2::from_angle(before.heading + step.omega / 2.0);
         touched.then(|| (self.pose.position - before.position).dot(middle))
+    }
+
+    /// Moves the body as another force does, unless something is in the way.
+    pub fn shove(&mut self, shove: &Shove, dt: f64, world: &World) {
+        let before = self.pose;
+        self.pose.position += shove.velocity_m_s * dt;
+        self.pose.heading += shove.turn_deg_s.to_radians() * dt;
+        let clearance = self.clearance_in(world);
+        if clearance > RELEASE_M {
+            self.clearance = clearance;
+        } else {
+            self.pose = before;
+        }
     }
 
     /// Moves the body out of obstacles, or back to `before` if that fails. Returns whether it

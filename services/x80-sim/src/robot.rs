@@ -5,7 +5,7 @@ use common::{
     ground_truth::GroundTruthTick,
     json_wire::Order,
     kinematics::Twist,
-    mission::{Block, BlockedWheels, Mission, Physics, Protocol, TouchKind, TouchRow},
+    mission::{Block, BlockedWheels, Mission, Physics, Protocol, Shove, TouchKind, TouchRow},
     wire::{
         Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
         StandardSensors, SystemSignal,
@@ -85,6 +85,7 @@ pub struct Robot {
     physics: Physics,
     ignores_time: bool,
     blocks: Vec<Block>,
+    shoves: Vec<Shove>,
     stops_when_silent: Option<f64>,
     pub(crate) rate_hz: f64,
     drivetrain: Drivetrain,
@@ -147,6 +148,7 @@ impl Robot {
             physics,
             ignores_time: mission.simulation.ignores_time,
             blocks: mission.simulation.blocks.clone(),
+            shoves: mission.simulation.shoves.clone(),
             stops_when_silent: mission.simulation.stops_when_silent_s,
             rate_hz: mission.robot.rate_hz,
             drivetrain: Drivetrain::new(mission, wheel_errors.diameter),
@@ -379,9 +381,13 @@ impl Robot {
         let (centre, radius) = (self.body.pose.position, self.body.radius);
         self.world.advance(self.time + dt, centre, radius);
 
+        let mut wheels = self.physics.wheels;
+        for shove in self.shoves.iter().filter(|shove| shove.acts(self.time)) {
+            wheels.slip_share = 1.0 - (1.0 - wheels.slip_share) * (1.0 - shove.slip);
+            self.body.shove(shove, dt, &self.world);
+        }
         let (now, noise) = (self.time, &mut self.wheel_noise);
         let drivetrain = self.drivetrain;
-        let wheels = self.physics.wheels;
         if let Some(car) = &self.car {
             let world = &self.world;
             car.step(&mut self.motors, &mut self.body, world, &wheels, (now, dt), noise);

@@ -22,6 +22,9 @@ const LOWER: [f64; 2] = [0.90, 0.65];
 const RUNS_COUNTS_S: [f64; 2] = [50.0, 300.0];
 /// Noise of readings near a frozen one. A tenth of it is the relative noise of beams.
 const NEAR_M: [f64; 2] = [0.005, 0.05];
+const DRIFTS_DEG_S: [f64; 2] = [1.0, 6.0];
+const SATURATES_DEG_S: [f64; 2] = [40.0, 10.0];
+const JUMPS_RAD_S: f64 = 1.0;
 const RANDOM_COUNTS_S: f64 = 1000.0;
 const RANDOM_M: f64 = 2.5;
 const NO_READING: f64 = -1.0;
@@ -53,6 +56,8 @@ pub(crate) struct FaultInjector {
     /// Newest moving command; none once the link stopped the robot other than by speed 0.
     moving: Option<Vec<u8>>,
     pushes: bool,
+    /// Angle of the gyro and the one told, before.
+    gyro: Option<[f64; 2]>,
 }
 
 impl FaultInjector {
@@ -71,6 +76,7 @@ impl FaultInjector {
             next_slow: [Duration::ZERO; 4],
             moving: None,
             pushes: false,
+            gyro: None,
         }
     }
 
@@ -126,7 +132,9 @@ impl FaultInjector {
     /// Converts the host's bytes into those for the robot.
     pub(crate) fn order(&mut self, bytes: &[u8]) -> Vec<u8> {
         let holds_wheels = self.fault == Some(RobotFault::HeldWheels);
-        let keeps_speed = self.fault.is_some_and(RobotFault::keeps_speed);
+        // A robot at rest has no speed to keep.
+        let rests = self.newest_speeds() == Some([0.0; 2]);
+        let keeps_speed = !rests && self.fault.is_some_and(RobotFault::keeps_speed);
         let mut out = Vec::new();
         for (mut bytes, effect) in self.words.ordered(bytes) {
             match effect {
@@ -194,7 +202,7 @@ impl FaultInjector {
                     said = said.with_readings_of(old.clone());
                 }
             }
-            F::RangeDeaf if !self.turns() => {}
+            F::RangeDeaf if self.newest_speeds().is_none_or(|speeds| speeds == [0.0; 2]) => {}
             F::RangeInvalid
             | F::RangeStuck
             | F::RangeSilent
@@ -202,14 +210,20 @@ impl FaultInjector {
             | F::RangeNear
             | F::RangeRandom
             | F::RangeDeaf => self.misread(fault, &mut said),
+            F::SonarsDeaf => {
+                let sonars = said.report.ranges.values_mut();
+                sonars.skip(self.channel).step_by(2).for_each(|range| *range = None);
+            }
+            F::GyroStops | F::GyroDrifts | F::GyroSaturates => {
+                self.misturn(fault, &mut said.report, now);
+            }
             _ => self.miscount(fault, &mut said, now),
         }
         said.bytes()
     }
 
-    fn turns(&self) -> bool {
-        let speeds = self.kept.iter().rev().find_map(|(_, said)| said.report.speeds);
-        speeds.is_some_and(|speeds| speeds != [0.0; 2])
+    fn newest_speeds(&self) -> Option<[f64; 2]> {
+        self.kept.iter().rev().find_map(|(_, said)| said.report.speeds)
     }
 
     fn misread(&mut self, fault: RobotFault, said: &mut Said) {
@@ -243,6 +257,24 @@ impl FaultInjector {
         for beam in scan.iter_mut().flatten().chain(named) {
             *beam = told(beam.map(f64::from), true).map(|beam| beam as f32);
         }
+    }
+
+    /// Changes the turn of the gyro since its last report.
+    fn misturn(&mut self, fault: RobotFault, report: &mut Report, now: Duration) {
+        let Some(angle) = &mut report.gyro else { return };
+        let for_s = now.saturating_sub(self.began.replace(now).unwrap_or(now)).as_secs_f64();
+        let [before, told] = self.gyro.unwrap_or([*angle; 2]);
+        let turn = *angle - before;
+        let turn = match fault {
+            RobotFault::GyroStops => 0.0,
+            RobotFault::GyroDrifts => turn + self.drawn(DRIFTS_DEG_S).to_radians() * for_s,
+            _ => {
+                let most = self.drawn(SATURATES_DEG_S).to_radians() * for_s;
+                turn.clamp(-most, most)
+            }
+        };
+        self.gyro = Some([*angle, told + turn]);
+        *angle = told + turn;
     }
 
     /// Changes the wheels of `said`, relative to those before the fault.
@@ -283,6 +315,7 @@ impl FaultInjector {
                 speeds = [(); 2].map(|()| random(-RANDOM_COUNTS_S, RANDOM_COUNTS_S));
             }
             F::CountsReset => angles = turned,
+            F::CountsJump => angles[channel] += JUMPS_RAD_S * since_s.floor(),
             F::HeldWheels if self.pushes => said.report.held = Some([true; 2]),
             _ => {}
         }

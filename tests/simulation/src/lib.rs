@@ -144,13 +144,31 @@ impl Scenario {
         }
     }
 
+    /// Returns the mission with what the disturbances do to the robot itself.
+    fn shoved(&self) -> Mission {
+        let mut random = Random::new(self.seed, 5);
+        let mut mission = self.mission.clone();
+        let faults = self.disturbances.iter().filter_map(|it| match it.what {
+            What::Fault(fault) => Some((it.at.as_secs_f64(), fault)),
+            _ => None,
+        });
+        let mut faults: Vec<_> = faults.collect();
+        faults.sort_by(|one, other| one.0.total_cmp(&other.0));
+        for (nth, &(at_s, fault)) in faults.iter().enumerate() {
+            let until_s = faults.get(nth + 1).map(|(next_s, _)| *next_s);
+            let shove = fault.and_then(|fault| fault.shove(at_s, until_s, &mut random));
+            mission.simulation.shoves.extend(shove);
+        }
+        mission
+    }
+
     /// Conducts the run to its end, with a new supervisor for each that is killed.
     fn conduct(
         &self,
         machine: &Rc<SimulatedMachine>,
         listener: &Rc<RefCell<Listener>>,
     ) -> Option<Finished> {
-        match Robot::start(&self.mission, self.pace) {
+        match Robot::start(&self.shoved(), self.pace) {
             Ok(robot) => machine.place(robot),
             Err(error) => {
                 machine.break_off("the robot starts", error.to_string());

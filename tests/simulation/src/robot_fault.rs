@@ -1,11 +1,14 @@
 //! Table of robot faults, and the promise under each.
 
-use std::sync::LazyLock;
+use std::{f64::consts::TAU, sync::LazyLock};
 
 use clap::ValueEnum;
-use common::mission::{Mission, Protocol};
+use common::mission::{Mission, Protocol, Shove};
+use glam::DVec2;
 use link::failsafe::stop_distance::from_faults;
 use serde::{Deserialize, Serialize};
+
+use crate::random::Random;
 
 /// Time until some faults show. Counts of 0 first look like a restart of the robot, and swapped
 /// encoders show in turns. A robot that believes stuck ranges drives slowly, and slow frames leave
@@ -74,6 +77,14 @@ pub enum RobotFault {
     RangeDeaf,
     LateMidway,
     Garbage,
+    CountsJump,
+    GyroStops,
+    GyroDrifts,
+    GyroSaturates,
+    SonarsDeaf,
+    Ice,
+    Pushed,
+    Carried,
 }
 
 static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
@@ -111,7 +122,36 @@ impl RobotFault {
             Protocol::Json => &row.json,
             Protocol::Arduino | Protocol::Ros2 => NOTHING,
         };
-        effect != NOTHING && mission.body().steering.is_none()
+        let can_tell = match self {
+            Self::GyroStops | Self::GyroDrifts | Self::GyroSaturates => mission.robot.gyro(),
+            Self::Ice | Self::Pushed | Self::Carried => mission.laser().is_some(),
+            _ => true,
+        };
+        effect != NOTHING && can_tell && mission.body().steering.is_none()
+    }
+
+    /// Returns what happens to the robot itself from `from_s` on.
+    pub(crate) fn shove(
+        self,
+        from_s: f64,
+        until_s: Option<f64>,
+        random: &mut Random,
+    ) -> Option<Shove> {
+        let slips =
+            Shove { from_s, until_s, slip: 0.0, velocity_m_s: DVec2::ZERO, turn_deg_s: 0.0 };
+        let mut moves = |for_s: f64, [least_m, most_m]: [f64; 2]| {
+            let way = DVec2::from_angle(TAU * random.share()) * random.within(least_m, most_m);
+            Shove { until_s: Some(from_s + for_s), velocity_m_s: way / for_s, ..slips }
+        };
+        Some(match self {
+            Self::Ice => Shove { slip: random.within(0.1, 0.3), ..slips },
+            Self::Pushed => moves(0.6, [0.3, 0.8]),
+            Self::Carried => {
+                let carried = moves(3.0, [0.5, 2.0]);
+                Shove { slip: 1.0, turn_deg_s: random.within(-45.0, 45.0), ..carried }
+            }
+            _ => return None,
+        })
     }
 
     /// Returns whether the robot says what is not so, and not only late, seldom or not at all.

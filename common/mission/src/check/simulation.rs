@@ -1,5 +1,5 @@
 use super::{Checker, MAX_TIMEOUT_S, Result, all_within, point, refuse_if, within};
-use crate::simulation::{Block, Person, Ranger, Simulation, Thing};
+use crate::simulation::{Block, Person, Ranger, Shove, Simulation, Thing};
 
 /// Limits that catch mistakes in a file.
 const MAX_THINGS: usize = 1000;
@@ -40,7 +40,9 @@ impl Checker {
             point("simulation.hole", hole.size_m)?;
         }
         at_most("simulation.block", simulation.blocks.len(), MAX_BLOCKS, "blocks of wheels")?;
-        simulation.blocks.iter().try_for_each(block)
+        simulation.blocks.iter().try_for_each(block)?;
+        at_most("simulation.shove", simulation.shoves.len(), MAX_BLOCKS, "shoves")?;
+        simulation.shoves.iter().try_for_each(shove)
     }
 
     fn thing(&mut self, thing: &Thing) -> Result {
@@ -84,6 +86,16 @@ fn span(key: &'static str, from_s: f64, until_s: Option<f64>) -> Result {
 
 fn block(block: &Block) -> Result {
     span("simulation.block", block.from_s, block.until_s)
+}
+
+fn shove(shove: &Shove) -> Result {
+    const KEY: &str = "simulation.shove";
+    span(KEY, shove.from_s, shove.until_s)?;
+    point(KEY, shove.velocity_m_s)?;
+    all_within([
+        (KEY, shove.slip, 0.0..=1.0, "as the share of slip"),
+        (KEY, shove.turn_deg_s, -720.0..=720.0, "degrees/s"),
+    ])
 }
 
 fn ranger(ranger: &Ranger) -> Result {
@@ -132,6 +144,10 @@ mod tests {
             (
                 "[[simulation.thing]]\nshape.drum = [{ at = [2, 0], radius_m = 1, bottom_m = 0.3, top_m = 0.2 }]",
                 "m.toml:2: simulation.thing: top_m = 0.2 is not above bottom_m = 0.3",
+            ),
+            (
+                "[[simulation.shove]]\nslip = 1.5",
+                "m.toml:2: simulation.shove: 1.5 as the share of slip is out of range",
             ),
             (
                 "[[simulation.person]]\nat = [1, 0]\ngoals = []",

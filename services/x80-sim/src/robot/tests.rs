@@ -265,6 +265,24 @@ fn batteries_drain_as_the_mission_says() {
 }
 
 #[test]
+fn a_shove_moves_the_robot_without_its_wheels_and_without_a_contact_and_slip_takes_their_way() {
+    let shove = |rest: &str| format!("simulation.shove = [{{ until_s = 1, {rest} }}]\n");
+    let wall = "world.wall = [{ points = [[-1, 0.6], [1, 0.6]] }]\n";
+    let aside = shove("velocity_m_s = [0, 1], turn_deg_s = 90");
+    let mut shoved = robot(&format!("{wall}{aside}"));
+    let GroundTruthTick { x, y, heading, contacts, left_counts, .. } = after(&mut shoved, 20);
+    assert!(x.abs() < 1e-9 && (0.3..0.6).contains(&y), "{x} {y}");
+    assert!((0.1..1.5).contains(&heading), "{heading}");
+    assert_eq!((contacts, left_counts), (0, 0));
+    let went = |text: &str| {
+        let mut slips = robot(text);
+        send(&mut slips, forward(1000, None));
+        after(&mut slips, 5).x
+    };
+    near(went(&shove("slip = 0.25")), 0.75 * went(""), 1e-3);
+}
+
+#[test]
 fn a_thing_that_moves_into_the_robot_pushes_it_and_is_a_contact() {
     let mut robot = robot(
         "[[simulation.thing]]\nshape.drum = [{ at = [2, 0], radius_m = 0.3 }]\nmoves = [{ at_s = 0, by = [0, 0] }, { at_s = 2, by = [-2, 0] }]",

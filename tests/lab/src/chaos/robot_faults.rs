@@ -7,6 +7,7 @@ use common::{ground_truth::GroundTruthTick, mission::Mission};
 use console::output::write_stderr;
 use mission_control::outcome::RIGHT_PLACE_M;
 use simulation::{Disturbance, Promise, Random, Request, RobotFault, Scenario, What};
+use summary::Summary;
 
 use super::stop_time_table::{Entry, StopTimeTable};
 use crate::{error::Result, simulate::quietly};
@@ -86,6 +87,11 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
         |tick: &GroundTruthTick| (tick.x - target.x).hypot(tick.y - target.y) > RIGHT_PLACE_M;
     if outcome == "reached" && truth.last().is_some_and(is_wrong) {
         outcome = "wrong_place".to_owned();
+    }
+    // A robot that does not trust its pose has not said where it is.
+    let is_unsure = |summary: &Summary| summary.pose_within_m > Some(mission.sure_within_m);
+    if outcome == "wrong_place" && ran.summary.as_ref().is_some_and(is_unsure) {
+        outcome = "reached_unsure".to_owned();
     }
     if let Some(broken) = ran.broken {
         (outcome, reason) = ("broken".to_owned(), broken.to_string());

@@ -211,6 +211,33 @@ fn a_json_robot_lies_as_the_table_says() {
 }
 
 #[test]
+fn a_gyro_lies_as_the_table_says() {
+    let gyro =
+        |angle| line(&Report { wheels: Some([0.0; 2]), gyro: Some(angle), ..Report::default() });
+    for (fault, told) in
+        [(F::GyroStops, 0.1..=0.1), (F::GyroDrifts, 2.11..=2.21), (F::GyroSaturates, 0.27..=0.80)]
+    {
+        let mut injector = faulty(fault, Protocol::Json, 1, &gyro(0.0));
+        injector.report(&gyro(0.1), at(1.1));
+        let passed = injector.report(&gyro(2.1), at(2.1));
+        let report: Report = parse(passed[0].bytes.trim_ascii()).unwrap();
+        assert!(told.contains(&report.gyro.unwrap()), "{fault:?}: {:?}", report.gyro);
+    }
+}
+
+fn said_at_rest(protocol: Protocol) -> Vec<u8> {
+    let (wheels, speeds) = (Some([1.0; 2]), Some([0.0; 2]));
+    match protocol {
+        Protocol::X80 => {
+            let mut bytes = Vec::new();
+            Frame::Motor(MotorSensors::default()).encode(Addressing::Numbered, &mut bytes);
+            bytes
+        }
+        _ => line(&Report { wheels, speeds, ..Report::default() }),
+    }
+}
+
+#[test]
 fn a_robot_keeps_its_speed_until_it_is_disabled_or_stands_where_it_is_held() {
     let command = |command: Command| {
         let mut bytes = Vec::new();
@@ -231,6 +258,11 @@ fn a_robot_keeps_its_speed_until_it_is_disabled_or_stands_where_it_is_held() {
         assert_eq!(keeps.order(&healthy), healthy, "{protocol:?}");
         keeps.set(Some(F::DoesNotStop));
         assert_eq!(keeps.order(&stand), go, "{protocol:?}");
+        let mut rests = FaultInjector::new(protocol, 1);
+        rests.order(&go);
+        rests.report(&said_at_rest(protocol), at(1.0));
+        rests.set(Some(F::DoesNotStop));
+        assert_eq!(rests.order(&stand), stand, "{protocol:?}");
         let disabled = [&*off, &stand].concat();
         assert_eq!(keeps.order(&disabled), disabled, "{protocol:?}");
         let mut held = FaultInjector::new(protocol, 1);
