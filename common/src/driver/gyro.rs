@@ -60,7 +60,10 @@ impl Compared {
         }
         self.turned = [0, 1].map(|of| self.turned[of] + turns[of]);
         let [odometry, gyro] = self.turned;
-        if odometry.abs() < COMPARED_RAD {
+        // Dead reckoning compares both, too, and doubts its pose. It must see a contradiction before
+        // the gyro is ignored.
+        let least_rad = if self.agrees { 2.0 * COMPARED_RAD } else { COMPARED_RAD };
+        if odometry.abs() < least_rad {
             return None;
         }
         (self.since_ns, self.turned) = (now_ns, [0.0; 2]);

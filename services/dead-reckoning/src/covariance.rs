@@ -26,7 +26,7 @@ pub(crate) struct Covariance(pub(crate) Matrix);
 
 /// Deviation of a gyro's bias before it is learned at rest, rad/s: 0.1 degrees/s. Worse sources
 /// remove their bias themselves. With more, a robot that never rests takes unequal wheels for bias.
-const BIAS_RAD_S: f64 = 0.002;
+pub(crate) const BIAS_RAD_S: f64 = 0.002;
 /// Growth of that deviation, rad/s per square root of a second.
 const BIAS_WALK: f64 = 2e-5;
 
@@ -138,6 +138,16 @@ impl ErrorModel {
     pub(crate) fn counted(&self, by_counts: Twist) -> f64 {
         let rests = by_counts.v == 0.0 && by_counts.omega == 0.0;
         if rests { self.counted / 64.0 } else { self.counted }
+    }
+
+    /// Returns the variance of a tick's turn by slip, rad^2, and the deviations that a whole motion
+    /// shares: of its turn by the track, and by unequal wheels, rad.
+    pub(crate) fn of_turn(&self, Twist { v, omega }: Twist) -> (f64, [f64; 2]) {
+        let half_track = self.track_m / 2.0;
+        let rolled = (v - omega * half_track).abs() + (v + omega * half_track).abs();
+        let [ratio, track, _] = self.systematic.map(f64::sqrt);
+        let width = if self.steers { f64::INFINITY } else { self.track_m };
+        (self.slip * rolled / self.track_m.powi(2), [track * omega, ratio * v / width])
     }
 
     /// Returns the covariance of unmeasured motion by up to `farthest` metres per wheel. The robot

@@ -2,9 +2,15 @@
 //! to them. They widen the published covariance only, because a wider filter's gates would accept
 //! anything.
 
-use common::samples::WheelSample;
+use common::{clock::MissionTime, found_response::if_there, samples::WheelSample};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
+
+use crate::{
+    covariance::{BIAS_RAD_S, ErrorModel},
+    filter::GYRO_SCALE,
+    tick::{GyroTurn, Tick},
+};
 
 /// Least difference from 1 of a ratio that is off: in its deviations, and absolute.
 ///
@@ -15,6 +21,10 @@ const LEAST_OFF: f64 = 0.018;
 /// Reported position doubt, metres.
 const TOLD_M: f64 = 0.1;
 const WIDEST_M: f64 = 10.0;
+/// Memory of the turns that are compared, seconds, and the squared deviations beyond which gyro and
+/// wheels contradict each other: of one healthy comparison in 10,000.
+const COMPARED_S: f64 = 10.0;
+const CONTRADICTS: f64 = 15.1;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Doubt {
@@ -25,6 +35,56 @@ pub(crate) struct Doubt {
     is_told: bool,
     /// Squared moves and turns by relocations, m^2 and rad^2.
     relocated: [f64; 2],
+    #[serde(deserialize_with = "if_there")]
+    turns: Turns,
+}
+
+/// Turns of the last ticks by gyro less those by wheels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Turns {
+    /// Newest compared tick.
+    until: MissionTime,
+    apart_rad: f64,
+    way_m: f64,
+    variance: f64,
+    /// Deviations that all ticks share: by track, unequal wheels, gyro scale and bias, rad.
+    shared_rad: [f64; 4],
+    /// Once gyro and wheels contradict each other: the turn between them, radians, and how far
+    /// apart they have led since, metres.
+    contradict: Option<[f64; 2]>,
+}
+
+impl Turns {
+    fn add(&mut self, errors: &ErrorModel, tick: &Tick, gyro: GyroTurn) {
+        let (slip, [track, ratio]) = errors.of_turn(tick.moved());
+        let apart = gyro.turn - tick.turn;
+        let left = (-tick.seconds / COMPARED_S).exp();
+        self.until = tick.time;
+        self.apart_rad = left * self.apart_rad + apart;
+        self.way_m = left * self.way_m + tick.arc.abs();
+        self.variance = left * left * self.variance + slip + gyro.variance;
+        let shared = [track, ratio, GYRO_SCALE * gyro.turn, BIAS_RAD_S * tick.seconds];
+        for (sum, more) in self.shared_rad.iter_mut().zip(shared) {
+            *sum = left * *sum + more;
+        }
+        let shared: f64 = self.shared_rad.iter().map(|it| it * it).sum();
+        let variance = self.variance + shared + errors.counted(tick.moved());
+        match &mut self.contradict {
+            Some([turn, _]) => *turn += apart,
+            None if self.apart_rad.powi(2) > CONTRADICTS * variance => {
+                // The turn came up on the compared way.
+                let aside_m = self.apart_rad.abs() * self.way_m / 2.0;
+                self.contradict = Some([self.apart_rad, aside_m]);
+            }
+            None => {}
+        }
+    }
+
+    /// Of position and heading, m^2 and rad^2.
+    fn variances(&self) -> [f64; 2] {
+        let [turn, way_m] = self.contradict.unwrap_or_default();
+        [way_m * way_m, turn * turn]
+    }
 }
 
 impl Doubt {
@@ -34,12 +94,30 @@ impl Doubt {
         *heading += turn * turn;
     }
 
-    pub(crate) const fn place_by_others(&mut self) {
+    pub(crate) fn place_by_others(&mut self) {
         self.rolled_m = 0.0;
+        self.turns = Turns { until: self.turns.until, ..Turns::default() };
     }
 
-    pub(crate) const fn place(&mut self) {
-        (self.rolled_m, self.relocated) = (0.0, [0.0; 2]);
+    pub(crate) fn place(&mut self) {
+        self.relocated = [0.0; 2];
+        self.place_by_others();
+    }
+
+    /// Compares the turns of new ticks by gyro and wheels. Returns whether they contradict each
+    /// other, once.
+    pub(crate) fn compare<'a>(
+        &mut self,
+        errors: &ErrorModel,
+        ticks: impl Iterator<Item = &'a Tick>,
+    ) -> bool {
+        let before = self.turns.contradict;
+        for tick in ticks {
+            if let Some(gyro) = tick.gyro.filter(|_| tick.time > self.turns.until) {
+                self.turns.add(errors, tick, gyro);
+            }
+        }
+        before.is_none() && self.turns.contradict.is_some()
     }
 
     /// Takes rim travel. Returns a warning once.
@@ -51,6 +129,9 @@ impl Doubt {
     ) -> Option<String> {
         assert!(rim_m >= 0.0 || rim_m.is_nan());
         self.rolled_m += rim_m;
+        if let Some([turn, aside_m]) = &mut self.turns.contradict {
+            *aside_m += turn.abs() * rim_m;
+        }
         let WheelSample { told_ratio, told_ratio_sd, .. } = *wheels;
         let off = (told_ratio - 1.0).abs();
         if off > LEAST_OFF.max(DEVIATIONS * told_ratio_sd) {
@@ -75,7 +156,7 @@ impl Doubt {
 
     /// Of position and heading, m^2 and rad^2.
     pub(crate) fn variances(&self, track_m: f64) -> [f64; 2] {
-        let [place, heading] = self.of_wheels(track_m);
-        [place + self.relocated[0], heading + self.relocated[1]]
+        let all = [self.of_wheels(track_m), self.relocated, self.turns.variances()];
+        [0, 1].map(|part| all.iter().map(|of| of[part]).sum())
     }
 }

@@ -36,7 +36,7 @@ const LEAST_VARIANCES: [f64; 3] = [25e-6, 25e-6, 3e-6];
 /// several times.
 const LEANS: [f64; 2] = [0.1, 0.05];
 /// Gyro scale error, a share.
-const GYRO_SCALE: f64 = 0.005;
+pub(crate) const GYRO_SCALE: f64 = 0.005;
 
 const JOINT: usize = PARTS + 1;
 

@@ -429,6 +429,33 @@ fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
 }
 
 #[test]
+fn a_gyro_that_contradicts_the_wheels_makes_the_pose_unsure_even_after_it_ends() {
+    // 4 s straight ahead, 2 s with `says` rad per tick, then 4 s without a gyro.
+    let deviation = |says: f64| {
+        let mut reckoning = x80();
+        let mut counts = 0;
+        for tick in 0..100 {
+            counts += 60;
+            let wheels = WheelSample {
+                stamp: Stamp { tick, stamp_ns: tick * TICK_NS, ..Stamp::default() },
+                left_counts: counts,
+                right_counts: counts,
+                ..WheelSample::default()
+            };
+            let said = if tick < 40 { 0.0 } else { says };
+            let turns = if tick < 60 { vec![turn(tick, said)] } else { Vec::new() };
+            reckoning.given(&wheels, &[], &turns);
+        }
+        reckoning.sample().position_rms_m()
+    };
+    let agrees = deviation(0.0);
+    assert!(agrees < 0.2, "{agrees}");
+    // 0.6 rad over more than 1 m.
+    let contradicts = deviation(0.03);
+    assert!(contradicts > 0.6, "{contradicts}");
+}
+
+#[test]
 fn what_counts_leave_open_is_not_taken_for_a_gyros_bias() {
     // Drives, stands, turns, drives; readings are off by half a count.
     let drive = |robot: &mut Robot| {
