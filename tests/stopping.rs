@@ -226,7 +226,8 @@ fn damage_bus(robot: &str, damage: fn(&Path)) {
 
 fn remove(path: &Path) {
     let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-    removed.unwrap();
+    // Its processes remove some files themselves.
+    assert!(removed.is_ok() || !path.exists(), "{}: {removed:?}", path.display());
 }
 
 fn truncate(path: &Path) {
