@@ -86,7 +86,7 @@ pub use sensor::{
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, Hole, InfraredPhysics, LaserTiming, Move,
     Person, Physics, Radio, Ranged, Ranger, Realism, Shove, Simulation, SonarPhysics, Thing,
-    WheelPhysics,
+    WheelPhysics, lasts,
 };
 pub use touch::{MOST_TOUCHES, TouchKind, TouchRow};
 

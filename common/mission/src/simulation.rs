@@ -125,10 +125,9 @@ rows! {
     }
 }
 
-impl Shove {
-    pub fn acts(&self, time_s: f64) -> bool {
-        time_s >= self.from_s && self.until_s.is_none_or(|until_s| time_s < until_s)
-    }
+/// Returns whether a thing, a block or a shove lasts at `time_s`.
+pub fn lasts(time_s: f64, from_s: f64, until_s: Option<f64>) -> bool {
+    time_s >= from_s && until_s.is_none_or(|until_s| time_s < until_s)
 }
 
 const fn walking_m_s() -> f64 {

@@ -141,13 +141,11 @@ impl ErrorModel {
     }
 
     /// Returns the variance of a tick's turn by slip, rad^2, and the deviations that a whole motion
-    /// shares: of its turn by the track, and by unequal wheels, rad.
-    pub(crate) fn of_turn(&self, Twist { v, omega }: Twist) -> (f64, [f64; 2]) {
-        let half_track = self.track_m / 2.0;
-        let rolled = (v - omega * half_track).abs() + (v + omega * half_track).abs();
-        let [ratio, track, _] = self.systematic.map(f64::sqrt);
-        let width = if self.steers { f64::INFINITY } else { self.track_m };
-        (self.slip * rolled / self.track_m.powi(2), [track * omega, ratio * v / width])
+    /// shares: by unequal wheels, and by the track, rad.
+    pub(crate) fn of_turn(&self, moved: Twist, seconds: f64) -> (f64, [f64; 2]) {
+        let Transition { carried, noise } = self.transition(Pose2::default(), moved, seconds);
+        let shared = |part: usize| self.systematic[part].sqrt() * carried[(2, 3 + part)];
+        (noise[(2, 2)], [0, 1].map(shared))
     }
 
     /// Returns the covariance of unmeasured motion by up to `farthest` metres per wheel. The robot

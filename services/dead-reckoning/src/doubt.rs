@@ -47,7 +47,7 @@ struct Turns {
     apart_rad: f64,
     way_m: f64,
     variance: f64,
-    /// Deviations that all ticks share: by track, unequal wheels, gyro scale and bias, rad.
+    /// Deviations that all ticks share: by unequal wheels, track, gyro scale and bias, rad.
     shared_rad: [f64; 4],
     /// Once gyro and wheels contradict each other: the turn between them, radians, and how far
     /// apart they have led since, metres.
@@ -56,14 +56,14 @@ struct Turns {
 
 impl Turns {
     fn add(&mut self, errors: &ErrorModel, tick: &Tick, gyro: GyroTurn) {
-        let (slip, [track, ratio]) = errors.of_turn(tick.moved());
+        let (slip, [ratio, track]) = errors.of_turn(tick.moved(), tick.seconds);
         let apart = gyro.turn - tick.turn;
         let left = (-tick.seconds / COMPARED_S).exp();
         self.until = tick.time;
         self.apart_rad = left * self.apart_rad + apart;
         self.way_m = left * self.way_m + tick.arc.abs();
         self.variance = left * left * self.variance + slip + gyro.variance;
-        let shared = [track, ratio, GYRO_SCALE * gyro.turn, BIAS_RAD_S * tick.seconds];
+        let shared = [ratio, track, GYRO_SCALE * gyro.turn, BIAS_RAD_S * tick.seconds];
         for (sum, more) in self.shared_rad.iter_mut().zip(shared) {
             *sum = left * *sum + more;
         }
@@ -104,20 +104,22 @@ impl Doubt {
         self.place_by_others();
     }
 
-    /// Compares the turns of new ticks by gyro and wheels. Returns whether they contradict each
-    /// other, once.
+    /// Compares the turns of new ticks by gyro and wheels. Returns a warning once.
     pub(crate) fn compare<'a>(
         &mut self,
         errors: &ErrorModel,
         ticks: impl Iterator<Item = &'a Tick>,
-    ) -> bool {
+    ) -> Option<String> {
         let before = self.turns.contradict;
         for tick in ticks {
             if let Some(gyro) = tick.gyro.filter(|_| tick.time > self.turns.until) {
                 self.turns.add(errors, tick, gyro);
             }
         }
-        before.is_none() && self.turns.contradict.is_some()
+        let is_new = before.is_none() && self.turns.contradict.is_some();
+        is_new.then(|| {
+            "gyro and wheels contradict each other, so the pose is uncertain; check the gyro's unit and bias, and whether the wheels slip".to_owned()
+        })
     }
 
     /// Takes rim travel. Returns a warning once.

@@ -48,8 +48,6 @@ const BOOTS_IN_S: f64 = 2.0;
 /// Largest correction per tick, metres and radians, so that the map around the robot does not tear.
 const MOST_CORRECTION: (f64, f64) = (0.02, std::f64::consts::PI / 180.0);
 
-const CONTRADICT: &str = "gyro and wheels contradict each other, so the pose is uncertain; check the gyro's unit and bias, and whether the wheels slip";
-
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Follows the estimate smoothly.
@@ -234,7 +232,7 @@ impl DeadReckoning {
         state.history.advance(&self.motions, tick);
         state.history.turn(&self.motions, &mut state.gyro, turns);
         let contradict = state.doubt.compare(&self.motions.errors, state.history.ticks.iter());
-        let doubted = doubted.or_else(|| contradict.then(|| CONTRADICT.to_owned()));
+        let doubted = doubted.or(contradict);
         let place = place.filter(|place| place.number > self.state.placed);
         if let Some(place) = &place {
             self.place(place);

@@ -5,7 +5,9 @@ use common::{
     ground_truth::GroundTruthTick,
     json_wire::Order,
     kinematics::Twist,
-    mission::{Block, BlockedWheels, Mission, Physics, Protocol, Shove, TouchKind, TouchRow},
+    mission::{
+        Block, BlockedWheels, Mission, Physics, Protocol, Shove, TouchKind, TouchRow, lasts,
+    },
     wire::{
         Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
         StandardSensors, SystemSignal,
@@ -382,7 +384,7 @@ impl Robot {
         self.world.advance(self.time + dt, centre, radius);
 
         let mut wheels = self.physics.wheels;
-        for shove in self.shoves.iter().filter(|shove| shove.acts(self.time)) {
+        for shove in self.shoves.iter().filter(|it| lasts(self.time, it.from_s, it.until_s)) {
             wheels.slip_share = 1.0 - (1.0 - wheels.slip_share) * (1.0 - shove.slip);
             self.body.shove(shove, dt, &self.world);
         }
@@ -411,10 +413,7 @@ impl Robot {
     }
 
     fn blocked_wheels(&self) -> [bool; 2] {
-        let blocks = |wheel: &Block| {
-            self.time >= wheel.from_s && wheel.until_s.is_none_or(|until| self.time < until)
-        };
-        let now = || self.blocks.iter().filter(|block| blocks(block));
+        let now = || self.blocks.iter().filter(|it| lasts(self.time, it.from_s, it.until_s));
         [BlockedWheels::Right, BlockedWheels::Left]
             .map(|other| now().any(|block| block.wheels != other))
     }

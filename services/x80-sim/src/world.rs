@@ -3,7 +3,7 @@
 use common::{
     geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
     kinematics::{Pose2, Twist},
-    mission::{Footprint, Heights, Hole, Mission, Move, Thing},
+    mission::{Footprint, Heights, Hole, Mission, Move, Thing, lasts},
 };
 use glam::DVec2;
 
@@ -175,8 +175,7 @@ impl World {
     pub fn advance(&mut self, time: f64, centre: DVec2, radius: f64) {
         for visitor in &mut self.things {
             visitor.offset = offset_at(&visitor.thing.moves, time);
-            let due = time >= visitor.thing.from_s
-                && visitor.thing.until_s.is_none_or(|until| time < until);
+            let due = lasts(time, visitor.thing.from_s, visitor.thing.until_s);
             visitor.present = due && (visitor.present || visitor.is_clear_of(centre, radius));
         }
         self.met = self.other.map_or_else(Vec::new, |other| other.solids_at(time));

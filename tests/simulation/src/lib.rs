@@ -6,8 +6,8 @@
 //!
 //! A seed draws how late each process runs, what the wire loses, doubles, reorders and delays, which
 //! process is killed, frozen or hangs, what operators ask, and how the robot is faulty. After every
-//! event the [invariants](invariant) are checked. The same seed of the same program gives the same events, so
-//! a failure is a seed.
+//! event the [invariants](invariant) are checked. The same seed of the same program gives the same
+//! events, so a failure is a seed.
 //!
 //! # Limits
 //! A turn of a process is one event: a process does not run beside another. The operator's stop

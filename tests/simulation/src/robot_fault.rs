@@ -114,7 +114,8 @@ impl RobotFault {
         &TABLE[self as usize]
     }
 
-    /// Returns whether a robot of this kind can have the fault. Cars and Arduinos have none.
+    /// Returns whether a robot of this kind can have the fault, and tell motion that its wheels do
+    /// not measure. Cars and Arduinos have none.
     pub fn has_meaning(self, mission: &Mission) -> bool {
         let row = self.row();
         let effect = match mission.robot.protocol() {
