@@ -19,7 +19,9 @@ struct StageOutput {
     patience: Duration,
     reads: Vec<&'static str>,
     published: Option<u64>,
-    /// Newest tick from before this stage or one that it reads started anew.
+    /// This stage or one that it reads has started anew since the last judgement.
+    starts_anew: bool,
+    /// Newest tick that the stage may have missed because of a start.
     excused: Option<u64>,
     unanswered_since: Option<Now>,
 }
@@ -38,6 +40,7 @@ impl OutputWatchdog {
                 .filter(|writer| find(writer).is_some())
                 .collect(),
             published: None,
+            starts_anew: false,
             excused: None,
             unanswered_since: None,
         };
@@ -54,13 +57,13 @@ impl OutputWatchdog {
         }
     }
 
-    /// Records a new generation of `stage`; ticks in progress belong to an earlier one. Readers of
-    /// `stage` may miss what the earlier one published: they follow the roster to the new one.
+    /// Records a new generation of `stage`. It receives nothing until it is ready, when
+    /// [`Self::stale`] is asked next. Its readers may miss what the earlier generation published:
+    /// they follow the roster to the new one.
     pub(crate) fn on_start(&mut self, stage: &str) {
-        let newest = self.0.iter().filter_map(|output| output.published).max();
         for output in &mut self.0 {
             if output.stage.name == stage || output.reads.contains(&stage) {
-                (output.excused, output.unanswered_since) = (newest, None);
+                (output.starts_anew, output.unanswered_since) = (true, None);
             }
         }
     }
@@ -72,13 +75,17 @@ impl OutputWatchdog {
         }
     }
 
-    /// Returns the first stage in pipeline order with an overdue answer.
+    /// Returns the first stage in pipeline order with an overdue answer. All stages are ready.
     ///
     /// Each stage's `now` is its last beat, without its waits for a processor.
     pub(crate) fn stale(&mut self, now: impl Fn(&str) -> Now) -> Option<&'static str> {
         let published: Vec<_> = self.0.iter().map(|it| (it.stage.name, it.published)).collect();
         let published = |writer: &str| published.iter().find(|(name, _)| *name == writer)?.1;
+        let newest = self.0.iter().filter_map(|output| output.published).max();
         for output in &mut self.0 {
+            if std::mem::take(&mut output.starts_anew) {
+                output.excused = newest;
+            }
             let input = output.reads.iter().map(|writer| published(writer)).min();
             if input.flatten() <= output.published.max(output.excused) {
                 output.unanswered_since = None;
@@ -138,12 +145,14 @@ mod tests {
     }
 
     #[test]
-    fn a_new_generation_need_not_answer_ticks_from_before_it() {
+    fn a_new_generation_need_not_answer_ticks_from_before_it_was_ready() {
         let mut watchdog =
-            published(&TABLE.iter().map(|stage| (stage.name, 6)).collect::<Vec<_>>());
-        watchdog.on_output("link", 7);
+            published(&TABLE.iter().map(|stage| (stage.name, 5)).collect::<Vec<_>>());
+        watchdog.on_output("link", 6);
         watchdog.stale(|_| Duration::ZERO);
         watchdog.on_start("dead-reckoning");
+        // The new generation has not yet subscribed.
+        watchdog.on_output("link", 7);
         assert_eq!(blamed(&mut watchdog), None);
         watchdog.on_output("link", 8);
         assert_eq!(blamed(&mut watchdog), Some("dead-reckoning"));
