@@ -27,6 +27,7 @@ const SATURATES_DEG_S: [f64; 2] = [40.0, 10.0];
 const JUMPS_RAD_S: f64 = 1.0;
 const RANDOM_COUNTS_S: f64 = 1000.0;
 const RANDOM_M: f64 = 2.5;
+const WIDE_M: [f64; 2] = [1.9, 2.4];
 const NO_READING: f64 = -1.0;
 /// Frozen range of a sensor without earlier readings.
 const FROZEN_M: f64 = 1.5;
@@ -213,6 +214,14 @@ impl FaultInjector {
             F::SonarsDeaf => {
                 let sonars = said.report.ranges.values_mut();
                 sonars.skip(self.channel).step_by(2).for_each(|range| *range = None);
+            }
+            F::FrontStuck | F::FrontWide => {
+                if let Some((name, range)) = said.report.ranges.iter_mut().next() {
+                    let before = self.newest.ranges.get(name).copied().flatten();
+                    let stuck = before.or(*range).unwrap_or(FROZEN_M);
+                    let wide = self.chance.within(WIDE_M[0], WIDE_M[1]);
+                    *range = Some(if fault == F::FrontStuck { stuck } else { wide });
+                }
             }
             F::GyroStops | F::GyroDrifts | F::GyroSaturates => {
                 self.misturn(fault, &mut said.report, now);

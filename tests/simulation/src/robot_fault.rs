@@ -85,6 +85,8 @@ pub enum RobotFault {
     Ice,
     Pushed,
     Carried,
+    FrontStuck,
+    FrontWide,
 }
 
 static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {
