@@ -1,5 +1,5 @@
-//! Range monitor: checks that readings change with motion, and that the front sonar hears what the
-//! infrared rangers see ([`super::undetected_surface`]). [`super::scan_motion`] judges scans.
+//! Range monitor: checks that readings change with motion. [`super::hearing`] judges what sensors do
+//! not hear, [`super::range_motion`] and [`super::scan_motion`] how late they are.
 //!
 //! A constant reading in motion is stuck, because surfaces come nearer, and turns show other
 //! surfaces. In 240 recorded missions at least [`READINGS`] readings equal to the centimetre came
@@ -23,12 +23,10 @@ use common::{
 };
 
 use super::{
-    deafness::Deafness,
-    lost_echo::LostEcho,
+    hearing::Hearing,
     monitor::{Condition, Counts, Moment, Monitor, Observation},
     range_motion::RangeMotion,
     scan_motion::{Poses, ScanMotion},
-    undetected_surface::UndetectedSurface,
 };
 
 /// Spread of stuck readings, metres: a centimetre to either side plus rounding, and a stuck
@@ -213,9 +211,7 @@ pub struct Range {
     spot_rad: f64,
     rows: Vec<Row>,
     scans: Vec<ScanMotion>,
-    undetected: Option<UndetectedSurface>,
-    deafness: Deafness,
-    lost_echo: LostEcho,
+    hearing: Hearing,
     motion: RangeMotion,
 }
 
@@ -233,7 +229,7 @@ impl Range {
             };
             self.pose = self.pose.along_arc(twist.v, twist.omega);
             self.way_m += twist.v;
-            self.deafness.went(twist.v);
+            self.hearing.went(twist.v);
             if twist.v.abs() < ON_THE_SPOT * twist.omega.abs() * self.body.track_m / 2.0 {
                 self.spot_rad += twist.omega;
             }
@@ -242,14 +238,8 @@ impl Range {
     }
 
     fn judged(&self, sure: bool) -> Option<String> {
-        let front = self.rows.iter().find(|row| row.looks_ahead);
-        let surface = self.undetected.as_ref().filter(|it| sure && it.is_implausible());
-        let surface = surface.zip(front).map(|(surface, front)| surface.explain(&front.name));
-        surface
-            .or_else(|| self.scans.iter().find_map(|scans| scans.judged(sure)))
-            .or_else(|| self.lost_echo.judged(sure))
-            .or_else(|| self.deafness.judged(sure))
-            .or_else(|| self.motion.judged(sure))
+        let scans = || self.scans.iter().find_map(|scans| scans.judged(sure));
+        self.hearing.judged(sure).or_else(scans).or_else(|| self.motion.judged(sure))
     }
 
     fn forget(&mut self) {
@@ -258,12 +248,8 @@ impl Range {
             (row.past, row.implausible) = (Past::default(), [None; 2]);
         }
         self.scans.iter_mut().for_each(ScanMotion::reset);
-        self.deafness.reset();
-        self.lost_echo.reset();
+        self.hearing.reset();
         self.motion.reset();
-        if let Some(undetected) = &mut self.undetected {
-            undetected.reset();
-        }
     }
 }
 
@@ -284,9 +270,7 @@ impl Monitor for Range {
             spot_rad: 0.0,
             rows: others.into_iter().map(|(row, sensor)| Row::of(row, sensor, front)).collect(),
             scans: lasers.into_iter().map(|(row, sensor)| ScanMotion::new(row, sensor)).collect(),
-            undetected: UndetectedSurface::of(mission),
-            deafness: Deafness::of(mission),
-            lost_echo: LostEcho::of(mission),
+            hearing: Hearing::of(mission),
             motion: RangeMotion::of(mission),
         }
     }
@@ -301,11 +285,7 @@ impl Monitor for Range {
                         row.take(reading, moved, now);
                     }
                 }
-                if let Some(undetected) = &mut self.undetected {
-                    undetected.take(readings);
-                }
-                self.deafness.take(readings);
-                self.lost_echo.take(readings, self.pose, now.time.seconds());
+                self.hearing.take(readings, self.pose, now.time.seconds());
                 self.motion.take(readings, &self.poses, now.time.seconds());
             }
             Observation::Scan(scan, at_s) => {
@@ -467,8 +447,8 @@ mod tests {
         let now = Moment::default();
         let nothing = RangeReading { status: RangeStatus::Nothing.into(), ..Default::default() };
         for _ in 0..100 {
-            monitor.deafness.take(&[nothing]);
-            monitor.deafness.went(0.05);
+            monitor.hearing.take(&[nothing], Pose2::default(), 0.0);
+            monitor.hearing.went(0.05);
         }
         for (row, implausible) in [[Some(now); 2], [Some(now), None]].into_iter().enumerate() {
             monitor.rows[row].implausible = implausible;
