@@ -1,7 +1,7 @@
 //! End of a run whose supervisor hangs: the middleware may wait forever for a truncated file.
 //!
-//! A separate thread also receives the signals. If the loop makes no iteration for [`STUCK`] after
-//! a signal, the thread ends the stages and the process, and removes their files. The robot stands
+//! A separate thread also receives the signals. If the loop hangs without an iteration after a
+//! signal, the thread ends the stages and the process, and removes their files. The robot stands
 //! by then: its link stops it when the supervisor is silent, and an unrenewed command expires.
 
 use std::{
@@ -17,17 +17,13 @@ use std::{
 
 use common::{
     domain::Domain,
-    process_status::{scheduled, state},
     signals::{Signals, exit_at_once},
 };
-use rustix::{
-    process::{Pid, Signal, kill_process},
-    thread::gettid,
-};
+use rustix::process::{Pid, Signal, kill_process};
 
-use crate::{domain, policy::STOP_GRACE};
+use crate::{activity::Times, domain, policy::STOP_GRACE};
 
-/// Time without an iteration after which the loop hangs; a healthy one turns five times a second.
+/// Deadline of an iteration; a healthy loop turns five times a second.
 const STUCK: Duration = Duration::from_secs(2);
 const FAILED: u8 = 1;
 
@@ -53,44 +49,33 @@ impl Turns {
         self.rests.store(rests, Ordering::Relaxed);
     }
 
-    fn await_stuck(&self, thread: Pid) {
-        const { assert!(2 * LOOK_EVERY.as_millis() < STUCK.as_millis()) };
-        let task = format!("self/task/{thread}");
-        let (mut seen, mut stuck) = (0, Duration::ZERO);
-        let mut times = scheduled(&task).unwrap_or_default();
-        while stuck < STUCK {
+    /// Waits until the leading thread, which runs the loop, hangs by the rule for stages.
+    fn await_stuck(&self) {
+        let pid = std::process::id();
+        let (mut seen, mut age, mut since) = (0, Duration::ZERO, Times::of(pid));
+        loop {
             let began = Instant::now();
             thread::park_timeout(LOOK_EVERY);
             // If this thread has to wait, so does the loop.
-            let passed = began.elapsed().min(2 * LOOK_EVERY);
-            let [ran, awaited] =
-                std::mem::replace(&mut times, scheduled(&task).unwrap_or_default());
+            age += began.elapsed().min(2 * LOOK_EVERY);
             let now = self.count.load(Ordering::Relaxed);
             if std::mem::replace(&mut seen, now) != now || self.rests.load(Ordering::Relaxed) {
-                stuck = Duration::ZERO;
+                (age, since) = (Duration::ZERO, Times::of(pid));
             }
-            // A starved loop is alive, and a save to a busy disk is no hang either. The kernel
-            // counts a wait for a processor when it ends; until then the loop is runnable and does
-            // not run.
-            let waits = match state(&task) {
-                Some('D') => true,
-                Some('R') => times[0] == ran,
-                _ => false,
-            };
-            if !waits {
-                stuck += passed.saturating_sub(times[1].saturating_sub(awaited));
+            let activity = since.and_then(|since| since.activity(pid));
+            if age >= STUCK && activity.is_none_or(|activity| activity.is_hung(age, STUCK)) {
+                return;
             }
         }
     }
 }
 
 pub fn watch(mut signals: Signals, turns: Turns, domain: Domain) {
-    let watched = gettid();
     thread::spawn(move || {
         if signals.wait().is_err() {
             return;
         }
-        turns.await_stuck(watched);
+        turns.await_stuck();
         tracing::error!("{HANGS}");
         let _ = writeln!(std::io::stderr(), "firsthand: {HANGS}");
         end_children(Signal::TERM);
