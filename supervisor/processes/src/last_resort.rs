@@ -51,6 +51,7 @@ impl Turns {
 
     /// Waits until the leading thread, which runs the loop, hangs by the rule for stages.
     fn await_stuck(&self) {
+        const { assert!(2 * LOOK_EVERY.as_millis() < STUCK.as_millis()) };
         let pid = std::process::id();
         let (mut seen, mut age, mut since) = (0, Duration::ZERO, Times::of(pid));
         loop {
@@ -62,8 +63,8 @@ impl Turns {
             if std::mem::replace(&mut seen, now) != now || self.rests.load(Ordering::Relaxed) {
                 (age, since) = (Duration::ZERO, Times::of(pid));
             }
-            let activity = since.and_then(|since| since.activity(pid));
-            if age >= STUCK && activity.is_none_or(|activity| activity.is_hung(age, STUCK)) {
+            let activity = || since.and_then(|since| since.activity(pid));
+            if age >= STUCK && activity().is_none_or(|activity| activity.is_hung(age, STUCK)) {
                 return;
             }
         }

@@ -27,6 +27,7 @@ const KNOWN: u32 = 5;
 const LIKELY: [f64; 2] = [0.2, 0.5];
 const FORGOTTEN_S: f64 = 20.0;
 const MOST: usize = 64;
+
 #[derive(Clone, Debug)]
 struct Echo {
     /// Candidate places with their likelihoods.
