@@ -108,7 +108,7 @@ struct Track {
 /// Tracker state, unsaved: the next process finds movers again within a second.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Movers {
-    /// Times, odometry poses and beams, oldest first.
+    /// Times, poses and beams, oldest first.
     scans: VecDeque<(f64, Pose2, Vec<f32>)>,
     tracks: Vec<Track>,
     seen_s: Option<f64>,
@@ -116,22 +116,18 @@ pub(crate) struct Movers {
 }
 
 impl Movers {
-    /// Tracks a scan's objects.
+    /// Tracks the objects of a scan seen from `robot`, in the frame of all scans before.
     ///
-    /// Returns its beams, without those that may end on moving surfaces, and whether the first
-    /// mover is seen.
-    pub(crate) fn take(&mut self, rows: &Rows, scan: &Placed) -> (Vec<f32>, bool) {
-        let (at_s, robot) = (scan.capture_ns as f64 * 1e-9, scan.robot.odometry());
-        let Some(fan) = rows.scan(scan.row, robot, &scan.beams) else {
-            return (scan.beams.clone(), false);
-        };
+    /// Returns its beams without those that may end on moving surfaces; none if nothing moves.
+    pub(crate) fn take(&mut self, rows: &Rows, scan: &Placed, robot: Pose2) -> Option<Vec<f32>> {
+        let at_s = scan.capture_ns as f64 * 1e-9;
+        let fan = rows.scan(scan.row, robot, &scan.beams)?;
         let scans = std::mem::take(&mut self.scans);
         let older = |by_s: f64| {
             let older = scans.iter().rev().find(|(then, ..)| at_s - then >= by_s);
             let (then_s, robot, beams) = older?;
             Some((at_s - then_s, rows.scan(scan.row, *robot, beams)?))
         };
-        let moved = self.moves(at_s);
         let is_next = scans.back().is_none_or(|(newest, ..)| at_s - newest >= APART_S);
         if is_next {
             // At first, no scan is that old.
@@ -144,28 +140,24 @@ impl Movers {
             self.follow(&things(&fan, before.as_ref(), at_s), &fan, at_s, laser);
         }
         debug_assert!(scans.iter().is_sorted_by(|one, next| one.0 < next.0));
-        let moves = self.moves(at_s);
-        let mut beams = scan.beams.clone();
-        if moves {
+        let moves = self.seen_s.is_some_and(|seen_s| at_s - seen_s <= MOVES_FOR_S);
+        let beams = moves.then(|| {
             let before = older(STANDS_S);
             let stands = |end: DVec2| {
                 before.is_some_and(|(_, before)| Difference::of(&before, end).has_same())
             };
-            for (beam, end) in beams.iter_mut().zip(fan.ends()) {
-                *beam = if end.is_some_and(stands) { *beam } else { f32::NAN };
-            }
-        }
+            let beams = scan.beams.iter().zip(fan.ends());
+            beams
+                .map(|(beam, end)| if end.is_some_and(stands) { *beam } else { f32::NAN })
+                .collect()
+        });
         self.scans = scans;
         if is_next {
             self.scans.retain(|(then, ..)| at_s - then <= KEPT_S);
             self.scans.push_back((at_s, robot, scan.beams.clone()));
             assert!((self.scans.len() as f64) < KEPT_S / APART_S + 2.0);
         }
-        (beams, moves && !moved)
-    }
-
-    fn moves(&self, at_s: f64) -> bool {
-        self.seen_s.is_some_and(|seen_s| at_s - seen_s <= MOVES_FOR_S)
+        beams
     }
 
     fn follow(&mut self, things: &[Thing], fan: &Fan<'_>, at_s: f64, laser: DVec2) {
@@ -206,9 +198,11 @@ impl Movers {
         }
     }
 
-    pub(crate) fn place(&mut self, pose: &PoseSample) {
-        let [x, y, turn] = pose.map_from_odom;
-        let (at_s, turned) = (pose.stamp.seconds(), DVec2::from_angle(turn));
+    /// Places the movers around `pose`, which is `robot` in the frame of the scans.
+    pub(crate) fn place(&mut self, pose: &PoseSample, robot: Pose2) {
+        let turned = DVec2::from_angle(pose.heading_rad - robot.heading);
+        let (at_s, robot) = (pose.stamp.seconds(), turned.rotate(robot.position));
+        let [x, y] = (pose.pose().position - robot).to_array();
         let movers = self.tracks.iter().filter(|it| it.is_mover && at_s - it.seen_s <= HIDDEN_S);
         let mover = |track: &Track| {
             let unseen_s = (at_s - track.seen_s - CAME_S).max(0.0);
@@ -458,7 +452,7 @@ mod tests {
             Self { rows: Rows::new(&mission), movers: Movers::default(), discs: discs.to_vec() }
         }
 
-        fn tick(&mut self, tick: u64) -> (Placed, (Vec<f32>, bool)) {
+        fn tick(&mut self, tick: u64) -> (Placed, Option<Vec<f32>>) {
             let at_s = PERIOD_S * tick as f64;
             let time = MissionTime::from_seconds(at_s);
             let stamp = Stamp { tick, stamp_ns: time.0, ..Stamp::default() };
@@ -477,8 +471,8 @@ mod tests {
                 discs.fold(walls, f64::min) as f32
             });
             let scan = Placed { row: 0, robot, capture_ns: time.0, beams: beams.collect() };
-            let taken = self.movers.take(&self.rows, &scan);
-            self.movers.place(&robot);
+            let taken = self.movers.take(&self.rows, &scan, robot.pose());
+            self.movers.place(&robot, robot.pose());
             (scan, taken)
         }
     }
@@ -549,16 +543,12 @@ mod tests {
     }
 
     #[test]
-    fn only_beams_that_end_on_what_stands_are_matched_while_something_moves() {
+    fn only_beams_that_end_on_what_stands_are_kept_while_something_moves() {
         let walker = (DVec2::new(3.5, -1.0), DVec2::new(-0.8, -0.3), 0.25);
         let mut room = Room::new(&[walker]);
-        let first = (0..16).find(|tick| {
-            let (scan, (beams, moves_first)) = room.tick(*tick);
-            assert_eq!(!moves_first, beams == scan.beams, "{tick}: all is matched before");
-            moves_first
-        });
-        let (scan, (beams, moves_first)) = room.tick(first.unwrap() + 8);
-        assert!(!moves_first, "the reference is dropped once");
+        let first = (0..16).find(|tick| room.tick(*tick).1.is_some());
+        let (scan, beams) = room.tick(first.unwrap() + 8);
+        let beams = beams.unwrap();
         let fan = room.rows.scan(0, scan.robot.pose(), &scan.beams).unwrap();
         let at_s = scan.capture_ns as f64 * 1e-9;
         let (mut on_walker, mut on_walls) = ([0, 0], [0, 0]);

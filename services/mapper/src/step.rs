@@ -23,7 +23,7 @@ use crate::{
     fault,
     movers::Movers,
     reading::{Rows, Touch},
-    scan_match::{Reference, ScanMatcher},
+    scan_match::{ScanMatcher, Surroundings},
     sonar_model::MOST,
 };
 
@@ -97,7 +97,7 @@ pub struct Belief {
     fault: FaultKind,
     pub target: DVec2,
     /// Matching reference; none before the first scan.
-    reference: Option<Reference>,
+    surroundings: Option<Surroundings>,
 }
 
 fn paint(
@@ -190,7 +190,7 @@ impl Mapper {
                 sensed,
                 fault: FaultKind::Nothing,
                 target: mission.target,
-                reference: None,
+                surroundings: None,
             },
         };
         assert!(mapper.reach >= 0.0 && mapper.half_track > 0.0);
@@ -359,9 +359,11 @@ impl Mapper {
                 scan => self.poses.scan_at_once(&self.rows, &pose, scan),
             };
             let scans: Vec<_> = scans.into_iter().filter_map(placed).collect();
-            let (reference, movers) = (&mut self.belief.reference, &mut self.movers);
-            let fix = self.matcher.step(&self.rows, reference, &scans, movers);
-            self.movers.place(&pose);
+            let (surroundings, movers) = (&mut self.belief.surroundings, &mut self.movers);
+            let fix = self.matcher.step(&self.rows, surroundings, &scans, movers);
+            let odometry = pose.odometry();
+            let held = self.belief.surroundings.as_ref();
+            self.movers.place(&pose, held.map_or(odometry, |held| held.carried(odometry)));
             let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
             let source = name("scan");
             self.fix = fix.map(|fix| FixSample { source, ..fix });
@@ -499,7 +501,7 @@ impl Mapper {
             }
         }
         self.belief.fault = fault::after_reset(self.belief.fault);
-        self.belief.reference = None;
+        self.belief.surroundings = None;
         self.falsify();
         self.belief.epoch = epoch;
         self.belief.version += 1;
