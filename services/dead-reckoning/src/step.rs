@@ -237,9 +237,10 @@ impl DeadReckoning {
         if let Some(place) = &place {
             self.place(place);
         }
-        let (mut relocated, mut refused, mut disagree) = (false, None, None);
+        let (mut relocated, mut by_scan, mut refused, mut disagree) = (false, false, None, None);
         for fix in fixes {
             let taken = self.take_fix(fix);
+            by_scan |= taken == Taken::Used && fix.shared[1] > 0.0;
             if let Ok(fix) = Fix::try_from(fix) {
                 let State { disagreement, history, .. } = &mut self.state;
                 let found = disagreement.compare(&fix, &history.ticks, self.body.track_m);
@@ -255,7 +256,8 @@ impl DeadReckoning {
             self.state.refusal = why.into();
         }
         let placed = place.is_some();
-        self.follow(relocated || placed);
+        // Matches show the surfaces that the map shows, so following them at once tears nothing.
+        self.follow(relocated || placed || by_scan);
         let Twist { v, omega } = self.speeds(motion, elapsed);
         self.state.counts = endless.copied();
         self.state.last = Some(Last {

@@ -326,6 +326,21 @@ fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_u
 }
 
 #[test]
+fn a_pushed_robot_is_where_its_scans_match() {
+    let mut run = run(0.0);
+    let scan = |robot: &mut Robot| {
+        let heading_rad = robot.truth.heading;
+        vec![FixSample { heading_rad, shared: [1e-6; 2], ..robot.fix() }]
+    };
+    run.wind(40, scan);
+    run.robot.truth.position += dvec2(0.3, 0.0);
+    run.robot.truth.heading += 0.15;
+    let (reckoned, error_m) = run.wind(1, scan).remove(0);
+    assert!(reckoned.refused.is_none() && error_m < 0.2, "{reckoned:?} {error_m}");
+    assert!(run.deviation_m() > 0.5 * error_m, "{} {error_m}", run.deviation_m());
+}
+
+#[test]
 fn a_doubt_of_the_wheels_is_settled_by_a_scan_that_says_where_the_robot_is_and_by_no_other() {
     for (own, contradicts, is_settled) in [
         ([0.05, 0.03], false, true),
