@@ -55,7 +55,7 @@ const STRAIGHT: f64 = 0.5;
 /// Spacing of surfaces, metres.
 const SPACING_M: f64 = 0.05;
 /// Bound on surfaces; those unseen for longest are forgotten first.
-const MOST_SURFACES: usize = 4096;
+const MOST_SURFACES: usize = 2048;
 /// Travel after which an unseen surface is forgotten, metres.
 const KEPT_M: f64 = 5.0;
 /// Range beyond a surface that shows it gone, metres.
@@ -262,6 +262,9 @@ impl ScanMatcher {
 }
 
 impl Surroundings {
+    /// Bound on the saved state: 40 bytes per surface.
+    pub(crate) const MOST_BYTES: usize = 40 * MOST_SURFACES + 256;
+
     /// Moves to a scan's pose: as matched, or as the wheels went.
     fn follow(&mut self, matched: Option<&Match>, odometry: Pose2) {
         let (pose, lost) = match matched {

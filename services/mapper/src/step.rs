@@ -256,7 +256,8 @@ impl Mapper {
             Sensed::Hits => 0,
             Sensed::Evidence(_) => self.evidential.saved_bytes(),
         };
-        self.frame.area() + evidence + 5 * self.beams + 256
+        let surroundings = if self.beams > 0 { Surroundings::MOST_BYTES } else { 0 };
+        self.frame.area() + evidence + surroundings + 256
     }
 
     /// Returns room for a journal entry, which takes 250 bytes plus four per beam.
