@@ -43,7 +43,10 @@ const GATE: f64 = 2.5;
 const SHRINKS: f64 = 0.7;
 /// Share of points that a round keeps, those nearest to their lines.
 const KEPT_SHARE: f64 = 0.9;
+/// Least cosine between the normals of a point and its surface: 45 degrees.
 const ALIKE: f64 = 0.7;
+/// Share of points on surfaces that shows a match without a wide search.
+const SURE_SHARE: f64 = 0.7;
 const ROUNDS: usize = 15;
 /// Pose change that ends the rounds, metres and radians.
 const SETTLED: f64 = 1e-4;
@@ -58,6 +61,8 @@ const STRAIGHT: f64 = 0.5;
 const SPACING_M: f64 = 0.05;
 /// Bound on surfaces; those unseen for longest are forgotten first.
 const MOST_SURFACES: usize = 2048;
+/// Distance of surfaces from the robot: reach of a laser and [`KEPT_M`], metres.
+const FARTHEST_M: f64 = 40.0;
 /// Travel after which an unseen surface is forgotten, metres.
 const KEPT_M: f64 = 5.0;
 /// Range beyond a surface that shows it gone, metres.
@@ -210,8 +215,8 @@ impl ScanMatcher {
 
     /// Matches the laser's scan with the known surroundings, and adds to them.
     ///
-    /// Returns `None` if too little of them is visible; they then begin again at the dead-reckoned
-    /// pose. Only static surfaces count.
+    /// Returns `None` if too little of them is visible; the match then goes on as the wheels went.
+    /// Only static surfaces are added.
     pub(crate) fn step(
         &self,
         rows: &Rows,
@@ -221,12 +226,16 @@ impl ScanMatcher {
     ) -> Option<FixSample> {
         let scan = scans.iter().find(|scan| scan.row == self.row)?;
         let (reckoned, odometry) = (scan.robot.pose(), scan.robot.odometry());
-        let mut anew = || {
+        if !(is_finite(reckoned) && is_finite(odometry)) {
+            return None;
+        }
+        // A file may hold any number.
+        held.take_if(|held| !(is_finite(held.pose) && is_finite(held.odometry)));
+        let held = held.get_or_insert_with(|| {
             *movers = Movers::default();
             let drift = covariance_of(&scan.robot) + variances(DRIFT);
             Surroundings { pose: reckoned, odometry, drift, ..Surroundings::default() }
-        };
-        let held = held.get_or_insert_with(&mut anew);
+        });
         let fan = rows.scan(self.row, Pose2::default(), &scan.beams)?;
         let mut seen = points(&fan);
         let matched = held.matched(&seen, odometry);
@@ -288,9 +297,27 @@ impl Surroundings {
     }
 
     /// Returns the best-fit pose of a scan; none if too few of its points are on surfaces.
+    ///
+    /// The search is wide only if surfaces right where the wheels say fit too few points, so that a
+    /// thing is not taken for another one beside it.
     fn matched(&mut self, points: &[Point], odometry: Pose2) -> Option<Match> {
+        let beside = self.matched_within(GATES_M[1], points, odometry);
+        if beside.as_ref().is_some_and(|found| found.share >= SURE_SHARE) {
+            return beside;
+        }
+        let wide = self.matched_within(GATES_M[0], points, odometry);
+        let share = |found: &Option<Match>| found.as_ref().map_or(0.0, |found| found.share);
+        if share(&wide) > share(&beside) { wide } else { beside }
+    }
+
+    fn matched_within(
+        &mut self,
+        first_gate_m: f64,
+        points: &[Point],
+        odometry: Pose2,
+    ) -> Option<Match> {
         if self.index.before.is_empty() {
-            self.index = Index::new(&self.surfaces);
+            self.sort();
         }
         let start = self.carried(odometry);
         let every = points.len().div_ceil(POINTS).max(1);
@@ -298,7 +325,7 @@ impl Surroundings {
         // The surface has errors, too, but averages over its points.
         let of_lines = 1.0 + 1.0 / every as f64;
         let prior = variances(PRIOR).inverse();
-        let (mut pose, mut gate_m) = (start, GATES_M[0]);
+        let (mut pose, mut gate_m) = (start, first_gate_m);
         let (mut information, mut squares, mut fits) = (DMat3::ZERO, 0.0, Vec::new());
         let mut found = 0;
         for _ in 0..ROUNDS {
@@ -348,9 +375,11 @@ impl Surroundings {
         // The identity stands for directions that the scan leaves unconstrained.
         let covariance =
             (information + DMat3::IDENTITY).inverse() * squares.clamp(SCALES[0], SCALES[1]);
-        let usable =
-            pose.position.is_finite() && pose.heading.is_finite() && covariance.is_finite();
-        usable.then(|| Match { pose, covariance, share: found as f64 / used as f64 })
+        (is_finite(pose) && covariance.is_finite()).then(|| Match {
+            pose,
+            covariance,
+            share: found as f64 / used as f64,
+        })
     }
 
     /// Makes the newest match a keyframe, and returns the share of its points that are new.
@@ -370,7 +399,7 @@ impl Surroundings {
         };
         let oldest_m = self.travelled_m - KEPT_M;
         self.surfaces.retain(|surface| surface.seen_m >= oldest_m && !is_gone(surface));
-        self.index = Index::new(&self.surfaces);
+        self.sort();
         let (mut new, mut all) = (0_u32, 0_u32);
         for Point { at, normal, deviation_m } in points {
             let Some(normal) = normal else { continue };
@@ -388,13 +417,22 @@ impl Surroundings {
                 self.surfaces.push(Surface { at, normal, seen_m: self.travelled_m });
             }
         }
+        self.sort();
+        self.keyframe = self.pose;
+        f64::from(new) / f64::from(all.max(1))
+    }
+
+    /// Indexes the surfaces, without those beyond a laser's reach.
+    fn sort(&mut self) {
+        let there = self.pose.position;
+        self.surfaces.retain(|surface| {
+            surface.at.distance(there) <= FARTHEST_M && surface.normal.is_normalized()
+        });
         if self.surfaces.len() > MOST_SURFACES {
-            self.surfaces.sort_by(|a, b| b.seen_m.total_cmp(&a.seen_m));
+            self.surfaces.sort_by(|one, other| other.seen_m.total_cmp(&one.seen_m));
             self.surfaces.truncate(MOST_SURFACES);
         }
         self.index = Index::new(&self.surfaces);
-        self.keyframe = self.pose;
-        f64::from(new) / f64::from(all.max(1))
     }
 
     /// Returns the newest match, moved as the wheels went since.
@@ -448,6 +486,10 @@ fn line_through<'a>(
     }
     let ([_, aside], along) = principal_axes([xx, xy, yy]);
     (aside <= STRAIGHT * half_m).then(|| (middle, DVec2::from_angle(along).perp()))
+}
+
+fn is_finite(pose: Pose2) -> bool {
+    pose.position.is_finite() && pose.heading.is_finite()
 }
 
 fn covariance_of(pose: &PoseSample) -> DMat3 {
@@ -590,6 +632,24 @@ mod tests {
     }
 
     #[test]
+    fn a_thing_is_not_taken_for_another_one_beside_it() {
+        let matcher = matcher();
+        let start = Pose2::default();
+        // The corridor ends ahead.
+        let ends_at = |x: f64| {
+            let mut beams = scan(start, true);
+            for (beam, range) in beams.iter_mut().enumerate().take(200).skip(161) {
+                *range = ((x + 0.064) / (beam as f64 - 180.0).to_radians().cos()) as f32;
+            }
+            beams
+        };
+        let held = &mut None;
+        matcher.step(held, start, &ends_at(2.0));
+        let x_m = matcher.step(held, start, &ends_at(2.2)).unwrap().x_m;
+        assert!(x_m.abs() < 0.02, "{x_m}");
+    }
+
+    #[test]
     fn a_robot_that_sees_nothing_known_goes_on_by_its_wheels_and_says_so() {
         let matcher = matcher();
         let (start, held) = (Pose2::default(), &mut None);
@@ -600,6 +660,26 @@ mod tests {
         assert_eq!(matcher.step(held, there, &hall), None);
         let fix = matcher.step(held, there, &hall).unwrap();
         assert!(fix.x_m > 0.19 && fix.shared[0] >= LOST[0] * LOST[0], "{fix:?}");
+    }
+
+    #[test]
+    fn wild_numbers_of_a_saved_state_are_dropped() {
+        let matcher = matcher();
+        let start = Pose2::default();
+        let beams = scan(start, false);
+        let mut held = None;
+        matcher.step(&mut held, start, &beams);
+        for wild in [f64::NAN, f64::INFINITY, 1e300, -1e12] {
+            let mut saved = held.clone();
+            let surroundings = saved.as_mut().unwrap();
+            surroundings.index = Index::default();
+            surroundings.surfaces[3].at.x = wild;
+            surroundings.surfaces[4].normal.y = wild;
+            assert!(matcher.step(&mut saved, start, &beams).is_some());
+            saved.as_mut().unwrap().pose.position.y = wild;
+            matcher.step(&mut saved, start, &beams);
+            assert!(matcher.step(&mut saved, start, &beams).is_some(), "{wild}: lost for good");
+        }
     }
 
     #[test]
