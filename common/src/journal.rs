@@ -191,6 +191,23 @@ mod tests {
     }
 
     #[test]
+    fn a_new_process_folds_the_entries_into_the_snapshot() {
+        let (_directory, path, _) = files();
+        let mut sum = 0;
+        for restart in 0..5 {
+            let (mut journal, _) = open(&path);
+            for entry in 1..=3 {
+                journal.append(&entry).unwrap();
+                sum += entry;
+                if restart == 2 && entry == 2 {
+                    journal.snapshot(&sum).unwrap();
+                }
+            }
+            assert_eq!(folded(&path), sum, "restart {restart}");
+        }
+    }
+
+    #[test]
     fn an_append_cut_after_any_byte_loses_that_entry_at_most() {
         let (_directory, path, file) = files();
         let (mut journal, _) = open(&path);

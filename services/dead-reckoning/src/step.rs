@@ -240,7 +240,7 @@ impl DeadReckoning {
         let (mut relocated, mut by_scan, mut refused, mut disagree) = (false, false, None, None);
         for fix in fixes {
             let taken = self.take_fix(fix);
-            by_scan |= taken == Taken::Used && fix.shared[1] > 0.0;
+            by_scan |= taken == Taken::UsedScan;
             if let Ok(fix) = Fix::try_from(fix) {
                 let State { disagreement, history, .. } = &mut self.state;
                 let found = disagreement.compare(&fix, &history.ticks, self.body.track_m);
@@ -249,7 +249,7 @@ impl DeadReckoning {
             relocated |= taken == Taken::Relocated;
             let why = match taken {
                 Taken::Refused(why) => why,
-                Taken::Used | Taken::Relocated => FixRefusal::None,
+                Taken::Used | Taken::UsedScan | Taken::Relocated => FixRefusal::None,
             };
             let new = why != FixRefusal::None && u8::from(why) != self.state.refusal;
             refused = if new { Some(why) } else { refused };
@@ -311,14 +311,14 @@ impl DeadReckoning {
         let Err(Refused { why, there }) = taken else {
             state.fixes += 1;
             state.contradictions = Contradictions::default();
-            let is_of_matcher = sample.shared[1] > 0.0;
+            let is_by_scan = fix.is_ok_and(|fix| fix.is_by_scan());
             // A matcher that contradicted the wheels may have restarted at their pose.
-            let is_apart = !is_of_matcher
+            let is_apart = !is_by_scan
                 || state.fixes_refused == 0 && fix.is_ok_and(|fix| fix.is_apart_from_wheels());
             if is_apart {
                 state.doubt.place_by_others();
             }
-            return Taken::Used;
+            return if is_by_scan { Taken::UsedScan } else { Taken::Used };
         };
         state.fixes_refused += 1;
         let estimate = &state.history.newest;
@@ -492,6 +492,8 @@ impl DeadReckoning {
 #[derive(PartialEq)]
 enum Taken {
     Used,
+    /// A scan matcher's fix.
+    UsedScan,
     Refused(FixRefusal),
     Relocated,
 }

@@ -632,6 +632,23 @@ mod tests {
     }
 
     #[test]
+    fn a_laser_of_great_noise_is_matched_with_its_first_scan_and_says_how_well() {
+        let matcher = matcher();
+        let mut noisy = noisy();
+        let (mut held, start) = (None, Pose2::default());
+        matcher.step(&mut held, start, &noisy(start));
+        let (mut squares, mut stated) = (0.0, 0.0);
+        for step in 0..40 {
+            let position = DVec2::new(0.01 * f64::from(step), 0.0);
+            let truth = Pose2 { position, heading: 0.0 };
+            let fix = matcher.step(&mut held, truth, &noisy(truth)).unwrap();
+            squares += DVec2::new(fix.x_m, fix.y_m).distance_squared(position);
+            stated += (fix.covariance[0] + fix.covariance[3]) / matcher.0.shared;
+        }
+        assert!((0.3..2.0).contains(&(squares / stated)), "{squares} where {stated} is stated");
+    }
+
+    #[test]
     fn a_thing_is_not_taken_for_another_one_beside_it() {
         let matcher = matcher();
         let start = Pose2::default();

@@ -340,6 +340,13 @@ mod tests {
         }
     }
 
+    #[test]
+    fn an_undisturbed_run_in_lockstep_arrives() {
+        let finished = Scenario::lockstep(&mission()).run().finished.unwrap();
+        assert_eq!(finished.ending.outcome.as_str(), "reached", "{}", finished.ending.reason);
+        assert_eq!(finished.restarts.values().sum::<u32>(), 0);
+    }
+
     /// `firsthand-lab simulate --seed S` repeats a failure, with this mission as a file.
     #[test]
     fn new_seeds_break_no_invariant() {

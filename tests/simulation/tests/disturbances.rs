@@ -75,6 +75,20 @@ fn a_robot_whose_counts_jump_in_motion_stands_and_its_arrival_is_unsure() {
     assert_eq!(ending.outcome.as_str(), "reached_unsure", "{ending:?}");
 }
 
+#[test]
+fn a_robot_that_ignores_velocity_0_is_made_to_stand_by_other_means() {
+    let ran = ran(
+        "",
+        &[
+            at(3.0, What::Fault(Some(RobotFault::IgnoresZero))),
+            at(3.5, What::Ask(Request::Stop)),
+            at(8.0, What::End),
+        ],
+    );
+    let last = ran.truth.last().unwrap();
+    assert!(last.v.abs() < 0.01, "{} m/s", last.v);
+}
+
 const SURE: &str = "sure_within_m = 9";
 
 fn assert_reached(ran: &Ran) {
@@ -85,6 +99,10 @@ fn assert_reached(ran: &Ran) {
 
 fn assert_untouched(ran: &Ran) {
     assert_eq!(ran.truth.last().unwrap().contacts, 0);
+}
+
+fn outcomes(ran: &Ran) -> Vec<TargetOutcome> {
+    ran.finished.as_ref().unwrap().targets.iter().map(|target| target.outcome).collect()
 }
 
 fn stops(ran: &Ran) -> Vec<Cause> {
@@ -156,15 +174,23 @@ fn a_robot_that_is_sent_elsewhere_in_flight_goes_on_without_a_stop() {
     let there = [at(3.0, What::Ask(Request::Goto([3.5, -1.0])))];
     let ran = ran(SURE, &there);
     assert_reached(&ran);
-    let targets = &ran.finished.as_ref().unwrap().targets;
-    assert!(
-        targets
-            .iter()
-            .map(|target| target.outcome)
-            .eq([TargetOutcome::Replaced, TargetOutcome::Reached])
-    );
+    assert_eq!(outcomes(&ran), [TargetOutcome::Replaced, TargetOutcome::Reached]);
     let mut after = ran.truth.iter().filter(|tick| (3.0..5.5).contains(&tick.time_s));
     assert!(after.all(|tick| tick.v + tick.omega.abs() > 0.05));
+}
+
+#[test]
+fn a_robot_that_stays_has_a_result_for_each_target_and_no_target_ends_it() {
+    let text = format!(
+        "target = [1, 0]\nstay = true\n{SURE}\ntimeout_s = 120\nperimeter.width_m = 8\n\
+         world.wall = [{{ points = [[2.2, -0.4], [3, -0.4], [3, 0.4], [2.2, 0.4], [2.2, -0.4]] }}]"
+    );
+    let ran = ran_text(&text, &[], &[[1.0, -1.0], [2.6, 0.0], [0.5, 0.8]].map(Request::Goto));
+    use TargetOutcome::{Reached, Unreachable};
+    assert_eq!(outcomes(&ran), [Reached, Reached, Unreachable, Reached]);
+    assert_untouched(&ran);
+    let idle = ran_text("stay = true\nperimeter.width_m = 8", &[], &[]).summary.unwrap();
+    assert_eq!((idle.outcome, idle.targets.len()), (Outcome::Waited, 0));
 }
 
 #[test]

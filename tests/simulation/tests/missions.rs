@@ -288,6 +288,18 @@ fn a_robot_that_bumps_into_a_low_board_or_comes_to_a_hole_marks_it_and_goes_arou
 }
 
 #[test]
+fn two_lasers_of_half_a_circle_cross_the_course_untouched() {
+    let lasers = [("front", 0), ("back", 180)].map(|(name, bearing_deg)| {
+        format!(
+            "{{name='{name}',kind='scan',forward_m=0.1,bearing_deg={bearing_deg},\
+             field_of_view_deg=180,beams=91}}"
+        )
+    });
+    let sensors = format!("robot.sensor=[{}]", lasers.join(","));
+    arrives_untouched("obstacle-course", &[KOBUKI[0], KOBUKI[1], &sensors]);
+}
+
+#[test]
 fn a_low_battery_doubles_the_time_and_an_empty_one_ends_the_mission_with_the_reason() {
     let at = |volts: &str, outcome| {
         ends("open-room", &[&format!("simulation.battery.start_v={volts}")], outcome)

@@ -156,6 +156,17 @@ fn wheels_may_be_wired_the_other_way_round() {
 }
 
 #[test]
+fn a_timed_command_ends_inside_the_period_and_not_where_time_is_ignored() {
+    let moved = |text: &str| {
+        let mut robot = robot(text);
+        send(&mut robot, forward(700, 100));
+        after(&mut robot, 2).right_counts
+    };
+    assert_eq!(moved("[simulation.wheels]\nlag_s = 0"), 70);
+    assert_eq!(moved("[simulation]\nignores_time = true\n[simulation.wheels]\nlag_s = 0"), 200);
+}
+
+#[test]
 fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
     // A speed loop of 60 ms falls from 250 mm/s to 10 mm/s, which counts as rest, in 3.2 time
     // constants.
@@ -174,6 +185,18 @@ fn the_truth_says_how_long_a_wheel_turns_after_the_last_command() {
     let ignored = stopping_time(own_limit);
     near(ignored - 0.2, coasting, 0.02);
     assert!(stopping_time("simulation = { ignores_time = true }") > 4.0);
+}
+
+#[test]
+fn a_silent_host_stops_the_motors_only_where_the_mission_says_so() {
+    let speed = |text: &str| {
+        let mut robot = robot(text);
+        send(&mut robot, forward(500, None));
+        robot.advance_to(3.0);
+        robot.motors[1].speed
+    };
+    assert!(speed("") > 499.0, "it keeps going");
+    assert_eq!(speed("[simulation]\nstops_when_silent_s = 1.5"), 0.0);
 }
 
 #[test]

@@ -229,6 +229,12 @@ fn far_poses_leave_no_far_coordinates() {
 }
 
 #[test]
+fn the_same_scene_gives_the_same_bytes() {
+    let run = three_drums();
+    assert_eq!(svg(&run.scene()), svg(&run.scene()));
+}
+
+#[test]
 fn what_is_low_is_dashed_what_is_of_glass_dash_dotted_what_is_soft_dotted_and_the_legend_says_so() {
     let drawn = |profile: &str| {
         let mut run = three_drums();

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use common::{
     latency::Histogram,
-    samples::{LinkSample, PoseSample, RangeReading, Stamp},
+    samples::{CommandSample, CommandState, LinkSample, PoseSample, RangeReading, Stamp},
 };
 use mission_control::Heard;
 use recording::Recording;
@@ -119,6 +119,13 @@ fn metrics_count_every_generation_and_every_sample() {
         let range =
             RangeReading { range_m: 0.2, status: u8::from(tick == 0), ..RangeReading::default() };
         content.measured.range(&range, &content.mission);
+        content.heard.hear(&Heard::Command(&CommandSample {
+            stamp: stamp(tick, 1),
+            left_rad_s: -1.0,
+            right_rad_s: tick as f64,
+            state: CommandState::Driving.into(),
+            ..CommandSample::default()
+        }));
     }
     let mut late = PoseSample { stamp: stamp(2, 1), v_m_s: 900.0, ..PoseSample::default() };
     late.stamp.stamp_ns += 1000;
@@ -128,4 +135,5 @@ fn metrics_count_every_generation_and_every_sample() {
     assert_eq!(content.measured.speed_change(), Some(0.5));
     assert_eq!(content.measured.near(), Some(1.0 / 3.0));
     assert_eq!(content.measured.unavailable(), Some(2.0 / 3.0));
+    assert_eq!(content.heard.wheel_range_rad_s(u64::MAX), Some(3.0));
 }

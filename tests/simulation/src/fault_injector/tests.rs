@@ -180,7 +180,10 @@ fn json(fault: F, seed: u64, wheels: [f64; 2]) -> Vec<Report> {
 fn a_json_robot_lies_as_the_table_says() {
     for (fault, told) in [
         (F::MotorZeros, &[[0.0, 0.0]][..]),
+        (F::EncodersSwapped, &[[2.0, 5.0]]),
+        (F::CountsReset, &[[3.0, 1.0]]),
         (F::EncoderDead, &[[1.0, 3.0], [4.0, 2.0]]),
+        (F::EncoderReversed, &[[-2.0, 3.0], [4.0, 1.0]]),
         (F::MotorRepeated, &[[1.0, 2.0]]),
     ] {
         let wheels = json(fault, 1, [4.0, 3.0])[0].wheels.unwrap();

@@ -5,7 +5,7 @@ use crate::support::{
     worst_residual,
 };
 use harmonic::{
-    Cancellation, Cell, Domain, Field, Method, Screening, Settings, SolveError, Solver,
+    Cancellation, Cell, Domain, Field, Method, Phase, Screening, Settings, SolveError, Solver,
     solve_exactly,
 };
 
@@ -179,4 +179,24 @@ fn double_precision_solves_what_fails_verification_in_single_precision_and_has_n
     assert_eq!(follow(&field), 1.0);
     let angles = Angles::between(&field, &solve_exactly(&domain).expect("a field"), CLEAR);
     assert!(angles.clear_max < 1.0, "{angles:?}");
+}
+
+/// The coarse equations decide how much each cycle gains.
+#[test]
+fn open_maps_converge_within_a_few_cycles() {
+    for (kind, length, most) in [
+        (Kind::Empty, f64::INFINITY, 4),
+        (Kind::Drums, f64::INFINITY, 8),
+        (Kind::Office, f64::INFINITY, 25),
+        (Kind::Drums, 20.0, 8),
+        (Kind::Noise { density: 0.1 }, f64::INFINITY, 20),
+    ] {
+        let domain = Map::generate(kind, 301, 233, 1).screened(length);
+        let mut cycles = 0;
+        let mut observe = |phase| cycles += usize::from(phase == Phase::Cycled);
+        Solver::default()
+            .solve_observed(&domain, &Cancellation::new(), &mut observe)
+            .expect("a field");
+        assert!(cycles <= most, "{kind:?}, {length}: {cycles} cycles");
+    }
 }
