@@ -1,8 +1,8 @@
 //! Laser tracker of moving objects.
 //!
 //! Gapless runs of beams form objects. A constant-velocity Kalman filter tracks their middles in
-//! the odometry frame, which fixes do not move. A mover's velocity and travel exceed their
-//! uncertainty, and it was seen whole where an earlier scan saw farther or less far.
+//! the scan matcher's frame, which other fixes do not move. A mover's velocity and travel exceed
+//! their uncertainty, and it was seen whole where an earlier scan saw farther or less far.
 //!
 //! The visible middle of a partly hidden object slides along it, so its deviation is its
 //! half-width. For a mover of known width, the middle follows from its visible end. Only mutually

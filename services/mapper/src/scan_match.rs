@@ -15,7 +15,6 @@
 //! all later fixes share, because averaging never removes it.
 
 use common::{
-    geometry::principal_axes,
     kinematics::Pose2,
     mission::Mission,
     samples::{FixSample, PoseSample},
@@ -27,6 +26,8 @@ use crate::{
     deskew::Placed,
     movers::Movers,
     reading::{Fan, Rows},
+    scan_points::{Point, points},
+    surfaces::{CELL_M, Index, Surface},
 };
 
 /// Minimum deviation of a point from its line. Walls are rough even if the laser's noise is lower.
@@ -36,7 +37,7 @@ const PRIOR: [f64; 2] = [0.02, 0.01];
 /// Drift of a scan without a match: metres and radians.
 const LOST: [f64; 2] = [0.10, 0.05];
 /// Gates from a point to the nearest surface: of the first round and of the last, metres.
-const GATES_M: [f64; 2] = [0.5, 0.1];
+const GATES_M: [f64; 2] = [CELL_M, 0.1];
 /// Last gate in deviations of a noisy point.
 const GATE: f64 = 2.5;
 /// Ratio of a round's gate to the gate before.
@@ -52,11 +53,6 @@ const ROUNDS: usize = 15;
 const SETTLED: f64 = 1e-4;
 /// Approximate points per match.
 const POINTS: usize = 240;
-/// Half-length of a line: minimum in metres, and deviations of a noisy point.
-const LINE_M: f64 = 0.06;
-const LINE: f64 = 2.5;
-/// Maximum RMS distance of points from their line, relative to its half-length.
-const STRAIGHT: f64 = 0.5;
 /// Spacing of surfaces, metres.
 const SPACING_M: f64 = 0.05;
 /// Bound on surfaces; those unseen for longest are forgotten first.
@@ -83,15 +79,6 @@ const SHARED_S: f64 = 2.0;
 /// Minimum deviation of a match: metres and radians.
 const LEAST: [f64; 2] = [0.005, 0.002];
 
-/// A piece of a line: one keyframe's points within about [`LINE_M`], in the mission frame.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Surface {
-    at: DVec2,
-    normal: DVec2,
-    /// Travel when last seen, metres.
-    seen_m: f64,
-}
-
 /// What the scan matcher knows: surfaces around the robot, and its newest match.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Surroundings {
@@ -106,79 +93,6 @@ pub(crate) struct Surroundings {
     /// By place; computed again after a restart.
     #[serde(skip)]
     index: Index,
-}
-
-/// Surfaces by square cells of the first gate, row by row.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Index {
-    origin: DVec2,
-    width: usize,
-    /// Number of surfaces before each cell, and in all.
-    before: Vec<u32>,
-    surfaces: Vec<u32>,
-}
-
-impl Index {
-    fn new(surfaces: &[Surface]) -> Self {
-        let corner = |pick: fn(DVec2, DVec2) -> DVec2| {
-            surfaces.iter().map(|surface| surface.at).reduce(pick).unwrap_or_default()
-        };
-        let origin = corner(DVec2::min) - GATES_M[0];
-        let cells = ((corner(DVec2::max) - origin) / GATES_M[0]).floor() + 2.0;
-        let (width, height) = (cells.x as usize, cells.y as usize);
-        let mut index =
-            Self { origin, width, before: vec![0; width * height + 1], surfaces: Vec::new() };
-        let mut order: Vec<_> =
-            (0_u32..).zip(surfaces).map(|(number, it)| (index.cell(it.at), number)).collect();
-        order.sort_unstable();
-        for (cell, _) in &order {
-            index.before[cell + 1] += 1;
-        }
-        for cell in 1..index.before.len() {
-            index.before[cell] += index.before[cell - 1];
-        }
-        index.surfaces = order.into_iter().map(|(_, number)| number).collect();
-        index
-    }
-
-    fn cell(&self, at: DVec2) -> usize {
-        let cell = (at - self.origin) / GATES_M[0];
-        cell.y as usize * self.width + cell.x as usize
-    }
-
-    /// Returns the number of the nearest surface within `gate` metres, at most the first gate.
-    fn nearest(&self, surfaces: &[Surface], at: DVec2, gate: f64) -> Option<usize> {
-        debug_assert!(gate <= GATES_M[0]);
-        let [low, high] = [-gate, gate].map(|way| (at + way - self.origin) / GATES_M[0]);
-        let height = (self.before.len() - 1) / self.width.max(1);
-        let [left, bottom] = [low.x, low.y].map(|it| it.max(0.0) as usize);
-        // A negative float becomes 0, whose margin of one cell is empty.
-        let (right, top) =
-            ((high.x as usize).min(self.width - 1), (high.y as usize).min(height - 1));
-        let (mut nearest, mut square) = (None, gate * gate);
-        for row in bottom..=top {
-            if left > right {
-                break;
-            }
-            let row = row * self.width;
-            let found = self.before[row + left] as usize..self.before[row + right + 1] as usize;
-            for number in &self.surfaces[found] {
-                let other = surfaces[*number as usize].at.distance_squared(at);
-                if other <= square {
-                    (nearest, square) = (Some(*number as usize), other);
-                }
-            }
-        }
-        nearest
-    }
-}
-
-/// A point of a scan in the robot's frame.
-struct Point {
-    at: DVec2,
-    /// None for points off a line.
-    normal: Option<DVec2>,
-    deviation_m: f64,
 }
 
 struct Match {
@@ -301,6 +215,9 @@ impl Surroundings {
     /// The search is wide only if surfaces right where the wheels say fit too few points, so that a
     /// thing is not taken for another one beside it.
     fn matched(&mut self, points: &[Point], odometry: Pose2) -> Option<Match> {
+        if self.index.is_empty() {
+            self.reindex();
+        }
         let beside = self.matched_within(GATES_M[1], points, odometry);
         if beside.as_ref().is_some_and(|found| found.share >= SURE_SHARE) {
             return beside;
@@ -316,9 +233,6 @@ impl Surroundings {
         points: &[Point],
         odometry: Pose2,
     ) -> Option<Match> {
-        if self.index.before.is_empty() {
-            self.sort();
-        }
         let start = self.carried(odometry);
         let every = points.len().div_ceil(POINTS).max(1);
         let used = points.len().div_ceil(every);
@@ -399,7 +313,7 @@ impl Surroundings {
         };
         let oldest_m = self.travelled_m - KEPT_M;
         self.surfaces.retain(|surface| surface.seen_m >= oldest_m && !is_gone(surface));
-        self.sort();
+        self.reindex();
         let (mut new, mut all) = (0_u32, 0_u32);
         for Point { at, normal, deviation_m } in points {
             let Some(normal) = normal else { continue };
@@ -417,13 +331,13 @@ impl Surroundings {
                 self.surfaces.push(Surface { at, normal, seen_m: self.travelled_m });
             }
         }
-        self.sort();
+        self.reindex();
         self.keyframe = self.pose;
         f64::from(new) / f64::from(all.max(1))
     }
 
     /// Indexes the surfaces, without those beyond a laser's reach.
-    fn sort(&mut self) {
+    fn reindex(&mut self) {
         let there = self.pose.position;
         self.surfaces.retain(|surface| {
             surface.at.distance(there) <= FARTHEST_M && surface.normal.is_normalized()
@@ -442,50 +356,6 @@ impl Surroundings {
         let heading = self.pose.heading + odometry.heading - self.odometry.heading;
         Pose2 { position: self.pose.position + went, heading }
     }
-}
-
-/// Returns a scan's points. Those on lines are their line's, because lines lie behind the points of
-/// round surfaces, which would bias the match towards them.
-fn points(fan: &Fan<'_>) -> Vec<Point> {
-    let ends: Vec<_> = fan.ends().collect();
-    let point = |beam: usize| {
-        let at = ends[beam]?;
-        let deviation_m = fan.deviation_m(at);
-        let spacing_m = at.distance(fan.origin) * fan.step_rad;
-        let half_m = LINE_M.max(LINE * deviation_m).max(1.5 * spacing_m);
-        let beside = ((half_m / spacing_m.max(1e-6)).ceil() as usize).clamp(1, 40);
-        let around = &ends[beam.saturating_sub(beside)..(beam + beside + 1).min(ends.len())];
-        let near = around.iter().flatten().filter(|other| other.distance(at) <= 2.0 * half_m);
-        let line = line_through(near, half_m);
-        let (at, normal) = line.map_or((at, None), |(middle, normal)| {
-            (middle, Some(if normal.dot(fan.origin - middle) < 0.0 { -normal } else { normal }))
-        });
-        Some(Point { at, normal, deviation_m })
-    };
-    (0..ends.len()).filter_map(point).collect()
-}
-
-/// Returns the middle and the normal of the line through points; none for fewer than three, or
-/// points off the line.
-fn line_through<'a>(
-    points: impl Iterator<Item = &'a DVec2> + Clone,
-    half_m: f64,
-) -> Option<(DVec2, DVec2)> {
-    let count = points.clone().count();
-    if count < 3 {
-        return None;
-    }
-    let share = 1.0 / count as f64;
-    let middle = points.clone().sum::<DVec2>() * share;
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for at in points {
-        let off = *at - middle;
-        xx += share * off.x * off.x;
-        xy += share * off.x * off.y;
-        yy += share * off.y * off.y;
-    }
-    let ([_, aside], along) = principal_axes([xx, xy, yy]);
-    (aside <= STRAIGHT * half_m).then(|| (middle, DVec2::from_angle(along).perp()))
 }
 
 fn is_finite(pose: Pose2) -> bool {
@@ -700,11 +570,18 @@ mod tests {
     }
 
     #[test]
-    fn surroundings_from_a_saved_state_match_as_before() {
+    fn surroundings_of_most_surfaces_fit_their_file_and_match_as_before() {
         let matcher = matcher();
         let mut held = None;
         ellipse(&matcher, &mut held);
-        let mut restored = held.clone();
+        let full = held.as_mut().unwrap();
+        full.surfaces = full.surfaces.iter().copied().cycle().take(MOST_SURFACES).collect();
+        full.reindex();
+        let saved = postcard::to_allocvec(&held).unwrap();
+        assert!(saved.len() <= Surroundings::MOST_BYTES, "{} bytes", saved.len());
+        let mut restored: Option<Surroundings> = postcard::from_bytes(&saved).unwrap();
+        restored.as_mut().unwrap().reindex();
+        assert_eq!(held, restored);
         restored.as_mut().unwrap().index = Index::default();
         let Surroundings { pose, odometry, .. } = held.clone().unwrap();
         let beams = scan(pose, false);
