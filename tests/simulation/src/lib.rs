@@ -253,6 +253,11 @@ pub trait Observer {
 
     /// Is called after each event.
     fn observe(&mut self);
+
+    /// Runs a turn of a stage that has opened its topics.
+    fn turn(&mut self, _stage: &str, turn: &mut dyn FnMut()) {
+        turn();
+    }
 }
 
 /// A shared observer, which its owner reads after the run.
@@ -263,6 +268,10 @@ impl<T: Observer> Observer for Rc<RefCell<T>> {
 
     fn observe(&mut self) {
         self.borrow_mut().observe();
+    }
+
+    fn turn(&mut self, stage: &str, turn: &mut dyn FnMut()) {
+        self.borrow_mut().turn(stage, turn);
     }
 }
 

@@ -471,7 +471,11 @@ impl SimulatedMachine {
                 turned
             }),
             (Some(turns), _) if process.is_terminated => turns.stop().map(|()| None),
-            (Some(turns), _) => turns.turn(),
+            (Some(turns), _) => {
+                let mut turned = Ok(None);
+                self.observed(process.stage, &mut || turned = turns.turn());
+                turned
+            }
             (None, None) => Ok(None),
         };
         let work = self.load.get().work;
@@ -489,6 +493,13 @@ impl SimulatedMachine {
             Ok(None) => process.spins_since_ns = Some(self.now_ns.get()),
         }
         self.processes.borrow_mut().insert(number, process);
+    }
+
+    fn observed(&self, stage: &str, turn: &mut dyn FnMut()) {
+        match &mut *self.observer.borrow_mut() {
+            Some(observer) => observer.turn(stage, turn),
+            None => turn(),
+        }
     }
 
     fn open(&self, generation: Generation, run: Run) -> common::start::Result<Box<dyn Simulated>> {

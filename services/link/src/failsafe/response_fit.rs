@@ -156,8 +156,9 @@ impl ResponseFit {
     /// Returns the best response for both motion and suspicion, with the lag of `stated`. Wheels
     /// that do not drive are left out.
     pub(super) fn explain(&self, stated: Response, suspected: Suspected) -> Option<Response> {
-        let explained = self.weighed(|dead_time_s, limits, ways| {
-            let explained = self.explained(limits, ways, suspected)?;
+        let explained = self.weighed(|dead_time_s, limits, courses| {
+            let motions = self.motions(dead_time_s, limits, courses, suspected.from_s);
+            let explained = self.explained(motions, suspected)?;
             let lag_s = stated.lag_s.min(dead_time_s);
             assert!((0.0..=dead_time_s).contains(&lag_s));
             let found = self.axle.response(dead_time_s - lag_s, limits);
@@ -179,9 +180,10 @@ impl ResponseFit {
             return None;
         }
         let scale = self.scale(intervals, last_s - from_s);
+        let (limits, courses) = self.courses(self.axle.limits(&stated));
         let fit = |later_s: f64| {
             let dead_time_s = stated.dead_time_s() + later_s;
-            let [_, channels] = self.motions_of(dead_time_s, &stated, *from_s);
+            let [_, channels] = self.motions(dead_time_s, limits, courses.each_ref(), *from_s);
             let ((wheels, factor), turn) = (self.of_wheels(&channels), &channels[TURN]);
             let unlike = wheels.unlike(factor);
             let turns = turn.both * turn.both.abs() >= TURN_EXPLAINED * turn.model * turn.turned;
@@ -215,14 +217,18 @@ impl ResponseFit {
             let (wheels, factor) = self.of_wheels(&channels);
             (scale * wheels.unlike(factor), scale * wheels.turned, factor)
         };
-        let of = |it: Response| fit(self.motions_of(it.dead_time_s(), &it, *first_s)).0;
+        let of = |it: Response| {
+            let (limits, courses) = self.courses(self.axle.limits(&it));
+            fit(self.motions(it.dead_time_s(), limits, courses.each_ref(), *first_s)).0
+        };
         let believed = believed.map(of);
         // Most robots answer as stated: even a perfect fit is not far better.
         if believed.is_some_and(|believed| !is_far_better(0.0, believed)) {
             return None;
         }
-        let fits = self.weighed(|dead_time_s, limits, ways| {
-            let (unlike, all, factor) = fit(self.motions(limits, ways, *first_s));
+        let fits = self.weighed(|dead_time_s, limits, courses| {
+            let motions = self.motions(dead_time_s, limits, courses, *first_s);
+            let (unlike, all, factor) = fit(motions);
             // Wheels that reach less speed reach it sooner.
             let most = limits.most.map(|most| most * factor);
             let response = self.axle.response(dead_time_s, Limits { most, ..limits });
@@ -246,8 +252,11 @@ impl ResponseFit {
 
     /// Returns the least explained share of the channels' motion. None for an implausible factor,
     /// deviating judged motion, or a suspected channel with hardly any command.
-    fn explained(&self, limits: Limits, ways: Ways<'_>, suspected: Suspected) -> Option<f64> {
-        let [all, judged_all] = self.motions(limits, ways, suspected.from_s);
+    fn explained(
+        &self,
+        [all, judged_all]: [[Motion; CHANNELS]; 2],
+        suspected: Suspected,
+    ) -> Option<f64> {
         let mut least: Option<f64> = None;
         let motions = all.iter().zip(&judged_all).enumerate();
         for (channel, (all, judged)) in motions.take(self.judged()) {
@@ -277,7 +286,7 @@ impl ResponseFit {
 
     /// Applies `weigh` to each response of the grid. Of separate turns only the best fit is tried;
     /// responses of single wheels come last.
-    fn weighed<T>(&self, weigh: impl Fn(f64, Limits, Ways<'_>) -> Option<T>) -> Vec<T> {
+    fn weighed<T>(&self, weigh: impl Fn(f64, Limits, [&Course; 2]) -> Option<T>) -> Vec<T> {
         let mut weighed = Vec::new();
         let accelerations = (0..ACCELERATIONS)
             .map(|power| LEAST_ACCELERATION_M_S2 * ACCELERATION_RATIO.powi(power))
@@ -287,26 +296,22 @@ impl ResponseFit {
             let grid = accelerations.clone().map(|acceleration| {
                 let most = acceleration * self.axle.counts_per_m;
                 let limits = Limits { are_apart, most: [most, most * share] };
-                (limits, [0, 1].map(|axis| self.course(limits, axis)))
+                self.courses(limits)
             });
             let grid: Vec<_> = grid.collect();
             for step in 0..DEAD_TIMES {
                 let dead_time_s = f64::from(step) * DEAD_TIME_STEP_S;
-                let ways = |axis: usize| {
-                    grid.iter().map(move |(_, courses)| self.ways(&courses[axis], dead_time_s))
-                };
-                let others: Vec<_> = ways(1).collect();
-                let unlike = others.iter().map(|ways| self.unlike_turn(ways));
+                let unlike = grid.iter().map(|(_, [_, turn])| self.unlike_turn(turn, dead_time_s));
                 let best = unlike.enumerate().min_by(|one, other| one.1.total_cmp(&other.1));
                 let best = best.filter(|(_, unlike)| are_apart && !unlike.is_nan());
-                for (index, one) in ways(0).enumerate().filter(|_| best.is_some() || !are_apart) {
-                    let other = best.map_or(index, |(best, _)| best);
-                    let most = [grid[index].0.most[0], grid[other].0.most[1]];
-                    weighed.extend(weigh(
-                        dead_time_s,
-                        Limits { are_apart, most },
-                        [&one, &others[other]],
-                    ));
+                for (index, one) in grid.iter().enumerate() {
+                    if are_apart && best.is_none() {
+                        continue;
+                    }
+                    let other = &grid[best.map_or(index, |(best, _)| best)];
+                    let most = [one.0.most[0], other.0.most[1]];
+                    let courses = [&one.1[0], &other.1[1]];
+                    weighed.extend(weigh(dead_time_s, Limits { are_apart, most }, courses));
                 }
             }
         }
@@ -314,11 +319,13 @@ impl ResponseFit {
     }
 
     /// Returns the deviation from half the wheels' difference; NaN if unmodelled.
-    fn unlike_turn(&self, ways: &[f64]) -> f64 {
+    fn unlike_turn(&self, course: &Course, dead_time_s: f64) -> f64 {
         let mut turn = Motion::default();
-        for ((_, turned), modelled) in self.turned.iter().skip(1).zip(ways) {
+        for ((_, turned), modelled) in
+            self.turned.iter().skip(1).zip(self.ways(course, dead_time_s))
+        {
             if let Some([left, right]) = turned {
-                turn.add(*modelled, (right - left) / 2.0);
+                turn.add(modelled, (right - left) / 2.0);
             }
         }
         turn.unlike(turn.factor())
@@ -327,7 +334,7 @@ impl ResponseFit {
     /// Returns an axis' course without dead time.
     fn course(&self, limits: Limits, axis: usize) -> Course {
         let (mut way, mut speed) = (0.0, 0.0);
-        let mut course = Vec::new();
+        let mut course = Vec::with_capacity(2 * self.commands.len());
         let ends = self.commands.iter().skip(1).map(|(at, _)| *at).chain([f64::INFINITY]);
         for (&(at, told), end) in self.commands.iter().zip(ends).filter(|((at, _), end)| at < end) {
             let target = limits.axes(told)[axis];
@@ -344,12 +351,17 @@ impl ResponseFit {
         course
     }
 
-    fn ways(&self, course: &Course, dead_time_s: f64) -> Vec<f64> {
+    /// Returns the travel of each interval.
+    fn ways<'a>(
+        &'a self,
+        course: &'a Course,
+        dead_time_s: f64,
+    ) -> impl Iterator<Item = f64> + use<'a> {
         let mut pieces = course.iter().peekable();
         let mut piece = &[0.0; 4];
         // The oldest counts only start the first interval.
         let mut before = None;
-        let rolled = |(until, _): &(f64, _)| {
+        self.turned.iter().filter_map(move |(until, _)| {
             while let Some(next) = pieces.next_if(|[from, ..]| *from <= until - dead_time_s) {
                 piece = next;
             }
@@ -357,34 +369,26 @@ impl ResponseFit {
             let for_s = until - dead_time_s - from;
             let way = way + for_s * (speed + rate * for_s / 2.0);
             before.replace(way).map(|before| way - before)
-        };
-        self.turned.iter().filter_map(rolled).collect()
+        })
     }
 
-    fn motions_of(
-        &self,
-        dead_time_s: f64,
-        response: &Response,
-        from_s: f64,
-    ) -> [[Motion; CHANNELS]; 2] {
-        let limits = self.axle.limits(response);
-        let [one, other] = [0, 1].map(|axis| self.ways(&self.course(limits, axis), dead_time_s));
-        self.motions(limits, [&one, &other], from_s)
+    fn courses(&self, limits: Limits) -> (Limits, [Course; 2]) {
+        (limits, [0, 1].map(|axis| self.course(limits, axis)))
     }
 
     /// Returns the channels' motion: all, and that since `from_s`.
     fn motions(
         &self,
+        dead_time_s: f64,
         limits: Limits,
-        [one, other]: Ways<'_>,
+        courses: [&Course; 2],
         from_s: f64,
     ) -> [[Motion; CHANNELS]; 2] {
         let mut all = [Motion::default(); CHANNELS];
         let mut judged_all = all;
-        assert_eq!(one.len(), other.len());
-        assert!(one.len() + 1 == self.turned.len() || one.is_empty());
+        let [one, other] = courses.map(|course| self.ways(course, dead_time_s));
         for ((&(until, turned), one), other) in self.turned.iter().skip(1).zip(one).zip(other) {
-            let modelled = channels(limits.wheels([*one, *other]));
+            let modelled = channels(limits.wheels([one, other]));
             for (channel, turned) in turned.map(channels).into_iter().flatten().enumerate() {
                 all[channel].add(modelled[channel], turned);
                 if until >= from_s {
@@ -403,8 +407,6 @@ impl ResponseFit {
 
 /// Pieces of a course: start, travel, speed, acceleration; seconds and counts.
 type Course = Vec<[f64; 4]>;
-/// Travel of both axes in each interval but the first.
-type Ways<'a> = [&'a [f64]; 2];
 
 /// Sums over intervals, counts: modelled travel, squares of modelled and counted travel, their
 /// product.
