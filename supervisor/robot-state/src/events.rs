@@ -228,8 +228,8 @@ impl Events {
         }
     }
 
-    pub(crate) fn log(&mut self, process: &str, line: &str) {
-        self.at_s = self.now_s;
+    pub(crate) fn log(&mut self, process: &str, line: &str, at_s: Option<f64>) {
+        self.at_s = at_s.unwrap_or(self.now_s);
         self.add(process, Kind::Log, line);
     }
 }
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn a_long_line_of_a_log_is_cut_between_letters() {
         let mut events = Events::default();
-        events.log("mapper", &"ö".repeat(1000));
+        events.log("mapper", &"ö".repeat(1000), None);
         assert_eq!(events.drain()[0].text.chars().count(), LONGEST + 1);
     }
 }

@@ -121,8 +121,9 @@ impl RobotState {
         assert!(self.way.len() <= MOST_POINTS && self.way_every_m >= POINT_EVERY_M);
     }
 
-    pub fn log(&mut self, process: &str, line: &str) {
-        self.events.log(process, line);
+    /// Takes a line of a log that was written at mission time `at_s`; now if it is unknown.
+    pub fn log(&mut self, process: &str, line: &str, at_s: Option<f64>) {
+        self.events.log(process, line, at_s);
     }
 
     pub fn processes(&self) -> Vec<u32> {

@@ -105,7 +105,7 @@ impl Content {
     fn take(&mut self, message: &Message) -> Option<()> {
         if *message.topic == *LOG {
             let (process, line) = recording::log_line(&message.data)?;
-            self.collector.state.log(&process, &line);
+            self.collector.state.log(&process, &line, None);
             return Some(());
         }
         let sample = Sample::decoded(&message.topic, &message.data)?;

@@ -3,13 +3,14 @@
 use std::{
     path::PathBuf,
     thread,
-    time::{Duration, Instant},
+    time::{Duration, Instant, SystemTime},
 };
 
 use axum::body::Bytes;
 use common::ground_truth::GROUND_TRUTH;
 use common::{
     bus::Bus,
+    clock::{MissionClock, monotonic_ns},
     domain::Domain,
     follower::{Event, Follower},
     process_usage::Processes,
@@ -35,12 +36,17 @@ const TRUTH_AT_ONCE: u64 = 1 << 16;
 /// Most bytes of results loaded for a run in progress.
 const LARGEST_RESULTS: u64 = 1 << 20;
 const PREVIEW_MOST_CELLS: usize = 512 * 512;
+/// Mission time within which the page sees how a run begins, seconds.
+const BEGINS_S: f64 = 2.0;
 
 struct Reading {
     collector: Collector,
     processes: Processes,
     logs: LogFiles,
     logs_read: Instant,
+    clock: MissionClock,
+    /// Whether the samples that the bus kept are read.
+    has_joined: bool,
     truth: (PathBuf, Tail),
     results: Results,
     packed: Option<Instant>,
@@ -55,6 +61,8 @@ impl Reading {
             processes: Processes::default(),
             logs: LogFiles::follow(&directory, true),
             logs_read: Instant::now(),
+            clock: run.clock,
+            has_joined: false,
             truth: (directory.join(GROUND_TRUTH), Tail::default()),
             results: Results::of(&directory, LARGEST_RESULTS),
             packed: None,
@@ -62,17 +70,29 @@ impl Reading {
     }
 
     fn publish(&mut self, shared: &Shared) {
-        let Self { collector, processes, logs, logs_read, results, packed, .. } = self;
+        let Self { collector, processes, logs, logs_read, clock, results, packed, .. } = self;
         let mut ended = Vec::new();
         if logs_read.elapsed() >= LOGS_EVERY {
             *logs_read = Instant::now();
-            for (process, line) in logs.take() {
-                collector.state.log(&process, &line);
+            let mut at_s = None;
+            let mut lines = logs.take();
+            // A line without a time continues the one before.
+            lines.sort_by_cached_key(|(_, line)| {
+                at_s = written(line).or(at_s);
+                at_s
+            });
+            for (process, line) in lines {
+                let at_s = written(&line).and_then(|at| mission_s(*clock, at));
+                collector.state.log(&process, &line, at_s);
             }
             ended = results.take();
         }
         collector.usage = processes.look(&collector.state.processes(), Instant::now());
-        let (rows, events) = (collector.take_rows(), collector.state.take_events());
+        let (rows, mut events) = (collector.take_rows(), collector.state.take_events());
+        if !std::mem::replace(&mut self.has_joined, true) && collector.state.now_s() > BEGINS_S {
+            // What holds when the page joins began at an unknown time.
+            events.clear();
+        }
         let state = collector.take_state();
         let is_due = packed.is_none_or(|packed| packed.elapsed() >= PACK_EVERY);
         let (mut map, mut field) = (None, None);
@@ -109,6 +129,18 @@ impl Reading {
             shown.preview.set(Bytes::from(preview));
         }
     }
+}
+
+/// Returns the time at the beginning of a line of a log.
+fn written(line: &str) -> Option<SystemTime> {
+    humantime::parse_rfc3339(line.split_whitespace().next()?).ok()
+}
+
+/// Returns the mission time at `at`, seconds; `None` if ticks count it.
+fn mission_s(clock: MissionClock, at: SystemTime) -> Option<f64> {
+    let ago = SystemTime::now().duration_since(at).unwrap_or_default();
+    let at_ns = monotonic_ns().saturating_sub(ago.as_nanos() as u64);
+    matches!(clock, MissionClock::Wall { .. }).then(|| clock.at(0, at_ns).seconds())
 }
 
 fn preview(collector: &Collector, target: DVec2) -> Option<Vec<u8>> {
@@ -159,5 +191,22 @@ pub fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool)
         if let Some(reading) = &mut reading {
             reading.publish(shared);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_a_log_has_the_mission_time_at_which_it_was_written() {
+        let epoch_ns = monotonic_ns().saturating_sub(100_000_000_000);
+        let clock = MissionClock::Wall { epoch_ns, rate: 2.0 };
+        let at = humantime::format_rfc3339_micros(SystemTime::now() - Duration::from_secs(60));
+        let line = format!("{at}  INFO mapper: ready");
+        let found = mission_s(clock, written(&line).unwrap()).unwrap();
+        // 40 s after the epoch, at double pace.
+        assert!((78.0..90.0).contains(&found), "{found}");
+        assert_eq!(written("   at mapper/src/step.rs:1"), None);
     }
 }
