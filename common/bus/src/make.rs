@@ -10,6 +10,7 @@ use std::{
     os::unix::{ffi::OsStrExt as _, fs::DirBuilderExt as _},
     path::{Path, PathBuf},
     rc::Rc,
+    time::SystemTime,
 };
 
 use iceoryx2::{
@@ -218,6 +219,13 @@ impl Bus {
         remove_unfilled(node, process)
     }
 
+    /// Returns the time at which a process last joined or left, or a service file came or went.
+    pub fn changed(&self) -> Option<SystemTime> {
+        let Medium::Shared { node, .. } = &self.medium else { return None };
+        let changed = |directory: &Path| directory.metadata().ok()?.modified().ok();
+        changed(&nodes_of(node)).max(changed(&services_of(node)))
+    }
+
     /// Cleans up after ended processes, at a few milliseconds each. Only the supervisor calls this.
     ///
     /// Frees their places and memory, removes files of incomplete starts of `killed` (which must
@@ -227,8 +235,7 @@ impl Bus {
         let Medium::Shared { node, .. } = &self.medium else { return Ok(true) };
         leftovers::restore(&backup_of(node), &services_of(node))?;
         let config = node.config();
-        let nodes = config.global.node_dir();
-        let nodes = Path::new(OsStr::from_bytes(nodes.as_bytes()));
+        let nodes = nodes_of(node);
         let (mut outcome, mut all) = (Ok(()), true);
         let listed = Node::<ipc::Service>::list(config, |listed| {
             if let NodeState::Dead(dead) = listed {
@@ -253,11 +260,16 @@ impl Bus {
         if all {
             killed.iter().try_for_each(|&process| {
                 remove_unfilled(node, process)?;
-                leftovers::remove_nodes(nodes, process)
+                leftovers::remove_nodes(&nodes, process)
             })?;
         }
         Ok(all)
     }
+}
+
+fn nodes_of(node: &BusNode) -> PathBuf {
+    let nodes = node.config().global.node_dir();
+    PathBuf::from(OsStr::from_bytes(nodes.as_bytes()))
 }
 
 fn services_of(node: &BusNode) -> PathBuf {

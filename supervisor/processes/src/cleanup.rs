@@ -1,13 +1,15 @@
 //! Cleanup of ended processes' places on topics, shared memory and node files on the bus.
 
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use common::{bus::Bus, clock::Instant};
 
 use crate::{death::Death, stages};
 
-/// Maximum interval between cleanups; a consumer's end is not notified.
+/// Least interval between cleanups of a bus that others join or leave.
 const PERIOD: Duration = Duration::from_secs(1);
+/// Interval of cleanups without that; a killed consumer leaves no sign.
+const LONGEST: Duration = Duration::from_secs(5);
 /// Delay after a stage's death.
 ///
 /// Another death often follows. A starved recorder meanwhile reads the stage's last samples; with
@@ -16,6 +18,8 @@ const DELAY: Duration = Duration::from_secs(1);
 
 pub struct Cleanup {
     done: Instant,
+    /// The bus's last change before `done`.
+    changed: Option<SystemTime>,
     /// Deaths since `done`, and the time of the last one.
     deaths: (usize, Instant),
     /// Ended processes with resources left to free.
@@ -25,7 +29,7 @@ pub struct Cleanup {
 impl Default for Cleanup {
     fn default() -> Self {
         let now = Instant::now();
-        Self { done: now, deaths: (0, now), pending: Vec::new() }
+        Self { done: now, changed: None, deaths: (0, now), pending: Vec::new() }
     }
 }
 
@@ -47,7 +51,9 @@ impl Cleanup {
     /// deaths hasten it, before places on the bus run out.
     pub fn run_if_due(&mut self, bus: &Bus, any_starting: bool) {
         let (deaths, last) = self.deaths;
-        let due = deaths > 0 && !any_starting || self.done.elapsed() >= PERIOD;
+        let rested = self.done.elapsed();
+        let changed = || rested >= PERIOD && bus.changed() != self.changed;
+        let due = deaths > 0 && !any_starting || rested >= LONGEST || changed();
         let quiet = last.elapsed() >= DELAY;
         let many = deaths >= stages::TABLE.len();
         if due && quiet || many {
@@ -59,7 +65,10 @@ impl Cleanup {
     fn run(&mut self, bus: &Bus) {
         self.done = Instant::now();
         self.deaths.0 = 0;
-        match bus.clear_up(&self.pending) {
+        let changed = bus.changed();
+        let cleared = bus.clear_up(&self.pending);
+        self.changed = changed.filter(|_| matches!(cleared, Ok(true)));
+        match cleared {
             Ok(true) => self.pending.clear(),
             Ok(false) => {}
             Err(error) => {
