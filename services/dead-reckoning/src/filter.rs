@@ -178,19 +178,6 @@ impl Anchor {
         [0, 1, 2].map(|part| (shared[part] - self.shared[part]).max(0.0))
     }
 
-    /// Reduces the shared variance of `fix` to the drift. Deviations shrink and correlations stay,
-    /// so the matrix stays positive.
-    fn apart(&self, fix: &Fix) -> Fix {
-        let (shared, stated) = (fix.shares(), fix.noise());
-        let drift = self.drift(shared);
-        let shrunk = SMatrix::from_diagonal(&SVector::from([0, 1, 2].map(|part| {
-            // A fix without a heading states 0.
-            let all = stated[(part, part)].max(LEAST_VARIANCES[part]);
-            ((all - shared[part] + drift[part]).max(LEAST_VARIANCES[part]) / all).sqrt()
-        })));
-        Fix { covariance: upper(shrunk * stated * shrunk), ..*fix }
-    }
-
     /// Returns the least variances after `fix`, which corrected the estimate at `pose` by `error`.
     fn floor(&mut self, fix: &Fix, pose: Pose2, error: &Error, variances: [f64; 3]) -> [f64; 3] {
         let shared = fix.shares();
@@ -262,16 +249,8 @@ impl Filter {
     }
 
     fn take(&mut self, fix: &Fix, there: Pose2) -> bool {
-        let mut laid = *fix;
-        if self.anchor.variances.is_some() && fix.shares() != [0.0; 3] {
-            let apart = self.anchor.apart(fix);
-            let fits = |frame| self.updated(&apart.laid(frame), there).is_some();
-            // The matcher may have restarted here.
-            if !fits(self.anchor.frame) && fits(Pose2::default()) {
-                self.anchor.frame = Pose2::default();
-            }
-            laid = fix.laid(self.anchor.frame);
-        }
+        let is_laid = self.anchor.variances.is_some() && fix.is_by_scan();
+        let laid = if is_laid { fix.laid(self.anchor.frame) } else { *fix };
         let taken = self.updated(&laid, there);
         if let Some((error, mut covariance)) = taken {
             let variances = [0, 1, 2].map(|part| covariance[(part, part)]);

@@ -312,10 +312,7 @@ impl DeadReckoning {
             state.fixes += 1;
             state.contradictions = Contradictions::default();
             let is_by_scan = fix.is_ok_and(|fix| fix.is_by_scan());
-            // A matcher that contradicted the wheels may have restarted at their pose.
-            let is_apart = !is_by_scan
-                || state.fixes_refused == 0 && fix.is_ok_and(|fix| fix.is_apart_from_wheels());
-            if is_apart {
+            if !is_by_scan || fix.is_ok_and(|fix| fix.is_apart_from_wheels()) {
                 state.doubt.place_by_others();
             }
             return if is_by_scan { Taken::UsedScan } else { Taken::Used };
