@@ -153,7 +153,7 @@ impl Json {
         });
         let named = report.scans.iter().map(|(name, Scan { ranges, age_s, time_s })| {
             let laser = self.lasers.iter().find(|(_, sensor)| sensor.name == *name);
-            let laser = laser.ok_or_else(|| format!("no laser is named {name:?}"))?;
+            let laser = laser.ok_or_else(|| format!("no laser is named {name:?}; rename it in \"scans\", or rename the row in robot.sensor"))?;
             scan_of(laser, ranges, [*age_s, *time_s])
         });
         only.into_iter().chain(named).collect()

@@ -151,7 +151,9 @@ fn not_running(error: &(dyn Error + 'static)) -> Option<String> {
     let own = rustix::process::geteuid().as_raw();
     let mut users = users(Path::new(SHARED_MEMORY), robot);
     if let Some(user) = users.find(|user| *user != own) {
-        return Some(format!("robot {robot} of user {user} runs here; its owner may stop it"));
+        return Some(format!(
+            "robot {robot} of user {user} runs here; only that user reaches it: `sudo -u '#{user}' firsthand ...`"
+        ));
     }
     let names: Vec<_> = robots::own().0.iter().map(|robot| robot.name.to_string()).collect();
     (!names.is_empty()).then(|| format!("{error}; these run here: {}", names.join(", ")))

@@ -177,7 +177,7 @@ impl Monitor for OtherCommander {
         let topic = &self.topic;
         if let Some(shows) = self.shows() {
             return Some(format!(
-                "the robot {shows}, so another host commands it over its network or serial server; end that host's program"
+                "the robot {shows}, so another program commands it, on this machine or another host; end that program"
             ));
         }
         let number = gid_text(self.told?.newest.number);

@@ -432,7 +432,7 @@ fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doub
     assert_ne!(none, Cause::AnotherCommander, "a few came twice");
     assert_eq!(after(&mut failsafe, 3..4, 50 + commander::UNOWED), Cause::AnotherCommander);
     let why = failsafe.explain(Cause::AnotherCommander, now()).unwrap();
-    assert!(why.contains("another host commands it"), "{why}");
+    assert!(why.contains("another program commands it"), "{why}");
     assert_ne!(after(&mut failsafe, 4..5, 50), Cause::AnotherCommander, "it has gone");
     failsafe.sees(Observation::Pace(Pace::Max), 0);
     assert_ne!(after(&mut failsafe, 5..6, 60), Cause::AnotherCommander, "it waits for commands");
