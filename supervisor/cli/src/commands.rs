@@ -140,9 +140,9 @@ const EXIT_CODES: &str = "Exit codes of run:
   4  timeout
   5  collision (simulated robot)
   6  aborted by a fault
-  9  in the wrong place: by the ground truth (simulated robot), or where it came to rest
+  9  in the wrong place: by the ground truth (simulated robot), or at rest
  10  could not be stopped: the robot still moves after every stop method
- 11  reached, unsure: the robot's pose may be farther off than the mission allows
+ 11  reached, unsure: the pose may be farther off than the mission allows
  78  invalid mission file; do not retry
 
 An error message ends with a code in brackets, which scripts can match.";

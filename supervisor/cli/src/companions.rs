@@ -36,26 +36,19 @@ pub const LABORATORY: &str = "firsthand-lab";
 
 /// Companions for the package, completions, help and the manual page.
 pub static TABLE: [Companion; 9] = [
-    viewer(
-        "top",
-        "firsthand-top",
-        "Show a robot on the terminal, with keys to kill, freeze, restart, stop, resume",
-    ),
+    viewer("top", "firsthand-top", "Show a robot on the terminal, and stop it or kill its stages"),
     viewer(
         "page",
         "firsthand-page",
-        "Show a robot in a browser, with orders for holders of the drive token",
+        "Show a robot in a browser, and drive it with the drive token",
     ),
     viewer("ros2", "firsthand-ros2", "Show a robot in ROS 2, to RViz and to other nodes"),
     viewer("foxglove", "firsthand-foxglove", "Serve a robot to Foxglove or Lichtblick, live"),
     viewer("remote", "firsthand-remote", "Show a robot of another machine on this one, read-only"),
-    laboratory("evaluate", "Run missions on many worlds and count successes by the ground truth"),
-    laboratory(
-        "experiments",
-        "Repeat the paper's experiments and compare the results with those of the paper",
-    ),
+    laboratory("evaluate", "Run missions on many worlds, and count the successes"),
+    laboratory("experiments", "Repeat the paper's experiments, and compare the results"),
     laboratory("field", "Solve the harmonic field of a map, without a robot"),
-    laboratory("bench", "Measure tick latency, and test a robot with random signals and faults"),
+    laboratory("bench", "Measure tick latency; test with random signals and faults"),
 ];
 
 pub fn find(named: &OsStr) -> Option<&'static Companion> {

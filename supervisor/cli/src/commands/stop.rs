@@ -3,7 +3,7 @@ use common::domain::RobotName;
 
 use console::{failure::Result, operator};
 
-/// Stop the robot until `firsthand resume`, which continues the mission.
+/// Stop the robot; `firsthand resume` continues the mission.
 ///
 /// Fails unless the encoders confirm rest. The link obeys directly, even if supervisor or shared
 /// memory fail. Without a link, the robot's stop guard orders the stop until the encoders show
