@@ -98,7 +98,7 @@ impl Suspicion {
             }
             Self::Jumps => "the counts jump farther than the wheels can turn; check the encoders",
             Self::Untold => {
-                "the wheels turn without a command; check whether another host commands the robot, or something pushes it"
+                "the wheels turn without a command; check whether another program commands the robot, or something pushes it"
             }
         }
     }

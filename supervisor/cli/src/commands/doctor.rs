@@ -157,16 +157,20 @@ fn version(printed: Option<&str>) -> Verdict {
 
 /// Takes the robots of killed supervisors, and other users with robots.
 pub fn others(killed: &[Robot], users: &[u32]) -> Verdict {
-    let killed: Vec<_> = killed.iter().map(|robot| robot.name.to_string()).collect();
-    if killed.is_empty() && users.is_empty() {
+    let killed = killed.iter().map(|robot| {
+        format!(
+            "the supervisor of {} was killed; its next `firsthand run` clears it up",
+            robot.name
+        )
+    });
+    let users = users.iter().map(|user| {
+        format!("user {user} has robots; list them with `sudo -u '#{user}' firsthand status --all`")
+    });
+    let notes: Vec<_> = killed.chain(users).collect();
+    if notes.is_empty() {
         return ("ok", "no killed run, no other user's robot".to_owned());
     }
-    (
-        "note",
-        format!(
-            "robots with a killed supervisor: {killed:?}, cleared by their next `firsthand run`; users with other robots: {users:?}, listed by `sudo -u '#USER' firsthand status --all`"
-        ),
-    )
+    ("note", notes.join("; "))
 }
 
 #[cfg(test)]
@@ -193,8 +197,8 @@ mod tests {
             (version(Some("firsthand-page 0.0.9")), "problem", "0.0.9"),
             (version(Some("")), "problem", "install both"),
             (others(&[], &[]), "ok", "no killed run"),
-            (others(&[Robot::find("x80".parse().unwrap())], &[]), "note", "[\"x80\"], cleared by"),
-            (others(&[], &[1000]), "note", "1000"),
+            (others(&[Robot::find("x80".parse().unwrap())], &[]), "note", "of x80 was killed"),
+            (others(&[], &[1000]), "note", "user 1000 has"),
         ] {
             assert_eq!(verdict, expected, "{text}");
             assert!(text.contains(says), "{says}: {text}");

@@ -31,7 +31,7 @@ use summary::{Hearer, Summary};
 use self::{recorder::RunRecorder, summary_file::SummaryFile};
 use super::{record::DiskBudget, run_report, stage::OTHER_PLANNERS};
 use console::{
-    failure::{Refused, Result, refuse},
+    failure::{self, Refused, Result, refuse},
     logging, missions,
     output::{json_lines, print, print_line, say, write_stderr},
     progress_line::{LINE_EVERY, ProgressLine},
@@ -305,8 +305,9 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             drop(recorder);
             drop(lock);
             made_for_nothing();
+            let failed = failure::report(Err(error.into()));
             say("`firsthand doctor` examines this machine");
-            return Err(error.into());
+            return Ok(failed);
         }
     };
     line.end();

@@ -330,5 +330,5 @@ fn a_robot_that_another_host_turns_or_speeds_is_suspected_and_the_words_name_tha
         assert!(after_s < 5.0, "{other:?}: {suspected:?}");
         assert!(!is_named || suspicion == Suspicion::Untold, "{suspected:?}");
     }
-    assert!(Suspicion::Untold.words().contains("another host commands"));
+    assert!(Suspicion::Untold.words().contains("another program commands"));
 }
