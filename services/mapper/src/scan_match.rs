@@ -31,7 +31,7 @@ use crate::{
 };
 
 /// Minimum deviation of a point from its line. Walls are rough even if the laser's noise is lower.
-const POINT_M: f64 = 0.02;
+const POINT_M: f64 = 0.05;
 /// Deviation of wheels that do not slip between two scans: metres and radians.
 const PRIOR: [f64; 2] = [0.02, 0.01];
 /// Drift of a scan without a match: metres and radians.

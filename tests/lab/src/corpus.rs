@@ -22,7 +22,11 @@ use common::{
     topics,
     wire::counts_between,
 };
-use console::{missions, output::print_line};
+use console::{
+    failure::Failure,
+    missions,
+    output::{print_line, say},
+};
 use glam::{DMat2, DVec2};
 use simulation::{Load, Observer, Random, Scenario};
 
@@ -125,12 +129,24 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut all: BTreeMap<(&str, Source), Vec<f64>> = BTreeMap::new();
     let drive = |&number: &u64, _: usize| {
         let _quiet = simulate::quietly();
-        let driven = draw(seed, number)
-            .and_then(|Drawn { robot, scenario }| Ok((number, robot, residuals(&scenario)?)));
-        driven.map_err(|error| format!("mission {number}: {error}"))
+        let driven = draw(seed, number).and_then(|Drawn { robot, scenario }| {
+            let of_robot = |error: Failure| -> Failure {
+                format!("{robot}, {}: {error}", scenario.mission.name).into()
+            };
+            Ok((number, robot, residuals(&scenario).map_err(of_robot)?))
+        });
+        driven.map_err(|error: Failure| format!("mission {number}: {error}"))
     };
+    let mut failed = 0;
     in_parallel((0..count).collect(), at_once(arguments.jobs), drive, |driven| {
-        let (number, robot, residuals) = driven?;
+        let (number, robot, residuals) = match driven {
+            Ok(driven) => driven,
+            Err(error) => {
+                say(&error);
+                failed += 1;
+                return Ok(());
+            }
+        };
         for Residual { source, tick, value } in residuals {
             let name = format!("{source:?}");
             let [number, tick] = [number, tick].map(|it| it.to_string());
@@ -142,7 +158,10 @@ pub fn main(arguments: &Arguments) -> Result {
     rows.flush()?;
     summarize(all, &directory.join("corpus.csv"))?;
     print_line(format!("{count} missions from seed {seed}; see {}", directory.display()))?;
-    Ok(())
+    match failed {
+        0 => Ok(()),
+        broken => Err(format!("{broken} missions failed and are not in the tables").into()),
+    }
 }
 
 fn summarize(all: BTreeMap<(&str, Source), Vec<f64>>, file: &Path) -> Result {
