@@ -31,6 +31,7 @@ use crate::{
 };
 
 /// Minimum deviation of a point from its line. Walls are rough even if the laser's noise is lower.
+/// With less, people beside the robot outweigh walls far away, where a laser is noisier.
 const POINT_M: f64 = 0.05;
 /// Deviation of wheels that do not slip between two scans: metres and radians.
 const PRIOR: [f64; 2] = [0.02, 0.01];

@@ -10,6 +10,7 @@ const LINE_M: f64 = 0.06;
 const LINE: f64 = 2.5;
 /// Maximum RMS distance of points from their line, relative to its half-length.
 const STRAIGHT: f64 = 0.5;
+
 /// A point of a scan in the robot's frame.
 pub(crate) struct Point {
     pub at: DVec2,

@@ -74,15 +74,16 @@ impl Reading {
         let mut ended = Vec::new();
         if logs_read.elapsed() >= LOGS_EVERY {
             *logs_read = Instant::now();
-            let mut at_s = None;
-            let mut lines = logs.take();
-            // A line without a time continues the one before.
-            lines.sort_by_cached_key(|(_, line)| {
-                at_s = written(line).or(at_s);
-                at_s
+            let mut at = None;
+            let lines = logs.take().into_iter().map(|(process, line)| {
+                // A line without a time continues the one before.
+                at = written(&line).or(at);
+                (at, process, line)
             });
-            for (process, line) in lines {
-                let at_s = written(&line).and_then(|at| mission_s(*clock, at));
+            let mut lines: Vec<_> = lines.collect();
+            lines.sort_by_key(|(at, ..)| *at);
+            for (at, process, line) in lines {
+                let at_s = at.and_then(|at| mission_s(*clock, at));
                 collector.state.log(&process, &line, at_s);
             }
             ended = results.take();
