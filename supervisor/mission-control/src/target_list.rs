@@ -108,6 +108,8 @@ impl TargetList {
     /// Follows a beacon. The first sample gives the first target.
     pub(crate) fn follow(&mut self, now_s: f64, arrival: Option<(CommandSample, TargetOutcome)>) {
         self.replace(&[], (0, now_s), arrival);
+        // A beacon that is never heard has a result too.
+        self.number += 1;
         (self.waits, self.by_hand, self.follows) = (true, false, true);
     }
 

@@ -175,7 +175,7 @@ fn draw_map(view: &View, frame: &mut Frame<'_>, area: Rect) {
 
 fn details(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let mut lines = numbers(&view.state);
-    let legend = legend();
+    let legend = legend(usize::from(area.width));
     let room = usize::from(area.height).saturating_sub(lines.len() + legend.len() + 1);
     lines.push(Line::default());
     let events = view.events.iter().take(room);
@@ -259,7 +259,8 @@ fn time(microseconds: f64) -> String {
     }
 }
 
-fn legend() -> Vec<Line<'static>> {
+/// Explains the map's signs in lines of at most `width` columns.
+fn legend(width: usize) -> Vec<Line<'static>> {
     let letters = [
         (map::robot(0.0), map::ROBOT_STYLE, "robot"),
         (map::TARGET, map::TARGET_STYLE, "target"),
@@ -267,5 +268,13 @@ fn legend() -> Vec<Line<'static>> {
         ('→', map::FIELD_STYLE, "field"),
     ];
     let hazards = map::legend().map(|(style, what)| ('█', style, what));
-    vec![explained(letters), explained(hazards)]
+    let mut lines: Vec<Line<'static>> = Vec::new();
+    for sign in letters.into_iter().chain(hazards) {
+        let sign = explained([sign]);
+        match lines.last_mut().filter(|line| line.width() + sign.width() <= width) {
+            Some(line) => line.extend(sign),
+            None => lines.push(sign),
+        }
+    }
+    lines
 }
