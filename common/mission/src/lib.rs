@@ -110,7 +110,7 @@ keys! {
         sensors: Option<Sensors>,
         /// Distance within which the target counts as reached.
         arrival_tolerance_m: f64 = 0.15,
-        /// A simulated robot farther off than this is in the wrong place.
+        /// An arrival that may be farther off than this is unsure.
         sure_within_m: f64 = 0.5,
         timeout_s: f64 = 180.0,
         stay: bool,

@@ -41,6 +41,8 @@ pub(crate) struct Snapshot<'a> {
     pub held: Vec<&'static str>,
     /// Stages left to another program to start.
     pub not_started: Vec<&'static str>,
+    /// Own stages that have yet to become ready.
+    pub not_ready: Vec<&'static str>,
     pub robot: &'a RobotName,
     pub address: &'a Address,
 }
@@ -173,6 +175,9 @@ impl Snapshot<'_> {
         } else if !self.has_ticked && !self.robot_answers() {
             let address = self.address;
             format!("no robot answers at {address}: switch the robot on, or correct robot.address")
+        } else if !self.has_ticked && !self.not_ready.is_empty() {
+            let stages = self.not_ready.join(", ");
+            format!("not ready: {stages}; see the log of each in the run directory")
         } else if !self.has_ticked {
             "the robot answers, but no tick begins: its wheel counts or a sensor of its mission may be missing; see link.log"
                 .to_owned()

@@ -330,6 +330,7 @@ impl<'a> Supervisor<'a> {
             reason: self.decision.reason,
             held: self.stages.held(),
             not_started,
+            not_ready: self.stages.not_ready(),
             robot: &self.options.robot,
             address: &self.robot.address,
         }

@@ -266,6 +266,12 @@ impl StageProcesses {
         self.names(|stage| external && !stage.is_running())
     }
 
+    /// Returns the supervisor's own stages that have yet to beat as ready.
+    pub fn not_ready(&self) -> Vec<&'static str> {
+        let own = self.starter != Starter::External;
+        self.names(|stage| own && !stage.is_running() && stage.phase() != Phase::Held)
+    }
+
     pub fn held(&self) -> Vec<&'static str> {
         self.names(|stage| stage.phase() == Phase::Held)
     }

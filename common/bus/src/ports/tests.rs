@@ -1,4 +1,7 @@
 //! Tests of the byte ports against the middleware's typed API.
+//!
+//! `unsafe` maps a file, because only a mapping shows which of its pages have memory. Only the
+//! kernel touches the mapped pages.
 
 use std::{
     ffi::{c_int, c_long, c_void},

@@ -49,6 +49,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
         reason: HoldReason::None,
         held: Vec::new(),
         not_started: Vec::new(),
+        not_ready: Vec::new(),
         robot: &robot,
         address: &address,
     };
@@ -110,6 +111,8 @@ fn every_rule_of_the_judgement_decides_its_row() {
         ("a held stage that says why it died", Snapshot { complaint: Some("mapper: no disk".to_owned()), ..held() }, late,
          Some((Aborted, "mapper died repeatedly (mapper: no disk)"))),
         ("a held stage on the wall clock may wait", Snapshot { in_ticks: false, ..held() }, late, None),
+        ("a stage that never becomes ready", Snapshot { not_ready: vec!["planner"], ..starting() }, late,
+         Some((Aborted, "not ready: planner; see the log"))),
         ("an external stage that is missing", Snapshot { not_started: vec!["planner"], held: vec!["mapper"], ..starting() },
          late, Some((Aborted, "not running: planner; start each with `firsthand stage NAME --robot x80`"))),
     ];
