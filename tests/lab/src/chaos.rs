@@ -32,11 +32,9 @@ use report::Series;
 /// Exit code after a failed mission or a faulty robot that stopped late.
 const NOT_CLEAN: u8 = 8;
 
-pub struct Judged {
-    pub tried: u64,
-    pub lost: u64,
-    pub worst: String,
-    pub text: String,
+struct Judged {
+    lost: u64,
+    text: String,
 }
 
 fn text(result: &impl Serialize, json: bool, plain: String) -> Result<String> {
@@ -50,7 +48,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 /// Keeps the missions' directory after a failure.
-pub fn judge(arguments: &Arguments) -> Result<Judged> {
+fn judge(arguments: &Arguments) -> Result<Judged> {
     if let Some(faults) = &arguments.robot_faults {
         let mission = missions::load(&arguments.mission, &arguments.set)?;
         let table = robot_faults::run(&mission, faults, arguments.seed, arguments.missions)?;

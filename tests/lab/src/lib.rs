@@ -7,13 +7,13 @@ mod background;
 mod baselines;
 mod both_ways;
 mod bring_up;
-mod certify;
 mod chaos;
 mod corpus;
 mod error;
 mod evaluate;
 mod experiments;
 mod field;
+mod fuzz;
 mod missions;
 mod robot;
 mod ros2_robot;
@@ -44,7 +44,7 @@ enum Command {
     Evaluate(evaluate::Arguments),
     Experiments(experiments::Arguments),
     Field(field::Arguments),
-    Certify(certify::Arguments),
+    Fuzz(fuzz::Arguments),
     Simulate(simulate::Arguments),
     BothWays(both_ways::Arguments),
     Corpus(corpus::Arguments),
@@ -87,7 +87,7 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
     let done = match &arguments.command {
         Command::Evaluate(arguments) => evaluate::main(arguments),
         Command::Experiments(arguments) => experiments::main(arguments),
-        Command::Certify(arguments) => certify::main(arguments),
+        Command::Fuzz(arguments) => fuzz::main(arguments),
         Command::Simulate(arguments) => return simulate::main(arguments),
         Command::BothWays(arguments) => return both_ways::main(arguments),
         Command::Corpus(arguments) => corpus::main(arguments),

@@ -138,8 +138,8 @@ pub trait Monitor {
         None
     }
 
-    /// Returns whether it judges the timing of frames. It is then skipped in lockstep and while the
-    /// robot is silent.
+    /// Returns whether it judges what the robot's frames say, or when they come. It is then skipped
+    /// in lockstep, where a simulated robot is as stated, and while the robot is silent.
     fn judges_frames(&self) -> bool {
         true
     }

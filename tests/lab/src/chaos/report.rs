@@ -122,12 +122,8 @@ impl Report {
     }
 
     pub fn judged(&self, json: bool) -> Result<Judged> {
-        let moved =
-            || format!("pose error {:.3} m above the undisturbed run", self.worst_pose_excess_m);
         Ok(Judged {
-            tried: self.signals.into(),
             lost: (self.wrong.len() + self.leftovers.len()) as u64,
-            worst: self.wrong.iter().chain(&self.leftovers).next().cloned().unwrap_or_else(moved),
             text: super::text(self, json, crate::text(self))?,
         })
     }

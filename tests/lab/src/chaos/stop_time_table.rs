@@ -69,17 +69,7 @@ pub struct StopTimeTable {
 impl StopTimeTable {
     pub fn judged(&self, json: bool) -> Result<Judged> {
         let lost = self.entries.iter().filter(|entry| !entry.is_kept());
-        let farthest = self.entries.iter().max_by(|a, b| a.way_m.total_cmp(&b.way_m));
-        let worst = lost.clone().next().or(farthest);
-        Ok(Judged {
-            tried: self.entries.len() as u64,
-            lost: lost.count() as u64,
-            worst: worst.map_or(String::new(), |entry| {
-                let Entry { fault, seed, way_m, outcome, reason, .. } = entry;
-                format!("{} (seed {seed}): {way_m:.2} m, {outcome}: {reason}", fault.row().name)
-            }),
-            text: super::text(self, json, self.text())?,
-        })
+        Ok(Judged { lost: lost.count() as u64, text: super::text(self, json, self.text())? })
     }
 
     /// Writes the table to `file`, with `section` in the first column.

@@ -25,29 +25,6 @@ pub fn share(hits: usize, n: usize) -> Estimate {
     Estimate { value, low: (middle - half).max(0.0), high: (middle + half).min(1.0) }
 }
 
-/// Returns the 95 % upper bound of the loss rate (Clopper and Pearson 1934).
-pub fn most_by_95_percent(lost: u64, tried: u64) -> f64 {
-    if lost >= tried {
-        return 1.0;
-    }
-    // Probability of at most `lost`, 5 % at the bound.
-    let at_most = |share: f64| {
-        let mut term = tried as f64 * (-share).ln_1p();
-        let terms = (0..=lost).map(|k| {
-            let now = term.exp();
-            term += ((tried - k) as f64 / (k + 1) as f64).ln() + share.ln() - (-share).ln_1p();
-            now
-        });
-        terms.sum::<f64>()
-    };
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..60 {
-        let middle = f64::midpoint(low, high);
-        if at_most(middle) > 0.05 { low = middle } else { high = middle }
-    }
-    high
-}
-
 /// Returns the difference of two shares on the same `n` worlds. `gained` worlds count only in the
 /// second setting, `lost` only in the first. Uses Wald's interval with half a pair added to each
 /// cell (Agresti and Min 2005).

@@ -1,5 +1,5 @@
-//! External inputs for all decoders: random, and mutated from valid messages. A panic is a loss;
-//! where panics abort (release builds), the first ends the command.
+//! External inputs for all decoders: random, and mutated from valid messages. Where panics abort
+//! (release builds), the first one ends the command.
 
 use std::{
     ffi::OsStr,
@@ -8,26 +8,34 @@ use std::{
     path::Path,
 };
 
+use clap::Args;
 use common::{
     clock::{MissionTime, Pace},
     journal::Journal,
     mission::Mission,
     samples::{HoldReason, Order},
 };
-use console::missions::SHIPPED;
+use console::{missions::SHIPPED, output::print_text};
 use link::step::{Entry, Event, Link, State};
 use recording::Recording;
 
 use simulation::Random;
 
-use crate::{
-    chaos::Judged,
-    error::{OrCannot as _, Result},
-};
+use crate::error::{OrCannot as _, Result};
+
+/// Give random and mutated inputs to the decoders of wires, missions, states, maps and recordings.
+#[derive(Debug, Args)]
+#[command(override_usage = "firsthand-lab fuzz [OPTIONS]")]
+pub struct Arguments {
+    #[arg(long, default_value_t = 100_000)]
+    inputs: u64,
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
 
 /// Inputs from coverage-guided fuzzing, and a recording's first bytes.
-const X80: &str = include_str!("../../../../common/wire/x80/fuzz/decoder-corpus.hex");
-const RECORDING: &[u8] = include_bytes!("../../../golden/open-room.mcap");
+const X80: &str = include_str!("../../../common/wire/x80/fuzz/decoder-corpus.hex");
+const RECORDING: &[u8] = include_bytes!("../../golden/open-room.mcap");
 const PGM: &str = "P5\n4 4\n255\n0123456789abcdef";
 const JSON: &str = "{\"clock_s\":12.5,\"wheels\":[1.5,2],\"speeds\":[0,1],\"ranges\":{\"front\":null,\"left\":1e308},\"scan\":[1,null,-1],\"scan_age_s\":0.1,\"scan_time_s\":0.1,\"heard\":1}\n{\"odometry\":[0,1,2],\"held\":[true,false],\"touched\":{\"bumper\":true},\"battery_v\":12,\"scans\":{\"a\":{\"ranges\":[1]}}}\n";
 const ARDUINO: &str = "e 100 -100\r\n123 456\r\nOK\r\n";
@@ -151,23 +159,32 @@ fn input(seed: &[u8], random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn judge(inputs: u64, seed: u64) -> Result<Judged> {
+pub fn main(arguments: &Arguments) -> Result {
+    let Arguments { inputs, seed } = *arguments;
+    match fuzz(inputs, seed)? {
+        None => print_text(format!("no panic of {inputs} inputs from seed {seed}\n")),
+        Some(panic) => Err(panic.into()),
+    }
+}
+
+/// Returns the last input at which a decoder panicked.
+fn fuzz(inputs: u64, seed: u64) -> Result<Option<String>> {
     let directory = tempfile::tempdir().or_cannot("make a temporary directory")?;
     let mut targets = targets(directory.path())?;
     let count = targets.len();
-    let mut judged =
-        Judged { tried: inputs, lost: 0, worst: "no panic".to_owned(), text: String::new() };
+    let mut panic = None;
     let mut random = Random::new(seed, 0xf022);
     for number in 0..inputs {
         let target = &mut targets[number as usize % count];
         let bytes = input(&target.seed, &mut random);
         let mut take = || target.take(&bytes, directory.path(), number * PERIOD_NS);
         if catch_unwind(AssertUnwindSafe(&mut take)).is_err() {
-            judged.lost += 1;
-            judged.worst = format!("{}: input {number}: {}", target.name, bytes.escape_ascii());
+            let bytes = bytes.escape_ascii();
+            panic =
+                Some(format!("{} panics at input {number} of seed {seed}: {bytes}", target.name));
         }
     }
-    Ok(judged)
+    Ok(panic)
 }
 
 #[cfg(test)]
@@ -176,7 +193,6 @@ mod tests {
 
     #[test]
     fn no_decoder_panics_at_random_and_changed_inputs() {
-        let Judged { lost, worst, .. } = judge(5000, 7).unwrap();
-        assert_eq!(lost, 0, "{worst}");
+        assert_eq!(fuzz(5000, 7).unwrap(), None);
     }
 }
