@@ -18,9 +18,9 @@ const PWM_DEAD_BAND: f64 = 8000.0;
 const POSITION_GAIN: f64 = 4.0;
 /// Position tolerance, counts.
 const POSITION_REACHED: f64 = 0.5;
-/// Speed below which friction stops a wheel with target 0, counts/s (2 mm/s), unless the starting
-/// dead band is wider.
-const STANDSTILL: f64 = 5.0;
+/// Speed below which friction stops a wheel with target 0, m/s, unless the starting dead band is
+/// wider. A robot seen at rest thus stands: what follows does not depend on how long it is watched.
+const STANDSTILL_M_S: f64 = 0.002;
 /// Share of the stall torque at which a tyre slips: half the weight of 34 N times friction 0.6,
 /// over 26 N of a stalled motor at the rim.
 const SLIPS_AT: f64 = 0.4;
@@ -34,6 +34,8 @@ pub struct Motor {
     top_speed: f64,
     /// Counts per second squared.
     acceleration: f64,
+    /// Counts per second.
+    standstill: f64,
     pub enabled: bool,
     mode: Mode,
     order: Option<Order>,
@@ -62,6 +64,7 @@ impl Motor {
             physics,
             top_speed,
             acceleration: f64::INFINITY,
+            standstill: 0.0,
             enabled: false,
             mode: Mode::Pwm,
             order: None,
@@ -73,10 +76,11 @@ impl Motor {
         }
     }
 
-    /// Counts per second squared.
+    /// Limits the acceleration of wheels with this many counts per metre.
     #[must_use]
-    pub fn accelerating(self, acceleration: f64) -> Self {
-        Self { acceleration, ..self }
+    pub fn accelerating(self, acceleration_m_s2: f64, counts_per_m: f64) -> Self {
+        let acceleration = acceleration_m_s2 * counts_per_m;
+        Self { acceleration, standstill: STANDSTILL_M_S * counts_per_m, ..self }
     }
 
     /// Sets the mode and runs until mission time `until`.
@@ -158,7 +162,7 @@ impl Motor {
             let sd = self.physics.noise_counts * (1.0 - decay * decay).sqrt();
             jitter = noise.normal(sd);
             self.speed += jitter;
-        } else if self.speed.abs() < STANDSTILL.max(self.physics.dead_band_counts) {
+        } else if self.speed.abs() < self.standstill.max(self.physics.dead_band_counts) {
             self.speed = 0.0;
         }
         counts + jitter * dt

@@ -132,8 +132,8 @@ impl Robot {
         let mut physics = mission.simulation.physics();
         physics.wheels = mission.wheel_physics();
         let size = mission.body();
-        let acceleration = physics.wheels.acceleration_m_s2 / size.metres_per_count();
-        let top_counts = size.top_speed_m_s / size.metres_per_count();
+        let counts_per_m = 1.0 / size.metres_per_count();
+        let top_counts = size.top_speed_m_s * counts_per_m;
         let longest_step = STEP_S.min(0.5 * size.radius_m / size.top_speed_m_s);
         assert!(longest_step > 0.0);
         let world = World::new(mission);
@@ -157,7 +157,8 @@ impl Robot {
             longest_step,
             world,
             motors: std::array::from_fn(|channel| {
-                Motor::new(physics.wheels, top_counts(channel)).accelerating(acceleration)
+                Motor::new(physics.wheels, top_counts(channel))
+                    .accelerating(physics.wheels.acceleration_m_s2, counts_per_m)
             }),
             car,
             streams: Streams::default(),

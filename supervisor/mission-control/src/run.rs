@@ -30,6 +30,8 @@ pub struct Finished {
     pub record: Record,
     pub truth: Vec<GroundTruthTick>,
     pub drove: bool,
+    /// Whether mission time followed the robot's ticks, as in lockstep.
+    pub in_ticks: bool,
     pub restarts: BTreeMap<&'static str, u32>,
     pub resumes: u32,
     /// Planner generations started because of stalls.
@@ -186,6 +188,7 @@ pub(crate) fn conduct<'a>(
         truth,
         drove: supervisor.drove,
         restarts: supervisor.stages.restarts().collect(),
+        in_ticks: supervisor.clock.in_ticks(),
         resumes: supervisor.state.resumes,
         replans,
         resets,

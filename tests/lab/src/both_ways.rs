@@ -14,9 +14,7 @@ use std::{
 };
 
 use clap::Args;
-use common::{
-    ground_truth::GROUND_TRUTH, mission::Waypoint, poll, samples::Cause::SupervisorSilent,
-};
+use common::{ground_truth::GROUND_TRUTH, mission::Waypoint, poll};
 use console::{missions, output::print_line};
 use mission_control::recovery::SUMMARY;
 use processes::records;
@@ -211,10 +209,6 @@ fn numbers(summary: &str) -> Result<Map<String, Value>> {
     let mut summary: Map<String, Value> = serde_json::from_str(summary)?;
     for measured in ["tick_latency_us", "full_solve_us"] {
         summary.remove(measured);
-    }
-    // A supervisor that is not scheduled for 2 s. Robot and mission time then stand.
-    if let Some(Value::Object(stops)) = summary.get_mut("stops") {
-        stops.remove(SupervisorSilent.name());
     }
     Ok(summary)
 }

@@ -32,11 +32,23 @@ pub struct Hearer {
 pub(crate) struct Interruptions {
     has_gone: bool,
     newest: Option<(Action, Cause)>,
-    pub stops: BTreeMap<String, u32>,
+    stops: BTreeMap<String, u32>,
     pub slowed: BTreeMap<String, u32>,
 }
 
 impl Interruptions {
+    /// Returns the stops that interrupted the mission.
+    ///
+    /// The link measures the supervisor's silence by the machine's clock. In lockstep, `in_ticks`,
+    /// mission time stands meanwhile, and nothing is interrupted.
+    pub(crate) fn stops(&self, in_ticks: bool) -> BTreeMap<String, u32> {
+        let mut stops = self.stops.clone();
+        if in_ticks {
+            stops.remove(Cause::SupervisorSilent.name());
+        }
+        stops
+    }
+
     fn hear(&mut self, link: &LinkSample) {
         let (action, cause) = (link.action(), link.cause());
         self.has_gone |= action == Action::Go;
@@ -139,7 +151,7 @@ mod tests {
             interruptions.hear(&LinkSample { action, cause, ..LinkSample::default() });
         }
         let counted = |cause: Cause, times| BTreeMap::from([(cause.name().to_owned(), times)]);
-        assert_eq!(interruptions.stops, counted(Cause::RangeImplausible, 1));
+        assert_eq!(interruptions.stops(false), counted(Cause::RangeImplausible, 1));
         assert_eq!(interruptions.slowed, counted(Cause::RangeDoubtful, 2));
     }
 }

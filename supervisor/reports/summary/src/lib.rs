@@ -167,7 +167,7 @@ impl Summary {
                 .and_then(|tick| heard.wheel_range_rad_s(tick)),
             ticks: last_tick.map_or(0, |tick| tick + 1),
             restarts: restarts.map(|(stage, times)| ((*stage).to_owned(), *times)).collect(),
-            stops: heard.interruptions.stops.clone(),
+            stops: heard.interruptions.stops(finished.in_ticks),
             slowed: heard.interruptions.slowed.clone(),
             resumes: *resumes,
             replans: finished.replans,

@@ -121,7 +121,7 @@ impl Report {
         }
     }
 
-    pub fn judged(&self, json: bool) -> Result<Judged> {
+    pub(super) fn judged(&self, json: bool) -> Result<Judged> {
         Ok(Judged {
             lost: (self.wrong.len() + self.leftovers.len()) as u64,
             text: super::text(self, json, crate::text(self))?,

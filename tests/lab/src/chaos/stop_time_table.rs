@@ -67,7 +67,7 @@ pub struct StopTimeTable {
 }
 
 impl StopTimeTable {
-    pub fn judged(&self, json: bool) -> Result<Judged> {
+    pub(super) fn judged(&self, json: bool) -> Result<Judged> {
         let lost = self.entries.iter().filter(|entry| !entry.is_kept());
         Ok(Judged { lost: lost.count() as u64, text: super::text(self, json, self.text())? })
     }
