@@ -45,8 +45,8 @@ pub struct Response {
 }
 
 impl Response {
-    /// Measured on X80s, whose vendor gives no acceleration. Other models use its delay and lag,
-    /// because no source states theirs.
+    /// Nominal values of an X80, whose vendor gives no acceleration. Other models use its delay
+    /// and lag, because no source states theirs.
     pub const X80: Self = Self {
         delay_s: 0.07,
         lag_s: 0.08,

@@ -222,7 +222,7 @@ section! {
         weak_dropout_share in 0.0..=1.0 => 0.0, 0.1;
         false_echo_share in 0.0..=1.0 => 0.0, 0.005;
         crosstalk_share in 0.0..=1.0 => 0.0, 0.005;
-        /// Independent per ranger: a two-state model (E. N. Gilbert 1960). X80s have shown 2 %.
+        /// Independent per ranger: a two-state model (E. N. Gilbert 1960).
         silence_share in 0.0..=0.5 => 0.0, 0.02;
         /// Source: a public eight-sonar log of an L-shaped corridor (Udacity RoboND, 413 samples,
         /// 0.21 s apart). A run lies between two echoes of at most 2.55 m, with at most 0.5 m of

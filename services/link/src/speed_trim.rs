@@ -1,7 +1,7 @@
 //! Speed trim: compensates wheels slower than commanded.
 //!
-//! Speed loops of real X80s reach 0.75 to 0.8 of a command. The link estimates that share from
-//! commands and encoders, and divides commands by it. Both wheels share it, so commands keep their
+//! The speed loop of an X80 may reach only 0.75 to 0.8 of a command. The link estimates that share
+//! from commands and encoders, and divides commands by it. Both wheels share it, so commands keep their
 //! curve. Speeds not yet reached are no evidence.
 
 use common::{

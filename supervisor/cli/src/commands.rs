@@ -145,7 +145,7 @@ const EXIT_CODES: &str = "Exit codes of run:
  11  reached, unsure: the pose may be farther off than the mission allows
  78  invalid mission file; do not retry
 
-An error message ends with a code in brackets, which scripts can match.";
+The message of an error that a script can handle ends with a code in brackets.";
 
 pub fn command_line() -> clap::Command {
     Arguments::command().subcommands(companions::TABLE.iter().map(companions::Companion::command))

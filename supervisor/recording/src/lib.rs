@@ -9,10 +9,11 @@
 //!   message is one sample in the CDR encoding of ROS 2. Its schema is the text of a ROS 2 message
 //!   (`ros2msg`), made from the topic's layout. Topics of slices have a `header` and `elements`.
 //! - Channels for viewers, in Foxglove's schemas as Protobuf: `foxglove/transforms`
-//!   (`FrameTransforms`: `map`, `base`, sensors), `foxglove/pose` (`PoseInFrame`),
+//!   (`FrameTransforms`: `map`, `base_link`, sensors), `foxglove/pose` (`PoseInFrame`),
 //!   `foxglove/odometry` (`Odometry`: with covariance), `foxglove/grid` (`Grid`), `foxglove/scene`
-//!   (`SceneUpdate`: trajectory, targets, body, uncertainty), `foxglove/scan/SENSOR` (`LaserScan`),
-//!   `log` (`Log`: the logs of the stages and the supervisor).
+//!   (`SceneUpdate`: trajectory, targets, body, uncertainty), `foxglove/movers` (`SceneUpdate`),
+//!   `foxglove/scan/SENSOR` (`LaserScan`), `log` (`Log`: the logs of the stages and the
+//!   supervisor).
 //! - A channel `recorder` (JSON): samples lost so far by topic, whenever they grow.
 //! - A metadata record `run`: robot, mission, seed, build, machine, date, and `run_toml`, the run
 //!   file of the stages.
