@@ -253,6 +253,7 @@ fn a_long_robot_turns_behind_a_gap_narrower_than_its_length_and_refuses_to_in_a_
         ));
         let found = (summary.outcome, summary.collisions);
         assert_eq!(found, (outcome, Some(0)), "{targets}: {summary:?}");
+        assert!(summary.departed_s > Some(0.0), "from its start: {summary:?}");
     }
 }
 

@@ -153,7 +153,7 @@ impl Summary {
             }),
             departed_s: truth
                 .iter()
-                .find(|tick| tick.x.hypot(tick.y) >= DEPARTED_M)
+                .find(|tick| mission.start.at.distance(DVec2::new(tick.x, tick.y)) >= DEPARTED_M)
                 .map(|tick| tick.time_s),
             stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
