@@ -226,6 +226,12 @@ impl Bus {
         changed(&nodes_of(node)).max(changed(&services_of(node)))
     }
 
+    /// Asks for a cleanup: the nodes' directory changes, which the supervisor watches.
+    pub(crate) fn ask_to_clear_up(&self) -> io::Result<()> {
+        let Medium::Shared { node, .. } = &self.medium else { return Ok(()) };
+        File::open(nodes_of(node))?.set_modified(SystemTime::now())
+    }
+
     /// Cleans up after ended processes, at a few milliseconds each. Only the supervisor calls this.
     ///
     /// Frees their places and memory, removes files of incomplete starts of `killed` (which must

@@ -50,7 +50,7 @@ impl Bus {
     }
 
     /// Opens an endpoint. A consumer waits for places of killed processes, which the supervisor
-    /// frees about once a second.
+    /// frees about once a second if it is asked to.
     fn once_freed<T>(&self, open: impl Fn() -> Result<T>) -> Result<T> {
         const { assert!(LOOK_EVERY.as_millis() < PLACES_FREED_WITHIN.as_millis()) };
         let began = Instant::now();
@@ -58,7 +58,11 @@ impl Bus {
             let held = self.hold()?;
             match open() {
                 Err(BusError::NoPlace { .. })
-                    if !self.is_stage && began.elapsed() < PLACES_FREED_WITHIN => {}
+                    if !self.is_stage && began.elapsed() < PLACES_FREED_WITHIN =>
+                {
+                    // Without this, a killed process is noticed later than the wait lasts.
+                    let _ = self.ask_to_clear_up();
+                }
                 opened => return opened,
             }
             drop(held);
