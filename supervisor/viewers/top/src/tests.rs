@@ -6,18 +6,14 @@ use std::f64::consts::FRAC_PI_2;
 use common::{
     grid::{CellState, GridFrame, Part},
     process_usage::Usage,
-    samples::{
-        CommandSample, DeathSample, FieldCell, GuidanceSample, GuidanceStatus, LinkSample, Order,
-        PoseSample, PowerSample, RosterEntry, RosterHeader, StageState, Stamp, TargetPoint,
-        TargetSample, name,
-    },
+    samples::*,
 };
 use glam::DVec2;
 use ratatui::{Terminal, backend::TestBackend};
 
 use robot_state::Sample;
 
-use super::{action::KEYS, screen, view::View};
+use super::{screen, view::View};
 
 const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
 
@@ -120,80 +116,14 @@ fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
     lines
 }
 
-fn columns(line: &str, letters: &str) -> Vec<usize> {
-    let columns = line.chars().enumerate();
-    columns.filter(|(_, letter)| letters.contains(*letter)).map(|(at, _)| at).collect()
-}
-
 #[test]
-fn every_stage_with_all_its_columns_is_on_the_smallest_and_on_a_large_screen() {
-    for (width, height) in [(80, 24), (200, 50)] {
-        let lines = screen(&view(), width, height);
-        assert!(
-            lines[0].contains("robot-of-16-char (simulated): driving, 1234.5 s"),
-            "{}",
-            lines[0]
-        );
-        for (line, stage) in lines[2..].iter().zip(STAGES) {
-            let state = if stage == "planner" { "backing off" } else { "running" };
-            let cells =
-                [stage, state, "4194000", "100", "99", "1234 Hz", "599.9 s", "199 %", "999.9 MB"];
-            let line: String = line.chars().take(80).collect();
-            let words: Vec<_> = line.trim_start_matches('>').split_whitespace().collect();
-            assert_eq!(words.join(" "), cells.join(" "), "{width} columns");
-        }
-        assert!(lines[7].contains("supervisor") && lines[7].contains("4194303"), "{}", lines[7]);
-        let foot = &lines[usize::from(height) - 2..];
-        assert_eq!(foot[0], "kill planner: done");
-        for (key, what, _) in KEYS {
-            assert!(foot[1].contains(&format!("{key} {what}")), "{}", foot[1]);
-        }
-        let whole = lines.join("\n");
-        for text in [
-            "0.00, -0.10 ±0.12 m, 90°",
-            "4.1 m to target 0 of 0",
-            "123.45 m",
-            "no path to the target, at most 0.50 m/s",
-            "0 hazards found; 1000 solves",
-            "stands: odometry implausible",
-            "dead-reckoning: generation 59 died (hung, signal 9)",
-            "█ perimeter",
-        ] {
-            assert!(whole.contains(text), "{width} columns: {text:?} in\n{whole}");
-        }
+fn stages_with_all_columns_and_the_map_with_all_on_it_are_on_the_smallest_and_on_a_large_screen() {
+    for (width, height, stored) in
+        [(80, 24, include_str!("tests/80x24.txt")), (200, 50, include_str!("tests/200x50.txt"))]
+    {
+        assert_eq!(screen(&view(), width, height).join("\n") + "\n", stored);
     }
 }
-
-#[test]
-fn robot_way_target_hazard_and_field_are_where_they_are_on_the_map() {
-    for (width, height, left) in [(80, 24, 0), (200, 50, 82)] {
-        let lines = screen(&view(), width, height);
-        let below = if left == 0 { 9 } else { 1 };
-        let map = lines[below..usize::from(height) - 2].iter().map(|line| {
-            line.chars().skip(left).take(if left == 0 { 26 } else { 118 }).collect::<String>()
-        });
-        let map: Vec<_> = map.collect();
-        let find = |letter: &str| {
-            let found = map.iter().enumerate();
-            found
-                .filter_map(|(row, line)| Some((row, *columns(line, letter).first()?)))
-                .collect::<Vec<_>>()
-        };
-        let (robot, target) = (find("▲"), find("X"));
-        let ((robot_row, robot_col), (target_row, target_col)) = (robot[0], target[0]);
-        assert_eq!((robot.len(), target.len()), (1, 1));
-        assert!(target_row < robot_row && target_col == robot_col, "the target is north of it");
-        let way: Vec<_> = find("·");
-        assert!(way.iter().all(|&(row, col)| row >= robot_row && col == robot_col), "{way:?}");
-        assert!(!way.is_empty());
-        assert!(find("↑").len() > 2, "the field leads north");
-        let wall = |line: &str| columns(line, "█").len();
-        let (north, south) = (wall(&map[2]), wall(&map[map.len() - 3]));
-        assert!(south >= north + 3, "{south} letters of wall below, {north} above");
-        assert!(columns(&map[map.len() - 3], "█").iter().any(|&at| at > robot_col));
-    }
-}
-
 #[test]
 fn a_long_message_is_shown_whole() {
     let mut view = view();
