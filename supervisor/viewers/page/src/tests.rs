@@ -14,6 +14,7 @@ use clap::Parser as _;
 use console::failure::code;
 use rustix::process::geteuid;
 use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket, protocol::Role};
 
 use crate::{
     Arguments,
@@ -82,28 +83,14 @@ fn origin(page: &Page) -> String {
     format!("Origin: http://{}", page.address)
 }
 
-const UPGRADE: [&str; 4] = [
-    "Connection: Upgrade",
-    "Upgrade: websocket",
-    "Sec-WebSocket-Version: 13",
-    "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
-];
+const UPGRADE: &str = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
 
-/// Minimal websocket client.
-struct Browser(TcpStream);
-
-#[derive(Debug, PartialEq)]
-enum Frame {
-    Text(Value),
-    Binary(Vec<u8>),
-    Closed(u16),
-}
+struct Browser(WebSocket<TcpStream>);
 
 impl Browser {
     fn open(page: &Page) -> Self {
         let mut stream = connect(page);
-        let (host, origin) = (host(page), origin(page));
-        let lines = [&["GET /live HTTP/1.1", &host, &origin][..], &UPGRADE].concat().join("\r\n");
+        let lines = ["GET /live HTTP/1.1", &host(page), &origin(page), UPGRADE].join("\r\n");
         stream.write_all((lines + "\r\n\r\n").as_bytes()).unwrap();
         let mut head = Vec::new();
         while !head.ends_with(b"\r\n\r\n") {
@@ -112,7 +99,7 @@ impl Browser {
             head.push(byte[0]);
         }
         assert!(head.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&head));
-        Self(stream)
+        Self(WebSocket::from_raw_socket(stream, Role::Client, None))
     }
 
     fn with_token(page: &Page, token: &str) -> Self {
@@ -130,50 +117,23 @@ impl Browser {
     }
 
     fn say(&mut self, text: &str) {
-        let length = text.len();
-        // The mask is four zeros.
-        let mut frame = match length {
-            0..126 => vec![0x81, 0x80 | length as u8],
-            _ => vec![0x81, 0xfe, (length >> 8) as u8, length as u8],
-        };
-        frame.extend([0; 4]);
-        frame.extend(text.as_bytes());
-        let _ = self.0.write_all(&frame);
+        let _ = self.0.send(Message::text(text));
     }
 
-    /// Returns the next frame, or a closure without a code.
-    fn hear(&mut self) -> Frame {
-        let mut head = [0; 2];
-        if self.0.read_exact(&mut head).is_err() {
-            return Frame::Closed(0);
-        }
-        let length = match head[1] {
-            126 => {
-                let mut length = [0; 2];
-                self.0.read_exact(&mut length).unwrap();
-                usize::from(u16::from_be_bytes(length))
-            }
-            127 => {
-                let mut length = [0; 8];
-                self.0.read_exact(&mut length).unwrap();
-                u64::from_be_bytes(length) as usize
-            }
-            length => usize::from(length),
-        };
-        let mut content = vec![0; length];
-        self.0.read_exact(&mut content).unwrap();
-        match head[0] & 0xf {
-            1 => Frame::Text(serde_json::from_slice(&content).unwrap()),
-            2 => Frame::Binary(content),
-            _ => Frame::Closed(content.first_chunk().map_or(0, |code| u16::from_be_bytes(*code))),
-        }
+    /// Returns the next message, or a closure without a code.
+    fn hear(&mut self) -> Message {
+        self.0.read().unwrap_or(Message::Close(None))
     }
 
     fn await_key(&mut self, key: &str) -> Value {
         loop {
             match self.hear() {
-                Frame::Text(text) if text.get(key).is_some() => return text[key].clone(),
-                Frame::Closed(code) => panic!("closed with {code} before {key}"),
+                Message::Text(text) => {
+                    if let Some(value) = serde_json::from_str::<Value>(&text).unwrap().get(key) {
+                        return value.clone();
+                    }
+                }
+                Message::Close(frame) => panic!("closed with {frame:?} before {key}"),
                 _ => {}
             }
         }
@@ -181,15 +141,15 @@ impl Browser {
 
     fn await_close(&mut self) -> u16 {
         loop {
-            if let Frame::Closed(code) = self.hear() {
-                return code;
+            if let Message::Close(frame) = self.hear() {
+                return frame.map_or(0, |frame| frame.code.into());
             }
         }
     }
 
     /// Returns whether an order is done, and the answer's text.
-    fn order(&mut self, order: &Value) -> (bool, String) {
-        let mut asked = order.clone();
+    fn order(&mut self, order: &str) -> (bool, String) {
+        let mut asked: Value = serde_json::from_str(order).unwrap();
         asked["id"] = 7.into();
         self.say(&asked.to_string());
         let answer = self.await_key("answer");
@@ -233,11 +193,10 @@ fn a_foreign_origin_and_a_websocket_or_a_change_without_one_are_forbidden() {
         &(origin.clone() + "/"),
         "",
     ] {
-        let lines = ["GET /live HTTP/1.1", &own, UPGRADE[0], UPGRADE[1], UPGRADE[2], UPGRADE[3]];
-        let mut lines = lines.to_vec();
-        lines.extend((!foreign.is_empty()).then_some(foreign));
-        assert_eq!(status(&ask(&page, &lines)), "403", "{foreign}");
-        if !foreign.is_empty() {
+        let named = Some(foreign).filter(|foreign| !foreign.is_empty());
+        let lines = ["GET /live HTTP/1.1", &own, UPGRADE].into_iter().chain(named);
+        assert_eq!(status(&ask(&page, &lines.collect::<Vec<_>>())), "403", "{foreign}");
+        if named.is_some() {
             assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &own, foreign])), "403");
         }
     }
@@ -280,11 +239,18 @@ fn a_browser_that_shows_a_wrong_token_or_none_in_time_is_left() {
         assert_eq!(Browser::with_token(&page, token).await_close(), 4401, "{token}");
     }
     let mut hasty = Browser::open(&page);
-    hasty.say(&json!({"id": 1, "order": "stop"}).to_string());
+    hasty.say(STOP);
     assert_eq!(hasty.await_close(), 4401, "an order is no token");
     assert_eq!(Browser::open(&page).await_close(), 4408, "a late token may be right");
     assert!(noted.lock().unwrap().is_empty());
 }
+
+const STOP: &str = r#"{"id": 7, "order": "stop"}"#;
+const KILL: &str = r#"{"order": "kill", "stage": "planner"}"#;
+const GO_TO: &str = r#"{"order": "go_to", "targets": [[1.0, 2.0]]}"#;
+const GO_BACK: &str = r#"{"order": "go_back"}"#;
+const HAND: &str = r#"{"order": "hand", "ahead": 1.0, "left": -0.5}"#;
+const PREVIEW: &str = r#"{"order": "preview", "x": 1.5, "y": 0.0}"#;
 
 #[test]
 fn who_watches_may_stop_the_robot_and_nothing_else() {
@@ -293,18 +259,18 @@ fn who_watches_may_stop_the_robot_and_nothing_else() {
     let mut browser = Browser::watching(&page);
     assert_eq!(browser.await_key("role"), "watch");
     for order in [
-        json!({"order": "resume"}),
-        json!({"order": "kill", "stage": "planner"}),
-        json!({"order": "restart", "stage": "planner"}),
-        json!({"order": "go_to", "targets": [[1.0, 2.0]]}),
-        json!({"order": "go_back"}),
-        json!({"order": "hand", "ahead": 1.0, "left": 0.0}),
-        json!({"order": "preview", "x": 1.0, "y": 0.0}),
+        r#"{"order": "resume"}"#,
+        KILL,
+        r#"{"order": "restart", "stage": "planner"}"#,
+        GO_TO,
+        GO_BACK,
+        HAND,
+        PREVIEW,
     ] {
-        let (done, why) = browser.order(&order);
+        let (done, why) = browser.order(order);
         assert!(!done && why.contains("to drive"), "{order}: {why}");
     }
-    assert_eq!(browser.order(&json!({"order": "stop"})), (true, "confirmed".to_owned()));
+    assert_eq!(browser.order(STOP), (true, "confirmed".to_owned()));
     assert_eq!(*noted.lock().unwrap(), [Order::Stop]);
 }
 
@@ -313,17 +279,16 @@ fn who_drives_is_told_what_was_confirmed_or_why_it_was_not_done() {
     let (page, noted) = page();
     let mut browser = Browser::driving(&page);
     assert_eq!(browser.await_key("role"), "drive");
-    let kill = json!({"order": "kill", "stage": "planner"});
-    let (done, why) = browser.order(&kill);
+    let (done, why) = browser.order(KILL);
     assert!(!done && why.contains("simulation"), "a real robot's stage: {why}");
     page.shared.lock().begin(&json!({}), true);
-    assert!(browser.order(&kill).0);
-    assert!(browser.order(&json!({"order": "go_to", "targets": [[1.0, 2.0]]})).0);
-    assert!(!browser.order(&json!({"order": "go_to", "targets": vec![[0.0, 0.0]; 17]})).0);
-    let (done, why) = browser.order(&json!({"order": "go_back"}));
-    assert_eq!((done, &*why), (false, "the robot has no supervisor"));
-    assert!(browser.order(&json!({"order": "hand", "ahead": 1.0, "left": -0.5})).0);
-    assert!(browser.order(&json!({"order": "preview", "x": 1.5, "y": 0.0})).0);
+    let refused = (false, "the robot has no supervisor".to_owned());
+    assert_eq!(browser.order(GO_BACK), refused);
+    let many = GO_TO.replace("[1.0", &format!("{}[1.0", "[0.0, 0.0],".repeat(16)));
+    assert!(!browser.order(&many).0);
+    for order in [KILL, GO_TO, HAND, PREVIEW] {
+        assert!(browser.order(order).0, "{order}");
+    }
     assert_eq!(page.shared.lock().wanted, Some([1.5, 0.0]));
     assert_eq!(
         *noted.lock().unwrap(),
@@ -339,7 +304,7 @@ fn who_drives_is_told_what_was_confirmed_or_why_it_was_not_done() {
 fn a_long_message_and_a_flood_end_the_session() {
     let (page, noted) = page();
     let mut browser = Browser::watching(&page);
-    browser.say(&format!("{{\"id\":1,\"order\":\"stop\",\"x\":\"{}\"}}", "x".repeat(4096)));
+    browser.say(&STOP.replace('}', &format!(", \"x\": \"{}\"}}", "x".repeat(4096))));
     browser.await_close();
     let mut browser = Browser::watching(&page);
     for _ in 0..200 {
@@ -360,8 +325,7 @@ fn connections_beyond_the_limit_are_closed_at_once_and_silent_ones_soon() {
     for stream in &mut silent {
         let _ = stream.write_all(b"GET / HTTP/1.1\r\n");
     }
-    watching.say(&json!({"id": 1, "order": "stop"}).to_string());
-    assert_eq!(watching.await_key("answer")["ok"], true, "who watches is served meanwhile");
+    assert!(watching.order(STOP).0, "who watches is served meanwhile");
     Browser::driving(&page).await_key("role");
     for stream in &mut silent {
         let mut answer = Vec::new();
@@ -388,7 +352,7 @@ fn clients_without_the_token_take_no_place_of_a_session_and_an_owner_always_gets
     for (number, browser) in sessions.iter_mut().enumerate() {
         match number {
             0 | 17 => assert_eq!(browser.await_close(), 4409, "the oldest of its role goes"),
-            _ => assert!(browser.order(&json!({"order": "stop"})).0, "{number}"),
+            _ => assert!(browser.order(STOP).0, "{number}"),
         }
     }
     drop(strangers);
