@@ -172,24 +172,14 @@ mod tests {
     }
 
     #[test]
-    fn the_way_around_a_wall_is_as_long_as_by_hand() {
+    fn a_straight_way_is_straight_and_one_around_a_wall_is_as_long_as_by_hand() {
+        let way = |shapes: &Shapes, to| shortest_path(shapes, DVec2::ZERO, to, 0.2).unwrap();
+        let straight = way(&Shapes::default(), DVec2::new(3.0, 1.0));
+        assert!((straight - 10_f64.sqrt()).abs() < 1e-9, "{straight}");
         // The path leads around the end at (1, 1) at the body's radius: two legs of about sqrt(1 +
         // 1.2^2).
-        let shapes = wall(&[[1.0, -9.0], [1.0, 1.0]]);
-        let found = shortest_path(&shapes, DVec2::ZERO, DVec2::new(2.0, 0.0), 0.2);
-        let Some(length) = found else {
-            panic!("{found:?}");
-        };
-        assert!((3.0..3.25).contains(&length), "{length}");
-    }
-
-    #[test]
-    fn a_straight_way_is_straight() {
-        let found = shortest_path(&Shapes::default(), DVec2::ZERO, DVec2::new(3.0, 1.0), 0.2);
-        let Some(length) = found else {
-            panic!("{found:?}");
-        };
-        assert!((length - 10_f64.sqrt()).abs() < 1e-9, "{length}");
+        let around = way(&wall(&[[1.0, -9.0], [1.0, 1.0]]), DVec2::new(2.0, 0.0));
+        assert!((3.0..3.25).contains(&around), "{around}");
     }
 
     #[test]
