@@ -93,18 +93,14 @@ mod tests {
             let metadata = fs::read(arguments.out.join("metadata.yaml")).unwrap();
             let metadata: serde_json::Value = serde_json::from_slice(&metadata).unwrap();
             let topics = &metadata["rosbag2_bagfile_information"]["topics_with_message_count"];
-            let row = |index: usize| (&topics[index], &topics[index]["topic_metadata"]);
-            let (tf, about) = row(0);
-            assert_eq!(
-                (&about["name"], &tf["message_count"]),
-                (&"/a/tf".into(), &(parts * poses).into())
-            );
-            let (fixed, about) = row(1);
-            assert_eq!(
-                (&about["name"], &fixed["message_count"]),
-                (&"/a/tf_static".into(), &1.into())
-            );
-            assert!(about["offered_qos_profiles"].to_string().contains("durability: 1"));
+            let told = |index: usize| {
+                let row = &topics[index];
+                (row["topic_metadata"]["name"].as_str(), row["message_count"].as_u64())
+            };
+            assert_eq!(told(0), (Some("/a/tf"), Some(parts * poses)));
+            assert_eq!(told(1), (Some("/a/tf_static"), Some(1)));
+            let profiles = topics[1]["topic_metadata"]["offered_qos_profiles"].to_string();
+            assert!(profiles.contains("durability: 1"));
             assert!(make("a", &arguments).unwrap_err().to_string().contains("exists"));
         }
     }

@@ -163,39 +163,40 @@ mod tests {
 
     #[test]
     fn parameters_are_the_options_with_their_types_and_values_and_those_of_a_subcommand_its_own() {
-        let value = |parameters: &[Parameter], name: &str| {
-            let found = parameters.iter().find(|parameter| parameter.name == name);
-            found.map(|parameter| parameter.value.clone()).unwrap_or_default()
+        let told = |words: &[&str], names: &str| {
+            let parameters = parameters(words);
+            assert!(parameters.iter().all(|parameter| !parameter.meaning.is_empty()));
+            let told = names.split(' ').map(|name| {
+                let found = parameters.iter().find(|parameter| parameter.name == name);
+                let value = found.map(|parameter| parameter.value.clone()).unwrap_or_default();
+                let ParameterValue { r#type, bool_value, integer_value, double_value, .. } = value;
+                let (text, list) = (value.string_value, value.string_array_value);
+                format!("{type} {bool_value} {integer_value} {double_value} {text:?} {list:?}")
+            });
+            told.collect::<Vec<_>>()
         };
-        let text = |value: ParameterValue| (value.r#type, value.string_value);
-        let bridge = parameters(&["--accept", "goals,stop", "--domain", "7", "--clock"]);
-        assert_eq!(text(value(&bridge, "robot")), (4, "x80".to_owned()));
-        let domain = value(&bridge, "domain");
-        assert_eq!((domain.r#type, domain.integer_value), (2, 7));
-        let clock = value(&bridge, "clock");
-        assert_eq!((clock.r#type, clock.bool_value), (1, true));
-        assert_eq!(text(value(&bridge, "frames")).1, "all");
-        let accept = value(&bridge, "accept");
-        assert_eq!(
-            (accept.r#type, accept.string_array_value.join(" ")),
-            (9, "goals stop".to_owned())
-        );
-        assert_eq!(value(&bridge, "topics"), ParameterValue::default());
-        let planner = parameters(&[
-            "--namespace",
-            "a",
-            "planner",
-            "--footprint",
-            "[[1, 1], [-1, 1], [0, -1]]",
-        ]);
-        assert_eq!(text(value(&planner, "namespace")).1, "a");
-        assert_eq!(text(value(&planner, "footprint")).1, "[[1, 1], [-1, 1], [0, -1]]");
-        assert_eq!(value(&planner, "occupied").integer_value, 99);
-        let screening = value(&planner, "screening");
-        assert_eq!((screening.r#type, screening.double_value), (3, 2.0));
-        assert_eq!(value(&planner, "avoid_unknown").r#type, 1);
-        assert_eq!(value(&planner, "accept").r#type, 0);
-        assert!(planner.iter().all(|parameter| !parameter.meaning.is_empty()));
+        let words = ["--accept", "goals,stop", "--domain", "7", "--clock"];
+        let bridge = told(&words, "robot domain clock frames accept topics");
+        let want = [
+            r#"4 false 0 0 "x80" []"#,
+            r#"2 false 7 0 "" []"#,
+            r#"1 true 0 0 "" []"#,
+            r#"4 false 0 0 "all" []"#,
+            r#"9 false 0 0 "" ["goals", "stop"]"#,
+            r#"0 false 0 0 "" []"#,
+        ];
+        assert_eq!(bridge, want);
+        let words = ["--namespace", "a", "planner", "--footprint", "[[1, 1], [-1, 1], [0, -1]]"];
+        let planner = told(&words, "namespace footprint occupied screening avoid_unknown accept");
+        let want = [
+            r#"4 false 0 0 "a" []"#,
+            r#"4 false 0 0 "[[1, 1], [-1, 1], [0, -1]]" []"#,
+            r#"2 false 99 0 "" []"#,
+            r#"3 false 0 2 "" []"#,
+            r#"1 false 0 0 "" []"#,
+            r#"0 false 0 0 "" []"#,
+        ];
+        assert_eq!(planner, want);
     }
 
     #[test]

@@ -39,7 +39,7 @@ fn map(grid: &Grid) -> Arc<Costmap> {
 
 /// Plans from (1, 4) to (9, 1) by a new planner.
 fn plan_across(map: &Arc<Costmap>) -> Vec<Pose> {
-    plan(&mut planner(), map, at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap()
+    plan_alone(map, at(1.0, 4.0), &[at(9.0, 1.0)]).unwrap()
 }
 
 /// Makes two rooms of 5 m x 5 m with a door of 1.5 m at the top, and a closed box in the left one.
@@ -61,10 +61,18 @@ fn plan(
     planner.plan(map, from, to, &Cancellation::default())
 }
 
+fn plan_alone(map: &Arc<Costmap>, from: DAffine2, to: &[DAffine2]) -> Result<Vec<Pose>, Failure> {
+    plan(&mut planner(), map, from, to)
+}
+
 fn update([col, row]: [u32; 2], [width, height]: [u32; 2], value: i8) -> Vec<u8> {
     let [x, y] = [col, row].map(|at| at as i32);
     let data = vec![value; (width * height) as usize];
     OccupancyGridUpdate { header: Header::at(0, "map"), x, y, width, height, data }.encode()
+}
+
+fn change(map: &mut Arc<Costmap>, corner: [u32; 2], size: [u32; 2], value: i8) {
+    Arc::make_mut(map).update(&update(corner, size, value)).unwrap();
 }
 
 /// Counts the points on blocked cells, at every half cell of the path's chords.
@@ -88,7 +96,7 @@ fn no_chord_of_a_long_winding_path_enters_a_blocked_cell() {
         grid.fill([580 * (wall % 2), 20 * wall], [20, 4], false);
     }
     let map = map(&grid);
-    let path = plan(&mut planner(), &map, at(0.5, 0.5), &[at(29.5, 29.6)]).unwrap();
+    let path = plan_alone(&map, at(0.5, 0.5), &[at(29.5, 29.6)]).unwrap();
     assert_eq!(lethal(&map, &path), 0, "{} poses", path.len());
     let chord = |pair: &[Pose]| (pair[0][0] - pair[1][0]).hypot(pair[0][1] - pair[1][1]);
     assert!(path.windows(2).any(|pair| chord(pair) > 0.2), "the path is not thinned");
@@ -98,12 +106,12 @@ fn no_chord_of_a_long_winding_path_enters_a_blocked_cell() {
 fn a_long_path_has_as_many_poses_as_an_answer_carries_and_all_of_its_goals() {
     let map = map(&Grid::new(1000, 20));
     let goals = [at(25.0, 0.5), at(49.0, 0.5)];
-    let path = plan(&mut planner(), &map, at(1.0, 0.5), &goals).unwrap();
+    let path = plan_alone(&map, at(1.0, 0.5), &goals).unwrap();
     // Every second of some 960 cells.
     assert!((400..=810).contains(&path.len()), "{}", path.len());
     assert!(path.contains(&[25.0, 0.5, 0.5]) && path.ends_with(&[[49.0, 0.5, 0.5]]), "{path:?}");
     let many = vec![at(2.0, 0.5); 101];
-    let refused = plan(&mut planner(), &map, at(1.0, 0.5), &many).unwrap_err();
+    let refused = plan_alone(&map, at(1.0, 0.5), &many).unwrap_err();
     assert!(refused.1.contains("at most 100 goals"), "{refused:?}");
 }
 
@@ -116,8 +124,7 @@ fn a_path_begins_at_the_start_ends_in_the_goals_pose_and_looks_ahead_a_cell_at_a
         assert!(from.distance(to) < 2.3 * RESOLUTION_M, "{from} {to}");
         assert!(((to - from).to_angle() - pair[0][2]).abs() < 1e-9);
     }
-    let by_way =
-        plan(&mut planner(), &map(&rooms()), at(1.0, 4.0), &[at(4.0, 4.5), at(9.0, 1.0)]).unwrap();
+    let by_way = plan_alone(&map(&rooms()), at(1.0, 4.0), &[at(4.0, 4.5), at(9.0, 1.0)]).unwrap();
     assert!(by_way.contains(&[4.0, 4.5, 0.5]) && by_way.last() == path.last());
 }
 
@@ -129,7 +136,7 @@ fn a_map_that_is_turned_gives_the_path_that_is_turned() {
     grid.info.origin = [0.0, 0.0, FRAC_PI_2].into();
     let payload = grid.encode();
     let turned = Arc::new(Costmap::read(&payload).unwrap());
-    let path = plan(&mut planner(), &turned, turn * at(1.0, 4.0), &[turn * at(9.0, 1.0)]).unwrap();
+    let path = plan_alone(&turned, turn * at(1.0, 4.0), &[turn * at(9.0, 1.0)]).unwrap();
     assert_eq!(path.len(), straight.len());
     for (a, b) in path.iter().zip(&straight) {
         assert!(
@@ -153,10 +160,10 @@ fn each_reason_against_a_path_has_nav2s_error_code_and_says_where() {
         (free, closed, 208, "no path leads from (4.00, 4.00) to (1.50, 1.50)"),
         (closed, free, 208, "no path"),
     ] {
-        let (reason, words) = plan(&mut planner(), &map, from, &[to]).unwrap_err();
+        let (reason, words) = plan_alone(&map, from, &[to]).unwrap_err();
         assert_eq!((reason as u16 + 200, words.contains(says)), (code, true), "{words}");
     }
-    assert_eq!(plan(&mut planner(), &map, free, &[]).unwrap_err().0 as u16, 9);
+    assert_eq!(plan_alone(&map, free, &[]).unwrap_err().0 as u16, 9);
     let canceled = Cancellation::default();
     canceled.cancel();
     let late = planner().plan(&map, free, &[at(9.0, 1.0)], &canceled).unwrap_err();
@@ -168,9 +175,9 @@ fn a_robot_that_touches_what_is_inflated_is_led_out_and_not_through_a_wall() {
     let mut grid = Grid::new(200, 100);
     grid.fill([100, 0], [1, 100], true);
     // 0.1 m before the wall the robot's centre is in the inflated part.
-    let path = plan(&mut planner(), &map(&grid), at(4.9, 2.5), &[at(1.0, 2.5)]).unwrap();
+    let path = plan_alone(&map(&grid), at(4.9, 2.5), &[at(1.0, 2.5)]).unwrap();
     assert!(path.iter().all(|pose| pose[0] < 4.95));
-    let through = plan(&mut planner(), &map(&grid), at(4.9, 2.5), &[at(9.0, 2.5)]).unwrap_err();
+    let through = plan_alone(&map(&grid), at(4.9, 2.5), &[at(9.0, 2.5)]).unwrap_err();
     assert_eq!(through.0, Reason::NoPath);
 }
 
@@ -184,14 +191,13 @@ fn a_path_leads_round_a_zone_that_costs_more() {
     let ends = (at(1.0, 1.9), [at(9.0, 1.9)]);
     let crosses = |path: &[Pose]| path.iter().find(|pose| pose[0] >= 5.0).unwrap()[1];
     let mut zone = map(&grid);
-    let direct = crosses(&plan(&mut planner(), &zone, ends.0, &ends.1).unwrap());
-    let window = update([70, 0], [60, 50], 90);
-    Arc::make_mut(&mut zone).update(&window).unwrap();
+    let direct = crosses(&plan_alone(&zone, ends.0, &ends.1).unwrap());
+    change(&mut zone, [70, 0], [60, 50], 90);
     // The update has covered the wall beside the lower door.
     for rows in [[0, 20], [36, 14]] {
-        Arc::make_mut(&mut zone).update(&update([100, rows[0]], [2, rows[1]], 100)).unwrap();
+        change(&mut zone, [100, rows[0]], [2, rows[1]], 100);
     }
-    let around = crosses(&plan(&mut planner(), &zone, ends.0, &ends.1).unwrap());
+    let around = crosses(&plan_alone(&zone, ends.0, &ends.1).unwrap());
     assert!(direct < 2.0 && around > 3.0, "{direct} {around}");
 }
 
@@ -202,20 +208,19 @@ fn a_change_of_the_map_changes_the_field_of_a_goal_as_a_new_solve_would() {
     let mut newest = map(&grid);
     let ends = (at(1.0, 4.0), [at(9.0, 1.0)]);
     plan(&mut changing, &newest, ends.0, &ends.1).unwrap();
-    grid.fill([100, 80], [2, 15], true);
-    grid.fill([150, 40], [20, 4], true);
-    for window in [([100, 80], [2, 15]), ([150, 40], [20, 4])] {
-        Arc::make_mut(&mut newest).update(&update(window.0, window.1, 100)).unwrap();
+    for (corner, size) in [([100, 80], [2, 15]), ([150, 40], [20, 4])] {
+        grid.fill(corner.map(|at| at as usize), size.map(|it| it as usize), true);
+        change(&mut newest, corner, size, 100);
     }
     let changed = plan(&mut changing, &newest, ends.0, &ends.1).unwrap();
     let anew = plan_across(&map(&grid));
     for (a, b) in changed.iter().zip(&anew) {
         assert!(DVec2::new(a[0], a[1]).distance(DVec2::new(b[0], b[1])) < 0.05, "{a:?} {b:?}");
     }
-    Arc::make_mut(&mut newest).update(&update([100, 60], [2, 25], 100)).unwrap();
-    assert_eq!(plan(&mut changing, &newest, ends.0, &ends.1).unwrap_err().0 as u16, 8);
-    Arc::make_mut(&mut newest).update(&update([178, 18], [4, 4], 100)).unwrap();
-    assert_eq!(plan(&mut changing, &newest, ends.0, &ends.1).unwrap_err().0 as u16, 6);
+    for (corner, size, reason) in [([100, 60], [2, 25], 8), ([178, 18], [4, 4], 6)] {
+        change(&mut newest, corner, size, 100);
+        assert_eq!(plan(&mut changing, &newest, ends.0, &ends.1).unwrap_err().0 as u16, reason);
+    }
 }
 
 #[test]
@@ -271,24 +276,33 @@ fn a_frame_is_found_in_another_by_way_of_the_one_above_both_unless_a_transform_i
     let take = |frames: &mut Frames, of: &[(&str, &str, Pose)], at| {
         frames.take(&crate::messages::transforms(0, of), at).unwrap();
     };
-    let find = |frames: &Frames, frame, since| frames.find(frame, "map", since);
+    let check = |frames: &Frames, frame, within, since, want: Result<Pose, &str>| match (
+        frames.find(frame, within, since),
+        want,
+    ) {
+        (Ok(found), Ok([x, y, heading])) => {
+            let want = DAffine2::from_angle_translation(heading, DVec2::new(x, y));
+            assert!(found.abs_diff_eq(want, 1e-12), "{frame}: {found}");
+        }
+        (found, want) => assert!(found.unwrap_err().contains(want.unwrap_err()), "{frame}"),
+    };
     take(&mut frames, &[("/odom", "base_link", [2.0, 0.0, 0.5])], Some(now));
-    assert!(find(&frames, "base_link", None).unwrap_err().contains("\"odom\""));
+    check(&frames, "base_link", "map", None, Err("\"odom\""));
     let odom = ("map", "odom", [1.0, 2.0, FRAC_PI_2]);
     take(&mut frames, &[odom, ("map", "mast", [1.0, 0.0, 0.0])], None);
-    let pose = find(&frames, "base_link", Some(now)).unwrap();
-    assert!(pose.translation.distance(DVec2::new(1.0, 4.0)) < 1e-12);
-    assert!((pose.matrix2.x_axis.to_angle() - 0.5 - FRAC_PI_2).abs() < 1e-12);
-    assert_eq!(find(&frames, "map", None), Ok(DAffine2::IDENTITY));
-    let later = Some(now + Duration::from_secs(1));
-    assert!(find(&frames, "base_link", later).unwrap_err().contains("outdated"));
-    assert!(find(&frames, "odom", later).is_ok(), "it stays");
-    let down = frames.find("map", "odom", None).unwrap();
-    assert!(down.transform_point2(DVec2::new(1.0, 4.0)).distance(DVec2::new(2.0, 0.0)) < 1e-12);
-    let aside = frames.find("mast", "odom", None).unwrap();
-    assert!(aside.translation.distance(DVec2::new(-2.0, 0.0)) < 1e-12);
     take(&mut frames, &[("a", "b", [0.0; 3]), ("b", "a", [0.0; 3])], None);
-    assert!(find(&frames, "a", None).unwrap_err().contains("loop"));
+    let later = Some(now + Duration::from_secs(1));
+    for (frame, within, since, want) in [
+        ("base_link", "map", Some(now), Ok([1.0, 4.0, 0.5 + FRAC_PI_2])),
+        ("base_link", "map", later, Err("outdated")),
+        ("odom", "map", later, Ok(odom.2)),
+        ("map", "map", None, Ok([0.0; 3])),
+        ("map", "odom", None, Ok([-2.0, 1.0, -FRAC_PI_2])),
+        ("mast", "odom", None, Ok([-2.0, 0.0, -FRAC_PI_2])),
+        ("a", "map", None, Err("loop")),
+    ] {
+        check(&frames, frame, within, since, want);
+    }
 }
 
 fn bytes(hex: &str) -> Vec<u8> {
