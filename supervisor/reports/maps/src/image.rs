@@ -204,13 +204,6 @@ mod tests {
     }
 
     #[test]
-    fn a_negated_map_is_free_where_it_is_dark() {
-        let negated = Lightness { negate: true, ..Lightness::default() };
-        assert!(middle_is_free(b"P5 3 3 255\n", &[10], negated));
-        assert!(!middle_is_free(b"P5 3 3 255\n", &[240], negated));
-    }
-
-    #[test]
     fn a_damaged_image_is_refused_and_a_large_one_before_it_is_read() {
         let usual = Lightness::default();
         let damaged: [&[u8]; 6] = [
