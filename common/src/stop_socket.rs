@@ -20,7 +20,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use crate::{clock::monotonic_ns, domain::Domain, file, machine, poll, samples::Rest};
+use crate::{clock::monotonic_ns, domain::Domain, file, poll, samples::Rest};
 
 /// Operator's request to the link: its byte. Recordings hold the number of the variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -247,7 +247,7 @@ impl OwedStop {
         if self.is_set() {
             return Ok(());
         }
-        if machine::is_simulated() {
+        if crate::machine::is_simulated() {
             return file::create(&self.0.owed_stop());
         }
         make_directory(self.0.directory())?;
