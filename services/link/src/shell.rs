@@ -238,7 +238,8 @@ impl Process for Shell {
 
     fn trouble(&mut self) -> Option<Refusal> {
         let (link, now_ns) = (&self.runner.stage.link, monotonic_ns());
-        let base = (!link.connected()).then(|| self.transport.trouble()).flatten();
+        let is_told = !link.connected() || self.transport.is_cut();
+        let base = is_told.then(|| self.transport.trouble()).flatten();
         self.refused.take_if(|(_, at_ns)| now_ns.saturating_sub(*at_ns) > REFUSAL_LASTS_NS);
         base.or_else(|| self.wires.iter().find_map(Transport::trouble))
             .or_else(|| self.refused.as_ref().map(|(why, _)| why.clone()))

@@ -170,10 +170,20 @@ impl Transport {
         self.wire.attempts(now_ns)
     }
 
+    /// Returns whether the robot ends one connection after another, as it does for two programs
+    /// that connect to it.
+    pub fn is_cut(&self) -> bool {
+        self.wire.tally().cut > 1
+    }
+
     /// Returns why the robot cannot be heard, if that is known.
     pub fn trouble(&self) -> Option<Refusal> {
         let failed = self.wire.attempts(0).and_then(|attempts| attempts.failed);
         let (what, remedy) = match (failed, self.wire.tally().other_port) {
+            _ if self.is_cut() => (
+                "it ends each connection within seconds".to_owned(),
+                "end the other program that connects to it, or find why it restarts",
+            ),
             (Some((errno, remedy)), _) => (io::Error::from(errno).to_string(), remedy),
             (None, 0) => return None,
             (None, port) => {

@@ -8,6 +8,8 @@ pub struct Tally {
     pub foreign_datagrams: u64,
     /// Port of the first dropped datagram from the robot's host; 0 for none.
     pub other_port: u16,
+    /// Connections in a row that the robot ended soon after it had spoken on them.
+    pub cut: u64,
     /// Messages that the wire did not accept.
     pub unsent: u64,
 }

@@ -29,6 +29,9 @@ const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(2);
 /// Time limit of an attempt, as a robot that is off stays silent.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Age of a connection that no other program cuts: two links take the robot from each other at
+/// least every [`LONGEST_PAUSE`].
+const STEADY: Duration = Duration::from_secs(10);
 
 pub(super) trait Dial: fmt::Debug {
     /// Silence of a dead stream; none if the system reports that.
@@ -53,6 +56,8 @@ struct Connection {
     is_open: bool,
     /// Start of the attempt, or when bytes last came.
     since_ns: u64,
+    opened_ns: u64,
+    has_spoken: bool,
 }
 
 #[derive(Debug)]
@@ -64,6 +69,7 @@ pub(super) struct Stream<D> {
     tail: Vec<u8>,
     backoff: Backoff,
     unsent: u64,
+    cut: u64,
     /// Why the wire is down, which is not logged again.
     down: Option<Errno>,
 }
@@ -78,6 +84,7 @@ impl<D: Dial + 'static> Stream<D> {
             tail: Vec::new(),
             backoff: Backoff::new(FIRST_PAUSE, LONGEST_PAUSE),
             unsent: 0,
+            cut: 0,
             down: None,
         }))
     }
@@ -93,7 +100,7 @@ impl<D: Dial> Wire for Stream<D> {
     }
 
     fn tally(&self) -> Tally {
-        Tally { unsent: self.unsent, ..Tally::default() }
+        Tally { unsent: self.unsent, cut: self.cut, ..Tally::default() }
     }
 
     fn attempts(&self, now_ns: u64) -> Option<Attempts> {
@@ -118,8 +125,13 @@ impl<D: Dial> Wire for Stream<D> {
                     let events = EventFlags::IN | EventFlags::OUT;
                     epoll::add(&self.epoll, &descriptor, EventData::new_u64(0), events)?;
                     assert!(self.tail.is_empty());
-                    self.connection =
-                        Some(Connection { descriptor, is_open: false, since_ns: now_ns });
+                    self.connection = Some(Connection {
+                        descriptor,
+                        is_open: false,
+                        since_ns: now_ns,
+                        opened_ns: now_ns,
+                        has_spoken: false,
+                    });
                 }
                 Err(error) => self.log(&error),
             }
@@ -132,6 +144,7 @@ impl<D: Dial> Wire for Stream<D> {
             match self.dial.finish(&connection.descriptor) {
                 Ok(()) => {
                     (connection.is_open, connection.since_ns) = (true, now_ns);
+                    connection.opened_ns = now_ns;
                     self.watch(EventFlags::IN)?;
                     tracing::info!(robot = %self.robot, "the wire is open");
                 }
@@ -146,13 +159,19 @@ impl<D: Dial> Wire for Stream<D> {
     }
 
     fn receive(&mut self, buffer: &mut [u8], now_ns: u64) -> io::Result<Option<usize>> {
-        let Some(Connection { descriptor, is_open: true, since_ns }) = &mut self.connection else {
+        let Some(connection) = self.connection.as_mut().filter(|it| it.is_open) else {
             return Ok(None);
         };
-        match read(&*descriptor, buffer) {
-            Ok(0) => self.close(&io::ErrorKind::UnexpectedEof.into()),
+        match read(&connection.descriptor, buffer) {
+            Ok(0) => {
+                self.cut += u64::from(connection.has_spoken);
+                self.close(&io::ErrorKind::UnexpectedEof.into());
+            }
             Ok(length) => {
-                *since_ns = now_ns;
+                (connection.since_ns, connection.has_spoken) = (now_ns, true);
+                if has_passed(connection.opened_ns, now_ns, STEADY) {
+                    self.cut = 0;
+                }
                 // Only received bytes reset the pauses. Otherwise a peer that closes each
                 // connection would be called ten times a second.
                 self.backoff.reset();

@@ -125,6 +125,27 @@ fn connected(listener: &TcpListener, transport: &mut Transport, now_ns: u64) -> 
 }
 
 #[test]
+fn a_robot_that_ends_one_connection_after_another_serves_another_program_too() {
+    let (listener, mut transport, mut robot) = connection();
+    let mut now_ns = 0;
+    for cuts in 1..=2 {
+        robot.write_all(b"frame").unwrap();
+        expect(&mut transport, b"frame", now_ns);
+        drop(robot);
+        expect_closing(&mut transport, now_ns);
+        assert_eq!(transport.is_cut(), cuts > 1);
+        now_ns += 10_000 * MS;
+        robot = connected(&listener, &mut transport, now_ns);
+    }
+    let trouble = transport.trouble().unwrap().to_string();
+    assert!(trouble.contains("end the other program that connects to it"), "{trouble}");
+    // A connection that lasts is its own.
+    robot.write_all(b"frame").unwrap();
+    expect(&mut transport, b"frame", now_ns + 11_000 * MS);
+    assert!(!transport.is_cut());
+}
+
+#[test]
 fn a_connection_without_a_word_is_taken_for_dead() {
     let (listener, mut transport, _robot) = connection();
     assert_eq!(transport.maintain(4999 * MS).unwrap(), None);
