@@ -99,7 +99,9 @@ fn a_robot_that_stays_takes_targets_zones_and_its_place_until_it_is_ended_and_re
     // The zone moves to the other side, which frees its old place.
     operate(robot, &["zone", "1", "-1", "1.4", "-1", "1.4", "3.9", "1", "3.9"]);
     operate(robot, &["zone", "1.2", "-2", "--remove"]);
-    operate(robot, &["goto", "1.2", "-2", "0", "0"]);
+    // The supervisor judges a target by the map, which shows the change in its next part.
+    let there = ["goto", "1.2", "-2", "0", "0", "--robot", robot];
+    support::wait_until("its old place is free", || output(&there).status.success());
     run.kill_and_await_successor("mapper", Signal::KILL);
     run.wait_until("it is back", waits);
     say(&["goto", "1.2", "2"], "target-in-hazard");
