@@ -324,7 +324,7 @@ payloads! {
     "firsthand.Following" FollowingSample {
         /// A [`FollowState`].
         state: u8 as FollowState,
-        /// The newest [`BeaconRefusal`](super::BeaconRefusal).
+        /// The newest [`BeaconRefusal`].
         refusal: u8 as BeaconRefusal,
         /// Distance that the robot keeps between its centre and the beacon, metres.
         distance_m: f64,
