@@ -15,6 +15,7 @@ use common::{
     claim::Claim,
     domain::{Domain, SHARED_MEMORY},
     file::append,
+    stop_socket::Operator,
     topics,
 };
 use rustix::fs::{Access, access, statvfs};
@@ -268,7 +269,13 @@ fn lock(domain: &Domain) -> Result<File, DomainError> {
 fn remove_run(domain: &Domain) -> Result<(), DomainError> {
     let files =
         [domain.run_link(), domain.run_directory(), domain.stop_socket(), domain.mirror_link()];
-    files.iter().try_for_each(|file| remove_file(file))
+    files.iter().try_for_each(|file| remove_file(file))?;
+    // A killed stop guard leaves its socket; one that answers still orders the stop.
+    let guard = domain.guard_socket();
+    match Operator::connect(&guard) {
+        Ok(None) => remove_file(&guard),
+        _ => Ok(()),
+    }
 }
 
 /// Removes the user's middleware files in this domain. A new bus has random names, without
@@ -375,7 +382,7 @@ mod tests {
         thread,
     };
 
-    use common::bus::BusError;
+    use common::{bus::BusError, stop_socket::StopSocket};
 
     use super::*;
 
@@ -438,6 +445,18 @@ mod tests {
         drop(held);
         assert!(!domain.directory().exists());
         drop(joining);
+    }
+
+    #[test]
+    fn a_run_removes_the_socket_of_a_killed_stop_guard_and_keeps_that_of_a_living_one() {
+        let domain = domain("guard");
+        make_directory(&domain).unwrap();
+        let guard = StopSocket::bind(domain.guard_socket()).unwrap();
+        drop(DomainLock::acquire(domain.clone(), 1).unwrap());
+        assert!(domain.guard_socket().exists());
+        drop(guard);
+        drop(DomainLock::acquire(domain.clone(), 1).unwrap());
+        assert!(!domain.directory().exists());
     }
 
     #[test]
