@@ -51,16 +51,17 @@ fn two_robots_that_meet_have_a_row_each_and_the_same_rows_twice() {
     let out = directory.path().join("rooms");
     let rows = |more: &[&str]| {
         let robots = ["--robot", "turtlebot2", "--set", "robot.rate_hz=10", "--seed", "3"];
-        let meeting = ["evaluate", "--json", "--worlds", "meeting", "--count", "1", "--out"];
+        let meeting = ["evaluate", "--json", "--worlds", "meeting", "--count", "2", "--out"];
         printed(&[&meeting[..], &[out.to_str().unwrap()], &robots, more].concat());
         std::fs::read_to_string(out.join("rows.csv")).unwrap()
     };
     let first = rows(&[]);
+    let worlds = ["0000", "0000-oncoming", "0001", "0001-oncoming"];
     let named = first.lines().skip(1).map(|row| row.split(',').next().unwrap());
-    assert!(named.eq(["meeting-3-0000", "meeting-3-0000-oncoming"]), "{first}");
-    assert_eq!(first.matches(",success,").count(), 2, "{first}");
+    assert!(named.eq(worlds.map(|world| format!("meeting-3-{world}"))), "{first}");
+    assert_eq!(first.matches(",success,").count(), 4, "{first}");
     // One robot's row is lost, so both drive again.
-    let kept = first.lines().filter(|row| !row.contains("oncoming"));
+    let kept = first.lines().filter(|row| !row.contains("0001-oncoming"));
     let kept: String = kept.map(|row| format!("{row}\n")).collect();
     std::fs::write(out.join("rows.csv"), kept).unwrap();
     assert_eq!(first, rows(&["--resume"]));

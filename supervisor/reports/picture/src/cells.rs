@@ -136,4 +136,13 @@ mod tests {
         assert!(sensed.element("").contains(&format!("{two}{one}")));
         assert!(known.is_empty() && perimeter.is_empty());
     }
+
+    #[test]
+    fn a_belief_in_shreds_stays_within_its_budget() {
+        let lattice = lattice(1024);
+        let cells: Vec<u8> =
+            (0..1024 * 1024).map(|at| ((at / 1024 + at % 1024) % 2) as u8).collect();
+        let hazard = BelievedHazard::of(&lattice, &cells);
+        assert!((1..=BUDGET).contains(&hazard.len()));
+    }
 }

@@ -121,9 +121,11 @@ mod tests {
     fn behind_a_proxy_only_its_name_counts() {
         let far = access(Some("robot.example"));
         assert!(far.addresses().starts_with("watch https://robot.example/#"));
+        assert!(far.host("127.0.0.1:8080").is_none());
         let host = far.host("robot.example").unwrap();
         assert!(far.is_own_origin("https://robot.example", host));
         assert!(!far.is_own_origin("http://robot.example", host));
+        assert_eq!(far.websocket(host), "wss://robot.example");
         for name in ["", "robot.example/x", "a;script-src *", "a b", "a\"b"] {
             assert!(host_name(name).is_err(), "{name}");
         }
