@@ -57,7 +57,6 @@ struct Connection {
     /// Start of the attempt, or when bytes last came.
     since_ns: u64,
     opened_ns: u64,
-    has_spoken: bool,
 }
 
 #[derive(Debug)]
@@ -130,10 +129,12 @@ impl<D: Dial> Wire for Stream<D> {
                         is_open: false,
                         since_ns: now_ns,
                         opened_ns: now_ns,
-                        has_spoken: false,
                     });
                 }
-                Err(error) => self.log(&error),
+                Err(error) => {
+                    self.cut = 0;
+                    self.log(&error);
+                }
             }
         }
         let Some(connection) = &mut self.connection else {
@@ -164,11 +165,12 @@ impl<D: Dial> Wire for Stream<D> {
         };
         match read(&connection.descriptor, buffer) {
             Ok(0) => {
-                self.cut += u64::from(connection.has_spoken);
+                // The robot has spoken since the last attempt.
+                self.cut += u64::from(self.backoff.attempts == 0);
                 self.close(&io::ErrorKind::UnexpectedEof.into());
             }
             Ok(length) => {
-                (connection.since_ns, connection.has_spoken) = (now_ns, true);
+                connection.since_ns = now_ns;
                 if has_passed(connection.opened_ns, now_ns, STEADY) {
                     self.cut = 0;
                 }
@@ -236,7 +238,9 @@ impl<D: Dial> Stream<D> {
     /// Closes the stream, whose descriptor leaves the epoll one.
     fn close(&mut self, error: &io::Error) {
         self.log(error);
-        if let Some(Connection { descriptor, .. }) = self.connection.take() {
+        if let Some(Connection { descriptor, is_open, .. }) = self.connection.take() {
+            // What accepts no connection does not end one for another program.
+            self.cut *= u64::from(is_open);
             self.dial.abandon(&descriptor);
         }
         self.tail.clear();

@@ -143,6 +143,24 @@ fn a_robot_that_ends_one_connection_after_another_serves_another_program_too() {
     robot.write_all(b"frame").unwrap();
     expect(&mut transport, b"frame", now_ns + 11_000 * MS);
     assert!(!transport.is_cut());
+    // Nor is a robot that is off in anybody's hands.
+    for _ in 0..2 {
+        drop(robot);
+        expect_closing(&mut transport, now_ns);
+        now_ns += 20_000 * MS;
+        robot = connected(&listener, &mut transport, now_ns);
+        robot.write_all(b"frame").unwrap();
+        expect(&mut transport, b"frame", now_ns);
+    }
+    assert!(transport.is_cut());
+    drop((robot, listener));
+    expect_closing(&mut transport, now_ns);
+    while transport.is_cut() {
+        now_ns += 3_000 * MS;
+        assert_eq!(transport.maintain(now_ns).unwrap(), None);
+    }
+    let trouble = transport.trouble().unwrap().to_string();
+    assert!(trouble.contains("switch the robot on"), "{trouble}");
 }
 
 #[test]
