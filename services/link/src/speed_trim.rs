@@ -1,8 +1,8 @@
 //! Speed trim: compensates wheels slower than commanded.
 //!
 //! The speed loop of an X80 may reach only 0.75 to 0.8 of a command. The link estimates that share
-//! from commands and encoders, and divides commands by it. Both wheels share it, so commands keep their
-//! curve. Speeds not yet reached are no evidence.
+//! from commands and encoders, and divides commands by it. Both wheels share it, so commands keep
+//! their curve. Speeds not yet reached are no evidence.
 
 use common::{
     driver::counts::WheelCounts,

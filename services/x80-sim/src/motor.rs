@@ -58,13 +58,15 @@ struct Order {
 
 impl Motor {
     /// Starts suspended, in PWM mode.
-    pub fn new(physics: WheelPhysics, top_speed: f64) -> Self {
-        assert!(top_speed >= 0.0);
+    ///
+    /// `top_speed` is in counts per second.
+    pub fn new(physics: WheelPhysics, top_speed: f64, counts_per_m: f64) -> Self {
+        assert!(top_speed >= 0.0 && counts_per_m > 0.0);
         Self {
             physics,
             top_speed,
-            acceleration: f64::INFINITY,
-            standstill: 0.0,
+            acceleration: physics.acceleration_m_s2 * counts_per_m,
+            standstill: STANDSTILL_M_S * counts_per_m,
             enabled: false,
             mode: Mode::Pwm,
             order: None,
@@ -74,13 +76,6 @@ impl Motor {
             turned: 0.0,
             load: 0.0,
         }
-    }
-
-    /// Limits the acceleration of wheels with this many counts per metre.
-    #[must_use]
-    pub fn accelerating(self, acceleration_m_s2: f64, counts_per_m: f64) -> Self {
-        let acceleration = acceleration_m_s2 * counts_per_m;
-        Self { acceleration, standstill: STANDSTILL_M_S * counts_per_m, ..self }
     }
 
     /// Sets the mode and runs until mission time `until`.

@@ -157,8 +157,7 @@ impl Robot {
             longest_step,
             world,
             motors: std::array::from_fn(|channel| {
-                Motor::new(physics.wheels, top_counts(channel))
-                    .accelerating(physics.wheels.acceleration_m_s2, counts_per_m)
+                Motor::new(physics.wheels, top_counts(channel), counts_per_m)
             }),
             car,
             streams: Streams::default(),

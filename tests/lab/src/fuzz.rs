@@ -27,8 +27,10 @@ use crate::error::{OrCannot as _, Result};
 #[derive(Debug, Args)]
 #[command(override_usage = "firsthand-lab fuzz [OPTIONS]")]
 pub struct Arguments {
+    /// Number of inputs.
     #[arg(long, default_value_t = 100_000)]
     inputs: u64,
+    /// Seed of the inputs.
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }

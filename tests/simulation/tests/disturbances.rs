@@ -2,15 +2,17 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::{path::Path, time::Duration};
+use std::{cell::RefCell, path::Path, rc::Rc, time::Duration};
 
 use common::{
+    bus::{Bus, Reader},
     mission::Mission,
-    samples::{Cause, FaultKind},
+    samples::{Cause, FaultKind, RequestAnswer, RequestKind, RequestSample},
+    topics,
 };
 use mission_control::{outcome::Outcome, target_list::TargetOutcome};
 use processes::stages;
-use simulation::{Disturbance, Quality, Ran, Request, RobotFault, Scenario, Way, What};
+use simulation::{Disturbance, Observer, Quality, Ran, Request, RobotFault, Scenario, Way, What};
 
 fn at(seconds: f64, what: What) -> Disturbance {
     Disturbance { at: Duration::from_secs_f64(seconds), what }
@@ -24,9 +26,19 @@ fn ran(keys: &str, disturbances: &[Disturbance]) -> Ran {
 
 /// Runs a mission file. At each wait for a target the operator makes the next request.
 fn ran_text(text: &str, disturbances: &[Disturbance], while_waiting: &[Request]) -> Ran {
+    ran_before(None, text, disturbances, while_waiting)
+}
+
+fn ran_before(
+    observer: Option<Box<dyn Observer>>,
+    text: &str,
+    disturbances: &[Disturbance],
+    while_waiting: &[Request],
+) -> Ran {
     let mission = Mission::parse(text, Path::new("disturbed.toml")).unwrap();
     let (disturbances, while_waiting) = (disturbances.to_vec(), while_waiting.to_vec());
-    let ran = Scenario { disturbances, while_waiting, ..Scenario::calm(&mission) }.run();
+    let scenario = Scenario { disturbances, while_waiting, ..Scenario::calm(&mission) };
+    let ran = scenario.run_before(observer);
     assert!(ran.broken.is_none(), "{:?}", ran.broken);
     ran
 }
@@ -323,4 +335,82 @@ fn a_robot_whose_stop_is_lost_at_its_target_drives_back() {
         farthest = ran.truth.iter().map(|truth| truth.x - 1.7).fold(farthest, f64::max);
     }
     assert!(farthest > 0.4, "no robot rolled on: {farthest} m");
+}
+
+#[derive(Default)]
+struct Orders {
+    reader: Option<Reader<RequestSample>>,
+    answers: Vec<(RequestKind, RequestAnswer)>,
+}
+
+impl Observer for Orders {
+    fn on_bus(&mut self, bus: &Bus) {
+        self.reader = bus.reader(&topics::ORDERS).ok();
+    }
+
+    fn observe(&mut self) {
+        while let Some(order) = self.reader.as_mut().and_then(|it| it.next_sample().unwrap()) {
+            self.answers.push((order.kind(), order.answer()));
+        }
+    }
+}
+
+/// Returns the answers to these requests, each made at its time in seconds, in a mission to a
+/// target 4 m ahead.
+fn answers(keys: &str, asked: &[(f64, What)]) -> Vec<RequestAnswer> {
+    let text = format!("target = [4, 0]\ntimeout_s = 120\nperimeter.width_m = 9\n{keys}");
+    let asked: Vec<_> = asked.iter().map(|(seconds, what)| at(*seconds, what.clone())).collect();
+    let orders = Rc::new(RefCell::new(Orders::default()));
+    ran_before(Some(Box::new(Rc::clone(&orders))), &text, &asked, &[]);
+    let answered = orders.take().answers.into_iter();
+    answered.filter(|(kind, _)| *kind != RequestKind::Resume).map(|(_, answer)| answer).collect()
+}
+
+#[test]
+fn a_robot_is_placed_only_at_rest_while_its_mission_waits() {
+    use RequestAnswer::{Moves, Taken};
+    let ask = What::Ask;
+    let asked = [
+        (2.5, ask(Request::Place)),
+        // It rolls for a moment after the stop.
+        (3.0, ask(Request::Stop)),
+        (3.1, ask(Request::Place)),
+        (5.0, ask(Request::Place)),
+        (6.0, ask(Request::Resume)),
+        // At rest for want of readings, it drives on by itself.
+        (7.5, What::Fault(Some(RobotFault::RangeInvalid))),
+        (10.0, ask(Request::Place)),
+        (11.0, What::Fault(None)),
+    ];
+    assert_eq!(answers("", &asked), [Moves, Taken, Moves, Taken, Moves]);
+}
+
+#[test]
+fn zones_are_added_and_removed_where_the_robot_is_not() {
+    use RequestAnswer::{NotInZone, Taken, ZoneHere};
+    let (here, ahead) = ([0.0, 0.0], [2.0, 0.6]);
+    let asked = [
+        (1.0, Request::AddZone(here)),
+        (1.1, Request::AddZone(ahead)),
+        (1.2, Request::RemoveZone(here)),
+        (1.3, Request::RemoveZone(ahead)),
+        (1.4, Request::RemoveZone(ahead)),
+    ];
+    let answers = answers("", &asked.map(|(at, what)| (at, What::Ask(what))));
+    assert_eq!(answers, [ZoneHere, Taken, NotInZone, Taken, NotInZone]);
+}
+
+#[test]
+fn hands_and_beacons_lead_only_a_robot_that_stays() {
+    use RequestAnswer::{NotFollowing, NotStaying, Outside, Taken};
+    let asked = [
+        (1.0, Request::Hand([1.0, 0.0])),
+        (1.1, Request::Goto([40.0, 0.0])),
+        (1.2, Request::Append([3.0, 0.0])),
+        (1.3, Request::Follow),
+        (1.4, Request::EndFollow),
+    ]
+    .map(|(at, what)| (at, What::Ask(what)));
+    assert_eq!(answers("", &asked), [NotStaying, Outside, Taken, NotStaying, NotFollowing]);
+    assert_eq!(answers("stay = true", &asked), [Taken, Outside, Taken, Taken, Taken]);
 }

@@ -8,7 +8,7 @@ use common::mission::Realism;
 const DT: f64 = 0.005;
 
 fn motor(physics: WheelPhysics) -> Motor {
-    Motor::new(physics, 2000.0).accelerating(f64::INFINITY, 2500.0)
+    Motor::new(physics, 2000.0, 2500.0)
 }
 
 fn ideal() -> Motor {

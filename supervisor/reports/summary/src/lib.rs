@@ -151,10 +151,7 @@ impl Summary {
                 let last = finished.targets.iter().rfind(tried)?;
                 Some((tick.x - last.x_m).hypot(tick.y - last.y_m))
             }),
-            departed_s: truth
-                .iter()
-                .find(|tick| mission.start.at.distance(DVec2::new(tick.x, tick.y)) >= DEPARTED_M)
-                .map(|tick| tick.time_s),
+            departed_s: departed_s(mission, truth),
             stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
             full_solves: heard.solves_until(guidance),
@@ -245,6 +242,14 @@ impl fmt::Display for Summary {
         }
         Ok(())
     }
+}
+
+/// Returns the time at which the robot had left its start.
+pub fn departed_s(mission: &Mission, truth: &[GroundTruthTick]) -> Option<f64> {
+    let start = mission.start.at;
+    let has_left =
+        |tick: &&GroundTruthTick| start.distance(DVec2::new(tick.x, tick.y)) >= DEPARTED_M;
+    truth.iter().find(has_left).map(|tick| tick.time_s)
 }
 
 /// Returns the length of the straight lines from the start over the targets, without replaced ones,

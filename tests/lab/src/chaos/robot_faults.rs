@@ -14,7 +14,6 @@ use crate::{error::Result, simulate::quietly};
 
 /// Least time from the departure to the fault, and width of the random range.
 const FAULT_AFTER_S: (f64, f64) = (1.0, 4.0);
-const DEPARTED_M: f64 = 0.1;
 /// Watch time of a faulty robot: several times as long as it may move.
 const WATCHED: Duration = Duration::from_secs(10);
 /// Watch time of a faulty robot that may go on: until arrival, when it can report a wrong place.
@@ -131,10 +130,7 @@ impl Healthy {
     fn drive(mission: &Mission, seed: u64) -> Self {
         let scenario = Scenario::calm(&Mission { seed, ..mission.clone() });
         let truth = scenario.run().truth;
-        let start = mission.start.at;
-        let departed =
-            truth.iter().find(|tick| (tick.x - start.x).hypot(tick.y - start.y) >= DEPARTED_M);
-        let departed_s = departed.map(|tick| tick.time_s);
+        let departed_s = summary::departed_s(mission, &truth);
         let ended_s = truth.last().map_or(0.0, |tick| tick.time_s);
         Self { scenario, departed_s, ended_s }
     }
