@@ -69,10 +69,10 @@ impl Json {
             scan.stamp_ns = stamp_ns.map(|stamp_ns| stamp_ns + scan.sweep.first_beam_ns);
         }
         let touched = report.touched.iter().map(|(name, feels)| {
-            let row = self.touches.iter().position(|row| row.name == *name);
-            Ok((row.ok_or_else(|| format!("no row of robot.touch is named {name:?}"))?, *feels))
+            let names = self.touches.iter().map(|row| &row.name);
+            Ok((row_of(["touched", name], "robot.touch", names)?, *feels))
         });
-        let touched = touched.collect::<Result<Vec<_>, String>>()?;
+        let touched = touched.collect::<Result<Vec<_>, Refusal>>()?;
         let turned = match (report.wheels, report.odometry) {
             (Some(_), Some(_)) => {
                 return Err("wheels and odometry are both given; send one of them".into());
@@ -123,18 +123,8 @@ impl Json {
         ranges: &BTreeMap<String, Option<f64>>,
     ) -> Result<Vec<RangeReading>, Refusal> {
         let reading = |(name, range): (&String, &Option<f64>)| {
-            let row = self.table.iter().position(|sensor| sensor.name == *name);
-            let row = row.ok_or_else(|| {
-                let names: Vec<_> = self.table.iter().map(|sensor| sensor.name.as_str()).collect();
-                Refusal {
-                    input: format!("ranges.{name}"),
-                    what: format!("no sensor is named {name:?}"),
-                    remedy: format!(
-                        "rename it to one of {}, or rename the row in robot.sensor",
-                        names.join(", ")
-                    ),
-                }
-            })?;
+            let names = self.table.iter().map(|sensor| &sensor.name);
+            let row = row_of(["ranges", name], "robot.sensor", names)?;
             Ok(range_reading(row, &self.table[row], *range))
         };
         ranges.iter().map(reading).collect()
@@ -152,12 +142,25 @@ impl Json {
             scan_of(laser, beams, [report.scan_age_s, report.scan_time_s])
         });
         let named = report.scans.iter().map(|(name, Scan { ranges, age_s, time_s })| {
-            let laser = self.lasers.iter().find(|(_, sensor)| sensor.name == *name);
-            let laser = laser.ok_or_else(|| format!("no laser is named {name:?}; rename it in \"scans\", or rename the row in robot.sensor"))?;
+            let names = self.lasers.iter().map(|(_, sensor)| &sensor.name);
+            let laser = &self.lasers[row_of(["scans", name], "robot.sensor", names)?];
             scan_of(laser, ranges, [*age_s, *time_s])
         });
         only.into_iter().chain(named).collect()
     }
+}
+
+/// Returns the place of a reported name among `names` of a table of the mission.
+fn row_of<'a>(
+    [key, name]: [&str; 2],
+    table: &str,
+    names: impl Iterator<Item = &'a String> + Clone,
+) -> Result<usize, Refusal> {
+    names.clone().position(|known| known == name).ok_or_else(|| Refusal {
+        input: format!("{key}.{name}"),
+        what: format!("no row of {table} is named {name:?}"),
+        remedy: format!("send one of the names {:?}, or rename a row", names.collect::<Vec<_>>()),
+    })
 }
 
 fn scan_of(
@@ -310,7 +313,10 @@ mod tests {
     #[test]
     fn a_range_of_no_sensor_and_a_motion_without_speeds_are_refused_with_the_remedy() {
         for (said, why) in [
-            (r#"{"ranges":{"nose":1}}"#, "no sensor is named \"nose\"; rename it to one of front,"),
+            (
+                r#"{"ranges":{"nose":1}}"#,
+                "no row of robot.sensor is named \"nose\"; send one of the names [\"front\",",
+            ),
             (r#"{"wheels":[0,0]}"#, "lack speeds"),
             (r#"{"wheels":[0,0],"odometry":[0,0,0],"speeds":[0,0]}"#, "send one of them"),
             (r#"{"odometry":[1e300,0,0],"speeds":[0,0]}"#, "odometry is out of range"),
@@ -433,7 +439,10 @@ mod tests {
         );
         for (said, why) in [
             (r#"{"scan":[1,2,3]}"#, "by the names of rows"),
-            (r#"{"scans":{"left":{"ranges":[1,2,3]}}}"#, "no laser is named \"left\""),
+            (
+                r#"{"scans":{"left":{"ranges":[1,2,3]}}}"#,
+                "no row of robot.sensor is named \"left\"; send one of the names [\"front\"",
+            ),
             (r#"{"scans":{"back":{"ranges":[1,2]}}}"#, "\"back\" has 3"),
         ] {
             assert!(refuses(&heard(&mut driver, said), why), "{said}");
@@ -446,7 +455,7 @@ mod tests {
         let said = r#"{"touched":{"bumper-right":true,"cliff-left":false}}"#;
         assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
         let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#);
-        assert!(refuses(&refused, "no row of robot.touch is named \"nose\""), "{refused:?}");
+        assert!(refuses(&refused, "named \"nose\"; send one of the names [\"bump"), "{refused:?}");
     }
 
     #[test]
