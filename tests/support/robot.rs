@@ -98,6 +98,9 @@ fn suite_of(process: u32) -> String {
 }
 
 fn remove_ended_suites() {
+    let entries = ["/tmp", "/dev/shm"].map(|directory| fs::read_dir(directory).unwrap().flatten());
+    let entries: Vec<_> = entries.into_iter().flatten().collect();
+    // Read after the files, so that it contains every suite that has any.
     let run = processes("").into_iter().map(|(pid, _)| suite_of(pid)).collect::<Vec<_>>();
     let left = |name: &str| {
         let name = name.strip_prefix("firsthand-").or_else(|| name.strip_prefix("fh"))?;
@@ -105,8 +108,7 @@ fn remove_ended_suites() {
         let whole = name.len() == 5 || name.as_bytes()[5] == b'_';
         (whole && !run.iter().any(|running| running == suite)).then_some(())
     };
-    let entries = ["/tmp", "/dev/shm"].map(|directory| fs::read_dir(directory).unwrap().flatten());
-    for entry in entries.into_iter().flatten() {
+    for entry in entries {
         if entry.file_name().to_str().and_then(left).is_some() {
             let path = entry.path();
             // Another suite may remove it meanwhile, and another user's cannot be removed.
