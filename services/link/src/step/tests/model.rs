@@ -89,7 +89,6 @@ struct Supervisor {
 
 struct World {
     link: Link,
-    admitted: Admitted,
     now_ns: u64,
     is_marked: bool,
     supervisor: Supervisor,
@@ -112,10 +111,6 @@ fn started(now_ns: u64, next_tick: u64) -> Link {
     let mut link = super::started(&MISSION, Pace::Rate(1.0), next_tick);
     link.now = MissionTime(now_ns);
     link
-}
-
-fn admitted(process: u32) -> Admitted {
-    Admitted::of(DIRECTIVE.spec(), Some(&Writers::of(process)))
 }
 
 /// Copies a link. Whole datagrams leave nothing in a driver that a stop depends on.
@@ -141,7 +136,6 @@ impl Clone for World {
     fn clone(&self) -> Self {
         Self {
             link: copy(&self.link),
-            admitted: admitted(self.supervisor.process),
             supervisor: self.supervisor.clone(),
             history: self.history.clone(),
             ..*self
@@ -154,7 +148,6 @@ impl World {
         let supervisor = Supervisor { process: 1, is_starting: true, ..Supervisor::default() };
         let mut world = Self {
             link: started(BEGAN_NS, 0),
-            admitted: admitted(1),
             now_ns: BEGAN_NS,
             is_marked: false,
             supervisor,
@@ -228,7 +221,9 @@ impl World {
     }
 
     fn order(&mut self, process: u32, order: Order, reason: HoldReason) {
-        if self.admitted.admits(Author { process, generation: u32::MAX }).unwrap() {
+        let own = Writers::of(self.supervisor.process);
+        let mut admitted = Admitted::of(DIRECTIVE.spec(), Some(&own));
+        if admitted.admits(Author { process, generation: u32::MAX }).unwrap() {
             self.give(Event::Order(order, reason));
         }
     }
@@ -274,7 +269,8 @@ impl World {
         }
     }
 
-    fn happen(&mut self, what: Happens) -> bool {
+    /// Returns None if that cannot happen now.
+    fn happen(&mut self, what: Happens) -> Option<()> {
         self.history.push(what);
         match what {
             Tick => self.tick(),
@@ -292,23 +288,15 @@ impl World {
                 self.supervisor.asked_resume = Some(self.asked_ns());
                 self.give(Event::Operator(Request::Resume));
             }
-            SupervisorHearsStop => match self.supervisor.asked_stop.take() {
-                Some(asked_ns) => {
-                    self.supervisor.operator_stop |= asked_ns >= self.supervisor.resumed_ns;
-                }
-                None => return false,
-            },
-            SupervisorHearsResume => match self.supervisor.asked_resume.take() {
-                Some(asked_ns) => {
-                    self.supervisor.operator_stop = false;
-                    self.supervisor.resumed_ns = asked_ns;
-                }
-                None => return false,
-            },
-            OldCommand => match self.old {
-                Some(old) => drop(self.give(Event::Command(old))),
-                None => return false,
-            },
+            SupervisorHearsStop => {
+                let asked_ns = self.supervisor.asked_stop.take()?;
+                self.supervisor.operator_stop |= asked_ns >= self.supervisor.resumed_ns;
+            }
+            SupervisorHearsResume => {
+                self.supervisor.resumed_ns = self.supervisor.asked_resume.take()?;
+                self.supervisor.operator_stop = false;
+            }
+            OldCommand => drop(self.give(Event::Command(self.old?))),
             LinkRestarts => self.restart_link(),
             SupervisorRestarts => {
                 // Its bus and link restart, and it remembers the operator's stop alone.
@@ -319,7 +307,6 @@ impl World {
                     operator_stop,
                     ..Supervisor::default()
                 };
-                self.admitted = admitted(process + 1);
                 self.restart_link();
             }
             SecondSupervisor => {
@@ -328,9 +315,9 @@ impl World {
                     self.order(other, Order::Drive, HoldReason::None);
                 }
             }
-            CauseBegins | CauseEnds | Resume => return false,
+            CauseBegins | CauseEnds | Resume => return None,
         }
-        true
+        Some(())
     }
 
     /// Returns distinct times for simultaneous requests.
@@ -379,25 +366,12 @@ impl World {
             (self.is_marked, supervisor.is_starting, supervisor.operator_stop, asked, in_order),
             (self.is_stopped, supervisor.said, held_ns.map(|ns| ns.min(self.cause.1 * MS + 1))),
         );
-        let text = format!("{state:?}");
-        let mut key = String::with_capacity(text.len());
-        let mut digits = String::new();
-        for letter in text.chars().chain([' ']) {
-            if letter.is_ascii_digit() {
-                digits.push(letter);
-                continue;
-            }
-            match digits.parse::<u64>() {
-                Ok(number) if number >= BEGAN_NS => {
-                    let age_ns = self.now_ns.saturating_sub(number).min(OLD_NS);
-                    key.push_str(&age_ns.to_string());
-                }
-                _ => key.push_str(&digits),
-            }
-            digits.clear();
-            key.push(letter);
-        }
-        key
+        let is_mark = |letter: char| !letter.is_alphanumeric();
+        let as_age = |word: &str| match word.trim_end_matches(is_mark).parse::<u64>() {
+            Ok(ns) if ns >= BEGAN_NS => format!("{} ", self.now_ns.saturating_sub(ns).min(OLD_NS)),
+            _ => word.to_owned(),
+        };
+        format!("{state:?}").split_inclusive(is_mark).map(as_age).collect()
     }
 }
 
@@ -405,13 +379,13 @@ fn explore(cause: (Cause, u64)) -> (usize, u64) {
     let first = World::new(cause);
     let mut seen = HashSet::from([first.key()]);
     let (mut newest, mut moved) = (vec![first], 0);
-    for depth in 0..DEPTH {
+    for _ in 0..DEPTH {
         let mut next = Vec::new();
         for world in newest {
             for what in ALL {
                 let mut world = world.clone();
                 let before = world.moved;
-                if world.happen(what) {
+                if world.happen(what).is_some() {
                     moved += world.moved - before;
                     if seen.insert(world.key()) {
                         next.push(world);
@@ -419,7 +393,6 @@ fn explore(cause: (Cause, u64)) -> (usize, u64) {
                 }
             }
         }
-        println!("{cause:?} {depth}: {} new, {} states", next.len(), seen.len());
         newest = next;
     }
     (seen.len(), moved)
