@@ -96,11 +96,8 @@ impl SpeedTrim {
 
 #[cfg(test)]
 mod tests {
-
-    use common::wire::COUNT_CYCLE;
-
     use super::*;
-    use crate::testing::{mission, near};
+    use crate::testing::*;
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
@@ -108,8 +105,7 @@ mod tests {
         let mut trim = SpeedTrim::new(&mission(""));
         let mut rolled = [0.0; 2];
         for tick in 0..ticks {
-            let counts = rolled.map(|counts: f64| counts.rem_euclid(COUNT_CYCLE.into()) as u16);
-            trim.rolled(counts.into(), tick as f64 * PERIOD_S);
+            trim.rolled(rolled.map(on_wire).into(), tick as f64 * PERIOD_S);
             let told = command(tick).map(|counts| counts / trim.share());
             trim.told(told.map(|counts| counts as i16));
             for (rolled, told) in rolled.iter_mut().zip(told) {
@@ -121,25 +117,27 @@ mod tests {
 
     #[test]
     fn slow_wheels_are_made_good_within_seconds_forward_and_on_the_spot() {
-        near(found(0.78, 28, |_| [600.0, 600.0]), 0.78, 0.02);
+        near(found(0.78, 28, |_| [600.0; 2]), 0.78, 0.02);
         near(found(0.78, 28, |_| [-600.0, 600.0]), 0.78, 0.02);
-        near(found(1.0, 28, |_| [600.0, 600.0]), 1.0, 0.01);
+        near(found(1.0, 28, |_| [600.0; 2]), 1.0, 0.01);
     }
 
     #[test]
     fn wheels_that_are_held_or_race_or_change_their_speed_change_nothing() {
-        let unchanged = |reached, command: fn(usize) -> [f64; 2]| {
-            assert!((found(reached, 50, command) - 1.0).abs() < 1e-9, "{reached}");
-        };
-        unchanged(0.0, |_| [600.0, 600.0]);
-        unchanged(-0.8, |_| [600.0, 600.0]);
-        unchanged(1.6, |_| [600.0, 600.0]);
-        unchanged(0.78, |_| [100.0, 100.0]);
-        unchanged(0.78, |tick| if tick % 2 == 0 { [600.0; 2] } else { [300.0; 2] });
+        for (reached, [even, odd]) in [
+            (0.0, [600.0; 2]),
+            (-0.8, [600.0; 2]),
+            (1.6, [600.0; 2]),
+            (0.78, [100.0; 2]),
+            (0.78, [600.0, 300.0]),
+        ] {
+            let found = found(reached, 50, |tick| [if tick % 2 == 0 { even } else { odd }; 2]);
+            assert_eq!(found, 1.0, "{reached} {even} {odd}");
+        }
     }
 
     #[test]
     fn no_command_grows_by_more_than_a_seventh_over_the_least_share() {
-        assert!(found(0.62, 200, |_| [600.0, 600.0]) >= LEAST_SHARE);
+        assert!(found(0.62, 200, |_| [600.0; 2]) >= LEAST_SHARE);
     }
 }

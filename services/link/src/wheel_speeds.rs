@@ -81,15 +81,14 @@ mod tests {
     use common::{kinematics::Twist, wire::COUNT_CYCLE};
 
     use super::*;
-    use crate::testing::mission;
+    use crate::testing::*;
 
     /// Returns a car's speeds if its steering encoder reads `counts`, at 7 Hz with 3600 counts per
     /// turn.
     fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
         let speeds = WheelSpeeds::new(&mission("robot.model = 'car'"));
-        let command = CommandSample { left_rad_s, right_rad_s: angle, ..CommandSample::default() };
         let wheels = WheelSample { right_counts: counts, ..WheelSample::default() };
-        speeds.of(&command, share, &wheels)
+        speeds.of(&turning(left_rad_s, angle), share, &wheels)
     }
 
     #[test]
@@ -118,12 +117,8 @@ mod tests {
         for (protocol, ratio) in [("json", 0.8), ("x80", 1.0)] {
             let speeds = WheelSpeeds::new(&mission(&format!("robot.protocol = '{protocol}'")));
             let top = speeds.body.top_rad_s();
-            let command = CommandSample {
-                left_rad_s: 0.8 * top,
-                right_rad_s: top,
-                ..CommandSample::default()
-            };
-            let [left, right] = speeds.of(&command, 1.25, &WheelSample::default()).map(f64::from);
+            let told = speeds.of(&turning(0.8 * top, top), 1.25, &WheelSample::default());
+            let [left, right] = told.map(f64::from);
             assert!((left / right - ratio).abs() < 0.01, "{protocol}: {left} {right}");
         }
     }
@@ -133,31 +128,26 @@ mod tests {
      {
         let mut speeds = WheelSpeeds::new(&mission("robot.model = 'kobuki'\nrobot.rate_hz = 10"));
         let drive = speeds.body.drive();
-        let mut tell = |v: f64, omega: f64| {
-            let [left_rad_s, right_rad_s] = drive.inputs(Twist { v, omega });
-            let command = CommandSample { left_rad_s, right_rad_s, ..CommandSample::default() };
-            let counts = speeds.of(&command, 1.0, &WheelSample::default());
+        let (r, w) = (speeds.body.wheel_radius_m, speeds.body.track_m);
+        // 1 m/s^2 and 2 rad/s^2 are 0.1 m/s and 0.2 rad/s per tick.
+        for (v, omega, reached_v, reached_omega) in [
+            (0.5, 0.0, 0.1, 0.0),
+            (0.5, 0.1, 0.2, 0.1),
+            // The curve of 0.5 m/s and 1 rad/s, at the turn rate reached.
+            (0.5, 1.0, 0.15, 0.3),
+            (0.5, -1.0, 0.1, -0.2),
+            (0.1, 0.0, 0.1, 0.0),
+            (0.0, 1.0, 0.0, 0.2),
+            (0.0, 0.0, 0.0, 0.0),
+            (f64::NAN, 0.0, 0.0, 0.0),
+        ] {
+            let [left, right] = drive.inputs(Twist { v, omega });
+            let counts = speeds.of(&turning(left, right), 1.0, &WheelSample::default());
             speeds.told(counts);
             let [left, right] = counts.map(|count| f64::from(count) / speeds.counts_per_radian());
-            let (r, w) = (speeds.body.wheel_radius_m, speeds.body.track_m);
-            [(right + left) * r / 2.0, (right - left) * r / w]
-        };
-        // Hundredths of m/s and rad/s.
-        let mut is = |said: [i32; 2], done: [i32; 2]| {
-            let [[v, omega], done] = [said, done].map(|it| it.map(|it| f64::from(it) / 100.0));
-            let [v, omega] = tell(v, omega);
-            let is_near = (v - done[0]).abs() < 1e-3 && (omega - done[1]).abs() < 5e-3;
-            assert!(is_near, "{said:?}: {v} {omega}");
-        };
-        // 1 m/s^2 and 2 rad/s^2 are 0.1 m/s and 0.2 rad/s per tick.
-        is([50, 0], [10, 0]);
-        is([50, 10], [20, 10]);
-        // The curve of 0.5 m/s and 1 rad/s, at the turn rate reached.
-        is([50, 100], [15, 30]);
-        is([50, -100], [10, -20]);
-        is([10, 0], [10, 0]);
-        is([0, 100], [0, 20]);
-        is([0, 0], [0, 0]);
-        assert_eq!(tell(f64::NAN, 0.0), [0.0; 2]);
+            let is = [(right + left) * r / 2.0, (right - left) * r / w];
+            let are_near = (is[0] - reached_v).abs() < 1e-3 && (is[1] - reached_omega).abs() < 5e-3;
+            assert!(are_near, "{v} {omega}: {is:?}");
+        }
     }
 }

@@ -257,19 +257,18 @@ impl Hearing {
 
 #[cfg(test)]
 mod tests {
+    use std::iter::repeat_n;
+
     use glam::DVec2;
 
     use super::*;
-    use crate::testing::mission;
+    use crate::testing::*;
 
-    fn reading(sensor: u8, range: Option<u8>) -> RangeReading {
-        let status = range.map_or(RangeStatus::Nothing, |_| RangeStatus::Measured);
-        let range_m = f64::from(range.unwrap_or_default()) / 100.0;
-        RangeReading { range_m, sensor, raw: 0, status: status.into() }
-    }
-
-    fn take(hearing: &mut Hearing, readings: &[RangeReading]) {
-        hearing.take(readings, Pose2::default(), 0.0);
+    /// Takes readings, centimetres, of these sensors.
+    fn take<const COUNT: usize>(hearing: &mut Hearing, ranges: [(u8, Option<u8>); COUNT]) {
+        let metres = |range: Option<u8>| range.map(|range| f64::from(range) / 100.0);
+        let readings = ranges.map(|(sensor, range)| reading(sensor, metres(range)));
+        hearing.take(&readings, Pose2::default(), 0.0);
     }
 
     /// Judges two sonars that approach a post of 0.1 m radius at (1.2, 0.1). The robot drives 2 cm
@@ -284,18 +283,14 @@ mod tests {
             let position = DVec2::new(0.02 * f64::from(tick.min(30)), 0.0);
             let heading = 0.3 * (0.4 * f64::from(tick)).sin();
             let robot = Pose2 { position, heading };
-            let readings: Vec<_> = (0..2)
-                .map(|sensor| {
-                    let from = hearing.sensors[&sensor].mount.on(robot);
-                    let half_rad = hearing.sensors[&sensor].field_of_view_deg.to_radians() / 2.0;
-                    let way = DVec2::new(1.2, 0.1) - from.position;
-                    let is_seen = way.dot(from.axis()) > half_rad.cos() * way.length();
-                    let hears = is_seen && is_heard(tick, sensor);
-                    let status = if hears { RangeStatus::Measured } else { RangeStatus::Nothing };
-                    let range_m = way.length() - 0.1;
-                    RangeReading { range_m, sensor, raw: 0, status: status.into() }
-                })
-                .collect();
+            let readings = [0, 1].map(|sensor| {
+                let from = hearing.sensors[&sensor].mount.on(robot);
+                let half_rad = hearing.sensors[&sensor].field_of_view_deg.to_radians() / 2.0;
+                let way = DVec2::new(1.2, 0.1) - from.position;
+                let is_seen = way.dot(from.axis()) > half_rad.cos() * way.length();
+                let hears = is_seen && is_heard(tick, sensor);
+                reading(sensor, hears.then_some(way.length() - 0.1))
+            });
             hearing.take(&readings, robot, 0.1 * f64::from(tick));
         }
         [false, true].map(|sure| hearing.judged(sure).is_some())
@@ -331,14 +326,10 @@ mod tests {
 
     fn judge(hearing: &mut Hearing, ranges: impl Iterator<Item = Option<u8>>) -> [bool; 2] {
         for range in ranges {
-            take(hearing, &[reading(3, range), reading(4, range)]);
+            take(hearing, [(3, range), (4, range)]);
             hearing.went(0.05);
         }
         [false, true].map(|sure| hearing.judged(sure).is_some())
-    }
-
-    fn frames(range: Option<u8>, count: usize) -> impl Iterator<Item = Option<u8>> {
-        std::iter::repeat_n(range, count)
     }
 
     #[test]
@@ -355,22 +346,26 @@ mod tests {
             (None, 500, [true, false]),
         ] {
             let before = if heard.is_some() { 60 } else { 0 };
-            let all = frames(heard, before).chain(frames(None, silent));
+            let all = repeat_n(heard, before).chain(repeat_n(None, silent));
             assert_eq!(judged(all), judgement, "{heard:?} {silent}");
         }
     }
 
     #[test]
     fn sensors_that_hear_only_whenever_the_robot_stands_are_deaf_until_it_is_resumed() {
-        let spell = || frames(Some(79), 60).chain(frames(None, 9));
-        let hears = || frames(Some(50), 9);
+        let spell = || repeat_n(Some(79), 60).chain(repeat_n(None, 9));
+        let hears = || repeat_n(Some(50), 9);
         assert_eq!(judged(spell().chain(spell()).chain(hears())), [false, false]);
         assert_eq!(judged(spell().chain(spell()).chain(spell()).chain(hears())), [true, true]);
     }
 
     /// Readings, centimetres, of the front sonar and of the rangers at 11.25 and -11.25 degrees.
-    fn front(front: Option<u8>, left: Option<u8>, right: Option<u8>) -> [RangeReading; 3] {
-        [reading(0, front), reading(4, left), reading(5, right)]
+    const fn front(
+        front: Option<u8>,
+        left: Option<u8>,
+        right: Option<u8>,
+    ) -> [(u8, Option<u8>); 3] {
+        [(0, front), (4, left), (5, right)]
     }
 
     #[test]
@@ -387,7 +382,7 @@ mod tests {
         ] {
             let mut hearing = Hearing::of(&mission(""));
             let first = (1..50).find(|_| {
-                take(&mut hearing, &front(None, Some(left), right));
+                take(&mut hearing, front(None, Some(left), right));
                 hearing.judged(true).is_some()
             });
             assert_eq!(first, is_implausible.then_some(5), "{left} {right:?}");
@@ -399,10 +394,10 @@ mod tests {
         for over in [front(Some(30), Some(30), Some(30)), front(None, None, Some(30))] {
             let mut hearing = Hearing::of(&mission(""));
             for _ in 0..6 {
-                take(&mut hearing, &front(None, Some(30), Some(30)));
+                take(&mut hearing, front(None, Some(30), Some(30)));
             }
             assert!(hearing.judged(true).is_some());
-            take(&mut hearing, &over);
+            take(&mut hearing, over);
             assert!(hearing.judged(true).is_none());
         }
     }

@@ -111,35 +111,27 @@ impl Monitor for LatencyMonitor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::mission;
+    use crate::testing::*;
 
-    const MS: u64 = 1_000_000;
-
-    fn observe(monitor: &mut LatencyMonitor, what: Observation<'_>, at_ms: u64) {
-        // At half the pace of the clock.
-        let now = Moment { machine_ns: 2 * at_ms * MS, ..Moment::default() };
-        monitor.observe(&what, now);
-    }
-
-    fn may_be_late(monitor: &LatencyMonitor) -> bool {
-        monitor.condition(Cause::RobotLate, Moment::default()) == Condition::Holds
-    }
-
-    /// Returns the monitor of a robot found at 10 s after commands every 70 ms, acknowledged after
-    /// `delay_ms`. Then nothing is sent for `quiet_ms`.
-    fn found(delay_ms: u64, quiet_ms: u64) -> LatencyMonitor {
+    /// Returns whether a robot may be late that was found at 10 s after commands every 70 ms,
+    /// acknowledged after `delay_ms`. Then nothing is sent for `quiet_ms`.
+    fn may_be_late(delay_ms: u64, quiet_ms: u64) -> bool {
         let mut monitor = LatencyMonitor::new(&mission(""));
-        observe(&mut monitor, Observation::Pace(Pace::Rate(0.5)), 10_000);
-        observe(&mut monitor, Observation::Sent, 10_000);
-        observe(&mut monitor, Observation::Found { again: true }, 10_000);
-        let last_acknowledged = delay_ms.min(quiet_ms);
+        // At half the pace of the clock.
+        let mut take = |what: Observation<'_>, ms: u64| {
+            let machine_ns = 2 * (10_000 + ms) * MS;
+            monitor.observe(&what, Moment { machine_ns, ..Moment::default() });
+        };
+        take(Observation::Pace(Pace::Rate(0.5)), 0);
+        take(Observation::Sent, 0);
+        take(Observation::Found { again: true }, 0);
         for now in (0..=quiet_ms).step_by(70) {
-            if now <= last_acknowledged {
-                observe(&mut monitor, Observation::Acknowledged, 10_000 + now);
+            if now <= delay_ms {
+                take(Observation::Acknowledged, now);
             }
-            observe(&mut monitor, Observation::Time, 10_000 + now);
+            take(Observation::Time, now);
         }
-        monitor
+        monitor.condition(Cause::RobotLate, Moment::default()) == Condition::Holds
     }
 
     #[test]
@@ -147,7 +139,7 @@ mod tests {
         for (delay_ms, quiet_ms, is_late) in
             [(20, 300, true), (20, 700, false), (200, 700, false), (2000, 700, true)]
         {
-            assert_eq!(may_be_late(&found(delay_ms, quiet_ms)), is_late, "{delay_ms} {quiet_ms}");
+            assert_eq!(may_be_late(delay_ms, quiet_ms), is_late, "{delay_ms} {quiet_ms}");
         }
     }
 }

@@ -327,48 +327,36 @@ impl Monitor for Range {
 
 #[cfg(test)]
 mod tests {
-
-    use common::clock::MissionTime;
-
     use super::*;
-    use crate::testing::{mission, near};
+    use crate::testing::*;
 
     /// Returns the first tick at which a sensor with these readings, centimetres, is implausible,
     /// with wheel travel per tick.
     fn implausible_at(
         sensor: u8,
         wheels_cm: [i16; 2],
-        reading: impl Fn(u32) -> u16,
+        range_cm: impl Fn(u32) -> u16,
     ) -> Option<u32> {
         let mission = mission("");
         let mut monitor = Range::new(&mission);
         let per_count = mission.body().metres_per_count();
         (0..200).find(|&tick| {
-            let time = MissionTime::from_seconds(f64::from(tick) / 7.0);
-            let now = Moment { time, machine_ns: time.0 };
-            let turned = wheels_cm
-                .map(|way| (0.01 * f64::from(way) * f64::from(tick) / per_count).round() as i32);
-            let counts = turned.map(|counts| counts.rem_euclid(32_768) as u16);
+            let now = Moment { time: at(f64::from(tick) / 7.0), ..Moment::default() };
+            let turned = |cm: i16| 0.01 * f64::from(cm) * f64::from(tick) / per_count;
+            let counts = wheels_cm.map(|cm| on_wire(turned(cm).round()));
             monitor.observe(&Observation::Motor(counts.into(), Counts::Follow), now);
-            let of = |sensor: u8, cm: u16| {
-                let status = if cm == 255 { RangeStatus::Nothing } else { RangeStatus::Measured };
-                RangeReading {
-                    range_m: f64::from(cm) / 100.0,
-                    raw: cm,
-                    sensor,
-                    status: status.into(),
-                }
-            };
+            let of =
+                |sensor: u8, cm: u16| reading(sensor, (cm != 255).then_some(f64::from(cm) / 100.0));
             let beside = of((sensor + 1) % 3, 20 + 9 * (tick % 2) as u16);
-            monitor.observe(&Observation::Readings(&[beside, of(sensor, reading(tick))]), now);
+            monitor.observe(&Observation::Readings(&[beside, of(sensor, range_cm(tick))]), now);
             monitor.condition(Cause::RangeImplausible, now) == Condition::Holds
         })
     }
 
-    type Reading = fn(u32) -> u16;
+    type RangeCm = fn(u32) -> u16;
 
     #[track_caller]
-    fn judged(rows: &[(u8, [i16; 2], Reading, Option<u32>)]) {
+    fn judged(rows: &[(u8, [i16; 2], RangeCm, Option<u32>)]) {
         for (row, &(sensor, wheels_cm, reading, expected)) in rows.iter().enumerate() {
             assert_eq!(implausible_at(sensor, wheels_cm, reading), expected, "row {row}");
         }
@@ -424,9 +412,7 @@ mod tests {
     fn the_words_count_the_readings_that_are_equal_and_not_those_that_come_near() {
         let mut row = Row::of(0, mission("").sensor_table().remove(0), 0);
         for tick in 0..12 {
-            let range_m = if tick == 0 { 1.05 } else { 1.0 };
-            let status = RangeStatus::Measured.into();
-            let reading = RangeReading { range_m, status, ..RangeReading::default() };
+            let reading = reading(0, Some(if tick == 0 { 1.05 } else { 1.0 }));
             row.take(&reading, [0.05 * f64::from(tick), 0.0, 0.0], Moment::default());
         }
         assert!(row.words.contains("within 0 cm in 11 frames"), "{}", row.words);
@@ -442,16 +428,13 @@ mod tests {
 
     #[test]
     fn the_explanation_is_that_of_the_judge_that_holds_and_not_of_one_that_only_doubts() {
-        let mission = mission("");
-        let mut monitor = Range::new(&mission);
-        let now = Moment::default();
-        let nothing = RangeReading { status: RangeStatus::Nothing.into(), ..Default::default() };
+        let (mut monitor, now) = (Range::new(&mission("")), Moment::default());
         for _ in 0..100 {
-            monitor.hearing.take(&[nothing], Pose2::default(), 0.0);
+            monitor.hearing.take(&[reading(0, None)], Pose2::default(), 0.0);
             monitor.hearing.went(0.05);
         }
-        for (row, implausible) in [[Some(now); 2], [Some(now), None]].into_iter().enumerate() {
-            monitor.rows[row].implausible = implausible;
+        for (row, second) in [Some(now), None].into_iter().enumerate() {
+            monitor.rows[row].implausible = [Some(now), second];
             monitor.rows[row].words = format!("sensor {row}");
         }
         let explain = |cause| monitor.explain(cause, now).unwrap();
@@ -461,12 +444,11 @@ mod tests {
 
     #[test]
     fn a_car_turns_by_its_steering() {
-        let mission = mission("robot.model = 'car'");
-        let mut monitor = Range::new(&mission);
+        let mut monitor = Range::new(&mission("robot.model = 'car'"));
         // A wheel of 0.04 m rolls half a turn. 300 of 3600 counts are 30 degrees right; the
         // wheelbase is 0.18 m.
         for left in [0, 300] {
-            monitor.turn([left, 32_768 - 300].into(), MissionTime::default());
+            monitor.turn([left, on_wire(-300.0)].into(), at(0.0));
         }
         let way_m = 0.04 * std::f64::consts::PI;
         let turn_rad = -way_m * 30_f64.to_radians().tan() / 0.18;

@@ -199,10 +199,8 @@ impl RangeMotion {
 mod tests {
     use std::ops::Range;
 
-    use common::clock::MissionTime;
-
     use super::*;
-    use crate::testing::mission;
+    use crate::testing::*;
 
     /// Returns the least range in a field of view to the post at (1, 0) or the wall at y = 0.7.
     fn range(sensor: &Sensor, robot: Pose2) -> Option<f64> {
@@ -233,16 +231,13 @@ mod tests {
             let pose = poses[poses.len() - 1]
                 .along_arc(0.04 * (at_s * 0.9).cos(), 0.1 * (at_s * 0.7).cos());
             poses.push(pose);
-            by_wheels.robot_is(pose, MissionTime::from_seconds(at_s));
+            by_wheels.robot_is(pose, at(at_s));
             let late = if during.contains(&tick) { late } else { 0 };
             let then = poses[poses.len().saturating_sub(1 + late)];
             let readings: Vec<_> = (0..)
                 .zip(&table)
                 .filter(|(sensor, _)| rows.contains(sensor))
-                .filter_map(|(sensor, it)| {
-                    let status = RangeStatus::Measured.into();
-                    Some(RangeReading { range_m: range(it, then)?, sensor, raw: 0, status })
-                })
+                .filter_map(|(sensor, it)| Some(reading(sensor, Some(range(it, then)?))))
                 .collect();
             motion.take(&readings, &by_wheels, at_s);
         }

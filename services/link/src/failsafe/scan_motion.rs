@@ -154,15 +154,13 @@ impl ScanMotion {
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
-    use crate::testing::mission;
+    use crate::testing::*;
 
-    fn range(at: DVec2, bearing: f64) -> f64 {
+    /// Returns the range to the walls at x = 3 and -3 and at y = 2 and -2.
+    fn range(from: DVec2, bearing: f64) -> f64 {
         let axis = DVec2::from_angle(bearing);
-        let walls = [3.0, 2.0].into_iter().zip([(at.x, axis.x), (at.y, axis.y)]);
-        let hits = walls.map(|(half, (from, along))| (half * f64::signum(along) - from) / along);
-        hits.fold(f64::INFINITY, f64::min)
+        ((DVec2::new(3.0, 2.0) * axis.signum() - from) / axis).min_element()
     }
 
     /// Judges 10 Hz scans for 6 s of alternate driving and turning; `seen` maps the present index
@@ -185,7 +183,7 @@ mod tests {
             };
             scans.push((0..sensor.beams).map(beam).collect::<Vec<_>>());
             let at_s = tick as f64 * 0.1;
-            poses.robot_is(pose, MissionTime::from_seconds(at_s));
+            poses.robot_is(pose, at(at_s));
             let beams = scans[seen(tick)].clone();
             motion.take(&LaserScan { row, beams, ..LaserScan::default() }, &poses, at_s);
         }

@@ -2,7 +2,7 @@ use super::{
     monitor::{Condition, Counts},
     *,
 };
-use crate::testing::{mission, near};
+use crate::testing::*;
 use common::{
     clock::{MissionTime, Pace},
     driver::{Commander, counts::WheelCounts},
@@ -10,12 +10,13 @@ use common::{
     samples::{CommandSample, HoldReason, Order, RangeReading, RangeStatus, Stamp},
 };
 
-const MS: u64 = 1_000_000;
 const LIMIT_MS: u64 = 250;
 const SILENT_MS: u64 = 3 * LIMIT_MS;
 /// Just over the age limit of inputs, nanoseconds.
 const STALE: u64 = LIMIT_MS * MS + 1;
 const LATE: Response = Response { delay_s: 0.3, ..Response::X80 };
+const DRIVE: Observation<'_> = Observation::Directive(Order::Drive, HoldReason::None);
+const FOUND: Observation<'_> = Observation::Found { again: false };
 
 fn front_only() -> Mission {
     mission("sensors = 'front'")
@@ -36,11 +37,6 @@ fn command(ns_ago: [u64; 3]) -> CommandSample {
     CommandSample { stamp, pose_ns, guidance_ns, ..CommandSample::default() }
 }
 
-fn front(status: RangeStatus, raw: u16) -> [RangeReading; 1] {
-    let range_m = f64::from(raw) / 100.0;
-    [RangeReading { range_m, status: status.into(), raw, ..RangeReading::default() }]
-}
-
 const fn boards(volts: f64) -> Observation<'static> {
     Observation::Batteries([volts, 0.0, 0.0])
 }
@@ -54,8 +50,16 @@ impl Failsafe {
         self.observe(&what, ago(ms_ago * MS));
     }
 
-    fn directive(&mut self, order: Order, reason: HoldReason) {
-        self.sees(Observation::Directive(order, reason), 0);
+    fn is_held(&mut self, reason: HoldReason) {
+        self.sees(Observation::Directive(Order::Hold, reason), 0);
+    }
+
+    fn takes_command(&mut self, ns_ago: [u64; 3]) {
+        self.sees(Observation::Command(&command(ns_ago)), 0);
+    }
+
+    fn loses_the_robot(&mut self) {
+        self.monitors.presence.lose(now().machine_ns);
     }
 
     fn jumps(&mut self, ms_ago: u64) {
@@ -77,23 +81,14 @@ impl Failsafe {
         self.frames((1..=30).map(|frame| 50 * frame), 4000);
     }
 
-    /// Drives with these front readings and wheel counts in each of ten ticks.
-    fn ranges(&mut self, reading: impl Fn(u16) -> u16, counts_per_tick: u16) {
+    /// Drives with these front ranges and wheel counts in each of ten ticks.
+    fn ranges(&mut self, range_cm: impl Fn(u16) -> u16, counts_per_tick: u16) {
         for tick in 0..10 {
-            let reading = front(RangeStatus::Measured, reading(tick));
+            let reading = [reading(0, Some(f64::from(range_cm(tick)) / 100.0))];
             for what in [Observation::Readings(&reading), counts(counts_per_tick * tick)] {
                 self.monitors.range.observe(&what, now());
             }
         }
-    }
-
-    fn fresh(&mut self, newest: Option<[u64; 3]>) {
-        let mut staleness = staleness::Staleness::new(&front_only());
-        staleness.observe(&Observation::Pace(Pace::Rate(1.0)), now());
-        if let Some(ns_ago) = newest {
-            staleness.observe(&Observation::Command(&command(ns_ago)), now());
-        }
-        self.monitors.staleness = staleness;
     }
 
     fn decides(&mut self) -> Decision {
@@ -109,18 +104,12 @@ impl Failsafe {
 fn well() -> Failsafe {
     let mut failsafe = Failsafe::new(&front_only());
     failsafe.monitors.presence.heard(now().machine_ns);
-    let supervisor_silent = ago(orders::SUPERVISOR_SILENT.as_nanos() as u64);
-    let frame = ago(SILENT_MS * MS - 1);
-    for (what, when) in [
-        (Observation::Pace(Pace::Rate(1.0)), now()),
-        (Observation::Directive(Order::Drive, HoldReason::None), supervisor_silent),
-        (Observation::Found { again: false }, frame),
-        (boards(7.2), frame),
-        (Observation::Readings(&front(RangeStatus::Nothing, 255)), frame),
-        (Observation::Command(&command([LIMIT_MS * MS; 3])), now()),
-    ] {
-        failsafe.observe(&what, when);
+    failsafe.sees(Observation::Pace(Pace::Rate(1.0)), 0);
+    failsafe.observe(&DRIVE, ago(orders::SUPERVISOR_SILENT.as_nanos() as u64));
+    for what in [FOUND, boards(7.2), Observation::Readings(&[reading(0, None)])] {
+        failsafe.observe(&what, ago(SILENT_MS * MS - 1));
     }
+    failsafe.takes_command([LIMIT_MS * MS; 3]);
     failsafe
 }
 
@@ -142,46 +131,36 @@ const fn commander(moves: bool) -> Observation<'static> {
 
 /// Omits infrared-1, which looks into the front sonar's cone.
 fn without_an_infrared_ranger(failsafe: &mut Failsafe) {
-    let status = RangeStatus::Nothing.into();
-    let valid = |sensor| RangeReading { sensor, status, ..RangeReading::default() };
-    let readings: Vec<_> = (0..10).filter(|sensor| *sensor != 4).map(valid).collect();
-    failsafe.monitors.streams = streams::Streams::new(&mission(""));
-    failsafe.sees(Observation::Found { again: false }, 0);
+    let readings: Vec<_> = [0, 1, 2, 3, 5, 6, 7, 8, 9].map(|sensor| reading(sensor, None)).into();
+    failsafe.monitors.streams = Monitor::new(&mission(""));
+    failsafe.sees(FOUND, 0);
     failsafe.sees(Observation::Readings(&readings), 0);
 }
 
 /// Sole change that leads to each cause.
 const CASES: &[(Break, Cause)] = &[
-    (|it| it.directive(Order::Stop, HoldReason::Ending), Cause::MissionOver),
+    (|it| it.sees(Observation::Directive(Order::Stop, HoldReason::Ending), 0), Cause::MissionOver),
     (|it| [2000, 0].into_iter().for_each(|ms| it.sees(boards(5.9), ms)), Cause::BatteryEmpty),
     (|it| it.jumps(10_000), Cause::OdometryGivenUp),
     (|it| it.sees(commander(true), 0), Cause::AnotherCommander),
     (Failsafe::does_not_stop, Cause::RobotDoesNotStop),
-    (|it| it.directive(Order::Hold, HoldReason::Operator), Cause::OperatorStop),
-    (|it| it.directive(Order::Hold, HoldReason::StageHeld), Cause::StageHeld),
+    (|it| it.is_held(HoldReason::Operator), Cause::OperatorStop),
+    (|it| it.is_held(HoldReason::StageHeld), Cause::StageHeld),
     (|it| it.monitors.orders = Monitor::new(&front_only()), Cause::NotOrdered),
-    (|it| it.directive(Order::Hold, HoldReason::Starting), Cause::NotOrdered),
-    (|it| it.directive(Order::Hold, HoldReason::None), Cause::NotOrdered),
-    (|it| it.directive(Order::Hold, HoldReason::Ending), Cause::NotOrdered),
+    (|it| it.is_held(HoldReason::Starting), Cause::NotOrdered),
+    (|it| it.is_held(HoldReason::None), Cause::NotOrdered),
+    (|it| it.is_held(HoldReason::Ending), Cause::NotOrdered),
     (
-        |it| {
-            let silent = orders::SUPERVISOR_SILENT.as_nanos() as u64 + 1;
-            it.observe(&Observation::Directive(Order::Drive, HoldReason::None), ago(silent));
-        },
+        |it| it.observe(&DRIVE, ago(orders::SUPERVISOR_SILENT.as_nanos() as u64 + 1)),
         Cause::SupervisorSilent,
     ),
-    (
-        |it| {
-            it.monitors.presence.lose(now().machine_ns);
-        },
-        Cause::RobotLost,
-    ),
+    (Failsafe::loses_the_robot, Cause::RobotLost),
     (|it| it.sees(Observation::Found { again: true }, 0), Cause::RobotLate),
-    (|it| it.sees(Observation::Found { again: false }, SILENT_MS), Cause::FramesSilent),
+    (|it| it.sees(FOUND, SILENT_MS), Cause::FramesSilent),
     (
         |it| {
-            for frame in 0..10 {
-                it.monitors.streams.observe(&counts(0), ago(300 * (9 - frame) * MS));
+            for frame in (0..10).rev() {
+                it.monitors.streams.observe(&counts(0), ago(300 * frame * MS));
             }
         },
         Cause::FramesSlow,
@@ -190,7 +169,7 @@ const CASES: &[(Break, Cause)] = &[
     (wheels_are_held, Cause::WheelsHeld),
     (
         |it| {
-            it.monitors.touch = touch::Touches::new(&mission("robot.model = 'kobuki'"));
+            it.monitors.touch = Monitor::new(&mission("robot.model = 'kobuki'"));
             it.monitors.touch.observe(&Observation::Commanded([100; 2]), now());
             it.sees(Observation::Touched(&[(0, true)]), 0);
         },
@@ -198,18 +177,19 @@ const CASES: &[(Break, Cause)] = &[
     ),
     (
         |it| {
-            it.sees(Observation::Readings(&front(RangeStatus::Nothing, 255)), SILENT_MS);
-            it.sees(Observation::Readings(&front(RangeStatus::Invalid, 0)), 0);
+            it.sees(Observation::Readings(&[reading(0, None)]), SILENT_MS);
+            let status = RangeStatus::Invalid.into();
+            it.sees(Observation::Readings(&[RangeReading { status, ..reading(0, None) }]), 0);
         },
         Cause::RangeSilent,
     ),
     (|it| it.ranges(|_| 100, 200), Cause::RangeImplausible),
     (|it| it.ranges(|tick| 100 + 6 * (tick % 2), 120), Cause::RangeDoubtful),
-    (|it| it.fresh(None), Cause::CommandStale),
-    (|it| it.fresh(Some([STALE, 0, 0])), Cause::CommandStale),
-    (|it| it.fresh(Some([0, STALE, 0])), Cause::PoseStale),
-    (|it| it.fresh(Some([0, now().machine_ns, 0])), Cause::PoseStale),
-    (|it| it.fresh(Some([0, 0, STALE])), Cause::GuidanceStale),
+    (|it| it.monitors.staleness = Monitor::new(&front_only()), Cause::CommandStale),
+    (|it| it.takes_command([STALE, 0, 0]), Cause::CommandStale),
+    (|it| it.takes_command([0, STALE, 0]), Cause::PoseStale),
+    (|it| it.takes_command([0, now().machine_ns, 0]), Cause::PoseStale),
+    (|it| it.takes_command([0, 0, STALE]), Cause::GuidanceStale),
     (without_an_infrared_ranger, Cause::InfraredSilent),
     (|it| it.sees(Observation::Responds(LATE), 0), Cause::BaseSlow),
     (|it| it.sees(boards(6.5), 0), Cause::BatteryLow),
@@ -245,12 +225,11 @@ fn every_cause_has_one_row_and_a_case_that_is_decided_otherwise_without_it() {
     for cause in (1..=u8::MAX).map(Cause::from_byte) {
         let rows = TABLE.iter().filter(|rule| rule.cause == cause).count();
         assert_eq!(rows, 1, "{cause:?}");
-        let mut own = CASES.iter().filter(|(_, reported)| *reported == cause);
-        let mut failsafe = broken(own.next().unwrap().0);
+        let (by, _) = CASES.iter().find(|(_, reported)| *reported == cause).unwrap();
+        let mut failsafe = broken(*by);
         let decision = failsafe.decides();
-        let others = TABLE.iter().zip(failsafe.applied);
-        let others = others.filter(|(rule, applied)| *applied && rule.cause != cause);
-        assert_ne!(Decision::worst(others.map(|(rule, _)| rule)), decision);
+        let others = TABLE.iter().filter(|it| it.cause != cause && failsafe.applied(it.cause));
+        assert_ne!(Decision::worst(others), decision);
     }
     assert!(TABLE.is_sorted_by(|one, next| one.action >= next.action), "the worst come first");
 }
@@ -260,11 +239,11 @@ fn whatever_is_wrong_at_once_nothing_milder_is_done_than_the_worst_of_it_asks_fo
     assert_eq!(Decision::worst(std::iter::empty()), Decision::GO);
     let rows = || 0..TABLE.len();
     for three in rows().flat_map(|a| rows().flat_map(move |b| rows().map(move |c| [a, b, c]))) {
-        let rules = || TABLE.iter().enumerate().filter(|(row, _)| three.contains(row));
-        let decision = Decision::worst(rules().map(|(_, rule)| rule));
-        let worst = rules().map(|(_, rule)| rule.action).max().unwrap();
-        let (_, reported) = rules().find(|(_, rule)| rule.action == worst).unwrap();
-        assert_eq!(decision, Decision { action: worst, cause: reported.cause });
+        let of = |row: usize| &TABLE[row];
+        let applying = rows().filter(|row| three.contains(row)).map(of);
+        // The worst come first.
+        let Rule { action, cause, .. } = *of(*three.iter().min().unwrap());
+        assert_eq!(Decision::worst(applying), Decision { action, cause });
     }
 }
 
@@ -273,7 +252,7 @@ fn in_lockstep_and_while_the_robot_is_away_its_frames_are_not_judged() {
     for by in [Failsafe::does_not_stop as Break, |it| it.jumps(0)] {
         assert_eq!(broken(by).decide(true, now()).action, Action::Go);
         let mut away = broken(by);
-        away.monitors.presence.lose(now().machine_ns);
+        away.loses_the_robot();
         assert_eq!(away.cause(), Cause::RobotLost);
     }
     for &(by, cause) in CASES {
@@ -318,7 +297,7 @@ fn an_operators_resume_clears_what_its_row_says_an_end_stays_and_a_held_robot_is
         failsafe.sees(Observation::Resumed, 0);
     }
     let mut held = broken(|it| {
-        it.directive(Order::Hold, HoldReason::StageHeld);
+        it.is_held(HoldReason::StageHeld);
         it.jumps(10_000);
     });
     assert_eq!(held.decides().action, Action::Stop, "no stage waits for it");
@@ -359,9 +338,8 @@ fn the_words_of_the_table_say_the_numbers_that_hold() {
     let robot = front_only().robot;
     assert_eq!(robot.silent_after_s(), 3.0 * robot.command_limit_s);
     near(battery::EMPTY_SHARE, 10.0 / 11.0, 1e-9);
-    assert!(
-        (Action::Slow.speed_share() - 0.5).abs() < 1e-9 && Action::Slow.effect().contains("half")
-    );
+    near(Action::Slow.speed_share(), 0.5, 1e-9);
+    assert!(Action::Slow.effect().contains("half"));
     for (cause, ends) in [
         (Cause::CommandStale, "that is over"),
         (Cause::OdometryGivenUp, "the next mission"),
@@ -398,19 +376,23 @@ fn who_tells_the_robot_to_move_is_a_commander_at_once_and_who_tells_it_to_stand_
 fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found() {
     let mut failsafe = well();
     failsafe.sees(Observation::Responds(LATE), 0);
-    failsafe.sees(Observation::Command(&command([0, 1, 0])), 0);
+    failsafe.takes_command([0, 1, 0]);
     assert_eq!(failsafe.cause(), Cause::BaseSlow);
     let told = failsafe.monitors.base.sample().unwrap();
     assert!(told.dead_time_s >= LATE.dead_time_s(), "{told:?}");
-    failsafe.sees(Observation::Command(&command([0; 3])), 0);
+    failsafe.takes_command([0; 3]);
     assert_eq!(failsafe.decides(), Decision::GO);
     assert!(failsafe.monitors.base.sample().is_some(), "a restarted stage needs it");
     for set in ["method = 'paper'", "planner.executable = './mine'"] {
-        let mut base = base_response::BaseResponse::new(&mission(set));
-        base.observe(&Observation::Responds(LATE), now());
-        base.observe(&Observation::Command(&command([0; 3])), now());
-        assert_eq!(base.condition(Cause::BaseSlow, now()), Condition::Holds, "{set}");
-        assert_eq!(base.sample(), None, "{set}");
+        let mut failsafe = well();
+        failsafe.monitors.base = Monitor::new(&mission(set));
+        failsafe.sees(Observation::Responds(LATE), 0);
+        failsafe.takes_command([0; 3]);
+        assert_eq!(
+            (failsafe.cause(), failsafe.monitors.base.sample()),
+            (Cause::BaseSlow, None),
+            "{set}"
+        );
     }
 }
 
@@ -442,25 +424,7 @@ fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doub
 fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_commander() {
     // After 6 undisturbed seconds, one frame in `every` comes, and one acknowledgement in
     // `answered`, after `late_ms`.
-    let cause = |[every, late_ms, answered]: [u64; 3]| {
-        let mut monitor = commander::OtherCommander::new(&front_only());
-        for tick in 0..140_u64 {
-            let at = ago((140 - tick) * 100 * MS);
-            let is_disturbed = tick > 60;
-            let mut take = |what: Observation<'_>, when: Moment| monitor.observe(&what, when);
-            if !is_disturbed || tick % every == 0 {
-                take(counts(0), at);
-            }
-            take(Observation::Owed(1), at);
-            if !is_disturbed || tick % answered == 0 {
-                let late = if is_disturbed { late_ms } else { 0 };
-                take(Observation::Acknowledged, ago((140 - tick) * 100 * MS - late * MS));
-            }
-            take(Observation::Time, at);
-        }
-        monitor.condition(Cause::AnotherCommander, now())
-    };
-    for (of, is_found, why) in [
+    for (disturbed, is_found, why) in [
         ([3, 5, 1], true, "it takes frames"),
         ([40, 5, 1], true, "it commands so often that it takes nearly all"),
         ([1, 5, 1], false, "all is well"),
@@ -468,8 +432,24 @@ fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_com
         ([3, 90, 1], false, "the machine is busy"),
         ([1000, 5, 1], false, "its motor frames have stopped"),
     ] {
-        let none = Condition::OverFor(Duration::MAX);
-        assert_eq!(cause(of), if is_found { Condition::Holds } else { none }, "{why}");
+        let mut monitor = commander::OtherCommander::new(&front_only());
+        for tick in 0..140 {
+            let ms_ago = (140 - tick) * 100;
+            let [every, late_ms, answered] = if tick > 60 { disturbed } else { [1, 0, 1] };
+            let mut take = |what: Observation<'_>, ms_ago: u64| {
+                monitor.observe(&what, ago(ms_ago * MS));
+            };
+            if tick % every == 0 {
+                take(counts(0), ms_ago);
+            }
+            take(Observation::Owed(1), ms_ago);
+            if tick % answered == 0 {
+                take(Observation::Acknowledged, ms_ago - late_ms);
+            }
+            take(Observation::Time, ms_ago);
+        }
+        let condition = monitor.condition(Cause::AnotherCommander, now());
+        assert_eq!(condition == Condition::Holds, is_found, "{why}");
     }
 }
 

@@ -118,27 +118,17 @@ impl Monitor for Touches {
 mod tests {
 
     use super::*;
-    use crate::testing::{mission, near};
+    use crate::testing::*;
 
-    fn touches() -> Touches {
-        let mission = mission("robot.model = 'kobuki'");
-        Touches { moves: true, ..Touches::new(&mission) }
-    }
-
-    fn at(seconds: f64) -> MissionTime {
-        MissionTime::from_seconds(seconds)
-    }
-
-    fn speeds(touches: &Touches, wheels: [f64; 2], s: f64) -> [f64; 2] {
-        let [left_rad_s, right_rad_s] = wheels;
-        let command = CommandSample { left_rad_s, right_rad_s, ..CommandSample::default() };
-        let permitted = touches.permitted(&command, at(s));
+    fn speeds(touches: &Touches, [left, right]: [f64; 2], s: f64) -> [f64; 2] {
+        let permitted = touches.permitted(&turning(left, right), at(s));
         [permitted.left_rad_s, permitted.right_rad_s]
     }
 
     #[test]
     fn a_robot_stands_at_a_touch_then_turns_and_backs_but_goes_no_nearer_until_it_is_over() {
-        let mut touches = touches();
+        let mut touches = Touches::new(&mission("robot.model = 'kobuki'"));
+        touches.moves = true;
         assert_eq!(speeds(&touches, [2.0, 4.0], 0.0), [2.0, 4.0]);
         touches.take(&[(0, true), (1, false)], at(1.0));
         assert_eq!(speeds(&touches, [-2.0, -2.0], 1.1).map(f64::abs), [0.0; 2]);

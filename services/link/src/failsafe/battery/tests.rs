@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::mission;
+use crate::testing::*;
 
 const LIMITS: BatteryLimits = BatteryLimits { board: 6.6, motor: 11.0, servo: 0.0 };
 
@@ -11,10 +11,9 @@ fn batteries(limits: BatteryLimits) -> Batteries {
 
 impl Batteries {
     fn at(&mut self, seconds: f64, volts: [f64; 3]) -> ([bool; 3], Vec<(&'static str, Charge)>) {
-        self.read(volts, MissionTime::from_seconds(seconds));
-        let changes = std::mem::take(&mut self.changes).into_iter();
-        let changes = changes.map(|change| (change.pack, change.charge));
-        (self.low(), changes.collect())
+        self.read(volts, at(seconds));
+        let changes = self.changes.drain(..).map(|change| (change.pack, change.charge)).collect();
+        (self.low(), changes)
     }
 }
 
@@ -30,7 +29,7 @@ fn a_low_battery_is_said_once_and_gives_enough_again_only_clearly_above_its_limi
         (7.0, false, Some(Charge::Enough)),
     ] {
         let ([low, ..], changes) = batteries.at(0.0, [board, 12.0, 1.2]);
-        let expected: Vec<_> = said.map(|charge| ("board", charge)).into_iter().collect();
+        let expected = Vec::from_iter(said.map(|charge| ("board", charge)));
         assert_eq!((low, changes), (is_low, expected), "{board}");
     }
 }
