@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use common::{
     clock::{MissionTime, Pace},
     samples::{
-        Action, Cause, CommandSample, CommandState, CountsSample, HoldReason, Order, RangeReading,
-        RangeStatus, Stamp, WheelSample,
+        Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeReading, RangeStatus,
+        Stamp, WheelSample,
     },
     wire::{
         Addressing, COUNT_CYCLE, Command, CustomSensors, Decoder, Mode, MotorSensors, Parameter,
@@ -14,9 +14,8 @@ use common::{
     },
 };
 
-use crate::testing::mission;
+use crate::testing::*;
 
-const MS: u64 = 1_000_000;
 const PERIOD_NS: u64 = 142_857_142;
 const STAND: [Option<i16>; 2] = [Some(0); 2];
 /// One turn per second, 1200 counts/s.

@@ -1,7 +1,6 @@
 //! Tests of a robot that sends only on request: polls, and late or missing answers.
 
 use super::*;
-use crate::testing::ARDUINO;
 
 const POLL_MS: u64 = 100;
 const ROUND: &str = "p 4\re\r";
@@ -9,10 +8,8 @@ const ROUND: &str = "p 4\re\r";
 /// Board that answers after a delay, its link and clock.
 struct Scene {
     link: Link,
-    rate: f64,
     ms: u64,
-    /// None if the board is silent.
-    delay_ms: Option<u64>,
+    delay_ms: u64,
     answers: Vec<(u64, String)>,
     sent: Vec<(u64, String)>,
     ticks: Vec<u64>,
@@ -22,12 +19,10 @@ struct Scene {
 
 impl Scene {
     fn at(pace: Pace) -> Self {
-        let rate = if let Pace::Rate(rate) = pace { rate } else { 1.0 };
         Self {
             link: started(&mission(ARDUINO), pace, 0),
-            rate,
             ms: 0,
-            delay_ms: Some(5),
+            delay_ms: 5,
             answers: Vec::new(),
             sent: Vec::new(),
             ticks: Vec::new(),
@@ -44,14 +39,16 @@ impl Scene {
         scene
     }
 
+    fn now(&self) -> MissionTime {
+        let State { pace, next_tick } = self.link.state;
+        MissionTime(match pace {
+            Pace::Max => next_tick * POLL_MS * MS,
+            Pace::Rate(rate) => (self.ms as f64 * rate) as u64 * MS,
+        })
+    }
+
     fn event(&mut self, event: Event<'_>) {
-        let machine_ns = self.ms * MS;
-        let now = match self.link.state.pace {
-            Pace::Max => self.link.state.next_tick * POLL_MS * MS,
-            Pace::Rate(_) => (machine_ns as f64 * self.rate) as u64,
-        };
-        let now = MissionTime(now);
-        for effect in self.link.step(Entry { event, machine_ns, now }) {
+        for effect in self.link.step(Entry { event, machine_ns: self.ms * MS, now: self.now() }) {
             match effect {
                 Effect::Send(bytes) if !bytes.is_empty() => {
                     let said = String::from_utf8(bytes).unwrap();
@@ -66,19 +63,20 @@ impl Scene {
 
     fn answer(&mut self, said: &str) {
         for request in said.split_terminator('\r') {
+            let turned = self.turned;
             let words: Vec<_> = request.split(' ').collect();
             let answer = match words[..] {
-                ["e"] => format!("{0} {0}\r\n", self.turned),
+                ["e"] => format!("{turned} {turned}\r\n"),
                 // Changes as the robot drives.
-                ["p", "4"] => format!("{}\r\n", 200 - self.turned / 100),
-                ["b"] => "57600\r\n".to_owned(),
+                ["p", "4"] => format!("{}\r\n", 200 - turned / 100),
+                ["b"] => "57600\r\n".into(),
                 ["m", left, _] => {
                     self.speed = left.parse().unwrap();
-                    "OK\r\n".to_owned()
+                    "OK\r\n".into()
                 }
-                _ => "Invalid Command\r\n".to_owned(),
+                _ => "Invalid Command\r\n".into(),
             };
-            self.answers.extend(self.delay_ms.map(|delay| (self.ms + delay, answer)));
+            self.answers.push((self.ms + self.delay_ms, answer));
         }
     }
 
@@ -96,8 +94,7 @@ impl Scene {
                 let ticks = self.ticks.len();
                 self.event(Event::Datagram(answer.as_bytes()));
                 if let Some(&tick) = self.ticks.get(ticks) {
-                    let now_ns = (self.ms as f64 * self.rate) as u64 * MS;
-                    self.event(Event::Command(command(tick, now_ns, [2.0; 2])));
+                    self.event(Event::Command(command(tick, self.now().0, [2.0; 2])));
                 }
             }
             self.event(Event::Quiet);
@@ -145,7 +142,7 @@ fn a_closed_wire_is_not_polled_and_an_open_one_is_asked_for_its_baud_rate_first(
     scene.event(Event::Wire(false));
     scene.sent = Vec::new();
     scene.run(500);
-    assert_eq!(scene.rounds(), [0_u64; 0]);
+    assert!(scene.rounds().is_empty());
     scene.event(Event::Wire(true));
     scene.run(200);
     let asked: Vec<_> = scene.sent.iter().filter(|(_, said)| !said.starts_with('m')).collect();
@@ -155,12 +152,11 @@ fn a_closed_wire_is_not_polled_and_an_open_one_is_asked_for_its_baud_rate_first(
 #[test]
 fn answers_later_than_a_command_lasts_begin_no_tick_and_the_robot_stands() {
     let mut scene = Scene::driving();
-    scene.delay_ms = Some(400);
+    scene.delay_ms = 400;
     scene.run(1000);
     scene.ticks = Vec::new();
     scene.run(2000);
-    assert_eq!((&scene.ticks[..], scene.speed), (&[][..], 0));
-    assert!(scene.link.decision.stops());
+    assert!(scene.ticks.is_empty() && scene.speed == 0 && scene.link.decision.stops());
 }
 
 #[test]
@@ -172,5 +168,5 @@ fn in_lockstep_each_command_and_ping_is_followed_by_one_poll_and_one_tick() {
     assert!(commands >= 20, "{:?}", scene.sent);
     assert_eq!(scene.ticks, (0..scene.ticks.len() as u64).collect::<Vec<_>>());
     assert!(scene.rounds().len().abs_diff(scene.ticks.len()) <= 1, "{:?}", scene.sent);
-    assert!(scene.link.tally.repeated_ticks == 0);
+    assert_eq!(scene.link.tally.repeated_ticks, 0);
 }

@@ -1,7 +1,6 @@
 //! Tests of lockstep, in which the robot waits for each command.
 
 use super::*;
-use crate::testing::near;
 
 #[test]
 fn in_lockstep_no_command_is_sent_again() {

@@ -254,8 +254,7 @@ impl World {
                 vec![Report::Standard(StandardSensors { board_battery, ..standard(255) })];
             if !self.has(Cause::FramesSilent) {
                 let [left, right] = self.counts;
-                let cycle = f64::from(COUNT_CYCLE);
-                reports.push(motor([-left, right].map(|counts| counts.rem_euclid(cycle) as u16)));
+                reports.push(motor([-left, right].map(on_wire)));
             }
             let effects = self.give(Event::Datagram(&encoded(reports)));
             for (tick, ..) in ticks(&effects) {

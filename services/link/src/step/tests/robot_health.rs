@@ -1,7 +1,6 @@
 //! Tests with a robot whose frames are implausible or missing.
 
 use super::*;
-use crate::testing::near;
 use common::wire::Quantity;
 
 const PERIOD_MS: u64 = 143;
@@ -127,8 +126,7 @@ fn wheels_that_reach_four_fifths_of_their_command_are_told_more_until_they_turn_
     let (mut turned, mut told) = (0.0, 0.0);
     for number in 1..61 {
         turned += 0.8 * told / 7.0;
-        let frames = rolled(f64::rem_euclid(turned, COUNT_CYCLE.into()) as u16);
-        let effects = tick(&mut link, number, &frames, [TURN / 2.0; 2]);
+        let effects = tick(&mut link, number, &rolled(on_wire(turned)), [TURN / 2.0; 2]);
         told = velocities(&effects)[0][1].unwrap().into();
     }
     near(0.8 * told, 600.0, 10.0);

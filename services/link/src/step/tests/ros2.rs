@@ -33,14 +33,10 @@ struct Scene {
     scans: bool,
     /// Beams change.
     sees: bool,
-    /// Speed of the robot's clock, and those reported.
-    clock: f64,
-    rates: Vec<f64>,
-    decided: Vec<(u64, Cause)>,
-    sent: Vec<(u64, [f64; 2])>,
+    clock_rate: f64,
     wheels: WheelSample,
     endless: [f64; 2],
-    refused: Vec<String>,
+    effects: Vec<Effect>,
 }
 
 impl Scene {
@@ -57,18 +53,15 @@ impl Scene {
             counts: true,
             scans: true,
             sees: true,
-            clock: 1.0,
-            rates: Vec::new(),
-            decided: Vec::new(),
-            sent: Vec::new(),
+            clock_rate: 1.0,
             wheels: WheelSample::default(),
             endless: [0.0; 2],
-            refused: Vec::new(),
+            effects: Vec::new(),
         };
         scene.run(2000);
         assert_eq!(scene.link.decision, Decision::GO);
         assert!(scene.told[0] > 0.1 && scene.pose[0] > 0.1);
-        (scene.decided, scene.sent) = (Vec::new(), Vec::new());
+        scene.effects.clear();
         scene
     }
 
@@ -78,29 +71,25 @@ impl Scene {
     }
 
     fn event(&mut self, event: Event<'_>) {
-        for effect in self.link.at(event, self.ms * MS) {
+        let effects = self.link.at(event, self.ms * MS);
+        for effect in &effects {
             match effect {
                 Effect::Send(bytes) if !bytes.is_empty() => {
-                    let number =
-                        |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
-                    self.told = [number(4), number(44)];
-                    self.sent.push((self.ms, self.told));
+                    self.told =
+                        [4, 44].map(|at| f64::from_le_bytes(*bytes[at..].first_chunk().unwrap()));
                 }
-                Effect::Decided { now, .. } => self.decided.push((self.ms, now.cause)),
-                Effect::Tick { tick, wheels, endless, .. } => {
-                    let CountsSample { left_counts, right_counts, .. } = endless.unwrap();
-                    self.endless = [left_counts, right_counts];
-                    (self.tick, self.wheels) = (tick, wheels);
+                Effect::Tick { tick, wheels, endless: Some(endless), .. } => {
+                    self.endless = [endless.left_counts, endless.right_counts];
+                    (self.tick, self.wheels) = (*tick, *wheels);
                 }
-                Effect::ClockRate(rate) => self.rates.push(rate),
-                Effect::Refused(why) => self.refused.push(why.to_string()),
                 _ => {}
             }
         }
+        self.effects.extend(effects);
     }
 
     fn odometry(&self) -> Vec<u8> {
-        let header = Header::at((self.ms as f64 * self.clock) as u64 * MS, "odom");
+        let header = Header::at((self.ms as f64 * self.clock_rate) as u64 * MS, "odom");
         let none = [0.0; COVARIANCE];
         messages::odometry(header, "base_footprint", (self.pose, none), (self.told, none))
     }
@@ -129,8 +118,7 @@ impl Scene {
             if self.odometry {
                 self.say(Content::Odometry, &self.odometry());
             }
-            let command = command(self.tick, self.ms * MS, [0.15 / 0.033; 2]);
-            self.event(Event::Command(command));
+            self.event(Event::Command(command(self.tick, self.ms * MS, [0.15 / 0.033; 2])));
             self.event(Event::Quiet);
         }
     }
@@ -144,9 +132,13 @@ impl Scene {
     }
 
     fn holds(&self, cause: Cause) {
-        let decision = self.link.decision;
-        assert_eq!((decision.action, decision.cause), (Action::Stop, cause), "{:?}", self.decided);
-        assert_eq!(self.told, [0.0; 2]);
+        let stop = Decision { action: Action::Stop, cause };
+        assert_eq!(
+            (self.link.decision, self.told),
+            (stop, [0.0; 2]),
+            "{:?}",
+            decided(&self.effects)
+        );
     }
 }
 
@@ -155,11 +147,10 @@ fn beside_another_commander_the_robot_is_told_to_stand_after_each_of_its_command
  {
     let mut scene = Scene::driving();
     for _ in 0..20 {
-        scene.commanded(0.1);
         // It obeys the other commander until a stop arrives.
-        assert_eq!(scene.sent.last(), Some(&(scene.ms, [0.0; 2])));
+        scene.told = [0.1, 0.0];
+        scene.commanded(0.1);
         scene.holds(Cause::AnotherCommander);
-        scene.told = [0.0; 2];
         scene.run(100);
     }
     scene.run(1000);
@@ -211,8 +202,7 @@ fn what_a_robot_drove_while_the_network_was_down_is_its_motion_as_far_as_it_can_
     ] {
         let mut scene = Scene::driving();
         scene.run(100);
-        let (before, restarts) = (scene.endless, scene.wheels.restarts);
-        let from = scene.pose[0];
+        let (before, restarts, from) = (scene.endless, scene.wheels.restarts, scene.pose[0]);
         scene.is_silent(true);
         scene.run(silent_ms);
         scene.holds(Cause::RobotLost);
@@ -223,11 +213,8 @@ fn what_a_robot_drove_while_the_network_was_down_is_its_motion_as_far_as_it_can_
         let per_count = burger().body().metres_per_count();
         for (after, before) in scene.endless.into_iter().zip(before) {
             let driven = (after - before) * per_count;
-            let is_driven = (driven - ahead).abs() < 0.02;
-            assert!(
-                if is_known { is_driven } else { driven < 0.13 },
-                "{driven} instead of {ahead}"
-            );
+            let is_right = if is_known { (driven - ahead).abs() < 0.02 } else { driven < 0.13 };
+            assert!(is_right, "{driven} instead of {ahead}");
         }
         assert_eq!(scene.wheels.restarts == restarts, is_known, "{way}");
     }
@@ -249,13 +236,11 @@ fn while_odometry_jumps_again_and_again_the_robot_stands_and_two_nodes_that_publ
         scene.holds(Cause::OdometryImplausible);
         assert!(scene.wheels.restarts >= 19);
         let words = scene.link.explain(Cause::OdometryImplausible, scene.ms * MS).unwrap();
-        let start = "two nodes publish /odom, with the GIDs a1.a1.";
-        assert_eq!(
-            words.starts_with(start) && words.contains("b2.b2; end one"),
-            are_two,
-            "{words}"
-        );
-        assert_eq!(scene.refused.contains(&words), are_two);
+        let names = words.starts_with("two nodes publish /odom, with the GIDs a1.a1.")
+            && words.contains("b2.b2; end one");
+        let is_refused =
+            |effect: &Effect| matches!(effect, Effect::Refused(why) if why.to_string() == words);
+        assert_eq!([names, scene.effects.iter().any(is_refused)], [are_two; 2], "{words}");
         scene.run(4000);
         assert_eq!(scene.link.decision, Decision::GO);
     }
@@ -264,9 +249,13 @@ fn while_odometry_jumps_again_and_again_the_robot_stands_and_two_nodes_that_publ
 #[test]
 fn a_simulator_whose_clock_goes_slower_than_mission_time_is_told_with_its_rate() {
     let mut scene = Scene::driving();
-    scene.run(15_000);
-    assert!(scene.rates.is_empty(), "{:?}", scene.rates);
-    scene.clock = 0.5;
-    scene.run(17_000);
-    assert!(scene.rates.len() == 1 && (scene.rates[0] - 0.5).abs() < 0.01, "{:?}", scene.rates);
+    let mut rates = |clock_rate: f64, ms: u64| {
+        scene.clock_rate = clock_rate;
+        scene.run(ms);
+        let rate = |effect| if let Effect::ClockRate(rate) = effect { Some(rate) } else { None };
+        scene.effects.drain(..).filter_map(rate).collect::<Vec<_>>()
+    };
+    assert_eq!(rates(1.0, 15_000), [0.0; 0]);
+    let told = rates(0.5, 17_000);
+    assert!(told.len() == 1 && (told[0] - 0.5).abs() < 0.01, "{told:?}");
 }
