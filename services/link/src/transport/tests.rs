@@ -19,17 +19,14 @@ use rustix::{
 use tempfile::TempDir;
 
 use super::*;
-use crate::testing::{ARDUINO, mission};
+use crate::testing::*;
 
 fn open_at(address: &Address) -> Transport {
     Transport::open(address, super::Line { baud: BAUD, lowers_dtr: false }).unwrap()
 }
 
-const MS: u64 = 1_000_000;
-
 fn ready(descriptor: impl AsFd) {
-    let came = poll::is_readable(descriptor, Duration::from_secs(10)).unwrap();
-    assert!(came, "nothing came");
+    assert!(poll::is_readable(descriptor, Duration::from_secs(10)).unwrap(), "nothing came");
 }
 
 fn maintain_until(transport: &mut Transport, open: bool, now_ns: u64) {
@@ -49,6 +46,10 @@ fn expect(transport: &mut Transport, wanted: &[u8], now_ns: u64) {
     assert_eq!(came, wanted);
 }
 
+fn trouble(transport: &Transport) -> String {
+    transport.trouble().unwrap().to_string()
+}
+
 fn expect_closing(transport: &mut Transport, now_ns: u64) {
     while transport.is_open() {
         ready(transport.descriptor().unwrap());
@@ -59,8 +60,7 @@ fn expect_closing(transport: &mut Transport, now_ns: u64) {
 
 #[test]
 fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_kept() {
-    let robot = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let other = UdpSocket::bind("127.0.0.1:0").unwrap();
+    let [robot, other] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
     let mut transport = open_at(&Address::Udp(robot.local_addr().unwrap()));
     transport.send(b"where?").unwrap();
     let (_, link) = robot.recv_from(&mut [0; 16]).unwrap();
@@ -70,7 +70,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     assert_eq!(transport.tally().foreign_datagrams, 1);
     // It may be the robot, if the mission has a wrong port.
     let port = other.local_addr().unwrap().port();
-    let trouble = transport.trouble().unwrap().to_string();
+    let trouble = trouble(&transport);
     assert!(trouble.contains(&format!("answers from port {port}; name that port")), "{trouble}");
     robot.send_to(b"hello", link).unwrap();
     ready(transport.descriptor().unwrap());
@@ -137,8 +137,8 @@ fn a_robot_that_ends_one_connection_after_another_serves_another_program_too() {
         now_ns += 10_000 * MS;
         robot = connected(&listener, &mut transport, now_ns);
     }
-    let trouble = transport.trouble().unwrap().to_string();
-    assert!(trouble.contains("end the other program that connects to it"), "{trouble}");
+    let why = trouble(&transport);
+    assert!(why.contains("end the other program that connects to it"), "{why}");
     // A connection that lasts is its own.
     robot.write_all(b"frame").unwrap();
     expect(&mut transport, b"frame", now_ns + 11_000 * MS);
@@ -159,8 +159,8 @@ fn a_robot_that_ends_one_connection_after_another_serves_another_program_too() {
         now_ns += 3_000 * MS;
         assert_eq!(transport.maintain(now_ns).unwrap(), None);
     }
-    let trouble = transport.trouble().unwrap().to_string();
-    assert!(trouble.contains("switch the robot on"), "{trouble}");
+    let why = trouble(&transport);
+    assert!(why.contains("switch the robot on"), "{why}");
 }
 
 #[test]
@@ -171,12 +171,13 @@ fn a_connection_without_a_word_is_taken_for_dead() {
     connected(&listener, &mut transport, 5000 * MS);
 }
 
-/// Sends to a robot that does not read until commands are lost. It then must read only complete
-/// frames, while more are sent.
-fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) -> Option<usize>) {
+#[test]
+fn a_line_that_takes_no_more_loses_whole_frames_only() {
+    let (line, mut transport) = open_line();
     let mut message = Vec::new();
     Command::velocity([Some(400), Some(-400)], 250).encode(Addressing::default(), &mut message);
-    let mut sent = 0_u64;
+    // The robot does not read until commands are lost, and then while more are sent.
+    let mut sent = 0;
     while transport.tally().unsent < 3 {
         transport.send(&message).unwrap();
         sent += 1;
@@ -184,9 +185,10 @@ fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) ->
     }
     let mut decoder = Decoder::default();
     let mut frames = 0;
-    let mut buffer = vec![0; 65_536];
+    let mut buffer = [0; 65_536];
     for _ in 0..2 {
-        while let Some(length) = robot_reads(&mut buffer) {
+        while poll::is_readable(&line.robot, Duration::from_millis(200)).unwrap() {
+            let length = read(&line.robot, &mut buffer).unwrap();
             decoder.push(&buffer[..length]);
             while decoder.next_frame().is_some() {
                 frames += 1;
@@ -205,15 +207,18 @@ fn overfill(transport: &mut Transport, mut robot_reads: impl FnMut(&mut [u8]) ->
 struct Line {
     robot: OwnedFd,
     name: PathBuf,
-    _directory: Option<TempDir>,
+    _directory: TempDir,
+}
+
+fn robots_end() -> OwnedFd {
+    openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap()
 }
 
 fn plug_in(name: &Path) -> OwnedFd {
-    let robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    let robot = robots_end();
     grantpt(&robot).unwrap();
     unlockpt(&robot).unwrap();
     let path = ptsname(&robot, Vec::new()).unwrap();
-    let _ = std::fs::remove_file(name);
     std::os::unix::fs::symlink(path.to_str().unwrap(), name).unwrap();
     fcntl_setfl(&robot, fcntl_getfl(&robot).unwrap() | OFlags::NONBLOCK).unwrap();
     robot
@@ -222,7 +227,7 @@ fn plug_in(name: &Path) -> OwnedFd {
 fn line() -> Line {
     let directory = tempfile::tempdir().unwrap();
     let name = directory.path().join("ttyUSB0");
-    Line { robot: plug_in(&name), name, _directory: Some(directory) }
+    Line { robot: plug_in(&name), name, _directory: directory }
 }
 
 /// Returns a line and the open transport to it.
@@ -240,8 +245,7 @@ fn read_from(robot: &OwnedFd, length: usize) -> Vec<u8> {
         ready(robot);
         match read(robot, &mut buffer) {
             Ok(length) => heard.extend_from_slice(&buffer[..length]),
-            Err(Errno::AGAIN) => {}
-            Err(error) => panic!("{error}"),
+            Err(error) => assert_eq!(error, Errno::AGAIN),
         }
     }
     heard
@@ -252,11 +256,10 @@ fn a_serial_line_is_set_to_115200_8n1_and_carries_every_byte_as_it_is() {
     let (line, mut transport) = open_line();
     let settings = tcgetattr(&line.robot).unwrap();
     assert_eq!(settings.output_speed(), 115_200);
-    let character = settings.control_modes
-        & (ControlModes::CSIZE | ControlModes::PARENB | ControlModes::CSTOPB);
-    assert_eq!(character, ControlModes::CS8);
+    let frame = ControlModes::CSIZE | ControlModes::PARENB | ControlModes::CSTOPB;
+    assert_eq!(settings.control_modes & frame, ControlModes::CS8);
     assert!(!settings.local_modes.contains(LocalModes::ECHO));
-    let bytes: Vec<u8> = (0..=255).collect();
+    let bytes = Vec::from_iter(0..=255);
     transport.send(&bytes).unwrap();
     assert_eq!(read_from(&line.robot, 256), bytes);
     write(&line.robot, &bytes).unwrap();
@@ -270,8 +273,8 @@ fn a_line_to_an_arduino_has_the_boards_speed_and_is_closed_without_a_hangup_that
     let mut settings = tcgetattr(&line.robot).unwrap();
     settings.control_modes.insert(ControlModes::HUPCL);
     tcsetattr(&line.robot, OptionalActions::Now, &settings).unwrap();
-    let mission = mission(ARDUINO);
-    let mut transport = Transport::of_base(&Address::Serial(line.name.clone()), &mission).unwrap();
+    let address = Address::Serial(line.name);
+    let mut transport = Transport::of_base(&address, &mission(ARDUINO)).unwrap();
     maintain_until(&mut transport, true, 0);
     let settings = tcgetattr(&line.robot).unwrap();
     assert_eq!(settings.output_speed(), 57_600);
@@ -285,7 +288,7 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     expect(&mut transport, b"here", 0);
     std::fs::remove_file(&line.name).unwrap();
     // The line hangs up when the robot's end is closed.
-    line.robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    line.robot = robots_end();
     expect_closing(&mut transport, 0);
     for now in [0, 100 * MS, 300 * MS] {
         assert_eq!(transport.maintain(now).unwrap(), None, "it is not there");
@@ -307,15 +310,6 @@ fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
     let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
     drop(first);
     maintain_until(&mut second, true, 100 * MS);
-}
-
-#[test]
-fn a_line_that_takes_no_more_loses_whole_frames_only() {
-    let (line, mut transport) = open_line();
-    overfill(&mut transport, |buffer| {
-        let came = poll::is_readable(&line.robot, Duration::from_millis(200)).unwrap();
-        came.then(|| read(&line.robot, buffer).unwrap())
-    });
 }
 
 #[test]

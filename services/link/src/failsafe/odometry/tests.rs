@@ -1,6 +1,6 @@
 use super::*;
-use crate::testing::{mission, near};
-use common::samples::ContactSample;
+use crate::testing::*;
+use common::{samples::ContactSample, wire::COUNT_CYCLE};
 
 /// Frame period at 7 Hz, seconds.
 const PERIOD: f64 = 1.0 / 7.0;
@@ -10,10 +10,6 @@ const TURN: i16 = 1200;
 fn odometry() -> Odometry {
     // 1 m/s is 2247 counts/s.
     Odometry::new(&mission(""))
-}
-
-fn at(seconds: f64) -> MissionTime {
-    MissionTime::from_seconds(seconds)
 }
 
 fn suspicion(odometry: &Odometry) -> Option<Suspicion> {
@@ -30,20 +26,15 @@ struct Wheels {
 }
 
 impl Wheels {
-    fn tell(&mut self, counts: [i16; 2]) {
-        self.told.push((self.now, counts));
-    }
-
     fn roll_to(&mut self, end: f64) {
         const STEP: f64 = 0.005;
         while self.now < end - STEP / 2.0 {
             let heard = |&&(at, _): &&(f64, [i16; 2])| at + 0.07 <= self.now;
             let target = self.told.iter().rev().find(heard);
+            // A command lasts 0.25 s.
+            let asked = target.filter(|(at, _)| at + 0.07 + 0.25 > self.now);
             for wheel in [0, 1] {
-                // A command lasts 0.25 s.
-                let asked = target
-                    .filter(|(at, _)| at + 0.07 + 0.25 > self.now)
-                    .map_or(0.0, |(_, counts)| 0.78 * f64::from(counts[wheel]));
+                let asked = asked.map_or(0.0, |(_, counts)| 0.78 * f64::from(counts[wheel]));
                 let asked = if asked.abs() < 20.0 { 0.0 } else { asked };
                 self.speed[wheel] += (asked - self.speed[wheel]) * STEP / 0.08;
                 self.rolled[wheel] += self.speed[wheel] * STEP;
@@ -51,13 +42,7 @@ impl Wheels {
             self.now += STEP;
         }
     }
-
-    fn counts(&self) -> [u16; 2] {
-        self.rolled.map(|rolled| rolled.rem_euclid(f64::from(COUNTS)) as u16)
-    }
 }
-
-const COUNTS: u16 = common::wire::COUNT_CYCLE;
 
 type Suspected = Option<(f64, Suspicion)>;
 
@@ -69,11 +54,11 @@ fn turn(
     tells: [i16; 2],
 ) -> Suspected {
     wheels.roll_to(time);
-    odometry.plausible(says(wheels.counts()), at(time));
+    odometry.plausible(says(wheels.rolled.map(on_wire)), at(time));
     let suspicion = suspicion(odometry);
     if suspicion.is_none() {
         odometry.commanded(tells, at(time));
-        wheels.tell(tells);
+        wheels.told.push((wheels.now, tells));
     }
     suspicion.map(|suspicion| (time, suspicion))
 }
@@ -103,16 +88,14 @@ fn ahead(_: u32) -> [i16; 2] {
 
 /// Asserts rest within 1.5 s of the first motion, including 0.2 s to stop and a frame's jitter.
 #[track_caller]
-fn in_time(suspected: Suspected, why: Suspicion) {
-    let (after, suspicion) = suspected.unwrap();
-    assert!(after <= 1.15 && suspicion == why, "{suspicion:?} after {after} s");
+fn in_time(suspected: Suspected, why: Suspicion, row: impl std::fmt::Debug) {
+    let is_right = suspected.is_some_and(|(after_s, is)| after_s <= 1.15 && is == why);
+    assert!(is_right, "{row:?}: {suspected:?}");
 }
 
 #[test]
 fn an_honest_robot_is_not_suspected_whatever_it_is_told() {
-    let reversing = |tick: u32| {
-        if (tick / 2).is_multiple_of(2) { [TURN, -TURN] } else { [-TURN, TURN] }
-    };
+    let reversing = |tick: u32| [[TURN, -TURN], [-TURN, TURN]][tick as usize / 2 % 2];
     let curves = |tick: u32| [900 + 300 * (tick % 3) as i16, 1200 - 300 * (tick % 4) as i16];
     let stop_and_go = |tick: u32| if tick % 7 < 3 { [0, 0] } else { [TURN, 80] };
     let tells: [&dyn Fn(u32) -> [i16; 2]; 6] =
@@ -149,12 +132,12 @@ fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_ti
 #[test]
 fn wheels_held_for_half_a_second_are_not_suspected() {
     // The frames repeat, and then continue from the same counts.
-    let mut held = 0;
+    let mut held = [0; 2];
     let says = |tick: u32, counts: [u16; 2]| {
-        if tick == 21 {
-            held = counts[0];
+        if !(22..=24).contains(&tick) {
+            held = counts;
         }
-        if (21..=24).contains(&tick) { [held; 2] } else { counts }
+        held
     };
     assert_eq!(drive(60, ahead, |_| false, says), None);
 }
@@ -171,36 +154,38 @@ fn a_command_after_a_lapse_is_judged_anew() {
 #[test]
 fn encoders_that_repeat_die_are_late_reversed_or_swapped_are_suspected_in_time_and_named() {
     use Suspicion::{Left, Right, Turn};
-    let suspected = |tells: &dyn Fn(u32) -> [i16; 2], says: &dyn Fn(u32, [u16; 2]) -> [u16; 2]| {
-        drive(40, tells, |_| false, says)
+    type Says = fn([u16; 2]) -> [u16; 2];
+    let same: Says = |_| [32_767; 2];
+    let dead: Says = |[left, _]| [left, 0];
+    let reversed: Says = |counts| counts.map(|count| (COUNT_CYCLE - count) % COUNT_CYCLE);
+    let swapped: Says = |[left, right]| [right, left];
+    let suspected = |tells: [[i16; 2]; 4], says: Says| {
+        drive(40, |tick| tells[tick as usize % 4], |_| false, |_, counts| says(counts))
     };
-    let same = |_, _| [32_767; 2];
-    in_time(suspected(&ahead, &same), Left);
-    in_time(suspected(&|_| [-80, 80], &same), Left);
-    let dead = |_, [left, _]: [u16; 2]| [left, 0];
-    in_time(suspected(&ahead, &dead), Right);
-    let reversed = |_, counts: [u16; 2]| counts.map(|count| (COUNTS - count) % COUNTS);
-    in_time(suspected(&ahead, &reversed), Left);
-    // Commands for a robot that turns away from the target.
-    let chatter = |tick: u32| [if (tick / 2).is_multiple_of(2) { 584 } else { -584 }; 2];
-    in_time(suspected(&chatter, &reversed), Left);
-    let swapped = |_, [left, right]: [u16; 2]| [right, left];
-    in_time(suspected(&|_| [-TURN, TURN], &swapped), Left);
-    // In a curve both wheels roll forward, but the robot turns the other way.
-    in_time(suspected(&|_| [TURN / 2, TURN], &swapped), Turn);
+    for (tells, says, why) in [
+        ([[TURN; 2]; 4], same, Left),
+        ([[-80, 80]; 4], same, Left),
+        ([[TURN; 2]; 4], dead, Right),
+        ([[TURN; 2]; 4], reversed, Left),
+        // Commands for a robot that turns away from the target.
+        ([[584; 2], [584; 2], [-584; 2], [-584; 2]], reversed, Left),
+        ([[-TURN, TURN]; 4], swapped, Left),
+        // In a curve both wheels roll forward, but the robot turns the other way.
+        ([[TURN / 2, TURN]; 4], swapped, Turn),
+    ] {
+        in_time(suspected(tells, says), why, (says([1, 2]), tells));
+    }
     let mut said = VecDeque::from([[0; 2]; 14]);
     let late = |_, counts| {
         said.push_back(counts);
         said.pop_front().unwrap()
     };
-    in_time(drive(40, ahead, |_| false, late), Left);
+    in_time(drive(40, ahead, |_| false, late), Left, "late");
     // The direction changes with every tick.
-    let to_and_fro = |tick: u32| {
-        if tick.is_multiple_of(2) { [400, -400] } else { [-400, 400] }
-    };
-    let dead = suspected(&to_and_fro, &dead);
+    let to_and_fro = [[400, -400], [-400, 400], [400, -400], [-400, 400]];
+    let dead = suspected(to_and_fro, dead);
     assert!(matches!(dead, Some((after_s, Right)) if after_s < 1.5), "{dead:?}");
-    assert_eq!(drive(200, to_and_fro, |_| false, honest), None);
+    assert_eq!(drive(200, |tick| to_and_fro[tick as usize % 2], |_| false, honest), None);
 }
 
 #[test]
@@ -241,8 +226,7 @@ fn held(
     for tick in 0..40 {
         let time = f64::from(tick) * PERIOD;
         odometry.contacts.take_currents(held.map(|held| current(held, stood)));
-        let counts = rolled.map(|rolled: f64| rolled.rem_euclid(f64::from(COUNTS)) as u16);
-        odometry.plausible(counts, at(time));
+        odometry.plausible(rolled.map(on_wire), at(time));
         contacts.extend(odometry.contacts.new.take().map(|contact| (time, contact)));
         if let Some(suspicion) = suspicion(&odometry) {
             return (contacts, Some((time, suspicion)));
@@ -252,8 +236,8 @@ fn held(
         stood = if stands { stood + 1 } else { 0 };
         let told = if stands { [0, 0] } else { tells };
         odometry.commanded(told, at(time));
-        for wheel in [0, 1].into_iter().filter(|wheel| !held[*wheel]) {
-            rolled[wheel] += f64::from(told[wheel]) * PERIOD;
+        for wheel in 0..2 {
+            rolled[wheel] += if held[wheel] { 0.0 } else { f64::from(told[wheel]) * PERIOD };
         }
     }
     (contacts, None)
@@ -276,15 +260,14 @@ fn wheels_that_draw_the_current_of_held_ones_are_a_contact_ahead_and_no_suspicio
 fn a_current_that_repeats_is_beyond_the_range_low_or_high_on_rolling_wheels_is_no_sign_of_held_ones()
  {
     for current in [HELD_AD, u16::MAX, ROLLS_AD] {
-        in_time(held([true; 2], [TURN; 2], |_, _| current).1, Suspicion::Left);
+        in_time(held([true; 2], [TURN; 2], |_, _| current).1, Suspicion::Left, current);
     }
-    let mut odometry = odometry();
-    let mut wheels = Wheels::default();
+    let (mut odometry, mut wheels) = (odometry(), Wheels::default());
     let suspected = (0..60).find_map(|tick| {
         odometry.contacts.take_currents([HELD_AD; 2]);
-        let time = f64::from(tick) * PERIOD;
         // The encoders die after 5 s.
         let says = |counts: [u16; 2]| if tick <= 35 { counts } else { [0; 2] };
+        let time = f64::from(tick) * PERIOD;
         let suspected = turn((&mut odometry, &mut wheels), time, says, [TURN; 2]);
         assert!(odometry.contacts.new.is_none());
         suspected
@@ -297,14 +280,13 @@ fn one_held_wheel_is_a_contact_at_its_side_and_behind_a_robot_that_backs() {
     use std::f64::consts::{FRAC_PI_2, PI};
     let contact =
         |wheels, tells| held(wheels, tells, |held, _| if held { HELD_AD } else { ROLLS_AD }).0[0].1;
-    let left = contact([true, false], [TURN, TURN]);
+    let left = contact([true, false], [TURN; 2]);
     assert!(left.bearing_rad > 0.0 && left.bearing_rad < FRAC_PI_2, "{left:?}");
-    let right = contact([false, true], [TURN, TURN]);
+    let right = contact([false, true], [TURN; 2]);
     assert_eq!((right.left, right.right, right.bearing_rad), (0, 1, -left.bearing_rad));
-    let behind = contact([true, true], [-TURN, -TURN]);
-    near(behind.bearing_rad, PI, 1e-9);
+    near(contact([true; 2], [-TURN; 2]).bearing_rad, PI, 1e-9);
     // A turn on the spot may touch anywhere.
-    assert_eq!(contact([true, true], [-TURN, TURN]).half_width_rad, 0.0);
+    assert_eq!(contact([true; 2], [-TURN, TURN]).half_width_rad, 0.0);
 }
 
 #[test]
@@ -321,7 +303,7 @@ fn a_robot_that_another_host_turns_or_speeds_is_suspected_and_the_words_name_tha
             let time = f64::from(tick) * PERIOD;
             while told_s < time {
                 wheels.roll_to(told_s);
-                wheels.tell(other);
+                wheels.told.push((told_s, other));
                 told_s += 1.0 / hertz;
             }
             turn((&mut odometry, &mut wheels), time, |counts| counts, [TURN / 3; 2])
