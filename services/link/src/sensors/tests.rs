@@ -7,7 +7,7 @@ use common::{
 };
 
 use super::*;
-use crate::testing::mission;
+use crate::testing::*;
 
 /// Returns the laser status after each of `scans`: the number of beams that end, their range, and a
 /// further turn of the wheels in opposite directions, decimetres and tenths of a radian. Other beams
@@ -66,10 +66,8 @@ fn a_reading_counts_for_one_tick_and_only_as_often_as_its_sensor_measures_and_of
         let mut sensors = Sensors::new(&mission(row));
         let motion = motion(&sensors.body, [0.0; 2], [0.0; 2], [false; 2]);
         for tick in 0..6 {
-            let status = Measured.into();
-            let readings =
-                [0, 99].map(|sensor| RangeReading { sensor, status, ..RangeReading::default() });
-            let mut heard = Heard { readings: readings.to_vec(), ..Heard::default() };
+            let readings = vec![reading(0, Some(1.0)), reading(99, Some(1.0))];
+            let mut heard = Heard { readings, ..Heard::default() };
             assert_eq!(sensors.take_heard(&mut heard, None).len(), 1);
             let given = sensors.for_tick(&motion, MissionTime::default()).0[0].status();
             assert_eq!(given, if tick % every == 0 { Measured } else { Absent }, "{tick}");
@@ -84,26 +82,23 @@ fn a_stamped_scan_is_placed_by_the_clocks_of_ticks_and_by_its_age_alone_once_the
     let (row, laser) = mission.laser().unwrap();
     let mut sensors = Sensors::new(&mission);
     let still = motion(&mission.body(), [0.0; 2], [0.0; 2], [false; 2]);
-    let mut placed_ms = |tick: [i64; 2], scan_ms: i64| {
+    // The second tick comes late, right before the third; the clock is set before the last.
+    for (tick_ms, now_ms, scan_ms, expected_ms) in [
+        (70_000, 5_000, 70_000, 0),
+        (70_100, 5_180, 70_050, -90),
+        (70_200, 5_200, 70_050, -110),
+        (70_300, 5_300, 70_330, 30),
+        (70_400, 5_400, 69_990, -410),
+        (10, 5_500, 70_390, -30),
+    ] {
         let ns = |ms: i64| ms * 1_000_000;
         let sweep = Sweep { first_beam_ns: ns(-30), ..Sweep::default() };
         let beams = vec![f32::INFINITY; laser.beams];
         let scan = LaserScan { row, beams, sweep, stamp_ns: Some(ns(scan_ms)) };
-        let motion = Motion { stamp_ns: Some(ns(tick[0])), ..still };
+        let motion = Motion { stamp_ns: Some(ns(tick_ms)), ..still };
         let mut heard = Heard { motion: Some(motion), scans: vec![scan], ..Heard::default() };
         sensors.take_heard(&mut heard, None);
-        let now = MissionTime(ns(tick[1]) as u64);
-        sensors.for_tick(&motion, now).1[0].sweep.first_beam_ns / 1_000_000
-    };
-    // The second tick comes late, right before the third; the clock is set before the last.
-    for (tick, scan_ms, expected_ms) in [
-        ([70_000, 5_000], 70_000, 0),
-        ([70_100, 5_180], 70_050, -90),
-        ([70_200, 5_200], 70_050, -110),
-        ([70_300, 5_300], 70_330, 30),
-        ([70_400, 5_400], 69_990, -410),
-        ([10, 5_500], 70_390, -30),
-    ] {
-        assert_eq!(placed_ms(tick, scan_ms), expected_ms, "{tick:?}");
+        let (_, scans) = sensors.for_tick(&motion, MissionTime(now_ms * MS));
+        assert_eq!(scans[0].sweep.first_beam_ns / ns(1), expected_ms, "{tick_ms}");
     }
 }

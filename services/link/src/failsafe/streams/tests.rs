@@ -1,8 +1,5 @@
 use super::*;
-use crate::testing::{mission, near};
-use common::samples::RangeReading;
-
-const MS: u64 = 1_000_000;
+use crate::testing::*;
 
 fn streams(text: &str) -> Streams {
     let mut streams = Streams::new(&mission(&format!("sensors = 'front'\n{text}")));
@@ -10,22 +7,27 @@ fn streams(text: &str) -> Streams {
     streams
 }
 
-fn at(machine_ns: u64) -> Moment {
-    Moment { time: MissionTime(machine_ns), machine_ns }
+const fn moment(ms: u64) -> Moment {
+    Moment { time: MissionTime(ms * MS), machine_ns: ms * MS }
 }
 
-fn range(streams: &mut Streams, machine_ns: u64) {
-    let front = RangeReading { status: RangeStatus::Nothing.into(), ..RangeReading::default() };
-    streams.observe(&Observation::Readings(&[front]), at(machine_ns));
+impl Streams {
+    fn hears_front(&mut self, ms: u64) {
+        self.observe(&Observation::Readings(&[reading(0, None)]), moment(ms));
+    }
+
+    fn hears_motor(&mut self, ms: u64) {
+        self.motor(MissionTime(ms * MS), ms * MS);
+    }
 }
 
 /// Takes motor frames at these intervals, milliseconds. Returns the last time.
 fn frames(streams: &mut Streams, intervals: impl IntoIterator<Item = u64>) -> u64 {
     let mut now = 0;
-    streams.motor(MissionTime(now), now);
+    streams.hears_motor(now);
     for interval in intervals {
-        now += interval * MS;
-        streams.motor(MissionTime(now), now);
+        now += interval;
+        streams.hears_motor(now);
     }
     now
 }
@@ -34,41 +36,35 @@ fn frames(streams: &mut Streams, intervals: impl IntoIterator<Item = u64>) -> u6
 fn a_robot_that_answers_without_motor_frames_is_asked_for_them_with_growing_pauses() {
     let mut streams = streams("");
     let last = frames(&mut streams, [143; 5]);
-    assert_eq!(streams.motor_frames(last + 749 * MS), Motor::Regular);
-    assert_eq!(streams.motor_frames(last + 750 * MS), Motor::Silent);
-    let asks = |from: u64, to: u64, streams: &mut Streams| {
-        let times = (from..to).step_by(10);
-        times.filter(|at| streams.wants_request(at * MS)).count()
-    };
-    assert_eq!(asks(1500, 60_000, &mut streams), 9);
-    streams.motor(MissionTime(0), 60_000 * MS);
-    range(&mut streams, 60_000 * MS);
-    assert_eq!(asks(60_000, 60_700, &mut streams), 0);
+    assert_eq!(streams.motor_frames((last + 749) * MS), Motor::Regular);
+    assert_eq!(streams.motor_frames((last + 750) * MS), Motor::Silent);
+    let asks = (1500..60_000).step_by(10).filter(|ms| streams.wants_request(ms * MS)).count();
+    assert_eq!(asks, 9);
+    streams.hears_motor(60_000);
+    streams.hears_front(60_000);
+    assert!(!(60_000..60_700).step_by(10).any(|ms| streams.wants_request(ms * MS)));
 }
 
 #[test]
 fn three_frames_a_second_are_told_with_their_rate_and_a_fading_radio_is_not() {
     let mut slow = streams("");
     let last = frames(&mut slow, [333; 9]);
-    let Motor::Slow(hz) = slow.motor_frames(last) else {
-        panic!();
-    };
-    near(hz, 3.0, 0.01);
-    let words = slow.explain(Cause::FramesSlow, at(last)).unwrap();
+    assert!(matches!(slow.motor_frames(last * MS), Motor::Slow(hz) if (hz - 3.0).abs() < 0.01));
+    let words = slow.explain(Cause::FramesSlow, moment(last)).unwrap();
     assert!(words.contains("3.0 motor frames") && words.contains("raise robot.command_limit_s"));
     let mut fading = streams("");
     let last = frames(&mut fading, [143, 700, 500, 143, 600, 400, 143, 500, 600]);
-    assert_eq!(fading.motor_frames(last), Motor::Regular);
+    assert_eq!(fading.motor_frames(last * MS), Motor::Regular);
 }
 
 #[test]
 fn a_front_sonar_without_readings_is_missed_by_a_mission_that_senses_only() {
     for (text, missed) in [("", true), ("sensing = false", false)] {
         let mut streams = streams(text);
-        range(&mut streams, 100 * MS);
+        streams.hears_front(100);
         assert_eq!(streams.silent(849 * MS), None);
         assert_eq!(streams.silent(850 * MS) == Some(Cause::RangeSilent), missed);
-        range(&mut streams, 900 * MS);
+        streams.hears_front(900);
         assert_eq!(streams.silent(1000 * MS), None, "back");
     }
 }
@@ -76,19 +72,17 @@ fn a_front_sonar_without_readings_is_missed_by_a_mission_that_senses_only() {
 /// Returns streams with readings of ten sensors, of which the `silent` give no valid one.
 fn heard(text: &str, silent: &[u8]) -> Streams {
     let mut streams = Streams::new(&mission(text));
-    let reading = |sensor| {
-        let is_silent = silent.contains(&sensor);
-        let status = if is_silent { RangeStatus::Invalid } else { RangeStatus::Nothing };
-        RangeReading { sensor, status: status.into(), ..RangeReading::default() }
-    };
-    let readings: Vec<_> = (0..10).map(reading).collect();
-    streams.observe(&Observation::Readings(&readings), at(900 * MS));
+    let mut readings = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|sensor| reading(sensor, None));
+    for sensor in silent {
+        readings[usize::from(*sensor)].status = RangeStatus::Invalid.into();
+    }
+    streams.observe(&Observation::Readings(&readings), moment(900));
     streams
 }
 
 /// Returns the cause and explanation while the `silent` give no valid reading.
 fn without(text: &str, silent: &[u8]) -> (Option<Cause>, String) {
-    let (streams, now) = (heard(text, silent), at(900 * MS));
+    let (streams, now) = (heard(text, silent), moment(900));
     let holds = |it: &Cause| streams.condition(*it, now) == Condition::Holds;
     let holding: Vec<_> =
         [Cause::RangeSilent, Cause::InfraredSilent].into_iter().filter(holds).collect();
@@ -127,6 +121,6 @@ fn without_a_second_sensor_or_a_ranger_whose_ground_no_sonar_covers_the_robot_st
 #[test]
 fn a_ranger_without_which_the_robot_goes_on_is_not_asked_for() {
     let mut streams = heard("", &[4]);
-    streams.motor(MissionTime(900 * MS), 900 * MS);
+    streams.hears_motor(900);
     assert!(!streams.wants_request(900 * MS));
 }
