@@ -10,13 +10,15 @@ use common::{
     samples::{CommandSample, HoldReason, Order, RangeReading, RangeStatus, Stamp},
 };
 
+use Observation::*;
+
 const LIMIT_MS: u64 = 250;
 const SILENT_MS: u64 = 3 * LIMIT_MS;
 /// Just over the age limit of inputs, nanoseconds.
 const STALE: u64 = LIMIT_MS * MS + 1;
 const LATE: Response = Response { delay_s: 0.3, ..Response::X80 };
-const DRIVE: Observation<'_> = Observation::Directive(Order::Drive, HoldReason::None);
-const FOUND: Observation<'_> = Observation::Found { again: false };
+const DRIVE: Observation<'_> = Directive(Order::Drive, HoldReason::None);
+const FOUND: Observation<'_> = Found { again: false };
 
 fn front_only() -> Mission {
     mission("sensors = 'front'")
@@ -38,11 +40,11 @@ fn command(ns_ago: [u64; 3]) -> CommandSample {
 }
 
 const fn boards(volts: f64) -> Observation<'static> {
-    Observation::Batteries([volts, 0.0, 0.0])
+    Batteries([volts, 0.0, 0.0])
 }
 
 const fn counts(counts: u16) -> Observation<'static> {
-    Observation::Motor(WheelCounts::Cyclic([counts; 2]), Counts::Follow)
+    Motor(WheelCounts::Cyclic([counts; 2]), Counts::Follow)
 }
 
 impl Failsafe {
@@ -51,11 +53,11 @@ impl Failsafe {
     }
 
     fn is_held(&mut self, reason: HoldReason) {
-        self.sees(Observation::Directive(Order::Hold, reason), 0);
+        self.sees(Directive(Order::Hold, reason), 0);
     }
 
     fn takes_command(&mut self, ns_ago: [u64; 3]) {
-        self.sees(Observation::Command(&command(ns_ago)), 0);
+        self.sees(Command(&command(ns_ago)), 0);
     }
 
     fn loses_the_robot(&mut self) {
@@ -64,7 +66,7 @@ impl Failsafe {
 
     fn jumps(&mut self, ms_ago: u64) {
         for _ in 0..3 {
-            let jump = Observation::Motor([0; 2].into(), Counts::Implausible);
+            let jump = Motor([0; 2].into(), Counts::Implausible);
             self.monitors.odometry.observe(&jump, ago(ms_ago * MS));
         }
     }
@@ -77,7 +79,7 @@ impl Failsafe {
     }
 
     fn does_not_stop(&mut self) {
-        self.sees(Observation::Commanded([0, 0]), 5000);
+        self.sees(Commanded([0, 0]), 5000);
         self.frames((1..=30).map(|frame| 50 * frame), 4000);
     }
 
@@ -85,7 +87,7 @@ impl Failsafe {
     fn ranges(&mut self, range_cm: impl Fn(u16) -> u16, counts_per_tick: u16) {
         for tick in 0..10 {
             let reading = [reading(0, Some(f64::from(range_cm(tick)) / 100.0))];
-            for what in [Observation::Readings(&reading), counts(counts_per_tick * tick)] {
+            for what in [Readings(&reading), counts(counts_per_tick * tick)] {
                 self.monitors.range.observe(&what, now());
             }
         }
@@ -104,9 +106,9 @@ impl Failsafe {
 fn well() -> Failsafe {
     let mut failsafe = Failsafe::new(&front_only());
     failsafe.monitors.presence.heard(now().machine_ns);
-    failsafe.sees(Observation::Pace(Pace::Rate(1.0)), 0);
+    failsafe.sees(Pace(Pace::Rate(1.0)), 0);
     failsafe.observe(&DRIVE, ago(orders::SUPERVISOR_SILENT.as_nanos() as u64));
-    for what in [FOUND, boards(7.2), Observation::Readings(&[reading(0, None)])] {
+    for what in [FOUND, boards(7.2), Readings(&[reading(0, None)])] {
         failsafe.observe(&what, ago(SILENT_MS * MS - 1));
     }
     failsafe.takes_command([LIMIT_MS * MS; 3]);
@@ -118,15 +120,14 @@ type Break = fn(&mut Failsafe);
 fn wheels_are_held(failsafe: &mut Failsafe) {
     for frame in (0..=10).rev() {
         let odometry = &mut failsafe.monitors.odometry;
-        for what in [Observation::Currents([1500; 2]), counts(0), Observation::Commanded([1200; 2])]
-        {
+        for what in [Currents([1500; 2]), counts(0), Commanded([1200; 2])] {
             odometry.observe(&what, ago(100 * frame * MS));
         }
     }
 }
 
 const fn commander(moves: bool) -> Observation<'static> {
-    Observation::Commander(Commander { number: [0xab; 16], moves })
+    Commander(Commander { number: [0xab; 16], moves })
 }
 
 /// Omits infrared-1, which looks into the front sonar's cone.
@@ -134,12 +135,12 @@ fn without_an_infrared_ranger(failsafe: &mut Failsafe) {
     let readings: Vec<_> = [0, 1, 2, 3, 5, 6, 7, 8, 9].map(|sensor| reading(sensor, None)).into();
     failsafe.monitors.streams = Monitor::new(&mission(""));
     failsafe.sees(FOUND, 0);
-    failsafe.sees(Observation::Readings(&readings), 0);
+    failsafe.sees(Readings(&readings), 0);
 }
 
 /// Sole change that leads to each cause.
 const CASES: &[(Break, Cause)] = &[
-    (|it| it.sees(Observation::Directive(Order::Stop, HoldReason::Ending), 0), Cause::MissionOver),
+    (|it| it.sees(Directive(Order::Stop, HoldReason::Ending), 0), Cause::MissionOver),
     (|it| [2000, 0].into_iter().for_each(|ms| it.sees(boards(5.9), ms)), Cause::BatteryEmpty),
     (|it| it.jumps(10_000), Cause::OdometryGivenUp),
     (|it| it.sees(commander(true), 0), Cause::AnotherCommander),
@@ -155,7 +156,7 @@ const CASES: &[(Break, Cause)] = &[
         Cause::SupervisorSilent,
     ),
     (Failsafe::loses_the_robot, Cause::RobotLost),
-    (|it| it.sees(Observation::Found { again: true }, 0), Cause::RobotLate),
+    (|it| it.sees(Found { again: true }, 0), Cause::RobotLate),
     (|it| it.sees(FOUND, SILENT_MS), Cause::FramesSilent),
     (
         |it| {
@@ -170,16 +171,16 @@ const CASES: &[(Break, Cause)] = &[
     (
         |it| {
             it.monitors.touch = Monitor::new(&mission("robot.model = 'kobuki'"));
-            it.monitors.touch.observe(&Observation::Commanded([100; 2]), now());
-            it.sees(Observation::Touched(&[(0, true)]), 0);
+            it.monitors.touch.observe(&Commanded([100; 2]), now());
+            it.sees(Touched(&[(0, true)]), 0);
         },
         Cause::Felt,
     ),
     (
         |it| {
-            it.sees(Observation::Readings(&[reading(0, None)]), SILENT_MS);
+            it.sees(Readings(&[reading(0, None)]), SILENT_MS);
             let status = RangeStatus::Invalid.into();
-            it.sees(Observation::Readings(&[RangeReading { status, ..reading(0, None) }]), 0);
+            it.sees(Readings(&[RangeReading { status, ..reading(0, None) }]), 0);
         },
         Cause::RangeSilent,
     ),
@@ -191,7 +192,7 @@ const CASES: &[(Break, Cause)] = &[
     (|it| it.takes_command([0, now().machine_ns, 0]), Cause::PoseStale),
     (|it| it.takes_command([0, 0, STALE]), Cause::GuidanceStale),
     (without_an_infrared_ranger, Cause::InfraredSilent),
-    (|it| it.sees(Observation::Responds(LATE), 0), Cause::BaseSlow),
+    (|it| it.sees(Responds(LATE), 0), Cause::BaseSlow),
     (|it| it.sees(boards(6.5), 0), Cause::BatteryLow),
 ];
 
@@ -288,13 +289,13 @@ fn a_cause_applies_no_longer_when_its_row_says_so() {
 fn an_operators_resume_clears_what_its_row_says_an_end_stays_and_a_held_robot_is_not_given_up() {
     let mut failsafe = broken(|it| it.jumps(9000));
     assert_eq!(failsafe.cause(), Cause::OdometryImplausible);
-    failsafe.sees(Observation::Resumed, 0);
+    failsafe.sees(Resumed, 0);
     assert!(!failsafe.applied(Cause::OdometryImplausible));
     assert_eq!(failsafe.decides(), Decision::GO);
     let mut failsafe = broken(|it| it.jumps(10_000));
     for _ in 0..2 {
         assert_eq!(failsafe.cause(), Cause::OdometryGivenUp);
-        failsafe.sees(Observation::Resumed, 0);
+        failsafe.sees(Resumed, 0);
     }
     let mut held = broken(|it| {
         it.is_held(HoldReason::StageHeld);
@@ -375,7 +376,7 @@ fn who_tells_the_robot_to_move_is_a_commander_at_once_and_who_tells_it_to_stand_
 #[test]
 fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found() {
     let mut failsafe = well();
-    failsafe.sees(Observation::Responds(LATE), 0);
+    failsafe.sees(Responds(LATE), 0);
     failsafe.takes_command([0, 1, 0]);
     assert_eq!(failsafe.cause(), Cause::BaseSlow);
     let told = failsafe.monitors.base.sample().unwrap();
@@ -386,7 +387,7 @@ fn a_slow_base_drives_at_half_speed_until_a_command_follows_from_what_was_found(
     for set in ["method = 'paper'", "planner.executable = './mine'"] {
         let mut failsafe = well();
         failsafe.monitors.base = Monitor::new(&mission(set));
-        failsafe.sees(Observation::Responds(LATE), 0);
+        failsafe.sees(Responds(LATE), 0);
         failsafe.takes_command([0; 3]);
         assert_eq!(
             (failsafe.cause(), failsafe.monitors.base.sample()),
@@ -402,9 +403,9 @@ fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doub
     let after = |failsafe: &mut Failsafe, windows: std::ops::Range<u64>, count: usize| {
         let monitor = &mut failsafe.monitors.commander;
         for when in windows.map(|window| ago((20 - 2 * window) * 1000 * MS)) {
-            monitor.observe(&Observation::Owed(50), when);
-            (0..count).for_each(|_| monitor.observe(&Observation::Acknowledged, when));
-            monitor.observe(&Observation::Time, when);
+            monitor.observe(&Owed(50), when);
+            (0..count).for_each(|_| monitor.observe(&Acknowledged, when));
+            monitor.observe(&Time, when);
         }
         failsafe.cause()
     };
@@ -416,7 +417,7 @@ fn acknowledgements_of_what_was_not_sent_show_another_commander_and_late_or_doub
     let why = failsafe.explain(Cause::AnotherCommander, now()).unwrap();
     assert!(why.contains("another program commands it"), "{why}");
     assert_ne!(after(&mut failsafe, 4..5, 50), Cause::AnotherCommander, "it has gone");
-    failsafe.sees(Observation::Pace(Pace::Max), 0);
+    failsafe.sees(Pace(Pace::Max), 0);
     assert_ne!(after(&mut failsafe, 5..6, 60), Cause::AnotherCommander, "it waits for commands");
 }
 
@@ -442,11 +443,11 @@ fn frames_that_go_elsewhere_while_acknowledgements_come_at_once_show_another_com
             if tick % every == 0 {
                 take(counts(0), ms_ago);
             }
-            take(Observation::Owed(1), ms_ago);
+            take(Owed(1), ms_ago);
             if tick % answered == 0 {
-                take(Observation::Acknowledged, ms_ago - late_ms);
+                take(Acknowledged, ms_ago - late_ms);
             }
-            take(Observation::Time, ms_ago);
+            take(Time, ms_ago);
         }
         let condition = monitor.condition(Cause::AnotherCommander, now());
         assert_eq!(condition == Condition::Holds, is_found, "{why}");

@@ -32,7 +32,7 @@ const ALL: [Happens; 9] = [
     SignedOff,
 ];
 
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
 struct World {
     link: bool,
     guard: bool,
@@ -100,15 +100,7 @@ impl World {
 
 #[test]
 fn no_history_leaves_a_robot_that_may_move_without_a_process_that_orders_the_stop() {
-    let first = World {
-        link: true,
-        guard: true,
-        mark: false,
-        moves: false,
-        commands: true,
-        frames: true,
-        due: false,
-    };
+    let first = World { link: true, guard: true, commands: true, frames: true, ..World::default() };
     let (mut seen, mut newest) = (HashSet::from([first]), vec![(first, Vec::new())]);
     for _ in 0..DEPTH {
         for (world, history) in std::mem::take(&mut newest) {

@@ -5,33 +5,17 @@ use common::wire::Quantity;
 
 const PERIOD_MS: u64 = 143;
 
-/// Runs wall-clock ticks, always commanded to drive, with frames `frames(tick)`. Returns decisions
-/// with mission milliseconds.
-fn drive(
-    link: &mut Link,
-    numbers: std::ops::Range<u64>,
-    frames: impl Fn(u64) -> Vec<u8>,
-) -> Vec<(u64, Cause)> {
-    let mut all = Vec::new();
-    for number in numbers {
-        let ms = number * PERIOD_MS;
-        let effects = tick(link, number, &frames(number), [TURN; 2]);
-        all.extend(causes(&effects).map(|cause| (ms, cause)));
-    }
-    all
-}
-
+/// Runs a tick on the wall clock with an order to drive, these frames, and a command.
 fn tick(link: &mut Link, number: u64, frames: &[u8], speeds: [f64; 2]) -> Vec<Effect> {
     let ms = number * PERIOD_MS;
-    let mut effects = link.drive(ms);
-    effects.extend(link.hears(frames, ms));
-    effects.extend(link.told(number, ms, speeds));
-    effects
+    [link.drive(ms), link.hears(frames, ms), link.told(number, ms, speeds)].concat()
 }
 
 fn suspected() -> Link {
     let mut link = driving(on_the_wall());
-    drive(&mut link, 0..10, |_| rolled(0));
+    for number in 0..10 {
+        tick(&mut link, number, &rolled(0), [TURN; 2]);
+    }
     assert_eq!(link.decision.cause, Cause::OdometryImplausible);
     link
 }
@@ -43,9 +27,8 @@ fn an_operators_stop_and_resume_let_a_suspected_robot_go_on_and_its_wait_is_no_e
         link.hold(HoldReason::Operator, number * PERIOD_MS);
         link.still(number * PERIOD_MS);
     }
-    assert_eq!(link.decision.cause, Cause::OperatorStop);
-    assert!(link.is_at_rest());
-    drive(&mut link, 100..101, |_| rolled(0));
+    assert!(link.is_at_rest() && link.decision.cause == Cause::OperatorStop);
+    tick(&mut link, 100, &rolled(0), [TURN; 2]);
     assert_eq!(link.decision, Decision::GO);
     // No other hold ends a suspicion.
     let mut link = suspected();
@@ -68,12 +51,11 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
     let mut tried = Vec::new();
     for number in 0..30 {
         let ms = number * PERIOD_MS;
-        let rolled = (80 * number) as u16;
-        let mut effects = link.hold(HoldReason::Operator, ms);
-        effects.extend(link.hears(&datagram(255, [rolled, 32_000 - rolled]), ms));
-        effects.extend(link.quiet(ms + 70));
+        let rolls = rolled(80 * number as u16);
+        let effects =
+            [link.hold(HoldReason::Operator, ms), link.hears(&rolls, ms), link.quiet(ms + 70)];
         assert!(tried.is_empty() || link.decision.cause == Cause::RobotDoesNotStop);
-        for command in sent(&effects) {
+        for command in sent(&effects.concat()) {
             match command {
                 Command::Enable { on: false, channel } => tried.push(channel),
                 Command::Motion(motion) if motion.quantity == Quantity::Pwm => {
@@ -89,15 +71,14 @@ fn a_robot_that_rolls_on_when_it_is_to_stand_is_told_by_every_method_in_turn() {
     }
     assert_eq!(tried[..4], [Some(0), Some(1), Some(99), None]);
     // It rests, and drives only after its motors are enabled.
-    let rests = datagram(255, [2320, 29_680]);
+    let rests = rolled(2320);
     for number in 30..36 {
         link.hears(&rests, number * PERIOD_MS);
     }
-    assert!(link.is_at_rest());
-    assert_eq!(link.decision.cause, Cause::OperatorStop);
+    assert!(link.is_at_rest() && link.decision.cause == Cause::OperatorStop);
     let go = sent(&tick(&mut link, 36, &rests, [TURN; 2]));
-    assert!(go.iter().any(|it| matches!(it, Command::Enable { on: true, .. })), "{go:?}");
-    assert!(matches!(go.last(), Some(Command::Motion(_))), "{go:?}");
+    let enables = go.iter().any(|it| matches!(it, Command::Enable { on: true, .. }));
+    assert!(enables && matches!(go.last(), Some(Command::Motion(_))), "{go:?}");
 }
 
 #[test]
@@ -135,9 +116,7 @@ fn wheels_that_reach_four_fifths_of_their_command_are_told_more_until_they_turn_
 #[test]
 fn on_the_wall_clock_a_second_command_for_a_tick_reaches_the_robot_too() {
     let mut link = ticking();
-    for (speed, counts) in [(0.25, 300), (0.5, 600)] {
-        let told = velocities(&link.told(0, 10, [speed * TURN; 2]));
-        assert_eq!(told[0][1], Some(counts));
-    }
+    let told = [0.25, 0.5].map(|share| velocities(&link.told(0, 10, [share * TURN; 2]))[0][1]);
+    assert_eq!(told, [Some(300), Some(600)]);
     assert_eq!(link.tally.commands_out, 2);
 }
