@@ -48,7 +48,7 @@ type Suspected = Option<(f64, Suspicion)>;
 
 /// Takes a frame that says `says` of the wheels' counts, and commands. Returns the suspicion.
 fn turn(
-    (odometry, wheels): (&mut Odometry, &mut Wheels),
+    (odometry, wheels): &mut (Odometry, Wheels),
     time: f64,
     says: impl FnOnce([u16; 2]) -> [u16; 2],
     tells: [i16; 2],
@@ -74,7 +74,7 @@ fn drive(
     let mut robot = (odometry(), Wheels::default());
     (0..ticks).filter(|tick| !out(*tick)).find_map(|tick| {
         let time = f64::from(tick) * PERIOD;
-        turn((&mut robot.0, &mut robot.1), time, |counts| says(tick, counts), tells(tick))
+        turn(&mut robot, time, |counts| says(tick, counts), tells(tick))
     })
 }
 
@@ -262,14 +262,14 @@ fn a_current_that_repeats_is_beyond_the_range_low_or_high_on_rolling_wheels_is_n
     for current in [HELD_AD, u16::MAX, ROLLS_AD] {
         in_time(held([true; 2], [TURN; 2], |_, _| current).1, Suspicion::Left, current);
     }
-    let (mut odometry, mut wheels) = (odometry(), Wheels::default());
+    let mut robot = (odometry(), Wheels::default());
     let suspected = (0..60).find_map(|tick| {
-        odometry.contacts.take_currents([HELD_AD; 2]);
+        robot.0.contacts.take_currents([HELD_AD; 2]);
         // The encoders die after 5 s.
         let says = |counts: [u16; 2]| if tick <= 35 { counts } else { [0; 2] };
         let time = f64::from(tick) * PERIOD;
-        let suspected = turn((&mut odometry, &mut wheels), time, says, [TURN; 2]);
-        assert!(odometry.contacts.new.is_none());
+        let suspected = turn(&mut robot, time, says, [TURN; 2]);
+        assert!(robot.0.contacts.new.is_none());
         suspected
     });
     assert!(suspected.unwrap().0 < 6.2, "{suspected:?}");
@@ -297,16 +297,16 @@ fn a_robot_that_another_host_turns_or_speeds_is_suspected_and_the_words_name_tha
         ([TURN, TURN], 20.0, true),
         ([-TURN / 2, -TURN / 2], 20.0, false),
     ] {
-        let (mut odometry, mut wheels) = (odometry(), Wheels::default());
+        let mut robot = (odometry(), Wheels::default());
         let mut told_s = 0.0;
         let suspected = (0..140).find_map(|tick| {
             let time = f64::from(tick) * PERIOD;
             while told_s < time {
-                wheels.roll_to(told_s);
-                wheels.told.push((told_s, other));
+                robot.1.roll_to(told_s);
+                robot.1.told.push((told_s, other));
                 told_s += 1.0 / hertz;
             }
-            turn((&mut odometry, &mut wheels), time, |counts| counts, [TURN / 3; 2])
+            turn(&mut robot, time, |counts| counts, [TURN / 3; 2])
         });
         let (after_s, suspicion) = suspected.unwrap();
         assert!(after_s < 5.0, "{other:?}: {suspected:?}");

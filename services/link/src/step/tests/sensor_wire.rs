@@ -4,19 +4,19 @@ use common::driver::{Driver, Heard, LaserScan, WireTally};
 
 use super::*;
 
-/// One byte per scan: the range of all beams, decimetres; 0 is outside the protocol.
+/// Each byte is the range of all beams, metres; 0 is outside the protocol.
 #[derive(Debug)]
 struct Laser;
 
 impl Driver for Laser {
     fn hear(&mut self, bytes: &[u8]) -> Heard {
         let mut heard = Heard { anything: true, ..Heard::default() };
-        match bytes {
-            [0] => heard.refused = Some("no scan".into()),
-            bytes => heard.scans.extend(bytes.iter().map(|decimetres| LaserScan {
-                beams: vec![f32::from(*decimetres) / 10.0; 360],
-                ..LaserScan::default()
-            })),
+        match bytes[0] {
+            0 => heard.refused = Some("no scan".into()),
+            metres => {
+                let beams = vec![f32::from(metres); 360];
+                heard.scans = vec![LaserScan { beams, ..LaserScan::default() }];
+            }
         }
         heard
     }
@@ -38,14 +38,14 @@ fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign
     link.drivers.push(Box::new(Laser));
     let greeted = link.at(Event::SensorWire(0, true), 0);
     assert!(greeted.contains(&Effect::SendSensor(0, b"scan".to_vec())), "{greeted:?}");
-    link.at(Event::Sensor(0, &[10]), MS);
+    link.at(Event::Sensor(0, &[1]), MS);
     assert!(!link.connected());
     let wheels = b"{\"wheels\":[0,0],\"speeds\":[0,0]}\n";
     link.hears(wheels, 10);
     link.drive(11);
-    link.at(Event::Sensor(0, &[20]), 50 * MS);
+    link.at(Event::Sensor(0, &[2]), 50 * MS);
     // No such sensor.
-    link.at(Event::Sensor(7, &[30]), 60 * MS);
+    link.at(Event::Sensor(7, &[3]), 60 * MS);
     let effects = link.hears(wheels, 110);
     let scans = effects.iter().filter_map(|effect| match effect {
         Effect::Tick { ranges, scans, .. } => Some((ranges[0].range_m, scans.clone())),
@@ -58,6 +58,6 @@ fn a_sensor_with_a_wire_of_its_own_is_greeted_heard_at_the_next_tick_and_no_sign
     let refused = link.at(Event::Sensor(0, &[0]), 120 * MS);
     assert!(refused.contains(&Effect::Refused("no scan".into())));
     // The laser falls silent.
-    let again = (3..30).flat_map(|tick| link.hears(wheels, 50 * tick));
-    assert!(again.filter(|effect| matches!(effect, Effect::SendSensor(..))).count() > 0);
+    let mut again = (3..30).flat_map(|tick| link.hears(wheels, 50 * tick));
+    assert!(again.any(|effect| matches!(effect, Effect::SendSensor(..))));
 }
