@@ -84,7 +84,7 @@ struct Supervisor {
     /// When an operator asked; not yet received.
     asked_stop: Option<u64>,
     asked_resume: Option<u64>,
-    said: Option<(Order, HoldReason)>,
+    said: Option<Order>,
 }
 
 struct World {
@@ -181,12 +181,9 @@ impl World {
                 self.judge_motion();
             }
         }
-        if let Some(since) = self.cause_since
-            && self.now_ns - since > self.cause.1 * MS
-        {
-            let decision = self.link.decision;
-            assert!(decision.stops(), "{:?} holds: {decision:?}, {:?}", self.cause, self.history);
-        }
+        let decision = self.link.decision;
+        let is_held = !self.is_cause_due() || decision.stops();
+        assert!(is_held, "{:?} holds: {decision:?}, {:?}", self.cause, self.history);
         if !self.has(Cause::RobotLost) {
             let acknowledged = ack().repeat(sent(&effects).len());
             if !acknowledged.is_empty() {
@@ -201,12 +198,13 @@ impl World {
         assert!(!self.is_stopped, "it moves although an operator stopped it: {history:?}");
         let obeyed = self.link.newest_command.unwrap().stamp.stamp_ns;
         assert!(obeyed > self.stopped_ns, "it obeys a command from before the stop: {history:?}");
-        let said = self.supervisor.said.map(|(order, _)| order);
+        let said = self.supervisor.said;
         assert_eq!(said, Some(Order::Drive), "it obeys another supervisor: {history:?}");
-        if let Some(since) = self.cause_since {
-            let held_ns = self.now_ns - since;
-            assert!(held_ns <= self.cause.1 * MS, "it moves under {:?}: {history:?}", self.cause);
-        }
+        assert!(!self.is_cause_due(), "it moves under {:?}: {history:?}", self.cause);
+    }
+
+    fn is_cause_due(&self) -> bool {
+        self.cause_since.is_some_and(|since| self.now_ns - since > self.cause.1 * MS)
     }
 
     fn has(&self, cause: Cause) -> bool {
@@ -243,7 +241,7 @@ impl World {
             } else {
                 (Order::Drive, HoldReason::None)
             };
-            supervisor.said = Some((order, reason));
+            supervisor.said = Some(order);
             let process = supervisor.process;
             self.order(process, order, reason);
         }
@@ -271,6 +269,8 @@ impl World {
     /// Returns None if that cannot happen now.
     fn happen(&mut self, what: Happens) -> Option<()> {
         self.history.push(what);
+        // Simultaneous requests have distinct times.
+        let asked_ns = self.now_ns + self.history.len() as u64;
         match what {
             Tick => self.tick(),
             Pause => (0..self.cause.1 / TICK_MS + 2).for_each(|_| self.tick()),
@@ -279,12 +279,12 @@ impl World {
             Stop => {
                 (self.is_stopped, self.stopped_ns) = (true, self.now_ns);
                 self.old = self.newest;
-                self.supervisor.asked_stop = Some(self.asked_ns());
+                self.supervisor.asked_stop = Some(asked_ns);
                 self.give(Event::Operator(Request::Stop));
             }
             Resume if self.is_stopped => {
                 self.is_stopped = false;
-                self.supervisor.asked_resume = Some(self.asked_ns());
+                self.supervisor.asked_resume = Some(asked_ns);
                 self.give(Event::Operator(Request::Resume));
             }
             SupervisorHearsStop => {
@@ -317,11 +317,6 @@ impl World {
             CauseBegins | CauseEnds | Resume => return None,
         }
         Some(())
-    }
-
-    /// Returns distinct times for simultaneous requests.
-    fn asked_ns(&self) -> u64 {
-        self.now_ns + self.history.len() as u64
     }
 
     fn restart_link(&mut self) {
