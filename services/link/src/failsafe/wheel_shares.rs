@@ -218,7 +218,7 @@ impl WheelShares {
 mod tests {
 
     use super::*;
-    use crate::testing::{mission, near};
+    use crate::testing::*;
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 

@@ -3,10 +3,8 @@ use crate::testing::*;
 
 const LIMITS: BatteryLimits = BatteryLimits { board: 6.6, motor: 11.0, servo: 0.0 };
 
-fn batteries(limits: BatteryLimits) -> Batteries {
-    let mut mission = mission("");
-    mission.robot.low_battery_v = limits;
-    Batteries::new(&mission)
+fn batteries() -> Batteries {
+    Batteries { limits: LIMITS, ..Batteries::new(&mission("")) }
 }
 
 impl Batteries {
@@ -19,7 +17,7 @@ impl Batteries {
 
 #[test]
 fn a_low_battery_is_said_once_and_gives_enough_again_only_clearly_above_its_limit() {
-    let mut batteries = batteries(LIMITS);
+    let mut batteries = batteries();
     // At 6.8 V it recovers while nothing turns.
     for (board, is_low, said) in [
         (6.6, false, None),
@@ -36,7 +34,7 @@ fn a_low_battery_is_said_once_and_gives_enough_again_only_clearly_above_its_limi
 
 #[test]
 fn each_battery_has_its_own_limit_and_one_that_is_not_there_is_not_low() {
-    let mut batteries = batteries(LIMITS);
+    let mut batteries = batteries();
     for (motor, is_low) in [(10.9, true), (0.2, false)] {
         assert_eq!(batteries.at(0.0, [7.2, motor, 1.2]).0, [false, is_low, false]);
     }
@@ -44,7 +42,7 @@ fn each_battery_has_its_own_limit_and_one_that_is_not_there_is_not_low() {
 
 #[test]
 fn a_battery_that_stays_sunk_is_empty_for_good_and_one_that_dips_is_only_low() {
-    let mut batteries = batteries(LIMITS);
+    let mut batteries = batteries();
     // Low below 11 V, empty below 10 V; a dip, and recovery at rest.
     for (seconds, motor, charge) in [
         (0.0, 12.0, Charge::Enough),
@@ -62,7 +60,7 @@ fn a_battery_that_stays_sunk_is_empty_for_good_and_one_that_dips_is_only_low() {
 
 #[test]
 fn a_robot_drives_on_without_its_servos() {
-    let mut batteries = batteries(BatteryLimits::default());
+    let mut batteries = Batteries::new(&mission(""));
     for seconds in [0.0, 5.0] {
         let (low, _) = batteries.at(seconds, [7.2, 7.2, 5.0]);
         assert_eq!((low, batteries.charge()), ([false, false, true], Charge::Enough));
