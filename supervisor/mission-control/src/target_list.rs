@@ -149,8 +149,11 @@ impl TargetList {
         (self.waits || self.by_hand).then_some(match newest {
             Some(TargetOutcome::Unreachable) => Outcome::Unreachable,
             Some(TargetOutcome::TimedOut) => Outcome::Timeout,
-            None | Some(TargetOutcome::Followed) => Outcome::Waited,
-            _ => Outcome::Reached,
+            // `of_all` says how the arrival was.
+            Some(
+                TargetOutcome::Reached | TargetOutcome::WrongPlace | TargetOutcome::ReachedUnsure,
+            ) => Outcome::Reached,
+            _ => Outcome::Waited,
         })
     }
 

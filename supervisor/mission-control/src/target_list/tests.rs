@@ -138,7 +138,7 @@ fn every_reason_against_a_target_has_its_answer() {
 
 #[test]
 fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
-    use TargetOutcome::{NotTried, Reached, TimedOut};
+    use TargetOutcome::{NotTried, Reached, Replaced, TimedOut};
     let stays = Mission::parse("stay = true\nperimeter.width_m = 8", Path::new("m.toml")).unwrap();
     let mut list = TargetList::of(&stays);
     assert_eq!((list.waits, list.outcome_while_waiting()), (true, Some(Outcome::Waited)));
@@ -149,8 +149,13 @@ fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
     list.replace(&[at(0.5, 0.0)], (20, 20.0), None);
     list.settle(Outcome::Reached, 30.0, Some((arrival(30), Reached)));
     assert_eq!(list.outcome_while_waiting(), Some(Outcome::Reached));
+    list.replace(&[at(4.0, 0.0)], (31, 31.0), None);
+    list.replace(&[at(0.7, 0.0)], (32, 32.0), None);
+    list.by_hand = true;
+    assert!(list.release());
+    assert_eq!(list.outcome_while_waiting(), Some(Outcome::Waited), "left for the hand");
     let results = list.results(&Ending::asked_for(Outcome::Reached, ""), None, None, None);
-    assert_eq!(outcomes(&results), [(1, TimedOut), (2, NotTried), (3, Reached)]);
+    assert_eq!(outcomes(&results), [(1, TimedOut), (2, NotTried), (3, Reached), (4, Replaced)]);
 }
 
 #[test]
