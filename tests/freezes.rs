@@ -45,7 +45,7 @@ fn freeze_each(robot: &str, times: usize) -> Vec<f64> {
 #[test]
 fn frozen_stages_are_noticed_when_their_beat_is_due() {
     let late = freeze_each("freezes", 2);
-    // Other tests share the processors, so only the median counts.
+    // Other programs share the processors, so only the median counts.
     let median = late[late.len() / 2];
     assert!(late[0] >= 0.0 && median < SLACK, "{late:?}");
 }

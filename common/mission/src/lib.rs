@@ -466,7 +466,7 @@ impl Mission {
         lasers
     }
 
-    /// Returns the lasers with a serial line of their own.
+    /// Returns the lasers with a wire of their own.
     pub fn rplidars(&self) -> Vec<(usize, Sensor, Rplidar)> {
         let with_product = |(row, sensor)| {
             let product = self.rplidar(row, &sensor)?;

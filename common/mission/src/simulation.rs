@@ -259,7 +259,7 @@ section! {
 }
 
 section! {
-    /// Gyro of a robot that has one and speaks JSON. The bias is constant within a mission.
+    /// Gyro of a robot that has one. The bias is constant within a mission.
     GyroPhysics, written as GyroKeys in "simulation.gyro" {
         noise_deg_sqrt_s in 0.0..=10.0 => 0.0, 0.015, 0.05;
         /// Uniform.

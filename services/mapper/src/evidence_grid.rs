@@ -4,8 +4,8 @@
 //! holds evidence for an obstacle, the last echo's direction, and whether it was scanned.
 //!
 //! An echo comes from somewhere on an arc. The arc's cells gain weight, most in the middle; cells
-//! before it lose weight. If a well-known occupied cell explains the echo, the others keep their
-//! weight. Otherwise every wall would grow at its ends.
+//! before it lose weight. If a well-known occupied cell explains the echo, cells that are not
+//! occupied keep their weight. Otherwise every wall would grow at its ends.
 //!
 //! A laser may look over or through an object, so each laser has its own grid; the other rangers
 //! beside lasers share one. A cell is hazard if any grid says so. An echo whose range the laser

@@ -37,7 +37,7 @@ const WAY_OUT_M_S: f64 = 0.08;
 
 #[derive(Debug)]
 enum Advisor {
-    /// Paper's method, and any method without sensing.
+    /// Paper's method, and a robot without arcs or sensing.
     Follow,
     /// Requires that the sonar has looked ahead.
     LookFirst(ActiveSensing),

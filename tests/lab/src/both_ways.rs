@@ -41,8 +41,8 @@ const PROCESSES: &str = "processes";
 const TARGETS: usize = 2;
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// Drive missions in one process and through real processes in lockstep, and compare all that they
-/// publish.
+/// Drive missions in one process and through real processes in lockstep, and compare what their
+/// stages publish.
 ///
 /// Exits with 1 if any mission differs, and names its first difference.
 #[derive(Debug, Args)]

@@ -1,5 +1,4 @@
-//! `firsthand experiments`: the paper's experiments, repeated with many seeds through the real
-//! processes, beside the paper's values.
+//! `firsthand experiments`: the paper's experiments, repeated with many seeds, beside the paper's values.
 
 mod report;
 mod table;

@@ -1,4 +1,4 @@
-//! Missions on many worlds, each through the real processes, judged by the ground truth.
+//! Missions on many worlds, each in one process or through real ones, judged by the ground truth.
 //!
 //! Every setting runs on the same worlds and noise, so that only the setting changes the results.
 

@@ -6,8 +6,8 @@ use console::failure::Result;
 
 /// Set the pose of a standing robot.
 ///
-/// The robot forgets earlier sensor data. Fails if the robot drives, or if the place is outside the
-/// perimeter.
+/// The robot forgets earlier sensor data. Fails unless the robot stands, or if the place is outside
+/// the perimeter.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// X in the mission frame, metres.

@@ -8,7 +8,7 @@ use recording::{
     replay::{self, Options},
 };
 
-/// Replay a recording and compare all outputs bit by bit.
+/// Replay a recording and compare the outputs of its stages bit by bit.
 ///
 /// Each generation of each stage gets its recorded inputs. Exits with 1 if an output differs from
 /// the recorded one.

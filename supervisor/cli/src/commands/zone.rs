@@ -8,7 +8,7 @@ use console::failure::Result;
 /// Add a keep-out zone to a running robot, or remove zones.
 ///
 /// A zone is a polygon that the body may not enter. Sensors do not see it, and the mission file
-/// does not change. Fails if the robot stands in the zone.
+/// does not change. Fails if the robot's body touches the zone.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// X and Y of each corner, metres in the mission frame.

@@ -50,7 +50,7 @@ pub struct Arguments {
     allow: Vec<String>,
     /// Topic to serve, for example `field`.
     ///
-    /// Default: all except the largest and those that operators write.
+    /// Default: all with one writer other than an operator, except the largest.
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
 }

@@ -59,7 +59,7 @@ pub fn run(words: &[OsString]) -> Result {
     Ok((stage.run)(&start)?)
 }
 
-/// Alternative planners: two for comparison, and that of `firsthand calibrate`.
+/// Alternative planners: one for comparison, and that of `firsthand calibrate`.
 pub const OTHER_PLANNERS: &[&str] = &["wavefront", calibration::PLANNER];
 
 fn become_executable(stage: &Stage, mission: &Mission, options: &[OsString]) -> Result {
