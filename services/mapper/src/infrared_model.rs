@@ -60,17 +60,22 @@ fn deviation_m(range_m: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn reads(range_m: f64) -> Seen {
-        let status = RangeStatus::Measured.into();
-        seen(&RangeReading { range_m, status, ..RangeReading::default() }, 0.81).unwrap()
+    fn reads(status: RangeStatus, range_m: f64, reach_m: f64) -> Option<Seen> {
+        let status = status.into();
+        seen(&RangeReading { range_m, status, ..RangeReading::default() }, reach_m)
     }
 
     #[test]
-    fn a_ray_is_free_to_less_than_the_reading_and_the_less_the_farther() {
-        for (range, clear, hit) in
-            [(0.2, 0.176, true), (0.5, 0.454, true), (0.7, 0.629, true), (0.81, 0.722, false)]
-        {
-            let seen = reads(range);
+    fn a_ray_is_free_to_less_than_the_reading_the_less_the_farther_and_nearer_than_10_cm_to_nothing()
+     {
+        for (range, clear, hit) in [
+            (0.095, 0.0, true),
+            (0.2, 0.176, true),
+            (0.5, 0.454, true),
+            (0.7, 0.629, true),
+            (0.81, 0.722, false),
+        ] {
+            let seen = reads(RangeStatus::Measured, range, 0.81).unwrap();
             assert!((seen.clear_m - clear).abs() < 0.003, "{range} m: {seen:?}");
             let near = seen.hit_m.is_some_and(|hit| (hit - range).abs() < 0.002);
             assert_eq!(near, hit, "{range} m: {seen:?}");
@@ -79,17 +84,8 @@ mod tests {
 
     #[test]
     fn a_ray_counts_no_further_than_the_reach_of_its_row() {
-        let reading = RangeReading { range_m: 0.6, ..RangeReading::default() };
-        let status = RangeStatus::Measured.into();
-        let seen = seen(&RangeReading { status, ..reading }, 0.5).unwrap();
+        let seen = reads(RangeStatus::Measured, 0.6, 0.5).unwrap();
         assert!(seen.hit_m.is_none() && seen.clear_m < 0.5, "{seen:?}");
-        assert_eq!(super::seen(&reading, 0.81), None);
-    }
-
-    #[test]
-    fn a_reading_nearer_than_10_cm_frees_nothing() {
-        let seen = reads(0.095);
-        assert_eq!(seen.clear_m, 0.0);
-        assert!(seen.hit_m.is_some());
+        assert_eq!(reads(RangeStatus::Absent, 0.6, 0.81), None);
     }
 }

@@ -335,45 +335,49 @@ mod tests {
         }
     }
 
-    fn index(x: f64, y: f64) -> usize {
-        LATTICE.index(LATTICE.cell_at(DVec2::new(x, y)).unwrap())
+    /// Returns the cell at this x, and y = 0.
+    fn ahead(x: f64) -> usize {
+        LATTICE.index(LATTICE.cell_at(DVec2::new(x, 0.0)).unwrap())
+    }
+
+    fn each(ranges: &[f32]) -> Vec<Vec<f32>> {
+        ranges.iter().map(|range| vec![*range]).collect()
     }
 
     #[test]
     fn a_beam_frees_the_way_to_its_end_and_knows_nothing_behind_it() {
         let grid = after(&[vec![1.0]]);
-        assert!(grid.is_occupied(index(1.0, 0.0)));
+        assert!(grid.is_occupied(ahead(1.0)));
         assert_eq!(grid.news.flips.len(), 1);
-        let scanned = [0.4, 0.9, 1.0, 1.2].map(|x| grid.is_scanned(index(x, 0.0)));
+        let scanned = [0.4, 0.9, 1.0, 1.2].map(|x| grid.is_scanned(ahead(x)));
         assert_eq!(scanned, [true, true, true, false]);
     }
 
     #[test]
     fn what_goes_away_is_contradicted_by_two_scans() {
-        let far = vec![2.0];
-        let gone = [vec![1.0], vec![1.0], vec![1.0], far.clone(), far.clone()];
-        assert!(after(&gone[..4]).is_occupied(index(1.0, 0.0)), "one scan may be wrong");
-        assert!(!after(&gone).is_occupied(index(1.0, 0.0)));
+        let gone = each(&[1.0, 1.0, 1.0, 2.0, 2.0]);
+        assert!(after(&gone[..4]).is_occupied(ahead(1.0)), "one scan may be wrong");
+        assert!(!after(&gone).is_occupied(ahead(1.0)));
     }
 
     #[test]
     fn a_depth_camera_keeps_what_it_looks_over_and_takes_no_ground_before_it_for_scanned() {
-        let approach = [vec![0.5], vec![0.5], vec![2.0], vec![2.0], vec![2.0], vec![2.0]];
+        let approach = each(&[0.5, 0.5, 2.0, 2.0, 2.0, 2.0]);
         let grid = |from_m| after_clearing_from(from_m, None, &approach);
-        assert!(!grid(0.0).is_occupied(index(0.5, 0.0)), "a laser");
-        assert!(grid(0.6).is_occupied(index(0.5, 0.0)));
-        let scanned = [0.4, 0.7].map(|x| grid(0.6).is_scanned(index(x, 0.0)));
+        assert!(!grid(0.0).is_occupied(ahead(0.5)), "a laser");
+        assert!(grid(0.6).is_occupied(ahead(0.5)));
+        let scanned = [0.4, 0.7].map(|x| grid(0.6).is_scanned(ahead(x)));
         assert_eq!(scanned, [false, true]);
         let by_laser = after(&approach[..1]);
         let grid = after_clearing_from(0.6, Some(&by_laser), &approach);
-        assert!(!grid.is_occupied(index(0.5, 0.0)), "the laser sees it too, and sees it go");
+        assert!(!grid.is_occupied(ahead(0.5)), "the laser sees it too, and sees it go");
     }
 
     #[test]
     fn a_beam_without_a_reading_says_nothing_and_one_without_an_end_frees_its_reach() {
         let grid = after(&[vec![f32::NAN, f32::NEG_INFINITY]]);
-        assert!(grid.news.flips.is_empty() && !grid.is_scanned(index(1.0, 0.0)));
-        assert!(after(&[vec![f32::INFINITY]]).is_scanned(index(2.4, 0.0)));
+        assert!(grid.news.flips.is_empty() && !grid.is_scanned(ahead(1.0)));
+        assert!(after(&[vec![f32::INFINITY]]).is_scanned(ahead(2.4)));
     }
 
     #[test]
@@ -384,9 +388,9 @@ mod tests {
             let scans: Vec<_> = seen.iter().cloned().chain(vec![vec![2.3]; scans]).collect();
             after(&scans)
         };
-        assert!(along(5).is_occupied(index(1.0, 0.0)));
-        assert!(!along(5).is_occupied(index(1.95, 0.0)), "nothing goes on behind it");
-        assert!(!along(12).is_occupied(index(1.0, 0.0)));
+        assert!(along(5).is_occupied(ahead(1.0)));
+        assert!(!along(5).is_occupied(ahead(1.95)), "nothing goes on behind it");
+        assert!(!along(12).is_occupied(ahead(1.0)));
     }
 
     #[test]
@@ -395,7 +399,8 @@ mod tests {
             let beam = |number: usize| if (5..5 + near).contains(&number) { 0.3 } else { 1.5 };
             vec![(0..14).map(beam).collect::<Vec<f32>>()]
         };
-        let place = index(0.3 * 5.5_f64.to_radians().cos(), 0.3 * 5.5_f64.to_radians().sin());
+        let place = 0.3 * DVec2::from_angle(5.5_f64.to_radians());
+        let place = LATTICE.index(LATTICE.cell_at(place).unwrap());
         assert!(!after(&beams(1)).is_occupied(place) && after(&beams(2)).is_occupied(place));
     }
 
@@ -404,9 +409,9 @@ mod tests {
         // Eleven beams cross the cell at 0.5 m at 0 to 10 degrees, about half of them through one
         // cell.
         let beams = |near: usize| (0..6).map(|beam| if beam < near { 0.5 } else { 1.5 }).collect();
-        assert!(after(&[beams(1)]).is_occupied(index(0.5, 0.0)));
+        assert!(after(&[beams(1)]).is_occupied(ahead(0.5)));
         let many = (0..12).map(|beam| if beam == 0 { 0.3 } else { 1.5 }).collect();
-        assert!(!after(&[many]).is_occupied(index(0.3, 0.0)), "one of seven");
+        assert!(!after(&[many]).is_occupied(ahead(0.3)), "one of seven");
     }
 
     #[test]

@@ -434,7 +434,7 @@ mod tests {
     use common::{bus::Stamp, clock::MissionTime};
 
     use super::*;
-    use crate::testing::mission;
+    use crate::testing::{mission, range_in_room};
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
@@ -459,7 +459,6 @@ mod tests {
             let robot = PoseSample { stamp, x_m: 0.5 * at_s, ..PoseSample::default() };
             let blank = vec![0.0; 360];
             let fan = self.rows.scan(0, robot.pose(), &blank).unwrap();
-            let wall = |from: f64, along: f64, half: f64| (half * along.signum() - from) / along;
             let beams = fan.iter().map(|(along, _)| {
                 let discs = self.discs.iter().filter_map(|(start, velocity, radius)| {
                     let way = *start + *velocity * at_s - fan.origin;
@@ -467,26 +466,13 @@ mod tests {
                     let ends = near > 0.0 && aside.abs() < *radius;
                     ends.then(|| near - (radius * radius - aside * aside).sqrt())
                 });
-                let walls = wall(fan.origin.x, along.x, 5.0).min(wall(fan.origin.y, along.y, 4.0));
+                let walls = range_in_room(DVec2::new(5.0, 4.0), fan.origin, along);
                 discs.fold(walls, f64::min) as f32
             });
             let scan = Placed { row: 0, robot, capture_ns: time.0, beams: beams.collect() };
             let taken = self.movers.take(&self.rows, &scan, robot.pose());
             self.movers.place(&robot, robot.pose());
             (scan, taken)
-        }
-    }
-
-    fn thing_at(middle: DVec2) -> Thing {
-        Thing {
-            at_s: 0.0,
-            origin: DVec2::ZERO,
-            own: [None; 2],
-            mean: middle,
-            nearest_m: middle.length(),
-            half_width_m: 0.3,
-            noise_m: 0.05,
-            came: true,
         }
     }
 
@@ -498,7 +484,16 @@ mod tests {
             let beams = vec![range_m; beams];
             let fan = rows.scan(0, Pose2::default(), &beams).unwrap();
             let middle = fan.origin + DVec2::new(x_m, 0.0);
-            let thing = Thing { half_width_m: 0.4, ..thing_at(middle) };
+            let thing = Thing {
+                at_s: 0.0,
+                origin: DVec2::ZERO,
+                own: [None; 2],
+                mean: middle,
+                nearest_m: middle.length(),
+                half_width_m: 0.4,
+                noise_m: 0.05,
+                came: true,
+            };
             let track = Track { middle, is_mover: true, ..Track::new(&thing) };
             track.is_hidden(&fan, 0.0)
         };

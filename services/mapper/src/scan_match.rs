@@ -377,60 +377,56 @@ mod tests {
     use std::sync::LazyLock;
 
     use super::*;
-    use crate::testing::mission;
+    use crate::testing::{mission, range_in_room};
 
-    struct Matcher(ScanMatcher, Rows);
-
-    impl Matcher {
-        fn step(
-            &self,
-            held: &mut Option<Surroundings>,
-            Pose2 { position, heading: heading_rad }: Pose2,
-            beams: &[f32],
-        ) -> Option<FixSample> {
-            let (x_m, y_m) = (position.x, position.y);
-            let reckoned = PoseSample { x_m, y_m, heading_rad, ..PoseSample::default() };
-            let beams = beams.to_vec();
-            let scan = Placed { row: 0, robot: reckoned, capture_ns: 0, beams };
-            self.0.step(&self.1, held, &[scan], &mut Movers::default())
-        }
-    }
+    const START: Pose2 = Pose2 { position: DVec2::ZERO, heading: 0.0 };
+    const ROOM: DVec2 = DVec2::new(3.0, 2.0);
+    const CORRIDOR: DVec2 = DVec2::new(f64::INFINITY, 2.0);
 
     static MISSION: LazyLock<Mission> = LazyLock::new(|| {
         mission("target = [3, 0]\nrobot.model = 'turtlebot3-waffle'\nrobot.rate_hz = 10")
     });
 
-    fn matcher() -> Matcher {
-        Matcher(ScanMatcher::new(&MISSION), Rows::new(&MISSION))
+    static MATCHER: LazyLock<(ScanMatcher, Rows)> =
+        LazyLock::new(|| (ScanMatcher::new(&MISSION), Rows::new(&MISSION)));
+
+    fn matched(
+        held: &mut Option<Surroundings>,
+        Pose2 { position: DVec2 { x: x_m, y: y_m }, heading: heading_rad }: Pose2,
+        beams: &[f32],
+    ) -> Option<FixSample> {
+        let robot = PoseSample { x_m, y_m, heading_rad, ..PoseSample::default() };
+        let scan = Placed { row: 0, robot, capture_ns: 0, beams: beams.to_vec() };
+        MATCHER.0.step(&MATCHER.1, held, &[scan], &mut Movers::default())
     }
 
-    /// Returns the scan of a robot at `pose` in a room of 6 m by 4 m, or in an endless corridor
-    /// along x.
-    fn scan(pose: Pose2, corridor: bool) -> Vec<f32> {
+    /// Returns what a robot holds after this scan at its start.
+    fn started(beams: &[f32]) -> Option<Surroundings> {
+        let mut held = None;
+        matched(&mut held, START, beams);
+        held
+    }
+
+    fn off_m(fix: &FixSample, truth: DVec2) -> f64 {
+        DVec2::new(fix.x_m, fix.y_m).distance(truth)
+    }
+
+    /// Returns the scan of a robot at `pose` in a room of this half size.
+    fn scan(pose: Pose2, half_m: DVec2) -> Vec<f32> {
         let mount = MISSION.sensor_table()[0].mount.on(pose);
-        (0..360)
-            .map(|beam| {
-                let angle = mount.heading - std::f64::consts::PI + f64::from(beam).to_radians();
-                let along = DVec2::from_angle(angle);
-                let to = |at: f64, way: f64, wall: f64| (wall * way.signum() - at) / way;
-                let across = to(mount.position.y, along.y, 2.0);
-                let range = match corridor {
-                    true => across,
-                    false => across.min(to(mount.position.x, along.x, 3.0)),
-                };
-                if range <= 8.0 { range as f32 } else { f32::INFINITY }
-            })
-            .collect()
+        let beam = |beam| {
+            let angle = mount.heading - std::f64::consts::PI + f64::from(beam).to_radians();
+            let range = range_in_room(half_m, mount.position, DVec2::from_angle(angle));
+            if range <= 8.0 { range as f32 } else { f32::INFINITY }
+        };
+        (0..360).map(beam).collect()
     }
 
     #[test]
     fn along_a_corridor_the_wheels_are_believed() {
-        let matcher = matcher();
-        let mut held = None;
-        let start = Pose2::default();
-        matcher.step(&mut held, start, &scan(start, true));
+        let beams = scan(START, CORRIDOR);
         let wheels = Pose2 { position: DVec2::new(0.3, 0.05), heading: 0.02 };
-        let fix = matcher.step(&mut held, wheels, &scan(start, true)).unwrap();
+        let fix = matched(&mut started(&beams), wheels, &beams).unwrap();
         assert!((fix.x_m - 0.3).abs() < 0.01 && fix.y_m.abs() < 0.01, "{fix:?}");
         assert!(fix.covariance[0] > 100.0 * fix.covariance[3], "{fix:?}");
     }
@@ -439,7 +435,7 @@ mod tests {
     fn noisy() -> impl FnMut(Pose2) -> Vec<f32> {
         let mut random = 1_u32;
         move |pose| {
-            let mut beams = scan(pose, false);
+            let mut beams = scan(pose, ROOM);
             for range in &mut beams {
                 // A sum of twelve uniform numbers is nearly normal.
                 let noise: f64 = (0..12)
@@ -458,7 +454,7 @@ mod tests {
 
     /// Drives an ellipse by scans with noise; returns the matches' error, and its ratio to
     /// what they state: squares over variances.
-    fn ellipse(matcher: &Matcher, held: &mut Option<Surroundings>) -> (f64, f64) {
+    fn ellipse(held: &mut Option<Surroundings>) -> (f64, f64) {
         let mut noisy = noisy();
         let (mut last_m, mut squares, mut stated) = (0.0, 0.0, 0.0);
         for step in 0..200 {
@@ -467,8 +463,8 @@ mod tests {
             // The wheels slip: a tenth too far, and a turn of 0.5 degrees per scan.
             let heading = 0.01 * f64::from(step);
             let wheels = Pose2 { position: 1.1 * truth.position, heading };
-            if let Some(fix) = matcher.step(held, wheels, &noisy(truth)) {
-                last_m = DVec2::new(fix.x_m, fix.y_m).distance(truth.position);
+            if let Some(fix) = matched(held, wheels, &noisy(truth)) {
+                last_m = off_m(&fix, truth.position);
                 squares += last_m * last_m;
                 stated += fix.covariance[0] + fix.covariance[3];
             }
@@ -478,18 +474,14 @@ mod tests {
 
     #[test]
     fn scans_hold_the_pose_of_a_robot_whose_wheels_slip_and_say_how_well() {
-        let (last_m, ratio) = ellipse(&matcher(), &mut None);
+        let (last_m, ratio) = ellipse(&mut None);
         assert!(last_m < 0.02 && (0.02..1.0).contains(&ratio), "{last_m} {ratio}");
     }
 
     #[test]
     fn a_missing_beam_and_a_thing_in_front_change_nothing() {
-        let matcher = matcher();
-        let start = Pose2::default();
-        let held = &mut None;
-        matcher.step(held, start, &scan(start, false));
         let there = Pose2 { position: DVec2::new(0.3, 0.1), heading: 0.2 };
-        let mut beams = scan(there, false);
+        let mut beams = scan(there, ROOM);
         for (beam, range) in beams.iter_mut().enumerate() {
             match beam {
                 40..55 => *range = 0.8,
@@ -497,84 +489,72 @@ mod tests {
                 _ => {}
             }
         }
-        let fix = matcher.step(held, start, &beams).unwrap();
-        let off_m = DVec2::new(fix.x_m, fix.y_m).distance(there.position);
+        let fix = matched(&mut started(&scan(START, ROOM)), START, &beams).unwrap();
+        let off_m = off_m(&fix, there.position);
         assert!(off_m < 0.01 && (fix.heading_rad - 0.2).abs() < 0.005, "{fix:?}");
     }
 
     #[test]
     fn a_laser_of_great_noise_is_matched_with_its_first_scan_and_says_how_well() {
-        let matcher = matcher();
         let mut noisy = noisy();
-        let (mut held, start) = (None, Pose2::default());
-        matcher.step(&mut held, start, &noisy(start));
+        let mut held = started(&noisy(START));
         let (mut squares, mut stated) = (0.0, 0.0);
         for step in 0..40 {
             let position = DVec2::new(0.01 * f64::from(step), 0.0);
             let truth = Pose2 { position, heading: 0.0 };
-            let fix = matcher.step(&mut held, truth, &noisy(truth)).unwrap();
-            squares += DVec2::new(fix.x_m, fix.y_m).distance_squared(position);
-            stated += (fix.covariance[0] + fix.covariance[3]) / matcher.0.shared;
+            let fix = matched(&mut held, truth, &noisy(truth)).unwrap();
+            squares += off_m(&fix, position).powi(2);
+            stated += (fix.covariance[0] + fix.covariance[3]) / MATCHER.0.shared;
         }
         assert!((0.3..2.0).contains(&(squares / stated)), "{squares} where {stated} is stated");
     }
 
     #[test]
     fn a_thing_is_not_taken_for_another_one_beside_it() {
-        let matcher = matcher();
-        let start = Pose2::default();
         // The corridor ends ahead.
         let ends_at = |x: f64| {
-            let mut beams = scan(start, true);
+            let mut beams = scan(START, CORRIDOR);
             for (beam, range) in beams.iter_mut().enumerate().take(200).skip(161) {
                 *range = ((x + 0.064) / (beam as f64 - 180.0).to_radians().cos()) as f32;
             }
             beams
         };
-        let held = &mut None;
-        matcher.step(held, start, &ends_at(2.0));
-        let x_m = matcher.step(held, start, &ends_at(2.2)).unwrap().x_m;
+        let x_m = matched(&mut started(&ends_at(2.0)), START, &ends_at(2.2)).unwrap().x_m;
         assert!(x_m.abs() < 0.02, "{x_m}");
     }
 
     #[test]
     fn a_robot_that_sees_nothing_known_goes_on_by_its_wheels_and_says_so() {
-        let matcher = matcher();
-        let (start, held) = (Pose2::default(), &mut None);
-        let room = scan(start, false);
-        matcher.step(held, start, &room);
+        let room = scan(START, ROOM);
+        let held = &mut started(&room);
         let hall: Vec<_> = room.iter().map(|range| 2.5 * range).collect();
         let there = Pose2 { position: DVec2::new(0.2, 0.0), heading: 0.1 };
-        assert_eq!(matcher.step(held, there, &hall), None);
-        let fix = matcher.step(held, there, &hall).unwrap();
+        assert_eq!(matched(held, there, &hall), None);
+        let fix = matched(held, there, &hall).unwrap();
         assert!(fix.x_m > 0.19 && fix.shared[0] >= LOST[0] * LOST[0], "{fix:?}");
     }
 
     #[test]
     fn wild_numbers_of_a_saved_state_are_dropped() {
-        let matcher = matcher();
-        let start = Pose2::default();
-        let beams = scan(start, false);
-        let mut held = None;
-        matcher.step(&mut held, start, &beams);
+        let beams = scan(START, ROOM);
+        let held = started(&beams);
         for wild in [f64::NAN, f64::INFINITY, 1e300, -1e12] {
             let mut saved = held.clone();
             let surroundings = saved.as_mut().unwrap();
             surroundings.index = Index::default();
             surroundings.surfaces[3].at.x = wild;
             surroundings.surfaces[4].normal.y = wild;
-            assert!(matcher.step(&mut saved, start, &beams).is_some());
+            assert!(matched(&mut saved, START, &beams).is_some());
             saved.as_mut().unwrap().pose.position.y = wild;
-            matcher.step(&mut saved, start, &beams);
-            assert!(matcher.step(&mut saved, start, &beams).is_some(), "{wild}: lost for good");
+            matched(&mut saved, START, &beams);
+            assert!(matched(&mut saved, START, &beams).is_some(), "{wild}: lost for good");
         }
     }
 
     #[test]
     fn surroundings_of_most_surfaces_fit_their_file_and_match_as_before() {
-        let matcher = matcher();
         let mut held = None;
-        ellipse(&matcher, &mut held);
+        ellipse(&mut held);
         let full = held.as_mut().unwrap();
         full.surfaces = full.surfaces.iter().copied().cycle().take(MOST_SURFACES).collect();
         full.reindex();
@@ -585,8 +565,8 @@ mod tests {
         assert_eq!(held, restored);
         restored.as_mut().unwrap().index = Index::default();
         let Surroundings { pose, odometry, .. } = held.clone().unwrap();
-        let beams = scan(pose, false);
-        let fixes = [&mut held, &mut restored].map(|held| matcher.step(held, odometry, &beams));
+        let beams = scan(pose, ROOM);
+        let fixes = [&mut held, &mut restored].map(|held| matched(held, odometry, &beams));
         assert!(fixes[0].is_some());
         assert_eq!(fixes[0], fixes[1]);
         assert_eq!(held, restored);

@@ -8,7 +8,13 @@ use common::samples::{RangeStatus, Stamp};
 use std::f64::consts::FRAC_PI_2;
 
 impl Mapper {
-    fn give(&mut self, tick: Tick) -> Window {
+    /// Gives it the next tick.
+    fn give(&mut self, mut tick: Tick) -> Window {
+        tick.pose.stamp.tick = self.belief.tick.map_or(0, |tick| tick + 1);
+        self.repeat(tick)
+    }
+
+    fn repeat(&mut self, tick: Tick) -> Window {
         let now = tick.pose.stamp.time();
         match self.step(Input::Tick(tick), now) {
             Change::Window(window) => window,
@@ -20,11 +26,14 @@ impl Mapper {
         self.give(Tick { pose, ranges: ranges.to_vec(), ..Tick::default() })
     }
 
+    fn scan(&mut self, pose: PoseSample, scans: Vec<Scan>) {
+        self.give(Tick { pose, scans, ..Tick::default() });
+    }
+
     fn touch(&mut self, bearing_rad: f64) {
-        let half_width_rad = 0.8;
         let contact = ContactSample {
             bearing_rad,
-            half_width_rad,
+            half_width_rad: 0.8,
             left: 1,
             right: 1,
             ..ContactSample::default()
@@ -56,9 +65,13 @@ impl Mapper {
         self.state_at(x_cm, y_cm).is_hazard()
     }
 
-    fn hazards(&self) -> usize {
-        let cells = self.belief.cells.iter();
-        cells.filter(|cell| CellState::from_byte(**cell).is_hazard()).count()
+    fn cells(&self, is: impl Fn(CellState) -> bool) -> Vec<Cell> {
+        let state = |cell| CellState::from_byte(self.belief.cells[self.frame.index(cell)]);
+        self.frame.whole().cells().filter(|cell| is(state(*cell))).collect()
+    }
+
+    fn hazards(&self) -> Vec<Cell> {
+        self.cells(CellState::is_hazard)
     }
 }
 
@@ -80,18 +93,12 @@ fn of(set: &str, cell_m: f64) -> Mapper {
     ))
 }
 
-fn at(tick: u64, x: f64, y: f64, heading: f64) -> PoseSample {
-    PoseSample {
-        stamp: Stamp { tick, ..Stamp::default() },
-        x_m: x,
-        y_m: y,
-        heading_rad: heading,
-        ..PoseSample::default()
-    }
+fn start() -> PoseSample {
+    PoseSample::default()
 }
 
-fn still(tick: u64) -> PoseSample {
-    at(tick, 0.0, 0.0, 0.0)
+fn at(x_m: f64, y_m: f64, heading_rad: f64) -> PoseSample {
+    PoseSample { x_m, y_m, heading_rad, ..PoseSample::default() }
 }
 
 fn reading(status: RangeStatus, range_m: f64) -> RangeReading {
@@ -103,19 +110,15 @@ fn echo(range_m: f64) -> RangeReading {
 }
 
 fn sensed(mapper: &Mapper) -> Vec<(u32, u32)> {
-    let cells = mapper.frame().cells;
-    let marked = |(index, _): (usize, _)| (index as u32 % cells, index as u32 / cells);
-    let is_sensed = |(_, cell): &(usize, &u8)| **cell == Sensed as u8;
-    let all = mapper.state().cells.iter().enumerate();
-    all.filter(is_sensed).map(marked).collect()
+    let cells = mapper.cells(|cell| cell == Sensed);
+    cells.into_iter().map(|Cell { col, row }| (col, row)).collect()
 }
 
 #[test]
 fn equation_18_blocks_the_border_alone_and_no_margin_changes_it() {
     let mut mapper = mapper("");
-    let blocked = mapper.state().cells.iter().filter(|&&cell| cell != 0);
-    assert_eq!(blocked.count(), 4 * 49);
-    mapper.sense(at(0, 1.9, 0.0, 0.0), &[echo(0.2)]);
+    assert_eq!(mapper.cells(|cell| cell != Free).len(), 4 * 49);
+    mapper.sense(at(1.9, 0.0, 0.0), &[echo(0.2)]);
     assert_eq!(mapper.state().cells[25 * 50 + 49], Perimeter as u8);
 }
 
@@ -123,7 +126,7 @@ fn equation_18_blocks_the_border_alone_and_no_margin_changes_it() {
 fn equation_19_by_hand() {
     // From (0.3, -0.2) facing y, S + offset = 0.5 + 0.2: the hit is at (0.3, 0.5), cell (28, 30).
     let mut mapper = mapper("");
-    let window = mapper.sense(at(0, 0.3, -0.2, FRAC_PI_2), &[echo(0.5)]);
+    let window = mapper.sense(at(0.3, -0.2, FRAC_PI_2), &[echo(0.5)]);
     let want: Vec<_> = (29..=31).flat_map(|row| (27..=29).map(move |col| (col, row))).collect();
     assert_eq!(sensed(&mapper), want);
     assert_eq!((window.col, window.row, window.width, window.height), (27, 29, 3, 3));
@@ -137,7 +140,7 @@ fn equation_19_takes_the_sensors_offset_along_its_bearing() {
     for bearing_deg in [0, 45, -90] {
         let set = format!("sonar.bearing_deg = {bearing_deg}\nmapper.margin_m = 0.0");
         let mut mapper = of(&set, 0.02);
-        mapper.sense(still(0), &[echo(0.8)]);
+        mapper.sense(start(), &[echo(0.8)]);
         let hit = DVec2::from_angle(f64::from(bearing_deg).to_radians());
         let cell = mapper.frame().cell_at(hit).unwrap();
         assert_eq!(sensed(&mapper), [(cell.col, cell.row)], "{bearing_deg}");
@@ -150,12 +153,12 @@ fn a_hit_just_outside_the_map_marks_the_part_of_its_margin_that_is_inside() {
     // The hit is at (2.5, 0), one cell outside. The margin is a cell, and the last cell stays
     // border.
     let outside = echo(0.5);
-    mapper.sense(at(0, 1.8, 0.0, 0.0), &[outside]);
+    mapper.sense(at(1.8, 0.0, 0.0), &[outside]);
     assert_eq!(sensed(&mapper), []);
     let mut mapper = of("mapper.margin_m = 0.25", 0.1);
-    mapper.sense(at(0, 1.8, 0.0, 0.0), &[outside]);
+    mapper.sense(at(1.8, 0.0, 0.0), &[outside]);
     assert!(sensed(&mapper).contains(&(48, 25)), "{:?}", sensed(&mapper));
-    let far = at(1, f64::NAN, 1e300, 0.0);
+    let far = at(f64::NAN, 1e300, 0.0);
     assert_eq!(mapper.sense(far, &[outside]).area(), 0);
 }
 
@@ -166,8 +169,8 @@ fn a_reading_that_shows_nothing_leaves_the_map_alone() {
     let readings = shows_nothing.map(|status| reading(status, 0.5));
     let far = [echo(2.1)];
     let all = readings.iter().map(std::slice::from_ref).chain([&[][..], &far]);
-    for (tick, readings) in (0..).zip(all) {
-        mapper.sense(still(tick), readings);
+    for readings in all {
+        mapper.sense(start(), readings);
     }
     assert_eq!(sensed(&mapper), []);
     assert_eq!(mapper.state().version, 1);
@@ -176,7 +179,7 @@ fn a_reading_that_shows_nothing_leaves_the_map_alone() {
 #[test]
 fn four_centimetres_or_nearer_is_mapped_just_ahead_and_never_under_the_robot() {
     let mut mapper = mapper("");
-    mapper.sense(still(0), &[reading(RangeStatus::AtContact, 0.0)]);
+    mapper.sense(start(), &[reading(RangeStatus::AtContact, 0.0)]);
     let marked = sensed(&mapper);
     assert!(marked.contains(&(27, 25)), "{marked:?}");
     for (col, row) in marked {
@@ -188,7 +191,7 @@ fn four_centimetres_or_nearer_is_mapped_just_ahead_and_never_under_the_robot() {
 #[test]
 fn the_targets_cell_is_never_marked() {
     let mut mapper = mapper("");
-    mapper.sense(at(0, 0.8, 0.0, 0.0), &[echo(0.5)]);
+    mapper.sense(at(0.8, 0.0, 0.0), &[echo(0.5)]);
     let marked = sensed(&mapper);
     assert!(marked.contains(&(39, 25)) && !marked.contains(&(40, 25)), "{marked:?}");
 }
@@ -196,14 +199,11 @@ fn the_targets_cell_is_never_marked() {
 #[test]
 fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
     let mut mapper = mapper("[[known.drum]]\nat = [1.0, 1.0]\nradius_m = 0.2");
-    let known = |mapper: &Mapper| {
-        let cells = &mapper.state().cells;
-        cells.iter().filter(|&&cell| cell == Known as u8).count()
-    };
+    let known = |mapper: &Mapper| mapper.cells(|cell| cell == Known).len();
     let before = known(&mapper);
     // A disc of 0.2 + 0.15 m has about pi 3.5^2 = 38 cells.
     assert!((34..=42).contains(&before), "{before} cells");
-    mapper.sense(still(0), &[echo(0.5)]);
+    mapper.sense(start(), &[echo(0.5)]);
     assert!(mapper.reset(1) && !mapper.reset(1));
     assert_eq!((known(&mapper), sensed(&mapper).len()), (before, 0));
 }
@@ -211,9 +211,9 @@ fn a_priori_shapes_are_hazard_from_the_start_and_after_a_reset() {
 #[test]
 fn a_tick_given_twice_is_one_safety_event() {
     let mut mapper = mapper("");
-    let (pose, range) = (still(3), echo(0.5));
-    mapper.sense(pose, &[range]);
-    assert_eq!(mapper.sense(pose, &[range]).area(), 0);
+    let tick = || Tick { ranges: vec![echo(0.5)], ..Tick::default() };
+    mapper.repeat(tick());
+    assert_eq!(mapper.repeat(tick()).area(), 0);
     assert_eq!(mapper.state().safety_events, 1);
 }
 
@@ -226,9 +226,8 @@ fn without_sensing_nothing_that_the_sonar_gives_is_mapped_by_either_method() {
         let mut mapper = mapper_of(&text);
         let before = mapper.state().cells.to_vec();
         assert!(before.contains(&(Known as u8)), "{method}");
-        let echo = echo(0.5);
-        for tick in 0..10 {
-            mapper.sense(still(tick), &[echo]);
+        for _ in 0..10 {
+            mapper.sense(start(), &[echo(0.5)]);
         }
         assert_eq!(mapper.state().cells, before, "{method}");
         assert_eq!(mapper.state().safety_events, 0, "{method}");
@@ -243,11 +242,6 @@ fn a_contact_is_hazard_where_the_body_touches_by_the_papers_method() {
     assert!(!mapper.is_hazard(0, -30) && !mapper.hazard_ahead(0));
 }
 
-fn send(mapper: &mut Mapper, tick: u64, x: f64) -> usize {
-    let (pose, target) = (still(tick), Some(DVec2::new(x, 0.0)));
-    mapper.give(Tick { pose, target, ..Tick::default() }).area()
-}
-
 #[test]
 fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
     for method in ["paper", "evidential"] {
@@ -256,14 +250,18 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
         let mut mapper = mapper_of(&text);
         // Listed targets may lie in a drum's margin.
         assert_eq!(mapper.ahead(-125), Known, "{method}");
+        let send = |mapper: &mut Mapper, x| {
+            let target = Some(DVec2::new(x, 0.0));
+            mapper.give(Tick { target, ..Tick::default() }).area()
+        };
         let version = mapper.state().version;
-        assert_eq!(send(&mut mapper, 1, -1.25), 1, "{method}");
+        assert_eq!(send(&mut mapper, -1.25), 1, "{method}");
         assert!(!mapper.hazard_ahead(-125), "{method}");
         assert_eq!(mapper.state().version, version + 1, "{method}");
         let mut restored = mapper.clone();
         restored.restore(mapper.state().clone()).unwrap();
         assert_eq!(restored.state().target, DVec2::new(-1.25, 0.0));
-        assert_eq!(send(&mut restored, 2, 1.5), 1, "{method}");
+        assert_eq!(send(&mut restored, 1.5), 1, "{method}");
         assert_eq!(restored.ahead(-125), Known, "{method}");
     }
 }
@@ -296,9 +294,6 @@ fn zones_are_hazard_by_either_method_and_what_was_sensed_shows_again_without_the
         assert!(mapper.reset(1));
         assert_eq!(mapper.state_at(125, -75), Known, "a reset forgets no zone");
         set(&mut mapper, vec![zone(-1.0)]);
-        let is_hazard = |cell: &u8| CellState::from_byte(*cell).is_hazard();
-        let hazards =
-            |mapper: &Mapper| mapper.belief.cells.iter().map(is_hazard).collect::<Vec<_>>();
-        assert_eq!(hazards(&mapper), hazards(&fresh), "{method}");
+        assert_eq!(mapper.hazards(), fresh.hazards(), "{method}");
     }
 }

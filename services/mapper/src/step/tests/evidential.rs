@@ -11,24 +11,24 @@ fn mapper(extra: &str) -> Mapper {
 }
 
 impl Mapper {
-    fn hear(&mut self, tick: u64, heading: f64, heard: Option<f64>) {
-        self.hear_from(tick, 0.0, heading, heard);
+    fn hear(&mut self, heading: f64, heard: Option<f64>) {
+        self.hear_from(0.0, heading, heard);
     }
 
-    fn hear_from(&mut self, tick: u64, x: f64, heading: f64, heard: Option<f64>) {
+    fn hear_from(&mut self, x: f64, heading: f64, heard: Option<f64>) {
         let heard = heard.map_or(reading(RangeStatus::Nothing, 0.0), echo);
-        self.sense(at(tick, x, 0.0, heading), &[heard]);
+        self.sense(at(x, 0.0, heading), &[heard]);
     }
 
-    fn see(&mut self, tick: u64, infrared_ad: [u16; 7]) {
-        self.sense(still(tick), &rays(infrared_ad));
+    fn see(&mut self, infrared_ad: [u16; 7]) {
+        self.sense(start(), &rays(infrared_ad));
     }
 }
 
 #[test]
 fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, Some(0.7));
+    mapper.hear(0.0, Some(0.7));
     // The hit is at 0.9. Body and clearance reach 0.22 m and half a cell around it.
     assert!(mapper.hazard_ahead(90));
     assert_eq!(mapper.ahead(70), Margin);
@@ -42,8 +42,8 @@ fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
     let mut mapper = mapper("");
     // The map ends at x = 2.45. A wall stands at 2.5, 0.5 m ahead of the sensor. The body reaches
     // 0.22 m and half a cell.
-    for tick in 0..3 {
-        mapper.hear_from(tick, 1.8, 0.0, Some(0.5));
+    for _ in 0..3 {
+        mapper.hear_from(1.8, 0.0, Some(0.5));
     }
     assert!(mapper.hazard_ahead(230));
     assert!(!mapper.hazard_ahead(220));
@@ -73,7 +73,7 @@ fn rear(range_m: f64) -> [u16; 7] {
 #[test]
 fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
     let mut mapper = mapper(INFRARED);
-    mapper.see(0, rear(0.6));
+    mapper.see(rear(0.6));
     // The echo is at -0.79. Body and clearance reach 0.22 m and half a cell around it.
     assert_eq!(mapper.ahead(-40), Scanned);
     assert!(mapper.hazard_ahead(-80));
@@ -87,7 +87,7 @@ fn an_infrared_ray_frees_the_ground_up_to_its_distance_and_no_further() {
 fn an_infrared_ranger_that_sees_nothing_frees_ground_only_if_it_is_live() {
     for (counts, state) in [(rear(0.81), Scanned), ([0; 7], Free), ([4095; 7], Free)] {
         let mut mapper = mapper(INFRARED);
-        mapper.see(0, counts);
+        mapper.see(counts);
         assert_eq!([-40, -80].map(|x| mapper.ahead(x)), [state; 2], "{counts:?}");
         assert_eq!(mapper.state().safety_events, 0);
     }
@@ -99,9 +99,9 @@ fn silence_of_the_sonar_does_not_take_back_what_infrared_saw() {
     // The obstacle is ahead to the left, seen from (0.19, 0) at 11.25 degrees.
     let mut counts = [0; 7];
     counts[1] = infrared_ad(0.5);
-    mapper.see(0, counts);
-    for tick in 1..9 {
-        mapper.hear(tick, 11.25_f64.to_radians(), None);
+    mapper.see(counts);
+    for _ in 0..8 {
+        mapper.hear(11.25_f64.to_radians(), None);
     }
     assert!(mapper.is_hazard(70, 15));
 }
@@ -109,7 +109,7 @@ fn silence_of_the_sonar_does_not_take_back_what_infrared_saw() {
 #[test]
 fn without_infrared_among_the_sensors_its_readings_are_not_mapped() {
     let mut mapper = mapper("sensors = 'front'");
-    mapper.see(0, rear(0.6));
+    mapper.see(rear(0.6));
     assert_eq!(mapper.ahead(-40), Free);
     assert_eq!(mapper.state().safety_events, 0);
 }
@@ -117,11 +117,10 @@ fn without_infrared_among_the_sensors_its_readings_are_not_mapped() {
 #[test]
 fn a_false_echo_is_gone_after_a_look_without_an_echo_at_it() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, Some(0.4));
+    mapper.hear(0.0, Some(0.4));
     assert!(mapper.hazard_ahead(60));
-    for tick in 1..=9 {
-        let heading = 0.1 * (tick as f64 - 5.0);
-        mapper.hear(tick, heading, None);
+    for step in -4..=4 {
+        mapper.hear(0.1 * f64::from(step), None);
     }
     assert_eq!(mapper.ahead(60), Scanned);
 }
@@ -129,12 +128,12 @@ fn a_false_echo_is_gone_after_a_look_without_an_echo_at_it() {
 #[test]
 fn no_echo_at_a_slant_does_not_take_back_what_was_heard_squarely() {
     let mut mapper = mapper("");
-    for tick in 0..3 {
-        mapper.hear(tick, 0.0, Some(0.7));
+    for _ in 0..3 {
+        mapper.hear(0.0, Some(0.7));
     }
     // The beam comes from the other side, where a smooth wall would give no echo.
-    for tick in 3..30 {
-        mapper.hear_from(tick, 1.9, std::f64::consts::PI, None);
+    for _ in 0..27 {
+        mapper.hear_from(1.9, std::f64::consts::PI, None);
     }
     assert!(mapper.hazard_ahead(90));
 }
@@ -142,19 +141,19 @@ fn no_echo_at_a_slant_does_not_take_back_what_was_heard_squarely() {
 #[test]
 fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
     let mut mapper = mapper("");
-    for tick in 0..4 {
-        mapper.hear(tick, 0.0, Some(0.7));
+    for _ in 0..4 {
+        mapper.hear(0.0, Some(0.7));
     }
     let before = mapper.hazards();
     // After half the arc's turn, its edge meets the object, its middle nothing new.
-    mapper.hear(4, 0.25, Some(0.7));
+    mapper.hear(0.25, Some(0.7));
     assert_eq!(mapper.hazards(), before);
 }
 
 #[test]
 fn an_echo_beyond_reach_is_not_mapped() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, Some(1.4));
+    mapper.hear(0.0, Some(1.4));
     assert_eq!(mapper.state().safety_events, 0);
     assert_eq!(mapper.ahead(100), Scanned);
 }
@@ -162,11 +161,11 @@ fn an_echo_beyond_reach_is_not_mapped() {
 #[test]
 fn scanned_ground_grows_stale_as_the_wheels_roll() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, None);
+    mapper.hear(0.0, None);
     assert_eq!(mapper.ahead(90), Scanned);
     // Six turns on the spot roll each wheel 4.9 m; the beam finally looks the other way.
     let heading = 13.0 * std::f64::consts::PI;
-    mapper.hear(1, heading, None);
+    mapper.hear(heading, None);
     assert_eq!(mapper.ahead(90), Free);
     assert_eq!(mapper.ahead(-90), Scanned);
 }
@@ -180,8 +179,8 @@ fn a_belief_of_the_other_method_is_refused() {
 #[test]
 fn what_is_forgotten_first_is_what_is_not_near_and_then_all_of_it() {
     let mut mapper = mapper("");
-    mapper.hear(0, 0.0, Some(0.9));
-    mapper.hear(1, 2.0, Some(0.3));
+    mapper.hear(0.0, Some(0.9));
+    mapper.hear(2.0, Some(0.3));
     assert!(mapper.reset(1) && !mapper.reset(1));
     assert!(!mapper.hazard_ahead(110));
     assert!(mapper.is_hazard(-21, 45));
@@ -192,7 +191,7 @@ fn what_is_forgotten_first_is_what_is_not_near_and_then_all_of_it() {
 #[test]
 fn the_targets_cell_is_never_hazard() {
     let mut mapper = mapper("");
-    mapper.hear_from(0, 1.3, 0.0, Some(0.5));
+    mapper.hear_from(1.3, 0.0, Some(0.5));
     assert!(mapper.hazard_ahead(190));
     assert!(!mapper.hazard_ahead(200));
 }
@@ -204,8 +203,8 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
         header.clear_beams().to_vec()
     };
     let mut mapper = mapper("sensors = 'front'");
-    mapper.hear(0, 0.0, Some(0.7));
-    mapper.hear(1, 0.5, None);
+    mapper.hear(0.0, Some(0.7));
+    mapper.hear(0.5, None);
     let [echo, silence] = beams(&mapper)[..] else {
         panic!("{:?}", beams(&mapper));
     };
@@ -213,7 +212,7 @@ fn readings_are_published_until_the_wheels_have_rolled_too_far() {
     assert!((0.6..0.7).contains(&echo.clear_m), "{echo:?}");
     assert!(silence.bearing_rad == 0.5 && silence.clear_m >= 1.5, "{silence:?}");
     for tick in 2..200 {
-        mapper.hear(tick, 0.5 + tick as f64, None);
+        mapper.hear(0.5 + tick as f64, None);
     }
     assert!(beams(&mapper).len() < 50, "{}", beams(&mapper).len());
     // A wrong pose may be the cause of a reset.
@@ -231,14 +230,13 @@ fn a_contact_is_hazard_where_the_body_touches_and_no_ranger_is_evidence_against_
     };
     assert!(touched(&mapper));
     // The ranger looks over the object.
-    let far = [infrared_ad(0.8); 7];
-    for tick in 1..40 {
-        let mut readings = rays(far);
-        readings.push(reading(RangeStatus::Nothing, 0.0));
-        mapper.sense(at(tick, -0.3, 0.0, 0.0), &readings);
+    let mut readings = rays([infrared_ad(0.8); 7]);
+    readings.push(reading(RangeStatus::Nothing, 0.0));
+    for _ in 0..39 {
+        mapper.sense(at(-0.3, 0.0, 0.0), &readings);
     }
     assert!(touched(&mapper));
-    mapper.hear_from(40, 0.2, 0.0, None);
+    mapper.hear_from(0.2, 0.0, None);
     assert!(!mapper.hazard_ahead(20));
 }
 
@@ -248,12 +246,12 @@ fn three_sonars_have_room_for_as_many_ticks_of_readings_as_one_and_map_what_is_a
     for (sensors, readings) in [("front", 128), ("three-front", 384), ("all", 384)] {
         let mut mapper = mapper(&format!("sensors = '{sensors}'"));
         let mut beside = mapper.clone();
-        beside.sense(still(0), &[left]);
+        beside.sense(start(), &[left]);
         assert_eq!(beside.is_hazard(49, 49), sensors != "front", "{sensors}");
         assert!(!beside.is_hazard(49, -49));
         let heard = |sensor| RangeReading { sensor, ..reading(RangeStatus::Nothing, 0.0) };
-        for tick in 0..200 {
-            mapper.sense(still(tick), &[0, 1, 2].map(heard));
+        for _ in 0..200 {
+            mapper.sense(start(), &[0, 1, 2].map(heard));
         }
         let kept = mapper.header(Part::default()).clear_beams().len();
         assert!(kept == readings || sensors == "all", "{sensors}: {kept}");
@@ -271,23 +269,18 @@ fn a_reading_that_no_sensor_can_give_is_ignored() {
 
 #[test]
 fn evidence_that_nothing_renews_is_weaker_with_time_and_gone_when_it_should_be() {
-    let seconds = |tick: u64| tick * 1_000_000_000;
-    let hear = |mapper: &mut Mapper, tick, heard: Option<f64>| {
-        let pose = still(tick);
-        let stamp = Stamp { stamp_ns: seconds(tick), ..pose.stamp };
-        let readings = heard.map(echo);
-        mapper.sense(PoseSample { stamp, ..pose }, readings.as_slice());
+    let hear = |mapper: &mut Mapper, second: u64, heard: Option<f64>| {
+        let stamp = Stamp { stamp_ns: second * 1_000_000_000, ..Stamp::default() };
+        mapper.sense(PoseSample { stamp, ..start() }, heard.map(echo).as_slice());
     };
     let gone_after = |set: &str, echoes: u64| {
         let mut mapper = mapper_of(&format!(
             "target = [2, 0]\nperimeter = {{ width_m = 5, cells = 50 }}\nsonar.forward_m = 0.2\n[mapper]\nmap_within_m = 1.0\n{set}"
         ));
-        for tick in 0..echoes {
-            hear(&mut mapper, tick, Some(0.7));
-        }
+        (0..echoes).for_each(|second| hear(&mut mapper, second, Some(0.7)));
         assert!(mapper.hazard_ahead(90) && mapper.ahead(50) == Scanned);
-        let gone = (echoes..400).find(|tick| {
-            hear(&mut mapper, *tick, None);
+        let gone = (echoes..400).find(|second| {
+            hear(&mut mapper, *second, None);
             !mapper.hazard_ahead(90)
         });
         (gone, mapper.ahead(50))
