@@ -187,17 +187,17 @@ mod tests {
         ErrorModel::new(&mission.robot.odometry, &mission.body())
     }
 
-    fn after(model: &ErrorModel, before: &Covariance, pose: Pose2, moved: Twist) -> Covariance {
-        let Transition { carried, noise } = model.transition(pose, moved, 0.1);
-        Covariance(carried * before.0 * carried.transpose() + noise)
+    const AHEAD: [Twist; 1000] = [Twist { v: 0.002, omega: 0.0 }; 1000];
+
+    fn turn(omega: f64) -> [Twist; 50] {
+        [Twist { v: 0.0, omega }; 50]
     }
 
-    const AHEAD: Twist = Twist { v: 0.002, omega: 0.0 };
-
-    fn drive(model: &ErrorModel, steps: usize, moved: Twist) -> [f64; 6] {
+    fn drive(model: &ErrorModel, ticks: impl IntoIterator<Item = Twist>) -> [f64; 6] {
         let (mut pose, mut covariance) = (Pose2::default(), model.start());
-        for _ in 0..steps {
-            covariance = after(model, &covariance, pose, moved);
+        for moved in ticks {
+            let Transition { carried, noise } = model.transition(pose, moved, 0.1);
+            covariance = Covariance(carried * covariance.0 * carried.transpose() + noise);
             pose = pose.along_arc(moved.v, moved.omega);
         }
         covariance.of_pose()
@@ -211,33 +211,28 @@ mod tests {
     fn each_error_of_the_wheels_is_in_the_covariance_by_hand() {
         // Variances of slip: heading 2 q s / W^2, sideways its integral q s^3 2 / (3 W^2), ahead
         // q s / 2.
-        let [xx, _, _, yy, _, heading] = drive(&model([10, 0, 0, 0]), 1000, AHEAD);
+        let [xx, _, _, yy, _, heading] = drive(&model([10, 0, 0, 0]), AHEAD);
         let per_metre = 2.0 * 1e-4 / (0.26 * 0.26);
         close(heading, per_metre * 2.0);
         close(yy, per_metre * 8.0 / 3.0);
         close(xx, 1e-4 * 2.0 / 2.0);
         // Errors of unequal wheels: heading e s / W, sideways e s^2 / 2 W.
-        let [_, _, _, yy, _, heading] = drive(&model([0, 6, 0, 0]), 1000, AHEAD);
+        let [_, _, _, yy, _, heading] = drive(&model([0, 6, 0, 0]), AHEAD);
         let variance = 0.006 * 0.006;
         close(heading, variance * (2.0_f64 / 0.26).powi(2));
         close(yy, variance * (4.0_f64 / 2.0 / 0.26).powi(2));
         // Larger wheels drive and turn farther.
         let larger = model([0, 0, 0, 10]);
-        let [xx, .., yy, _, _] = drive(&larger, 1000, AHEAD);
+        let [xx, .., yy, _, _] = drive(&larger, AHEAD);
         close(xx, 1e-4 * 4.0);
         assert!(yy < 1e-18);
-        close(drive(&larger, 50, Twist { v: 0.0, omega: 0.02 })[5], 1e-4);
+        close(drive(&larger, turn(0.02))[5], 1e-4);
     }
 
     #[test]
     fn an_uncertain_track_is_undone_by_turning_back() {
         let model = model([0, 0, 10, 0]);
-        close(drive(&model, 50, Twist { v: 0.0, omega: 0.02 })[5], 1e-4);
-        let (mut covariance, mut pose) = (model.start(), Pose2::default());
-        for omega in [0.02; 50].into_iter().chain([-0.02; 50]) {
-            covariance = after(&model, &covariance, pose, Twist { v: 0.0, omega });
-            pose = pose.along_arc(0.0, omega);
-        }
-        assert!(covariance.of_pose()[5] < 1e-18);
+        close(drive(&model, turn(0.02))[5], 1e-4);
+        assert!(drive(&model, [0.02, -0.02].into_iter().flat_map(turn))[5] < 1e-18);
     }
 }

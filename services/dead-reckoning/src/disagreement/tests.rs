@@ -11,7 +11,8 @@ const TRACK_M: f64 = 0.26;
 struct Robot {
     late_s: f64,
     turned_rad: f64,
-    mirrored: bool,
+    /// Sign of what a laser sees to the left.
+    left: f64,
     /// True over wheels' distance and turn.
     way: f64,
     turn: f64,
@@ -24,7 +25,7 @@ struct Robot {
 const RIGHT: Robot = Robot {
     late_s: 0.0,
     turned_rad: 0.0,
-    mirrored: false,
+    left: 1.0,
     way: 1.0,
     turn: 1.0,
     uneven: 1.0,
@@ -72,20 +73,16 @@ fn named(robot: Robot, seed: u64, for_s: f64) -> Option<(f64, Cause)> {
         let bend = arc * (robot.uneven - 1.0) / TRACK_M;
         poses.push(before.along_arc(arc * robot.way, turn * robot.turn + bend));
         let late = (robot.late_s / PERIOD_S).round() as usize;
-        let Some(seen) = poses.len().checked_sub(1 + late).map(|at| poses[at]) else {
+        let Some(seen) = poses.iter().rev().nth(late) else {
             continue;
         };
-        let [y, heading] = match robot.mirrored {
-            true => [-seen.position.y, -seen.heading],
-            false => [seen.position.y, seen.heading],
-        };
         // To a laser turned left, the robot's frame is turned right.
-        let position = DVec2::new(seen.position.x, y);
+        let position = DVec2::new(1.0, robot.left) * seen.position;
         let fix = Fix {
             time: MissionTime::from_seconds(now),
             position: DVec2::from_angle(-robot.turned_rad).rotate(position)
                 + 0.006 * DVec2::new(random(), random()),
-            heading: Some(heading + 0.003 * random()),
+            heading: Some(robot.left * seen.heading + 0.003 * random()),
             covariance: [1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4],
             shared: [1e-5, 1e-6],
         };
@@ -115,7 +112,7 @@ fn a_late_a_turned_and_a_mirrored_laser_and_wrong_wheels_are_named_within_half_a
         let near = |cause| matches!(cause, Cause::Turned(by) if (by - turned_rad).abs() < 0.05);
         is(Robot { turned_rad, ..RIGHT }, &near);
     }
-    is(Robot { mirrored: true, ..RIGHT }, &|cause| cause == Cause::Mirrored);
+    is(Robot { left: -1.0, ..RIGHT }, &|cause| cause == Cause::Mirrored);
     for uneven in [0.94, 1.1] {
         let near = |cause| matches!(cause, Cause::Uneven(it) if (it - uneven).abs() < 0.02);
         is(Robot { uneven, ..RIGHT }, &near);

@@ -70,6 +70,10 @@ impl Robot {
         }
     }
 
+    fn headed_fix(&mut self) -> FixSample {
+        FixSample { heading_rad: self.truth.heading, ..self.fix() }
+    }
+
     fn error_m(&self, pose: &PoseSample) -> f64 {
         self.truth.position.distance(pose.pose().position)
     }
@@ -153,12 +157,13 @@ fn fixes_hold_the_pose_of_a_robot_with_unequal_wheels_and_teach_their_ratio() {
 #[test]
 fn no_number_of_fixes_makes_the_pose_surer_than_the_error_that_they_share() {
     let mut run = run(0.005);
-    run.wind(200, |robot| vec![FixSample { shared: [0.04, 0.0], ..robot.fix() }]);
+    let sharing = |robot: &mut Robot| vec![FixSample { shared: [0.04, 0.0], ..robot.fix() }];
+    run.wind(200, sharing);
     assert!((run.deviation_m() - 0.2).abs() < 0.01, "{}", run.deviation_m());
     run.wind(200, |robot| vec![robot.fix()]);
     assert!(run.deviation_m() < 0.05, "fixes of another source do");
     let before = run.reckoning.sample().fixes;
-    run.wind(1, |robot| vec![FixSample { shared: [0.04, 0.0], ..robot.fix() }]);
+    run.wind(1, sharing);
     assert_eq!(run.reckoning.sample().fixes, before + 1, "and those of the first stay in use");
 }
 
@@ -188,18 +193,14 @@ fn the_pose_follows_a_fix_without_tearing_the_map_and_odometry_does_not_jump() {
     // Counts are lost in motion, so the pose may be off.
     let lost = WheelSample { restarts: 1, ..robot.drive(0.0, 0.0) };
     robot.truth.position += dvec2(0.1, 0.08);
-    let odometry = |pose: &PoseSample| {
-        let [x, y, turn] = pose.map_from_odom;
-        DVec2::from_angle(-turn).rotate(pose.pose().position - dvec2(x, y))
-    };
     reckoning.given(&lost, &[], &[]);
     let mut reached = false;
     for tick in 0..40 {
         let wheels = WheelSample { restarts: 1, ..robot.drive(0.03, 0.0) };
-        let fix = FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
+        let fix = robot.headed_fix();
         let pose = reckoning.given(&wheels, &[fix], &[]).pose;
         let moved = before.pose().position.distance(pose.pose().position);
-        let by_wheels = odometry(&pose).distance(odometry(&before));
+        let by_wheels = pose.odometry().position.distance(before.odometry().position);
         let turned = (pose.heading_rad - before.heading_rad).abs().to_degrees();
         assert!(moved < 0.051 && by_wheels < 0.031 && turned < 1.1, "{moved} {by_wheels} {turned}");
         reached |= tick > 5 && robot.error_m(&pose) < 0.05;
@@ -247,7 +248,7 @@ fn a_fix_that_cannot_be_used_is_refused_with_its_cause() {
         run.wind(50, each_second);
         let Run { mut robot, mut reckoning } = run;
         let wheels = robot.wind();
-        let mut fix = FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
+        let mut fix = robot.headed_fix();
         spoil(&mut fix);
         let used = reckoning.state().fixes;
         let reckoned = reckoning.given(&wheels, &[fix], &[]);
@@ -272,8 +273,7 @@ fn fixes_that_agree_for_three_seconds_relocate_a_robot_that_was_carried() {
         };
         all.filter_map(relocated).collect::<Vec<_>>()
     };
-    let headed = |robot: &mut Robot| FixSample { heading_rad: robot.truth.heading, ..robot.fix() };
-    for relocated in [relocations(Robot::fix), relocations(headed)] {
+    for relocated in [relocations(Robot::fix), relocations(Robot::headed_fix)] {
         let [(3, error)] = relocated[..] else { panic!("{relocated:?}") };
         assert!(error < 0.15, "{error}");
     }
@@ -328,10 +328,7 @@ fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_u
 #[test]
 fn a_pushed_robot_is_where_its_scans_match() {
     let mut run = run(0.0);
-    let scan = |robot: &mut Robot| {
-        let heading_rad = robot.truth.heading;
-        vec![FixSample { heading_rad, shared: [1e-6; 2], ..robot.fix() }]
-    };
+    let scan = |robot: &mut Robot| vec![FixSample { shared: [1e-6; 2], ..robot.headed_fix() }];
     run.wind(40, scan);
     run.robot.truth.position += dvec2(0.3, 0.0);
     run.robot.truth.heading += 0.15;
@@ -353,13 +350,11 @@ fn a_doubt_of_the_wheels_is_settled_by_a_scan_that_says_where_the_robot_is_and_b
         run.wind(80, |robot| {
             // All fixes share 1 cm and 0.01 rad.
             let [place, heading] = own.map(|own: f64| own * own + 1e-4);
-            let fix = FixSample {
-                heading_rad: robot.truth.heading,
+            vec![FixSample {
                 covariance: [place, 0.0, 0.0, place, 0.0, heading],
                 shared: [1e-4; 2],
-                ..robot.fix()
-            };
-            vec![fix]
+                ..robot.headed_fix()
+            }]
         });
         let deviation = run.deviation_m();
         assert!(if is_settled { deviation < 0.1 } else { deviation > 0.5 }, "{own:?} {deviation}");
@@ -444,18 +439,11 @@ fn a_gyro_holds_the_heading_and_its_bias_is_learned_at_rest() {
 fn a_gyro_that_contradicts_the_wheels_makes_the_pose_unsure_even_after_it_ends() {
     // 4 s straight ahead, 2 s with `says` rad per tick, then 4 s without a gyro.
     let deviation = |says: f64| {
-        let mut reckoning = x80();
-        let mut counts = 0;
+        let (mut robot, mut reckoning) = (Robot::new(0.0), x80());
         for tick in 0..100 {
-            counts += 60;
-            let wheels = WheelSample {
-                stamp: Stamp { tick, stamp_ns: tick * TICK_NS, ..Stamp::default() },
-                left_counts: counts,
-                right_counts: counts,
-                ..WheelSample::default()
-            };
+            let wheels = robot.drive(0.0267, 0.0);
             let said = if tick < 40 { 0.0 } else { says };
-            let turns = if tick < 60 { vec![turn(tick, said)] } else { Vec::new() };
+            let turns = if tick < 60 { vec![turn(robot.tick, said)] } else { Vec::new() };
             reckoning.given(&wheels, &[], &turns);
         }
         reckoning.sample().position_rms_m()
