@@ -32,6 +32,40 @@ impl Planner {
         let pose = PoseSample { stamp: Stamp { stamp_ns, ..pose.stamp }, ..*pose };
         self.answer(&pose).unwrap().1
     }
+
+    fn ask_at(&mut self, x_m: f64, y_m: f64) -> GuidanceSample {
+        self.ask(&PoseSample { x_m, y_m, ..PoseSample::default() })
+    }
+
+    fn ask_at_start(&mut self) -> GuidanceSample {
+        self.ask_at(0.0, 0.0)
+    }
+
+    fn status_at_start(&mut self) -> GuidanceStatus {
+        self.ask_at_start().status()
+    }
+
+    /// Takes the next version of its map, in which these places are hazard too.
+    fn block(&mut self, becomes: impl Fn(DVec2) -> bool) {
+        let (mut header, mut cells) = (self.belief, self.grid.cells().to_vec());
+        let frame = header.part.frame();
+        for (cell, state) in frame.whole().cells().zip(&mut cells) {
+            if becomes(frame.centre_of(cell)) {
+                *state = CellState::Sensed as u8;
+            }
+        }
+        header.part.version += 1;
+        assert_eq!(self.take_grid(&header, &cells).unwrap(), Work::Stale);
+    }
+
+    fn block_post(&mut self, x: f64, y: f64) {
+        self.block(|at| at.distance(DVec2::new(x, y)) < 0.03);
+    }
+
+    fn solve(&mut self) {
+        let job = self.begin_job().unwrap();
+        assert_eq!(self.swap_in(solve(&job)).unwrap(), Work::SwappedIn);
+    }
 }
 
 fn sent(mission: &Mission) -> Planner {
@@ -41,38 +75,47 @@ fn sent(mission: &Mission) -> Planner {
     planner
 }
 
-fn keyframe(version: u64, hazard: impl Fn(DVec2) -> bool) -> (GridHeader, Vec<u8>) {
-    keyframe_of(mission().grid_frame(), version, hazard)
-}
-
-fn keyframe_of(
-    frame: GridFrame,
-    version: u64,
+fn keyframe(
+    mission: &Mission,
     hazard: impl Fn(DVec2) -> bool,
+    scanned: impl Fn(DVec2) -> bool,
 ) -> (GridHeader, Vec<u8>) {
-    let cells = frame.whole().cells();
-    let cells = cells.map(|cell| u8::from(frame.is_rim(cell) || hazard(frame.centre_of(cell))));
-    let header = GridHeader { part: Part::whole(frame, version), ..GridHeader::default() };
-    (header, cells.collect())
-}
-
-/// Returns a keyframe whose free cells were all scanned.
-fn scanned_of(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> (GridHeader, Vec<u8>) {
-    let (header, mut cells) = keyframe_of(mission.grid_frame(), 1, hazard);
-    let free = cells.iter_mut().filter(|cell| **cell == CellState::Free as u8);
-    free.for_each(|cell| *cell = CellState::Scanned as u8);
-    (header, cells)
+    let frame = mission.grid_frame();
+    let state = |cell| match frame.centre_of(cell) {
+        _ if frame.is_rim(cell) => CellState::Perimeter,
+        at if hazard(at) => CellState::Sensed,
+        at if scanned(at) => CellState::Scanned,
+        _ => CellState::Free,
+    };
+    let cells = frame.whole().cells().map(|cell| state(cell) as u8).collect();
+    (GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() }, cells)
 }
 
 fn in_room(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> Planner {
+    in_scanned_room(mission, hazard, |_| false)
+}
+
+/// Returns a planner of a robot whose scan to both sides had no echo.
+fn in_scanned_room(
+    mission: &Mission,
+    hazard: impl Fn(DVec2) -> bool,
+    scanned: impl Fn(DVec2) -> bool,
+) -> Planner {
+    let (mut header, cells) = keyframe(mission, hazard, scanned);
+    header.clear_beam_count = 11;
+    for (index, beam) in header.clear_beams.iter_mut().take(11).enumerate() {
+        let bearing_rad = (index as f32 - 5.0) * 15.0_f32.to_radians();
+        *beam = ClearBeam { x_m: 0.0, y_m: 0.0, bearing_rad, clear_m: 2.0 };
+    }
+    header.clear_beams.swap(0, 5);
     let mut planner = sent(mission);
-    let (header, cells) = keyframe_of(mission.grid_frame(), 1, hazard);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
     planner
 }
 
-fn at(x_m: f64, y_m: f64) -> PoseSample {
-    PoseSample { x_m, y_m, ..PoseSample::default() }
+/// A wall that is open only above y = 1.
+fn wall(at: DVec2) -> bool {
+    (at.x - 0.7).abs() < 0.06 && at.y < 1.0
 }
 
 fn after(seconds: f64) -> PoseSample {
@@ -88,7 +131,7 @@ fn solve(job: &Job) -> Solved {
 #[test]
 fn before_the_first_keyframe_there_is_no_guidance() {
     let mut planner = sent(&mission());
-    assert_eq!(planner.ask(&at(0.0, 0.0)).status(), Waiting);
+    assert_eq!(planner.status_at_start(), Waiting);
     assert!(planner.snapshot().is_none());
 }
 
@@ -103,7 +146,7 @@ fn the_status_and_direction_of_a_place_are_those_of_the_map_around_it() {
         ("walled in", &ring, [0.0, 0.0], Unreachable, DVec2::ZERO),
         ("on a hazard, left of its middle", &block, [-0.15, 0.0], WayOut, DVec2::NEG_X),
     ] {
-        let guidance = in_room(&mission(), hazard).ask(&at(from[0], from[1]));
+        let guidance = in_room(&mission(), hazard).ask_at(from[0], from[1]);
         assert_eq!(guidance.status(), status, "{name}");
         let off = direction.distance(DVec2::new(guidance.ex, guidance.ey));
         assert!(off < 0.03, "{name}: {guidance:?}");
@@ -112,75 +155,40 @@ fn the_status_and_direction_of_a_place_are_those_of_the_map_around_it() {
     }
 }
 
-/// Planner with the field of an empty room, and the keyframe of a wall that is open only above y =
-/// 1.
-fn with_a_wall_to_come() -> (Planner, impl Fn(u64) -> (GridHeader, Vec<u8>)) {
-    let (mission, frame) = (mission_of(200), mission_of(200).grid_frame());
-    let planner = in_room(&mission, |_| false);
-    let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
-    (planner, move |version| keyframe_of(frame, version, wall))
-}
-
 #[test]
 fn a_wall_that_appears_elsewhere_is_solved_for_after_the_tick() {
-    let (mut planner, wall) = with_a_wall_to_come();
-    let before = planner.ask(&at(-1.5, 0.0));
-    let (header, cells) = wall(2);
-    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Stale);
-    let after = planner.ask(&at(-1.5, 0.0));
+    let mut planner = in_room(&mission_of(200), |_| false);
+    let ask = |planner: &mut Planner| planner.ask_at(-1.5, 0.0);
+    let before = ask(&mut planner);
+    planner.block(wall);
+    let after = ask(&mut planner);
     assert_eq!((after.ex, after.ey, after.full_solves), (before.ex, before.ey, 1));
-    let over = |planner: &mut Planner| planner.end_tick().unwrap().0;
-    assert_eq!(over(&mut planner), Work::Solved);
-    assert_eq!(over(&mut planner), Work::None, "once");
-    let guidance = planner.ask(&at(-1.5, 0.0));
+    let over = [Work::Solved, Work::None];
+    assert_eq!(over.map(|_| planner.end_tick().unwrap().0), over, "once");
+    let guidance = ask(&mut planner);
     assert!(guidance.ey > before.ey + 0.1, "{guidance:?}");
     assert_eq!(planner.snapshot().unwrap().header.grid_version, 2);
 }
 
 #[test]
 fn a_wall_that_appears_on_the_way_ahead_is_solved_for_in_the_tick() {
-    let (mut planner, wall) = with_a_wall_to_come();
-    let (header, cells) = wall(2);
-    planner.take_grid(&header, &cells).unwrap();
-    let guidance = planner.ask(&at(0.45, 0.0));
+    let mut planner = in_room(&mission_of(200), |_| false);
+    planner.block(wall);
+    let guidance = planner.ask_at(0.45, 0.0);
     assert_eq!((guidance.status(), guidance.full_solves), (Along, 2));
     assert!(guidance.ex < 0.0 && guidance.ey > 0.3, "{guidance:?}");
 }
 
 fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
-    evidential_in(&Mission { method: Method::Evidential, ..mission() }, |_| false, scanned)
-}
-
-fn evidential_in(
-    mission: &Mission,
-    hazard: impl Fn(DVec2) -> bool,
-    scanned: impl Fn(DVec2) -> bool,
-) -> Planner {
-    let (mut header, mut cells) = keyframe(1, hazard);
-    // A scan to both sides had no echo.
-    header.clear_beam_count = 11;
-    for (index, beam) in header.clear_beams.iter_mut().take(11).enumerate() {
-        let bearing = (index as f32 - 5.0) * 15.0_f32.to_radians();
-        let (x_m, y_m, clear_m) = (0.0, 0.0, 2.0);
-        *beam = ClearBeam { x_m, y_m, bearing_rad: bearing, clear_m };
-    }
-    header.clear_beams.swap(0, 5);
-    let frame = mission.grid_frame();
-    for (cell, state) in frame.whole().cells().zip(&mut cells) {
-        if *state == CellState::Free as u8 && scanned(frame.centre_of(cell)) {
-            *state = CellState::Scanned as u8;
-        }
-    }
-    let mut planner = sent(mission);
-    planner.take_grid(&header, &cells).unwrap();
-    planner
+    let mission = Mission { method: Method::Evidential, ..mission() };
+    in_scanned_room(&mission, |_| false, scanned)
 }
 
 #[test]
 fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
     // Only the ground to the left of the way ahead is unscanned.
     let mut planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
-    let guidance = planner.ask(&at(0.0, 0.0));
+    let guidance = planner.ask_at_start();
     assert_eq!(guidance.status(), Look);
     assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
     assert_eq!(guidance.maneuver(), Maneuver::Turn);
@@ -190,7 +198,7 @@ fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
 fn an_evidential_robot_without_sensing_does_not_look_first() {
     let mission = Mission { method: Method::Evidential, sensing: false, ..mission() };
     let mut planner = in_room(&mission, |_| false);
-    let guidance = planner.ask(&at(0.0, 0.0));
+    let guidance = planner.ask_at_start();
     assert_eq!(guidance.status(), Along);
     assert_eq!(guidance.speed_limit_m_s, f64::INFINITY);
 }
@@ -200,7 +208,7 @@ fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() 
     // A sonar that looked ahead only scanned all ground.
     let mut planner = evidential(|_| true);
     planner.belief.clear_beam_count = 1;
-    let guidance = planner.ask(&at(0.0, 0.0));
+    let guidance = planner.ask_at_start();
     assert_eq!(guidance.status(), Look);
     let to_the_side = guidance.ey.atan2(guidance.ex).to_degrees().abs();
     assert!((45.0..=90.0).contains(&to_the_side), "{to_the_side}");
@@ -208,7 +216,7 @@ fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() 
 
 #[test]
 fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
-    let guidance = evidential(|_| true).ask(&at(0.0, 0.0));
+    let guidance = evidential(|_| true).ask_at_start();
     assert_eq!(guidance.status(), Along);
     assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
 }
@@ -216,10 +224,10 @@ fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
 #[test]
 fn a_robot_that_senses_beside_it_turns_from_a_drum_before_the_field_does() {
     let drum = |at: DVec2| at.distance(DVec2::new(0.8, 0.05)) < 0.3;
-    let mut planner = evidential_in(&mission_with("robot.model = 'kobuki'"), drum, |_| true);
-    let asked = at(0.1, 0.0);
-    let (_, field) = planner.follow_field(&asked.pose()).unwrap();
-    let guidance = planner.ask(&asked);
+    let mut planner = in_scanned_room(&mission_with("robot.model = 'kobuki'"), drum, |_| true);
+    let pose = Pose2 { position: DVec2::new(0.1, 0.0), ..Pose2::default() };
+    let (_, field) = planner.follow_field(&pose).unwrap();
+    let guidance = planner.ask_at(0.1, 0.0);
     assert_eq!(guidance.status(), Along);
     let [field, aimed] = [field.to_angle(), guidance.ey.atan2(guidance.ex)].map(f64::to_degrees);
     assert!(field < 0.0 && (-90.0..field - 5.0).contains(&aimed), "{field} {aimed}");
@@ -228,24 +236,23 @@ fn a_robot_that_senses_beside_it_turns_from_a_drum_before_the_field_does() {
 #[test]
 fn a_robot_whose_base_was_found_to_stop_late_goes_no_faster_than_it_can_stop() {
     let mut planner = evidential(|at| at.x < 0.7);
-    let asked = at(0.0, 0.0);
-    let before = planner.ask(&asked).speed_limit_m_s;
-    let sample =
-        BaseResponseSample { dead_time_s: 0.5, acceleration_m_s2: 0.3, ..Default::default() };
-    planner.take_response(&sample.into());
-    let limit = planner.ask(&asked).speed_limit_m_s;
-    assert!(limit > 0.0 && limit < 0.6 * before, "{before} to {limit}");
-    let hostile = BaseResponseSample { dead_time_s: f64::INFINITY, ..sample };
-    planner.take_response(&hostile.into());
-    assert_eq!(planner.ask(&asked).speed_limit_m_s, limit);
+    let before = planner.ask_at_start().speed_limit_m_s;
+    let mut limit = |dead_time_s| {
+        let sample =
+            BaseResponseSample { dead_time_s, acceleration_m_s2: 0.3, ..Default::default() };
+        planner.take_response(&sample.into());
+        planner.ask_at_start().speed_limit_m_s
+    };
+    let late = limit(0.5);
+    assert!(late > 0.0 && late < 0.6 * before, "{before} to {late}");
+    assert_eq!(limit(f64::INFINITY), late);
 }
 
 #[test]
 fn a_robot_goes_slower_before_what_it_has_not_seen_as_long_as_nobody_knows_how_it_answers() {
     let limit = |robot: &str| {
-        evidential_in(&mission_with(robot), |_| false, |at| at.x < 0.7)
-            .ask(&at(0.0, 0.0))
-            .speed_limit_m_s
+        let mission = mission_with(robot);
+        in_scanned_room(&mission, |_| false, |at| at.x < 0.7).ask_at_start().speed_limit_m_s
     };
     let stated =
         "robot = { protocol = 'json', response = { delay_s = 0.07, acceleration_m_s2 = 1000.0 } }";
@@ -258,7 +265,7 @@ fn a_robot_goes_slower_before_what_it_has_not_seen_as_long_as_nobody_knows_how_i
 fn a_late_base_is_guided_for_the_place_where_it_will_act() {
     let mission = mission_with("robot.response.delay_s = 0.4");
     let advice = |commanded: &[CommandSample], from: f64| {
-        let mut planner = evidential_in(&mission, |_| false, |at| at.x < 0.9);
+        let mut planner = in_scanned_room(&mission, |_| false, |at| at.x < 0.9);
         commanded.iter().for_each(|command| _ = planner.take_command(command));
         planner.ask(&PoseSample { x_m: from, ..after(0.48) })
     };
@@ -285,7 +292,7 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
             (beam.x_m, beam.clear_m) = (0.19, clear_m);
             beam.bearing_rad = 0.0;
         }
-        let guidance = planner.ask(&at(0.0, 0.0));
+        let guidance = planner.ask_at_start();
         let limit = guidance.speed_limit_m_s;
         assert_eq!(limit > 0.0, may_go, "{clear_m} m: {guidance:?}");
         let ahead = planner.advise(&Pose2::default(), WayOut, DVec2::X);
@@ -293,139 +300,91 @@ fn an_evidential_robot_does_not_creep_towards_what_it_hears_right_before_it() {
     }
 }
 
-/// Cells per side of a map for the background solver.
-const LARGE: u32 = 600;
-
-/// Large room with a wall at x = 0.8 that has two gaps.
-struct LargeRoom {
-    planner: Planner,
-    header: GridHeader,
-    cells: Vec<u8>,
+/// Large room, of a background solver, with a wall at x = 0.8 that has two gaps.
+fn large_room() -> Planner {
+    let in_gap = |y| (1.0..1.4).contains(&y) || (-0.2..0.2).contains(&y);
+    let mut planner = in_room(&mission_of(600), |at| (at.x - 0.8).abs() < 0.03 && !in_gap(at.y));
+    assert!(planner.begin_job().is_none(), "the field is current");
+    planner
 }
 
-const FAR_GAP: [f64; 2] = [1.0, 1.4];
-const NEAR_GAP: [f64; 2] = [-0.2, 0.2];
-
-impl LargeRoom {
-    fn new() -> Self {
-        let mission = mission_of(LARGE);
-        let in_gap =
-            |y: f64| [FAR_GAP, NEAR_GAP].iter().any(|[from, to]| (*from..*to).contains(&y));
-        let hazard = |at: DVec2| (at.x - 0.8).abs() < 0.03 && !in_gap(at.y);
-        let (header, cells) = keyframe_of(mission.grid_frame(), 1, hazard);
-        let mut planner = sent(&mission);
-        assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
-        assert!(planner.begin_job().is_none(), "the field is current");
-        Self { planner, header, cells }
-    }
-
-    fn block(&mut self, becomes: impl Fn(DVec2) -> bool) {
-        let frame = self.header.part.frame();
-        for (cell, state) in frame.whole().cells().zip(&mut self.cells) {
-            if becomes(frame.centre_of(cell)) {
-                *state = CellState::Sensed as u8;
-            }
-        }
-        self.header.part.version += 1;
-        let work = self.planner.take_grid(&self.header, &self.cells);
-        assert_eq!(work.unwrap(), Work::Stale);
-    }
-
-    fn block_post(&mut self, x: f64, y: f64) {
-        self.block(|at| at.distance(DVec2::new(x, y)) < 0.03);
-    }
-
-    fn close_near_gap(&mut self) {
-        self.block(|at| (at.x - 0.8).abs() < 0.03 && at.y < 1.0);
-    }
-
-    fn solve(&mut self) {
-        let job = self.planner.begin_job().unwrap();
-        assert_eq!(self.planner.swap_in(solve(&job)).unwrap(), Work::SwappedIn);
-    }
-
-    fn status_at(&mut self, x: f64, y: f64) -> GuidanceStatus {
-        self.planner.ask(&at(x, y)).status()
-    }
+fn close_near_gap(planner: &mut Planner) {
+    planner.block(|at| (at.x - 0.8).abs() < 0.03 && at.y < 1.0);
 }
 
 #[test]
 fn on_a_large_map_a_change_on_the_way_ahead_makes_the_robot_wait_until_the_field_is_solved() {
-    let mut room = LargeRoom::new();
-    assert_eq!(room.status_at(0.0, 0.0), Along);
+    let mut room = large_room();
+    assert_eq!(room.status_at_start(), Along);
     room.block_post(0.2, 0.1);
-    assert_eq!(room.status_at(0.0, 0.0), Waiting);
-    let solved = solve(&room.planner.begin_job().unwrap());
+    assert_eq!(room.status_at_start(), Waiting);
+    let solved = solve(&room.begin_job().unwrap());
     let other = Solved { number: solved.number + 1, field: solved.field.clone(), took_ns: 0 };
-    assert_eq!(room.planner.swap_in(other).unwrap(), Work::None, "no field waits for it");
-    assert_eq!(room.status_at(0.0, 0.0), Waiting);
-    assert_eq!(room.planner.swap_in(solved).unwrap(), Work::SwappedIn);
-    assert_eq!(room.status_at(0.0, 0.0), Along);
-    assert_eq!(room.status_at(0.2, 0.1), WayOut);
+    assert_eq!(room.swap_in(other).unwrap(), Work::None, "no field waits for it");
+    assert_eq!(room.status_at_start(), Waiting);
+    assert_eq!(room.swap_in(solved).unwrap(), Work::SwappedIn);
+    assert_eq!(room.status_at_start(), Along);
+    assert_eq!(room.ask_at(0.2, 0.1).status(), WayOut);
 }
 
 #[test]
 fn on_a_large_map_a_robot_goes_on_where_nothing_changed_on_its_way_ahead() {
-    let mut room = LargeRoom::new();
-    let before = room.planner.ask(&at(0.0, 0.0));
-    room.close_near_gap();
-    let after = room.planner.ask(&at(0.0, 0.0));
+    let mut room = large_room();
+    let before = room.ask_at_start();
+    close_near_gap(&mut room);
+    let after = room.ask_at_start();
     assert_eq!((after.ex, after.ey), (before.ex, before.ey), "far from the gap");
-    assert_eq!(room.status_at(0.5, 0.0), Waiting, "at the gap");
+    assert_eq!(room.ask_at(0.5, 0.0).status(), Waiting, "at the gap");
     room.solve();
-    let guidance = room.planner.ask(&at(0.5, 0.0));
+    let guidance = room.ask_at(0.5, 0.0);
     assert!(guidance.ey > 0.4, "to the other gap: {guidance:?}");
 }
 
 #[test]
 fn a_change_while_a_job_runs_is_in_the_field_of_the_job_after() {
-    let mut room = LargeRoom::new();
-    room.close_near_gap();
-    let first = room.planner.begin_job().unwrap();
-    assert!(room.planner.begin_job().is_none(), "one at a time");
+    let mut room = large_room();
+    close_near_gap(&mut room);
+    let first = room.begin_job().unwrap();
+    assert!(room.begin_job().is_none(), "one at a time");
     room.block_post(0.4, 0.6);
-    let version = |room: &LargeRoom| room.planner.snapshot().unwrap().header.grid_version;
+    let version = |room: &Planner| room.snapshot().unwrap().header.grid_version;
     assert_eq!(version(&room), 1);
-    room.planner.swap_in(solve(&first)).unwrap();
+    room.swap_in(solve(&first)).unwrap();
     assert_eq!(version(&room), 2);
-    assert_eq!(room.status_at(0.4, 0.4), Waiting);
+    assert_eq!(room.ask_at(0.4, 0.4).status(), Waiting);
     room.solve();
     assert_eq!(version(&room), 3);
-    assert_eq!(room.status_at(0.4, 0.4), Along);
-    assert_eq!(room.status_at(0.4, 0.6), WayOut);
-    assert!(room.planner.begin_job().is_none(), "the field is current");
+    assert_eq!(room.ask_at(0.4, 0.4).status(), Along);
+    assert_eq!(room.ask_at(0.4, 0.6).status(), WayOut);
+    assert!(room.begin_job().is_none(), "the field is current");
 }
 
 #[test]
 fn a_robot_cut_off_on_a_large_map_hears_so_only_from_a_field_of_the_newest_map() {
-    let mut room = LargeRoom::new();
+    let mut room = large_room();
     room.block(|at| (at.x - 0.8).abs() < 0.03);
     room.solve();
-    assert_eq!(room.status_at(0.0, 0.0), Unreachable);
+    assert_eq!(room.status_at_start(), Unreachable);
     room.block_post(-1.0, -1.0);
-    assert_eq!(room.status_at(0.0, 0.0), Waiting);
+    assert_eq!(room.status_at_start(), Waiting);
     room.solve();
-    assert_eq!(room.status_at(0.0, 0.0), Unreachable);
+    assert_eq!(room.status_at_start(), Unreachable);
 }
 
 #[test]
 fn a_missing_version_waits_for_a_keyframe() {
-    let mut planner = sent(&mission());
-    let (mut header, _) = keyframe(5, |_| false);
-    header.part.keyframe = 0;
-    (header.part.width, header.part.height) = (1, 1);
-    assert_eq!(planner.take_grid(&header, &[1]).unwrap(), Work::Missed);
+    let part = Part { keyframe: 0, width: 1, height: 1, ..Part::whole(mission().grid_frame(), 5) };
+    let header = GridHeader { part, ..GridHeader::default() };
+    assert_eq!(sent(&mission()).take_grid(&header, &[1]).unwrap(), Work::Missed);
 }
 
 #[test]
 fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
-    let mut planner = sent(&mission());
-    let (header, cells) = keyframe(1, |at| at.distance(DVec2::new(0.7, 0.3)) < 0.3);
-    planner.take_grid(&header, &cells).unwrap();
+    let planner = in_room(&mission(), |at| at.distance(DVec2::new(0.7, 0.3)) < 0.3);
     let snapshot = planner.snapshot().unwrap();
     let policy = snapshot.cells();
     assert_eq!((policy.len(), snapshot.header.grid_version), (1600, 1));
-    for (cell, &state) in policy.iter().zip(&cells) {
+    for (cell, &state) in policy.iter().zip(planner.grid.cells()) {
         let length = f64::from(cell.ex).hypot(f64::from(cell.ey));
         let directed = (length - 1.0).abs() < 1e-6;
         let target = cell.log2_u == 0.0;
@@ -440,12 +399,9 @@ fn sample(number: u64, x: f64, y: f64) -> TargetSample {
 
 #[test]
 fn a_new_target_is_solved_for_on_the_same_map_within_the_tick() {
-    let mut planner = sent(&mission());
-    let wall = |at: DVec2| (at.x - 0.7).abs() < 0.06 && at.y < 1.0;
-    let (header, cells) = keyframe(1, wall);
-    planner.take_grid(&header, &cells).unwrap();
+    let mut planner = in_room(&mission(), wall);
     assert_eq!(planner.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Stale);
-    let guidance = planner.ask(&at(0.3, 0.0));
+    let guidance = planner.ask_at(0.3, 0.0);
     assert_eq!(guidance.status(), Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
     assert_eq!((guidance.target_number, guidance.distance_m), (2, 1.8));
@@ -454,55 +410,41 @@ fn a_new_target_is_solved_for_on_the_same_map_within_the_tick() {
 #[test]
 fn a_planner_that_knows_no_target_gives_no_direction() {
     let mut planner = Planner::new(&mission());
-    let (header, cells) = keyframe(1, |_| false);
+    let (header, cells) = keyframe(&mission(), |_| false, |_| false);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::None);
-    let guidance = planner.ask(&at(0.0, 0.0));
+    let guidance = planner.ask_at_start();
     assert_eq!((guidance.status(), guidance.target_number), (Waiting, 0));
     assert_eq!(planner.take_target(&sample(1, 1.5, 0.0)).unwrap(), Work::Solved);
-    assert_eq!(planner.ask(&at(0.0, 0.0)).status(), Along);
+    assert_eq!(planner.status_at_start(), Along);
 }
 
 #[test]
 fn a_target_in_hazard_or_outside_ends_no_planner() {
     let mut planner = in_room(&mission(), |at| at.x < -0.5);
     planner.take_target(&sample(2, -1.5, 0.0)).unwrap();
-    assert_eq!(planner.ask(&at(0.0, 0.0)).status(), Unreachable);
+    assert_eq!(planner.status_at_start(), Unreachable);
     // The mapper's next map still has hazard there.
-    let (header, cells) = keyframe(2, |at| at.x < -0.4);
-    planner.take_grid(&header, &cells).unwrap();
+    planner.block(|at| at.x < -0.4);
     for (x, y) in [(9.0, 0.0), (1.99, 0.0), (f64::NAN, 0.0)] {
         assert_eq!(planner.take_target(&sample(3, x, y)).unwrap(), Work::None, "{x}");
-        assert_eq!(planner.ask(&at(0.0, 0.0)).target_number, 2, "{x}");
+        assert_eq!(planner.ask_at_start().target_number, 2, "{x}");
     }
 }
 
 #[test]
 fn on_a_large_map_the_robot_waits_until_the_field_leads_to_its_new_target() {
-    let mut room = LargeRoom::new();
-    assert_eq!(room.status_at(0.0, 0.0), Along);
+    let mut room = large_room();
+    assert_eq!(room.status_at_start(), Along);
     room.block_post(-1.0, -1.0);
-    let before = room.planner.begin_job().unwrap();
-    assert_eq!(room.planner.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Stale);
-    assert_eq!(room.status_at(0.0, 0.0), Waiting);
-    assert_eq!(room.planner.swap_in(solve(&before)).unwrap(), Work::None);
-    assert_eq!(room.status_at(0.0, 0.0), Waiting);
+    let before = room.begin_job().unwrap();
+    assert_eq!(room.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Stale);
+    assert_eq!(room.status_at_start(), Waiting);
+    assert_eq!(room.swap_in(solve(&before)).unwrap(), Work::None);
+    assert_eq!(room.status_at_start(), Waiting);
     room.solve();
-    let guidance = room.planner.ask(&at(0.0, 0.0));
+    let guidance = room.ask_at_start();
     assert_eq!(guidance.status(), Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
-}
-
-/// Planner of a robot of 0.9 by 0.4 m with a laser, in a scanned room, and its keyframe.
-fn long_in_room(target: &str, hazard: impl Fn(DVec2) -> bool) -> (Planner, GridHeader, Vec<u8>) {
-    let text = format!(
-        "{target}\nrobot.model = 'jackal'\nperimeter = {{ width_m = 4, cells = 80 }}\n\
-         robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]"
-    );
-    let mission = parse(&text);
-    let mut planner = sent(&mission);
-    let (header, cells) = scanned_of(&mission, hazard);
-    assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
-    (planner, header, cells)
 }
 
 #[test]
@@ -511,20 +453,24 @@ fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
     let wall = |at: DVec2, x: f64, gap: f64| {
         (at.x - x).abs() < 0.255 && at.y > -1.0 && (at.y - gap).abs() > 0.05
     };
-    let hazard = |at: DVec2| wall(at, 0.3, 0.0) || wall(at, 0.85, 1.0);
-    let (mut planner, header, cells) = long_in_room("target = [1.5, 1.0]", hazard);
-    let start = at(-0.3, 0.0);
-    let first = planner.ask(&start);
-    assert!(first.speed_limit_m_s == 0.0, "it does not go in: {first:?}");
-    let mut led = first;
+    let hazard = |at| wall(at, 0.3, 0.0) || wall(at, 0.85, 1.0);
+    // A robot of 0.9 by 0.4 m with a laser.
+    let text = "target = [1.5, 1.0]\nrobot.model = 'jackal'\n\
+         perimeter = { width_m = 4, cells = 80 }\n\
+         robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]";
+    let mut planner = in_scanned_room(&parse(text), hazard, |_| true);
+    let mut led = planner.ask_at(-0.3, 0.0);
+    assert!(led.speed_limit_m_s == 0.0, "it does not go in: {led:?}");
     for _ in 0..30 {
         planner.end_tick().unwrap();
-        led = planner.ask(&start);
+        led = planner.ask_at(-0.3, 0.0);
     }
     assert!(led.ey < -0.5 && led.status() != Unreachable, "{led:?}");
-    let reset = GridHeader { epoch: 1, part: Part { version: 2, ..header.part }, ..header };
+    let part = Part { version: 2, ..planner.belief.part };
+    let (reset, cells) =
+        (GridHeader { epoch: 1, part, ..planner.belief }, planner.grid.cells().to_vec());
     planner.take_grid(&reset, &cells).unwrap();
-    assert_eq!(planner.ask(&start).speed_limit_m_s, 0.0, "the refusal is forgotten");
+    assert_eq!(planner.ask_at(-0.3, 0.0).speed_limit_m_s, 0.0, "the refusal is forgotten");
 }
 
 /// Robot at the origin that drives at 0.4 m/s along x in a wide, scanned hall, beside a mover.
@@ -535,30 +481,21 @@ fn guidance_beside(model: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSam
 /// Same hall with two walls at `wall_m` metres from the robot's way.
 fn guidance_between(wall_m: f64, model: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
     let pose = PoseSample { v_m_s: 0.4, ..PoseSample::default() };
-    Hall::new(wall_m, model).guidance(&pose, at, velocity)
+    in_hall(wall_m, model).guidance(&pose, at, velocity)
 }
 
-struct Hall {
-    planner: Planner,
-    header: GridHeader,
-    cells: Vec<u8>,
+fn in_hall(wall_m: f64, model: &str) -> Planner {
+    let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
+    let mission = parse(&format!("{hall}\nrobot.model = '{model}'"));
+    in_scanned_room(&mission, |at| at.y.abs() > wall_m, |_| true)
 }
 
-impl Hall {
-    fn new(wall_m: f64, model: &str) -> Self {
-        let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
-        let mission = parse(&format!("{hall}\nrobot.model = '{model}'"));
-        let (header, cells) = scanned_of(&mission, |at| at.y.abs() > wall_m);
-        Self { planner: sent(&mission), header, cells }
-    }
-
+impl Planner {
     fn guidance(&mut self, pose: &PoseSample, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
         let ([x_m, y_m], [vx_m_s, vy_m_s]) = (at.map(|x| x as f32), velocity.map(|v| v as f32));
         let mover = Mover { x_m, y_m, vx_m_s, vy_m_s, radius_m: 0.3, ..Mover::default() };
-        self.header.movers[0] = mover;
-        self.header.mover_count = 1;
-        self.planner.take_grid(&self.header, &self.cells).unwrap();
-        self.planner.ask(pose)
+        (self.belief.movers[0], self.belief.mover_count) = (mover, 1);
+        self.ask(pose)
     }
 
     /// Returns the guidance while something comes along x from `x_m`.
@@ -572,19 +509,19 @@ fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time
  {
     let aside = |guidance: GuidanceSample| guidance.ey.abs() > 0.3;
     let insisting = || {
-        let mut hall = Hall::new(6.0, "jackal");
-        (1..=16).for_each(|second| assert!(aside(hall.comes(second, 4.5)), "{second} s"));
-        hall.comes(17, 4.5);
-        let far = hall.comes(18, 4.5);
+        let mut planner = in_hall(6.0, "jackal");
+        (1..=16).for_each(|second| assert!(aside(planner.comes(second, 4.5)), "{second} s"));
+        planner.comes(17, 4.5);
+        let far = planner.comes(18, 4.5);
         assert!(far.ex > 0.99 && far.signed_limit_m_s() > 0.0, "{far:?}");
-        hall
+        planner
     };
     assert_eq!(insisting().comes(19, 1.0).status(), Waiting);
     let mut alone = insisting();
     (19..=35).for_each(|second| _ = alone.comes(second, 100.0));
     assert!(aside(alone.comes(36, 4.5)), "nothing moved near it");
     let mut sent = insisting();
-    sent.planner.take_target(&sample(2, 4.0, 0.2)).unwrap();
+    sent.take_target(&sample(2, 4.0, 0.2)).unwrap();
     assert!(aside(sent.comes(19, 4.5)), "it has another target");
 }
 
