@@ -60,70 +60,72 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let nose = || Some("link: no nose".to_owned());
     use Outcome::{Aborted, Collision, Reached, Timeout, Unreachable};
     #[rustfmt::skip]
-    let rows = [
-        ("a driving robot goes on", driving(), early, None),
-        ("a simulator that ended", Snapshot { simulator_ended: true, arrival: arrival(0.1, 0), ..driving() }, early,
-         Some((Aborted, "x80-sim.log"))),
-        ("an arrival", Snapshot { arrival: arrival(0.123, 0), collision_m: Some([1.0, 2.0]), ..driving() }, early,
-         Some((Reached, "0.12 m from the target"))),
+    let goes_on = [
+        ("a driving robot goes on", driving(), early),
         ("an arrival on the wall clock waits for rest",
-         Snapshot { arrival: arrival(0.1, 0), link: Some(&moving), in_ticks: false, ..driving() }, RESTS_WITHIN - MS, None),
+         Snapshot { arrival: arrival(0.1, 0), link: Some(&moving), in_ticks: false, ..driving() }, RESTS_WITHIN - MS),
+        ("a stop by the link's failsafe is no end",
+         Snapshot { link: Some(&stop), ..driving() }, early),
+        ("the time of an operator's stop is no mission time", Snapshot { deadline: deadline(8.0, 3.0), ..driving() }, early),
+        ("a real robot may be away", Snapshot { may_be_away: true, ..driving() }, late),
+        ("a real robot may be away while its link says why it does not hear it",
+         Snapshot { may_be_away: true, link: Some(&away), complaint: Some("link: refused".to_owned()), ..driving() }, late),
+        ("an operator may wait", Snapshot { reason: HoldReason::Operator, ..driving() }, late),
+        ("a held stage on the wall clock may wait", Snapshot { in_ticks: false, ..held() }, late),
+    ];
+    for (rule, snapshot, after) in goes_on {
+        assert!(snapshot.ending(start + after).is_none(), "{rule}");
+    }
+    #[rustfmt::skip]
+    let ends = [
+        ("a simulator that ended", Snapshot { simulator_ended: true, arrival: arrival(0.1, 0), ..driving() }, early,
+         Aborted, "x80-sim.log"),
+        ("an arrival", Snapshot { arrival: arrival(0.123, 0), collision_m: Some([1.0, 2.0]), ..driving() }, early,
+         Reached, "0.12 m from the target"),
         ("an arrival at rest",
          Snapshot { arrival: arrival(0.1, 0), link: Some(&resting), in_ticks: false, ..driving() }, early,
-         Some((Reached, "0.10 m from the target"))),
+         Reached, "0.10 m from the target"),
         ("an arrival without a report of rest",
          Snapshot { arrival: arrival(0.1, 1), link: None, in_ticks: false, ..driving() }, RESTS_WITHIN + 1000 * MS,
-         Some((Aborted, "not seen at rest"))),
+         Aborted, "not seen at rest"),
         ("an end by the link's failsafe",
          Snapshot { link: Some(&end), collision_m: Some([1.0, 2.0]), ..driving() },
-         early, Some((Aborted, "battery"))),
-        ("a stop by the link's failsafe is no end",
-         Snapshot { link: Some(&stop), ..driving() }, early, None),
+         early, Aborted, "battery"),
         ("a collision", Snapshot { collision_m: Some([1.0, 2.0]), deadline: deadline(5.0, 0.0), ..driving() }, early,
-         Some((Collision, "(1.00, 2.00)"))),
-        ("a timeout", Snapshot { deadline: deadline(10.0, 0.0), ..driving() }, late, Some((Timeout, "10 s"))),
-        ("the time of an operator's stop is no mission time", Snapshot { deadline: deadline(8.0, 3.0), ..driving() }, early, None),
+         Collision, "(1.00, 2.00)"),
+        ("a timeout", Snapshot { deadline: deadline(10.0, 0.0), ..driving() }, late, Timeout, "10 s"),
         ("a timeout after an operator's stop", Snapshot { deadline: deadline(8.0, 2.0), ..driving() }, late,
-         Some((Timeout, "target not reached within 8 s, 2 s of operator stops excluded"))),
-        ("no tick while driving", driving(), late, Some((Aborted, "stages' logs"))),
-        ("a real robot may be away", Snapshot { may_be_away: true, ..driving() }, late, None),
+         Timeout, "target not reached within 8 s, 2 s of operator stops excluded"),
+        ("no tick while driving", driving(), late, Aborted, "stages' logs"),
         ("a real robot whose samples a stage cannot use is not away",
          Snapshot { may_be_away: true, complaint: nose(), ..driving() }, late,
-         Some((Aborted, "link: no nose"))),
+         Aborted, "link: no nose"),
         ("a robot in a procedure may not be away", Snapshot { has_ticked: false, ..driving() }, late,
-         Some((Aborted, "no tick begins"))),
-        ("a real robot may be away while its link says why it does not hear it",
-         Snapshot { may_be_away: true, link: Some(&away), complaint: Some("link: refused".to_owned()), ..driving() }, late, None),
+         Aborted, "no tick begins"),
         ("a real robot that is to start may not be away", Snapshot { may_be_away: true, link: None, ..starting() }, late,
-         Some((Aborted, "no robot answers at udp://10.0.0.1:10001"))),
-        ("a robot that answers and does not start", starting(), late, Some((Aborted, "a sensor of its mission"))),
+         Aborted, "no robot answers at udp://10.0.0.1:10001"),
+        ("a robot that answers and does not start", starting(), late, Aborted, "a sensor of its mission"),
         ("a robot that has begun a tick is not looked for", Snapshot { link: None, ..driving() }, late,
-         Some((Aborted, "stages' logs"))),
+         Aborted, "stages' logs"),
         ("a robot of which a stage complains", Snapshot { link: None, complaint: nose(), ..starting() }, late,
-         Some((Aborted, "link: no nose"))),
+         Aborted, "link: no nose"),
         ("a timeout while a stage complains",
          Snapshot { deadline: deadline(10.0, 0.0), complaint: nose(), ..driving() }, late,
-         Some((Timeout, "target not reached within 10 s; link: no nose"))),
+         Timeout, "target not reached within 10 s; link: no nose"),
         ("an arrival beside the target", Snapshot { arrival: beside, ..driving() }, early,
-         Some((Unreachable, "0.36 m from the target, at [2.64, 0.00]: the nearest point that a hazard allows"))),
-        ("an operator may wait", Snapshot { reason: HoldReason::Operator, ..driving() }, late, None),
-        ("a held stage in ticks", held(), late, Some((Aborted, "mapper died repeatedly"))),
+         Unreachable, "0.36 m from the target, at [2.64, 0.00]: the nearest point that a hazard allows"),
+        ("a held stage in ticks", held(), late, Aborted, "mapper died repeatedly"),
         ("a held stage that says why it died", Snapshot { complaint: Some("mapper: no disk".to_owned()), ..held() }, late,
-         Some((Aborted, "mapper died repeatedly (mapper: no disk)"))),
-        ("a held stage on the wall clock may wait", Snapshot { in_ticks: false, ..held() }, late, None),
+         Aborted, "mapper died repeatedly (mapper: no disk)"),
         ("a stage that never becomes ready", Snapshot { not_ready: vec!["planner"], ..starting() }, late,
-         Some((Aborted, "not ready: planner; see the log"))),
+         Aborted, "not ready: planner; see the log"),
         ("an external stage that is missing", Snapshot { not_started: vec!["planner"], held: vec!["mapper"], ..starting() },
-         late, Some((Aborted, "not running: planner; start each with `firsthand stage NAME --robot x80`"))),
+         late, Aborted, "not running: planner; start each with `firsthand stage NAME --robot x80`"),
     ];
-    for (rule, snapshot, after, expected) in rows {
-        let ending = snapshot.ending(start + after);
-        let outcome = ending.as_ref().map(|ending| ending.outcome);
-        assert_eq!(outcome, expected.map(|(outcome, _)| outcome), "{rule}");
-        if let (Some(ending), Some((outcome, words))) = (ending, expected) {
-            assert!(ending.reason.contains(words), "{rule}: {}", ending.reason);
-            assert_eq!(ending.asked_for, outcome == Reached, "{rule}");
-        }
+    for (rule, snapshot, after, outcome, words) in ends {
+        let ending = snapshot.ending(start + after).expect(rule);
+        assert_eq!((ending.outcome, ending.asked_for), (outcome, outcome == Reached), "{rule}");
+        assert!(ending.reason.contains(words), "{rule}: {}", ending.reason);
     }
 }
 

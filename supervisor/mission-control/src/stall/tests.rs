@@ -3,6 +3,7 @@ use GuidanceStatus::{Along, Look, Unreachable, Waiting, WayOut};
 use RecoveryStep::{GiveUp, Replan, Reset};
 use StallCause::{CutOff, Held, InsideHazard, Pinned, Relocated, Still, Wandering};
 use common::samples::Stamp;
+use std::ops::Range;
 
 fn mission(more: &str) -> Mission {
     let text = format!("target = [3, 0]\n{more}");
@@ -34,20 +35,20 @@ fn parts(stall: &StallSample) -> (StallCause, RecoveryStep, u64) {
     (stall.cause(), stall.recovery(), stall.epoch)
 }
 
-/// Returns the time of each stall until one gives up, and what it says, of a robot in `poses`,
-/// led alike.
+/// Returns the time of each stall until one gives up, and what it says, of a robot led alike, with
+/// a pose in every second.
 fn stalls(
     watch: &mut StallWatch,
     (status, distance_m): (GuidanceStatus, f64),
-    poses: impl Iterator<Item = PoseSample>,
-) -> Vec<(f64, StallCause, RecoveryStep, u64)> {
+    seconds: Range<u32>,
+    pose: impl Fn(f64) -> PoseSample,
+) -> Vec<(f64, (StallCause, RecoveryStep, u64))> {
     let mut stalls = Vec::new();
-    for pose in poses {
+    for pose in seconds.map(|second| pose(second.into())) {
         let along = GuidanceSample { distance_m, ..guidance(status, watch.epoch()) };
         if let Some(stall) = step(watch, pose, along) {
-            let (cause, recovery, epoch) = parts(&stall);
-            stalls.push((pose.stamp.tick as f64 / 1e9, cause, recovery, epoch));
-            if recovery == GiveUp {
+            stalls.push((pose.stamp.tick as f64 / 1e9, parts(&stall)));
+            if stall.recovery() == GiveUp {
                 break;
             }
         }
@@ -55,37 +56,35 @@ fn stalls(
     stalls
 }
 
-/// Returns poses in every second, of a robot that stands.
-fn standing(seconds: std::ops::Range<u32>) -> impl Iterator<Item = PoseSample> {
-    seconds.map(|second| pose(second.into(), 5.0))
+fn standing(second: f64) -> PoseSample {
+    pose(second, 5.0)
 }
 
 #[test]
 fn a_robot_that_moves_scans_waits_or_was_held_is_not_stalled() {
-    let moving =
-        (0..100).map(f64::from).map(|it| PoseSample { x_m: it * 0.05, ..pose(it, it * 0.05) });
-    assert_eq!(stalls(&mut watch(), (Along, 3.0), moving), []);
-    let scanning = (0..75).map(|tick| f64::from(tick) * 0.2);
-    let scanning = scanning.map(|it| PoseSample { heading_rad: it.sin(), ..pose(it, 0.0) });
-    assert_eq!(stalls(&mut watch(), (Look, 3.0), scanning), []);
+    let moving = |it| PoseSample { x_m: it * 0.05, ..pose(it, it * 0.05) };
+    assert_eq!(stalls(&mut watch(), (Along, 3.0), 0..100, moving), []);
+    let scanning = |it: f64| PoseSample { heading_rad: it.sin(), ..pose(it, 0.0) };
+    assert_eq!(stalls(&mut watch(), (Look, 3.0), 0..75, |it| scanning(it * 0.2)), []);
     let mut held = watch();
-    for pose in standing(0..20) {
-        assert_eq!(held.step(&pose, &guidance(Along, 0), true, false), None, "held by another");
+    for second in 0..20 {
+        let held = held.step(&standing(second.into()), &guidance(Along, 0), true, false);
+        assert_eq!(held, None, "held by another");
     }
     let mut without_ticks = watch();
     assert_eq!(step(&mut without_ticks, pose(0.0, 0.0), guidance(Along, 0)), None);
     without_ticks.forget_motion();
     assert_eq!(step(&mut without_ticks, pose(20.0, 0.0), guidance(Along, 0)), None);
     let waits_s = (FIELD_WITHIN + STALLED_AFTER).as_secs_f64();
-    let waiting = stalls(&mut watch(), (Waiting, 3.0), standing(0..300));
+    let waiting = stalls(&mut watch(), (Waiting, 3.0), 0..300, standing);
     // The next recovery step takes as long again.
     assert!(waiting[0].0 == waits_s && waiting[1].0 > waits_s + 5.0, "{waiting:?}");
 }
 
 #[test]
 fn a_stalled_robot_gets_a_fresh_planner_twice_then_a_fresh_belief() {
-    let stalls = stalls(&mut watch(), (Along, 3.0), standing(0..11));
-    let stalls: Vec<_> = stalls.into_iter().map(|it| (it.1, it.2, it.3)).collect();
+    let stalls = stalls(&mut watch(), (Along, 3.0), 0..11, standing);
+    let stalls: Vec<_> = stalls.into_iter().map(|it| it.1).collect();
     assert_eq!(stalls, [(Still, Replan, 0), (Still, Replan, 0), (Still, Reset, 1)]);
 }
 
@@ -107,9 +106,9 @@ fn what_a_robot_did_while_it_was_not_to_drive_is_no_stall() {
 #[test]
 fn a_robot_cut_off_by_the_evidential_method_looks_around_before_its_belief_is_blamed() {
     let mission = mission("");
-    let turning = (0..100).map(f64::from);
-    let turning = turning.map(|it| PoseSample { heading_rad: it, ..pose(it, 0.0) });
-    let first = stalls(&mut StallWatch::new(&mission), (Unreachable, 3.0), turning)[0].0;
+    let turning = |it| PoseSample { heading_rad: it, ..pose(it, 0.0) };
+    let mut watch = StallWatch::new(&mission);
+    let first = stalls(&mut watch, (Unreachable, 3.0), 0..100, turning)[0].0;
     let turn = TAU / mission.hurry().look_rad_s;
     assert!(first > turn && first < 5.0 * turn, "{first}");
 }
@@ -125,15 +124,12 @@ fn an_answer_from_before_the_reset_does_not_reset_again() {
 }
 
 /// Returns the recovery steps of a robot that rocks.
-fn rock(watch: &mut StallWatch, seconds: std::ops::Range<u32>) -> Vec<RecoveryStep> {
-    let rocking = seconds.map(f64::from).map(|it| PoseSample {
-        x_m: 0.05 * it.sin(),
-        heading_rad: it,
-        ..pose(it, 0.05 * it)
-    });
-    let stalls = stalls(watch, (Along, 3.0), rocking);
-    assert!(stalls.iter().all(|it| it.1 == Pinned), "{stalls:?}");
-    stalls.into_iter().map(|it| it.2).collect()
+fn rock(watch: &mut StallWatch, seconds: Range<u32>) -> Vec<RecoveryStep> {
+    let rocking =
+        |it: f64| PoseSample { x_m: 0.05 * it.sin(), heading_rad: it, ..pose(it, 0.05 * it) };
+    let stalls = stalls(watch, (Along, 3.0), seconds, rocking);
+    assert!(stalls.iter().all(|it| it.1.0 == Pinned), "{stalls:?}");
+    stalls.into_iter().map(|it| it.1.1).collect()
 }
 
 #[test]
@@ -152,43 +148,31 @@ fn a_robot_that_circles_what_it_should_stand_on_is_pinned_and_one_that_crawls_to
     let mission = mission("method = 'paper'");
     let (speed, turn) = (mission.speed_m_s(), mission.turn_rad_s());
     let radius = speed / turn;
-    let mut circling = StallWatch::new(&mission);
-    let mut crawling = StallWatch::new(&mission);
-    let mut seen = [None; 2];
-    for second in (0..40).map(f64::from) {
-        let heading = turn * second;
-        let circle = PoseSample {
-            x_m: radius * heading.sin(),
-            y_m: -radius * heading.cos(),
-            heading_rad: heading,
-            ..pose(second, speed * second)
-        };
-        let crawl = PoseSample { x_m: 0.01 * second, ..pose(second, 0.01 * second) };
-        let near = |distance_m| GuidanceSample { distance_m, ..guidance(Along, 0) };
-        let stalls = [
-            step(&mut circling, circle, near(3.0 - circle.x_m)),
-            step(&mut crawling, crawl, near(0.5 - crawl.x_m)),
-        ];
-        for (first, stall) in seen.iter_mut().zip(stalls) {
-            *first = first.or(stall.map(|stall| stall.cause()));
-        }
-    }
+    let circle = |second: f64| {
+        let heading_rad = turn * second;
+        let (x_m, y_m) = (radius * heading_rad.sin(), -radius * heading_rad.cos());
+        PoseSample { x_m, y_m, heading_rad, ..pose(second, speed * second) }
+    };
+    let crawl = |second| PoseSample { x_m: 0.01 * second, ..pose(second, 0.01 * second) };
+    let seen =
+        [(3.0, &circle as &dyn Fn(f64) -> PoseSample), (0.5, &crawl)].map(|(away_m, pose)| {
+            let mut watch = StallWatch::new(&mission);
+            (0..40).map(f64::from).map(pose).find_map(|pose| {
+                let near = GuidanceSample { distance_m: away_m - pose.x_m, ..guidance(Along, 0) };
+                step(&mut watch, pose, near).map(|stall| stall.cause())
+            })
+        });
     assert_eq!(seen, [Some(Pinned), None]);
 }
 
 #[test]
 fn a_robot_that_drives_far_in_hazard_forgets_and_one_that_gets_out_does_not() {
-    let drive = |watch: &mut StallWatch, tenths: std::ops::Range<u32>| {
-        let driving =
-            tenths.map(f64::from).map(|it| PoseSample { x_m: it * 0.1, ..pose(it, it * 0.1) });
-        stalls(watch, (WayOut, 3.0), driving)
-    };
-    let (_, cause, recovery, epoch) = drive(&mut watch(), 0..12)[0];
-    assert_eq!((cause, recovery, epoch), (InsideHazard, Reset, 1));
+    let driving = |it| PoseSample { x_m: it * 0.1, ..pose(it, it * 0.1) };
+    let drive = |watch: &mut StallWatch, seconds| stalls(watch, (WayOut, 3.0), seconds, driving);
+    assert_eq!(drive(&mut watch(), 0..12)[0].1, (InsideHazard, Reset, 1));
     let mut watch = watch();
     assert_eq!(drive(&mut watch, 0..8), []);
-    let out = PoseSample { x_m: 0.8, ..pose(8.0, 0.8) };
-    step(&mut watch, out, guidance(Along, 0));
+    step(&mut watch, driving(8.0), guidance(Along, 0));
     assert_eq!(drive(&mut watch, 9..17), []);
 }
 
@@ -225,13 +209,12 @@ fn a_robot_that_drives_three_times_as_far_as_its_target_was_away_forgets_and_in_
         ("paper", 8.0, &[]),
     ] {
         let mut watch = StallWatch::new(&mission(&format!("method = '{method}'")));
-        let poses = (0..200).map(f64::from);
-        let poses = poses.map(|it| PoseSample { x_m: it % 2.0, ..pose(2.0 * it, it) });
-        let stalls = stalls(&mut watch, (Along, target_m), poses);
+        let poses = |it| PoseSample { x_m: it % 2.0, ..pose(2.0 * it, it) };
+        let stalls = stalls(&mut watch, (Along, target_m), 0..200, poses);
         let steps = [Reset, Reset, Reset, GiveUp];
         let want: Vec<_> =
             want.iter().zip(steps).map(|(it, step)| (2.0 * it, Wandering, step)).collect();
-        let stalls: Vec<_> = stalls.into_iter().map(|it| (it.0, it.1, it.2)).collect();
+        let stalls: Vec<_> = stalls.into_iter().map(|it| (it.0, it.1.0, it.1.1)).collect();
         assert_eq!(stalls, want, "{method}, {target_m} m");
     }
 }
@@ -241,9 +224,9 @@ fn a_robot_with_a_laser_wanders_where_it_has_been_and_not_where_it_has_not() {
     // The limit is 12 m, plus 3 m for each of four squares.
     for (round_m, want) in [(1e9, None), (4.0, Some(24.0))] {
         let mut watch = StallWatch::new(&mission("robot.model = 'kobuki'"));
-        let poses = (0..200).map(f64::from);
-        let poses = poses.map(|it| PoseSample { x_m: it % round_m, ..pose(2.0 * it, it) });
-        let first = stalls(&mut watch, (Along, 3.0), poses).first().map(|it| it.0 / 2.0);
+        let poses = |it| PoseSample { x_m: it % round_m, ..pose(2.0 * it, it) };
+        let stalls = stalls(&mut watch, (Along, 3.0), 0..200, poses);
+        let first = stalls.first().map(|it| it.0 / 2.0);
         assert_eq!(first, want, "rounds of {round_m} m");
     }
 }
