@@ -73,12 +73,13 @@ mod tests {
 
     const FRAME: GridFrame = GridFrame { cells: 41, resolution_m: 0.05, centre: DVec2::ZERO };
 
+    fn map(is_hazard: impl Fn(DVec2) -> bool) -> Vec<u8> {
+        let state = |at| if is_hazard(at) { CellState::Sensed } else { CellState::Free };
+        FRAME.whole().cells().map(|cell| state(FRAME.centre_of(cell)) as u8).collect()
+    }
+
     fn aim(target: DVec2, is_hazard: impl Fn(DVec2) -> bool) -> Option<DVec2> {
-        let mut cells = vec![CellState::Free as u8; FRAME.area()];
-        for cell in FRAME.whole().cells().filter(|cell| is_hazard(FRAME.centre_of(*cell))) {
-            cells[FRAME.index(cell)] = CellState::Sensed as u8;
-        }
-        cell(&FRAME, &cells, target).map(|cell| FRAME.centre_of(cell))
+        cell(&FRAME, &map(is_hazard), target).map(|cell| FRAME.centre_of(cell))
     }
 
     #[test]
@@ -94,11 +95,7 @@ mod tests {
     #[test]
     fn a_target_whose_neighbours_are_margins_is_approached_by_a_free_cell_within_the_tolerance() {
         let target = DVec2::new(0.5, 0.0);
-        let mut cells = vec![CellState::Free as u8; FRAME.area()];
-        let own = FRAME.cell_at(target).unwrap();
-        for cell in around(&FRAME, own, 1).filter(|cell| *cell != own) {
-            cells[FRAME.index(cell)] = CellState::Sensed as u8;
-        }
+        let cells = map(|at| (0.01..0.08).contains(&at.distance(target)));
         for (reach_m, off_m) in [(0.15, 0.1), (0.05, 0.0)] {
             let cell = cell_with_a_way_in(&FRAME, &cells, target, reach_m).unwrap();
             let off = FRAME.centre_of(cell).distance(target);

@@ -19,3 +19,6 @@ pub mod stage;
 pub mod step;
 mod undetected_surfaces;
 mod view;
+
+#[cfg(test)]
+mod testing;

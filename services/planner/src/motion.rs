@@ -176,16 +176,15 @@ impl MotionModel {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
+    use crate::testing::mission;
 
     fn motion(acceleration_m_s2: f64) -> MotionModel {
         let text = format!(
             "target = [3, 0]\nrobot.model = 'jackal'\n\
              robot.response = {{ delay_s = 0.1, acceleration_m_s2 = {acceleration_m_s2} }}"
         );
-        MotionModel::of_limited(&Mission::parse(&text, Path::new("m.toml")).unwrap()).unwrap()
+        MotionModel::of_limited(&mission(&text)).unwrap()
     }
 
     fn moving(v: f64, omega: f64) -> Moving {

@@ -32,30 +32,20 @@ pub(crate) fn clear_ahead_m(belief: &GridHeader, pose: &Pose2, radius: f64, sona
 
 #[cfg(test)]
 mod tests {
-    use common::samples::ClearBeam;
-
     use super::*;
+    use crate::testing::{beam, belief};
 
-    /// Readings of a sonar 0.19 m ahead of a robot at the origin: bearings in degrees, free lengths
-    /// in metres.
-    fn belief(readings: &[(f32, f32)]) -> GridHeader {
-        let mut belief =
-            GridHeader { clear_beam_count: readings.len() as u64, ..GridHeader::default() };
-        for (beam, &(bearing_deg, clear_m)) in belief.clear_beams.iter_mut().zip(readings) {
-            let bearing_rad = bearing_deg.to_radians();
-            *beam = ClearBeam {
-                x_m: 0.19 * bearing_rad.cos(),
-                y_m: 0.19 * bearing_rad.sin(),
-                bearing_rad,
-                clear_m,
-            };
-        }
-        belief
-    }
-
-    fn clear(readings: &[(f32, f32)], radius: f64, x: f64) -> f64 {
+    /// Returns what is clear after readings of a sonar 0.19 m ahead of a robot at the origin:
+    /// bearings in degrees, free lengths in metres.
+    fn clear(readings: &[(f64, f64)], radius: f64, x: f64) -> f64 {
         let pose = Pose2 { position: DVec2::new(x, 0.0), heading: 0.0 };
-        clear_ahead_m(&belief(readings), &pose, radius, 1)
+        let beams: Vec<_> = readings
+            .iter()
+            .map(|&(deg, clear_m)| {
+                beam(0.19 * DVec2::from_angle(f64::to_radians(deg)), deg, clear_m)
+            })
+            .collect();
+        clear_ahead_m(&belief(&beams, &[]), &pose, radius, 1)
     }
 
     #[test]

@@ -498,4 +498,4 @@ fn screening(mission: &Mission) -> Screening {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

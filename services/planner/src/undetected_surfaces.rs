@@ -223,27 +223,12 @@ impl UndetectedSurfaces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::{beam, belief};
 
     const BODY_M: f64 = 0.19;
 
-    fn beam(x: f64, bearing_deg: f64, clear_m: f64) -> ClearBeam {
-        ClearBeam {
-            x_m: x as f32,
-            y_m: 0.0,
-            bearing_rad: bearing_deg.to_radians() as f32,
-            clear_m: clear_m as f32,
-        }
-    }
-
-    fn belief(beams: &[ClearBeam], rays: &[ClearBeam]) -> GridHeader {
-        let mut header = GridHeader {
-            clear_beam_count: beams.len() as u64,
-            clear_ray_count: rays.len() as u64,
-            ..GridHeader::default()
-        };
-        header.clear_beams[..beams.len()].copy_from_slice(beams);
-        header.clear_rays[..rays.len()].copy_from_slice(rays);
-        header
+    fn ahead(x: f64, bearing_deg: f64, clear_m: f64) -> ClearBeam {
+        beam(DVec2::new(x, 0.0), bearing_deg, clear_m)
     }
 
     fn undetected(beams: &[ClearBeam], rays: &[ClearBeam]) -> Vec<i32> {
@@ -255,27 +240,27 @@ mod tests {
     #[test]
     fn a_silent_beam_excludes_only_surfaces_square_to_it_and_a_scan_or_a_ring_of_rays_all() {
         assert_eq!(undetected(&[], &[]).len(), 11);
-        assert_eq!(undetected(&[beam(0.0, 0.0, 2.0)], &[]), [-75, -60, -45, -30, 30, 45, 60, 75]);
-        assert_eq!(undetected(&[beam(0.0, 45.0, 2.0)], &[]), [-75, -60, -45, -30, -15, 0, 15, 75]);
-        let scan: Vec<_> = (-4..=4).map(|step| beam(-0.3, f64::from(step) * 16.0, 2.0)).collect();
+        assert_eq!(undetected(&[ahead(0.0, 0.0, 2.0)], &[]), [-75, -60, -45, -30, 30, 45, 60, 75]);
+        assert_eq!(undetected(&[ahead(0.0, 45.0, 2.0)], &[]), [-75, -60, -45, -30, -15, 0, 15, 75]);
+        let scan: Vec<_> = (-4..=4).map(|step| ahead(-0.3, f64::from(step) * 16.0, 2.0)).collect();
         assert_eq!(undetected(&scan, &[]), [0; 0]);
         assert_eq!(undetected(&[], &ring(0.25, 0.7)), [0; 0]);
     }
 
     #[test]
     fn a_reading_excludes_no_surface_beyond_its_echo_or_too_far_aside() {
-        let (echo, silence) = (beam(0.0, 0.0, 0.15), beam(0.0, 0.0, 2.0));
+        let (echo, silence) = (ahead(0.0, 0.0, 0.15), ahead(0.0, 0.0, 2.0));
         for (what, beams, rays, degrees, detected) in [
             // The body with its margin extends 0.21 m ahead.
-            ("a surface before the echo", &[beam(-0.5, 0.0, 0.72)][..], &[][..], 0, true),
-            ("a surface at the echo", &[beam(-0.5, 0.0, 0.70)], &[], 0, false),
-            ("a surface that extends for a metre", &[beam(-0.9, 75.0, 2.0)], &[], 75, true),
-            ("a surface that would extend farther", &[beam(-1.1, 75.0, 2.0)], &[], 75, false),
+            ("a surface before the echo", &[ahead(-0.5, 0.0, 0.72)][..], &[][..], 0, true),
+            ("a surface at the echo", &[ahead(-0.5, 0.0, 0.70)], &[], 0, false),
+            ("a surface that extends for a metre", &[ahead(-0.9, 75.0, 2.0)], &[], 75, true),
+            ("a surface that would extend farther", &[ahead(-1.1, 75.0, 2.0)], &[], 75, false),
             ("a silence beside an echo", &[echo, silence], &[], 0, true),
             ("a lost ping among echoes", &[echo, silence, echo], &[], 0, false),
             // The ray at 11.25 degrees meets a surface square ahead after 0.28 m.
             ("a surface beyond the rays", &[], &ring(0.25, 0.25), 0, false),
-            ("a ray 0.5 m aside", &[], &[ClearBeam { y_m: 0.5, ..beam(0.0, 0.0, 0.7) }], 0, false),
+            ("a ray 0.5 m aside", &[], &[ClearBeam { y_m: 0.5, ..ahead(0.0, 0.0, 0.7) }], 0, false),
         ] {
             assert_eq!(!undetected(beams, rays).contains(&degrees), detected, "{what}");
         }
@@ -285,11 +270,8 @@ mod tests {
     /// origin.
     fn ring(behind: f64, clear_m: f64) -> [ClearBeam; 4] {
         [33.75, 11.25, -11.25, -33.75].map(|bearing_deg: f64| {
-            let (sin, cos) = bearing_deg.to_radians().sin_cos();
-            ClearBeam {
-                y_m: (BODY_M * sin) as f32,
-                ..beam(BODY_M * cos - behind, bearing_deg, clear_m)
-            }
+            let from = BODY_M * DVec2::from_angle(bearing_deg.to_radians());
+            beam(from - behind * DVec2::X, bearing_deg, clear_m)
         })
     }
 
@@ -299,7 +281,7 @@ mod tests {
         let beams: Vec<_> = (0..120_i16)
             .map(|n| {
                 let n = f64::from(n);
-                beam(0.3 * (n * 0.7).sin(), n * 137.5 % 360.0, 0.15 + 0.2 * (n * 1.3).sin())
+                ahead(0.3 * (n * 0.7).sin(), n * 137.5 % 360.0, 0.15 + 0.2 * (n * 1.3).sin())
             })
             .collect();
         let belief = belief(&beams, &[]);

@@ -1,32 +1,38 @@
 use super::*;
+use crate::{
+    testing::{self, beam, belief},
+    view::View,
+};
 use GuidanceStatus::{Along, Look, Unreachable, Waiting, WayOut};
 use common::{
     bus::Stamp,
     grid::{CellState, Part},
-    samples::{BaseResponseSample, ClearBeam, Mover, TargetPoint},
+    samples::{BaseResponseSample, Mover, TargetPoint},
 };
-use std::path::Path;
-
-fn parse(text: &str) -> Mission {
-    Mission::parse(text, Path::new("test.toml")).unwrap()
-}
+use glam::dvec2;
 
 fn mission() -> Mission {
     mission_of(40)
 }
 
 fn mission_of(cells: u32) -> Mission {
-    parse(&format!(
+    testing::mission(&format!(
         "target = [1.5, 0]\nmethod = 'paper'\nperimeter = {{ width_m = 4, cells = {cells} }}"
     ))
 }
 
 /// Returns the mission of a robot that this line describes, by the default method.
 fn mission_with(robot: &str) -> Mission {
-    parse(&format!("target = [1.5, 0]\nperimeter = {{ width_m = 4, cells = 40 }}\n{robot}"))
+    testing::mission(&format!(
+        "target = [1.5, 0]\nperimeter = {{ width_m = 4, cells = 40 }}\n{robot}"
+    ))
 }
 
 impl Planner {
+    pub(crate) fn view(&self) -> View<'_> {
+        self.live.as_ref().unwrap().view(self.grid.cells())
+    }
+
     fn ask(&mut self, pose: &PoseSample) -> GuidanceSample {
         let stamp_ns = pose.stamp.stamp_ns + 60_000_000_000;
         let pose = PoseSample { stamp: Stamp { stamp_ns, ..pose.stamp }, ..*pose };
@@ -59,7 +65,7 @@ impl Planner {
     }
 
     fn block_post(&mut self, x: f64, y: f64) {
-        self.block(|at| at.distance(DVec2::new(x, y)) < 0.03);
+        self.block(|at| at.distance(dvec2(x, y)) < 0.03);
     }
 
     fn solve(&mut self) {
@@ -75,7 +81,7 @@ fn sent(mission: &Mission) -> Planner {
     planner
 }
 
-fn keyframe(
+pub(crate) fn keyframe(
     mission: &Mission,
     hazard: impl Fn(DVec2) -> bool,
     scanned: impl Fn(DVec2) -> bool,
@@ -96,18 +102,16 @@ fn in_room(mission: &Mission, hazard: impl Fn(DVec2) -> bool) -> Planner {
 }
 
 /// Returns a planner of a robot whose scan to both sides had no echo.
-fn in_scanned_room(
+pub(crate) fn in_scanned_room(
     mission: &Mission,
     hazard: impl Fn(DVec2) -> bool,
     scanned: impl Fn(DVec2) -> bool,
 ) -> Planner {
-    let (mut header, cells) = keyframe(mission, hazard, scanned);
-    header.clear_beam_count = 11;
-    for (index, beam) in header.clear_beams.iter_mut().take(11).enumerate() {
-        let bearing_rad = (index as f32 - 5.0) * 15.0_f32.to_radians();
-        *beam = ClearBeam { x_m: 0.0, y_m: 0.0, bearing_rad, clear_m: 2.0 };
-    }
-    header.clear_beams.swap(0, 5);
+    let (header, cells) = keyframe(mission, hazard, scanned);
+    let mut beams = [-5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5]
+        .map(|step| beam(DVec2::ZERO, f64::from(step) * 15.0, 2.0));
+    beams.swap(0, 5);
+    let header = GridHeader { part: header.part, ..belief(&beams, &[]) };
     let mut planner = sent(mission);
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::Solved);
     planner
@@ -139,7 +143,7 @@ fn before_the_first_keyframe_there_is_no_guidance() {
 fn the_status_and_direction_of_a_place_are_those_of_the_map_around_it() {
     let ring = |at: DVec2| (0.5..0.75).contains(&at.length());
     let block = |at: DVec2| at.x.abs() < 0.25 && at.y.abs() < 0.45;
-    let aside = DVec2::new(1.0, -1.0).normalize();
+    let aside = dvec2(1.0, -1.0).normalize();
     for (name, hazard, from, status, direction) in [
         ("an empty room", &(|_| false) as &dyn Fn(DVec2) -> bool, [0.0, 0.0], Along, DVec2::X),
         ("in the target's cell", &|_| false, [1.48, 0.02], Along, aside),
@@ -148,7 +152,7 @@ fn the_status_and_direction_of_a_place_are_those_of_the_map_around_it() {
     ] {
         let guidance = in_room(&mission(), hazard).ask_at(from[0], from[1]);
         assert_eq!(guidance.status(), status, "{name}");
-        let off = direction.distance(DVec2::new(guidance.ex, guidance.ey));
+        let off = direction.distance(dvec2(guidance.ex, guidance.ey));
         assert!(off < 0.03, "{name}: {guidance:?}");
         let left = (mission().target - DVec2::from(from)).length();
         assert!((guidance.distance_m - left).abs() < 1e-9, "{name}: {guidance:?}");
@@ -223,9 +227,9 @@ fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
 
 #[test]
 fn a_robot_that_senses_beside_it_turns_from_a_drum_before_the_field_does() {
-    let drum = |at: DVec2| at.distance(DVec2::new(0.8, 0.05)) < 0.3;
+    let drum = |at: DVec2| at.distance(dvec2(0.8, 0.05)) < 0.3;
     let mut planner = in_scanned_room(&mission_with("robot.model = 'kobuki'"), drum, |_| true);
-    let pose = Pose2 { position: DVec2::new(0.1, 0.0), ..Pose2::default() };
+    let pose = Pose2 { position: dvec2(0.1, 0.0), ..Pose2::default() };
     let (_, field) = planner.follow_field(&pose).unwrap();
     let guidance = planner.ask_at(0.1, 0.0);
     assert_eq!(guidance.status(), Along);
@@ -380,7 +384,7 @@ fn a_missing_version_waits_for_a_keyframe() {
 
 #[test]
 fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
-    let planner = in_room(&mission(), |at| at.distance(DVec2::new(0.7, 0.3)) < 0.3);
+    let planner = in_room(&mission(), |at| at.distance(dvec2(0.7, 0.3)) < 0.3);
     let snapshot = planner.snapshot().unwrap();
     let policy = snapshot.cells();
     assert_eq!((policy.len(), snapshot.header.grid_version), (1600, 1));
@@ -393,7 +397,7 @@ fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
 }
 
 fn sample(number: u64, x: f64, y: f64) -> TargetSample {
-    let target = TargetPoint::at(DVec2::new(x, y));
+    let target = TargetPoint::at(dvec2(x, y));
     TargetSample { number, last: number, target, ..TargetSample::default() }
 }
 
@@ -458,7 +462,7 @@ fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
     let text = "target = [1.5, 1.0]\nrobot.model = 'jackal'\n\
          perimeter = { width_m = 4, cells = 80 }\n\
          robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]";
-    let mut planner = in_scanned_room(&parse(text), hazard, |_| true);
+    let mut planner = in_scanned_room(&testing::mission(text), hazard, |_| true);
     let mut led = planner.ask_at(-0.3, 0.0);
     assert!(led.speed_limit_m_s == 0.0, "it does not go in: {led:?}");
     for _ in 0..30 {
@@ -486,7 +490,7 @@ fn guidance_between(wall_m: f64, model: &str, at: [f64; 2], velocity: [f64; 2]) 
 
 fn in_hall(wall_m: f64, model: &str) -> Planner {
     let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
-    let mission = parse(&format!("{hall}\nrobot.model = '{model}'"));
+    let mission = testing::mission(&format!("{hall}\nrobot.model = '{model}'"));
     in_scanned_room(&mission, |at| at.y.abs() > wall_m, |_| true)
 }
 
