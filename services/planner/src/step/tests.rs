@@ -51,21 +51,35 @@ impl Planner {
         self.ask_at_start().status()
     }
 
+    /// Takes its map again with this change.
+    fn retake(&mut self, change: impl FnOnce(&mut GridHeader, &mut [u8])) -> Work {
+        let (mut header, mut cells) = (self.belief, self.grid.cells().to_vec());
+        change(&mut header, &mut cells);
+        self.take_grid(&header, &cells).unwrap()
+    }
+
     /// Takes the next version of its map, in which these places are hazard too.
     fn block(&mut self, becomes: impl Fn(DVec2) -> bool) {
-        let (mut header, mut cells) = (self.belief, self.grid.cells().to_vec());
-        let frame = header.part.frame();
-        for (cell, state) in frame.whole().cells().zip(&mut cells) {
-            if becomes(frame.centre_of(cell)) {
-                *state = CellState::Sensed as u8;
+        let work = self.retake(|header, cells| {
+            let frame = header.part.frame();
+            for (cell, state) in frame.whole().cells().zip(cells) {
+                if becomes(frame.centre_of(cell)) {
+                    *state = CellState::Sensed as u8;
+                }
             }
-        }
-        header.part.version += 1;
-        assert_eq!(self.take_grid(&header, &cells).unwrap(), Work::Stale);
+            header.part.version += 1;
+        });
+        assert_eq!(work, Work::Stale);
     }
 
     fn block_post(&mut self, x: f64, y: f64) {
         self.block(|at| at.distance(dvec2(x, y)) < 0.03);
+    }
+
+    fn send(&mut self, number: u64, x: f64, y: f64) -> Work {
+        let target = TargetPoint::at(dvec2(x, y));
+        let sample = TargetSample { number, last: number, target, ..TargetSample::default() };
+        self.take_target(&sample).unwrap()
     }
 
     fn solve(&mut self) {
@@ -396,15 +410,10 @@ fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
     }
 }
 
-fn sample(number: u64, x: f64, y: f64) -> TargetSample {
-    let target = TargetPoint::at(dvec2(x, y));
-    TargetSample { number, last: number, target, ..TargetSample::default() }
-}
-
 #[test]
 fn a_new_target_is_solved_for_on_the_same_map_within_the_tick() {
     let mut planner = in_room(&mission(), wall);
-    assert_eq!(planner.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Stale);
+    assert_eq!(planner.send(2, -1.5, 0.0), Work::Stale);
     let guidance = planner.ask_at(0.3, 0.0);
     assert_eq!(guidance.status(), Along);
     assert!(guidance.ex < -0.9, "{guidance:?}");
@@ -418,19 +427,19 @@ fn a_planner_that_knows_no_target_gives_no_direction() {
     assert_eq!(planner.take_grid(&header, &cells).unwrap(), Work::None);
     let guidance = planner.ask_at_start();
     assert_eq!((guidance.status(), guidance.target_number), (Waiting, 0));
-    assert_eq!(planner.take_target(&sample(1, 1.5, 0.0)).unwrap(), Work::Solved);
+    assert_eq!(planner.send(1, 1.5, 0.0), Work::Solved);
     assert_eq!(planner.status_at_start(), Along);
 }
 
 #[test]
 fn a_target_in_hazard_or_outside_ends_no_planner() {
     let mut planner = in_room(&mission(), |at| at.x < -0.5);
-    planner.take_target(&sample(2, -1.5, 0.0)).unwrap();
+    planner.send(2, -1.5, 0.0);
     assert_eq!(planner.status_at_start(), Unreachable);
     // The mapper's next map still has hazard there.
     planner.block(|at| at.x < -0.4);
     for (x, y) in [(9.0, 0.0), (1.99, 0.0), (f64::NAN, 0.0)] {
-        assert_eq!(planner.take_target(&sample(3, x, y)).unwrap(), Work::None, "{x}");
+        assert_eq!(planner.send(3, x, y), Work::None, "{x}");
         assert_eq!(planner.ask_at_start().target_number, 2, "{x}");
     }
 }
@@ -441,7 +450,7 @@ fn on_a_large_map_the_robot_waits_until_the_field_leads_to_its_new_target() {
     assert_eq!(room.status_at_start(), Along);
     room.block_post(-1.0, -1.0);
     let before = room.begin_job().unwrap();
-    assert_eq!(room.take_target(&sample(2, -1.5, 0.0)).unwrap(), Work::Stale);
+    assert_eq!(room.send(2, -1.5, 0.0), Work::Stale);
     assert_eq!(room.status_at_start(), Waiting);
     assert_eq!(room.swap_in(solve(&before)).unwrap(), Work::None);
     assert_eq!(room.status_at_start(), Waiting);
@@ -470,10 +479,7 @@ fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
         led = planner.ask_at(-0.3, 0.0);
     }
     assert!(led.ey < -0.5 && led.status() != Unreachable, "{led:?}");
-    let part = Part { version: 2, ..planner.belief.part };
-    let (reset, cells) =
-        (GridHeader { epoch: 1, part, ..planner.belief }, planner.grid.cells().to_vec());
-    planner.take_grid(&reset, &cells).unwrap();
+    planner.retake(|header, _| (header.epoch, header.part.version) = (1, 2));
     assert_eq!(planner.ask_at(-0.3, 0.0).speed_limit_m_s, 0.0, "the refusal is forgotten");
 }
 
@@ -498,7 +504,7 @@ impl Planner {
     fn guidance(&mut self, pose: &PoseSample, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
         let ([x_m, y_m], [vx_m_s, vy_m_s]) = (at.map(|x| x as f32), velocity.map(|v| v as f32));
         let mover = Mover { x_m, y_m, vx_m_s, vy_m_s, radius_m: 0.3, ..Mover::default() };
-        (self.belief.movers[0], self.belief.mover_count) = (mover, 1);
+        self.retake(|header, _| (header.movers[0], header.mover_count) = (mover, 1));
         self.ask(pose)
     }
 
@@ -525,7 +531,7 @@ fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time
     (19..=35).for_each(|second| _ = alone.comes(second, 100.0));
     assert!(aside(alone.comes(36, 4.5)), "nothing moved near it");
     let mut sent = insisting();
-    sent.take_target(&sample(2, 4.0, 0.2)).unwrap();
+    sent.send(2, 4.0, 0.2);
     assert!(aside(sent.comes(19, 4.5)), "it has another target");
 }
 
