@@ -120,17 +120,6 @@ mod tests {
         by_robot: true,
     };
 
-    fn truth(tick: u64, contacts: u64) -> GroundTruthTick {
-        GroundTruthTick {
-            tick,
-            time_s: tick as f64,
-            contacts,
-            left_counts: tick as u16,
-            right_counts: tick as u16,
-            ..GroundTruthTick::default()
-        }
-    }
-
     /// A run with ticks of one second.
     fn run(
         ticks: u64,
@@ -148,8 +137,15 @@ mod tests {
         record.poses = (0..ticks).map(pose).collect();
         record.arrival =
             arrival.map(|tick| CommandSample { stamp: stamp(tick), ..CommandSample::default() });
-        let touched = |tick| u64::from(contact.is_some_and(|contact| tick >= contact));
-        let truth = (0..ticks).map(|tick| truth(tick, touched(tick))).collect();
+        let truth = |tick| GroundTruthTick {
+            tick,
+            time_s: tick as f64,
+            contacts: u64::from(contact.is_some_and(|contact| tick >= contact)),
+            left_counts: tick as u16,
+            right_counts: tick as u16,
+            ..GroundTruthTick::default()
+        };
+        let truth = (0..ticks).map(truth).collect();
         (record, truth)
     }
 

@@ -49,6 +49,8 @@ mod stall_recovery;
 mod supervisor;
 pub mod surroundings;
 pub mod target_list;
+#[cfg(test)]
+mod testing;
 
 pub use error::SupervisorError;
 pub use observer::{Heard, Listener, Record};

@@ -154,7 +154,7 @@ impl Ending {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::Path;
+    use crate::testing;
 
     /// Returns the outcome of an ending that says this, of a robot with this covariance [xx, xy, yy]
     /// that truly ended at `ended`.
@@ -164,8 +164,7 @@ mod tests {
         covariance: Option<[f64; 3]>,
         ended: Option<f64>,
     ) -> Outcome {
-        let text = format!("target = [3, 0]\n{set}");
-        let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
+        let mission = testing::mission(&format!("target = [3, 0]\n{set}"));
         let ended = ended.map(|x| GroundTruthTick { x, ..GroundTruthTick::default() });
         let pose = covariance.map(|[xx, xy, yy]| PoseSample {
             x_m: 2.9,

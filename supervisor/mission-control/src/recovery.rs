@@ -125,17 +125,17 @@ mod tests {
     use common::{
         address::Address,
         domain::RobotName,
-        mission::{MOST_CORNERS, MOST_ZONES, Mission},
+        mission::{MOST_CORNERS, MOST_ZONES},
         samples::{CommandSample, MOST_TARGETS, TargetPoint},
     };
     use glam::DVec2;
 
     use super::*;
-    use crate::target_list::TargetOutcome;
+    use crate::{target_list::TargetOutcome, testing::mission};
 
     #[test]
     fn the_persisted_targets_of_the_longest_run_fit_into_the_checkpoint() {
-        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        let mission = mission("target = [3, 0]");
         let mut list = TargetList::of(&mission);
         let points =
             [TargetPoint { x_m: 1.5, has_heading: 1, ..TargetPoint::default() }; MOST_TARGETS];
@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn mission_time_goes_on_while_a_robot_without_a_supervisor_may_roll_and_no_longer() {
         let directory = tempfile::tempdir().unwrap();
-        let mut mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
+        let mut mission = mission("target = [3, 0]");
         mission.robot.address = Some("127.0.0.1:5990".to_owned());
         let resumed_at = |began_ago_s: i64| {
             let epoch_ns = monotonic_ns().saturating_add_signed(-began_ago_s * 1_000_000_000);

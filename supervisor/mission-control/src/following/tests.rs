@@ -1,14 +1,13 @@
-use std::path::Path;
-
 use common::grid::Part;
 
 use super::*;
+use crate::testing;
+use glam::dvec2;
 
 const HERE: DVec2 = DVec2::ZERO;
 
 fn mission() -> Mission {
-    let text = "stay = true\nperimeter = { width_m = 8, cells = 160 }";
-    Mission::parse(text, Path::new("m.toml")).unwrap()
+    testing::mission("stay = true\nperimeter = { width_m = 8, cells = 160 }")
 }
 
 fn map(is_hazard: impl Fn(DVec2) -> bool) -> Replica<u8> {
@@ -34,10 +33,10 @@ fn follows(x_m: f64, y_m: f64) -> Following {
 
 #[test]
 fn the_robot_goes_to_the_nearest_place_at_its_distance_and_not_into_what_stands_at_the_beacon() {
-    let body = DVec2::new(2.5, 0.0);
+    let body = dvec2(2.5, 0.0);
     let map = map(|at| at.distance(body) < 0.55);
     let next = follows(2.5, 0.0).next_place(&map, &mission(), (HERE, None), false).unwrap();
-    assert!(next.distance(DVec2::new(1.5, 0.0)) < 0.08, "{next}");
+    assert!(next.distance(dvec2(1.5, 0.0)) < 0.08, "{next}");
     let stands = follows(0.9, 0.0).next_place(&map, &mission(), (HERE, Some(HERE)), true);
     assert_eq!(stands, None, "it is near enough");
 }
@@ -48,23 +47,23 @@ fn the_robot_goes_round_a_wall_to_see_the_beacon_and_where_no_way_leads_as_near_
     let mission = mission();
     let around = map(|at| wall(at) && at.y < 1.0);
     let next = follows(1.5, 0.0).next_place(&around, &mission, (HERE, Some(HERE)), true).unwrap();
-    assert!(next.x > 0.9 && next.distance(DVec2::new(1.5, 0.0)) <= 1.0, "{next}");
+    assert!(next.x > 0.9 && next.distance(dvec2(1.5, 0.0)) <= 1.0, "{next}");
     let closed = map(wall);
     let next = follows(3.0, 0.5).next_place(&closed, &mission, (HERE, None), false).unwrap();
-    assert!(next.distance(DVec2::new(0.65, 0.5)) < 0.1, "{next}");
+    assert!(next.distance(dvec2(0.65, 0.5)) < 0.1, "{next}");
 }
 
 #[test]
 fn a_target_goes_on_until_the_beacon_leaves_it_or_comes_to_the_robot() {
     let (map, mission) = (map(|_| false), mission());
     let goes_on = |x_m: f64, rest: f64| {
-        let at = |x| DVec2::new(x, 0.0);
+        let at = |x| dvec2(x, 0.0);
         follows(x_m, 0.0).next_place(&map, &mission, (at(rest), Some(at(1.0))), false)
     };
     assert_eq!(goes_on(2.0, 0.0), None, "it is at its distance from the beacon");
     assert_eq!(goes_on(1.8, 0.0), None, "the beacon came a little nearer");
-    assert!(goes_on(2.08, 0.0).unwrap().distance(DVec2::new(1.08, 0.0)) < 0.05);
-    assert!(goes_on(1.2, 0.3).unwrap().distance(DVec2::new(0.3, 0.0)) < 0.05, "it stands");
+    assert!(goes_on(2.08, 0.0).unwrap().distance(dvec2(1.08, 0.0)) < 0.05);
+    assert!(goes_on(1.2, 0.3).unwrap().distance(dvec2(0.3, 0.0)) < 0.05, "it stands");
 }
 
 #[test]

@@ -1,4 +1,5 @@
 use super::*;
+use crate::testing;
 use GuidanceStatus::{Along, Look, Unreachable, Waiting, WayOut};
 use RecoveryStep::{GiveUp, Replan, Reset};
 use StallCause::{CutOff, Held, InsideHazard, Pinned, Relocated, Still, Wandering};
@@ -6,8 +7,7 @@ use common::samples::Stamp;
 use std::ops::Range;
 
 fn mission(more: &str) -> Mission {
-    let text = format!("target = [3, 0]\n{more}");
-    Mission::parse(&text, std::path::Path::new("test.toml")).unwrap()
+    testing::mission(&format!("target = [3, 0]\n{more}"))
 }
 
 fn watch() -> StallWatch {

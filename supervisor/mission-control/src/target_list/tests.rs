@@ -1,5 +1,3 @@
-use std::path::Path;
-
 use common::{
     grid::{CellState, Part},
     samples::{GuidanceSample, GuidanceStatus, PoseSample, Stamp},
@@ -7,10 +5,10 @@ use common::{
 use glam::DVec2;
 
 use super::*;
+use crate::testing;
 
 fn mission(extra: &str) -> Mission {
-    let text = format!("target = [3, 0]\nperimeter.width_m = 8\n{extra}");
-    Mission::parse(&text, Path::new("m.toml")).unwrap()
+    testing::mission(&format!("target = [3, 0]\nperimeter.width_m = 8\n{extra}"))
 }
 
 fn at(x: f64, y: f64) -> TargetPoint {
@@ -152,7 +150,7 @@ fn every_reason_against_a_target_has_its_answer() {
 #[test]
 fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
     use TargetOutcome::{NotTried, Reached, Replaced, TimedOut};
-    let stays = Mission::parse("stay = true\nperimeter.width_m = 8", Path::new("m.toml")).unwrap();
+    let stays = testing::mission("stay = true\nperimeter.width_m = 8");
     let mut list = TargetList::of(&stays);
     assert_eq!((list.waits, list.outcome_while_waiting()), (true, Some(Outcome::Waited)));
     list.replace(&[at(1.0, 0.0), at(2.0, 0.0)], (5, 5.0), None);
