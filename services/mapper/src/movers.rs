@@ -435,6 +435,7 @@ mod tests {
 
     use super::*;
     use crate::testing::{mission, range_in_room};
+    use glam::dvec2;
 
     const PERIOD_S: f64 = 1.0 / 7.0;
 
@@ -466,7 +467,7 @@ mod tests {
                     let ends = near > 0.0 && aside.abs() < *radius;
                     ends.then(|| near - (radius * radius - aside * aside).sqrt())
                 });
-                let walls = range_in_room(DVec2::new(5.0, 4.0), fan.origin, along);
+                let walls = range_in_room(dvec2(5.0, 4.0), fan.origin, along);
                 discs.fold(walls, f64::min) as f32
             });
             let scan = Placed { row: 0, robot, capture_ns: time.0, beams: beams.collect() };
@@ -483,7 +484,7 @@ mod tests {
         let is_hidden = |x_m: f64, range_m: f32| {
             let beams = vec![range_m; beams];
             let fan = rows.scan(0, Pose2::default(), &beams).unwrap();
-            let middle = fan.origin + DVec2::new(x_m, 0.0);
+            let middle = fan.origin + dvec2(x_m, 0.0);
             let thing = Thing {
                 at_s: 0.0,
                 origin: DVec2::ZERO,
@@ -504,9 +505,9 @@ mod tests {
     #[test]
     fn what_moves_is_known_within_a_second_with_its_velocity_and_posts_that_the_robot_passes_stand()
     {
-        let posts = [1.0, 1.5, 2.0].map(|x| (DVec2::new(x, 1.0), DVec2::ZERO, 0.05));
-        let velocity = DVec2::new(-0.8, -0.3);
-        let walker = (DVec2::new(3.5, -1.0), velocity, 0.25);
+        let posts = [1.0, 1.5, 2.0].map(|x| (dvec2(x, 1.0), DVec2::ZERO, 0.05));
+        let velocity = dvec2(-0.8, -0.3);
+        let walker = (dvec2(3.5, -1.0), velocity, 0.25);
         let mut room = Room::new(&posts);
         for tick in 0..30 {
             room.tick(tick);
@@ -523,8 +524,8 @@ mod tests {
 
     #[test]
     fn a_mover_that_turns_round_stays_known_and_its_velocity_is_right_within_a_second() {
-        let velocity = DVec2::new(0.0, -1.5);
-        let mut room = Room::new(&[(DVec2::new(3.0, 2.0), velocity, 0.3)]);
+        let velocity = dvec2(0.0, -1.5);
+        let mut room = Room::new(&[(dvec2(3.0, 2.0), velocity, 0.3)]);
         (0..8).for_each(|tick| drop(room.tick(tick)));
         let turned = room.discs[0].0 + 2.0 * velocity * 7.0 * PERIOD_S;
         room.discs[0] = (turned, -velocity, 0.3);
@@ -539,7 +540,7 @@ mod tests {
 
     #[test]
     fn only_beams_that_end_on_what_stands_are_kept_while_something_moves() {
-        let walker = (DVec2::new(3.5, -1.0), DVec2::new(-0.8, -0.3), 0.25);
+        let walker = (dvec2(3.5, -1.0), dvec2(-0.8, -0.3), 0.25);
         let mut room = Room::new(&[walker]);
         let first = (0..16).find(|tick| room.tick(*tick).1.is_some());
         let (scan, beams) = room.tick(first.unwrap() + 8);

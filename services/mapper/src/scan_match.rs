@@ -378,10 +378,11 @@ mod tests {
 
     use super::*;
     use crate::testing::{mission, range_in_room};
+    use glam::dvec2;
 
     const START: Pose2 = Pose2 { position: DVec2::ZERO, heading: 0.0 };
-    const ROOM: DVec2 = DVec2::new(3.0, 2.0);
-    const CORRIDOR: DVec2 = DVec2::new(f64::INFINITY, 2.0);
+    const ROOM: DVec2 = dvec2(3.0, 2.0);
+    const CORRIDOR: DVec2 = dvec2(f64::INFINITY, 2.0);
 
     static MISSION: LazyLock<Mission> = LazyLock::new(|| {
         mission("target = [3, 0]\nrobot.model = 'turtlebot3-waffle'\nrobot.rate_hz = 10")
@@ -408,7 +409,7 @@ mod tests {
     }
 
     fn off_m(fix: &FixSample, truth: DVec2) -> f64 {
-        DVec2::new(fix.x_m, fix.y_m).distance(truth)
+        dvec2(fix.x_m, fix.y_m).distance(truth)
     }
 
     /// Returns the scan of a robot at `pose` in a room of this half size.
@@ -425,7 +426,7 @@ mod tests {
     #[test]
     fn along_a_corridor_the_wheels_are_believed() {
         let beams = scan(START, CORRIDOR);
-        let wheels = Pose2 { position: DVec2::new(0.3, 0.05), heading: 0.02 };
+        let wheels = Pose2 { position: dvec2(0.3, 0.05), heading: 0.02 };
         let fix = matched(&mut started(&beams), wheels, &beams).unwrap();
         assert!((fix.x_m - 0.3).abs() < 0.01 && fix.y_m.abs() < 0.01, "{fix:?}");
         assert!(fix.covariance[0] > 100.0 * fix.covariance[3], "{fix:?}");
@@ -459,7 +460,7 @@ mod tests {
         let (mut last_m, mut squares, mut stated) = (0.0, 0.0, 0.0);
         for step in 0..200 {
             let (sin, cos) = (f64::from(step) * 0.03).sin_cos();
-            let truth = Pose2 { position: DVec2::new(sin, 0.6 - 0.6 * cos), heading: 0.0 };
+            let truth = Pose2 { position: dvec2(sin, 0.6 - 0.6 * cos), heading: 0.0 };
             // The wheels slip: a tenth too far, and a turn of 0.5 degrees per scan.
             let heading = 0.01 * f64::from(step);
             let wheels = Pose2 { position: 1.1 * truth.position, heading };
@@ -480,7 +481,7 @@ mod tests {
 
     #[test]
     fn a_missing_beam_and_a_thing_in_front_change_nothing() {
-        let there = Pose2 { position: DVec2::new(0.3, 0.1), heading: 0.2 };
+        let there = Pose2 { position: dvec2(0.3, 0.1), heading: 0.2 };
         let mut beams = scan(there, ROOM);
         for (beam, range) in beams.iter_mut().enumerate() {
             match beam {
@@ -500,7 +501,7 @@ mod tests {
         let mut held = started(&noisy(START));
         let (mut squares, mut stated) = (0.0, 0.0);
         for step in 0..40 {
-            let position = DVec2::new(0.01 * f64::from(step), 0.0);
+            let position = dvec2(0.01 * f64::from(step), 0.0);
             let truth = Pose2 { position, heading: 0.0 };
             let fix = matched(&mut held, truth, &noisy(truth)).unwrap();
             squares += off_m(&fix, position).powi(2);
@@ -528,7 +529,7 @@ mod tests {
         let room = scan(START, ROOM);
         let held = &mut started(&room);
         let hall: Vec<_> = room.iter().map(|range| 2.5 * range).collect();
-        let there = Pose2 { position: DVec2::new(0.2, 0.0), heading: 0.1 };
+        let there = Pose2 { position: dvec2(0.2, 0.0), heading: 0.1 };
         assert_eq!(matched(held, there, &hall), None);
         let fix = matched(held, there, &hall).unwrap();
         assert!(fix.x_m > 0.19 && fix.shared[0] >= LOST[0] * LOST[0], "{fix:?}");

@@ -5,6 +5,7 @@ use super::*;
 use crate::testing::mission;
 use CellState::{Free, Known, Margin, Perimeter, Scanned, Sensed};
 use common::samples::{RangeStatus, Stamp};
+use glam::dvec2;
 use std::f64::consts::FRAC_PI_2;
 
 impl Mapper {
@@ -47,7 +48,7 @@ impl Mapper {
 
     /// Returns the state at a place in centimetres.
     fn state_at(&self, x_cm: i32, y_cm: i32) -> CellState {
-        let place = DVec2::new(x_cm.into(), y_cm.into()) / 100.0;
+        let place = dvec2(x_cm.into(), y_cm.into()) / 100.0;
         let cell = self.frame.cell_at(place).unwrap();
         CellState::from_byte(self.belief.cells[self.frame.index(cell)])
     }
@@ -251,7 +252,7 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
         // Listed targets may lie in a drum's margin.
         assert_eq!(mapper.ahead(-125), Known, "{method}");
         let send = |mapper: &mut Mapper, x| {
-            let target = Some(DVec2::new(x, 0.0));
+            let target = Some(dvec2(x, 0.0));
             mapper.give(Tick { target, ..Tick::default() }).area()
         };
         let version = mapper.state().version;
@@ -260,7 +261,7 @@ fn the_cell_of_the_target_is_free_as_long_as_the_robot_is_sent_there() {
         assert_eq!(mapper.state().version, version + 1, "{method}");
         let mut restored = mapper.clone();
         restored.restore(mapper.state().clone()).unwrap();
-        assert_eq!(restored.state().target, DVec2::new(-1.25, 0.0));
+        assert_eq!(restored.state().target, dvec2(-1.25, 0.0));
         assert_eq!(send(&mut restored, 1.5), 1, "{method}");
         assert_eq!(restored.ahead(-125), Known, "{method}");
     }
@@ -287,9 +288,9 @@ fn zones_are_hazard_by_either_method_and_what_was_sensed_shows_again_without_the
         assert_eq!(mapper.state_at(125, -75), Known);
         // The target moves away from the zone, and its cell becomes hazard again.
         let tick = |target| Tick { target: Some(target), ..Tick::default() };
-        mapper.give(tick(DVec2::new(1.25, -0.45)));
+        mapper.give(tick(dvec2(1.25, -0.45)));
         assert!(!mapper.is_hazard(125, -45));
-        mapper.give(tick(DVec2::new(1.5, 1.0)));
+        mapper.give(tick(dvec2(1.5, 1.0)));
         assert_eq!(mapper.state_at(125, -45), Known);
         assert!(mapper.reset(1));
         assert_eq!(mapper.state_at(125, -75), Known, "a reset forgets no zone");

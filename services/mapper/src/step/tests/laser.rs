@@ -99,11 +99,11 @@ fn wall_of(row: &str, at: DVec2, looks_deg: f64) -> Vec<f64> {
         [[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nchannel = 0\nmodel = 'rplidar-a1'\n{row}\n"
     );
     let mut mapper = mapper_of(&text);
-    let robot = Pose2 { position: DVec2::new(0.3, -0.2), heading: 0.5 };
+    let robot = Pose2 { position: dvec2(0.3, -0.2), heading: 0.5 };
     let origin = robot.position + DVec2::from_angle(robot.heading).rotate(at);
     let beam = |degrees: u32| {
         let angle = robot.heading + (looks_deg - 180.0 + f64::from(degrees)).to_radians();
-        let walls = DVec2::new(f64::INFINITY, 1.25);
+        let walls = dvec2(f64::INFINITY, 1.25);
         range_in_room(walls, origin, DVec2::from_angle(angle)) as f32
     };
     let Pose2 { position, heading } = robot;
@@ -122,8 +122,8 @@ fn a_laser_that_is_turned_and_off_the_centre_maps_a_wall_where_it_is() {
     let centred = wall_of("forward_m = 0\nbearing_deg = 0", DVec2::ZERO, 0.0);
     assert!(centred.iter().all(|y| (0.95..=1.25).contains(y)), "{centred:?}");
     for (row, at, looks_deg) in [
-        ("forward_m = -0.04\nbearing_deg = 0\nturned_deg = 90", DVec2::new(-0.04, 0.0), 90.0),
-        ("forward_m = 0.3\nbearing_deg = 90\nturned_deg = -120", DVec2::new(0.0, 0.3), -30.0),
+        ("forward_m = -0.04\nbearing_deg = 0\nturned_deg = 90", dvec2(-0.04, 0.0), 90.0),
+        ("forward_m = 0.3\nbearing_deg = 90\nturned_deg = -120", dvec2(0.0, 0.3), -30.0),
     ] {
         let wall = wall_of(row, at, looks_deg);
         let is_there = centred.iter().zip(&wall).all(|(one, other)| (one - other).abs() < 0.06);
@@ -140,7 +140,7 @@ fn scan_in_room(s: f64, sweep: Sweep) -> Vec<f32> {
     let beam = |beam: usize| {
         let robot = circling(s + sweep.beam_time_ns(beam, 360) as f64 / 1e9);
         let along = DVec2::from_angle(robot.heading + (beam as f64 - 180.0).to_radians());
-        range_in_room(DVec2::new(3.0, 2.0), robot.position, along) as f32
+        range_in_room(dvec2(3.0, 2.0), robot.position, along) as f32
     };
     (0..360).map(beam).collect()
 }
@@ -165,7 +165,7 @@ fn a_scan_is_matched_and_mapped_where_it_was_taken_however_late_it_is_and_howeve
             let s = tick as f64 / 10.0;
             let mut pose = circling(s);
             // Corrections of the pose are no motion.
-            let moved = if tick > 40 { DVec2::new(0.0, 0.02) } else { DVec2::ZERO };
+            let moved = if tick > 40 { dvec2(0.0, 0.02) } else { DVec2::ZERO };
             pose.position += moved;
             let Pose2 { position, heading } = pose;
             let mut pose = at(position.x, position.y, heading);
@@ -177,7 +177,7 @@ fn a_scan_is_matched_and_mapped_where_it_was_taken_however_late_it_is_and_howeve
                 continue;
             };
             let truth = circling(fix.capture_ns as f64 / 1e9);
-            let off = truth.position.distance(DVec2::new(fix.x_m, fix.y_m));
+            let off = truth.position.distance(dvec2(fix.x_m, fix.y_m));
             let turned = (fix.heading_rad - truth.heading).abs();
             assert!(off < 0.015 && turned < 0.01, "{sweep:?} {tick}: {off} m, {turned} rad");
         }
