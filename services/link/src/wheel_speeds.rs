@@ -148,6 +148,8 @@ mod tests {
             let is = [(right + left) * r / 2.0, (right - left) * r / w];
             let are_near = (is[0] - reached_v).abs() < 1e-3 && (is[1] - reached_omega).abs() < 5e-3;
             assert!(are_near, "{v} {omega}: {is:?}");
+            let stands = [reached_v, reached_omega] == [0.0; 2];
+            assert!(!stands || counts == [0, 0], "{v} {omega}: {counts:?}");
         }
     }
 }

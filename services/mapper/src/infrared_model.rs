@@ -77,6 +77,7 @@ mod tests {
         ] {
             let seen = reads(RangeStatus::Measured, range, 0.81).unwrap();
             assert!((seen.clear_m - clear).abs() < 0.003, "{range} m: {seen:?}");
+            assert_eq!(seen.clear_m == 0.0, clear == 0.0, "{range} m: {seen:?}");
             let near = seen.hit_m.is_some_and(|hit| (hit - range).abs() < 0.002);
             assert_eq!(near, hit, "{range} m: {seen:?}");
         }
