@@ -75,6 +75,10 @@ fn a_run_whose_robot_names_a_sensor_otherwise_ends_with_both_names_and_blames_no
     let (code, summary) = robot.run("json-nose", &["--set", nose]).finish();
     assert_ended(code, &summary, 6, "aborted");
     let reason = summary["reason"].as_str().unwrap();
-    assert!(reason.contains("is named \"front\"; send one of the names [\"nose\""), "{summary}");
+    assert!(
+        reason
+            .contains("no row of robot.sensor is named \"front\"; send one of the names [\"nose\""),
+        "{summary}"
+    );
     assert_no_restart(&summary);
 }

@@ -70,7 +70,7 @@ impl Json {
         }
         let touched = report.touched.iter().map(|(name, feels)| {
             let names = self.touches.iter().map(|row| &row.name);
-            Ok((row_of(["touched", name], "robot.touch", names)?, *feels))
+            Ok((row_of(["touched", name], "row of robot.touch", names)?, *feels))
         });
         let touched = touched.collect::<Result<Vec<_>, Refusal>>()?;
         let turned = match (report.wheels, report.odometry) {
@@ -124,7 +124,7 @@ impl Json {
     ) -> Result<Vec<RangeReading>, Refusal> {
         let reading = |(name, range): (&String, &Option<f64>)| {
             let names = self.table.iter().map(|sensor| &sensor.name);
-            let row = row_of(["ranges", name], "robot.sensor", names)?;
+            let row = row_of(["ranges", name], "row of robot.sensor", names)?;
             Ok(range_reading(row, &self.table[row], *range))
         };
         ranges.iter().map(reading).collect()
@@ -143,22 +143,22 @@ impl Json {
         });
         let named = report.scans.iter().map(|(name, Scan { ranges, age_s, time_s })| {
             let names = self.lasers.iter().map(|(_, sensor)| &sensor.name);
-            let laser = &self.lasers[row_of(["scans", name], "robot.sensor", names)?];
+            let laser = &self.lasers[row_of(["scans", name], "laser", names)?];
             scan_of(laser, ranges, [*age_s, *time_s])
         });
         only.into_iter().chain(named).collect()
     }
 }
 
-/// Returns the place of a reported name among `names` of a table of the mission.
+/// Returns the place of a reported name among `names`, those of the mission's `kind`.
 fn row_of<'a>(
     [key, name]: [&str; 2],
-    table: &str,
+    kind: &str,
     names: impl Iterator<Item = &'a String> + Clone,
 ) -> Result<usize, Refusal> {
     names.clone().position(|known| known == name).ok_or_else(|| Refusal {
         input: format!("{key}.{name}"),
-        what: format!("no row of {table} is named {name:?}"),
+        what: format!("no {kind} is named {name:?}"),
         remedy: format!("send one of the names {:?}, or rename a row", names.collect::<Vec<_>>()),
     })
 }
@@ -441,7 +441,7 @@ mod tests {
             (r#"{"scan":[1,2,3]}"#, "by the names of rows"),
             (
                 r#"{"scans":{"left":{"ranges":[1,2,3]}}}"#,
-                "no row of robot.sensor is named \"left\"; send one of the names [\"front\"",
+                "no laser is named \"left\"; send one of the names [\"front\"",
             ),
             (r#"{"scans":{"back":{"ranges":[1,2]}}}"#, "\"back\" has 3"),
         ] {
@@ -455,7 +455,8 @@ mod tests {
         let said = r#"{"touched":{"bumper-right":true,"cliff-left":false}}"#;
         assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
         let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#);
-        assert!(refuses(&refused, "named \"nose\"; send one of the names [\"bump"), "{refused:?}");
+        let why = "no row of robot.touch is named \"nose\"; send one of the names [\"bump";
+        assert!(refuses(&refused, why), "{refused:?}");
     }
 
     #[test]
