@@ -147,8 +147,8 @@ def fix(
     counter-clockwise from x.
 
     `sd_m` is the standard deviation of x and of y, `sd_rad` that of the heading. `shared_sd_m` is the part of `sd_m` that all fixes
-    of the source share. `capture_ns` is the mission time of the measurement, at most 2 s and 64 ticks ago; the default is that of the newest pose.
-    `pose.fixes`, `pose.fixes_refused` and `pose.refusal` show whether the robot uses the fix. Raises NotRunning.
+    of the source share. `capture_ns` is the mission time of the measurement, at most 2 s and 64 ticks ago; the default is that of the
+    newest pose. `pose.fixes`, `pose.fixes_refused` and `pose.refusal` show whether the robot uses the fix. Raises NotRunning.
     """
     if (heading_rad is None) != (sd_rad is None):
         raise ValueError("one of heading_rad and sd_rad is missing; give both or neither")

@@ -22,8 +22,8 @@ const LEAST_UNSEEN_M: f64 = 0.01;
 ///
 /// Prints the line of an error, and key and remedy of a refused value. For a valid mission, prints
 /// the distance from each fault to rest. If only two driven wheels measure the heading, prints how
-/// often the mission ends in a wrong place, from 2 %. Prints the heights at which the body touches obstacles that its sensors do not
-/// see.
+/// often the mission ends in a wrong place, from 2 %. Prints the heights at which the body touches
+/// obstacles that its sensors do not see.
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Mission file, or shipped mission (`firsthand missions`).
