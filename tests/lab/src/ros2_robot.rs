@@ -19,7 +19,7 @@ use common::{
     clock::{Pace, monotonic_ns},
     json_wire::{Lines, Order, Report, Scan, line, parse},
     kinematics::{DifferentialDrive, Pose2, Twist},
-    mission::Mission,
+    mission::{Mission, Protocol, RobotConfig, Ros2Topics},
     poll,
 };
 use console::{
@@ -53,7 +53,7 @@ const RELIABLE: Quality = Quality { is_reliable: true, is_latched: false, depth:
 /// keys as options of `firsthand run`.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Mission whose simulated robot speaks JSON lines.
+    /// Mission of the simulated robot.
     mission: String,
     /// Set a key of the simulated robot, unknown to its program and mission.
     #[arg(long, value_name = "KEY=VALUE")]
@@ -65,7 +65,11 @@ pub struct Arguments {
 
 pub fn main(arguments: &Arguments) -> Result {
     let Arguments { mission, set, out } = arguments;
-    let mut simulator = simulated(out, &missions::load(mission, set)?, Pace::Rate(1.0))?;
+    let mut own = missions::load(mission, set)?;
+    let RobotConfig { protocol, address, ros2, .. } = &mut own.robot;
+    // The mission may already describe the robot that this one is presented as.
+    (*protocol, *address, *ros2) = (Some(Protocol::Json), None, Ros2Topics::default());
+    let mut simulator = simulated(out, &own, Pace::Rate(1.0))?;
     let stated = |keys: &[String]| missions::load(mission, keys);
     let robot = Ros2Robot::start(simulator.address(), 0, 1.0, stated)?;
     print_text(robot.keys.iter().map(|key| format!("--set={key}\n")).collect::<String>())?;
