@@ -5,17 +5,18 @@
 use std::{
     collections::BTreeMap,
     convert::Infallible,
-    env, fmt, io,
+    env, fmt, io, mem,
     net::Ipv4Addr,
     os::fd::{AsFd, BorrowedFd, OwnedFd},
     sync::Arc,
     task::{Wake, Waker},
+    time::{self, Instant},
 };
 
 use rustdds::{
-    DomainParticipant, DomainParticipantBuilder, DomainParticipantStatusEvent as Status, Duration,
-    GUID, QosPolicies, QosPolicyBuilder, RTPSEntity as _, RepresentationIdentifier,
-    StatusEvented as _, TopicKind, WriteOptionsBuilder,
+    DataWriterStatus, DomainParticipant, DomainParticipantBuilder,
+    DomainParticipantStatusEvent as Status, Duration, GUID, QosPolicies, QosPolicyBuilder,
+    RTPSEntity as _, RepresentationIdentifier, StatusEvented as _, TopicKind, WriteOptionsBuilder,
     bytes::Bytes,
     no_key::{
         DataWriter, Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter,
@@ -40,6 +41,14 @@ const LONGEST_REPLY: usize = 65_000;
 const MOST_BROKEN: usize = 16;
 /// Tracked writers of a [`LateReader`]'s topic; further ones do not open it.
 const MOST_WRITERS: usize = 256;
+/// Tracked readers of a [`Server`]'s replies. Replies to further ones wait in vain.
+const MOST_READERS: usize = 256;
+const MOST_UNSENT: usize = 64;
+/// Time from a reader's detection until it hears replies. The library reports a reader before it
+/// sends the first heartbeat, and readers ignore messages older than that.
+const SETTLED: time::Duration = time::Duration::from_millis(100);
+/// Longest wait of a reply for its reader. A starved participant takes seconds to know one.
+const KNOWN_WITHIN: time::Duration = time::Duration::from_secs(10);
 
 type Payload = Vec<u8>;
 pub type Gid = [u8; 16];
@@ -178,6 +187,12 @@ impl Participant {
         let topic = self.topic(topic, &policies)?;
         let writer = publisher.create_datawriter_no_key(&topic, Some(policies));
         writer.map(Writer).map_err(io::Error::other)
+    }
+
+    pub fn server(&self, [requests, replies]: [&Topic; 2], quality: Quality) -> io::Result<Server> {
+        let requests = self.reader(requests, quality)?;
+        let replies = self.writer(replies, quality)?;
+        Ok(Server { requests, replies, readers: Readers::default(), unsent: Vec::new() })
     }
 
     fn topic(&self, topic: &Topic, policies: &QosPolicies) -> io::Result<rustdds::Topic> {
@@ -346,16 +361,79 @@ impl Writer {
         self.0.write(payload, None).is_ok()
     }
 
-    /// Returns whether the library took it; a reply must fit into one datagram.
-    pub fn reply(&self, to: &Request, payload: &[u8]) -> bool {
-        let options = WriteOptionsBuilder::new().related_sample_identity(to.identity).build();
-        let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
-        let payload = [encapsulation, &to.header, rest].concat();
-        payload.len() <= LONGEST_REPLY && self.0.write_with_options(payload, options).is_ok()
-    }
-
     pub fn gid(&self) -> Gid {
         self.0.guid().to_bytes()
+    }
+}
+
+/// Readers of a [`Server`]'s replies, and when each became known.
+#[derive(Debug, Default)]
+struct Readers(BTreeMap<GUID, Instant>);
+
+impl Readers {
+    fn on_matched(&mut self, reader: GUID, is_lost: bool) {
+        if is_lost {
+            self.0.remove(&reader);
+        } else if self.0.len() < MOST_READERS {
+            self.0.insert(reader, Instant::now());
+        }
+    }
+
+    /// Returns whether the participant of `client` hears a reply.
+    fn hears(&self, client: GUID, now: Instant) -> bool {
+        self.0.iter().any(|(reader, since)| {
+            reader.prefix == client.prefix && now.saturating_duration_since(*since) >= SETTLED
+        })
+    }
+}
+
+/// Service of a node.
+///
+/// A reply reaches only readers that the library knows. A client may ask before its own reader is
+/// known here, so a reply waits for that reader.
+#[derive(Debug)]
+pub struct Server {
+    pub requests: Reader,
+    pub replies: Writer,
+    readers: Readers,
+    /// Oldest first.
+    unsent: Vec<(Instant, SampleIdentity, Payload)>,
+}
+
+impl Server {
+    /// Returns at most `most` requests.
+    pub fn take(&mut self, most: usize) -> Vec<Message> {
+        self.send();
+        self.requests.messages().take(most).collect()
+    }
+
+    /// Replies as soon as the library knows the client's reader, or after [`KNOWN_WITHIN`]. Drops a
+    /// reply that fits into no datagram.
+    pub fn reply(&mut self, to: &Request, payload: &[u8]) {
+        let (encapsulation, rest) = payload.split_at(payload.len().min(ENCAPSULATION));
+        let payload = [encapsulation, &to.header, rest].concat();
+        if payload.len() <= LONGEST_REPLY {
+            self.unsent.push((Instant::now(), to.identity, payload));
+            self.send();
+        }
+    }
+
+    fn send(&mut self) {
+        while let Some(status) = self.replies.0.try_recv_status() {
+            if let DataWriterStatus::PublicationMatched { reader, current, .. } = status {
+                self.readers.on_matched(reader, current.count_change() < 0);
+            }
+        }
+        let surplus = self.unsent.len().saturating_sub(MOST_UNSENT);
+        for (place, (since, to, payload)) in mem::take(&mut self.unsent).into_iter().enumerate() {
+            let is_known = self.readers.hears(to.writer_guid, Instant::now());
+            if !is_known && place >= surplus && since.elapsed() < KNOWN_WITHIN {
+                self.unsent.push((since, to, payload));
+                continue;
+            }
+            let options = WriteOptionsBuilder::new().related_sample_identity(to).build();
+            let _ = self.replies.0.write_with_options(payload, options);
+        }
     }
 }
 
@@ -393,6 +471,21 @@ debug_by_guid! { Participant.inner Reader.inner Writer.0 }
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_client_hears_a_reply_once_its_reader_is_known_for_a_moment_and_until_it_is_lost() {
+        let [reader, client, other] =
+            [1_u128, 2, 1 << 120].map(|number| GUID::from_bytes(number.to_be_bytes()));
+        let mut readers = Readers::default();
+        let hears =
+            |readers: &Readers, client, after| readers.hears(client, Instant::now() + after);
+        assert!(!hears(&readers, client, SETTLED));
+        readers.on_matched(reader, false);
+        assert!(!readers.hears(client, Instant::now()), "a heartbeat may follow the report");
+        assert!(hears(&readers, client, SETTLED) && !hears(&readers, other, SETTLED));
+        readers.on_matched(reader, true);
+        assert!(!hears(&readers, client, SETTLED));
+    }
 
     #[test]
     fn writers_that_came_and_went_take_no_later_writers_place() {

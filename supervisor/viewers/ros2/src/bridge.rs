@@ -394,7 +394,7 @@ impl Bridge<'_> {
     fn publish(&mut self) {
         let now_ns = self.now_ns();
         self.read_results();
-        let (node, server) = (&self.node, &mut self.server);
+        let (node, server) = (&mut self.node, &mut self.server);
         if let Some(status) = server.goals.take_status() {
             node.publish_status(0, status);
         }

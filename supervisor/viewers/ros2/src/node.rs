@@ -11,7 +11,7 @@ use std::{
 use ros2::{
     cdr::Cdr as _,
     msg::{self, NodeEntitiesInfo, ParticipantEntitiesInfo},
-    participant::{LateReader, Message, Participant, Quality, Reader, Request, Writer},
+    participant::{LateReader, Message, Participant, Quality, Reader, Request, Server, Writer},
     topic::Topic,
 };
 
@@ -52,8 +52,7 @@ pub struct Node<Id> {
     writers: BTreeMap<Id, Writer>,
     readers: Vec<(Id, Reader)>,
     late_readers: Vec<(Id, LateReader)>,
-    /// Requests and replies.
-    services: BTreeMap<Service, (Reader, Writer)>,
+    services: BTreeMap<Service, Server>,
     /// Feedback and status of each action.
     actions: Vec<[Writer; 2]>,
     parameters: Vec<Parameter>,
@@ -130,9 +129,8 @@ impl<Id: Copy + Ord> Node<Id> {
 
     fn offer(&mut self, service: Service, name: &str, kind: &str) -> io::Result<()> {
         let [requests, replies] = Topic::service(name, kind);
-        let requests = self.participant.reader(&requests, SURE)?;
-        let replies = self.participant.writer(&replies, SURE)?;
-        self.services.insert(service, (requests, replies));
+        let server = self.participant.server([&requests, &replies], SURE)?;
+        self.services.insert(service, server);
         Ok(())
     }
 
@@ -157,8 +155,8 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 
     pub fn announce(&self) {
-        let requests = self.services.values().map(|(requests, _)| requests);
-        let replies = self.services.values().map(|(_, replies)| replies);
+        let requests = self.services.values().map(|server| &server.requests);
+        let replies = self.services.values().map(|server| &server.replies);
         let readers = self.readers.iter().map(|(_, reader)| reader).chain(requests);
         let writers = self.writers.values().chain(replies).chain(self.actions.iter().flatten());
         let gid = |data| msg::Gid { data };
@@ -203,18 +201,16 @@ impl<Id: Copy + Ord> Node<Id> {
     }
 
     /// Answers requests for parameters. Returns calls of actions, without their headers.
-    pub fn called(&self) -> Vec<(usize, Call, Message)> {
+    pub fn called(&mut self) -> Vec<(usize, Call, Message)> {
         let mut called = Vec::new();
-        for (service, (requests, replies)) in &self.services {
-            for mut message in requests.messages().take(AT_A_TIME) {
+        for (service, server) in &mut self.services {
+            for mut message in server.take(AT_A_TIME) {
                 message.payload = message.request.without_header(&message.payload);
                 match service {
                     Service::Action(action, call) => called.push((*action, *call, message)),
                     Service::Parameters(service) => {
                         match parameters::reply(&self.parameters, *service, &message.payload) {
-                            Ok(reply) => {
-                                replies.reply(&message.request, &reply);
-                            }
+                            Ok(reply) => server.reply(&message.request, &reply),
                             Err(why) => tracing::warn!("refused a request for parameters: {why}"),
                         }
                     }
@@ -224,9 +220,9 @@ impl<Id: Copy + Ord> Node<Id> {
         called
     }
 
-    pub fn reply(&self, action: usize, call: Call, to: &Request, payload: &[u8]) {
-        if let Some((_, replies)) = self.services.get(&Service::Action(action, call)) {
-            replies.reply(to, payload);
+    pub fn reply(&mut self, action: usize, call: Call, to: &Request, payload: &[u8]) {
+        if let Some(server) = self.services.get_mut(&Service::Action(action, call)) {
+            server.reply(to, payload);
         }
     }
 }
