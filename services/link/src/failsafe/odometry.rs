@@ -185,6 +185,12 @@ impl Evidence {
     }
 }
 
+/// Returns the part of a command that the base has reached, and none of a speed that it only still
+/// has: a base that stops driving sooner than turning moves a wheel back without a command.
+fn due(reached: f64, told: f64) -> f64 {
+    if reached * told > 0.0 { reached.abs().min(told.abs()).copysign(told) } else { 0.0 }
+}
+
 #[derive(Clone, Debug)]
 pub struct Odometry {
     axle: Axle,
@@ -232,9 +238,11 @@ impl Odometry {
             self.restart_evidence(now);
         }
         self.commanded = Some(now);
-        let [left, right] = self.ask(counts.map(f64::from), now);
+        let told = counts.map(f64::from);
+        let reached = self.ask(told, now);
+        let [left, right] = [0, 1].map(|wheel| due(reached[wheel], told[wheel]));
         let mean = (left.abs() + right.abs()) / 2.0;
-        let turn = right - left;
+        let turn = due(reached[1] - reached[0], told[1] - told[0]);
         let tells = turn.abs() >= LEAST_TURN_SHARE * mean;
         let asked = [left, right, if tells { turn } else { 0.0 }];
         // Only one wheel of a car drives.

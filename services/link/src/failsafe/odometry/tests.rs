@@ -130,6 +130,25 @@ fn an_honest_robot_is_not_suspected_with_its_radio_out_a_fifth_or_half_of_the_ti
 }
 
 #[test]
+fn a_wheel_is_not_told_back_by_a_base_that_stops_driving_sooner_than_turning() {
+    let mut odometry = Odometry::new(&mission("robot = { model = 'kobuki', rate_hz = 10 }"));
+    let mut rolled = [0.0; 2];
+    for tick in 0..30 {
+        let now = at(f64::from(tick) / 10.0);
+        odometry.plausible(rolled.map(on_wire), now);
+        let (tells, rolls) = match tick {
+            0..20 => ([0, 5000], [0.0, 500.0]),
+            _ => ([0, 0], [60.0, 200.0]),
+        };
+        odometry.commanded(tells, now);
+        for wheel in 0..2 {
+            rolled[wheel] += rolls[wheel];
+        }
+        assert_eq!(suspicion(&odometry), None, "tick {tick}");
+    }
+}
+
+#[test]
 fn wheels_held_for_half_a_second_are_not_suspected() {
     // The frames repeat, and then continue from the same counts.
     let mut held = [0; 2];
