@@ -185,12 +185,6 @@ impl Evidence {
     }
 }
 
-/// Returns the part of a command that the base has reached, and none of a speed that it only still
-/// has: a base that stops driving sooner than turning moves a wheel back without a command.
-fn due(reached: f64, told: f64) -> f64 {
-    if reached * told > 0.0 { reached.abs().min(told.abs()).copysign(told) } else { 0.0 }
-}
-
 #[derive(Clone, Debug)]
 pub struct Odometry {
     axle: Axle,
@@ -212,6 +206,9 @@ pub struct Odometry {
     frame: Option<(WheelCounts, MissionTime)>,
     /// Of the left and the right wheel, and of their difference.
     evidence: [Evidence; 3],
+    /// Signs of the last commands to each; 0 before any. A base that stops driving sooner than
+    /// turning moves a wheel back without a command.
+    directions: [f64; 3],
     untold_s: f64,
     pub(crate) contacts: Contacts,
     jumps: VecDeque<MissionTime>,
@@ -238,11 +235,15 @@ impl Odometry {
             self.restart_evidence(now);
         }
         self.commanded = Some(now);
-        let told = counts.map(f64::from);
-        let reached = self.ask(told, now);
-        let [left, right] = [0, 1].map(|wheel| due(reached[wheel], told[wheel]));
+        let [told_left, told_right] = counts.map(f64::from);
+        let [left, right] = self.ask([told_left, told_right], now);
+        let told = [told_left, told_right, told_right - told_left];
+        for (direction, told) in self.directions.iter_mut().zip(told).filter(|(_, it)| *it != 0.0) {
+            *direction = told.signum();
+        }
+        let [left, right, turn] = [(0, left), (1, right), (2, right - left)]
+            .map(|(of, reached)| if reached * self.directions[of] > 0.0 { reached } else { 0.0 });
         let mean = (left.abs() + right.abs()) / 2.0;
-        let turn = due(reached[1] - reached[0], told[1] - told[0]);
         let tells = turn.abs() >= LEAST_TURN_SHARE * mean;
         let asked = [left, right, if tells { turn } else { 0.0 }];
         // Only one wheel of a car drives.
@@ -477,6 +478,7 @@ impl Monitor for Odometry {
             commanded: None,
             frame: None,
             evidence: Default::default(),
+            directions: [0.0; 3],
             untold_s: 0.0,
             contacts: Contacts::new(mission),
             jumps: VecDeque::new(),
