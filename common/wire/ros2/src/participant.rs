@@ -41,8 +41,9 @@ const LONGEST_REPLY: usize = 65_000;
 const MOST_BROKEN: usize = 16;
 /// Tracked writers of a [`LateReader`]'s topic; further ones do not open it.
 const MOST_WRITERS: usize = 256;
-/// Tracked readers of a [`Server`]'s replies. Replies to further ones wait in vain.
+/// Tracked readers of a [`Server`]'s replies. Replies to further ones wait for [`KNOWN_WITHIN`].
 const MOST_READERS: usize = 256;
+/// Waiting replies of a [`Server`]; the oldest of more is sent at once.
 const MOST_UNSENT: usize = 64;
 /// Time from a reader's detection until it hears replies. The library reports a reader before it
 /// sends the first heartbeat, and readers ignore messages older than that.
