@@ -223,8 +223,6 @@ wire_enum! {
 
 wire_enum! {
     Maneuver, unknown = Stand {
-        /// No motion. At its target, a disc still turns to the wanted heading, and another body
-        /// only with `AtTarget`.
         Stand = 0,
         /// Along (ex, ey) within the speed limit. Below the least speed, a robot that can turn on
         /// the spot only faces (ex, ey).

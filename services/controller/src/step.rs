@@ -8,7 +8,7 @@ use common::{
     kinematics::Drive,
     mission::{Lead, Mission},
     motion_law::{Alignment, MotionLaw},
-    samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus, Maneuver},
+    samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
     stage::{Answer, Answering, ForeignState},
     topics::{COMMAND, GUIDANCE},
 };
@@ -23,8 +23,8 @@ const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 enum Arrival {
     #[default]
     OnTheWay,
-    /// At the target, turning to its heading.
-    Turning,
+    /// At the target, not yet facing its heading.
+    There,
     Arrived,
 }
 
@@ -101,16 +101,10 @@ impl Controller {
             target_number: guidance.target_number,
             ..CommandSample::default()
         };
-        let (maneuver, direction) =
-            match (self.arrival(guidance, distance), guidance.target.heading()) {
-                (Arrival::Arrived, _) => {
-                    return CommandSample { state: CommandState::Arrived.into(), ..command };
-                }
-                (Arrival::Turning, Some(heading)) if self.may_turn(guidance, distance) => {
-                    (Maneuver::Turn, DVec2::from_angle(heading))
-                }
-                _ => (guidance.maneuver(), DVec2::new(guidance.ex, guidance.ey)),
-            };
+        if self.arrival(guidance, distance) == Arrival::Arrived {
+            return CommandSample { state: CommandState::Arrived.into(), ..command };
+        }
+        let direction = DVec2::new(guidance.ex, guidance.ey);
         // Samples may hold anything; only unit vectors are followed.
         let unit = (direction.length() - 1.0).abs() < 1e-3;
         let is_sent = guidance.target_number != 0;
@@ -123,7 +117,7 @@ impl Controller {
         let alignment = Alignment::of(acts_at.axis(), direction);
         let limit = guidance.speed_limit_m_s;
         let twist = if sane {
-            self.law.twist(maneuver, alignment, distance, limit, &mut self.side)
+            self.law.twist(guidance.maneuver(), alignment, distance, limit, &mut self.side)
         } else {
             None
         };
@@ -152,35 +146,23 @@ impl Controller {
         if self.arrival.0 != number {
             self.arrival = (number, Arrival::OnTheWay);
         }
-        let is_there = self.is_there(guidance, distance);
+        let beside = guidance.status() == GuidanceStatus::AtTarget && distance <= MOST_OFF_TARGET_M;
+        let is_there = beside || distance <= self.mission.arrival_tolerance_m;
         let rolled_on = !is_there && distance > 2.0 * self.mission.arrival_tolerance_m;
         let arrival = &mut self.arrival.1;
-        if *arrival == Arrival::Arrived && rolled_on {
+        if rolled_on {
             *arrival = Arrival::OnTheWay;
         }
         if *arrival == Arrival::OnTheWay && is_there && number != 0 {
-            *arrival = Arrival::Turning;
+            *arrival = Arrival::There;
         }
         let faces = guidance.target.heading().is_none_or(|heading| {
             wrap_angle(heading - guidance.heading_rad).abs() <= FACES_WITHIN_RAD
         });
-        if *arrival == Arrival::Turning && faces {
+        if *arrival == Arrival::There && faces {
             *arrival = Arrival::Arrived;
         }
         *arrival
-    }
-
-    fn is_there(&self, guidance: &GuidanceSample, distance: f64) -> bool {
-        let beside = guidance.status() == GuidanceStatus::AtTarget;
-        distance <= self.mission.arrival_tolerance_m || beside && distance <= MOST_OFF_TARGET_M
-    }
-
-    /// Returns whether the robot may turn to the wanted heading. The planner lets non-circular
-    /// bodies stand where they lack room.
-    fn may_turn(&self, guidance: &GuidanceSample, distance: f64) -> bool {
-        let is_beside = guidance.status() == GuidanceStatus::AtTarget;
-        let allows = is_beside || guidance.maneuver() != Maneuver::Stand;
-        self.mission.outline().is_none() || allows && self.is_there(guidance, distance)
     }
 }
 

@@ -76,6 +76,8 @@ pub struct Planner {
     /// `None` before the first keyframe.
     live: Option<Live>,
     on_a_saddle: bool,
+    /// Number of the target that the robot has reached; 0 for none.
+    reached: u64,
     jobs: u64,
     full_solves: u64,
 }
@@ -98,6 +100,7 @@ impl Planner {
             belief: GridHeader::default(),
             live: None,
             on_a_saddle: false,
+            reached: 0,
             jobs: 0,
             full_solves: 0,
         }
@@ -391,10 +394,25 @@ impl Planner {
 
     fn advise(&mut self, pose: &Pose2, status: GuidanceStatus, direction: DVec2) -> Advice {
         let free = Advice::new(status, direction, f64::INFINITY);
+        let heading = self.heading_there(pose, status);
         let (Some(live), Some(target)) = (&self.live, self.place()) else {
             return free;
         };
         let view = live.view(self.grid.cells());
+        if let Some(heading) = heading {
+            let turn = wrap_angle(heading - pose.heading);
+            return match &self.advisor {
+                Advisor::LookFirst(ActiveSensing { outline: Some(outline), .. })
+                    if !outline.turns(&view, pose, turn) =>
+                {
+                    Advice { status: GuidanceStatus::Unreachable, ..STAND }
+                }
+                _ => Advice {
+                    maneuver: Maneuver::Turn,
+                    ..Advice::new(status, DVec2::from_angle(heading), 0.0)
+                },
+            };
+        }
         let sensing = match (&mut self.advisor, status) {
             (Advisor::LookFirst(sensing), _) => sensing,
             (Advisor::Steer(arcs), GuidanceStatus::Along | GuidanceStatus::WayOut) => {
@@ -418,14 +436,6 @@ impl Planner {
         let Some(outline) = &mut sensing.outline else {
             return advice;
         };
-        let beside = status == GuidanceStatus::AtTarget;
-        let is_there = beside || pose.position.distance(target) <= self.mission.arrival_tolerance_m;
-        let heading = self.target.and_then(|it| it.target.heading()).filter(|_| is_there);
-        if heading
-            .is_some_and(|heading| !outline.turns(&view, pose, wrap_angle(heading - pose.heading)))
-        {
-            return Advice { status: GuidanceStatus::Unreachable, ..STAND };
-        }
         let axis = pose.axis();
         let may_turn = outline.turns(&view, pose, axis.angle_to(advice.to));
         let slow = match advice.status {
@@ -458,6 +468,18 @@ impl Planner {
                 Advice::along(axis, 0.0)
             }
         }
+    }
+
+    /// Returns the heading to which a robot at its target turns. Once there, it counts as there to
+    /// twice the tolerance: it may slip while it turns.
+    fn heading_there(&mut self, pose: &Pose2, status: GuidanceStatus) -> Option<f64> {
+        let sent = self.target?;
+        let tolerance_m = self.mission.arrival_tolerance_m;
+        let most_m = if self.reached == sent.number { 2.0 * tolerance_m } else { tolerance_m };
+        let is_there = status == GuidanceStatus::AtTarget
+            || pose.position.distance(sent.target.position()) <= most_m;
+        self.reached = if is_there { sent.number } else { 0 };
+        sent.target.heading().filter(|_| is_there)
     }
 
     /// Returns the field to `target` on a map, which a new planner computes.

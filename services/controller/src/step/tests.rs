@@ -3,7 +3,7 @@ mod car;
 use super::*;
 use common::{
     kinematics::Pose2,
-    samples::{BaseResponseSample, TargetPoint},
+    samples::{BaseResponseSample, Maneuver, TargetPoint},
 };
 use std::{
     f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_3, FRAC_PI_4, PI},
@@ -200,28 +200,25 @@ fn an_arrival_holds_for_its_target_alone_until_the_robot_has_rolled_on() {
 }
 
 #[test]
-fn a_robot_that_is_to_face_a_heading_turns_on_the_spot_and_then_has_arrived() {
-    for method in ["paper", "evidential"] {
-        let mut controller = Controller::new(&mission(&format!("method = '{method}'")));
-        let mut guidance = ahead();
-        (guidance.target.heading_rad, guidance.target.has_heading) = (2.0 + 2.0 * PI, 1);
-        let mut pose = short(0.05);
-        let mut turned = 0;
-        let mut command = controller.at(pose, &guidance);
-        while command.state() == CommandState::Driving {
-            close(command.v_m_s, 0.0);
-            assert!(command.omega_rad_s > 0.0, "{method}: the shorter way");
-            pose.heading += command.omega_rad_s / 7.0;
-            // It slips on the spot, and stays at its target.
-            pose.position.x -= 0.02;
-            command = controller.at(pose, &guidance);
-            turned += 1;
-            assert!(turned < 200, "{method}: it turns for ever");
-        }
-        assert_eq!(command.state(), CommandState::Arrived, "{method}");
-        assert!((pose.heading - 2.0).abs() <= 5_f64.to_radians(), "{method}: {}", pose.heading);
-        assert!(turned > 3, "{method}: {turned}");
+fn a_robot_has_arrived_once_it_is_there_and_faces_the_heading_and_follows_the_planner_until_then() {
+    let mut guidance = told(Maneuver::Turn);
+    (guidance.target.heading_rad, guidance.target.has_heading) = (2.0 + 2.0 * PI, 1);
+    for (short_m, heading, state) in [
+        (0.05, 2.0, CommandState::Arrived),
+        (0.05, 2.0 + 4_f64.to_radians(), CommandState::Arrived),
+        (0.05, 2.0 - 6_f64.to_radians(), CommandState::Driving),
+        (0.3, 2.0, CommandState::Driving),
+    ] {
+        let pose = Pose2 { heading, ..short(short_m) };
+        assert_eq!(controller("").at(pose, &guidance).state(), state, "{short_m} {heading}");
     }
+    let mut controller = controller("");
+    let slips = |short_m| Pose2 { heading: 2.0, ..short(short_m) };
+    controller.at(short(0.05), &guidance);
+    assert_eq!(controller.at(slips(0.15), &guidance).state(), CommandState::Arrived);
+    assert_eq!(controller.at(slips(0.25), &guidance).state(), CommandState::Driving);
+    let stand = GuidanceSample { maneuver: Maneuver::Stand.into(), ..guidance };
+    assert_eq!(controller.at(short(0.05), &stand).state(), CommandState::Halt);
 }
 
 #[test]
@@ -283,22 +280,5 @@ fn a_robot_that_is_to_back_does_so_along_its_axis_and_no_faster_than_the_mission
         let back = GuidanceSample { speed_limit_m_s, ..told(Maneuver::Back) };
         let command = jackal().at(facing(0.3), &back);
         assert_eq!((command.v_m_s, command.omega_rad_s), (v, 0.0));
-    }
-}
-
-#[test]
-fn a_body_that_is_no_disc_turns_to_a_heading_only_where_the_planner_lets_it_move() {
-    let target = TargetPoint {
-        heading_rad: FRAC_PI_2,
-        has_heading: 1,
-        ..TargetPoint::at(DVec2::new(3.0, 0.0))
-    };
-    let (turn, stand, follow) = (Maneuver::Turn, Maneuver::Stand, Maneuver::Follow);
-    for (maneuver, short_m, turns) in [(turn, 0.1, true), (stand, 0.1, false), (follow, 0.3, false)]
-    {
-        let mut jackal = jackal();
-        jackal.at(short(0.1), &GuidanceSample { target, ..ahead() });
-        let command = jackal.at(short(short_m), &GuidanceSample { target, ..told(maneuver) });
-        assert_eq!(command.omega_rad_s != 0.0, turns, "{maneuver:?}: {command:?}");
     }
 }

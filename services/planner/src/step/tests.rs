@@ -592,3 +592,34 @@ fn a_robot_with_a_laser_stands_for_half_a_second_at_first_to_see_what_moves_and_
         assert_eq!(status == Waiting, waits, "{robot} after {seconds} s");
     }
 }
+
+#[test]
+fn a_robot_turns_at_its_target_to_the_heading_though_it_slips_and_stands_if_its_body_has_no_room() {
+    let target = TargetPoint {
+        heading_rad: std::f64::consts::FRAC_PI_2,
+        has_heading: 1,
+        ..TargetPoint::at(dvec2(4.0, 0.0))
+    };
+    let long = "robot.model = 'jackal'\n\
+        robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]";
+    for (robot, wall_m, there) in [
+        ("robot.model = 'kobuki'", 6.0, Maneuver::Turn),
+        (long, 6.0, Maneuver::Turn),
+        (long, 0.1, Maneuver::Stand),
+    ] {
+        let hall = format!("target = [4, 0]\nperimeter = {{ width_m = 12, cells = 120 }}\n{robot}");
+        let mission = testing::mission(&hall);
+        let mut planner = in_scanned_room(&mission, |at| at.y.abs() > wall_m, |_| true);
+        let sent = TargetSample { number: 2, last: 2, target, ..TargetSample::default() };
+        planner.take_target(&sent).unwrap();
+        let tolerance_m = planner.mission.arrival_tolerance_m;
+        let asked = [1.5, 0.5, 1.5, 2.5].map(|short| {
+            let guidance = planner.ask_at(4.0 - short * tolerance_m, 0.0);
+            assert!(guidance.maneuver() != Maneuver::Turn || guidance.ey > 0.99, "{guidance:?}");
+            guidance.maneuver()
+        });
+        let [far, near, slipped, farther] = asked;
+        assert_eq!([near, slipped], [there; 2], "{robot} {wall_m}");
+        assert!(![far, farther].contains(&there), "{asked:?}");
+    }
+}
