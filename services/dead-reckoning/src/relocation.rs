@@ -22,11 +22,17 @@ const UNKNOWN: f64 = 1.0;
 /// Least turn, in deviations. Below, the wheels' heading is better than one from a short distance.
 const NO_TURN: f64 = 3.0;
 
-/// Refused fixes since a used one, with the poses at their times.
+/// Refused fixes since a used one of their kind, with the poses at their times.
+///
+/// A scan that matches the robot's own map does not refute a camera: both may be elsewhere.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Contradictions(VecDeque<(Pose2, Fix)>);
 
 impl Contradictions {
+    pub(crate) fn settle(&mut self, used: &Fix) {
+        self.0.retain(|(_, refused)| refused.is_by_scan() != used.is_by_scan());
+    }
+
     /// Returns the relocated estimate if the newest fixes agree.
     pub(crate) fn add(&mut self, there: Pose2, fix: &Fix, estimate: &Filter) -> Option<Filter> {
         let time = |(_, fix): &(Pose2, Fix)| fix.time;

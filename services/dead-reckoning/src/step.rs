@@ -307,15 +307,17 @@ impl DeadReckoning {
         let state = &mut self.state;
         let fix = Fix::try_from(sample);
         let taken = fix.map_err(|why| Refused { why, there: None });
-        let taken = taken.and_then(|fix| state.history.take(&self.motions, fix));
-        let Err(Refused { why, there }) = taken else {
-            state.fixes += 1;
-            state.contradictions = Contradictions::default();
-            let is_by_scan = fix.is_ok_and(|fix| fix.is_by_scan());
-            if !is_by_scan || fix.is_ok_and(|fix| fix.is_apart_from_wheels()) {
-                state.doubt.place_by_others();
+        let taken = taken.and_then(|fix| state.history.take(&self.motions, fix).map(|()| fix));
+        let (why, there) = match taken {
+            Ok(used) => {
+                state.fixes += 1;
+                state.contradictions.settle(&used);
+                if !used.is_by_scan() || used.is_apart_from_wheels() {
+                    state.doubt.place_by_others();
+                }
+                return if used.is_by_scan() { Taken::UsedScan } else { Taken::Used };
             }
-            return if is_by_scan { Taken::UsedScan } else { Taken::Used };
+            Err(Refused { why, there }) => (why, there),
         };
         state.fixes_refused += 1;
         let estimate = &state.history.newest;

@@ -283,6 +283,19 @@ fn fixes_that_agree_for_three_seconds_relocate_a_robot_that_was_carried() {
 }
 
 #[test]
+fn a_robot_that_was_carried_is_relocated_by_a_camera_while_its_scans_match_its_old_map() {
+    let (mut run, aside) = (run(0.0), dvec2(0.0, 2.0));
+    run.wind(100, each_second);
+    run.robot.truth.position += aside;
+    let by_both = |robot: &mut Robot| {
+        let scan = FixSample { shared: [1e-6; 2], ..moved(robot.headed_fix(), -aside) };
+        vec![robot.fix(), scan]
+    };
+    let all = run.wind(40, by_both);
+    assert!(all.iter().any(|(reckoned, _)| reckoned.relocated));
+}
+
+#[test]
 fn a_source_that_is_aside_moves_the_robot_no_farther_than_it_is_and_the_pose_keeps_the_doubt() {
     for aside_m in [0.3, 1.0, 3.0] {
         let mut run = run(0.0);
