@@ -383,7 +383,8 @@ pub(crate) fn gyro_finding(
 ) -> Option<Finding> {
     let Some(gyro) = gyro else {
         let text = "none of its turns was used: it is silent, or contradicts odometry, for example because its z axis points down; see link.log";
-        return mission.robot.ros2.imu.is_some().then(|| Finding::wrong("gyro", text));
+        let has_gyro = mission.robot.gyro() || mission.robot.ros2.imu.is_some();
+        return has_gyro.then(|| Finding::wrong("gyro", text));
     };
     let (truth, by) = match moves.turn.filter(|_| placed.is_some()) {
         Some(turn) => (turn, "laser sees; correct its scale"),
