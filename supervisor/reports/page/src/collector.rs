@@ -94,7 +94,8 @@ impl Collector {
     pub fn apply(&mut self, sample: &Sample) {
         self.state.apply(sample);
         match sample {
-            Sample::Pose(pose) => {
+            // A mirror repeats its last samples.
+            Sample::Pose(pose) if self.newest.pose.is_none_or(|it| it.stamp != pose.stamp) => {
                 self.pose_tick = pose.stamp.tick;
                 self.tick(pose.stamp.tick).pose = Some(*pose);
             }
@@ -262,7 +263,8 @@ impl Collector {
         self.state.target.map_or(self.mission.target, |sent| sent.target.position())
     }
 
-    /// Returns a changed state of the processes, once a second if only ages differ.
+    /// Returns a changed state of the processes, once a second if only ages differ. A mirror's time
+    /// stands while its robot is not heard.
     pub fn take_state(&mut self) -> Option<Value> {
         if self.state.stages.is_empty() {
             return None;
@@ -273,7 +275,8 @@ impl Collector {
         let RosterHeader { order, reason, .. } = self.roster();
         key.extend([action, cause, at_rest, order, reason, self.status()].map(u64::from));
         let target = self.state.target.map_or(0, |sent| sent.number);
-        key.extend([u64::from(connected), target, self.state.targets().count() as u64]);
+        let mirror_s = self.state.mirror.map_or(0, |mirror| mirror.age_s() as u64);
+        key.extend([u64::from(connected), target, self.state.targets().count() as u64, mirror_s]);
         let now = self.state.now_s();
         if let Some((before, at)) = &self.state_of
             && *before == key
