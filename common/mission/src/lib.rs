@@ -618,6 +618,13 @@ impl Mission {
         })
     }
 
+    /// Returns whether the robot tests its wheels, slowly and for a minute, and so drives on if they
+    /// do not follow their commands.
+    pub fn tests_wheels(&self) -> bool {
+        let plan = self.planner.calibration.as_ref();
+        plan.is_some_and(|plan| plan.procedure == Procedure::BringUp)
+    }
+
     /// Returns whether planner and controller limit the speed by the base's response.
     pub fn brakes_by_response(&self) -> bool {
         self.method == Method::Evidential && self.sensing && self.planner.executable.is_none()

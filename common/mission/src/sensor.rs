@@ -477,7 +477,11 @@ mod tests {
         };
         let rows = [row("a", "cone", ""), row("b", "cone", "channel = 0\n"), row("c", "ray", "")];
         let rows = [rows.concat(), row("d", "cone", ""), row("e", "cone", "channel = 200\n")];
-        let table = mission(&format!("robot.protocol = 'json'\n{}", rows.concat())).sensor_table();
+        let table = mission(&format!(
+            "robot.protocol = 'json'\nrobot.counts_per_turn = 1320\nrobot.address = '1.2.3.4:5'\n{}",
+            rows.concat()
+        ))
+        .sensor_table();
         let channels: Vec<_> = table.iter().map(|sensor| sensor.channel).collect();
         assert_eq!(channels, [1, 0, 0, 2, 200]);
     }

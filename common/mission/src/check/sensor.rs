@@ -18,21 +18,30 @@ pub(super) fn check(mission: &Mission) -> Result {
     let problem = format!("{} rows exceed the limit of {MOST_SENSORS}", rows.len());
     refuse_if(rows.len() > MOST_SENSORS, KEY, problem, "remove some")?;
     let speaks_x80 = mission.robot.protocol() == Protocol::X80;
+    let is_simulated = mission.robot.address.is_none();
     for (index, row) in rows.iter().enumerate() {
         let SensorRow { name, kind, .. } = row;
         self::row(row, mission.robot.rate_hz)?;
-        if speaks_x80 && *kind != SensorKind::Scan {
+        let has_channel = speaks_x80 || is_simulated && row.channel.is_some();
+        if has_channel && *kind != SensorKind::Scan {
             its_channel(row)?;
         }
         let mut earlier = rows[..index].iter();
         let is_called_so = earlier.clone().any(|other| other.name == *name);
         refuse_if(is_called_so, KEY, format!("two rows are named {name:?}"), "rename one")?;
         let is_shared =
-            speaks_x80 && earlier.any(|it| (it.kind, it.channel) == (*kind, row.channel));
+            has_channel && earlier.any(|it| (it.kind, it.channel) == (*kind, row.channel));
         let problem = format!("{name:?} shares its channel with another {kind:?}");
         refuse_if(is_shared, KEY, problem, "give each its own channel")?;
     }
     let written = |kind| rows.iter().filter(|row| row.kind == kind).count();
+    let (sonars, rays) = (written(SensorKind::Cone), written(SensorKind::Ray));
+    refuse_if(
+        is_simulated && (sonars > SONARS || rays > INFRARED_RANGERS),
+        KEY,
+        format!("{sonars} cones and {rays} rays exceed what the simulator has"),
+        format!("give at most {SONARS} cones and {INFRARED_RANGERS} rays, or robot.address"),
+    )?;
     let lasers = written(SensorKind::Scan);
     let problem = format!("{lasers} lasers exceed the limit of {MOST_LASERS}");
     refuse_if(lasers > MOST_LASERS, KEY, problem, "remove some")?;
@@ -202,8 +211,10 @@ mod tests {
     #[test]
     fn a_row_that_the_robot_cannot_have_is_refused_with_its_key() {
         let second = |set: &str| format!("{FRONT}{}{set}", FRONT.replace("'front'", "'second'"));
-        let many: String =
-            (0..17).map(|index| FRONT.replace("front", &format!("s{index}"))).collect();
+        let rows = |count: u32, row: &str| -> String {
+            (0..count).map(|index| row.replace("front", &format!("s{index}"))).collect()
+        };
+        let json = rows(7, &FRONT.replace("channel = 1\n", ""));
         assert_refused([
             (FRONT.replace("= 1", "= 6"), "channel 6"),
             (FRONT.replace("cone", "ray").replace("= 1", "= 7"), "channel 7"),
@@ -221,7 +232,8 @@ mod tests {
             (format!("{FRONT}model = 'x80-infrared'"), "X80Infrared"),
             (second("").replace("'second'", "'front'"), "two rows are named"),
             (second(""), "shares its channel"),
-            (many, "17 rows"),
+            (rows(17, FRONT), "17 rows"),
+            (format!("robot.protocol = 'json'\n{json}"), "7 cones and 0 rays exceed"),
             (second(""), "m.toml:2: robot.sensor: "),
             (format!("sonar.index = 2\n{FRONT}"), "m.toml:2: sonar: "),
             (format!("sensors = 'front+infrared'\n{FRONT}"), "m.toml:2: sensors: "),

@@ -31,7 +31,7 @@ use std::{collections::VecDeque, time::Duration};
 use common::{
     clock::MissionTime,
     driver::counts::WheelCounts,
-    mission::{Mission, ModelledSpeed, Procedure, Response},
+    mission::{Mission, ModelledSpeed, Response},
     samples::{Cause, Order},
 };
 
@@ -217,8 +217,8 @@ pub struct Odometry {
     /// Time of the last search for a delay.
     looked: MissionTime,
     ordered_to_drive: bool,
-    /// A bring-up tests for disobedient wheels, so its robot drives on, slowly and for a minute.
-    is_bring_up: bool,
+    /// Whether wheels that do not follow their commands are suspect.
+    judges: bool,
     two_publishers: Option<(String, MissionTime)>,
 }
 
@@ -333,7 +333,7 @@ impl Odometry {
         let suspicion = self.evidence.iter().zip(all).find(suspected);
         let untold = (self.untold_s >= UNTOLD_AFTER.as_secs_f64()).then_some(Suspicion::Untold);
         if let Some(suspicion) = suspicion.map(|(_, suspicion)| suspicion).or(untold)
-            && !self.is_bring_up
+            && self.judges
         {
             self.suspicion.get_or_insert((suspicion, now));
         }
@@ -343,7 +343,7 @@ impl Odometry {
 
     /// Looks for added delay: late frames or commands look like a late base.
     fn look_for_delay(&mut self, now: MissionTime) {
-        if self.suspicion.is_some() || self.is_bring_up || now.since(self.looked) < LOOK_EVERY {
+        if self.suspicion.is_some() || !self.judges || now.since(self.looked) < LOOK_EVERY {
             return;
         }
         self.looked = now;
@@ -486,11 +486,7 @@ impl Monitor for Odometry {
             suspicion: None,
             looked: MissionTime::default(),
             ordered_to_drive: false,
-            is_bring_up: mission
-                .planner
-                .calibration
-                .as_ref()
-                .is_some_and(|plan| plan.procedure == Procedure::BringUp),
+            judges: !mission.tests_wheels(),
             two_publishers: None,
         }
     }
