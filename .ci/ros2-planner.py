@@ -13,6 +13,7 @@ import os
 import subprocess
 import sys
 import time
+import traceback
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
@@ -349,4 +350,10 @@ def main(firsthand):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    try:
+        main(sys.argv[1])
+    except BaseException:
+        traceback.print_exc()
+        # Threads of DDS, with readers still open, would keep a failed check from ending.
+        sys.stderr.flush()
+        os._exit(1)
