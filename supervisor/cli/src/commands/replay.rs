@@ -14,7 +14,7 @@ use recording::{
 /// the recorded one.
 #[derive(Debug, Args)]
 pub struct Arguments {
-    /// Directory of a recorded run, or a recording.
+    /// Directory of a run with one recording, or a recording.
     #[arg(value_name = "RUN|F.mcap")]
     recording: PathBuf,
     /// Replay only these stages, separated by commas.

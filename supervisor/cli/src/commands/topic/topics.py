@@ -81,7 +81,7 @@ class Follower:
             yield "gone", None
 
     def publish(self, topic, sample):
-        """Publish a struct on a topic that consumers may write: `fix`, `turn`. Only while the robot is here."""
+        """Publish a struct on a topic that consumers may write: `fix`, `turn`, `beacon`. Only while the robot is here."""
         iox2 = self.iox2
         if topic not in self.publishers:
             name = iox2.ServiceName.new(topic)

@@ -188,6 +188,6 @@ fn crates() -> String {
     };
     let rows: String = folders.iter().map(row).collect();
     format!(
-        "| crate | content |\n|---|---|\n{rows}| `tests` | Whole runs through real processes |\n"
+        "| crate | content |\n|---|---|\n{rows}| `tests` | Tests of the package `firsthand`, most with whole runs through real processes |\n"
     )
 }
