@@ -22,33 +22,22 @@ use std::{fs, process::ExitCode, time::Instant};
 
 use console::{
     missions,
-    output::{print_text, write_stderr},
+    output::{print_rows, write_stderr},
 };
-use serde::Serialize;
 
 use crate::error::{OrCannot as _, Result};
-use report::Series;
+use report::{Report, Series};
 
 /// Exit code after a failed mission or a faulty robot that stopped late.
 const NOT_CLEAN: u8 = 8;
 
-struct Judged {
-    lost: u64,
-    text: String,
-}
-
-fn text(result: &impl Serialize, json: bool, plain: String) -> Result<String> {
-    Ok(if json { serde_json::to_string(result)? + "\n" } else { plain })
-}
-
 pub fn main(arguments: &Arguments) -> Result<ExitCode> {
-    let judged = judge(arguments)?;
-    print_text(&judged.text)?;
-    Ok(ExitCode::from(if judged.lost == 0 { 0 } else { NOT_CLEAN }))
+    Ok(ExitCode::from(if judge(arguments)? { 0 } else { NOT_CLEAN }))
 }
 
-/// Keeps the missions' directory after a failure.
-fn judge(arguments: &Arguments) -> Result<Judged> {
+/// Prints the result, and returns whether it is clean. Keeps the missions' directory after a
+/// failure.
+fn judge(arguments: &Arguments) -> Result<bool> {
     if let Some(faults) = &arguments.robot_faults {
         let mission = missions::load(&arguments.mission, &arguments.set)?;
         let table = robot_faults::run(&mission, faults, arguments.seed, arguments.missions)?;
@@ -56,27 +45,27 @@ fn judge(arguments: &Arguments) -> Result<Judged> {
             fs::create_dir_all(directory).or_cannot_file("make", directory)?;
             table.write(&arguments.robot.to_string(), &directory.join("stop_times.csv"))?;
         }
-        return table.judged(arguments.json);
+        print_rows(&[&table], arguments.json, table.text())?;
+        return Ok(table.is_kept());
     }
     let options = Options::of(arguments)?;
     let directory = options.directory.display();
-    match run(&options).and_then(|report| report.judged(arguments.json)) {
-        Ok(judged) if judged.lost == 0 => {
-            fs::remove_dir_all(&options.directory)?;
-            Ok(judged)
-        }
-        Ok(judged) => {
-            write_stderr(&format!(
-                "firsthand: the files of the failed missions are in {directory}\n"
-            ));
-            Ok(judged)
-        }
-        Err(error) if fs::remove_dir(&options.directory).is_ok() => Err(error),
-        Err(error) => Err(format!("{error}; see {directory}").into()),
+    let report = match run(&options) {
+        Ok(report) => report,
+        Err(error) if fs::remove_dir(&options.directory).is_ok() => return Err(error),
+        Err(error) => return Err(format!("{error}; see {directory}").into()),
+    };
+    let is_clean = report.wrong.is_empty() && report.leftovers.is_empty();
+    if is_clean {
+        fs::remove_dir_all(&options.directory)?;
+    } else {
+        write_stderr(&format!("firsthand: the files of the failed missions are in {directory}\n"));
     }
+    print_rows(&[&report], arguments.json, crate::text(&report))?;
+    Ok(is_clean)
 }
 
-fn run(options: &Options) -> Result<report::Report> {
+fn run(options: &Options) -> Result<Report> {
     let began = Instant::now();
     let mut series = Series::new(options)?;
     while !series.is_over() {

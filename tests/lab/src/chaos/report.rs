@@ -8,7 +8,6 @@ use common::latency::Histogram;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::{
-    Judged,
     options::Options,
     replays::Replays,
     schedule::{Kind, Schedule},
@@ -119,13 +118,6 @@ impl Report {
                 first_output_ms.iter().for_each(|ms| record(&mut recovery.output, ms));
             }
         }
-    }
-
-    pub(super) fn judged(&self, json: bool) -> Result<Judged> {
-        Ok(Judged {
-            lost: (self.wrong.len() + self.leftovers.len()) as u64,
-            text: super::text(self, json, crate::text(self))?,
-        })
     }
 }
 
