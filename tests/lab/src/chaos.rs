@@ -69,16 +69,12 @@ fn run(options: &Options) -> Result<Report> {
     let began = Instant::now();
     let mut series = Series::new(options)?;
     while !series.is_over() {
-        let seed = options.asked.seed + series.report.missions;
-        let undisturbed = mission::undisturbed(options, seed)?;
-        mission::attack(&mut series, seed, &undisturbed)?;
+        mission::attack(&mut series)?;
         let left = leftovers::find(&options.asked.robot, &options.directory);
-        let report = &mut series.report;
-        let (kills, missions) = (report.signals, report.missions);
-        report
-            .leftovers
-            .extend(left.iter().map(|what| format!("after mission {missions}: {what}")));
-        write_stderr(&format!("{kills} of {} signals, {missions} missions\n", options.asked.kills));
+        let Report { signals, missions, leftovers, .. } = &mut series.report;
+        leftovers.extend(left.iter().map(|what| format!("after mission {missions}: {what}")));
+        let kills = options.asked.kills;
+        write_stderr(&format!("{signals} of {kills} signals, {missions} missions\n"));
     }
     series.report.took_s = began.elapsed().as_secs_f64();
     Ok(series.report)

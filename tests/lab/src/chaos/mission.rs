@@ -33,7 +33,7 @@ fn command(options: &Options, seed: u64, pace: Pace, out: &Path) -> Command {
     command
 }
 
-pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
+fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     let directory = options.directory.join("undisturbed");
     let command = command(options, seed, Pace::Max, &directory);
     let summary = Run::start(command, &directory, false)?.wait(PATIENCE, || ())?.summary()?;
@@ -41,10 +41,13 @@ pub fn undisturbed(options: &Options, seed: u64) -> Result<Summary> {
     Ok(summary)
 }
 
-/// Attacks the mission and reports. Keeps its files after a failure.
-pub fn attack(series: &mut Series<'_>, seed: u64, undisturbed: &Summary) -> Result {
+/// Runs the next mission of `series` undisturbed, attacks it, and reports. Keeps its files after a
+/// failure.
+pub fn attack(series: &mut Series<'_>) -> Result {
     let options = series.options;
     let asked = &options.asked;
+    let seed = asked.seed + series.report.missions;
+    let undisturbed = undisturbed(options, seed)?;
     let before = series.report.kills();
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).or_cannot("make a directory")?;
