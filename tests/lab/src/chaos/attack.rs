@@ -19,7 +19,6 @@ use processes::{
     process::Process,
 };
 use rustix::process::{Pid, Signal, kill_process};
-use serde::Deserialize;
 
 use super::{
     consumers::Consumers,
@@ -49,14 +48,6 @@ pub struct Attack {
     sent: Vec<Sent>,
     kept: usize,
     pose: Option<PoseSample>,
-}
-
-/// Death in the record of a run.
-#[derive(Deserialize)]
-pub struct Death {
-    stage: String,
-    generation: u32,
-    hung: bool,
 }
 
 struct Sent {
@@ -164,18 +155,10 @@ impl Attack {
     }
 
     /// Returns whether a generation was frozen alone, and may be aborted.
-    fn was_frozen(&self, stage: &str, generation: u32) -> bool {
+    pub fn was_frozen(&self, stage: &str, generation: u32) -> bool {
         self.sent.iter().map(|sent| &sent.row).any(|row| {
             row.kind == Kind::Freeze && row.stage == stage && row.generation == Some(generation)
         })
-    }
-
-    /// Returns stages aborted as hung, by the run's `deaths`, that were not frozen alone.
-    pub fn healthy_aborted(&self, deaths: &[Death]) -> Vec<String> {
-        let healthy =
-            deaths.iter().filter(|it| it.hung && !self.was_frozen(&it.stage, it.generation));
-        let name = |it: &Death| format!("{} generation {}", it.stage, it.generation);
-        healthy.map(name).collect()
     }
 
     pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {

@@ -10,7 +10,7 @@ use std::{
 use common::{clock::Pace, mission::Mission};
 
 use crate::chaos::{
-    attack::{Attack, Death},
+    attack::Attack,
     consumers::Consumers,
     options::{Arguments, Options},
     report::Series,
@@ -21,10 +21,19 @@ use crate::{
 };
 use mission_control::{outcome::Outcome, simulator::Simulator, surroundings::SimulatedRobot as _};
 use processes::DEATHS;
+use serde::Deserialize;
 use summary::Summary;
 
 /// A mission takes half a minute of wall-clock time.
 const PATIENCE: Duration = Duration::from_secs(600);
+
+/// Death in the record of a run.
+#[derive(Deserialize)]
+struct Death {
+    stage: String,
+    generation: u32,
+    hung: bool,
+}
 
 fn command(options: &Options, seed: u64, pace: Pace, out: &Path) -> Command {
     let Arguments { mission, robot, set, .. } = &options.asked;
@@ -98,8 +107,12 @@ pub fn attack(series: &mut Series<'_>) -> Result {
     if collisions > 0 {
         wrong.push(format!("{collisions} collisions"));
     }
-    let aborted = attack.healthy_aborted(&deaths(&directory));
-    wrong.extend(aborted.iter().map(|stage| format!("healthy stage aborted: {stage}")));
+    let deaths = fs::read_to_string(directory.join(DEATHS)).unwrap_or_default();
+    let deaths = deaths.lines().filter_map(|line| serde_json::from_str::<Death>(line).ok());
+    let aborted = deaths.filter(|it| it.hung && !attack.was_frozen(&it.stage, it.generation));
+    wrong.extend(aborted.map(|Death { stage, generation, .. }| {
+        format!("healthy stage aborted: {stage} generation {generation}")
+    }));
     let allowance_m = pose_allowance_m(&options.loaded, kills, &summary);
     if excess_m > allowance_m {
         wrong.push(format!(
@@ -115,12 +128,6 @@ pub fn attack(series: &mut Series<'_>) -> Result {
     }
     report.wrong.extend(wrong.iter().map(|what| format!("seed {seed}: {what}")));
     Ok(())
-}
-
-fn deaths(directory: &Path) -> Vec<Death> {
-    let text = fs::read_to_string(directory.join(DEATHS)).unwrap_or_default();
-    let lines = text.lines().map(serde_json::from_str);
-    lines.filter_map(Result::ok).collect()
 }
 
 /// Returns the allowed final pose error beyond that of the undisturbed run, metres.
