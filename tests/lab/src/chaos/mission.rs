@@ -19,7 +19,7 @@ use crate::{
     error::{OrCannot as _, Result},
     robot::{self, Run, firsthand},
 };
-use mission_control::{outcome::Outcome, simulator::Simulator, surroundings::SimulatedRobot as _};
+use mission_control::{outcome::Outcome, surroundings::SimulatedRobot as _};
 use processes::DEATHS;
 use serde::Deserialize;
 use summary::Summary;
@@ -61,7 +61,11 @@ pub fn attack(series: &mut Series<'_>) -> Result {
     let files = options.directory.join(format!("seed-{seed}"));
     fs::create_dir(&files).or_cannot("make a directory")?;
     let directory = files.join("run");
-    let mut robot = asked.include_supervisor.then(|| robot(options, seed, &files)).transpose()?;
+    let simulated = || {
+        let mission = Mission { seed, ..options.loaded.clone() };
+        robot::simulated(&files.join("robot"), &mission, asked.pace)
+    };
+    let mut robot = asked.include_supervisor.then(simulated).transpose()?;
     let mut start = command(options, seed, asked.pace, &directory);
     if let Some(robot) = &robot {
         let address = robot.address();
@@ -141,9 +145,4 @@ fn pose_allowance_m(mission: &Mission, kills: u32, summary: &Summary) -> f64 {
     let slips = mission.simulation.physics().wheels.slip_noise > 0.0;
     let slip_m = if slips { 1.5 * summary.pose_within_m.unwrap_or_default() } else { 0.0 };
     body.metres_per_count() * (f64::from(kills) + target / body.track_m) + slip_m
-}
-
-fn robot(options: &Options, seed: u64, files: &Path) -> Result<Simulator> {
-    let mission = Mission { seed, ..options.loaded.clone() };
-    robot::simulated(&files.join("robot"), &mission, options.asked.pace)
 }
