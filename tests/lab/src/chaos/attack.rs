@@ -146,12 +146,13 @@ impl Attack {
         self.sent.push(Sent { row, at: Instant::now(), pending, startup_hit: None });
     }
 
-    pub fn supervisor_is_down(&self) -> bool {
-        self.is_recovering(SUPERVISOR)
+    pub fn supervisor_is_down(&mut self) -> bool {
+        self.pending(SUPERVISOR).is_some()
     }
 
-    fn is_recovering(&self, stage: &str) -> bool {
-        self.sent.iter().any(|sent| sent.pending && sent.row.stage == stage)
+    /// Returns the signal from which `stage` recovers. It gets no other meanwhile.
+    fn pending(&mut self, stage: &str) -> Option<&mut Sent> {
+        self.sent.iter_mut().find(|sent| sent.pending && sent.row.stage == stage)
     }
 
     /// Returns whether a generation was frozen alone, and may be aborted.
@@ -169,10 +170,10 @@ impl Attack {
 
     fn read(&mut self, subscriptions: &mut Subscriptions) -> Result {
         while let Some(death) = subscriptions.deaths.next_sample()? {
-            for Sent { row, at, .. } in self.sent.iter_mut().filter(|sent| sent.pending) {
-                if row.stage == name_str(&death.stage) && row.generation == Some(death.generation) {
-                    row.noticed_ms.get_or_insert_with(|| ms_since(*at));
-                }
+            if let Some(Sent { row, at, .. }) = self.pending(name_str(&death.stage))
+                && row.generation == Some(death.generation)
+            {
+                row.noticed_ms.get_or_insert_with(|| ms_since(*at));
             }
         }
         while let Some(entries) = subscriptions.roster.samples.next_slice()? {
@@ -214,13 +215,12 @@ impl Attack {
     }
 
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool) {
-        let pending = self.sent.iter_mut().filter(|sent| sent.pending);
-        for Sent { row, at, pending, .. } in pending {
-            if row.stage == stage && Some(generation) > row.generation {
-                row.ready_ms.get_or_insert_with(|| ms_since(*at));
-                row.first_output_ms = (!beat).then(|| ms_since(*at));
-                *pending = beat;
-            }
+        if let Some(Sent { row, at, pending, .. }) = self.pending(stage)
+            && Some(generation) > row.generation
+        {
+            row.ready_ms.get_or_insert_with(|| ms_since(*at));
+            row.first_output_ms = (!beat).then(|| ms_since(*at));
+            *pending = beat;
         }
     }
 
@@ -276,7 +276,7 @@ impl Attack {
             return Ok(());
         };
         let lately = |sent: &&Sent| sent.row.stage == stage && sent.at.elapsed() < HOLD_WINDOW;
-        let is_spared = self.is_recovering(stage)
+        let is_spared = self.pending(stage).is_some()
             || self.sent.iter().filter(lately).count() >= MOST_HITS
             || !send(pid, kind.signal());
         if !is_spared {
