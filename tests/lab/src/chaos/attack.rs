@@ -157,14 +157,14 @@ impl Attack {
 
     /// Returns whether a generation was frozen alone, and may be aborted.
     pub fn was_frozen(&self, stage: &str, generation: u32) -> bool {
-        self.sent.iter().map(|sent| &sent.row).any(|row| {
+        self.sent.iter().any(|Sent { row, .. }| {
             row.kind == Kind::Freeze && row.stage == stage && row.generation == Some(generation)
         })
     }
 
     pub fn pose_error(&self, truth: &[GroundTruthTick]) -> Option<f64> {
         let pose = self.pose?;
-        let tick = truth.iter().rev().find(|tick| tick.is_of(&pose))?;
+        let tick = truth.iter().rfind(|tick| tick.is_of(&pose))?;
         Some(tick.pose_error_m(&pose))
     }
 
@@ -251,38 +251,36 @@ impl Attack {
             if let Some((name, starts)) = self.consumers.hit(index, kind, pause, report)? {
                 self.note(series, (&name, Some(starts)), kind, false);
             }
-            return Ok(());
-        }
-        if asked.include_supervisor && schedule.supervisor() {
+        } else if asked.include_supervisor && schedule.supervisor() {
             let kind = schedule.supervisor_kind();
             if !self.supervisor_is_down() && send(self.supervisor, kind.signal()) {
                 self.note(series, (SUPERVISOR, None), kind, true);
                 (self.supervisor_hit, self.driving) = (true, false);
             }
-            return Ok(());
-        }
-        if asked.freeze_all
+        } else if asked.freeze_all
             && let Some(pause) = schedule.freeze_all()
         {
             self.freeze_all(pause, series);
-            return Ok(());
-        }
-        let (stage, kind, startup_hit) =
-            (schedule.stage(), schedule.kind(), schedule.startup_hit());
-        let running = |entry: &&RosterEntry| {
-            name_str(&entry.stage) == stage && entry.state() == StageState::Running
-        };
-        let Some(&RosterEntry { pid, generation, .. }) = self.entries.iter().find(running) else {
-            return Ok(());
-        };
-        let lately = |sent: &&Sent| sent.row.stage == stage && sent.at.elapsed() < HOLD_WINDOW;
-        let is_spared = self.pending(stage).is_some()
-            || self.sent.iter().filter(lately).count() >= MOST_HITS
-            || !send(pid, kind.signal());
-        if !is_spared {
-            self.note(series, (stage, Some(generation)), kind, true);
-            let startup_hit = startup_hit.filter(|_| asked.include_startup && kind != Kind::Freeze);
-            self.sent.last_mut().into_iter().for_each(|sent| sent.startup_hit = startup_hit);
+        } else {
+            let (stage, kind, startup_hit) =
+                (schedule.stage(), schedule.kind(), schedule.startup_hit());
+            let running = |entry: &&RosterEntry| {
+                name_str(&entry.stage) == stage && entry.state() == StageState::Running
+            };
+            let lately = |sent: &&Sent| sent.row.stage == stage && sent.at.elapsed() < HOLD_WINDOW;
+            if let Some(&RosterEntry { pid, generation, .. }) = self.entries.iter().find(running)
+                && self.pending(stage).is_none()
+                && self.sent.iter().filter(lately).count() < MOST_HITS
+                && send(pid, kind.signal())
+            {
+                self.note(series, (stage, Some(generation)), kind, true);
+                if asked.include_startup
+                    && kind != Kind::Freeze
+                    && let Some(sent) = self.pending(stage)
+                {
+                    sent.startup_hit = startup_hit;
+                }
+            }
         }
         Ok(())
     }
