@@ -251,8 +251,9 @@ impl Attack {
             if let Some((name, starts)) = self.consumers.hit(index, kind, pause, report)? {
                 self.note(series, (&name, Some(starts)), kind, false);
             }
-        } else if asked.include_supervisor && schedule.supervisor() {
-            let kind = schedule.supervisor_kind();
+        } else if asked.include_supervisor
+            && let Some(kind) = schedule.supervisor()
+        {
             if !self.supervisor_is_down() && send(self.supervisor, kind.signal()) {
                 self.note(series, (SUPERVISOR, None), kind, true);
                 (self.supervisor_hit, self.driving) = (true, false);

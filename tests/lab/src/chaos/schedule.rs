@@ -59,29 +59,22 @@ impl Schedule {
     }
 
     pub fn pause(&mut self) -> Duration {
-        MEAN_PAUSE.mul_f64(-(1.0 - self.0.share()).ln())
+        self.0.exponential(MEAN_PAUSE)
     }
 
     pub fn stage(&mut self) -> &'static str {
         TABLE[self.0.below(TABLE.len())].name
     }
 
-    pub fn supervisor(&mut self) -> bool {
-        self.0.share() < SUPERVISOR_SHARE
-    }
-
-    /// Draws the supervisor's hit. SIGTERM would end the run, and only systemd notices a frozen
-    /// supervisor.
-    pub fn supervisor_kind(&mut self) -> Kind {
-        match self.0.share() {
-            ..0.8 => Kind::Kill,
-            _ => Kind::Crash,
-        }
+    /// Draws the supervisor's hit, if it gets one. SIGTERM would end the run, and only systemd
+    /// notices a frozen supervisor.
+    pub fn supervisor(&mut self) -> Option<Kind> {
+        let is_hit = self.0.chance(SUPERVISOR_SHARE);
+        is_hit.then(|| if self.0.chance(0.8) { Kind::Kill } else { Kind::Crash })
     }
 
     pub fn freeze_all(&mut self) -> Option<Duration> {
-        let frozen = self.0.share() < FREEZE_ALL_SHARE;
-        frozen.then(|| self.freeze())
+        self.0.chance(FREEZE_ALL_SHARE).then(|| self.freeze())
     }
 
     fn freeze(&mut self) -> Duration {
@@ -91,15 +84,11 @@ impl Schedule {
     /// Draws consumer, kind and freeze time, if a consumer is hit.
     pub fn consumer(&mut self, count: usize) -> Option<(usize, Kind, Duration)> {
         // Without consumers, this leaves the sequence of decisions unchanged.
-        if count == 0 || self.0.share() >= CONSUMER_SHARE {
-            return None;
-        }
-        let index = self.0.below(count);
-        let kind = match self.0.share() {
-            ..0.7 => Kind::Kill,
-            _ => Kind::Freeze,
-        };
-        Some((index, kind, self.freeze()))
+        (count > 0 && self.0.chance(CONSUMER_SHARE)).then(|| {
+            let index = self.0.below(count);
+            let kind = if self.0.chance(0.7) { Kind::Kill } else { Kind::Freeze };
+            (index, kind, self.freeze())
+        })
     }
 
     pub fn kind(&mut self) -> Kind {
@@ -113,7 +102,7 @@ impl Schedule {
 
     pub fn startup_hit(&mut self) -> Option<Duration> {
         // Converts the share of all signals to a share of those that can be followed by one.
-        let hit = self.0.share() < STARTUP_SHARE / (1.0 - STARTUP_SHARE);
-        hit.then(|| STARTUP.mul_f64(self.0.share()))
+        let share = STARTUP_SHARE / (1.0 - STARTUP_SHARE);
+        self.0.chance(share).then(|| STARTUP.mul_f64(self.0.share()))
     }
 }
