@@ -8,8 +8,8 @@ use common::{
     ground_truth::GroundTruthTick,
     roster::Roster,
     samples::{
-        DeathSample, HealthSample, HealthState, Order, PoseSample, RosterEntry, RosterHeader,
-        StageState, name_str,
+        DeathSample, HealthSample, HealthState, Order, PoseSample, RosterEntry, StageState,
+        name_str,
     },
     topics::{self, SUPERVISOR},
 };
@@ -78,17 +78,18 @@ impl Attack {
         for sent in &mut self.sent {
             sent.pending &= sent.row.stage == SUPERVISOR;
         }
-        let (mut joined, mut next) = (None, None);
+        let mut joined = None;
         while child.try_reap().or_cannot("reap")?.is_none() && began.elapsed() < patience {
             self.consumers.maintain(&mut series.report)?;
-            let Some(subscriptions) = &mut joined else {
-                joined = Subscriptions::join(series.options, child.id()).unwrap_or_default();
-                if joined.is_none() {
-                    std::thread::park_timeout(POLL);
+            let Some((subscriptions, next)) = &mut joined else {
+                match Subscriptions::join(series.options, child.id()) {
+                    Ok(Some(found)) => {
+                        joined = Some((found, Instant::now() + series.schedule.pause()));
+                    }
+                    _ => std::thread::park_timeout(POLL),
                 }
                 continue;
             };
-            let next = next.get_or_insert_with(|| Instant::now() + series.schedule.pause());
             // An overdue hit waits until the robot drives.
             let due = next.checked_duration_since(Instant::now());
             let startup_hit = self.next_startup_hit();
@@ -334,9 +335,10 @@ impl Subscriptions {
     fn join(options: &Options, supervisor: u32) -> Result<Option<Self>> {
         let bus = Bus::join(&options.asked.robot.domain(), "chaos")?;
         let mut roster = Roster::open(&bus)?;
-        roster.waiter.on(bus.wakeup(&topics::DEATHS)?);
-        roster.waiter.on(bus.wakeup(&topics::HEALTH)?);
-        roster.waiter.on(bus.wakeup(&topics::COMMAND)?);
+        let wakes: [&dyn AnyTopic; 3] = [&topics::DEATHS, &topics::HEALTH, &topics::COMMAND];
+        for topic in wakes {
+            roster.waiter.on(bus.wakeup(topic)?);
+        }
         let outputs: [&dyn AnyTopic; 4] =
             [&topics::WHEELS, &topics::GRID, &topics::GUIDANCE, &topics::COMMAND];
         let outputs = outputs.iter().map(|it| Ok((it.spec().writer, it.any_reader(&bus)?)));
@@ -347,10 +349,9 @@ impl Subscriptions {
             pose: bus.reader(&topics::POSE)?,
             outputs: outputs.collect::<Result<_, BusError>>()?,
         };
-        let of_supervisor = |header: &RosterHeader, _: &[RosterEntry]| {
+        let found = subscriptions.roster.find(2 * topics::RESTATE, |header, _| {
             (header.supervisor_pid == supervisor).then_some(())
-        };
-        let found = subscriptions.roster.find(2 * topics::RESTATE, of_supervisor)?;
+        })?;
         Ok(found.map(|()| subscriptions))
     }
 }
