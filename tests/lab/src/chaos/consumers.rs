@@ -78,7 +78,6 @@ impl Consumers {
                 && let Some(cause) = process.try_reap().or_cannot("reap")?
             {
                 running.process = None;
-                running.frozen_until = None;
                 let said = log_tail(&running.said, 0);
                 let counts = report.consumer(&running.consumer.name);
                 counts.ended_by_itself += 1;
@@ -100,7 +99,7 @@ impl Consumers {
         report: &mut Report,
     ) -> Result<Option<(String, u32)>> {
         let freezes = kind == Kind::Freeze;
-        let Some(running) = self.all.get_mut(index) else { return Ok(None) };
+        let running = &mut self.all[index];
         if running.process.is_none() {
             running.start(&self.directory, report)?;
             return Ok(None);
@@ -114,7 +113,6 @@ impl Consumers {
             running.frozen_until = Some(Instant::now() + pause);
         } else {
             running.process = None;
-            running.frozen_until = None;
             running.start(&self.directory, report)?;
         }
         Ok(Some(hit))
@@ -126,16 +124,16 @@ impl Consumers {
             running.thaw();
             running.signal(Signal::TERM);
         }
-        for process in self.all.iter_mut().filter_map(|running| running.process.as_mut()) {
+        for mut process in self.all.drain(..).filter_map(|running| running.process) {
             process.end(ENDS_WITHIN);
         }
-        self.all.clear();
     }
 }
 
 impl Running {
     fn start(&mut self, directory: &Path, report: &mut Report) -> Result {
         let mut command = self.consumer.command();
+        self.frozen_until = None;
         self.starts += 1;
         if self.consumer.name == RECORD {
             command.arg("--out").arg(directory.join(format!("record-{}.mcap", self.starts)));
@@ -228,13 +226,11 @@ pub struct Arguments {
 }
 
 pub fn main(arguments: &Arguments) -> Result {
+    let Arguments { parent, words } = arguments;
     // The kernel's signal at the parent's end survives exec.
-    become_child("consumer", arguments.parent)?;
-    let Some((program, words)) = arguments.words.split_first() else {
-        return Err("give a program and its arguments".into());
-    };
-    let error = Command::new(program).args(words).exec();
-    Err(format!("cannot execute {}: {error}", program.display()).into())
+    become_child("consumer", *parent)?;
+    let error = Command::new(&words[0]).args(&words[1..]).exec();
+    Err(format!("cannot execute {}: {error}", words[0].display()).into())
 }
 
 #[cfg(test)]
