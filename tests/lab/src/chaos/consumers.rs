@@ -147,8 +147,9 @@ impl Running {
 
     /// Signals the unreaped process and its descendants.
     fn signal(&self, signal: Signal) {
-        let process = self.process.as_ref();
-        if let Some(pid) = process.and_then(|it| Pid::from_raw(it.id().cast_signed())) {
+        if let Some(process) = &self.process
+            && let Some(pid) = Pid::from_raw(process.id().cast_signed())
+        {
             let _ = kill_process_group(pid, signal);
         }
     }
@@ -174,7 +175,7 @@ impl FromStr for Consumer {
     type Err = String;
 
     fn from_str(command: &str) -> Result<Self, String> {
-        let found = || {
+        let parsed = || {
             if command.contains('\0') {
                 return Err("it contains a zero byte".to_owned());
             }
@@ -183,16 +184,15 @@ impl FromStr for Consumer {
             let mut words = words.into_iter();
             let program = words.next().ok_or("it is empty")?;
             let found = executable::find(Path::new(&program));
-            let found = found.map_err(|problem| format!("{program}: {problem}"))?;
-            Ok((found, words.collect()))
+            let program = found.map_err(|problem| format!("{program}: {problem}"))?;
+            Ok(Self { name: command.to_owned(), program, arguments: words.collect() })
         };
-        let (program, arguments) = found().map_err(|problem: String| {
+        parsed().map_err(|problem: String| {
             format!(
                 "the consumer {command:?} cannot be started: {problem}; give the path of a program, or its name on PATH, and its \
                  arguments; quote arguments with spaces (no shell reads them)"
             )
-        })?;
-        Ok(Self { name: command.to_owned(), program, arguments })
+        })
     }
 }
 
