@@ -102,20 +102,22 @@ impl Report {
     }
 
     fn add(&mut self, row: &Row) {
-        let Row { stage, kind, ready_ms, first_output_ms, .. } = row;
+        let Row { ref stage, kind, ready_ms, first_output_ms, .. } = *row;
         *match self.consumers.get_mut(stage) {
-            Some(counts) if *kind == Kind::Freeze => &mut counts.frozen,
+            Some(counts) if kind == Kind::Freeze => &mut counts.frozen,
             Some(counts) => &mut counts.killed,
-            None => self.kills.entry(stage.clone()).or_default().entry(*kind).or_default(),
+            None => self.kills.entry(stage.clone()).or_default().entry(kind).or_default(),
         } += 1;
-        if let Some(ready_ms) = ready_ms {
-            let recovery = self.recovery_ms.entry(stage.clone()).or_default();
-            let record = |histogram: &mut Histogram, ms: &f64| histogram.record((ms * 1e6) as u64);
-            if *kind == Kind::Freeze {
-                record(&mut recovery.after_freeze, ready_ms);
-            } else {
-                record(&mut recovery.ready, ready_ms);
-                first_output_ms.iter().for_each(|ms| record(&mut recovery.output, ms));
+        let Some(ready_ms) = ready_ms else { return };
+        let Recovery { ready, after_freeze, output } =
+            self.recovery_ms.entry(stage.clone()).or_default();
+        let record = |histogram: &mut Histogram, ms: f64| histogram.record((ms * 1e6) as u64);
+        if kind == Kind::Freeze {
+            record(after_freeze, ready_ms);
+        } else {
+            record(ready, ready_ms);
+            if let Some(ms) = first_output_ms {
+                record(output, ms);
             }
         }
     }
@@ -124,7 +126,7 @@ impl Report {
 /// Serializes median, 99 % quantile and maximum in milliseconds; empty without measurements.
 fn quantiles<S: Serializer>(histogram: &Histogram, to: S) -> Result<S::Ok, S::Error> {
     let us = [0.5, 0.99, 1.0].into_iter().filter_map(|share| histogram.quantile_us(share));
-    us.map(|us| rounded(us / 1e3)).collect::<Vec<_>>().serialize(to)
+    to.collect_seq(us.map(|us| rounded(us / 1e3)))
 }
 
 /// Signal; unmeasured values are empty cells.
@@ -151,7 +153,7 @@ pub struct Row {
 }
 
 pub fn ms_since(at: Instant) -> f64 {
-    (at.elapsed().as_secs_f64() * 1e6).round() / 1e3
+    rounded(at.elapsed().as_secs_f64() * 1e3)
 }
 
 pub fn create(directory: &Path) -> Result<Table<Row>> {
