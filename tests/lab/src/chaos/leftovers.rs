@@ -6,9 +6,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use ::processes::STOP_GUARD;
 use common::domain::{RobotName, SHARED_MEMORY};
 use console::robots::entries;
+use processes::STOP_GUARD;
 
 use crate::robot::command_lines;
 
@@ -17,11 +17,9 @@ const LOOK: Duration = Duration::from_millis(10);
 
 pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     let domain = robot.domain();
-    let prefix = domain.shared_memory_prefix();
-    let names = entries(SHARED_MEMORY.as_ref())
-        .map(|entry| entry.file_name().to_string_lossy().into_owned());
-    let shared = names.filter(|name| name.starts_with(&prefix));
-    let mut found: Vec<String> = shared.map(|name| format!("{SHARED_MEMORY}/{name}")).collect();
+    let own = format!("{SHARED_MEMORY}/{}", domain.shared_memory_prefix());
+    let files = entries(SHARED_MEMORY.as_ref()).map(|entry| entry.path().display().to_string());
+    let mut found: Vec<_> = files.filter(|file| file.starts_with(&own)).collect();
     let directory = directory.to_string_lossy();
     // A stop guard outlives its link until its robot rests.
     let began = Instant::now();
@@ -30,9 +28,7 @@ pub fn find(robot: &RobotName, directory: &Path) -> Vec<String> {
     }
     found.extend(lines(&directory));
     let own_directory = domain.directory();
-    if own_directory.exists() {
-        found.push(own_directory.display().to_string());
-    }
+    found.extend(own_directory.exists().then(|| own_directory.display().to_string()));
     found
 }
 

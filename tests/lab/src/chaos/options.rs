@@ -79,8 +79,6 @@ pub struct Options {
     pub directory: PathBuf,
 }
 
-const LONG_TIMEOUT: &str = "timeout_s=1800";
-
 impl Options {
     /// Creates the options and a new directory for the missions.
     ///
@@ -90,7 +88,7 @@ impl Options {
         let mut asked = asked.clone();
         if asked.freeze_all {
             // The robot's clock continues during a freeze. A user's --set comes later and wins.
-            asked.set.insert(0, LONG_TIMEOUT.to_owned());
+            asked.set.insert(0, "timeout_s=1800".to_owned());
         }
         let loaded = missions::load(&asked.mission, &asked.set)?;
         if asked.include_supervisor && loaded.robot.address.is_some() {
