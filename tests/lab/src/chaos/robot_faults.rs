@@ -6,7 +6,7 @@ use clap::ValueEnum as _;
 use common::{ground_truth::GroundTruthTick, mission::Mission};
 use console::output::write_stderr;
 use mission_control::outcome::RIGHT_PLACE_M;
-use simulation::{Disturbance, Promise, Random, Request, RobotFault, Scenario, What};
+use simulation::{Disturbance, Random, Request, RobotFault, Scenario, What};
 use summary::Summary;
 
 use super::stop_time_table::{Entry, StopTimeTable};
@@ -57,10 +57,8 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
         RobotFault::LateFromBoot => Some(Duration::ZERO),
         _ => healthy.onset(fault),
     };
-    let watched = match fault.row().promise {
-        Promise::Unharmed | Promise::EndsAtRest => WATCHED_ON_ITS_WAY,
-        _ => WATCHED,
-    };
+    let promised_s = fault.row().rest_within_s(&scenario.mission);
+    let watched = if promised_s.is_some() { WATCHED } else { WATCHED_ON_ITS_WAY };
     if let Some(at) = at {
         let mut add = |at, what| scenario.disturbances.push(Disturbance { at, what });
         add(at, What::Fault(Some(fault)));
@@ -72,28 +70,26 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
     let ran = scenario.run();
     let Scenario { seed, mission, .. } = &scenario;
     let truth = &ran.truth;
-    let (mut outcome, mut reason) = match &ran.finished {
-        Some(finished) => {
-            (finished.ending.outcome.as_str().to_owned(), finished.ending.reason.clone())
-        }
+    let (mut outcome, mut reason) = match ran.finished {
+        Some(finished) => (finished.ending.outcome.as_str(), finished.ending.reason),
         None => {
             let cause = ran.causes.last().and_then(|(_, cause)| *cause);
-            ("goes on".to_owned(), cause.map_or("", |cause| cause.name()).to_owned())
+            ("goes on", cause.map_or("", |cause| cause.name()).to_owned())
         }
     };
     let target = mission.target;
     let is_wrong =
         |tick: &GroundTruthTick| (tick.x - target.x).hypot(tick.y - target.y) > RIGHT_PLACE_M;
     if outcome == "reached" && truth.last().is_some_and(is_wrong) {
-        outcome = "wrong_place".to_owned();
+        outcome = "wrong_place";
     }
     // A robot that does not trust its pose has not said where it is.
-    let is_unsure = |summary: &Summary| summary.pose_within_m > Some(mission.sure_within_m);
-    if outcome == "wrong_place" && ran.summary.as_ref().is_some_and(is_unsure) {
-        outcome = "reached_unsure".to_owned();
+    let is_unsure = |summary: Summary| summary.pose_within_m > Some(mission.sure_within_m);
+    if outcome == "wrong_place" && ran.summary.is_some_and(is_unsure) {
+        outcome = "reached_unsure";
     }
     if let Some(broken) = ran.broken {
-        (outcome, reason) = ("broken".to_owned(), broken.to_string());
+        (outcome, reason) = ("broken", broken.to_string());
     }
     let began_s = at.unwrap_or(ran.simulated).as_secs_f64();
     // The tick before the fault counts as its start.
@@ -101,13 +97,16 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
     let watched = &truth[first.saturating_sub(1)..];
     let ways = watched.windows(2).map(|two| (two[1].x - two[0].x).hypot(two[1].y - two[0].y));
     let track_m = mission.body().track_m;
-    let turning = watched.iter().skip(1).rfind(|tick| !is_at_rest(tick, track_m));
+    let is_at_rest = |tick: &GroundTruthTick| {
+        tick.v.abs() + tick.omega.abs() * track_m / 2.0 < GroundTruthTick::AT_REST_M_S
+    };
+    let turning = watched.iter().skip(1).rfind(|tick| !is_at_rest(tick));
     let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
     let since = |then: Option<f64>| then.map_or(0.0, |then_s| (then_s - began_s).max(0.0));
     Entry {
         fault,
         seed: *seed,
-        promised_s: fault.row().rest_within_s(mission),
+        promised_s,
         fault_began: at.is_some(),
         last_moving_s: at.map(|_| since(ran.moved.map(|moved| moved.as_secs_f64()))),
         rest_s: at.map(|_| since(turning.map(|tick| tick.time_s))),
@@ -143,10 +142,6 @@ impl Healthy {
         let at_s = self.departed_s? + after_s;
         (at_s < self.ended_s).then(|| Duration::from_secs_f64(at_s))
     }
-}
-
-fn is_at_rest(tick: &GroundTruthTick, track_m: f64) -> bool {
-    tick.v.abs() + tick.omega.abs() * track_m / 2.0 < GroundTruthTick::AT_REST_M_S
 }
 
 #[cfg(test)]

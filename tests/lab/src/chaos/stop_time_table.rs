@@ -41,7 +41,7 @@ pub struct Entry {
     pub watched_s: f64,
     pub collisions: u64,
     /// Mission outcome; `goes on` if still open at the end of the watch.
-    pub outcome: String,
+    pub outcome: &'static str,
     /// Reason of the outcome. For an open mission, why the link blocks commands; empty if they
     /// pass.
     pub reason: String,
@@ -136,7 +136,7 @@ mod tests {
             way_m: 0.12,
             watched_s: 10.0,
             collisions: 0,
-            outcome: "goes on".to_owned(),
+            outcome: "goes on",
             reason: "robot lost".to_owned(),
         }
     }
@@ -154,7 +154,7 @@ mod tests {
             (Entry { fault_began: false, ..entry(Silence) }, false),
             (Entry { rest_s: Some(9.9), ..entry(CountsReset) }, true),
             (Entry { collisions: 1, ..entry(CountsReset) }, false),
-            (Entry { outcome: "wrong_place".to_owned(), ..entry(CountsReset) }, false),
+            (Entry { outcome: "wrong_place", ..entry(CountsReset) }, false),
             (Entry { collisions: 1, ..entry(RangeSilent) }, false),
             (Entry { fault_began: false, ..entry(RangeSilent) }, false),
         ];
