@@ -73,10 +73,11 @@ impl StopTimeTable {
     /// Writes the table to `file`, with `section` in the first column.
     pub fn write(&self, section: &str, file: &Path) -> Result {
         let mut writer = csv::Writer::from_path(file)?;
-        let headings = HEADINGS.map(|heading| heading.trim_start_matches('>'));
-        writer.write_record(["section"].iter().chain(&headings))?;
+        writer.write_field("section")?;
+        writer.write_record(HEADINGS.map(|heading| heading.trim_start_matches('>')))?;
         for row in self.rows() {
-            writer.write_record([section].into_iter().chain(row.iter().map(String::as_str)))?;
+            writer.write_field(section)?;
+            writer.write_record(row)?;
         }
         Ok(writer.flush()?)
     }
