@@ -4,11 +4,9 @@
 //! and load are drawn. Nothing is faulty, so every residual is one that a monitor has to accept.
 
 use std::{
-    cell::RefCell,
     collections::{BTreeMap, HashMap},
     num::NonZero,
     path::{Path, PathBuf},
-    rc::Rc,
 };
 
 use clap::Args;
@@ -203,12 +201,10 @@ fn draw(seed: u64, number: u64) -> Result<Drawn> {
 }
 
 fn residuals(scenario: &Scenario) -> Result<Vec<Residual>> {
-    let watch = Rc::new(RefCell::new(Watch::new(&scenario.mission)));
-    let ran = scenario.run_before(Some(Box::new(Rc::clone(&watch))));
+    let (ran, watch) = simulate::observe(scenario, Watch::new(&scenario.mission));
     if let Some(broken) = ran.broken {
         return Err(broken.to_string().into());
     }
-    let watch = Rc::into_inner(watch).map(RefCell::into_inner);
     let mut watch = watch.ok_or("the simulation still watches a run that has ended")?;
     watch.failed.take().map_or(Ok(()), Err).or_cannot("read the bus of a simulation")?;
     watch.judge_poses(&ran.truth);

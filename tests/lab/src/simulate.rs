@@ -185,12 +185,18 @@ fn run(scenario: &Scenario, arguments: &Arguments) -> Result<Ran> {
     Ok(ran)
 }
 
+/// Runs `scenario` before `observer`, and returns it too, unless the simulation keeps it.
+pub fn observe<T: Observer + 'static>(scenario: &Scenario, observer: T) -> (Ran, Option<T>) {
+    let observer = Rc::new(RefCell::new(observer));
+    let ran = scenario.run_before(Some(Box::new(Rc::clone(&observer))));
+    (ran, Rc::into_inner(observer).map(RefCell::into_inner))
+}
+
 /// Runs `scenario` and records it in `out`.
 pub fn record(scenario: &Scenario, out: &Path) -> Result<Ran> {
     let tape = Tape::new(&Scenario::robot(), Scenario::directory(), out.to_path_buf());
-    let recorder = Rc::new(RefCell::new(Recorder { tape, failed: Ok(()) }));
-    let ran = scenario.run_before(Some(Box::new(Rc::clone(&recorder))));
-    if let Some(Recorder { tape, failed }) = Rc::into_inner(recorder).map(RefCell::into_inner) {
+    let (ran, recorder) = observe(scenario, Recorder { tape, failed: Ok(()) });
+    if let Some(Recorder { tape, failed }) = recorder {
         failed?;
         tape.finish()?;
     }
@@ -200,11 +206,11 @@ pub fn record(scenario: &Scenario, out: &Path) -> Result<Ran> {
 /// Recorder of a simulated run. After its first error it only keeps that.
 struct Recorder {
     tape: Tape,
-    failed: std::result::Result<(), RecordingError>,
+    failed: Result<(), RecordingError>,
 }
 
 impl Recorder {
-    fn record(&mut self, act: impl FnOnce(&mut Tape) -> std::result::Result<(), RecordingError>) {
+    fn record(&mut self, act: impl FnOnce(&mut Tape) -> Result<(), RecordingError>) {
         if self.failed.is_ok() {
             self.failed = act(&mut self.tape);
         }
