@@ -21,11 +21,11 @@ use common::{
     wire::counts_between,
 };
 use console::{
-    failure::Failure,
     missions,
     output::{print_line, say},
 };
 use glam::{DMat2, DVec2};
+use serde::Serialize;
 use simulation::{Load, Observer, Random, Scenario};
 
 use crate::{
@@ -81,7 +81,7 @@ pub struct Arguments {
     jobs: Option<NonZero<usize>>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 enum Source {
     Way,
     Turn,
@@ -113,11 +113,6 @@ struct Residual {
     value: f64,
 }
 
-struct Drawn {
-    robot: &'static str,
-    scenario: Scenario,
-}
-
 pub fn main(arguments: &Arguments) -> Result {
     let Arguments { count, seed, .. } = *arguments;
     let directory = &arguments.out;
@@ -125,31 +120,21 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut rows = csv::Writer::from_path(directory.join("residuals.csv"))?;
     rows.write_record(["mission", "robot", "residual", "tick", "value"])?;
     let mut all: BTreeMap<(&str, Source), Vec<f64>> = BTreeMap::new();
-    let drive = |&number: &u64, _: usize| {
-        let _quiet = simulate::quietly();
-        let driven = draw(seed, number).and_then(|Drawn { robot, scenario }| {
-            let of_robot = |error: Failure| -> Failure {
-                format!("{robot}, {}: {error}", scenario.mission.name).into()
-            };
-            Ok((number, robot, residuals(&scenario).map_err(of_robot)?))
-        });
-        driven.map_err(|error: Failure| format!("mission {number}: {error}"))
-    };
+    let drive =
+        |&number: &u64, _: usize| (number, drive(seed, number).map_err(|error| error.to_string()));
     let mut failed = 0;
-    in_parallel((0..count).collect(), at_once(arguments.jobs), drive, |driven| {
-        let (number, robot, residuals) = match driven {
-            Ok(driven) => driven,
-            Err(error) => {
-                say(&error);
-                failed += 1;
-                return Ok(());
+    in_parallel((0..count).collect(), at_once(arguments.jobs), drive, |(number, driven)| {
+        match driven {
+            Ok((robot, residuals)) => {
+                for Residual { source, tick, value } in residuals {
+                    rows.serialize((number, robot, source, tick, format!("{value:.6}")))?;
+                    all.entry((robot, source)).or_default().push(value);
+                }
             }
-        };
-        for Residual { source, tick, value } in residuals {
-            let name = format!("{source:?}");
-            let [number, tick] = [number, tick].map(|it| it.to_string());
-            rows.write_record([&number, robot, &name, &tick, &format!("{value:.6}")])?;
-            all.entry((robot, source)).or_default().push(value);
+            Err(error) => {
+                say(format_args!("mission {number}: {error}"));
+                failed += 1;
+            }
         }
         Ok(())
     })?;
@@ -173,16 +158,22 @@ fn summarize(all: BTreeMap<(&str, Source), Vec<f64>>, file: &Path) -> Result {
         sizes.sort_by(f64::total_cmp);
         let at = |share: f64| sizes[((sizes.len() - 1) as f64 * share) as usize];
         let figures = [mean, at(0.5), at(0.99), at(0.999), at(1.0)];
-        let count = values.len().to_string();
         let figures = figures.map(|figure| format!("{figure:.4}"));
-        let row = ["corpus", source.name(), robot, &count].into_iter();
-        summary.write_record(row.chain(figures.iter().map(String::as_str)))?;
+        summary.serialize(("corpus", source.name(), robot, values.len(), figures))?;
     }
     Ok(summary.flush()?)
 }
 
-/// Draws a mission.
-fn draw(seed: u64, number: u64) -> Result<Drawn> {
+/// Drives a drawn mission. Returns the robot and its residuals.
+fn drive(seed: u64, number: u64) -> Result<(&'static str, Vec<Residual>)> {
+    let _quiet = simulate::quietly();
+    let (robot, scenario) = draw(seed, number)?;
+    let residuals = residuals(&scenario);
+    Ok((robot, residuals.map_err(|it| format!("{robot}, {}: {it}", scenario.mission.name))?))
+}
+
+/// Draws a robot and its mission.
+fn draw(seed: u64, number: u64) -> Result<(&'static str, Scenario)> {
     let random = &mut Random::of_world(seed, STREAM, number);
     let (robot, keys) = ROBOTS[random.below(ROBOTS.len())];
     let mut keys: Vec<String> = keys.iter().map(ToString::to_string).collect();
@@ -197,7 +188,7 @@ fn draw(seed: u64, number: u64) -> Result<Drawn> {
     mission.seed = random.bits() >> 1;
     let loads = [Load::IDLE, Load::BUSY, Load::OVERLOADED];
     let load = loads[random.below(loads.len())];
-    Ok(Drawn { robot, scenario: Scenario { load, ..Scenario::calm(&mission) } })
+    Ok((robot, Scenario { load, ..Scenario::calm(&mission) }))
 }
 
 fn residuals(scenario: &Scenario) -> Result<Vec<Residual>> {
