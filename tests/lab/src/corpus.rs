@@ -13,12 +13,14 @@ use clap::Args;
 use common::{
     bus::{Bus, BusError, Reader},
     ground_truth::GroundTruthTick,
-    mission::{Mission, ModelledSpeed, Sensor, SensorKind},
+    mission::{Body, Mission, ModelledSpeed, Sensor, SensorKind},
+    readers,
     samples::{
         CommandSample, FixSample, PoseSample, RangeReading, RangeStatus, RangesHeader, TurnSample,
     },
     topics,
     wire::counts_between,
+    wiring::Readers as _,
 };
 use console::{
     missions,
@@ -204,7 +206,7 @@ fn residuals(scenario: &Scenario) -> Result<Vec<Residual>> {
 
 impl Observer for Watch {
     fn on_bus(&mut self, bus: &Bus) {
-        match Readers::open(bus) {
+        match Inputs::open_readers(bus) {
             Ok(readers) => self.readers = Some(readers),
             Err(error) => self.failed = Some(error),
         }
@@ -220,35 +222,25 @@ impl Observer for Watch {
     }
 }
 
-struct Readers {
-    command: Reader<CommandSample>,
-    pose: Reader<PoseSample>,
-    turn: Reader<TurnSample>,
-    fix: Reader<FixSample>,
-    ranges: Reader<RangesHeader, RangeReading>,
-}
-
-impl Readers {
-    fn open(bus: &Bus) -> std::result::Result<Self, BusError> {
-        Ok(Self {
-            command: bus.reader(&topics::COMMAND)?,
-            pose: bus.reader(&topics::POSE)?,
-            turn: bus.reader(&topics::IMU_TURN)?,
-            fix: bus.reader(&topics::SCAN_FIX)?,
-            ranges: bus.reader(&topics::RANGES)?,
-        })
+readers! {
+    struct Inputs {
+        inputs {
+            command: Reader<CommandSample> = topics::COMMAND,
+            pose: Reader<PoseSample> = topics::POSE,
+            turn: Reader<TurnSample> = topics::IMU_TURN,
+            fix: Reader<FixSample> = topics::SCAN_FIX,
+            ranges: Reader<RangesHeader, RangeReading> = topics::RANGES,
+        }
     }
 }
 
 /// Residuals of a run.
 struct Watch {
-    readers: Option<Readers>,
+    readers: Option<Inputs>,
     failed: Option<BusError>,
     found: Vec<Residual>,
     sensors: Vec<Sensor>,
-    metres_per_count: f64,
-    wheel_radius_m: f64,
-    track_m: f64,
+    body: Body,
     tick_s: f64,
     /// Forward speed and turn rate by the stated response.
     base: [ModelledSpeed; 2],
@@ -269,9 +261,7 @@ impl Watch {
             failed: None,
             found: Vec::new(),
             sensors: mission.sensor_table(),
-            metres_per_count: body.metres_per_count(),
-            wheel_radius_m: body.wheel_radius_m,
-            track_m: body.track_m,
+            body,
             tick_s: 1.0 / mission.robot.rate_hz,
             base: [response.acceleration_m_s2, response.turn_acceleration_rad_s2].map(axis),
             poses: Vec::new(),
@@ -286,12 +276,13 @@ impl Watch {
         }
     }
 
-    fn take(&mut self, readers: &mut Readers) -> std::result::Result<(), BusError> {
+    fn take(&mut self, readers: &mut Inputs) -> Result<(), BusError> {
         while let Some(command) = readers.command.next_sample()? {
-            let at_s = seconds(command.stamp.stamp_ns);
+            let at_s = command.stamp.seconds();
             let [left, right] = [command.left_rad_s, command.right_rad_s];
-            self.base[0].command(at_s, self.wheel_radius_m * f64::midpoint(left, right));
-            self.base[1].command(at_s, self.wheel_radius_m * (right - left) / self.track_m);
+            let Body { wheel_radius_m, track_m, .. } = self.body;
+            self.base[0].command(at_s, wheel_radius_m * f64::midpoint(left, right));
+            self.base[1].command(at_s, wheel_radius_m * (right - left) / track_m);
         }
         while let Some(pose) = readers.pose.next_sample()? {
             self.on_pose(pose);
@@ -317,14 +308,16 @@ impl Watch {
     }
 
     fn on_pose(&mut self, pose: PoseSample) {
-        let at_s = seconds(pose.stamp.stamp_ns);
+        let at_s = pose.stamp.seconds();
         let [way, turn] = self.base.each_mut().map(|axis| axis.go_on(at_s));
         if let Some(before) = self.poses.last() {
-            let for_s = at_s - seconds(before.stamp.stamp_ns);
+            let for_s = at_s - before.stamp.seconds();
             let tick = pose.stamp.tick;
-            let left = self.metres(before.left_counts, pose.left_counts);
-            let right = self.metres(before.right_counts, pose.right_counts);
-            let wheels = (right - left) / self.track_m;
+            let per_count_m = self.body.metres_per_count();
+            let metres = |from, to| f64::from(counts_between(from, to)) * per_count_m;
+            let left = metres(before.left_counts, pose.left_counts);
+            let right = metres(before.right_counts, pose.right_counts);
+            let wheels = (right - left) / self.body.track_m;
             self.find(Source::Interval, tick, for_s - self.tick_s);
             if for_s < LONGEST_S {
                 if let Some(gyro) = self.gyro.remove(&pose.stamp.stamp_ns) {
@@ -337,10 +330,6 @@ impl Watch {
         self.poses.push(pose);
     }
 
-    fn metres(&self, from: u16, to: u16) -> f64 {
-        f64::from(counts_between(from, to)) * self.metres_per_count
-    }
-
     /// Compares an echo with the last one of its sensor.
     fn on_echo(&mut self, tick: u64, reading: &RangeReading) {
         let Some(sensor) = self.sensors.get(usize::from(reading.sensor)) else { return };
@@ -350,7 +339,7 @@ impl Watch {
         let last = self.echoes.insert(reading.sensor, (now, reading.range_m));
         let Some((before, range_m)) = last else { return };
         let [before, now] = [before, now].map(|at| &self.poses[at]);
-        let moved = DVec2::new(now.x_m - before.x_m, now.y_m - before.y_m);
+        let moved = now.pose().position - before.pose().position;
         let nearer_m = moved.dot(DVec2::from_angle(now.heading_rad + axis));
         let off_m = reading.range_m - (range_m - nearer_m);
         let turned_rad = (now.heading_rad - before.heading_rad).abs();
@@ -375,10 +364,6 @@ impl Watch {
             self.find(Source::Pose, pose.stamp.tick, error);
         }
     }
-}
-
-fn seconds(nanoseconds: u64) -> f64 {
-    nanoseconds as f64 * 1e-9
 }
 
 /// Returns the covariance of x and y, of which a millimetre each is not asked.
