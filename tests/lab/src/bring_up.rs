@@ -10,7 +10,7 @@ use std::{
 
 use clap::{Args, builder::PossibleValuesParser};
 use common::clock::Pace;
-use console::{missions, output::print_text};
+use console::{missions, output::print_line};
 use mission_control::surroundings::SimulatedRobot as _;
 use processes::process::Process;
 use serde::Deserialize;
@@ -130,14 +130,15 @@ pub fn main(arguments: &Arguments) -> Result {
     in_parallel((0..all).collect(), arguments.jobs.max(1), one, |(is_right, line)| {
         right += u64::from(is_right);
         if !is_right {
-            print_text(format!("{line}\n"))?;
+            print_line(line)?;
         }
         Ok(())
     })?;
-    print_text(format!("findings of {right} of {all} robots are right\n"))?;
-    (right == all)
-        .then_some(())
-        .ok_or_else(|| "the findings missed a fault or named one that does not exist".into())
+    print_line(format!("findings of {right} of {all} robots are right"))?;
+    if right == all {
+        return Ok(());
+    }
+    Err("the findings missed a fault or named one that does not exist".into())
 }
 
 fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, String)> {

@@ -76,7 +76,7 @@ fn text(report: &impl Serialize) -> String {
 
 fn print(report: &impl Serialize, json: bool) -> error::Result {
     let text = if json { serde_json::to_string(report)? } else { text(report) };
-    console::output::print_text(format!("{text}\n"))
+    console::output::print_line(text)
 }
 
 pub fn main() -> ExitCode {
@@ -93,12 +93,14 @@ fn execute(arguments: &Arguments) -> error::Result<ExitCode> {
         Command::Corpus(arguments) => corpus::main(arguments),
         Command::Field(arguments) => field::main(arguments),
         Command::Stage(arguments) => baselines::process::main(arguments),
-        Command::Bench(Bench::Tick(arguments)) => tick::main(arguments),
-        Command::Bench(Bench::Chaos(arguments)) => return chaos::main(arguments),
-        Command::Bench(Bench::BringUp(arguments)) => bring_up::main(arguments),
-        Command::Bench(Bench::Consumer(arguments)) => chaos::consumers::main(arguments),
-        Command::Bench(Bench::Ros2Robot(arguments)) => ros2_robot::main(arguments),
-        Command::Bench(Bench::Sources(arguments)) => sources::main(arguments),
+        Command::Bench(bench) => match bench {
+            Bench::Tick(arguments) => tick::main(arguments),
+            Bench::Chaos(arguments) => return chaos::main(arguments),
+            Bench::BringUp(arguments) => bring_up::main(arguments),
+            Bench::Consumer(arguments) => chaos::consumers::main(arguments),
+            Bench::Ros2Robot(arguments) => ros2_robot::main(arguments),
+            Bench::Sources(arguments) => sources::main(arguments),
+        },
     };
     Ok(done?.report())
 }
