@@ -2,7 +2,7 @@
 
 use std::{fmt::Display, path::Path};
 
-pub use console::failure::{Failure, Refused, Result};
+pub use console::failure::{Failure, Result, refuse};
 
 pub trait OrCannot<T>: Sized {
     fn or_cannot(self, action: &str) -> Result<T>;

@@ -19,16 +19,16 @@ use processes::{
 };
 use summary::Summary;
 
-use crate::error::{OrCannot as _, Refused, Result};
+use crate::error::{OrCannot as _, Result, refuse};
 
 /// Returns the path of `firsthand`, beside this executable or on `PATH`.
 ///
 /// # Errors
 /// It is at neither place.
-pub fn path() -> Result<PathBuf, Refused> {
-    executable::find(Path::new("firsthand")).map_err(|problem| {
+pub fn path() -> Result<PathBuf> {
+    executable::find(Path::new("firsthand")).or_else(|problem| {
         let build = "build it with `cargo build --release`";
-        Refused::new("not-built", format!("firsthand: {problem}; {build}"))
+        refuse("not-built", format!("firsthand: {problem}; {build}"))
     })
 }
 

@@ -20,7 +20,7 @@ use common::{
 use processes::stages::PLANNER;
 
 use super::planner::Baseline;
-use crate::error::{Refused, Result};
+use crate::error::{Result, refuse};
 
 pub const BASELINES: &[&str] = &["wavefront"];
 
@@ -36,7 +36,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let name = &*arguments.name;
     if !BASELINES.contains(&name) {
         let message = format!("unknown comparison planner {name:?}; give wavefront");
-        return Err(Refused::new("unknown-stage", message).into());
+        return refuse("unknown-stage", message);
     }
     Ok(run_stage::<Shell>(&stage_command::start_with(PLANNER, arguments.options.iter().cloned())?)?)
 }

@@ -21,7 +21,7 @@ use rustix::process::{Pid, Signal, kill_process_group};
 
 use super::{options, report::Report, schedule::Kind};
 use crate::{
-    error::{OrCannot as _, Refused, Result},
+    error::{OrCannot as _, Result},
     robot,
 };
 
@@ -197,7 +197,7 @@ impl FromStr for Consumer {
 }
 
 impl Consumer {
-    pub fn own(robot: &RobotName) -> Result<[Self; 3], Refused> {
+    pub fn own(robot: &RobotName) -> Result<[Self; 3]> {
         let program = robot::path()?;
         let own = |(name, words): (&str, &str)| Self {
             name: name.to_owned(),

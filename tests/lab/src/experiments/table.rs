@@ -5,7 +5,7 @@ use console::missions;
 use serde::Deserialize;
 
 use crate::{
-    error::{Refused, Result},
+    error::{Result, refuse},
     missions::trial::{Trial, swept_m},
 };
 
@@ -57,7 +57,7 @@ pub fn named(names: &[String]) -> Result<Vec<Experiment>> {
         let known: Vec<_> = table.into_iter().map(|it| it.name).collect();
         let known = known.join(", ");
         let unknown = format!("unknown experiment {name:?}; give some of {known}");
-        return Err(Refused::new("unknown-experiment", unknown).into());
+        return refuse("unknown-experiment", unknown);
     }
     table.retain(|it| names.is_empty() || names.contains(&it.name));
     Ok(table)

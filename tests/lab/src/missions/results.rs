@@ -10,7 +10,7 @@ use common::file::replace;
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::row::{Latency, Row};
-use crate::error::{OrCannot as _, Refused, Result};
+use crate::error::{OrCannot as _, Result, refuse};
 
 const PLAN_FILE: &str = "plan.txt";
 
@@ -51,13 +51,13 @@ impl Results {
                 let taken = format!(
                     "{named} contains results; continue them with --resume, or give another --out"
                 );
-                return Err(Refused::new("results-there", taken).into());
+                return refuse("results-there", taken);
             }
             if earlier != command {
                 let other = format!(
                     "--resume: {named} has results of another command, `{earlier}`; give another --out"
                 );
-                return Err(Refused::new("other-results", other).into());
+                return refuse("other-results", other);
             }
         } else {
             fs::create_dir_all(directory).or_cannot(&use_it)?;
