@@ -6,7 +6,7 @@
 mod recordings;
 
 use std::{
-    fs,
+    fs, iter,
     num::NonZero,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -15,9 +15,8 @@ use std::{
 
 use clap::Args;
 use common::{ground_truth::GROUND_TRUTH, mission::Waypoint, poll};
-use console::{missions, output::print_line};
+use console::{missions, output::print_line, runs};
 use mission_control::recovery::SUMMARY;
-use processes::records;
 use recording::Recording;
 use rustix::process::Signal;
 use serde_json::{Map, Value};
@@ -87,8 +86,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let mut differ = 0;
     let drive = |(number, trial): &(u64, Trial), thread| {
         let seed = seed.wrapping_add(*number);
-        let targets = arguments.stay.then_some(TARGETS);
-        let job = Job { arguments, directory, trial, seed, targets, thread };
+        let job = Job { arguments, directory, trial, seed, thread };
         let compared = job.compare().map_err(|error| error.to_string());
         (trial.mission.name.clone(), compared)
     };
@@ -112,8 +110,6 @@ struct Job<'a> {
     directory: &'a Path,
     trial: &'a Trial,
     seed: u64,
-    /// Number of the mission's targets, if the robot stays.
-    targets: Option<usize>,
     thread: usize,
 }
 
@@ -125,7 +121,7 @@ impl Job<'_> {
         fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
         mission.seed = self.seed;
         let mut sent_to = Vec::new();
-        if self.targets.is_some() {
+        if self.arguments.stay {
             let waypoint = |at| Waypoint { at, heading_deg: None };
             mission.stay = true;
             mission.targets = [mission.target, mission.start.at].map(waypoint).to_vec();
@@ -168,9 +164,10 @@ impl Job<'_> {
         let mut command = robot::mission("run", file, &name, &self.arguments.set);
         command.args(["--pace", "max", "--out"]).arg(directory);
         let mut run = Run::start(command, directory, true)?;
-        let (mut sent_to, mut targets) = (sent_to.iter(), self.targets);
+        let mut sent_to = sent_to.iter();
+        let mut targets = self.arguments.stay.then_some(TARGETS);
         while run.process.try_reap().or_cannot("reap a mission")?.is_none() {
-            if targets.is_some_and(|targets| results(directory) >= targets) {
+            if targets.is_some_and(|targets| runs::targets(directory).len() >= targets) {
                 targets = match sent_to.next() {
                     // The robot has another target, unless it refused this one.
                     Some(place) => targets.map(|it| it + usize::from(send(&name, place))),
@@ -190,11 +187,6 @@ impl Job<'_> {
         let truth = read(GROUND_TRUTH)?.lines().map(str::to_owned).collect();
         Ok(Way { summary: numbers(&read(SUMMARY)?)?, truth })
     }
-}
-
-/// Returns the number of targets with a result.
-fn results(run: &Path) -> usize {
-    fs::read_to_string(run.join(records::TARGETS)).map_or(0, |text| text.lines().count())
 }
 
 /// Sends a robot to another target. Returns whether it took it.
@@ -237,10 +229,9 @@ impl Way {
                 return Some(format!("summary, {key}: {one} and {many}"));
             }
         }
-        let missing = String::new();
-        let lines = (0..self.truth.len())
-            .map(|at| (at, &self.truth[at], other.truth.get(at).unwrap_or(&missing)));
-        let mut unequal = lines.filter(|(_, one, many)| one != many);
-        unequal.next().map(|(at, one, many)| format!("ground truth {at}: {one} and {many}"))
+        let others = other.truth.iter().map(String::as_str).chain(iter::repeat(""));
+        let mut lines = self.truth.iter().zip(others).enumerate();
+        let (at, (one, many)) = lines.find(|(_, (one, many))| one != many)?;
+        Some(format!("ground truth {at}: {one} and {many}"))
     }
 }
