@@ -120,17 +120,17 @@ impl Job<'_> {
         let directory = self.directory.join(&mission.name);
         fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
         mission.seed = self.seed;
-        let mut sent_to = Vec::new();
+        let mut sent_to = None;
         if self.arguments.stay {
             let waypoint = |at| Waypoint { at, heading_deg: None };
             mission.stay = true;
             mission.targets = [mission.target, mission.start.at].map(waypoint).to_vec();
-            sent_to.push(mission.target.into());
+            sent_to = Some(mission.target.into());
         }
         let file = directory.join("world.toml");
         fs::write(&file, toml::to_string(&mission)?).or_cannot_file("write", &file)?;
-        let one = self.in_one_process(&file, &directory, &sent_to)?;
-        let many = self.through_processes(&file, &directory.join(PROCESSES), &sent_to)?;
+        let one = self.in_one_process(&file, &directory, sent_to)?;
+        let many = self.through_processes(&file, &directory.join(PROCESSES), sent_to)?;
         let mut difference = one.difference(&many);
         if difference.is_none() {
             let one_process = Recording::open(&directory.join(ONE_PROCESS))?;
@@ -143,9 +143,14 @@ impl Job<'_> {
         Ok(difference)
     }
 
-    fn in_one_process(&self, file: &Path, directory: &Path, sent_to: &[[f64; 2]]) -> Result<Way> {
+    fn in_one_process(
+        &self,
+        file: &Path,
+        directory: &Path,
+        sent_to: Option<[f64; 2]>,
+    ) -> Result<Way> {
         let mission = missions::load(&file.to_string_lossy(), &self.arguments.set)?;
-        let while_waiting = sent_to.iter().copied().map(Request::Goto).collect();
+        let while_waiting = sent_to.map(Request::Goto).into_iter().collect();
         let scenario = Scenario { while_waiting, ..Scenario::lockstep(&mission) };
         let ran = simulate::record(&scenario, &directory.join(ONE_PROCESS))?;
         let broken = ran.broken.map_or(String::new(), |broken| broken.to_string());
@@ -158,17 +163,16 @@ impl Job<'_> {
         &self,
         file: &Path,
         directory: &Path,
-        sent_to: &[[f64; 2]],
+        mut sent_to: Option<[f64; 2]>,
     ) -> Result<Way> {
         let name = format!("both-ways{}-{}", std::process::id(), self.thread);
         let mut command = robot::mission("run", file, &name, &self.arguments.set);
         command.args(["--pace", "max", "--out"]).arg(directory);
         let mut run = Run::start(command, directory, true)?;
-        let mut sent_to = sent_to.iter();
         let mut targets = self.arguments.stay.then_some(TARGETS);
         while run.process.try_reap().or_cannot("reap a mission")?.is_none() {
             if targets.is_some_and(|targets| runs::targets(directory).len() >= targets) {
-                targets = match sent_to.next() {
+                targets = match sent_to.take() {
                     // The robot has another target, unless it refused this one.
                     Some(place) => targets.map(|it| it + usize::from(send(&name, place))),
                     None => {
@@ -190,8 +194,8 @@ impl Job<'_> {
 }
 
 /// Sends a robot to another target. Returns whether it took it.
-fn send(robot: &str, [x, y]: &[f64; 2]) -> bool {
-    let [x, y] = [x, y].map(f64::to_string);
+fn send(robot: &str, place: [f64; 2]) -> bool {
+    let [x, y] = place.map(|it| it.to_string());
     let sent = robot::firsthand(&["goto", "--robot", robot, &x, &y]).output();
     sent.is_ok_and(|sent| sent.status.success())
 }
