@@ -25,7 +25,7 @@ use simulation::{Request, Scenario};
 use crate::{
     error::{OrCannot as _, Result},
     missions::{
-        runner::{at_once, in_parallel},
+        runner::in_parallel,
         trial::{Trial, swept_m},
     },
     robot::{self, Run},
@@ -90,7 +90,7 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         let compared = job.compare().map_err(|error| error.to_string());
         (trial.mission.name.clone(), compared)
     };
-    in_parallel(jobs, at_once(arguments.jobs), drive, |(world, compared)| {
+    in_parallel(jobs, arguments.jobs, drive, |(world, compared)| {
         if let Some(difference) = compared.map_err(|error| format!("{world}: {error}"))? {
             differ += 1;
             print_line(format!("{world}: {difference}"))?;

@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeSet,
     fs::{self, File},
+    num::NonZero,
     path::PathBuf,
     process::Stdio,
     time::{Duration, Instant},
@@ -126,7 +127,8 @@ pub fn main(arguments: &Arguments) -> Result {
     let one = |number: &u64, _| {
         one(arguments, &table, *number).unwrap_or_else(|why| (false, format!("failed: {why}")))
     };
-    in_parallel((0..all).collect(), arguments.jobs.max(1), one, |(is_right, line)| {
+    let jobs = NonZero::new(arguments.jobs.max(1));
+    in_parallel((0..all).collect(), jobs, one, |(is_right, line)| {
         if !is_right {
             return print_line(line);
         }

@@ -32,10 +32,7 @@ use simulation::{Load, Observer, Random, Scenario};
 
 use crate::{
     error::{OrCannot as _, Result},
-    missions::{
-        runner::{at_once, in_parallel},
-        trial::swept_m,
-    },
+    missions::{runner::in_parallel, trial::swept_m},
     simulate,
     worlds::{self, Asked},
 };
@@ -125,7 +122,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let drive =
         |&number: &u64, _: usize| (number, drive(seed, number).map_err(|error| error.to_string()));
     let mut failed = 0;
-    in_parallel((0..count).collect(), at_once(arguments.jobs), drive, |(number, driven)| {
+    in_parallel((0..count).collect(), arguments.jobs, drive, |(number, driven)| {
         match driven {
             Ok((robot, residuals)) => {
                 for Residual { source, tick, value } in residuals {

@@ -117,7 +117,6 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
         }
     }
     let first = all - left.len();
-    let threads = at_once(plan.jobs);
     let (began, mut ended, mut line) = (Instant::now(), 0, ProgressLine::new(LINE_EVERY));
     let run = |job: &Job<'_>, thread| {
         let ended = match job.run(thread) {
@@ -128,7 +127,7 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
         };
         ended.map_err(|error| error.to_string())
     };
-    let kept = in_parallel(left, threads, run, |given| {
+    let kept = in_parallel(left, plan.jobs, run, |given| {
         for (row, latency) in given? {
             // Latencies come first, so that a mission with a row has both.
             latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
@@ -155,21 +154,18 @@ fn world_file(directory: &Path, world: &str) -> PathBuf {
     directory.join("worlds").join(format!("{world}.toml"))
 }
 
-/// Returns the number of missions at once; by default one per processor.
-pub fn at_once(jobs: Option<NonZero<usize>>) -> usize {
-    jobs.or(thread::available_parallelism().ok()).map_or(1, NonZero::get)
-}
-
-/// Runs `jobs` on numbered threads, and takes results in order of completion.
+/// Runs `jobs` on numbered threads, by default one per processor, and takes results in order of
+/// completion.
 ///
 /// # Errors
 /// Returns the first error of `take`; no further job begins.
 pub fn in_parallel<Job: Send, Done: Send>(
     jobs: Vec<Job>,
-    threads: usize,
+    threads: Option<NonZero<usize>>,
     work: impl Fn(&Job, usize) -> Done + Sync,
     take: impl FnMut(Done) -> Result,
 ) -> Result {
+    let threads = threads.or(thread::available_parallelism().ok()).map_or(1, NonZero::get);
     let (queue, (give, results)) = (Mutex::new(jobs.into_iter()), channel());
     thread::scope(|scope| {
         for number in 0..threads {
