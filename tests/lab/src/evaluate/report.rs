@@ -12,7 +12,7 @@ use crate::{
         results::Results,
         row::{OUTCOMES, Outcome, Row, spread},
         runner,
-        statistics::{Estimate, mean, median, paired_difference, rounded, share},
+        statistics::{mean, median, paired_difference, rounded, share},
     },
 };
 
@@ -37,12 +37,10 @@ const METRICS: [&str; 9] = [
 ];
 
 pub fn report(settings: &[Setting], rows: &[Row]) -> Value {
-    let mut report = totals(&settings[0].name, rows);
-    let others = settings.iter().skip(1);
-    let others = others.map(|other| versus(&settings[0].name, &other.name, rows));
-    let others: Vec<Value> = others.collect();
+    let (first, others) = (&settings[0].name, &settings[1..]);
+    let mut report = totals(first, rows);
     if !others.is_empty() {
-        report["versus"] = others.into();
+        report["versus"] = others.iter().map(|other| versus(first, &other.name, rows)).collect();
     }
     report
 }
@@ -53,7 +51,7 @@ fn totals(setting: &str, rows: &[Row]) -> Value {
     let mut add = |name: &str, counts: &dyn Fn(&Row) -> bool| {
         let share = share(rows.iter().filter(|row| counts(row)).count(), rows.len());
         totals[name] = share.value.into();
-        totals["intervals"][name] = interval(share).into();
+        totals["intervals"][name] = [share.low, share.high].map(rounded).into();
     };
     OUTCOMES.into_iter().for_each(|name| add(name, &|row| row.outcome_name() == name));
     add(AT_FAULT, &Row::is_at_fault);
@@ -71,10 +69,6 @@ fn totals(setting: &str, rows: &[Row]) -> Value {
     totals
 }
 
-fn interval(of: Estimate) -> Vec<f64> {
-    [of.low, of.high].map(rounded).to_vec()
-}
-
 fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
     let of = |setting| -> BTreeMap<_, &Row> {
         let its = rows.iter().filter(|row| row.setting == setting);
@@ -87,7 +81,7 @@ fn versus(from: &str, to: &str, rows: &[Row]) -> Value {
         let gained = pairs.iter().filter(|(a, b)| has(b) && !has(a)).count();
         let lost = pairs.iter().filter(|(a, b)| has(a) && !has(b)).count();
         let change = paired_difference(gained, lost, pairs.len());
-        [vec![rounded(change.value)], interval(change)].concat()
+        [change.value, change.low, change.high].map(rounded)
     };
     let both = pairs.iter().filter(|(a, b)| a.is_success() && b.is_success());
     let mut versus = json!({
