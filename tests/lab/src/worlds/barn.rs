@@ -13,7 +13,7 @@ use glam::DVec2;
 use serde::{Deserialize, de::DeserializeOwned};
 
 use super::{
-    files::{malformed, unreadable},
+    files::{malformed, text, unreadable},
     shapes::{drum, wall, walls},
 };
 use crate::{
@@ -61,9 +61,7 @@ pub fn table(file: &Path) -> Result<Vec<World>> {
 }
 
 pub fn gazebo(file: &Path) -> Result<World> {
-    let mut text = String::new();
-    open(file)?.take(LONGEST).read_to_string(&mut text).map_err(unreadable(file))?;
-    let drums = cylinders(&text).ok_or_else(|| {
+    let drums = cylinders(&text(file, LONGEST)?).ok_or_else(|| {
         malformed(file, "the file has no <model> with a <pose> and a <cylinder>; give a BARN world")
     })?;
     let name = file.file_stem().unwrap_or_default().display();
@@ -112,14 +110,12 @@ pub const RULES: Rules = Rules {
     optimal_time_s: None,
 };
 
-fn open(file: &Path) -> Result<Box<dyn Read>> {
+fn rows<T: DeserializeOwned>(file: &Path) -> Result<Vec<T>> {
     let opened = File::open(file).map_err(unreadable(file))?;
     let zipped = file.extension().is_some_and(|extension| extension == "gz");
-    Ok(if zipped { Box::new(flate2::read::GzDecoder::new(opened)) } else { Box::new(opened) })
-}
-
-fn rows<T: DeserializeOwned>(file: &Path) -> Result<Vec<T>> {
-    crate::rows(open(file)?.take(LONGEST)).map_err(|error| match error.kind() {
+    let table: Box<dyn Read> =
+        if zipped { Box::new(flate2::read::GzDecoder::new(opened)) } else { Box::new(opened) };
+    crate::rows(table.take(LONGEST)).map_err(|error| match error.kind() {
         csv::ErrorKind::Io(_) => unreadable(file)(error),
         _ => malformed(file, error),
     })

@@ -8,11 +8,11 @@
 //! and `initial_pose_y`, `initial_pose_a` (radians), `goal_pose_x`, `goal_pose_y`. The goal's
 //! heading is unused.
 
-use std::{fs::File, io::Read as _, path::Path};
+use std::path::Path;
 
 use glam::DVec2;
 
-use super::files::{malformed, unreadable};
+use super::files::{malformed, text};
 use crate::error::Result;
 
 /// Such a file has some twenty short lines.
@@ -34,11 +34,7 @@ pub fn read(file: &Path) -> Result<Vec<Ends>> {
     if !file.is_file() {
         return Err(malformed(file, "not a regular file; give MRPB's tests"));
     }
-    let mut text = String::new();
-    File::open(file)
-        .and_then(|opened| opened.take(LONGEST).read_to_string(&mut text))
-        .map_err(unreadable(file))?;
-    parse(&text).map_err(|problem| malformed(file, problem))
+    parse(&text(file, LONGEST)?).map_err(|problem| malformed(file, problem))
 }
 
 /// Allows up to 1000 km.

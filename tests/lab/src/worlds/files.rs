@@ -3,7 +3,8 @@
 use std::{
     collections::BTreeSet,
     fmt::Display,
-    fs, io,
+    fs::{self, File},
+    io::{self, Read as _},
     path::{Path, PathBuf},
 };
 
@@ -30,6 +31,15 @@ pub fn unreadable<E: Display>(file: &Path) -> impl Fn(E) -> Failure {
     move |cause| {
         format!("cannot read {file}: {cause}; give a kind of world, a file or a folder (`firsthand help evaluation`)").into()
     }
+}
+
+/// Returns the first `longest` bytes of a text file.
+pub fn text(file: &Path, longest: u64) -> Result<String> {
+    let mut text = String::new();
+    File::open(file)
+        .and_then(|opened| opened.take(longest).read_to_string(&mut text))
+        .map_err(unreadable(file))?;
+    Ok(text)
 }
 
 pub fn malformed(file: &Path, problem: impl Display) -> Failure {
