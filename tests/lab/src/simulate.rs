@@ -18,7 +18,7 @@ use recording::{
     replay::{Options, replay},
 };
 use serde::Serialize;
-use simulation::{Broken, Observer, Ran, Scenario};
+use simulation::{Observer, Ran, Scenario};
 use tracing::subscriber::{DefaultGuard, NoSubscriber, set_default};
 
 use crate::error::{OrCannot as _, Result};
@@ -147,7 +147,10 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
             print_line(format!("seed {seed}: {outcome:?} after {} events", ran.events))?;
         }
         if let Some(broken) = ran.broken {
-            report(&scenario, &broken, arguments)?;
+            print_line(format!("simulation: seed {} at {VERSION}: {broken}", scenario.seed))?;
+            if arguments.shrink {
+                show(&scenario.shrink(&broken))?;
+            }
         }
     }
     let seconds = began.elapsed().as_secs_f64();
@@ -231,14 +234,6 @@ fn show(scenario: &Scenario) -> Result {
     print_line(format!("load {:?}", scenario.load))?;
     for disturbance in &scenario.disturbances {
         print_line(disturbance.to_string())?;
-    }
-    Ok(())
-}
-
-fn report(scenario: &Scenario, broken: &Broken, arguments: &Arguments) -> Result {
-    print_line(format!("simulation: seed {} at {VERSION}: {broken}", scenario.seed))?;
-    if arguments.shrink {
-        show(&scenario.shrink(broken))?;
     }
     Ok(())
 }
