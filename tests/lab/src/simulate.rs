@@ -3,7 +3,6 @@
 use std::{
     cell::RefCell,
     env,
-    fs::File,
     path::{Path, PathBuf},
     process::ExitCode,
     rc::Rc,
@@ -11,13 +10,12 @@ use std::{
 };
 
 use clap::Args;
-use common::{VERSION, bus::Bus};
+use common::{VERSION, bus::Bus, file::append};
 use console::{missions, output::print_line};
 use recording::{
     Recording, RecordingError, Tape,
     replay::{Options, replay},
 };
-use serde::Serialize;
 use simulation::{Observer, Ran, Scenario};
 use tracing::subscriber::{DefaultGuard, NoSubscriber, set_default};
 
@@ -83,41 +81,38 @@ impl Totals {
     /// Appends a row to `file`, and the header if the file is new.
     fn append(&self, arguments: &Arguments, first: u64, minutes: f64, file: &Path) -> Result {
         let is_new = !file.exists();
-        let file =
-            File::options().create(true).append(true).open(file).or_cannot("open the rows")?;
-        let mut writer = csv::WriterBuilder::new().has_headers(is_new).from_writer(file);
-        writer.serialize(Row {
-            section: "seeds",
-            mission: &arguments.mission,
+        let mut writer = csv::Writer::from_writer(append(file).or_cannot("open the rows")?);
+        if is_new {
+            writer.write_record(COLUMNS)?;
+        }
+        writer.serialize((
+            "seeds",
+            &arguments.mission,
             first,
-            runs: arguments.count,
-            broken: self.broken,
-            disturbances: self.disturbances,
-            supervisors_killed: self.supervisors_killed,
-            events: self.events,
-            hours: format!("{:.1}", self.simulated_s / 3600.0),
-            minutes: format!("{minutes:.1}"),
-        })?;
+            arguments.count,
+            self.broken,
+            self.disturbances,
+            self.supervisors_killed,
+            self.events,
+            format!("{:.1}", self.simulated_s / 3600.0),
+            format!("{minutes:.1}"),
+        ))?;
         Ok(writer.flush()?)
     }
 }
 
-#[derive(Serialize)]
-struct Row<'a> {
-    section: &'static str,
-    mission: &'a str,
-    #[serde(rename = "first seed")]
-    first: u64,
-    runs: u64,
-    broken: u64,
-    disturbances: usize,
-    #[serde(rename = "supervisors killed")]
-    supervisors_killed: u32,
-    events: u64,
-    #[serde(rename = "hours of mission")]
-    hours: String,
-    minutes: String,
-}
+const COLUMNS: [&str; 10] = [
+    "section",
+    "mission",
+    "first seed",
+    "runs",
+    "broken",
+    "disturbances",
+    "supervisors killed",
+    "events",
+    "hours of mission",
+    "minutes",
+];
 
 /// Keeps what simulated processes log from the terminal, unless `FIRSTHAND_LOG` asks for it.
 pub fn quietly() -> Option<DefaultGuard> {
