@@ -23,7 +23,7 @@ pub fn draw(random: &mut Random, number: usize) -> Scene {
     let room = Room::draw(random, 7.0, [2.0, 3.0]);
     let Room { target, least, greatest } = room;
     let mut shapes = walls([room.closed()]);
-    if random.share() < 0.5 {
+    if random.chance(0.5) {
         shapes.walls.push(curtain(random, least, greatest));
     }
     let mut taken: Vec<(DVec2, f64)> = Vec::new();

@@ -83,7 +83,7 @@ fn cylinder(random: &mut Random, &(_, orders, speeds, deviations): &Difficulty) 
         }
         let speed = loop {
             let speed = random.in_range(speeds);
-            if random.share() < (-0.5 * ((speed - mean) / deviation).powi(2)).exp() {
+            if random.chance((-0.5 * ((speed - mean) / deviation).powi(2)).exp()) {
                 break speed;
             }
         };
@@ -114,7 +114,7 @@ fn path(random: &mut Random, orders: [usize; 2]) -> Vec<DVec2> {
     let mut path: Vec<DVec2> = inside.chain(points.iter().copied()).collect();
     path.sort_by(|a, b| a.x.total_cmp(&b.x));
     path.dedup();
-    if random.share() < 0.5 {
+    if random.chance(0.5) {
         path.reverse();
     }
     path

@@ -99,7 +99,7 @@ fn room(random: &mut Random, number: usize, doors: Doors, oblique: bool) -> Scen
     let room = Room::draw(random, 8.0, [1.6, 3.0]);
     let target = room.target;
     let mut shapes = walls([room.closed()]);
-    if doors == Doors::All || random.share() < DOOR_SHARE {
+    if doors == Doors::All || random.chance(DOOR_SHARE) {
         let at = random.within(1.2, target.x - 1.2);
         let door = door(random, &room, DOORS_M);
         let mut slant = 0.0;
