@@ -226,13 +226,15 @@ impl Attack {
     }
 
     fn freeze_all(&mut self, pause: Duration, series: &mut Series<'_>) {
-        // A stage frozen alone stays frozen.
-        let hangs =
-            |entry: &&RosterEntry| self.was_frozen(name_str(&entry.stage), entry.generation);
-        let stages = self.entries.iter().filter(|entry| !hangs(entry));
         // The supervisor freezes first and thaws last, so that it never sees frozen stages.
-        let all = std::iter::once(self.supervisor).chain(stages.map(|entry| entry.pid));
-        let all: Vec<u32> = all.filter(|&process| send(process, Signal::STOP)).collect();
+        let mut all = vec![self.supervisor];
+        for RosterEntry { stage, generation, pid, .. } in &self.entries {
+            // A stage frozen alone stays frozen.
+            if !self.was_frozen(name_str(stage), *generation) {
+                all.push(*pid);
+            }
+        }
+        all.retain(|&process| send(process, Signal::STOP));
         let began = Instant::now();
         std::thread::sleep(pause);
         for process in all.into_iter().rev() {
