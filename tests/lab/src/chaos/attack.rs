@@ -183,7 +183,7 @@ impl Attack {
             self.entries = entries.to_vec();
             self.entries_read = Some(Instant::now());
             if self.driving {
-                self.on_supervisor_sign(true);
+                self.on_sign(SUPERVISOR, 0, true);
             }
         }
         while let Some(health) = subscriptions.health.next_sample()? {
@@ -201,22 +201,18 @@ impl Attack {
                 self.time = self.time.max(Some(stamp.time()));
                 self.on_sign(writer, stamp.generation, false);
                 if *writer == topics::COMMAND.spec().writer {
-                    self.on_supervisor_sign(false);
+                    self.on_sign(SUPERVISOR, 0, false);
                 }
             }
         }
         Ok(())
     }
 
-    fn on_supervisor_sign(&mut self, beat: bool) {
-        if !self.supervisor_hit {
-            // The successor has its own bus.
-            self.on_sign(SUPERVISOR, 0, beat);
-        }
-    }
-
     fn on_sign(&mut self, stage: &str, generation: u32, beat: bool) {
-        if let Some(Sent { row, at, pending, .. }) = self.pending(stage)
+        // The successor of a hit supervisor has its own bus.
+        let is_of_former = stage == SUPERVISOR && self.supervisor_hit;
+        if !is_of_former
+            && let Some(Sent { row, at, pending, .. }) = self.pending(stage)
             && Some(generation) > row.generation
         {
             row.ready_ms.get_or_insert_with(|| ms_since(*at));
