@@ -8,7 +8,7 @@ use std::{
 };
 
 use clap::Args;
-use common::{clock::Pace, mission::Mission};
+use common::clock::Pace;
 use console::{missions, output::write_stderr};
 use glam::DVec2;
 use processes::planner_executable;
@@ -114,11 +114,11 @@ pub fn main(arguments: &Arguments) -> Result {
         target: target.into(),
     });
     // Invalid keys are refused before the first mission.
-    let robots: Vec<Mission> = settings
+    let robots: Result<Vec<_>, _> = settings
         .iter()
         .map(|setting| missions::parsed("target = [1, 0]", "its missions", &setting.set))
-        .collect::<Result<_, _>>()?;
-    let swept_m = swept_m(&robots[0]);
+        .collect();
+    let swept_m = swept_m(&robots?[0]);
     let asked = Asked { count: arguments.count, seed, ends, swept_m };
     // A damaged world is no error of the mission on the command line.
     let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;

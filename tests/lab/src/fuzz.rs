@@ -179,8 +179,8 @@ fn fuzz(inputs: u64, seed: u64) -> Result<Option<String>> {
     for number in 0..inputs {
         let target = &mut targets[number as usize % count];
         let bytes = input(&target.seed, &mut random);
-        let mut take = || target.take(&bytes, directory.path(), number * PERIOD_NS);
-        if catch_unwind(AssertUnwindSafe(&mut take)).is_err() {
+        let take = || target.take(&bytes, directory.path(), number * PERIOD_NS);
+        if catch_unwind(AssertUnwindSafe(take)).is_err() {
             let bytes = bytes.escape_ascii();
             panic =
                 Some(format!("{} panics at input {number} of seed {seed}: {bytes}", target.name));
