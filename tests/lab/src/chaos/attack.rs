@@ -94,7 +94,7 @@ impl Attack {
             let due = next.checked_duration_since(Instant::now());
             let startup_hit = self.next_startup_hit();
             let startup_hit =
-                startup_hit.map_or(POLL, |(at, ..)| at.saturating_duration_since(Instant::now()));
+                startup_hit.map_or(POLL, |(at, _)| at.saturating_duration_since(Instant::now()));
             let timeout = due.unwrap_or(POLL).min(startup_hit);
             subscriptions.roster.waiter.wait(timeout.min(POLL))?;
             if let Some(robot) = &mut robot {
@@ -285,29 +285,30 @@ impl Attack {
         Ok(())
     }
 
-    /// Returns the time, signal index and process of the next start-up hit.
-    fn next_startup_hit(&self) -> Option<(Instant, usize, RosterEntry)> {
+    /// Returns the time and process of the next start-up hit.
+    fn next_startup_hit(&self) -> Option<(Instant, RosterEntry)> {
         let read = self.entries_read?;
-        let pending = self.sent.iter().enumerate().filter(|(_, sent)| sent.pending);
-        let hits = pending.filter_map(|(place, Sent { row, startup_hit, .. })| {
+        let pending = self.sent.iter().filter(|sent| sent.pending);
+        let hits = pending.filter_map(|Sent { row, startup_hit, .. }| {
             let entry = self.entries.iter().find(|entry| {
                 name_str(&entry.stage) == row.stage
                     && Some(entry.generation) > row.generation
                     && entry.pid != 0
             })?;
             let age = Duration::from_nanos(entry.uptime_ns);
-            Some((read + (*startup_hit)?.saturating_sub(age), place, *entry))
+            Some((read + (*startup_hit)?.saturating_sub(age), *entry))
         });
         hits.min_by_key(|hit| hit.0)
     }
 
     fn hit_starting(&mut self, series: &mut Series<'_>) {
-        while let Some((at, place, entry)) = self.next_startup_hit()
+        while let Some((at, entry)) = self.next_startup_hit()
             && at <= Instant::now()
+            && let Some(sent) = self.pending(name_str(&entry.stage))
         {
-            self.sent[place].startup_hit = None;
+            sent.startup_hit = None;
             if send(entry.pid, Signal::KILL) {
-                self.sent[place].pending = false;
+                sent.pending = false;
                 let hit = (name_str(&entry.stage), Some(entry.generation));
                 self.note(series, hit, Kind::KillAtStart, true);
             }

@@ -59,8 +59,10 @@ impl Counts {
             self.without_step += found.without_step;
             self.compared += found.compared;
             self.not_replayed += found.not_replayed.len() as u64;
-            let not = found.not_replayed.iter().filter(|_| !partial);
-            wrong.extend(not.map(|(number, why)| format!("{stage} generation {number}: {why}")));
+            if !partial {
+                let not = found.not_replayed.iter();
+                wrong.extend(not.map(|(nth, why)| format!("{stage} generation {nth}: {why}")));
+            }
         }
         wrong.extend(report.difference.map(|difference| difference.to_string()));
         Ok(())
