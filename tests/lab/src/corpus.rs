@@ -13,6 +13,7 @@ use clap::Args;
 use common::{
     bus::{Bus, BusError, Reader},
     ground_truth::GroundTruthTick,
+    kinematics::Pose2,
     mission::{Body, Mission, ModelledSpeed, Sensor, SensorKind},
     readers,
     samples::{
@@ -244,8 +245,8 @@ struct Watch {
     poses: Vec<PoseSample>,
     /// Turn by the gyro that ends at a mission time, rad.
     gyro: HashMap<u64, f64>,
-    /// Last echo of a sensor, with the index of its pose.
-    echoes: HashMap<u8, (usize, f64)>,
+    /// Last echo of a sensor, with the robot's pose.
+    echoes: HashMap<u8, (Pose2, f64)>,
 }
 
 impl Watch {
@@ -331,15 +332,15 @@ impl Watch {
     fn on_echo(&mut self, tick: u64, reading: &RangeReading) {
         let Some(sensor) = self.sensors.get(usize::from(reading.sensor)) else { return };
         let is_echo = sensor.kind == SensorKind::Cone && reading.status() == RangeStatus::Measured;
-        let Some(now) = self.poses.len().checked_sub(1).filter(|_| is_echo) else { return };
+        let pose = self.poses.last().filter(|_| is_echo);
+        let Some(now) = pose.map(PoseSample::pose) else { return };
         let axis = sensor.mount.looks_rad();
         let last = self.echoes.insert(reading.sensor, (now, reading.range_m));
         let Some((before, range_m)) = last else { return };
-        let [before, now] = [before, now].map(|at| &self.poses[at]);
-        let moved = now.pose().position - before.pose().position;
-        let nearer_m = moved.dot(DVec2::from_angle(now.heading_rad + axis));
+        let moved = now.position - before.position;
+        let nearer_m = moved.dot(DVec2::from_angle(now.heading + axis));
         let off_m = reading.range_m - (range_m - nearer_m);
-        let turned_rad = (now.heading_rad - before.heading_rad).abs();
+        let turned_rad = (now.heading - before.heading).abs();
         if turned_rad < SAME_SURFACE_RAD && off_m.abs() < SAME_SURFACE_M {
             self.find(Source::Echo, tick, off_m);
         }
