@@ -130,7 +130,9 @@ pub fn run(plan: &Plan, results: &mut Results, title: &str) -> Result {
     let kept = in_parallel(left, plan.jobs, run, |given| {
         for (row, latency) in given? {
             // Latencies come first, so that a mission with a row has both.
-            latency.map_or(Ok(()), |latency| results.latencies.add(latency))?;
+            if let Some(latency) = latency {
+                results.latencies.add(latency)?;
+            }
             results.rows.add(row)?;
         }
         ended += 1;
@@ -227,12 +229,11 @@ impl Robot<'_> {
         Ok(())
     }
 
-    /// Drives the mission in one process, which is equal to real processes in lockstep. Returns
-    /// `None` for a mission that needs those.
+    /// Drives the mission of a robot alone in one process, which is equal to real processes in
+    /// lockstep. Returns `None` for a mission that needs those.
     fn in_one_process(&self) -> Result<Option<Summary>> {
-        let Job { plan, trial, setting, directory, .. } = *self.job;
-        let needs_processes = plan.processes || plan.pace != Pace::Max;
-        if needs_processes || trial.oncoming.is_some() || setting.planner != HARMONIC {
+        let Job { plan, setting, directory, .. } = *self.job;
+        if plan.processes || plan.pace != Pace::Max || setting.planner != HARMONIC {
             return Ok(None);
         }
         let file = world_file(directory, &self.trial.mission.name);
