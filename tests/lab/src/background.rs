@@ -1,8 +1,6 @@
 //! Threads beside a measurement: programs of simulated robots, and consumers.
 
 use std::{
-    io,
-    net::{Ipv4Addr, SocketAddr, UdpSocket},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering::Relaxed},
@@ -42,11 +40,4 @@ impl Drop for Turns {
             let _ = thread.join();
         }
     }
-}
-
-pub fn to_robot(robot: SocketAddr) -> io::Result<UdpSocket> {
-    let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
-    socket.set_nonblocking(true)?;
-    socket.connect(robot)?;
-    Ok(socket)
 }

@@ -36,7 +36,7 @@ use ros2::{
 use ros2_driver::topics::{Content, Topics};
 
 use crate::{
-    background::{Turns, to_robot},
+    background::Turns,
     error::{OrCannot as _, Result},
     robot::simulated,
 };
@@ -125,7 +125,9 @@ struct Node {
 
 impl Node {
     fn new(robot: SocketAddr, stated: &Mission, domain: u16, turns: f64) -> io::Result<Self> {
-        let wire = to_robot(robot)?;
+        let wire = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
+        wire.set_nonblocking(true)?;
+        wire.connect(robot)?;
         let participant = Participant::join(domain, Some(Ipv4Addr::LOCALHOST))?;
         let topics = Topics::of(stated);
         let said = topics.heard.iter().filter(|(content, _)| *content != Content::Command);
