@@ -97,18 +97,17 @@ fn files_of(folder: &Path) -> io::Result<Vec<PathBuf>> {
 /// Adds the worlds of a file, by the end of its name. Returns whether it contains worlds.
 fn add(found: &mut Found, file: &Path, asked: Asked) -> Result<bool> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let ends = |ends: &[&str]| ends.iter().any(|end| name.ends_with(end));
-    if ends(&[".yaml", ".yml"]) {
+    if name.ends_with(".yaml") || name.ends_with(".yml") {
         add_map(found, file, asked)?;
         return Ok(true);
     }
-    let worlds = if ends(&[".toml"]) {
+    let worlds = if name.ends_with(".toml") {
         let mission = Mission::load(file)?.with_calibration()?;
         found.add(Trial::of_mission(mission, asked.swept_m));
         Vec::new()
-    } else if ends(&[".world"]) {
+    } else if name.ends_with(".world") {
         vec![barn::gazebo(file)?]
-    } else if ends(&["cylinders.csv", ".csv.gz"]) {
+    } else if name.ends_with("cylinders.csv") || name.ends_with(".csv.gz") {
         barn::table(file)?
     } else {
         return Ok(false);
