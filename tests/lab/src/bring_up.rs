@@ -10,7 +10,6 @@ use std::{
 };
 
 use clap::{Args, builder::PossibleValuesParser};
-use common::clock::Pace;
 use console::{missions, output::print_line};
 use mission_control::surroundings::SimulatedRobot as _;
 use processes::process::Process;
@@ -169,7 +168,7 @@ fn one(arguments: &Arguments, table: &[Fault], number: u64) -> Result<(bool, Str
         keys.iter().cloned().partition(|key| key.starts_with(ODOMETRY_TURNS));
     let mission = missions::parsed(&text, "bring-up", &of_mission)?;
     let directory = arguments.out.join(number.to_string());
-    let mut simulator = robot::simulated(&directory, &mission, Pace::Rate(1.0))?;
+    let mut simulator = robot::simulated(&directory, &mission)?;
     let stated = directory.join("stated.toml");
     let address = format!("address = 'udp://{}'", simulator.address());
     fs::write(&stated, text.replace(ADDRESS, &address)).or_cannot_file("write", &stated)?;

@@ -51,9 +51,11 @@ pub fn mission(
     command
 }
 
-/// Starts a simulated robot that outlives its supervisor, with files in `directory`.
-pub fn simulated(directory: &Path, mission: &Mission, pace: Pace) -> Result<Simulator> {
+/// Starts a simulated robot that outlives its supervisor, in wall-clock time, with files in
+/// `directory`.
+pub fn simulated(directory: &Path, mission: &Mission) -> Result<Simulator> {
     fs::create_dir_all(directory).or_cannot_file("make", directory)?;
+    let pace = Pace::Rate(1.0);
     Ok(Simulator::start(firsthand(&[]), None, directory, mission, pace, None)?)
 }
 

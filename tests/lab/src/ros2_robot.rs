@@ -16,7 +16,7 @@ use std::{
 
 use clap::Args;
 use common::{
-    clock::{Pace, monotonic_ns},
+    clock::monotonic_ns,
     json_wire::{Lines, Order, Report, Scan, line, parse},
     kinematics::{DifferentialDrive, Pose2, Twist},
     mission::{Mission, Protocol, RobotConfig, Ros2Topics},
@@ -69,7 +69,7 @@ pub fn main(arguments: &Arguments) -> Result {
     let RobotConfig { protocol, address, ros2, .. } = &mut own.robot;
     // The mission may already describe the robot that this one is presented as.
     (*protocol, *address, *ros2) = (Some(Protocol::Json), None, Ros2Topics::default());
-    let mut simulator = simulated(out, &own, Pace::Rate(1.0))?;
+    let mut simulator = simulated(out, &own)?;
     let stated = |keys: &[String]| missions::load(mission, keys);
     let robot = Ros2Robot::start(simulator.address(), 0, 1.0, stated)?;
     print_text(robot.keys.iter().map(|key| format!("--set={key}\n")).collect::<String>())?;

@@ -63,7 +63,7 @@ pub fn attack(series: &mut Series<'_>) -> Result {
     let directory = files.join("run");
     let simulated = || {
         let mission = Mission { seed, ..options.loaded.clone() };
-        robot::simulated(&files.join("robot"), &mission, asked.pace)
+        robot::simulated(&files.join("robot"), &mission)
     };
     let mut robot = asked.include_supervisor.then(simulated).transpose()?;
     let mut start = command(options, seed, asked.pace, &directory);
