@@ -74,23 +74,24 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     let Arguments { count, seed, .. } = *arguments;
     let robot = missions::parsed("target = [1, 0]", "its missions", &arguments.set)?;
     let asked = Asked { count, seed, ends: None, swept_m: swept_m(&robot) };
-    let found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
+    let mut found = worlds::find(&arguments.worlds, asked).map_err(|error| error.to_string())?;
     if found.trials.iter().any(|trial| trial.oncoming.is_some()) {
         return Err("two robots meet in these worlds; give worlds with one robot".into());
     }
     let own = tempfile::tempdir().or_cannot("make a directory for runs")?;
     let directory = arguments.out.as_deref().unwrap_or(own.path());
-    let jobs: Vec<_> = (0..).zip(found.trials).collect();
-    let all = jobs.len();
+    for (number, trial) in (0..).zip(&mut found.trials) {
+        trial.mission.seed = seed.wrapping_add(number);
+    }
+    let all = found.trials.len();
     let began = Instant::now();
     let mut differ = 0;
-    let drive = |(number, trial): &(u64, Trial), thread| {
-        let seed = seed.wrapping_add(*number);
-        let job = Job { arguments, directory, trial, seed, thread };
+    let drive = |trial: &Trial, thread| {
+        let job = Job { arguments, directory, trial, thread };
         let compared = job.compare().map_err(|error| error.to_string());
         (trial.mission.name.clone(), compared)
     };
-    in_parallel(jobs, arguments.jobs, drive, |(world, compared)| {
+    in_parallel(found.trials, arguments.jobs, drive, |(world, compared)| {
         if let Some(difference) = compared.map_err(|error| format!("{world}: {error}"))? {
             differ += 1;
             print_line(format!("{world}: {difference}"))?;
@@ -109,7 +110,6 @@ struct Job<'a> {
     arguments: &'a Arguments,
     directory: &'a Path,
     trial: &'a Trial,
-    seed: u64,
     thread: usize,
 }
 
@@ -119,7 +119,6 @@ impl Job<'_> {
         let mut mission = self.trial.mission.clone();
         let directory = self.directory.join(&mission.name);
         fs::create_dir_all(&directory).or_cannot_file("make", &directory)?;
-        mission.seed = self.seed;
         let mut sent_to = None;
         if self.arguments.stay {
             let waypoint = |at| Waypoint { at, heading_deg: None };
