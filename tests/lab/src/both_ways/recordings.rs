@@ -40,15 +40,15 @@ fn compared(topic: &dyn AnyTopic) -> Compared {
         "guidance" => Compared::Samples(&["full_solve_ns"]),
         "target" | "following" | "zones" | "place" | "directive" | "complaints" => Compared::Values,
         // Requests, deaths and the roster have process numbers and times of their own.
-        "orders" | "deaths" | "roster" => Compared::Not,
+        "orders" | "deaths" | "roster"
         // The wall clock decides heartbeats, latencies and pings.
-        "health" | "link" | "wire" | "inputs" => Compared::Not,
+        | "health" | "link" | "wire" | "inputs"
         // It says how far the supervisor has read.
-        "tick_limit" => Compared::Not,
+        | "tick_limit"
         // The newest frame, once the link has nothing else to do. No stage reads it.
-        "infrared" | "power" | "surroundings" => Compared::Not,
+        | "infrared" | "power" | "surroundings"
         // A run does not record them, or no process of the robot publishes them.
-        "field" | "requests" | "faults" | "mirror" => Compared::Not,
+        | "field" | "requests" | "faults" | "mirror" => Compared::Not,
         _ => Compared::Samples(&[]),
     }
 }
