@@ -23,7 +23,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use super::{
     consumers::Consumers,
     options::Options,
-    report::{EVERYTHING, Row, Series, ms_since},
+    report::{Row, Series, ms_since},
     schedule::Kind,
 };
 use crate::error::{OrCannot as _, Result};
@@ -240,7 +240,7 @@ impl Attack {
         for sent in self.sent.iter_mut().filter(|sent| sent.pending) {
             sent.at += began.elapsed();
         }
-        self.note(series, (EVERYTHING, None), Kind::FreezeAll, false);
+        self.note(series, ("everything", None), Kind::FreezeAll, false);
     }
 
     fn hit(&mut self, series: &mut Series<'_>) -> Result {

@@ -18,7 +18,6 @@ use crate::{
 };
 
 const FILE_NAME: &str = "signals.csv";
-pub const EVERYTHING: &str = "everything";
 
 #[derive(Default, Serialize)]
 pub struct Report {
