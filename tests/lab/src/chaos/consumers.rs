@@ -132,16 +132,18 @@ impl Consumers {
 
 impl Running {
     fn start(&mut self, directory: &Path, report: &mut Report) -> Result {
-        let mut command = self.consumer.command();
+        let Consumer { name, program, arguments } = &self.consumer;
+        let own = std::process::id().to_string();
+        let mut command = process::firsthand(&["bench", "consumer", &own]);
+        command.arg(program).args(arguments).stdout(Stdio::null());
         self.frozen_until = None;
         self.starts += 1;
-        if self.consumer.name == RECORD {
+        if name == RECORD {
             command.arg("--out").arg(directory.join(format!("record-{}.mcap", self.starts)));
         }
-        let said = append(&self.said);
-        command.stderr(said.or_cannot("write what a consumer says")?);
+        command.stderr(append(&self.said).or_cannot("write what a consumer says")?);
         self.process = Some(Process::spawn(command).or_cannot("start a consumer")?);
-        report.consumer(&self.consumer.name).started += 1;
+        report.consumer(name).started += 1;
         Ok(())
     }
 
@@ -205,13 +207,6 @@ impl Consumer {
             arguments: format!("{words} --robot {robot}").split(' ').map(str::to_owned).collect(),
         };
         Ok([(RECORD, "record"), ("hz", "topic hz"), ("logs -f", "logs --follow")].map(own))
-    }
-
-    fn command(&self) -> Command {
-        let own = std::process::id().to_string();
-        let mut command = process::firsthand(&["bench", "consumer", &own]);
-        command.arg(&self.program).args(&self.arguments).stdout(Stdio::null());
-        command
     }
 }
 
