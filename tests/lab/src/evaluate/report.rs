@@ -16,12 +16,6 @@ use crate::{
     },
 };
 
-/// Share of collisions in motion; in the others the robot was run into at rest.
-const AT_FAULT: &str = "at_fault_collision";
-/// Shares of departed robots that the failsafe stopped, or slowed to half speed.
-const STOPPED: &str = "stopped_by_failsafe";
-const SLOWED: &str = "slowed_by_failsafe";
-
 /// Metrics beside the shares. `median_` keys are medians of a column over the successes, others
 /// means over all missions.
 const METRICS: [&str; 9] = [
@@ -54,9 +48,11 @@ fn totals(setting: &str, rows: &[Row]) -> Value {
         totals["intervals"][name] = [share.low, share.high].map(rounded).into();
     };
     OUTCOMES.into_iter().for_each(|name| add(name, &|row| row.outcome_name() == name));
-    add(AT_FAULT, &Row::is_at_fault);
-    add(STOPPED, &|row| !row.stops.is_empty());
-    add(SLOWED, &|row| !row.slowed.is_empty());
+    // Collisions in motion; in the others the robot was run into at rest.
+    add("at_fault_collision", &Row::is_at_fault);
+    // Departed robots that the failsafe stopped, or slowed to half speed.
+    add("stopped_by_failsafe", &|row| !row.stops.is_empty());
+    add("slowed_by_failsafe", &|row| !row.slowed.is_empty());
     for key in METRICS {
         let value = match key.strip_prefix("median_") {
             Some(column) => spread(&rows, column).map(|spread| spread.median),
