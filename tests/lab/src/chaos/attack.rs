@@ -316,7 +316,7 @@ impl Attack {
     }
 }
 
-pub fn send(pid: u32, signal: Signal) -> bool {
+fn send(pid: u32, signal: Signal) -> bool {
     Pid::from_raw(pid.cast_signed()).is_some_and(|pid| kill_process(pid, signal).is_ok())
 }
 

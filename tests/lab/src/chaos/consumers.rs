@@ -199,7 +199,7 @@ impl FromStr for Consumer {
 }
 
 impl Consumer {
-    pub fn own(robot: &RobotName) -> Result<[Self; 3]> {
+    fn own(robot: &RobotName) -> Result<[Self; 3]> {
         let program = robot::path()?;
         let own = |(name, words): (&str, &str)| Self {
             name: name.to_owned(),

@@ -42,8 +42,8 @@ pub struct Report {
 
 #[derive(Default, Serialize)]
 pub struct ConsumerCounts {
-    pub killed: u32,
-    pub frozen: u32,
+    killed: u32,
+    frozen: u32,
     pub started: u32,
     pub ended_by_itself: u32,
     /// Last such end, and the last line of its standard error.
@@ -52,16 +52,16 @@ pub struct ConsumerCounts {
 }
 
 #[derive(Default, Serialize)]
-pub struct Recovery {
+struct Recovery {
     /// First ready beat after kills, which are noticed at once.
     #[serde(serialize_with = "quantiles")]
-    pub ready: Histogram,
+    ready: Histogram,
     /// First ready beat after freezes, which are noticed by missing beats.
     #[serde(rename = "ready_when_frozen", serialize_with = "quantiles")]
-    pub after_freeze: Histogram,
+    after_freeze: Histogram,
     /// First sample of a tick, which may come up to a tick later.
     #[serde(serialize_with = "quantiles")]
-    pub output: Histogram,
+    output: Histogram,
 }
 
 pub struct Series<'a> {
@@ -155,7 +155,7 @@ pub fn ms_since(at: Instant) -> f64 {
     rounded(at.elapsed().as_secs_f64() * 1e3)
 }
 
-pub fn create(directory: &Path) -> Result<Table<Row>> {
+fn create(directory: &Path) -> Result<Table<Row>> {
     let path = directory.join(FILE_NAME);
     fs::create_dir_all(directory).or_cannot_file("make the directory of", &path)?;
     if path.exists() {
