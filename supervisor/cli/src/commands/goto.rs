@@ -49,7 +49,7 @@ pub struct Arguments {
     #[arg(long, conflicts_with = "follow")]
     wait: bool,
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
 }
 

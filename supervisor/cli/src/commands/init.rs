@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(long, value_parser = protocol)]
     protocol: Option<Protocol>,
     /// The name that the robot gets on this machine.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
 }
 

@@ -26,7 +26,7 @@ pub struct Arguments {
     /// Name of the robot.
     ///
     /// Prints its current run, or its newest run below --runs.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// Directory that holds the directories of runs.
     #[arg(long, value_name = "DIR", default_value = "runs")]

@@ -26,7 +26,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DEG", default_value = "3")]
     sigma_heading: f64,
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
 }
 

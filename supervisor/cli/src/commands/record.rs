@@ -26,7 +26,7 @@ use console::{
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot, which may start later.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// File of the recording.
     ///

@@ -9,7 +9,7 @@ use console::failure::Result;
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
 }
 

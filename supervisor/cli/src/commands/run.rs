@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(default_value = "obstacle-course")]
     mission: String,
     /// Name of the robot and of its shared memory.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// Speed of mission time: `max`, or R times wall-clock time.
     ///

@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long)]
     ground_truth: bool,
     /// Name by which other robots in the same world find this robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// End when this parent process ends.
     #[arg(long, hide = true)]

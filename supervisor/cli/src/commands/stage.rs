@@ -45,7 +45,7 @@ enum Command {
         /// Stage (`firsthand stage list`).
         stage: String,
         /// Name of the robot.
-        #[arg(long, default_value = "x80")]
+        #[arg(long, default_value_t)]
         robot: RobotName,
     },
     Fault(fault::Arguments),
@@ -59,7 +59,7 @@ struct StageProcess {
     /// Stage (`firsthand stage list`), or `supervisor`.
     stage: String,
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
 }
 

@@ -38,7 +38,7 @@ use console::{
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// List the running robots of this user on this machine instead.
     #[arg(long, conflicts_with = "robot")]

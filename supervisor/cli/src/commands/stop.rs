@@ -11,7 +11,7 @@ use console::{failure::Result, operator};
 #[derive(Debug, Args)]
 pub struct Arguments {
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// End the stop guard: you saw the robot at rest, or off.
     ///

@@ -18,7 +18,7 @@ pub struct Arguments {
     #[arg(long)]
     remove: bool,
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
 }
 

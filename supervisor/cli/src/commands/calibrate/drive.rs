@@ -30,7 +30,7 @@ const COMPLETED: &str = "completed";
 #[derive(Debug, Args)]
 pub struct Setting {
     /// Name of the robot and of its shared memory.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     pub robot: RobotName,
     /// Pace of a simulated robot: `max`, or R times wall-clock time.
     #[arg(long)]

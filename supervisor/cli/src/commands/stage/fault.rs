@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Fault; see below.
     fault: String,
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// Allow the fault on a real robot, which may then drive anywhere.
     ///

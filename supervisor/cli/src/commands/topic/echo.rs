@@ -18,7 +18,7 @@ pub struct Arguments {
     /// Topic (`firsthand topic list`).
     topic: String,
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// Print one JSON object per line, with all array elements.
     ///

@@ -25,7 +25,7 @@ pub struct Arguments {
     /// Print only this topic (`firsthand topic list`).
     topic: Option<String>,
     /// Name of the robot.
-    #[arg(long, default_value = "x80")]
+    #[arg(long, default_value_t)]
     robot: RobotName,
     /// Print one JSON object per line.
     #[arg(long)]
