@@ -18,37 +18,28 @@ use processes::executable;
 pub struct Companion {
     pub name: &'static str,
     pub executable: &'static str,
-    /// Whether the executable has several subcommands and needs this one's name.
-    is_one_of_many: bool,
     pub about: &'static str,
 }
 
-const fn viewer(name: &'static str, executable: &'static str, about: &'static str) -> Companion {
-    Companion { name, executable, is_one_of_many: false, about }
+const fn row(name: &'static str, executable: &'static str, about: &'static str) -> Companion {
+    Companion { name, executable, about }
 }
 
-const fn laboratory(name: &'static str, about: &'static str) -> Companion {
-    Companion { name, executable: LABORATORY, is_one_of_many: true, about }
-}
-
-/// Executable that measures robots and contains the planners for comparison.
+/// Executable that measures robots and contains the planners for comparison. It has several
+/// subcommands and needs the companion's name.
 pub const LABORATORY: &str = "firsthand-lab";
 
 /// Companions for the package, completions, help and the manual page.
 pub static TABLE: [Companion; 9] = [
-    viewer("top", "firsthand-top", "Show a robot on the terminal, and stop it or kill its stages"),
-    viewer(
-        "page",
-        "firsthand-page",
-        "Show a robot in a browser, and drive it with the drive token",
-    ),
-    viewer("ros2", "firsthand-ros2", "Show a robot in ROS 2, to RViz and to other nodes"),
-    viewer("foxglove", "firsthand-foxglove", "Serve a robot to Foxglove or Lichtblick, live"),
-    viewer("remote", "firsthand-remote", "Show a robot of another machine on this one, read-only"),
-    laboratory("evaluate", "Run missions on many worlds, and count the successes"),
-    laboratory("experiments", "Repeat the paper's experiments, and compare the results"),
-    laboratory("field", "Solve the harmonic field of a map, without a robot"),
-    laboratory("bench", "Measure tick latency; test with random signals and faults"),
+    row("top", "firsthand-top", "Show a robot on the terminal, and stop it or kill its stages"),
+    row("page", "firsthand-page", "Show a robot in a browser, and drive it with the drive token"),
+    row("ros2", "firsthand-ros2", "Show a robot in ROS 2, to RViz and to other nodes"),
+    row("foxglove", "firsthand-foxglove", "Serve a robot to Foxglove or Lichtblick, live"),
+    row("remote", "firsthand-remote", "Show a robot of another machine on this one, read-only"),
+    row("evaluate", LABORATORY, "Run missions on many worlds, and count the successes"),
+    row("experiments", LABORATORY, "Repeat the paper's experiments, and compare the results"),
+    row("field", LABORATORY, "Solve the harmonic field of a map, without a robot"),
+    row("bench", LABORATORY, "Measure tick latency; test with random signals and faults"),
 ];
 
 pub fn find(named: &OsStr) -> Option<&'static Companion> {
@@ -67,7 +58,8 @@ pub fn execute(words: &[OsString]) -> Option<Result<ExitCode>> {
         }
         None => return None,
     };
-    Some(Err(companion.become_executable(options)))
+    let name = (companion.executable == LABORATORY).then(|| companion.name.into());
+    Some(Err(become_executable(companion.executable, name.into_iter().chain(options))))
 }
 
 /// Forwards a completion request. `words` are the executable, `--`, and the line to complete.
@@ -76,7 +68,7 @@ pub fn answer_shell(words: &[OsString]) {
     if env::var_os(VARIABLE).is_none() || words.len() < 5 {
         return;
     }
-    let hidden = usize::from(!companion.is_one_of_many);
+    let hidden = usize::from(companion.executable != LABORATORY);
     let Ok(executable) = executable::find(Path::new(companion.executable)) else { return };
     let mut command = Command::new(executable);
     command.arg("--").arg(companion.executable).args(&words[3 + hidden..]);
@@ -88,11 +80,6 @@ pub fn answer_shell(words: &[OsString]) {
 }
 
 impl Companion {
-    fn become_executable(&self, options: Vec<OsString>) -> Failure {
-        let name = self.is_one_of_many.then(|| self.name.into());
-        become_executable(self.executable, name.into_iter().chain(options))
-    }
-
     pub fn command(&self) -> clap::Command {
         let words = Arg::new("words")
             .num_args(0..)
