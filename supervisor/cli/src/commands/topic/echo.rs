@@ -38,8 +38,8 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut stream = Stream::open()?;
     let domain = arguments.robot.domain();
     // Topics that wake no reader are read when the link ends the tick.
-    let mut follower = Follower::new(domain, "echo", topic, |bus| topic.any_reader(bus))
-        .also_on([&topics::LINK as &'static dyn AnyTopic]);
+    let mut follower =
+        Follower::new(domain, "echo", &topics::LINK, |bus| topic.any_reader(bus)).also_on([topic]);
     let mut waiting = Waiting::default();
     let mut left = arguments.number.unwrap_or(u64::MAX);
     while left > 0 && !stream.has_ended() {

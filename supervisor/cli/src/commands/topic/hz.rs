@@ -74,10 +74,9 @@ pub fn main(arguments: &Arguments) -> Result {
     let mut stream = Stream::open()?;
     let domain = arguments.robot.domain();
     let open = |bus: &Bus| Readers::open(bus, &topics);
-    let others = topics.iter().skip(1).map(|&topic| topic as &'static dyn AnyTopic);
     // Topics that wake no reader are read when the link ends the tick.
-    let others = others.chain([&topics::LINK as &'static dyn AnyTopic]);
-    let mut follower = Follower::new(domain, "hz", topics[0], open).also_on(others);
+    let mut follower =
+        Follower::new(domain, "hz", &topics::LINK, open).also_on(topics.iter().copied());
     let mut waiting = Waiting::default();
     let mut left = arguments.number.unwrap_or(u64::MAX);
     let mut due = None;
