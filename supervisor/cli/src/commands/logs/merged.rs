@@ -25,23 +25,10 @@ struct Log {
     end: u64,
     position: u64,
     unfinished: Vec<u8>,
-    head: Option<Line>,
+    /// Next line: time, process and text.
+    head: Option<String>,
+    /// UTC time of the newest line, as written, or that of the line before it.
     time: String,
-}
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Line {
-    /// UTC time, as written, or that of the previous line.
-    pub time: String,
-    pub process: String,
-    pub text: String,
-}
-
-impl std::fmt::Display for Line {
-    fn fmt(&self, to: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { time, process, text } = self;
-        write!(to, "{time:TIME$} {process:<14} {text}")
-    }
 }
 
 impl Logs {
@@ -80,10 +67,9 @@ impl Logs {
         self.logs.iter_mut().try_for_each(Log::advance)
     }
 
-    pub fn next_line(&mut self) -> io::Result<Option<Line>> {
+    pub fn next_line(&mut self) -> io::Result<Option<String>> {
         let with_line = self.logs.iter_mut().filter(|log| log.head.is_some());
-        let time = |log: &&mut Log| log.head.as_ref().map(|line| line.time.clone());
-        let Some(log) = with_line.min_by_key(time) else {
+        let Some(log) = with_line.min_by(|one, other| one.time.cmp(&other.time)) else {
             return Ok(None);
         };
         let line = log.head.take();
@@ -126,11 +112,8 @@ impl Log {
             }
             None => line,
         };
-        self.head = Some(Line {
-            time: self.time.clone(),
-            process: self.process.clone(),
-            text: text.chars().filter(|letter| !letter.is_control()).collect(),
-        });
+        let text: String = text.chars().filter(|letter| !letter.is_control()).collect();
+        self.head = Some(format!("{:TIME$} {:<14} {text}", self.time, self.process));
         self.unfinished.clear();
         Ok(())
     }
@@ -156,7 +139,12 @@ mod tests {
     fn round(logs: &mut Logs) -> Vec<String> {
         logs.look().unwrap();
         let lines = std::iter::from_fn(|| logs.next_line().unwrap());
-        lines.map(|line| format!("{} {}", line.process, line.text)).collect()
+        let after_time = lines.map(|line| line[TIME + 1..].to_owned());
+        let parted = after_time.map(|line| {
+            let (process, text) = line.split_at(14);
+            format!("{} {}", process.trim_end(), text.trim_start())
+        });
+        parted.collect()
     }
 
     const AT: &str = "2026-11-21T06:04:22.72915";
