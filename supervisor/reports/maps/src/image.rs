@@ -43,18 +43,13 @@ impl Lightness {
 
 type Cause = Box<dyn Error>;
 
-/// Free pixels, row by row.
-pub(super) struct Free {
-    pub cols: usize,
-    pub pixels: Vec<bool>,
-}
-
+/// Loads a map whose rim is blocked like a mission's perimeter.
 pub(super) fn load(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
-    let Free { cols, pixels } = pixels(file, lightness)?;
-    Ok(Map::new(cols, pixels.len() / cols, pixels.into_iter()))
+    pixels(file, lightness).map(Map::with_rim)
 }
 
-pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError> {
+/// Loads a map that blocks only pixels.
+pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Map, MapError> {
     let mut reader = BufReader::new(open(file, LONGEST)?);
     let start = reader.fill_buf().map_err(MapError::unreadable(file))?;
     // The first bytes decide: a PNG may be called .pgm.
@@ -82,12 +77,7 @@ pub(super) fn pixels(file: &Path, lightness: Lightness) -> Result<Free, MapError
 }
 
 /// Reads greys (2 and 5) or colours (3 and 6), in ASCII (2 and 3) or binary.
-fn netpbm(
-    reader: impl BufRead,
-    kind: u8,
-    lightness: Lightness,
-    file: &Path,
-) -> Result<Free, Cause> {
+fn netpbm(reader: impl BufRead, kind: u8, lightness: Lightness, file: &Path) -> Result<Map, Cause> {
     let mut bytes = reader.bytes();
     let mut header = || number(&mut bytes);
     let (cols, rows, most) = (header()?, header()?, header()?);
@@ -102,15 +92,15 @@ fn netpbm(
         _ => Ok(u32::from(byte(&mut bytes)?) << 8 | u32::from(byte(&mut bytes)?)),
     };
     let channels = if matches!(kind, b'2' | b'5') { 1 } else { 3 };
-    let mut pixels = Vec::new();
+    let mut free = Vec::new();
     for _ in 0..u64::from(cols) * u64::from(rows) {
         let mut sum = 0.0;
         for _ in 0..channels {
             sum += f64::from(sample()?.min(most));
         }
-        pixels.push(lightness.is_free(sum / f64::from(most * channels)));
+        free.push(lightness.is_free(sum / f64::from(most * channels)));
     }
-    Ok(Free { cols: cols as usize, pixels })
+    Ok(Map::new(cols as usize, free))
 }
 
 fn byte(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u8, Cause> {
@@ -139,7 +129,7 @@ fn number(bytes: &mut impl Iterator<Item = io::Result<u8>>) -> Result<u32, Cause
     }
 }
 
-fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result<Free, Cause> {
+fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result<Map, Cause> {
     let limits = png::Limits { bytes: LONGEST as usize };
     let mut decoder = png::Decoder::new_with_limits(reader, limits);
     decoder.set_transformations(png::Transformations::EXPAND);
@@ -167,10 +157,8 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
         let samples = pixel.chunks_exact(bytes).map(brightness);
         lightness.is_free(samples.zip(weights).map(|(sample, weight)| sample * weight).sum())
     };
-    Ok(Free {
-        cols: cols as usize,
-        pixels: samples.chunks_exact(bytes * weights.len()).map(is_free).collect(),
-    })
+    let free = samples.chunks_exact(bytes * weights.len()).map(is_free);
+    Ok(Map::new(cols as usize, free))
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ pub const MOST_BOXES: usize = 20_000;
 pub struct Map {
     pub cols: usize,
     pub rows: usize,
-    /// Blocked cells, including the whole rim.
+    /// Blocked cells, with the whole rim unless only occupied cells count.
     pub blocked: Vec<bool>,
 }
 
@@ -22,21 +22,24 @@ pub struct PlacedMap {
 }
 
 impl Map {
-    /// Blocks the rim like a mission's perimeter.
-    pub(crate) fn new(cols: usize, rows: usize, free: impl Iterator<Item = bool>) -> Self {
-        let mut blocked: Vec<bool> = free.map(|free| !free).collect();
+    /// Takes whole rows of `cols` cells each.
+    pub(crate) fn new(cols: usize, free: impl IntoIterator<Item = bool>) -> Self {
+        let blocked: Vec<bool> = free.into_iter().map(|free| !free).collect();
+        let rows = blocked.len() / cols;
         assert_eq!(blocked.len(), cols * rows);
-        for (row, line) in blocked.chunks_mut(cols.max(1)).enumerate() {
-            if row == 0 || row + 1 == rows {
+        Self { cols, rows, blocked }
+    }
+
+    /// Blocks the rim like a mission's perimeter.
+    pub(crate) fn with_rim(mut self) -> Self {
+        for (row, line) in self.blocked.chunks_mut(self.cols).enumerate() {
+            if row == 0 || row + 1 == self.rows {
                 line.fill(true);
             }
-            for rim in [0, cols.saturating_sub(1)] {
-                if let Some(cell) = line.get_mut(rim) {
-                    *cell = true;
-                }
-            }
+            line[0] = true;
+            line[self.cols - 1] = true;
         }
-        Self { cols, rows, blocked }
+        self
     }
 
     /// Returns column and row, or `None` if no cell is free.
@@ -90,19 +93,19 @@ mod tests {
 
     #[test]
     fn the_rim_of_a_map_is_blocked_and_nothing_else() {
-        let map = Map::new(4, 3, [true; 12].into_iter());
+        let map = Map::new(4, [true; 12]).with_rim();
         let free: Vec<usize> = (0..12).filter(|&at| !map.blocked[at]).collect();
         assert_eq!(free, [5, 6]);
-        let map = Map::new(1, 1, [true].into_iter());
+        let map = Map::new(1, [true]).with_rim();
         assert_eq!(map.blocked, [true]);
     }
 
     #[test]
     fn the_nearest_free_cell_is_found_from_outside_too() {
-        let map = Map::new(5, 5, [true; 25].into_iter());
+        let map = Map::new(5, [true; 25]).with_rim();
         assert_eq!(map.nearest_free(0, 2), Some((1, 2)));
         assert_eq!(map.nearest_free(usize::MAX, 3), Some((1, 1)));
-        let walled = Map::new(2, 2, [true; 4].into_iter());
+        let walled = Map::new(2, [true; 4]).with_rim();
         assert_eq!(walled.nearest_free(0, 0), None);
     }
 }

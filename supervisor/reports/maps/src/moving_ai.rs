@@ -47,7 +47,7 @@ fn parse(bytes: &[u8]) -> Result<Map, String> {
     if lines.any(|line| !line.trim_ascii().is_empty()) {
         return Err(format!("more than the {rows} rows of its header; correct `height`"));
     }
-    Ok(Map::new(cols, rows, free.into_iter()))
+    Ok(Map::new(cols, free).with_rim())
 }
 
 fn header<'a>(lines: &mut impl Iterator<Item = &'a [u8]>) -> Result<(u64, u64), &'static str> {

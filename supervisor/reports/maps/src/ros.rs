@@ -14,7 +14,7 @@ use yaml_rust2::parser::{Event, Parser};
 use crate::{
     error::MapError,
     file::read,
-    image::{self, Free, Lightness},
+    image::{self, Lightness},
     map::{Map, PlacedMap},
 };
 
@@ -42,10 +42,7 @@ pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
 pub(super) fn load_occupied(file: &Path) -> Result<PlacedMap, MapError> {
     placed(file, |file, text| {
         let (image, lightness) = named_image(file, text)?;
-        let free_thresh = f64::INFINITY;
-        let Free { cols, pixels } = image::pixels(&image, Lightness { free_thresh, ..lightness })?;
-        let blocked: Vec<bool> = pixels.into_iter().map(|is_free| !is_free).collect();
-        Ok(Map { cols, rows: blocked.len() / cols, blocked })
+        image::pixels(&image, Lightness { free_thresh: f64::INFINITY, ..lightness })
     })
 }
 
