@@ -27,7 +27,8 @@ const FARTHEST_M: f64 = 1e6;
 struct Keys(HashMap<String, Vec<String>>);
 
 pub(super) fn load(file: &Path) -> Result<Map, MapError> {
-    image_of(file, &text(file)?)
+    let (image, lightness) = of_keys(file, |keys| keys.image(file))?;
+    image::load(&image, lightness)
 }
 
 /// Loads a map with its position.
@@ -35,51 +36,29 @@ pub(super) fn load(file: &Path) -> Result<Map, MapError> {
 /// # Errors
 /// The YAML or its image cannot be read, or is not a map.
 pub fn load_placed(file: &Path) -> Result<PlacedMap, MapError> {
-    placed(file, image_of)
+    placed(file, image::load)
 }
 
 /// Loads a map that blocks only occupied cells.
 pub(super) fn load_occupied(file: &Path) -> Result<PlacedMap, MapError> {
-    placed(file, |file, text| {
-        let (image, lightness) = named_image(file, text)?;
-        image::pixels(&image, Lightness { free_thresh: f64::INFINITY, ..lightness })
+    placed(file, |image, lightness| {
+        image::pixels(image, Lightness { free_thresh: f64::INFINITY, ..lightness })
     })
 }
 
 fn placed(
     file: &Path,
-    map_of: fn(&Path, &str) -> Result<Map, MapError>,
+    map_of: fn(&Path, Lightness) -> Result<Map, MapError>,
 ) -> Result<PlacedMap, MapError> {
-    let text = text(file)?;
-    let (cell_m, corner_m) = of_keys(file, &text, Keys::place)?;
-    Ok(PlacedMap { map: map_of(file, &text)?, cell_m, corner_m })
+    let ((cell_m, corner_m), (image, lightness)) =
+        of_keys(file, |keys| Ok((keys.place()?, keys.image(file)?)))?;
+    Ok(PlacedMap { map: map_of(&image, lightness)?, cell_m, corner_m })
 }
 
-fn of_keys<T>(
-    file: &Path,
-    text: &str,
-    value: impl FnOnce(&Keys) -> Result<T, String>,
-) -> Result<T, MapError> {
-    Keys::parse(text).and_then(|keys| value(&keys)).map_err(|problem| MapError::of(file, problem))
-}
-
-fn text(file: &Path) -> Result<String, MapError> {
-    String::from_utf8(read(file, LONGEST)?)
-        .map_err(|_| MapError::of(file, "not UTF-8 text; give the YAML of a map_server map"))
-}
-
-fn image_of(file: &Path, text: &str) -> Result<Map, MapError> {
-    let (image, lightness) = named_image(file, text)?;
-    image::load(&image, lightness)
-}
-
-fn named_image(file: &Path, text: &str) -> Result<(PathBuf, Lightness), MapError> {
-    of_keys(file, text, |keys| {
-        let image = keys.scalar("image")?.ok_or_else(|| missing("image: FILE"))?;
-        let folder = file.parent().unwrap_or(Path::new(""));
-        // `join` keeps an absolute path.
-        Ok((folder.join(image), keys.lightness()?))
-    })
+fn of_keys<T>(file: &Path, value: impl FnOnce(&Keys) -> Result<T, String>) -> Result<T, MapError> {
+    let text = String::from_utf8(read(file, LONGEST)?)
+        .map_err(|_| "not UTF-8 text; give the YAML of a map_server map".to_owned());
+    text.and_then(|text| value(&Keys::parse(&text)?)).map_err(|problem| MapError::of(file, problem))
 }
 
 /// Row-major image, row 0 at the top.
@@ -163,6 +142,14 @@ impl Keys {
         let number =
             |text: &str| text.parse().map_err(|_| format!("{key}: {text:?} is not a number"));
         self.scalar(key)?.map(number).transpose()
+    }
+
+    /// Returns the image that the map `file` names.
+    fn image(&self, file: &Path) -> Result<(PathBuf, Lightness), String> {
+        let image = self.scalar("image")?.ok_or_else(|| missing("image: FILE"))?;
+        let folder = file.parent().unwrap_or(Path::new(""));
+        // `join` keeps an absolute path.
+        Ok((folder.join(image), self.lightness()?))
     }
 
     /// Returns the side of a cell and the corner of least x and y, metres.
