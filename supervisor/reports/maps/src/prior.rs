@@ -84,14 +84,10 @@ pub fn save_believed(
         }
     };
     // Row 0 is the lowest of the grid and the highest of an image.
-    let pixels = (0..side).rev().flat_map(|row| (0..side).map(move |col| (col, row)));
-    let map = ros::Saved {
-        cols: frame.cells as usize,
-        pixels: pixels.map(|(col, row)| pixel(col, row)).collect(),
-        cell_m: frame.resolution_m,
-        corner_m: frame.corner_of(Cell { col: 0, row: 0 }).to_array(),
-    };
-    ros::save(file, &map)
+    let places = (0..side).rev().flat_map(|row| (0..side).map(move |col| (col, row)));
+    let pixels: Vec<u8> = places.map(|(col, row)| pixel(col, row)).collect();
+    let corner_m = frame.corner_of(Cell { col: 0, row: 0 }).to_array();
+    ros::save(file, frame.cells as usize, &pixels, frame.resolution_m, corner_m)
 }
 
 #[cfg(test)]
@@ -113,13 +109,8 @@ mod tests {
     fn occupied_pixels_become_boxes_where_the_map_says_and_unknown_ones_do_not() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("office.yaml");
-        let map = ros::Saved {
-            cols: 4,
-            pixels: vec![FREE, OCCUPIED, OCCUPIED, FREE, UNKNOWN, OCCUPIED, OCCUPIED, OCCUPIED],
-            cell_m: 0.5,
-            corner_m: [-1.0, 1.0],
-        };
-        ros::save(&file, &map).unwrap();
+        let pixels = [FREE, OCCUPIED, OCCUPIED, FREE, UNKNOWN, OCCUPIED, OCCUPIED, OCCUPIED];
+        ros::save(&file, 4, &pixels, 0.5, [-1.0, 1.0]).unwrap();
         let named = mission(&format!("map = '{}'", file.display()));
         let known = with_prior_map(named).unwrap();
         assert_eq!(known.map, None);

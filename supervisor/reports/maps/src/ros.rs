@@ -61,30 +61,29 @@ fn of_keys<T>(file: &Path, value: impl FnOnce(&Keys) -> Result<T, String>) -> Re
     text.and_then(|text| value(&Keys::parse(&text)?)).map_err(|problem| MapError::of(file, problem))
 }
 
-/// Row-major image, row 0 at the top.
-pub(super) struct Saved {
-    pub cols: usize,
-    /// 0 occupied, 254 free, 205 unknown, as the map_saver writes them.
-    pub pixels: Vec<u8>,
-    pub cell_m: f64,
-    /// Corner of least x and y.
-    pub corner_m: [f64; 2],
-}
-
-pub(super) fn save(file: &Path, map: &Saved) -> Result<(), MapError> {
+/// Saves an image of rows of `cols` pixels, the first at the top, as a map of cells of `cell_m`
+/// metres, whose corner of least x and y is given.
+///
+/// A pixel is 0 if occupied, 254 if free, 205 if unknown, as the map_saver writes them.
+pub(super) fn save(
+    file: &Path,
+    cols: usize,
+    pixels: &[u8],
+    cell_m: f64,
+    [x, y]: [f64; 2],
+) -> Result<(), MapError> {
     let unwritable =
         |cause| MapError::of(file, format!("{cause}; give the name of a map to write"));
-    assert!(map.pixels.len().is_multiple_of(map.cols));
+    assert!(pixels.len().is_multiple_of(cols));
     let image = file.with_extension("pgm");
-    let mut bytes = format!("P5\n{} {}\n255\n", map.cols, map.pixels.len() / map.cols).into_bytes();
-    bytes.extend_from_slice(&map.pixels);
+    let mut bytes = format!("P5\n{cols} {}\n255\n", pixels.len() / cols).into_bytes();
+    bytes.extend_from_slice(pixels);
     file::replace(&image, bytes).map_err(unwritable)?;
-    let (name, [x, y]) = (image.file_name().unwrap_or_default().to_string_lossy(), map.corner_m);
+    let name = image.file_name().unwrap_or_default().to_string_lossy();
     // A name in single quotes is literal, except for doubled quotes.
     let name = name.replace('\'', "''");
     let yaml = format!(
-        "image: '{name}'\nmode: trinary\nresolution: {:?}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
-        map.cell_m
+        "image: '{name}'\nmode: trinary\nresolution: {cell_m:?}\norigin: [{x:?}, {y:?}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
     );
     file::replace(file, yaml).map_err(unwritable)
 }
