@@ -1,9 +1,10 @@
 //! Ground truth of a simulated robot as JSON lines: a [`GroundTruthHeader`], then one
 //! [`GroundTruthTick`] each. Stages never read it.
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::samples::PoseSample;
+use crate::{kinematics::Pose2, samples::PoseSample};
 
 pub const GROUND_TRUTH: &str = "ground_truth.jsonl";
 
@@ -69,6 +70,10 @@ impl GroundTruthTick {
             Some(radio) => self.tick.saturating_sub(radio.missed_ticks),
             None => self.tick,
         }
+    }
+
+    pub const fn pose(&self) -> Pose2 {
+        Pose2 { position: DVec2::new(self.x, self.y), heading: self.heading }
     }
 
     pub const fn is_of(&self, pose: &PoseSample) -> bool {

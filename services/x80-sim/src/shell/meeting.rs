@@ -214,8 +214,8 @@ impl Meeting {
         let ended = ended || (truth.contacts > 0 && !self.goes_on_after_contact);
         let goes = if ended { 0.0 } else { 1.0 };
         let own = &mut self.own;
-        (own.time_s, own.at, own.heading) =
-            (truth.time_s, DVec2::new(truth.x, truth.y), truth.heading);
+        let pose = truth.pose();
+        (own.time_s, own.at, own.heading) = (truth.time_s, pose.position, pose.heading);
         (own.v, own.omega, own.ended) = (goes * truth.v, goes * truth.omega, ended);
         self.send();
     }

@@ -67,7 +67,7 @@ fn svg(mission: &Mission, finished: &Finished, heard: &Hearer, summary: &Summary
             let [xx, xy, _, yy, ..] = pose.covariance;
             [xx, xy, yy]
         }),
-        truth: &true_poses(&finished.truth),
+        truth: &finished.truth.iter().map(GroundTruthTick::pose).collect::<Vec<_>>(),
         targets: &targets,
         trails: &trails,
         facts: Facts {
@@ -81,11 +81,4 @@ fn svg(mission: &Mission, finished: &Finished, heard: &Hearer, summary: &Summary
         },
         captions: &captions,
     })
-}
-
-fn true_poses(truth: &[GroundTruthTick]) -> Vec<Pose2> {
-    truth
-        .iter()
-        .map(|tick| Pose2 { position: DVec2::new(tick.x, tick.y), heading: tick.heading })
-        .collect()
 }

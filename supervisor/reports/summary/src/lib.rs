@@ -9,7 +9,6 @@ use std::{collections::BTreeMap, fmt};
 use common::{
     ground_truth::GroundTruthTick, latency::Histogram, mission::Mission, samples::PoseSample,
 };
-use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use self::totals::LookTotals;
@@ -247,8 +246,7 @@ impl fmt::Display for Summary {
 /// Returns the time at which the robot had left its start.
 pub fn departed_s(mission: &Mission, truth: &[GroundTruthTick]) -> Option<f64> {
     let start = mission.start.at;
-    let has_left =
-        |tick: &&GroundTruthTick| start.distance(DVec2::new(tick.x, tick.y)) >= DEPARTED_M;
+    let has_left = |tick: &&GroundTruthTick| start.distance(tick.pose().position) >= DEPARTED_M;
     truth.iter().find(has_left).map(|tick| tick.time_s)
 }
 
@@ -266,9 +264,8 @@ fn straight_m(mission: &Mission, targets: &[TargetResult]) -> f64 {
 
 /// Uses square roots, identical on every processor, unlike the C library's `hypot`.
 fn path_length(truth: &[GroundTruthTick]) -> f64 {
-    let places =
-        truth.windows(2).map(|pair| [&pair[0], &pair[1]].map(|tick| DVec2::new(tick.x, tick.y)));
-    places.map(|[from, to]| from.distance(to)).sum()
+    let legs = truth.windows(2).map(|pair| [0, 1].map(|at| pair[at].pose().position));
+    legs.map(|[from, to]| from.distance(to)).sum()
 }
 
 fn contact_speed_m_s(truth: &[GroundTruthTick], track_m: f64) -> Option<f64> {
@@ -287,9 +284,8 @@ fn near_share(truth: &[GroundTruthTick]) -> Option<f64> {
 
 fn path_smoothness(truth: &[GroundTruthTick]) -> Option<f64> {
     let squared = |three: &[GroundTruthTick]| {
-        let change =
-            |of: fn(&GroundTruthTick) -> f64| of(&three[2]) - 2.0 * of(&three[1]) + of(&three[0]);
-        change(|tick| tick.x).powi(2) + change(|tick| tick.y).powi(2)
+        let [before, here, after] = [0, 1, 2].map(|at| three[at].pose().position);
+        (after - 2.0 * here + before).length_squared()
     };
     (truth.len() > 2).then(|| truth.windows(3).map(squared).sum())
 }

@@ -135,7 +135,7 @@ impl Setting {
         if still_moving.is_some() {
             return Err("THE ROBOT MOVES although every stop method was tried".into());
         }
-        let truth = finished.truth.last().map(|truth| DVec2::new(truth.x, truth.y));
+        let truth = finished.truth.last().map(|truth| truth.pose().position);
         let (ending, seconds) = (&finished.ending, finished.duration_s);
         let outcome = match ending.outcome {
             // Uncalibrated wheels may end anywhere. A failed planner stores the reason in its
