@@ -11,7 +11,6 @@ use common::{
 };
 use serde::{Deserialize, Serialize};
 
-use self::totals::LookTotals;
 pub use self::{hearer::Hearer, trails::Trail};
 
 use mission_control::{
@@ -117,11 +116,10 @@ impl Summary {
         let pose = last_tick.and_then(|tick| record.pose_at(tick));
         let guidance = last_tick.and_then(|tick| record.guidance_at(tick));
         let truth = &finished.truth[..];
+        let ended = truth.last();
         let clearance = truth.iter().map(|tick| tick.clearance_m).reduce(f64::min);
-        let ended = truth.last().map(|tick| tick.x.hypot(tick.y));
-        let collisions = truth.last().map(|tick| tick.contacts);
         let restarts = finished.restarts.iter();
-        let looks = last_tick.map_or(LookTotals::default(), |tick| heard.looks.at(tick));
+        let looks = last_tick.map(|tick| heard.looks.at(tick)).unwrap_or_default();
         Self {
             outcome: ending.outcome,
             reason: ending.reason.clone(),
@@ -137,21 +135,21 @@ impl Summary {
             p_o: near_share(truth),
             f_ps_m2: path_smoothness(truth),
             f_vs_m_s2: velocity_smoothness(truth),
-            collisions,
+            collisions: ended.map(|tick| tick.contacts),
             contact_speed_m_s: contact_speed_m_s(truth, mission.body().track_m),
             pose_error_m: pose.and_then(|pose| {
                 let its = truth.iter().rev().find(|tick| tick.is_of(pose));
-                Some(its.or(truth.last())?.pose_error_m(pose))
+                Some(its.or(ended)?.pose_error_m(pose))
             }),
             pose_error_expected_m: pose.map(PoseSample::position_rms_m),
             pose_within_m: pose.map(PoseSample::position_within_m),
-            true_distance_m: truth.last().and_then(|tick| {
+            true_distance_m: ended.and_then(|tick| {
                 let tried = |it: &&TargetResult| it.outcome != TargetOutcome::NotTried;
                 let last = finished.targets.iter().rfind(tried)?;
                 Some((tick.x - last.x_m).hypot(tick.y - last.y_m))
             }),
             departed_s: departed_s(mission, truth),
-            stopping_time_s: truth.last().map(|tick| tick.stopping_time_s),
+            stopping_time_s: ended.map(|tick| tick.stopping_time_s),
             safety_events: guidance.map_or(0, |guidance| guidance.safety_events),
             full_solves: heard.solves_until(guidance),
             looks: looks.looks,
