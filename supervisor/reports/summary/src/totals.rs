@@ -16,17 +16,14 @@ pub(crate) struct Totals<T> {
 impl<T: Copy + Default> Totals<T> {
     /// A repeated tick counts once.
     pub(crate) fn add(&mut self, tick: u64, add: impl FnOnce(T) -> T) {
-        let (last, totals) = match self.newest.back() {
-            Some(&(last, totals)) => (Some(last), totals),
-            None => (None, T::default()),
-        };
+        let (last, totals) = self.newest.back().copied().unzip();
         if last.is_some_and(|last| tick <= last) {
             return;
         }
         if self.newest.len() == MOST {
             self.newest.pop_front();
         }
-        self.newest.push_back((tick, add(totals)));
+        self.newest.push_back((tick, add(totals.unwrap_or_default())));
         assert!(self.newest.len() <= MOST);
     }
 
