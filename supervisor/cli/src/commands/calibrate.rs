@@ -101,15 +101,16 @@ pub fn main(arguments: &Arguments) -> Result {
         drive_m: arguments.drive,
     };
     arguments.setting.log("calibration.log")?;
+    let mission = arguments.mission(plan)?;
     if arguments.response {
-        return response::measure(arguments, plan);
+        return response::measure(arguments, &mission);
     }
     let found = match arguments.gyro {
-        Some(scale_sd) => gyro::measure(arguments, plan, scale_sd),
-        None if arguments.squares => by_squares(arguments, plan),
-        None => by_wall(arguments, plan),
+        Some(scale_sd) => gyro::measure(arguments, &mission, scale_sd),
+        None if arguments.squares => by_squares(arguments, &mission),
+        None => by_wall(arguments, &mission),
     }?;
-    found.write(arguments)
+    found.write(arguments, &mission.robot.odometry)
 }
 
 impl Arguments {
@@ -142,12 +143,8 @@ fn refused(message: impl Display) -> Failure {
     Refused::new("not-calibrated", format!("nothing was written: {message}")).into()
 }
 
-fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
-    let mission = arguments.mission(plan)?;
-    let body = mission.body();
-    let before = mission.robot.odometry.clone();
-    let Carried { directory, seconds, .. } =
-        arguments.setting.carry_out(&mission, "calibration")?;
+fn by_wall(arguments: &Arguments, mission: &Mission) -> Result<Found> {
+    let Carried { directory, seconds, .. } = arguments.setting.carry_out(mission, "calibration")?;
     let place = directory.display();
     let Some(Drive::Wall(wall)) = Drive::of_run(&directory)? else {
         return Err(refused(format_args!(
@@ -164,9 +161,8 @@ fn by_wall(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
         }
     }
     let (estimate, _) =
-        loops::checked(&wall.loops, wall.normal_sd(), body.track_m).map_err(refused)?;
-    let metres = wall.metres();
-    Ok(Found { method: "wall", before, estimate, metres, seconds })
+        loops::checked(&wall.loops, wall.normal_sd(), mission.body().track_m).map_err(refused)?;
+    Ok(Found { method: "wall", estimate, metres: wall.metres(), seconds })
 }
 
 /// Gives each square its own noise, but the same wheels.
@@ -181,12 +177,11 @@ fn noise_of_its_own(mission: &mut Mission, number: u32) {
     mission.seed = mission.seed.wrapping_add(u64::from(number) << 32);
 }
 
-fn by_squares(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
+fn by_squares(arguments: &Arguments, base: &Mission) -> Result<Found> {
     let mut signals = Signals::that_end()?;
     let mut driven = Vec::new();
     let (mut metres, mut seconds) = (0.0, 0.0);
-    let base = arguments.mission(plan)?;
-    let (body, before) = (base.body(), base.robot.odometry.clone());
+    let body = base.body();
     let is_simulated = base.robot.address.is_none();
     let count = 2 * arguments.count;
     for number in 1..=count {
@@ -214,5 +209,5 @@ fn by_squares(arguments: &Arguments, plan: CalibrationPlan) -> Result<Found> {
         driven.push(squares::Driven { ways, end });
     }
     let estimate = squares::checked(&driven, body.track_m).map_err(refused)?;
-    Ok(Found { method: "squares", before, estimate, metres, seconds })
+    Ok(Found { method: "squares", estimate, metres, seconds })
 }

@@ -2,7 +2,7 @@
 
 use bring_up::{Trace, trace::Told};
 use calibration::gyro::{Motion, checked};
-use common::mission::{CalibrationPlan, Mission, Odometry};
+use common::mission::{Mission, Odometry};
 use recording::Recording;
 
 use super::{Arguments, drive::Carried, refused, written::Found};
@@ -11,22 +11,20 @@ use console::failure::Result;
 /// Time for a robot to come to rest, seconds.
 const RESTS_AFTER_S: f64 = 0.8;
 
-pub fn measure(arguments: &Arguments, plan: CalibrationPlan, scale_sd: f64) -> Result<Found> {
-    let mut mission = arguments.mission(plan)?;
+pub fn measure(arguments: &Arguments, mission: &Mission, scale_sd: f64) -> Result<Found> {
     if !(mission.robot.gyro() || mission.robot.ros2.imu.is_some()) {
         return Err("this robot has no gyro; if its JSON lines report a gyro angle, set `gyro = true` below [robot]; if a ROS 2 topic carries the angle, name the topic as robot.ros2.imu; or calibrate before a wall or along squares".into());
     }
-    let Carried { directory, seconds, .. } =
-        arguments.setting.carry_out(&mission, "calibration")?;
-    let before = std::mem::take(&mut mission.robot.odometry);
+    let Carried { directory, seconds, .. } = arguments.setting.carry_out(mission, "calibration")?;
     // Nominal distances are those of uncalibrated wheels.
+    let mut mission = mission.clone();
     mission.robot.odometry = Odometry::default();
     let trace = Trace::read(&mission, &Recording::open(&directory)?)?;
     let (at_rest, motions) = motions(&mission, &trace).map_err(refused)?;
     let estimate =
         checked(&at_rest, &motions, scale_sd, mission.body().track_m).map_err(refused)?;
     let metres = motions.iter().map(|it| it.rolled_m).sum::<f64>() / 2.0;
-    Ok(Found { method: "gyro", before, estimate, metres, seconds })
+    Ok(Found { method: "gyro", estimate, metres, seconds })
 }
 
 /// Pairs of seconds and turned angle, radians.

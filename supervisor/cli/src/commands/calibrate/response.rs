@@ -2,7 +2,7 @@
 
 use bring_up::Trace;
 use calibration::response::{By, Estimate, Measured, estimate, keys};
-use common::mission::CalibrationPlan;
+use common::mission::Mission;
 use recording::Recording;
 use serde_json::json;
 
@@ -12,11 +12,10 @@ use console::{
     output::{print_line, print_text},
 };
 
-pub fn measure(arguments: &Arguments, plan: CalibrationPlan) -> Result {
-    let mission = arguments.mission(plan)?;
+pub fn measure(arguments: &Arguments, mission: &Mission) -> Result {
     let body = mission.body();
-    let Carried { directory, .. } = arguments.setting.carry_out(&mission, "turns")?;
-    let trace = Trace::read(&mission, &Recording::open(&directory)?)?;
+    let Carried { directory, .. } = arguments.setting.carry_out(mission, "turns")?;
+    let trace = Trace::read(mission, &Recording::open(&directory)?)?;
     let turn = |(at, [left, right]): &(f64, [f64; 2])| (*at, (right - left) / body.track_m);
     let [told, turned] =
         [&trace.told, &trace.rolled].map(|it| it.iter().map(turn).collect::<Vec<_>>());

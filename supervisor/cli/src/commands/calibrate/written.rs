@@ -12,7 +12,6 @@ use console::{failure::Result, logging::today, output::print_line};
 
 pub struct Found {
     pub method: &'static str,
-    pub before: Odometry,
     pub estimate: Estimate,
     pub metres: f64,
     pub seconds: f64,
@@ -20,10 +19,10 @@ pub struct Found {
 
 impl Found {
     /// Replaces the file atomically.
-    pub fn write(&self, arguments: &Arguments) -> Result {
+    pub fn write(&self, arguments: &Arguments, before: &Odometry) -> Result {
         let (file, setting) = (&arguments.out, &arguments.setting);
         let it = &self.estimate;
-        let mut odometry = it.odometry(&self.before);
+        let mut odometry = it.odometry(before);
         odometry.calibrated = Some(Provenance {
             date: today(),
             robot: setting.robot.to_string(),
