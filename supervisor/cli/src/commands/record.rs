@@ -118,9 +118,10 @@ impl Wishes for Asks {
 }
 
 pub fn main(arguments: &Arguments) -> Result {
-    let signals = Signals::that_end()?;
+    let mut asks = Asks { signals: Signals::that_end()?, supervisor: None };
     if let Some(supervisor) = arguments.supervisor {
         become_child("recorder", supervisor)?;
+        asks.supervisor = Some(io::stdin().as_fd().try_clone_to_owned()?.into());
     }
     let chosen = arguments.topics.as_ref();
     let chosen = chosen.map(|names| names.iter().map(|name| readable(name)).collect::<Result<_>>());
@@ -149,9 +150,5 @@ pub fn main(arguments: &Arguments) -> Result {
             say(format_args!("cannot print the state of the recording: {error}"));
         }
     };
-    let supervisor = match arguments.supervisor {
-        Some(_) => Some(File::from(io::stdin().as_fd().try_clone_to_owned()?)),
-        None => None,
-    };
-    Ok(recording::record(&options, &mut Asks { signals, supervisor }, &mut tell)?)
+    Ok(recording::record(&options, &mut asks, &mut tell)?)
 }
