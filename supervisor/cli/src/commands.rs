@@ -32,7 +32,6 @@ mod zone;
 
 use std::{
     ffi::{OsStr, OsString},
-    fmt::Write as _,
     process::{ExitCode, Termination as _},
 };
 
@@ -175,8 +174,7 @@ fn listed() -> String {
     let all = all.subcommands(companions::TABLE.iter().map(companions::Companion::command));
     let mut text = String::new();
     for (heading, names) in GROUPS {
-        // Infallible for a String.
-        let _ = writeln!(text, "{heading}:");
+        text += &format!("{heading}:\n");
         for name in *names {
             let is_it = |it: &&clap::Command| it.get_name().replace('-', "") == name.to_lowercase();
             let Some(command) = all.get_subcommands().find(is_it) else { continue };
@@ -184,7 +182,7 @@ fn listed() -> String {
             let about = about.map(ToString::to_string).unwrap_or_default();
             let about = about.split([';', ':']).next().unwrap_or_default();
             let about = about.split(". ").next().unwrap_or_default();
-            let _ = writeln!(text, "  {name:<12} {about}");
+            text += &format!("  {name:<12} {about}\n");
         }
         text.push('\n');
     }

@@ -1,7 +1,4 @@
-use std::{
-    fmt::Write as _,
-    io::{self, IsTerminal as _},
-};
+use std::io::{self, IsTerminal as _};
 
 use clap::{Args, Command, error::ErrorKind};
 
@@ -103,10 +100,9 @@ pub fn page_names() -> Vec<String> {
 pub fn pages() -> String {
     let mut list = String::from("Guide (firsthand help PAGE):\n");
     for Part { title, pages } in GUIDE {
-        // Infallible for a String.
-        let _ = writeln!(list, " {title}");
+        list += &format!(" {title}\n");
         for page in *pages {
-            let _ = writeln!(list, "  {:<22} {}", page.name(), page.title());
+            list += &format!("  {:<22} {}\n", page.name(), page.title());
         }
     }
     list

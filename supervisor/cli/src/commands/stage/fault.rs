@@ -1,4 +1,4 @@
-use std::{fmt::Write as _, time::Instant};
+use std::time::Instant;
 
 use clap::Args;
 use common::{
@@ -111,12 +111,8 @@ fn table() -> String {
     let mut text = String::from("Faults:\n");
     for fault in &faults::TABLE {
         let stage = fault.stage.unwrap_or("any");
-        // Infallible for a String.
-        let _ = writeln!(
-            text,
-            "  {stage:<8} {:<14} {}; until: {}",
-            fault.name, fault.meaning, fault.ends
-        );
+        text +=
+            &format!("  {stage:<8} {:<14} {}; until: {}\n", fault.name, fault.meaning, fault.ends);
     }
     text
 }

@@ -1,6 +1,6 @@
 //! `firsthand topic list --python`: a module for consumers in Python.
 
-use std::{collections::BTreeSet, fmt::Write as _};
+use std::collections::BTreeSet;
 
 use common::{
     VERSION,
@@ -35,15 +35,14 @@ const CELL_STATES: &[(&str, u8)] = &[
 /// Returns the module: structs with layouts checked on import, and a follower.
 pub fn module() -> String {
     let mut module = include_str!("topics.py").to_owned();
-    // Infallible for a String.
     for (name, values) in ENUMS.iter().chain(&[("CellState", CELL_STATES)]) {
-        let _ = writeln!(module, "class {name}(enum.IntEnum):");
+        module += &format!("class {name}(enum.IntEnum):\n");
         for (value, byte) in *values {
             // `None` is a keyword of Python.
             let value = if *value == "None" { "Nothing" } else { value };
-            let _ = writeln!(module, "    {value} = {byte}");
+            module += &format!("    {value} = {byte}\n");
         }
-        module.push_str("\n\n");
+        module += "\n\n";
     }
     let (mut known, mut table) = (BTreeSet::new(), String::new());
     for topic in topics::TABLE {
@@ -52,11 +51,10 @@ pub fn module() -> String {
             declare(kind, &mut known, &mut module);
         }
         let element = element.map_or("None".to_owned(), |element| python(&element));
-        let _ =
-            writeln!(table, "    \"{}\": ({}, {element}),", topic.spec().name, python(&payload));
+        let (name, payload) = (topic.spec().name, python(&payload));
+        table += &format!("    \"{name}\": ({payload}, {element}),\n");
     }
-    let _ = write!(
-        module,
+    module += &format!(
         "# What each sample is: a struct; or a header, and what a slice is made of.\nTOPICS = {{\n{table}}}\nVERSION = {VERSION:?}\n"
     );
     module
@@ -76,30 +74,29 @@ fn declare(kind: &Kind, known: &mut BTreeSet<&'static str>, module: &mut String)
         declare(&field.kind, known, module);
     }
     let class = class(structure);
-    let _ = writeln!(module, "class {class}(Struct):");
+    *module += &format!("class {class}(Struct):\n");
     let commented = || structure.fields.iter().filter(|field| !field.doc.is_empty());
     if commented().count() > 0 {
-        module.push_str("    \"\"\"\n");
+        *module += "    \"\"\"\n";
         for field in commented() {
-            let _ = writeln!(module, "    {}:{}", field.name, plain(field.doc));
+            *module += &format!("    {}:{}\n", field.name, plain(field.doc));
         }
-        module.push_str("    \"\"\"\n\n");
+        *module += "    \"\"\"\n\n";
     }
-    module.push_str("    _fields_ = [\n");
+    *module += "    _fields_ = [\n";
     for field in &structure.fields {
-        let _ = writeln!(module, "        (\"{}\", {}),", field.name, python(&field.kind));
+        *module += &format!("        (\"{}\", {}),\n", field.name, python(&field.kind));
     }
-    let _ = writeln!(
-        module,
-        "    ]\n\n    @staticmethod\n    def type_name():\n        return \"{}\"\n\n",
+    *module += &format!(
+        "    ]\n\n    @staticmethod\n    def type_name():\n        return \"{}\"\n\n\n",
         structure.name
     );
-    let _ = writeln!(module, "assert ctypes.sizeof({class}) == {}", structure.size);
+    *module += &format!("assert ctypes.sizeof({class}) == {}\n", structure.size);
     for field in &structure.fields {
         let (name, offset) = (field.name, field.offset);
-        let _ = writeln!(module, "assert {class}.{name}.offset == {offset}");
+        *module += &format!("assert {class}.{name}.offset == {offset}\n");
     }
-    module.push_str("\n\n");
+    *module += "\n\n";
 }
 
 /// Returns a comment without link markup.

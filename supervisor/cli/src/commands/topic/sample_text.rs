@@ -1,7 +1,5 @@
 //! Formats samples by their layouts: text with one field per line, or one JSON object.
 
-use std::fmt::Write as _;
-
 use common::bus::Value;
 use serde::{Serialize, Serializer};
 
@@ -36,28 +34,25 @@ pub fn fields(header: Value, elements: Option<Vec<Value>>) -> Fields {
     fields
 }
 
-// Infallible for a String.
 fn write_field(to: &mut String, indent: usize, name: &str, value: &Value, most: usize) {
-    let _ = match value {
+    match value {
         Value::Struct(fields) => {
-            let _ = writeln!(to, "{:indent$}{name}:", "");
+            *to += &format!("{:indent$}{name}:\n", "");
             for (name, value) in fields {
                 write_field(to, indent + 2, name, value, most);
             }
-            return;
         }
         Value::Array(elements) if matches!(elements.first(), Some(Value::Struct(_))) => {
-            let _ = writeln!(to, "{:indent$}{name}:", "");
+            *to += &format!("{:indent$}{name}:\n", "");
             for element in elements.iter().take(most) {
-                let _ = writeln!(to, "{:indent$}- {}", "", on_one_line(element, most));
+                *to += &format!("{:indent$}- {}\n", "", on_one_line(element, most));
             }
-            match elements.len().saturating_sub(most) {
-                0 => return,
-                more => writeln!(to, "{:indent$}# {more} more", ""),
+            if elements.len() > most {
+                *to += &format!("{:indent$}# {} more\n", "", elements.len() - most);
             }
         }
-        other => writeln!(to, "{:indent$}{name}: {}", "", on_one_line(other, most)),
-    };
+        other => *to += &format!("{:indent$}{name}: {}\n", "", on_one_line(other, most)),
+    }
 }
 
 fn on_one_line(value: &Value, most: usize) -> String {
