@@ -39,8 +39,12 @@ pub fn main(arguments: &Arguments) -> Result {
         Table::Failsafe => failsafe(),
         Table::Faults => faults(),
         Table::Results => stored::results(),
-        Table::Capabilities => stored::markdown("capabilities", None).unwrap_or_default(),
-        Table::Versions => stored::markdown("versions", None).unwrap_or_default(),
+        Table::Capabilities => {
+            stored::markdown("capabilities", include_str!("../../../guide/capabilities.csv"))
+        }
+        Table::Versions => {
+            stored::markdown("versions", include_str!("../../../guide/versions.csv"))
+        }
     })
 }
 

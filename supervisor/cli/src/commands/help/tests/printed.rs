@@ -135,8 +135,28 @@ fn shown(name: &str, section: Option<&str>) -> Option<String> {
         "failsafe" => Some(table::failsafe()),
         "faults" => Some(table::faults()),
         "ros2" => Some(firsthand_ros2::topics()),
-        stored => table::stored::markdown(stored, section),
+        name => stored(name, section),
     }
+}
+
+/// Returns the rows of all or some sections (`a,b`) of a stored file, or `None` if there are none.
+fn stored(name: &str, section: Option<&str>) -> Option<String> {
+    let guide = root().join("supervisor/guide");
+    let files = [format!("{name}.csv"), format!("results/{}.csv", name.replace('-', "_"))];
+    let file = files.map(|file| guide.join(file)).into_iter().find(|file| file.exists())?;
+    let mut reader = csv::Reader::from_path(file).unwrap();
+    let (mut text, mut count) = (Vec::<u8>::new(), 0);
+    let mut writer = csv::Writer::from_writer(&mut text);
+    writer.write_record(reader.headers().unwrap()).unwrap();
+    for row in reader.records().map(Result::unwrap) {
+        if section.is_none_or(|asked| asked.split(',').any(|asked| row.get(0) == Some(asked))) {
+            writer.write_record(&row).unwrap();
+            count += 1;
+        }
+    }
+    writer.flush().unwrap();
+    drop(writer);
+    (count > 0).then(|| table::stored::markdown(name, std::str::from_utf8(&text).unwrap()))
 }
 
 #[test]
