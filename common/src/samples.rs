@@ -59,45 +59,6 @@ macro_rules! payloads {
     )*};
 }
 
-macro_rules! wire_enum {
-    ($(#[$meta:meta])* $name:ident, unknown = $unknown:ident, text = $text:ident { $($(#[$doc:meta])* $variant:ident = $byte:literal $words:literal),* $(,)? }) => {
-        wire_enum! { $(#[$meta])* $name, unknown = $unknown { $($(#[$doc])* $variant = $byte),* } }
-        impl $name {
-            pub const fn $text(self) -> &'static str {
-                match self { $(Self::$variant => $words),* }
-            }
-        }
-    };
-    ($(#[$meta:meta])* $name:ident, unknown = $unknown:ident { $($(#[$doc:meta])* $variant:ident = $byte:literal),* $(,)? }) => {
-        $(#[$meta])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u8)]
-        pub enum $name { $($(#[$doc])* $variant = $byte),* }
-        impl $name {
-            /// Names of all values and their bytes.
-            pub const VALUES: &[(&str, u8)] = &[$((stringify!($variant), $byte)),*];
-
-            /// Decodes a byte; an unknown one gives the safe value.
-            pub const fn from_byte(byte: u8) -> Self {
-                match byte {
-                    $($byte => Self::$variant,)*
-                    _ => Self::$unknown,
-                }
-            }
-        }
-        impl From<u8> for $name {
-            fn from(byte: u8) -> Self {
-                Self::from_byte(byte)
-            }
-        }
-        impl From<$name> for u8 {
-            fn from(value: $name) -> u8 {
-                value as u8
-            }
-        }
-    };
-}
-
 // These modules use the macros above.
 mod localisation;
 mod navigation;

@@ -5,22 +5,24 @@ use std::borrow::Cow;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// Cell state by (18), (19) and the a-priori map.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[repr(u8)]
-pub enum CellState {
-    /// Possibly safe: 0 in the paper's DSE.
-    Free = 0,
-    /// Safety event or its margin.
-    Sensed = 1,
-    Known = 2,
-    /// Perimeter of operation; never cleared.
-    Perimeter = 3,
-    /// Possibly safe and scanned by the sonar; only the evidential method distinguishes it from
-    /// [`Free`](Self::Free).
-    Scanned = 4,
-    /// Scanned and empty, but the body would touch something nearby: a hazard.
-    Margin = 5,
+wire_enum! {
+    /// Cell state by (18), (19) and the a-priori map, a byte of the `grid` topic. An unknown byte
+    /// counts as a hazard.
+    #[derive(Serialize, Deserialize)]
+    CellState, unknown = Perimeter {
+        /// Possibly safe: 0 in the paper's DSE.
+        Free = 0,
+        /// Safety event or its margin.
+        Sensed = 1,
+        Known = 2,
+        /// Perimeter of operation; never cleared.
+        Perimeter = 3,
+        /// Possibly safe and scanned by the sonar; only the evidential method distinguishes it from
+        /// [`Free`](Self::Free).
+        Scanned = 4,
+        /// Scanned and empty, but the body would touch something nearby: a hazard.
+        Margin = 5,
+    }
 }
 
 impl CellState {
@@ -31,18 +33,6 @@ impl CellState {
 
     pub const fn is_scanned(self) -> bool {
         matches!(self, Self::Scanned | Self::Margin)
-    }
-
-    /// Decodes a byte of the `grid` topic; an unknown one counts as a hazard.
-    pub const fn from_byte(byte: u8) -> Self {
-        match byte {
-            0 => Self::Free,
-            1 => Self::Sensed,
-            2 => Self::Known,
-            4 => Self::Scanned,
-            5 => Self::Margin,
-            _ => Self::Perimeter,
-        }
     }
 }
 

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Name;
-use crate::bus::ZeroCopySend;
+use crate::{bus::ZeroCopySend, mission::wire_enum};
 
 payloads! {
     /// Position fix of an external source, for example a camera or a satellite receiver.

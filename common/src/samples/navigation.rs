@@ -8,7 +8,7 @@ use crate::{
     geometry::{Zone, principal_axes},
     grid::Part,
     kinematics::{Pose2, Twist},
-    mission::{INFRARED_RANGERS, Mission, Waypoint},
+    mission::{INFRARED_RANGERS, Mission, Waypoint, wire_enum},
 };
 
 payloads! {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     bus::ZeroCopySend,
     latency,
-    mission::{INFRARED_RANGERS, Sensor},
+    mission::{INFRARED_RANGERS, Sensor, wire_enum},
 };
 
 wire_enum! {

@@ -8,7 +8,10 @@ use super::{
     localisation::BeaconRefusal,
     navigation::{MOST_TARGETS, TargetPoint},
 };
-use crate::bus::{ZeroCopySend, unpadded};
+use crate::{
+    bus::{ZeroCopySend, unpadded},
+    mission::wire_enum,
+};
 
 wire_enum! {
     HealthState, unknown = Starting {

@@ -10,7 +10,7 @@ use common::{
     topics,
 };
 
-/// Lists byte enums that comments of structs name.
+/// Lists byte enums that comments of structs name, and that of the bytes of `grid`.
 macro_rules! enums {
     ($($name:ident)*) => {
         const ENUMS: &[(&str, &[(&str, u8)])] = &[$((stringify!($name), $name::VALUES)),*];
@@ -20,22 +20,13 @@ macro_rules! enums {
 enums! {
     Action BeaconRefusal Cause CommandState DeathCause Direction FaultAnswer FaultKind FixRefusal FollowState GuidanceStatus HealthState
     HoldReason Maneuver NextStep Order RangeStatus RecoveryStep RequestAnswer RequestKind Rest StageState StallCause
+    CellState
 }
-
-/// Bytes of `grid`, which belong to no field.
-const CELL_STATES: &[(&str, u8)] = &[
-    ("Free", CellState::Free as u8),
-    ("Sensed", CellState::Sensed as u8),
-    ("Known", CellState::Known as u8),
-    ("Perimeter", CellState::Perimeter as u8),
-    ("Scanned", CellState::Scanned as u8),
-    ("Margin", CellState::Margin as u8),
-];
 
 /// Returns the module: structs with layouts checked on import, and a follower.
 pub fn module() -> String {
     let mut module = include_str!("topics.py").to_owned();
-    for (name, values) in ENUMS.iter().chain(&[("CellState", CELL_STATES)]) {
+    for (name, values) in ENUMS {
         module += &format!("class {name}(enum.IntEnum):\n");
         for (value, byte) in *values {
             // `None` is a keyword of Python.
