@@ -1,13 +1,12 @@
 //! Installs a systemd service. The Debian package has the same files (`[package.metadata.deb]`).
 
 use std::{
-    fs, io,
+    fs,
     path::{Path, PathBuf},
 };
 
 use clap::Args;
 use processes::stages;
-use thiserror::Error;
 
 use console::{
     consent,
@@ -68,13 +67,6 @@ then, when /etc/firsthand/mission.toml is the robot's mission:
   systemctl enable --now firsthand          # the supervisor starts the stages, or
   systemctl enable --now firsthand-watch    # systemd does:";
 
-#[derive(Debug, Error)]
-#[error("cannot write {file}: {source}; as root, or with --root?", file = file.display())]
-struct InstallError {
-    file: PathBuf,
-    source: io::Error,
-}
-
 pub fn main(arguments: &Arguments) -> Result {
     let executable = std::env::current_exe()?;
     if !arguments.print {
@@ -121,10 +113,12 @@ fn refuse_hidden(executable: &Path) -> Result {
     refuse("home-directory", message)
 }
 
-fn put(file: &Path, text: &str) -> Result<(), InstallError> {
+fn put(file: &Path, text: &str) -> Result {
     let written =
         file.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::write(file, text));
-    written.map_err(|source| InstallError { file: file.to_path_buf(), source })
+    let refused =
+        |error| format!("cannot write {}: {error}; as root, or with --root?", file.display());
+    Ok(written.map_err(refused)?)
 }
 
 fn remaining() -> String {
