@@ -10,7 +10,6 @@ pub(crate) struct Measured {
     pub ticks: u64,
     /// Mission time of the newest pose, seconds.
     pub time_s: f64,
-    pub path_m: f64,
     pub last_pose: Option<PoseSample>,
     last_speed: Option<f64>,
     speed_change: f64,
@@ -27,7 +26,6 @@ impl Measured {
     pub(crate) fn pose(&mut self, pose: &PoseSample, mission: &Mission) {
         self.ticks += 1;
         self.time_s = self.time_s.max(pose.stamp.seconds());
-        self.path_m = pose.travelled_m;
         let Some(last) = self.last_pose.replace(*pose) else {
             self.last_speed = Some(pose.v_m_s);
             return;

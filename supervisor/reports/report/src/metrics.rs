@@ -30,9 +30,9 @@ fn spl(content: &Content, path: Option<f64>) -> Option<f64> {
 /// `summary.json` or formula.
 pub(crate) fn rows(content: &Content) -> Vec<Value> {
     let measured = &content.measured;
-    let has_poses = measured.ticks > 0;
+    let pose = measured.last_pose.as_ref();
     let of = |field: &str, measured: Option<f64>| content.summed(field).or(measured);
-    let path = of("path_length_m", has_poses.then_some(measured.path_m));
+    let path = of("path_length_m", pose.map(|pose| pose.travelled_m));
     let straight = Some(content.mission.straight_m()).filter(|straight| *straight > 0.0);
     let ratio = path.zip(straight).map(|(path, straight)| path / straight);
     let latency = content.heard.latency();
@@ -53,8 +53,7 @@ pub(crate) fn rows(content: &Content) -> Vec<Value> {
     let known =
         |name, field, measured, digits, unit| row(name, field, of(field, measured), digits, unit);
     let count = |value: u64| Some(value as f64);
-    let pose = measured.last_pose.as_ref();
-    let time = has_poses.then_some(measured.time_s);
+    let time = pose.map(|_| measured.time_s);
     let [rms, within] = [PoseSample::position_rms_m, PoseSample::position_within_m];
     vec![
         json!(["success", success, "outcome"]),
