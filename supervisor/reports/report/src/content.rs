@@ -18,7 +18,7 @@ use robot_state::{Kind, Sample, TOPICS};
 use serde_json::{Map, Value, json};
 use summary::Hearer;
 
-use crate::{beliefs::Beliefs, measured::Measured, source};
+use crate::{beliefs::Beliefs, measured::Measured, metrics, source};
 
 const LOG: &str = "log";
 /// Maximum bytes of ground truth: an hour at 10 Hz takes 10 MB.
@@ -175,7 +175,7 @@ impl Content {
         }
     }
 
-    pub(crate) fn html(mut self, metrics: Vec<Value>) -> String {
+    pub(crate) fn html(mut self) -> String {
         self.add();
         if let Some(map) = self.collector.take_map() {
             self.page.blob(&map);
@@ -193,7 +193,7 @@ impl Content {
         let targets = self.summary.get("targets").and_then(Value::as_array).into_iter().flatten();
         let results: Vec<_> = targets.map(page::result).collect();
         self.page.text(&json!({
-            "metrics": metrics.into_iter().chain(about).collect::<Vec<_>>(),
+            "metrics": metrics::rows(&self).into_iter().chain(about).collect::<Vec<_>>(),
             "results": results,
             "outcome": self.ended(),
             "kind": self.kind(),

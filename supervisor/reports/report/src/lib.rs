@@ -40,15 +40,10 @@ pub fn write(run: &Path, out: Option<&Path>) -> Result<PathBuf, RecordingError> 
     let content = Content::read(&files)?;
     fs::create_dir_all(&out).map_err(FileError::of("make", &out))?;
     let page = out.join(PAGE);
-    fs::write(&page, html(content)).map_err(|error| {
+    fs::write(&page, content.html()).map_err(|error| {
         // An incomplete page is useless.
         let _ = fs::remove_file(&page);
         FileError::of("write", &page)(error)
     })?;
     Ok(page)
-}
-
-fn html(content: Content) -> String {
-    let metrics = metrics::rows(&content);
-    content.html(metrics)
 }

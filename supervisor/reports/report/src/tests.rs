@@ -7,7 +7,7 @@ use common::{
 use mission_control::Heard;
 use recording::Recording;
 
-use crate::{content::Content, html};
+use crate::content::Content;
 
 #[allow(unreachable_pub, reason = "the system tests share it")]
 #[path = "../../../../tests/support/recorded_page.rs"]
@@ -28,7 +28,7 @@ fn golden_of(name: &str) -> Content {
 fn a_page_has_every_tick_the_maps_a_field_and_the_metrics() {
     let content = golden();
     let ticks = content.measured.ticks as usize;
-    let (messages, blobs) = messages(&html(content));
+    let (messages, blobs) = messages(&content.html());
     let about = &messages[0]["about"];
     assert_eq!(about["robot"], "x80");
     let rows = messages.iter().filter_map(|message| message["rows"].as_array()).flatten();
@@ -55,7 +55,7 @@ fn a_page_has_every_tick_the_maps_a_field_and_the_metrics() {
 
 #[test]
 fn a_report_tells_of_a_stage_that_was_killed_and_refers_to_nothing() {
-    let page = html(golden_of("stall-and-kill"));
+    let page = golden_of("stall-and-kill").html();
     assert!(!page.contains("src=\"") && !page.contains("href=\"/"), "it refers to something");
     let (messages, _) = messages(&page);
     let told = messages.iter().filter_map(|message| message["events"].as_array()).flatten();
@@ -72,7 +72,7 @@ fn text_of_a_recording_is_never_markup() {
     content.mission.name = hostile.to_owned();
     content.remarks.push(hostile.to_owned());
     content.summary.insert("outcome".to_owned(), hostile.into());
-    let html = html(content);
+    let html = content.html();
     assert!(!html.contains("<script>alert"));
     let (messages, _) = messages(&html);
     assert_eq!(messages.last().unwrap()["remarks"][0], hostile);
