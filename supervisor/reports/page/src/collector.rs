@@ -150,16 +150,15 @@ impl Collector {
     /// the sensors.
     fn row(&mut self, tick: Tick) -> Option<Value> {
         let pose = &tick.pose?;
-        let Tick { wheels, command, guidance, ranges, movers, link, .. } =
-            std::mem::take(&mut self.newest);
+        let before = std::mem::take(&mut self.newest);
         self.newest = Tick {
-            pose: Some(*pose),
-            wheels: tick.wheels.or(wheels),
-            command: tick.command.or(command),
-            guidance: tick.guidance.or(guidance),
-            ranges: tick.ranges.or(ranges),
-            movers: tick.movers.or(movers),
-            link: tick.link.or(link),
+            pose: tick.pose,
+            wheels: tick.wheels.or(before.wheels),
+            command: tick.command.or(before.command),
+            guidance: tick.guidance.or(before.guidance),
+            ranges: tick.ranges.or(before.ranges),
+            movers: tick.movers.or(before.movers),
+            link: tick.link.or(before.link),
         };
         let [left, right] = self.newest.wheels.unwrap_or([f64::NAN; 2]);
         let command = self.newest.command.unwrap_or_default();
@@ -273,7 +272,8 @@ impl Collector {
         let mut key: Vec<u64> = self.state.stages.iter().flat_map(flags).collect();
         let LinkSample { action, cause, connected, at_rest, .. } = self.link();
         let RosterHeader { order, reason, .. } = self.roster();
-        key.extend([action, cause, at_rest, order, reason, self.status()].map(u64::from));
+        let status = self.newest.guidance.map_or(0, |guidance| guidance.status);
+        key.extend([action, cause, at_rest, order, reason, status].map(u64::from));
         let target = self.state.target.map_or(0, |sent| sent.number);
         let mirror_s = self.state.mirror.map_or(0, |mirror| mirror.age_s() as u64);
         key.extend([u64::from(connected), target, self.state.targets().count() as u64, mirror_s]);
@@ -286,10 +286,6 @@ impl Collector {
         }
         self.state_of = Some((key, now));
         Some(self.state_json())
-    }
-
-    fn status(&self) -> u8 {
-        self.newest.guidance.map_or(0, |guidance| guidance.status)
     }
 
     fn state_json(&self) -> Value {
