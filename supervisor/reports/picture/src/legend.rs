@@ -123,10 +123,8 @@ impl Legend<'_> {
         let length = round_up(self.view.side_m / 8.0);
         let (y, right) = (PLOT_TOP + PLOT_SIDE - 4.0, COLUMN + self.view.px(length));
         let mut bar = Path::default();
-        bar.move_to(DVec2::new(COLUMN, y - 8.0));
-        bar.line_to(DVec2::new(COLUMN, y));
-        bar.line_to(DVec2::new(right, y));
-        bar.line_to(DVec2::new(right, y - 8.0));
+        let corners = [(COLUMN, y - 8.0), (COLUMN, y), (right, y), (right, y - 8.0)];
+        bar.polyline(corners.map(DVec2::from));
         bar.element(&format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"", ink::TEXT))
             + &text(
                 DVec2::new((COLUMN + right) / 2.0, y - 7.0),
@@ -173,7 +171,7 @@ fn patch(at: DVec2, style: &str) -> String {
 
 fn line(at: DVec2, style: &str) -> String {
     let mut path = Path::default();
-    path.segment(at - DVec2::X * 17.0, at + DVec2::X * 17.0);
+    path.polyline([at - DVec2::X * 17.0, at + DVec2::X * 17.0]);
     path.element(style)
 }
 

@@ -82,7 +82,7 @@ pub(super) fn axes(view: &View) -> String {
             at[axis] = value;
             let mark = view.place(at);
             let away = if axis == 0 { DVec2::Y } else { DVec2::NEG_X } * 6.0;
-            marks.segment(mark, mark + away);
+            marks.polyline([mark, mark + away]);
             let (at, anchor) = if axis == 0 {
                 (DVec2::new(mark.x, bottom + 20.0), " text-anchor=\"middle\"")
             } else {

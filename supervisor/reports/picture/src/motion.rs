@@ -68,13 +68,15 @@ impl<'a> Motion<'a> {
         if targets.is_empty() {
             targets.extend(self.scene.mission.waypoints().iter().map(|waypoint| waypoint.at));
         }
+        let [truth, believed] =
+            [self.scene.truth, self.scene.believed].map(|poses| trajectory(view, poses));
         [
             targets.into_iter().map(|at| target(view.place(at), ring)).collect(),
-            halo(&trajectory(view, self.scene.truth)),
-            halo(&trajectory(view, self.scene.believed)),
+            halo(&truth),
+            halo(&believed),
             self.bodies(view, radius),
-            trajectory(view, self.scene.truth).element(&truth_line()),
-            trajectory(view, self.scene.believed).element(&believed_line()),
+            truth.element(&truth_line()),
+            believed.element(&believed_line()),
             start_mark(view.place(start.position)),
             self.end(view, radius),
             self.region(view),
@@ -200,8 +202,7 @@ pub(super) fn add_body(path: &mut Path, at: DVec2, radius: f64, heading: f64) {
     path.circle(at, radius);
     // The sheet's y axis points down.
     let axis = DVec2::from_angle(-heading);
-    path.move_to(at + axis * (radius * 0.35));
-    path.line_to(at + axis * radius);
+    path.polyline([at + axis * (radius * 0.35), at + axis * radius]);
 }
 
 /// Draws a ring of the tolerance around a bull's eye.

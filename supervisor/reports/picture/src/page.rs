@@ -162,15 +162,14 @@ impl Path {
         self.push('L', to);
     }
 
-    pub(super) fn segment(&mut self, from: DVec2, to: DVec2) {
-        self.move_to(from);
-        self.line_to(to);
+    pub(super) fn polyline(&mut self, points: impl IntoIterator<Item = DVec2>) {
+        for (nth, point) in points.into_iter().enumerate() {
+            self.push(if nth == 0 { 'M' } else { 'L' }, point);
+        }
     }
 
     pub(super) fn polygon(&mut self, corners: impl IntoIterator<Item = DVec2>) {
-        for (nth, corner) in corners.into_iter().enumerate() {
-            self.push(if nth == 0 { 'M' } else { 'L' }, corner);
-        }
+        self.polyline(corners);
         self.data.push('Z');
     }
 
