@@ -79,7 +79,7 @@ fn draw(line: &[DVec2], spacing: f64, lines: &mut Path, arrowheads: &mut Path) {
     let mut heading = DVec2::ZERO;
     let mut since_arrow = spacing * ARROWS_APART / 2.0;
     let mut from = first;
-    for (nth, &to) in rest.iter().enumerate() {
+    for &to in rest {
         let step = (to - from).normalize_or_zero();
         if heading == DVec2::ZERO {
             heading = step;
@@ -88,9 +88,6 @@ fn draw(line: &[DVec2], spacing: f64, lines: &mut Path, arrowheads: &mut Path) {
             lines.line_to(from);
             heading = step;
         }
-        if nth + 1 == rest.len() {
-            lines.line_to(to);
-        }
         since_arrow += from.distance(to);
         if since_arrow >= spacing * ARROWS_APART {
             since_arrow = 0.0;
@@ -98,6 +95,7 @@ fn draw(line: &[DVec2], spacing: f64, lines: &mut Path, arrowheads: &mut Path) {
         }
         from = to;
     }
+    lines.line_to(from);
 }
 
 pub(super) fn arrowhead(at: DVec2, heading: DVec2) -> [DVec2; 3] {
@@ -147,27 +145,25 @@ struct Tracer<'a> {
 impl Tracer<'_> {
     /// Returns a unit vector; `None` in a hazard and without guidance.
     fn direction(&self, at: DVec2) -> Option<DVec2> {
-        let e_at = |col: f64, row: f64| {
-            let last = |cells: usize| cells.saturating_sub(1) as f64;
-            if !(0.0..=last(self.lattice.cols)).contains(&col)
-                || !(0.0..=last(self.lattice.rows)).contains(&row)
-            {
+        let Lattice { cols, rows, .. } = *self.lattice;
+        let last = DVec2::from([cols, rows].map(|cells| cells.saturating_sub(1) as f64));
+        let e_at = |place: DVec2| {
+            if !(place.cmpge(DVec2::ZERO) & place.cmple(last)).all() {
                 return DVec2::ZERO;
             }
-            let index = row as usize * self.lattice.cols + col as usize;
+            let index = place.y as usize * cols + place.x as usize;
             self.cells.get(index).map_or(DVec2::ZERO, |cell| {
                 let e = DVec2::new(cell.ex.into(), cell.ey.into());
                 if e.is_finite() { e } else { DVec2::ZERO }
             })
         };
-        let nearest = at.round();
-        if e_at(nearest.x, nearest.y) == DVec2::ZERO {
+        if e_at(at.round()) == DVec2::ZERO {
             return None;
         }
         let low = at.floor();
         let part = at - low;
-        let below = e_at(low.x, low.y).lerp(e_at(low.x + 1.0, low.y), part.x);
-        let above = e_at(low.x, low.y + 1.0).lerp(e_at(low.x + 1.0, low.y + 1.0), part.x);
+        let below = e_at(low).lerp(e_at(low + DVec2::X), part.x);
+        let above = e_at(low + DVec2::Y).lerp(e_at(low + 1.0), part.x);
         below.lerp(above, part.y).try_normalize()
     }
 
