@@ -6,15 +6,13 @@
 //! report them on standard error, and panic if that fails too.
 
 use std::{
-    fs::File,
     io::{self, Write},
-    os::{fd::AsFd, unix::fs::MetadataExt},
     path::Path,
     sync::Mutex,
 };
 
 use common::file::append;
-
+use rustix::fs::fstat;
 use tracing::{Level, Metadata};
 use tracing_subscriber::{
     Layer, Registry,
@@ -33,14 +31,8 @@ type AnyLayer = Box<dyn Layer<Registry> + Send + Sync>;
 /// Returns whether the journal reads standard error. Redirected children inherit `JOURNAL_STREAM`,
 /// so the file is compared.
 pub fn to_journal() -> bool {
-    let Some(journal) = std::env::var_os("JOURNAL_STREAM") else {
-        return false;
-    };
-    let stderr = io::stderr().as_fd().try_clone_to_owned().map(File::from);
-    let Ok(found) = stderr.and_then(|stderr| stderr.metadata()) else {
-        return false;
-    };
-    journal.to_str() == Some(&format!("{}:{}", found.dev(), found.ino()))
+    let journal = std::env::var("JOURNAL_STREAM");
+    fstat(io::stderr()).is_ok_and(|it| journal == Ok(format!("{}:{}", it.st_dev, it.st_ino)))
 }
 
 /// Logs by the filter in FIRSTHAND_LOG, or from level `default` up.
