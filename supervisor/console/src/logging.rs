@@ -89,18 +89,14 @@ impl<'writer> MakeWriter<'writer> for Journal {
         Self(self.0)
     }
 
+    /// Takes the priority by syslog(3).
     fn make_writer_for(&'writer self, event: &Metadata<'_>) -> Self {
-        Self(priority(*event.level()))
-    }
-}
-
-/// Returns the priority by syslog(3).
-fn priority(level: Level) -> &'static str {
-    match level {
-        Level::ERROR => "<3>",
-        Level::WARN => "<4>",
-        Level::INFO => "<6>",
-        _ => "<7>",
+        Self(match *event.level() {
+            Level::ERROR => "<3>",
+            Level::WARN => "<4>",
+            Level::INFO => "<6>",
+            _ => "<7>",
+        })
     }
 }
 
