@@ -2,10 +2,10 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use common::{
-    bus::{AnyReader, Bus, BusError},
+    bus::{Bus, BusError},
     domain::RobotName,
     follower::{Event, Follower},
-    topics::{self, AnyTopic},
+    topics,
 };
 
 use super::echo::readable;
@@ -37,35 +37,6 @@ pub struct Arguments {
 
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-struct Readers(Vec<(Box<dyn AnyReader>, TopicRates)>);
-
-impl Readers {
-    fn open(bus: &Bus, topics: &[&'static dyn AnyTopic]) -> Result<Self, BusError> {
-        let now = Instant::now();
-        let opened = topics.iter().map(|topic| {
-            let rates = TopicRates::new(topic.spec(), now);
-            Ok((topic.any_reader(bus)?, rates))
-        });
-        Ok(Self(opened.collect::<Result<_, BusError>>()?))
-    }
-
-    fn take(&mut self) -> Result<(), BusError> {
-        for (reader, rates) in &mut self.0 {
-            while let Some(sample) = reader.next_sample()? {
-                rates.add(sample.author(), *sample.stamp(), Instant::now());
-            }
-        }
-        Ok(())
-    }
-
-    fn report(&mut self, json: bool) -> serde_json::Result<String> {
-        let now = Instant::now();
-        let reports = self.0.iter_mut().map(|(_, rates)| rates.report(now));
-        let reports: Vec<_> = reports.collect();
-        if json { json_lines(&reports) } else { Ok(rates::table(&reports) + "\n") }
-    }
-}
-
 pub fn main(arguments: &Arguments) -> Result {
     let topics = match &arguments.topic {
         Some(name) => vec![readable(name)?],
@@ -73,7 +44,14 @@ pub fn main(arguments: &Arguments) -> Result {
     };
     let mut stream = Stream::open()?;
     let domain = arguments.robot.domain();
-    let open = |bus: &Bus| Readers::open(bus, &topics);
+    let open = |bus: &Bus| {
+        let now = Instant::now();
+        let opened = topics.iter().map(|topic| {
+            let rates = TopicRates::new(topic.spec(), now);
+            Ok((topic.any_reader(bus)?, rates))
+        });
+        opened.collect::<Result<Vec<_>, BusError>>()
+    };
     // Topics that wake no reader are read when the link ends the tick.
     let mut follower =
         Follower::new(domain, "hz", &topics::LINK, open).also_on(topics.iter().copied());
@@ -87,12 +65,22 @@ pub fn main(arguments: &Arguments) -> Result {
             Event::Connected => due = Some(Instant::now() + REPORT_EVERY),
             Event::Disconnected => due = None,
             Event::Nothing => {}
-            Event::Samples(readers) => readers.take()?,
+            Event::Samples(readers) => {
+                for (reader, rates) in readers {
+                    while let Some(sample) = reader.next_sample()? {
+                        rates.add(sample.author(), *sample.stamp(), Instant::now());
+                    }
+                }
+            }
         }
         if due.is_some_and(|due| Instant::now() >= due)
             && let Some(readers) = follower.topics()
         {
-            stream.write(&readers.report(arguments.json)?)?;
+            let now = Instant::now();
+            let reports = readers.iter_mut().map(|(_, rates)| rates.report(now));
+            let reports: Vec<_> = reports.collect();
+            let table = || rates::table(&reports) + "\n";
+            stream.write(&if arguments.json { json_lines(&reports)? } else { table() })?;
             due = Some(Instant::now() + REPORT_EVERY);
             left -= 1;
         }
