@@ -102,6 +102,5 @@ pub fn points(places: &[f64]) -> Result<Vec<TargetPoint>> {
         let message = format!("{} is an X without a Y; give two numbers for each place", rest[0]);
         return refuse("no-target", message);
     }
-    let point = |&[x_m, y_m]: &[f64; 2]| TargetPoint { x_m, y_m, ..TargetPoint::default() };
-    Ok(places.iter().map(point).collect())
+    Ok(places.iter().map(|&place| TargetPoint::at(place.into())).collect())
 }
