@@ -33,7 +33,7 @@ const WORDS: f64 = 50.0;
 
 impl Legend<'_> {
     pub(super) fn layer(&self) -> String {
-        let mut column = Column::at(DVec2::new(COLUMN, PLOT_TOP + 10.0));
+        let mut column = Column { at: DVec2::new(COLUMN, PLOT_TOP + 10.0), text: String::new() };
         self.motion_rows(&mut column);
         self.hazard_rows(&mut column);
         self.field_rows(&mut column);
@@ -51,8 +51,8 @@ impl Legend<'_> {
             column.row("no path to the target", |at| patch(at, &style));
         }
         if let Some(levels) = self.levels {
-            column.text += &colour_bar(levels, column.x, column.y);
-            column.y += COLOUR_BAR;
+            column.text += &colour_bar(levels, column.at);
+            column.at.y += COLOUR_BAR;
         }
     }
 
@@ -135,30 +135,25 @@ impl Legend<'_> {
 }
 
 struct Column {
-    x: f64,
-    y: f64,
+    /// Place of the next row.
+    at: DVec2,
     text: String,
 }
 
 impl Column {
-    const fn at(corner: DVec2) -> Self {
-        Self { x: corner.x, y: corner.y, text: String::new() }
-    }
-
     fn heading(&mut self, words: &str) {
         // The first group starts at the plot's top, the others below a gap.
         if !self.text.is_empty() {
-            self.y += 14.0;
+            self.at.y += 14.0;
         }
-        let at = DVec2::new(self.x, self.y);
-        self.text += &text(at, " font-size=\"14\" font-weight=\"600\"", words);
-        self.y += ROW;
+        self.text += &text(self.at, " font-size=\"14\" font-weight=\"600\"", words);
+        self.at.y += ROW;
     }
 
     fn row(&mut self, words: &str, symbol: impl FnOnce(DVec2) -> String) {
-        self.text += &symbol(DVec2::new(self.x + SYMBOL, self.y - 4.0));
-        self.text += &text(DVec2::new(self.x + WORDS, self.y), "", words);
-        self.y += ROW;
+        self.text += &symbol(self.at + DVec2::new(SYMBOL, -4.0));
+        self.text += &text(self.at + DVec2::X * WORDS, "", words);
+        self.at.y += ROW;
     }
 }
 
@@ -185,25 +180,25 @@ fn guidance_symbol(at: DVec2) -> String {
 
 const COLOUR_BAR: f64 = 80.0;
 
-fn colour_bar(levels: Levels, left: f64, y: f64) -> String {
+fn colour_bar(levels: Levels, corner: DVec2) -> String {
     const LENGTH: f64 = 216.0;
     let bands = levels.count + 1;
     let width = LENGTH / f64::from(bands);
-    let edge = |nth: u32| left + LENGTH - f64::from(nth) * width;
-    let at = |x: f64, down: f64| DVec2::new(x, y + down);
+    let edge = |nth: u32| corner.x + LENGTH - f64::from(nth) * width;
+    let at = |x: f64, down: f64| DVec2::new(x, corner.y + down);
     let mut bar = text(
-        at(left, 0.0),
+        corner,
         "",
         "log<tspan font-size=\"9\" dy=\"3\">2</tspan>\
          <tspan dx=\"3\" dy=\"-3\">u, where u is the chance that</tspan>",
     );
-    bar += &text(at(left, 17.0), "", "a random walk meets the");
-    bar += &text(at(left, 34.0), "", "target before a hazard");
+    bar += &text(at(corner.x, 17.0), "", "a random walk meets the");
+    bar += &text(at(corner.x, 34.0), "", "target before a hazard");
     for nth in 0..bands {
         bar += &format!(
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"13\" fill=\"{}\"/>\n",
             Px(edge(nth + 1)),
-            Px(y + 45.0),
+            Px(corner.y + 45.0),
             Px(width),
             levels.colour(nth)
         );
