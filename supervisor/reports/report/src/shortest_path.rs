@@ -80,11 +80,7 @@ impl Grid {
         if cells.is_nan() || cells > MOST_CELLS {
             return None;
         }
-        let mut grid = Self {
-            origin,
-            size: size.as_ivec2(),
-            blocked: vec![false; (size.x * size.y) as usize],
-        };
+        let mut grid = Self { origin, size: size.as_ivec2(), blocked: vec![false; cells as usize] };
         shapes.pieces().for_each(|piece| grid.block(&piece, radius));
         Some(grid)
     }
@@ -96,8 +92,9 @@ impl Grid {
         for y in from.y..=to.y {
             for x in from.x..=to.x {
                 let cell = IVec2::new(x, y);
-                if piece.clearance(self.centre(cell)) < radius {
-                    let index = self.index(cell);
+                if piece.clearance(self.centre(cell)) < radius
+                    && let Some(index) = self.index(cell)
+                {
                     self.blocked[index] = true;
                 }
             }
@@ -112,14 +109,14 @@ impl Grid {
         self.origin + cell.as_dvec2() * CELL_M
     }
 
-    fn index(&self, cell: IVec2) -> usize {
-        debug_assert!(cell.cmpge(IVec2::ZERO).all() && cell.cmplt(self.size).all());
-        (cell.y * self.size.x + cell.x) as usize
+    /// Returns `None` outside the grid.
+    fn index(&self, cell: IVec2) -> Option<usize> {
+        let is_inside = cell.cmpge(IVec2::ZERO).all() && cell.cmplt(self.size).all();
+        is_inside.then(|| (cell.y * self.size.x + cell.x) as usize)
     }
 
     fn is_free(&self, cell: IVec2) -> bool {
-        let inside = cell.cmpge(IVec2::ZERO).all() && cell.cmplt(self.size).all();
-        inside && !self.blocked[self.index(cell)]
+        self.index(cell).is_some_and(|index| !self.blocked[index])
     }
 
     fn neighbour(&self, cell: IVec2, step: [i32; 2]) -> Option<IVec2> {
