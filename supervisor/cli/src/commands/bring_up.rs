@@ -91,9 +91,9 @@ pub fn main(arguments: &Arguments) -> Result {
         }
         print_line(format_args!("picture: {}", picture.display()))?;
     }
-    let file = arguments.mission.as_deref().filter(|_| arguments.write);
     let keys: Vec<_> = found.iter().flat_map(|finding| finding.keys.iter()).collect();
-    if let Some(file) = file
+    if let Some(file) = &arguments.mission
+        && arguments.write
         && !keys.is_empty()
     {
         let text = written::with_keys(&Mission::read(file.as_ref())?, &keys)?;
