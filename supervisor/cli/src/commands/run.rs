@@ -1,12 +1,7 @@
 pub mod recorder;
 mod summary_file;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::ExitCode,
-    thread,
-};
+use std::{fs, path::PathBuf, process::ExitCode, thread};
 
 use clap::Args;
 use common::{
@@ -335,17 +330,22 @@ pub fn main(arguments: &Arguments) -> Result<ExitCode> {
         ));
     }
     let ending = &finished.ending;
-    let told = (!ending.asked_for).then(|| {
+    let told = if ending.asked_for {
+        String::new()
+    } else {
         let (outcome, directory) = (summary.outcome.as_str(), directory.display());
         format!("firsthand: {outcome}: {}; the logs are in {directory}\n", ending.reason)
-    });
-    let told = told.unwrap_or_default();
+    };
     let as_asked = ending.asked_for && summary.outcome == ending.outcome;
     let code = if as_asked { 0 } else { summary.outcome.exit_code() };
     if may_be_removed {
         let _ = fs::remove_dir_all(directory);
         if !arguments.json {
-            complain(print_removed(directory));
+            let directory = directory.display();
+            let printed = print_line(format_args!(
+                "the robot did not drive, so {directory} is removed; --out DIR keeps it"
+            ));
+            complain(printed.map_err(|error| format!("cannot print what is removed: {error}")));
         }
     } else {
         // Picture and report do not affect the result, so a signal skips them.
@@ -404,12 +404,6 @@ fn may_be_removed(arguments: &Arguments, options: &Options, finished: &Finished)
         && !finished.drove
         && !is_placed
         && finished.restarts.values().all(|&restarts| restarts == 0)
-}
-
-fn print_removed(directory: &Path) -> Result<(), String> {
-    let directory = directory.display();
-    let text = format!("the robot did not drive, so {directory} is removed; --out DIR keeps it");
-    print_line(text).map_err(|error| format!("cannot print what is removed: {error}"))
 }
 
 fn title(options: &Options) -> String {
