@@ -1,6 +1,6 @@
 //! Deaths, recoveries, orders and log lines as one list.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use common::samples::{
     Cause, CommandSample, CommandState, ComplaintSample, DeathSample, DirectiveSample, FaultSample,
@@ -62,7 +62,7 @@ pub(crate) struct Events {
     arrived: u64,
     follows: bool,
     /// Generation of each stage seen to run.
-    running: Vec<(String, u32)>,
+    running: BTreeMap<String, u32>,
     /// Mission time of the newest pose, seconds, for new processes.
     pub now_s: f64,
     at_s: f64,
@@ -125,18 +125,12 @@ impl Events {
     }
 
     fn roster(&mut self, entries: &[RosterEntry]) {
-        for entry in entries {
-            if entry.state() != StageState::Running {
-                continue;
+        let running = entries.iter().filter(|entry| entry.state() == StageState::Running);
+        for RosterEntry { stage, generation, .. } in running {
+            let name = name_str(stage);
+            if self.running.insert(name.to_owned(), *generation) != Some(*generation) {
+                self.add(name, Kind::Good, format!("generation {generation} runs"));
             }
-            let name = name_str(&entry.stage);
-            let before = self.running.iter_mut().find(|(stage, _)| stage == name);
-            match before {
-                Some((_, generation)) if *generation == entry.generation => continue,
-                Some((_, generation)) => *generation = entry.generation,
-                None => self.running.push((name.to_owned(), entry.generation)),
-            }
-            self.add(name, Kind::Good, format!("generation {} runs", entry.generation));
         }
     }
 
