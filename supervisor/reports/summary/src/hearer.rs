@@ -110,10 +110,11 @@ impl Hearer {
 
     /// Counts those of all planners. `last` is the last that counts.
     pub fn solves_until(&self, last: Option<&GuidanceSample>) -> u64 {
-        let (newest, its) =
-            last.map_or((u32::MAX, None), |last| (last.stamp.generation, Some(last.full_solves)));
-        let before: u64 = self.solves.range(..newest).map(|(_, count)| count).sum();
-        before + its.or(self.solves.get(&newest).copied()).unwrap_or_default()
+        let Some(last) = last else {
+            return self.solves.values().sum();
+        };
+        let before = self.solves.range(..last.stamp.generation);
+        before.map(|(_, count)| count).sum::<u64>() + last.full_solves
     }
 
     /// In rad/s.
