@@ -80,14 +80,15 @@ struct Listed<'a> {
 
 pub fn main(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
-        None => list(&arguments.list),
-        Some(Command::List(arguments)) => list(arguments),
-        Some(Command::Diff(arguments)) => diff::main(arguments),
-        Some(Command::Targets { run, json }) => targets(run, *json),
+        None => list(&arguments.list)?,
+        Some(Command::List(arguments)) => list(arguments)?,
+        Some(Command::Diff(arguments)) => return diff::main(arguments),
+        Some(Command::Targets { run, json }) => targets(run, *json)?,
     }
+    Ok(ExitCode::SUCCESS)
 }
 
-fn targets(run: &Path, json: bool) -> Result<ExitCode> {
+fn targets(run: &Path, json: bool) -> Result {
     let targets = runs::targets(run);
     if targets.is_empty() {
         return Err(format!("no target of {} has a result", run.display()).into());
@@ -107,11 +108,10 @@ fn targets(run: &Path, json: bool) -> Result<ExitCode> {
             &with(target.truth_m, "m"),
         ]);
     }
-    print_rows(&targets, json, table)?;
-    Ok(ExitCode::SUCCESS)
+    print_rows(&targets, json, table)
 }
 
-fn list(arguments: &List) -> Result<ExitCode> {
+fn list(arguments: &List) -> Result {
     let runs = &arguments.runs;
     if !runs.is_dir() {
         return Err(format!(
@@ -134,8 +134,7 @@ fn list(arguments: &List) -> Result<ExitCode> {
     let mut chosen: Vec<_> = chosen().collect();
     chosen.sort();
     let listed: Vec<_> = chosen.iter().map(listed).collect();
-    print_rows(&listed, arguments.json, table(&listed))?;
-    Ok(ExitCode::SUCCESS)
+    print_rows(&listed, arguments.json, table(&listed))
 }
 
 fn listed(run: &RunDirectory) -> Listed<'_> {
