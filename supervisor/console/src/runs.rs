@@ -7,8 +7,8 @@ use std::{
     time::SystemTime,
 };
 
-use common::{domain::RobotName, file, run};
-use mission_control::recovery::SUMMARY;
+use common::{domain::RobotName, run};
+use mission_control::recovery::{self, SUMMARY};
 use processes::records;
 use recording::log_files::Tail;
 use serde::{Deserialize, Serialize};
@@ -21,8 +21,6 @@ use super::{
 
 /// Bytes for the results of 20,000 targets.
 const LARGEST_TARGETS: u64 = 4 << 20;
-/// Largest summary that is read. A summary takes 2 kB.
-const LARGEST_SUMMARY: u64 = 1 << 20;
 
 #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RunDirectory {
@@ -121,10 +119,8 @@ impl RunDirectory {
 
     /// Returns how the run ended, or that it is running or cut off.
     pub fn outcome(&self) -> Ended {
-        let file = self.directory.join(SUMMARY);
-        let text = file::text(&file, LARGEST_SUMMARY);
-        let outcome = match text.map(|text| serde_json::from_str(&text)) {
-            Some(Ok(ended)) => return ended,
+        let outcome = match recovery::summary(&self.directory) {
+            Some(ended) => return ended,
             _ if self.has_ended() => "unreadable",
             _ if self.is_running() => "running",
             _ => "cut off",

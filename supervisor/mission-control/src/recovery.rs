@@ -15,7 +15,7 @@ use common::{
     samples::PlaceSample,
 };
 use dead_reckoning::{saved_place, saved_state};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use thiserror::Error;
 
 use crate::{following::Following, target_list::TargetList};
@@ -25,6 +25,8 @@ use crate::{following::Following, target_list::TargetList};
 const CAPACITY: usize = 18 << 10;
 /// Summary of a finished run, in its run directory.
 pub const SUMMARY: &str = "summary.json";
+/// Largest summary that is read. A summary takes 2 kB.
+const LARGEST_SUMMARY: u64 = 1 << 20;
 const SIMULATOR: &str = "x80-sim";
 /// Time for a robot to come to rest after its supervisor's end. It counts as mission time, in which
 /// the wheels may turn.
@@ -50,6 +52,11 @@ impl SupervisorState {
         let (checkpoint, state) = Checkpoint::open::<Self>(&file, CAPACITY)?;
         Ok((checkpoint, state.unwrap_or_default()))
     }
+}
+
+/// Returns the summary of the run in `directory`; `None` without a readable one.
+pub fn summary<T: DeserializeOwned>(directory: &Path) -> Option<T> {
+    serde_json::from_str(&file::text(&directory.join(SUMMARY), LARGEST_SUMMARY)?).ok()
 }
 
 /// Returns the last known place of the robot of the run in `directory`, and its age, seconds.

@@ -2,12 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use common::{file, run::Run};
+use common::run::Run;
+use mission_control::recovery;
 use recording::Recording;
 use serde_json::{Map, Value};
-
-/// Greatest size of a summary, bytes; real ones take 2 kB.
-const LARGEST_SUMMARY: u64 = 1 << 20;
 
 pub(crate) fn default_out(run: &Path, file: &Path) -> PathBuf {
     if run.is_dir() {
@@ -19,8 +17,7 @@ pub(crate) fn default_out(run: &Path, file: &Path) -> PathBuf {
 }
 
 pub(crate) fn summary(recording: &Recording) -> Option<Map<String, Value>> {
-    let file = run_directory(recording)?.join("summary.json");
-    serde_json::from_str(&file::text(&file, LARGEST_SUMMARY)?).ok()
+    recovery::summary(run_directory(recording)?)
 }
 
 pub(crate) fn run_directory(recording: &Recording) -> Option<&Path> {
