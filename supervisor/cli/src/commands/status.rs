@@ -386,28 +386,25 @@ impl fmt::Display for Status<'_> {
         }
         if let Some(TargetStatus { number, last, x_m, y_m, to_go_m }) = &self.target {
             write!(f, "target {number} of {last}: ({x_m:.2}, {y_m:.2})")?;
-            writeln!(f, "{}", to_go_m.map_or(String::new(), |m| format!(", {m:.2} m to go")))?;
+            if let Some(to_go_m) = to_go_m {
+                write!(f, ", {to_go_m:.2} m to go")?;
+            }
+            writeln!(f)?;
         }
         if let Some(following) = &self.following {
-            let seen = following.seen_ago_s.map(|ago_s| age(Some(ago_s)) + " ago");
-            let (what, seen) =
-                (if following.lost { "LOST what it follows" } else { "follows" }, seen);
-            let seen = seen.as_deref().unwrap_or("never");
+            let what = if following.lost { "LOST what it follows" } else { "follows" };
+            let ago = if following.seen_ago_s.is_some() { " ago" } else { "" };
             write!(
                 f,
-                "{what} at {:.2} m, seen {seen}; {}",
-                following.distance_m, following.result
+                "{what} at {:.2} m, seen {}{ago}; {}",
+                following.distance_m,
+                age(following.seen_ago_s),
+                following.result
             )?;
-            match following.refusal {
-                Some(why) => {
-                    writeln!(
-                        f,
-                        "; samples refused: {}, the newest because {why}",
-                        following.refused
-                    )?;
-                }
-                None => writeln!(f)?,
+            if let Some(why) = following.refusal {
+                write!(f, "; samples refused: {}, the newest because {why}", following.refused)?;
             }
+            writeln!(f)?;
         }
         if let Some(PoseStatus { x_m, y_m, heading_deg, within_m }) = &self.pose {
             writeln!(
@@ -452,15 +449,16 @@ impl fmt::Display for Status<'_> {
 
 impl fmt::Display for LinkStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (self.lost_s, self.next_attempt_s) {
-            (Some(lost), Some(next)) => write!(
+        if self.connected {
+            write!(f, "the robot answers")?;
+        } else {
+            write!(
                 f,
                 "ROBOT LOST for {}: {} attempts to reach it, the next in {}",
-                age(Some(lost)),
+                age(self.lost_s),
                 self.attempts,
-                age(Some(next))
-            )?,
-            _ => write!(f, "the robot answers")?,
+                age(self.next_attempt_s)
+            )?;
         }
         if self.losses > 0 {
             write!(f, "; times it was lost: {}", self.losses)?;
