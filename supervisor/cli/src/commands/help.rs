@@ -1,4 +1,7 @@
-use std::io::{self, IsTerminal as _};
+use std::{
+    io::{self, IsTerminal as _},
+    iter,
+};
 
 use clap::{Args, Command, error::ErrorKind};
 
@@ -147,11 +150,9 @@ fn wrapped(markdown: &str, width: usize) -> String {
         if is_code || is_fence || line.starts_with('#') || line.is_empty() {
             all.push(line.to_owned());
         } else if line.starts_with('|') {
-            let mut rows = vec![line];
-            while let Some(row) = lines.next_if(|next| next.starts_with('|')) {
-                rows.push(row);
-            }
-            all.extend(drawn(&rows, width));
+            // The second row only separates the header.
+            let rest = iter::from_fn(|| lines.next_if(|next| next.starts_with('|'))).skip(1);
+            all.extend(drawn(iter::once(line).chain(rest), width));
         } else {
             let mut paragraph = line.to_owned();
             while let Some(more) = lines.next_if(|next| goes_on(next)) {
@@ -181,14 +182,12 @@ fn goes_on(line: &str) -> bool {
 const NARROWEST: usize = 8;
 
 /// Draws table `rows` in columns that fit into `width`.
-fn drawn(rows: &[&str], width: usize) -> Vec<String> {
-    let cells = |row: &&str| -> Vec<String> {
+fn drawn<'a>(rows: impl Iterator<Item = &'a str>, width: usize) -> Vec<String> {
+    let cells = |row: &str| -> Vec<String> {
         let row = row.trim().trim_matches('|').replace("\\|", "\u{1}");
         row.split('|').map(|cell| cell.trim().replace('\u{1}', "|")).collect()
     };
-    // The second row only separates the header.
-    let rows = rows.iter().enumerate().filter(|(at, _)| *at != 1);
-    let rows: Vec<Vec<String>> = rows.map(|(_, row)| cells(row)).collect();
+    let rows: Vec<Vec<String>> = rows.map(cells).collect();
     let columns = rows.iter().map(Vec::len).max().unwrap_or_default();
     let longest =
         |column: usize| rows.iter().filter_map(|row| Some(row.get(column)?.chars().count())).max();
