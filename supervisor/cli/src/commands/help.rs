@@ -159,12 +159,8 @@ fn wrapped(markdown: &str, width: usize) -> String {
                 paragraph = paragraph + " " + more.trim_start();
             }
             let hang = if line.trim_start().starts_with("- ") { "  " } else { "" };
-            let rest = item::wrapped(&paragraph, width.saturating_sub(hang.len()).max(1), true);
-            all.extend(
-                (0..)
-                    .zip(rest)
-                    .map(|(nth, line)| if nth > 0 { hang.to_owned() + &line } else { line }),
-            );
+            let parts = item::wrapped(&paragraph, width.saturating_sub(hang.len()).max(1), true);
+            all.push(parts.join(&format!("\n{hang}")));
         }
     }
     all.join("\n") + "\n"
