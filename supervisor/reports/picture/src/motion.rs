@@ -17,24 +17,23 @@ const WITHIN_95: f64 = 2.4477;
 
 pub(super) struct Motion<'a> {
     scene: &'a Scene<'a>,
+    /// True poses, or else the believed ones.
+    way: &'a [Pose2],
     /// Mission time between two bodies, and poses from one to the next.
     every: Option<(f64, f64)>,
 }
 
 impl<'a> Motion<'a> {
     pub(super) fn of(scene: &'a Scene<'a>) -> Self {
-        let mut motion = Self { scene, every: None };
+        let way = if scene.truth.is_empty() { scene.believed } else { scene.truth };
         let duration = scene.facts.mission_time_s;
-        let steps = motion.way().len().saturating_sub(1);
-        if steps > 0 && duration.is_finite() && duration > 0.0 {
+        let steps = way.len().saturating_sub(1);
+        let is_timed = steps > 0 && duration.is_finite() && duration > 0.0;
+        let every = is_timed.then(|| {
             let seconds = round_up(duration / BODIES);
-            motion.every = Some((seconds, seconds / duration * steps as f64));
-        }
-        motion
-    }
-
-    fn way(&self) -> &'a [Pose2] {
-        if self.scene.truth.is_empty() { self.scene.believed } else { self.scene.truth }
+            (seconds, seconds / duration * steps as f64)
+        });
+        Self { scene, way, every }
     }
 
     pub(super) const fn has_truth(&self) -> bool {
@@ -56,7 +55,7 @@ impl<'a> Motion<'a> {
     pub(super) fn instants(&self) -> impl Iterator<Item = (f64, &'a Pose2)> {
         (0..).map(f64::from).map_while(|nth| {
             let (seconds, stride) = self.every?;
-            Some((nth * seconds, self.way().get((nth * stride).round() as usize)?))
+            Some((nth * seconds, self.way.get((nth * stride).round() as usize)?))
         })
     }
 
@@ -135,12 +134,8 @@ impl<'a> Motion<'a> {
             }
             path.element(style)
         };
-        let believed = if self.has_truth() {
-            body(self.scene.believed.last(), &believed_end())
-        } else {
-            String::new()
-        };
-        body(self.way().last(), &final_body()) + &believed
+        let believed = self.scene.believed.last().filter(|_| self.has_truth());
+        body(self.way.last(), &final_body()) + &body(believed, &believed_end())
     }
 }
 
