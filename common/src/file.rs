@@ -42,17 +42,11 @@ pub(crate) enum Store {
 }
 
 impl Store {
-    /// Opens or creates `path` and reserves `length` bytes on disk, if the file system can; the
-    /// file's length stays.
+    /// Opens a file with [`reserved`] space.
     pub(crate) fn open(path: &Path, length: u64) -> io::Result<Self> {
-        if let Some(machine) = machine::simulated() {
-            return killed().map(|()| Self::Simulated(machine.files().open(path)));
-        }
-        let mut options = fs::File::options();
-        let file = options.read(true).write(true).create(true).truncate(false).open(path)?;
-        match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length) {
-            Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(Self::System(file)),
-            Err(errno) => Err(errno.into()),
+        match machine::simulated() {
+            Some(machine) => killed().map(|()| Self::Simulated(machine.files().open(path))),
+            None => reserved(path, length).map(Self::System),
         }
     }
 
@@ -84,6 +78,17 @@ impl Store {
                 Ok(())
             }
         }
+    }
+}
+
+/// Opens or creates `path` and reserves `length` bytes on disk, if the file system can; the file's
+/// length stays.
+pub fn reserved(path: &Path, length: u64) -> io::Result<fs::File> {
+    let mut options = fs::File::options();
+    let file = options.read(true).write(true).create(true).truncate(false).open(path)?;
+    match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, length) {
+        Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(file),
+        Err(errno) => Err(errno.into()),
     }
 }
 

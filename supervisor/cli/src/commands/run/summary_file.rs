@@ -6,11 +6,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use common::file::reserved;
 use mission_control::recovery::SUMMARY;
-use rustix::{
-    fs::{FallocateFlags, fallocate, fstatvfs},
-    io::Errno,
-};
+use rustix::fs::fstatvfs;
 
 use console::failure::{Refused, refuse};
 
@@ -38,15 +36,7 @@ impl SummaryFile {
     pub fn reserve(directory: &Path, needed: u64) -> Result<Self, Refused> {
         let path = directory.join(UNFINISHED);
         // A resumed run has its space.
-        let opened = File::options().create(true).truncate(false).write(true).open(&path);
-        let reserved = opened.and_then(|file| {
-            match fallocate(&file, FallocateFlags::KEEP_SIZE, 0, ROOM) {
-                // The file system cannot reserve.
-                Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => Ok(file),
-                Err(errno) => Err(errno.into()),
-            }
-        });
-        let file = reserved.map_err(|error| {
+        let file = reserved(&path, ROOM).map_err(|error| {
             let full = error.kind() == io::ErrorKind::StorageFull;
             let code = if full { "disk-full" } else { "not-writable" };
             Refused::new(code, failed("reserve room for", &path)(error))
