@@ -2,7 +2,6 @@
 
 use std::{
     collections::VecDeque,
-    fmt::Write as _,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicUsize, Ordering},
@@ -161,11 +160,7 @@ impl Cursor {
         let results = shown.results.after(&mut sent.results);
         for (name, items) in [("rows", rows), ("events", events), ("results", results)] {
             if !items.is_empty() {
-                let mut part = format!("\"{name}\":[");
-                for (at, item) in items.iter().enumerate() {
-                    let _ = write!(part, "{}{item}", if at > 0 { "," } else { "" });
-                }
-                parts.push(part + "]");
+                parts.push(format!("\"{name}\":[{}]", items.join(",")));
             }
         }
         if let Some(state) = shown.state.after(&mut sent.state) {
