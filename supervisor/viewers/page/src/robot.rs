@@ -117,18 +117,10 @@ impl Reading {
         for target in ended {
             shown.results.push(&page::result(&serde_json::json!(target)));
         }
-        if let Some(state) = state {
-            shown.state.set(state.to_string().into());
-        }
-        if let Some(map) = map {
-            shown.map.set(Bytes::from(map));
-        }
-        if let Some(field) = field {
-            shown.field.set(Bytes::from(field));
-        }
-        if let Some(preview) = preview {
-            shown.preview.set(Bytes::from(preview));
-        }
+        shown.state.update(state.map(|state| state.to_string().into()));
+        shown.map.update(map.map(Bytes::from));
+        shown.field.update(field.map(Bytes::from));
+        shown.preview.update(preview.map(Bytes::from));
     }
 }
 

@@ -24,8 +24,11 @@ pub struct Newest<T> {
 }
 
 impl<T: Clone> Newest<T> {
-    pub fn set(&mut self, value: T) {
-        (self.number, self.value) = (self.number + 1, Some(value));
+    /// Takes a newer value, if there is one.
+    pub fn update(&mut self, newer: Option<T>) {
+        if newer.is_some() {
+            (self.number, self.value) = (self.number + 1, newer);
+        }
     }
 
     fn after(&self, cursor: &mut u64) -> Option<T> {
@@ -196,7 +199,7 @@ mod tests {
         assert!(cursor.news().text.contains("\"robot\":\"x80\""));
         for row in 0..MOST + 100 {
             shared.lock().rows.push(&json!([row]));
-            shared.lock().map.set(Bytes::from(row.to_string()));
+            shared.lock().map.update(Some(Bytes::from(row.to_string())));
         }
         let (mut rows, mut blobs) = (0, Vec::new());
         loop {
