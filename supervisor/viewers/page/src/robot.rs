@@ -162,9 +162,9 @@ pub fn follow(domain: &Domain, shared: &Shared, ended: &mut dyn FnMut() -> bool)
                     if let Some(Reading { collector, truth, .. }) = &mut reading {
                         let (file, tail) = truth;
                         tail.skip(file, TRUTH_AT_ONCE);
-                        tail.lines(file).lines().for_each(|line| {
+                        for line in tail.lines(file).lines() {
                             collector.truth(line);
-                        });
+                        }
                         feed.read(&mut |sample| collector.apply(&sample))?;
                     }
                 }

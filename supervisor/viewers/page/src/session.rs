@@ -75,32 +75,27 @@ pub async fn run(mut socket: WebSocket, stranger: Place, context: &Arc<Context>)
     let (answers, told) = mpsc::channel(16);
     let sending = tokio::spawn(send(sender, Cursor::new(&context.shared), role, told));
     let (mut counted_since, mut count) = (Instant::now(), 0);
-    let mut code = None;
-    loop {
+    let code = loop {
         let message = tokio::select! {
             message = receiver.next() => message,
-            () = lost(&place) => {
-                code = Some(REPLACED);
-                break;
-            }
+            () = lost(&place) => break Some(REPLACED),
         };
         let Some(Ok(message)) = message else {
-            break;
+            break None;
         };
         if counted_since.elapsed() >= Duration::from_secs(1) {
             (counted_since, count) = (Instant::now(), 0);
         }
         count += 1;
         if count > MOST_A_SECOND {
-            code = Some(TOO_MUCH);
-            break;
+            break Some(TOO_MUCH);
         }
         if let Message::Text(text) = message
             && let Ok(asked) = serde_json::from_str(&text)
         {
             tokio::spawn(perform(asked, role, context.clone(), answers.clone()));
         }
-    }
+    };
     match code {
         // The sending task closes the socket when it ends.
         Some(code) => {
