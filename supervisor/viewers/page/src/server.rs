@@ -5,7 +5,7 @@ use std::{convert::Infallible, io, net::TcpListener, sync::Arc, time::Duration};
 use axum::{
     body::Body,
     extract::{FromRequestParts as _, Request, ws::WebSocketUpgrade},
-    http::{HeaderMap, HeaderValue, Method, StatusCode, header},
+    http::{HeaderMap, Method, StatusCode, header},
     response::{IntoResponse as _, Response},
 };
 use hyper::{body::Incoming, server::conn::http1, service::service_fn};
@@ -92,7 +92,6 @@ async fn answer(context: &Arc<Context>, request: Request, place: Place) -> Respo
          base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
         context.access.websocket(&host)
     );
-    let mut answer = (*text).into_response();
     let headers = [
         (header::CONTENT_TYPE, (*kind).to_owned()),
         (header::CONTENT_SECURITY_POLICY, policy),
@@ -100,12 +99,7 @@ async fn answer(context: &Arc<Context>, request: Request, place: Place) -> Respo
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff".to_owned()),
         (header::REFERRER_POLICY, "no-referrer".to_owned()),
     ];
-    for (name, value) in headers {
-        if let Ok(value) = HeaderValue::from_str(&value) {
-            answer.headers_mut().insert(name, value);
-        }
-    }
-    answer
+    (headers, *text).into_response()
 }
 
 /// Returns the host of `request` if its headers agree and the page answers to it.
