@@ -1,7 +1,4 @@
-use std::{
-    sync::mpsc::{Receiver, TryRecvError, channel},
-    thread::{self, JoinHandle},
-};
+use std::thread::{self, JoinHandle};
 
 use common::domain::RobotName;
 use mission_control::operator as requests;
@@ -109,7 +106,8 @@ fn meaning(letter: u8) -> Option<Key> {
 /// Executor of one action at a time. A thread waits, because a stop lasts until rest.
 pub struct Operator {
     robot: RobotName,
-    under_way: Option<(JoinHandle<()>, Receiver<String>)>,
+    /// Thread that gives the text to show.
+    under_way: Option<JoinHandle<String>>,
 }
 
 impl Operator {
@@ -129,40 +127,25 @@ impl Operator {
         };
         let asked = format!("{} {stage}", action.name()).trim_end().to_owned();
         let (robot, name) = (self.robot.clone(), asked.clone());
-        let (sender, receiver) = channel();
-        let thread = thread::spawn(move || {
-            let message = match action.perform(&robot, &stage) {
-                Ok(()) => format!("{name}: done"),
-                Err(problem) => format!("{name}: {problem}"),
-            };
-            let _ = sender.send(message);
-        });
-        self.under_way = Some((thread, receiver));
+        self.under_way = Some(thread::spawn(move || match action.perform(&robot, &stage) {
+            Ok(()) => format!("{name}: done"),
+            Err(problem) => format!("{name}: {problem}"),
+        }));
         format!("{asked} ...")
     }
 
     pub fn answer(&mut self) -> Option<String> {
-        let (_, receiver) = self.under_way.as_ref()?;
-        let message = match receiver.try_recv() {
-            Ok(message) => message,
-            Err(TryRecvError::Empty) => return None,
-            Err(TryRecvError::Disconnected) => "failed".to_owned(),
-        };
-        self.end();
-        Some(message)
-    }
-
-    fn end(&mut self) {
-        if let Some((thread, _)) = self.under_way.take() {
-            let _ = thread.join();
-        }
+        let thread = self.under_way.take_if(|thread| thread.is_finished())?;
+        Some(thread.join().unwrap_or_else(|_| "failed".to_owned()))
     }
 }
 
 /// Waits for an action under way, so that it leaves the bus in order.
 impl Drop for Operator {
     fn drop(&mut self) {
-        self.end();
+        if let Some(thread) = self.under_way.take() {
+            let _ = thread.join();
+        }
     }
 }
 
