@@ -5,6 +5,7 @@ use robot_state::{Event, RobotState, Sample};
 
 const MOST_EVENTS: usize = 50;
 
+#[derive(Default)]
 pub struct View {
     pub robot: RobotName,
     pub connected: bool,
@@ -21,22 +22,12 @@ pub struct View {
 
 impl View {
     pub fn new(robot: RobotName) -> Self {
-        Self {
-            robot,
-            connected: false,
-            state: RobotState::default(),
-            usage: Vec::new(),
-            rates_hz: Vec::new(),
-            chosen: 0,
-            events: VecDeque::new(),
-            message: String::new(),
-        }
+        Self { robot, ..Self::default() }
     }
 
     pub fn on_connected(&mut self) {
-        let chosen = self.chosen;
-        *self = Self::new(self.robot.clone());
-        (self.connected, self.chosen) = (true, chosen);
+        let Self { robot, chosen, .. } = std::mem::take(self);
+        *self = Self { robot, connected: true, chosen, ..Self::default() };
     }
 
     pub fn chosen_stage(&self) -> Option<&str> {
