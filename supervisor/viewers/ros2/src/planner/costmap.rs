@@ -16,7 +16,7 @@ const MOST_REACH: f64 = 60.0;
 const DEAREST: f32 = 3.0;
 
 /// Rules for blocked cells of any map.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Body {
     /// Least distance of the robot's centre from occupied cells, metres.
     pub radius_m: f64,

@@ -38,7 +38,7 @@ pub enum Reason {
 
 pub type Failure = (Reason, String);
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Planner {
     body: Body,
     screening_m: f64,
@@ -52,15 +52,7 @@ pub struct Planner {
 
 impl Planner {
     pub fn new(body: Body, screening_m: f64) -> Self {
-        Self {
-            body,
-            screening_m,
-            solver: Solver::default(),
-            map: None,
-            blocked: Vec::new(),
-            costs: Vec::new(),
-            fields: VecDeque::new(),
-        }
+        Self { body, screening_m, ..Self::default() }
     }
 
     /// Returns poses through all `goals`, about a cell apart, farther on long paths. Goals keep
