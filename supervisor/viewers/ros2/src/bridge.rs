@@ -64,7 +64,7 @@ pub enum BridgeError {
     )]
     Overlap { topic: String, domain: u16 },
     #[error("cannot start a thread or catch a signal: {0}")]
-    System(io::Error),
+    System(#[from] io::Error),
 }
 
 struct Bridge<'a> {
@@ -94,13 +94,13 @@ pub fn serve(
         let node = endpoints::open(network, options, parameters.clone());
         node.map_err(|source| BridgeError::Join { domain: network.0, source })
     };
-    let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
+    let mut continued = Signals::catch(&[SIGCONT])?;
     let mut bridge = Bridge {
         network,
         options,
         node: join()?,
         transforms: Transforms::default(),
-        orders: Orders::new(robot).map_err(BridgeError::System)?,
+        orders: Orders::new(robot)?,
         shown: None,
         server: Server::default(),
         run: None,

@@ -177,14 +177,14 @@ pub fn serve(
         let node = node.map_err(|source| BridgeError::Join { domain: network.0, source })?;
         Server::new(options, node).map_err(BridgeError::System)
     };
-    let mut continued = Signals::catch(&[SIGCONT]).map_err(BridgeError::System)?;
+    let mut continued = Signals::catch(&[SIGCONT])?;
     let mut server = open()?;
     while !ended() {
         if continued.came() {
             // A continued process has interrupted system calls, which end the library's threads.
             server = open()?;
         }
-        is_readable(&server.node.participant, LOOK_EVERY).map_err(BridgeError::System)?;
+        is_readable(&server.node.participant, LOOK_EVERY)?;
         server.turn();
     }
     Ok(())
