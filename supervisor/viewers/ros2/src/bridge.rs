@@ -90,6 +90,7 @@ pub fn serve(
     ended: &mut dyn FnMut() -> bool,
 ) -> Result<(), BridgeError> {
     let robot = &options.robot;
+    let robot_domain = robot.domain();
     let join = || {
         let node = endpoints::open(network, options, parameters.clone());
         node.map_err(|source| BridgeError::Join { domain: network.0, source })
@@ -105,12 +106,11 @@ pub fn serve(
         server: Server::default(),
         run: None,
         stored: String::new(),
-        goals_file: PathBuf::new(),
+        goals_file: robot_domain.run_directory().with_file_name(GOALS),
         feedback_at: Instant::now(),
         stands_for_cancel: None,
         told_at: None,
     };
-    let robot_domain = robot.domain();
     bridge.restore(&robot_domain);
     let open = |bus: &Bus| Feed::open(bus, TOPICS);
     let follow = || Follower::new(robot_domain.clone(), "ros2", &topics::LINK, open);
@@ -194,7 +194,6 @@ impl Bridge<'_> {
 
     /// Their clients still wait.
     fn restore(&mut self, domain: &Domain) {
-        self.goals_file = domain.run_directory().with_file_name(GOALS);
         let text = fs::read_to_string(&self.goals_file).unwrap_or_default();
         let Ok((directory, server)) = serde_json::from_str::<(PathBuf, Server)>(&text) else {
             return;
