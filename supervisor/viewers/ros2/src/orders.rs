@@ -80,9 +80,14 @@ impl Orders {
             })?;
             Ok::<_, io::Error>(orders)
         };
-        let [targets, stops] = ["targets", "stops"].map(|name| worker(name, MOST_WAITING));
-        let (robot, hands) = (robot.clone(), worker("hands", 1)?);
-        Ok(Self { robot, targets: targets?, stops: stops?, hands, done, refused })
+        Ok(Self {
+            robot: robot.clone(),
+            targets: worker("targets", MOST_WAITING)?,
+            stops: worker("stops", MOST_WAITING)?,
+            hands: worker("hands", 1)?,
+            done,
+            refused,
+        })
     }
 
     pub fn give(&self, order: Order) {
