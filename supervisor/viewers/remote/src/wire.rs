@@ -17,7 +17,9 @@ pub struct Hello {
 
 impl Hello {
     pub fn decoded(bytes: &[u8]) -> Option<Self> {
-        let bytes = bytes.get(..LONGEST_HELLO).map_or(Some(bytes), |_| None)?;
+        if bytes.len() >= LONGEST_HELLO {
+            return None;
+        }
         serde_json::from_slice(bytes).ok()
     }
 }
