@@ -45,7 +45,6 @@ pub type Now = Duration;
 pub enum Event {
     Start,
     StartFailed,
-    BeatStarting,
     BeatReady,
     /// The process beats, but does not answer its inputs.
     OutputStale,

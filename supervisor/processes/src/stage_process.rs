@@ -111,16 +111,12 @@ impl StageProcess {
         let was_running = self.is_running();
         let state = health.state();
         self.stopping = state == HealthState::Stopping;
-        let event = match state {
-            HealthState::Ready => Event::BeatReady,
-            HealthState::Starting | HealthState::Stopping => Event::BeatStarting,
-        };
-        if event == Event::BeatReady {
+        if state == HealthState::Ready {
             self.times = self.process.as_ref().and_then(|process| process.times());
+            self.policy.step(Event::BeatReady, now);
         }
-        self.policy.step(event, now);
         // A starting process waits for a roster that names it.
-        state == HealthState::Starting || !was_running && event == Event::BeatReady
+        state == HealthState::Starting || !was_running && state == HealthState::Ready
     }
 
     pub(crate) fn start(

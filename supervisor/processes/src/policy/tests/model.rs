@@ -46,10 +46,9 @@ impl Generation {
     }
 }
 
-const EVENTS: [Event; 15] = [
+const EVENTS: [Event; 14] = [
     Event::Start,
     Event::StartFailed,
-    Event::BeatStarting,
     Event::BeatReady,
     Event::OutputStale,
     Event::Exited,
@@ -86,11 +85,9 @@ impl Model {
             Event::StartFailed => self.generation.as_ref().is_some_and(|generation| {
                 generation.sign == self.now && generation.ready.is_none() && !generation.stopping
             }),
-            Event::BeatStarting
-            | Event::BeatReady
-            | Event::OutputStale
-            | Event::Exited
-            | Event::Refused => self.generation.is_some(),
+            Event::BeatReady | Event::OutputStale | Event::Exited | Event::Refused => {
+                self.generation.is_some()
+            }
             Event::Replace | Event::Stop | Event::Time(_) => true,
         }
     }
