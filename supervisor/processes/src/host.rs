@@ -21,9 +21,6 @@ use crate::{
 pub trait Watched {
     fn id(&self) -> u32;
 
-    /// Returns whether it is a child, whose end is seen with its cause.
-    fn is_child(&self) -> bool;
-
     fn signal(&self, signal: Signal);
 
     fn try_reap(&mut self) -> io::Result<Option<ExitCause>>;
@@ -105,10 +102,6 @@ impl Host for System {
 impl Watched for SystemProcess {
     fn id(&self) -> u32 {
         self.process.id()
-    }
-
-    fn is_child(&self) -> bool {
-        self.process.is_child()
     }
 
     fn signal(&self, signal: Signal) {

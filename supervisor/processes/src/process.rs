@@ -158,10 +158,6 @@ impl Process {
         let _ = pidfd_send_signal(&self.pidfd, signal);
     }
 
-    pub(crate) const fn is_child(&self) -> bool {
-        self.child.is_some()
-    }
-
     pub fn try_reap(&mut self) -> io::Result<Option<ExitCause>> {
         let Some(child) = &mut self.child else {
             let gone = self.wait(Duration::ZERO)?;

@@ -181,7 +181,7 @@ impl StageProcess {
             .try_reap()
             .map_err(|source| StageProcessError { stage: self.stage.name, source })?;
         let found_before = std::mem::replace(&mut self.found_ended, cause.is_some());
-        let is_known = process.is_child() || self.stopping || found_before;
+        let is_known = cause != Some(ExitCause::Unknown) || self.stopping || found_before;
         Ok(cause.filter(|_| is_known))
     }
 

@@ -159,10 +159,6 @@ impl Watched for SimulatedProcess {
         self.number
     }
 
-    fn is_child(&self) -> bool {
-        true
-    }
-
     fn signal(&self, signal: Signal) {
         self.machine.signal(self.number, signal);
     }
