@@ -25,7 +25,7 @@ use mission_control::{
     surroundings::{Robot, SimulatedRobot, Surroundings},
 };
 use processes::{
-    activity::{Activity, Times},
+    activity::Activity,
     host::{Host, Watched},
     process::ExitCause,
 };
@@ -175,17 +175,7 @@ impl Watched for SimulatedProcess {
         None
     }
 
-    fn times(&self) -> Option<Times> {
-        let Activity { ran, starved, .. } = self.machine.activity(self.number)?;
-        Some(Times { ran, starved })
-    }
-
-    fn activity(&self, then: Times) -> Option<Activity> {
-        let now = self.machine.activity(self.number)?;
-        Some(Activity {
-            ran: now.ran.saturating_sub(then.ran),
-            starved: now.starved.saturating_sub(then.starved),
-            ..now
-        })
+    fn activity(&self) -> Option<Activity> {
+        self.machine.activity(self.number)
     }
 }
