@@ -133,13 +133,13 @@ impl Simulator {
             }
         }
     }
+
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
 }
 
 impl SimulatedRobot for Simulator {
-    fn address(&self) -> SocketAddr {
-        self.address
-    }
-
     fn truth(&self) -> &[GroundTruthTick] {
         &self.truth.ticks
     }

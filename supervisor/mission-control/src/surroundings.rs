@@ -2,7 +2,7 @@
 //! a real run; a simulation has its own.
 
 use std::{
-    net::{Ipv4Addr, SocketAddr},
+    net::Ipv4Addr,
     os::fd::{AsFd as _, BorrowedFd},
     path::Path,
     rc::Rc,
@@ -26,8 +26,6 @@ use crate::{
 
 /// A simulated robot, as its supervisor sees it.
 pub trait SimulatedRobot {
-    fn address(&self) -> SocketAddr;
-
     /// Returns the ground truth so far.
     fn truth(&self) -> &[GroundTruthTick];
 
@@ -136,15 +134,14 @@ impl Surroundings for Real<'_> {
             options.pace,
             Some(self.signals.as_fd()),
         );
-        let simulator = match started {
+        if let Err(SimulatorError::GivenUp) = started {
             // The run ends before it contacts a robot.
-            Err(SimulatorError::GivenUp) => None,
-            started => Some(started?),
-        };
-        let address = simulator.as_ref().map(Simulator::address);
-        let address = Address::Udp(address.unwrap_or((Ipv4Addr::UNSPECIFIED, 0).into()));
-        let simulator = simulator.map(|simulator| Box::new(simulator) as Box<dyn SimulatedRobot>);
-        Ok(Robot { simulator, address })
+            let nowhere = (Ipv4Addr::UNSPECIFIED, 0).into();
+            return Ok(Robot { simulator: None, address: Address::Udp(nowhere) });
+        }
+        let simulator = started?;
+        let address = Address::Udp(simulator.address());
+        Ok(Robot { simulator: Some(Box::new(simulator)), address })
     }
 
     fn is_asked_to_end(&self) -> bool {

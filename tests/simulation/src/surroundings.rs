@@ -84,7 +84,7 @@ impl Surroundings for Simulated {
             return Ok(robot);
         }
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, 1));
-        let robot = Truth { machine: Rc::clone(&self.machine), ticks: Vec::new(), address };
+        let robot = Truth { machine: Rc::clone(&self.machine), ticks: Vec::new() };
         Ok(Robot { simulator: Some(Box::new(robot)), address: Address::Udp(address) })
     }
 
@@ -109,14 +109,9 @@ impl Surroundings for Simulated {
 struct Truth {
     machine: Rc<SimulatedMachine>,
     ticks: Vec<GroundTruthTick>,
-    address: SocketAddr,
 }
 
 impl SimulatedRobot for Truth {
-    fn address(&self) -> SocketAddr {
-        self.address
-    }
-
     fn truth(&self) -> &[GroundTruthTick] {
         &self.ticks
     }
