@@ -108,8 +108,8 @@ pub(crate) struct StallWatch {
     place_m: f64,
     pinned_after: Duration,
     cut_off_after: Duration,
-    anchor: Option<Anchor>,
-    place: Option<Place>,
+    /// Last motion and place of the robot; `None` before both are known.
+    motion: Option<(Anchor, Place)>,
     cut_off_since: Option<MissionTime>,
     waits_since: Option<MissionTime>,
     inside_hazard_since: Option<f64>,
@@ -260,7 +260,7 @@ impl StallWatch {
         } else if contact {
             StallCause::Held
         } else if self.waits_for_field(pose, guidance) {
-            (self.anchor, self.place) = (None, None);
+            self.motion = None;
             return None;
         } else {
             self.without_policy(pose, guidance)
@@ -302,7 +302,7 @@ impl StallWatch {
             RecoveryStep::GiveUp
         };
         let now = pose.stamp.time();
-        if let (Some(anchor), Some(place)) = (&mut self.anchor, &mut self.place) {
+        if let Some((anchor, place)) = &mut self.motion {
             (anchor.time, place.since) = (now, now);
         }
         (self.cut_off_since, self.inside_hazard_since) = (None, None);
@@ -359,7 +359,7 @@ impl StallWatch {
 
     /// Clears motion after something held the robot, perhaps without a tick.
     pub(crate) const fn forget_motion(&mut self) {
-        (self.anchor, self.place) = (None, None);
+        self.motion = None;
         (self.cut_off_since, self.waits_since) = (None, None);
     }
 
@@ -416,15 +416,14 @@ impl StallWatch {
     ) -> Option<StallCause> {
         let now = pose.stamp.time();
         let here = Anchor { time: now, travelled: pose.travelled_m, heading: pose.heading_rad };
-        let anchor = self.anchor.get_or_insert(here);
+        let (middle, nearest_m) = (pose.pose().position, guidance.distance_m);
+        let arrived = Place { since: now, middle, nearest_m };
+        let (anchor, place) = self.motion.get_or_insert((here, arrived));
         if (here.travelled - anchor.travelled).abs() >= self.moved_m
             || (here.heading - anchor.heading).abs() >= self.turned_rad
         {
             *anchor = here;
         }
-        let (middle, nearest_m) = (pose.pose().position, guidance.distance_m);
-        let arrived = Place { since: now, middle, nearest_m };
-        let place = self.place.get_or_insert(arrived);
         if middle.distance(place.middle) >= self.place_m {
             *place = arrived;
             self.replans_here = 0;
@@ -432,13 +431,12 @@ impl StallWatch {
             // A robot that crawls to its target makes progress.
             *place = Place { middle: place.middle, ..arrived };
         }
-        let since = place.since;
         // The planner looks around first, which has its own timeout.
         if guidance.status() == GuidanceStatus::Unreachable {
             return None;
         }
         let still = now.since(anchor.time) >= STALLED_AFTER;
-        let pinned = now.since(since) >= self.pinned_after;
+        let pinned = now.since(place.since) >= self.pinned_after;
         match (still, pinned) {
             (true, _) => Some(StallCause::Still),
             (_, true) => Some(StallCause::Pinned),
