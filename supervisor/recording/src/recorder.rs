@@ -104,15 +104,7 @@ pub trait Wishes {
     fn next_wish(&mut self) -> Wish;
 
     /// Returns descriptors that become readable on another request.
-    fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
-        Vec::new()
-    }
-}
-
-impl<F: FnMut() -> Wish> Wishes for F {
-    fn next_wish(&mut self) -> Wish {
-        self()
-    }
+    fn descriptors(&self) -> Vec<BorrowedFd<'_>>;
 }
 
 fn open_readers(topics: &[&'static dyn AnyTopic], bus: &Bus) -> Result<Readers, BusError> {
@@ -445,6 +437,16 @@ mod tests {
     use super::*;
 
     const PATIENCE: Duration = Duration::from_secs(30);
+
+    impl<F: FnMut() -> Wish> Wishes for F {
+        fn next_wish(&mut self) -> Wish {
+            self()
+        }
+
+        fn descriptors(&self) -> Vec<BorrowedFd<'_>> {
+            Vec::new()
+        }
+    }
 
     #[test]
     fn a_recording_ends_though_its_supervisor_ends_long_after_it_removed_the_bus() {
