@@ -62,21 +62,17 @@ pub struct Options {
 }
 
 impl Options {
-    fn topics(&self) -> Vec<&'static dyn AnyTopic> {
+    /// Returns the topics with the inputs first, as [`CurrentRun::take`] needs them.
+    fn sorted_topics(&self) -> Vec<&'static dyn AnyTopic> {
         let logged = |topic: &&&'static dyn AnyTopic| match topic.spec().logged {
             Logged::Yes => true,
             Logged::No => false,
             Logged::WithFields => self.fields,
         };
-        match &self.topics {
+        let mut topics = match &self.topics {
             Some(topics) => topics.clone(),
             None => topics::TABLE.iter().filter(logged).copied().collect(),
-        }
-    }
-
-    /// Returns the topics with the inputs first, as [`CurrentRun::take`] needs them.
-    fn sorted_topics(&self) -> Vec<&'static dyn AnyTopic> {
-        let mut topics = self.topics();
+        };
         topics.sort_by_key(|topic| topic.spec().name != topics::INPUTS.spec().name);
         topics
     }
