@@ -44,7 +44,7 @@ type Body = Rc<Vec<u8>>;
 struct Computed {
     sequence: u32,
     message: Vec<u8>,
-    inputs: Vec<Body>,
+    inputs: VecDeque<Body>,
 }
 
 #[derive(Default)]
@@ -142,11 +142,8 @@ impl<'a> Generation<'a> {
                     field.copy_from_slice(&number.to_le_bytes());
                 }
             }
-            channel.computed.push_back(Computed {
-                sequence,
-                message,
-                inputs: self.last_inputs.iter().cloned().collect(),
-            });
+            let inputs = self.last_inputs.clone();
+            channel.computed.push_back(Computed { sequence, message, inputs });
             self.compare(output.topic);
         }
     }
@@ -252,11 +249,8 @@ impl<'a> Generation<'a> {
         if self.replay.is_some()
             && let Some((topic, message)) = self.channels.iter().find_map(late)
         {
-            let nothing = Computed {
-                sequence: 0,
-                message: Vec::new(),
-                inputs: self.last_inputs.iter().cloned().collect(),
-            };
+            let inputs = self.last_inputs.clone();
+            let nothing = Computed { sequence: 0, message: Vec::new(), inputs };
             self.differs(&topic, &message, &nothing);
         }
     }
