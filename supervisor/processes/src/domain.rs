@@ -14,7 +14,7 @@ use common::{
     bus::{Bus, Services},
     claim::Claim,
     domain::{Domain, SHARED_MEMORY},
-    file::append,
+    file::{self, append},
     stop_socket::Operator,
     topics,
 };
@@ -161,8 +161,7 @@ impl DomainLock {
         }
         // Last, because a consumer that waits for one expects all others.
         for file in [domain.stages_lock_file(), domain.joining_lock_file()] {
-            let made = append(&file);
-            made.map_err(failed("make", &file))?;
+            append(&file).map_err(failed("make", &file))?;
         }
         Ok(())
     }
@@ -331,15 +330,11 @@ fn remove_root(root: &Path) -> Result<(), DomainError> {
 
 /// Removes a file, which a leaving consumer may have removed.
 fn remove_file(path: &Path) -> Result<(), DomainError> {
-    removed(fs::remove_file(path), path)
+    file::remove(path).map_err(failed("remove", path))
 }
 
 fn remove_directory(path: &Path) -> Result<(), DomainError> {
-    removed(fs::remove_dir_all(path), path)
-}
-
-fn removed(result: io::Result<()>, path: &Path) -> Result<(), DomainError> {
-    match result {
+    match fs::remove_dir_all(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed("remove", path)(error)),
         _ => Ok(()),
     }

@@ -31,8 +31,7 @@ pub(crate) const RETRY: Duration = Duration::from_millis(10);
 pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
     let path = domain.stages_lock_file();
     let lock = File::create(&path).map_err(failed("make", &path))?;
-    let system = |source| failed("lock", &path)(source);
-    if locked_within(&lock, STOP_GRACE).map_err(system)? {
+    if locked_within(&lock, STOP_GRACE).map_err(failed("lock", &path))? {
         return Ok(lock);
     }
     let holders = holders(&lock).map_err(failed("look for who locks", &path))?;
@@ -40,7 +39,7 @@ pub(crate) fn wait_for(domain: &Domain) -> Result<File, DomainError> {
         tracing::warn!(pid, "a stage has outlived its supervisor and is killed");
         let _ = signal(pid, &lock, Signal::KILL);
     }
-    if locked_within(&lock, KILLED).map_err(system)? {
+    if locked_within(&lock, KILLED).map_err(failed("lock", &path))? {
         return Ok(lock);
     }
     let holders: Vec<_> = holders.iter().map(u32::to_string).collect();
