@@ -394,10 +394,8 @@ mod tests {
         fs::create_dir(domain.middleware_config()).unwrap();
         let refused = DomainLock::acquire(domain.clone(), 1).err().unwrap();
         fs::remove_dir(domain.middleware_config()).unwrap();
-        assert!(
-            matches!(&refused, DomainError::File { path, .. } if *path == domain.middleware_config()),
-            "{refused}"
-        );
+        let DomainError::File(error) = &refused else { panic!("{refused}") };
+        assert_eq!(error.file, domain.middleware_config());
         assert!(!domain.lock_file().exists() && !domain.stages_lock_file().exists());
         fs::remove_dir(domain.directory()).unwrap();
     }

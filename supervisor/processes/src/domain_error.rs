@@ -3,7 +3,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use common::{bus::BusError, domain::SHARED_MEMORY};
+use common::{bus::BusError, domain::SHARED_MEMORY, file::FileError};
 use thiserror::Error;
 
 use crate::descriptors::NEEDED;
@@ -27,13 +27,13 @@ pub enum DomainError {
     Descriptors { limit: u64 },
     #[error("{path} belongs to another user; remove it, or run as its owner", path = path.display())]
     Foreign { path: PathBuf },
-    #[error("cannot {action} {path}: {source}; check that it is writable and has free space", path = path.display())]
-    File { action: &'static str, path: PathBuf, source: io::Error },
+    #[error("{0}; check that it is writable and has free space")]
+    File(#[from] FileError),
     #[error(transparent)]
     Bus(#[from] BusError),
 }
 
 pub(crate) fn failed(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
-    let path = path.to_path_buf();
-    move |source| DomainError::File { action, path, source }
+    let failed = FileError::of(action, path);
+    move |source| DomainError::File(failed(source))
 }
