@@ -182,8 +182,7 @@ impl Policy {
 
             (Phase::Starting { .. }, Event::BeatReady) => {
                 self.blocked_starts = 0;
-                let (since, beat) = (now, now);
-                self.phase = Phase::Running { since, beat };
+                self.phase = Phase::Running { since: now, beat: now };
                 None
             }
             (Phase::Running { since, .. }, Event::BeatReady) => {
@@ -205,8 +204,7 @@ impl Policy {
                 self.abort(Stability::of(since, now), now)
             }
             (Phase::Starting { .. } | Phase::Running { .. }, Event::Replace) => {
-                let kill = now + STOP_GRACE;
-                self.phase = Phase::Replaced { kill };
+                self.phase = Phase::Replaced { kill: now + STOP_GRACE };
                 Some(Action::Terminate)
             }
             (Phase::Aborted { kill, .. }, Event::Replace) => {
@@ -220,14 +218,13 @@ impl Policy {
                 | Phase::Replaced { .. },
                 Event::Stop,
             ) => {
-                let kill = now + STOP_GRACE;
-                self.phase = Phase::Stopping { kill };
+                self.phase = Phase::Stopping { kill: now + STOP_GRACE };
                 Some(Action::Terminate)
             }
             (
-                Phase::Aborted { kill, .. } | Phase::Replaced { kill } | Phase::Stopping { kill },
+                Phase::Aborted { .. } | Phase::Replaced { .. } | Phase::Stopping { .. },
                 Event::Time(_),
-            ) if now >= kill => {
+            ) if due => {
                 self.delay_kill(now);
                 Some(Action::Kill)
             }
@@ -263,8 +260,7 @@ impl Policy {
 
     fn abort(&mut self, stability: Stability, now: Now) -> Option<Action> {
         assert!(matches!(self.phase, Phase::Starting { .. } | Phase::Running { .. }));
-        let kill = now + ABORT_GRACE;
-        self.phase = Phase::Aborted { stability, kill };
+        self.phase = Phase::Aborted { stability, kill: now + ABORT_GRACE };
         Some(Action::Abort)
     }
 
