@@ -6,11 +6,12 @@ use std::{
 };
 
 use rustix::fs::{Access, access};
+
 /// Returns the absolute path of `named`: a path, or a plain name beside this executable or on
 /// `PATH`.
 pub fn find(named: &Path) -> io::Result<PathBuf> {
-    let is_name = named.components().count() == 1 && !named.is_absolute();
-    let is_name = is_name && !named.as_os_str().as_encoded_bytes().contains(&b'/');
+    let has_slash = named.as_os_str().as_encoded_bytes().contains(&b'/');
+    let is_name = named.components().count() == 1 && !has_slash;
     let found = if is_name {
         let mut found = folders().map(|folder| folder.join(named));
         found
