@@ -1,11 +1,6 @@
 //! Record of a stage's death, source of the `deaths.jsonl` line, the bus sample and the log line.
 
-use std::{
-    fs::File,
-    io::{self, Read as _, Seek as _, SeekFrom},
-    path::Path,
-    time::Duration,
-};
+use std::{fs::File, os::unix::fs::FileExt as _, path::Path, time::Duration};
 
 use common::{
     samples::{DeathSample, NextStep, name, words},
@@ -15,7 +10,7 @@ use serde::Serialize;
 
 use crate::process::ExitCause;
 
-const LOG_TAIL_BYTES: u64 = 400;
+const LOG_TAIL_BYTES: usize = 400;
 
 #[derive(Debug, Serialize)]
 pub struct Death {
@@ -102,19 +97,16 @@ fn nanoseconds(seconds: f64) -> u64 {
 
 /// In whole lines; empty without a log.
 pub fn log_tail(log: &Path, since: u64) -> String {
-    let read = || -> io::Result<Vec<u8>> {
-        let mut file = File::open(log)?;
-        let end = file.metadata()?.len();
-        file.seek(SeekFrom::Start(end.saturating_sub(LOG_TAIL_BYTES).max(since)))?;
-        let mut bytes = Vec::new();
-        file.take(LOG_TAIL_BYTES).read_to_end(&mut bytes)?;
-        Ok(bytes)
-    };
-    let bytes = read().unwrap_or_default();
-    let text = String::from_utf8_lossy(&bytes);
+    let mut bytes = [0; LOG_TAIL_BYTES];
+    let read = File::open(log).and_then(|log| {
+        let end = log.metadata()?.len();
+        log.read_at(&mut bytes, end.saturating_sub(LOG_TAIL_BYTES as u64).max(since))
+    });
+    let length = read.unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes[..length]);
     // The first line may be incomplete.
     let whole = match text.split_once('\n') {
-        Some((_, rest)) if bytes.len() as u64 == LOG_TAIL_BYTES => rest,
+        Some((_, rest)) if length == LOG_TAIL_BYTES => rest,
         _ => &text,
     };
     whole.trim().to_owned()
@@ -132,7 +124,7 @@ mod tests {
         std::fs::write(&log, &lines).unwrap();
         let words = log_tail(&log, 0);
         assert!(words.starts_with("line ") && words.ends_with("line 99"), "{words}");
-        assert!(words.len() as u64 <= LOG_TAIL_BYTES);
+        assert!(words.len() <= LOG_TAIL_BYTES);
         assert_eq!(log_tail(&log, lines.len() as u64 - 8), "line 99");
         assert_eq!(log_tail(&directory.path().join("none"), 0), "");
     }
