@@ -7,6 +7,7 @@ use common::{
     clock::Instant,
     mission::Mission,
     samples::{HealthSample, RosterEntry, name_str},
+    topics::LINK,
 };
 use rustix::process::Signal;
 
@@ -17,7 +18,7 @@ use crate::{
     output_watchdog::OutputWatchdog,
     policy::{Action, Event, Now, Phase, STOP_GRACE},
     stage_process::{StageProcess, StageProcessError},
-    stages::start_order,
+    stages::TABLE,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,9 +51,9 @@ impl StageProcesses {
         host: Box<dyn Host>,
     ) -> Self {
         let cells = mission.grid_frame().area();
-        let stages = start_order().into_iter();
+        assert_eq!(TABLE[0].name, LINK.spec().writer);
         Self {
-            stages: stages.map(|stage| StageProcess::new(stage, mission)).collect(),
+            stages: TABLE.iter().map(|stage| StageProcess::new(stage, mission)).collect(),
             watchdog: OutputWatchdog::new(cells),
             directory,
             clock: ObservedTime::new(Instant::now()),
