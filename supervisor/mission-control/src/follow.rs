@@ -27,7 +27,7 @@ pub(crate) struct Beacon {
 impl Supervisor<'_> {
     pub(crate) fn follow(&mut self, request: &RequestSample) -> RequestAnswer {
         let mission = &self.options.mission;
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         if let Some(answer) = target_list::held_refusal(self.why_held()) {
             return answer;
         }
@@ -45,7 +45,7 @@ impl Supervisor<'_> {
         let is_late = |it: &mut BeaconSample| now.since(MissionTime(it.capture_ns)) > SILENT;
         self.beacon.waiting.take_if(is_late);
         self.state.following = Some(Following::new(distance_m, now, pose.as_ref()));
-        self.beacon.last_tick = self.bus.observer.record.newest_tick().unwrap_or_default();
+        self.beacon.last_tick = self.record.newest_tick().unwrap_or_default();
         self.await_target();
         tracing::info!(distance_m, "the robot follows the beacon");
         self.tell_following();
@@ -62,7 +62,7 @@ impl Supervisor<'_> {
     /// Ends the following, if any, and lets the robot wait. Returns whether it did.
     pub(crate) fn end_following(&mut self, outcome: TargetOutcome) -> bool {
         let Some(following) = self.state.following.take() else { return false };
-        let (now, pose) = (self.pose_time(), self.bus.observer.record.pose);
+        let (now, pose) = (self.pose_time(), self.record.pose);
         let followed = following.followed(now, pose.as_ref());
         self.targets.end_following((outcome, followed), following.place(), now.seconds());
         self.await_target();
@@ -107,7 +107,7 @@ impl Supervisor<'_> {
         else {
             return false;
         };
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         let newest = record.pose.map(|pose| pose.stamp.tick);
         let begins = newest.is_none() && following.is_new();
         // Samples of even later ticks lie in the future and are refused.
@@ -121,7 +121,7 @@ impl Supervisor<'_> {
         let Some(following) = &mut self.state.following else { return false };
         let was_lost = following.is_lost;
         let taken = following.take(beacon, now, mission);
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         if let (Some(captured), Some(pose)) = (self.clock.tick_at(beacon.capture_ns), record.pose) {
             self.beacon.last_tick = self.beacon.last_tick.max(captured.min(pose.stamp.tick) + 1);
         }
@@ -161,11 +161,11 @@ impl Supervisor<'_> {
     fn tell_following(&mut self) {
         if let Some(following) = &self.state.following {
             let now = self.pose_time();
-            self.beacon.told = Some(following.sample(now, self.bus.observer.record.pose.as_ref()));
+            self.beacon.told = Some(following.sample(now, self.record.pose.as_ref()));
         }
     }
 
     pub(crate) fn stands_beside(&self) -> bool {
-        self.targets.follows && self.bus.observer.record.arrival.is_some()
+        self.targets.follows && self.record.arrival.is_some()
     }
 }

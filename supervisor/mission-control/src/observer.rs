@@ -60,7 +60,6 @@ pub(crate) struct Observer {
     field: Reader<FieldHeader, FieldCell>,
     command: Reader<CommandSample>,
     writers: Writers,
-    pub record: Record,
 }
 
 #[derive(Default)]
@@ -84,11 +83,11 @@ pub struct Record {
 }
 
 impl Observer {
-    /// Opens all readers on `bus`, to complete `record`.
+    /// Opens all readers on `bus`.
     ///
     /// `waiter` wakes for heartbeats, fields and link samples, which end a tick, and leaves the
     /// processor to the stages during a tick.
-    pub(crate) fn new(bus: &Bus, waiter: &mut Waiter, record: Record) -> Result<Self, BusError> {
+    pub(crate) fn new(bus: &Bus, waiter: &mut Waiter) -> Result<Self, BusError> {
         waiter.on(bus.wakeup(&topics::HEALTH)?);
         waiter.on(bus.wakeup(&topics::LINK)?);
         waiter.on(bus.wakeup(&topics::FIELD)?);
@@ -104,13 +103,13 @@ impl Observer {
             field: bus.reader(&topics::FIELD)?,
             command: bus.recorder_reader(&topics::COMMAND)?,
             writers: bus.writers().cloned().unwrap_or_default(),
-            record,
         })
     }
 
-    /// Reads all new samples. Returns whether they changed the roster.
+    /// Reads all new samples into `record`. Returns whether they changed the roster.
     pub(crate) fn read_all(
         &mut self,
+        record: &mut Record,
         stages: &mut StageProcesses,
         listener: &mut Listener,
     ) -> Result<bool, BusError> {
@@ -120,10 +119,9 @@ impl Observer {
         while let Some(health) = self.health.next_sample()? {
             roster_changed |= stages.on_health(&health);
             if name_str(&health.stage) == processes::stages::PLANNER {
-                self.record.published.planner = (health.stamp.generation, health.stamp.tick);
+                record.published.planner = (health.stamp.generation, health.stamp.tick);
             }
         }
-        let record = &mut self.record;
         // The command is read before the samples behind it, so a record with the command holds them
         // too.
         while let Some(command) = self.command.next_sample()? {

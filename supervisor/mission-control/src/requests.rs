@@ -14,6 +14,7 @@ use glam::DVec2;
 use processes::records;
 
 use crate::{
+    bus_endpoints::warn_if_failed,
     error::Result,
     order::Decision,
     outcome::{Ending, Outcome, allowed_m},
@@ -36,8 +37,10 @@ impl Supervisor<'_> {
             if answer != RequestAnswer::Taken {
                 tracing::warn!(?kind, reason, "an operator's request is refused");
             }
-            self.bus.last_request = (request.id, answer);
-            self.bus.publish_order(self.mission_time(), request, answer);
+            self.last_request = (request.id, answer);
+            let (tick, time) = (self.record.newest_tick(), self.mission_time());
+            let order = RequestSample { answer: answer.into(), ..request };
+            warn_if_failed(self.bus.orders.publish(tick.unwrap_or_default(), time, order));
             // The roster holds one answer, so each is published separately.
             self.publish_state()?;
         }
@@ -99,7 +102,7 @@ impl Supervisor<'_> {
             self.decision.reason,
             HoldReason::Operator | HoldReason::Waiting | HoldReason::Lost
         );
-        let link = self.bus.observer.record.link;
+        let link = self.record.link;
         if !stands_by || link.is_none_or(|link| link.at_rest() != Rest::AtRest) {
             return RequestAnswer::Moves;
         }
@@ -130,8 +133,7 @@ impl Supervisor<'_> {
         if zones.len() == before {
             return RequestAnswer::NotInZone;
         }
-        let here =
-            self.bus.observer.record.pose.map_or(mission.start.at, |pose| pose.pose().position);
+        let here = self.record.pose.map_or(mission.start.at, |pose| pose.pose().position);
         let new = zones.last().filter(|_| adds);
         if new.is_some_and(|zone| zone.clearance(here) <= mission.body().radius_m) {
             return RequestAnswer::ZoneHere;
@@ -147,7 +149,7 @@ impl Supervisor<'_> {
         appends: bool,
         first_tick: u64,
     ) -> RequestAnswer {
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         let mission = &self.options.mission;
         let points = request.targets();
         if let Some(answer) = target_list::refusal(points, self.why_held(), mission, record) {
@@ -171,7 +173,7 @@ impl Supervisor<'_> {
         let waits = self.decision.reason == HoldReason::Waiting;
         let limit = self.recovery_steps.limit.filter(|_| !waits);
         let since_tick = limit.map_or(first_tick, |limit| limit.last_tick + 1);
-        let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
+        let arrival = self.record.sure_arrival(&self.options.mission);
         self.targets.replace(points, (since_tick, self.pose_time().seconds()), arrival);
         self.on_new_target();
     }
@@ -182,7 +184,7 @@ impl Supervisor<'_> {
         if !mission.stay {
             return RequestAnswer::NotStaying;
         }
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         let (Some([stick]), Some(pose)) = (request.targets(), record.pose) else {
             return RequestAnswer::Malformed;
         };
@@ -216,7 +218,7 @@ impl Supervisor<'_> {
 
     /// Returns the hold reason. The link may obey an operator before the supervisor does.
     pub(crate) fn why_held(&self) -> HoldReason {
-        let link = self.bus.observer.record.link;
+        let link = self.record.link;
         let stopped = self.state.operator_stop
             || link.is_some_and(|link| link.cause() == Cause::OperatorStop);
         if stopped { HoldReason::Operator } else { self.decision.reason }
@@ -231,7 +233,7 @@ impl Supervisor<'_> {
             return false;
         }
         let now_s = self.pose_time().seconds();
-        let arrival = self.bus.observer.record.sure_arrival(&self.options.mission);
+        let arrival = self.record.sure_arrival(&self.options.mission);
         tracing::info!(
             number = self.targets.number,
             outcome = ending.outcome.as_str(),
@@ -242,21 +244,20 @@ impl Supervisor<'_> {
             self.targets.settle(ending.outcome, now_s, arrival);
         }
         assert!(self.targets.waits);
-        self.stall_watch.settle(self.bus.observer.record.pose.map(|pose| pose.stamp.tick));
+        self.stall_watch.settle(self.record.pose.map(|pose| pose.stamp.tick));
         self.await_target();
         true
     }
 
     /// Voids arrivals until there is a target.
     pub(crate) fn await_target(&mut self) {
-        let record = &mut self.bus.observer.record;
-        (record.target_number, record.arrival) = (u64::MAX, None);
+        (self.record.target_number, self.record.arrival) = (u64::MAX, None);
         self.arrived = None;
     }
 
     pub(crate) fn take_arrival(&mut self) -> bool {
         let mission = &self.options.mission;
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         let truth = self.robot.truth();
         self.targets.compare(record, truth, allowed_m(mission));
         for result in self.targets.take_known(!truth.is_empty()) {
@@ -286,8 +287,7 @@ impl Supervisor<'_> {
     }
 
     pub(crate) fn on_new_target(&mut self) {
-        self.bus.observer.record.target_number = self.targets.number;
-        self.bus.observer.record.arrival = None;
+        (self.record.target_number, self.record.arrival) = (self.targets.number, None);
         self.arrived = None;
         // Each target has its own deadline.
         self.state.operator_stopped_s = 0.0;

@@ -155,7 +155,7 @@ pub(crate) fn conduct<'a>(
     let end_by_stall = supervisor.end_by_stall();
     let deadline = supervisor.deadline();
     let mut truth = supervisor.robot.truth().to_vec();
-    let mut record = std::mem::take(&mut supervisor.bus.observer.record);
+    let mut record = std::mem::take(&mut supervisor.record);
     let mut targets = supervisor.targets.clone();
     targets.compare(&record, &truth, allowed_m(&options.mission));
     record.arrival.take_if(|_| !targets.is_last());

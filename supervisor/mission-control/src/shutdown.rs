@@ -9,6 +9,7 @@ use common::{
 use processes::policy::Now;
 
 use crate::{
+    bus_endpoints::BusEndpoints,
     error::Result,
     judge::{RESTS_WITHIN, TickProgress},
     order::Decision,
@@ -64,7 +65,10 @@ impl Supervisor<'_> {
         // A stage that dies now must not start again on the old bus.
         self.stages.start_no_more();
         self.stop_all()?;
-        self.bus.recreate(surroundings)?;
+        surroundings.recreate_bus()?;
+        // The next link connects to the robot anew.
+        self.record.link = None;
+        self.bus = BusEndpoints::open(surroundings.bus()?)?;
         self.publish_state()?;
         self.stages.start_all(self.first_tick());
         self.tick_progress = TickProgress::new(self.stages.now());
@@ -78,7 +82,7 @@ impl Supervisor<'_> {
         let began = self.stages.now();
         loop {
             self.wait_turn()?;
-            let confirmed = self.bus.observer.record.link.is_none_or(|link| link.stopped());
+            let confirmed = self.record.link.is_none_or(|link| link.stopped());
             if confirmed || self.waited_since(began) >= STAND_CONFIRMED {
                 return Ok(());
             }
@@ -120,7 +124,7 @@ impl Supervisor<'_> {
         let Some(link) = self.connected_link() else {
             return Wheels::Unknown("it does not answer".to_owned());
         };
-        let age = self.bus.observer.record.rest_read.map(|read| read.elapsed());
+        let age = self.record.rest_read.map(|read| read.elapsed());
         match (link.at_rest(), age) {
             (_, None) => Wheels::Unknown("no usable motor frames came".to_owned()),
             (Rest::AtRest, Some(age)) if age < NEW && link.action() == Action::End => {
@@ -136,7 +140,7 @@ impl Supervisor<'_> {
     /// Returns the state of a link that runs and hears the robot.
     fn connected_link(&self) -> Option<LinkSample> {
         let runs = self.stages.runs(topics::LINK.spec().writer);
-        self.bus.observer.record.link.filter(|link| runs && link.connected == 1)
+        self.record.link.filter(|link| runs && link.connected == 1)
     }
 
     fn waited_since(&self, since: Now) -> Duration {
@@ -145,11 +149,11 @@ impl Supervisor<'_> {
 
     pub(crate) fn wait_turn(&mut self) -> Result {
         self.service.feed();
-        self.bus.observer.read_all(&mut self.stages, &mut self.listener)?;
+        self.bus.observer.read_all(&mut self.record, &mut self.stages, &mut self.listener)?;
         self.poll_processes(self.first_tick())?;
         // A full pipe would block the simulated robot, and its answers to the link.
         self.robot.poll()?;
-        if self.bus.is_due(topics::RESTATE) {
+        if self.bus.is_due() {
             self.publish_state()?;
         }
         Ok(())

@@ -7,6 +7,7 @@ use common::{
 use processes::{records, stages};
 
 use crate::{
+    bus_endpoints::warn_if_failed,
     error::Result,
     outcome::{Ending, Outcome},
     recovery_step::Next,
@@ -19,7 +20,7 @@ impl Supervisor<'_> {
     pub(crate) fn watch_for_stalls(&mut self) -> Result<Option<Ending>> {
         if self.decision.order() != Order::Drive {
             // In lockstep mission time stands still meanwhile.
-            let record = &self.bus.observer.record;
+            let record = &self.record;
             let pose = record.pose.filter(|_| !self.clock.in_ticks());
             let epoch = record.published.grid_epoch;
             if let Some(stall) = pose.and_then(|pose| self.stall_watch.stand(&pose, epoch)) {
@@ -30,7 +31,7 @@ impl Supervisor<'_> {
             return Ok(None);
         }
         loop {
-            let published = self.bus.observer.record.published;
+            let published = self.record.published;
             match self.recovery_steps.next(published, Instant::now()) {
                 Next::Wait => break,
                 Next::Begin(step) => {
@@ -55,7 +56,7 @@ impl Supervisor<'_> {
     }
 
     fn next_stall(&mut self) -> Option<StallSample> {
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         let in_ticks = self.clock.in_ticks();
         // The link stops a robot with held wheels, and only the supervisor can free it.
         let stopped =
@@ -85,7 +86,8 @@ impl Supervisor<'_> {
 
     fn tell(&mut self, stall: &StallSample) {
         stall::log(stall);
-        self.bus.publish_stall(*stall);
+        let stamp = stall.stamp;
+        warn_if_failed(self.bus.stalls.publish(stamp.tick, stamp.time(), *stall));
         records::append(&self.options.directory, records::STALLS, stall);
     }
 

@@ -10,8 +10,8 @@ use common::{
     mission::Mission,
     run::Run,
     samples::{
-        Cause, DirectiveSample, HoldReason, Order, PlaceSample, RosterHeader, TickLimitSample,
-        ZoneCorner, ZonesHeader, name_str,
+        Cause, DirectiveSample, HoldReason, Order, PlaceSample, RequestAnswer, RosterHeader,
+        TickLimitSample, ZoneCorner, ZonesHeader, name_str,
     },
     topics,
 };
@@ -22,15 +22,16 @@ use processes::{
     records,
     service_manager::ServiceManager,
     stage_processes::{StageProcesses, Starter},
+    stages,
 };
 
 use crate::{
-    bus_endpoints::BusEndpoints,
+    bus_endpoints::{BusEndpoints, warn_if_failed},
     decisive,
     error::Result,
     follow::Beacon,
     judge::{self, Arrival, Deadline, StopClock, TickProgress},
-    observer::Listener,
+    observer::{Listener, Record},
     order::{self, Decision},
     outcome::{Ending, Outcome},
     progress::Progress,
@@ -64,6 +65,9 @@ pub(crate) struct Supervisor<'a> {
     pub stages: StageProcesses,
     pub robot: Robot,
     pub bus: BusEndpoints,
+    pub record: Record,
+    /// Id and answer of the newest request; id 0 before the first.
+    pub last_request: (u64, RequestAnswer),
     pub listener: Listener,
     checkpoint: Checkpoint,
     pub state: SupervisorState,
@@ -134,6 +138,8 @@ impl<'a> Supervisor<'a> {
             ),
             robot,
             bus: BusEndpoints::open(surroundings.bus()?)?,
+            record: Record::default(),
+            last_request: (0, RequestAnswer::Taken),
             listener,
             checkpoint,
             state,
@@ -154,7 +160,7 @@ impl<'a> Supervisor<'a> {
             turns,
             service: ServiceManager::of_environment(),
         };
-        supervisor.bus.observer.record.target_number = supervisor.targets.number;
+        supervisor.record.target_number = supervisor.targets.number;
         if supervisor.targets.waits {
             supervisor.await_target();
         }
@@ -201,12 +207,12 @@ impl<'a> Supervisor<'a> {
             if self.stages.is_start_blocked() {
                 return Ok(None);
             }
-            let tick = self.bus.observer.record.published.tick;
+            let tick = self.record.published.tick;
             if let Some(tick) = tick.filter(|tick| catch_up_at.is_some_and(|at| *tick >= at)) {
                 surroundings.let_catch_up();
                 catch_up_at = Some(tick + CAUGHT_UP_EVERY);
             }
-            if self.bus.is_due(topics::RESTATE) {
+            if self.bus.is_due() {
                 self.publish_state()?;
                 self.show_progress(show);
                 surroundings.restore();
@@ -219,16 +225,17 @@ impl<'a> Supervisor<'a> {
     }
 
     fn iterate(&mut self) -> Result<Option<Ending>> {
-        let roster_changed = self.bus.observer.read_all(&mut self.stages, &mut self.listener)?;
+        let roster_changed =
+            self.bus.observer.read_all(&mut self.record, &mut self.stages, &mut self.listener)?;
         let next = self.take_arrival() | self.miss_hand() | self.take_beacon()?;
         let first_tick = self.first_tick();
         let asked = self.take_requests(first_tick)?;
         let died = self.poll_processes(first_tick)?;
         // Without frames, no later tick brings what a stage has missed of the newest one.
-        let frames_come =
-            self.bus.observer.record.link.is_some_and(|link| {
-                !matches!(link.cause(), Cause::RobotLost | Cause::FramesSilent)
-            });
+        let frames_come = self
+            .record
+            .link
+            .is_some_and(|link| !matches!(link.cause(), Cause::RobotLost | Cause::FramesSilent));
         let driving = self.decision.order() == Order::Drive && frames_come;
         self.stages.check_outputs(driving, first_tick);
         let simulator_ended = !self.robot.poll()?;
@@ -252,9 +259,10 @@ impl<'a> Supervisor<'a> {
     /// Reaps and restarts stages, and reports deaths. Returns whether there were any.
     pub(crate) fn poll_processes(&mut self, first_tick: u64) -> Result<bool> {
         let deaths = self.stages.poll(&self.bus.bus, first_tick)?;
+        let stamp = self.record.pose.unwrap_or_default().stamp;
         for death in &deaths {
             death.log();
-            self.bus.publish_death(death.sample());
+            warn_if_failed(self.bus.deaths.publish(stamp.tick, stamp.time(), death.sample()));
             records::append(&self.options.directory, records::DEATHS, death);
         }
         self.cleanup.on_deaths(&deaths, &self.bus.bus);
@@ -263,7 +271,7 @@ impl<'a> Supervisor<'a> {
 
     /// Returns whether the decision changed.
     fn decide_order(&mut self) -> bool {
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         let decision = order::decide(&order::Snapshot {
             was_ready: self.decision.ready,
             all_running: self.stages.all_running(),
@@ -293,7 +301,7 @@ impl<'a> Supervisor<'a> {
 
     fn judge(&mut self, simulator_ended: bool) -> Option<Ending> {
         let now = self.stages.now();
-        let record = &self.bus.observer.record;
+        let record = &self.record;
         let target = self.targets.current.position();
         let newest_m = record.pose.map(|pose| target.distance(pose.pose().position));
         // A robot that follows goes on with its beacon.
@@ -338,14 +346,14 @@ impl<'a> Supervisor<'a> {
     }
 
     pub(crate) fn mission_time(&self) -> MissionTime {
-        self.clock.now(self.bus.observer.record.pose.as_ref(), self.robot.truth().last())
+        self.clock.now(self.record.pose.as_ref(), self.robot.truth().last())
     }
 
     /// Returns the mission time. In lockstep it is the newest pose's, because the ground truth comes
     /// when its process is scheduled.
     pub(crate) fn pose_time(&self) -> MissionTime {
         match self.clock.in_ticks() {
-            true => self.clock.pose_time(self.bus.observer.record.pose.as_ref()),
+            true => self.clock.pose_time(self.record.pose.as_ref()),
             false => self.mission_time(),
         }
     }
@@ -364,13 +372,13 @@ impl<'a> Supervisor<'a> {
     }
 
     pub(crate) fn first_tick(&self) -> u64 {
-        self.clock.first_tick(self.bus.observer.record.newest_tick())
+        self.clock.first_tick(self.record.newest_tick())
     }
 
     pub(crate) fn published_as_of(&self) -> (u64, MissionTime) {
         // An external stage takes its first tick from this sample.
         let tick = self.first_tick().saturating_sub(1);
-        let time = self.clock.pose_time(self.bus.observer.record.pose.as_ref());
+        let time = self.clock.pose_time(self.record.pose.as_ref());
         (tick, time)
     }
 
@@ -406,27 +414,32 @@ impl<'a> Supervisor<'a> {
             epoch: epoch - u64::from(self.recovery_steps.withholds(epoch)),
             ..DirectiveSample::default()
         };
+        let (last_request, answer) = self.last_request;
         let header = RosterHeader {
             supervisor_pid: machine::process(),
             order: order.into(),
             reason: reason.into(),
             simulated: self.robot.simulator.is_some().into(),
+            last_request,
+            answer: answer.into(),
             ..RosterHeader::default()
         };
         // A stage that ended cannot repeat its trouble, and one that runs does so later.
-        if let Some(complaint) = self.bus.observer.record.complaint()
+        if let Some(complaint) = self.record.complaint()
             && (self.bus.misses_trouble || !self.stages.runs(name_str(&complaint.stage)))
         {
             self.bus.complaints.publish(tick, time, complaint)?;
         }
+        (self.bus.published, self.bus.misses_trouble) = (Some(Instant::now()), false);
         let entries = self.stages.roster();
-        self.bus.publish_state(tick, time, directive, header, &entries)?;
-        Ok(())
+        assert_eq!(entries.len(), stages::TABLE.len());
+        self.bus.directive.publish(tick, time, directive)?;
+        Ok(self.bus.roster.publish_slice(tick, time, header, &entries)?)
     }
 
     fn show_progress(&mut self, show: &mut dyn FnMut(&Progress<'_>)) {
         let progress = Progress {
-            record: &self.bus.observer.record,
+            record: &self.record,
             running: self.stages.running(),
             driving: self.decision.order() == Order::Drive,
             straight_m: self.targets.current.position().distance(self.options.mission.start.at),
