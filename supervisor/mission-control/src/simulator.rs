@@ -19,7 +19,7 @@ use common::{
     poll, run,
 };
 use processes::process::Process;
-use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::io::ioctl_fionbio;
 use thiserror::Error;
 
 use crate::{long_record, surroundings::SimulatedRobot};
@@ -103,9 +103,7 @@ impl Simulator {
         let pipe = process
             .take_stdout()
             .ok_or_else(|| SimulatorError::Startup("it has no output".into()))?;
-        fcntl_getfl(&pipe)
-            .and_then(|flags| fcntl_setfl(&pipe, flags | OFlags::NONBLOCK))
-            .map_err(|errno| system("listen to")(errno.into()))?;
+        ioctl_fionbio(&pipe, true).map_err(|errno| system("listen to")(errno.into()))?;
         let file = append(directory.join(GROUND_TRUTH));
         let mut truth = GroundTruth {
             pipe,
