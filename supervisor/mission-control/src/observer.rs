@@ -19,7 +19,10 @@ use common::{
 use glam::DVec2;
 use processes::stage_processes::StageProcesses;
 
-use crate::{long_record, target_list::TargetOutcome};
+use crate::{
+    long_record,
+    target_list::{Arrived, TargetOutcome},
+};
 
 /// Guidance history, long enough for the guidance of an arrival.
 const MOST_GUIDANCE: usize = 1024;
@@ -210,7 +213,7 @@ impl Record {
             .is_none_or(|index| CellState::from_byte(self.grid.cells()[index]).is_hazard())
     }
 
-    pub(crate) fn sure_arrival(&self, mission: &Mission) -> Option<(CommandSample, TargetOutcome)> {
+    pub(crate) fn sure_arrival(&self, mission: &Mission) -> Option<Arrived> {
         let command = self.arrival?;
         let pose = self.pose_at(command.stamp.tick);
         let outcome = if self.beside(&command, mission.arrival_tolerance_m).is_some() {

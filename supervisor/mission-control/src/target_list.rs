@@ -37,6 +37,9 @@ pub enum TargetOutcome {
     Followed,
 }
 
+/// First command at a target, and how the robot arrived there.
+pub(crate) type Arrived = (CommandSample, TargetOutcome);
+
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Followed {
     pub way_m: f64,
@@ -106,7 +109,7 @@ impl TargetList {
     }
 
     /// Follows a beacon. The first sample gives the first target.
-    pub(crate) fn follow(&mut self, now_s: f64, arrival: Option<(CommandSample, TargetOutcome)>) {
+    pub(crate) fn follow(&mut self, now_s: f64, arrival: Option<Arrived>) {
         self.replace(&[], (0, now_s), arrival);
         // A beacon that is never heard has a result too.
         self.number += 1;
@@ -189,7 +192,7 @@ impl TargetList {
         &mut self,
         points: &[TargetPoint],
         (since_tick, now_s): (u64, f64),
-        arrival: Option<(CommandSample, TargetOutcome)>,
+        arrival: Option<Arrived>,
     ) {
         if self.has_target() {
             self.end_current(TargetOutcome::Replaced, now_s, arrival);
@@ -205,12 +208,7 @@ impl TargetList {
 
     /// Ends the current target with `outcome` at `now_s`; later ones are not tried. The robot
     /// waits.
-    pub(crate) fn settle(
-        &mut self,
-        outcome: Outcome,
-        now_s: f64,
-        arrival: Option<(CommandSample, TargetOutcome)>,
-    ) {
+    pub(crate) fn settle(&mut self, outcome: Outcome, now_s: f64, arrival: Option<Arrived>) {
         if self.release() {
             return;
         }
@@ -224,12 +222,7 @@ impl TargetList {
         self.waits = true;
     }
 
-    fn end_current(
-        &mut self,
-        outcome: TargetOutcome,
-        now_s: f64,
-        arrival: Option<(CommandSample, TargetOutcome)>,
-    ) {
+    fn end_current(&mut self, outcome: TargetOutcome, now_s: f64, arrival: Option<Arrived>) {
         if let Some(arrival) = arrival {
             return self.store_arrival(arrival);
         }
@@ -244,7 +237,7 @@ impl TargetList {
         }
     }
 
-    pub(crate) fn advance(&mut self, arrival: (CommandSample, TargetOutcome), since_tick: u64) {
+    pub(crate) fn advance(&mut self, arrival: Arrived, since_tick: u64) {
         if self.ahead.is_empty() {
             return;
         }
@@ -267,7 +260,7 @@ impl TargetList {
         }
     }
 
-    fn store_arrival(&mut self, (command, outcome): (CommandSample, TargetOutcome)) {
+    fn store_arrival(&mut self, (command, outcome): Arrived) {
         let result = TargetResult {
             at_s: Some(command.stamp.seconds()),
             distance_m: Some(command.distance_m),

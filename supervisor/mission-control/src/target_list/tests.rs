@@ -25,7 +25,7 @@ fn reached() -> Ending {
 }
 
 /// Returns a list of two targets after this arrival at the first.
-fn advanced(arrival: (CommandSample, TargetOutcome)) -> TargetList {
+fn advanced(arrival: Arrived) -> TargetList {
     let mut list = TargetList::of(&mission(""));
     assert!(list.append(&[at(0.0, 0.0)]));
     list.advance(arrival, 8);
