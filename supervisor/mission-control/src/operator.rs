@@ -116,19 +116,16 @@ pub fn stand(robot: &RobotName) -> Result<Untold> {
     refuse_mirror(&domain)?;
     domain.made_again(domain.stop_socket());
     let link = told_link(&domain)?;
-    let run = Run::load(&domain.run_directory());
-    if link.is_none() && run.is_err() && owes_stop(robot) {
-        return match comes_to_rest(&domain, None)? {
-            true => Ok(None),
-            false => Err(not_at_rest(
-                robot,
-                &sees(robot).map_or("its state is unknown".into(), |it| it.0),
-            )),
-        };
-    }
-    if link.is_none() && run.is_err() {
-        request_stop(robot, asked_ns)?;
-        return await_rest(robot, stopped_for_good).map(|()| None);
+    if link.is_none() && Run::load(&domain.run_directory()).is_err() {
+        if !owes_stop(robot) {
+            request_stop(robot, asked_ns)?;
+            return await_rest(robot, stopped_for_good).map(|()| None);
+        }
+        if comes_to_rest(&domain, None)? {
+            return Ok(None);
+        }
+        let seen = sees(robot).map_or("its state is unknown".into(), |(seen, _)| seen);
+        return Err(not_at_rest(robot, &seen));
     }
     let supervisor = tell_supervisor(robot, asked_ns)?;
     let rests = comes_to_rest(&domain, link)?;
