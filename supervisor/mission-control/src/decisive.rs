@@ -3,7 +3,7 @@
 //! After an event, the stages run until the supervisor has stopped the robot. Their progress until
 //! then depends on the machine; the order of events is deterministic.
 
-use common::{ground_truth::GroundTruthTick, samples::PoseSample};
+use common::{ground_truth::GroundTruthTick, mission::Mission, samples::PoseSample};
 
 use crate::{
     judge::{Deadline, arrived, touched},
@@ -11,8 +11,13 @@ use crate::{
     outcome::{Ending, Outcome},
 };
 
-pub(crate) fn first_contact(truth: &[GroundTruthTick]) -> Option<&GroundTruthTick> {
-    truth.get(truth.partition_point(|tick| tick.contacts == 0))
+/// Returns the first contact that ends `mission`.
+pub(crate) fn first_contact<'a>(
+    truth: &'a [GroundTruthTick],
+    mission: &Mission,
+) -> Option<&'a GroundTruthTick> {
+    let contact = truth.get(truth.partition_point(|tick| tick.contacts == 0));
+    contact.filter(|_| !mission.simulation.goes_on_after_contact)
 }
 
 pub(crate) struct Decided {
@@ -49,30 +54,33 @@ pub(crate) fn first(
     ending: Ending,
     record: &Record,
     truth: &[GroundTruthTick],
-    contact: Option<&GroundTruthTick>,
+    mission: &Mission,
     timeout: Timeout,
     stall: Option<(u64, Ending)>,
-    tolerance_m: f64,
 ) -> Decided {
     let undecided = |ending| Decided { ending, last_tick: None, truth_ticks: truth.len() };
     if ending.outcome == Outcome::Aborted {
         return undecided(ending);
     }
     let poses = &record.poses;
+    let contact = first_contact(truth, mission);
     let contact = contact.map(|contact| (tick_of(contact, poses), touched([contact.x, contact.y])));
-    let arrival = record.arrival;
-    let arrival =
-        arrival.map(|it| (it.stamp.tick, arrived(it.distance_m, record.beside(&it, tolerance_m))));
+    let arrival = record.arrival.map(|it| {
+        let beside = record.beside(&it, mission.arrival_tolerance_m);
+        (it.stamp.tick, arrived(it.distance_m, beside))
+    });
     let arrived_in = arrival.as_ref().map(|(tick, _)| *tick);
     let late = timeout.tick(poses, truth);
     let late = late.map(|tick| (tick, timeout.deadline.timed_out()));
     // Of two events in one tick, the first in the list counts.
     let events = [contact, arrival, late, stall];
+    let ticks_until = |pose: Option<&PoseSample>| {
+        let last = pose.and_then(|pose| truth_of(pose, truth));
+        last.map_or(truth.len(), |index| index + 1)
+    };
     let Some((tick, ending)) = events.into_iter().flatten().min_by_key(|event| event.0) else {
         // The robot waits. How far it rolls after its newest tick depends on how its processes end.
-        let newest = poses.last().and_then(|pose| truth_of(pose, truth));
-        let truth_ticks = newest.map_or(truth.len(), |index| index + 1);
-        return Decided { truth_ticks, ..undecided(ending) };
+        return Decided { truth_ticks: ticks_until(poses.last()), ..undecided(ending) };
     };
     let last_tick = match ending.outcome {
         // The arrival's command is the mission's last.
@@ -84,10 +92,7 @@ pub(crate) fn first(
         Outcome::Timeout if timeout.by_robot => {
             truth.partition_point(|tick| tick.time_s < timeout.deadline.at_s())
         }
-        _ => record
-            .pose_at(last_tick)
-            .and_then(|pose| truth_of(pose, truth))
-            .map_or(truth.len(), |index| index + 1),
+        _ => ticks_until(record.pose_at(last_tick)),
     };
     assert!(truth_ticks <= truth.len());
     Decided { ending, last_tick: Some(last_tick), truth_ticks }
@@ -114,6 +119,7 @@ mod tests {
     use common::samples::{CommandSample, Stamp};
 
     use super::*;
+    use crate::testing;
 
     const TIMEOUT: Timeout = Timeout {
         deadline: Deadline { began_s: 0.0, timeout_s: 20.0, stopped_s: 0.0 },
@@ -171,10 +177,9 @@ mod tests {
                 Ending::failed(seen, ""),
                 &record,
                 &truth,
-                first_contact(&truth),
+                &testing::mission("target = [3, 0]"),
                 TIMEOUT,
                 (ticks == 18).then(|| (15, Ending::failed(Unreachable, ""))),
-                0.15,
             );
             let Decided { ending, last_tick, truth_ticks } = decided;
             assert_eq!((ending.outcome, last_tick, truth_ticks), want, "{what}");

@@ -159,15 +159,13 @@ pub(crate) fn conduct<'a>(
     let mut targets = supervisor.targets.clone();
     targets.compare(&record, &truth, allowed_m(&options.mission));
     record.arrival.take_if(|_| !targets.is_last());
-    let goes_on = options.mission.simulation.goes_on_after_contact;
     let decided = decisive::first(
         ending,
         &record,
         &truth,
-        decisive::first_contact(&truth).filter(|_| !goes_on),
+        &options.mission,
         Timeout { deadline, by_robot: supervisor.clock.in_ticks() },
         end_by_stall,
-        options.mission.arrival_tolerance_m,
     );
     let (replans, resets) = supervisor.stall_watch.recoveries(decided.last_tick);
     truth.truncate(decided.truth_ticks);

@@ -314,8 +314,7 @@ impl<'a> Supervisor<'a> {
             beside: record.beside(&command, self.options.mission.arrival_tolerance_m),
             since: *self.arrived.get_or_insert(now),
         });
-        let goes_on = self.options.mission.simulation.goes_on_after_contact;
-        let collision = decisive::first_contact(self.robot.truth()).filter(|_| !goes_on);
+        let collision = decisive::first_contact(self.robot.truth(), &self.options.mission);
         let time = self.mission_time();
         let stopped = self.decision.reason == HoldReason::Operator;
         self.state.operator_stopped_s += self.stop_clock.passed_s(stopped, time);
