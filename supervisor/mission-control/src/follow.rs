@@ -126,8 +126,7 @@ impl Supervisor<'_> {
             self.beacon.last_tick = self.beacon.last_tick.max(captured.min(pose.stamp.tick) + 1);
         }
         if let Err(refusal) = taken {
-            let BeaconSample { x_m, y_m, deviation_m, .. } = *beacon;
-            self.log_refusal(refusal, [x_m, y_m, deviation_m]);
+            self.log_refusal(refusal, beacon);
             return false;
         }
         if was_lost {
@@ -148,8 +147,8 @@ impl Supervisor<'_> {
         true
     }
 
-    fn log_refusal(&mut self, refusal: BeaconRefusal, beacon: [f64; 3]) {
-        let [x_m, y_m, deviation_m] = beacon;
+    fn log_refusal(&mut self, refusal: BeaconRefusal, beacon: &BeaconSample) {
+        let BeaconSample { x_m, y_m, deviation_m, .. } = *beacon;
         // A source may send thousands, so a repeated reason is logged once.
         if self.beacon.told.is_none_or(|told| told.refusal != u8::from(refusal)) {
             let why = refusal.words();
