@@ -107,7 +107,7 @@ impl Supervisor<'_> {
             return RequestAnswer::Moves;
         }
         let number = self.state.place.number + 1;
-        let (x_m, y_m, heading_rad) = (point.x_m, point.y_m, point.heading_rad);
+        let TargetPoint { x_m, y_m, heading_rad, .. } = *point;
         tracing::warn!(x_m, y_m, heading_rad, "an operator places the robot");
         let stamp = Default::default();
         self.state.place = PlaceSample { stamp, number, x_m, y_m, heading_rad, sigma_m, sigma_rad };
