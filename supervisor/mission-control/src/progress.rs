@@ -24,8 +24,8 @@ impl fmt::Display for Progress<'_> {
             write!(f, "{what}: {running}/{all} stages alive")?;
             return write_complaint(f, record);
         }
-        let time = record.pose.map_or(0.0, |pose| pose.stamp.seconds());
-        let speed = record.pose.map_or(0.0, |pose| pose.v_m_s);
+        let pose = record.pose.unwrap_or_default();
+        let (time, speed) = (pose.stamp.seconds(), pose.v_m_s);
         let distance = record.command.map_or(self.straight_m, |command| command.distance_m);
         let events = record.guidance.back().map_or(0, |guidance| guidance.safety_events);
         write!(
