@@ -6,7 +6,6 @@ use common::{
     samples::{Action, LinkSample, Order, Rest},
     topics,
 };
-use processes::policy::Now;
 
 use crate::{
     bus_endpoints::BusEndpoints,
@@ -83,7 +82,7 @@ impl Supervisor<'_> {
         loop {
             self.wait_turn()?;
             let confirmed = self.record.link.is_none_or(|link| link.stopped());
-            if confirmed || self.waited_since(began) >= STAND_CONFIRMED {
+            if confirmed || self.stages.now().saturating_sub(began) >= STAND_CONFIRMED {
                 return Ok(());
             }
             self.wait()?;
@@ -141,10 +140,6 @@ impl Supervisor<'_> {
     fn connected_link(&self) -> Option<LinkSample> {
         let runs = self.stages.runs(topics::LINK.spec().writer);
         self.record.link.filter(|link| runs && link.connected == 1)
-    }
-
-    fn waited_since(&self, since: Now) -> Duration {
-        self.stages.now().saturating_sub(since)
     }
 
     pub(crate) fn wait_turn(&mut self) -> Result {
