@@ -34,10 +34,14 @@ impl Supervisor<'_> {
             let published = self.record.published;
             match self.recovery_steps.next(published, Instant::now()) {
                 Next::Wait => break,
-                Next::Begin(step) => {
-                    self.carry_out(step)?;
-                    if let Some(ending) = self.given_up() {
-                        return Ok(Some(ending));
+                Next::Begin(RecoveryStep::Replan) => {
+                    self.stages.replace(stages::PLANNER, self.first_tick());
+                }
+                Next::Begin(RecoveryStep::Reset) => self.publish_state()?,
+                Next::Begin(RecoveryStep::GiveUp) => {
+                    let ending = self.given_up();
+                    if ending.is_some() {
+                        return Ok(ending);
                     }
                 }
                 Next::Check => match self.next_stall() {
@@ -89,15 +93,6 @@ impl Supervisor<'_> {
         let stamp = stall.stamp;
         warn_if_failed(self.bus.stalls.publish(stamp.tick, stamp.time(), *stall));
         records::append(&self.options.directory, records::STALLS, stall);
-    }
-
-    fn carry_out(&mut self, step: RecoveryStep) -> Result {
-        match step {
-            RecoveryStep::Replan => self.stages.replace(stages::PLANNER, self.first_tick()),
-            RecoveryStep::Reset => self.publish_state()?,
-            RecoveryStep::GiveUp => {}
-        }
-        Ok(())
     }
 
     fn given_up(&self) -> Option<Ending> {
