@@ -163,8 +163,4 @@ impl Supervisor<'_> {
             self.beacon.told = Some(following.sample(now, self.record.pose.as_ref()));
         }
     }
-
-    pub(crate) fn stands_beside(&self) -> bool {
-        self.targets.follows && self.record.arrival.is_some()
-    }
 }

@@ -65,8 +65,10 @@ impl Supervisor<'_> {
         // The link stops a robot with held wheels, and only the supervisor can free it.
         let stopped =
             record.link.is_none_or(|link| link.stopped() && link.cause() != Cause::WheelsHeld);
+        // The robot waits beside its beacon.
+        let waits = self.targets.follows && record.arrival.is_some();
         // In lockstep mission time stands still while something holds the robot.
-        let held = !in_ticks && (stopped || !self.stages.all_running()) || self.stands_beside();
+        let held = !in_ticks && (stopped || !self.stages.all_running()) || waits;
         if held {
             self.stall_watch.forget_motion();
         }
