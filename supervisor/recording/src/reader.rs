@@ -188,9 +188,9 @@ impl Recording {
         &self,
         topic: &'static Topic<P>,
     ) -> Result<impl Iterator<Item = Result<Sample<P>>> + use<P>> {
-        self.decoded(topic.spec().name, |log_ns, data| {
-            let sample = decode_sample(data)?;
-            Some(Sample { log_ns, sample })
+        self.decoded(&[topic.spec().name], |message| {
+            let sample = decode_sample(&message.data)?;
+            Some(Sample { log_ns: message.log_ns, sample })
         })
     }
 
@@ -199,22 +199,25 @@ impl Recording {
         &self,
         topic: &'static Topic<H, T>,
     ) -> Result<impl Iterator<Item = Result<SliceSample<H, T>>> + use<H, T>> {
-        self.decoded(topic.spec().name, |log_ns, data| {
-            let (header, elements) = decode_slice(data)?;
-            Some(SliceSample { log_ns, header, elements })
+        self.decoded(&[topic.spec().name], |message| {
+            let (header, elements) = decode_slice(&message.data)?;
+            Some(SliceSample { log_ns: message.log_ns, header, elements })
         })
     }
 
-    fn decoded<S, D: Fn(u64, &[u8]) -> Option<S>>(
+    /// Returns what `decode` makes of the messages of the topics in `wanted`, in file order up to a
+    /// cut. Its `None` is the error of a malformed message.
+    pub fn decoded<S, D: FnMut(Message) -> Option<S>>(
         &self,
-        topic: &str,
-        decode: D,
+        wanted: &[&str],
+        mut decode: D,
     ) -> Result<impl Iterator<Item = Result<S>> + use<S, D>> {
         let file = self.path.clone();
-        let messages = self.messages(&[topic])?;
+        let messages = self.messages(wanted)?;
         Ok(messages.map(move |message| {
-            let Message { log_ns, data, topic, .. } = message?;
-            decode(log_ns, &data).ok_or_else(|| RecordingError::Message {
+            let message = message?;
+            let topic = Arc::clone(&message.topic);
+            decode(message).ok_or_else(|| RecordingError::Message {
                 file: file.clone(),
                 topic: topic.to_string(),
             })

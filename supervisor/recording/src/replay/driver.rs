@@ -12,7 +12,7 @@ use common::{
 use processes::stages::{self, Stage};
 
 use crate::{
-    End, Message, Recording, RecordingError, Result,
+    End, Message, Recording, Result,
     replay::{
         generation::{Generation, Setting},
         report::Report,
@@ -60,13 +60,8 @@ pub fn replay(recording: &Recording, options: &Options) -> Result<Report> {
         report.stages.entry(stage.name).or_default();
     }
     let mut generations = Generations { setting: &setting, chosen, all: BTreeMap::new() };
-    for message in recording.messages(&wanted)? {
-        let message = message?;
-        let topic = message.topic.clone();
-        generations.take(message).ok_or_else(|| RecordingError::Message {
-            file: recording.path.clone(),
-            topic: topic.to_string(),
-        })?;
+    for taken in recording.decoded(&wanted, |message| generations.take(message))? {
+        taken?;
     }
     for ((_, stage, _), generation) in generations.all {
         let found = report.stages.entry(stage).or_default();

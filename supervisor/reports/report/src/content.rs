@@ -90,16 +90,7 @@ impl Content {
         self.remarks.extend(recording.gaps());
         let topics = TOPICS.iter().map(|topic| topic.spec().name);
         let wanted: Vec<_> = topics.chain([LOG]).collect();
-        for message in recording.messages(&wanted)? {
-            let message = message?;
-            if self.take(&message).is_none() {
-                return Err(RecordingError::Message {
-                    file: recording.path.to_path_buf(),
-                    topic: message.topic.to_string(),
-                });
-            }
-        }
-        Ok(())
+        recording.decoded(&wanted, |message| self.take(&message))?.collect()
     }
 
     fn take(&mut self, message: &Message) -> Option<()> {

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 use clap::Args;
 use common::topics;
 use console::failure::Failure;
-use recording::{Bag, Recording, RecordingError};
+use recording::{Bag, Message, Recording};
 use robot_state::{Sample, TOPICS};
 
 use crate::{endpoints::published, shown::Shown};
@@ -44,12 +44,9 @@ pub fn make(namespace: &str, arguments: &Arguments) -> Result<String, Failure> {
     shown.mounting(began_ns, &mut |id, payload| messages.push((began_ns, id, payload)));
     let wanted: Vec<_> = TOPICS.iter().map(|topic| topic.spec().name).collect();
     for recording in &recordings {
-        for message in recording.messages(&wanted)? {
-            let message = message?;
-            let Some(sample) = Sample::decoded(&message.topic, &message.data) else {
-                let (file, topic) = (recording.path.clone(), message.topic.to_string());
-                return Err(RecordingError::Message { file, topic }.into());
-            };
+        let decode = |message: Message| Sample::decoded(&message.topic, &message.data);
+        for sample in recording.decoded(&wanted, decode)? {
+            let sample = sample?;
             let at_ns = sample.time().0;
             shown.sample(&sample, at_ns, &mut |id, payload| messages.push((at_ns, id, payload)));
             // Mission time is unknown before the first pose.
