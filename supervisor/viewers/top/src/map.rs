@@ -50,14 +50,15 @@ const fn hazard(state: CellState) -> Option<Color> {
     }
 }
 
-pub fn legend() -> [(Style, &'static str); 4] {
-    let style = |state| Style::new().fg(hazard(state).unwrap_or_default());
-    [
-        (style(CellState::Sensed), "sensed"),
-        (style(CellState::Margin), "margin"),
-        (style(CellState::Known), "known"),
-        (style(CellState::Perimeter), "perimeter"),
-    ]
+/// Returns the signs of hazards with their meanings.
+pub fn legend() -> [(char, Style, &'static str); 4] {
+    let hazards = [
+        (CellState::Sensed, "sensed"),
+        (CellState::Margin, "margin"),
+        (CellState::Known, "known"),
+        (CellState::Perimeter, "perimeter"),
+    ];
+    hazards.map(|(state, what)| ('█', Style::new().fg(hazard(state).unwrap_or_default()), what))
 }
 
 struct Scale {

@@ -267,9 +267,8 @@ fn legend(width: usize) -> Vec<Line<'static>> {
         (map::WAY, map::WAY_STYLE, "way"),
         ('→', map::FIELD_STYLE, "field"),
     ];
-    let hazards = map::legend().map(|(style, what)| ('█', style, what));
     let mut lines: Vec<Line<'static>> = Vec::new();
-    for sign in letters.into_iter().chain(hazards) {
+    for sign in letters.into_iter().chain(map::legend()) {
         let sign = explained([sign]);
         match lines.last_mut().filter(|line| line.width() + sign.width() <= width) {
             Some(line) => line.extend(sign),
