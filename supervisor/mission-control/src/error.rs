@@ -25,10 +25,9 @@ pub enum SupervisorError {
     #[error("robot.address: {0}")]
     Address(#[from] AddressError),
     #[error("cannot {action}: {source}")]
-    System { action: String, source: io::Error },
+    System { action: &'static str, source: io::Error },
 }
 
-pub(crate) fn system(action: impl Into<String>) -> impl FnOnce(io::Error) -> SupervisorError {
-    let action = action.into();
+pub(crate) fn system(action: &'static str) -> impl FnOnce(io::Error) -> SupervisorError {
     move |source| SupervisorError::System { action, source }
 }
