@@ -3,7 +3,7 @@
 use std::{
     fs,
     io::{self, Write as _},
-    net::{SocketAddr, TcpListener},
+    net::TcpListener,
     os::unix::fs::OpenOptionsExt as _,
     path::PathBuf,
     sync::Arc,
@@ -33,8 +33,6 @@ enum PageError {
 
 #[derive(Debug)]
 pub struct Page {
-    #[cfg_attr(not(test), allow(dead_code, reason = "tests connect to it"))]
-    pub address: SocketAddr,
     pub access: Arc<Access>,
     /// File with the addresses, removed with the page.
     pub kept: PathBuf,
@@ -97,7 +95,7 @@ impl Page {
             });
             runtime.shutdown_timeout(Duration::from_secs(1));
         })?;
-        Ok(Self { address, access, kept, domain, shared, server: Some((end, thread)) })
+        Ok(Self { access, kept, domain, shared, server: Some((end, thread)) })
     }
 
     pub fn show(&self, ended: &mut dyn FnMut() -> bool) {

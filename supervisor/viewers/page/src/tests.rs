@@ -4,7 +4,7 @@
 use std::{
     fs,
     io::{ErrorKind, Read as _, Write as _},
-    net::TcpStream,
+    net::{SocketAddr, TcpStream},
     os::unix::fs::MetadataExt as _,
     sync::{Arc, Mutex},
     time::Duration,
@@ -49,8 +49,16 @@ fn page() -> (Page, Noted) {
 /// Longest wait of a test.
 const PATIENCE: Duration = Duration::from_secs(30);
 
+impl Page {
+    fn address(&self) -> SocketAddr {
+        let kept = self.kept.to_string_lossy();
+        let (_, port) = kept.rsplit_once('-').unwrap();
+        SocketAddr::from(([127, 0, 0, 1], port.parse().unwrap()))
+    }
+}
+
 fn connect(page: &Page) -> TcpStream {
-    let stream = TcpStream::connect(page.address).unwrap();
+    let stream = TcpStream::connect(page.address()).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
     stream
 }
@@ -76,11 +84,11 @@ fn status(answer: &str) -> &str {
 }
 
 fn host(page: &Page) -> String {
-    format!("Host: {}", page.address)
+    format!("Host: {}", page.address())
 }
 
 fn origin(page: &Page) -> String {
-    format!("Origin: http://{}", page.address)
+    format!("Origin: http://{}", page.address())
 }
 
 const UPGRADE: &str = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
@@ -162,7 +170,7 @@ impl Browser {
 fn a_request_that_names_another_host_or_none_or_two_is_misdirected() {
     let (page, _) = page();
     let own = host(&page);
-    let foreign = format!("Host: evil.example:{}", page.address.port());
+    let foreign = format!("Host: evil.example:{}", page.address().port());
     for lines in [
         &["GET / HTTP/1.1", &foreign][..],
         &["GET / HTTP/1.1", "Host: 127.0.0.1"],
@@ -176,7 +184,7 @@ fn a_request_that_names_another_host_or_none_or_two_is_misdirected() {
         // The HTTP library refuses requests that no server may accept.
         assert!(["421", "400"].contains(&status(&answer)), "{lines:?}: {answer}");
     }
-    let local = format!("Host: localhost:{}", page.address.port());
+    let local = format!("Host: localhost:{}", page.address().port());
     for accepted in [own, local] {
         assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &accepted])), "200");
     }
@@ -387,7 +395,7 @@ fn a_page_that_cannot_be_served_says_why() {
     let far = refused(&options("0.0.0.0:0"));
     assert_eq!(code(far.as_ref()), Some("not-loopback"), "{far}");
     let (first, _) = page();
-    let taken = refused(&options(&first.address.to_string()));
+    let taken = refused(&options(&first.address().to_string()));
     assert_eq!(code(taken.as_ref()), Some("cannot-listen"), "{taken}");
 }
 
