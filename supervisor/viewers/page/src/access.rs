@@ -30,11 +30,6 @@ impl Token {
         let differing = pairs.fold(0, |differing, (one, other)| differing | (one ^ other));
         self.0.len() == shown.len() && differing == 0
     }
-
-    #[cfg(test)]
-    pub fn reveal(&self) -> &str {
-        &self.0
-    }
 }
 
 /// Hides the token from logs.
@@ -112,6 +107,12 @@ pub fn host_name(text: &str) -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl Token {
+        pub fn reveal(&self) -> &str {
+            &self.0
+        }
+    }
 
     fn access(proxy: Option<&str>) -> Access {
         Access::new("127.0.0.1:8080".parse().unwrap(), proxy).unwrap()
