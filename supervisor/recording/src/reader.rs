@@ -97,7 +97,7 @@ impl Recording {
         let mut about = None;
         let mut counts = BTreeMap::new();
         let mut lost = BTreeMap::new();
-        let mut bounds: Option<(u64, u64)> = None;
+        let (mut from, mut to) = (u64::MAX, 0_u64);
         let problem = loop {
             match records.next() {
                 Ok(Some(Record::Metadata(found))) if found.name == RUN => {
@@ -109,9 +109,8 @@ impl Recording {
                         lost = losses(&data).unwrap_or(lost);
                     }
                     *counts.entry(topic.to_string()).or_default() += 1;
-                    let time = header.log_time;
-                    let (from, to) = bounds.unwrap_or((time, time));
-                    bounds = Some((from.min(time), to.max(time)));
+                    from = from.min(header.log_time);
+                    to = to.max(header.log_time);
                 }
                 Ok(Some(_)) => {}
                 Ok(None) => break None,
@@ -133,7 +132,6 @@ impl Recording {
             }
             other => other.into(),
         })?;
-        let after = bounds.map_or(0, |(from, to)| to - from);
         Ok(Self {
             path: path.to_path_buf(),
             run_text,
@@ -142,7 +140,7 @@ impl Recording {
             machine: about("machine"),
             began: about("began"),
             end: problem.map_or(End::Complete, |problem| End::Cut {
-                after: Duration::from_nanos(after),
+                after: Duration::from_nanos(to.saturating_sub(from)),
                 problem,
             }),
             counts,
