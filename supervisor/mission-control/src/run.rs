@@ -134,14 +134,13 @@ pub(crate) fn conduct<'a>(
     let mut supervisor = Supervisor::start(options, surroundings, turns.clone(), listener)
         .inspect_err(|_| turns.rest(true))?;
     let ending = loop {
-        let driven = supervisor.drive(surroundings, show);
-        match driven.and_then(|ending| match ending {
-            None => supervisor.recreate_bus(surroundings).map(|()| None),
-            ending => Ok(ending),
-        }) {
-            Ok(None) => {}
+        let goes_on = match supervisor.drive(surroundings, show) {
             Ok(Some(ending)) => break ending,
-            Err(error) => break Ending::failed(Outcome::Aborted, error.to_string()),
+            Ok(None) => supervisor.recreate_bus(surroundings),
+            Err(error) => Err(error),
+        };
+        if let Err(error) = goes_on {
+            break Ending::failed(Outcome::Aborted, error.to_string());
         }
     };
     let stopped = supervisor.end_mission(&mut || {
