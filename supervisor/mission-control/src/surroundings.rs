@@ -37,7 +37,9 @@ pub trait SimulatedRobot {
 
     /// Returns what becomes readable at its end; none on a simulated machine. Ground truth is read
     /// at the end of a tick.
-    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
 }
 
 /// Robot of a run: simulated, or at its address.

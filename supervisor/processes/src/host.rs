@@ -29,7 +29,9 @@ pub trait Watched {
     fn end(&mut self, grace: Duration);
 
     /// Returns what becomes readable at the end of the process; none on a simulated machine.
-    fn descriptor(&self) -> Option<BorrowedFd<'_>>;
+    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
+        None
+    }
 
     /// Returns the activity since the start; `None` if the process has ended or is not counted.
     fn activity(&self) -> Option<Activity>;

@@ -4,7 +4,6 @@ use std::{
     collections::VecDeque,
     io,
     net::{Ipv4Addr, SocketAddr},
-    os::fd::BorrowedFd,
     path::Path,
     rc::Rc,
     time::Duration,
@@ -124,10 +123,6 @@ impl SimulatedRobot for Truth {
     fn stop(&mut self) -> Result<(), SimulatorError> {
         self.poll().map(drop)
     }
-
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        None
-    }
 }
 
 struct SimulatedHost(Rc<SimulatedMachine>);
@@ -164,10 +159,6 @@ impl Watched for SimulatedProcess {
 
     fn end(&mut self, _: Duration) {
         self.machine.signal(self.number, Signal::KILL);
-    }
-
-    fn descriptor(&self) -> Option<BorrowedFd<'_>> {
-        None
     }
 
     fn activity(&self) -> Option<Activity> {
