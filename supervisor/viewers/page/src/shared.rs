@@ -158,10 +158,12 @@ impl Cursor {
             parts.push(format!("\"running\":{}", shown.connected));
             parts.push(format!("\"problem\":{}", Value::from(shown.problem.as_str())));
         }
-        let rows = shown.rows.after(&mut sent.rows);
-        let events = shown.events.after(&mut sent.events);
-        let results = shown.results.after(&mut sent.results);
-        for (name, items) in [("rows", rows), ("events", events), ("results", results)] {
+        for (name, ring, cursor) in [
+            ("rows", &shown.rows, &mut sent.rows),
+            ("events", &shown.events, &mut sent.events),
+            ("results", &shown.results, &mut sent.results),
+        ] {
+            let items = ring.after(cursor);
             if !items.is_empty() {
                 parts.push(format!("\"{name}\":[{}]", items.join(",")));
             }
