@@ -1,18 +1,18 @@
 //! Shapes of the world and of the a-priori map, in metres in the mission frame.
 
 use glam::DVec2;
-use serde::{Deserialize, Serialize};
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Light {
-    /// Scatters the beam: a laser detects it from any side.
-    #[default]
-    Matt,
-    /// Transmits the beam, except near the normal, where it reflects it back into the laser.
-    Glass,
-    /// Scatters a tenth of the light: a laser detects it at short range.
-    Black,
+words! {
+    #[derive(Default)]
+    Light {
+        /// Scatters the beam: a laser detects it from any side.
+        #[default]
+        Matt,
+        /// Transmits the beam, except near the normal, where it reflects it back into the laser.
+        Glass,
+        /// Scatters a tenth of the light: a laser detects it at short range.
+        Black,
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -88,6 +88,18 @@ macro_rules! wire_enum {
     };
 }
 
+/// Declares choices that a mission writes as words in kebab case.
+macro_rules! words {
+    ($($(#[$about:meta])* $name:ident { $($choices:tt)* })*) => {$(
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        $(#[$about])*
+        pub enum $name {
+            $($choices)*
+        }
+    )*};
+}
+
 pub mod address;
 mod arduino;
 mod check;
@@ -225,16 +237,17 @@ impl From<Waypoint> for Vec<f64> {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Method {
-    /// Looks before it drives: evidence for and against hazards, scanned ground, and a speed that
-    /// fits them.
-    #[default]
-    Evidential,
-    /// Follows the paper. Each hit is a hazard with its margin (19), the map only grows (10), and
-    /// the robot drives along the field (15), (16).
-    Paper,
+words! {
+    #[derive(Default)]
+    Method {
+        /// Looks before it drives: evidence for and against hazards, scanned ground, and a speed
+        /// that fits them.
+        #[default]
+        Evidential,
+        /// Follows the paper. Each hit is a hazard with its margin (19), the map only grows (10),
+        /// and the robot drives along the field (15), (16).
+        Paper,
+    }
 }
 
 /// Start pose, written as a [`Waypoint`] or as its heading alone.
@@ -274,14 +287,15 @@ impl From<Start> for Waypoint {
     }
 }
 
-/// Behaviour after a supervisor crash, power failure or reboot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Resume {
-    /// Keeps the robot stopped until an operator resumes it.
-    #[default]
-    Manual,
-    Automatic,
+words! {
+    /// Behaviour after a supervisor crash, power failure or reboot.
+    #[derive(Default)]
+    Resume {
+        /// Keeps the robot stopped until an operator resumes it.
+        #[default]
+        Manual,
+        Automatic,
+    }
 }
 
 keys! {
@@ -307,14 +321,15 @@ keys! {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Integration {
-    /// Exact along the arc of constant curvature.
-    #[default]
-    Arc,
-    /// Forward Euler, as the paper prints (21).
-    Euler,
+words! {
+    #[derive(Default)]
+    Integration {
+        /// Exact along the arc of constant curvature.
+        #[default]
+        Arc,
+        /// Forward Euler, as the paper prints (21).
+        Euler,
+    }
 }
 
 keys! {

@@ -47,16 +47,17 @@ keys! {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Procedure {
-    #[default]
-    Wall,
-    LeftSquare,
-    RightSquare,
-    Turns,
-    Gyro,
-    BringUp,
+words! {
+    #[derive(Default)]
+    Procedure {
+        #[default]
+        Wall,
+        LeftSquare,
+        RightSquare,
+        Turns,
+        Gyro,
+        BringUp,
+    }
 }
 
 impl Odometry {

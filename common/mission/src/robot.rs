@@ -49,14 +49,15 @@ pub enum Model {
     Car,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Protocol {
-    #[default]
-    X80,
-    Json,
-    Ros2,
-    Arduino,
+words! {
+    #[derive(Default)]
+    Protocol {
+        #[default]
+        X80,
+        Json,
+        Ros2,
+        Arduino,
+    }
 }
 
 impl Protocol {

@@ -5,8 +5,6 @@
 //! `[sonar]`, its two neighbours, and seven infrared rangers. The key `sensors` selects those for
 //! the mapper.
 
-use serde::{Deserialize, Serialize};
-
 use crate::sonar::Mount;
 
 /// Also limits the readings in a sample of `ranges`.
@@ -38,48 +36,47 @@ const RING: [(f64, f64); INFRARED_RANGERS] = [
     (90.0, 0.121 / 0.19),
 ];
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum SensorKind {
-    /// Sonar: an echo means something on its arc, and no nearer surface square to the beam.
-    #[default]
-    Cone,
-    /// Infrared ranger: the ray is free up to its end.
-    Ray,
-    /// Laser or depth camera: a fan of beams, each free up to its end.
-    Scan,
-}
+words! {
+    #[derive(Default)]
+    SensorKind {
+        /// Sonar: an echo means something on its arc, and no nearer surface square to the beam.
+        #[default]
+        Cone,
+        /// Infrared ranger: the ray is free up to its end.
+        Ray,
+        /// Laser or depth camera: a fan of beams, each free up to its end.
+        Scan,
+    }
 
-/// Product, which selects the mapper's measurement model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SensorModel {
-    /// DUR5200 of the X80: a cone, 40 kHz. Source: X80 user manual, 2006; the mapper's
-    /// `sonar_model` has its numbers.
-    Dur5200,
-    /// Infrared ranger of the X80: a ray, 10 to 80 cm. Source: formula in the X80 user manual,
-    /// 2006; the mapper's `infrared_model` has its numbers.
-    X80Infrared,
-    /// Hokuyo UST-10LX, a laser: 270 degrees in 1,081 beams, 0.06 to 10 m, 40 Hz. Source: its
-    /// specification, C-42-04077, 2014.
-    #[serde(rename = "ust-10lx")]
-    Ust10lx,
-    /// Slamtec RPLIDAR A1, a laser: 360 degrees, 0.15 to 12 m, 5.5 Hz, 8,000 readings per second.
-    /// Source: its data sheet, 2020.
-    RplidarA1,
-    /// Slamtec RPLIDAR C1, a laser: 360 degrees in 500 readings, 0.05 to 12 m, 10 Hz, 30 mm.
-    /// Source: its data sheet, 2023.
-    RplidarC1,
-    /// LDS-02 of a TurtleBot 3, a laser: 360 degrees in 1-degree steps, 0.16 to 8 m, 5 Hz. Source:
-    /// ROBOTIS e-Manual.
-    #[serde(rename = "lds-02")]
-    Lds02,
-    /// Intel RealSense D435, a depth camera as a fan: 87 by 58 degrees, 0.3 to 3 m, 2 % at 2 m.
-    /// Source: its product brief, 2018.
-    ///
-    /// Each beam is the nearest tangible thing in an image column, as in ROS
-    /// `pointcloud_to_laserscan`. Two columns per degree are nominal.
-    D435,
+    /// Product, which selects the mapper's measurement model.
+    SensorModel {
+        /// DUR5200 of the X80: a cone, 40 kHz. Source: X80 user manual, 2006; the mapper's
+        /// `sonar_model` has its numbers.
+        Dur5200,
+        /// Infrared ranger of the X80: a ray, 10 to 80 cm. Source: formula in the X80 user manual,
+        /// 2006; the mapper's `infrared_model` has its numbers.
+        X80Infrared,
+        /// Hokuyo UST-10LX, a laser: 270 degrees in 1,081 beams, 0.06 to 10 m, 40 Hz. Source: its
+        /// specification, C-42-04077, 2014.
+        #[serde(rename = "ust-10lx")]
+        Ust10lx,
+        /// Slamtec RPLIDAR A1, a laser: 360 degrees, 0.15 to 12 m, 5.5 Hz, 8,000 readings per
+        /// second. Source: its data sheet, 2020.
+        RplidarA1,
+        /// Slamtec RPLIDAR C1, a laser: 360 degrees in 500 readings, 0.05 to 12 m, 10 Hz, 30 mm.
+        /// Source: its data sheet, 2023.
+        RplidarC1,
+        /// LDS-02 of a TurtleBot 3, a laser: 360 degrees in 1-degree steps, 0.16 to 8 m, 5 Hz.
+        /// Source: ROBOTIS e-Manual.
+        #[serde(rename = "lds-02")]
+        Lds02,
+        /// Intel RealSense D435, a depth camera as a fan: 87 by 58 degrees, 0.3 to 3 m, 2 % at 2 m.
+        /// Source: its product brief, 2018.
+        ///
+        /// Each beam is the nearest tangible thing in an image column, as in ROS
+        /// `pointcloud_to_laserscan`. Two columns per degree are nominal.
+        D435,
+    }
 }
 
 /// Laser, on the base's wire or on a separate serial line.
@@ -320,17 +317,17 @@ impl Sensor {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Sensors {
-    /// Sensor nearest to the bearing of `[sonar]`; cones take precedence.
-    Front,
-    #[serde(rename = "front+infrared")]
-    FrontInfrared,
-    /// Front sonar and the cones within 60 degrees of it.
-    ThreeFront,
-    Laser,
-    All,
+words! {
+    Sensors {
+        /// Sensor nearest to the bearing of `[sonar]`; cones take precedence.
+        Front,
+        #[serde(rename = "front+infrared")]
+        FrontInfrared,
+        /// Front sonar and the cones within 60 degrees of it.
+        ThreeFront,
+        Laser,
+        All,
+    }
 }
 
 /// Builds the sensor table at `rate_hz` and marks the rows of `set` as used.

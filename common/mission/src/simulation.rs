@@ -6,7 +6,6 @@
 //! `supervisor/guide/simulation-keys.csv` documents each key and its source.
 
 use glam::DVec2;
-use serde::{Deserialize, Serialize};
 
 use crate::geometry::Shapes;
 
@@ -45,15 +44,16 @@ keys! {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Realism {
-    Laboratory,
-    /// The radio is perfect unless the mission sets its keys.
-    #[default]
-    Measured,
-    /// More slip than in any log found, in the same direction for each robot.
-    Harsh,
+words! {
+    #[derive(Default)]
+    Realism {
+        Laboratory,
+        /// The radio is perfect unless the mission sets its keys.
+        #[default]
+        Measured,
+        /// More slip than in any log found, in the same direction for each robot.
+        Harsh,
+    }
 }
 
 rows! {
@@ -144,12 +144,12 @@ impl Hole {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum BlockedWheels {
-    Left,
-    Right,
-    Both,
+words! {
+    BlockedWheels {
+        Left,
+        Right,
+        Both,
+    }
 }
 
 pub type Ranged = (&'static str, f64, std::ops::RangeInclusive<f64>);
