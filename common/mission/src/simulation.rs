@@ -154,6 +154,8 @@ words! {
 
 pub type Ranged = (&'static str, f64, std::ops::RangeInclusive<f64>);
 
+const SHARE: std::ops::RangeInclusive<f64> = 0.0..=1.0;
+
 /// Returns the value for `realism` from laboratory, measured and harsh ones; a missing one repeats
 /// the one before.
 const fn chosen(row: &[f64], realism: Realism) -> f64 {
@@ -214,14 +216,14 @@ section! {
         /// 90 is a rough wall.
         wall_limit_deg in 0.0..=90.0 => 90.0, 22.5;
         drum_limit_deg in 0.0..=90.0 => 90.0, 50.0;
-        edge_share in 0.0..=1.0 => 0.0, 0.5;
+        edge_share in SHARE => 0.0, 0.5;
         edge_reach_m in 0.0..=2.55 => 1.2;
-        multipath_share in 0.0..=1.0 => 0.0, 0.3;
-        dropout_share in 0.0..=1.0 => 0.0;
+        multipath_share in SHARE => 0.0, 0.3;
+        dropout_share in SHARE => 0.0;
         /// Weak echoes are those near the limits and from edges.
-        weak_dropout_share in 0.0..=1.0 => 0.0, 0.1;
-        false_echo_share in 0.0..=1.0 => 0.0, 0.005;
-        crosstalk_share in 0.0..=1.0 => 0.0, 0.005;
+        weak_dropout_share in SHARE => 0.0, 0.1;
+        false_echo_share in SHARE => 0.0, 0.005;
+        crosstalk_share in SHARE => 0.0, 0.005;
         /// Independent per ranger: a two-state model (E. N. Gilbert 1960).
         silence_share in 0.0..=0.5 => 0.0, 0.02;
         /// Source: a public eight-sonar log of an L-shaped corridor (Udacity RoboND, 413 samples,
@@ -254,7 +256,7 @@ section! {
     LaserTiming, written as LaserKeys in "simulation.laser" {
         delay_s in 0.0..=1.0 => 0.0;
         sweep_s in 0.0..=1.0 => 0.0;
-        stated_share in 0.0..=1.0 => 1.0;
+        stated_share in SHARE => 1.0;
     }
 }
 
@@ -305,7 +307,7 @@ section! {
         /// The vendor rates each X80 motor at 22 kg cm: 26 N at the rim, 52 N together. Tyres hold
         /// at most the weight, 3.5 kg or 34 N, times the friction, so they slip before the motors
         /// stall.
-        contact_slip in 0.0..=1.0 => 0.0, 1.0;
+        contact_slip in SHARE => 0.0, 1.0;
     }
 }
 
@@ -337,10 +339,10 @@ section! {
         loss_share in 0.0..=0.95 => 0.0;
         delay_s in 0.0..=5.0 => 0.0;
         jitter_s in 0.0..=5.0 => 0.0;
-        duplicate_share in 0.0..=1.0 => 0.0;
-        reorder_share in 0.0..=1.0 => 0.0;
-        split_share in 0.0..=1.0 => 0.0;
-        merge_share in 0.0..=1.0 => 0.0;
+        duplicate_share in SHARE => 0.0;
+        reorder_share in SHARE => 0.0;
+        split_share in SHARE => 0.0;
+        merge_share in SHARE => 0.0;
     }
 }
 
