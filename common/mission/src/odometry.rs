@@ -67,7 +67,7 @@ impl Odometry {
         [both, both * self.diameter_ratio]
     }
 
-    pub(crate) fn ranges(&self) -> [(&'static str, f64, std::ops::RangeInclusive<f64>); 8] {
+    pub(crate) fn ranges(&self) -> [crate::Ranged; 8] {
         [
             ("robot.odometry.diameter_ratio", self.diameter_ratio, 0.8..=1.25),
             ("robot.odometry.diameter_ratio_sd", self.diameter_ratio_sd, 0.0..=0.1),
