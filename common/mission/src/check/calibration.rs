@@ -1,15 +1,7 @@
 //! Calibration file named by a mission.
 
-use std::path::Path;
-
 use super::{Mission, MissionError, read_bounded};
-use crate::odometry::{Calibration, Odometry};
-
-fn read(path: &Path) -> Result<Odometry, MissionError> {
-    let failed = |problem: String| MissionError::Calibration { file: path.to_path_buf(), problem };
-    let text = read_bounded(path).map_err(|error| failed(error.to_string()))?;
-    Calibration::parse(&text).map_err(failed)
-}
+use crate::odometry::Calibration;
 
 impl Mission {
     /// Replaces the name of the calibration file by its values, so that a run is independent of the
@@ -19,7 +11,10 @@ impl Mission {
     /// If the file cannot be read or is invalid.
     pub fn with_calibration(mut self) -> Result<Self, MissionError> {
         if let Some(file) = self.robot.calibration.take() {
-            self.robot.odometry = read(&file)?;
+            let read = read_bounded(&file).map_err(|error| error.to_string());
+            self.robot.odometry = read
+                .and_then(|text| Calibration::parse(&text))
+                .map_err(|problem| MissionError::Calibration { file, problem })?;
         }
         Ok(self)
     }
@@ -28,7 +23,10 @@ impl Mission {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{odometry::Provenance, testing::mission};
+    use crate::{
+        odometry::{Odometry, Provenance},
+        testing::mission,
+    };
 
     fn calibrated() -> Odometry {
         Odometry {
