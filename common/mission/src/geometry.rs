@@ -223,10 +223,7 @@ impl Piece<'_> {
 
     pub fn bounds(&self) -> (DVec2, DVec2) {
         match self {
-            Self::Drum(drum) => {
-                let reach = DVec2::splat(drum.radius_m);
-                (drum.at - reach, drum.at + reach)
-            }
+            Self::Drum(drum) => (drum.at - drum.radius_m, drum.at + drum.radius_m),
             Self::Edge(from, to) => (from.min(*to), from.max(*to)),
             Self::Box(block) => bounds(&block.corners()),
             Self::Zone(zone) => bounds(&zone.points),

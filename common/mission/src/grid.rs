@@ -114,7 +114,7 @@ impl GridFrame {
 
     /// Converts metres to cell units, in which cell centres are integers.
     pub fn to_cells(&self, point: DVec2) -> DVec2 {
-        (point - self.centre) / self.resolution_m + DVec2::splat(f64::from(self.centre_index()))
+        (point - self.centre) / self.resolution_m + f64::from(self.centre_index())
     }
 
     /// Returns [x / Delta] of (19).
@@ -130,12 +130,12 @@ impl GridFrame {
 
     pub fn centre_of(&self, cell: Cell) -> DVec2 {
         let centre = f64::from(self.centre_index());
-        let offset = DVec2::new(f64::from(cell.col) - centre, f64::from(cell.row) - centre);
+        let offset = DVec2::new(cell.col.into(), cell.row.into()) - centre;
         self.centre + offset * self.resolution_m
     }
 
     pub fn corner_of(&self, cell: Cell) -> DVec2 {
-        self.centre_of(cell) - DVec2::splat(self.resolution_m / 2.0)
+        self.centre_of(cell) - self.resolution_m / 2.0
     }
 
     /// Returns the index in a row-major slice of the whole map.
