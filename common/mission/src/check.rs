@@ -369,7 +369,7 @@ fn stages(mission: &Mission) -> Result {
         "leave the key out, or give method = \"evidential\"",
     )?;
     refuse_if(
-        planner.executable.as_ref().is_some_and(|executable| executable.as_os_str().is_empty()),
+        planner.executable == Some(PathBuf::new()),
         "planner.executable",
         "the path is empty",
         "name an executable, or leave the key out",
