@@ -95,14 +95,10 @@ struct Calibrated {
 }
 
 impl Calibration {
-    pub const fn new(odometry: Odometry) -> Self {
-        Self { robot: Calibrated { odometry } }
-    }
-
     /// # Errors
     /// If a value cannot be written as TOML.
-    pub fn to_text(&self) -> Result<String, toml::ser::Error> {
-        toml::to_string(self)
+    pub fn text(odometry: Odometry) -> Result<String, toml::ser::Error> {
+        toml::to_string(&Self { robot: Calibrated { odometry } })
     }
 
     /// # Errors

@@ -46,7 +46,7 @@ mod tests {
     #[test]
     fn a_mission_takes_the_values_of_its_calibration_file_and_no_longer_needs_the_file() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        std::fs::write(&file, Calibration::new(calibrated()).to_text().unwrap()).unwrap();
+        std::fs::write(&file, Calibration::text(calibrated()).unwrap()).unwrap();
         let named = mission(&format!("robot.calibration = {:?}", file.path()));
         let with_values = named.with_calibration().unwrap();
         assert_eq!(with_values.robot.odometry, calibrated());
@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn a_calibration_file_that_cannot_be_used_is_refused_with_its_name() {
         let folder = tempfile::tempdir().unwrap();
-        let whole = Calibration::new(calibrated()).to_text().unwrap();
+        let whole = Calibration::text(calibrated()).unwrap();
         for (name, text, said) in [
             ("missing", None, "missing"),
             ("empty", Some(String::new()), "robot"),

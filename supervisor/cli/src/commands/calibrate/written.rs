@@ -31,7 +31,7 @@ impl Found {
             chi2_per_dof: it.chi2_per_dof,
         });
         let mut object = serde_json::to_value(&odometry)?;
-        let text = Calibration::new(odometry).to_text()?;
+        let text = Calibration::text(odometry)?;
         replace(file, &text).map_err(FileError::of("write", file))?;
         if setting.json {
             object["residuals"] = json!(it.residuals);
