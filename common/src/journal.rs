@@ -33,6 +33,7 @@ const HEADER: usize = 16;
 const END: [u8; HEADER] = [0; HEADER];
 /// Most bytes of an entry: twice the mapper's with a scan of the most beams.
 const LONGEST: usize = 131_072;
+/// Most bytes of the number of the next entry, which precedes the state in a snapshot.
 const NUMBER: usize = 10;
 
 #[derive(Debug)]
@@ -53,12 +54,6 @@ pub struct Restored<S, E> {
     pub entries: Vec<E>,
 }
 
-#[derive(Serialize, Deserialize)]
-struct Snapshot<S> {
-    next: u64,
-    state: S,
-}
-
 impl Journal {
     /// Opens or creates the snapshot at `path`, for encoded states of at most `capacity` bytes, and
     /// the journal beside it. It has space for entries of `entry_bytes` until the next snapshot.
@@ -67,14 +62,12 @@ impl Journal {
         capacity: usize,
         entry_bytes: usize,
     ) -> Result<(Self, Restored<S, E>), CheckpointError> {
-        let (snapshots, snapshot) = Checkpoint::open::<Snapshot<S>>(path, capacity + NUMBER)?;
+        let (snapshots, snapshot) = Checkpoint::open::<(u64, S)>(path, capacity + NUMBER)?;
         let path = path.with_extension("journal");
         let snapshot_after = snapshot_after(capacity);
         let file = open_reserved(&path, snapshot_after * (HEADER + entry_bytes) as u64)?;
-        let (first, state) = match snapshot {
-            Some(Snapshot { next, state }) => (next, Some(state)),
-            None => (0, None),
-        };
+        let (first, state) = snapshot.unzip();
+        let first = first.unwrap_or_default();
         let mut journal =
             Self { snapshots, file, path, end: 0, number: first, first, snapshot_after };
         let entries = journal.read()?;
@@ -141,7 +134,7 @@ impl Journal {
 
     /// Takes the fold of all entries.
     pub fn snapshot<S: Serialize>(&mut self, state: &S) -> Result<(), CheckpointError> {
-        self.snapshots.save(&Snapshot { next: self.number, state })?;
+        self.snapshots.save(&(self.number, state))?;
         self.first = self.number;
         self.end = 0;
         self.write(&END)
