@@ -15,7 +15,6 @@ use crate::{
 };
 
 pub const SUBCOMMAND: &str = "stage";
-const DEFAULT_ROBOT: &str = "x80";
 
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
@@ -88,13 +87,9 @@ pub fn start_with(
             },
             supervisor,
         }),
-        (None, None, robot) if number.is_none() && first_tick.is_none() => Ok(Start::External {
-            stage,
-            robot: match robot {
-                Some(robot) => robot,
-                None => parsed(stage, "--robot", &DEFAULT_ROBOT.into())?,
-            },
-        }),
+        (None, None, robot) if number.is_none() && first_tick.is_none() => {
+            Ok(Start::External { stage, robot: robot.unwrap_or_default() })
+        }
         _ => Err(failed(
             "--run, --supervisor, --generation and --first-tick go together, without --robot"
                 .to_owned(),
