@@ -63,18 +63,14 @@ pub(crate) fn join(stage: &'static str, robot: &RobotName) -> Result<Joined> {
     let supervisor = domain.supervisor().map_err(system("find the supervisor"))?;
     let supervisor = supervisor.ok_or_else(gone)?;
     let bus = Bus::join_as_stage(&domain, stage, supervisor)?;
-    let place = wait_for_place(&bus, stage)?;
+    let (first_tick, supervisor) = wait_for_place(&bus, stage)?;
     let number = run::next_generation(&directory, stage)?;
-    let generation = Generation { stage, directory, number, first_tick: place.first_tick };
-    Ok(Joined { generation, run, bus, supervisor: Some(place.supervisor), stage_lock })
+    let generation = Generation { stage, directory, number, first_tick };
+    Ok(Joined { generation, run, bus, supervisor: Some(supervisor), stage_lock })
 }
 
-struct Place {
-    first_tick: u64,
-    supervisor: OwnedFd,
-}
-
-fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place> {
+/// Returns the stage's first tick and a descriptor of its supervisor, as [`watch`] does.
+fn wait_for_place(bus: &Bus, stage: &str) -> Result<(u64, OwnedFd)> {
     let mut first = None;
     let place = Roster::open(bus)?.find(PATIENCE, |header, entries| {
         if header.order() == Order::Stop {
@@ -84,8 +80,7 @@ fn wait_for_place(bus: &Bus, stage: &str) -> Result<Place> {
         let entry = entries.iter().find(|entry| name_str(&entry.stage) == stage)?;
         if entry.pid == 0 {
             let first_tick = header.stamp.tick + 1;
-            let place = |supervisor| Place { first_tick, supervisor };
-            return Some(watch(header.supervisor_pid).map(place));
+            return Some(watch(header.supervisor_pid).map(|supervisor| (first_tick, supervisor)));
         }
         let is_taken = first.get_or_insert_with(Instant::now).elapsed() >= FREED_WITHIN;
         is_taken.then(|| {
