@@ -135,7 +135,10 @@ impl Arduino {
             (Answer::Invalid, _) => {
                 return Err("the board reports an invalid request; it arrived garbled".to_owned());
             }
-            (_, _) => return Err(format!("{:?} is an unexpected answer", text(line))),
+            (_, _) => {
+                let line = String::from_utf8_lossy(line);
+                return Err(format!("{:?} is an unexpected answer", line.trim()));
+            }
         }
         Ok(())
     }
@@ -169,10 +172,6 @@ impl Arduino {
             self.waits = Waits::Baud { since: None };
         }
     }
-}
-
-fn text(line: &[u8]) -> String {
-    String::from_utf8_lossy(line).trim().to_owned()
 }
 
 impl Driver for Arduino {
