@@ -243,7 +243,7 @@ pub struct Turn {
     pub variance_rad2: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
     pub wheels: WheelSample,
     /// Counts of `wheels` without wraparound, for a robot that reports angles or odometry.

@@ -158,12 +158,7 @@ impl Arduino {
         // The samples' cycle divides that of 32 bits, so wrapped counts continue.
         let counts = counts.map(|count| count.rem_euclid(i32::from(COUNT_CYCLE)) as u16);
         // The board measures no currents.
-        Motion {
-            wheels: wheel_sample(counts, speeds),
-            endless: None,
-            stamp_ns: None,
-            currents: [0; 2],
-        }
+        Motion { wheels: wheel_sample(counts, speeds), ..Motion::default() }
     }
 
     /// Restarts with an unmistakable request.

@@ -65,7 +65,7 @@ impl Driver for X80 {
             let speeds = both.map(|encoder| encoder.velocity());
             let wheels = wheel_sample(both.map(|encoder| encoder.position), speeds);
             let currents = self.channels.map(|wheel| motor.currents[index(wheel)]);
-            heard.motion = Some(Motion { wheels, endless: None, stamp_ns: None, currents });
+            heard.motion = Some(Motion { wheels, currents, ..Motion::default() });
         }
         if let Some(standard) = standard {
             heard.readings = self.rangers.take_standard(&standard);
