@@ -263,6 +263,11 @@ pub fn principal_axes([xx, xy, yy]: [f64; 3]) -> ([f64; 2], f64) {
     (variances.map(|variance| variance.max(0.0).sqrt()), 0.5 * xy.atan2(half))
 }
 
+/// Returns the symmetric matrix with this upper triangle; both are row by row.
+pub const fn symmetric([xx, xy, xt, yy, yt, tt]: [f64; 6]) -> [[f64; 3]; 3] {
+    [[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]]
+}
+
 /// To (-pi, pi], radians.
 pub fn wrap_angle(angle: f64) -> f64 {
     use std::f64::consts::{PI, TAU};

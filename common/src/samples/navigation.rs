@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bus::ZeroCopySend,
-    geometry::{Zone, principal_axes},
+    geometry::{Zone, principal_axes, symmetric},
     grid::Part,
     kinematics::{Pose2, Twist},
     mission::{INFRARED_RANGERS, Mission, Waypoint, wire_enum},
@@ -61,9 +61,8 @@ impl PoseSample {
     /// Returns the row-major 6x6 covariance of ROS messages: x, y, z and the rotations about them,
     /// of which x, y and the last are estimated.
     pub fn covariance_6x6(&self) -> [f64; 36] {
-        let [xx, xy, xt, yy, yt, tt] = self.covariance;
         let mut whole = [0.0; 36];
-        for (row, values) in [(0, [xx, xy, xt]), (1, [xy, yy, yt]), (5, [xt, yt, tt])] {
+        for (row, values) in [0, 1, 5].into_iter().zip(symmetric(self.covariance)) {
             for (col, value) in [0, 1, 5].into_iter().zip(values) {
                 whole[row * 6 + col] = value;
             }

@@ -7,6 +7,7 @@ use std::{collections::VecDeque, fmt, time::Duration};
 
 use common::{
     clock::MissionTime,
+    geometry::symmetric,
     kinematics::{Pose2, Twist},
     mission::Integration,
     samples::{FixRefusal, FixSample, TurnSample},
@@ -115,8 +116,7 @@ impl Fix {
     }
 
     fn noise(&self) -> SMatrix<f64, 3, 3> {
-        let [xx, xy, xt, yy, yt, tt] = self.covariance;
-        SMatrix::from([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
+        SMatrix::from(symmetric(self.covariance))
     }
 
     fn shares(&self) -> [f64; 3] {

@@ -14,11 +14,7 @@
 //! [`SHARED_S`], so that period's fixes together weigh like one. A fix also states the drift, which
 //! all later fixes share, because averaging never removes it.
 
-use common::{
-    kinematics::Pose2,
-    mission::Mission,
-    samples::{FixSample, PoseSample},
-};
+use common::{geometry::symmetric, kinematics::Pose2, mission::Mission, samples::FixSample};
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -148,7 +144,8 @@ impl ScanMatcher {
         held.take_if(|held| !(is_finite(held.pose) && is_finite(held.odometry)));
         let held = held.get_or_insert_with(|| {
             *movers = Movers::default();
-            let drift = covariance_of(&scan.robot) + variances(DRIFT);
+            let covariance = DMat3::from_cols_array_2d(&symmetric(scan.robot.covariance));
+            let drift = covariance + variances(DRIFT);
             Surroundings { pose: reckoned, odometry, drift, ..Surroundings::default() }
         });
         let fan = rows.scan(self.row, Pose2::default(), &scan.beams)?;
@@ -363,11 +360,6 @@ fn is_finite(pose: Pose2) -> bool {
     pose.position.is_finite() && pose.heading.is_finite()
 }
 
-fn covariance_of(pose: &PoseSample) -> DMat3 {
-    let [xx, xy, xt, yy, yt, tt] = pose.covariance;
-    DMat3::from_cols(DVec3::new(xx, xy, xt), DVec3::new(xy, yy, yt), DVec3::new(xt, yt, tt))
-}
-
 fn variances([place, heading]: [f64; 2]) -> DMat3 {
     DMat3::from_diagonal(DVec3::new(place, place, heading).map(|deviation| deviation * deviation))
 }
@@ -378,6 +370,7 @@ mod tests {
 
     use super::*;
     use crate::testing::{mission, range_in_room};
+    use common::samples::PoseSample;
     use glam::dvec2;
 
     const START: Pose2 = Pose2 { position: DVec2::ZERO, heading: 0.0 };
