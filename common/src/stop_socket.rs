@@ -120,8 +120,8 @@ impl AsFd for StopSocket {
     }
 }
 
-/// Recreates its directory if necessary.
-fn bind(path: &Path) -> io::Result<UnixDatagram> {
+/// Binds a socket in a robot's directory, which it recreates if necessary; no call on it blocks.
+pub fn bind(path: &Path) -> io::Result<UnixDatagram> {
     if let Some(directory) = path.parent() {
         make_directory(directory)?;
     }

@@ -8,22 +8,22 @@
 
 use std::{
     collections::VecDeque,
-    fs::{self, DirBuilder},
     io::ErrorKind,
     os::{
         fd::{AsFd, OwnedFd},
-        unix::{fs::DirBuilderExt as _, net::UnixDatagram},
+        unix::net::UnixDatagram,
     },
     path::PathBuf,
     time::{Duration, Instant},
 };
 
 use common::{
+    file,
     geometry::{Light, Profile},
     ground_truth::GroundTruthTick,
     kinematics::{Pose2, Twist},
     mission::{Footprint, Mission},
-    poll,
+    poll, stop_socket,
 };
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -118,17 +118,9 @@ impl Meeting {
         waits: bool,
     ) -> Result<Self> {
         let listen = || {
-            if let Some(directory) = own.parent() {
-                DirBuilder::new().recursive(true).mode(0o700).create(directory)?;
-            }
             // An earlier simulator may have left its socket.
-            match fs::remove_file(&own) {
-                Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
-                _ => {}
-            }
-            let socket = UnixDatagram::bind(&own)?;
-            socket.set_nonblocking(true)?;
-            Ok((socket, stop.as_fd().try_clone_to_owned()?))
+            file::remove(&own)?;
+            Ok((stop_socket::bind(&own)?, stop.as_fd().try_clone_to_owned()?))
         };
         let (socket, stop) =
             listen().map_err(|source| SimError::Meet { socket: own.clone(), source })?;
