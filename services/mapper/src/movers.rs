@@ -12,13 +12,9 @@
 //! While something moves, a beam counts as static only if a scan [`STANDS_S`] earlier had a surface
 //! at its end.
 
-use std::{
-    collections::VecDeque,
-    f64::consts::{FRAC_PI_4, TAU},
-};
+use std::{collections::VecDeque, f64::consts::FRAC_PI_4};
 
 use common::{
-    geometry::wrap_angle,
     kinematics::Pose2,
     samples::{GridHeader, Mover, PoseSample},
 };
@@ -267,11 +263,8 @@ impl Track {
 
     fn is_hidden(&self, fan: &Fan<'_>, at_s: f64) -> bool {
         let way = self.at(at_s) - fan.origin;
-        let bearing = wrap_angle(way.to_angle() - fan.first_rad);
-        let beam = (bearing.rem_euclid(TAU) / fan.step_rad).round() as usize;
         // Outside the fan, or too near, there is no reading.
-        let range = fan.beams.get(beam).map_or(f64::NAN, |range| f64::from(*range));
-        let is_seen = range >= way.length() - self.radius_m - GAP_M;
+        let is_seen = fan.range(fan.beam_along(way)) >= way.length() - self.radius_m - GAP_M;
         self.is_mover && !is_seen
     }
 
@@ -407,13 +400,11 @@ impl Difference {
     fn of(before: &Fan<'_>, end: DVec2) -> Self {
         let way = end - before.origin;
         assert!(before.step_rad > 0.0);
-        let bearing = wrap_angle(way.to_angle() - before.first_rad);
-        let beam = (bearing.rem_euclid(TAU) / before.step_rad).round() as usize;
-        let count = before.beams.len();
+        let (beam, count) = (before.beam_along(way), before.beams.len());
         let by = |beside: usize| {
             let beam = beam + count + beside - 1;
             let beam = if before.is_circle() { beam % count } else { beam.wrapping_sub(count) };
-            let range = before.beams.get(beam).map_or(f64::NAN, |range| f64::from(*range));
+            let range = before.range(beam);
             if range <= before.reach_m { range - way.length() } else { f64::NAN }
         };
         Self { by_beams: [by(0), by(1), by(2)], most_m: OTHER_M + OTHER * before.deviation_m(end) }

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use common::{
+    geometry::wrap_angle,
     kinematics::Pose2,
     mission::{Mission, Sensor, SensorKind},
     samples::{ContactSample, RangeReading, RangeStatus},
@@ -153,6 +154,17 @@ impl Fan<'_> {
         self.iter().map(|(along, range)| {
             (range >= 0.0 && range <= self.reach_m).then(|| self.origin + range * along)
         })
+    }
+
+    /// Returns the beam along `way`; there may be none of its number.
+    pub(crate) fn beam_along(&self, way: DVec2) -> usize {
+        let bearing = wrap_angle(way.to_angle() - self.first_rad);
+        (bearing.rem_euclid(TAU) / self.step_rad).round() as usize
+    }
+
+    /// Returns the range of a beam, metres; NaN outside the fan.
+    pub(crate) fn range(&self, beam: usize) -> f64 {
+        self.beams.get(beam).map_or(f64::NAN, |range| f64::from(*range))
     }
 
     pub(crate) fn deviation_m(&self, end: DVec2) -> f64 {
