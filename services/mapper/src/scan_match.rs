@@ -300,13 +300,8 @@ impl Surroundings {
         let turned = DVec2::from_angle(heading);
         let is_gone = |surface: &Surface| {
             let from = DVec2::from_angle(-heading).rotate(surface.at - position) - fan.origin;
-            let bearing = (from.to_angle() - fan.first_rad).rem_euclid(std::f64::consts::TAU);
-            let beam = (bearing / fan.step_rad).round() as usize;
-            let through = |beam: usize| {
-                fan.beams
-                    .get(beam)
-                    .is_some_and(|range| f64::from(*range) > from.length() + THROUGH_M)
-            };
+            let beam = fan.beam_along(from);
+            let through = |beam: usize| fan.range(beam) > from.length() + THROUGH_M;
             (beam.saturating_sub(1)..=beam + 1).all(through)
         };
         let oldest_m = self.travelled_m - KEPT_M;
