@@ -148,16 +148,13 @@ impl ScanMatcher {
             let drift = covariance + variances(DRIFT);
             Surroundings { pose: reckoned, odometry, drift, ..Surroundings::default() }
         });
-        let fan = rows.scan(self.row, Pose2::default(), &scan.beams)?;
+        let mut fan = rows.scan(self.row, Pose2::default(), &scan.beams)?;
         let mut seen = points(&fan);
         let matched = held.matched(&seen, odometry);
         let robot = matched.as_ref().map_or(held.carried(odometry), |matched| matched.pose);
         let without = movers.take(rows, scan, robot);
-        let fan = match &without {
-            Some(beams) => rows.scan(self.row, Pose2::default(), beams)?,
-            None => fan,
-        };
-        if without.is_some() {
+        if let Some(beams) = &without {
+            fan = rows.scan(self.row, Pose2::default(), beams)?;
             seen = points(&fan);
         }
         held.follow(matched.as_ref(), odometry);
