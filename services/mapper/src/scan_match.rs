@@ -111,10 +111,7 @@ impl ScanMatcher {
     pub(crate) fn new(mission: &Mission) -> Self {
         let rate_hz = mission.robot.rate_hz;
         let every_ticks = (rate_hz / MOST_FIXES_HZ).ceil().max(1.0) as u64;
-        let (row, scans) = match mission.laser() {
-            Some((row, laser)) => (row, laser.every_ticks.max(1)),
-            None => (0, 1),
-        };
+        let (row, scans) = mission.laser().map_or((0, 1), |(row, laser)| (row, laser.every_ticks));
         let fixes_hz = rate_hz / every_ticks.max(scans) as f64;
         assert!(every_ticks > 0 && fixes_hz <= MOST_FIXES_HZ * (1.0 + 1e-9));
         Self { row, every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
