@@ -14,7 +14,12 @@
 //! [`SHARED_S`], so that period's fixes together weigh like one. A fix also states the drift, which
 //! all later fixes share, because averaging never removes it.
 
-use common::{geometry::symmetric, kinematics::Pose2, mission::Mission, samples::FixSample};
+use common::{
+    geometry::symmetric,
+    kinematics::Pose2,
+    mission::Mission,
+    samples::{FixSample, name},
+};
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
@@ -117,14 +122,10 @@ impl ScanMatcher {
         Self { row, every_ticks, shared: (SHARED_S * fixes_hz).max(1.0) }
     }
 
-    pub(crate) const fn publishes(&self, tick: u64) -> bool {
-        tick.is_multiple_of(self.every_ticks)
-    }
-
     /// Matches the laser's scan with the known surroundings, and adds to them.
     ///
-    /// Returns `None` if too little of them is visible; the match then goes on as the wheels went.
-    /// Only static surfaces are added.
+    /// Returns `None` in ticks that are due no fix, or if too little of them is visible; the match
+    /// then goes on as the wheels went. Only static surfaces are added.
     pub(crate) fn step(
         &self,
         rows: &Rows,
@@ -163,7 +164,8 @@ impl ScanMatcher {
                 held.drift += (covariance + variances(DRIFT)) * new;
             }
         }
-        let Match { pose, covariance, .. } = matched?;
+        let is_due = scan.robot.stamp.tick.is_multiple_of(self.every_ticks);
+        let Match { pose, covariance, .. } = matched.filter(|_| is_due)?;
         let all = (covariance + variances(LEAST)) * self.shared + drift;
         let [x, y, turn] = [all.x_axis, all.y_axis, all.z_axis];
         Some(FixSample {
@@ -173,6 +175,7 @@ impl ScanMatcher {
             heading_rad: pose.heading,
             covariance: [x.x, x.y, x.z, y.y, y.z, turn.z],
             shared: [0.5 * (drift.x_axis.x + drift.y_axis.y), drift.z_axis.z],
+            source: name("scan"),
             ..FixSample::default()
         })
     }

@@ -9,9 +9,7 @@ use common::{
     geometry::{Piece, Zone},
     grid::{Cell, CellState, GridFrame, Part, Window},
     mission::{Method, Mission},
-    samples::{
-        ContactSample, FaultKind, FixSample, GridHeader, PoseSample, RangeReading, Sweep, name,
-    },
+    samples::{ContactSample, FaultKind, FixSample, GridHeader, PoseSample, RangeReading, Sweep},
     stage::ForeignState,
 };
 use glam::DVec2;
@@ -361,13 +359,10 @@ impl Mapper {
             };
             let scans: Vec<_> = scans.into_iter().filter_map(placed).collect();
             let (surroundings, movers) = (&mut self.belief.surroundings, &mut self.movers);
-            let fix = self.matcher.step(&self.rows, surroundings, &scans, movers);
+            self.fix = self.matcher.step(&self.rows, surroundings, &scans, movers);
             let odometry = pose.odometry();
             let held = self.belief.surroundings.as_ref();
             self.movers.place(&pose, held.map_or(odometry, |held| held.carried(odometry)));
-            let fix = fix.filter(|_| self.matcher.publishes(pose.stamp.tick));
-            let source = name("scan");
-            self.fix = fix.map(|fix| FixSample { source, ..fix });
             let forgot = self.forget(pose.stamp.time());
             let mapped = self.map(&pose, (&ranges, &scans), contact.as_ref());
             moved.union(forgot).union(mapped)
