@@ -41,7 +41,7 @@ impl EvidenceMap {
 pub(crate) struct Evidential {
     grid: GridFrame,
     /// Maximum centre distance that an occupied cell blocks, metres.
-    reach: f64,
+    pub reach: f64,
     ground: Ground,
     /// Lattice column under each grid column's middle; rows are equal, as both are square with one
     /// centre.
@@ -77,10 +77,6 @@ impl Evidential {
             beside_laser: !lasers.is_empty() && sonars + rays > 0,
             lasers,
         }
-    }
-
-    pub(crate) const fn reach(&self) -> f64 {
-        self.reach
     }
 
     pub(crate) fn empty(&self) -> EvidenceMap {

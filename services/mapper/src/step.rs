@@ -124,7 +124,7 @@ pub fn hazard_reach_m(mission: &Mission) -> f64 {
         Method::Paper => {
             (f64::from(mission.margin_cells()) + 0.5) * mission.grid_frame().resolution_m
         }
-        Method::Evidential => Evidential::new(mission).reach(),
+        Method::Evidential => Evidential::new(mission).reach,
     }
 }
 
