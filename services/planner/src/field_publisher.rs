@@ -37,31 +37,25 @@ struct Computed {
 /// Yields of the thread per policy; each may make it wait.
 const YIELDS: usize = 8;
 
-#[derive(Default)]
-struct Worker {
-    before: Arc<Vec<FieldCell>>,
-}
-
-impl Worker {
-    fn compute(&mut self, (snapshot, at): (Snapshot, Progress)) -> Computed {
-        let frame = snapshot.frame;
-        let every = (frame.cells as usize).div_ceil(YIELDS);
-        // This avoids a wait of some milliseconds for a stage on this processor.
-        let yields = |row: usize| {
-            if row.is_multiple_of(every) {
-                std::thread::yield_now();
-            }
-        };
-        let cells = Arc::new(snapshot.cells_with(yields));
-        assert_eq!(cells.len(), frame.area());
-        let changed = if self.before.len() == cells.len() {
-            frame.changed_window(&self.before, &cells)
-        } else {
-            frame.whole()
-        };
-        self.before = Arc::clone(&cells);
-        Computed { policy: Policy { header: snapshot.header, frame, cells }, at, changed }
-    }
+/// Replaces the cells `before` by those of the snapshot.
+fn compute(before: &mut Arc<Vec<FieldCell>>, snapshot: &Snapshot, at: Progress) -> Computed {
+    let frame = snapshot.frame;
+    let every = (frame.cells as usize).div_ceil(YIELDS);
+    // This avoids a wait of some milliseconds for a stage on this processor.
+    let yields = |row: usize| {
+        if row.is_multiple_of(every) {
+            std::thread::yield_now();
+        }
+    };
+    let cells = Arc::new(snapshot.cells_with(yields));
+    assert_eq!(cells.len(), frame.area());
+    let changed = if before.len() == cells.len() {
+        frame.changed_window(before, &cells)
+    } else {
+        frame.whole()
+    };
+    *before = Arc::clone(&cells);
+    Computed { policy: Policy { header: snapshot.header, frame, cells }, at, changed }
 }
 
 /// Publisher of the changed window of a policy, or of all of it if due or for a new reader.
@@ -76,10 +70,10 @@ pub(crate) struct FieldPublisher {
 
 impl FieldPublisher {
     pub(crate) fn start() -> io::Result<Self> {
-        let mut worker = Worker::default();
+        let mut before = Arc::default();
         Ok(Self {
-            thread: Background::start("policy", Cancellation::default(), move |job| {
-                worker.compute(job)
+            thread: Background::start("policy", Cancellation::default(), move |(snapshot, at)| {
+                compute(&mut before, &snapshot, at)
             })?,
             busy: false,
             version: 0,
