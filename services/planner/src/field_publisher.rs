@@ -61,7 +61,7 @@ fn compute(before: &mut Arc<Vec<FieldCell>>, snapshot: &Snapshot, at: Progress) 
 /// Publisher of the changed window of a policy, or of all of it if due or for a new reader.
 pub(crate) struct FieldPublisher {
     thread: Background<(Snapshot, Progress), Computed>,
-    busy: bool,
+    pub busy: bool,
     version: u64,
     change_published: Option<MissionTime>,
     keyframe_published: Option<MissionTime>,
@@ -95,10 +95,6 @@ impl FieldPublisher {
         self.busy = true;
         self.change_published = Some(at.time);
         self.thread.begin((snapshot, at));
-    }
-
-    pub(crate) const fn is_busy(&self) -> bool {
-        self.busy
     }
 
     /// Returns the part of `policy` to publish `now`, and its tick.

@@ -98,7 +98,7 @@ impl Process for Shell {
         if asked || swapped && !self.lockstep {
             self.answer()?;
         }
-        if self.field.is_busy() {
+        if self.field.busy {
             self.publish_field()?;
         }
         if !knew_target && self.has_target {
