@@ -15,7 +15,7 @@
 use std::f64::consts::{PI, TAU};
 
 use common::{
-    geometry::{nearest_on_segment, wrap_angle},
+    geometry::{distance_to_segment, wrap_angle},
     kinematics::Twist,
     mission::{Mission, Sensor, SensorKind},
     samples::Mover,
@@ -284,7 +284,7 @@ impl<'a> Scene<'a> {
         let Evasion { inflated_m, rest_m, .. } = *self.evasion;
         let is_its = |disc: &Disc| {
             let was = disc.at - TRACE_S * disc.velocity;
-            let apart_m = nearest_on_segment(at, was, disc.at).distance(at);
+            let apart_m = distance_to_segment(at, was, disc.at);
             apart_m <= disc.radius + inflated_m + rest_m + TRACE_M
         };
         let near = match self.view.is_hazard(at) {

@@ -1,7 +1,7 @@
 //! World of a mission, with things that appear, vanish or move.
 
 use common::{
-    geometry::{Box2, Profile, Shapes, Wall, nearest_on_segment},
+    geometry::{Box2, Profile, Shapes, Wall, distance_to_segment, nearest_on_segment},
     kinematics::{Pose2, Twist},
     mission::{Footprint, Heights, Hole, Mission, Move, Thing, lasts},
 };
@@ -29,7 +29,7 @@ impl Surface {
     pub fn distance(&self, point: DVec2) -> f64 {
         match *self {
             Self::Drum { at, radius } => at.distance(point) - radius,
-            Self::Face { from, to } => nearest_on_segment(point, from, to).distance(point),
+            Self::Face { from, to } => distance_to_segment(point, from, to),
         }
     }
 
