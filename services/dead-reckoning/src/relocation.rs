@@ -2,7 +2,7 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use common::{clock::MissionTime, kinematics::Pose2};
+use common::kinematics::Pose2;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
@@ -35,9 +35,7 @@ impl Contradictions {
 
     /// Returns the relocated estimate if the newest fixes agree.
     pub(crate) fn add(&mut self, there: Pose2, fix: &Fix, estimate: &Filter) -> Option<Filter> {
-        let time = |(_, fix): &(Pose2, Fix)| fix.time;
-        let last = self.0.back().map_or(MissionTime(0), time);
-        if !self.0.is_empty() && fix.time.since(last) < APART {
+        if self.0.back().is_some_and(|(_, last)| fix.time.since(last.time) < APART) {
             return None;
         }
         self.0.push_back((there, *fix));
