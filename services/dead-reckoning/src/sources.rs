@@ -55,11 +55,5 @@ impl Further for Sources {
 }
 
 fn some<H: Stamped>(reader: &mut Reader<H>, most: usize) -> Result<Vec<H>, BusError> {
-    let mut taken = Vec::new();
-    while taken.len() < most
-        && let Some(sample) = reader.next_sample()?
-    {
-        taken.push(sample);
-    }
-    Ok(taken)
+    std::iter::from_fn(|| reader.next_sample().transpose()).take(most).collect()
 }
