@@ -87,7 +87,13 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
             (saved, Some(checkpoint), Some(lock))
         }
     };
-    let robot = robot(&mission, saved.as_ref());
+    let robot = match &saved {
+        None => Robot::new(&mission),
+        Some(saved) => {
+            tracing::info!(?saved, "the robot starts at the last process's pose");
+            Robot::restored(&mission, saved)
+        }
+    };
     let meeting = meeting
         .map(|sockets| Meeting::open(&mission, sockets, &stop, pace == Pace::Max))
         .transpose()?;
@@ -108,16 +114,6 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
         }
         session.catch_up()?;
     }
-}
-
-fn robot(mission: &Mission, saved: Option<&SavedState>) -> Robot {
-    saved.map_or_else(
-        || Robot::new(mission),
-        |saved| {
-            tracing::info!(?saved, "the robot starts at the last process's pose");
-            Robot::restored(mission, saved)
-        },
-    )
 }
 
 /// Ground truth as JSON lines; none without a reader.

@@ -14,6 +14,7 @@ use common::{
 use super::session::Session;
 use crate::{
     error::Result,
+    robot::Robot,
     transport::{Source, Way},
 };
 
@@ -31,7 +32,7 @@ impl InMemory {
         let tell = Box::new(move |tick| {
             let _ = told.send(tick);
         });
-        let (robot, ways) = (super::robot(mission, None), (Way::to(host), None));
+        let (robot, ways) = (Robot::new(mission), (Way::to(host), None));
         let session = Session::new(mission, robot, pace, ways, tell, (None, None))?;
         Ok(Self { session, sent, truth })
     }
