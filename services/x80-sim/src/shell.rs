@@ -107,7 +107,7 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     loop {
         let [came, stopped] = wait(&session, &stop)?;
         if stopped {
-            return session.end().map(drop);
+            return session.end();
         }
         if came {
             session.listen(&mut buffer)?;

@@ -18,7 +18,6 @@ use crate::{
     error::Result,
     radio::Radio,
     robot::{Heard, Robot, Said},
-    saved_state::SavedState,
     transport::{Source, Way},
 };
 
@@ -117,8 +116,8 @@ impl Session {
         Ok(())
     }
 
-    /// The robot comes to rest. Returns its state there.
-    pub(super) fn end(mut self) -> Result<SavedState> {
+    /// Saves the robot when it has come to rest.
+    pub(super) fn end(mut self) -> Result {
         // The other robot sees the same path to rest, regardless of late commands.
         let Self { robot, meeting, .. } = &mut self;
         let mut tell = |robot: &mut Robot, ended| {
@@ -128,8 +127,7 @@ impl Session {
         };
         robot.come_to_rest(|robot| tell(robot, false));
         tell(robot, true);
-        self.save()?;
-        Ok(self.robot.saved_state())
+        self.save()
     }
 
     pub(super) fn readable(&self) -> Vec<BorrowedFd<'_>> {
