@@ -4,14 +4,7 @@ mod in_memory;
 mod meeting;
 mod session;
 
-use std::{
-    fs::File,
-    io::{self, Write},
-    net::SocketAddr,
-    os::fd::AsFd,
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{io::Write, net::SocketAddr, os::fd::AsFd, path::PathBuf, time::Duration};
 
 use common::{
     checkpoint::Checkpoint,
@@ -80,8 +73,8 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
         None => (None, None, None),
         Some(file) => {
             // The previous process may still be coming to rest.
-            let lock =
-                lock(&file).map_err(|source| SimError::Lock { file: file.clone(), source })?;
+            let lock = append(&file).and_then(|lock| lock.lock().map(|()| lock));
+            let lock = lock.map_err(|source| SimError::Lock { file: file.clone(), source })?;
             const { assert!(size_of::<SavedState>() < saved_state::CAPACITY) };
             let (checkpoint, saved) = Checkpoint::open::<SavedState>(&file, saved_state::CAPACITY)?;
             (saved, Some(checkpoint), Some(lock))
@@ -131,13 +124,6 @@ impl TruthLines {
             self.0 = None;
         }
     }
-}
-
-/// Creates `file` and locks it, waiting for other holders.
-fn lock(file: &Path) -> io::Result<File> {
-    let file = append(file)?;
-    file.lock()?;
-    Ok(file)
 }
 
 fn wait(session: &Session, stop: &impl AsFd) -> Result<[bool; 2]> {
