@@ -58,8 +58,16 @@ pub struct SimOptions {
 /// # Errors
 /// If it cannot listen, the transport fails, or the state cannot be saved.
 pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
-    let SimOptions { mission, pace, listen, transport, own_user_only, keep, ground_truth, meeting } =
-        options;
+    let SimOptions {
+        mission,
+        pace,
+        listen,
+        transport,
+        own_user_only,
+        keep,
+        mut ground_truth,
+        meeting,
+    } = options;
     let way = Way::open(transport, listen, own_user_only)?;
     tracing::info!(address = way.address(), %pace, "a simulated X80 listens");
     let laser_way = match (mission.rplidars().first(), transport) {
@@ -90,10 +98,9 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     let meeting = meeting
         .map(|sockets| Meeting::open(&mission, sockets, &stop, pace == Pace::Max))
         .transpose()?;
-    let mut lines = TruthLines(ground_truth);
     let (listening, laser) = (way.address(), laser_way.as_ref().map(Way::address));
-    lines.write(&GroundTruthHeader { listening, laser });
-    let ground_truth = Box::new(move |tick| lines.write(&tick));
+    tell(&mut ground_truth, &GroundTruthHeader { listening, laser });
+    let ground_truth = Box::new(move |tick| tell(&mut ground_truth, &tick));
     let (ways, others) = ((way, laser_way), (meeting, checkpoint));
     let mut session = Session::new(&mission, robot, pace, ways, ground_truth, others)?;
     let mut buffer = vec![0; 65_536];
@@ -109,20 +116,16 @@ pub fn run(options: SimOptions, stop: impl AsFd) -> Result {
     }
 }
 
-/// Ground truth as JSON lines; none without a reader.
-struct TruthLines(Option<Box<dyn Write + Send>>);
-
-impl TruthLines {
-    fn write(&mut self, record: &impl Serialize) {
-        let Some(reader) = &mut self.0 else {
-            return;
-        };
-        // One write per line: a pipe write costs far more than its bytes.
-        let written = reader.write_all(&line(record)).and_then(|()| reader.flush());
-        if let Err(error) = written {
-            tracing::warn!(%error, "the ground truth has lost its reader; the robot continues without one");
-            self.0 = None;
-        }
+/// Writes a JSON line of the ground truth, if it has a reader.
+fn tell(reader: &mut Option<Box<dyn Write + Send>>, record: &impl Serialize) {
+    let Some(listens) = reader else {
+        return;
+    };
+    // One write per line: a pipe write costs far more than its bytes.
+    let written = listens.write_all(&line(record)).and_then(|()| listens.flush());
+    if let Err(error) = written {
+        tracing::warn!(%error, "the ground truth has lost its reader; the robot continues without one");
+        *reader = None;
     }
 }
 
@@ -206,10 +209,10 @@ mod tests {
     fn a_robot_whose_truth_nobody_reads_goes_on() {
         let (reader, writer) = UnixStream::pair().unwrap();
         drop(reader);
-        let mut lines = TruthLines(Some(Box::new(writer)));
-        lines.write(&"a tick");
-        assert!(lines.0.is_none());
-        lines.write(&"the next");
+        let mut truth: Option<Box<dyn Write + Send>> = Some(Box::new(writer));
+        tell(&mut truth, &"a tick");
+        assert!(truth.is_none());
+        tell(&mut truth, &"the next");
     }
 
     #[test]
