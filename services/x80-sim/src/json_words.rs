@@ -88,7 +88,7 @@ impl JsonWords {
             };
             Some((sensor.name.clone(), range))
         });
-        let said = |laser: &Laser| Some((laser.name().to_owned(), laser.said()?));
+        let said = |laser: &Laser| Some((laser.sensor.name.clone(), laser.said()?));
         let mut scans: BTreeMap<_, _> = lasers.iter().filter_map(said).collect();
         let only = if lasers.len() == 1 { scans.pop_first() } else { None };
         let (scan, [scan_age_s, scan_time_s]) = match only {

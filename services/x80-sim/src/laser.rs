@@ -34,7 +34,7 @@ const FASTEST_M_S: f64 = 5.0;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Laser {
-    sensor: Sensor,
+    pub sensor: Sensor,
     height_m: f64,
     timing: LaserTiming,
     /// Recent poses by time in seconds, as far back as a scan goes.
@@ -73,10 +73,6 @@ impl Laser {
             true => self.scan(world, pose, time),
             false => Vec::new(),
         };
-    }
-
-    pub(crate) fn name(&self) -> &str {
-        &self.sensor.name
     }
 
     pub(crate) fn said(&self) -> Option<Scan> {
