@@ -342,7 +342,7 @@ impl Robot {
     /// Returns when the ultrasonic rangers listen for the next tick, if still ahead.
     fn listens_at(&self) -> Option<f64> {
         let age = self.physics.sonar.age_s;
-        (age > 0.0 && !self.ranging.has_listened()).then(|| self.next_tick_s() - age)
+        (age > 0.0 && self.ranging.heard.is_none()).then(|| self.next_tick_s() - age)
     }
 
     /// Advances in short steps, which never cross the end of a timed command or the time of a

@@ -34,7 +34,8 @@ pub struct Ranging {
     pub(crate) silence: Silence,
     sonar_noise: Noise,
     infrared_noise: Noise,
-    heard: Option<[u8; 6]>,
+    /// Echoes for the next tick, if the ultrasonic rangers have listened.
+    pub(crate) heard: Option<[u8; 6]>,
 }
 
 impl Ranging {
@@ -81,14 +82,8 @@ impl Ranging {
         sensors.ultrasonic[self.front]
     }
 
-    pub fn has_listened(&self) -> bool {
-        self.heard.is_some()
-    }
-
     pub fn listen(&mut self, world: &World, body: &Body, physics: &SonarPhysics) {
-        if self.heard.is_none() {
-            self.heard = Some(self.heard_now(world, body, physics));
-        }
+        self.heard = Some(self.heard_now(world, body, physics));
     }
 
     fn heard_now(&mut self, world: &World, body: &Body, physics: &SonarPhysics) -> [u8; 6] {
