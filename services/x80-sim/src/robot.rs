@@ -460,9 +460,8 @@ impl Robot {
     /// Sensor noise is drawn only here.
     fn measure(&mut self) {
         let noise = self.physics.wheels.count_noise;
-        for (channel, encoder) in self.motor.encoders.iter_mut().enumerate() {
-            let error = self.count_noise.normal(noise);
-            *encoder = sensors::encoder(&self.motors[channel], error);
+        for (encoder, motor) in self.motor.encoders.iter_mut().zip(&self.motors) {
+            *encoder = sensors::encoder(motor, self.count_noise.normal(noise));
         }
         self.motor.currents = sensors::currents(&self.motors);
         self.motor.pots = [sensors::MIDDLE; 6];

@@ -160,8 +160,7 @@ pub fn encoder(motor: &Motor, error: f64) -> Encoder {
 
 /// Returns AD counts.
 pub fn currents(motors: &[Motor; 6]) -> [u16; 6] {
-    std::array::from_fn(|channel| {
-        let motor = &motors[channel];
+    motors.each_ref().map(|motor| {
         if !motor.enabled {
             return 0;
         }
