@@ -76,11 +76,10 @@ impl Rplidar {
         // The sensor reports lost echoes as nothing in reach, which is trusted only where no
         // neighbour beam ended.
         let ended: Vec<_> = beams.iter().map(|beam| beam.is_finite()).collect();
-        let last = ended.len().saturating_sub(1);
+        let count = ended.len();
         for (beam, range) in beams.iter_mut().enumerate().filter(|(_, range)| range.is_infinite()) {
-            let beside =
-                [beam.checked_sub(1).unwrap_or(last), if beam == last { 0 } else { beam + 1 }];
-            if beside.into_iter().any(|beam| ended.get(beam) == Some(&true)) {
+            let beside = [beam + count - 1, beam + 1];
+            if beside.into_iter().any(|beam| ended[beam % count]) {
                 *range = f32::NAN;
             }
         }
