@@ -110,13 +110,13 @@ impl Ros2 {
         heard: &mut Heard,
     ) -> Result<(), String> {
         match content {
-            Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard),
+            Content::Odometry => self.take_odometry(&Odometry::read(payload)?, heard)?,
             Content::Scan(row) => {
                 let mut scan = Scan::read(payload)?;
                 if self.table.get(row).is_some_and(|sensor| sensor.is_upside_down) {
                     scan.turn_over();
                 }
-                self.take_scan(row, &scan, heard)
+                self.take_scan(row, &scan, heard)?;
             }
             Content::Range(row) => {
                 let range = read_range(payload)?;
@@ -124,35 +124,29 @@ impl Ros2 {
                 // Infinite means nothing in reach.
                 let range = Some(range).filter(|range| *range != f64::INFINITY);
                 heard.readings.extend(sensor.map(|sensor| range_reading(row, sensor, range)));
-                Ok(())
             }
             Content::Battery => {
                 let volts = BatteryState::decode(payload)?.voltage;
                 if volts.is_finite() && volts >= 0.0 {
                     heard.take_battery(volts.into());
                 }
-                Ok(())
             }
-            Content::Imu => self.gyro.take(Imu::read(payload)?),
-            Content::Touch(row) => {
-                heard.touched.push((row, Bool::decode(payload)?.data));
-                Ok(())
-            }
+            Content::Imu => self.gyro.take(Imu::read(payload)?)?,
+            Content::Touch(row) => heard.touched.push((row, Bool::decode(payload)?.data)),
             Content::Hazards => {
                 let frames = read_hazards(payload)?;
                 let feels =
                     |row: &TouchRow| frames.iter().any(|frame| frame.replace('_', "-") == row.name);
                 heard.touched.extend(self.touches.iter().map(feels).enumerate());
-                Ok(())
             }
             Content::Command => {
                 let (&number, payload) =
                     payload.split_first_chunk().ok_or("the command lacks its writer")?;
                 let moves = read_moves(payload, self.stamped)?;
                 heard.commander = Some(Commander { number, moves });
-                Ok(())
             }
         }
+        Ok(())
     }
 
     fn take_odometry(&mut self, odometry: &Odometry, heard: &mut Heard) -> Result<(), String> {
