@@ -72,13 +72,11 @@ pub trait Base: Driver {
         Vec::new()
     }
 
-    /// Returns the state that continues the wheel counts in the next driver; `None` if the robot
-    /// counts.
-    fn memory(&self) -> Option<Memory> {
+    /// Returns the odometry whose memory continues the wheel counts in the next driver; `None` if
+    /// the robot counts.
+    fn odometry(&mut self) -> Option<&mut odometry::Odometry> {
         None
     }
-
-    fn remember(&mut self, _memory: &Memory) {}
 
     /// Returns ways to stop a robot that ignores a velocity of 0, in order of use. Greet the robot
     /// afterwards, before it drives.

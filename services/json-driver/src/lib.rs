@@ -7,8 +7,7 @@ use std::{collections::BTreeMap, time::Duration};
 
 use common::{
     driver::{
-        Base, Driver, Heard, LaserScan, Memory, Motion, Refusal, StopMethod, Turn, WireTally, beam,
-        gyro,
+        Base, Driver, Heard, LaserScan, Motion, Refusal, StopMethod, Turn, WireTally, beam, gyro,
         odometry::{Odometry, motion, twist, wheel_speeds},
         range_reading,
     },
@@ -242,12 +241,8 @@ impl Base for Json {
         self.gyro.for_tick(self.rate_hz)
     }
 
-    fn memory(&self) -> Option<Memory> {
-        self.odometry.memory()
-    }
-
-    fn remember(&mut self, memory: &Memory) {
-        self.odometry.remember(*memory);
+    fn odometry(&mut self) -> Option<&mut Odometry> {
+        Some(&mut self.odometry)
     }
 
     fn other_stops(&self) -> Vec<StopMethod> {

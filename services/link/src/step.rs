@@ -192,7 +192,9 @@ impl Link {
             }
             Event::Quiet | Event::Operator(Request::SignOff | Request::Look) => {}
             Event::Remember(memory) => {
-                self.base.remember(&memory);
+                if let Some(odometry) = self.base.odometry() {
+                    odometry.remember(memory);
+                }
                 return Vec::new();
             }
             Event::Telemetry => return Vec::new(),
@@ -263,8 +265,8 @@ impl Link {
     }
 
     /// Returns None if the robot itself counts.
-    pub(crate) fn driver_memory(&self) -> Option<Memory> {
-        self.base.memory()
+    pub(crate) fn driver_memory(&mut self) -> Option<Memory> {
+        self.base.odometry()?.memory()
     }
 
     pub const fn is_stopped_by_operator(&self) -> bool {

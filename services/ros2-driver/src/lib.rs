@@ -12,7 +12,7 @@ use std::{f64::consts::TAU, time::Duration};
 
 use common::{
     driver::{
-        Base, Commander, Driver, Heard, LaserScan, Memory, Motion, Turn, WireTally, beam,
+        Base, Commander, Driver, Heard, LaserScan, Motion, Turn, WireTally, beam,
         odometry::{self, motion, twist},
         range_reading,
     },
@@ -320,12 +320,8 @@ impl Base for Ros2 {
         write_twist(v, omega, self.stamped)
     }
 
-    fn memory(&self) -> Option<Memory> {
-        self.odometry.memory()
-    }
-
-    fn remember(&mut self, memory: &Memory) {
-        self.odometry.remember(*memory);
+    fn odometry(&mut self) -> Option<&mut odometry::Odometry> {
+        Some(&mut self.odometry)
     }
 }
 

@@ -392,10 +392,10 @@ fn the_counts_of_a_link_that_is_started_again_go_on_where_they_were_and_take_wha
     let mut first = driver("");
     said(&mut first, ODOM, &odometry_at(1000));
     said(&mut first, ODOM, &odometry_from(1200, 1.1));
-    let memory = first.memory().unwrap();
+    let memory = first.odometry.memory().unwrap();
     let started = || {
         let mut second = driver("");
-        second.remember(&memory);
+        second.odometry.remember(memory);
         second
     };
     let counts = |mut driver: Ros2| {
