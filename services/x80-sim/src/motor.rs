@@ -37,7 +37,6 @@ pub struct Motor {
     /// Counts per second.
     standstill: f64,
     pub enabled: bool,
-    mode: Mode,
     order: Option<Order>,
     /// With their times, before the delay.
     pending: VecDeque<(f64, f64)>,
@@ -57,7 +56,7 @@ struct Order {
 }
 
 impl Motor {
-    /// Starts suspended, in PWM mode.
+    /// Starts suspended.
     ///
     /// `top_speed` is in counts per second.
     pub fn new(physics: WheelPhysics, top_speed: f64, counts_per_m: f64) -> Self {
@@ -68,7 +67,6 @@ impl Motor {
             acceleration: physics.acceleration_m_s2 * counts_per_m,
             standstill: STANDSTILL_M_S * counts_per_m,
             enabled: false,
-            mode: Mode::Pwm,
             order: None,
             pending: VecDeque::new(),
             target: 0.0,
@@ -81,11 +79,6 @@ impl Motor {
     /// Sets the mode and runs until mission time `until`.
     pub fn order(&mut self, quantity: Quantity, value: i16, until: Option<f64>) {
         self.enabled = true;
-        self.mode = match quantity {
-            Quantity::Position => Mode::Position,
-            Quantity::Pwm => Mode::Pwm,
-            Quantity::Velocity => Mode::Velocity,
-        };
         self.order = Some(Order { quantity, value, until });
     }
 
@@ -101,13 +94,18 @@ impl Motor {
         self.order = None;
     }
 
-    /// Gains and feedback have no effect: the loop follows measurements.
+    /// A mode other than the order's discards the order. Gains and feedback have no effect: the
+    /// loop follows measurements.
     pub fn configure(&mut self, parameter: Parameter) {
         if let Parameter::Mode(mode) = parameter {
-            if mode != self.mode {
-                self.order = None;
-            }
-            self.mode = mode;
+            self.order.take_if(|order| {
+                let its = match order.quantity {
+                    Quantity::Position => Mode::Position,
+                    Quantity::Pwm => Mode::Pwm,
+                    Quantity::Velocity => Mode::Velocity,
+                };
+                its != mode
+            });
         }
     }
 
