@@ -179,7 +179,7 @@ impl Planner {
         let Some(mut live) = self.live.take() else {
             return self.solve_first();
         };
-        live.map = self.map(&frame, self.aim(&frame))?;
+        live.map = self.map(&frame)?;
         live.target_changed(self.grid.version());
         self.live = Some(live);
         Ok(Work::Stale)
@@ -203,7 +203,7 @@ impl Planner {
         if self.target.is_none() {
             return Ok(Work::None);
         }
-        let map = self.map(&frame, self.aim(&frame))?;
+        let map = self.map(&frame)?;
         let field = self.solver.solve(&map, &Cancellation::default())?;
         self.full_solves += 1;
         self.live = Some(Live::new(frame, map, field));
@@ -214,14 +214,13 @@ impl Planner {
         let Some(mut live) = self.live.take() else {
             return self.solve_first();
         };
-        let aim = self.aim(&live.frame);
         let mut changed = true;
-        if aim == Some(live.map.target()) {
+        if self.aim(&live.frame) == Some(live.map.target()) {
             let changes = live.changes_in(window, self.grid.cells());
             live.map.apply(&changes)?;
             changed = !changes.is_empty();
         } else {
-            live.map = self.map(&live.frame, aim)?;
+            live.map = self.map(&live.frame)?;
             live.refuse_again()?;
         }
         if changed {
@@ -254,12 +253,12 @@ impl Planner {
     }
 
     /// Builds the domain with a free target cell, because the mapper may not know the target yet.
-    fn map(&self, frame: &GridFrame, aim: Option<Cell>) -> Result<Domain, SolveError> {
+    fn map(&self, frame: &GridFrame) -> Result<Domain, SolveError> {
         let side = frame.cells as usize;
         let blocked = self.grid.cells().iter().map(|&cell| is_hazard(cell));
         let mut blocked: Vec<_> = blocked.collect();
         // The solver refuses a target outside the map.
-        let aim = aim.unwrap_or(Cell::new(side, side));
+        let aim = self.aim(frame).unwrap_or(Cell::new(side, side));
         if let Some(cell) = blocked.get_mut(aim.row * side + aim.col) {
             *cell = false;
         }
