@@ -254,11 +254,8 @@ impl<'a> Scene<'a> {
     fn new(evasion: &'a Evasion, view: &'a View<'a>, movers: &[Mover], start: Moving) -> Self {
         let (at, reach_m) = (start.pose.position, AHEAD_S * evasion.motion.law.speed + FAR_M);
         let comes = |disc: &Disc| {
-            let way = AHEAD_S * disc.velocity;
-            let share = (at - disc.at).dot(way) / way.length_squared();
-            // The share is NaN for a mover that stands.
-            let share = if share > 0.0 { share.min(1.0) } else { 0.0 };
-            (disc.at + share * way).distance(at) <= reach_m + disc.touches_m
+            let goes_to = disc.at + AHEAD_S * disc.velocity;
+            distance_to_segment(at, disc.at, goes_to) <= reach_m + disc.touches_m
         };
         let discs = movers.iter().map(|mover| evasion.disc(mover)).filter(comes).collect();
         Self { evasion, view, discs, start }
