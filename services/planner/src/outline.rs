@@ -120,7 +120,7 @@ impl Outline {
         assert!(smaller > 0.0 && larger <= body.radius_m + 1e-5);
         Self {
             points: footprint.outline(mission.grid_frame().resolution_m).collect(),
-            half_width: footprint.half_widths_m()[0],
+            half_width: smaller,
             covers: body.radius_m,
             speed: mission.speed_m_s().min(NARROW_M_S),
             turn: mission.turn_rad_s(),

@@ -71,7 +71,7 @@ impl View<'_> {
 
     pub(crate) fn is_refused(&self, cell: Cell) -> bool {
         debug_assert!(self.refused.is_empty() || self.refused.len() == self.frame.area());
-        self.refused.get(self.frame.index(cell)).is_some_and(|it| *it)
+        self.refused.get(self.frame.index(cell)) == Some(&true)
     }
 
     /// Free and sensed cells within `radius`.
