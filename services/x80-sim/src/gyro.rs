@@ -20,11 +20,10 @@ impl Gyro {
     pub(crate) fn new(mission: &Mission, seed: u64) -> Self {
         let physics = mission.simulation.physics().gyro;
         let mut errors = Noise::of_nth(mission.seed, Source::Gyro, 1);
-        let mut off = |spread: f64| spread * (2.0 * errors.uniform() - 1.0);
         Self {
             noise_rad_sqrt_s: physics.noise_deg_sqrt_s.to_radians(),
-            bias_rad_s: off(physics.bias_spread_deg_s).to_radians(),
-            scale: 1.0 + off(physics.scale_spread),
+            bias_rad_s: errors.within(physics.bias_spread_deg_s).to_radians(),
+            scale: 1.0 + errors.within(physics.scale_spread),
             noise: Noise::new(seed, Source::Gyro),
             newest: None,
             angle: 0.0,

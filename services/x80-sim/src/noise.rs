@@ -32,6 +32,11 @@ impl Noise {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
+    /// Returns a uniform deviate of mean 0, up to `spread` to either side.
+    pub fn within(&mut self, spread: f64) -> f64 {
+        spread * (2.0 * self.uniform() - 1.0)
+    }
+
     /// Returns a normal deviate of mean 0; draws nothing if `sd` is 0.
     pub fn normal(&mut self, sd: f64) -> f64 {
         if sd <= 0.0 {

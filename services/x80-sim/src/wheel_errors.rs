@@ -21,14 +21,13 @@ impl WheelErrors {
     pub fn of(mission: &Mission) -> Self {
         let physics = mission.simulation.physics().wheels;
         let mut noise = Noise::new(mission.seed, Source::WheelErrors);
-        let mut off = |spread: f64| spread * (2.0 * noise.uniform() - 1.0);
-        let ratio = physics.diameter_ratio * (1.0 + off(physics.diameter_spread));
+        let ratio = physics.diameter_ratio * (1.0 + noise.within(physics.diameter_spread));
         let diameter = [2.0, 2.0 * ratio].map(|share| share / (1.0 + ratio));
         assert!((diameter[0] + diameter[1] - 2.0).abs() < 1e-9);
         Self {
             diameter,
-            track: physics.track_scale * (1.0 + off(physics.track_spread)),
-            slip_share: physics.slip_share + off(physics.slip_share_spread),
+            track: physics.track_scale * (1.0 + noise.within(physics.track_spread)),
+            slip_share: physics.slip_share + noise.within(physics.slip_share_spread),
         }
     }
 }
