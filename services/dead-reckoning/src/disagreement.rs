@@ -115,8 +115,7 @@ impl Disagreement {
         ticks: &VecDeque<Tick>,
         track_m: f64,
     ) -> Option<Cause> {
-        // Only the scan matcher states both.
-        if newest.heading.is_none() || newest.shared[1] <= 0.0 {
+        if !newest.is_by_scan() {
             return None;
         }
         let apart_s = |from: &Fix, to: &Fix| to.time.seconds() - from.time.seconds();
