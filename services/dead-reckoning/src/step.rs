@@ -112,7 +112,6 @@ pub struct Reckoned {
 /// Dead reckoning by (20) and (21).
 #[derive(Debug)]
 pub struct DeadReckoning {
-    drive: Drive,
     body: Body,
     wheel_scales: [f64; 2],
     distance_scale: f64,
@@ -141,7 +140,6 @@ impl Answering for DeadReckoning {
         let errors = ErrorModel::new(odometry, &body);
         let period_s = 1.0 / mission.robot.rate_hz;
         Self {
-            drive: body.drive(),
             body,
             wheel_scales: odometry.wheel_scales(),
             distance_scale: odometry.distance_scale,
@@ -416,7 +414,7 @@ impl DeadReckoning {
         }
         // (20) is linear: wheel angles give arc and turn as wheel speeds give v and omega.
         let wheel = left * per_count;
-        Some(match &self.drive {
+        Some(match self.body.drive() {
             Drive::Differential(drive) => {
                 let [left_scale, right_scale] = self.wheel_scales;
                 let right = right * per_count * right_scale;
