@@ -182,18 +182,21 @@ const CREEP_M_S: f64 = 0.1;
 
 impl Body {
     pub fn drive(&self) -> Drive {
-        let &Self { wheel_radius_m, track_m, .. } = self;
         match self.ackermann() {
             Some(ackermann) => Drive::Ackermann(ackermann),
-            None => {
-                let top_rad_s = self.top_rad_s();
-                Drive::Differential(DifferentialDrive::new(wheel_radius_m, track_m, top_rad_s))
-            }
+            None => Drive::Differential(DifferentialDrive {
+                top_wheel_speed: self.top_rad_s(),
+                ..self.unlimited()
+            }),
         }
     }
 
     pub fn unlimited(&self) -> DifferentialDrive {
-        DifferentialDrive::new(self.wheel_radius_m, self.track_m, f64::INFINITY)
+        DifferentialDrive {
+            radius: self.wheel_radius_m,
+            track: self.track_m,
+            top_wheel_speed: f64::INFINITY,
+        }
     }
 
     pub fn top_rad_s(&self) -> f64 {
@@ -224,13 +227,13 @@ impl Body {
 
     pub fn ackermann(&self) -> Option<Ackermann> {
         let steering = self.steering?;
-        Some(Ackermann::new(
-            self.wheel_radius_m,
-            steering.wheelbase_m,
-            steering.limit_rad,
-            self.top_rad_s(),
-            CREEP_M_S,
-        ))
+        Some(Ackermann {
+            wheel_radius: self.wheel_radius_m,
+            wheelbase: steering.wheelbase_m,
+            steering_limit: steering.limit_rad,
+            top_wheel_speed: self.top_rad_s(),
+            creep: CREEP_M_S,
+        })
     }
 
     pub fn metres_per_count(&self) -> f64 {

@@ -16,7 +16,6 @@ const PUSHES: usize = 4;
 #[derive(Clone, Debug)]
 pub struct Body {
     drive: DifferentialDrive,
-    wheel_radius: f64,
     /// True track, metres; W is the nominal one.
     pub track: f64,
     pub radius: f64,
@@ -34,10 +33,8 @@ impl Body {
         let body = mission.body();
         let track = body.track_m * track_scale;
         let pose = mission.start_pose();
-        let top = body.top_rad_s();
         let mut it = Self {
-            drive: DifferentialDrive::new(body.wheel_radius_m, track, top),
-            wheel_radius: body.wheel_radius_m,
+            drive: DifferentialDrive { track, ..body.unlimited() },
             track,
             radius: body.radius_m,
             footprint: body.footprint,
@@ -69,7 +66,7 @@ impl Body {
     /// Moves as both wheels ask, metres of ground. On contact the body slides along the obstacle,
     /// or halts. Returns the ground covered by each wheel.
     pub fn roll(&mut self, asked: [f64; 2], world: &World) -> [f64; 2] {
-        let step = self.drive.twist(asked.map(|metres| metres / self.wheel_radius));
+        let step = self.drive.twist(asked.map(|metres| metres / self.drive.radius));
         let Some(arc) = self.go(step, world) else {
             return asked;
         };

@@ -20,7 +20,6 @@ pub(crate) struct Car {
     steering: Steering,
     driven: OnChannel,
     steered: OnChannel,
-    wheel_radius_m: f64,
     counts_per_radian: f64,
 }
 
@@ -31,19 +30,15 @@ impl Car {
         let body = mission.body();
         let steering = body.steering?;
         let [driven, steered] = OnChannel::left_and_right(&mission.robot);
-        let wheel_radius_m = body.wheel_radius_m * errors.diameter[0];
         Some(Self {
-            drive: Ackermann::new(
-                wheel_radius_m,
-                steering.wheelbase_m * errors.track,
-                steering.limit_rad,
-                f64::INFINITY,
-                0.0,
-            ),
+            drive: Ackermann {
+                wheel_radius: body.wheel_radius_m * errors.diameter[0],
+                wheelbase: steering.wheelbase_m * errors.track,
+                ..body.ackermann()?
+            },
             steering,
             driven,
             steered,
-            wheel_radius_m,
             counts_per_radian: body.counts_per_turn / std::f64::consts::TAU,
         })
     }
@@ -79,13 +74,14 @@ impl Car {
         let OnChannel { channel, sign } = self.driven;
         let asked = motors[channel].step(now, dt, noise);
         self.steer(&mut motors[self.steered.channel], now, dt, noise);
-        let rim = sign * asked / self.counts_per_radian * self.wheel_radius_m;
+        let rim = sign * asked / self.counts_per_radian * self.drive.wheel_radius;
         let ground = slipped(rim, physics, noise);
         // (3) is linear in the wheel: its angle gives arc and turn as its speed gives v and omega.
-        let step = self.drive.twist([ground / self.wheel_radius_m, self.angle(motors)]);
+        let step = self.drive.twist([ground / self.drive.wheel_radius, self.angle(motors)]);
         let held_at = body.go(step, world);
         let grip = grip(held_at.is_some(), physics);
-        let went = held_at.unwrap_or(ground) / self.wheel_radius_m * self.counts_per_radian * sign;
+        let went =
+            held_at.unwrap_or(ground) / self.drive.wheel_radius * self.counts_per_radian * sign;
         let motor = &mut motors[channel];
         let share = grip.unwrap_or(0.0);
         motor.turned += went * share + asked * (1.0 - share);

@@ -2,30 +2,22 @@
 
 use super::pose::Twist;
 
-/// G of (3): one driven axle and one steered axle.
+/// G of (3): one driven axle and one steered axle; all sizes are positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ackermann {
-    wheel_radius: f64,
-    wheelbase: f64,
-    steering_limit: f64,
-    top_wheel_speed: f64,
-    creep: f64,
+    /// r, metres.
+    pub wheel_radius: f64,
+    /// L, driven to steered axle, metres.
+    pub wheelbase: f64,
+    /// Radians, below pi/2.
+    pub steering_limit: f64,
+    /// In rad/s.
+    pub top_wheel_speed: f64,
+    /// Limit of turns commanded without enough speed, m/s.
+    pub creep: f64,
 }
 
 impl Ackermann {
-    /// Takes r and the `wheelbase` L (driven to steered axle) in metres, and the top speed in
-    /// rad/s. The limit is in radians, below pi/2; all are positive. `creep`, m/s, limits turns
-    /// commanded without enough speed.
-    pub const fn new(
-        wheel_radius: f64,
-        wheelbase: f64,
-        steering_limit: f64,
-        top_wheel_speed: f64,
-        creep: f64,
-    ) -> Self {
-        Self { wheel_radius, wheelbase, steering_limit, top_wheel_speed, creep }
-    }
-
     /// Returns the radius of the driven axle's midpoint, metres.
     pub fn least_turning_radius(&self) -> f64 {
         self.wheelbase / self.steering_limit.tan()
@@ -64,7 +56,13 @@ mod tests {
     use std::f64::consts::FRAC_PI_4;
 
     fn car(steering_limit: f64) -> Ackermann {
-        Ackermann::new(0.1, 0.5, steering_limit, 10.0, 0.05)
+        Ackermann {
+            wheel_radius: 0.1,
+            wheelbase: 0.5,
+            steering_limit,
+            top_wheel_speed: 10.0,
+            creep: 0.05,
+        }
     }
 
     fn close(got: f64, want: f64) {

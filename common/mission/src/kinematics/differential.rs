@@ -2,19 +2,18 @@
 
 use super::pose::Twist;
 
+/// G of (2): two driven wheels; all sizes are positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DifferentialDrive {
-    radius: f64,
-    track: f64,
-    top_wheel_speed: f64,
+    /// r, metres.
+    pub radius: f64,
+    /// W, metres.
+    pub track: f64,
+    /// In rad/s.
+    pub top_wheel_speed: f64,
 }
 
 impl DifferentialDrive {
-    /// Takes the `radius` r and the `track` W in metres, and the top speed in rad/s; all positive.
-    pub fn new(radius: f64, track: f64, top_wheel_speed: f64) -> Self {
-        Self { radius, track, top_wheel_speed }
-    }
-
     /// Maps omega_L and omega_R, rad/s, by (2). The map is linear, so wheel angles give (arc,
     /// turn).
     pub fn twist(&self, [left, right]: [f64; 2]) -> Twist {
@@ -43,7 +42,7 @@ mod tests {
     fn equation_2_by_hand_and_its_inverse_which_keeps_the_curvature_at_the_wheels_limit() {
         // r = 0.1, W = 0.4: v = 0.05 (3 + 1) = 0.2, omega = 0.25 (3 - 1) = 0.5.
         for (limit, wheels) in [(100.0, [1.0, 3.0]), (1.5, [0.5, 1.5])] {
-            let drive = DifferentialDrive::new(0.1, 0.4, limit);
+            let drive = DifferentialDrive { radius: 0.1, track: 0.4, top_wheel_speed: limit };
             let Twist { v, omega } = drive.twist([1.0, 3.0]);
             assert!((v - 0.2).abs() < 1e-12 && (omega - 0.5).abs() < 1e-12, "{v} {omega}");
             let got = drive.wheels(Twist { v, omega });
