@@ -5,9 +5,7 @@ use common::{
     ground_truth::GroundTruthTick,
     json_wire::Order,
     kinematics::Twist,
-    mission::{
-        Block, BlockedWheels, Mission, Physics, Protocol, Shove, TouchKind, TouchRow, lasts,
-    },
+    mission::{BlockedWheels, Mission, Physics, Protocol, Simulation, TouchKind, TouchRow, lasts},
     wire::{
         Addressing, COUNT_CYCLE, Command, CustomSensors, Frame, Motion, MotorSensors, Report,
         StandardSensors, SystemSignal,
@@ -85,10 +83,7 @@ impl Said<'_> {
 #[derive(Clone, Debug)]
 pub struct Robot {
     physics: Physics,
-    ignores_time: bool,
-    blocks: Vec<Block>,
-    shoves: Vec<Shove>,
-    stops_when_silent: Option<f64>,
+    simulation: Simulation,
     pub(crate) rate_hz: f64,
     drivetrain: Drivetrain,
     car: Option<Car>,
@@ -148,10 +143,7 @@ impl Robot {
         let body = Body::new(mission, &world, wheel_errors.track);
         let mut robot = Self {
             physics,
-            ignores_time: mission.simulation.ignores_time,
-            blocks: mission.simulation.blocks.clone(),
-            shoves: mission.simulation.shoves.clone(),
-            stops_when_silent: mission.simulation.stops_when_silent_s,
+            simulation: mission.simulation.clone(),
             rate_hz: mission.robot.rate_hz,
             drivetrain: Drivetrain::new(mission, wheel_errors.diameter),
             longest_step,
@@ -288,7 +280,7 @@ impl Robot {
         self.ordered_at = self.time;
         let until = motion
             .limit_ms
-            .filter(|_| !self.ignores_time)
+            .filter(|_| !self.simulation.ignores_time)
             .map(|limit| self.time + f64::from(limit) / 1000.0);
         for (number, motor) in (0_u8..).zip(&mut self.motors) {
             if let Some(value) = motion.targets.of(number) {
@@ -376,15 +368,17 @@ impl Robot {
     }
 
     fn step(&mut self, dt: f64) {
-        let silent = self.stops_when_silent.is_some_and(|limit| self.time >= self.heard_at + limit);
-        if silent {
+        let limit = self.simulation.stops_when_silent_s;
+        if limit.is_some_and(|limit| self.time >= self.heard_at + limit) {
             self.motors.iter_mut().for_each(Motor::halt);
         }
         let (centre, radius) = (self.body.pose.position, self.body.radius);
         self.world.advance(self.time + dt, centre, radius);
 
         let mut wheels = self.physics.wheels;
-        for shove in self.shoves.iter().filter(|it| lasts(self.time, it.from_s, it.until_s)) {
+        for shove in
+            self.simulation.shoves.iter().filter(|it| lasts(self.time, it.from_s, it.until_s))
+        {
             wheels.slip_share = 1.0 - (1.0 - wheels.slip_share) * (1.0 - shove.slip);
             self.body.shove(shove, dt, &self.world);
         }
@@ -413,7 +407,8 @@ impl Robot {
     }
 
     fn blocked_wheels(&self) -> [bool; 2] {
-        let now = || self.blocks.iter().filter(|it| lasts(self.time, it.from_s, it.until_s));
+        let now =
+            || self.simulation.blocks.iter().filter(|it| lasts(self.time, it.from_s, it.until_s));
         [BlockedWheels::Right, BlockedWheels::Left]
             .map(|other| now().any(|block| block.wheels != other))
     }
