@@ -42,13 +42,13 @@ pub struct MotionLaw {
     is_car: bool,
     /// vd, m/s.
     pub speed: f64,
-    turn: f64,
+    pub turn: f64,
     look: f64,
     /// Cosines of the evidential law's angles: full speed within, turns on the spot beyond.
     full_speed: f64,
-    turns: f64,
-    keys: Controller,
-    response: Response,
+    pub turns: f64,
+    pub keys: Controller,
+    pub response: Response,
 }
 
 impl MotionLaw {

@@ -10,7 +10,8 @@
 
 use common::{
     kinematics::{FACES_COSINE, LEAST_SPEED_M_S, Pose2},
-    mission::{Mission, Response, SensorKind},
+    mission::{Mission, SensorKind},
+    motion_law::MotionLaw,
     samples::{GridHeader, GuidanceStatus},
 };
 use glam::DVec2;
@@ -34,9 +35,7 @@ pub(crate) struct ActiveSensing {
     radius: f64,
     ground_m: f64,
     pub outline: Option<Outline>,
-    speed: f64,
-    turn: f64,
-    response: Response,
+    law: MotionLaw,
     brakes_within_s: f64,
     bearing: DVec2,
     /// Length of the arc, metres: at least the stopping distance at top speed.
@@ -55,18 +54,16 @@ pub(crate) struct ActiveSensing {
 
 impl ActiveSensing {
     pub(crate) fn new(mission: &Mission) -> Self {
-        let (response, speed) = (mission.trusted_response(), mission.speed_m_s());
+        let law = MotionLaw::new(mission);
         let brakes_within_s = mission.brakes_within_s();
-        let stops_m = response.way_to_stop_m(speed, brakes_within_s);
+        let stops_m = law.response.way_to_stop_m(law.speed, brakes_within_s);
         assert!(stops_m >= 0.0 && stops_m.is_finite());
         let (radius, outline) = (mission.body().radius_m, mission.outline());
         Self {
             radius,
             ground_m: outline.map_or(radius, |it| it.half_widths_m()[1]),
             outline: outline.map(|it| Outline::new(mission, &it)),
-            speed,
-            turn: mission.turn_rad_s(),
-            response,
+            law,
             brakes_within_s,
             bearing: DVec2::from_angle(mission.front_sonar().faces_rad()),
             ahead_m: AHEAD_M.max(stops_m + STEP_M),
@@ -118,7 +115,7 @@ impl ActiveSensing {
         if clear_m < STANDS_BEFORE_M {
             return 0.0;
         }
-        self.response.speed_to_stop_within(clear_m, self.brakes_within_s)
+        self.law.response.speed_to_stop_within(clear_m, self.brakes_within_s)
     }
 
     fn is_open(
@@ -167,7 +164,7 @@ impl ActiveSensing {
         pose: &Pose2,
         direction: DVec2,
     ) -> f64 {
-        let curvature = self.turn * pose.axis().perp_dot(direction) / self.speed;
+        let curvature = self.law.turn * pose.axis().perp_dot(direction) / self.law.speed;
         let steps = (self.ahead_m / STEP_M) as usize;
         let open = |step: &usize| {
             let way = *step as f64 * STEP_M;
@@ -177,7 +174,7 @@ impl ActiveSensing {
         };
         let free = (1..=steps).find(|step| !open(step)).unwrap_or(steps + 1) - 1;
         let room_m = free as f64 * STEP_M;
-        let on_arc = self.response.speed_to_stop_within(room_m, self.brakes_within_s);
+        let on_arc = self.law.response.speed_to_stop_within(room_m, self.brakes_within_s);
         let faces = pose.axis().dot(direction) > FACES_COSINE;
         let least = if faces { LEAST_SPEED_M_S } else { 0.0 };
         on_arc.max(least).min(self.limit_before_echoes(belief, pose))

@@ -6,10 +6,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use common::{
-    kinematics::Pose2,
-    mission::{Mission, Response},
-};
+use common::{kinematics::Pose2, mission::Mission, motion_law::MotionLaw};
 use glam::DVec2;
 use harmonic::Guidance;
 
@@ -24,14 +21,11 @@ const STOPS_WITHIN_S: f64 = 0.6;
 /// Least free length of a drivable arc, metres.
 const LEAST_FREE_M: f64 = 0.1;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(crate) struct Arcs {
     /// Curvature of the tightest circle, 1/m.
     most_curvature: f64,
-    speed: f64,
-    turn: f64,
-    slow_radius: f64,
-    response: Response,
+    law: MotionLaw,
 }
 
 #[derive(Clone, Copy)]
@@ -48,10 +42,7 @@ impl Arcs {
         let car = mission.body().ackermann()?;
         Some(Self {
             most_curvature: 1.0 / car.least_turning_radius(),
-            speed: mission.speed_m_s(),
-            turn: mission.turn_rad_s(),
-            slow_radius: mission.controller.slow_radius_m,
-            response: mission.trusted_response(),
+            law: MotionLaw::new(mission),
         })
     }
 
@@ -67,7 +58,7 @@ impl Arcs {
             .filter(|arc| arc.free_m >= LEAST_FREE_M.min(distance))
             .max_by(|a, b| a.progress_m.total_cmp(&b.progress_m));
         best.map_or((pose.axis(), 0.0), |arc| {
-            let limit = self.response.speed_to_stop_within(arc.free_m, STOPS_WITHIN_S);
+            let limit = self.law.response.speed_to_stop_within(arc.free_m, STOPS_WITHIN_S);
             (self.direction(pose, arc.curvature, distance), limit)
         })
     }
@@ -95,9 +86,9 @@ impl Arcs {
     fn direction(&self, pose: &Pose2, curvature: f64, distance: f64) -> DVec2 {
         // With s the sine of the angle to the direction, the turn rate is wd s and the speed vd (1
         // - s/2), less near the target.
-        let speed = self.speed * (distance / self.slow_radius).min(1.0);
+        let speed = self.law.speed * (distance / self.law.keys.slow_radius_m).min(1.0);
         assert!(curvature.abs() <= self.most_curvature);
-        let sine = curvature * speed / (self.turn + curvature.abs() * speed / 2.0);
+        let sine = curvature * speed / (self.law.turn + curvature.abs() * speed / 2.0);
         let angle = if sine.abs() < 1.0 { sine.asin() } else { FRAC_PI_2.copysign(sine) };
         DVec2::from_angle(angle).rotate(pose.axis())
     }

@@ -13,7 +13,8 @@ use common::{
     geometry::wrap_angle,
     grid::Cell,
     kinematics::{LEAST_SPEED_M_S, Pose2},
-    mission::{Footprint, Mission, Response},
+    mission::{Footprint, Mission},
+    motion_law::MotionLaw,
 };
 use glam::DVec2;
 
@@ -69,10 +70,7 @@ pub(crate) struct Outline {
     half_width: f64,
     covers: f64,
     speed: f64,
-    turn: f64,
-    /// Cosine of the angle beyond which the controller turns on the spot.
-    turns: f64,
-    response: Response,
+    law: MotionLaw,
     brakes_within_s: f64,
     /// Next step last.
     plan: Vec<Planned>,
@@ -115,17 +113,15 @@ struct Reached {
 
 impl Outline {
     pub(crate) fn new(mission: &Mission, footprint: &Footprint) -> Self {
-        let (body, hurry) = (mission.body(), mission.hurry());
+        let (body, law) = (mission.body(), MotionLaw::new(mission));
         let [smaller, larger] = footprint.half_widths_m();
         assert!(smaller > 0.0 && larger <= body.radius_m + 1e-5);
         Self {
             points: footprint.outline(mission.grid_frame().resolution_m).collect(),
             half_width: smaller,
             covers: body.radius_m,
-            speed: mission.speed_m_s().min(NARROW_M_S),
-            turn: mission.turn_rad_s(),
-            turns: hurry.turns_beyond_deg.to_radians().cos(),
-            response: mission.trusted_response(),
+            speed: law.speed.min(NARROW_M_S),
+            law,
             brakes_within_s: mission.brakes_within_s(),
             plan: Vec::new(),
         }
@@ -204,7 +200,7 @@ impl Outline {
         let run = self.plan.iter().rev().take_while(|it| it.step[0] == way);
         let room_m = run.clone().count() as f64 * WAY_M;
         assert!(room_m > 0.0);
-        let speed = self.response.speed_to_stop_within(room_m, self.brakes_within_s);
+        let speed = self.law.response.speed_to_stop_within(room_m, self.brakes_within_s);
         let speed = speed.max(LEAST_SPEED_M_S);
         let fits = self.fits(view, pose);
         let moves = |way, turn| {
@@ -226,9 +222,9 @@ impl Outline {
             let pursuit = 2.0 * pose.axis().perp_dot(to) / to.length_squared();
             let speed = speed.min(self.speed);
             // By (15), the controller's turn rate is proportional to the sine.
-            let sines = [pursuit, turn / way].map(|curvature| curvature * speed / self.turn);
+            let sines = [pursuit, turn / way].map(|curvature| curvature * speed / self.law.turn);
             let mut sines = sines.into_iter().map(|sine| sine.clamp(-0.9, 0.9));
-            let sine = sines.find(|sine| moves(way, way * sine * self.turn / speed));
+            let sine = sines.find(|sine| moves(way, way * sine * self.law.turn / speed));
             sine.map(|sine| Passage::Drive(pose.along_arc(0.0, sine.asin()).axis(), speed))
         };
         let is_valid =
@@ -250,11 +246,11 @@ impl Outline {
         let (mut at, mut along, mut way, mut narrow) = (*pose, direction, 0.0, false);
         while way < AHEAD * self.covers && along != DVec2::ZERO {
             let (cosine, sine) = (at.axis().dot(along), at.axis().perp_dot(along));
-            if cosine < self.turns {
+            if cosine < self.law.turns {
                 let angle = sine.atan2(cosine);
                 at = at.along_arc(0.0, angle.clamp(-TURN_RAD / 2.0, TURN_RAD / 2.0));
             } else {
-                at = at.along_arc(STEP_M, STEP_M * self.turn * sine / self.speed);
+                at = at.along_arc(STEP_M, STEP_M * self.law.turn * sine / self.speed);
                 way += STEP_M;
                 along = view.along(at.position);
             }

@@ -35,6 +35,7 @@ pub use output::{Job, Snapshot, Solved, Work};
 /// Speed limit out of a hazard around the robot, m/s, because an obstacle is near.
 const WAY_OUT_M_S: f64 = 0.08;
 
+#[allow(clippy::large_enum_variant, reason = "a planner has one")]
 #[derive(Debug)]
 enum Advisor {
     /// Paper's method, and a robot without arcs or sensing.
