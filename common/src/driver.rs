@@ -255,7 +255,7 @@ pub struct Motion {
 /// Returns the greatest plausible range for nothing in reach; a greater one has another unit or is
 /// garbage.
 fn most_m(sensor: &Sensor) -> f64 {
-    2.0 * sensor.reach_m.max(sensor.model.reach_m())
+    2.0 * sensor.reach_m.max(sensor.model.product().reach_m)
 }
 
 /// Returns the reading of the sensor in `row` at a range, metres. Missing or beyond reach means
@@ -274,7 +274,7 @@ pub fn range_reading(row: usize, sensor: &Sensor, range: Option<f64>) -> RangeRe
 /// Converts a beam for the topic `scan`: infinite if missing or beyond reach, NaN if below the
 /// least range or beyond twice the reach.
 pub fn beam(sensor: &Sensor, range: Option<f32>) -> f32 {
-    let (least_m, reach_m) = (sensor.model.least_m() as f32, sensor.reach_m as f32);
+    let (least_m, reach_m) = (sensor.model.product().least_m as f32, sensor.reach_m as f32);
     match range {
         Some(range) if !(f64::from(least_m)..=most_m(sensor)).contains(&range.into()) => f32::NAN,
         Some(range) if range <= reach_m => range,

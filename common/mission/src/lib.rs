@@ -134,8 +134,8 @@ pub use response::{Base, ModelledSpeed, Response, ResponseKeys};
 pub use robot::{BatteryLimits, Body, Channel, Model, Protocol, RobotConfig, Steering};
 pub use ros2::Ros2Topics;
 pub use sensor::{
-    INFRARED_RANGERS, MOST_BEAMS, MOST_LASERS, MOST_SENSORS, Rplidar, SONARS, Sensor, SensorKind,
-    SensorModel, SensorRow, Sensors, SonarConfig,
+    INFRARED_RANGERS, MOST_BEAMS, MOST_LASERS, MOST_SENSORS, Product, Rplidar, SONARS, Sensor,
+    SensorKind, SensorModel, SensorRow, Sensors, SonarConfig,
 };
 pub use simulation::{
     BatteryPhysics, Block, BlockedWheels, Heights, Hole, InfraredPhysics, LaserTiming, Move,

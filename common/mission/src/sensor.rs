@@ -93,21 +93,25 @@ pub struct Rplidar {
 }
 
 /// Values from the source of a [`SensorModel`].
-pub(crate) struct Product {
+pub struct Product {
     pub kind: SensorKind,
     /// 0 for a ray.
-    field_of_view_deg: f64,
-    reach_m: f64,
-    least_m: f64,
+    pub field_of_view_deg: f64,
+    pub reach_m: f64,
+    pub least_m: f64,
     /// 1 except for lasers.
     beams: usize,
-    noise: (f64, f64),
+    /// Standard deviation of a range: metres, and a share of the range.
+    ///
+    /// The manuals give 15 mm up to half a metre and 5 % beyond for the LDS-02. They give less than
+    /// 1 % for the A1, and at most 40 mm for the UST-10LX. These count as two deviations.
+    pub noise: (f64, f64),
     /// Vertical field of view of a depth camera, degrees; 0 otherwise.
     tall_deg: f64,
 }
 
 impl SensorModel {
-    pub(crate) const fn product(self) -> Product {
+    pub const fn product(self) -> Product {
         use SensorKind::{Cone, Ray, Scan};
         let (kind, field_of_view_deg, reach_m, least_m, beams, noise) = match self {
             Self::Dur5200 => (Cone, 30.0, 2.55, 0.0, 1, (0.0, 0.0)),
@@ -157,19 +161,7 @@ impl SensorModel {
     /// The UST-10LX specification gives 4 m, against 10 m for white. Others get the same share,
     /// which is nominal: Slamtec states it for its RPLIDAR A3 (black 10 m, white 25 m).
     pub const fn black_reach_m(self) -> f64 {
-        0.4 * self.reach_m()
-    }
-
-    pub const fn field_of_view_deg(self) -> f64 {
-        self.product().field_of_view_deg
-    }
-
-    pub const fn reach_m(self) -> f64 {
-        self.product().reach_m
-    }
-
-    pub const fn least_m(self) -> f64 {
-        self.product().least_m
+        0.4 * self.product().reach_m
     }
 
     /// Returns the rise of the highest beam and the fall of the lowest per metre; 0 for lasers.
@@ -182,14 +174,6 @@ impl SensorModel {
     pub fn clears_from_m(self) -> f64 {
         let Product { least_m, tall_deg, .. } = self.product();
         if tall_deg > 0.0 { least_m } else { 0.0 }
-    }
-
-    /// Returns the standard deviation of a range: metres, and a share of the range.
-    ///
-    /// The manuals give 15 mm up to half a metre and 5 % beyond for the LDS-02. They give less than
-    /// 1 % for the A1, and at most 40 mm for the UST-10LX. These count as two deviations.
-    pub const fn beam_noise(self) -> (f64, f64) {
-        self.product().noise
     }
 }
 

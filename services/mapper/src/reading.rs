@@ -52,7 +52,7 @@ impl Rows {
             first_rad: mount.heading + first,
             step_rad,
             reach_m: laser.reach_m,
-            noise: laser.model.beam_noise(),
+            noise: laser.model.product().noise,
             clears_from_m: laser.model.clears_from_m(),
             beams,
         })

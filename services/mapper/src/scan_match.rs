@@ -430,7 +430,7 @@ mod tests {
                         f64::from(random) / f64::from(u32::MAX) - 0.5
                     })
                     .sum();
-                let (least_m, share) = MISSION.sensor_table()[0].model.beam_noise();
+                let (least_m, share) = MISSION.sensor_table()[0].model.product().noise;
                 let exact = f64::from(*range);
                 *range = (exact + noise * (least_m + share * exact)) as f32;
             }

@@ -80,8 +80,9 @@ pub(crate) struct SonarModel {
 
 impl SonarModel {
     pub(crate) fn of(sensor: &Sensor) -> Self {
-        let wide = sensor.field_of_view_deg / SensorModel::Dur5200.field_of_view_deg();
-        let far = (sensor.reach_m / SensorModel::Dur5200.reach_m()).min(1.0);
+        let product = SensorModel::Dur5200.product();
+        let wide = sensor.field_of_view_deg / product.field_of_view_deg;
+        let far = (sensor.reach_m / product.reach_m).min(1.0);
         Self {
             arc: 16.0 * DEGREE * wide,
             against: 8.0 * DEGREE * wide,

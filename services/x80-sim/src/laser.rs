@@ -137,7 +137,7 @@ impl Laser {
     }
 
     fn reading(&mut self, near: &[Solid], from: DVec2, heading: f64) -> Option<f32> {
-        let (noise_m, noise_share) = self.sensor.model.beam_noise();
+        let (noise_m, noise_share) = self.sensor.model.product().noise;
         let black_reach_m = self.sensor.model.black_reach_m();
         let along = DVec2::from_angle(heading);
         let rise = self.sensor.model.rise();
@@ -154,7 +154,7 @@ impl Laser {
         let noise = self.noise.normal(1.0);
         let range = hit.map(|(range, _)| range + noise * (noise_m + noise_share * range));
         match range {
-            Some(range) if lost || range < self.sensor.model.least_m() => Some(-1.0),
+            Some(range) if lost || range < self.sensor.model.product().least_m => Some(-1.0),
             Some(range) if range <= self.sensor.reach_m => Some(range as f32),
             _ => None,
         }

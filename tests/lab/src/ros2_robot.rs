@@ -269,7 +269,7 @@ impl Program {
         let taken_ns = now_ns - (age_s.unwrap_or_default() * 1e9) as u64;
         let beam_s = time_s.unwrap_or_default() / ranges.len() as f64;
         let period_s = sensor.every_ticks as f64 / self.stated.robot.rate_hz;
-        let limits = [sensor.model.least_m(), sensor.reach_m];
+        let limits = [sensor.model.product().least_m, sensor.reach_m];
         let ranges = ranges.iter().map(range).collect();
         let header = Header::at(taken_ns, &sensor.name);
         Some(scan(header, sensor.fan().into(), limits, [beam_s, period_s], ranges))

@@ -156,7 +156,7 @@ impl Shown {
                 RangeStatus::Invalid => f64::NAN,
                 RangeStatus::Absent => continue,
             };
-            let limits = [sensor.model.least_m(), sensor.reach_m];
+            let limits = [sensor.model.product().least_m, sensor.reach_m];
             let [min_range, max_range] = limits.map(|limit| limit as f32);
             let message = Range {
                 header: Header::at(now_ns, &sensor.name),
@@ -190,7 +190,7 @@ impl Shown {
             let beam_s = beam_ns as f64 * 1e-9 / self.pace;
             let at_ns = now_ns.saturating_add_signed((after_tick_ns as f64 / self.pace) as i64);
             let fan = [header.first_rad - sensor.mount.looks_rad(), header.step_rad];
-            let limits = [sensor.model.least_m(), header.reach_m];
+            let limits = [sensor.model.product().least_m, header.reach_m];
             let header = Header::at(at_ns, &sensor.name);
             let told = beams.iter().map(|range| within(limits, f64::from(*range)) as f32).collect();
             sink(Id::Scan(row), scan(header, fan, limits, [beam_s, period_s], told));
