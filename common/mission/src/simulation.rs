@@ -163,50 +163,73 @@ const fn chosen(row: &[f64], realism: Realism) -> f64 {
     row[if column < row.len() { column } else { row.len() - 1 }]
 }
 
-/// Declares the settled struct for the simulator and the written one with optional keys from one
-/// table: key, range, and a row for [`chosen`].
-macro_rules! section {
-    (
+/// Declares the sections, in the order of the guide: for each the settled struct for the simulator,
+/// and the written one with optional keys, from one table of key, range, and a row for [`chosen`].
+macro_rules! sections {
+    ($(
         $(#[$about:meta])*
-        $settled:ident, written as $written:ident in $table:literal {
+        $section:ident: $settled:ident, written as $written:ident {
             $($(#[$doc:meta])* $key:ident in $range:expr => $($value:expr),+;)*
         }
-    ) => {
-        $(#[$about])*
+    )*) => {
+        $(
+            $(#[$about])*
+            #[derive(Clone, Copy, Debug, PartialEq)]
+            pub struct $settled {
+                $($(#[$doc])* pub $key: f64,)*
+            }
+
+            impl $settled {
+                pub const fn preset(realism: Realism) -> Self {
+                    Self { $($key: chosen(&[$($value),+], realism),)* }
+                }
+
+                fn ranges(&self) -> Vec<Ranged> {
+                    vec![$((
+                        concat!("simulation.", stringify!($section), ".", stringify!($key)),
+                        self.$key,
+                        $range,
+                    ),)*]
+                }
+            }
+
+            rows! {
+                #[doc = concat!("`[simulation.", stringify!($section), "]` as a mission writes it: [`", stringify!($settled), "`].")]
+                #[derive(Copy, Default)]
+                #[serde(default)]
+                $written { $($(#[$doc])* $key: Option<f64>,)* }
+            }
+
+            impl $written {
+                pub fn over(&self, realism: Realism) -> $settled {
+                    let preset = $settled::preset(realism);
+                    $settled { $($key: self.$key.unwrap_or(preset.$key),)* }
+                }
+            }
+        )*
+
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct $settled {
-            $($(#[$doc])* pub $key: f64,)*
+        pub struct Physics {
+            $(pub $section: $settled,)*
         }
 
-        impl $settled {
-            pub const fn preset(realism: Realism) -> Self {
-                Self { $($key: chosen(&[$($value),+], realism),)* }
+        impl Simulation {
+            pub fn physics(&self) -> Physics {
+                Physics { $($section: self.$section.over(self.realism),)* }
             }
 
-            fn ranges(&self) -> Vec<Ranged> {
-                vec![$((concat!($table, ".", stringify!($key)), self.$key, $range),)*]
-            }
-        }
-
-        rows! {
-            #[doc = concat!("`[", $table, "]` as a mission writes it: [`", stringify!($settled), "`].")]
-            #[derive(Copy, Default)]
-            #[serde(default)]
-            $written { $($(#[$doc])* $key: Option<f64>,)* }
-        }
-
-        impl $written {
-            pub fn over(&self, realism: Realism) -> $settled {
-                let preset = $settled::preset(realism);
-                $settled { $($key: self.$key.unwrap_or(preset.$key),)* }
+            /// Returns each key with its value and range.
+            pub fn ranges(&self) -> Vec<Ranged> {
+                let physics = self.physics();
+                [$(physics.$section.ranges(),)*].concat()
             }
         }
     };
 }
 
-section! {
+sections! {
     /// Physics of the ultrasonic rangers (the DUR5200 of the X80, 40 kHz).
-    SonarPhysics, written as SonarKeys in "simulation.sonar" {
+    sonar: SonarPhysics, written as SonarKeys {
         /// Half of the beam angle with echoes at full range, degrees.
         cone_deg in 0.0..=60.0 => 15.0;
         /// Half angle at which the last answer fades, degrees; up to `cone_deg` there is no lobe.
@@ -242,38 +265,30 @@ section! {
         /// cm broom handle. The X80's ranger was not measured.
         post_reach_m in 0.05..=10.0 => 2.55, 2.0;
     }
-}
 
-section! {
-    InfraredPhysics, written as InfraredKeys in "simulation.infrared" {
+    infrared: InfraredPhysics, written as InfraredKeys {
         noise_counts in 0.0..=1000.0 => 5.0, 15.0;
     }
-}
 
-section! {
     /// Timing of laser scans from a JSON robot. Moving things are seen where they are when the scan
     /// is sent.
-    LaserTiming, written as LaserKeys in "simulation.laser" {
+    laser: LaserTiming, written as LaserKeys {
         delay_s in 0.0..=1.0 => 0.0;
         sweep_s in 0.0..=1.0 => 0.0;
         stated_share in SHARE => 1.0;
     }
-}
 
-section! {
     /// Gyro of a robot that has one. The bias is constant within a mission.
-    GyroPhysics, written as GyroKeys in "simulation.gyro" {
+    gyro: GyroPhysics, written as GyroKeys {
         noise_deg_sqrt_s in 0.0..=10.0 => 0.0, 0.015, 0.05;
         /// Uniform.
         bias_spread_deg_s in 0.0..=10.0 => 0.0, 0.02, 0.05;
         /// Uniform.
         scale_spread in 0.0..=0.5 => 0.0, 0.005, 0.01;
     }
-}
 
-section! {
     /// Wheel speed loops and ground contact.
-    WheelPhysics, written as WheelKeys in "simulation.wheels" {
+    wheels: WheelPhysics, written as WheelKeys {
         gain in 0.05..=2.0 => 1.0, 0.78;
         delay_s in 0.0..=1.0 => 0.0, 0.07;
         lag_s in 0.0..=5.0 => 0.06, 0.08;
@@ -309,30 +324,24 @@ section! {
         /// stall.
         contact_slip in SHARE => 0.0, 1.0;
     }
-}
 
-section! {
     /// Heights of the body and its sensors above the floor, equal in all presets, for shapes with
     /// `bottom_m` or `top_m`. Nominal: the X80's drawing gives none.
-    Heights, written as HeightKeys in "simulation.heights" {
+    heights: Heights, written as HeightKeys {
         ground_clearance_m in 0.0..=5.0 => 0.03;
         body_top_m in 0.01..=5.0 => 0.255;
         sonar_m in 0.0..=5.0 => 0.18;
         infrared_m in 0.0..=5.0 => 0.18;
     }
-}
 
-section! {
     /// Batteries; all three are alike.
-    BatteryPhysics, written as BatteryKeys in "simulation.battery" {
+    battery: BatteryPhysics, written as BatteryKeys {
         start_v in 1.0..=9.0 => 7.8;
         drain_v_per_min in 0.0..=9.0 => 0.0, 0.01;
     }
-}
 
-section! {
     /// Radio channel that is good or out in both directions alike, and its effects on datagrams.
-    Radio, written as RadioKeys in "simulation.radio" {
+    radio: Radio, written as RadioKeys {
         outage_share in 0.0..=0.95 => 0.0;
         outage_mean_s in 0.001..=60.0 => 0.5;
         outage_max_s in 0.001..=600.0 => 2.0;
@@ -350,37 +359,4 @@ impl Heights {
     pub fn touched(&self, shapes: &Shapes) -> Shapes {
         shapes.between(self.ground_clearance_m, self.body_top_m)
     }
-}
-
-/// Declares the sections, in the order of the guide.
-macro_rules! physics {
-    ($($section:ident: $settled:ident,)*) => {
-        #[derive(Clone, Copy, Debug, PartialEq)]
-        pub struct Physics {
-            $(pub $section: $settled,)*
-        }
-
-        impl Simulation {
-            pub fn physics(&self) -> Physics {
-                Physics { $($section: self.$section.over(self.realism),)* }
-            }
-
-            /// Returns each key with its value and range.
-            pub fn ranges(&self) -> Vec<Ranged> {
-                let physics = self.physics();
-                [$(physics.$section.ranges(),)*].concat()
-            }
-        }
-    };
-}
-
-physics! {
-    sonar: SonarPhysics,
-    infrared: InfraredPhysics,
-    laser: LaserTiming,
-    gyro: GyroPhysics,
-    wheels: WheelPhysics,
-    heights: Heights,
-    battery: BatteryPhysics,
-    radio: Radio,
 }
