@@ -94,8 +94,7 @@ impl Json {
             let why = self.gyro.take(report.gyro, turned, &self.body, 1e9 / self.rate_hz);
             heard.refused = why.map(Refusal::from).or(heard.refused.take());
             let held = report.held.unwrap_or_default();
-            let motion = motion(&self.body, turned, speeds, held);
-            heard.motion = Some(Motion { stamp_ns, ..motion });
+            heard.motion = Some(Motion { stamp_ns, ..motion(&self.body, turned, speeds, held) });
             heard.stamp_ns = stamp_ns.or(heard.stamp_ns);
         }
         heard.scans.extend(scans);

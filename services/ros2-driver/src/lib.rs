@@ -185,8 +185,10 @@ impl Ros2 {
             }
             let [v, omega] = odometry.twist;
             let speeds = self.body.unlimited().wheels(Twist { v, omega });
-            let motion = motion(&self.body, turned, speeds, [false; 2]);
-            heard.motion = Some(Motion { stamp_ns: Some(stamp_ns), ..motion });
+            heard.motion = Some(Motion {
+                stamp_ns: Some(stamp_ns),
+                ..motion(&self.body, turned, speeds, [false; 2])
+            });
         }
         Ok(())
     }
