@@ -6,6 +6,15 @@ use crate::{
     verification::{Check, Verification},
 };
 
+/// Column and row of a cell, negative or beyond the last outside the map.
+pub(crate) type Place = (i64, i64);
+
+/// Returns the cell at `place`; a negative index gives one outside every map.
+pub(crate) fn cell_at((col, row): Place) -> Cell {
+    let index = |at: i64| usize::try_from(at).unwrap_or(usize::MAX);
+    Cell { col: index(col), row: index(row) }
+}
+
 /// Verified field of one [`Domain`].
 ///
 /// u is 1 at the target, 0 in blocked and cut-off cells, and positive in every cell that can reach
@@ -112,10 +121,10 @@ impl Field {
         least.log10()
     }
 
-    pub(crate) fn steepest_ascent(&self, col: i64, row: i64) -> [i64; 2] {
+    pub(crate) fn steepest_ascent(&self, (col, row): Place) -> [i64; 2] {
         let mut best = (Scaled::ZERO, [0; 2]);
         for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-            let u = self.u_at(col + dc, row + dr);
+            let u = self.u_at((col + dc, row + dr));
             if u > best.0 {
                 best = (u, [dc, dr]);
             }
@@ -128,10 +137,7 @@ impl Field {
     }
 
     /// Returns 0 outside the map.
-    pub(crate) fn u_at(&self, col: i64, row: i64) -> Scaled {
-        match (usize::try_from(col), usize::try_from(row)) {
-            (Ok(col), Ok(row)) => self.u(Cell { col, row }),
-            _ => Scaled::ZERO,
-        }
+    pub(crate) fn u_at(&self, place: Place) -> Scaled {
+        self.u(cell_at(place))
     }
 }

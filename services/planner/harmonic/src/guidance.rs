@@ -8,7 +8,10 @@
 //! The gradient therefore never leads into a blocked cell. Only ratios of neighbouring u matter, so
 //! the common exponent is removed first.
 
-use crate::{Cell, Field};
+use crate::{
+    Cell, Field,
+    field::{Place, cell_at},
+};
 
 /// Answer of a field at a position; directions are unit vectors (along columns, along rows).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,31 +47,30 @@ impl Field {
         }
         // The casts saturate, so far positions stay outside the map.
         let here = (col.round() as i64, row.round() as i64);
-        if self.blocked_at(here.0, here.1) {
+        let cell = cell_at(here);
+        if self.is_blocked(cell) {
             return self.way_out(col, row);
         }
-        if self.u_at(here.0, here.1).is_zero() {
+        if !self.is_reachable(cell) {
             return Guidance::Unreachable;
         }
-        let cell = Cell { col: here.0 as usize, row: here.1 as usize };
         if cell == self.target() {
             return Guidance::AtTarget;
         }
         let offset = [col - here.0 as f64, row - here.1 as f64];
-        let gradient = self.interpolate(here, offset, |c, r| self.central_difference(here, (c, r)));
-        let allowed = self.without_wall_component(here, offset, gradient);
+        let gradient = self.interpolate(here, offset, |there| self.central_difference(here, there));
+        let mut allowed = self.without_wall_component(here, offset, gradient);
         // Steepest ascent replaces the removed component and leads around walls. A gradient
         // straight into a wall would otherwise keep its direction.
         let removed = (gradient[0] - allowed[0]).hypot(gradient[1] - allowed[1]);
-        let mut total = allowed;
         if removed > 0.0 {
-            let ascent = self.interpolate(here, offset, |c, r| {
-                self.steepest_ascent(c, r).map(|step| step as f64)
+            let ascent = self.interpolate(here, offset, |there| {
+                self.steepest_ascent(there).map(|step| step as f64)
             });
             let ascent = self.without_wall_component(here, offset, ascent);
-            total = [allowed[0] + removed * ascent[0], allowed[1] + removed * ascent[1]];
+            allowed = add_scaled(allowed, removed, ascent);
         }
-        unit(total, SADDLE)
+        unit(allowed, SADDLE)
             .or_else(|| self.toward_best_neighbour(here, [col, row]))
             .map_or(Guidance::Unreachable, Guidance::Along)
     }
@@ -87,52 +89,44 @@ impl Field {
             .or_else(|| self.toward_best_neighbour(here, [cell.col as f64, cell.row as f64]))
     }
 
-    fn blocked_at(&self, col: i64, row: i64) -> bool {
-        match (usize::try_from(col), usize::try_from(row)) {
-            (Ok(col), Ok(row)) => self.is_blocked(Cell { col, row }),
-            _ => true,
-        }
-    }
-
     /// Returns the bilinear mean of `value` over the reachable cells among the four centres around
     /// the position at `offset` from the centre of `here`.
     fn interpolate(
         &self,
-        here: (i64, i64),
+        here: Place,
         offset: [f64; 2],
-        value: impl Fn(i64, i64) -> [f64; 2],
+        value: impl Fn(Place) -> [f64; 2],
     ) -> [f64; 2] {
         let side = |o: f64| if o < 0.0 { -1 } else { 1 };
         let (col, row) = (here.0 + side(offset[0]), here.1 + side(offset[1]));
-        let [x, y] = [offset[0].abs(), offset[1].abs()];
+        let [x, y] = offset.map(f64::abs);
 
         assert!(x <= 0.5 && y <= 0.5);
-        let free = |c: i64, r: i64| !self.u_at(c, r).is_zero();
-        let beside = free(col, here.1);
-        let below = free(here.0, row);
-        let diagonal = (beside || below) && free(col, row);
+        let free = |place| !self.u_at(place).is_zero();
+        let beside = free((col, here.1));
+        let below = free((here.0, row));
+        let diagonal = (beside || below) && free((col, row));
 
         let mut sum = [0.0; 2];
-        for (used, (c, r), weight) in [
+        for (used, there, weight) in [
             (true, here, (1.0 - x) * (1.0 - y)),
             (beside, (col, here.1), x * (1.0 - y)),
             (below, (here.0, row), (1.0 - x) * y),
             (diagonal, (col, row), x * y),
         ] {
             if used && weight > 0.0 {
-                let value = value(c, r);
-                sum = [sum[0] + weight * value[0], sum[1] + weight * value[1]];
+                sum = add_scaled(sum, weight, value(there));
             }
         }
         sum
     }
 
     /// In units of u(here).
-    fn central_difference(&self, here: (i64, i64), there: (i64, i64)) -> [f64; 2] {
-        let own = self.u_at(there.0, there.1);
+    fn central_difference(&self, here: Place, there: Place) -> [f64; 2] {
+        let own = self.u_at(there);
         assert!(!own.is_zero(), "the cell is reachable");
         let u = |dc: i64, dr: i64| {
-            let beside = self.u_at(there.0 + dc, there.1 + dr);
+            let beside = self.u_at((there.0 + dc, there.1 + dr));
             beside.relative_to(own.exponent) / own.mantissa
         };
         let relative = [0.5 * (u(1, 0) - u(-1, 0)), 0.5 * (u(0, 1) - u(0, -1))];
@@ -143,11 +137,11 @@ impl Field {
     /// Returns u(there) / u(here).
     ///
     /// A diagonal neighbour is reached by way of a free cell beside both.
-    fn ratio(&self, here: (i64, i64), there: (i64, i64)) -> f64 {
-        let step = |from: (i64, i64), to: (i64, i64)| {
-            let own = self.u_at(from.0, from.1);
+    fn ratio(&self, here: Place, there: Place) -> f64 {
+        let step = |from, to| {
+            let own = self.u_at(from);
             assert!(!own.is_zero());
-            self.u_at(to.0, to.1).relative_to(own.exponent) / own.mantissa
+            self.u_at(to).relative_to(own.exponent) / own.mantissa
         };
         if here == there {
             1.0
@@ -155,7 +149,7 @@ impl Field {
             step(here, there)
         } else {
             let beside = (there.0, here.1);
-            let zero = self.u_at(beside.0, beside.1).is_zero();
+            let zero = self.u_at(beside).is_zero();
             let between = if zero { (here.0, there.1) } else { beside };
             step(here, between) * step(between, there)
         }
@@ -169,12 +163,11 @@ impl Field {
     /// At most two neighbours, at right angles, are within reach, so their order is irrelevant.
     fn without_wall_component(
         &self,
-        here: (i64, i64),
+        here: Place,
         offset: [f64; 2],
-        gradient: [f64; 2],
+        mut gradient: [f64; 2],
     ) -> [f64; 2] {
-        let blocked = |dc: i64, dr: i64| self.blocked_at(here.0 + dc, here.1 + dr);
-        let mut allowed = gradient;
+        let blocked = |dc: i64, dr: i64| self.is_blocked(cell_at((here.0 + dc, here.1 + dr)));
         for (dc, dr) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)] {
             let diagonal = dc != 0 && dr != 0;
             if !blocked(dc, dr) || (diagonal && (blocked(dc, 0) || blocked(0, dr))) {
@@ -194,20 +187,20 @@ impl Field {
                 let length = (dc as f64).hypot(dr as f64);
                 [dc as f64 / length, dr as f64 / length]
             };
-            let inward = allowed[0] * normal[0] + allowed[1] * normal[1];
+            let inward = gradient[0] * normal[0] + gradient[1] * normal[1];
             debug_assert!((normal[0].hypot(normal[1]) - 1.0).abs() < 1e-9);
             if inward > 0.0 {
                 let share = inward * (1.0 - distance / WALL_REACH);
-                allowed = [allowed[0] - share * normal[0], allowed[1] - share * normal[1]];
+                gradient = add_scaled(gradient, -share, normal);
             }
         }
-        allowed
+        gradient
     }
 
     /// Two adjacent cells are convex together, so the straight way is free from anywhere in `here`.
-    fn toward_best_neighbour(&self, here: (i64, i64), position: [f64; 2]) -> Option<[f64; 2]> {
-        debug_assert!(!self.u_at(here.0, here.1).is_zero());
-        let [dc, dr] = self.steepest_ascent(here.0, here.1).map(|step| step as f64);
+    fn toward_best_neighbour(&self, here: Place, position: [f64; 2]) -> Option<[f64; 2]> {
+        debug_assert!(!self.u_at(here).is_zero());
+        let [dc, dr] = self.steepest_ascent(here).map(|step| step as f64);
         unit([here.0 as f64 + dc - position[0], here.1 as f64 + dr - position[1]], 0.0)
     }
 
@@ -215,14 +208,14 @@ impl Field {
         let (width, height) = (self.width() as i64, self.height() as i64);
         // Far outside, the search starts at the rim of the map.
         let from = ((col.round() as i64).clamp(-1, width), (row.round() as i64).clamp(-1, height));
-        let mut best: Option<(f64, (i64, i64))> = None;
+        let mut best: Option<(f64, Place)> = None;
         for ring in 1..=width.max(height) + 1 {
             // Every cell of this ring and beyond is at least `ring` away.
             if best.is_some_and(|(distance, _)| distance <= ring as f64) {
                 break;
             }
             for (c, r) in ring_cells(from, ring, width, height) {
-                if !self.u_at(c, r).is_zero() {
+                if !self.u_at((c, r)).is_zero() {
                     let distance = (c as f64 - from.0 as f64).hypot(r as f64 - from.1 as f64);
                     if best.is_none_or(|(least, _)| distance < least) {
                         best = Some((distance, (c, r)));
@@ -235,12 +228,7 @@ impl Field {
     }
 }
 
-fn ring_cells(
-    centre: (i64, i64),
-    ring: i64,
-    width: i64,
-    height: i64,
-) -> impl Iterator<Item = (i64, i64)> {
+fn ring_cells(centre: Place, ring: i64, width: i64, height: i64) -> impl Iterator<Item = Place> {
     let columns = (centre.0 - ring).max(0)..=(centre.0 + ring).min(width - 1);
     let rows = (centre.1 - ring + 1).max(0)..=(centre.1 + ring - 1).min(height - 1);
     let edges =
@@ -250,6 +238,11 @@ fn ring_cells(
     edges
         .flat_map(move |r| columns.clone().map(move |c| (c, r)))
         .chain(sides.flat_map(move |c| rows.clone().map(move |r| (c, r))))
+}
+
+/// Returns `vector` + `factor` * `other`.
+pub(crate) fn add_scaled(vector: [f64; 2], factor: f64, other: [f64; 2]) -> [f64; 2] {
+    [vector[0] + factor * other[0], vector[1] + factor * other[1]]
 }
 
 fn unit(vector: [f64; 2], least: f64) -> Option<[f64; 2]> {

@@ -1,6 +1,6 @@
 //! Path along the field from a cell to the target.
 
-use crate::{Cell, Field, Guidance};
+use crate::{Cell, Field, Guidance, guidance::add_scaled};
 
 const STEP: f64 = 0.25;
 /// Limit of steps within one cell; six steps cross it.
@@ -22,23 +22,21 @@ impl Field {
         let (mut cell, mut steps) = ((start.col as i64, start.row as i64), 0);
         let mut at = [start.col as f64, start.row as f64];
         let mut path = vec![at];
-        while let Guidance::Along([x, y]) = self.guidance(at[0], at[1]) {
-            let ahead = [at[0] + STEP * x, at[1] + STEP * y];
+        while let Guidance::Along(direction) = self.guidance(at[0], at[1]) {
+            let ahead = add_scaled(at, STEP, direction);
             let next = (ahead[0].round() as i64, ahead[1].round() as i64);
             let stays = next == cell && steps < MOST_STEPS;
-            let u = |col, row| self.u_at(col, row);
+            let u = |place| self.u_at(place);
             // A diagonal step must not cut the corner of a blocked cell.
-            let cuts = u(next.0, cell.1).is_zero() || u(cell.0, next.1).is_zero();
-            if stays || u(next.0, next.1) > u(cell.0, cell.1) && !cuts {
+            let cuts = u((next.0, cell.1)).is_zero() || u((cell.0, next.1)).is_zero();
+            if stays || u(next) > u(cell) && !cuts {
                 (at, cell) = (ahead, next);
                 steps = if stays { steps + 1 } else { 0 };
             } else {
-                let [right, down] = self.steepest_ascent(cell.0, cell.1);
-                assert!(
-                    u(cell.0 + right, cell.1 + down) > u(cell.0, cell.1),
-                    "the field has no maximum"
-                );
-                cell = (cell.0 + right, cell.1 + down);
+                let [right, down] = self.steepest_ascent(cell);
+                let best = (cell.0 + right, cell.1 + down);
+                assert!(u(best) > u(cell), "the field has no maximum");
+                cell = best;
                 (at, steps) = ([cell.0 as f64, cell.1 as f64], 0);
             }
             path.push(at);
