@@ -12,49 +12,43 @@
 
 mod back_substitution;
 mod breadth_first;
-mod budget;
 mod dense;
 mod gauss_seidel;
+mod job;
 mod tree;
 mod workspace;
 
-use crate::{Cancellation, Domain, SolveError, store::Store};
+use crate::{SolveError, store::Store};
 
 use back_substitution::substitute;
 
 pub(crate) use breadth_first::BreadthFirst;
-pub(crate) use budget::Budget;
 pub(crate) use gauss_seidel::relax;
+pub(crate) use job::Job;
 pub(crate) use tree::Tree;
 pub(crate) use workspace::Workspace;
 
 pub(crate) type Ordered = (BreadthFirst, Tree);
 
 /// Orders the cells from the target.
-pub(crate) fn order(
-    domain: &Domain,
-    budget: &Budget,
-    cancellation: &Cancellation,
-) -> Result<Ordered, SolveError> {
-    let pass = BreadthFirst::from_target(domain, budget, cancellation)?;
-    let tree = Tree::of(&pass, budget, cancellation)?;
+pub(crate) fn order(job: Job<'_>) -> Result<Ordered, SolveError> {
+    let pass = BreadthFirst::from_target(job)?;
+    let tree = Tree::of(&pass, job)?;
     Ok((pass, tree))
 }
 
-/// Solves the five-point equations on `domain`, exact except for rounding.
+/// Solves the five-point equations on the map of `job`, exact except for rounding.
 ///
 /// With `known`, solves only the cells that `pass` visits, from the values of its first cells.
 pub(crate) fn solve(
-    domain: &Domain,
+    job: Job<'_>,
     ordered: &Ordered,
     known: Option<&Store>,
-    budget: &Budget,
     workspace: &mut Workspace,
-    cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
-    budget.ask(ordered.1.cost.bytes)?;
-    let solved = factor(domain, ordered, workspace, cancellation)
-        .and_then(|()| substitute(domain, ordered, known, workspace, cancellation));
+    job.ask(ordered.1.cost.bytes)?;
+    let solved = factor(job, ordered, workspace)
+        .and_then(|()| substitute(job, ordered, known, workspace));
     workspace.trim();
     solved
 }
@@ -62,10 +56,9 @@ pub(crate) fn solve(
 const NOWHERE: u32 = u32::MAX;
 
 fn factor(
-    domain: &Domain,
+    job: Job<'_>,
     (pass, tree): &Ordered,
     workspace: &mut Workspace,
-    cancellation: &Cancellation,
 ) -> Result<(), SolveError> {
     let Workspace { rows, lengths, slot, .. } = workspace;
     rows.clear();
@@ -81,7 +74,7 @@ fn factor(
     let mut matrix = dense::Matrix::default();
 
     for (index, front) in tree.fronts.iter().enumerate() {
-        cancellation.check()?;
+        job.cancellation.check()?;
         let cells = tree.cells(front);
         let own = front.own as usize;
         assert!(own <= cells.len());
@@ -99,7 +92,7 @@ fn factor(
             spent.push(update);
         }
         for (at, &place) in cells[..own].iter().enumerate() {
-            matrix.add(at, at, 4.0 * (1.0 + domain.screening_of(pass.cell(place))));
+            matrix.add(at, at, 4.0 * (1.0 + job.domain.screening_of(pass.cell(place))));
             for neighbour in pass.neighbours(place) {
                 // Cells that a child eliminated have no slot here; pairs within the front are met
                 // twice.

@@ -8,7 +8,7 @@ use std::{num::NonZeroUsize, ops::Range};
 
 use crate::{
     Cancellation, Domain, Field, Method, SolveError,
-    multifrontal::{self, Budget, Ordered, Workspace},
+    multifrontal::{self, Job, Ordered, Workspace},
     multigrid::{DOUBLE_CYCLES, FIRST_CHECK, Multigrid, SINGLE_CYCLES},
     multigrid_bands,
     real::Real,
@@ -127,16 +127,14 @@ impl Solver {
 
 struct Task<'a> {
     threads: NonZeroUsize,
-    domain: &'a Domain,
-    budget: Budget,
-    cancellation: &'a Cancellation,
+    job: Job<'a>,
     observe: &'a mut dyn FnMut(Phase),
 }
 
 impl Task<'_> {
     fn check(&mut self, store: &Store) -> Check {
         (self.observe)(Phase::Solved);
-        let check = verification::check(self.domain, store, self.threads);
+        let check = verification::check(self.job.domain, store, self.threads);
         (self.observe)(Phase::Verified);
         check
     }
@@ -163,8 +161,8 @@ impl Solver {
     ) -> Result<Field, SolveError> {
         let Settings { threads, memory_limit } = self.settings;
         cancellation.check()?;
-        let budget = Budget::of(domain, memory_limit);
-        let mut task = Task { threads, domain, budget, cancellation, observe };
+        let job = Job::new(domain, memory_limit, cancellation);
+        let mut task = Task { threads, job, observe };
         if let Some(near) = near.filter(|near| near.fits(domain)) {
             let method = near.verification().method;
             // The shape of the map alone decides the cost of the factorisation, so the usual plan
@@ -176,7 +174,7 @@ impl Solver {
                 }
             }
         }
-        let mut ordered = plan(domain, &budget, cancellation)?;
+        let mut ordered = plan(job)?;
         // Unless it was planned, the factorisation is the last resort.
         let multigrid: &[_] = match ordered {
             Some(_) => &[],
@@ -204,18 +202,16 @@ impl Solver {
         planned: Option<Ordered>,
         task: &mut Task<'_>,
     ) -> Result<Solved, SolveError> {
-        let Task { domain, budget, cancellation, .. } = *task;
+        let job = task.job;
         let ordered = match planned {
             Some(ordered) => ordered,
-            None => multifrontal::order(domain, &budget, cancellation)?,
+            None => multifrontal::order(job)?,
         };
         (task.observe)(Phase::SetUp);
-        let workspace = &mut self.multifrontal;
-        let mut store =
-            multifrontal::solve(domain, &ordered, None, &budget, workspace, cancellation)?;
+        let mut store = multifrontal::solve(job, &ordered, None, &mut self.multifrontal)?;
         let mut check = task.check(&store);
         if !check.holds() {
-            store = multifrontal::relax(domain, &ordered.0, &store);
+            store = multifrontal::relax(job.domain, &ordered.0, &store);
             check = task.check(&store);
         }
         Ok((store, check, Method::Multifrontal))
@@ -231,7 +227,7 @@ impl Solver {
         near: Option<&Field>,
         task: &mut Task<'_>,
     ) -> Result<Solved, SolveError> {
-        let Task { domain, budget, cancellation, .. } = *task;
+        let job = task.job;
         let most_cycles = |from_scratch| if near.is_some() { NEAR_CYCLES } else { from_scratch };
         if method == Method::MultigridDouble {
             let (store, check) = self.double.solve(task, near, most_cycles(DOUBLE_CYCLES))?;
@@ -241,18 +237,17 @@ impl Solver {
         if check.holds() || check.unreached == 0 {
             return Ok((store, check, Method::MultigridSingle));
         }
-        let beyond = beyond_single(domain, &store, &budget, cancellation)?;
-        let (store, method) = if let Some(ordered) = beyond {
-            let (known, workspace) = (Some(&store), &mut self.multifrontal);
-            let store =
-                multifrontal::solve(domain, &ordered, known, &budget, workspace, cancellation)?;
+        let (store, method) = if let Some(ordered) = beyond_single(job, &store)? {
+            let known = Some(&store);
+            let store = multifrontal::solve(job, &ordered, known, &mut self.multifrontal)?;
             (store, Method::MultigridAndMultifrontal)
         } else {
             let cycled = &mut || (task.observe)(Phase::Cycled);
             // The bands overwrite the levels, so the next solve sets them up again.
             self.single.width = 0;
             let levels = &mut self.single.levels;
-            let store = multigrid_bands::solve(domain, store, levels, cancellation, cycled)?;
+            let store =
+                multigrid_bands::solve(job.domain, store, levels, job.cancellation, cycled)?;
             (store, Method::MultigridBands)
         };
         let check = task.check(&store);
@@ -271,7 +266,7 @@ where
         near: Option<&Field>,
         most_cycles: usize,
     ) -> Result<(Store, Check), SolveError> {
-        let Task { threads, domain, cancellation, .. } = *task;
+        let (threads, Job { domain, cancellation, .. }) = (task.threads, task.job);
         let levels = self.prepare(domain);
         (task.observe)(Phase::SetUp);
         let mut first_check = FIRST_CHECK;

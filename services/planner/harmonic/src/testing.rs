@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use crate::{
     Cancellation, Domain, Field, Method, SolveError,
-    multifrontal::{self, Budget, Workspace},
+    multifrontal::{self, Job, Workspace},
     verification,
 };
 
@@ -17,11 +17,9 @@ use crate::{
 /// Succeeds on every valid map: the memory is unlimited and nothing cancels the solve.
 pub fn solve_exactly(domain: &Domain) -> Result<Field, SolveError> {
     let cancellation = Cancellation::new();
-    let budget = Budget::of(domain, u64::MAX);
-    let ordered = multifrontal::order(domain, &budget, &cancellation)?;
-    let mut workspace = Workspace::default();
-    let store =
-        multifrontal::solve(domain, &ordered, None, &budget, &mut workspace, &cancellation)?;
+    let job = Job::new(domain, u64::MAX, &cancellation);
+    let ordered = multifrontal::order(job)?;
+    let store = multifrontal::solve(job, &ordered, None, &mut Workspace::default())?;
     let store = multifrontal::relax(domain, &ordered.0, &store);
     let check = verification::check(domain, &store, NonZeroUsize::MIN);
     Ok(Field::new(domain, store, &check, Method::Multifrontal))

@@ -1,8 +1,8 @@
 //! Back substitution in extended range: from the factors to u, outwards from the cells with known
 //! u.
 
-use super::{Ordered, breadth_first::BreadthFirst, workspace::Workspace};
-use crate::{Cancellation, Domain, Scaled, SolveError, store::Store};
+use super::{Job, Ordered, breadth_first::BreadthFirst, workspace::Workspace};
+use crate::{Domain, Scaled, SolveError, store::Store};
 
 /// Binary orders of magnitude up to which a front uses plain `f64` with one common exponent.
 const PLAIN_SPAN: i32 = 300;
@@ -12,11 +12,10 @@ const PLAIN_LEAST: f64 = 1e-180;
 
 /// The first cells of `pass` take u from `known`, or 1 at the target.
 pub(super) fn substitute(
-    domain: &Domain,
+    job: Job<'_>,
     (pass, tree): &Ordered,
     known: Option<&Store>,
     workspace: &mut Workspace,
-    cancellation: &Cancellation,
 ) -> Result<Store, SolveError> {
     let Workspace { rows, lengths, u, .. } = workspace;
     // Sorted by place, the cells of a front lie close together.
@@ -28,7 +27,7 @@ pub(super) fn substitute(
     let mut plain = Vec::new();
     let (mut rows, mut lengths) = (&rows[..], &lengths[..]);
     for front in tree.fronts.iter().rev() {
-        cancellation.check()?;
+        job.cancellation.check()?;
         let cells = tree.cells(front);
         let own = front.own as usize;
         let (before, lengths_here) = lengths.split_at(lengths.len() - own);
@@ -42,7 +41,7 @@ pub(super) fn substitute(
         }
     }
     assert!(rows.is_empty() && lengths.is_empty());
-    Ok(store(domain, pass, u, known))
+    Ok(store(job.domain, pass, u, known))
 }
 
 fn store(domain: &Domain, pass: &BreadthFirst, u: &[Scaled], known: Option<&Store>) -> Store {

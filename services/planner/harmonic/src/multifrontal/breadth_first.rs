@@ -1,7 +1,7 @@
 //! Breadth-first pass over the free cells, from the target or from all cells with known u.
 
-use super::budget::Budget;
-use crate::{Cancellation, Domain, SolveError};
+use super::Job;
+use crate::SolveError;
 
 /// Place of a blocked or cut-off cell.
 pub(crate) const ABSENT: u32 = u32::MAX;
@@ -21,25 +21,20 @@ pub(crate) struct BreadthFirst {
 }
 
 impl BreadthFirst {
-    pub(crate) fn from_target(
-        domain: &Domain,
-        budget: &Budget,
-        cancellation: &Cancellation,
-    ) -> Result<Self, SolveError> {
-        let target = domain.index(domain.target());
-        Self::from_known(domain, |index| index == target, budget, cancellation)
+    pub(crate) fn from_target(job: Job<'_>) -> Result<Self, SolveError> {
+        let target = job.domain.index(job.domain.target());
+        Self::from_known(job, |index| index == target)
     }
 
     /// Visits the cells with unknown u from those that `is_known`, by row-major index.
     pub(crate) fn from_known(
-        domain: &Domain,
+        job: Job<'_>,
         is_known: impl Fn(usize) -> bool,
-        budget: &Budget,
-        cancellation: &Cancellation,
     ) -> Result<Self, SolveError> {
+        let domain = job.domain;
         let (width, height) = (domain.width(), domain.height());
         let entries = (width + 2) * (height + 2) + width * height;
-        budget.ask((entries * size_of::<u32>()) as u64)?;
+        job.ask((entries * size_of::<u32>()) as u64)?;
         // A border of absent cells makes bounds checks for neighbours unnecessary.
         const UNSEEN: u32 = u32::MAX - 1;
         const KNOWN: u32 = u32::MAX - 2;
@@ -76,7 +71,7 @@ impl BreadthFirst {
         let mut next = 0;
         while next < order.len() {
             if levels.len() % CHECKED_EVERY == 0 {
-                cancellation.check()?;
+                job.cancellation.check()?;
             }
             let end = order.len();
             while next < end {

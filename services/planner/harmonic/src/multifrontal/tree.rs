@@ -16,8 +16,8 @@
 
 use std::{cmp::Reverse, ops::Range};
 
-use super::{breadth_first::BreadthFirst, budget::Budget};
-use crate::{Cancellation, SolveError};
+use super::{Job, breadth_first::BreadthFirst};
+use crate::SolveError;
 
 #[derive(Clone, Copy)]
 pub(crate) struct Front {
@@ -86,14 +86,10 @@ impl Tree {
     /// # Errors
     /// - [`SolveError::Cancelled`].
     /// - [`SolveError::TooCostly`] as soon as the factorisation needs more memory or operations
-    ///   than `budget` allows.
-    pub(crate) fn of(
-        pass: &BreadthFirst,
-        budget: &Budget,
-        cancellation: &Cancellation,
-    ) -> Result<Self, SolveError> {
+    ///   than `job` allows.
+    pub(crate) fn of(pass: &BreadthFirst, job: Job<'_>) -> Result<Self, SolveError> {
         let shape = Shape::of(pass);
-        budget.ask(Builder::bytes(pass))?;
+        job.ask(Builder::bytes(pass))?;
         let mut builder = Builder::new(pass);
         let mut stages = 0_usize;
         let distances = pass.levels.len() - 1;
@@ -109,9 +105,9 @@ impl Tree {
             let mut end = (inner + slab).min(distances);
             while end > inner + 1 {
                 if stages.is_multiple_of(CHECKED_EVERY) {
-                    cancellation.check()?;
-                    budget.ask(builder.tree.growing_bytes())?;
-                    budget.ask_operations(builder.tree.cost.operations)?;
+                    job.cancellation.check()?;
+                    job.ask(builder.tree.growing_bytes())?;
+                    job.ask_operations(builder.tree.cost.operations)?;
                 }
                 stages += 1;
                 let start = end.saturating_sub(shape.thickness).max(inner + 1);
@@ -126,8 +122,8 @@ impl Tree {
         let own = tree.fronts.iter().map(|front| front.own as usize).sum::<usize>();
         assert_eq!(own, pass.unknown().len(), "each unknown cell has one front");
         tree.cost.bytes = tree.bytes(pass);
-        budget.ask(tree.cost.bytes)?;
-        budget.ask_operations(tree.cost.operations)?;
+        job.ask(tree.cost.bytes)?;
+        job.ask_operations(tree.cost.operations)?;
         Ok(tree)
     }
 
@@ -422,24 +418,25 @@ impl Pieces {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cancellation::Cancellation;
     use crate::cell::Cell;
     use crate::domain::Domain;
-    use crate::multifrontal::{Workspace, solve};
+    use crate::multifrontal::{Workspace, order, solve};
     use crate::store::Store;
 
     #[test]
     fn neighbours_at_one_distance_from_several_known_cells_keep_their_coupling() {
         let domain = Domain::new(60, 40, vec![false; 2400], Cell::new(7, 8)).unwrap();
-        let (none, budget) = (Cancellation::new(), Budget::of(&domain, u64::MAX));
+        let none = Cancellation::new();
+        let job = Job::new(&domain, u64::MAX, &none);
         let field = |pass: BreadthFirst, known: Option<&Store>| {
-            let tree = Tree::of(&pass, &budget, &none).unwrap();
-            let mut workspace = Workspace::default();
-            solve(&domain, &(pass, tree), known, &budget, &mut workspace, &none).unwrap()
+            let tree = Tree::of(&pass, job).unwrap();
+            solve(job, &(pass, tree), known, &mut Workspace::default()).unwrap()
         };
-        let right = field(BreadthFirst::from_target(&domain, &budget, &none).unwrap(), None);
+        let right = field(BreadthFirst::from_target(job).unwrap(), None);
         // Cells in the middle are equally far from both ends.
         let is_known = |index: usize| !(10..50).contains(&(index % 60));
-        let pass = BreadthFirst::from_known(&domain, is_known, &budget, &none).unwrap();
+        let pass = BreadthFirst::from_known(job, is_known).unwrap();
         let found = field(pass, Some(&right));
         for index in 0..2400 {
             let (found, right) = (found.u(index), right.u(index));
@@ -451,16 +448,13 @@ mod tests {
     fn a_factorisation_without_the_memory_it_needs_is_refused_before_it_is_allocated() {
         let domain = Domain::new(60, 50, vec![false; 3000], Cell::new(7, 8)).unwrap();
         let none = Cancellation::new();
-        let large = Budget::of(&domain, u64::MAX);
-        let pass = BreadthFirst::from_target(&domain, &large, &none).unwrap();
-        let needed = Tree::of(&pass, &large, &none).unwrap().cost.bytes;
-        let refused = |budget: &Budget| {
-            let pass = BreadthFirst::from_target(&domain, budget, &none);
-            pass.and_then(|pass| Tree::of(&pass, budget, &none)).err()
-        };
-        assert_eq!(refused(&Budget::of(&domain, needed)), None);
+        let large = Job::new(&domain, u64::MAX, &none);
+        let pass = BreadthFirst::from_target(large).unwrap();
+        let needed = Tree::of(&pass, large).unwrap().cost.bytes;
+        let refused = |allowed: u64| order(Job::new(&domain, allowed, &none)).err();
+        assert_eq!(refused(needed), None);
         for allowed in [100, 30_000, 60_000, 100_000, needed - 1] {
-            let error = refused(&Budget::of(&domain, allowed)).unwrap();
+            let error = refused(allowed).unwrap();
             assert!(
                 matches!(error, SolveError::TooCostly { needed: asked, width: 60, height: 50, .. }
                     if (allowed + 1..=needed).contains(&asked)),

@@ -5,8 +5,8 @@
 //! cost of the factorisation.
 
 use crate::{
-    Cancellation, Domain, SolveError,
-    multifrontal::{BreadthFirst, Budget, Ordered, Tree},
+    Domain, SolveError,
+    multifrontal::{BreadthFirst, Job, Ordered, Tree},
     real::Real as _,
     store::Store,
 };
@@ -44,17 +44,13 @@ fn cycles(decades: f64) -> f64 {
 }
 
 /// Returns the order of a factorisation that costs less than multigrid.
-pub(super) fn plan(
-    domain: &Domain,
-    budget: &Budget,
-    cancellation: &Cancellation,
-) -> Result<Option<Ordered>, SolveError> {
+pub(super) fn plan(job: Job<'_>) -> Result<Option<Ordered>, SolveError> {
+    let domain = job.domain;
     let width = mean_width(domain);
     if width >= WIDE {
         return Ok(None);
     }
-    let pass = BreadthFirst::from_target(domain, budget, cancellation);
-    let Some(pass) = unless_too_costly(pass)? else {
+    let Some(pass) = unless_too_costly(BreadthFirst::from_target(job))? else {
         return Ok(None);
     };
     let cells = pass.len() as f64;
@@ -69,7 +65,7 @@ pub(super) fn plan(
     if cost < 0.5 * MULTIFRONTAL_PER_CELL * cells {
         return Ok(None);
     }
-    if_cheaper(pass, cost, budget, cancellation)
+    if_cheaper(pass, cost, job)
 }
 
 fn unless_too_costly<T>(found: Result<T, SolveError>) -> Result<Option<T>, SolveError> {
@@ -84,32 +80,26 @@ fn unless_too_costly<T>(found: Result<T, SolveError>) -> Result<Option<T>, Solve
 fn if_cheaper(
     pass: BreadthFirst,
     nanoseconds: f64,
-    budget: &Budget,
-    cancellation: &Cancellation,
+    job: Job<'_>,
 ) -> Result<Option<Ordered>, SolveError> {
     let cells = pass.unknown().len() as f64;
     let operations = (nanoseconds - MULTIFRONTAL_PER_CELL * cells) / MULTIFRONTAL_PER_OPERATION;
-    let tree = Tree::of(&pass, &budget.with_operations(operations), cancellation);
+    let tree = Tree::of(&pass, job.with_operations(operations));
     Ok(unless_too_costly(tree)?.map(|tree| (pass, tree)))
 }
 
 /// Covers the cells with u below the range of single precision. Returns `None` if multigrid in
 /// bands costs less.
-pub(super) fn beyond_single(
-    domain: &Domain,
-    store: &Store,
-    budget: &Budget,
-    cancellation: &Cancellation,
-) -> Result<Option<Ordered>, SolveError> {
+pub(super) fn beyond_single(job: Job<'_>, store: &Store) -> Result<Option<Ordered>, SolveError> {
     let is_known = |index: usize| store.raw(index).0 > f32::KNOWN;
-    let pass = BreadthFirst::from_known(domain, is_known, budget, cancellation);
+    let pass = BreadthFirst::from_known(job, is_known);
     let Some(pass) = unless_too_costly(pass)?.filter(|pass| !pass.unknown().is_empty()) else {
         return Ok(None);
     };
-    let per_cell = decades_per_cell(domain, pass.width());
+    let per_cell = decades_per_cell(job.domain, pass.width());
     let bands = (pass.levels.len() as f64 * per_cell / SINGLE_DECADES).max(1.0);
-    let bands = domain.blocked().len() as f64 * further_bands(bands, per_cell);
-    if_cheaper(pass, bands, budget, cancellation)
+    let bands = job.domain.blocked().len() as f64 * further_bands(bands, per_cell);
+    if_cheaper(pass, bands, job)
 }
 
 /// Returns the orders of magnitude by which u falls per cell along a passage.
