@@ -46,7 +46,6 @@ pub(crate) fn solve(
     known: Option<&Store>,
     workspace: &mut Workspace,
 ) -> Result<Store, SolveError> {
-    job.ask(ordered.1.cost.bytes)?;
     let solved = factor(job, ordered, workspace)
         .and_then(|()| substitute(job, ordered, known, workspace));
     workspace.trim();

@@ -38,8 +38,6 @@ pub(crate) struct Cost {
     pub operations: f64,
     /// Upper limit of the weights stored for the substitution.
     pub weights: usize,
-    /// Bytes that the factorisation allocates.
-    pub bytes: u64,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -118,11 +116,10 @@ impl Tree {
             }
             builder.add_stage(&outer, None, several, [OUTER, INNER]);
         }
-        let mut tree = builder.tree;
+        let tree = builder.tree;
         let own = tree.fronts.iter().map(|front| front.own as usize).sum::<usize>();
         assert_eq!(own, pass.unknown().len(), "each unknown cell has one front");
-        tree.cost.bytes = tree.bytes(pass);
-        job.ask(tree.cost.bytes)?;
+        job.ask(tree.bytes(pass))?;
         job.ask_operations(tree.cost.operations)?;
         Ok(tree)
     }
@@ -152,6 +149,7 @@ impl Tree {
         fronts as u64 + 8 * self.cost.weights as u64
     }
 
+    /// Returns the bytes that the factorisation allocates.
     fn bytes(&self, pass: &BreadthFirst) -> u64 {
         // The largest few fronts bound the updates that exist at once.
         let fixed = pass.len() * 12;
@@ -450,7 +448,7 @@ mod tests {
         let none = Cancellation::new();
         let large = Job::new(&domain, u64::MAX, &none);
         let pass = BreadthFirst::from_target(large).unwrap();
-        let needed = Tree::of(&pass, large).unwrap().cost.bytes;
+        let needed = Tree::of(&pass, large).unwrap().bytes(&pass);
         let refused = |allowed: u64| order(Job::new(&domain, allowed, &none)).err();
         assert_eq!(refused(needed), None);
         for allowed in [100, 30_000, 60_000, 100_000, needed - 1] {
