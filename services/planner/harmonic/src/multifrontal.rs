@@ -61,7 +61,7 @@ fn factor(
 ) -> Result<(), SolveError> {
     let Workspace { rows, lengths, slot, .. } = workspace;
     rows.clear();
-    rows.reserve(tree.cost.weights);
+    rows.reserve(tree.weights);
     lengths.clear();
     lengths.reserve(pass.len());
     slot.clear();

@@ -33,13 +33,6 @@ pub(crate) struct Front {
 
 const NONE: u32 = u32::MAX;
 
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Cost {
-    pub operations: f64,
-    /// Upper limit of the weights stored for the substitution.
-    pub weights: usize,
-}
-
 #[derive(Clone, Copy, Debug)]
 struct Shape {
     /// Distances per stage.
@@ -75,7 +68,9 @@ const CHECKED_EVERY: usize = 16;
 pub(crate) struct Tree {
     pub fronts: Vec<Front>,
     places: Vec<u32>,
-    pub cost: Cost,
+    operations: f64,
+    /// Upper limit of the weights stored for the substitution.
+    pub weights: usize,
 }
 
 impl Tree {
@@ -105,7 +100,7 @@ impl Tree {
                 if stages.is_multiple_of(CHECKED_EVERY) {
                     job.cancellation.check()?;
                     job.ask(builder.tree.growing_bytes())?;
-                    job.ask_operations(builder.tree.cost.operations)?;
+                    job.ask_operations(builder.tree.operations)?;
                 }
                 stages += 1;
                 let start = end.saturating_sub(shape.thickness).max(inner + 1);
@@ -120,7 +115,7 @@ impl Tree {
         let own = tree.fronts.iter().map(|front| front.own as usize).sum::<usize>();
         assert_eq!(own, pass.unknown().len(), "each unknown cell has one front");
         job.ask(tree.bytes(pass))?;
-        job.ask_operations(tree.cost.operations)?;
+        job.ask_operations(tree.operations)?;
         Ok(tree)
     }
 
@@ -146,7 +141,7 @@ impl Tree {
 
     fn growing_bytes(&self) -> u64 {
         let fronts = self.places.len() * size_of::<u32>() + self.fronts.len() * size_of::<Front>();
-        fronts as u64 + 8 * self.cost.weights as u64
+        fronts as u64 + 8 * self.weights as u64
     }
 
     /// Returns the bytes that the factorisation allocates.
@@ -160,16 +155,6 @@ impl Tree {
             .max()
             .unwrap_or(0);
         fixed as u64 + self.growing_bytes() + 16 * largest * largest
-    }
-}
-
-impl Cost {
-    fn add_front(&mut self, own: usize, boundary: usize) {
-        let size = (own + boundary) as f64;
-        let rest = boundary as f64;
-        // Sum of (n - k)^2 / 2 over the pivots k, and a constant per cell for the assembly.
-        self.operations += (size * size * size - rest * rest * rest) / 6.0 + 60.0 * size;
-        self.weights += (own + boundary) * (own + boundary) / 2 - boundary * boundary / 2;
     }
 }
 
@@ -207,7 +192,8 @@ impl<'a> Builder<'a> {
             tree: Tree {
                 fronts: Vec::with_capacity(fronts),
                 places: Vec::with_capacity(places),
-                cost: Cost::default(),
+                operations: 0.0,
+                weights: 0,
             },
             pieces: Pieces::default(),
             seen: vec![NONE; pass.len()],
@@ -326,7 +312,10 @@ impl<'a> Builder<'a> {
         boundary.sort_unstable_by_key(|&place| (outer.contains(&place), Reverse(place)));
         let touches_outer = boundary.last().is_some_and(|place| outer.contains(place));
         let boundary = boundary.len();
-        tree.cost.add_front(own, boundary);
+        let (size, rest) = ((own + boundary) as f64, boundary as f64);
+        // Sum of (n - k)^2 / 2 over the pivots k, and a constant per cell for the assembly.
+        tree.operations += (size * size * size - rest * rest * rest) / 6.0 + 60.0 * size;
+        tree.weights += (own + boundary) * (own + boundary) / 2 - boundary * boundary / 2;
         tree.fronts.push(Front {
             first,
             own: own as u32,
