@@ -56,12 +56,12 @@ pub(crate) fn check_above(
     floor: f64,
 ) -> Check {
     match store {
-        Store::Single { values, .. } => {
-            in_strips(domain, threads, |rows| check_plain(domain, values, rows, floor))
-        }
-        Store::Double { values, .. } => {
-            in_strips(domain, threads, |rows| check_plain(domain, values, rows, floor))
-        }
+        Store::Single { values, .. } => in_strips(domain, threads, |rows| {
+            check_plain(domain.width(), values, rows, floor, weights_of(domain))
+        }),
+        Store::Double { values, .. } => in_strips(domain, threads, |rows| {
+            check_plain(domain.width(), values, rows, floor, weights_of(domain))
+        }),
         Store::Extended { mantissas, exponents } => {
             in_strips(domain, threads, |rows| check_extended(domain, mantissas, exponents, rows))
         }
@@ -92,11 +92,15 @@ fn in_strips(
     })
 }
 
-fn check_plain<R: Real>(domain: &Domain, values: &[R], strip: Range<usize>, floor: f64) -> Check {
-    let width = domain.width();
+fn check_plain<R: Real>(
+    width: usize,
+    values: &[R],
+    strip: Range<usize>,
+    floor: f64,
+    set_weights: impl Fn(usize, &mut [R]),
+) -> Check {
     let row_of = |row: usize| values.get(row * width..(row + 1) * width);
-    let cells = Cells::above(width, floor);
-    check_rows(values, cells, Rows::new(width), row_of, strip, weights_of(domain))
+    check_rows(values, Cells::above(width, floor), Rows::new(width), row_of, strip, set_weights)
 }
 
 fn check_extended(
@@ -132,11 +136,9 @@ pub(crate) fn check_above_with<R: Real>(
     weights: &[R],
     floor: f64,
 ) -> Check {
-    let row_of = |row: usize| values.get(row * width..(row + 1) * width);
     let set =
         |row: usize, of_row: &mut [R]| of_row.copy_from_slice(&weights[row * width..][..width]);
-    let strip = 0..values.len() / width;
-    check_rows(values, Cells::above(width, floor), Rows::new(width), row_of, strip, set)
+    check_plain(width, values, 0..values.len() / width, floor, set)
 }
 
 /// Checks a strip of rows with wide vectors.
