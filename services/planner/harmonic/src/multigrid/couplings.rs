@@ -19,8 +19,13 @@ pub(super) const SOUTH_WEST: usize = 3;
 
 pub(super) type Place = (usize, usize);
 
-pub(super) trait Couplings<R>: Copy {
+pub(super) trait Couplings<R: Real>: Copy {
     fn times(self, x: usize, value: R) -> R;
+
+    #[inline(always)]
+    fn at(self, x: usize) -> R {
+        self.times(x, R::ONE)
+    }
 }
 
 impl<R: Real> Couplings<R> for &[R] {

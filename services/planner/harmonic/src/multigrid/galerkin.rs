@@ -135,15 +135,12 @@ pub(super) fn corner_weights<R: Real>(
     let c_sw = fine.diagonal(SOUTH_WEST, (OO, o), n);
     let c_se = fine.diagonal(SOUTH_EAST, (OO, o), n);
     for x in 0..n {
-        nw[x] = inverse[x] * (c_nw.times(x, R::ONE) + up.times(x, w[x]) + left.times(x, no[x]));
-        ne[x] =
-            inverse[x] * (c_ne.times(x, R::ONE) + up.times(x, e[x]) + right.times(x, no_east[x]));
+        nw[x] = inverse[x] * (c_nw.at(x) + up.times(x, w[x]) + left.times(x, no[x]));
+        ne[x] = inverse[x] * (c_ne.at(x) + up.times(x, e[x]) + right.times(x, no_east[x]));
     }
     for x in 0..n {
-        sw[x] =
-            inverse[x] * (c_sw.times(x, R::ONE) + down.times(x, w_below[x]) + left.times(x, so[x]));
-        se[x] = inverse[x]
-            * (c_se.times(x, R::ONE) + down.times(x, e_below[x]) + right.times(x, so_east[x]));
+        sw[x] = inverse[x] * (c_sw.at(x) + down.times(x, w_below[x]) + left.times(x, so[x]));
+        se[x] = inverse[x] * (c_se.at(x) + down.times(x, e_below[x]) + right.times(x, so_east[x]));
     }
 }
 
@@ -196,13 +193,13 @@ pub(super) fn coarsen<R: Real>(
             for x in 0..n {
                 let d = inverse[x].inverse();
                 q0[x] = d * w[x]
-                    - left.times(x, R::ONE)
+                    - left.at(x)
                     - up.times(x, a_sw[x])
                     - down.times(x, h_nw[x])
                     - c_nw.times(x, so_above[x])
                     - c_sw.times(x, no[x]);
                 q1[x] = d * e[x]
-                    - right.times(x, R::ONE)
+                    - right.at(x)
                     - up.times(x, a_se[x])
                     - down.times(x, h_ne[x])
                     - c_ne.times(x, so_above_east[x])
@@ -226,13 +223,13 @@ pub(super) fn coarsen<R: Real>(
             for x in 0..n {
                 let d = inverse[x].inverse();
                 v0[x] = d * no[x]
-                    - up.times(x, R::ONE)
+                    - up.at(x)
                     - left.times(x, l_ne[x])
                     - right.times(x, h_nw[x])
                     - c_nw.times(x, e_west[x])
                     - c_ne.times(x, w[x]);
                 v1[x] = d * so[x]
-                    - down.times(x, R::ONE)
+                    - down.at(x)
                     - left.times(x, l_se[x])
                     - right.times(x, h_sw[x])
                     - c_sw.times(x, e_below_west[x])
@@ -310,10 +307,10 @@ pub(super) fn interpolate<R: Real>(fine: &mut impl Level<R>, rows: Range<usize>)
         let (sw, se) = (diagonal(SOUTH_WEST, OE, o), diagonal(SOUTH_EAST, OE, o));
         let (no, so) = (along(SOUTH, (OO, o - s), (OO, o - s)), along(SOUTH, (OE, o), (OO, o)));
         for x in 0..n {
-            let share = share(own[x].inverse(), no.times(x, R::ONE), so.times(x, R::ONE));
-            let (w, e) = (w.times(x, R::ONE), e.times(x, R::ONE));
-            to_west[x] = w.is_active() * (w + nw.times(x, R::ONE) + sw.times(x, R::ONE)) * share;
-            to_east[x] = e.is_active() * (e + ne.times(x, R::ONE) + se.times(x, R::ONE)) * share;
+            let share = share(own[x].inverse(), no.at(x), so.at(x));
+            let (w, e) = (w.at(x), e.at(x));
+            to_west[x] = w.is_active() * (w + nw.at(x) + sw.at(x)) * share;
+            to_east[x] = e.is_active() * (e + ne.at(x) + se.at(x)) * share;
         }
         let own = &fine.inverse()[EO][o..][..n];
         let (no, so) = (along(SOUTH, (EE, o), (EE, o)), along(SOUTH, (EO, o), (EE, o + s)));
@@ -321,10 +318,10 @@ pub(super) fn interpolate<R: Real>(fine: &mut impl Level<R>, rows: Range<usize>)
         let (sw, se) = (diagonal(SOUTH_WEST, EO, o), diagonal(SOUTH_EAST, EO, o));
         let (w, e) = (along(EAST, (OO, o - 1), (OO, o - 1)), along(EAST, (EO, o), (OO, o)));
         for x in 0..n {
-            let share = share(own[x].inverse(), w.times(x, R::ONE), e.times(x, R::ONE));
-            let (no, so) = (no.times(x, R::ONE), so.times(x, R::ONE));
-            to_north[x] = no.is_active() * (no + nw.times(x, R::ONE) + ne.times(x, R::ONE)) * share;
-            to_south[x] = so.is_active() * (so + sw.times(x, R::ONE) + se.times(x, R::ONE)) * share;
+            let share = share(own[x].inverse(), w.at(x), e.at(x));
+            let (no, so) = (no.at(x), so.at(x));
+            to_north[x] = no.is_active() * (no + nw.at(x) + ne.at(x)) * share;
+            to_south[x] = so.is_active() * (so + sw.at(x) + se.at(x)) * share;
         }
     }
     *fine.weights_mut() = weights;
