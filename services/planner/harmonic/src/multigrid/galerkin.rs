@@ -29,7 +29,6 @@ type Rows<R, const COUNT: usize> = [Vec<R>; COUNT];
 /// Intermediate rows from a fine level to the next, reused between set-ups.
 #[derive(Debug)]
 pub(super) struct Products<R> {
-    n: usize,
     /// Row above, this row.
     corner: [Rows<R, 4>; 2],
     odd_even: Rows<R, 6>,
@@ -55,7 +54,6 @@ impl<R: Real> Products<R> {
             std::array::from_fn(|_| vec![R::default(); grid.stride + MARGIN])
         }
         Self {
-            n: grid.columns,
             corner: [rows(grid), rows(grid)],
             odd_even: rows(grid),
             even_odd: [rows(grid), rows(grid)],
@@ -71,7 +69,7 @@ impl<R: Real> Products<R> {
         next: &mut Coarse<R>,
         y: usize,
     ) {
-        let n = self.n;
+        let (n, zero) = (next.grid.width, R::default());
         let q = |column: usize| &self.odd_even[column][MARGIN..][..n];
         let q_west = |column: usize| &self.odd_even[column][MARGIN - 1..][..n];
         let v = |column: usize| &self.even_odd[1][column][MARGIN..][..n];
@@ -82,23 +80,23 @@ impl<R: Real> Products<R> {
         let (e0, a, b, c, d) = (own(0), q(FIRST), q_west(SECOND), v(FIRST), v_above(SECOND));
         for (x, out) in diagonal[..n].iter_mut().enumerate() {
             let sum = e0[x] + west[x] * a[x] + east[x] * b[x] + north[x] * c[x] + south[x] * d[x];
-            *out = if e0[x] > R::default() { sum } else { R::default() };
+            *out = if e0[x] > zero { sum } else { zero };
         }
         let (e1, a, c, d) = (own(1), q(SECOND), v(NORTH_EAST), v_above(BELOW_EAST));
         for (x, out) in right[..n].iter_mut().enumerate() {
-            *out = R::default() - (e1[x] + west[x] * a[x] + north[x] * c[x] + south[x] * d[x]);
+            *out = zero - (e1[x] + west[x] * a[x] + north[x] * c[x] + south[x] * d[x]);
         }
         let (e2, a, b, c) = (own(2), q(BELOW_WEST), q_west(BELOW_EAST), v(SECOND));
         for (x, out) in down[..n].iter_mut().enumerate() {
-            *out = R::default() - (e2[x] + west[x] * a[x] + east[x] * b[x] + north[x] * c[x]);
+            *out = zero - (e2[x] + west[x] * a[x] + east[x] * b[x] + north[x] * c[x]);
         }
         let (e3, a, c) = (own(3), q(BELOW_EAST), v(BELOW_EAST));
         for (x, out) in down_right[..n].iter_mut().enumerate() {
-            *out = R::default() - (e3[x] + west[x] * a[x] + north[x] * c[x]);
+            *out = zero - (e3[x] + west[x] * a[x] + north[x] * c[x]);
         }
         let (e4, b, c) = (own(4), q_west(BELOW_WEST), v(BELOW_WEST));
         for (x, out) in down_left[..n].iter_mut().enumerate() {
-            *out = R::default() - (e4[x] + east[x] * b[x] + north[x] * c[x]);
+            *out = zero - (e4[x] + east[x] * b[x] + north[x] * c[x]);
         }
         for out in diagonal[..n].iter_mut() {
             *out = out.inverse();
@@ -152,11 +150,11 @@ pub(super) fn coarsen<R: Real>(
     products: &mut Products<R>,
 ) {
     let Grid { columns: n, stride: s, .. } = fine.grid();
+    let (zero, m) = (R::default(), MARGIN);
     let Products { corner: [_, corner], even_odd: [_, even_odd], .. } = products;
     for row in corner.iter_mut().chain(even_odd) {
-        row.fill(R::default());
+        row.fill(zero);
     }
-    let (zero, m) = (R::default(), MARGIN);
     let [west, east, north, south] = fine.weights();
     let we = |at: usize| [&west[at..][..n], &east[at..][..n]];
     let ns = |at: usize| [&north[at..][..n], &south[at..][..n]];
