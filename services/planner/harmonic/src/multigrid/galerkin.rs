@@ -14,16 +14,6 @@ use super::{
 };
 use crate::real::Real;
 
-/// Columns of a product row, by coarse cell.
-///
-/// Around an odd-even cell: west, east, and the two north and south of each. Around an even-odd
-/// cell: north, south, and the two west and east of each.
-const FIRST: usize = 0;
-const SECOND: usize = 1;
-const NORTH_EAST: usize = 3;
-const BELOW_WEST: usize = 4;
-const BELOW_EAST: usize = 5;
-
 type Rows<R, const COUNT: usize> = [Vec<R>; COUNT];
 
 /// Intermediate rows from a fine level to the next, reused between set-ups.
@@ -31,8 +21,9 @@ type Rows<R, const COUNT: usize> = [Vec<R>; COUNT];
 pub(super) struct Products<R> {
     /// Row above, this row.
     corner: [Rows<R, 4>; 2],
+    /// By coarse cell: west, east, north-west, north-east, south-west, south-east.
     odd_even: Rows<R, 6>,
-    /// Row above, this row.
+    /// Row above, this row; by coarse cell: north, south, then as above.
     even_odd: [Rows<R, 6>; 2],
     /// Even-even products: diagonal, then the four stored directions.
     even_even: Rows<R, 5>,
@@ -69,34 +60,34 @@ impl<R: Real> Products<R> {
         next: &mut Coarse<R>,
         y: usize,
     ) {
-        let (n, zero) = (next.grid.width, R::default());
-        let q = |column: usize| &self.odd_even[column][MARGIN..][..n];
-        let q_west = |column: usize| &self.odd_even[column][MARGIN - 1..][..n];
-        let v = |column: usize| &self.even_odd[1][column][MARGIN..][..n];
-        let v_above = |column: usize| &self.even_odd[0][column][MARGIN..][..n];
-        let own = |k: usize| &self.even_even[k][MARGIN..][..n];
+        let (n, zero, m) = (next.grid.width, R::default(), MARGIN);
+        let [e0, e1, e2, e3, e4] = places(&self.even_even, m, n);
+        let [q_w, q_e, .., q_sw, q_se] = places(&self.odd_even, m, n);
+        let [_, west_q_e, .., west_q_sw, west_q_se] = places(&self.odd_even, m - 1, n);
+        let [v_n, v_s, _, v_ne, v_sw, v_se] = places(&self.even_odd[1], m, n);
+        let [_, above_v_s, .., above_v_se] = places(&self.even_odd[0], m, n);
         let [diagonal, right, down, down_right, down_left] = &mut self.out;
 
-        let (e0, a, b, c, d) = (own(0), q(FIRST), q_west(SECOND), v(FIRST), v_above(SECOND));
         for (x, out) in diagonal[..n].iter_mut().enumerate() {
-            let sum = e0[x] + west[x] * a[x] + east[x] * b[x] + north[x] * c[x] + south[x] * d[x];
+            let sum = e0[x]
+                + west[x] * q_w[x]
+                + east[x] * west_q_e[x]
+                + north[x] * v_n[x]
+                + south[x] * above_v_s[x];
             *out = if e0[x] > zero { sum } else { zero };
         }
-        let (e1, a, c, d) = (own(1), q(SECOND), v(NORTH_EAST), v_above(BELOW_EAST));
         for (x, out) in right[..n].iter_mut().enumerate() {
-            *out = zero - (e1[x] + west[x] * a[x] + north[x] * c[x] + south[x] * d[x]);
+            *out =
+                zero - (e1[x] + west[x] * q_e[x] + north[x] * v_ne[x] + south[x] * above_v_se[x]);
         }
-        let (e2, a, b, c) = (own(2), q(BELOW_WEST), q_west(BELOW_EAST), v(SECOND));
         for (x, out) in down[..n].iter_mut().enumerate() {
-            *out = zero - (e2[x] + west[x] * a[x] + east[x] * b[x] + north[x] * c[x]);
+            *out = zero - (e2[x] + west[x] * q_sw[x] + east[x] * west_q_se[x] + north[x] * v_s[x]);
         }
-        let (e3, a, c) = (own(3), q(BELOW_EAST), v(BELOW_EAST));
         for (x, out) in down_right[..n].iter_mut().enumerate() {
-            *out = zero - (e3[x] + west[x] * a[x] + north[x] * c[x]);
+            *out = zero - (e3[x] + west[x] * q_se[x] + north[x] * v_se[x]);
         }
-        let (e4, b, c) = (own(4), q_west(BELOW_WEST), v(BELOW_WEST));
         for (x, out) in down_left[..n].iter_mut().enumerate() {
-            *out = zero - (e4[x] + east[x] * b[x] + north[x] * c[x]);
+            *out = zero - (e4[x] + east[x] * west_q_sw[x] + north[x] * v_sw[x]);
         }
         for out in diagonal[..n].iter_mut() {
             *out = out.inverse();
