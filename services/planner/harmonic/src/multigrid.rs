@@ -230,15 +230,6 @@ impl<R: Real> Multigrid<R> {
         self.start_from_sources();
     }
 
-    pub(crate) fn unload(&self, mut row_is: impl FnMut(usize, &[R])) {
-        let grid = &self.finest.grid;
-        let mut buffer = vec![R::default(); 2 * grid.columns];
-        for row in 0..grid.height {
-            grid::join_row(grid, &self.finest.u, row, R::ONE, &mut buffer);
-            row_is(row, &buffer[..grid.width]);
-        }
-    }
-
     /// Runs until every cell has settled and `after` finds no fault, or for `most` cycles. After
     /// each cycle, `after` receives whether to check the field. It returns the largest residual as
     /// a multiple of its limit, if that is too large.
@@ -347,27 +338,32 @@ impl<R: Real> Multigrid<R> {
         );
     }
 
-    /// Reads u of every cell, row by row, times 2^TOP / u(target); blocked cells become `blocked`.
-    pub(crate) fn read(&self, target: Cell, blocked: R, into: &mut Vec<R>) {
+    /// Returns u of every cell, row by row, times 2^TOP / u(target); `blocked` in blocked cells.
+    pub(crate) fn read(&self, target: Cell, blocked: R) -> Vec<R> {
         let grid = &self.finest.grid;
         let (plane, at) = grid.locate(target.col, target.row);
         let top = pow2(R::TOP);
         assert!(target.col < grid.width && target.row < grid.height);
-        let scale = R::of(top / self.finest.u[plane][at].wide());
-        into.clear();
-        into.resize(grid.width * grid.height, R::default());
+        let mut values = vec![blocked; grid.width * grid.height];
+        self.unload(R::of(top / self.finest.u[plane][at].wide()), &mut values);
+        values[target.row * grid.width + target.col] = R::of(top);
+        values
+    }
+
+    /// Writes u of the cells with an equation, row by row, times `scale`.
+    pub(crate) fn unload(&self, scale: R, values: &mut [R]) {
+        let grid = &self.finest.grid;
         let mut u = vec![R::default(); 2 * grid.columns];
         let mut inverse = u.clone();
-        for (row, out) in into.chunks_exact_mut(grid.width).enumerate() {
+        for (row, out) in values.chunks_exact_mut(grid.width).enumerate() {
             grid::join_row(grid, &self.finest.u, row, R::ONE, &mut u);
             grid::join_row(grid, &self.finest.inverse, row, R::ONE, &mut inverse);
             for ((out, u), inverse) in out.iter_mut().zip(&u).zip(&inverse) {
                 // Unconverged cells may be below zero; the verification finds a zero there.
                 let u = if *u > R::default() { *u * scale } else { R::default() };
-                *out = if *inverse > R::default() { u } else { blocked };
+                *out = if *inverse > R::default() { u } else { *out };
             }
         }
-        into[target.row * grid.width + target.col] = R::of(top);
     }
 }
 

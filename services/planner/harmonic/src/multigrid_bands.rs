@@ -103,13 +103,7 @@ pub(crate) fn solve(
                 return None;
             }
             levels.finish();
-            levels.unload(|row, found| {
-                let cells = row * here.width..(row + 1) * here.width;
-                let values = values[cells.clone()].iter_mut().zip(&inverse[cells]);
-                for ((value, _), found) in values.zip(found).filter(|it| *it.0.1 > 0.0) {
-                    *value = found.max(0.0);
-                }
-            });
+            levels.unload(1.0, &mut values);
             let check = verification::check_above_with(here.width, &values, &inverse, CHECKED);
             let excess = MARGIN * check.excess();
             (excess > 1.0 || !check.holds_where_reached()).then_some(excess)

@@ -288,8 +288,7 @@ where
                 return None;
             }
             levels.finish();
-            let mut values = Vec::new();
-            levels.read(domain.target(), R::of(BLOCKED), &mut values);
+            let values = levels.read(domain.target(), R::of(BLOCKED));
             assert_eq!(values.len(), domain.blocked().len());
             let store = Store::from(values);
             let check = task.check(&store);
