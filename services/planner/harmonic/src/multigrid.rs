@@ -168,16 +168,16 @@ impl<R: Real> Multigrid<R> {
             grid::split_row(&grid, &mut finest.u, row, &buffer);
         }
         // This inflow satisfies the equation of the target; the sweeps relax the others.
-        let u = |col: Option<usize>, row: Option<usize>| match (col, row) {
-            (Some(col), Some(row)) if col < grid.width && row < grid.height => {
-                let (plane, at) = grid.locate(col, row);
-                finest.inverse[plane][at].is_active() * finest.u[plane][at]
+        let u = |col: usize, row: usize| {
+            if col >= grid.width || row >= grid.height {
+                return R::default();
             }
-            _ => R::default(),
+            let (plane, at) = grid.locate(col, row);
+            finest.inverse[plane][at].is_active() * finest.u[plane][at]
         };
-        let (col, row) = (target.col, target.row);
-        let around = u(col.checked_sub(1), Some(row)) + u(Some(col + 1), Some(row));
-        let around = around + u(Some(col), row.checked_sub(1)) + u(Some(col), Some(row + 1));
+        let Cell { col, row } = target;
+        let around = u(col.wrapping_sub(1), row) + u(col + 1, row);
+        let around = around + u(col, row.wrapping_sub(1)) + u(col, row + 1);
         let (plane, at) = grid.locate(col, row);
         let value = finest.inverse[plane][at].inverse() * finest.u[plane][at] - around;
         finest.sources = vec![Source::of(&grid, target, value)];
