@@ -176,12 +176,12 @@ impl Solver {
         }
         let mut ordered = plan(job)?;
         // Unless it was planned, the factorisation is the last resort.
-        let multigrid: &[_] = match ordered {
-            Some(_) => &[],
-            None => &[Method::MultigridSingle, Method::MultigridDouble],
+        let methods: &[_] = match ordered {
+            Some(_) => &[Method::Multifrontal],
+            None => &[Method::MultigridSingle, Method::MultigridDouble, Method::Multifrontal],
         };
         let mut failed = Check::default();
-        for &method in multigrid.iter().chain(&[Method::Multifrontal]) {
+        for &method in methods {
             let (store, check, method) = match method {
                 Method::Multifrontal => self.multifrontal(ordered.take(), &mut task)?,
                 method => self.multigrid(method, None, &mut task)?,
@@ -228,12 +228,11 @@ impl Solver {
         task: &mut Task<'_>,
     ) -> Result<Solved, SolveError> {
         let job = task.job;
-        let most_cycles = |from_scratch| if near.is_some() { NEAR_CYCLES } else { from_scratch };
         if method == Method::MultigridDouble {
-            let (store, check) = self.double.solve(task, near, most_cycles(DOUBLE_CYCLES))?;
+            let (store, check) = self.double.solve(task, near, DOUBLE_CYCLES)?;
             return Ok((store, check, method));
         }
-        let (store, check) = self.single.solve(task, near, most_cycles(SINGLE_CYCLES))?;
+        let (store, check) = self.single.solve(task, near, SINGLE_CYCLES)?;
         if check.holds() || check.unreached == 0 {
             return Ok((store, check, Method::MultigridSingle));
         }
@@ -259,7 +258,8 @@ impl<R: Real> Prepared<R>
 where
     Store: From<Vec<R>>,
 {
-    /// Runs cycles, from `near` if given, until convergence or the cycle limit.
+    /// Runs cycles, from `near` if given, until convergence or the cycle limit, which is
+    /// `most_cycles` from scratch.
     fn solve(
         &mut self,
         task: &mut Task<'_>,
@@ -269,20 +269,22 @@ where
         let (threads, Job { domain, cancellation, .. }) = (task.threads, task.job);
         let levels = self.prepare(domain);
         (task.observe)(Phase::SetUp);
-        let mut first_check = FIRST_CHECK;
-        match near {
+        let cycles = match near {
             Some(near) => {
                 let width = domain.width();
                 levels.start_near(domain.target(), |row, guess| {
                     let cells = row * width..(row + 1) * width;
                     near.store.read_row_as(cells, -R::TOP, guess);
                 });
-                first_check = FIRST_CHECK_NEAR;
+                (FIRST_CHECK_NEAR, NEAR_CYCLES)
             }
-            None => levels.start(domain.target()),
-        }
+            None => {
+                levels.start(domain.target());
+                (FIRST_CHECK, most_cycles)
+            }
+        };
         let mut found = (Store::from(Vec::new()), Check::default());
-        levels.converge((first_check, most_cycles), cancellation, |levels, checked| {
+        levels.converge(cycles, cancellation, |levels, checked| {
             (task.observe)(Phase::Cycled);
             if !checked {
                 return None;
