@@ -309,10 +309,7 @@ where
     fn prepare(&mut self, domain: &Domain) -> &mut Multigrid<R> {
         let (width, height) = (domain.width(), domain.height());
         let same_size = self.width == width && self.blocked.len() == domain.blocked().len();
-        let changed = if same_size
-            && self.screening == domain.screening_coefficient()
-            && self.costs.len() == domain.costs().len()
-        {
+        let changed = if same_size && self.screening == domain.screening_coefficient() {
             self.changed_rows(domain)
         } else {
             Some(0..height)
@@ -323,11 +320,9 @@ where
         if let Some(rows) = changed {
             self.levels.set_up_rows(domain, rows);
             self.width = width;
-            self.blocked.clear();
-            self.blocked.extend_from_slice(domain.blocked());
             self.screening = domain.screening_coefficient();
-            self.costs.clear();
-            self.costs.extend_from_slice(domain.costs());
+            domain.blocked().clone_into(&mut self.blocked);
+            domain.costs().clone_into(&mut self.costs);
         }
         &mut self.levels
     }
