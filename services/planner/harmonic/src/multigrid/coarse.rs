@@ -10,7 +10,7 @@
 
 use super::{
     couplings::{EAST, SOUTH, SOUTH_EAST, SOUTH_WEST},
-    grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct},
+    grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct, zero_values},
     kernels::{add_active, gather, relax, subtract, sum_weighted},
 };
 use crate::real::Real;
@@ -43,9 +43,9 @@ pub(super) struct Coarse<R> {
 impl<R: Real> Coarse<R> {
     pub(super) fn reshape(&mut self, grid: Grid) {
         self.grid = grid;
-        let values = self.u.iter_mut().chain(&mut self.first_visit).chain(&mut self.f);
-        let equations = self.inverse.iter_mut().chain(self.coupling.iter_mut().flatten());
-        grid.reset(values.chain(equations).chain(&mut self.weights));
+        let planes = [&mut self.u, &mut self.first_visit, &mut self.f, &mut self.inverse];
+        let planes = planes.into_iter().chain(&mut self.coupling).chain([&mut self.weights]);
+        zero_values(planes.flatten(), grid.len());
         self.scratch.reset(&grid);
     }
 

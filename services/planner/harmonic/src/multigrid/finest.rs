@@ -12,7 +12,9 @@
 
 use super::{
     coarse::Coarse,
-    grid::{EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct, first},
+    grid::{
+        EE, EO, Grid, MARGIN, OE, OO, Planes, Scratch, Weights, around, correct, first, zero_values,
+    },
 };
 use crate::{Cell, real::Real};
 
@@ -65,7 +67,8 @@ pub(super) struct Work<R> {
 impl<R: Real> Finest<R> {
     pub(super) fn reshape(&mut self, grid: Grid) {
         self.grid = grid;
-        grid.reset(self.u.iter_mut().chain(&mut self.inverse).chain(&mut self.weights));
+        let planes = self.u.iter_mut().chain(&mut self.inverse).chain(&mut self.weights);
+        zero_values(planes, grid.len());
         self.sources.clear();
         self.scratch.reset(&grid);
     }

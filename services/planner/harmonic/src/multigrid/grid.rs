@@ -91,13 +91,10 @@ impl Grid {
         let first = MARGIN + number % 2 * self.stride;
         [first, 2 * MARGIN + self.stride - first]
     }
-
-    pub(super) fn reset<'a, R: Real>(&self, planes: impl IntoIterator<Item = &'a mut Vec<R>>) {
-        zero_values(planes, self.len());
-    }
 }
 
-fn zero_values<'a, R: Real>(rows: impl IntoIterator<Item = &'a mut Vec<R>>, len: usize) {
+/// Gives every row `len` zeros.
+pub(super) fn zero_values<'a, R: Real>(rows: impl IntoIterator<Item = &'a mut Vec<R>>, len: usize) {
     for row in rows {
         if row.capacity() < len {
             // Fresh pages are already zero.
@@ -127,10 +124,10 @@ pub(super) struct Scratch<R> {
 impl<R: Real> Scratch<R> {
     pub(super) fn reset(&mut self, grid: &Grid) {
         let Self { correction, restricted, change_ee, change_oo, .. } = self;
-        let residuals = [&mut self.residual_eo, &mut self.residual_oe, &mut self.residual_ee];
-        let others = [correction, restricted, change_ee, change_oo];
+        let Self { residual_eo, residual_oe, residual_ee, .. } = self;
         let len = (grid.strip_rows + 1) * grid.stride + 2 * MARGIN;
-        zero_values(others.into_iter().chain(residuals), len);
+        zero_values([correction, restricted, change_ee, change_oo], len);
+        zero_values([residual_eo, residual_oe, residual_ee], len);
     }
 
     #[inline(always)]
@@ -203,13 +200,11 @@ fn add_products<R: Real>(out: &mut [R], (w, a): (&[R], &[R]), (v, b): (&[R], &[R
 
 #[inline(always)]
 pub(super) fn split_row<R: Real>(grid: &Grid, planes: &mut Planes<R>, row: usize, values: &[R]) {
-    let start = grid.start(row / 2);
-    let (first, second) = planes.split_at_mut(2);
-    let pair = if row.is_multiple_of(2) { first } else { second };
-    let (even, odd) = pair.split_at_mut(1);
-    let even = &mut even[0][start..start + grid.columns];
-    let odd = &mut odd[0][start..start + grid.columns];
-    let values = &values[..2 * grid.columns];
+    let (start, n) = (grid.start(row / 2), grid.columns);
+    let [ee, oe, eo, oo] = planes;
+    let (even, odd) = if row.is_multiple_of(2) { (ee, oe) } else { (eo, oo) };
+    cut!(start, n, even, odd);
+    let values = &values[..2 * n];
     for ((even, odd), pair) in even.iter_mut().zip(odd).zip(values.chunks_exact(2)) {
         *even = pair[0];
         *odd = pair[1];
