@@ -2,7 +2,7 @@
 //!
 //! For whole maps, [`Field::direction`] per cell takes several times as long.
 
-use crate::{Cell, Field, Scaled, guidance::SADDLE, store::Store};
+use crate::{Cell, Field, Scaled, guidance::SADDLE, real::Real as _, store::Store};
 
 /// Direction and log2 u at the centre of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,9 +23,7 @@ impl Field {
         assert!(row < self.height());
         let inside = (1..self.height().saturating_sub(1)).contains(&row);
         match &self.store {
-            Store::Single { values, exponent } if inside => {
-                self.of_row(values, *exponent, row, each);
-            }
+            Store::Single(values) if inside => self.of_row(values, -f32::TOP, row, each),
             Store::Double { values, exponent } if inside => {
                 self.of_row(values, *exponent, row, each);
             }

@@ -16,8 +16,8 @@ const BOTTOM: i32 = -960;
 /// Stored u: positive if reachable, 0 if free but cut off, [`BLOCKED`] if blocked.
 #[derive(Clone, Debug)]
 pub(crate) enum Store {
-    /// `f32` with one common exponent.
-    Single { values: Vec<f32>, exponent: i32 },
+    /// `f32`, as u times 2^[`TOP`](Real::TOP) of an `f32`.
+    Single(Vec<f32>),
     /// `f64` with one common exponent.
     Double { values: Vec<f64>, exponent: i32 },
     /// Mantissa and exponent per cell.
@@ -27,22 +27,20 @@ pub(crate) enum Store {
 /// Takes values of u times 2^TOP.
 impl From<Vec<f32>> for Store {
     fn from(values: Vec<f32>) -> Self {
-        let exponent = -f32::TOP;
-        Self::Single { values, exponent }
+        Self::Single(values)
     }
 }
 
 impl From<Vec<f64>> for Store {
     fn from(values: Vec<f64>) -> Self {
-        let exponent = -f64::TOP;
-        Self::Double { values, exponent }
+        Self::Double { values, exponent: -f64::TOP }
     }
 }
 
 impl Store {
     pub(crate) fn raw(&self, index: usize) -> (f64, i32) {
         match self {
-            Self::Single { values, exponent } => (f64::from(values[index]), *exponent),
+            Self::Single(values) => (f64::from(values[index]), -f32::TOP),
             Self::Double { values, exponent } => (values[index], *exponent),
             Self::Extended { mantissas, exponents } => (mantissas[index], exponents[index]),
         }
@@ -57,8 +55,8 @@ impl Store {
     /// In units of 2^`reference`; 0 if the result is below the range of `R`.
     pub(crate) fn read_row_as<R: Real>(&self, cells: Range<usize>, reference: i32, into: &mut [R]) {
         assert_eq!(into.len(), cells.len());
-        if let Self::Single { values, exponent } = self
-            && *exponent == reference
+        if let Self::Single(values) = self
+            && reference == -f32::TOP
         {
             for (to, &u) in into.iter_mut().zip(&values[cells]) {
                 *to = R::of(f64::from(u.max(0.0)));

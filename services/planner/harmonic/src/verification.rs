@@ -56,7 +56,7 @@ pub(crate) fn check_above(
     floor: f64,
 ) -> Check {
     match store {
-        Store::Single { values, .. } => in_strips(domain, threads, |rows| {
+        Store::Single(values) => in_strips(domain, threads, |rows| {
             check_plain(domain.width(), values, rows, floor, weights_of(domain))
         }),
         Store::Double { values, .. } => in_strips(domain, threads, |rows| {
