@@ -30,12 +30,6 @@ use galerkin::Products;
 
 use grid::Grid;
 
-/// Angle, in radians, above which a correction leaves a direction unsettled.
-///
-/// The next correction is smaller by a factor of three or more, which leaves directions well within
-/// a degree.
-const TOLERANCE: f64 = 0.02;
-
 /// Cycles before the first check.
 ///
 /// The first cycles leave some cells at zero, and these count as settled.
@@ -243,8 +237,8 @@ impl<R: Real> Multigrid<R> {
         let mut next_check = first_check;
         for cycle in 1..=most {
             cancellation.check()?;
-            let judged = (cycle >= next_check).then_some(TOLERANCE);
-            let settled = self.cycle(judged) == 0 && judged.is_some();
+            let judged = cycle >= next_check;
+            let settled = self.cycle(judged) == 0 && judged;
             let checked = settled || cycle == most;
             match after(self, checked) {
                 Some(excess) if checked => {
@@ -258,13 +252,10 @@ impl<R: Real> Multigrid<R> {
         Ok(())
     }
 
-    /// Runs a cycle and counts the cells whose direction turns by more than `tolerance`, in
-    /// radians.
-    ///
-    /// Without a tolerance, the count is 0.
-    pub(crate) fn cycle(&mut self, tolerance: Option<f64>) -> usize {
+    /// Runs a cycle and counts the cells that it unsettles, if `judged`; otherwise the count is 0.
+    fn cycle(&mut self, judged: bool) -> usize {
         let sweeps = if self.corrects && self.is_large() { SWEEPS } else { 1 };
-        let unsettled = self.pass(sweeps, true, tolerance);
+        let unsettled = self.pass(sweeps, true, judged);
         self.solve_level(0);
         self.corrects = true;
         unsettled
@@ -315,14 +306,14 @@ impl<R: Real> Multigrid<R> {
     ///
     /// Near a saddle point the direction depends on the last digits.
     pub(crate) fn finish(&mut self) {
-        self.pass(1 + SMOOTHING, false, None);
+        self.pass(1 + SMOOTHING, false, false);
         grid::clear(&mut self.coarse[0].u);
     }
 
-    fn pass(&mut self, sweeps: usize, descend: bool, tolerance: Option<f64>) -> usize {
+    fn pass(&mut self, sweeps: usize, descend: bool, judged: bool) -> usize {
         let (finest, next) = (&mut self.finest, &mut self.coarse[0]);
         let share = if self.corrects { OVERCORRECTION } else { 1.0 };
-        let work = Work { share: R::of(share), sweeps, descend, tolerance: tolerance.map(R::of) };
+        let work = Work { share: R::of(share), sweeps, descend, judged };
         self.simd.run(
             #[inline(always)]
             || finest.pass(next, work),

@@ -34,6 +34,12 @@ impl<R> Source<R> {
     }
 }
 
+/// Angle, in radians, above which a coarse correction leaves a direction unsettled.
+///
+/// The next correction is smaller by a factor of three or more, which leaves directions well within
+/// a degree.
+const TOLERANCE: f64 = 0.02;
+
 /// Relative change of u by a coarse correction above which a cell counts as unsettled in any case.
 const LARGEST_CHANGE: f64 = 0.05;
 
@@ -60,8 +66,8 @@ pub(super) struct Work<R> {
     pub share: R,
     pub sweeps: usize,
     pub descend: bool,
-    /// Angle, in radians, beyond which a turned cell counts as unsettled; `None` skips the check.
-    pub tolerance: Option<R>,
+    /// Whether to count the unsettled cells.
+    pub judged: bool,
 }
 
 impl<R: Real> Finest<R> {
@@ -75,11 +81,11 @@ impl<R: Real> Finest<R> {
 
     /// Applies the correction from `next`, sweeps and restricts the residual.
     ///
-    /// Returns the number of unsettled even-even cells: direction turned by more than the
-    /// tolerance, or u changed by more than [`LARGEST_CHANGE`].
+    /// Returns the number of unsettled even-even cells: direction turned by more than
+    /// [`TOLERANCE`], or u changed by more than [`LARGEST_CHANGE`].
     #[inline(always)]
     pub(super) fn pass(&mut self, next: &mut Coarse<R>, work: Work<R>) -> usize {
-        let Work { share, sweeps, descend, tolerance } = work;
+        let Work { share, sweeps, descend, judged } = work;
         let (grid, strips, m) = (self.grid, self.grid.strips, MARGIN);
         let mut unsettled = 0;
         debug_assert!(self.sources.is_sorted_by_key(|source| (source.plane, source.row)));
@@ -92,8 +98,8 @@ impl<R: Real> Finest<R> {
                 let (o, n) = grid.strip(y);
                 let (upper, lower) =
                     scratch.correction_below(&grid, (&next.grid, &next.u), y, share);
-                if let Some(tolerance) = tolerance {
-                    unsettled += self.unsettled(o, upper, lower, tolerance, n);
+                if judged {
+                    unsettled += self.unsettled(o, upper, lower, n);
                 }
                 correct(&mut self.u, &self.weights, (upper, lower), o, n);
             }
@@ -149,10 +155,11 @@ impl<R: Real> Finest<R> {
     /// Differences of u to the next even-even cell east and south form a gradient, and those of the
     /// correction its change. Their cross product gives the angle of the turn.
     #[inline(always)]
-    fn unsettled(&self, o: usize, upper: &[R], lower: &[R], tolerance: R, n: usize) -> usize {
+    fn unsettled(&self, o: usize, upper: &[R], lower: &[R], n: usize) -> usize {
         let stride = self.grid.stride;
         let flat = R::of(FLAT / self.grid.width.max(self.grid.height) as f64);
         let (flat, largest) = (flat * flat, R::of(LARGEST_CHANGE));
+        let tolerance = R::of(TOLERANCE);
         let (c, c_east, c_south) = (&upper[..n], &upper[1..=n], &lower[..n]);
         let ee = &self.u[EE];
         let (u, east, south) = (&ee[o..][..n], &ee[o + 1..][..n], &ee[o + stride..][..n]);
