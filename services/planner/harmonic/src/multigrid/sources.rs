@@ -49,25 +49,11 @@ fn spread_flow<R: Real>(
 ) {
     let stride = level.grid().stride;
     let (col, row) = ((at - MARGIN) % stride, (at - MARGIN) / stride - 1);
-    for (k, weight) in interpolation_weights(level, plane, at).into_iter().enumerate() {
-        if weight > R::default() {
-            flows.push(((col + k % 2, row + k / 2), value * weight));
-        }
-    }
-}
-
-/// Returns the weights of a cell on the coarse cells north-west, north-east, south-west and
-/// south-east.
-///
-/// The first is in the same column or row if that is even.
-pub(super) fn interpolation_weights<R: Real>(
-    level: &impl Level<R>,
-    plane: usize,
-    at: usize,
-) -> [R; 4] {
     let zero = R::default();
     let [west, east, north, south] = level.weights().each_ref().map(|row| row[at]);
-    match plane {
+    // On the coarse cells north-west, north-east, south-west and south-east, of which the first is
+    // in the same column or row if that is even.
+    let weights = match plane {
         EE => [R::ONE, zero, zero, zero],
         OE => [west, east, zero, zero],
         EO => [north, zero, south, zero],
@@ -75,6 +61,11 @@ pub(super) fn interpolation_weights<R: Real>(
             let mut corners = [zero; 4];
             corner_weights(level, at, 1, corners.each_mut().map(std::slice::from_mut));
             corners
+        }
+    };
+    for (k, weight) in weights.into_iter().enumerate() {
+        if weight > zero {
+            flows.push(((col + k % 2, row + k / 2), value * weight));
         }
     }
 }
