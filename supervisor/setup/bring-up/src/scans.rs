@@ -18,7 +18,7 @@ use crate::{
     Finding, Trace,
     body::{MOTOR, Moves, SizesTold, motors, words},
     rangers::Gyro,
-    trace::between,
+    trace::{Scan, between},
     wheels::Motion,
 };
 
@@ -126,14 +126,13 @@ fn pose(poses: &[(f64, [f64; 3])], at_s: f64) -> Pose2 {
 }
 
 struct Problem<'a> {
-    trace: &'a Trace,
     motion: &'a Motion,
     track_m: f64,
     header: ScanHeader,
     /// Ranges at rest; not finite without an echo.
     reference: Vec<f64>,
     /// All scans since it moved, each with the wheels' turn until then.
-    scans: Vec<(usize, f64)>,
+    scans: Vec<(&'a Scan, f64)>,
     /// Interval of later scans that are placed.
     every: usize,
     beams_of_each: usize,
@@ -142,9 +141,9 @@ struct Problem<'a> {
 impl<'a> Problem<'a> {
     fn new(trace: &'a Trace, motion: &'a Motion, track_m: f64) -> Option<Self> {
         let header = trace.scans.first()?.1;
-        let alike = |scan: &&(f64, ScanHeader, Vec<f32>)| scan.1.sensor == header.sensor;
         let until = trace.rest_until_s();
-        let at_rest: Vec<_> = trace.scans.iter().filter(alike).filter(|it| it.0 < until).collect();
+        let alike = trace.scans.iter().filter(|it| it.1.sensor == header.sensor);
+        let (at_rest, moving): (Vec<_>, Vec<_>) = alike.partition(|it| it.0 < until);
         let beams = at_rest.iter().map(|it| it.2.len()).min().filter(|beams| *beams > 8)?;
         let median = |beam: usize| {
             let mut ranges: Vec<f64> = at_rest.iter().map(|it| f64::from(it.2[beam])).collect();
@@ -153,15 +152,11 @@ impl<'a> Problem<'a> {
             let enough = 2 * ranges.len() > at_rest.len();
             if enough { ranges[ranges.len() / 2] } else { f64::INFINITY }
         };
-        let moving: Vec<usize> = (0..trace.scans.len())
-            .filter(|it| trace.scans[*it].0 >= until && trace.scans[*it].1.sensor == header.sensor)
-            .collect();
-        let turned = |scan: usize| {
-            let [angle, way] = between(motion, trace.scans[scan].0).unwrap_or_default();
+        let turned = |scan: &'a Scan| {
+            let [angle, way] = between(motion, scan.0).unwrap_or_default();
             (scan, angle.abs() + 2.0 * way.abs() / track_m)
         };
         Some(Self {
-            trace,
             motion,
             track_m,
             header,
@@ -208,11 +203,11 @@ impl<'a> Problem<'a> {
         let mut ends = Vec::new();
         // Beams of a scan without sweep times share one pose.
         let mut held = (f64::NAN, DVec2::ZERO, DVec2::X);
-        let is_placed = |(number, (_, turned)): &(usize, &(usize, f64))| {
+        let is_placed = |(number, (_, turned)): &(usize, &(&Scan, f64))| {
             *turned <= most_turn && (*turned <= EARLY || number.is_multiple_of(self.every))
         };
         for (_, (scan, _)) in self.scans.iter().enumerate().filter(is_placed) {
-            let (at, header, beams) = &self.trace.scans[*scan];
+            let (at, header, beams) = scan;
             for beam in (0..beams.len()).step_by(1 + beams.len() / self.beams_of_each) {
                 let range = f64::from(beams[beam]);
                 let seconds = 1e-9 * header.sweep().beam_time_ns(beam, beams.len()) as f64;

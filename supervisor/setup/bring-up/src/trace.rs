@@ -31,8 +31,11 @@ pub struct Trace {
     pub gyro: Vec<(f64, f64)>,
     /// Readings of a tick, one per row of the mission's table.
     pub ranges: Vec<(f64, Vec<RangeReading>)>,
-    pub scans: Vec<(f64, ScanHeader, Vec<f32>)>,
+    pub scans: Vec<Scan>,
 }
+
+/// Time, header and ranges.
+pub type Scan = (f64, ScanHeader, Vec<f32>);
 
 /// Stretch of time with one command.
 #[derive(Clone, Copy, Debug, PartialEq)]
