@@ -93,10 +93,10 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
         return (found, Vec::new());
     }
     let placed = scans::place(mission, trace, &motion);
-    let gyro = rangers::Gyro::of(trace, &motion);
+    let gyro_scale = rangers::gyro_scale(trace, &motion);
     let sure = placed.as_ref().filter(|placed| placed.is_sure());
     let moves = match sure {
-        Some(placed) => placed.moves(gyro.as_ref()),
+        Some(placed) => placed.moves(gyro_scale),
         None => rangers::moves(mission, trace, &motion),
     };
     found.extend(rangers::liveliness(mission, trace, !moves.exchanged));
@@ -104,8 +104,9 @@ pub fn findings(mission: &Mission, trace: &Trace, lifted: bool) -> (Vec<Finding>
     let motors = moves.finding(mission, wheels.is_as_told());
     let are_right = motors.is_none();
     found.extend(motors);
-    found.extend(scans::findings(mission, trace, placed.as_ref(), &moves, gyro.as_ref()));
-    found.extend(rangers::gyro_finding(mission, gyro.as_ref(), sure, &moves));
+    let has_gyro = gyro_scale.is_some();
+    found.extend(scans::findings(mission, trace, placed.as_ref(), &moves, has_gyro));
+    found.extend(rangers::gyro_finding(mission, gyro_scale, sure, &moves));
     if are_right || sure.is_some() {
         found.extend(rangers::findings(mission, trace, &motion, sure, &moves));
     }

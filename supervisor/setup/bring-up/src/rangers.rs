@@ -140,33 +140,21 @@ fn laser_lives(trace: &Trace, row: usize, sensor: &Sensor) -> Finding {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Gyro {
-    /// Gyro turns over wheel turns.
-    scale: f64,
-}
-
-impl Gyro {
-    /// Returns `None` without a gyro, or if the wheels hardly turned the body.
-    pub(crate) fn of(trace: &Trace, motion: &Motion) -> Option<Self> {
-        let (mut squares, mut products, mut wheels) = (0.0, 0.0, 0.0);
-        for (at, turn) in &trace.gyro {
-            let tick = motion.partition_point(|it| it.0 < *at);
-            let (Some(now), Some(before)) = (motion.get(tick), motion.get(tick.wrapping_sub(1)))
-            else {
-                continue;
-            };
-            let by_wheels = now.1[0] - before.1[0];
-            squares += by_wheels * by_wheels;
-            products += turn * by_wheels;
-            wheels += by_wheels.abs();
-        }
-        (wheels > LEAST_TURN).then(|| Self { scale: products / squares })
+/// Returns the gyro's turns over the wheels' turns; `None` without a gyro, or if the wheels hardly
+/// turned the body.
+pub(crate) fn gyro_scale(trace: &Trace, motion: &Motion) -> Option<f64> {
+    let (mut squares, mut products, mut wheels) = (0.0, 0.0, 0.0);
+    for (at, turn) in &trace.gyro {
+        let tick = motion.partition_point(|it| it.0 < *at);
+        let (Some(now), Some(before)) = (motion.get(tick), motion.get(tick.wrapping_sub(1))) else {
+            continue;
+        };
+        let by_wheels = now.1[0] - before.1[0];
+        squares += by_wheels * by_wheels;
+        products += turn * by_wheels;
+        wheels += by_wheels.abs();
     }
-
-    pub(crate) const fn agrees(&self) -> bool {
-        self.scale > 0.0
-    }
+    (wheels > LEAST_TURN).then(|| products / squares)
 }
 
 /// Ranges by bearing from the robot's first place.
@@ -377,11 +365,11 @@ pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves 
 
 pub(crate) fn gyro_finding(
     mission: &Mission,
-    gyro: Option<&Gyro>,
+    gyro_scale: Option<f64>,
     placed: Option<&Placed>,
     moves: &Moves,
 ) -> Option<Finding> {
-    let Some(gyro) = gyro else {
+    let Some(gyro_scale) = gyro_scale else {
         let text = "none of its turns was used: it is silent, or contradicts odometry, for example because its z axis points down; see link.log";
         let has_gyro = mission.robot.gyro() || mission.robot.ros2.imu.is_some();
         return has_gyro.then(|| Finding::wrong("gyro", text));
@@ -390,9 +378,9 @@ pub(crate) fn gyro_finding(
         Some(turn) => (turn, "laser sees; correct its scale"),
         None => (1.0, "wheels count; correct its scale or robot.track_m"),
     };
-    let scale = gyro.scale.abs() / truth;
+    let scale = gyro_scale.abs() / truth;
     let text = format!("it reports {:.1} % of the turn", 100.0 * scale);
-    Some(match (gyro.agrees(), moves.turns_back) {
+    Some(match (gyro_scale > 0.0, moves.turns_back) {
         _ if moves.exchanged => return None,
         (false, None) => return None,
         (false, Some(false)) => Finding::wrong(

@@ -17,7 +17,6 @@ use nalgebra::{SMatrix, SVector};
 use crate::{
     Finding, Trace,
     body::{MOTOR, Moves, SizesTold, motors, words},
-    rangers::Gyro,
     trace::{Scan, between},
     wheels::Motion,
 };
@@ -97,10 +96,10 @@ impl Placed {
     ///
     /// A laser upside down or looking back resembles swapped or reversed motors, except for turns
     /// that drive. A gyro that turns with the wheels decides.
-    pub(crate) fn moves(&self, gyro: Option<&Gyro>) -> Moves {
+    pub(crate) fn moves(&self, gyro_scale: Option<f64>) -> Moves {
         let Hypothesis { turns_back, exchanged } = self.hypothesis;
         let scale = |it: usize| Some(self.unknowns[it].exp());
-        let agrees = gyro.map(Gyro::agrees);
+        let agrees = gyro_scale.map(|scale| scale > 0.0);
         let drives_back = self.seems_back();
         let are_motors = exchanged || turns_back && agrees == Some(false);
         let is_laser = !exchanged && turns_back && agrees == Some(true);
@@ -354,7 +353,7 @@ pub(crate) fn findings(
     trace: &Trace,
     placed: Option<&Placed>,
     moves: &Moves,
-    gyro: Option<&Gyro>,
+    has_gyro: bool,
 ) -> Vec<Finding> {
     let table = mission.sensor_table();
     let Some(placed) = placed else {
@@ -387,12 +386,11 @@ pub(crate) fn findings(
     if seen_back {
         let roll = if sensor.is_upside_down { "0" } else { "180" };
         let upside_down = format!("{name} sees it turn the other way: it is upside down");
-        found.push(match gyro {
-            Some(_) => Finding::wrong(name, upside_down).with_key(key("roll_deg"), roll),
-            None => {
-                let key = key("roll_deg");
-                Finding::wrong(name, format!("{upside_down}, so that {key} = {roll}, {or_motors}"))
-            }
+        let key = key("roll_deg");
+        found.push(if has_gyro {
+            Finding::wrong(name, upside_down).with_key(key, roll)
+        } else {
+            Finding::wrong(name, format!("{upside_down}, so that {key} = {roll}, {or_motors}"))
         });
     } else if looks_back {
         let key = key("turned_deg");
@@ -403,7 +401,7 @@ pub(crate) fn findings(
     let off = DVec2::new(it[X], it[Y]);
     let yaw = it[YAW];
     // The place and direction of a laser that may be upside down or look back are unknown.
-    let is_known = (!seen_back || gyro.is_some()) && !placed.seems_back();
+    let is_known = (!seen_back || has_gyro) && !placed.seems_back();
     let (turns, stands) =
         (is_known && yaw.abs() > YAW_TOLD, is_known && off.length() > PLACE_TOLD_M);
     let mut bearing_rad = mount.bearing_rad;
