@@ -13,7 +13,7 @@ use glam::DVec2;
 use crate::{
     Finding, Placed, Trace,
     body::{Moves, SizesTold},
-    trace::{Leg, Told, between},
+    trace::{Told, between},
     wheels::Motion,
 };
 
@@ -191,30 +191,6 @@ impl Profile {
     }
 }
 
-/// Returns a ranger's echoes during turns: bearing from the first heading, and distance from the
-/// robot's centre.
-fn seen_turning(
-    trace: &Trace,
-    row: usize,
-    sensor: &Sensor,
-    heading: &dyn Fn(f64) -> f64,
-) -> Vec<(f64, f64)> {
-    let turning = turning_legs(trace);
-    readings(trace, row)
-        .filter(|(at, _)| turning.iter().any(|leg| leg.contains(*at)))
-        .filter_map(|(at, reading)| {
-            let range = range_m(reading)? + sensor.mount.forward_m;
-            Some((heading(at) + sensor.mount.bearing_rad, range))
-        })
-        .collect()
-}
-
-/// Returns the turns at the robot's first place.
-fn turning_legs(trace: &Trace) -> Vec<Leg> {
-    let legs = trace.legs().into_iter().take_while(|leg| leg.told != Told::Drive);
-    legs.filter(|leg| leg.told != Told::Stand).collect()
-}
-
 /// Returns findings about rangers, and about the body if no laser saw its motion.
 pub(crate) fn findings(
     mission: &Mission,
@@ -255,7 +231,7 @@ pub(crate) fn findings(
             return found;
         }
     }
-    let all = seen_by_cones(&table, trace, &|at| {
+    let all = seen_by_cones(&table, trace, |at| {
         placed.map_or_else(|| turned(motion, at), |placed| placed.pose(at).heading)
     });
     for (place, (sensor, seen)) in all.iter().enumerate() {
@@ -278,13 +254,26 @@ fn turned(motion: &Motion, at_s: f64) -> f64 {
     between(motion, at_s).map_or(0.0, |[angle, _]| angle)
 }
 
+/// Returns the echoes of each sonar during turns at the robot's first place: bearing from the first
+/// heading, and distance from the robot's centre.
 fn seen_by_cones<'a>(
     table: &'a [Sensor],
     trace: &Trace,
-    heading: &dyn Fn(f64) -> f64,
+    heading: impl Fn(f64) -> f64,
 ) -> Vec<Seen<'a>> {
+    let legs = trace.legs().into_iter().take_while(|leg| leg.told != Told::Drive);
+    let turning: Vec<_> = legs.filter(|leg| leg.told != Told::Stand).collect();
+    let seen = |(row, sensor): (usize, &'a Sensor)| {
+        let in_turn =
+            readings(trace, row).filter(|it| turning.iter().any(|leg| leg.contains(it.0)));
+        let echo = |(at, reading): (f64, &RangeReading)| {
+            let range = range_m(reading)? + sensor.mount.forward_m;
+            Some((heading(at) + sensor.mount.bearing_rad, range))
+        };
+        (sensor, in_turn.filter_map(echo).collect())
+    };
     let cones = table.iter().enumerate().filter(|(_, it)| it.kind == SensorKind::Cone);
-    cones.map(|(row, it)| (it, seen_turning(trace, row, it, heading))).collect()
+    cones.map(seen).collect()
 }
 
 type Seen<'a> = (&'a Sensor, Vec<(f64, f64)>);
@@ -339,7 +328,7 @@ impl Turn {
 pub(crate) fn moves(mission: &Mission, trace: &Trace, motion: &Motion) -> Moves {
     let table = mission.sensor_table();
     let turn = Turn::best(|scale| {
-        disagreement(&seen_by_cones(&table, trace, &|at| scale * turned(motion, at)))
+        disagreement(&seen_by_cones(&table, trace, |at| scale * turned(motion, at)))
     });
     let rims_m = mission.body().track_m / 2.0;
     let turned_m = |[angle, _]: [f64; 2]| angle * rims_m;
