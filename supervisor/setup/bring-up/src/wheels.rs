@@ -1,5 +1,7 @@
 //! Commands that each encoder follows, and the response of the base.
 
+use std::iter::zip;
+
 use calibration::response;
 use common::mission::Mission;
 use nalgebra::{Matrix2, Vector2};
@@ -34,10 +36,9 @@ pub(crate) fn rate(mission: &Mission, trace: &Trace) -> Finding {
 
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) struct Wheels {
-    /// Rows are counting wheels, columns commanded wheels; left and right.
-    counted: Matrix2<f64>,
-    /// Whether the commands to turn and to drive lasted long enough.
-    is_told: bool,
+    /// Rows are counting wheels, columns commanded wheels; left and right. `None` if the commands
+    /// to turn and to drive were too short.
+    counted: Option<Matrix2<f64>>,
 }
 
 /// Body motion by the wheels under their commands: angle, radians, and distance, metres.
@@ -51,31 +52,26 @@ impl Wheels {
         for leg in legs.iter().filter(|leg| leg.told != Told::Stand) {
             let settled = leg.from_s + SETTLED_S.min(leg.seconds() / 2.0);
             let in_leg = trace.rolled.iter().filter(|(at, _)| (settled..leg.until_s).contains(at));
-            let mut before: Option<&(f64, [f64; 2])> = None;
-            for now in in_leg {
-                if let Some(before) = before
-                    && let Some(told) = between(&trace.sent, before.0)
-                {
-                    // Closely spaced late frames, as on a busy machine, weigh less.
-                    let told = Vector2::from(told);
-                    squares += told * told.transpose() * (now.0 - before.0);
-                    products += (Vector2::from(now.1) - Vector2::from(before.1)) * told.transpose();
-                }
-                before = Some(now);
+            for (before, now) in zip(in_leg.clone(), in_leg.skip(1)) {
+                let Some(told) = between(&trace.sent, before.0) else { continue };
+                // Closely spaced late frames, as on a busy machine, weigh less.
+                let told = Vector2::from(told);
+                squares += told * told.transpose() * (now.0 - before.0);
+                products += (Vector2::from(now.1) - Vector2::from(before.1)) * told.transpose();
             }
         }
         // Only turns together with drives separate the wheels.
         let is_told = squares.determinant() > 1e-6 * squares[(0, 0)] * squares[(1, 1)];
         let inverse = squares.try_inverse().filter(|_| is_told);
-        let counted = inverse.map_or_else(Matrix2::identity, |inverse| products * inverse);
-        Self { counted, is_told: inverse.is_some() }
+        Self { counted: inverse.map(|inverse| products * inverse) }
     }
 
     /// Returns the wheel that each encoder follows. Each row, an encoder's, has 1 in the column of
     /// its wheel, or -1 if it counts backwards. A dead encoder has zeros.
     fn follows(&self) -> Matrix2<f64> {
+        let counted = self.counted.unwrap_or_else(Matrix2::identity);
         Matrix2::from_fn(|row, column| {
-            let (share, other) = (self.counted[(row, column)], self.counted[(row, 1 - column)]);
+            let (share, other) = (counted[(row, column)], counted[(row, 1 - column)]);
             let is_least = share.abs() < other.abs() || share.abs() == other.abs() && column == 1;
             if is_least || share.abs() < LEAST_SHARE { 0.0 } else { share.signum() }
         })
@@ -83,11 +79,11 @@ impl Wheels {
 
     /// Returns the finding; `motors` has the wheels behind each command, if observed.
     pub(crate) fn finding(&self, motors: Option<Matrix2<f64>>) -> Finding {
-        if !self.is_told {
+        let Some(counted) = self.counted else {
             let text = "it moved too briefly, perhaps with something within 0.2 m of its front; see the logs of the run, and give it more room";
             return Finding::unknown("wheels", text);
-        }
-        let [left, right] = [0, 1].map(|row| self.counted.row(row).amax());
+        };
+        let [left, right] = [0, 1].map(|row| counted.row(row).amax());
         let follows = self.follows();
         // Encoders that agree with commands are wired like the motors.
         let (encoders, or_motors) = match motors {
