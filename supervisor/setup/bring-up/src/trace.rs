@@ -1,6 +1,6 @@
 //! Commands, counts and readings of the procedure.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, iter::zip};
 
 use common::{
     driver::counts::WheelCounts,
@@ -159,12 +159,13 @@ impl Trace {
     pub fn begins_at_rest(&self) -> bool {
         let until = self.rest_until_s();
         let (first, last) = (self.rolled.first(), self.rolled.iter().rfind(|it| it.0 < until));
-        let went = first.zip(last).map(|(first, last)| [0, 1].map(|it| last.1[it] - first.1[it]));
-        went.is_none_or(|went| went.iter().all(|it| it.abs() < RESTS_M))
+        first.zip(last).is_none_or(|(first, last)| {
+            zip(first.1, last.1).all(|(from, to)| (to - from).abs() < RESTS_M)
+        })
     }
 
     pub fn rest_until_s(&self) -> f64 {
-        self.legs().first().map_or(0.0, |rest| rest.until_s)
+        self.legs()[0].until_s
     }
 }
 
