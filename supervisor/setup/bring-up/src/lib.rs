@@ -49,19 +49,19 @@ impl Verdict {
 }
 
 impl Finding {
-    pub(crate) fn new(part: impl Into<String>, verdict: Verdict, text: impl Into<String>) -> Self {
+    pub(crate) fn new(part: &str, verdict: Verdict, text: impl Into<String>) -> Self {
         Self { part: part.into(), verdict, text: text.into(), keys: Vec::new() }
     }
 
-    pub(crate) fn right(part: impl Into<String>, text: impl Into<String>) -> Self {
+    pub(crate) fn right(part: &str, text: impl Into<String>) -> Self {
         Self::new(part, Verdict::Right, text)
     }
 
-    pub(crate) fn wrong(part: impl Into<String>, text: impl Into<String>) -> Self {
+    pub(crate) fn wrong(part: &str, text: impl Into<String>) -> Self {
         Self::new(part, Verdict::Wrong, text)
     }
 
-    pub(crate) fn unknown(part: impl Into<String>, text: impl Into<String>) -> Self {
+    pub(crate) fn unknown(part: &str, text: impl Into<String>) -> Self {
         Self::new(part, Verdict::Unknown, text)
     }
 
