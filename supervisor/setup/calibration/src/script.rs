@@ -137,25 +137,23 @@ impl Script {
             Procedure::Gyro => (self.side_m, SPEED_M_S, AHEAD_M),
             _ => (WAY_M, SLOWLY_M_S, NEAR_M),
         };
+        let nearer_than = |limit_m| echo_m.is_some_and(|it| it < limit_m);
         let is_over = match self.leg() {
             Some(Leg::Stand(least_s)) => seconds >= least_s,
             Some(Leg::Turn(angle)) => {
-                rolled_m >= angle.abs() * body.track_m / 2.0 || seconds >= LONGEST_TURN_S
+                let turned = rolled_m >= angle.abs() * body.track_m / 2.0;
+                turned || seconds >= LONGEST_TURN_S || nearer_than(NEAR_M)
             }
-            Some(Leg::Drive) => rolled_m >= way_m || seconds >= 3.0 * way_m / way_m_s,
+            Some(Leg::Drive) => {
+                rolled_m >= way_m || seconds >= 3.0 * way_m / way_m_s || nearer_than(ahead_m)
+            }
             Some(Leg::ToAndFro(_)) => seconds >= LEG_S,
             Some(Leg::Side) => (ways.arc_m() - from.arc_m()).abs() >= self.side_m,
             Some(Leg::Corner) => left(self.leg) <= TURNED_RAD,
             None => false,
         };
-        let nearer_than = |limit_m| echo_m.is_some_and(|it| it < limit_m);
-        let is_near = match self.leg() {
-            Some(Leg::Turn(_)) => nearer_than(NEAR_M),
-            Some(Leg::Drive) => nearer_than(ahead_m),
-            _ => false,
-        };
         self.ticks = self.ticks.saturating_add(1);
-        if is_over || is_near {
+        if is_over {
             (self.leg, self.ticks, self.from) = (self.leg + 1, 1, ways);
         }
         let left = left(self.leg);
