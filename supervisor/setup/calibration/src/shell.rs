@@ -111,7 +111,6 @@ pub struct Shell {
     newest: Option<(u64, Option<f64>)>,
     scan: Option<FreeByScan>,
     answered: Option<GuidanceSample>,
-    progress: Progress,
 }
 
 impl Process for Shell {
@@ -145,16 +144,14 @@ impl Process for Shell {
             newest: None,
             scan,
             answered: None,
-            progress: Progress::default(),
         })
     }
 
     fn turn(&mut self) -> Result<Progress, StageError> {
         while let Some(pose) = self.inputs.pose.next_sample()? {
-            self.progress = Progress::of(&pose.stamp);
+            self.out.at = Progress::of(&pose.stamp);
             // A repeated tick gets its answer again.
             if let Some(answered) = self.answered.filter(|it| it.pose_ns == pose.stamp.stamp_ns) {
-                self.out.at = self.progress;
                 self.out.publish(&GUIDANCE, answered)?;
                 continue;
             }
@@ -175,7 +172,7 @@ impl Process for Shell {
             }
             self.answer(&pose, echo_m)?;
         }
-        Ok(self.progress)
+        Ok(self.out.at)
     }
 }
 
@@ -204,7 +201,6 @@ impl Shell {
             ..GuidanceSample::for_pose(pose, &GridHeader::default(), &self.target)
         };
         self.answered = Some(guidance);
-        self.out.at = Progress::of(&pose.stamp);
         self.out.publish(&GUIDANCE, guidance)
     }
 }
