@@ -309,8 +309,7 @@ impl Wall {
     }
 
     fn order(&self, heading: f64, echo_m: Option<f64>) -> Order {
-        let turn = |target: f64, fast: bool| {
-            let most = if fast { FAST_RAD } else { SLOW_RAD };
+        let turn = |target: f64, most: f64| {
             (GuidanceStatus::Look, direction_aside(target - heading, most), 0.0)
         };
         let along = |target: f64, limit: f64| {
@@ -323,12 +322,12 @@ impl Wall {
         let beyond = self.half_rad() + SLOW_RAD;
         let (status, aside_rad, speed_limit_m_s) = match self.phase {
             Phase::Approach => along(self.facing, speed),
-            Phase::Aside => turn(self.facing - beyond, true),
-            Phase::Sweep(0) => turn(self.facing + beyond, false),
-            Phase::Sweep(_) => turn(self.facing - beyond, false),
-            Phase::Turn(target) => turn(target, true),
+            Phase::Aside => turn(self.facing - beyond, FAST_RAD),
+            Phase::Sweep(0) => turn(self.facing + beyond, SLOW_RAD),
+            Phase::Sweep(_) => turn(self.facing - beyond, SLOW_RAD),
+            Phase::Turn(target) => turn(target, FAST_RAD),
             Phase::Away(target) => along(target, SPEED_M_S),
-            Phase::Back => turn(self.facing, true),
+            Phase::Back => turn(self.facing, FAST_RAD),
             // The run is over in both phases.
             Phase::Finished | Phase::Failed(_) => (GuidanceStatus::AtTarget, 0.0, 0.0),
         };
