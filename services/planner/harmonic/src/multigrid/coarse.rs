@@ -15,15 +15,17 @@ use super::{
 };
 use crate::real::Real;
 
-const W: (isize, isize) = (-1, 0);
-const E: (isize, isize) = (1, 0);
-const N: (isize, isize) = (0, -1);
-const S: (isize, isize) = (0, 1);
-const NW: (isize, isize) = (-1, -1);
-const NE: (isize, isize) = (1, -1);
-const SW: (isize, isize) = (-1, 1);
-const SE: (isize, isize) = (1, 1);
-const ALL: [(isize, isize); 8] = [W, E, N, S, NW, NE, SW, SE];
+/// Columns and rows from a cell to a neighbour.
+type Step = (isize, isize);
+const W: Step = (-1, 0);
+const E: Step = (1, 0);
+const N: Step = (0, -1);
+const S: Step = (0, 1);
+const NW: Step = (-1, -1);
+const NE: Step = (1, -1);
+const SW: Step = (-1, 1);
+const SE: Step = (1, 1);
+const ALL: [Step; 8] = [W, E, N, S, NW, NE, SW, SE];
 
 #[derive(Debug, Default)]
 pub(super) struct Coarse<R> {
@@ -137,7 +139,7 @@ impl<R: Real> Coarse<R> {
         &mut self,
         plane: usize,
         (o, n): (usize, usize),
-        steps: [(isize, isize); COUNT],
+        steps: [Step; COUNT],
     ) {
         let mut row = std::mem::take(&mut self.u[plane]);
         let terms = self.terms(plane, o, n, steps);
@@ -153,7 +155,7 @@ impl<R: Real> Coarse<R> {
         plane: usize,
         o: usize,
         n: usize,
-        steps: [(isize, isize); COUNT],
+        steps: [Step; COUNT],
     ) -> [(&[R], &[R]); COUNT] {
         // `map` is not always inlined, and this loop runs for every row.
         let mut terms: [(&[R], &[R]); COUNT] = [(&[], &[]); COUNT];
@@ -164,7 +166,7 @@ impl<R: Real> Coarse<R> {
     }
 
     #[inline(always)]
-    fn term(&self, plane: usize, o: usize, n: usize, step: (isize, isize)) -> (&[R], &[R]) {
+    fn term(&self, plane: usize, o: usize, n: usize, step: Step) -> (&[R], &[R]) {
         let (there, at) = neighbour(&self.grid, plane, o, step);
         let here = step.1 > 0 || step == E;
         let (owner, from) = if here { (plane, o) } else { (there, at) };
@@ -179,7 +181,7 @@ impl<R: Real> Coarse<R> {
 }
 
 #[inline(always)]
-fn neighbour(grid: &Grid, plane: usize, at: usize, (dx, dy): (isize, isize)) -> (usize, usize) {
+fn neighbour(grid: &Grid, plane: usize, at: usize, (dx, dy): Step) -> (usize, usize) {
     let (x, y) = ((plane & 1) as isize + dx, (plane >> 1) as isize + dy);
     let there = (x.rem_euclid(2) + 2 * y.rem_euclid(2)) as usize;
     let offset = y.div_euclid(2) * grid.stride as isize + x.div_euclid(2);
