@@ -46,8 +46,8 @@ pub(crate) fn solve(
     known: Option<&Store>,
     workspace: &mut Workspace,
 ) -> Result<Store, SolveError> {
-    let solved = factor(job, ordered, workspace)
-        .and_then(|()| substitute(job, ordered, known, workspace));
+    let solved =
+        factor(job, ordered, workspace).and_then(|()| substitute(job, ordered, known, workspace));
     workspace.trim();
     solved
 }

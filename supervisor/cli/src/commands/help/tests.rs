@@ -30,7 +30,7 @@ struct Document {
 
 fn documents() -> Vec<Document> {
     let pages = all_pages().map(|page| PathBuf::from(format!("supervisor/guide/{}.md", page.file)));
-    std::iter::once(PathBuf::from("README.md"))
+    iter::once(PathBuf::from("README.md"))
         .chain(pages)
         .map(|path| Document { text: fs::read_to_string(root().join(&path)).unwrap(), path })
         .collect()
@@ -138,7 +138,7 @@ fn arguments(command: &[String]) -> Option<&[String]> {
 fn understood(words: &[String]) -> Result<Option<commands::Command>, clap::Error> {
     fn by<A: clap::Parser>(words: &[String]) -> Result<Option<commands::Command>, clap::Error> {
         let executable = "companion".to_owned();
-        A::try_parse_from(std::iter::once(&executable).chain(words)).map(|_| None)
+        A::try_parse_from(iter::once(&executable).chain(words)).map(|_| None)
     }
     match words.first().map(String::as_str) {
         Some("top") => by::<firsthand_top::Arguments>(&words[1..]),
