@@ -7,7 +7,6 @@ use common::{
     clock::Instant,
     mission::Mission,
     samples::{HealthSample, RosterEntry, name_str},
-    topics::LINK,
 };
 use rustix::process::Signal;
 
@@ -18,7 +17,7 @@ use crate::{
     output_watchdog::OutputWatchdog,
     policy::{Action, Event, Now, Phase, STOP_GRACE},
     stage_process::{StageProcess, StageProcessError},
-    stages::TABLE,
+    stages::start_order,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,9 +50,9 @@ impl StageProcesses {
         host: Box<dyn Host>,
     ) -> Self {
         let cells = mission.grid_frame().area();
-        assert_eq!(TABLE[0].name, LINK.spec().writer);
+        let stages = start_order().into_iter();
         Self {
-            stages: TABLE.iter().map(|stage| StageProcess::new(stage, mission)).collect(),
+            stages: stages.map(|stage| StageProcess::new(stage, mission)).collect(),
             watchdog: OutputWatchdog::new(cells),
             directory,
             clock: ObservedTime::new(Instant::now()),
