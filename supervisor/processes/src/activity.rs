@@ -9,20 +9,19 @@ use std::{fs, time::Duration};
 use common::process_status::{scheduled, state};
 
 /// Deadlines that a process may sleep before it counts as blocked. A slow disk takes more than one.
-const BLOCKED_DEADLINES: u32 = 4;
+pub(crate) const BLOCKED_DEADLINES: u32 = 4;
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum State {
     Ready,
     /// Stopped by a signal or a debugger.
     Stopped,
     /// Waiting for an event, a lock or a disk.
-    #[default]
     Asleep,
 }
 
-/// Activity of a process since its start, or since an earlier time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Activity of a process since its start or last beat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Activity {
     pub ran: Duration,
     pub starved: Duration,
@@ -30,34 +29,39 @@ pub struct Activity {
 }
 
 impl Activity {
-    /// Returns the activity of process `pid` since its start; `None` if it has ended or is not
-    /// counted.
-    pub(crate) fn of(pid: u32) -> Option<Self> {
-        let [ran, _] = scheduled(&pid.to_string())?;
-        let threads = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
-        let paths = threads.map(|it| format!("{pid}/task/{}", it.file_name().display()));
-        let starved = paths.filter_map(|path| Some(scheduled(&path)?[1])).sum();
-        let state = match state(&pid.to_string())? {
-            'R' => State::Ready,
-            'T' | 't' => State::Stopped,
-            _ => State::Asleep,
-        };
-        Some(Self { ran, starved, state })
-    }
-
-    pub(crate) const fn since(self, earlier: Self) -> Self {
-        Self {
-            ran: self.ran.saturating_sub(earlier.ran),
-            starved: self.starved.saturating_sub(earlier.starved),
-            ..self
-        }
-    }
-
     /// Returns whether a process without a sign of life for `age` is stopped, has run for
     /// `deadline`, or sleeps.
     pub(crate) fn is_hung(&self, age: Duration, deadline: Duration) -> bool {
         let slept = age.saturating_sub(self.ran + self.starved);
         let blocked = self.state == State::Asleep && slept >= deadline * BLOCKED_DEADLINES;
         self.state == State::Stopped || self.ran >= deadline || blocked
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Times {
+    pub ran: Duration,
+    pub starved: Duration,
+}
+
+impl Times {
+    /// Returns the times of process `pid`; `None` if it has ended or is not counted.
+    pub(crate) fn of(pid: u32) -> Option<Self> {
+        let [ran, _] = scheduled(&pid.to_string())?;
+        let threads = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
+        let paths = threads.map(|it| format!("{pid}/task/{}", it.file_name().display()));
+        let starved = paths.filter_map(|path| Some(scheduled(&path)?[1])).sum();
+        Some(Self { ran, starved })
+    }
+
+    pub(crate) fn activity(self, pid: u32) -> Option<Activity> {
+        let now = Self::of(pid)?;
+        let state = match state(&pid.to_string())? {
+            'R' => State::Ready,
+            'T' | 't' => State::Stopped,
+            _ => State::Asleep,
+        };
+        let ran = now.ran.saturating_sub(self.ran);
+        Some(Activity { ran, starved: now.starved.saturating_sub(self.starved), state })
     }
 }

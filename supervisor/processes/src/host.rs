@@ -12,7 +12,7 @@ use common::{file::append, start::Generation};
 use rustix::process::Signal;
 
 use crate::{
-    activity::Activity,
+    activity::{Activity, Times},
     death::log_tail,
     process::{self, ExitCause, Process},
 };
@@ -33,8 +33,11 @@ pub trait Watched {
         None
     }
 
-    /// Returns the activity since the start; `None` if the process has ended or is not counted.
-    fn activity(&self) -> Option<Activity>;
+    /// Returns the times that the process ran and starved; `None` if it has ended or is not
+    /// counted.
+    fn times(&self) -> Option<Times>;
+
+    fn activity(&self, then: Times) -> Option<Activity>;
 
     /// Returns the end of what the process has logged, in whole lines.
     fn log_tail(&self) -> String {
@@ -119,8 +122,12 @@ impl Watched for SystemProcess {
         Some(self.process.as_fd())
     }
 
-    fn activity(&self) -> Option<Activity> {
-        Activity::of(self.id())
+    fn times(&self) -> Option<Times> {
+        Times::of(self.id())
+    }
+
+    fn activity(&self, then: Times) -> Option<Activity> {
+        then.activity(self.id())
     }
 
     fn log_tail(&self) -> String {

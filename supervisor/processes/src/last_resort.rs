@@ -21,7 +21,7 @@ use common::{
 };
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::{activity::Activity, domain, policy::STOP_GRACE};
+use crate::{activity::Times, domain, policy::STOP_GRACE};
 
 /// Deadline of an iteration; a healthy loop turns five times a second.
 const STUCK: Duration = Duration::from_secs(2);
@@ -53,7 +53,7 @@ impl Turns {
     fn await_stuck(&self) {
         const { assert!(2 * LOOK_EVERY.as_millis() < STUCK.as_millis()) };
         let pid = std::process::id();
-        let (mut seen, mut age, mut before) = (0, Duration::ZERO, Activity::of(pid));
+        let (mut seen, mut age, mut since) = (0, Duration::ZERO, Times::of(pid));
         loop {
             let began = Instant::now();
             thread::park_timeout(LOOK_EVERY);
@@ -61,9 +61,9 @@ impl Turns {
             age += began.elapsed().min(2 * LOOK_EVERY);
             let now = self.count.load(Ordering::Relaxed);
             if std::mem::replace(&mut seen, now) != now || self.rests.load(Ordering::Relaxed) {
-                (age, before) = (Duration::ZERO, Activity::of(pid));
+                (age, since) = (Duration::ZERO, Times::of(pid));
             }
-            let activity = || Some(Activity::of(pid)?.since(before?));
+            let activity = || since.and_then(|since| since.activity(pid));
             if age >= STUCK && activity().is_none_or(|activity| activity.is_hung(age, STUCK)) {
                 return;
             }

@@ -15,7 +15,7 @@ use rustix::process::Signal;
 use thiserror::Error;
 
 use crate::{
-    activity::Activity,
+    activity::{Activity, Times},
     death::{Death, Next},
     host::{Host, Watched},
     policy::{Event, Now, Phase, Policy},
@@ -39,8 +39,8 @@ pub(crate) struct StageProcess {
     generation: u32,
     started: Now,
     beat: Option<Now>,
-    /// Activity of the process until its start or last ready beat; `None` if uncounted.
-    activity: Option<Activity>,
+    /// Process times at its start or last ready beat; `None` if uncounted.
+    times: Option<Times>,
     pub output: Option<Now>,
     hung: Option<Now>,
     /// Whether the last beat announced a stop on request.
@@ -60,7 +60,7 @@ impl StageProcess {
             generation: 0,
             started: Now::ZERO,
             beat: None,
-            activity: None,
+            times: None,
             output: None,
             hung: None,
             stopping: false,
@@ -96,7 +96,7 @@ impl StageProcess {
         };
         self.policy.step(Event::Start, now);
         assert!(matches!(self.phase(), Phase::Starting { .. }));
-        (self.started, self.activity) = (now, process.activity());
+        (self.started, self.times) = (now, process.times());
         self.process = Some(process);
         self.generation = health.stamp.generation;
         true
@@ -112,7 +112,7 @@ impl StageProcess {
         let state = health.state();
         self.stopping = state == HealthState::Stopping;
         if state == HealthState::Ready {
-            self.activity = self.process.as_ref().and_then(|process| process.activity());
+            self.times = self.process.as_ref().and_then(|process| process.times());
             self.policy.step(Event::BeatReady, now);
         }
         // A starting process waits for a roster that names it.
@@ -128,7 +128,7 @@ impl StageProcess {
     ) {
         assert!(self.process.is_none());
         let stage = self.stage.name;
-        (self.started, self.hung, self.activity) = (now, None, Some(Activity::default()));
+        (self.started, self.hung, self.times) = (now, None, Some(Times::default()));
         let number = run::next_generation(directory, stage).map_err(io::Error::other);
         let spawned = number.and_then(|number| {
             self.generation = number;
@@ -159,13 +159,13 @@ impl StageProcess {
     /// Returns the activity since the last beat, if a deadline has passed.
     pub(crate) fn overdue_activity(&self, now: Now) -> Option<Activity> {
         self.policy.deadline().filter(|deadline| now >= *deadline)?;
-        Some(self.process.as_ref()?.activity()?.since(self.activity?))
+        self.process.as_ref()?.activity(self.times?)
     }
 
     /// Returns the time of the last beat without the process's waits for a processor. While no beat
     /// comes, the policy judges the process.
     pub(crate) fn unstarved(&self) -> Now {
-        let starved = self.activity.unwrap_or_default().starved;
+        let starved = self.times.unwrap_or_default().starved;
         self.beat.unwrap_or_default().saturating_sub(starved)
     }
 

@@ -24,7 +24,7 @@ use mission_control::{
     surroundings::{Robot, SimulatedRobot, Surroundings},
 };
 use processes::{
-    activity::Activity,
+    activity::{Activity, Times},
     host::{Host, Watched},
     process::ExitCause,
 };
@@ -161,7 +161,17 @@ impl Watched for SimulatedProcess {
         self.machine.signal(self.number, Signal::KILL);
     }
 
-    fn activity(&self) -> Option<Activity> {
-        self.machine.activity(self.number)
+    fn times(&self) -> Option<Times> {
+        let Activity { ran, starved, .. } = self.machine.activity(self.number)?;
+        Some(Times { ran, starved })
+    }
+
+    fn activity(&self, then: Times) -> Option<Activity> {
+        let now = self.machine.activity(self.number)?;
+        Some(Activity {
+            ran: now.ran.saturating_sub(then.ran),
+            starved: now.starved.saturating_sub(then.starved),
+            ..now
+        })
     }
 }
