@@ -34,7 +34,7 @@ pub struct Arguments {
 enum Command {
     List(List),
     Diff(diff::Arguments),
-    /// List the targets of a run, even in progress.
+    /// List the results of a run's targets, even in progress.
     ///
     /// Prints place, outcome, mission time, and final distance, as estimated and true.
     Targets {
