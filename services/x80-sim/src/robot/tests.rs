@@ -130,21 +130,6 @@ fn one_is_answered_in_the_form_one_is_addressed_in() {
 }
 
 #[test]
-fn counts_come_from_real_motion_on_the_wired_channels_and_wrap() {
-    let mut robot = robot("[simulation.wheels]\nlag_s = 0\n[perimeter]\nwidth_m = 100");
-    send(&mut robot, forward(1000, None));
-    let truth = after(&mut robot, 7);
-    // In one second the wheels turn 1000 counts of 2 pi 0.085 / 1200 m. Channel 0 is reversed and
-    // wraps below 0.
-    let sensors = motor(&mut robot);
-    assert_eq!(sensors.encoders.map(|e| e.position), [32_768 - 1000, 1000]);
-    assert_eq!(sensors.encoders.map(|e| e.velocity()), [-1000, 1000]);
-    assert_eq!((truth.left_counts, truth.right_counts), (1000, 1000));
-    near(truth.x, 0.445_059, 1e-6);
-    assert_eq!(after(&mut robot, 7 * 32).left_counts, 33_000 - 32_768);
-}
-
-#[test]
 fn wheels_may_be_wired_the_other_way_round() {
     let mut robot = robot(
         "[robot]\nleft = { channel = 1, reversed = false }\nright = { channel = 0, reversed = true }\n[simulation.wheels]\nlag_s = 0",
