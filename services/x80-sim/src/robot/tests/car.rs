@@ -6,7 +6,6 @@ use common::{
 };
 
 use super::{Robot, after, robot, send};
-use crate::testing::near;
 
 /// Drives a car for `ticks` at these counts/s: the wheel forward, the steering left.
 fn drive(robot: &mut Robot, wheel: i16, steering: i16, ticks: u32) -> GroundTruthTick {
@@ -23,15 +22,4 @@ fn the_steering_takes_its_time_ends_at_its_stop_and_turns_no_standing_car() {
         assert!((counts_between(0, truth.right_counts) - counts).abs() <= 1, "{truth:?}");
         assert_eq!((truth.x, truth.y, truth.heading), (0.0, 0.0, 0.0));
     }
-}
-
-#[test]
-fn a_longer_wheelbase_turns_less() {
-    let heading = |scale: f64| {
-        let mut car =
-            robot(&format!("robot.model = 'car'\nsimulation.wheels.track_scale = {scale:?}"));
-        drive(&mut car, 0, 1000, 7);
-        drive(&mut car, 300, 0, 7).heading
-    };
-    near(heading(1.0) / heading(1.1), 1.1, 1e-9);
 }
