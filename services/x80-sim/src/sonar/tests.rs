@@ -123,19 +123,6 @@ fn answers_are_lost_and_invented_as_often_as_the_mission_says() {
     assert!((0.04..=0.055).contains(&short), "{short} were short");
 }
 
-#[test]
-fn the_byte_has_the_noise_of_its_range_and_whole_centimetres() {
-    let physics = SonarPhysics::preset(Realism::Laboratory);
-    let mut noise = Noise::new(4, Source::Sonar);
-    let bytes: Vec<f64> = (0..20_000).map(|_| f64::from(byte(2.0, &physics, &mut noise))).collect();
-    let mean = bytes.iter().sum::<f64>() / bytes.len() as f64;
-    let sd = (bytes.iter().map(|b| (b - mean).powi(2)).sum::<f64>() / bytes.len() as f64).sqrt();
-    // 1 cm + 0.5 % of 2 m is 2 cm; rounding adds 1/12 cm^2.
-    near(mean, 200.0, 0.1);
-    near(sd, (4.0_f64 + 1.0 / 12.0).sqrt(), 0.05);
-    assert_eq!(byte(f64::INFINITY, &physics, &mut noise), 255);
-}
-
 /// Returns the reach of a smooth disc of `radius_m` and `echo` straight ahead, metres.
 fn reach_of(radius_m: f64, echo: f64) -> f64 {
     let is_heard = |centimetres: &u16| {
