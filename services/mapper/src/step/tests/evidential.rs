@@ -26,18 +26,6 @@ impl Mapper {
 }
 
 #[test]
-fn a_hit_is_hazard_as_far_as_the_body_reaches_and_the_ground_before_it_is_swept() {
-    let mut mapper = mapper("");
-    mapper.hear(0.0, Some(0.7));
-    // The hit is at 0.9. Body and clearance reach 0.22 m and half a cell around it.
-    assert!(mapper.hazard_ahead(90));
-    assert_eq!(mapper.ahead(70), Margin);
-    assert_eq!(mapper.ahead(50), Scanned);
-    assert_eq!(mapper.state_at(50, 50), Free);
-    assert_eq!(mapper.state().safety_events, 1);
-}
-
-#[test]
 fn a_wall_just_outside_the_perimeter_blocks_what_the_body_would_touch_inside() {
     let mut mapper = mapper("");
     // The map ends at x = 2.45. A wall stands at 2.5, 0.5 m ahead of the sensor. The body reaches
@@ -148,14 +136,6 @@ fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
     // After half the arc's turn, its edge meets the object, its middle nothing new.
     mapper.hear(0.25, Some(0.7));
     assert_eq!(mapper.hazards(), before);
-}
-
-#[test]
-fn an_echo_beyond_reach_is_not_mapped() {
-    let mut mapper = mapper("");
-    mapper.hear(0.0, Some(1.4));
-    assert_eq!(mapper.state().safety_events, 0);
-    assert_eq!(mapper.ahead(100), Scanned);
 }
 
 #[test]
