@@ -345,15 +345,6 @@ mod tests {
     }
 
     #[test]
-    fn a_beam_frees_the_way_to_its_end_and_knows_nothing_behind_it() {
-        let grid = after(&[vec![1.0]]);
-        assert!(grid.is_occupied(ahead(1.0)));
-        assert_eq!(grid.news.flips.len(), 1);
-        let scanned = [0.4, 0.9, 1.0, 1.2].map(|x| grid.is_scanned(ahead(x)));
-        assert_eq!(scanned, [true, true, true, false]);
-    }
-
-    #[test]
     fn what_goes_away_is_contradicted_by_two_scans() {
         let gone = each(&[1.0, 1.0, 1.0, 2.0, 2.0]);
         assert!(after(&gone[..4]).is_occupied(ahead(1.0)), "one scan may be wrong");
