@@ -481,21 +481,6 @@ mod tests {
     }
 
     #[test]
-    fn a_laser_of_great_noise_is_matched_with_its_first_scan_and_says_how_well() {
-        let mut noisy = noisy();
-        let mut held = started(&noisy(START));
-        let (mut squares, mut stated) = (0.0, 0.0);
-        for step in 0..40 {
-            let position = dvec2(0.01 * f64::from(step), 0.0);
-            let truth = Pose2 { position, heading: 0.0 };
-            let fix = matched(&mut held, truth, &noisy(truth)).unwrap();
-            squares += off_m(&fix, position).powi(2);
-            stated += (fix.covariance[0] + fix.covariance[3]) / MATCHER.0.shared;
-        }
-        assert!((0.3..2.0).contains(&(squares / stated)), "{squares} where {stated} is stated");
-    }
-
-    #[test]
     fn a_thing_is_not_taken_for_another_one_beside_it() {
         // The corridor ends ahead.
         let ends_at = |x: f64| {
