@@ -117,26 +117,6 @@ fn told(maneuver: Maneuver) -> GuidanceSample {
 }
 
 #[test]
-fn a_look_turns_on_the_spot_and_ends_where_it_should() {
-    let look = told(Maneuver::Turn);
-    let far = evidential().at(facing(-2.0), &look);
-    assert_eq!((far.v_m_s, far.omega_rad_s), (0.0, 1.4));
-    let near = evidential().at(facing(0.2), &look);
-    assert!((-0.7..-0.5).contains(&near.omega_rad_s), "{near:?}");
-}
-
-#[test]
-fn an_evidential_robot_turns_on_the_spot_beyond_73_degrees_and_hurries_within_26() {
-    let guidance = ahead();
-    let at = |degrees: f64| evidential().at(facing(degrees.to_radians()), &guidance);
-    assert_eq!((at(73.5).v_m_s, at(-73.5).v_m_s), (0.0, 0.0));
-    assert!(at(73.5).omega_rad_s < 0.0);
-    assert!((0.04..0.4).contains(&at(60.0).v_m_s));
-    close(at(26.0).v_m_s, 0.4);
-    close(at(0.0).v_m_s, 0.4);
-}
-
-#[test]
 fn an_evidential_robot_goes_no_faster_than_its_guidance_allows_however_well_it_faces_its_way() {
     for (limit, v) in
         [(0.0, 0.0), (f64::NAN, 0.0), (0.01, 0.0), (0.039, 0.0), (0.04, 0.04), (0.1, 0.1)]
@@ -239,13 +219,6 @@ fn a_robot_has_arrived_beside_a_target_that_is_not_free_if_it_is_within_half_a_m
         let command = controller("").at(short(short_m), &beside);
         assert_eq!(command.state() == CommandState::Arrived, has_arrived, "{short_m}");
     }
-}
-
-#[test]
-fn an_evidential_robot_slows_down_towards_its_target() {
-    let mut controller = evidential();
-    close(controller.at(short(0.6), &ahead()).v_m_s, 0.4);
-    close(controller.at(short(0.25), &ahead()).v_m_s, 0.2);
 }
 
 #[test]
