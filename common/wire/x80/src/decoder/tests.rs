@@ -131,14 +131,6 @@ fn every_byte_is_accounted_for() {
     assert_eq!((tally.frames, tally.bad_crc, tally.noise_bytes), (1, 1, 13));
 }
 
-#[derive(Clone, Debug)]
-enum Piece {
-    Untouched { did: u8, data: Vec<u8> },
-    Flipped { data: Vec<u8>, at: prop::sample::Index, mask: u8 },
-    Truncated { data: Vec<u8>, at: prop::sample::Index },
-    Noise(Vec<u8>),
-}
-
 fn tricky_bytes(most: usize) -> impl Strategy<Value = Vec<u8>> {
     let byte = prop_oneof![
         3 => any::<u8>(),
@@ -149,14 +141,26 @@ fn tricky_bytes(most: usize) -> impl Strategy<Value = Vec<u8>> {
     prop::collection::vec(byte, 0..=most)
 }
 
+/// Bytes, and the frame that they were encoded from, with whether it is untouched.
+type Piece = (Vec<u8>, Option<(Owned, bool)>);
+
 fn piece() -> impl Strategy<Value = Piece> {
+    let index = any::<prop::sample::Index>;
     prop_oneof![
-        4 => (any::<u8>(), tricky_bytes(255)).prop_map(|(did, data)| Piece::Untouched { did, data }),
-        1 => (tricky_bytes(60), any::<prop::sample::Index>(), 1..=255_u8)
-            .prop_map(|(data, at, mask)| Piece::Flipped { data, at, mask }),
-        1 => (tricky_bytes(60), any::<prop::sample::Index>())
-            .prop_map(|(data, at)| Piece::Truncated { data, at }),
-        1 => tricky_bytes(80).prop_map(Piece::Noise),
+        4 => (any::<u8>(), tricky_bytes(255))
+            .prop_map(|(did, data)| (encoded(did, &data), Some(((1, 0, did, data), true)))),
+        1 => (tricky_bytes(60), index(), 1..=255_u8).prop_map(|(data, at, mask)| {
+            let mut bytes = encoded(77, &data);
+            let at = at.index(bytes.len());
+            bytes[at] ^= mask;
+            (bytes, Some(((1, 0, 77, data), false)))
+        }),
+        1 => (tricky_bytes(60), index()).prop_map(|(data, at)| {
+            let mut bytes = encoded(78, &data);
+            bytes.truncate(at.index(bytes.len()));
+            (bytes, Some(((1, 0, 78, data), false)))
+        }),
+        1 => tricky_bytes(80).prop_map(|bytes| (bytes, None)),
     ]
 }
 
@@ -171,25 +175,12 @@ proptest! {
         let mut stream = Vec::new();
         let mut untouched = Vec::new();
         let mut touched = Vec::new();
-        for piece in &pieces {
-            match piece {
-                Piece::Untouched { did, data } => {
-                    stream.extend(encoded(*did, data));
-                    untouched.push((1, 0, *did, data.clone()));
-                }
-                Piece::Flipped { data, at, mask } => {
-                    let mut bytes = encoded(77, data);
-                    let at = at.index(bytes.len());
-                    bytes[at] ^= mask;
-                    stream.extend(bytes);
-                    touched.push((1, 0, 77, data.clone()));
-                }
-                Piece::Truncated { data, at } => {
-                    let bytes = encoded(78, data);
-                    stream.extend(&bytes[..at.index(bytes.len())]);
-                    touched.push((1, 0, 78, data.clone()));
-                }
-                Piece::Noise(bytes) => stream.extend(bytes),
+        for (bytes, frame) in pieces {
+            stream.extend(bytes);
+            match frame {
+                Some((frame, true)) => untouched.push(frame),
+                Some((frame, false)) => touched.push(frame),
+                None => {}
             }
         }
         // The decoder needs the announced length of a noisy header before it can reject it.
