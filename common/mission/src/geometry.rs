@@ -283,19 +283,10 @@ mod tests {
 
     #[test]
     fn clearance_is_to_the_surface_and_negative_inside() {
-        let shapes = Shapes {
-            drums: vec![Drum { at: DVec2::new(2.0, 0.0), radius_m: 0.5, ..Drum::default() }],
-            walls: vec![Wall {
-                points: vec![DVec2::new(-1.0, -3.0), DVec2::new(-1.0, 3.0)],
-                ..Wall::default()
-            }],
-            boxes: vec![Box2 {
-                at: DVec2::new(0.0, 4.0),
-                size_m: DVec2::new(2.0, 1.0),
-                angle_deg: 90.0,
-                ..Box2::default()
-            }],
-        };
+        let text = "drum = [{ at = [2, 0], radius_m = 0.5 }]\n\
+            wall = [{ points = [[-1, -3], [-1, 3]] }]\n\
+            box = [{ at = [0, 4], size_m = [2, 1], angle_deg = 90 }]";
+        let shapes: Shapes = toml::from_str(text).unwrap();
         for (x, y, clearance, what) in [
             (0.0, 0.0, 1.0, "the wall is nearest"),
             (1.0, 0.0, 0.5, "the drum is"),
@@ -326,18 +317,10 @@ mod tests {
 
     #[test]
     fn a_body_meets_what_is_between_its_lowest_and_its_highest_part() {
-        let block =
-            |bottom_m, top_m| Box2 { bottom_m, top_m, size_m: DVec2::ONE, ..Box2::default() };
-        let shapes = Shapes {
-            boxes: vec![
-                block(None, None),
-                block(None, Some(0.02)),
-                block(None, Some(0.1)),
-                block(Some(0.24), Some(0.3)),
-                block(Some(0.7), None),
-            ],
-            ..Shapes::default()
-        };
+        let heights =
+            ["", "top_m = 0.02", "top_m = 0.1", "bottom_m = 0.24\ntop_m = 0.3", "bottom_m = 0.7"];
+        let block = |heights| format!("[[box]]\nat = [0, 0]\nsize_m = [1, 1]\n{heights}\n");
+        let shapes: Shapes = toml::from_str(&heights.map(block).concat()).unwrap();
         let met = shapes.between(0.03, 0.255).boxes;
         let tops: Vec<_> = met.iter().map(|block| block.top_m).collect();
         assert_eq!(tops, [None, Some(0.1), Some(0.3)]);
