@@ -112,15 +112,17 @@ mod tests {
         let file = directory.path().join(FILE_NAME);
         let text = fs::read_to_string(&file).unwrap();
         let later = text.replacen(VERSION, "99.0.0", 1);
-        fs::write(&file, &later).unwrap();
-        assert_eq!(Run::load(directory.path()).unwrap(), run);
-        fs::write(&file, later.replace("[mission]", "[mission]\nspeeed = 3")).unwrap();
-        let refused = Run::load(directory.path()).unwrap_err();
+        let load = |text: &str| {
+            fs::write(&file, text).unwrap();
+            Run::load(directory.path())
+        };
+        assert_eq!(load(&later).unwrap(), run);
+        let misspelt = |text: &str| text.replace("[mission]", "[mission]\nspeeed = 3");
+        let refused = load(&misspelt(&later)).unwrap_err();
         assert!(matches!(refused, RunError::OtherVersion { .. }), "{refused}");
         let said = refused.to_string();
         assert!(said.contains("99.0.0") && said.contains("speeed"), "{said}");
-        fs::write(&file, text.replace("[mission]", "[mission]\nspeeed = 3")).unwrap();
-        let refused = Run::load(directory.path()).unwrap_err();
+        let refused = load(&misspelt(&text)).unwrap_err();
         assert!(matches!(refused, RunError::Content { .. }), "{refused}");
     }
 
