@@ -122,8 +122,8 @@ pub(crate) fn in_scanned_room(
     scanned: impl Fn(DVec2) -> bool,
 ) -> Planner {
     let (header, cells) = keyframe(mission, hazard, scanned);
-    let mut beams = [-5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5]
-        .map(|step| beam(DVec2::ZERO, f64::from(step) * 15.0, 2.0));
+    let look = |step: i32| beam(DVec2::ZERO, f64::from(step) * 15.0, 2.0);
+    let mut beams: Vec<_> = (-5..=5).map(look).collect();
     beams.swap(0, 5);
     let header = GridHeader { part: header.part, ..belief(&beams, &[]) };
     let mut planner = sent(mission);
@@ -242,7 +242,7 @@ fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
 #[test]
 fn a_robot_that_senses_beside_it_turns_from_a_drum_before_the_field_does() {
     let drum = |at: DVec2| at.distance(dvec2(0.8, 0.05)) < 0.3;
-    let mut planner = in_scanned_room(&mission_with("robot.model = 'kobuki'"), drum, |_| true);
+    let mut planner = in_scanned_room(&mission_with(KOBUKI), drum, |_| true);
     let pose = Pose2 { position: dvec2(0.1, 0.0), ..Pose2::default() };
     let (_, field) = planner.follow_field(&pose).unwrap();
     let guidance = planner.ask_at(0.1, 0.0);
@@ -483,20 +483,23 @@ fn the_field_leads_past_a_bend_that_the_body_refused_until_the_map_is_reset() {
     assert_eq!(planner.ask_at(-0.3, 0.0).speed_limit_m_s, 0.0, "the refusal is forgotten");
 }
 
+const KOBUKI: &str = "robot.model = 'kobuki'";
+const JACKAL: &str = "robot.model = 'jackal'";
+
 /// Robot at the origin that drives at 0.4 m/s along x in a wide, scanned hall, beside a mover.
-fn guidance_beside(model: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
-    guidance_between(6.0, model, at, velocity)
+fn guidance_beside(robot: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
+    guidance_between(6.0, robot, at, velocity)
 }
 
 /// Same hall with two walls at `wall_m` metres from the robot's way.
-fn guidance_between(wall_m: f64, model: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
+fn guidance_between(wall_m: f64, robot: &str, at: [f64; 2], velocity: [f64; 2]) -> GuidanceSample {
     let pose = PoseSample { v_m_s: 0.4, ..PoseSample::default() };
-    in_hall(wall_m, model).guidance(&pose, at, velocity)
+    in_hall(wall_m, robot).guidance(&pose, at, velocity)
 }
 
-fn in_hall(wall_m: f64, model: &str) -> Planner {
+fn in_hall(wall_m: f64, robot: &str) -> Planner {
     let hall = "target = [4, 0]\nperimeter = { width_m = 12, cells = 120 }";
-    let mission = testing::mission(&format!("{hall}\nrobot.model = '{model}'"));
+    let mission = testing::mission(&format!("{hall}\n{robot}"));
     in_scanned_room(&mission, |at| at.y.abs() > wall_m, |_| true)
 }
 
@@ -519,7 +522,7 @@ fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time
  {
     let aside = |guidance: GuidanceSample| guidance.ey.abs() > 0.3;
     let insisting = || {
-        let mut planner = in_hall(6.0, "jackal");
+        let mut planner = in_hall(6.0, JACKAL);
         (1..=16).for_each(|second| assert!(aside(planner.comes(second, 4.5)), "{second} s"));
         planner.comes(17, 4.5);
         let far = planner.comes(18, 4.5);
@@ -537,9 +540,9 @@ fn a_robot_that_movers_kept_from_its_way_for_long_goes_on_where_it_rests_in_time
 
 #[test]
 fn what_goes_away_or_passes_far_off_changes_no_guidance() {
-    let speed = mission_with("robot.model = 'kobuki'").speed_m_s();
+    let speed = mission_with(KOBUKI).speed_m_s();
     for (at, velocity) in [([1.5, 0.0], [1.5, 0.0]), ([0.0, 3.0], [1.0, 0.0])] {
-        let guidance = guidance_beside("kobuki", at, velocity);
+        let guidance = guidance_beside(KOBUKI, at, velocity);
         assert_eq!(guidance.status(), Along);
         assert!(guidance.ex > 0.99 && guidance.signed_limit_m_s() >= speed, "{guidance:?}");
     }
@@ -547,13 +550,13 @@ fn what_goes_away_or_passes_far_off_changes_no_guidance() {
 
 #[test]
 fn a_robot_gets_out_of_the_way_of_what_comes_early_or_stands() {
-    let near = guidance_beside("jackal", [2.5, 0.1], [-0.8, 0.0]);
+    let near = guidance_beside(JACKAL, [2.5, 0.1], [-0.8, 0.0]);
     let aside = near.ey.abs() > 0.3 || near.maneuver() == Maneuver::Back;
     assert!(aside && near.status() == Along, "{near:?}");
     // A Jackal cannot back up, because its laser does not cover the rear.
-    let far = guidance_beside("jackal", [4.5, 0.1], [-1.2, 0.0]);
+    let far = guidance_beside(JACKAL, [4.5, 0.1], [-1.2, 0.0]);
     assert!(far.status() == Along && far.ey.abs() > 0.3, "{far:?}");
-    let late = guidance_beside("kobuki", [1.2, 0.0], [-1.5, 0.0]);
+    let late = guidance_beside(KOBUKI, [1.2, 0.0], [-1.5, 0.0]);
     assert_eq!(late.status(), Waiting, "{late:?}");
 }
 
@@ -562,7 +565,7 @@ fn a_robot_does_not_take_a_wall_beside_what_comes_for_its_trace_and_does_not_ste
     let aside = |wall_m| {
         (13..19).any(|decimetres| {
             let at = [0.1 * f64::from(decimetres), 0.0];
-            let guidance = guidance_between(wall_m, "jackal", at, [-0.4, 0.0]);
+            let guidance = guidance_between(wall_m, JACKAL, at, [-0.4, 0.0]);
             guidance.ey.abs() > 0.3 && guidance.signed_limit_m_s() > 0.0
         })
     };
@@ -571,22 +574,18 @@ fn a_robot_does_not_take_a_wall_beside_what_comes_for_its_trace_and_does_not_ste
 
 #[test]
 fn a_robot_backs_only_where_a_laser_looks() {
-    let backs = |model| {
+    let backs = |robot| {
         (2..30).any(|decimetres| {
             let at = [0.1 * f64::from(decimetres), 0.0];
-            guidance_beside(model, at, [-0.8, 0.0]).maneuver() == Maneuver::Back
+            guidance_beside(robot, at, [-0.8, 0.0]).maneuver() == Maneuver::Back
         })
     };
-    assert_eq!(["kobuki", "jackal"].map(backs), [true, false]);
+    assert_eq!([KOBUKI, JACKAL].map(backs), [true, false]);
 }
 
 #[test]
 fn a_robot_with_a_laser_stands_for_half_a_second_at_first_to_see_what_moves_and_others_do_not() {
-    for (robot, seconds, waits) in [
-        ("robot.model = 'kobuki'", 0.3, true),
-        ("robot.model = 'kobuki'", 0.6, false),
-        ("", 0.3, false),
-    ] {
+    for (robot, seconds, waits) in [(KOBUKI, 0.3, true), (KOBUKI, 0.6, false), ("", 0.3, false)] {
         let mut planner = in_room(&mission_with(robot), |_| false);
         let status = planner.answer(&after(seconds)).unwrap().1.status();
         assert_eq!(status == Waiting, waits, "{robot} after {seconds} s");
@@ -602,14 +601,10 @@ fn a_robot_turns_at_its_target_to_the_heading_though_it_slips_and_stands_if_its_
     };
     let long = "robot.model = 'jackal'\n\
         robot.footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]";
-    for (robot, wall_m, there) in [
-        ("robot.model = 'kobuki'", 6.0, Maneuver::Turn),
-        (long, 6.0, Maneuver::Turn),
-        (long, 0.1, Maneuver::Stand),
-    ] {
-        let hall = format!("target = [4, 0]\nperimeter = {{ width_m = 12, cells = 120 }}\n{robot}");
-        let mission = testing::mission(&hall);
-        let mut planner = in_scanned_room(&mission, |at| at.y.abs() > wall_m, |_| true);
+    for (robot, wall_m, there) in
+        [(KOBUKI, 6.0, Maneuver::Turn), (long, 6.0, Maneuver::Turn), (long, 0.1, Maneuver::Stand)]
+    {
+        let mut planner = in_hall(wall_m, robot);
         let sent = TargetSample { number: 2, last: 2, target, ..TargetSample::default() };
         planner.take_target(&sent).unwrap();
         let tolerance_m = planner.mission.arrival_tolerance_m;
