@@ -40,15 +40,3 @@ fn a_replica_follows_windows_waits_for_a_keyframe_when_one_is_missing_and_tells_
     }
     assert_eq!((replica.cells(), replica.version()), (&cells(5, 2)[..], 5));
 }
-
-#[test]
-fn a_part_says_what_it_was_made_of() {
-    let frame = GridFrame { centre: DVec2::new(1.0, -2.0), ..frame(40) };
-    let whole = Part::whole(frame, 7);
-    assert_eq!((whole.frame(), whole.window()), (frame, frame.whole()));
-    assert!(whole.is_keyframe() && whole.version == 7);
-    let window = Window::default().including(Cell { col: 3, row: 9 });
-    let part = Part::of(frame, window, 8);
-    assert_eq!((part.frame(), part.window()), (frame, window));
-    assert!(!part.is_keyframe());
-}
