@@ -210,28 +210,3 @@ impl GridFrame {
         fits(window.col, window.width) && fits(window.row, window.height)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn equation_19_rounds_to_the_cell_with_the_origin_at_the_centre_and_a_centre_to_its_own() {
-        let frame = GridFrame { cells: 50, resolution_m: 0.1, centre: DVec2::ZERO };
-        for (x, y, cell) in [
-            (0.0, 0.0, Some((25, 25))),
-            (0.26, -0.14, Some((28, 24))),
-            (2.4, -2.5, Some((49, 0))),
-            // One past the last column.
-            (2.46, 0.0, None),
-            (f64::NAN, 0.0, None),
-        ] {
-            let cell = cell.map(|(col, row)| Cell { col, row });
-            assert_eq!(frame.cell_at(DVec2::new(x, y)), cell, "{x} {y}");
-        }
-        let frame = GridFrame { cells: 41, centre: DVec2::new(1.3, -0.7), ..frame };
-        for cell in frame.whole().cells() {
-            assert_eq!(frame.cell_at(frame.centre_of(cell)), Some(cell));
-        }
-    }
-}
