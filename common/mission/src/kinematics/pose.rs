@@ -41,22 +41,3 @@ impl Pose2 {
         Self { position: self.position + self.axis() * arc, heading: self.heading + turn }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::f64::consts::FRAC_PI_2;
-
-    #[test]
-    fn an_arc_is_exact_and_equation_21_moves_along_the_old_heading() {
-        let up = Pose2 { heading: FRAC_PI_2, ..Pose2::default() };
-        for (end, at, heading) in [
-            // A quarter circle of radius 2 from the origin facing x ends at (2, 2) facing y.
-            (Pose2::default().along_arc(FRAC_PI_2 * 2.0, FRAC_PI_2), DVec2::splat(2.0), FRAC_PI_2),
-            (up.along_euler(0.3, 0.2), DVec2::new(0.0, 0.3), FRAC_PI_2 + 0.2),
-        ] {
-            assert!(end.position.distance(at) < 1e-12, "{end:?}");
-            assert!((end.heading - heading).abs() < 1e-12, "{end:?}");
-        }
-    }
-}
