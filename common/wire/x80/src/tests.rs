@@ -128,14 +128,6 @@ fn the_motor_frame_and_the_standard_frame_which_may_be_a_byte_longer_lie_as_the_
     assert_eq!(out[2..6], [0xb8, 0, 123, 33]);
 }
 
-#[test]
-fn wheel_counts_go_the_shorter_way_round_the_cycle() {
-    let at = |position| Encoder { position, ..Encoder::default() };
-    assert_eq!(at(3).counts_since(&at(32_766)), 5);
-    assert_eq!(at(32_766).counts_since(&at(3)), -5);
-    assert_eq!(at(700).counts_since(&at(100)), 600);
-}
-
 proptest! {
     #[test]
     fn any_data_under_any_did_are_a_message_or_an_error(
