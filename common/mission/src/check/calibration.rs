@@ -75,13 +75,4 @@ mod tests {
             assert!(says_file && refusal.to_string().contains(said), "{name}: {refusal:?}");
         }
     }
-
-    #[test]
-    fn a_right_wheel_that_is_larger_rolls_farther_and_the_mean_is_the_distance_scale() {
-        let odometry =
-            Odometry { diameter_ratio: 1.02, distance_scale: 0.99, ..Odometry::default() };
-        let [left, right] = odometry.wheel_scales();
-        assert!((right / left - 1.02).abs() < 1e-12);
-        assert!((f64::midpoint(left, right) - 0.99).abs() < 1e-12);
-    }
 }
