@@ -189,19 +189,6 @@ mod tests {
     }
 
     #[test]
-    fn a_beam_ends_at_the_first_thing_in_reach_that_is_as_high_as_the_laser() {
-        let scan = seen(
-            "robot.model = 'turtlebot3-waffle'\nworld.wall = [{ points = [[2, -1], [2, 1]] }]\nworld.drum = [{ at = [0, 2], radius_m = 0.5 }]\nworld.box = [{ at = [1, 0], size_m = [0.2, 0.2], top_m = 0.02 }]",
-        );
-        assert_eq!(scan.len(), 360);
-        // The first beam looks back. The laser is 64 mm behind the centre; its deviation is 5 cm at
-        // 2 m.
-        is_near(scan[180], 2.064, 0.25);
-        is_near(scan[270], 1.5, 0.2);
-        assert_eq!(scan[0], None);
-    }
-
-    #[test]
     fn a_laser_that_is_turned_and_off_the_centre_measures_from_where_it_is_and_its_middle_beam_looks_where_it_is_turned()
      {
         let scan = seen(
