@@ -316,20 +316,6 @@ mod tests {
     }
 
     #[test]
-    fn a_body_meets_what_is_between_its_lowest_and_its_highest_part() {
-        let heights =
-            ["", "top_m = 0.02", "top_m = 0.1", "bottom_m = 0.24\ntop_m = 0.3", "bottom_m = 0.7"];
-        let block = |heights| format!("[[box]]\nat = [0, 0]\nsize_m = [1, 1]\n{heights}\n");
-        let shapes: Shapes = toml::from_str(&heights.map(block).concat()).unwrap();
-        let met = shapes.between(0.03, 0.255).boxes;
-        let tops: Vec<_> = met.iter().map(|block| block.top_m).collect();
-        assert_eq!(tops, [None, Some(0.1), Some(0.3)]);
-        let profile = met[1].profile();
-        assert!((profile.height_gap(0.18) - 0.08).abs() < 1e-12, "{profile:?}");
-        assert_eq!(profile.height_gap(0.05), 0.0);
-    }
-
-    #[test]
     fn angles_wrap_to_the_half_open_turn() {
         use std::f64::consts::PI;
         for (half_turns, wrapped) in [(3.0, 1.0), (-0.5, -0.5), (1.5, -0.5)] {
