@@ -132,21 +132,6 @@ fn an_evidential_robot_goes_no_faster_than_its_guidance_allows_however_well_it_f
 }
 
 #[test]
-fn no_evidential_command_stands_in_the_dead_band_of_the_wheels() {
-    // A dead band of 20 counts/s after a gain of 0.78, at 1200 counts per turn.
-    let dead = 20.0 / 0.78 / 1200.0 * std::f64::consts::TAU;
-    for degrees in -180..180 {
-        for limit in [0.0, 0.01, 0.03, 0.05, 0.4] {
-            let command = evidential().at(facing(f64::from(degrees).to_radians()), &limited(limit));
-            let fastest = command.left_rad_s.abs().max(command.right_rad_s.abs());
-            let halts = command.state() == CommandState::Halt;
-            let is_right = fastest > dead || halts && fastest == 0.0;
-            assert!(is_right, "{degrees} degrees, limit {limit}: {command:?}");
-        }
-    }
-}
-
-#[test]
 fn without_guidance_the_robot_stands() {
     let nan = GuidanceSample { ex: f64::NAN, ..ahead() };
     for guidance in [GuidanceSample::default(), told(Maneuver::Stand), nan] {
