@@ -21,13 +21,14 @@ fn mission(set: &str) -> Mission {
 
 fn driver() -> Arduino {
     let mut driver = Arduino::new(&mission(""));
-    assert_eq!(polled(&mut driver), "\rb\r");
+    asks(&mut driver, "\rb\r");
     assert!(heard(&mut driver, " 57600\r\n").anything);
     driver
 }
 
-fn polled(driver: &mut Arduino) -> String {
-    String::from_utf8(driver.poll()).unwrap()
+#[track_caller]
+fn asks(driver: &mut Arduino, request: &str) {
+    assert_eq!(String::from_utf8(driver.poll()).unwrap(), request);
 }
 
 fn heard(driver: &mut Arduino, bytes: &str) -> Heard {
@@ -37,7 +38,7 @@ fn heard(driver: &mut Arduino, bytes: &str) -> Heard {
 const ROUND: &str = "p 4\rp 5\re\r";
 
 fn round(driver: &mut Arduino, answers: &str) -> Heard {
-    assert_eq!(polled(driver), ROUND);
+    asks(driver, ROUND);
     heard(driver, answers)
 }
 
@@ -81,7 +82,7 @@ fn a_round_gives_the_range_of_each_sonar_and_the_counts_that_begin_a_tick() {
 #[test]
 fn answers_come_in_any_pieces_and_commands_are_answered_between_them() {
     let mut driver = driver();
-    assert_eq!(polled(&mut driver), ROUND);
+    asks(&mut driver, ROUND);
     for piece in ["OK\r\n12", "3\r", "\nOK\r\n7\r\nOK\r\n1", " 2\r"] {
         assert_eq!(counts(&heard(&mut driver, piece)), None, "{piece:?}");
     }
@@ -106,7 +107,7 @@ fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
         // Late answers, and an unrequested baud rate.
         let late = heard(&mut driver, "77\r\n88\r\n9 9\r\n57600\r\n");
         assert!(says_nothing(&late), "{late:?}");
-        assert_eq!(polled(&mut driver), "\rb\r");
+        asks(&mut driver, "\rb\r");
         let late = heard(&mut driver, "77\r\n88\r\n9 9\r\nInvalid Command\r\n");
         assert!(says_nothing(&late) && !late.anything, "{late:?}");
         assert!(heard(&mut driver, "57600\r\n").anything);
@@ -119,38 +120,39 @@ fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
 #[test]
 fn a_round_that_is_overdue_is_dropped_and_its_late_answers_are_no_answers_of_the_next() {
     let mut driver = driver();
-    assert_eq!(polled(&mut driver), ROUND);
+    asks(&mut driver, ROUND);
     assert!(heard(&mut driver, "11\r\n").readings.is_empty());
-    assert_eq!([polled(&mut driver), polled(&mut driver)], ["", ""]);
-    assert_eq!(polled(&mut driver), "\rb\r");
+    asks(&mut driver, "");
+    asks(&mut driver, "");
+    asks(&mut driver, "\rb\r");
     let late = heard(&mut driver, "22\r\n1 2\r\n");
     assert!(says_nothing(&late) && is_refused(&late, "`p 5` is overdue"), "{late:?}");
     assert!(heard(&mut driver, "57600\r\n").anything);
     assert!(round(&mut driver, "1\r\n1\r\n1 2\r\n").motion.is_some());
     // A line that nobody asked for is refused too.
     assert!(heard(&mut driver, "12\r\n").refused.is_some());
-    assert_eq!(polled(&mut driver), "\rb\r");
+    asks(&mut driver, "\rb\r");
 }
 
 #[test]
 fn a_baud_rate_is_asked_for_again_only_when_its_answer_is_lost() {
     let mut driver = Arduino::new(&mission(""));
-    assert_eq!(polled(&mut driver), "\rb\r");
+    asks(&mut driver, "\rb\r");
     // The board boots with other text: the driver waits.
     assert!(heard(&mut driver, "booting\r\n").refused.is_some());
     for _ in 1..20 {
-        assert_eq!(polled(&mut driver), "");
+        asks(&mut driver, "");
     }
-    assert_eq!(polled(&mut driver), "\rb\r");
+    asks(&mut driver, "\rb\r");
 }
 
 #[test]
 fn a_wire_that_opens_again_begins_anew() {
     let mut driver = driver();
-    assert_eq!(polled(&mut driver), ROUND);
+    asks(&mut driver, ROUND);
     driver.hear(b"1\r\n2");
     driver.reset();
-    assert_eq!(polled(&mut driver), "\rb\r");
+    asks(&mut driver, "\rb\r");
     let said = heard(&mut driver, "57600\r\n");
     assert!(said.refused.is_none() && said.anything, "{said:?}");
 }
@@ -172,8 +174,8 @@ fn counts_that_wrap_at_32_bits_go_on_and_their_speeds_are_those_of_the_interval_
 fn the_speed_across_polls_without_a_round_is_by_the_time_between() {
     let mut driver = driver();
     turned(&mut driver, [0, 0]);
-    assert_eq!(polled(&mut driver), ROUND);
-    assert_eq!(polled(&mut driver), "");
+    asks(&mut driver, ROUND);
+    asks(&mut driver, "");
     heard(&mut driver, "1\r\n1\r\n10 10\r\n");
     // A poll without a request precedes this round.
     turned(&mut driver, [30, 30]);
@@ -192,10 +194,10 @@ fn counts_that_begin_anew_are_said_as_they_are_and_their_jump_is_no_speed() {
 #[test]
 fn a_flood_of_lines_or_of_bytes_without_an_end_is_bounded_and_begins_anew() {
     let mut driver = driver();
-    assert_eq!(polled(&mut driver), ROUND);
+    asks(&mut driver, ROUND);
     let said = heard(&mut driver, &"1\r\n".repeat(100_000));
     assert!(said.readings.is_empty() && said.refused.is_some());
-    assert_eq!(polled(&mut driver), "\rb\r");
+    asks(&mut driver, "\rb\r");
     for _ in 0..100 {
         driver.hear(&[b'1'; 10_000]);
     }
