@@ -276,6 +276,10 @@ mod tests {
         )
     }
 
+    fn driver_with_laser(keys: &str) -> Json {
+        driver_of(&format!("robot.protocol = 'json'\n{}", laser("laser", keys)))
+    }
+
     fn heard(driver: &mut Json, line: &str) -> Heard {
         driver.hear(format!("{line}\n").as_bytes())
     }
@@ -334,8 +338,7 @@ mod tests {
 
     #[test]
     fn a_line_of_16384_beams_with_all_digits_is_taken_and_a_laser_upside_down_is_mirrored() {
-        let row = laser("laser", "beams = 16384\nroll_deg = 180");
-        let mut driver = driver_of(&format!("robot.protocol = 'json'\n{row}"));
+        let mut driver = driver_with_laser("beams = 16384\nroll_deg = 180");
         let range = |beam: u16| 1.000_000_000_000_123_4 + f64::from(beam) * 1e-4;
         let beams: Vec<_> = (0..16_384).map(|beam| range(beam).to_string()).collect();
         let heard = heard(&mut driver, &format!("{{\"scan\":[{}]}}", beams.join(",")));
@@ -357,8 +360,7 @@ mod tests {
             let heard = heard(&mut driver(), &format!("{{\"ranges\":{{\"front\":{said}}}}}"));
             assert_eq!(heard.readings[0].status(), status, "{said}");
         }
-        let row = laser("laser", "beams = 3");
-        let mut driver = driver_of(&format!("robot.protocol = 'json'\n{row}"));
+        let mut driver = driver_with_laser("beams = 3");
         let beams = heard(&mut driver, r#"{"scan":[null,1e308,1]}"#).scans.remove(0).beams;
         assert!(beams[0] == f32::INFINITY && beams[1].is_nan(), "{beams:?}");
     }
@@ -465,8 +467,7 @@ mod tests {
     fn the_first_beam_of_a_sweep_is_the_first_in_time_of_an_upside_down_laser_too() {
         for (wide_deg, roll_deg, first) in [(90, 0, 0), (90, 180, 3), (360, 0, 0), (360, 180, 0)] {
             let keys = format!("beams = 4\nfield_of_view_deg = {wide_deg}\nroll_deg = {roll_deg}");
-            let row = laser("laser", &keys);
-            let mut driver = driver_of(&format!("robot.protocol = 'json'\n{row}"));
+            let mut driver = driver_with_laser(&keys);
             let said = r#"{"wheels":[0,0],"speeds":[0,0],"scan":[1,2,3,4],"scan_time_s":0.4}"#;
             let LaserScan { beams, sweep, .. } = heard(&mut driver, said).scans.remove(0);
             let times = (0..4).map(|beam| (sweep.beam_time_ns(beam, 4), beams[beam]));
