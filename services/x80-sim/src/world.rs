@@ -284,15 +284,11 @@ mod tests {
         let mut world = world(
             "[[simulation.thing]]\nfrom_s = 1\nuntil_s = 9\nshape.drum = [{ at = [0, 5], radius_m = 1 }]\nmoves = [{ at_s = 2, by = [0, 0] }, { at_s = 4, by = [0, -2] }]",
         );
-        let mut at = |time| {
+        let clearances = [0.5, 1.5, 3.0, 8.0, 9.0].map(|time| {
             world.advance(time, DVec2::ZERO, 0.1);
             world.clearance(DVec2::ZERO)
-        };
-        assert_eq!(at(0.5), f64::INFINITY);
-        assert_eq!(at(1.5), 4.0);
-        assert_eq!(at(3.0), 3.0);
-        assert_eq!(at(8.0), 2.0);
-        assert_eq!(at(9.0), f64::INFINITY);
+        });
+        assert_eq!(clearances, [f64::INFINITY, 4.0, 3.0, 2.0, f64::INFINITY]);
     }
 
     #[test]
@@ -312,9 +308,8 @@ mod tests {
             world(&format!("world.box = [{{ at = [1, 0], size_m = [1, 1], {heights} }}]"))
                 .clearance(DVec2::ZERO)
         };
-        assert_eq!(clearance("top_m = 0.1"), 0.5, "a low box");
-        assert_eq!(clearance("top_m = 0.02"), f64::INFINITY, "a door sill");
-        assert_eq!(clearance("bottom_m = 0.22"), 0.5, "the bar of a chair");
-        assert_eq!(clearance("bottom_m = 0.7"), f64::INFINITY, "a table top");
+        // A low box, a door sill, the bar of a chair and a table top.
+        let heights = ["top_m = 0.1", "top_m = 0.02", "bottom_m = 0.22", "bottom_m = 0.7"];
+        assert_eq!(heights.map(clearance), [0.5, f64::INFINITY, 0.5, f64::INFINITY]);
     }
 }
