@@ -104,12 +104,9 @@ mod tests {
 
     #[test]
     fn every_sonar_byte_is_read_as_the_protocol_says() {
-        let status = |byte| heard(byte).status();
-        assert_eq!(status(0), RangeStatus::Invalid);
-        assert_eq!(status(4), RangeStatus::AtContact);
-        assert_eq!(status(5), RangeStatus::Measured);
-        assert_eq!(status(254), RangeStatus::Measured);
-        assert_eq!(status(255), RangeStatus::Nothing);
+        use RangeStatus::{AtContact, Invalid, Measured, Nothing};
+        let statuses = [0, 4, 5, 254, 255].map(|byte| heard(byte).status());
+        assert_eq!(statuses, [Invalid, AtContact, Measured, Measured, Nothing]);
     }
 
     #[test]

@@ -46,11 +46,9 @@ mod tests {
         let (power, surroundings) = (power(&standard, [1, 2, 3, 4, 5, 6]), surroundings(&standard));
         assert!((power.board_v - 7.2).abs() < 1e-9);
         assert!((power.motor_v - 12.003).abs() < 1e-3);
-        assert_eq!(power.driver_c, [60.0, 100.0]);
-        assert_eq!(power.current_ad, [1, 2, 3, 4, 5, 6]);
+        assert_eq!((power.driver_c, power.current_ad), ([60.0, 100.0], [1, 2, 3, 4, 5, 6]));
         assert!((surroundings.temperature_c - 20.0).abs() < 1e-9);
-        assert_eq!(surroundings.human_alarm_ad, [10, 30]);
-        assert_eq!(surroundings.human_motion_ad, [20, 40]);
-        assert_eq!(surroundings.tilt_ad, [50, 60]);
+        let SurroundingsSample { human_alarm_ad, human_motion_ad, tilt_ad, .. } = surroundings;
+        assert_eq!([human_alarm_ad, human_motion_ad, tilt_ad], [[10, 30], [20, 40], [50, 60]]);
     }
 }
