@@ -49,20 +49,18 @@ mod tests {
     }
 
     #[test]
-    fn an_echo_that_comes_and_goes_is_there() {
-        let near = clear(&[(0.0, 0.03), (0.0, 2.0), (0.0, 0.03), (0.0, 2.0)], 0.19, 0.0);
-        assert!((near - 0.03).abs() < 1e-6, "{near}");
-        let inside = clear(&[(0.0, 0.07)], 0.22, 0.0);
-        assert!((inside - 0.04).abs() < 1e-6, "a sensor within the body's edge: {inside}");
-        let nearer = clear(&[(0.0, 0.5)], 0.19, 0.4);
-        assert!((nearer - 0.1).abs() < 1e-6, "the robot went on since: {nearer}");
-    }
-
-    #[test]
-    fn what_is_beside_or_long_past_is_not_ahead() {
-        assert_eq!(clear(&[(30.0, 0.03)], 0.19, 0.0), f64::INFINITY);
-        let mut readings = vec![(0.0, 0.03)];
-        readings.extend([(0.0, 2.0); NEWEST]);
-        assert!(clear(&readings, 0.19, 0.0) > 1.9);
+    fn an_echo_that_comes_and_goes_is_there_and_one_beside_or_long_past_is_not_ahead() {
+        let (echo, silence) = ((0.0, 0.03), (0.0, 2.0));
+        let long_past = [&[echo][..], &[silence; NEWEST]].concat();
+        for (what, readings, radius, x, want) in [
+            ("every second reading", &[echo, silence, echo, silence][..], 0.19, 0.0, 0.03),
+            ("a sensor within the body's edge", &[(0.0, 0.07)], 0.22, 0.0, 0.04),
+            ("the robot went on since", &[(0.0, 0.5)], 0.19, 0.4, 0.1),
+            ("beside", &[(30.0, 0.03)], 0.19, 0.0, f64::INFINITY),
+            ("long past", &long_past[..], 0.19, 0.0, 2.0),
+        ] {
+            let clear_m = clear(readings, radius, x);
+            assert!(clear_m == want || (clear_m - want).abs() < 1e-6, "{what}: {clear_m}");
+        }
     }
 }
