@@ -1,6 +1,6 @@
 //! Robot without a process: it has the bytes of one.
 
-use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+use std::net::SocketAddr;
 
 use common::{
     clock::Pace,
@@ -12,13 +12,6 @@ use rplidar_protocol::START;
 use x80_sim::InMemory;
 
 use crate::support::{Sim, encoded, forward, mission};
-
-const fn wire(port: u16) -> SocketAddr {
-    SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::LOCALHOST, port))
-}
-
-const HOST: SocketAddr = wire(7);
-const LASER: SocketAddr = wire(8);
 
 #[test]
 fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
@@ -40,7 +33,8 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
         (&arduino, requests),
     ] {
         let sim = Sim::start(text, Pace::Max);
-        let hosts = [(HOST, sim.host()), (LASER, sim.host())];
+        // Of the robot, and of its laser.
+        let hosts = [7, 8].map(|port| (SocketAddr::from(([127, 0, 0, 1], port)), sim.host()));
         let mut robot = InMemory::start(&mission(text), Pace::Max).unwrap();
         assert_eq!(robot.next_due_ns(), None);
         let mut buffer = vec![0; 65_536];
