@@ -187,17 +187,6 @@ fn a_robot_has_arrived_once_it_is_there_and_faces_the_heading_and_follows_the_pl
 }
 
 #[test]
-fn a_command_names_the_pose_and_the_guidance_that_it_follows() {
-    let mut guidance = GuidanceSample { pose_ns: 7, ..ahead() };
-    guidance.stamp.stamp_ns = 8;
-    let halted = GuidanceSample { ex: f64::NAN, ..guidance };
-    for guidance in [guidance, halted] {
-        let command = controller("").at(facing(0.0), &guidance);
-        assert_eq!((command.pose_ns, command.guidance_ns), (7, 8));
-    }
-}
-
-#[test]
 fn a_robot_has_arrived_beside_a_target_that_is_not_free_if_it_is_within_half_a_metre() {
     let beside = GuidanceSample { status: GuidanceStatus::AtTarget.into(), ..ahead() };
     for (short_m, has_arrived) in [(0.45, true), (0.55, false)] {
