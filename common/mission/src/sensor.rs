@@ -389,13 +389,8 @@ pub(crate) fn x80(radius_m: f64, sonar: &SonarConfig) -> Vec<SensorRow> {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec2;
-
     use super::*;
-    use crate::{
-        kinematics::Pose2,
-        testing::{laser, mission, read_back},
-    };
+    use crate::testing::{laser, mission, read_back};
 
     fn used(extra: &str) -> Vec<String> {
         let table = mission(extra).sensor_table();
@@ -404,14 +399,6 @@ mod tests {
 
     const ROWS: &str = "[[robot.sensor]]\nname = 'nose'\nkind = 'cone'\nchannel = 4\nforward_m = 0.2\nbearing_deg = 5\nrate_hz = 3.5\n\
         [[robot.sensor]]\nname = 'eye'\nkind = 'ray'\nchannel = 2\nforward_m = 0.1\nbearing_deg = -30\nreach_m = 0.5\n";
-
-    #[test]
-    fn the_ring_turns_with_the_robot_and_ranger_5_looks_to_its_right() {
-        let pose = Pose2 { position: DVec2::new(1.0, 2.0), heading: std::f64::consts::FRAC_PI_2 };
-        let right = mission("").sensor_table()[3 + 4].mount.on(pose);
-        assert!(right.position.distance(DVec2::new(1.121, 2.0)) < 1e-9);
-        assert!(right.axis().distance(DVec2::X) < 1e-9);
-    }
 
     #[test]
     fn the_sonars_beside_the_front_one_look_45_degrees_to_either_side_of_it() {
