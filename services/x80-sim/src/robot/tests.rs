@@ -200,19 +200,6 @@ fn enabling_and_a_speed_reach_their_channel() {
 }
 
 #[test]
-fn the_truth_has_the_least_clearance_since_the_last_tick_and_counts_contacts() {
-    let mut robot = robot("world.wall = [{ points = [[0.5, -1], [0.5, 1]] }]");
-    near(robot.ground_truth().clearance_m, 0.31, 1e-12);
-    send(&mut robot, forward(2000, None));
-    let first = after(&mut robot, 1);
-    assert!(first.clearance_m < 0.31 && first.contacts == 0);
-    let ground_truth = after(&mut robot, 7);
-    assert_eq!(ground_truth.contacts, 1);
-    assert!((0.0..1e-6).contains(&ground_truth.clearance_m), "{ground_truth:?}");
-    assert_eq!(ground_truth.v, 0.0, "the wall holds it");
-}
-
-#[test]
 fn a_line_of_truth_has_the_names_that_its_readers_know() {
     let line = serde_json::to_string(&robot("").ground_truth()).unwrap();
     let names: Vec<&str> = line.split('"').skip(1).step_by(2).collect();
