@@ -233,13 +233,6 @@ fn an_evidential_robot_looks_square_to_the_surfaces_it_could_touch_undetected() 
 }
 
 #[test]
-fn over_scanned_ground_an_evidential_robot_goes_at_full_speed() {
-    let guidance = evidential(|_| true).ask_at_start();
-    assert_eq!(guidance.status(), Along);
-    assert!(guidance.speed_limit_m_s > 0.25, "{guidance:?}");
-}
-
-#[test]
 fn a_robot_that_senses_beside_it_turns_from_a_drum_before_the_field_does() {
     let drum = |at: DVec2| at.distance(dvec2(0.8, 0.05)) < 0.3;
     let mut planner = in_scanned_room(&mission_with(KOBUKI), drum, |_| true);
@@ -408,16 +401,6 @@ fn the_policy_covers_every_cell_with_unit_vectors_or_nothing() {
         let target = cell.log2_u == 0.0;
         assert_eq!(directed || target, state == 0, "{cell:?} where the grid says {state}");
     }
-}
-
-#[test]
-fn a_new_target_is_solved_for_on_the_same_map_within_the_tick() {
-    let mut planner = in_room(&mission(), wall);
-    assert_eq!(planner.send(2, -1.5, 0.0), Work::Stale);
-    let guidance = planner.ask_at(0.3, 0.0);
-    assert_eq!(guidance.status(), Along);
-    assert!(guidance.ex < -0.9, "{guidance:?}");
-    assert_eq!((guidance.target_number, guidance.distance_m), (2, 1.8));
 }
 
 #[test]
