@@ -127,18 +127,6 @@ fn no_echo_at_a_slant_does_not_take_back_what_was_heard_squarely() {
 }
 
 #[test]
-fn a_well_known_thing_explains_the_echo_and_does_not_grow_at_its_ends() {
-    let mut mapper = mapper("");
-    for _ in 0..4 {
-        mapper.hear(0.0, Some(0.7));
-    }
-    let before = mapper.hazards();
-    // After half the arc's turn, its edge meets the object, its middle nothing new.
-    mapper.hear(0.25, Some(0.7));
-    assert_eq!(mapper.hazards(), before);
-}
-
-#[test]
 fn scanned_ground_grows_stale_as_the_wheels_roll() {
     let mut mapper = mapper("");
     mapper.hear(0.0, None);
