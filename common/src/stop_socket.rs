@@ -263,6 +263,14 @@ fn make_directory(directory: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
 
+    fn ask(guard: &mut StopSocket, path: &Path, request: Request) -> Operator {
+        let operator = Operator::connect(path).unwrap().unwrap();
+        operator.send(request).unwrap();
+        assert_eq!(guard.take(), Some(request));
+        assert_eq!(operator.answer(Duration::ZERO).unwrap(), Some(Answer::Heard));
+        operator
+    }
+
     #[test]
     fn a_link_whose_socket_and_directory_were_removed_is_reached_when_it_has_looked_again() {
         let domain = Domain::of(format!("stop-{}", std::process::id()).parse().unwrap());
@@ -270,10 +278,7 @@ mod tests {
         for _ in 0..2 {
             fs::remove_dir_all(domain.directory()).unwrap();
             assert_eq!(link.take(), None);
-            let operator = Operator::connect(&domain.stop_socket()).unwrap().unwrap();
-            operator.send(Request::Stop).unwrap();
-            assert_eq!(link.take(), Some(Request::Stop));
-            assert_eq!(operator.answer(Duration::ZERO).unwrap(), Some(Answer::Heard));
+            ask(&mut link, &domain.stop_socket(), Request::Stop);
         }
         fs::remove_dir_all(domain.directory()).unwrap();
     }
@@ -283,19 +288,12 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("guard");
         let mut guard = StopSocket::bind(path.clone()).unwrap();
-        let ask = |guard: &mut StopSocket, request| {
-            let operator = Operator::connect(&path).unwrap().unwrap();
-            operator.send(request).unwrap();
-            assert_eq!(guard.take(), Some(request));
-            assert_eq!(operator.answer(Duration::ZERO).unwrap(), Some(Answer::Heard));
-            operator
-        };
         for _ in 0..=MOST_ASKING {
-            let looks = ask(&mut guard, Request::Look);
+            let looks = ask(&mut guard, &path, Request::Look);
             guard.tell(Rest::Moving, 1);
             assert_eq!(looks.answer(Duration::ZERO).unwrap(), Some(Answer::Sees(Rest::Moving, 1)));
         }
-        let stops = ask(&mut guard, Request::Stop);
+        let stops = ask(&mut guard, &path, Request::Stop);
         guard.tell_at_rest();
         assert_eq!(stops.answer(Duration::ZERO).unwrap(), Some(Answer::AtRest));
     }

@@ -126,11 +126,11 @@ mod tests {
                 })
                 .collect();
             assert!(said.len().abs_diff(a_second) < 4, "{}", said.len());
-            let nodes = said.iter().map(|said| match said {
+            let node = |said: &Said| match said {
                 Said::Node(node) => *node,
                 other => panic!("{other:?}"),
-            });
-            let nodes: Vec<_> = nodes.collect();
+            };
+            let nodes: Vec<_> = said.iter().map(node).collect();
             let first = nodes.iter().filter(|node| node.is_first).count();
             assert!(first.abs_diff(turns) < 2, "{first}");
             let at = |degrees: u16| {

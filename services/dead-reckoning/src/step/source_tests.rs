@@ -33,13 +33,12 @@ impl Robot {
         let [left_counts, right_counts] =
             self.counts.map(|counts| (counts.round() as i64).rem_euclid(32_768) as u16);
         let stamp = Stamp { tick: self.tick, stamp_ns: self.tick * TICK_NS, ..Stamp::default() };
-        let (told_ratio, told_ratio_sd) = (self.told_ratio, 0.006);
         WheelSample {
             stamp,
             left_counts,
             right_counts,
-            told_ratio,
-            told_ratio_sd,
+            told_ratio: self.told_ratio,
+            told_ratio_sd: 0.006,
             ..WheelSample::default()
         }
     }
