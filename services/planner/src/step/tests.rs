@@ -203,16 +203,6 @@ fn evidential(scanned: impl Fn(DVec2) -> bool) -> Planner {
 }
 
 #[test]
-fn an_evidential_robot_looks_where_nobody_looked_before_it_goes_there() {
-    // Only the ground to the left of the way ahead is unscanned.
-    let mut planner = evidential(|at| at.x < 0.2 || at.y < 0.1);
-    let guidance = planner.ask_at_start();
-    assert_eq!(guidance.status(), Look);
-    assert!(guidance.ex > 0.3 && guidance.ey > 0.1, "{guidance:?}");
-    assert_eq!(guidance.maneuver(), Maneuver::Turn);
-}
-
-#[test]
 fn an_evidential_robot_without_sensing_does_not_look_first() {
     let mission = Mission { method: Method::Evidential, sensing: false, ..mission() };
     let mut planner = in_room(&mission, |_| false);
