@@ -314,12 +314,4 @@ mod tests {
         let (least, greatest) = Piece::Zone(&zone).bounds();
         assert_eq!((least, greatest), (DVec2::ZERO, DVec2::splat(4.0)));
     }
-
-    #[test]
-    fn angles_wrap_to_the_half_open_turn() {
-        use std::f64::consts::PI;
-        for (half_turns, wrapped) in [(3.0, 1.0), (-0.5, -0.5), (1.5, -0.5)] {
-            assert!((wrap_angle(half_turns * PI) - wrapped * PI).abs() < 1e-12, "{half_turns}");
-        }
-    }
 }
