@@ -123,9 +123,6 @@ fn the_motor_frame_and_the_standard_frame_which_may_be_a_byte_longer_lie_as_the_
         let frame = Frame { rid: 0, sn: 0, did, data: &data[..bytes] };
         assert_eq!(format!("{:x?}", Report::parse(&frame)), said);
     }
-    let report = Report::Motor(MotorSensors::default());
-    let out = encoded(|out| report.encode(Addressing::Lettered, out));
-    assert_eq!(out[2..6], [0xb8, 0, 123, 33]);
 }
 
 proptest! {
