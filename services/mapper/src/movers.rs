@@ -429,6 +429,8 @@ mod tests {
     use glam::dvec2;
 
     const PERIOD_S: f64 = 1.0 / 7.0;
+    /// Start, velocity and radius.
+    const WALKER: (DVec2, DVec2, f64) = (dvec2(3.5, -1.0), dvec2(-0.8, -0.3), 0.25);
 
     /// A robot with a laser drives along x at 0.5 m/s in a room of 10 m by 8 m. Discs have starts,
     /// velocities and radii.
@@ -497,17 +499,16 @@ mod tests {
     fn what_moves_is_known_within_a_second_with_its_velocity_and_posts_that_the_robot_passes_stand()
     {
         let posts = [1.0, 1.5, 2.0].map(|x| (dvec2(x, 1.0), DVec2::ZERO, 0.05));
-        let velocity = dvec2(-0.8, -0.3);
-        let walker = (dvec2(3.5, -1.0), velocity, 0.25);
         let mut room = Room::new(&posts);
         for tick in 0..30 {
             room.tick(tick);
             assert!(room.movers.placed.is_empty(), "{tick}: {:?}", room.movers.placed);
         }
-        let mut room = Room::new(&[&posts[..], &[walker]].concat());
+        let mut room = Room::new(&[&posts[..], &[WALKER]].concat());
         (0..=7).for_each(|tick| drop(room.tick(tick)));
         let [mover] = room.movers.placed[..] else { panic!("{:?}", room.movers.placed) };
-        let there = walker.0 + velocity * 7.0 * PERIOD_S;
+        let (start, velocity, _) = WALKER;
+        let there = start + velocity * 7.0 * PERIOD_S;
         let off_m = there.distance(mover.place());
         let off_m_s = velocity.distance(mover.velocity());
         assert!(off_m < 0.1 && off_m_s < 0.15, "{mover:?} {off_m} {off_m_s}");
@@ -531,8 +532,7 @@ mod tests {
 
     #[test]
     fn only_beams_that_end_on_what_stands_are_kept_while_something_moves() {
-        let walker = (dvec2(3.5, -1.0), dvec2(-0.8, -0.3), 0.25);
-        let mut room = Room::new(&[walker]);
+        let mut room = Room::new(&[WALKER]);
         let first = (0..16).find(|tick| room.tick(*tick).1.is_some());
         let (scan, beams) = room.tick(first.unwrap() + 8);
         let beams = beams.unwrap();
@@ -540,7 +540,7 @@ mod tests {
         let at_s = scan.capture_ns as f64 * 1e-9;
         let (mut on_walker, mut on_walls) = ([0, 0], [0, 0]);
         for (end, beam) in fan.ends().zip(&beams) {
-            let off_m = end.unwrap().distance(walker.0 + walker.1 * at_s);
+            let off_m = end.unwrap().distance(WALKER.0 + WALKER.1 * at_s);
             let counts = if off_m < 0.3 { &mut on_walker } else { &mut on_walls };
             counts[usize::from(beam.is_nan())] += 1;
         }
