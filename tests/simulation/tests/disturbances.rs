@@ -6,6 +6,7 @@ use std::{cell::RefCell, path::Path, rc::Rc, time::Duration};
 
 use common::{
     bus::{Bus, Reader},
+    ground_truth::GroundTruthTick,
     mission::Mission,
     samples::{Cause, FaultKind, RequestAnswer, RequestKind, RequestSample},
     topics,
@@ -13,9 +14,20 @@ use common::{
 use mission_control::{outcome::Outcome, target_list::TargetOutcome};
 use processes::stages;
 use simulation::{Disturbance, Observer, Quality, Ran, Request, RobotFault, Scenario, Way, What};
+use summary::Summary;
+
+const SURE: &str = "sure_within_m = 9";
 
 fn at(seconds: f64, what: What) -> Disturbance {
     Disturbance { at: Duration::from_secs_f64(seconds), what }
+}
+
+fn ask_at(seconds: f64, request: Request) -> Disturbance {
+    at(seconds, What::Ask(request))
+}
+
+fn fault_at(seconds: f64, fault: impl Into<Option<RobotFault>>) -> Disturbance {
+    at(seconds, What::Fault(fault.into()))
 }
 
 /// Runs a mission to a target 4 m ahead, with further keys.
@@ -43,6 +55,37 @@ fn ran_before(
     ran
 }
 
+#[track_caller]
+fn assert_outcome(ran: &Ran, outcome: Outcome) -> &Summary {
+    let summary = ran.summary.as_ref().unwrap();
+    assert_eq!(summary.outcome, outcome, "{summary:?}");
+    summary
+}
+
+#[track_caller]
+fn assert_reached(ran: &Ran) -> &Summary {
+    assert_untouched(ran);
+    assert_outcome(ran, Outcome::Reached)
+}
+
+#[track_caller]
+fn assert_untouched(ran: &Ran) {
+    assert_eq!(ran.truth.last().unwrap().contacts, 0);
+}
+
+#[track_caller]
+fn assert_stopped(ran: &Ran, cause: Cause) {
+    assert!(ran.causes.iter().any(|(_, it)| *it == Some(cause)), "{:?}", ran.causes);
+}
+
+fn tick_after(ran: &Ran, time_s: f64) -> &GroundTruthTick {
+    ran.truth.iter().find(|tick| tick.time_s > time_s).unwrap()
+}
+
+fn outcomes(ran: &Ran) -> Vec<TargetOutcome> {
+    ran.finished.as_ref().unwrap().targets.iter().map(|target| target.outcome).collect()
+}
+
 #[test]
 fn a_robot_whose_encoders_cannot_be_true_stands_and_its_mission_ends_with_the_reason() {
     for fault in [
@@ -51,10 +94,11 @@ fn a_robot_whose_encoders_cannot_be_true_stands_and_its_mission_ends_with_the_re
         RobotFault::EncoderReversed,
         RobotFault::CountsRandom,
     ] {
-        let ran = ran("", &[at(3.0, What::Fault(Some(fault)))]);
-        let ending = ran.finished.unwrap().ending;
-        assert_eq!(ending.outcome.as_str(), "aborted", "{fault:?}: {ending:?}");
-        assert_eq!(ending.cause, Some("odometry implausible for long"), "{fault:?}");
+        let ran = ran("", &[fault_at(3.0, fault)]);
+        let Summary { outcome, cause, .. } = ran.summary.unwrap();
+        let found = (outcome, cause.as_deref());
+        let reason = Some("odometry implausible for long");
+        assert_eq!(found, (Outcome::Aborted, reason), "{fault:?}");
         let moved_s = ran.moved.unwrap().as_secs_f64() - 3.0;
         assert!(moved_s < 1.5, "{fault:?}: told to move for {moved_s} s");
     }
@@ -68,57 +112,28 @@ fn a_robot_stands_for_the_time_of_its_fault_and_then_goes_on() {
         (RobotFault::Silence, Cause::RobotLost),
         (RobotFault::FramesSlow, Cause::FramesSlow),
     ] {
-        let times = [(3.0, Some(fault)), (8.0, None)];
-        let ran =
-            ran("sure_within_m = 9", &times.map(|(time_s, fault)| at(time_s, What::Fault(fault))));
+        let ran = ran(SURE, &[fault_at(3.0, fault), fault_at(8.0, None)]);
         let stood = ran.causes.iter().find(|(_, it)| *it == Some(cause));
-        assert!(stood.is_some_and(|(at, _)| *at < Duration::from_secs(8)), "{:?}", ran.causes);
-        let ending = ran.finished.unwrap().ending;
-        assert_eq!(ending.outcome.as_str(), "reached", "{fault:?}: {ending:?}");
+        assert!(stood.is_some_and(|(at, _)| at.as_secs() < 8), "{cause:?}: {:?}", ran.causes);
+        assert_outcome(&ran, Outcome::Reached);
     }
 }
 
 #[test]
 fn a_robot_whose_counts_jump_in_motion_stands_and_its_arrival_is_unsure() {
-    let ran = ran("sure_within_m = 0.5", &[at(4.0, What::Fault(Some(RobotFault::CountsReset)))]);
-    let stood = ran.causes.iter().any(|(_, it)| *it == Some(Cause::OdometryImplausible));
-    assert!(stood, "{:?}", ran.causes);
-    let ending = ran.finished.unwrap().ending;
-    assert_eq!(ending.outcome.as_str(), "reached_unsure", "{ending:?}");
+    let ran = ran("sure_within_m = 0.5", &[fault_at(4.0, RobotFault::CountsReset)]);
+    assert_stopped(&ran, Cause::OdometryImplausible);
+    assert_outcome(&ran, Outcome::ReachedUnsure);
 }
 
 #[test]
 fn a_robot_that_ignores_velocity_0_is_made_to_stand_by_other_means() {
     let ran = ran(
         "",
-        &[
-            at(3.0, What::Fault(Some(RobotFault::IgnoresZero))),
-            at(3.5, What::Ask(Request::Stop)),
-            at(8.0, What::End),
-        ],
+        &[fault_at(3.0, RobotFault::IgnoresZero), ask_at(3.5, Request::Stop), at(8.0, What::End)],
     );
     let last = ran.truth.last().unwrap();
     assert!(last.v.abs() < 0.01, "{} m/s", last.v);
-}
-
-const SURE: &str = "sure_within_m = 9";
-
-fn assert_reached(ran: &Ran) {
-    let summary = ran.summary.as_ref().unwrap();
-    assert_eq!(summary.outcome, Outcome::Reached, "{summary:?}");
-    assert_untouched(ran);
-}
-
-fn assert_untouched(ran: &Ran) {
-    assert_eq!(ran.truth.last().unwrap().contacts, 0);
-}
-
-fn outcomes(ran: &Ran) -> Vec<TargetOutcome> {
-    ran.finished.as_ref().unwrap().targets.iter().map(|target| target.outcome).collect()
-}
-
-fn stops(ran: &Ran) -> Vec<Cause> {
-    ran.causes.iter().filter_map(|(_, cause)| *cause).collect()
 }
 
 #[test]
@@ -131,8 +146,7 @@ fn a_robot_that_a_broken_planner_or_map_holds_comes_free_by_a_new_planner_or_a_r
         ] {
             let keys = format!("method = '{method}'\n{SURE}");
             let ran = ran(&keys, &[at(3.0, What::Break(stage, fault))]);
-            assert_reached(&ran);
-            let summary = ran.summary.unwrap();
+            let summary = assert_reached(&ran);
             let resets = summary.resets > 0;
             assert_eq!(resets, stage == "mapper", "{method}, {fault:?}: {summary:?}");
             assert!(resets || summary.replans > 0, "{method}, {fault:?}: {summary:?}");
@@ -165,17 +179,12 @@ fn a_car_whose_stages_are_each_killed_or_frozen_arrives() {
 fn a_stopped_robot_whose_stages_are_each_killed_or_frozen_stands_until_it_is_resumed() {
     for what in [What::Kill, What::Freeze] {
         let mut disturbances = each_stage(what);
-        disturbances.push(at(3.0, What::Ask(Request::Stop)));
-        disturbances.push(at(20.0, What::Ask(Request::Resume)));
+        disturbances.extend([ask_at(3.0, Request::Stop), ask_at(20.0, Request::Resume)]);
         let ran = ran(SURE, &disturbances);
-        assert!(stops(&ran).contains(&Cause::OperatorStop), "{:?}", ran.causes);
-        let place = |time_s: f64| {
-            let tick = ran.truth.iter().find(|tick| tick.time_s > time_s).unwrap();
-            (tick.x, tick.y)
-        };
-        assert_eq!(place(6.0), place(19.0));
-        assert_reached(&ran);
-        let summary = ran.summary.unwrap();
+        assert_stopped(&ran, Cause::OperatorStop);
+        let [stopped, resumed] = [6.0, 19.0].map(|time_s| tick_after(&ran, time_s));
+        assert_eq!((stopped.x, stopped.y), (resumed.x, resumed.y));
+        let summary = assert_reached(&ran);
         // The poses go on, so that the wait is no stall.
         assert_eq!((summary.replans, summary.resets), (0, 0), "{summary:?}");
     }
@@ -183,8 +192,7 @@ fn a_stopped_robot_whose_stages_are_each_killed_or_frozen_stands_until_it_is_res
 
 #[test]
 fn a_robot_that_is_sent_elsewhere_in_flight_goes_on_without_a_stop() {
-    let there = [at(3.0, What::Ask(Request::Goto([3.5, -1.0])))];
-    let ran = ran(SURE, &there);
+    let ran = ran(SURE, &[ask_at(3.0, Request::Goto([3.5, -1.0]))]);
     assert_reached(&ran);
     assert_eq!(outcomes(&ran), [TargetOutcome::Replaced, TargetOutcome::Reached]);
     let mut after = ran.truth.iter().filter(|tick| (3.0..5.5).contains(&tick.time_s));
@@ -213,7 +221,7 @@ fn a_hand_drives_a_robot_into_no_hazard_and_it_stands_when_the_hand_goes() {
     // In one run the hand lets go before the wall, in the other it pushes on.
     for (pushes, waits, x_m) in [(5, 0, 1.0..2.2), (150, 30, 2.2..2.8)] {
         let pushes: Vec<_> =
-            (0..pushes).map(|nth| at(3.0 + 0.1 * f64::from(nth), What::Ask(ahead))).collect();
+            (0..pushes).map(|nth| ask_at(3.0 + 0.1 * f64::from(nth), ahead)).collect();
         let ran = ran_text(wall, &pushes, &vec![ahead; waits]);
         assert_untouched(&ran);
         let last = ran.truth.last().unwrap();
@@ -236,14 +244,13 @@ fn a_robot_follows_a_walker_past_a_drum_and_stands_while_the_beacon_is_silent() 
     let heard = (5..130).map(|nth| f64::from(nth) * 0.2).filter(|at| !(9.0..13.0).contains(at));
     let mut disturbances: Vec<_> =
         heard.map(|time_s| at(time_s, What::Beacon(walker(time_s)))).collect();
-    disturbances.push(at(1.2, What::Ask(Request::Follow)));
-    disturbances.push(at(26.0, What::Ask(Request::EndFollow)));
+    disturbances.extend([ask_at(1.2, Request::Follow), ask_at(26.0, Request::EndFollow)]);
     let ran = ran(keys, &disturbances);
     assert_untouched(&ran);
-    let tick = |time_s: f64| ran.truth.iter().find(|tick| tick.time_s > time_s).unwrap();
-    assert!(tick(12.0).v.abs() < 0.01, "{:?}", tick(12.0));
+    let [waits, follows] = [12.0, 25.0].map(|time_s| tick_after(&ran, time_s));
+    assert!(waits.v.abs() < 0.01, "{waits:?}");
     let [x, y] = walker(25.0);
-    let off_m = (tick(25.0).x - x).hypot(tick(25.0).y - y);
+    let off_m = (follows.x - x).hypot(follows.y - y);
     assert!((0.75..1.6).contains(&off_m), "{off_m} m from the walker");
     let result = ran.finished.unwrap().targets.pop().unwrap();
     assert_eq!(result.outcome, TargetOutcome::Followed, "{result:?}");
@@ -259,8 +266,8 @@ fn a_robot_that_is_held_by_a_thing_that_no_sensor_notices_maps_it_and_goes_anoth
         format!("simulation.thing = [{{from_s=3,shape={{box={shape}}}}}]"),
     ] {
         let keys = format!("{SURE}\n{thing}\nsimulation.wheels = {{ contact_slip = 0 }}");
-        let summary = ran(&keys, &[]).summary.unwrap();
-        assert_eq!(summary.outcome, Outcome::Reached, "{summary:?}");
+        let ran = ran(&keys, &[]);
+        let summary = assert_outcome(&ran, Outcome::Reached);
         assert!(summary.replans > 0, "{summary:?}");
     }
 }
@@ -271,8 +278,8 @@ fn a_bump_stops_the_robot_and_lets_it_go_on() {
         "{SURE}\nrobot.model = 'kobuki'\nworld.box = [{{at=[2,0],size_m=[0.3,0.8],top_m=0.1}}]"
     );
     let ran = ran(&keys, &[]);
-    assert!(stops(&ran).contains(&Cause::Felt), "{:?}", ran.causes);
-    assert_eq!(ran.summary.unwrap().outcome, Outcome::Reached);
+    assert_stopped(&ran, Cause::Felt);
+    assert_outcome(&ran, Outcome::Reached);
 }
 
 #[test]
@@ -282,33 +289,33 @@ fn an_arduino_that_falls_silent_stands_and_drives_on_when_it_answers_again() {
     let disturbances = [(4.0, deaf), (8.0, Quality::default())]
         .map(|(time_s, quality)| at(time_s, What::Wire(Way::ToHost, quality)));
     let ran = ran_text(&format!("{SURE}\n{text}"), &disturbances, &[]);
-    assert!(stops(&ran).contains(&Cause::RobotLost), "{:?}", ran.causes);
+    assert_stopped(&ran, Cause::RobotLost);
     assert_reached(&ran);
 }
 
 #[test]
 fn no_mission_ends_before_a_robot_rests_that_ignores_velocity_0_and_obeys_disable() {
-    let ran = ran("sure_within_m = 9", &[at(3.0, What::Fault(Some(RobotFault::IgnoresZero)))]);
-    let outcome = ran.finished.unwrap().ending.outcome.as_str();
-    assert!(["reached", "wrong_place"].contains(&outcome), "{outcome}");
+    let ran = ran(SURE, &[fault_at(3.0, RobotFault::IgnoresZero)]);
+    let outcome = ran.summary.unwrap().outcome;
+    assert!(matches!(outcome, Outcome::Reached | Outcome::WrongPlace), "{outcome:?}");
     // The simulation goes on for 6 s after the run.
     let end_s = ran.simulated.as_secs_f64() - 6.0;
     let end = ran.truth.iter().rfind(|truth| truth.time_s <= end_s).unwrap();
     assert!(end_s > 8.0 && end.v.abs() < 0.01, "{} m/s at {end_s} s", end.v);
 }
 
-/// Counts an operator's stops in a mission, whose time they must not use up.
-fn operator_stops(ran: &Ran) -> usize {
-    let summary = ran.summary.as_ref().unwrap();
-    assert_eq!((summary.outcome.as_str(), summary.replans), ("reached", 0), "{summary:?}");
-    ran.causes.iter().filter(|(_, cause)| *cause == Some(Cause::OperatorStop)).count()
+/// The operator's stop must not use up the time of the mission.
+fn assert_stopped_once(ran: &Ran) {
+    let summary = assert_outcome(ran, Outcome::Reached);
+    assert_eq!(summary.replans, 0, "{summary:?}");
+    let stops = ran.causes.iter().filter(|(_, cause)| *cause == Some(Cause::OperatorStop));
+    assert_eq!(stops.count(), 1, "{:?}", ran.causes);
 }
 
 #[test]
 fn an_operators_stop_holds_until_the_resume_uses_up_no_mission_time_and_is_no_stall() {
-    let asked = [at(5.0, What::Ask(Request::Stop)), at(125.0, What::Ask(Request::Resume))];
-    let ran = ran("sure_within_m = 9", &asked);
-    assert_eq!(operator_stops(&ran), 1, "{:?}", ran.causes);
+    let ran = ran(SURE, &[ask_at(5.0, Request::Stop), ask_at(125.0, Request::Resume)]);
+    assert_stopped_once(&ran);
     let held = ran.truth.iter().filter(|truth| (8.0..125.0).contains(&truth.time_s));
     let speeds: Vec<_> = held.map(|truth| truth.v.abs()).collect();
     assert!(speeds.len() > 100 && speeds.iter().all(|&speed| speed < 0.01));
@@ -317,8 +324,7 @@ fn an_operators_stop_holds_until_the_resume_uses_up_no_mission_time_and_is_no_st
 #[test]
 fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot_again() {
     let asked = [(5.0, Request::Stop), (7.0, Request::Resume), (8.0, Request::LateStop)];
-    let ran = ran("sure_within_m = 9", &asked.map(|(time, what)| at(time, What::Ask(what))));
-    assert_eq!(operator_stops(&ran), 1, "{:?}", ran.causes);
+    assert_stopped_once(&ran(SURE, &asked.map(|(time_s, request)| ask_at(time_s, request))));
 }
 
 #[test]
@@ -337,10 +343,11 @@ fn a_robot_whose_stop_is_lost_at_its_target_drives_back() {
     assert!(farthest > 0.4, "no robot rolled on: {farthest} m");
 }
 
+/// Answers to all requests other than to resume.
 #[derive(Default)]
 struct Orders {
     reader: Option<Reader<RequestSample>>,
-    answers: Vec<(RequestKind, RequestAnswer)>,
+    answers: Vec<RequestAnswer>,
 }
 
 impl Observer for Orders {
@@ -350,37 +357,35 @@ impl Observer for Orders {
 
     fn observe(&mut self) {
         while let Some(order) = self.reader.as_mut().and_then(|it| it.next_sample().unwrap()) {
-            self.answers.push((order.kind(), order.answer()));
+            if order.kind() != RequestKind::Resume {
+                self.answers.push(order.answer());
+            }
         }
     }
 }
 
-/// Returns the answers to these requests, each made at its time in seconds, in a mission to a
-/// target 4 m ahead.
-fn answers(keys: &str, asked: &[(f64, What)]) -> Vec<RequestAnswer> {
+/// Returns the answers in a mission to a target 4 m ahead.
+fn answers(keys: &str, asked: &[Disturbance]) -> Vec<RequestAnswer> {
     let text = format!("target = [4, 0]\ntimeout_s = 120\nperimeter.width_m = 9\n{keys}");
-    let asked: Vec<_> = asked.iter().map(|(seconds, what)| at(*seconds, what.clone())).collect();
     let orders = Rc::new(RefCell::new(Orders::default()));
-    ran_before(Some(Box::new(Rc::clone(&orders))), &text, &asked, &[]);
-    let answered = orders.take().answers.into_iter();
-    answered.filter(|(kind, _)| *kind != RequestKind::Resume).map(|(_, answer)| answer).collect()
+    ran_before(Some(Box::new(Rc::clone(&orders))), &text, asked, &[]);
+    orders.take().answers
 }
 
 #[test]
 fn a_robot_is_placed_only_at_rest_while_its_mission_waits() {
     use RequestAnswer::{Moves, Taken};
-    let ask = What::Ask;
     let asked = [
-        (2.5, ask(Request::Place)),
+        ask_at(2.5, Request::Place),
         // It rolls for a moment after the stop.
-        (3.0, ask(Request::Stop)),
-        (3.1, ask(Request::Place)),
-        (5.0, ask(Request::Place)),
-        (6.0, ask(Request::Resume)),
+        ask_at(3.0, Request::Stop),
+        ask_at(3.1, Request::Place),
+        ask_at(5.0, Request::Place),
+        ask_at(6.0, Request::Resume),
         // At rest for want of readings, it drives on by itself.
-        (7.5, What::Fault(Some(RobotFault::RangeInvalid))),
-        (10.0, ask(Request::Place)),
-        (11.0, What::Fault(None)),
+        fault_at(7.5, RobotFault::RangeInvalid),
+        ask_at(10.0, Request::Place),
+        fault_at(11.0, None),
     ];
     assert_eq!(answers("", &asked), [Moves, Taken, Moves, Taken, Moves]);
 }
@@ -390,27 +395,25 @@ fn zones_are_added_and_removed_where_the_robot_is_not() {
     use RequestAnswer::{NotInZone, Taken, ZoneHere};
     let (here, ahead) = ([0.0, 0.0], [2.0, 0.6]);
     let asked = [
-        (1.0, Request::AddZone(here)),
-        (1.1, Request::AddZone(ahead)),
-        (1.2, Request::RemoveZone(here)),
-        (1.3, Request::RemoveZone(ahead)),
-        (1.4, Request::RemoveZone(ahead)),
+        ask_at(1.0, Request::AddZone(here)),
+        ask_at(1.1, Request::AddZone(ahead)),
+        ask_at(1.2, Request::RemoveZone(here)),
+        ask_at(1.3, Request::RemoveZone(ahead)),
+        ask_at(1.4, Request::RemoveZone(ahead)),
     ];
-    let answers = answers("", &asked.map(|(at, what)| (at, What::Ask(what))));
-    assert_eq!(answers, [ZoneHere, Taken, NotInZone, Taken, NotInZone]);
+    assert_eq!(answers("", &asked), [ZoneHere, Taken, NotInZone, Taken, NotInZone]);
 }
 
 #[test]
 fn hands_and_beacons_lead_only_a_robot_that_stays() {
     use RequestAnswer::{NotFollowing, NotStaying, Outside, Taken};
     let asked = [
-        (1.0, Request::Hand([1.0, 0.0])),
-        (1.1, Request::Goto([40.0, 0.0])),
-        (1.2, Request::Append([3.0, 0.0])),
-        (1.3, Request::Follow),
-        (1.4, Request::EndFollow),
-    ]
-    .map(|(at, what)| (at, What::Ask(what)));
+        ask_at(1.0, Request::Hand([1.0, 0.0])),
+        ask_at(1.1, Request::Goto([40.0, 0.0])),
+        ask_at(1.2, Request::Append([3.0, 0.0])),
+        ask_at(1.3, Request::Follow),
+        ask_at(1.4, Request::EndFollow),
+    ];
     assert_eq!(answers("", &asked), [NotStaying, Outside, Taken, NotStaying, NotFollowing]);
     assert_eq!(answers("stay = true", &asked), [Taken, Outside, Taken, Taken, Taken]);
 }
