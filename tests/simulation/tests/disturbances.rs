@@ -304,27 +304,24 @@ fn no_mission_ends_before_a_robot_rests_that_ignores_velocity_0_and_obeys_disabl
     assert!(end_s > 8.0 && end.v.abs() < 0.01, "{} m/s at {end_s} s", end.v);
 }
 
-/// The operator's stop must not use up the time of the mission.
-fn assert_stopped_once(ran: &Ran) {
-    let summary = assert_outcome(ran, Outcome::Reached);
+#[test]
+fn an_operators_stop_holds_to_the_resume_not_beyond_uses_up_no_mission_time_and_is_no_stall() {
+    let ran = ran(
+        SURE,
+        &[
+            ask_at(5.0, Request::Stop),
+            ask_at(125.0, Request::Resume),
+            // Asked before the resume, it does not stop the robot again.
+            ask_at(126.0, Request::LateStop),
+        ],
+    );
+    let summary = assert_outcome(&ran, Outcome::Reached);
     assert_eq!(summary.replans, 0, "{summary:?}");
     let stops = ran.causes.iter().filter(|(_, cause)| *cause == Some(Cause::OperatorStop));
     assert_eq!(stops.count(), 1, "{:?}", ran.causes);
-}
-
-#[test]
-fn an_operators_stop_holds_until_the_resume_uses_up_no_mission_time_and_is_no_stall() {
-    let ran = ran(SURE, &[ask_at(5.0, Request::Stop), ask_at(125.0, Request::Resume)]);
-    assert_stopped_once(&ran);
     let held = ran.truth.iter().filter(|truth| (8.0..125.0).contains(&truth.time_s));
     let speeds: Vec<_> = held.map(|truth| truth.v.abs()).collect();
     assert!(speeds.len() > 100 && speeds.iter().all(|&speed| speed < 0.01));
-}
-
-#[test]
-fn a_stop_of_which_the_supervisor_hears_after_the_resume_does_not_stop_the_robot_again() {
-    let asked = [(5.0, Request::Stop), (7.0, Request::Resume), (8.0, Request::LateStop)];
-    assert_stopped_once(&ran(SURE, &asked.map(|(time_s, request)| ask_at(time_s, request))));
 }
 
 #[test]
