@@ -325,6 +325,15 @@ fn an_operators_stop_holds_to_the_resume_not_beyond_uses_up_no_mission_time_and_
 }
 
 #[test]
+fn a_wire_that_doubles_every_datagram_starts_no_storm() {
+    let doubled = Quality { doubled: 1.0, ..Quality::default() };
+    let mut disturbances = vec![ask_at(4.0, Request::Stop), ask_at(6.0, Request::Resume)];
+    disturbances.extend([Way::ToRobot, Way::ToHost].map(|way| at(2.0, What::Wire(way, doubled))));
+    let events = ran("", &disturbances).events;
+    assert!(events < 40_000, "{events} events");
+}
+
+#[test]
 fn a_robot_whose_stop_is_lost_at_its_target_drives_back() {
     let mut farthest = 0.0_f64;
     for lost_s in [2.6, 2.8, 3.0, 3.2] {
