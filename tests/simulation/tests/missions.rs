@@ -19,7 +19,7 @@ const PAPER: &str = "method='paper'";
 /// Speed below which a car, or a robot by the paper's method, touches nothing with any seed.
 const SLOW: &str = "controller.speed_m_s=0.2";
 const CAR: &str = "robot.model='car'";
-const KOBUKI: [&str; 2] = ["robot.model='kobuki'", "robot.rate_hz=10"];
+const KOBUKI: &str = "robot={model='kobuki',rate_hz=10}";
 const ARDUINO: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../supervisor/guide/example-arduino/");
 
@@ -27,12 +27,6 @@ const ARDUINO: &str =
 fn drive(mission: &str, settings: &[&str]) -> Summary {
     let settings: Vec<_> = SURE.iter().chain(settings).map(ToString::to_string).collect();
     summary_of(&missions::load(mission, &settings).unwrap())
-}
-
-/// Drives a mission file.
-fn drive_text(text: &str) -> Summary {
-    let text = format!("sure_within_m = 9\nseed = 3\n{text}");
-    summary_of(&Mission::parse(&text, Path::new("text.toml")).unwrap())
 }
 
 fn summary_of(mission: &Mission) -> Summary {
@@ -55,6 +49,15 @@ fn arrives_untouched(mission: &str, settings: &[&str]) -> Summary {
     summary
 }
 
+/// Drives a mission file without a touch.
+#[track_caller]
+fn text_ends(text: &str, outcome: Outcome) -> Summary {
+    let text = format!("sure_within_m = 9\nseed = 3\n{text}");
+    let summary = summary_of(&Mission::parse(&text, Path::new("text.toml")).unwrap());
+    assert_eq!((summary.outcome, summary.collisions), (outcome, Some(0)), "{text}: {summary:?}");
+    summary
+}
+
 fn seeds(last: u64) -> impl Iterator<Item = String> {
     (1..=last).map(|seed| format!("seed={seed}"))
 }
@@ -71,17 +74,17 @@ fn the_default_mission_and_a_hall_with_five_people_are_crossed_untouched_for_see
 fn by_the_papers_method_it_does_for_seeds_1_to_8() {
     // The path is twice as long, so with measured wheels the arrival would be unsure. Laboratory
     // wheels are better.
-    let wheels = ["robot.odometry.diameter_ratio_sd=0", "robot.odometry.slip=0.001"];
+    let wheels = "robot.odometry={diameter_ratio_sd=0,slip=0.001}";
     for seed in seeds(8) {
-        arrives_untouched("obstacle-course", &[PAPER, SLOW, wheels[0], wheels[1], &seed]);
+        arrives_untouched("obstacle-course", &[PAPER, SLOW, wheels, &seed]);
     }
 }
 
 #[test]
 fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
-    let fading = ["simulation.radio.outage_share=0.2", "simulation.radio.outage_mean_s=0.5"];
+    let fading = "simulation.radio={outage_share=0.2,outage_mean_s=0.5}";
     for seed in seeds(8) {
-        let settings = ["simulation.realism='measured'", fading[0], fading[1], &seed];
+        let settings = ["simulation.realism='measured'", fading, &seed];
         let summary = drive("obstacle-course", &settings);
         // Measured wheels drift, and this test ignores the error of the believed target.
         let arrived = [Outcome::Reached, Outcome::ReachedUnsure, Outcome::WrongPlace];
@@ -92,11 +95,10 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
 
 #[test]
 fn a_robot_with_a_gyro_and_wheels_that_nobody_calibrated_knows_its_place() {
-    // These settings replace the mission's own, which are for calibrated wheels.
-    let wheels = ["robot.odometry={}", "simulation.wheels={}"];
+    let gyro = "robot={protocol='json',gyro=true}";
     for seed in seeds(6) {
-        let gyro = ["robot.protocol='json'", "robot.gyro=true"];
-        let settings = [wheels[0], wheels[1], gyro[0], gyro[1], &seed];
+        // The first two replace the mission's own, which are for calibrated wheels.
+        let settings = ["robot.odometry={}", "simulation.wheels={}", gyro, &seed];
         let summary = arrives_untouched("obstacle-course", &settings);
         assert!(summary.pose_error_m < Some(0.3), "{seed}: {summary:?}");
     }
@@ -164,11 +166,9 @@ fn an_empty_room_or_hall_is_crossed_straight_ahead_and_without_a_safety_event() 
     assert!(detour(&summary) < 1.01, "{summary:?}");
     let turned = arrives_untouched("open-room", &["start.heading_deg=90"]);
     assert!(detour(&turned) < 1.1, "{turned:?}");
-    let hall = drive_text(
-        "target = [7, 0]\nsensors = 'front'\nperimeter = { width_m = 20, centre = [3.5, 0] }\n\
-         simulation.realism = 'laboratory'",
-    );
-    assert_eq!((hall.outcome, hall.collisions), (Outcome::Reached, Some(0)), "{hall:?}");
+    let hall = "target = [7, 0]\nsensors = 'front'\nsimulation.realism = 'laboratory'\n\
+                perimeter = { width_m = 20, centre = [3.5, 0] }";
+    text_ends(hall, Outcome::Reached);
 }
 
 #[test]
@@ -207,19 +207,15 @@ fn a_wheel_that_is_blocked_for_5_s_costs_a_fresh_planner_and_for_ever_the_target
     let block = "simulation.block=[{wheels='left',from_s=7,until_s=12}]";
     let blocked = ends("open-room", &[SLOW, block], Outcome::Reached);
     assert!(blocked.replans > 0, "{blocked:?}");
-    let held = ends(
-        "open-room",
-        &[SLOW, "simulation.block=[{wheels='both',from_s=7}]"],
-        Outcome::Unreachable,
-    );
+    let block = "simulation.block=[{wheels='both',from_s=7}]";
+    let held = ends("open-room", &[SLOW, block], Outcome::Unreachable);
     assert!(held.reason.contains("held fast") && held.replans > 1, "{held:?}");
 }
 
 #[test]
 fn by_its_laser_a_robot_whose_wheels_are_not_what_they_should_be_knows_where_it_is() {
     for seed in seeds(3) {
-        let fast = "controller.speed_m_s=0.5";
-        let settings = [KOBUKI[0], KOBUKI[1], fast, "simulation.realism='harsh'", &seed];
+        let settings = [KOBUKI, "controller.speed_m_s=0.5", "simulation.realism='harsh'", &seed];
         let summary = ends("obstacle-course", &settings, Outcome::Reached);
         assert!(summary.pose_error_m < Some(0.12), "{seed}: {summary:?}");
     }
@@ -227,9 +223,12 @@ fn by_its_laser_a_robot_whose_wheels_are_not_what_they_should_be_knows_where_it_
 
 #[test]
 fn a_laser_that_is_late_and_turns_slowly_and_says_so_places_the_robot_like_a_prompt_one() {
-    for [delay_s, sweep_s] in [[0.2, 0.0], [0.0, 0.2], [0.3, 0.2]] {
-        let laser = format!("simulation.laser={{delay_s={delay_s:?},sweep_s={sweep_s:?}}}");
-        let settings = ["robot.model='kobuki'", "seed=2", &laser];
+    for laser in [
+        "simulation.laser={delay_s=0.2,sweep_s=0}",
+        "simulation.laser={delay_s=0,sweep_s=0.2}",
+        "simulation.laser={delay_s=0.3,sweep_s=0.2}",
+    ] {
+        let settings = ["robot.model='kobuki'", "seed=2", laser];
         let summary = ends("obstacle-course", &settings, Outcome::Reached);
         assert!(summary.pose_error_m < Some(0.1), "{laser}: {summary:?}");
     }
@@ -247,13 +246,12 @@ fn a_long_robot_turns_behind_a_gap_narrower_than_its_length_and_refuses_to_in_a_
         ("[[2.2, 0, 90]]", corridor, Outcome::Unreachable),
         ("[[2.2, 0], [-0.5, 0, 180]]", corridor, Outcome::Reached),
     ] {
-        let summary = drive_text(&format!(
+        let text = format!(
             "targets = {targets}\nperimeter = {{ width_m = 8, centre = [1.5, 0] }}\n\
              world.wall = {walls}\n[robot]\nmodel = 'jackal'\n\
              footprint = [[-0.45, -0.2], [0.45, -0.2], [0.45, 0.2], [-0.45, 0.2]]"
-        ));
-        let found = (summary.outcome, summary.collisions);
-        assert_eq!(found, (outcome, Some(0)), "{targets}: {summary:?}");
+        );
+        let summary = text_ends(&text, outcome);
         assert!(summary.departed_s > Some(0.0), "from its start: {summary:?}");
     }
 }
@@ -261,7 +259,7 @@ fn a_long_robot_turns_behind_a_gap_narrower_than_its_length_and_refuses_to_in_a_
 #[test]
 fn a_heavy_rectangle_passes_the_loose_end_of_a_wall_untouched_as_stated_and_as_found() {
     for stated in ["robot.response = { delay_s = 0.1, acceleration_m_s2 = 0.3 }", ""] {
-        let summary = drive_text(&format!(
+        let text = format!(
             "target = [7.05, -0.44]\nstart.heading_deg = -76.5\ntimeout_s = 144\n{stated}\n\
              perimeter = {{ width_m = 10.7, centre = [3.53, 0.12] }}\nrobot.model = 'jackal'\n\
              simulation.wheels = {{ acceleration_m_s2 = 0.3, delay_s = 0.1 }}\n\
@@ -270,9 +268,8 @@ fn a_heavy_rectangle_passes_the_loose_end_of_a_wall_untouched_as_stated_and_as_f
              world.wall = [{{ points = [[-1.2, -1.897], [8.25, -1.897], [8.25, 1.897],\
                                         [-1.2, 1.897], [-1.2, -1.897]] }},\
                            {{ points = [[1.894, 0.466], [2.344, 2.141]] }}]"
-        ));
-        let found = (summary.outcome, summary.collisions);
-        assert_eq!(found, (Outcome::Reached, Some(0)), "{stated}: {summary:?}");
+        );
+        text_ends(&text, Outcome::Reached);
     }
 }
 
@@ -282,7 +279,7 @@ fn a_robot_that_bumps_into_a_low_board_or_comes_to_a_hole_marks_it_and_goes_arou
         ("world.box=[{at=[2,0],size_m=[0.3,0.8],top_m=0.1}]", true),
         ("simulation.hole=[{at=[2,0],size_m=[0.4,0.8]}]", false),
     ] {
-        let settings = [KOBUKI[0], KOBUKI[1], SLOW, "simulation.goes_on_after_contact=true", world];
+        let settings = [KOBUKI, SLOW, "simulation.goes_on_after_contact=true", world];
         let summary = ends("open-room", &settings, Outcome::Reached);
         let found = (summary.collisions > Some(0), summary.replans, summary.resets);
         assert_eq!(found, (touches, 0, 0), "no wheel goes over the hole: {summary:?}");
@@ -291,35 +288,27 @@ fn a_robot_that_bumps_into_a_low_board_or_comes_to_a_hole_marks_it_and_goes_arou
 
 #[test]
 fn two_lasers_of_half_a_circle_cross_the_course_untouched() {
-    let lasers = [("front", 0), ("back", 180)].map(|(name, bearing_deg)| {
-        format!(
-            "{{name='{name}',kind='scan',forward_m=0.1,bearing_deg={bearing_deg},\
-             field_of_view_deg=180,beams=91}}"
-        )
-    });
-    let sensors = format!("robot.sensor=[{}]", lasers.join(","));
-    arrives_untouched("obstacle-course", &[KOBUKI[0], KOBUKI[1], &sensors]);
+    let lasers = "robot.sensor=[{name='front',kind='scan',forward_m=0.1,bearing_deg=0,\
+                  field_of_view_deg=180,beams=91},{name='back',kind='scan',forward_m=0.1,\
+                  bearing_deg=180,field_of_view_deg=180,beams=91}]";
+    arrives_untouched("obstacle-course", &[KOBUKI, lasers]);
 }
 
 #[test]
 fn a_low_battery_doubles_the_time_and_an_empty_one_ends_the_mission_with_the_reason() {
-    let at = |volts: &str, outcome| {
-        ends("open-room", &[&format!("simulation.battery.start_v={volts}")], outcome)
-    };
-    let full = at("7.8", Outcome::Reached);
-    let low = at("6.5", Outcome::Reached);
+    let full = ends("open-room", &["simulation.battery.start_v=7.8"], Outcome::Reached);
+    let low = ends("open-room", &["simulation.battery.start_v=6.5"], Outcome::Reached);
     assert!(low.mission_time_s > 1.5 * full.mission_time_s, "{low:?} against {full:?}");
-    let empty = at("5.9", Outcome::Aborted);
+    let empty = ends("open-room", &["simulation.battery.start_v=5.9"], Outcome::Aborted);
     assert_eq!(empty.cause.as_deref(), Some("battery empty"), "{empty:?}");
     assert!((1.9..3.0).contains(&empty.mission_time_s), "{empty:?}");
 }
 
 #[test]
 fn the_targets_of_a_list_are_reached_in_turn_and_each_has_its_time_and_truth() {
-    let summary = drive_text(
-        "targets = [[1.5, -1.0], [2.5, 0.5, 180], [0.5, 0.8]]\n\
-         world.drum = [{ at = [2.0, 0.0], radius_m = 0.2 }]",
-    );
+    let text = "targets = [[1.5, -1.0], [2.5, 0.5, 180], [0.5, 0.8]]\n\
+                world.drum = [{ at = [2.0, 0.0], radius_m = 0.2 }]";
+    let summary = text_ends(text, Outcome::Reached);
     let targets = &summary.targets;
     assert!(targets.len() == 3 && targets.is_sorted_by_key(|it| it.at_s), "{summary:?}");
     let is_there = |it: &TargetResult| {
