@@ -168,12 +168,16 @@ fn lines(wheels: [f64; 2], beam: f32) -> Vec<u8> {
     [line(&report), line(&Report { heard: Some(1), ..Report::default() })].concat()
 }
 
-/// Returns the lines of a JSON robot with a fault since its wheels had turned by 1 and 2 rad.
-fn json(fault: F, seed: u64, wheels: [f64; 2]) -> Vec<Report> {
-    let mut injector = faulty(fault, Protocol::Json, seed, &lines([1.0, 2.0], 0.5));
-    let passed = injector.report(&lines(wheels, 0.75), at(1.1));
+/// Returns the reports that passed.
+fn reports(passed: &[Late]) -> Vec<Report> {
     let lines = passed.iter().flat_map(|late| late.bytes.split(|byte| *byte == b'\n'));
     lines.filter_map(|line| parse(line).ok()).collect()
+}
+
+/// Returns the reports of a JSON robot with a fault since its wheels had turned by 1 and 2 rad.
+fn json(fault: F, seed: u64, wheels: [f64; 2]) -> Vec<Report> {
+    let mut injector = faulty(fault, Protocol::Json, seed, &lines([1.0, 2.0], 0.5));
+    reports(&injector.report(&lines(wheels, 0.75), at(1.1)))
 }
 
 #[test]
@@ -219,21 +223,8 @@ fn a_gyro_lies_as_the_table_says() {
     {
         let mut injector = faulty(fault, Protocol::Json, 1, &gyro(0.0));
         injector.report(&gyro(0.1), at(1.1));
-        let passed = injector.report(&gyro(2.1), at(2.1));
-        let report: Report = parse(passed[0].bytes.trim_ascii()).unwrap();
-        assert!(told.contains(&report.gyro.unwrap()), "{fault:?}: {:?}", report.gyro);
-    }
-}
-
-fn said_at_rest(protocol: Protocol) -> Vec<u8> {
-    let (wheels, speeds) = (Some([1.0; 2]), Some([0.0; 2]));
-    match protocol {
-        Protocol::X80 => {
-            let mut bytes = Vec::new();
-            Frame::Motor(MotorSensors::default()).encode(Addressing::Numbered, &mut bytes);
-            bytes
-        }
-        _ => line(&Report { wheels, speeds, ..Report::default() }),
+        let angle = reports(&injector.report(&gyro(2.1), at(2.1)))[0].gyro.unwrap();
+        assert!(told.contains(&angle), "{fault:?}: {angle}");
     }
 }
 
@@ -251,30 +242,32 @@ fn a_robot_keeps_its_speed_until_it_is_disabled_or_stands_where_it_is_held() {
         command(Command::velocity([Some(0); 2], 250)),
         command(Command::Enable { on: false, channel: None }),
     ];
+    let mut still = Vec::new();
+    Frame::Motor(MotorSensors::default()).encode(Addressing::Numbered, &mut still);
     let json = [drive(2.0), drive(0.0), line(&Order::Brake {})];
-    for (protocol, [go, stand, off]) in [(Protocol::X80, x80), (Protocol::Json, json)] {
-        let mut keeps = FaultInjector::new(protocol, 1);
-        let healthy = [&*go, &stand].concat();
-        assert_eq!(keeps.order(&healthy), healthy, "{protocol:?}");
-        keeps.set(Some(F::DoesNotStop));
-        assert_eq!(keeps.order(&stand), go, "{protocol:?}");
-        let mut rests = FaultInjector::new(protocol, 1);
-        rests.order(&go);
-        rests.report(&said_at_rest(protocol), at(1.0));
-        rests.set(Some(F::DoesNotStop));
-        assert_eq!(rests.order(&stand), stand, "{protocol:?}");
-        let disabled = [&*off, &stand].concat();
-        assert_eq!(keeps.order(&disabled), disabled, "{protocol:?}");
-        let mut held = FaultInjector::new(protocol, 1);
-        held.set(Some(F::HeldWheels));
-        assert_eq!(held.order(&go), stand, "{protocol:?}");
-    }
-    let mut held = FaultInjector::new(Protocol::Json, 1);
-    held.set(Some(F::HeldWheels));
-    held.order(&drive(2.0));
-    let passed = held.report(&lines([1.0, 2.0], 0.5), at(1.0));
-    let report: Report =
-        parse(passed[0].bytes.split(|byte| *byte == b'\n').next().unwrap()).unwrap();
+    let (wheels, speeds) = (Some([1.0; 2]), Some([0.0; 2]));
+    let still_line = line(&Report { wheels, speeds, ..Report::default() });
+    let [_, mut held] = [(Protocol::X80, x80, still), (Protocol::Json, json, still_line)].map(
+        |(protocol, [go, stand, off], still)| {
+            let mut keeps = FaultInjector::new(protocol, 1);
+            let healthy = [&*go, &stand].concat();
+            assert_eq!(keeps.order(&healthy), healthy, "{protocol:?}");
+            keeps.set(Some(F::DoesNotStop));
+            assert_eq!(keeps.order(&stand), go, "{protocol:?}");
+            let mut rests = FaultInjector::new(protocol, 1);
+            rests.order(&go);
+            rests.report(&still, at(1.0));
+            rests.set(Some(F::DoesNotStop));
+            assert_eq!(rests.order(&stand), stand, "{protocol:?}");
+            let disabled = [&*off, &stand].concat();
+            assert_eq!(keeps.order(&disabled), disabled, "{protocol:?}");
+            let mut held = FaultInjector::new(protocol, 1);
+            held.set(Some(F::HeldWheels));
+            assert_eq!(held.order(&go), stand, "{protocol:?}");
+            held
+        },
+    );
+    let report = &reports(&held.report(&lines([1.0, 2.0], 0.5), at(1.0)))[0];
     assert_eq!(report.held, Some([true; 2]));
 }
 
