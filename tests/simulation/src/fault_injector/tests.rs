@@ -182,24 +182,13 @@ fn json(fault: F, seed: u64, wheels: [f64; 2]) -> Vec<Report> {
 
 #[test]
 fn a_json_robot_lies_as_the_table_says() {
-    for (fault, told) in [
-        (F::MotorZeros, &[[0.0, 0.0]][..]),
-        (F::EncodersSwapped, &[[2.0, 5.0]]),
-        (F::CountsReset, &[[3.0, 1.0]]),
-        (F::EncoderDead, &[[1.0, 3.0], [4.0, 2.0]]),
-        (F::EncoderReversed, &[[-2.0, 3.0], [4.0, 1.0]]),
-        (F::MotorRepeated, &[[1.0, 2.0]]),
-    ] {
-        let wheels = json(fault, 1, [4.0, 3.0])[0].wheels.unwrap();
-        let wheels = wheels.map(|angle| (angle * 1e6).round() / 1e6);
-        assert!(told.contains(&wheels), "{fault:?}: {wheels:?}");
+    // In other faults of wheels and ranges it differs from an X80 only by its words.
+    for (fault, wheels) in [(F::MotorZeros, [0.0, 0.0]), (F::CountsReset, [3.0, 1.0])] {
+        assert_eq!(json(fault, 1, [4.0, 3.0])[0].wheels, Some(wheels), "{fault:?}");
     }
-    for (fault, beam, rest) in [
-        (F::RangeInvalid, Some(-1.0), Some(-1.0)),
-        (F::RangeStuck, Some(0.3), Some(0.3)),
-        (F::RangeSilent, None, None),
-        (F::RangeFrozen, Some(0.5), None),
-    ] {
+    for (fault, beam, rest) in
+        [(F::RangeStuck, Some(0.3), Some(0.3)), (F::RangeFrozen, Some(0.5), None)]
+    {
         let line = &json(fault, 1, [4.0, 3.0])[0];
         assert_eq!(line.scan, Some(vec![beam, rest]), "{fault:?}");
         assert_eq!(line.ranges["front"].map(|range| range as f32), beam, "{fault:?}");
