@@ -14,7 +14,6 @@ use common::{
 };
 
 use crate::{
-    load::Load,
     robot_fault::RobotFault,
     wire::{Quality, Way},
 };
@@ -45,7 +44,6 @@ pub enum What {
     /// A stage computes without end.
     Hang(&'static str),
     Wire(Way, Quality),
-    Load(Load),
     Ask(Request),
     /// Injects a fault into a stage.
     Break(&'static str, FaultKind),

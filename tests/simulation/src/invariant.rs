@@ -161,7 +161,6 @@ impl Invariants {
             }
             What::KillSupervisor(_)
             | What::Wire(..)
-            | What::Load(_)
             | What::Ask(_)
             | What::Beacon(_)
             | What::End => {}

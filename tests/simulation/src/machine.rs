@@ -83,7 +83,7 @@ pub(crate) struct SimulatedMachine {
     guard: RefCell<Guard>,
     processes: RefCell<BTreeMap<u32, Process>>,
     random: RefCell<Random>,
-    load: Cell<Load>,
+    load: Load,
     /// The soonest last.
     disturbances: RefCell<Vec<Disturbance>>,
     invariants: RefCell<Invariants>,
@@ -121,7 +121,7 @@ impl SimulatedMachine {
             guard: RefCell::default(),
             processes: RefCell::default(),
             random: RefCell::new(Random::new(seed, 0)),
-            load: Cell::new(load),
+            load,
             disturbances: RefCell::new(disturbances),
             invariants: RefCell::new(invariants),
             observer: RefCell::default(),
@@ -285,15 +285,12 @@ impl SimulatedMachine {
 
     /// Draws the time from a wakeup to its turn, and which part of it the process starves.
     fn lateness(&self) -> (u64, Duration) {
-        let (load, mut random) = (self.load.get(), self.random.borrow_mut());
-        let starved = match load.starved {
+        let mut random = self.random.borrow_mut();
+        let starved = match self.load.starved {
             (share, mean) if share > 0.0 && random.chance(share) => random.exponential(mean),
             _ => Duration::ZERO,
         };
-        let latency = match load.latency.is_zero() {
-            true => Duration::ZERO,
-            false => random.exponential(load.latency),
-        };
+        let latency = random.exponential(self.load.latency);
         ((latency + starved).as_nanos() as u64, starved)
     }
 
@@ -478,7 +475,7 @@ impl SimulatedMachine {
             }
             (None, None) => Ok(None),
         };
-        let work = self.load.get().work;
+        let work = self.load.work;
         process.ran += work;
         process.busy_until_ns = self.now_ns.get() + work.as_nanos() as u64;
         match turned {
@@ -544,7 +541,6 @@ impl SimulatedMachine {
                 self.with(stage, |process| process.spins_since_ns = Some(self.now_ns.get()));
             }
             What::Wire(way, quality) => self.wires.borrow_mut().set_quality(*way, *quality),
-            What::Load(load) => self.load.set(*load),
             What::Ask(request) => self.ask(*request),
             // Nobody hears either while there is no bus.
             What::Break(stage, kind) => {
