@@ -84,11 +84,11 @@ pub(crate) struct Invariants {
     /// Newest order of the supervisor that lives.
     order: Option<Order>,
     /// Why the link stops the robot, or that it does not, and since when.
-    causes: Vec<(Duration, Option<Cause>)>,
+    pub causes: Vec<(Duration, Option<Cause>)>,
     /// Whether the newest motion command of this event moves.
     sent: Option<bool>,
     told: Option<Duration>,
-    moved: Option<Duration>,
+    pub moved: Option<Duration>,
     /// First order to stand after the last one to move.
     stood: Option<Duration>,
     /// Whether the wire to the robot keeps what it carries, whether the robot obeys, and when either
@@ -165,15 +165,6 @@ impl Invariants {
             | What::Beacon(_)
             | What::End => {}
         }
-    }
-
-    pub(crate) const fn moved(&self) -> Option<Duration> {
-        self.moved
-    }
-
-    /// Takes what the link did, and from when on.
-    pub(crate) fn take_causes(&mut self) -> Vec<(Duration, Option<Cause>)> {
-        std::mem::take(&mut self.causes)
     }
 
     /// Notes what the link or its guard sends.

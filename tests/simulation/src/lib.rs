@@ -131,17 +131,8 @@ impl Scenario {
             self.conduct(&machine, &Rc::new(RefCell::new(listener)))
         });
         let summarize = |finished| Summary::new(&self.mission, finished, &heard.borrow());
-        Ran {
-            summary: finished.as_ref().map(summarize),
-            finished,
-            broken: machine.broken(),
-            events: machine.events(),
-            simulated: machine.now(),
-            supervisors: machine.supervisors(),
-            truth: machine.take_truth(),
-            moved: machine.moved(),
-            causes: machine.take_causes(),
-        }
+        let summary = finished.as_ref().map(summarize);
+        machine.take_ran(finished, summary)
     }
 
     /// Returns the mission with what the disturbances do to the robot itself.

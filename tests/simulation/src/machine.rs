@@ -18,17 +18,18 @@ use common::{
     machine::{Files, Machine, MachineWire},
     mission::Mission,
     run::Run,
-    samples::{Cause, PoseSample},
+    samples::PoseSample,
     shell::Simulated,
     start::Generation,
 };
 use mission_control::Finished;
 use processes::{activity::Activity, process::ExitCause, stages};
 use rustix::process::Signal;
+use summary::Summary;
 use x80_sim::SimError;
 
 use crate::{
-    Observer, Scenario,
+    Observer, Ran, Scenario,
     disturbance::{Disturbance, Request, What, inject, say_beacon},
     fault_injector::FaultInjector,
     guard::Guard,
@@ -156,8 +157,20 @@ impl SimulatedMachine {
         recent.copied().find(|tick| tick.is_of(pose))
     }
 
-    pub(crate) fn take_truth(&self) -> Vec<GroundTruthTick> {
-        self.robot.take().map(|robot| robot.truth).unwrap_or_default()
+    /// Takes what came of the run.
+    pub(crate) fn take_ran(&self, finished: Option<Finished>, summary: Option<Summary>) -> Ran {
+        let mut invariants = self.invariants.borrow_mut();
+        Ran {
+            finished,
+            summary,
+            broken: self.broken.take(),
+            events: self.events.get(),
+            simulated: self.now(),
+            supervisors: self.supervisors.get(),
+            truth: self.robot.take().map(|robot| robot.truth).unwrap_or_default(),
+            moved: invariants.moved,
+            causes: std::mem::take(&mut invariants.causes),
+        }
     }
 
     /// Copies the ground truth that `to` does not have yet.
@@ -172,31 +185,9 @@ impl SimulatedMachine {
         self.ends_ns.set(BEGIN_NS + time.as_nanos() as u64);
     }
 
-    pub(crate) const fn supervisors(&self) -> u32 {
-        self.supervisors.get()
-    }
-
-    pub(crate) fn events(&self) -> u64 {
-        self.events.get()
-    }
-
-    pub(crate) fn broken(&self) -> Option<Broken> {
-        self.broken.borrow().clone()
-    }
-
     /// Returns whether the scenario has ended or an invariant is broken.
     pub(crate) fn is_over(&self) -> bool {
         self.is_ended.get() || self.broken.borrow().is_some()
-    }
-
-    /// Returns the time of the last command that moves the robot.
-    pub(crate) fn moved(&self) -> Option<Duration> {
-        self.invariants.borrow().moved()
-    }
-
-    /// Takes what the link did, and from when on.
-    pub(crate) fn take_causes(&self) -> Vec<(Duration, Option<Cause>)> {
-        self.invariants.borrow_mut().take_causes()
     }
 
     pub(crate) fn check_end(&self, mission: &Mission, finished: &Finished) {
