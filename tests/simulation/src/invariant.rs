@@ -76,6 +76,7 @@ impl Observed {
     }
 }
 
+#[derive(Default)]
 pub(crate) struct Invariants {
     protocol: Protocol,
     in_ticks: bool,
@@ -117,22 +118,9 @@ impl Invariants {
         Self {
             protocol: mission.robot.protocol(),
             in_ticks,
-            observed: None,
-            decoder: Decoder::default(),
-            order: None,
-            causes: Vec::new(),
-            sent: None,
-            told: None,
-            moved: None,
-            stood: None,
             wire_is_calm: true,
             obeys: true,
-            obedience_changed: Duration::ZERO,
-            has_lied: false,
-            disturbed: Vec::new(),
-            command: 0,
-            compared: 0,
-            joins: 0,
+            ..Self::default()
         }
     }
 

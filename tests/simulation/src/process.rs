@@ -10,6 +10,7 @@ use processes::{
 use rustix::process::Signal;
 
 /// A stage's process.
+#[derive(Default)]
 pub(crate) struct Process {
     pub stage: &'static str,
     /// Until its first turn.
@@ -37,17 +38,9 @@ impl Process {
         Self {
             stage: generation.stage,
             starts: Some((generation.clone(), run)),
-            turns: None,
             due_ns,
-            woken_ns: None,
             busy_until_ns: due_ns,
-            frozen: false,
-            spins_since_ns: None,
-            is_terminated: false,
-            exit: None,
-            ran: Duration::ZERO,
-            starved: Duration::ZERO,
-            starves: Duration::ZERO,
+            ..Self::default()
         }
     }
 
