@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
     /// Mean time from a wakeup to the turn.
     pub latency: Duration,

@@ -65,6 +65,7 @@ enum Event {
     Turn(u32),
 }
 
+#[derive(Default)]
 pub(crate) struct SimulatedMachine {
     own: Weak<Self>,
     now_ns: Cell<u64>,
@@ -110,26 +111,14 @@ impl SimulatedMachine {
             now_ns: Cell::new(BEGIN_NS),
             running: Cell::new(OBSERVER),
             supervisor: Cell::new(OBSERVER),
-            supervisors: Cell::new(0),
             ends_ns: Cell::new(u64::MAX),
-            processes_started: Cell::new(0),
-            doomed: RefCell::default(),
-            files: Files::default(),
-            memory: RefCell::default(),
             wires: Rc::new(RefCell::new(Wires::new(seed))),
-            robot: RefCell::default(),
             faults,
-            guard: RefCell::default(),
-            processes: RefCell::default(),
             random: RefCell::new(Random::new(seed, 0)),
             load,
             disturbances: RefCell::new(disturbances),
             invariants: RefCell::new(invariants),
-            observer: RefCell::default(),
-            broken: RefCell::default(),
-            is_ended: Cell::new(false),
-            events: Cell::new(0),
-            second: Cell::new((0, 0)),
+            ..Self::default()
         })
     }
 

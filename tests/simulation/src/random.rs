@@ -9,6 +9,12 @@ use rand_pcg::{Pcg64, rand_core::Rng as _};
 #[derive(Clone, Debug)]
 pub struct Random(Pcg64);
 
+impl Default for Random {
+    fn default() -> Self {
+        Self::new(0, 0)
+    }
+}
+
 impl Random {
     pub fn new(seed: u64, stream: u128) -> Self {
         Self(Pcg64::new(seed.into(), stream))

@@ -41,7 +41,7 @@ struct Datagram {
 }
 
 /// Datagrams of one direction.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Lane {
     quality: Quality,
     /// Arrival of the last datagram that kept its order.
@@ -56,10 +56,6 @@ const LEAST_NS: u64 = 100_000;
 const LATE: Duration = Duration::from_millis(150);
 
 impl Lane {
-    fn new(random: Random) -> Self {
-        Self { quality: Quality::default(), in_order_ns: 0, under_way: VecDeque::new(), random }
-    }
-
     fn send(&mut self, port: Port, bytes: &[u8], now_ns: u64) {
         let Quality { lost, doubled, reordered, delay } = self.quality;
         if lost > 0.0 && self.random.chance(lost) {
@@ -83,10 +79,10 @@ impl Lane {
     }
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Wires {
-    to_robot: Lane,
-    to_host: Lane,
+    /// By [`Way`].
+    lanes: [Lane; 2],
     /// What has come for each open end.
     inboxes: BTreeMap<Port, VecDeque<Vec<u8>>>,
     opened: Port,
@@ -96,18 +92,15 @@ const FIRST_PORT: Port = 40_000;
 
 impl Wires {
     pub(crate) fn new(seed: u64) -> Self {
-        let lane = |stream| Lane::new(Random::new(seed, stream));
-        Self { to_robot: lane(1), to_host: lane(2), inboxes: BTreeMap::new(), opened: 0 }
+        let lane = |stream| Lane { random: Random::new(seed, stream), ..Lane::default() };
+        Self { lanes: [1, 2].map(lane), ..Self::default() }
     }
 
-    const fn lane(&mut self, way: Way) -> &mut Lane {
-        match way {
-            Way::ToRobot => &mut self.to_robot,
-            Way::ToHost => &mut self.to_host,
-        }
+    fn lane(&mut self, way: Way) -> &mut Lane {
+        &mut self.lanes[way as usize]
     }
 
-    pub(crate) const fn set_quality(&mut self, way: Way, quality: Quality) {
+    pub(crate) fn set_quality(&mut self, way: Way, quality: Quality) {
         self.lane(way).quality = quality;
     }
 
@@ -116,22 +109,18 @@ impl Wires {
     }
 
     pub(crate) fn next_ns(&self, way: Way) -> Option<u64> {
-        let lane = match way {
-            Way::ToRobot => &self.to_robot,
-            Way::ToHost => &self.to_host,
-        };
-        lane.under_way.front().map(|datagram| datagram.due_ns)
+        self.lanes[way as usize].under_way.front().map(|datagram| datagram.due_ns)
     }
 
     /// Takes a datagram that has come to the robot, with its sender.
     pub(crate) fn take_for_robot(&mut self) -> Option<(Port, Vec<u8>)> {
-        let Datagram { port, bytes, .. } = self.to_robot.under_way.pop_front()?;
+        let Datagram { port, bytes, .. } = self.lane(Way::ToRobot).under_way.pop_front()?;
         Some((port, bytes))
     }
 
     /// Puts a datagram that has come to its host's end, unless that is closed.
     pub(crate) fn deliver_to_host(&mut self) {
-        if let Some(Datagram { port, bytes, .. }) = self.to_host.under_way.pop_front()
+        if let Some(Datagram { port, bytes, .. }) = self.lane(Way::ToHost).under_way.pop_front()
             && let Some(inbox) = self.inboxes.get_mut(&port)
         {
             inbox.push_back(bytes);
