@@ -384,7 +384,7 @@ impl SimulatedMachine {
         }
     }
 
-    fn send_to_robot(&self, from: Port, bytes: &[u8]) {
+    pub(crate) fn send_to_robot(&self, from: Port, bytes: &[u8]) {
         self.invariants.borrow_mut().on_sent(bytes, self.now());
         self.wires.borrow_mut().send(Way::ToRobot, from, bytes, self.now_ns.get());
     }
@@ -614,12 +614,6 @@ impl Machine for SimulatedMachine {
     }
 
     fn wire(&self, _: &str) -> Box<dyn MachineWire> {
-        let machine = self.own.clone();
-        let send = move |from: Port, bytes: &[u8]| {
-            if let Some(machine) = machine.upgrade() {
-                machine.send_to_robot(from, bytes);
-            }
-        };
-        Box::new(HostEnd::open(&self.wires, Box::new(send)))
+        Box::new(HostEnd::open(&self.wires, self.own.clone()))
     }
 }

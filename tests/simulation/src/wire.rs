@@ -3,14 +3,13 @@
 use std::{
     cell::RefCell,
     collections::{BTreeMap, VecDeque},
-    fmt,
-    rc::Rc,
+    rc::{Rc, Weak},
     time::Duration,
 };
 
 use common::machine::MachineWire;
 
-use crate::random::Random;
+use crate::{machine::SimulatedMachine, random::Random};
 
 /// Direction of a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -132,24 +131,21 @@ impl Wires {
     }
 }
 
-/// Sends a host's datagram.
-pub(crate) type Send = Box<dyn Fn(Port, &[u8])>;
-
 /// A host's end of a wire.
+#[derive(Debug)]
 pub(crate) struct HostEnd {
     wires: Rc<RefCell<Wires>>,
     port: Port,
-    send: Send,
+    machine: Weak<SimulatedMachine>,
 }
 
 impl HostEnd {
-    pub(crate) fn open(wires: &Rc<RefCell<Wires>>, send: Send) -> Self {
+    pub(crate) fn open(wires: &Rc<RefCell<Wires>>, machine: Weak<SimulatedMachine>) -> Self {
         let mut opened = wires.borrow_mut();
         opened.opened = opened.opened.wrapping_add(1);
         let port = FIRST_PORT.wrapping_add(opened.opened);
         opened.inboxes.insert(port, VecDeque::new());
-        drop(opened);
-        Self { wires: Rc::clone(wires), port, send }
+        Self { wires: Rc::clone(wires), port, machine }
     }
 }
 
@@ -159,18 +155,14 @@ impl Drop for HostEnd {
     }
 }
 
-impl fmt::Debug for HostEnd {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("HostEnd").field("port", &self.port).finish_non_exhaustive()
-    }
-}
-
 impl MachineWire for HostEnd {
     fn receive(&mut self) -> Option<Vec<u8>> {
         self.wires.borrow_mut().inboxes.get_mut(&self.port)?.pop_front()
     }
 
     fn send(&mut self, bytes: &[u8]) {
-        (self.send)(self.port, bytes);
+        if let Some(machine) = self.machine.upgrade() {
+            machine.send_to_robot(self.port, bytes);
+        }
     }
 }
