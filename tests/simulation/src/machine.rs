@@ -274,27 +274,22 @@ impl SimulatedMachine {
         ((latency + starved).as_nanos() as u64, starved)
     }
 
+    /// Returns the soonest event, of those at one time the first.
     fn next(&self) -> Option<(u64, Event)> {
-        let mut next: Option<(u64, Event)> = None;
-        let mut offer = |at_ns: Option<u64>, event: Event| {
-            if let Some(at_ns) = at_ns
-                && next.as_ref().is_none_or(|(soonest, _)| at_ns < *soonest)
-            {
-                next = Some((at_ns, event));
-            }
-        };
         let disturbances = self.disturbances.borrow();
-        let at = disturbances.last().map(|disturbance| disturbance.at);
-        offer(at.map(|at| BEGIN_NS + at.as_nanos() as u64), Event::Disturbance);
+        let disturbs = disturbances.last().map(|it| BEGIN_NS + it.at.as_nanos() as u64);
         let wires = self.wires.borrow();
-        offer(wires.next_ns(Way::ToRobot), Event::ToRobot);
-        offer(wires.next_ns(Way::ToHost), Event::ToHost);
-        offer(self.robot.borrow().as_ref().and_then(Robot::next_ns), Event::Robot);
-        offer(self.guard.borrow().next_ns(), Event::Guard);
-        for (number, process) in self.processes.borrow().iter() {
-            offer(process.next_ns(), Event::Turn(*number));
-        }
-        next
+        let others = [
+            (disturbs, Event::Disturbance),
+            (wires.next_ns(Way::ToRobot), Event::ToRobot),
+            (wires.next_ns(Way::ToHost), Event::ToHost),
+            (self.robot.borrow().as_ref().and_then(Robot::next_ns), Event::Robot),
+            (self.guard.borrow().next_ns(), Event::Guard),
+        ];
+        let processes = self.processes.borrow();
+        let turns = processes.iter().map(|(nth, process)| (process.next_ns(), Event::Turn(*nth)));
+        let all = others.into_iter().chain(turns);
+        all.filter_map(|(at_ns, event)| Some((at_ns?, event))).min_by_key(|(at_ns, _)| *at_ns)
     }
 
     /// Runs events until `deadline_ns`, or until `is_ready`, whose turn comes late like others'.
