@@ -28,10 +28,10 @@ const ASKED: usize = 2;
 /// Time at which an operator resumes whatever stands.
 const RESUMED: Duration = Duration::from_secs(50);
 
-/// Draws the time without a supervisor after its death.
-pub(crate) fn absence(random: &mut Random) -> Duration {
+/// Draws a time up to 3 s, seldom up to 30 s.
+pub(crate) fn a_while(random: &mut Random, least_s: f64) -> Duration {
     let longest_s = if random.chance(0.2) { 30.0 } else { 3.0 };
-    Duration::from_secs_f64(random.within(0.1, longest_s))
+    Duration::from_secs_f64(random.within(least_s, longest_s))
 }
 
 pub(crate) fn load(random: &mut Random) -> Load {
@@ -74,8 +74,7 @@ pub(crate) fn disturbances(random: &mut Random, mission: &Mission) -> Vec<Distur
 fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Disturbance>) {
     let stage = stages::TABLE[random.below(stages::TABLE.len())].name;
     let operations = random.below(200) as u32;
-    let longest_s = if random.chance(0.2) { 30.0 } else { 3.0 };
-    let lasts = Duration::from_secs_f64(random.within(0.05, longest_s));
+    let lasts = a_while(random, 0.05);
     let mut add = |after: Duration, what| all.push(Disturbance { at: at + after, what });
     match random.below(15) {
         0..=2 => add(Duration::ZERO, What::Kill(stage)),

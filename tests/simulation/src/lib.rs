@@ -194,7 +194,7 @@ impl Scenario {
                 return None;
             }
             if machine.supervisor_is_killed() {
-                machine.pass(draw::absence(&mut random));
+                machine.pass(draw::a_while(&mut random, 0.1));
                 recovered = match RecoveredRun::load(&directory) {
                     Ok(run) => Some(run),
                     Err(error) => {

@@ -205,7 +205,11 @@ impl SimulatedMachine {
     }
 
     pub(crate) fn supervisor_is_killed(&self) -> bool {
-        is_killed(&self.doomed.borrow(), self.supervisor.get())
+        self.has_met_doom(self.supervisor.get())
+    }
+
+    fn has_met_doom(&self, process: u32) -> bool {
+        self.doomed.borrow().get(&process) == Some(&0)
     }
 
     /// Passes time without a supervisor, whose stages end in order.
@@ -341,9 +345,7 @@ impl SimulatedMachine {
                 }
             }
             Event::ToHost => self.wires.borrow_mut().deliver_to_host(),
-            Event::Robot => {
-                self.with_robot(Robot::pass);
-            }
+            Event::Robot => self.with_robot(Robot::pass),
             Event::Guard => {
                 self.running.set(GUARD);
                 let is_succeeded = self.is_open(LINK);
@@ -367,6 +369,7 @@ impl SimulatedMachine {
         if let Err(error) = act(robot) {
             self.break_off("the robot runs", error.to_string());
         }
+        robot.observe();
         let mut wires = self.wires.borrow_mut();
         for (to, datagram) in robot.sent() {
             let Some(faults) = &self.faults else {
@@ -454,7 +457,7 @@ impl SimulatedMachine {
         process.ran += work;
         process.busy_until_ns = self.now_ns.get() + work.as_nanos() as u64;
         match turned {
-            _ if is_killed(&self.doomed.borrow(), number) => {
+            _ if self.has_met_doom(number) => {
                 self.end(&mut process, killed_by(Signal::KILL));
             }
             Err(error) => self.end(&mut process, ExitCause::Exited(error.exit_code().into())),
@@ -568,10 +571,6 @@ impl SimulatedMachine {
             self.guard.borrow_mut().on_link_ended(self.now_ns.get());
         }
     }
-}
-
-fn is_killed(doomed: &BTreeMap<u32, u32>, process: u32) -> bool {
-    doomed.get(&process) == Some(&0)
 }
 
 impl Machine for SimulatedMachine {

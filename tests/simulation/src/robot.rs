@@ -19,20 +19,16 @@ impl Robot {
         Ok(robot)
     }
 
-    fn observe(&mut self) {
+    pub(crate) fn observe(&mut self) {
         self.truth.extend(self.robot.truth());
     }
 
     pub(crate) fn hear(&mut self, from: Port, bytes: &[u8]) -> Result<(), SimError> {
-        self.robot.hear(SocketAddr::from((Ipv4Addr::LOCALHOST, from)), bytes)?;
-        self.observe();
-        Ok(())
+        self.robot.hear(SocketAddr::from((Ipv4Addr::LOCALHOST, from)), bytes)
     }
 
     pub(crate) fn pass(&mut self) -> Result<(), SimError> {
-        self.robot.pass()?;
-        self.observe();
-        Ok(())
+        self.robot.pass()
     }
 
     pub(crate) fn next_ns(&self) -> Option<u64> {
