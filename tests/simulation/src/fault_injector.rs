@@ -41,6 +41,7 @@ pub(crate) struct Late {
 }
 
 /// Passes bytes unchanged while no fault acts.
+#[derive(Default)]
 pub(crate) struct FaultInjector {
     fault: Option<RobotFault>,
     /// Time of the first wheel message that the fault changed.
@@ -63,22 +64,8 @@ pub(crate) struct FaultInjector {
 
 impl FaultInjector {
     pub(crate) fn new(protocol: Protocol, seed: u64) -> Self {
-        Self {
-            fault: None,
-            began: None,
-            chance: Random::new(seed, 13),
-            channel: 0,
-            size: 0.0,
-            words: Words::of(protocol),
-            base: None,
-            newest: Report::default(),
-            kept: VecDeque::new(),
-            next_again: Duration::ZERO,
-            next_slow: [Duration::ZERO; 4],
-            moving: None,
-            pushes: false,
-            gyro: None,
-        }
+        let chance = Random::new(seed, 13);
+        Self { chance, words: Words::of(protocol), ..Self::default() }
     }
 
     /// Draws the size of `fault` and the wheel that it affects. The fault acts until the next one

@@ -17,50 +17,44 @@ const LONGEST_ECHO_M: f64 = 2.54;
 const MOTOR_BYTES: usize = 33;
 pub(super) const COUNT_RAD: f64 = TAU / 1200.0;
 
-pub(super) enum Words {
-    X80 { robot: Decoder, host: Decoder, encoders: [Encoder; 2], counts: [f64; 2] },
-    Json { robot: Lines, host: Lines },
+#[derive(Default)]
+pub(super) struct Words {
+    /// All but an X80 say lines.
+    protocol: Protocol,
+    robot_frames: Decoder,
+    host_frames: Decoder,
+    encoders: [Encoder; 2],
+    counts: [f64; 2],
+    robot_lines: Lines,
+    host_lines: Lines,
 }
 
 impl Words {
     pub(super) fn of(protocol: Protocol) -> Self {
-        match protocol {
-            Protocol::X80 => {
-                let (encoders, counts) = Default::default();
-                let (robot, host) = Default::default();
-                Self::X80 { robot, host, encoders, counts }
-            }
-            Protocol::Json | Protocol::Arduino | Protocol::Ros2 => {
-                Self::Json { robot: Lines::default(), host: Lines::default() }
-            }
-        }
+        Self { protocol, ..Self::default() }
     }
 
     pub(super) fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
-        match self {
-            Self::X80 { robot, encoders, counts, .. } => {
-                let said = frames(robot, bytes, |frame| Said::of_frame(frame, encoders, counts));
-                said.into_iter().flatten().collect()
-            }
-            Self::Json { robot, .. } => {
-                let lines = robot.push(bytes).into_iter().filter_map(|line| parse(&line).ok());
-                lines.map(|report| Said { report, frame: None }).collect()
-            }
+        if self.protocol == Protocol::X80 {
+            let said = frames(&mut self.robot_frames, bytes, |frame| {
+                Said::of_frame(frame, &mut self.encoders, &mut self.counts)
+            });
+            return said.into_iter().flatten().collect();
         }
+        let lines = self.robot_lines.push(bytes).into_iter().filter_map(|line| parse(&line).ok());
+        lines.map(|report| Said { report, frame: None }).collect()
     }
 
     pub(super) fn ordered(&mut self, bytes: &[u8]) -> Vec<(Vec<u8>, Effect)> {
-        match self {
-            Self::X80 { host, .. } => frames(host, bytes, |frame| {
+        if self.protocol == Protocol::X80 {
+            return frames(&mut self.host_frames, bytes, |frame| {
                 let mut bytes = Vec::new();
                 frame.encode(&mut bytes);
                 (bytes, Effect::of_frame(frame))
-            }),
-            Self::Json { host, .. } => {
-                let lines = host.push(bytes).into_iter();
-                lines.map(|order| ([&*order, b"\n"].concat(), Effect::of_line(&order))).collect()
-            }
+            });
         }
+        let lines = self.host_lines.push(bytes).into_iter();
+        lines.map(|order| ([&*order, b"\n"].concat(), Effect::of_line(&order))).collect()
     }
 }
 
