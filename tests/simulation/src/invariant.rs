@@ -114,14 +114,8 @@ fn holds(holds: bool, invariant: &'static str, detail: impl FnOnce() -> String) 
 }
 
 impl Invariants {
-    pub(crate) fn new(mission: &Mission, in_ticks: bool) -> Self {
-        Self {
-            protocol: mission.robot.protocol(),
-            in_ticks,
-            wire_is_calm: true,
-            obeys: true,
-            ..Self::default()
-        }
+    pub(crate) fn new(protocol: Protocol, in_ticks: bool) -> Self {
+        Self { protocol, in_ticks, wire_is_calm: true, obeys: true, ..Self::default() }
     }
 
     pub(crate) fn on_bus(&mut self, memory: &Rc<Memory>) {

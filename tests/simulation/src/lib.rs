@@ -46,9 +46,7 @@ pub use self::{
     robot_fault::{Promise, RobotFault},
     wire::{Quality, Way},
 };
-use self::{
-    invariant::Invariants, machine::SimulatedMachine, robot::Robot, surroundings::Simulated,
-};
+use self::{machine::SimulatedMachine, robot::Robot, surroundings::Simulated};
 
 /// Directory of the run, which exists only on the simulated machine.
 const DIRECTORY: &str = "/simulation/run";
@@ -123,10 +121,7 @@ impl Scenario {
     /// Runs the scenario before an observer.
     pub fn run_before(&self, observer: Option<Box<dyn Observer>>) -> Ran {
         let (heard, listener) = Hearer::with_listener();
-        let in_ticks = self.pace == Pace::Max;
-        let invariants = Invariants::new(&self.mission, in_ticks);
-        let machine = SimulatedMachine::new(self, invariants);
-        machine.show_to(observer);
+        let machine = SimulatedMachine::new(self, observer);
         let finished = common::machine::simulate(Rc::<SimulatedMachine>::clone(&machine), || {
             self.conduct(&machine, &Rc::new(RefCell::new(listener)))
         });

@@ -13,6 +13,7 @@ use std::{
 
 use common::{
     bus::{Bus, Memory},
+    clock::Pace,
     ground_truth::GroundTruthTick,
     kinematics::Pose2,
     machine::{Files, Machine, MachineWire},
@@ -98,12 +99,13 @@ pub(crate) struct SimulatedMachine {
 }
 
 impl SimulatedMachine {
-    pub(crate) fn new(scenario: &Scenario, invariants: Invariants) -> Rc<Self> {
+    pub(crate) fn new(scenario: &Scenario, observer: Option<Box<dyn Observer>>) -> Rc<Self> {
         let Scenario { seed, load, .. } = *scenario;
         let mut disturbances = scenario.disturbances.clone();
         disturbances.sort_by_key(|disturbance| std::cmp::Reverse(disturbance.at));
         let is_fault = |it: &Disturbance| matches!(it.what, What::Fault(Some(_)));
         let protocol = scenario.mission.robot.protocol();
+        let invariants = Invariants::new(protocol, scenario.pace == Pace::Max);
         let faults = disturbances.iter().any(is_fault);
         let faults = faults.then(|| RefCell::new(FaultInjector::new(protocol, seed)));
         Rc::new_cyclic(|own| Self {
@@ -118,16 +120,13 @@ impl SimulatedMachine {
             load,
             disturbances: RefCell::new(disturbances),
             invariants: RefCell::new(invariants),
+            observer: RefCell::new(observer),
             ..Self::default()
         })
     }
 
     pub(crate) fn now(&self) -> Duration {
         Duration::from_nanos(self.now_ns.get() - BEGIN_NS)
-    }
-
-    pub(crate) fn show_to(&self, observer: Option<Box<dyn Observer>>) {
-        self.observer.replace(observer);
     }
 
     pub(crate) fn place(&self, robot: Robot) {
@@ -180,8 +179,7 @@ impl SimulatedMachine {
     }
 
     pub(crate) fn check_end(&self, mission: &Mission, finished: &Finished) {
-        let checked = self.invariants.borrow().check_end(self, mission, finished);
-        self.judge(checked);
+        self.judge(self.invariants.borrow().check_end(self, mission, finished));
     }
 
     /// Begins the life of a supervisor, with a new bus. Returns the bus.
@@ -358,8 +356,7 @@ impl SimulatedMachine {
         if let Some(observer) = &mut *self.observer.borrow_mut() {
             observer.observe();
         }
-        let checked = self.invariants.borrow_mut().check(self);
-        self.judge(checked);
+        self.judge(self.invariants.borrow_mut().check(self));
         self.running.set(before);
     }
 
@@ -446,11 +443,14 @@ impl SimulatedMachine {
                 turned
             }),
             (Some(turns), _) if process.is_terminated => turns.stop().map(|()| None),
-            (Some(turns), _) => {
-                let mut turned = Ok(None);
-                self.observed(process.stage, &mut || turned = turns.turn());
-                turned
-            }
+            (Some(turns), _) => match &mut *self.observer.borrow_mut() {
+                Some(observer) => {
+                    let mut turned = Ok(None);
+                    observer.turn(process.stage, &mut || turned = turns.turn());
+                    turned
+                }
+                None => turns.turn(),
+            },
             (None, None) => Ok(None),
         };
         let work = self.load.work;
@@ -468,13 +468,6 @@ impl SimulatedMachine {
             Ok(None) => process.spins_since_ns = Some(self.now_ns.get()),
         }
         self.processes.borrow_mut().insert(number, process);
-    }
-
-    fn observed(&self, stage: &str, turn: &mut dyn FnMut()) {
-        match &mut *self.observer.borrow_mut() {
-            Some(observer) => observer.turn(stage, turn),
-            None => turn(),
-        }
     }
 
     fn open(&self, generation: Generation, run: Run) -> common::start::Result<Box<dyn Simulated>> {
