@@ -7,6 +7,7 @@
 use std::{
     cell::{Cell, RefCell},
     collections::BTreeMap,
+    net::{Ipv4Addr, SocketAddr},
     rc::{Rc, Weak},
     time::Duration,
 };
@@ -27,7 +28,7 @@ use mission_control::Finished;
 use processes::{activity::Activity, process::ExitCause, stages};
 use rustix::process::Signal;
 use summary::Summary;
-use x80_sim::SimError;
+use x80_sim::{InMemory, SimError};
 
 use crate::{
     Observer, Ran, Scenario,
@@ -339,11 +340,12 @@ impl SimulatedMachine {
                     if let Some(faults) = &self.faults {
                         bytes = faults.borrow_mut().order(&bytes);
                     }
+                    let from = SocketAddr::from((Ipv4Addr::LOCALHOST, from));
                     self.with_robot(|robot| robot.hear(from, &bytes));
                 }
             }
             Event::ToHost => self.wires.borrow_mut().deliver_to_host(),
-            Event::Robot => self.with_robot(Robot::pass),
+            Event::Robot => self.with_robot(InMemory::pass),
             Event::Guard => {
                 self.running.set(GUARD);
                 let is_succeeded = self.is_open(LINK);
@@ -360,15 +362,16 @@ impl SimulatedMachine {
         self.running.set(before);
     }
 
-    fn with_robot(&self, act: impl FnOnce(&mut Robot) -> Result<(), SimError>) {
+    fn with_robot(&self, act: impl FnOnce(&mut InMemory) -> Result<(), SimError>) {
         let mut robot = self.robot.borrow_mut();
         let Some(robot) = &mut *robot else { return };
-        if let Err(error) = act(robot) {
+        if let Err(error) = act(&mut robot.simulated) {
             self.break_off("the robot runs", error.to_string());
         }
         robot.observe();
         let mut wires = self.wires.borrow_mut();
-        for (to, datagram) in robot.sent() {
+        for (to, datagram) in robot.simulated.sent() {
+            let to = to.port();
             let Some(faults) = &self.faults else {
                 wires.send(Way::ToHost, to, &datagram, self.now_ns.get());
                 continue;
