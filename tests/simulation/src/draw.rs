@@ -75,16 +75,17 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
     let stage = stages::TABLE[random.below(stages::TABLE.len())].name;
     let operations = random.below(200) as u32;
     let lasts = a_while(random, 0.05);
+    let now = Duration::ZERO;
     let mut add = |after: Duration, what| all.push(Disturbance { at: at + after, what });
     match random.below(15) {
-        0..=2 => add(Duration::ZERO, What::Kill(stage)),
-        3..=4 => add(Duration::ZERO, What::KillAfter(stage, operations)),
+        0..=2 => add(now, What::Kill(stage)),
+        3..=4 => add(now, What::KillAfter(stage, operations)),
         5 => {
-            add(Duration::ZERO, What::Freeze(stage));
+            add(now, What::Freeze(stage));
             add(lasts, What::Thaw(stage));
         }
-        6 => add(Duration::ZERO, What::Hang(stage)),
-        7 => add(Duration::ZERO, What::KillSupervisor(operations)),
+        6 => add(now, What::Hang(stage)),
+        7 => add(now, What::KillSupervisor(operations)),
         8..=9 => {
             let mut share = || match random.below(4) {
                 0..=1 => 0.0,
@@ -94,11 +95,11 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
             let (lost, doubled, reordered) = (share(), share(), share());
             let delay = LONGEST_DELAY.mul_f64(share());
             let way = if share() > 0.0 { Way::ToRobot } else { Way::ToHost };
-            add(Duration::ZERO, What::Wire(way, Quality { lost, doubled, reordered, delay }));
+            add(now, What::Wire(way, Quality { lost, doubled, reordered, delay }));
             add(lasts, What::Wire(way, Quality::default()));
         }
         10 => {
-            add(Duration::ZERO, What::Ask(Request::Stop));
+            add(now, What::Ask(Request::Stop));
             if random.chance(0.5) {
                 add(lasts / 2, What::Ask(Request::Place));
             }
@@ -108,19 +109,19 @@ fn one(random: &mut Random, mission: &Mission, at: Duration, all: &mut Vec<Distu
             let faults = RobotFault::value_variants().iter().copied();
             let faults: Vec<_> = faults.filter(|fault| fault.has_meaning(mission)).collect();
             if let Some(fault) = faults.get(random.below(faults.len())) {
-                add(Duration::ZERO, What::Fault(Some(*fault)));
+                add(now, What::Fault(Some(*fault)));
                 add(lasts, What::Fault(None));
             }
         }
         13 => {
             let place = on_the_way(random, mission);
-            add(Duration::ZERO, What::Ask(Request::AddZone(place)));
+            add(now, What::Ask(Request::AddZone(place)));
             add(lasts, What::Ask(Request::RemoveZone(place)));
         }
         _ => {
             let place = on_the_way(random, mission);
             let requests = [Request::Goto(place), Request::Append(place), Request::Restart(stage)];
-            add(Duration::ZERO, What::Ask(requests[random.below(requests.len())]));
+            add(now, What::Ask(requests[random.below(requests.len())]));
         }
     }
 }

@@ -235,10 +235,10 @@ impl Scenario {
 /// Sees everything that is published, without a part in it.
 pub trait Observer {
     /// Is given each new bus, before anything is published on it.
-    fn on_bus(&mut self, bus: &Bus);
+    fn on_bus(&mut self, _bus: &Bus) {}
 
     /// Is called after each event.
-    fn observe(&mut self);
+    fn observe(&mut self) {}
 
     /// Runs a turn of a stage that has opened its topics.
     fn turn(&mut self, _stage: &str, turn: &mut dyn FnMut()) {
@@ -308,8 +308,6 @@ mod tests {
             let map = bus.reader(&topics::GRID).unwrap();
             self.0.push(Box::new((roster, map, bus.reader(&topics::FIELD).unwrap())));
         }
-
-        fn observe(&mut self) {}
     }
 
     #[test]

@@ -5,7 +5,7 @@
 use std::{cell::RefCell, collections::BTreeMap, rc::Rc};
 
 use allocation_counter::measure;
-use common::{bus::Bus, mission::Mission};
+use common::mission::Mission;
 use console::missions;
 use simulation::{Observer, Scenario};
 
@@ -13,10 +13,6 @@ use simulation::{Observer, Scenario};
 struct Counter(BTreeMap<String, u64>);
 
 impl Observer for Counter {
-    fn on_bus(&mut self, _: &Bus) {}
-
-    fn observe(&mut self) {}
-
     fn turn(&mut self, stage: &str, turn: &mut dyn FnMut()) {
         *self.0.entry(stage.to_owned()).or_default() += measure(turn).count_total;
     }
