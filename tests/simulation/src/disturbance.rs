@@ -7,8 +7,7 @@ use common::{
     clock::{MissionTime, monotonic_ns},
     kinematics::Pose2,
     samples::{
-        BeaconSample, FaultKind, FaultSample, MOST_TARGETS, RequestKind, RequestSample,
-        TargetPoint, name,
+        BeaconSample, FaultKind, FaultSample, RequestKind, RequestSample, TargetPoint, name,
     },
     topics,
 };
@@ -79,16 +78,26 @@ pub enum Request {
 impl Request {
     pub(crate) fn publish(self, bus: &Bus, here: Pose2) -> Result<(), BusError> {
         let target = |at: [f64; 2]| vec![TargetPoint::at(at.into())];
+        let (id, asked_ns) = (monotonic_ns() | 1, monotonic_ns());
+        let mut sample = RequestSample { id, asked_ns, ..RequestSample::default() };
         let (kind, points) = match self {
-            Self::Stop | Self::LateStop => (RequestKind::Stop, vec![]),
+            Self::Stop => (RequestKind::Stop, vec![]),
+            Self::LateStop => {
+                sample.asked_ns = 1;
+                (RequestKind::Stop, vec![])
+            }
             Self::Resume => (RequestKind::Resume, vec![]),
             Self::Goto(at) => (RequestKind::Goto, target(at)),
             Self::Append(at) => (RequestKind::Append, target(at)),
-            Self::Restart(_) => (RequestKind::Restart, vec![]),
+            Self::Restart(stage) => {
+                sample.stage = name(stage);
+                (RequestKind::Restart, vec![])
+            }
             Self::Hand(stick) => (RequestKind::Hand, target(stick)),
             Self::Follow => (RequestKind::Follow, vec![]),
             Self::EndFollow => (RequestKind::EndFollow, vec![]),
             Self::Place => {
+                sample.deviations = PLACED;
                 let heading_rad = here.heading;
                 let at = TargetPoint { heading_rad, ..TargetPoint::at(here.position) };
                 (RequestKind::Place, vec![at])
@@ -100,22 +109,9 @@ impl Request {
             }
             Self::RemoveZone(at) => (RequestKind::RemoveZone, target(at)),
         };
-        let mut targets = [TargetPoint::default(); MOST_TARGETS];
-        targets[..points.len()].copy_from_slice(&points);
-        let stage = match self {
-            Self::Restart(stage) => name(stage),
-            _ => Default::default(),
-        };
-        let sample = RequestSample {
-            id: monotonic_ns() | 1,
-            asked_ns: if matches!(self, Self::LateStop) { 1 } else { monotonic_ns() },
-            kind: kind.into(),
-            stage,
-            targets,
-            target_count: points.len() as u8,
-            deviations: if matches!(self, Self::Place) { PLACED } else { [0.0; 2] },
-            ..RequestSample::default()
-        };
+        sample.kind = kind.into();
+        sample.target_count = points.len() as u8;
+        sample.targets[..points.len()].copy_from_slice(&points);
         bus.writer(&topics::REQUESTS, 1)?.publish(0, MissionTime::default(), sample)
     }
 }
