@@ -39,11 +39,8 @@ impl Guard {
             None if is_succeeded || !mark.is_set() => return,
             None => Orders::open(run),
         };
-        let turned = orders.and_then(|mut orders| {
-            let rest = orders.turn(now_ns)?;
-            Ok((orders, rest))
-        });
-        let Ok((orders, rest)) = turned else {
+        let turned = orders.and_then(|mut orders| Ok((orders.turn(now_ns)?, orders)));
+        let Ok((rest, orders)) = turned else {
             self.due_ns = Some(now_ns + TRIES_AGAIN.as_nanos() as u64);
             return;
         };

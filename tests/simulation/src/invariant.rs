@@ -207,7 +207,10 @@ impl Invariants {
         let before = self.order;
         self.read(machine, now)?;
         let may_move = drives(before) || drives(self.order);
-        if !self.in_ticks && sent == Some(true) {
+        if self.in_ticks {
+            return Ok(());
+        }
+        if sent == Some(true) {
             let drives = self.causes.last().is_some_and(|(_, cause)| cause.is_none());
             // A link that was killed in this turn sent, but did not publish why.
             holds(drives || !machine.is_open(LINK), "zero command while held", || {
@@ -218,9 +221,6 @@ impl Invariants {
             })?;
         }
         let Some(truth) = machine.truth() else { return Ok(()) };
-        if self.in_ticks {
-            return Ok(());
-        }
         let moves = truth.v.abs() > MOVES_M_S;
         let age =
             |then: Option<Duration>| then.map_or(Duration::MAX, |then| now.saturating_sub(then));

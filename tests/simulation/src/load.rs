@@ -20,11 +20,8 @@ impl Load {
         starved: (0.0, Duration::ZERO),
     };
     /// An idle machine of two cores.
-    pub const IDLE: Self = Self {
-        latency: Duration::from_micros(60),
-        work: Duration::from_micros(200),
-        starved: (0.0, Duration::ZERO),
-    };
+    pub const IDLE: Self =
+        Self { latency: Duration::from_micros(60), work: Duration::from_micros(200), ..Self::NONE };
     /// A machine that compiles beside the robot.
     pub const BUSY: Self = Self {
         latency: Duration::from_micros(500),
@@ -38,9 +35,6 @@ impl Load {
         starved: (0.2, Duration::from_millis(40)),
     };
     /// A machine on which processes wait for a processor for longer than a stage's deadline.
-    pub const STARVED: Self = Self {
-        latency: Duration::from_millis(3),
-        work: Duration::from_millis(1),
-        starved: (0.1, Duration::from_millis(300)),
-    };
+    pub const STARVED: Self =
+        Self { starved: (0.1, Duration::from_millis(300)), ..Self::OVERLOADED };
 }

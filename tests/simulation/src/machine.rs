@@ -409,8 +409,8 @@ impl SimulatedMachine {
     fn wake(&self) {
         let mail = self.wires.borrow().has_mail();
         for process in self.processes.borrow_mut().values_mut() {
-            let woken = process.turns.as_ref().is_some_and(|turns| turns.is_woken())
-                || mail && process.stage == LINK && process.turns.is_some();
+            let has_mail = mail && process.stage == LINK;
+            let woken = process.turns.as_ref().is_some_and(|it| it.is_woken() || has_mail);
             if woken && process.woken_ns.is_none() {
                 self.make_ready(process);
             }
