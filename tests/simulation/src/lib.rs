@@ -34,7 +34,7 @@ use common::{
     bus::Bus, clock::Pace, domain::RobotName, ground_truth::GroundTruthTick, mission::Mission,
     samples::Cause,
 };
-use mission_control::{Finished, Heard, Listener, Options, recovery::RecoveredRun};
+use mission_control::{Finished, Heard, Options, recovery::RecoveredRun};
 use processes::Starter;
 use summary::{Hearer, Summary};
 
@@ -120,10 +120,10 @@ impl Scenario {
 
     /// Runs the scenario before an observer.
     pub fn run_before(&self, observer: Option<Box<dyn Observer>>) -> Ran {
-        let (heard, listener) = Hearer::with_listener();
+        let heard = Rc::<RefCell<Hearer>>::default();
         let machine = SimulatedMachine::new(self, observer);
         let finished = common::machine::simulate(Rc::<SimulatedMachine>::clone(&machine), || {
-            self.conduct(&machine, &Rc::new(RefCell::new(listener)))
+            self.conduct(&machine, &heard)
         });
         let summarize = |finished| Summary::new(&self.mission, finished, &heard.borrow());
         let summary = finished.as_ref().map(summarize);
@@ -152,7 +152,7 @@ impl Scenario {
     fn conduct(
         &self,
         machine: &Rc<SimulatedMachine>,
-        listener: &Rc<RefCell<Listener>>,
+        heard: &Rc<RefCell<Hearer>>,
     ) -> Option<Finished> {
         match Robot::start(&self.shoved(), self.pace) {
             Ok(robot) => machine.place(robot),
@@ -172,8 +172,8 @@ impl Scenario {
         let mut recovered = None;
         loop {
             let mut surroundings = Simulated::new(machine, &self.while_waiting);
-            let listener = Rc::clone(listener);
-            let hear = move |heard: Heard<'_>| (*listener.borrow_mut())(heard);
+            let hearer = Rc::clone(heard);
+            let hear = move |heard: Heard<'_>| hearer.borrow_mut().hear(&heard);
             let options = Options {
                 mission: self.mission.clone(),
                 robot: Self::robot(),
