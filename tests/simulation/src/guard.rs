@@ -11,21 +11,13 @@ const STARTS_AFTER_NS: u64 = 30_000_000;
 
 #[derive(Default)]
 pub(crate) struct Guard {
-    run: Option<Run>,
+    /// Of the newest link, whose end the guard awaits.
+    pub run: Option<Run>,
     orders: Option<Orders>,
-    due_ns: Option<u64>,
+    pub due_ns: Option<u64>,
 }
 
 impl Guard {
-    pub(crate) const fn next_ns(&self) -> Option<u64> {
-        self.due_ns
-    }
-
-    /// Waits for the end of a link that starts.
-    pub(crate) fn on_link_started(&mut self, run: &Run) {
-        self.run = Some(run.clone());
-    }
-
     pub(crate) fn on_link_ended(&mut self, now_ns: u64) {
         self.due_ns.get_or_insert(now_ns + STARTS_AFTER_NS);
     }

@@ -229,7 +229,7 @@ impl SimulatedMachine {
     pub(crate) fn start(&self, generation: &Generation, run: Run) -> u32 {
         let process = self.new_process();
         if generation.stage == LINK {
-            self.guard.borrow_mut().on_link_started(&run);
+            self.guard.borrow_mut().run = Some(run.clone());
         }
         let due_ns = self.now_ns.get() + self.lateness().0;
         let started = Process::new(generation, run, due_ns);
@@ -287,7 +287,7 @@ impl SimulatedMachine {
             (wires.next_ns(Way::ToRobot), Event::ToRobot),
             (wires.next_ns(Way::ToHost), Event::ToHost),
             (self.robot.borrow().as_ref().and_then(Robot::next_ns), Event::Robot),
-            (self.guard.borrow().next_ns(), Event::Guard),
+            (self.guard.borrow().due_ns, Event::Guard),
         ];
         let processes = self.processes.borrow();
         let turns = processes.iter().map(|(nth, process)| (process.next_ns(), Event::Turn(*nth)));
