@@ -170,8 +170,7 @@ impl Invariants {
                     match Command::parse(&frame) {
                         Ok(Command::Motion(motion)) if motion.quantity == Quantity::Velocity => {
                             let Targets::All(speeds) = motion.targets else { continue };
-                            let turns = speeds.iter().flatten().any(|speed| *speed != 0);
-                            moves = Some(turns);
+                            moves = Some(speeds.iter().flatten().any(|speed| *speed != 0));
                         }
                         Ok(Command::Motion(_) | Command::Enable { on: false, .. }) => {
                             moves = Some(false);
@@ -222,16 +221,16 @@ impl Invariants {
         }
         let Some(truth) = machine.truth() else { return Ok(()) };
         let moves = truth.v.abs() > MOVES_M_S;
-        let age =
-            |then: Option<Duration>| then.map_or(Duration::MAX, |then| now.saturating_sub(then));
+        let age = |then: Duration| now.saturating_sub(then);
         if moves {
-            holds(age(self.told) < TOLD_EVERY, "a robot that moves is told", || {
+            let is_told = self.told.is_some_and(|told| age(told) < TOLD_EVERY);
+            holds(is_told, "a robot that moves is told", || {
                 format!("it moves at {:.2} m/s and hears nothing since {:?}", truth.v, self.told)
             })?;
             let obeys = self.wire_is_calm && self.obeys;
-            let obeys = obeys && age(Some(self.obedience_changed)) > 2 * RESTS_WITHIN;
-            let is_told = self.stood.is_some_and(|stood| age(Some(stood)) > RESTS_WITHIN);
-            holds(!(obeys && is_told), "a robot that is told to stand stands", || {
+            let obeys = obeys && age(self.obedience_changed) > 2 * RESTS_WITHIN;
+            let must_stand = self.stood.is_some_and(|stood| age(stood) > RESTS_WITHIN);
+            holds(!(obeys && must_stand), "a robot that is told to stand stands", || {
                 format!("it moves at {:.2} m/s, told to stand at {:?}", truth.v, self.stood)
             })?;
         }
