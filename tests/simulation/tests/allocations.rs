@@ -5,7 +5,6 @@
 use std::{cell::RefCell, collections::BTreeMap, rc::Rc};
 
 use allocation_counter::measure;
-use common::mission::Mission;
 use console::missions;
 use simulation::{Observer, Scenario};
 
@@ -18,16 +17,12 @@ impl Observer for Counter {
     }
 }
 
-/// Returns the allocations a tick, by stage.
-fn allocations(mission: &Mission) -> BTreeMap<String, u64> {
-    let counter = Rc::new(RefCell::new(Counter::default()));
-    let ran = Scenario::lockstep(mission).run_before(Some(Box::new(Rc::clone(&counter))));
-    let ticks = ran.summary.unwrap().ticks;
-    counter.take().0.into_iter().map(|(stage, count)| (stage, count / ticks)).collect()
-}
-
 #[test]
 fn a_tick_of_the_link_allocates_at_most_60_times_and_one_of_the_planner_40_times() {
-    let found = allocations(&missions::load("obstacle-course", &[]).unwrap());
-    assert!(found["link"] <= 60 && found["planner"] <= 40, "{found:?}");
+    let counter = Rc::new(RefCell::new(Counter::default()));
+    let scenario = Scenario::lockstep(&missions::load("obstacle-course", &[]).unwrap());
+    let ran = scenario.run_before(Some(Box::new(Rc::clone(&counter))));
+    let (ticks, Counter(found)) = (ran.summary.unwrap().ticks, counter.take());
+    let [link, planner] = ["link", "planner"].map(|stage| found[stage] / ticks);
+    assert!(link <= 60 && planner <= 40, "{found:?} in {ticks} ticks");
 }
