@@ -96,9 +96,11 @@ fn wheels_and_sonar_as_measured_under_a_fading_radio_touch_nothing() {
 #[test]
 fn a_robot_with_a_gyro_and_wheels_that_nobody_calibrated_knows_its_place() {
     let gyro = "robot={protocol='json',gyro=true}";
+    // The mission's own are those of calibrated wheels.
+    let known = "robot.odometry={diameter_ratio_sd=0.005,track_scale_sd=0.015}";
+    let wheels = "simulation.wheels={diameter_spread=0.008,track_spread=0.025}";
     for seed in seeds(6) {
-        // The first two replace the mission's own, which are for calibrated wheels.
-        let settings = ["robot.odometry={}", "simulation.wheels={}", gyro, &seed];
+        let settings = [known, wheels, gyro, &seed];
         let summary = arrives_untouched("obstacle-course", &settings);
         assert!(summary.pose_error_m < Some(0.3), "{seed}: {summary:?}");
     }
