@@ -15,12 +15,7 @@ use robot_state::Sample;
 use ros2::{
     cdr::Cdr,
     messages::{COVARIANCE, battery, scan, twist},
-    msg::{
-        CancelGoalRequest, Clock, DiagnosticArray, DiagnosticStatus, GoalInfo, Header, KeyValue,
-        LaserScan, Log, MapMetaData, NavigateToPoseGetResultResponse, NavigateToPoseResult,
-        NavigateToPoseSendGoalRequest, OccupancyGrid, Odometry, Path as PathMessage, PoseStamped,
-        PoseWithCovariance, PoseWithCovarianceStamped, Range, TFMessage, Twist, UUID, Vector3,
-    },
+    msg::{Path as PathMessage, *},
 };
 
 use crate::{
@@ -373,9 +368,9 @@ fn the_covariance_of_odometry_grows_with_the_way_and_is_large_on_what_no_wheel_m
     let start = drive(0).0;
     assert_eq!((start[0], start[7], start[35]), (0.0, 0.0, 0.0));
     let (at_10_m, speeds, of_speeds) = (1..=1000).map(&mut drive).last().unwrap();
-    assert_eq!((speeds[0], speeds[1]), (0.1, 0.0));
+    assert_eq!(speeds, [0.1, 0.0]);
     // 1 % of the distance by the mean diameter, and slip of 1 mm per root metre of two wheels.
-    assert!((at_10_m[0].sqrt() - 0.1).abs() < 0.001, "{}", at_10_m[0].sqrt());
+    assert!((at_10_m[0].sqrt() - 0.1).abs() < 0.001, "{at_10_m:?}");
     // Lateral: half the ratio's deviation times the distance squared, over the track.
     assert!(at_10_m[7].sqrt() > 0.5 && at_10_m[35].sqrt() > 0.1, "{at_10_m:?}");
     assert!((at_10_m[11] - at_10_m[31]).abs() < 1e-12 && at_10_m[11] > 0.0);
@@ -390,24 +385,22 @@ fn the_covariance_of_odometry_grows_with_the_way_and_is_large_on_what_no_wheel_m
 #[test]
 fn speeds_are_in_the_time_of_the_stamps_at_every_pace() {
     let mut shown = shown();
-    shown.pace = 4.0;
     let pose = PoseSample { v_m_s: 0.1, omega_rad_s: -0.2, ..PoseSample::default() };
-    let sent = shows(&mut shown, &Sample::Pose(pose));
-    let (_, speeds, fast) = read_odometry(&sent[2].1);
-    assert_eq!((speeds[0], speeds[1]), (0.4, -0.8));
-    shown.pace = 1.0;
-    let sent = shows(&mut shown, &Sample::Pose(pose));
-    let slow = read_odometry(&sent[2].1).2;
+    let [(speeds, fast), (_, slow)] = [4.0, 1.0].map(|pace| {
+        shown.pace = pace;
+        let sent = shows(&mut shown, &Sample::Pose(pose));
+        let (_, speeds, of_speeds) = read_odometry(&sent[2].1);
+        (speeds, of_speeds)
+    });
+    assert_eq!(speeds, [0.4, -0.8]);
     assert!((fast[0] / slow[0] - 16.0).abs() < 1e-9 && fast[14] == slow[14]);
 }
 
 #[test]
 fn ranges_too_far_too_near_and_not_measured_are_those_of_rep_117() {
-    let limits = [0.06, 4.0];
-    assert_eq!(messages::within(limits, 4.01), f64::INFINITY);
-    assert_eq!(messages::within(limits, 0.05), f64::NEG_INFINITY);
-    assert_eq!(messages::within(limits, 1.0), 1.0);
-    assert!(messages::within(limits, f64::NAN).is_nan());
+    let told = [4.01, 0.05, 1.0, f64::NAN].map(|range| messages::within([0.06, 4.0], range));
+    assert_eq!(told[..3], [f64::INFINITY, f64::NEG_INFINITY, 1.0]);
+    assert!(told[3].is_nan());
     // X80's sonars.
     let mut shown = shown();
     for (status, is) in [
@@ -420,30 +413,32 @@ fn ranges_too_far_too_near_and_not_measured_are_those_of_rep_117() {
             RangeReading { range_m: 1.5, status: status.into(), ..RangeReading::default() };
         let ranges = Sample::Ranges(RangesHeader::default(), vec![reading]);
         let sent = shows(&mut shown, &ranges);
-        let told = sent.first().map(|(_, payload)| payload[payload.len() - 8..].to_vec());
-        let told = told.map(|last| f32::from_le_bytes(last[..4].try_into().unwrap()));
-        assert_eq!(told, is);
+        assert_eq!(sent.first().map(|it| Range::decode(&it.1).unwrap().range), is);
     }
+}
+
+/// Returns a robot with a laser, and the header of its scans.
+fn with_a_laser() -> (Shown, ScanHeader) {
+    let mission = mission("target = [4, 0]\nrobot.model = 'turtlebot4'");
+    let (row, laser) = mission.laser().unwrap();
+    (Shown::new("tb4".to_owned(), mission), ScanHeader::of(row, &laser))
 }
 
 #[test]
 fn a_scan_is_stamped_when_its_first_beam_was_measured_and_says_the_time_between_beams() {
-    let mission = mission("target = [4, 0]\nrobot.model = 'turtlebot4'");
-    let (row, laser) = mission.laser().unwrap();
-    let mut shown = Shown::new("tb4".to_owned(), mission);
-    let mut told = |pace, first_beam, beam_ns| {
+    let (mut shown, header) = with_a_laser();
+    let mut told = |pace, beam_ns| {
         shown.pace = pace;
-        let sweep = Sweep { first_beam_ns: -90_000_000, beam_ns, first_beam };
-        let header = ScanHeader::of(row, &laser).swept(sweep);
-        let scan = Sample::Scan(header, vec![1.0; 360]);
+        let sweep = Sweep { first_beam_ns: -90_000_000, beam_ns, first_beam: 0 };
+        let scan = Sample::Scan(header.swept(sweep), vec![1.0; 360]);
         let sent = published(|sink| shown.sample(&scan, 1_000_000_000, sink));
         let scan = LaserScan::decode(&sent[0].1).unwrap();
         (scan.header.stamp.ns(), scan.time_increment)
     };
-    assert_eq!(told(1.0, 0, 250_000), (910_000_000, 0.00025));
-    assert_eq!(told(2.0, 0, 250_000), (955_000_000, 0.000_125));
+    assert_eq!(told(1.0, 250_000), (910_000_000, 0.00025));
+    assert_eq!(told(2.0, 250_000), (955_000_000, 0.000_125));
     // A clockwise laser has its beams in another order, so the stamp is that of the middle.
-    assert_eq!(told(1.0, 0, -250_000), (955_000_000, 0.0));
+    assert_eq!(told(1.0, -250_000), (955_000_000, 0.0));
 }
 
 #[test]
@@ -464,15 +459,12 @@ fn what_happens_is_logged_with_its_severity_and_clocks_are_mission_time() {
 
 #[test]
 fn the_frame_of_a_laser_is_where_it_is_mounted_and_its_beams_are_told_in_that_frame() {
-    let mission = mission("target = [4, 0]\nrobot.model = 'turtlebot4'");
-    let (row, laser) = mission.laser().unwrap();
-    let mut shown = Shown::new("tb4".to_owned(), mission);
+    let (mut shown, header) = with_a_laser();
     let sent = published(|sink| shown.mounting(0, sink));
     let (names, (at, turned)) = only_transform(&sent[0].1);
     assert_eq!((names, at), (["base_link", "laser"].map(str::to_owned), [-0.04, 0.0]));
     assert!((turned - FRAC_PI_2).abs() < 1e-12);
     // The first of 360 beams points to the robot's right, which is behind the laser.
-    let header = ScanHeader::of(row, &laser);
     assert!((header.first_rad + FRAC_PI_2).abs() < 1e-12);
     let sent = shows(&mut shown, &Sample::Scan(header, vec![1.0; 360]));
     assert!((LaserScan::decode(&sent[0].1).unwrap().angle_min + PI as f32).abs() < 1e-6);
@@ -583,8 +575,8 @@ fn what_moves_is_markers_of_its_disc_doubt_and_way_and_they_are_deleted_when_it_
 #[test]
 fn the_configuration_of_rviz_names_topics_that_the_bridge_has() {
     let named = RVIZ.lines().filter_map(|line| line.trim().strip_prefix("Value: "));
-    let named: Vec<_> = named.collect();
-    assert_eq!(named.len(), 9);
-    let is_known = |name: &str| TABLE.iter().any(|spec| spec.name.starts_with(name));
-    assert!(named.iter().all(|name| is_known(name)), "{named:?}");
+    for name in named.clone() {
+        assert!(TABLE.iter().any(|spec| spec.name.starts_with(name)), "{name}");
+    }
+    assert_eq!(named.count(), 9);
 }
