@@ -66,7 +66,7 @@ fn plan_alone(map: &Arc<Costmap>, from: DAffine2, to: &[DAffine2]) -> Result<Vec
 }
 
 fn update([col, row]: [u32; 2], [width, height]: [u32; 2], value: i8) -> Vec<u8> {
-    let [x, y] = [col, row].map(|at| at as i32);
+    let (x, y) = (col as i32, row as i32);
     let data = vec![value; (width * height) as usize];
     OccupancyGridUpdate { header: Header::at(0, "map"), x, y, width, height, data }.encode()
 }
@@ -75,11 +75,15 @@ fn change(map: &mut Arc<Costmap>, corner: [u32; 2], size: [u32; 2], value: i8) {
     Arc::make_mut(map).update(&update(corner, size, value)).unwrap();
 }
 
+fn point(&[x, y, _]: &Pose) -> DVec2 {
+    DVec2::new(x, y)
+}
+
 /// Counts the points on blocked cells, at every half cell of the path's chords.
 fn lethal(map: &Costmap, path: &[Pose]) -> usize {
     let blocked = map.blocked_and_costs(&BODY, 1.0).0;
     let chords = path.windows(2).flat_map(|pair| {
-        let [from, to] = [pair[0], pair[1]].map(|[x, y, _]| DVec2::new(x, y));
+        let [from, to] = [&pair[0], &pair[1]].map(point);
         let steps = (from.distance(to) / RESOLUTION_M * 2.0).ceil().max(1.0);
         (0..=steps as usize).map(move |step| from.lerp(to, step as f64 / steps))
     });
@@ -98,8 +102,8 @@ fn no_chord_of_a_long_winding_path_enters_a_blocked_cell() {
     let map = map(&grid);
     let path = plan_alone(&map, at(0.5, 0.5), &[at(29.5, 29.6)]).unwrap();
     assert_eq!(lethal(&map, &path), 0, "{} poses", path.len());
-    let chord = |pair: &[Pose]| (pair[0][0] - pair[1][0]).hypot(pair[0][1] - pair[1][1]);
-    assert!(path.windows(2).any(|pair| chord(pair) > 0.2), "the path is not thinned");
+    let mut chords = path.windows(2).map(|pair| point(&pair[0]).distance(point(&pair[1])));
+    assert!(chords.any(|chord| chord > 0.2), "the path is not thinned");
 }
 
 #[test]
@@ -117,14 +121,15 @@ fn a_long_path_has_as_many_poses_as_an_answer_carries_and_all_of_its_goals() {
 
 #[test]
 fn a_path_begins_at_the_start_ends_in_the_goals_pose_and_looks_ahead_a_cell_at_a_time() {
-    let path = plan_across(&map(&rooms()));
-    assert_eq!((path[0][..2].to_vec(), path.last()), (vec![1.0, 4.0], Some(&[9.0, 1.0, 0.5])));
+    let map = map(&rooms());
+    let path = plan_across(&map);
+    assert_eq!((point(&path[0]), path.last()), (DVec2::new(1.0, 4.0), Some(&[9.0, 1.0, 0.5])));
     for pair in path.windows(2) {
-        let [from, to] = [pair[0], pair[1]].map(|[x, y, _]| DVec2::new(x, y));
+        let [from, to] = [&pair[0], &pair[1]].map(point);
         assert!(from.distance(to) < 2.3 * RESOLUTION_M, "{from} {to}");
         assert!(((to - from).to_angle() - pair[0][2]).abs() < 1e-9);
     }
-    let by_way = plan_alone(&map(&rooms()), at(1.0, 4.0), &[at(4.0, 4.5), at(9.0, 1.0)]).unwrap();
+    let by_way = plan_alone(&map, at(1.0, 4.0), &[at(4.0, 4.5), at(9.0, 1.0)]).unwrap();
     assert!(by_way.contains(&[4.0, 4.5, 0.5]) && by_way.last() == path.last());
 }
 
@@ -134,14 +139,11 @@ fn a_map_that_is_turned_gives_the_path_that_is_turned() {
     let turn = DAffine2::from_angle_translation(FRAC_PI_2, DVec2::ZERO);
     let mut grid = OccupancyGrid::decode(&rooms().message()).unwrap();
     grid.info.origin = [0.0, 0.0, FRAC_PI_2].into();
-    let payload = grid.encode();
-    let turned = Arc::new(Costmap::read(&payload).unwrap());
+    let turned = Arc::new(Costmap::read(&grid.encode()).unwrap());
     let path = plan_alone(&turned, turn * at(1.0, 4.0), &[turn * at(9.0, 1.0)]).unwrap();
     assert_eq!(path.len(), straight.len());
     for (a, b) in path.iter().zip(&straight) {
-        assert!(
-            turn.transform_point2(DVec2::new(b[0], b[1])).distance(DVec2::new(a[0], a[1])) < 1e-6
-        );
+        assert!(turn.transform_point2(point(b)).distance(point(a)) < 1e-6);
     }
 }
 
@@ -188,16 +190,18 @@ fn a_path_leads_round_a_zone_that_costs_more() {
     grid.fill([100, 0], [2, 100], true);
     grid.fill([100, 20], [2, 16], false);
     grid.fill([100, 65], [2, 16], false);
-    let ends = (at(1.0, 1.9), [at(9.0, 1.9)]);
-    let crosses = |path: &[Pose]| path.iter().find(|pose| pose[0] >= 5.0).unwrap()[1];
+    let crosses = |map: &_| {
+        let path = plan_alone(map, at(1.0, 1.9), &[at(9.0, 1.9)]).unwrap();
+        path.iter().find(|pose| pose[0] >= 5.0).unwrap()[1]
+    };
     let mut zone = map(&grid);
-    let direct = crosses(&plan_alone(&zone, ends.0, &ends.1).unwrap());
+    let direct = crosses(&zone);
     change(&mut zone, [70, 0], [60, 50], 90);
     // The update has covered the wall beside the lower door.
-    for rows in [[0, 20], [36, 14]] {
-        change(&mut zone, [100, rows[0]], [2, rows[1]], 100);
+    for [row, height] in [[0, 20], [36, 14]] {
+        change(&mut zone, [100, row], [2, height], 100);
     }
-    let around = crosses(&plan_alone(&zone, ends.0, &ends.1).unwrap());
+    let around = crosses(&zone);
     assert!(direct < 2.0 && around > 3.0, "{direct} {around}");
 }
 
@@ -206,20 +210,20 @@ fn a_change_of_the_map_changes_the_field_of_a_goal_as_a_new_solve_would() {
     let mut changing = planner();
     let mut grid = rooms();
     let mut newest = map(&grid);
-    let ends = (at(1.0, 4.0), [at(9.0, 1.0)]);
-    plan(&mut changing, &newest, ends.0, &ends.1).unwrap();
+    let mut replan = |map: &_| plan(&mut changing, map, at(1.0, 4.0), &[at(9.0, 1.0)]);
+    replan(&newest).unwrap();
     for (corner, size) in [([100, 80], [2, 15]), ([150, 40], [20, 4])] {
         grid.fill(corner.map(|at| at as usize), size.map(|it| it as usize), true);
         change(&mut newest, corner, size, 100);
     }
-    let changed = plan(&mut changing, &newest, ends.0, &ends.1).unwrap();
+    let changed = replan(&newest).unwrap();
     let anew = plan_across(&map(&grid));
     for (a, b) in changed.iter().zip(&anew) {
-        assert!(DVec2::new(a[0], a[1]).distance(DVec2::new(b[0], b[1])) < 0.05, "{a:?} {b:?}");
+        assert!(point(a).distance(point(b)) < 0.05, "{a:?} {b:?}");
     }
     for (corner, size, reason) in [([100, 60], [2, 25], 8), ([178, 18], [4, 4], 6)] {
         change(&mut newest, corner, size, 100);
-        assert_eq!(plan(&mut changing, &newest, ends.0, &ends.1).unwrap_err().0 as u16, reason);
+        assert_eq!(replan(&newest).unwrap_err().0 as u16, reason);
     }
 }
 
@@ -391,12 +395,9 @@ fn results_are_those_of_the_clients_release_with_the_error_code_of_their_action(
         failure: None,
     };
     for (codes, releases, [found, none]) in RESULTS {
-        let failure = match codes {
-            200 => (Reason::NoPath, "no way"),
-            _ => (Reason::NoGoal, "no goal"),
-        };
-        let failure = Some((failure.0, failure.1.to_owned()));
-        let failed = Outcome { failure, ..Outcome::default() };
+        let (reason, words) =
+            if codes == 200 { (Reason::NoPath, "no way") } else { (Reason::NoGoal, "no goal") };
+        let failed = Outcome { failure: Some((reason, words.to_owned())), ..Outcome::default() };
         for release in releases {
             assert_eq!(calls::result(4, &path, codes, release), bytes(found), "{release:?}");
             assert_eq!(calls::result(6, &failed, codes, release), bytes(none), "{release:?}");

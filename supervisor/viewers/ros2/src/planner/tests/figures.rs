@@ -112,12 +112,16 @@ impl Grid {
         OccupancyGrid { header: Header::at(0, "map"), info, data }.encode()
     }
 
+    fn at(&self, cell: usize) -> [usize; 2] {
+        [cell % self.width, cell / self.width]
+    }
+
     fn place(&self, cell: usize) -> DVec2 {
-        DVec2::new((cell % self.width) as f64, (cell / self.width) as f64)
+        self.at(cell).map(|it| it as f64).into()
     }
 
     fn beside(&self, cell: usize, by: usize) -> impl Iterator<Item = [usize; 2]> {
-        let (col, row) = (cell % self.width, cell / self.width);
+        let [col, row] = self.at(cell);
         let rows = row.saturating_sub(by)..self.height.min(row + by + 1);
         let cols = col.saturating_sub(by)..self.width.min(col + by + 1);
         rows.flat_map(move |row| cols.clone().map(move |col| [col, row]))
@@ -154,7 +158,7 @@ impl Grid {
             if so_far > paid[cell] {
                 continue;
             }
-            let [col, row] = [cell % self.width, cell / self.width];
+            let [col, row] = self.at(cell);
             for [c, r] in self.beside(cell, 2) {
                 let (across, along) = (c.abs_diff(col), r.abs_diff(row));
                 let passed = (c.min(col)..=c.max(col))
@@ -231,7 +235,7 @@ impl Nav2 {
 
     /// Returns the paths and milliseconds of NavFn, Theta* and Smac 2D.
     fn plan(&mut self, grid: &Grid, costs: &[u8], ends: [usize; 2]) -> [(Vec<DVec2>, f64); 3] {
-        let [from, to] = ends.map(|cell| [cell % grid.width, cell / grid.width]);
+        let [from, to] = ends.map(|cell| grid.at(cell));
         let input = self.child.stdin.as_mut().unwrap();
         for number in [grid.width, grid.height, from[0], from[1], to[0], to[1]] {
             input.write_all(&(number as u32).to_ne_bytes()).unwrap();
@@ -333,7 +337,7 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
             ends.iter().all(|&end| grid.place(end).distance(grid.place(*cell)) > 12.0)
         };
         let block = std::iter::repeat_with(any).find(is_away).unwrap();
-        changed.fill([block % grid.width, block / grid.width], [3, 3], true);
+        changed.fill(grid.at(block), [3, 3], true);
         let costmap_of = |grid: &Grid| grid.message_of(published(&inflated(&grid.distances())));
         for (names, radius_m, messages) in [
             (["ours", "ours, map changed"], RADIUS_M, [grid.message(), changed.message()]),
@@ -356,8 +360,8 @@ fn paths_on_random_maps_exist_where_a_way_does_touch_nothing_and_are_short_and_c
                 });
                 let (blocked, _) = map.blocked_and_costs(&body, 1.0);
                 let cells = map.place.inverse();
-                let at = |[x, y, _]: [f64; 3]| cells.transform_point2(DVec2::new(x, y));
-                let way: Vec<DVec2> = path.into_iter().map(at).collect();
+                let at = |pose| cells.transform_point2(super::point(pose));
+                let way: Vec<DVec2> = path.iter().map(at).collect();
                 for at in &way {
                     let cell = map.cell_at(*at).unwrap();
                     assert!(!blocked[cell.row * grid.width + cell.col], "{seed}: {name} {at}");
