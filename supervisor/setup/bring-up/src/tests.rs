@@ -1,6 +1,8 @@
 use std::{
     f64::consts::{FRAC_PI_2, TAU},
+    fmt::Debug,
     path::Path,
+    str::FromStr,
 };
 
 use common::{
@@ -86,7 +88,7 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
     let header = ScanHeader::of(0, &table[0]);
     let (mut trace, mut pose, mut rolled, mut poses) =
         (Trace::default(), Pose2::default(), [0.0; 2], Vec::new());
-    let mut at = 0.0;
+    let (mut at, mut product, mut square) = (0.0, 0.0, 0.0);
     for (seconds, told) in legs {
         trace.told.push((at, told));
         for _ in 0..(seconds * RATE_HZ) as usize {
@@ -98,6 +100,9 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
             pose = pose.along_arc((left + right) / 2.0, turn);
             let counted = through(robot.encoders, rims);
             rolled = [0, 1].map(|wheel| rolled[wheel] + counted[wheel]);
+            let turn_by_counts = (counted[1] - counted[0]) / track_m;
+            product += turn_by_counts * turn;
+            square += turn_by_counts.powi(2);
             trace.rolled.push((at, rolled));
             trace.told.push((at, told));
             trace.gyro.push((at, turn));
@@ -123,12 +128,6 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
     }
     trace.sent = trace.told.clone();
     // The driver drops a gyro that contradicts the wheels' counts.
-    let by_counts = |it: usize| {
-        let [now, before] = [trace.rolled[it].1, trace.rolled[it - 1].1];
-        (now[1] - before[1] - now[0] + before[0]) / track_m
-    };
-    let product: f64 = (1..trace.rolled.len()).map(|it| by_counts(it) * trace.gyro[it].1).sum();
-    let square: f64 = (1..trace.rolled.len()).map(|it| by_counts(it).powi(2)).sum();
     if !(0.5..2.0).contains(&(product / square)) {
         trace.gyro.clear();
     }
@@ -148,7 +147,7 @@ fn wrong(found: &[Finding]) -> Vec<&str> {
     found.iter().filter(|it| it.verdict == Verdict::Wrong).map(|it| it.part.as_str()).collect()
 }
 
-fn key(found: &[Finding], name: &str) -> Option<f64> {
+fn key<T: FromStr<Err: Debug>>(found: &[Finding], name: &str) -> Option<T> {
     let mut keys = found.iter().flat_map(|it| &it.keys);
     keys.find(|it| it.0 == name).map(|it| it.1.parse().unwrap())
 }
@@ -187,14 +186,13 @@ fn what_is_wrong_is_named_with_the_keys_that_mend_it() {
         let found = found(&mission, robot, true);
         assert_eq!(wrong(&found), parts, "{robot:?}: {found:?}");
         for &(name, value, within) in keys {
-            let off = key(&found, name).unwrap() - value;
+            let off = key::<f64>(&found, name).unwrap() - value;
             assert!(off.abs() <= within, "{robot:?}, {name}: {off}");
         }
         // The keys of a laser behind the centre do not turn it.
-        let looks = ["bearing_deg", "turned_deg"];
         if robot.laser_m < 0.0 {
-            let looks = looks.map(|it| key(&found, &format!("robot.sensor.laser.{it}")).unwrap());
-            assert!((looks[0] + looks[1]).abs() < 1.5, "{looks:?}");
+            let bearing: f64 = key(&found, "robot.sensor.laser.bearing_deg").unwrap();
+            assert!((bearing + key::<f64>(&found, &turned).unwrap()).abs() < 1.5, "{bearing}");
         }
     }
 }
@@ -251,15 +249,9 @@ fn expected(robot: Robot, mission: &Mission, is_told: bool) -> (Vec<&'static str
 }
 
 fn with_keys(mission: &Mission, found: &[Finding]) -> Vec<Channel> {
-    let of = |side: &str, stated: Channel| {
-        let value = |key: &str| {
-            let key = format!("robot.{side}.{key}");
-            found.iter().flat_map(|it| &it.keys).find(|it| it.0 == key).map(|it| it.1.as_str())
-        };
-        Channel {
-            channel: value("channel").map_or(stated.channel, |it| it.parse().unwrap()),
-            reversed: value("reversed").map_or(stated.reversed, |it| it.parse().unwrap()),
-        }
+    let of = |side: &str, stated: Channel| Channel {
+        channel: key(found, &format!("robot.{side}.channel")).unwrap_or(stated.channel),
+        reversed: key(found, &format!("robot.{side}.reversed")).unwrap_or(stated.reversed),
     };
     vec![of("left", mission.robot.left), of("right", mission.robot.right)]
 }
