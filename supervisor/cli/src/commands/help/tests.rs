@@ -49,14 +49,12 @@ impl Document {
                 (None, Some(_)) => {}
                 (None, None) => {
                     // A code span between longer rows of backticks may contain backticks.
-                    let line = line.replace("``", "\u{1}");
-                    let (odd, plain) = line
-                        .split('\u{1}')
-                        .enumerate()
-                        .partition::<Vec<_>, _>(|(at, _)| at % 2 == 1);
-                    code.extend(odd.into_iter().map(|(_, text)| text.to_owned()));
-                    for (_, text) in plain {
-                        code.extend(text.split('`').skip(1).step_by(2).map(str::to_owned));
+                    for (at, text) in line.split("``").enumerate() {
+                        if at % 2 == 1 {
+                            code.push(text.to_owned());
+                        } else {
+                            code.extend(text.split('`').skip(1).step_by(2).map(str::to_owned));
+                        }
                     }
                 }
             }
@@ -66,15 +64,11 @@ impl Document {
 
     /// Returns the link targets, as paths from the root.
     fn links(&self) -> Vec<PathBuf> {
-        let targets = self.text.split("](").skip(1);
-        targets
-            .map(|rest| rest.split(')').next().unwrap())
+        let targets = self.text.split("](").skip(1).map(|rest| rest.split(')').next().unwrap());
+        let files = targets
             .filter(|target| !target.contains("://"))
-            .map(|target| {
-                let file = target.split('#').next().unwrap();
-                self.path.parent().unwrap().join(file)
-            })
-            .collect()
+            .map(|target| target.split('#').next().unwrap());
+        files.map(|file| self.path.parent().unwrap().join(file)).collect()
     }
 }
 
@@ -104,19 +98,15 @@ fn commands(line: &str) -> Vec<Vec<String>> {
 }
 
 fn filled_in(word: &str) -> String {
-    let value = |word: &str| match word {
-        "S" | "N" | "H" | "K" | "$s" => Some("256"),
-        "NAME" | "STAGE" => Some("planner"),
-        "FAULT" => Some("saddle"),
-        "TOPIC" => Some("pose"),
-        "PAGE" => Some("method"),
-        _ => None,
-    };
-    let (key, last) = match word.rsplit_once('=') {
-        Some((key, last)) => (format!("{key}="), last),
-        None => (String::new(), word),
-    };
-    value(last).map_or(word.to_owned(), |value| format!("{key}{value}"))
+    let parts = word.split_inclusive('=').map(|part| match part {
+        "S" | "N" | "H" | "K" | "$s" => "256",
+        "NAME" | "STAGE" => "planner",
+        "FAULT" => "saddle",
+        "TOPIC" => "pose",
+        "PAGE" => "method",
+        part => part,
+    });
+    parts.collect()
 }
 
 /// Returns the arguments of a `firsthand` command.

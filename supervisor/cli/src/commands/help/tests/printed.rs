@@ -43,8 +43,7 @@ fn test_functions() -> BTreeSet<String> {
 fn flaw(row: &[String; 3], functions: &BTreeSet<String>) -> Option<String> {
     let [text, verdict, tests] = row;
     let mut tests = tests.split_whitespace();
-    let first = tests.clone().next();
-    match (verdict.as_str(), first) {
+    match (verdict.as_str(), tests.clone().next()) {
         ("Contract", None) => Some(format!("{text}: a contract without a test")),
         ("Contract", Some(_)) => tests
             .find(|test| !functions.contains(*test))
@@ -108,10 +107,8 @@ fn renewed(text: &str, print: impl Fn(&str, Option<&str>) -> String) -> String {
         renewed.push('\n');
         let marker = line.strip_prefix("<!-- table ").and_then(|line| line.strip_suffix(" -->"));
         let Some(marker) = marker else { continue };
-        let (name, section) = match marker.split_once(' ') {
-            Some((name, section)) => (name, Some(section)),
-            None => (marker, None),
-        };
+        let (name, section) =
+            marker.split_once(' ').map_or((marker, None), |(name, section)| (name, Some(section)));
         renewed.push('\n');
         renewed.push_str(&print(name, section));
         while lines.next_if(|line| line.is_empty() || is_of_a_table(line)).is_some() {}
@@ -130,6 +127,7 @@ fn is_of_a_table(line: &str) -> bool {
 /// Returns the table for `<!-- table NAME SECTION -->`.
 fn shown(name: &str, section: Option<&str>) -> Option<String> {
     match name {
+        "crates" => Some(crates()),
         "topics" => Some(table::topics()),
         "stages" => Some(table::stages()),
         "failsafe" => Some(table::failsafe()),
@@ -164,10 +162,9 @@ fn documents_show_the_tables_that_are_printed() {
     let renew = std::env::var_os("RENEW").is_some();
     for document in documents() {
         let path = root().join(&document.path);
-        let print = |name: &str, section: Option<&str>| match name {
-            "crates" => crates(),
-            name => shown(name, section)
-                .unwrap_or_else(|| panic!("{}: no table {name} {section:?}", path.display())),
+        let print = |name: &str, section: Option<&str>| {
+            shown(name, section)
+                .unwrap_or_else(|| panic!("{}: no table {name} {section:?}", path.display()))
         };
         let text = renewed(&document.text, print);
         if renew && text != document.text {
