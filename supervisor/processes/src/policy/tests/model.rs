@@ -1,6 +1,6 @@
 //! Random and all short event sequences, compared with a model of the rules.
 
-use std::collections::HashSet;
+use std::{collections::HashSet, iter};
 
 use rand_pcg::{Pcg64, rand_core::Rng as _};
 
@@ -22,7 +22,7 @@ struct Model {
     blocked_starts: u32,
 }
 
-#[derive(Clone, PartialEq, Eq, Hash)]
+#[derive(Clone, Default, PartialEq, Eq, Hash)]
 struct Generation {
     ready: Option<Now>,
     /// Last sign of life, including the start.
@@ -174,13 +174,7 @@ impl Model {
 
     fn begin(&mut self) -> Action {
         (self.wanted, self.held) = (true, false);
-        self.generation = Some(Generation {
-            ready: None,
-            sign: self.now,
-            stopping: false,
-            aborted: false,
-            kill: None,
-        });
+        self.generation = Some(Generation { sign: self.now, ..Generation::default() });
         Action::Start
     }
 
@@ -277,7 +271,6 @@ impl Model {
 fn every_short_history_keeps_every_rule() {
     let mut seen = HashSet::new();
     let mut newest = vec![Model::new().at_zero()];
-    let mut cases = 0_u64;
     for _ in 0..6 {
         let mut next = Vec::new();
         for model in newest {
@@ -286,7 +279,6 @@ fn every_short_history_keeps_every_rule() {
                     let mut model = model.clone();
                     model.now += pause;
                     if model.can(event) {
-                        cases += 1;
                         model.step(event);
                         let model = model.at_zero();
                         if seen.insert(model.clone()) {
@@ -298,7 +290,6 @@ fn every_short_history_keeps_every_rule() {
         }
         newest = next;
     }
-    println!("{cases} cases, {} models", seen.len());
 }
 
 #[test]
@@ -309,8 +300,10 @@ fn two_million_steps_of_long_histories_keep_every_rule() {
     for history in 0..2_000 {
         let mut model = Model::new();
         // Each history has its own event probabilities.
-        let weights: Vec<u64> = EVENTS.iter().map(|_| chance.next_u64() % 100).collect();
-        let sum: u64 = weights.iter().sum::<u64>().max(1);
+        let choices: Vec<_> = EVENTS
+            .into_iter()
+            .flat_map(|event| iter::repeat_n(event, chance.next_u64() as usize % 100))
+            .collect();
         for _ in 0..1_000 {
             let moments = model.moments();
             let pause = moments[chance.next_u64() as usize % moments.len()];
@@ -318,13 +311,7 @@ fn two_million_steps_of_long_histories_keep_every_rule() {
             if pause < ms(5_000) || chance.next_u64().is_multiple_of(50) {
                 model.now += pause;
             }
-            let mut pick = chance.next_u64() % sum;
-            let event = EVENTS.iter().zip(&weights).find(|(_, weight)| {
-                let found = pick < **weight;
-                pick = pick.saturating_sub(**weight);
-                found
-            });
-            let event = *event.map_or(&Event::Time(None), |(event, _)| event);
+            let event = choices[chance.next_u64() as usize % choices.len()];
             if model.can(event) {
                 model.step(event);
                 actions += 1;
