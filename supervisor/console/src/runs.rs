@@ -225,13 +225,8 @@ mod tests {
     #[test]
     fn what_ended_says_how_and_what_was_cut_off_is_told_from_it() {
         let runs = tempfile::tempdir().unwrap();
-        let begun = |name: &str| {
-            let directory = runs.path().join(name);
-            fs::create_dir(&directory).unwrap();
-            let run = "robot = 'listed-runs'\n[mission]\nname = 'trap'";
-            fs::write(directory.join(run::FILE_NAME), run).unwrap();
-            directory
-        };
+        let begun =
+            |name| begun(runs.path(), "robot = 'listed-runs'\n[mission]\nname = 'trap'", name);
         fs::create_dir(runs.path().join("no-run")).unwrap();
         let summary = r#"{"outcome":"timeout","mission_time_s":2.5,"new":[]}"#;
         fs::write(begun("a-ended").join(SUMMARY), summary).unwrap();
@@ -250,8 +245,7 @@ mod tests {
         assert_eq!(outcomes, expected);
         assert_eq!(listed[0].mission.as_deref(), Some("trap"));
         assert!(listed[0].size() >= 1024, "{}", listed[0].size());
-        let ended: Vec<_> = listed.iter().map(RunDirectory::has_ended).collect();
-        assert_eq!(ended, [true, true, false]);
+        assert!(listed.iter().map(RunDirectory::has_ended).eq([true, true, false]));
     }
 
     #[test]
@@ -266,10 +260,9 @@ mod tests {
         assert_eq!(numbers, [1, 3]);
     }
 
-    fn begun(runs: &Path, robot: &str, name: &str) -> PathBuf {
+    fn begun(runs: &Path, run: &str, name: &str) -> PathBuf {
         let directory = runs.join(name);
         fs::create_dir(&directory).unwrap();
-        let run = format!("robot = '{robot}'");
         fs::write(directory.join(run::FILE_NAME), run).unwrap();
         directory
     }
@@ -283,11 +276,11 @@ mod tests {
         let runs = tempfile::tempdir().unwrap();
         let runs = runs.path();
         assert_eq!(newest(runs, &x80()), None);
-        let cut = begun(runs, "x80", "cut");
+        let cut = begun(runs, "robot = 'x80'", "cut");
         let file = fs::File::options().append(true).open(cut.join(run::FILE_NAME)).unwrap();
         file.set_modified(SystemTime::now() + std::time::Duration::from_secs(60)).unwrap();
-        fs::write(begun(runs, "x80", "ended").join(SUMMARY), "").unwrap();
-        begun(runs, "other", "others");
+        fs::write(begun(runs, "robot = 'x80'", "ended").join(SUMMARY), "").unwrap();
+        begun(runs, "robot = 'other'", "others");
         let found = newest(runs, &x80()).unwrap();
         assert_eq!((&found.directory, found.has_ended()), (&cut, false));
         fs::write(cut.join(SUMMARY), "").unwrap();
@@ -300,18 +293,18 @@ mod tests {
         let runs = runs.path();
         let began = SystemTime::now();
         for (age, name) in ["a-001", "a-002", "a-003"].iter().rev().enumerate() {
-            let directory = begun(runs, "x80", name);
+            let directory = begun(runs, "robot = 'x80'", name);
             fs::write(directory.join(SUMMARY), "").unwrap();
             let file = fs::File::open(directory.join(run::FILE_NAME)).unwrap();
             let minutes = std::time::Duration::from_secs(60 * age as u64);
             file.set_modified(began - minutes).unwrap();
         }
-        begun(runs, "x80", "a-004");
-        fs::write(begun(runs, "other", "b-001").join(SUMMARY), "").unwrap();
+        begun(runs, "robot = 'x80'", "a-004");
+        fs::write(begun(runs, "robot = 'other'", "b-001").join(SUMMARY), "").unwrap();
         prune(runs, &x80(), 1);
-        let mut left: Vec<_> = fs::read_dir(runs).unwrap().flatten().collect();
-        left.sort_by_key(fs::DirEntry::file_name);
-        let left: Vec<_> = left.iter().map(fs::DirEntry::file_name).collect();
+        let mut left: Vec<_> =
+            fs::read_dir(runs).unwrap().map(|it| it.unwrap().file_name()).collect();
+        left.sort();
         assert_eq!(left, ["a-003", "a-004", "b-001"]);
         let next = numbered(runs, "a").unwrap();
         assert!(next.ends_with("a-005"), "{}", next.display());

@@ -85,39 +85,34 @@ mod tests {
 
     use super::*;
 
-    fn stamp(sequence: u32) -> Stamp {
-        Stamp { sequence, generation: 1, ..Stamp::default() }
+    fn came(losses: &mut Losses, sequence: u32) -> bool {
+        let stamp = Stamp { sequence, generation: 1, ..Stamp::default() };
+        losses.came(POSE.spec(), &stamp, &sequence.to_le_bytes())
     }
 
     #[test]
     fn a_sample_that_is_given_again_is_not_new_and_nothing_is_lost_by_it() {
         let mut losses = Losses::default();
-        let pose = POSE.spec();
-        assert!(losses.came(pose, &stamp(7), b"seven"));
-        assert!(losses.came(pose, &stamp(8), b"eight"));
-        assert!(!losses.came(pose, &stamp(8), b"eight"));
-        assert!(losses.came(pose, &stamp(9), b"nine"));
-        assert_eq!(losses.total(), 0);
+        let new = [7, 8, 8, 9].map(|sequence| came(&mut losses, sequence));
+        assert_eq!((new, losses.total()), ([true, true, false, true], 0));
     }
 
     #[test]
     fn the_last_sample_is_not_new_after_the_same_bus_was_joined_again() {
         let mut losses = Losses::default();
-        assert!(losses.came(POSE.spec(), &stamp(7), b"seven"));
-        losses.joined_again();
-        assert!(!losses.came(POSE.spec(), &stamp(7), b"seven"));
-        losses.joined_again();
-        assert!(losses.came(POSE.spec(), &stamp(9), b"nine"));
-        losses.joined_again();
-        assert!(losses.came(POSE.spec(), &stamp(0), b"another"));
-        assert_eq!(losses.total(), 0);
+        let new = [7, 7, 9, 0].map(|sequence| {
+            let new = came(&mut losses, sequence);
+            losses.joined_again();
+            new
+        });
+        assert_eq!((new, losses.total()), ([true, false, true, true], 0));
     }
 
     #[test]
     fn samples_that_did_not_come_are_counted() {
         let mut losses = Losses::default();
         for sequence in [3, 4, 7] {
-            losses.came(POSE.spec(), &stamp(sequence), b"pose");
+            came(&mut losses, sequence);
         }
         assert_eq!(losses.total(), 2);
     }
@@ -126,7 +121,7 @@ mod tests {
     fn first_samples_that_did_not_come_are_lost_to_a_recorder_that_was_there_before_the_writer() {
         let lost = |whole: bool| {
             let mut losses = Losses::new(whole);
-            assert!(losses.came(POSE.spec(), &stamp(5), b"five"));
+            assert!(came(&mut losses, 5));
             losses.total()
         };
         assert_eq!([lost(true), lost(false)], [5, 0]);
