@@ -17,9 +17,9 @@ use common::{
     samples::{GridHeader, Mover, PoseSample, RangeReading, RangeStatus, RangesHeader},
 };
 use foxglove::{
-    Decode, Encode, Schema,
+    Decode, Encode,
     messages::{
-        FrameTransforms, Grid, LaserScan, Log, Odometry, PoseInFrame, SceneUpdate,
+        FrameTransforms, Grid, LaserScan, Log, Odometry, Pose, PoseInFrame, SceneUpdate,
         packed_element_field::NumericType,
     },
 };
@@ -30,8 +30,9 @@ use crate::{LAYOUT, live::Live};
 /// Messages by topic.
 type Sent = BTreeMap<String, Vec<u8>>;
 
-fn mission() -> Mission {
-    Mission::parse("target = [4, 0]", Path::new("m.toml")).unwrap()
+fn mission(robot: &str) -> Mission {
+    let text = format!("target = [4, 0]\nrobot.model = '{robot}'");
+    Mission::parse(&text, Path::new("m.toml")).unwrap()
 }
 
 /// Returns the messages for a robot at (1, 2) that senses an obstacle at 0.5 m.
@@ -40,7 +41,7 @@ fn sent() -> Sent {
     let mut sink = |topic: &str, message: &[u8]| {
         sent.insert(topic.to_owned(), message.to_vec());
     };
-    let mission = mission();
+    let mission = mission("x80");
     let mut drawn = Drawn::new(Some(mission.clone()));
     let mut message = Vec::new();
     let pose = PoseSample {
@@ -90,11 +91,15 @@ fn schemas_are_those_of_the_sdk() {
         Log::get_schema(),
         LaserScan::get_schema(),
     ];
-    let known: Vec<Schema> = known.into_iter().flatten().collect();
-    for channel in viewers::channels(Some(&mission())) {
-        let schema = known.iter().find(|schema| schema.name == channel.schema).unwrap();
+    for channel in viewers::channels(Some(&mission("x80"))) {
+        let schema = known.iter().flatten().find(|schema| schema.name == channel.schema).unwrap();
         assert_eq!((&*schema.encoding, &*schema.data), ("protobuf", channel.descriptors));
     }
+}
+
+fn is_to_the_left(pose: Option<Pose>) -> bool {
+    let turned = pose.unwrap().orientation.unwrap();
+    (2.0 * turned.z.atan2(turned.w) - FRAC_PI_2).abs() < 1e-12
 }
 
 #[test]
@@ -103,10 +108,9 @@ fn messages_have_what_viewers_draw() {
     let pose: PoseInFrame = decoded(&sent, "foxglove/pose");
     let stamp = pose.timestamp.unwrap();
     assert_eq!((stamp.sec(), stamp.nsec(), &*pose.frame_id), (7, 9, "map"));
-    let (at, turned) =
-        (pose.pose.unwrap().position.unwrap(), pose.pose.unwrap().orientation.unwrap());
+    let at = pose.pose.unwrap().position.unwrap();
     assert_eq!((at.x, at.y, at.z), (1.0, 2.0, 0.0));
-    assert!((2.0 * turned.z.atan2(turned.w) - FRAC_PI_2).abs() < 1e-12);
+    assert!(is_to_the_left(pose.pose));
     let odometry: Odometry = decoded(&sent, "foxglove/odometry");
     assert_eq!((odometry.pose_covariance.len(), odometry.pose_covariance[0]), (36, 0.04));
     assert_eq!(
@@ -115,7 +119,8 @@ fn messages_have_what_viewers_draw() {
     );
     assert_eq!(odometry.body_frame_id, "base_link");
     let mounts: FrameTransforms = decoded(&sent, "foxglove/transforms");
-    let sensors: Vec<_> = mission().sensor_table().into_iter().map(|sensor| sensor.name).collect();
+    let sensors: Vec<_> =
+        mission("x80").sensor_table().into_iter().map(|sensor| sensor.name).collect();
     let frames = mounts.transforms.iter().map(|mount| mount.child_frame_id.clone());
     assert_eq!(frames.collect::<Vec<_>>(), sensors);
     let scan: LaserScan = decoded(&sent, &format!("foxglove/scan/{}", sensors[0]));
@@ -138,8 +143,7 @@ fn messages_have_what_viewers_draw() {
     assert_eq!(scene.entities[2].cylinders[0].color.unwrap().a, 0.4);
     let movers: SceneUpdate = decoded(&sent, "foxglove/movers");
     let [mover] = &movers.entities[..] else { panic!("{movers:?}") };
-    let turned = mover.arrows[0].pose.unwrap().orientation.unwrap();
-    assert!((2.0 * turned.z.atan2(turned.w) - FRAC_PI_2).abs() < 1e-12);
+    assert!(is_to_the_left(mover.arrows[0].pose));
     assert_eq!(mover.arrows[0].shaft_length + mover.arrows[0].head_length, 0.5, "of 1 s");
     let widths = mover.cylinders.iter().map(|disc| disc.size.unwrap().x);
     assert!(widths.zip([0.5, 0.9]).all(|(width, wanted)| (width - wanted).abs() < 1e-6));
@@ -176,14 +180,12 @@ fn a_web_page_of_another_origin_is_refused_and_a_viewer_is_served() {
 
 #[test]
 fn the_layout_shows_topics_that_there_are() {
-    let text = "target = [4, 0]\nrobot.model = 'kobuki'";
-    let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-    let channels: Vec<_> =
-        viewers::channels(Some(&mission)).into_iter().map(|channel| channel.topic).collect();
+    let channels = viewers::channels(Some(&mission("kobuki")));
+    let channels = channels.into_iter().map(|channel| channel.topic);
     let bus = common::topics::TABLE.iter().map(|topic| topic.spec().name.to_owned());
-    let known: Vec<_> = channels.into_iter().map(|topic| topic.to_string()).chain(bus).collect();
-    let words = LAYOUT.split('"');
-    let shown: Vec<_> = words
+    let known: Vec<_> = channels.chain(bus).collect();
+    let shown: Vec<_> = LAYOUT
+        .split('"')
         .filter(|word| word.contains('/') && !word.contains(' ') || word.starts_with("command."))
         .map(|word| word.split_once('.').map_or(word, |(topic, _)| topic))
         .collect();
