@@ -116,14 +116,12 @@ fn every_reason_against_a_target_has_its_answer() {
     let mut cells = vec![CellState::Free as u8; frame.area()];
     let hazard = frame.cell_at(DVec2::new(1.0, 1.0)).unwrap();
     cells[frame.index(hazard)] = CellState::Sensed as u8;
-    let part = Part::whole(frame, 1);
     let mut record = Record::default();
-    record.grid.apply(&part, &cells);
+    record.grid.apply(&Part::whole(frame, 1), &cells);
     let car = mission("robot.model = 'car'");
     let calibrates = mission("planner.calibration = { procedure = 'wall' }");
     let faces = TargetPoint { has_heading: 1, ..at(2.0, 0.0) };
     let there = at(2.0, 0.0);
-    let empty = Record::default();
     use HoldReason::{Ending, None as Drives, Operator, StageHeld, Starting};
     let answer = |mission, reason, point, record| refusal(Some(&[point]), reason, mission, record);
     for reason in [Drives, StageHeld] {
@@ -144,7 +142,7 @@ fn every_reason_against_a_target_has_its_answer() {
         assert_eq!(got, Some(want), "{reason:?} {point:?}");
     }
     assert_eq!(refusal(None, Drives, &plain, &record), Some(Malformed));
-    assert_eq!(answer(&plain, Drives, there, &empty), Some(NotRunning));
+    assert_eq!(answer(&plain, Drives, there, &Record::default()), Some(NotRunning));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use common::{
     latency::Histogram,
@@ -18,10 +18,13 @@ fn golden() -> Content {
     golden_of("open-room")
 }
 
-fn golden_of(name: &str) -> Content {
+fn file_of(name: &str) -> PathBuf {
     let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/golden");
-    let file = format!("{golden}/{name}.mcap");
-    Content::read(&recording::files(Path::new(&file)).unwrap()).unwrap()
+    Path::new(golden).join(name).with_extension("mcap")
+}
+
+fn golden_of(name: &str) -> Content {
+    Content::read(&recording::files(&file_of(name)).unwrap()).unwrap()
 }
 
 #[test]
@@ -80,8 +83,7 @@ fn text_of_a_recording_is_never_markup() {
 
 #[test]
 fn a_recording_that_is_cut_off_gives_a_report_that_says_so() {
-    let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../tests/golden/open-room.mcap");
-    let bytes = std::fs::read(whole).unwrap();
+    let bytes = std::fs::read(file_of("open-room")).unwrap();
     let directory = tempfile::tempdir().unwrap();
     let file = directory.path().join("cut.mcap");
     std::fs::write(&file, &bytes[..bytes.len() * 2 / 3]).unwrap();
@@ -132,8 +134,12 @@ fn metrics_count_every_generation_and_every_sample() {
     content.measured.pose(&late, &content.mission);
     let counts: u32 = content.heard.latency().counts.iter().sum();
     assert_eq!(counts, 2);
-    assert_eq!(content.measured.speed_change(), Some(0.5));
-    assert_eq!(content.measured.near(), Some(1.0 / 3.0));
-    assert_eq!(content.measured.unavailable(), Some(2.0 / 3.0));
-    assert_eq!(content.heard.wheel_range_rad_s(u64::MAX), Some(3.0));
+    let Content { measured, heard, .. } = content;
+    let metrics = [
+        measured.speed_change(),
+        measured.near(),
+        measured.unavailable(),
+        heard.wheel_range_rad_s(u64::MAX),
+    ];
+    assert_eq!(metrics, [0.5, 1.0 / 3.0, 2.0 / 3.0, 3.0].map(Some));
 }

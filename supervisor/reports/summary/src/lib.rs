@@ -343,9 +343,6 @@ mod tests {
         assert_eq!(near_share(&truth), Some(0.75));
         assert_eq!(path_smoothness(&truth), Some(1.0 + 5.0));
         assert_eq!(velocity_smoothness(&truth), Some((1.0 + 2.0 + 1.0) / 3.0));
-        assert_eq!(
-            (near_share(&[]), path_smoothness(&[]), velocity_smoothness(&[])),
-            (None, None, None)
-        );
+        assert_eq!([near_share(&[]), path_smoothness(&[]), velocity_smoothness(&[])], [None; 3]);
     }
 }

@@ -82,7 +82,7 @@ fn trace(mission: &Mission, robot: Robot) -> Trace {
     let rest = (1.0, [0.0; 2]);
     let mut legs = vec![(2.5, [0.0; 2]), (8.0, turn(1.0)), rest, (8.0, turn(-1.0)), rest];
     legs.extend([(2.0, [0.15; 2]), rest]);
-    legs.extend((0..8).map(|leg| (1.6, turn(if leg % 2 == 0 { 1.0 } else { -1.0 }))));
+    legs.extend([(1.6, turn(1.0)), (1.6, turn(-1.0))].repeat(4));
     let table = mission.sensor_table();
     let (first, step) = (-TAU / 2.0, TAU / BEAMS as f64);
     let header = ScanHeader::of(0, &table[0]);

@@ -1,5 +1,5 @@
 //! Tests of the screen, drawn into memory.
-#![allow(clippy::unwrap_used, clippy::print_stdout)]
+#![allow(clippy::unwrap_used)]
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -9,7 +9,7 @@ use common::{
     samples::*,
 };
 use glam::DVec2;
-use ratatui::{Terminal, backend::TestBackend};
+use ratatui::{Terminal, backend::TestBackend, buffer::Cell};
 
 use robot_state::Sample;
 
@@ -107,13 +107,11 @@ fn screen(view: &View, width: u16, height: u16) -> Vec<String> {
     terminal.draw(|frame| screen::draw(view, frame)).unwrap();
     let buffer = terminal.backend().buffer().clone();
     let lines = buffer.content().chunks(usize::from(width).max(1));
-    let text = |line: &[ratatui::buffer::Cell]| {
-        let line: String = line.iter().map(ratatui::buffer::Cell::symbol).collect();
+    let text = |line: &[Cell]| {
+        let line: String = line.iter().map(Cell::symbol).collect();
         line.trim_end().to_owned()
     };
-    let lines: Vec<_> = lines.map(text).collect();
-    println!("{}", lines.join("\n"));
-    lines
+    lines.map(text).collect()
 }
 
 #[test]

@@ -77,8 +77,7 @@ fn loops_that_agree_pass_and_a_held_out_pair_that_contradicts_is_refused() {
     assert!((estimate.ratio() - 1.004).abs() <= 3.0 * estimate.ratio_sd());
     // The last loops have a wheel without its tyre.
     let mut other = loops;
-    other[6] = drawn(4, 8, 1.03, 1.01, 0.001)[6];
-    other[7] = drawn(4, 8, 1.03, 1.01, 0.001)[7];
+    other[6..].copy_from_slice(&drawn(4, 8, 1.03, 1.01, 0.001)[6..]);
     let refusal = checked(&other, NORMAL_SD, TRACK_M).unwrap_err();
     let refused = matches!(
         refusal,

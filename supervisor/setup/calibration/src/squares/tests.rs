@@ -21,13 +21,11 @@ fn drive(ratio: f64, track: f64, to_the_left: bool) -> Driven {
         if order.status == GuidanceStatus::AtTarget {
             break;
         }
-        let step = obeyed(&order);
-        nominal = [nominal[0] + step[0], nominal[1] + step[1]];
-        ways.push(step);
-        pose = pose.along_arc(
-            f64::midpoint(step[0], step[1]),
-            wheels.turned(step[0], step[1], body().track_m),
-        );
+        let [left, right] = obeyed(&order);
+        nominal = [nominal[0] + left, nominal[1] + right];
+        ways.push([left, right]);
+        let turned = wheels.turned(left, right, body().track_m);
+        pose = pose.along_arc(f64::midpoint(left, right), turned);
     }
     assert_eq!(square.state(), State::Finished);
     Driven { ways, end: pose.position }

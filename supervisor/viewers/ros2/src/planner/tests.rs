@@ -280,18 +280,8 @@ fn a_frame_is_found_in_another_by_way_of_the_one_above_both_unless_a_transform_i
     let take = |frames: &mut Frames, of: &[(&str, &str, Pose)], at| {
         frames.take(&crate::messages::transforms(0, of), at).unwrap();
     };
-    let check = |frames: &Frames, frame, within, since, want: Result<Pose, &str>| match (
-        frames.find(frame, within, since),
-        want,
-    ) {
-        (Ok(found), Ok([x, y, heading])) => {
-            let want = DAffine2::from_angle_translation(heading, DVec2::new(x, y));
-            assert!(found.abs_diff_eq(want, 1e-12), "{frame}: {found}");
-        }
-        (found, want) => assert!(found.unwrap_err().contains(want.unwrap_err()), "{frame}"),
-    };
     take(&mut frames, &[("/odom", "base_link", [2.0, 0.0, 0.5])], Some(now));
-    check(&frames, "base_link", "map", None, Err("\"odom\""));
+    assert!(frames.find("base_link", "map", None).unwrap_err().contains("\"odom\""));
     let odom = ("map", "odom", [1.0, 2.0, FRAC_PI_2]);
     take(&mut frames, &[odom, ("map", "mast", [1.0, 0.0, 0.0])], None);
     take(&mut frames, &[("a", "b", [0.0; 3]), ("b", "a", [0.0; 3])], None);
@@ -305,7 +295,13 @@ fn a_frame_is_found_in_another_by_way_of_the_one_above_both_unless_a_transform_i
         ("mast", "odom", None, Ok([-2.0, 0.0, -FRAC_PI_2])),
         ("a", "map", None, Err("loop")),
     ] {
-        check(&frames, frame, within, since, want);
+        match (frames.find(frame, within, since), want) {
+            (Ok(found), Ok([x, y, heading])) => {
+                let want = DAffine2::from_angle_translation(heading, DVec2::new(x, y));
+                assert!(found.abs_diff_eq(want, 1e-12), "{frame}: {found}");
+            }
+            (found, want) => assert!(found.unwrap_err().contains(want.unwrap_err()), "{frame}"),
+        }
     }
 }
 
