@@ -2,12 +2,7 @@
 
 use std::path::Path;
 
-use common::{
-    grid::{Cell, CellState},
-    kinematics::Pose2,
-    mission::Mission,
-    samples::FieldCell,
-};
+use common::{grid::CellState, kinematics::Pose2, mission::Mission, samples::FieldCell};
 use glam::DVec2;
 
 use super::{Facts, Scene, Trail, svg};
@@ -85,8 +80,6 @@ fn mission(cells: u32) -> Mission {
 fn three_drums() -> Run {
     let mission = mission(120);
     let frame = mission.grid_frame();
-    let cells =
-        (0..frame.area() as u32).map(|at| Cell { col: at % frame.cells, row: at / frame.cells });
     let state = |cell| match (frame.is_rim(cell), mission.known.clearance(frame.centre_of(cell))) {
         (true, _) => CellState::Perimeter as u8,
         (false, clearance) if clearance < 0.25 => CellState::Known as u8,
@@ -105,8 +98,8 @@ fn three_drums() -> Run {
         (0..100).map(pose).collect()
     };
     Run {
-        grid: cells.clone().map(state).collect(),
-        field: cells.map(policy).collect(),
+        grid: frame.whole().cells().map(state).collect(),
+        field: frame.whole().cells().map(policy).collect(),
         believed: poses(0.1),
         truth: poses(0.0),
         captions: vec!["Least true clearance 0.11 m".to_owned()],

@@ -50,18 +50,14 @@ fn view() -> View {
     let frame = GridFrame { cells: 100, resolution_m: 0.1, centre: DVec2::ZERO };
     let mut grid = vec![CellState::Free as u8; frame.area()];
     let mut field = vec![FieldCell { ex: 0.0, ey: 1.0, log2_u: -1.0 }; frame.area()];
-    for row in 0..100 {
-        for col in 0..100 {
-            let rim = [row, col].iter().any(|&at| at == 0 || at == 99);
-            let wall = col >= 80 && row < 50;
-            let state = match (rim, wall) {
-                (true, _) => CellState::Perimeter,
-                (_, true) => CellState::Sensed,
-                _ => continue,
-            };
-            grid[row * 100 + col] = state as u8;
-            field[row * 100 + col].ey = 0.0;
-        }
+    for cell in frame.whole().cells() {
+        let state = match (frame.is_rim(cell), cell.col >= 80 && cell.row < 50) {
+            (true, _) => CellState::Perimeter,
+            (_, true) => CellState::Sensed,
+            _ => continue,
+        };
+        grid[frame.index(cell)] = state as u8;
+        field[frame.index(cell)].ey = 0.0;
     }
     view.state.map.apply(&Part::whole(frame, 3), &grid);
     view.state.field.apply(&Part::whole(frame, 3), &field);

@@ -220,10 +220,13 @@ impl Model {
         let (phase, now) = (self.policy.phase(), self.now);
         assert_eq!(action, expected, "{event:?} at {now:?}, now {phase:?}");
         assert_eq!(self.policy.deadline(), self.due(), "{event:?}: {phase:?}");
-        assert_eq!(phase == Phase::Held, self.held, "{event:?}: {phase:?}");
-        assert_eq!(phase == Phase::Down, self.generation.is_none() && !self.wanted);
         let no_process = matches!(phase, Phase::Down | Phase::Held | Phase::BackingOff { .. });
-        assert_eq!(no_process, self.generation.is_none(), "{event:?}: {phase:?}");
+        let none = self.generation.is_none();
+        assert_eq!(
+            [phase == Phase::Held, phase == Phase::Down, no_process],
+            [self.held, none && !self.wanted, none],
+            "{event:?}: {phase:?}"
+        );
     }
 
     /// Returns pauses to and around the due times, and a very long one.
