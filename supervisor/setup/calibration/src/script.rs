@@ -177,16 +177,12 @@ impl Script {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use common::mission::Mission;
-
     use super::*;
+    use crate::wall::tests::body;
 
     #[test]
     fn the_procedure_ends_in_time_whether_the_wheels_count_or_not() {
-        let mission = Mission::parse("target = [3, 0]", Path::new("m.toml")).unwrap();
-        let body = mission.body();
+        let body = body();
         for counts_a_tick in [0, 40] {
             let mut procedure = Script::new(Procedure::BringUp, 0.0, 10.0);
             let (mut ticks, mut counts) = (0, [0_u16; 2]);
