@@ -1,9 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use common::{
-    latency::Histogram,
-    samples::{CommandSample, CommandState, LinkSample, PoseSample, RangeReading, Stamp},
-};
+use common::{latency::Histogram, samples::*};
 use mission_control::Heard;
 use recording::Recording;
 

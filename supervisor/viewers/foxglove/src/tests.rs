@@ -14,7 +14,7 @@ use common::{
     bus::{encode_sample, encode_slice},
     grid::{CellState, Part},
     mission::Mission,
-    samples::{GridHeader, Mover, PoseSample, RangeReading, RangeStatus, RangesHeader},
+    samples::*,
 };
 use foxglove::{
     Decode, Encode,

@@ -8,7 +8,7 @@ use common::{
     mission::Mission,
     roster,
     run::Run,
-    samples::{GridHeader, PoseSample, RosterEntry, RosterHeader},
+    samples::*,
     topics,
 };
 use mission_control::operator::{self, OperatorError};
