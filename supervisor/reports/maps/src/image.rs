@@ -165,35 +165,33 @@ fn png(reader: impl BufRead + Seek, lightness: Lightness, file: &Path) -> Result
 mod tests {
     use super::*;
 
-    fn map_of(bytes: &[u8], lightness: Lightness) -> Result<Map, MapError> {
+    fn map_of(bytes: &[u8]) -> Result<Map, MapError> {
         let directory = tempfile::tempdir().unwrap();
         let file = directory.path().join("map.pgm");
         std::fs::write(&file, bytes).unwrap();
-        load(&file, lightness)
+        load(&file, Lightness::default())
     }
 
-    fn middle_is_free(header: &[u8], pixel: &[u8], lightness: Lightness) -> bool {
-        let map = map_of(&[header, &pixel.repeat(9)].concat(), lightness).unwrap();
+    fn middle_is_free(header: &[u8], pixel: &[u8]) -> bool {
+        let map = map_of(&[header, &pixel.repeat(9)].concat()).unwrap();
         assert_eq!((map.cols, map.rows), (3, 3));
         !map.blocked[4]
     }
 
     #[test]
     fn a_pixel_is_free_from_the_lightness_of_the_usual_threshold_on() {
-        let usual = Lightness::default();
         // 1 - 205 / 255 = 0.19607..., unknown by the map_server's 0.196.
         for (grey, free) in [(0, false), (205, false), (206, true), (255, true)] {
-            assert_eq!(middle_is_free(b"P5 3 3 255\n", &[grey], usual), free, "{grey}");
+            assert_eq!(middle_is_free(b"P5 3 3 255\n", &[grey]), free, "{grey}");
         }
         // The pixel has a quarter of the range, in 16 bits and in colours.
-        assert!(!middle_is_free(b"P5 3 3 65535\n", &[0x40, 0], usual));
-        assert!(middle_is_free(b"P6 3 3 255\n", &[255, 255, 200], usual));
-        assert!(middle_is_free(b"P5 3 3 100\n", &[90], usual));
+        assert!(!middle_is_free(b"P5 3 3 65535\n", &[0x40, 0]));
+        assert!(middle_is_free(b"P6 3 3 255\n", &[255, 255, 200]));
+        assert!(middle_is_free(b"P5 3 3 100\n", &[90]));
     }
 
     #[test]
     fn a_damaged_image_is_refused_and_a_large_one_before_it_is_read() {
-        let usual = Lightness::default();
         let damaged: [&[u8]; 6] = [
             b"",
             b"P5",
@@ -203,11 +201,11 @@ mod tests {
             b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR",
         ];
         for bytes in damaged {
-            let error = map_of(bytes, usual).unwrap_err();
+            let error = map_of(bytes).unwrap_err();
             assert!(error.to_string().contains("save it"), "{error}");
         }
         for header in ["P5 99999 3 255\n", "P5 0 3 255\n", "P5 4000000000 4000000000 255\n"] {
-            let error = map_of(header.as_bytes(), usual).unwrap_err();
+            let error = map_of(header.as_bytes()).unwrap_err();
             assert!(error.to_string().contains("on each side"), "{header}: {error}");
         }
     }
@@ -220,7 +218,7 @@ mod tests {
         let mut writer = encoder.write_header().unwrap();
         writer.write_image_data(&pixel.repeat(9)).unwrap();
         drop(writer);
-        middle_is_free(&bytes, &[], Lightness::default())
+        middle_is_free(&bytes, &[])
     }
 
     #[test]
@@ -245,7 +243,7 @@ mod tests {
     #[test]
     fn a_map_in_ascii_with_comments_is_read_as_in_binary() {
         let ascii = b"P2\n# by hand\n3 3 255\n0 0 0 0 206 0\n0 0 0";
-        let map = map_of(ascii, Lightness::default()).unwrap();
+        let map = map_of(ascii).unwrap();
         assert_eq!(map.blocked.iter().filter(|blocked| !**blocked).count(), 1);
     }
 }

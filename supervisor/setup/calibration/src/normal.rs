@@ -97,22 +97,24 @@ pub(crate) fn normal(legs: &[Leg; 2]) -> Result<Normal, NoNormal> {
 mod tests {
     use super::*;
 
-    /// Returns a turn past a wall at heading `wall` that answers within `half` to either side,
-    /// `late` radians behind.
-    fn leg(from: f64, to: f64, wall: f64, half: f64, late: f64) -> Leg {
+    /// Returns a turn to one `side`, of what `echo` gives for each heading.
+    fn turn(side: f64, echo: impl Fn(f64) -> Option<f64>) -> Leg {
         let mut leg = Leg::default();
         for step in 0..=90 {
-            let heading = from + (to - from) * f64::from(step) / 90.0;
-            let seen = heading - late * (to - from).signum();
-            let echo = ((seen - wall).abs() <= half).then_some(0.42);
-            leg.push(heading, echo);
+            let heading = side * 0.8 * (f64::from(step) / 45.0 - 1.0);
+            leg.push(heading, echo(heading));
         }
         leg
     }
 
+    /// Returns a turn past a wall at heading `wall` that is seen `late` radians behind.
+    fn leg(side: f64, wall: f64, late: f64) -> Leg {
+        turn(side, |heading| ((heading - late * side - wall).abs() <= 0.38).then_some(0.42))
+    }
+
     #[test]
     fn the_age_of_the_ranges_cancels_between_both_ways() {
-        let legs = [leg(-0.8, 0.8, 0.1, 0.38, 0.02), leg(0.8, -0.8, 0.1, 0.38, 0.02)];
+        let legs = [leg(1.0, 0.1, 0.02), leg(-1.0, 0.1, 0.02)];
         let normal = normal(&legs).unwrap();
         assert!((normal.heading - 0.1).abs() < 0.01, "{normal:?}");
         assert!((normal.difference - 0.04).abs() < 0.02, "{normal:?}");
@@ -120,10 +122,10 @@ mod tests {
 
     #[test]
     fn an_arc_that_the_sweep_or_silence_cuts_short_gives_no_normal() {
-        let whole = leg(-0.8, 0.8, 0.1, 0.38, 0.0);
-        let cut = leg(-0.8, 0.8, 0.6, 0.38, 0.0);
+        let whole = leg(1.0, 0.1, 0.0);
+        let cut = leg(1.0, 0.6, 0.0);
         assert_eq!(normal(&[whole.clone(), cut]), Err(NoNormal::Narrow));
-        let mut silent = leg(0.8, -0.8, 0.1, 0.38, 0.0);
+        let mut silent = leg(-1.0, 0.1, 0.0);
         silent.0.iter_mut().filter(|(heading, _)| *heading > 0.2).for_each(|it| it.1 = f64::NAN);
         assert_eq!(normal(&[whole.clone(), silent]), Err(NoNormal::Unequal));
         assert_eq!(normal(&[whole, Leg::default()]), Err(NoNormal::Narrow));
@@ -131,16 +133,11 @@ mod tests {
 
     #[test]
     fn a_rough_wall_that_answers_at_every_angle_is_found_by_its_nearest_part() {
-        let rough = |from: f64, to: f64| {
-            let mut leg = Leg::default();
-            for step in 0..=90 {
-                let heading = from + (to - from) * f64::from(step) / 90.0;
-                let beyond = ((heading - 0.05).abs() - 0.26).max(0.0);
-                leg.push(heading, Some(0.61 / beyond.cos() - 0.19 * beyond.cos()));
-            }
-            leg
+        let rough = |heading: f64| {
+            let beyond = ((heading - 0.05).abs() - 0.26).max(0.0);
+            Some(0.61 / beyond.cos() - 0.19 * beyond.cos())
         };
-        let normal = normal(&[rough(-0.8, 0.8), rough(0.8, -0.8)]).unwrap();
+        let normal = normal(&[turn(1.0, rough), turn(-1.0, rough)]).unwrap();
         assert!((normal.heading - 0.05).abs() < 0.03, "{normal:?}");
     }
 }

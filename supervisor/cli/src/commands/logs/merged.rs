@@ -139,9 +139,8 @@ mod tests {
     fn round(logs: &mut Logs) -> Vec<String> {
         logs.look().unwrap();
         let lines = std::iter::from_fn(|| logs.next_line().unwrap());
-        let after_time = lines.map(|line| line[TIME + 1..].to_owned());
-        let parted = after_time.map(|line| {
-            let (process, text) = line.split_at(14);
+        let parted = lines.map(|line| {
+            let (process, text) = line[TIME + 1..].split_at(14);
             format!("{} {}", process.trim_end(), text.trim_start())
         });
         parted.collect()
