@@ -413,13 +413,12 @@ mod tests {
 
     #[test]
     fn a_log_line_has_the_level_it_names_and_is_read_from_both_encodings() {
-        let message = log("mapper", "12.5  WARN missed a grid version", 7);
-        assert_eq!(level("12.5  WARN missed a grid version"), 3);
-        assert_eq!(level("mapper: cannot open"), 4);
-        let line = ("mapper".to_owned(), "12.5  WARN missed a grid version".to_owned());
-        assert_eq!(log_line(&message).as_ref(), Some(&line));
+        let text = "12.5  WARN missed a grid version";
+        assert_eq!([text, "mapper: cannot open"].map(level), [3, 4]);
+        let line = Some(("mapper".to_owned(), text.to_owned()));
+        assert_eq!(log_line(&log("mapper", text, 7)), line);
         let json = br#"{"level":3,"message":"12.5  WARN missed a grid version","name":"mapper"}"#;
-        assert_eq!(log_line(json), Some(line));
+        assert_eq!(log_line(json), line);
         assert_eq!(log_line(b"{"), None);
         assert_eq!(log_line(&[0xff]), None);
     }

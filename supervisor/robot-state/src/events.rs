@@ -265,11 +265,10 @@ mod tests {
 
     #[test]
     fn a_death_that_is_read_late_has_the_time_at_which_it_happened() {
-        let at = |stamp_ns| Stamp { stamp_ns, ..Stamp::default() };
         let mut events = Events::default();
-        let stamp = at(60_000_000_000);
+        let mut stamp = Stamp { stamp_ns: 60_000_000_000, ..Stamp::default() };
         events.sample(&Sample::Pose(PoseSample { stamp, ..PoseSample::default() }));
-        let stamp = at(7_000_000_000);
+        stamp.stamp_ns = 7_000_000_000;
         events.sample(&Sample::Death(DeathSample { stamp, ..DeathSample::default() }));
         assert_eq!(events.drain()[0].t, 7.0);
     }

@@ -347,17 +347,17 @@ mod tests {
     #[test]
     fn a_row_has_the_movers_of_its_tick_and_none_that_cannot_be_drawn() {
         let mut collector = Collector::new(&Mission::default());
-        let stamp = |tick| Stamp { tick, ..Stamp::default() };
         let mover =
             Mover { x_m: 1.0, vy_m_s: -0.5, radius_m: 0.25, doubt_m: 0.1, ..Mover::default() };
         let mut row = |tick, movers: &[Mover]| {
-            let pose = PoseSample { stamp: stamp(tick), ..PoseSample::default() };
+            let stamp = Stamp { tick, ..Stamp::default() };
+            let pose = PoseSample { stamp, ..PoseSample::default() };
             collector.apply(&Sample::Pose(pose));
-            let mut header = GridHeader { stamp: stamp(tick), ..GridHeader::default() };
+            let mut header = GridHeader { stamp, ..GridHeader::default() };
             header.movers[..movers.len()].copy_from_slice(movers);
             header.mover_count = movers.len() as u64;
             collector.apply(&Sample::Grid(header, Vec::new()));
-            let link = LinkSample { stamp: stamp(tick), ..LinkSample::default() };
+            let link = LinkSample { stamp, ..LinkSample::default() };
             collector.apply(&Sample::Link(link));
             let sensors = Mission::default().sensor_table().len();
             collector.take_rows().remove(0).get(COLUMNS.len() + sensors).cloned()

@@ -266,11 +266,11 @@ mod tests {
             let bands = Bands::of(&lattice, &field, &MISSION).unwrap();
             let lowest = bands.areas(MISSION.finest).swap_remove(0).element("");
             assert_eq!(lowest.matches('M').count(), 1, "one ring for N = {cells}");
-            let corners = lowest
+            let corners: Vec<_> = lowest
                 .split(['M', 'L', 'Z', '"'])
                 .filter_map(|point| point.split_once(' '))
                 .filter_map(|(x, y)| Some(DVec2::new(x.parse().ok()?, y.parse().ok()?)))
-                .collect::<Vec<_>>();
+                .collect();
             let middle = lattice.place(DVec2::splat(f64::from(cells) / 2.0 - 0.5));
             assert!(corners.len() > 3);
             for corner in corners {

@@ -52,10 +52,7 @@ mod tests {
             clock: MissionClock::Ticks { period_ns: 1 },
             mission,
         };
-        overlap((domain, namespace), &run, sensors.into_iter())
-            .into_iter()
-            .map(|(_, name)| name)
-            .next()
+        overlap((domain, namespace), &run, sensors.into_iter()).into_iter().next().map(|it| it.1)
     }
 
     #[test]
