@@ -128,14 +128,14 @@ mod tests {
 
     use super::*;
 
+    fn mission(text: &str) -> Mission {
+        Mission::parse(text, Path::new("m.toml")).unwrap()
+    }
+
     #[test]
     fn a_far_target_a_narrow_track_and_unknown_wheels_mean_wrong_places_and_a_gyro_or_a_laser_none()
     {
-        let share = |text: &str| {
-            let text = format!("{text}\nperimeter.width_m = 30");
-            let mission = Mission::parse(&text, Path::new("m.toml")).unwrap();
-            wrong_places(&mission)
-        };
+        let share = |text: &str| wrong_places(&mission(&format!("{text}\nperimeter.width_m = 30")));
         let six_m = share("target = [6, 0]").unwrap();
         // Measured: 41 of 100 on the default course, 40 of 100 in rooms.
         assert!((0.25..0.45).contains(&six_m), "{six_m}");
@@ -152,8 +152,7 @@ mod tests {
     fn heights_that_the_body_touches_and_no_sensor_sees_ahead_are_told_and_a_depth_camera_leaves_none()
      {
         let unseen = |robot: &str| {
-            let text = format!("target = [3, 0]\nrobot.{robot}");
-            unseen(&Mission::parse(&text, Path::new("m.toml")).unwrap()).unwrap_or_default()
+            unseen(&mission(&format!("target = [3, 0]\nrobot.{robot}"))).unwrap_or_default()
         };
         let laser = unseen("model = 'kobuki'");
         assert!(laser.contains("from 0.03 to 0.18 m and from 0.18 to 0.26 m"), "{laser}");

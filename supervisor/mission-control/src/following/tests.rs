@@ -57,8 +57,8 @@ fn the_robot_goes_round_a_wall_to_see_the_beacon_and_where_no_way_leads_as_near_
 fn a_target_goes_on_until_the_beacon_leaves_it_or_comes_to_the_robot() {
     let (map, mission) = (map(|_| false), mission());
     let goes_on = |x_m: f64, rest: f64| {
-        let at = |x| dvec2(x, 0.0);
-        follows(x_m, 0.0).next_place(&map, &mission, (at(rest), Some(at(1.0))), false)
+        let place = (dvec2(rest, 0.0), Some(dvec2(1.0, 0.0)));
+        follows(x_m, 0.0).next_place(&map, &mission, place, false)
     };
     assert_eq!(goes_on(2.0, 0.0), None, "it is at its distance from the beacon");
     assert_eq!(goes_on(1.8, 0.0), None, "the beacon came a little nearer");
@@ -69,7 +69,6 @@ fn a_target_goes_on_until_the_beacon_leaves_it_or_comes_to_the_robot() {
 #[test]
 fn a_sample_that_cannot_be_used_is_refused_for_its_reason_and_leaves_the_place_as_it_was() {
     use BeaconRefusal::{Doubtful, Future, Late, NotFinite, Outside};
-    let second = 1_000_000_000;
     type Change = fn(&mut BeaconSample);
     #[rustfmt::skip]
     let rows: [(BeaconRefusal, Change); 10] = [
@@ -88,7 +87,7 @@ fn a_sample_that_cannot_be_used_is_refused_for_its_reason_and_leaves_the_place_a
         assert_eq!((told.used, told.refused, told.refusal), (1, nth, refusal.into()));
         assert_eq!((told.x_m, told.y_m), (1.0, 0.0));
     }
-    let old = BeaconSample { capture_ns: NOW.0 - second - 1, ..beacon(1.0, 0.0) };
+    let old = BeaconSample { capture_ns: NOW.0 - 1_000_000_001, ..beacon(1.0, 0.0) };
     let mut following = Following::new(1.0, NOW, None);
     assert_eq!(following.take(&old, NOW, &mission()), Err(Late));
 }

@@ -90,15 +90,11 @@ fn is_free(cell: u8) -> Option<bool> {
 mod tests {
     use super::*;
 
-    fn map_of(text: &str) -> Result<Map, String> {
-        parse(text.as_bytes())
-    }
-
     #[test]
     fn ground_and_swamp_are_free_and_nothing_else_whatever_the_line_ends() {
         let text = "type octile\nheight 3\nwidth 9\nmap\n@@@@@@@@@\n@.GS@OTW@\n@@@@@@@@@\n";
         for text in [text.to_owned(), text.replace('\n', "\r\n")] {
-            let map = map_of(&text).unwrap();
+            let map = parse(text.as_bytes()).unwrap();
             let free: Vec<usize> = (0..27).filter(|&at| !map.blocked[at]).collect();
             assert_eq!((map.cols, map.rows, free), (9, 3, vec![10, 11, 12]));
         }
@@ -118,7 +114,7 @@ mod tests {
             ("type octile\nheight 99999999999\nwidth 3\nmap\n", "99999999999"),
         ];
         for (text, said) in cases {
-            let error = map_of(text).unwrap_err();
+            let error = parse(text.as_bytes()).unwrap_err();
             assert!(error.contains(said), "{text:?} gave {error}");
         }
     }

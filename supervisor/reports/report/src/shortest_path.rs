@@ -185,10 +185,7 @@ mod tests {
             let mut shapes =
                 wall(&[[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0], [-1.0, -1.0]]);
             for side in [-1.0, 1.0] {
-                shapes.walls.push(Wall {
-                    points: vec![DVec2::new(1.0, side), DVec2::new(1.0, side * gap / 2.0)],
-                    ..Wall::default()
-                });
+                shapes.walls.extend(wall(&[[1.0, side], [1.0, side * gap / 2.0]]).walls);
             }
             shortest_path(&shapes, DVec2::ZERO, DVec2::new(2.0, 0.0), 0.2)
         };

@@ -114,13 +114,10 @@ mod tests {
         }
     }
 
-    fn access(proxy: Option<&str>) -> Access {
-        Access::new("127.0.0.1:8080".parse().unwrap(), proxy).unwrap()
-    }
-
     #[test]
     fn behind_a_proxy_only_its_name_counts() {
-        let far = access(Some("robot.example"));
+        let address = "127.0.0.1:8080".parse().unwrap();
+        let far = Access::new(address, Some("robot.example")).unwrap();
         assert!(far.addresses().starts_with("watch https://robot.example/#"));
         assert!(far.host("127.0.0.1:8080").is_none());
         let host = far.host("robot.example").unwrap();
