@@ -424,7 +424,7 @@ fn machine() -> String {
 #[cfg(test)]
 mod tests {
     use std::{
-        sync::atomic::{AtomicUsize, Ordering},
+        sync::atomic::{AtomicUsize, Ordering::Relaxed},
         thread,
     };
 
@@ -459,39 +459,38 @@ mod tests {
             budget: None,
         };
         let [rounds, attached, complete] = [const { AtomicUsize::new(0) }; 3];
-        let until = |is_so: &dyn Fn() -> bool| {
+        let reaches = |counter: &AtomicUsize, count| {
             let began = Instant::now();
-            while !is_so() && began.elapsed() < PATIENCE {
+            while counter.load(Relaxed) < count && began.elapsed() < PATIENCE {
                 thread::yield_now();
             }
-            is_so()
+            counter.load(Relaxed) >= count
         };
         thread::scope(|scope| {
             let recorder = scope.spawn(|| {
                 let began = Instant::now();
                 let mut wish = || {
-                    rounds.fetch_add(1, Ordering::Relaxed);
+                    rounds.fetch_add(1, Relaxed);
                     // A stopped recorder also completes its file, so it is stopped only after a
                     // failure.
                     let failed = began.elapsed() > PATIENCE * 4;
-                    let over = failed || complete.load(Ordering::Relaxed) > 0;
+                    let over = failed || complete.load(Relaxed) > 0;
                     if over { Wish::Stop } else { Wish::Record }
                 };
                 record(&options, &mut wish, &mut |happened| {
                     match happened {
-                        Happened::Attached(_) => attached.fetch_add(1, Ordering::Relaxed),
-                        Happened::Complete(..) => complete.fetch_add(1, Ordering::Relaxed),
+                        Happened::Attached(_) => attached.fetch_add(1, Relaxed),
+                        Happened::Complete(..) => complete.fetch_add(1, Relaxed),
                         Happened::CaughtUp => 0,
                     };
                 })
             });
-            assert!(until(&|| attached.load(Ordering::Relaxed) > 0));
+            assert!(reaches(&attached, 1));
             fs::remove_file(domain.middleware_config()).unwrap();
-            let known = rounds.load(Ordering::Relaxed) + 5;
-            assert!(until(&|| rounds.load(Ordering::Relaxed) >= known));
-            assert_eq!(complete.load(Ordering::Relaxed), 0, "the supervisor has not ended");
+            assert!(reaches(&rounds, rounds.load(Relaxed) + 5));
+            assert_eq!(complete.load(Relaxed), 0, "the supervisor has not ended");
             drop(lock);
-            assert!(until(&|| complete.load(Ordering::Relaxed) > 0), "the recording goes on");
+            assert!(reaches(&complete, 1), "the recording goes on");
             recorder.join().unwrap().unwrap();
         });
     }

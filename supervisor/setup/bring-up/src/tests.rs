@@ -291,11 +291,8 @@ fn a_laser_tells_all_swapped_and_reversed_motors_and_encoders_right_or_as_undeci
             if !is_told {
                 *parts.last_mut().unwrap() = "laser";
             }
-            assert_eq!(wrong(&found), parts, "{motors:?} {encoders:?}: {found:?}");
-            assert!(
-                found.iter().all(|it| it.keys.is_empty()),
-                "{motors:?} {encoders:?}: {found:?}"
-            );
+            assert_eq!(wrong(&found), parts, "{robot:?}: {found:?}");
+            assert!(found.iter().all(|it| it.keys.is_empty()), "{robot:?}: {found:?}");
         }
     };
     std::thread::scope(|threads| {

@@ -80,11 +80,12 @@ fn an_echo_and_what_another_protocol_says_are_not_known() {
 #[test]
 fn the_frames_of_an_x80_tell_its_rate_and_the_sensors_that_read() {
     let standard = StandardSensors { ultrasonic: [0, 80, 135, 0, 0, 0], ..Default::default() };
-    let custom = CustomSensors { ad: [1000; 8], io: 0 };
     let mut bytes = Vec::new();
-    for frame in
-        [Frame::Standard(standard), Frame::Custom(custom), Frame::Motor(MotorSensors::default())]
-    {
+    for frame in [
+        Frame::Standard(standard),
+        Frame::Custom(CustomSensors { ad: [1000; 8], io: 0 }),
+        Frame::Motor(MotorSensors::default()),
+    ] {
         frame.encode(Addressing::default(), &mut bytes);
     }
     let mut seen = Seen::new(Protocol::X80).unwrap();

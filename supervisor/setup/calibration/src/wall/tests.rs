@@ -61,11 +61,7 @@ fn run(robot: &mut Robot, plan: CalibrationPlan) -> Wall {
     for _ in 0..20_000 {
         let order = wall.step(counts_of(robot.ways), robot.echo(), &body());
         robot.obey(&order);
-        assert!(
-            robot.pose.position.x < WALL_M - 0.25,
-            "it came too near the wall: {:?}",
-            wall.phase
-        );
+        assert!(robot.pose.position.x < WALL_M - 0.25, "{:?}", wall.phase);
         if wall.state() != State::Running {
             break;
         }
@@ -84,8 +80,7 @@ fn a_robot_that_does_not_slip_is_calibrated_to_a_thousandth_and_stands_where_it_
             crate::loops::checked(&wall.loops, wall.normal_sd(), body().track_m).unwrap();
         assert!((estimate.ratio() - ratio).abs() < 0.001, "{ratio}: {}", estimate.ratio());
         assert!((estimate.track() - track).abs() < 0.002, "{track}: {}", estimate.track());
-        let y = robot.pose.position.y;
-        assert!(y.abs() < 1.0, "it drifted along the wall: {y}");
+        assert!(robot.pose.position.y.abs() < 1.0, "it drifted along the wall");
     }
 }
 
