@@ -26,8 +26,7 @@ fn every_rule_of_the_judgement_decides_its_row() {
     let end = link(Action::End, Cause::BatteryEmpty);
     let away = LinkSample { connected: 0, ..go };
     let robot = "x80".parse().unwrap();
-    let address = "udp://10.0.0.1:10001".parse::<Address<String>>().unwrap();
-    let address = address.resolve().unwrap();
+    let address = "udp://10.0.0.1:10001".parse::<Address<String>>().unwrap().resolve().unwrap();
     let moving = LinkSample { at_rest: 0, ..go };
     let resting = LinkSample { at_rest: 1, ..go };
     let arrival = |distance_m, seconds| {
@@ -131,11 +130,10 @@ fn every_rule_of_the_judgement_decides_its_row() {
 
 #[test]
 fn progress_is_when_a_tick_or_the_start_of_a_stage_was_first_seen() {
-    let start = Duration::ZERO;
-    let at = |seconds| start + Duration::from_secs(seconds);
-    let mut progress = TickProgress::new(start);
+    let at = Duration::from_secs;
+    let mut progress = TickProgress::new(at(0));
     for (tick, to_start, s, since) in [
-        (None, 0, 1, start),
+        (None, 0, 1, at(0)),
         (None, 5, 2, at(2)),
         (None, 4, 3, at(3)),
         (Some(7), 4, 4, at(4)),

@@ -248,15 +248,14 @@ fn a_relocated_robot_forgets_all_of_its_map_each_time_and_gives_up_for_it_never(
 #[test]
 fn a_robot_that_stands_and_is_elsewhere_forgets_its_map_at_once_and_nothing_else_does_so() {
     let mut watch = watch();
-    let stands = |watch: &mut StallWatch, second: f64, relocations| {
-        watch.stand(&PoseSample { relocations, ..pose(second, 0.0) }, 3)
+    let mut stands = |second, relocations| {
+        let stall = watch.stand(&PoseSample { relocations, ..pose(second, 0.0) }, 3);
+        stall.map(|stall| parts(&stall))
     };
     // Relocations before the first pose are known.
-    assert_eq!(stands(&mut watch, 0.0, 5), None);
-    assert_eq!(stands(&mut watch, 60.0, 5), None);
-    let stall = stands(&mut watch, 61.0, 6).unwrap();
-    assert_eq!(parts(&stall), (Relocated, Reset, 4));
-    assert_eq!(stands(&mut watch, 62.0, 6), None);
+    assert_eq!([stands(0.0, 5), stands(60.0, 5)], [None; 2]);
+    assert_eq!(stands(61.0, 6), Some((Relocated, Reset, 4)));
+    assert_eq!(stands(62.0, 6), None);
     let driving = PoseSample { relocations: 6, ..pose(63.0, 0.0) };
     assert_eq!(step(&mut watch, driving, guidance(Along, 4)), None);
 }

@@ -94,12 +94,12 @@ fn an_arrival_beside_a_hazard_is_reached_within_the_tolerance_and_unreachable_be
 #[test]
 fn an_arrival_that_the_ground_truth_contradicts_makes_the_whole_list_wrong() {
     let pose = PoseSample { stamp: arrival(7).stamp, left_counts: 7, ..PoseSample::default() };
-    let truth = |x, tick| GroundTruthTick { tick, x, left_counts: 7, ..GroundTruthTick::default() };
     for (x, outcome) in [(2.6, Outcome::Reached), (2.4, Outcome::WrongPlace)] {
         let mut list = advanced((arrival(7), TargetOutcome::Reached));
         let mut record = Record::default();
         record.poses.push(pose);
-        list.compare(&record, &[truth(x, 7)], 0.5);
+        let truth = GroundTruthTick { tick: 7, x, left_counts: 7, ..GroundTruthTick::default() };
+        list.compare(&record, &[truth], 0.5);
         let (results, whole) = results(&list);
         assert!((results[0].truth_m.unwrap() - (3.0 - x)).abs() < 1e-12, "{results:?}");
         assert_eq!(whole, outcome);
@@ -120,8 +120,8 @@ fn every_reason_against_a_target_has_its_answer() {
     record.grid.apply(&Part::whole(frame, 1), &cells);
     let car = mission("robot.model = 'car'");
     let calibrates = mission("planner.calibration = { procedure = 'wall' }");
-    let faces = TargetPoint { has_heading: 1, ..at(2.0, 0.0) };
     let there = at(2.0, 0.0);
+    let faces = TargetPoint { has_heading: 1, ..there };
     use HoldReason::{Ending, None as Drives, Operator, StageHeld, Starting};
     let answer = |mission, reason, point, record| refusal(Some(&[point]), reason, mission, record);
     for reason in [Drives, StageHeld] {
@@ -171,18 +171,18 @@ fn a_robot_that_stays_has_a_result_for_each_target_and_none_for_the_wait() {
 fn a_hands_target_has_no_result_and_ends_in_waiting_for_the_next_one() {
     use TargetOutcome::{Reached, Replaced};
     let mut list = TargetList::of(&mission("stay = true"));
-    let hand = |list: &mut TargetList, x| {
-        list.replace(&[at(x, 0.0)], (5, 4.0), None);
+    let hand = |list: &mut TargetList| {
+        list.replace(&[at(0.5, 0.0)], (5, 4.0), None);
         list.by_hand = true;
     };
-    hand(&mut list, 0.5);
-    hand(&mut list, 0.6);
+    hand(&mut list);
+    hand(&mut list);
     assert_eq!((list.number, list.waits, list.has_target()), (3, false, false));
     list.settle(Outcome::Reached, 6.0, Some((arrival(6), Reached)));
     assert!(list.waits && !list.release());
-    hand(&mut list, 0.7);
+    hand(&mut list);
     assert!(list.release() && list.waits);
-    hand(&mut list, 0.8);
+    hand(&mut list);
     assert_eq!(list.outcome_while_waiting(), Some(Outcome::Waited));
     list.replace(&[at(2.0, 0.0)], (9, 8.0), None);
     assert!(list.has_target());

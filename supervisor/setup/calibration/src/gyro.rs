@@ -128,12 +128,9 @@ mod tests {
 
     #[test]
     fn a_robot_that_hardly_drove_or_never_turned_or_never_stood_is_told_so() {
-        let short = |motions: &[[f64; 2]]| {
+        for motions in [&[[0.2, 0.0], [0.0, 3.2], [0.2, 0.0]][..], &[[2.0, 0.0], [2.0, 0.0]], &[]] {
             assert!(matches!(estimate(1.0, 1.0, 0.0, motions), Err(Refusal::Short { .. })));
-        };
-        short(&[[0.2, 0.0], [0.0, 3.2], [0.2, 0.0]]);
-        short(&[[2.0, 0.0], [2.0, 0.0]]);
-        short(&[]);
+        }
         assert!(matches!(checked(&[], &[], 0.01, TRACK_M), Err(Refusal::NoRest { .. })));
     }
 }
