@@ -173,8 +173,8 @@ impl Browser {
 #[test]
 fn a_request_that_names_another_host_or_none_or_two_is_misdirected() {
     let (page, _) = page();
-    let own = host(&page);
-    let foreign = format!("Host: evil.example:{}", page.address().port());
+    let (own, port) = (host(&page), page.address().port());
+    let foreign = format!("Host: evil.example:{port}");
     for lines in [
         &["GET / HTTP/1.1", &foreign][..],
         &["GET / HTTP/1.1", "Host: 127.0.0.1"],
@@ -188,8 +188,7 @@ fn a_request_that_names_another_host_or_none_or_two_is_misdirected() {
         // The HTTP library refuses requests that no server may accept.
         assert!(["421", "400"].contains(&status(&answer)), "{lines:?}: {answer}");
     }
-    let local = format!("Host: localhost:{}", page.address().port());
-    for accepted in [own, local] {
+    for accepted in [own, format!("Host: localhost:{port}")] {
         assert_eq!(status(&ask(&page, &["GET / HTTP/1.1", &accepted])), "200");
     }
 }
