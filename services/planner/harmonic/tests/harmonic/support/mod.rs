@@ -11,7 +11,7 @@ mod reference;
 pub(crate) use angles::{Angles, CLEAR};
 pub(crate) use maps::{Kind, Map};
 pub(crate) use random::Random;
-pub(crate) use reference::{angle, follow, worst_residual};
+pub(crate) use reference::{angle, leads_to_target, worst_residual};
 
 pub(crate) fn domain(width: usize, height: usize, blocked: Vec<bool>, target: Cell) -> Domain {
     Domain::new(width, height, blocked, target).expect("a valid map")

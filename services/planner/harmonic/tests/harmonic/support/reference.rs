@@ -25,36 +25,18 @@ pub(crate) fn angle(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]).abs().to_degrees()
 }
 
-/// Returns the share of the reachable cells from which steepest ascent ends at the target.
-pub(crate) fn follow(field: &Field) -> f64 {
-    let width = field.width();
+/// Returns whether steepest ascent from every reachable cell ends at the target.
+///
+/// It climbs as long as a neighbour has a larger u, so it can only end elsewhere at a cell without
+/// one.
+pub(crate) fn leads_to_target(field: &Field) -> bool {
+    let (width, height) = (field.width(), field.height());
     let cell = |index: usize| Cell::new(index % width, index / width);
-    // Whether the walk from each cell arrives, once known.
-    let mut arrives = vec![None; width * field.height()];
-    arrives[field.target().row * width + field.target().col] = Some(true);
-    let (mut arrived, mut all) = (0_usize, 0_usize);
-    for start in (0..arrives.len()).filter(|&index| field.is_reachable(cell(index))) {
-        let mut path = Vec::new();
-        let mut here = start;
-        let result = loop {
-            if let Some(known) = arrives[here] {
-                break known;
-            }
-            // A walk that meets itself never arrives, so the cell counts as not arriving until
-            // proven.
-            arrives[here] = Some(false);
-            path.push(here);
-            let u = |index: usize| field.u(cell(index));
-            here = around(width, field.height(), here)
-                .into_iter()
-                .flatten()
-                .fold(here, |best, next| if u(next) > u(best) { next } else { best });
-        };
-        for index in path {
-            arrives[index] = Some(result);
-        }
-        arrived += usize::from(arrives[start] == Some(true));
-        all += 1;
-    }
-    arrived as f64 / all.max(1) as f64
+    let climbs = |index: usize| {
+        let mut beside = around(width, height, index).into_iter().flatten();
+        beside.any(|next| field.u(cell(next)) > field.u(cell(index)))
+    };
+    (0..width * height).all(|index| {
+        !field.is_reachable(cell(index)) || cell(index) == field.target() || climbs(index)
+    })
 }
