@@ -1,6 +1,6 @@
 //! Tests of the guidance at any position of a solved map.
 
-use crate::support::{Kind, Map, Random, angle, solve};
+use crate::support::{Kind, Map, Random, angle, cells, solve};
 use harmonic::{Cell, Domain, Field, Guidance};
 
 fn generated(kind: Kind, seed: u64) -> (Domain, Field) {
@@ -51,8 +51,7 @@ fn the_path_from_every_cell_ends_at_the_target_and_touches_no_blocked_cell() {
     for (seed, kind) in KINDS.into_iter().enumerate() {
         let (domain, field) = generated(kind, seed as u64);
         let target = [domain.target().col as f64, domain.target().row as f64];
-        for index in 0..domain.blocked().len() {
-            let start = Cell::new(index % domain.width(), index / domain.width());
+        for start in cells(domain.width(), domain.height()) {
             let path = field.path(start);
             assert_eq!(path.is_some(), field.is_reachable(start), "{kind:?} {start:?}");
             let path = path.unwrap_or(vec![target]);
@@ -75,29 +74,22 @@ fn guidance_never_points_into_a_wall_it_touches() {
     for (seed, kind) in KINDS.into_iter().enumerate() {
         let (domain, field) = generated(kind, 7 + seed as u64);
         let mut random = Random::new(3);
-        for row in 1..domain.height() - 1 {
-            for col in 1..domain.width() - 1 {
-                if !field.is_reachable(Cell::new(col, row)) {
+        // The rim is blocked, so a reachable cell has four neighbours.
+        for cell in cells(domain.width(), domain.height()).filter(|&it| field.is_reachable(it)) {
+            let (col, row) = (cell.col as f64, cell.row as f64);
+            for (dc, dr) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+                if !domain.is_blocked(Cell::new((col + dc) as usize, (row + dr) as usize)) {
                     continue;
                 }
-                for (dc, dr) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-                    let beside = Cell::new((col as f64 + dc) as usize, (row as f64 + dr) as usize);
-                    if !domain.is_blocked(beside) {
-                        continue;
-                    }
-                    let along = random.between(-0.499, 0.499);
-                    let at = [
-                        col as f64 + 0.499_999_9 * dc + along * dr,
-                        row as f64 + 0.499_999_9 * dr + along * dc,
-                    ];
-                    if let Guidance::Along(d) = field.guidance(at[0], at[1]) {
-                        // Under the saddle rule, the direction may lean towards the centre line of
-                        // the cell, but never outwards.
-                        assert!(
-                            d[0] * dc + d[1] * dr < 1e-4,
-                            "{kind:?}: {d:?} into the wall at {at:?}"
-                        );
-                    }
+                let along = random.between(-0.499, 0.499);
+                let at = [col + 0.499_999_9 * dc + along * dr, row + 0.499_999_9 * dr + along * dc];
+                if let Guidance::Along(d) = field.guidance(at[0], at[1]) {
+                    // Under the saddle rule, the direction may lean towards the centre line of the
+                    // cell, but never outwards.
+                    assert!(
+                        d[0] * dc + d[1] * dr < 1e-4,
+                        "{kind:?}: {d:?} into the wall at {at:?}"
+                    );
                 }
             }
         }

@@ -2,7 +2,7 @@
 //! target.
 
 use crate::support::{
-    Angles, Kind, Map, Random, around, domain, leads_to_target, screened, solve, solve_near,
+    Angles, Kind, Map, Random, around, cells, domain, leads_to_target, screened, solve, solve_near,
     solve_with, worst_residual,
 };
 use harmonic::{Cell, Change, Domain, Field, Guidance, Settings, Solver, solve_exactly};
@@ -46,16 +46,13 @@ fn reachable(domain: &Domain) -> Vec<bool> {
 /// Asserts that two fields have the same numbers in every cell.
 fn assert_same(a: &Field, b: &Field, name: &str) {
     assert_eq!(a.verification(), b.verification(), "{name}");
-    for index in 0..a.width() * a.height() {
-        let cell = Cell::new(index % a.width(), index / a.width());
+    for cell in cells(a.width(), a.height()) {
         assert_eq!(a.u(cell), b.u(cell), "{name}, {cell:?}");
     }
 }
 
 fn assert_sound(domain: &Domain, field: &Field) {
-    let width = domain.width();
-    for (index, reachable) in reachable(domain).into_iter().enumerate() {
-        let cell = Cell::new(index % width, index / width);
+    for (cell, reachable) in cells(domain.width(), domain.height()).zip(reachable(domain)) {
         assert_eq!(field.is_reachable(cell), reachable, "{cell:?}");
         assert_eq!(field.is_blocked(cell), domain.is_blocked(cell), "{cell:?}");
         for offset in [0.0, 0.49, -0.3] {

@@ -2,7 +2,7 @@
 
 use harmonic::{Cell, Field};
 
-use super::reference::angle;
+use super::{cells, reference::angle};
 
 /// Angles in degrees, over the cells that can reach the target.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,18 +28,15 @@ impl Angles {
     pub(crate) fn between(field: &Field, right: &Field, clear: f64) -> Self {
         let mut angles = Vec::new();
         let mut clear_max = 0.0_f64;
-        for row in 0..right.height() {
-            for col in 0..right.width() {
-                let cell = Cell::new(col, row);
-                let Some(wanted) = right.direction(cell) else {
-                    continue;
-                };
-                let off = field.direction(cell).map_or(180.0, |it| angle(it, wanted));
-                if steepness(right, cell) >= clear {
-                    clear_max = clear_max.max(off);
-                }
-                angles.push(off);
+        for cell in cells(right.width(), right.height()) {
+            let Some(wanted) = right.direction(cell) else {
+                continue;
+            };
+            let off = field.direction(cell).map_or(180.0, |it| angle(it, wanted));
+            if steepness(right, cell) >= clear {
+                clear_max = clear_max.max(off);
             }
+            angles.push(off);
         }
         angles.sort_by(f64::total_cmp);
         let Some(&max) = angles.last() else {

@@ -34,6 +34,11 @@ pub(crate) fn solve_near(solver: &mut Solver, domain: &Domain, before: &Field) -
     solver.solve_near(domain, before, &Cancellation::new()).expect("the map has a field")
 }
 
+/// Returns the cells of a map, row by row.
+pub(crate) fn cells(width: usize, height: usize) -> impl Iterator<Item = Cell> {
+    (0..width * height).map(move |index| Cell::new(index % width, index / width))
+}
+
 /// Returns the indices of the west, east, north and south neighbours inside the map.
 pub(crate) fn around(width: usize, height: usize, index: usize) -> [Option<usize>; 4] {
     let (col, row) = (index % width, index / width);
