@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use harmonic::{Cell, Domain};
 
-use crate::support::domain;
+use crate::support::Map;
 
 /// Threshold of the ROS map_server; darker cells are not free.
 const FREE_FROM: u8 = 206;
@@ -24,19 +24,11 @@ pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
 /// Loads a map; the target is the free cell nearest to the middle.
 fn load(file: &Path) -> Domain {
     let bytes = std::fs::read(file).expect("a map");
-    let (width, height, mut blocked) = pgm(&bytes);
-    for (at, blocked) in blocked.iter_mut().enumerate() {
-        let (col, row) = (at % width, at / width);
-        *blocked |= col == 0 || row == 0 || col == width - 1 || row == height - 1;
-    }
-    let from_middle = |at: &usize| {
-        let (col, row) = (at % width, at / width);
-        col.abs_diff(width / 2).pow(2) + row.abs_diff(height / 2).pow(2)
-    };
-    let target =
-        (0..blocked.len()).filter(|&at| !blocked[at]).min_by_key(from_middle).expect("a free cell");
-    let target = Cell::new(target % width, target / width);
-    domain(width, height, blocked, target)
+    let (width, height, blocked) = pgm(&bytes);
+    let mut map = Map { width, height, blocked, target: Cell::new(0, 0) };
+    map.block_rim();
+    map.aim((width / 2, height / 2));
+    map.domain()
 }
 
 /// Reads a binary 8-bit PGM with comments on separate lines.

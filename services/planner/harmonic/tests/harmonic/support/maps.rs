@@ -62,10 +62,7 @@ impl Map {
             Kind::Trap => map.trap(),
             Kind::Noise { density } => map.blocked.fill_with(|| random.unit() < density),
         }
-        map.fill(0..width, 0..1, true);
-        map.fill(0..width, height - 1..height, true);
-        map.fill(0..1, 0..height, true);
-        map.fill(width - 1..width, 0..height, true);
+        map.block_rim();
         map.aim(wanted);
         map
     }
@@ -89,6 +86,12 @@ impl Map {
             for col in cols.start..cols.end.min(self.width) {
                 self.blocked[row * self.width + col] = blocked;
             }
+        }
+    }
+
+    pub(crate) fn block_rim(&mut self) {
+        for (index, blocked) in self.blocked.iter_mut().enumerate() {
+            *blocked |= around(self.width, self.height, index).contains(&None);
         }
     }
 
