@@ -30,7 +30,7 @@ use std::{path::Path, time::Instant};
 
 use crate::split::{Measured, measured};
 use crate::support::{Kind, Map, solve_with};
-use harmonic::{Cell, Change, Domain, Solver};
+use harmonic::{Cell, Domain, Solver};
 
 /// Returns the milliseconds of the fastest of `runs` calls.
 fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
@@ -137,12 +137,4 @@ fn full_row(name: &str, domain: &Domain) {
         target / wavefront,
         field.log10_u_min(),
     );
-}
-
-pub(crate) fn block(domain: &Domain, col: usize, row: usize) -> Vec<Change> {
-    (row..row + 3)
-        .flat_map(|row| (col..col + 3).map(move |col| Cell::new(col, row)))
-        .filter(|&cell| cell != domain.target() && !domain.is_blocked(cell))
-        .map(|cell| Change { cell, blocked: true })
-        .collect()
 }

@@ -2,10 +2,8 @@
 
 use std::time::Instant;
 
-use crate::support::{Kind, Map, Random, solve_near, solve_with};
+use crate::support::{Kind, Map, Random, block, solve_near, solve_with};
 use harmonic::{Cell, Solver};
-
-use crate::block;
 
 /// Timed solves per map.
 const UPDATES: usize = 100;
@@ -30,7 +28,7 @@ fn row(kind: Kind, n: usize, length: f64) {
     let mut times = Vec::new();
     while times.len() < UPDATES {
         let (col, row) = (random.below(n - 8) + 2, random.below(n - 8) + 2);
-        let mut changes = block(&domain, col, row);
+        let mut changes = block(&domain, (col, row), (3, 3));
         if changes.is_empty() || !field.is_reachable(Cell::new(col, row)) {
             continue;
         }

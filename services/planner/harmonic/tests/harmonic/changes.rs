@@ -1,7 +1,9 @@
 //! Tests that solves from the previous field give the directions of a solve from scratch.
 
-use crate::support::{Angles, CLEAR, Kind, Map, Random, leads_to_target, solve_near, solve_with};
-use harmonic::{Cell, Change, Domain, Field, Solver, solve_exactly};
+use crate::support::{
+    Angles, CLEAR, Kind, Map, Random, block, leads_to_target, solve_near, solve_with,
+};
+use harmonic::{Change, Domain, Field, Solver, solve_exactly};
 
 struct Case {
     solver: Solver,
@@ -21,17 +23,6 @@ impl Case {
         self.field = solve_near(&mut self.solver, &self.domain, &self.field);
     }
 
-    fn block(&self, (col, row): (usize, usize), (width, height): (usize, usize)) -> Vec<Change> {
-        let (right, bottom) = (self.domain.width() - 1, self.domain.height() - 1);
-        (row.max(1)..(row + height).min(bottom))
-            .flat_map(|row| {
-                (col.max(1)..(col + width).min(right)).map(move |col| Cell::new(col, row))
-            })
-            .filter(|&cell| cell != self.domain.target() && !self.domain.is_blocked(cell))
-            .map(|cell| Change { cell, blocked: true })
-            .collect()
-    }
-
     fn angles(&self) -> Angles {
         Angles::between(&self.field, &solve_exactly(&self.domain).expect("a field"), CLEAR)
     }
@@ -48,7 +39,7 @@ fn after_a_block_in_one_of_two_corridors_the_directions_in_the_hall_that_they_fe
         }
         map.aim((20, 128));
         let mut case = Case::new(map.domain());
-        case.change(&case.block((160, 70 + (wide - size.1) / 2), size));
+        case.change(&block(&case.domain, (160, 70 + (wide - size.1) / 2), size));
         let angles = case.angles();
         assert!(angles.clear_max < 1.0, "{angles:?}");
     }
@@ -70,7 +61,7 @@ fn after_many_changes_every_cell_leads_to_the_target_and_all_directions_are_righ
             } else {
                 let at = (random.below(side), random.below(side));
                 let side = 1 + random.below(5);
-                let square = case.block(at, (side, side));
+                let square = block(&case.domain, at, (side, side));
                 case.change(&square);
                 there.push(square);
             }

@@ -1,7 +1,7 @@
 //! Generated maps of every kind, independent checks, and angles between fields.
 #![allow(dead_code, unused_imports, reason = "tests and benchmark each use a part")]
 
-use harmonic::{Cancellation, Cell, Domain, Field, Screening, Solver};
+use harmonic::{Cancellation, Cell, Change, Domain, Field, Screening, Solver};
 
 mod angles;
 mod maps;
@@ -32,6 +32,19 @@ pub(crate) fn solve_with(solver: &mut Solver, domain: &Domain) -> Field {
 
 pub(crate) fn solve_near(solver: &mut Solver, domain: &Domain, before: &Field) -> Field {
     solver.solve_near(domain, before, &Cancellation::new()).expect("the map has a field")
+}
+
+/// Returns the changes that block the free cells of a rectangle, except the target.
+pub(crate) fn block(
+    domain: &Domain,
+    (col, row): (usize, usize),
+    (width, height): (usize, usize),
+) -> Vec<Change> {
+    (row..row + height)
+        .flat_map(|row| (col..col + width).map(move |col| Cell::new(col, row)))
+        .filter(|&cell| cell != domain.target() && !domain.is_blocked(cell))
+        .map(|cell| Change { cell, blocked: true })
+        .collect()
 }
 
 /// Returns the cells of a map, row by row.
