@@ -68,8 +68,12 @@ fn assert_sound(domain: &Domain, field: &Field) {
     assert!(leads_to_target(field));
 }
 
+fn cases(cases: u32) -> ProptestConfig {
+    ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() }
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(400))]
 
     #[test]
     fn any_grid_gets_a_field_that_leads_to_the_target_from_every_cell_that_can_reach_it(domain in any_domain()) {
@@ -87,16 +91,15 @@ proptest! {
 
 proptest! {
     // Each case solves and follows a map several times.
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(cases(60))]
 
     #[test]
     fn a_field_solved_after_any_changes_from_the_one_before_leads_to_the_target_from_every_cell_that_can_reach_it(
         seed in any::<u64>(),
-        kind in prop_oneof![
-            Just(Kind::Empty), Just(Kind::Drums), Just(Kind::Office), Just(Kind::Trap), Just(Kind::Maze { corridor: 1 }),
-            Just(Kind::Maze { corridor: 5 }), Just(Kind::Maze { corridor: 16 }), Just(Kind::Serpentine { corridor: 8 }),
-            Just(Kind::Noise { density: 0.2 })
-        ],
+        kind in prop::sample::select(vec![
+            Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap, Kind::Maze { corridor: 1 }, Kind::Maze { corridor: 5 },
+            Kind::Maze { corridor: 16 }, Kind::Serpentine { corridor: 8 }, Kind::Noise { density: 0.2 }
+        ]),
         changes in prop::collection::vec((0_usize..150, 0_usize..150, any::<bool>()), 1..30),
     ) {
         let mut domain = Map::generate(kind, 150, 150, seed).domain();
