@@ -19,9 +19,9 @@ const KINDS: [Kind; 5] = [
 
 #[test]
 fn following_the_guidance_from_anywhere_arrives_without_entering_a_blocked_cell() {
-    for (seed, kind) in KINDS.into_iter().enumerate() {
-        let (domain, field) = generated(kind, seed as u64);
-        let mut random = Random::new(seed as u64);
+    for (seed, kind) in (0..).zip(KINDS) {
+        let (domain, field) = generated(kind, seed);
+        let mut random = Random::new(seed);
         let mut walks = 0;
         while walks < 60 {
             let mut at = [random.between(0.0, 39.0), random.between(0.0, 29.0)];
@@ -48,8 +48,8 @@ fn following_the_guidance_from_anywhere_arrives_without_entering_a_blocked_cell(
 
 #[test]
 fn the_path_from_every_cell_ends_at_the_target_and_touches_no_blocked_cell() {
-    for (seed, kind) in KINDS.into_iter().enumerate() {
-        let (domain, field) = generated(kind, seed as u64);
+    for (seed, kind) in (0..).zip(KINDS) {
+        let (domain, field) = generated(kind, seed);
         let target = [domain.target().col as f64, domain.target().row as f64];
         for start in cells(domain.width(), domain.height()) {
             let path = field.path(start);
@@ -71,8 +71,8 @@ fn the_path_from_every_cell_ends_at_the_target_and_touches_no_blocked_cell() {
 
 #[test]
 fn guidance_never_points_into_a_wall_it_touches() {
-    for (seed, kind) in KINDS.into_iter().enumerate() {
-        let (domain, field) = generated(kind, 7 + seed as u64);
+    for (seed, kind) in (7..).zip(KINDS) {
+        let (domain, field) = generated(kind, seed);
         let mut random = Random::new(3);
         // The rim is blocked, so a reachable cell has four neighbours.
         for cell in cells(domain.width(), domain.height()).filter(|&it| field.is_reachable(it)) {
