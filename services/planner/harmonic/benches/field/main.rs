@@ -26,7 +26,7 @@ mod sweep;
 mod updates;
 mod wavefront;
 
-use std::{path::Path, time::Instant};
+use std::time::Instant;
 
 use crate::split::{Measured, measured};
 use crate::support::{Kind, Map, solve_with};
@@ -34,13 +34,12 @@ use harmonic::{Cell, Domain, Solver};
 
 /// Returns the milliseconds of the fastest of `runs` calls.
 fn fastest(runs: usize, mut call: impl FnMut()) -> f64 {
-    let mut best = f64::INFINITY;
-    for _ in 0..runs {
+    let milliseconds = (0..runs).map(|_| {
         let start = Instant::now();
         call();
-        best = best.min(start.elapsed().as_secs_f64() * 1e3);
-    }
-    best
+        start.elapsed().as_secs_f64() * 1e3
+    });
+    milliseconds.fold(f64::INFINITY, f64::min)
 }
 
 fn runs(cells: usize) -> usize {
@@ -59,23 +58,22 @@ fn main() {
         return split::growth_table();
     }
     if asked("sweep") {
-        let real = maps_directory().map(|it| real::load_all(Path::new(&it)));
-        return sweep::table(real);
+        return sweep::table(&real_maps());
     }
     if asked("accuracy") {
         return accuracy::angle_table();
     }
     full_table();
-    if let Some(directory) = maps_directory() {
-        for (name, domain) in real::load_all(Path::new(&directory)) {
-            full_row(&name, &domain);
-        }
+    for (name, domain) in real_maps() {
+        full_row(&name, &domain);
     }
     updates::table();
 }
 
-fn maps_directory() -> Option<String> {
-    std::env::args().skip_while(|it| it != "--maps").nth(1)
+/// Loads the maps of the directory after `--maps`, if any.
+fn real_maps() -> Vec<(String, Domain)> {
+    let directory = std::env::args().skip_while(|it| it != "--maps").nth(1);
+    directory.map(real::load_all).unwrap_or_default()
 }
 
 fn full_table() {

@@ -7,20 +7,13 @@ use crate::fastest;
 pub(crate) fn dijkstra(domain: &Domain) -> f64 {
     const STRAIGHT: u32 = 1000;
     const DIAGONAL: u32 = 1414;
-    let steps: [(isize, isize, u32); 8] = [
-        (1, 0, STRAIGHT),
-        (-1, 0, STRAIGHT),
-        (0, 1, STRAIGHT),
-        (0, -1, STRAIGHT),
-        (1, 1, DIAGONAL),
-        (-1, 1, DIAGONAL),
-        (1, -1, DIAGONAL),
-        (-1, -1, DIAGONAL),
-    ];
+    let steps: [(isize, isize); 8] =
+        [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)];
     let start = (domain.target().col as u32, domain.target().row as u32);
     fastest(3, || {
         let distances = pathfinding::prelude::dijkstra_all(&start, |&(col, row)| {
-            steps.into_iter().filter_map(move |(dx, dy, cost)| {
+            steps.into_iter().filter_map(move |(dx, dy)| {
+                let cost = if dx * dy == 0 { STRAIGHT } else { DIAGONAL };
                 let (c, r) = (
                     (col as usize).checked_add_signed(dx)?,
                     (row as usize).checked_add_signed(dy)?,

@@ -9,16 +9,13 @@ use crate::support::Map;
 /// Threshold of the ROS map_server; darker cells are not free.
 const FREE_FROM: u8 = 206;
 
-pub(crate) fn load_all(directory: &Path) -> Vec<(String, Domain)> {
+pub(crate) fn load_all(directory: String) -> Vec<(String, Domain)> {
     let entries = std::fs::read_dir(directory).expect("a directory of maps");
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     files.retain(|file| file.extension().is_some_and(|extension| extension == "pgm"));
     files.sort();
-    let named = |file: &PathBuf| {
-        let name = file.file_stem().unwrap_or_default().to_string_lossy();
-        (name.into_owned(), load(file))
-    };
-    files.iter().map(named).collect()
+    let name = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    files.iter().map(|file| (name(file), load(file))).collect()
 }
 
 /// Loads a map; the target is the free cell nearest to the middle.

@@ -42,14 +42,14 @@ fn kinds() -> Vec<(String, Kind, f64)> {
 }
 
 /// Prints times of each map and of a wavefront measured in turn, worst ratio first.
-pub(crate) fn table(real: Option<Vec<(String, Domain)>>) {
+pub(crate) fn table(real: &[(String, Domain)]) {
     let mut rows: Vec<_> = kinds()
         .into_iter()
         .map(|(name, kind, length)| {
             row(&name, &Map::generate(kind, SIDE, SIDE, 1).screened(length))
         })
         .collect();
-    rows.extend(real.into_iter().flatten().map(|(name, domain)| row(&name, &domain)));
+    rows.extend(real.iter().map(|(name, domain)| row(name, domain)));
     rows.sort_by(|a, b| b.0.total_cmp(&a.0));
     println!(
         "\nSolves from scratch, {SIDE} x {SIDE} cells, as multiples of a wavefront's time, the worst first"
