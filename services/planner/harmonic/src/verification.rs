@@ -179,11 +179,7 @@ fn check_rows<'f, R: Real, W: Window<R>>(
 mod tests {
     use super::cells::{RESIDUAL_LIMIT, TILE_LIMIT};
     use super::*;
-    use crate::cancellation::Cancellation;
-    use crate::cell::Cell;
-    use crate::screening::Screening;
-    use crate::solver::Solver;
-    use crate::store::BLOCKED;
+    use crate::{Cancellation, Cell, Field, Scaled, Screening, Solver, store::BLOCKED};
 
     /// Returns a hall of `side` x `side` cells with a box in it.
     fn hall(side: usize) -> Domain {
@@ -194,44 +190,41 @@ mod tests {
         Domain::new(side, side, blocked, Cell::new(side / 6, side / 5)).unwrap()
     }
 
+    fn solve(domain: &Domain) -> Field {
+        Solver::default().solve(domain, &Cancellation::new()).unwrap()
+    }
+
     #[test]
     fn a_field_solved_with_screening_does_not_pass_for_one_without_though_its_residuals_are_small()
     {
         for (side, k) in [(512, 5e-6_f64), (512, 2e-4), (128, 2e-4)] {
             let domain = hall(side);
             let screened = domain.clone().with_screening(&Screening::cells(0.5 / k.sqrt()));
-            let mut solver = Solver::default();
-            let wrong = solver.solve(&screened.unwrap(), &Cancellation::new()).unwrap();
-            let threads = NonZeroUsize::MIN;
-            let found = check(&domain, &wrong.store, threads);
-            assert!(found.worst_residual < RESIDUAL_LIMIT || k > 1e-4, "{found:?}");
-            assert!(found.worst_tile > TILE_LIMIT, "{found:?}");
-            let right = solver.solve(&domain, &Cancellation::new()).unwrap();
-            let found = check(&domain, &right.store, threads);
-            assert!(found.worst_tile < TILE_LIMIT / 10.0, "{found:?}");
+            let [wrong, right] = [&screened.unwrap(), &domain]
+                .map(|solved| check(&domain, &solve(solved).store, NonZeroUsize::MIN));
+            assert!(wrong.worst_residual < RESIDUAL_LIMIT || k > 1e-4, "{wrong:?}");
+            assert!(wrong.worst_tile > TILE_LIMIT, "{wrong:?}");
+            assert!(right.worst_tile < TILE_LIMIT / 10.0, "{right:?}");
         }
     }
 
     #[test]
     fn a_field_with_an_exponent_a_cell_is_checked_as_one_with_a_common_exponent_is() {
         let domain = hall(128);
-        let field = Solver::default().solve(&domain, &Cancellation::new()).unwrap();
-        let place = domain.index(Cell::new(90, 70));
+        let store = solve(&domain).store;
+        let u = (0..domain.blocked().len()).map(|index| store.u(index));
         for factor in [1.0, 1.001, 3.0, 0.0, f64::NAN, f64::INFINITY] {
-            let u = |index: usize| field.store.u(index);
-            let blocked = |index: usize| domain.blocked()[index];
-            let factor = |index: usize| if index == place { factor } else { 1.0 };
-            let of = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
-                let cells = 0..domain.blocked().len();
-                cells.map(|index| if blocked(index) { BLOCKED } else { value(index) }).collect()
+            let stored = |value: fn(Scaled) -> f64| -> Vec<f64> {
+                let values = u.clone().zip(domain.blocked());
+                let values = values.map(|(u, blocked)| if *blocked { BLOCKED } else { value(u) });
+                let mut values: Vec<f64> = values.collect();
+                values[domain.index(Cell::new(90, 70))] *= factor;
+                values
             };
-            let common = Store::Double {
-                values: of(&|index| u(index).relative_to(0) * factor(index)),
-                exponent: 0,
-            };
+            let common = Store::Double { values: stored(|u| u.relative_to(0)), exponent: 0 };
             let extended = Store::Extended {
-                mantissas: of(&|index| u(index).mantissa * factor(index)),
-                exponents: (0..domain.blocked().len()).map(|index| u(index).exponent).collect(),
+                mantissas: stored(|u| u.mantissa),
+                exponents: u.clone().map(|u| u.exponent).collect(),
             };
             let [common, extended] =
                 [common, extended].map(|store| check(&domain, &store, NonZeroUsize::MIN));
@@ -242,7 +235,7 @@ mod tests {
                 |a: f64, b: f64| !a.is_finite() && !b.is_finite() || (a / b - 1.0).abs() < 1e-6;
             assert!(agree(common.worst_residual, extended.worst_residual));
             assert!(agree(common.worst_tile, extended.worst_tile));
-            assert_eq!(common.holds(), factor(place) == 1.0);
+            assert_eq!(common.holds(), factor == 1.0);
         }
     }
 }
