@@ -84,22 +84,11 @@ fn full_table() {
         "{:<24} {:>9} {:<14} {:>9} {:>9} {:>9} {:>6} {:>6} {:>9} {:>9}",
         "map", "cells", "method", "scratch", "target", "wavefront", "x", "x", "dijkstra", "log10 u"
     );
-    let kinds = [
-        Kind::Empty,
-        Kind::Drums,
-        Kind::Office,
-        Kind::Trap,
-        Kind::Maze { corridor: 1 },
-        Kind::Maze { corridor: 4 },
-        Kind::Maze { corridor: 8 },
-        Kind::Maze { corridor: 16 },
-        Kind::Maze { corridor: 32 },
-        Kind::Maze { corridor: 64 },
-        Kind::Noise { density: 0.35 },
-        Kind::Serpentine { corridor: 1 },
-        Kind::Serpentine { corridor: 8 },
-        Kind::Serpentine { corridor: 24 },
-    ];
+    let kinds = [Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap]
+        .into_iter()
+        .chain([1, 4, 8, 16, 32, 64].map(|corridor| Kind::Maze { corridor }))
+        .chain([Kind::Noise { density: 0.35 }])
+        .chain([1, 8, 24].map(|corridor| Kind::Serpentine { corridor }));
     for kind in kinds {
         full_row(&format!("{kind:?}"), &Map::generate(kind, 512, 512, 1).domain());
     }
