@@ -10,6 +10,8 @@ mod moving;
 mod people;
 mod rooms;
 mod shapes;
+#[cfg(test)]
+mod testing;
 mod traps;
 
 use self::{ends::Ends, rooms::Doors};

@@ -158,6 +158,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
+    use crate::worlds::testing::drawn;
 
     const ALL: Asked = Asked { count: None, seed: 1, ends: None, swept_m: 0.24 };
 
@@ -167,19 +168,11 @@ mod tests {
 
     /// Returns the map of a hall of 6 m by 3 m at (10, 20), its walls 10 cm thick.
     fn hall() -> tempfile::TempDir {
-        let folder = tempfile::tempdir().unwrap();
-        let (cols, rows) = (60, 30);
-        let grey = |at: usize| {
-            let (col, row) = (at % cols, at / cols);
-            let solid = col == 0 || row == 0 || col + 1 == cols || row + 1 == rows;
-            if solid { 0 } else { 254 }
-        };
-        let mut image = format!("P5 {cols} {rows} 255\n").into_bytes();
-        image.extend((0..cols * rows).map(grey));
-        fs::write(folder.path().join("hall.pgm"), image).unwrap();
-        let yaml = "image: hall.pgm\nresolution: 0.1\norigin: [10, 20, 0]";
-        fs::write(folder.path().join("hall.yaml"), yaml).unwrap();
-        folder
+        let (wall, inside) = ("#".repeat(60), format!("#{}#", ".".repeat(58)));
+        let mut rows = [&*inside; 30];
+        rows[0] = &wall;
+        rows[29] = &wall;
+        drawn(&rows, "resolution: 0.1\norigin: [10, 20, 0]")
     }
 
     #[test]

@@ -141,22 +141,13 @@ impl Floor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::worlds::testing::drawn;
 
     /// Returns the floor of a drawing: `#` is solid, cells of half a metre, the lower left corner
     /// at (-1, 2).
     fn floor(rows: &[&str]) -> Floor {
-        let folder = tempfile::tempdir().unwrap();
-        let (cols, number) = (rows[0].len(), rows.len());
-        let mut image = format!("P5 {cols} {number} 255\n").into_bytes();
-        image.extend(rows.concat().bytes().map(|byte| match byte {
-            b'#' => 0,
-            b'?' => 205,
-            _ => 254,
-        }));
-        std::fs::write(folder.path().join("a.pgm"), image).unwrap();
-        let file = folder.path().join("a.yaml");
-        std::fs::write(&file, "image: a.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]").unwrap();
-        Floor::load(&file).unwrap()
+        let folder = drawn(rows, "resolution: 0.5\norigin: [-1.0, 2.0, 0.0]");
+        Floor::load(&folder.path().join("hall.yaml")).unwrap()
     }
 
     #[test]
@@ -191,11 +182,15 @@ mod tests {
 
     #[test]
     fn drawn_ends_are_connected_for_the_body_and_follow_from_the_seed() {
-        let long = [".".repeat(16), "#".repeat(16)];
-        let rows: Vec<String> =
-            [1, 0, 0, 0, 1, 0, 1].map(|solid: usize| format!("#{}#", long[solid])).to_vec();
-        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
-        let floor = floor(&rows);
+        let floor = floor(&[
+            "##################",
+            "#................#",
+            "#................#",
+            "#................#",
+            "##################",
+            "#................#",
+            "##################",
+        ]);
         let draw = |seed| floor.draw([Random::of_world(seed, 7, 0)].into_iter(), 0.24)[0];
         assert_eq!(draw(1), draw(1));
         assert_ne!(draw(1), draw(2));
@@ -209,11 +204,8 @@ mod tests {
 
     #[test]
     fn a_map_of_a_town_is_refused_with_its_size() {
-        let folder = tempfile::tempdir().unwrap();
-        let image = [b"P5 200 2 255\n".as_slice(), &[254; 400]].concat();
-        std::fs::write(folder.path().join("a.pgm"), image).unwrap();
-        let file = folder.path().join("a.yaml");
-        std::fs::write(&file, "image: a.pgm\nresolution: 1\norigin: [0, 0, 0]").unwrap();
+        let folder = drawn(&[&*".".repeat(200); 2], "resolution: 1\norigin: [0, 0, 0]");
+        let file = folder.path().join("hall.yaml");
         let refused = Floor::load(&file).unwrap_err().to_string();
         let named = file.to_str().unwrap();
         assert!(refused.starts_with(named) && refused.contains("is 200 m on a side"), "{refused}");
