@@ -203,15 +203,10 @@ mod tests {
         assert!((left_m - 0.9).abs() < 1e-9, "the wall at the left: {left_m}");
         assert!((given.trials[0].shortest_m - 17_f64.sqrt()).abs() < 1e-9);
 
-        let value = |key: &str, value: f64| format!("<arg name=\"{key}\" default=\"{value}\"/>\n");
-        let tests = [
-            value("initial_pose_x", 11.0),
-            value("initial_pose_y", 21.0),
-            value("initial_pose_a", 0.0),
-            value("goal_pose_x", 15.0),
-            value("goal_pose_y", 22.0),
-        ];
-        fs::write(folder.path().join(TESTS_FILE), tests.concat()).unwrap();
+        let test = "<arg name='initial_pose_x' default='11'/><arg name='initial_pose_y' default='21'/>\
+            <arg name='initial_pose_a' default='0'/><arg name='goal_pose_x' default='15'/>\
+            <arg name='goal_pose_y' default='22'/>";
+        fs::write(folder.path().join(TESTS_FILE), test).unwrap();
         let tested = read(folder.path(), ALL).unwrap();
         assert_eq!(names(&tested), ["hall-1"]);
         assert_eq!(&tested.trials[0].mission, mission);
@@ -220,21 +215,22 @@ mod tests {
     #[test]
     fn what_cannot_be_a_world_is_refused_with_the_file_or_the_option() {
         let folder = hall();
-        let refused = |path: &Path, asked| read(path, asked).unwrap_err().to_string();
-        let image = refused(&folder.path().join("hall.pgm"), ALL);
-        assert!(image.contains("hall.pgm") && image.contains(".yaml"), "{image}");
+        let assert_refused = |path: &Path, asked, named: &str| {
+            let refused = read(path, asked).unwrap_err().to_string();
+            assert!(refused.contains(named), "{refused}");
+        };
+        let image = "hall.pgm: not a world; give a mission (.toml), a ROS map (.yaml)";
+        assert_refused(&folder.path().join("hall.pgm"), ALL, image);
 
         let mission = folder.path().join("mission.toml");
         fs::write(&mission, "target = [2, 0]").unwrap();
         let ends = Some(Ends { start: DVec2::ZERO, heading: 0.0, target: DVec2::ONE });
-        let no_map = refused(&mission, Asked { ends, ..ALL });
-        assert!(no_map.contains("--start"), "{no_map}");
+        assert_refused(&mission, Asked { ends, ..ALL }, "--start");
 
         let twice = folder.path().join("twice");
         fs::create_dir(&twice).unwrap();
         fs::copy(&mission, twice.join("mission.toml")).unwrap();
         fs::remove_file(folder.path().join("hall.yaml")).unwrap();
-        let twice = refused(folder.path(), ALL);
-        assert!(twice.contains("two worlds have the name mission"), "{twice}");
+        assert_refused(folder.path(), ALL, "two worlds have the name mission");
     }
 }
