@@ -215,23 +215,11 @@ mod tests {
     use common::mission::Mission;
     use std::{fs, path::Path};
 
-    fn setting() -> Setting {
-        Setting { name: "a".to_owned(), planner: "harmonic".to_owned(), set: Vec::new() }
-    }
-
-    fn trial(optimal_time_s: Option<f64>) -> Trial {
+    fn judged(rules: Rules, summary: &Summary) -> Row {
         let mission = Mission::parse("target = [4, 0]", Path::new("test.toml")).unwrap();
-        Trial {
-            mission,
-            shortest_m: 4.0,
-            rules: Rules {
-                optimal_time_s,
-                scored: optimal_time_s.is_some(),
-                clock_after_departure: optimal_time_s.is_some(),
-                ..Rules::PLAIN
-            },
-            oncoming: None,
-        }
+        let trial = Trial { mission, shortest_m: 4.0, rules, oncoming: None };
+        let (name, planner) = ("a".to_owned(), "harmonic".to_owned());
+        Row::new(&trial, 1, &Setting { name, planner, set: Vec::new() }, summary)
     }
 
     fn summary(outcome: Reported, true_distance_m: f64) -> Summary {
@@ -245,8 +233,8 @@ mod tests {
         }
     }
 
-    fn row(trial: &Trial, outcome: Reported, true_distance_m: f64) -> Row {
-        Row::new(trial, 1, &setting(), &summary(outcome, true_distance_m))
+    fn arrived(rules: Rules) -> Row {
+        judged(rules, &summary(Reported::Reached, 0.1))
     }
 
     #[test]
@@ -259,7 +247,8 @@ mod tests {
             (Reported::Collision, 0.1, Outcome::Collision),
             (Reported::Timeout, 0.1, Outcome::Timeout),
         ] {
-            assert_eq!(row(&trial(None), said, distance).outcome, outcome, "{said:?} {distance}");
+            let row = judged(Rules::PLAIN, &summary(said, distance));
+            assert_eq!(row.outcome, outcome, "{said:?} {distance}");
         }
     }
 
@@ -267,36 +256,41 @@ mod tests {
     fn a_robot_at_rest_is_run_into_and_one_in_motion_is_at_fault() {
         let is_at_fault = |contact_speed_m_s| {
             let summary = Summary { contact_speed_m_s, ..summary(Reported::Collision, 3.0) };
-            Row::new(&trial(None), 1, &setting(), &summary).is_at_fault()
+            judged(Rules::PLAIN, &summary).is_at_fault()
         };
         assert_eq!([Some(0.0), Some(0.5), None].map(is_at_fault), [false, true, true]);
-        assert!(!row(&trial(None), Reported::Reached, 0.1).is_at_fault());
+        assert!(!arrived(Rules::PLAIN).is_at_fault());
     }
 
     #[test]
     fn metrics_are_those_of_their_definitions() {
-        let won = row(&trial(None), Reported::Reached, 0.1);
+        let won = arrived(Rules::PLAIN);
         assert_eq!((won.k, won.spl, won.barn_score), (1.25, 0.8, None));
-        let lost = row(&trial(None), Reported::Timeout, 3.0);
-        assert_eq!(lost.spl, 0.0);
+        assert_eq!(judged(Rules::PLAIN, &summary(Reported::Timeout, 3.0)).spl, 0.0);
     }
 
     #[test]
     fn rows_from_before_a_column_was_added_are_read() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let row = row(&trial(None), Reported::Reached, 0.1);
-        Table::open(file.path().to_path_buf()).unwrap().add(row.clone()).unwrap();
+        let open = || Table::<Row>::open(file.path().to_path_buf()).unwrap();
+        let row = arrived(Rules::PLAIN);
+        open().add(row.clone()).unwrap();
         let written = fs::read_to_string(file.path()).unwrap();
         let former = written.replacen(",p_o,f_ps_m2,f_vs_m_s2", "", 1).replacen(",,,", "", 1);
         assert_eq!(written.len() - former.len(), ",p_o,f_ps_m2,f_vs_m_s2,,,".len());
         fs::write(file.path(), former).unwrap();
-        assert_eq!(Table::<Row>::open(file.path().to_path_buf()).unwrap().rows, [row]);
+        assert_eq!(open().rows, [row]);
     }
 
     #[test]
     fn the_barn_clock_starts_with_the_motion_and_the_score_is_between_an_eighth_and_a_half() {
         for (optimal_s, score) in [(6.0, 0.25), (1.0, 0.125), (20.0, 0.5)] {
-            let row = row(&trial(Some(optimal_s)), Reported::Reached, 0.1);
+            let row = arrived(Rules {
+                optimal_time_s: Some(optimal_s),
+                scored: true,
+                clock_after_departure: true,
+                ..Rules::PLAIN
+            });
             assert_eq!((row.time_s, row.barn_score), (24.0, Some(score)), "{optimal_s} s");
         }
     }
@@ -304,16 +298,12 @@ mod tests {
     #[test]
     fn an_arrival_after_the_challenges_time_is_a_timeout_and_a_world_without_an_optimal_time_is_scored()
      {
-        let row = |most_s| {
-            let mut trial = trial(None);
-            trial.rules = Rules { most_s, scored: true, ..trial.rules };
-            row(&trial, Reported::Reached, 0.1)
+        let judged = |most_s| {
+            let row = arrived(Rules { most_s, scored: true, ..Rules::PLAIN });
+            (row.outcome, row.barn_score)
         };
-        let time_s = row(None).time_s;
-        assert_eq!(row(Some(time_s)).outcome, Outcome::Success);
-        // The shortest path of 4 m takes 2 s at 2 m/s.
-        assert!(row(None).barn_score >= Some(0.125));
-        assert_eq!(row(Some(time_s - 1.0)).outcome, Outcome::Timeout);
-        assert_eq!(row(Some(time_s - 1.0)).barn_score, Some(0.0));
+        // The shortest path of 4 m takes 2 s at 2 m/s, less than an eighth of the 30 s.
+        assert_eq!(judged(Some(30.0)), (Outcome::Success, Some(0.125)));
+        assert_eq!(judged(Some(29.0)), (Outcome::Timeout, Some(0.0)));
     }
 }
