@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_promise_is_broken_by_motion_a_touch_a_wrong_place_or_silence_about_the_reason() {
-        use RobotFault::{CountsReset, RangeSilent, Silence};
+        use RobotFault::{CountsReset, Silence};
         #[rustfmt::skip]
         let rows = [
             (entry(Silence), true),
@@ -156,8 +156,6 @@ mod tests {
             (Entry { rest_s: Some(9.9), ..entry(CountsReset) }, true),
             (Entry { collisions: 1, ..entry(CountsReset) }, false),
             (Entry { outcome: "wrong_place", ..entry(CountsReset) }, false),
-            (Entry { collisions: 1, ..entry(RangeSilent) }, false),
-            (Entry { fault_began: false, ..entry(RangeSilent) }, false),
         ];
         for (entry, kept) in rows {
             assert_eq!(entry.is_kept(), kept, "{entry:?}");
