@@ -174,11 +174,12 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_in_the_file_as_soon_as_they_are_added_and_are_read_as_they_were() {
+    fn rows_are_in_the_file_as_soon_as_they_are_added_and_are_not_written_over() {
         let folder = tempfile::tempdir().unwrap();
         let directory = folder.path().join("results");
+        let path = directory.join(FILE_NAME);
         let mut file = create(&directory).unwrap();
-        assert_eq!(read(&directory.join(FILE_NAME)), []);
+        assert_eq!(read(&path), []);
         let plain = Row {
             mission: 3,
             time_s: Some(1.25),
@@ -196,19 +197,12 @@ mod tests {
         for row in [&plain, &odd] {
             file.add(row.clone()).unwrap();
         }
-        assert_eq!(read(&directory.join(FILE_NAME)), [plain, odd]);
-        let text = fs::read_to_string(directory.join(FILE_NAME)).unwrap();
+        assert_eq!(read(&path), [plain, odd]);
+        let text = fs::read_to_string(&path).unwrap();
         let columns = "mission,time_s,stage,kind,generation,start_up,noticed_ms,";
         assert!(text.starts_with(columns), "{text}");
         assert!(text.contains("\n3,1.25,mapper,kill_at_start,4,true,,,\n"), "{text}");
-    }
-
-    #[test]
-    fn results_that_are_there_are_not_written_over() {
-        let folder = tempfile::tempdir().unwrap();
-        create(folder.path()).unwrap();
-        let refused = create(folder.path()).unwrap_err().to_string();
-        let named = folder.path().join(FILE_NAME);
-        assert!(refused.contains(named.to_str().unwrap()), "{refused}");
+        let refused = create(&directory).unwrap_err().to_string();
+        assert!(refused.contains(path.to_str().unwrap()), "{refused}");
     }
 }
