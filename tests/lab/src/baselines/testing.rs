@@ -24,13 +24,9 @@ pub fn drawn(rows: &[&str]) -> (GridHeader, Vec<u8>) {
     (header, letters.map(state).collect())
 }
 
-pub fn mission([x, y]: [f64; 2]) -> Mission {
-    let text = format!("target = [{x:?}, {y:?}]");
-    Mission::parse(&text, Path::new("test.toml")).unwrap()
-}
-
 pub fn sent(target: [f64; 2]) -> Baseline {
-    let mission = mission(target);
+    let text = format!("target = {target:?}");
+    let mission = Mission::parse(&text, Path::new("test.toml")).unwrap();
     let mut baseline = Baseline::new(&mission);
     baseline.target = Some(TargetSample::first(&mission));
     baseline
