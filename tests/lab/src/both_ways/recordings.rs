@@ -156,6 +156,7 @@ fn unequal(topic: &dyn AnyTopic, both: &[Vec<Vec<u8>>; 2], left_out: &[&str]) ->
 mod tests {
     use common::{
         bus::{encode_sample, encode_slice},
+        grid::GridFrame,
         samples::PoseSample,
     };
 
@@ -185,15 +186,11 @@ mod tests {
     #[test]
     fn a_cell_of_a_map_is_found_and_a_further_keyframe_is_no_difference() {
         let keyframe = |tick, cell| {
-            let part =
-                Part { cells: 1, width: 1, height: 1, keyframe: 1, version: 1, ..Part::default() };
+            let part = Part::whole(GridFrame { cells: 1, ..GridFrame::default() }, 1);
             let stamp = Stamp { tick, ..Stamp::default() };
+            let header = GridHeader { stamp, part, ..GridHeader::default() };
             let mut sample = Vec::new();
-            encode_slice(
-                &GridHeader { stamp, part, ..GridHeader::default() },
-                &[cell],
-                &mut sample,
-            );
+            encode_slice(&header, &[cell], &mut sample);
             sample
         };
         let one = maps(&[keyframe(0, 0_u8)], 1);
