@@ -67,8 +67,6 @@ mod tests {
         assert_eq!(
             beside(&axis, 0.5),
             [DVec2::new(0.0, 0.5), DVec2::new(0.5, 0.5), DVec2::new(0.5, 1.0)]
-                .map(|point: DVec2| point)
-                .to_vec()
         );
     }
 }
