@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_of_cylinders_gives_each_world_with_its_time() {
+    fn a_table_of_cylinders_gives_each_world_with_its_time_and_a_damaged_one_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("cylinders.csv");
         std::fs::write(&file, "world,x_m,y_m,radius_m\n7,0,5,0.075\n7,1,5,0.075\n9,0,6,0.1\n")
@@ -154,12 +154,6 @@ mod tests {
             })
             .collect();
         assert_eq!(found, [("barn-007", 2, Some(6.2)), ("barn-009", 1, None)]);
-    }
-
-    #[test]
-    fn a_damaged_table_is_refused_with_the_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("cylinders.csv");
         std::fs::write(&file, "world,x_m,y_m,radius_m\n7,left,5,0.075\n").unwrap();
         let refused = table(&file).unwrap_err().to_string();
         let named = file.to_str().unwrap();
