@@ -1,6 +1,9 @@
 //! Maps of real places, one cell per pixel.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::BufRead as _,
+    path::{Path, PathBuf},
+};
 
 use harmonic::{Cell, Domain};
 
@@ -33,10 +36,8 @@ fn pgm(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
     let mut numbers = Vec::new();
     let mut rest = bytes.strip_prefix(b"P5\n").expect("a binary PGM");
     while numbers.len() < 3 {
-        let end = rest.iter().position(|&byte| byte == b'\n');
-        let (line, after) = rest.split_at(end.expect("a header") + 1);
-        rest = after;
-        let line = std::str::from_utf8(line).expect("a header in ASCII");
+        let mut line = String::new();
+        assert_ne!(rest.read_line(&mut line).expect("a header in ASCII"), 0, "a header");
         if !line.starts_with('#') {
             let words = line.split_whitespace();
             numbers.extend(words.map(|word| word.parse::<usize>().expect("a number")));
