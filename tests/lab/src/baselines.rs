@@ -6,6 +6,4 @@
 pub mod belief;
 pub mod planner;
 pub mod process;
-#[cfg(test)]
-mod testing;
 pub mod wavefront;

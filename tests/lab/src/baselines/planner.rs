@@ -70,15 +70,3 @@ impl Baseline {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::baselines::testing::{pose, sent};
-
-    #[test]
-    fn without_a_map_the_robot_waits() {
-        let guidance = sent([0.3, 0.0]).guidance(&pose([0.0, 0.0]));
-        assert_eq!(guidance.status, u8::from(GuidanceStatus::Waiting));
-    }
-}

@@ -1,9 +1,12 @@
+use std::path::Path;
+
 use super::*;
-use crate::baselines::{
-    planner::Baseline,
-    testing::{drawn, pose, sent},
+use crate::baselines::{belief::Belief, planner::Baseline};
+use common::{
+    grid::{CellState, GridFrame, Part},
+    mission::Mission,
+    samples::{GridHeader, GuidanceSample, GuidanceStatus, PoseSample, TargetSample},
 };
-use common::samples::GuidanceStatus;
 
 const WALL: [&str; 9] = [
     ".........",
@@ -17,11 +20,33 @@ const WALL: [&str; 9] = [
     "....#....",
 ];
 
-fn planner(rows: &[&str]) -> Baseline {
-    let mut planner = sent([0.3, 0.0]);
-    let (header, cells) = drawn(rows);
-    assert!(planner.belief.follow(&header, &cells));
+/// Returns a planner to (0.3, 0.0) that knows a drawn map: `#` is hazard, the first row has the
+/// greatest y. Cells are 0.1 m wide, the middle one at (0, 0).
+fn planner(rows: &[&str; 9]) -> Baseline {
+    let mission = Mission::parse("target = [0.3, 0.0]", Path::new("test.toml")).unwrap();
+    let mut planner = Baseline::new(&mission);
+    planner.target = Some(TargetSample::first(&mission));
+    let frame = GridFrame { cells: 9, resolution_m: 0.1, centre: DVec2::ZERO };
+    let header = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
+    let letters = rows.iter().rev().flat_map(|row| row.bytes());
+    let cells = letters.map(|letter| match letter {
+        b'#' => CellState::Sensed as u8,
+        _ => CellState::Free as u8,
+    });
+    assert!(planner.belief.follow(&header, &cells.collect::<Vec<_>>()));
     planner
+}
+
+fn guidance(planner: &Baseline, [x_m, y_m]: [f64; 2]) -> GuidanceSample {
+    planner.guidance(&PoseSample { x_m, y_m, ..PoseSample::default() })
+}
+
+#[test]
+fn without_a_map_the_robot_waits() {
+    let mut planner = planner(&WALL);
+    planner.belief = Belief::default();
+    let status = guidance(&planner, [0.0, 0.0]).status;
+    assert_eq!(status, u8::from(GuidanceStatus::Waiting));
 }
 
 #[test]
@@ -30,7 +55,7 @@ fn the_way_leads_around_a_wall_and_cuts_no_corner() {
     let planner = planner(&WALL);
     let mut driven = 0.0;
     while at.distance(DVec2::new(0.3, 0.0)) > 0.03 {
-        let guidance = planner.guidance(&pose(at.into()));
+        let guidance = guidance(&planner, at.into());
         assert_eq!(guidance.status, u8::from(GuidanceStatus::Along), "at {at}, after {driven} m");
         at += 0.02 * DVec2::new(guidance.ex, guidance.ey);
         driven += 0.02;
@@ -48,14 +73,14 @@ fn a_target_behind_a_closed_wall_or_inside_hazard_is_unreachable() {
     let mut on_target = ["........."; 9];
     on_target[4] = ".......#.";
     for rows in [closed, on_target] {
-        let status = planner(&rows).guidance(&pose([-0.3, 0.0])).status;
+        let status = guidance(&planner(&rows), [-0.3, 0.0]).status;
         assert_eq!(status, u8::from(GuidanceStatus::Unreachable));
     }
 }
 
 #[test]
 fn a_robot_inside_hazard_leaves_by_the_nearest_free_cell() {
-    let guidance = planner(&WALL).guidance(&pose([0.02, 0.15]));
+    let guidance = guidance(&planner(&WALL), [0.02, 0.15]);
     assert_eq!(guidance.status, u8::from(GuidanceStatus::WayOut));
     assert!(guidance.ex.abs() > 0.8, "{guidance:?}");
     assert!(guidance.speed_limit_m_s < 0.1);
