@@ -249,12 +249,11 @@ mod tests {
 
     #[test]
     fn a_command_is_its_program_and_its_words_and_nothing_is_expanded() {
-        let given: Consumer =
-            "sh -c 'exit  1' \"d 'e\" f\\ g '' $HOME *.rs | `id`".parse().unwrap();
+        let command = "sh -c 'exit  1' \"d 'e\" f\\ g '' $HOME *.rs | `id`";
+        let given: Consumer = command.parse().unwrap();
         assert!(given.program.is_absolute() && given.program.ends_with("sh"));
         let words = ["-c", "exit  1", "d 'e", "f g", "", "$HOME", "*.rs", "|", "`id`"];
         assert_eq!(given.arguments, words);
-        let given: Consumer = "sh -c 'exit 1'".parse().unwrap();
-        assert_eq!(given.name, "sh -c 'exit 1'");
+        assert_eq!(given.name, command);
     }
 }
