@@ -166,13 +166,10 @@ mod tests {
         found.trials.iter().map(|trial| &*trial.mission.name).collect()
     }
 
-    /// Returns the map of a hall of 6 m by 3 m at (10, 20), its walls 10 cm thick.
+    /// Returns the map of a hall of 8 m by 3 m at (10.1, 20.1), its walls 1 m thick.
     fn hall() -> tempfile::TempDir {
-        let (wall, inside) = ("#".repeat(60), format!("#{}#", ".".repeat(58)));
-        let mut rows = [&*inside; 30];
-        rows[0] = &wall;
-        rows[29] = &wall;
-        drawn(&rows, "resolution: 0.1\norigin: [10, 20, 0]")
+        let rows = ["##########", "#........#", "#........#", "#........#", "##########"];
+        drawn(&rows, "resolution: 1\norigin: [9.1, 19.1, 0]")
     }
 
     #[test]
