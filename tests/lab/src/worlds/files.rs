@@ -161,6 +161,9 @@ mod tests {
     use crate::worlds::testing::drawn;
 
     const ALL: Asked = Asked { count: None, seed: 1, ends: None, swept_m: 0.24 };
+    const ENDS: Ends =
+        Ends { start: DVec2::new(11.0, 21.0), heading: 0.0, target: DVec2::new(15.0, 22.0) };
+    const WITH_ENDS: Asked = Asked { ends: Some(ENDS), ..ALL };
 
     fn names(found: &Found) -> Vec<&str> {
         found.trials.iter().map(|trial| &*trial.mission.name).collect()
@@ -190,10 +193,7 @@ mod tests {
         let drawn = read(folder.path(), ALL).unwrap();
         assert_eq!(drawn.trials.len(), DRAWN);
 
-        let ends =
-            Ends { start: DVec2::new(11.0, 21.0), heading: 0.0, target: DVec2::new(15.0, 22.0) };
-        let asked = Asked { ends: Some(ends), ..ALL };
-        let given = read(folder.path(), asked).unwrap();
+        let given = read(folder.path(), WITH_ENDS).unwrap();
         let mission = &given.trials[0].mission;
         assert_eq!(mission.target, DVec2::new(4.0, 1.0));
         let left_m = mission.world.clearance(DVec2::ZERO);
@@ -221,8 +221,7 @@ mod tests {
 
         let mission = folder.path().join("mission.toml");
         fs::write(&mission, "target = [2, 0]").unwrap();
-        let ends = Some(Ends { start: DVec2::ZERO, heading: 0.0, target: DVec2::ONE });
-        assert_refused(&mission, Asked { ends, ..ALL }, "--start");
+        assert_refused(&mission, WITH_ENDS, "--start");
 
         let twice = folder.path().join("twice");
         fs::create_dir(&twice).unwrap();
