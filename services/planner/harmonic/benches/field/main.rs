@@ -110,8 +110,8 @@ fn others_than(domain: &Domain) -> [Domain; 2] {
 fn full_row(name: &str, domain: &Domain) {
     let cells = domain.blocked().len();
     let mut solver = Solver::default();
-    let Measured { split, wavefront, field } = measured(&mut solver, domain, runs(cells).min(12));
-    let scratch = split.total;
+    let Measured { total: scratch, wavefront, field, .. } =
+        measured(&mut solver, domain, runs(cells).min(12));
     let target = fastest(runs(cells), || {
         solve_with(&mut solver, domain);
     });
