@@ -3,7 +3,7 @@
 use super::random::Random;
 use harmonic::{Cell, Domain};
 
-use super::{around, domain, screened};
+use super::{around, cells, domain, screened};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Kind {
@@ -95,17 +95,14 @@ impl Map {
         }
     }
 
-    /// Puts the target on the free cell nearest to `wanted`, or frees `wanted` if there is none.
+    /// Puts the target on the free cell nearest to `wanted`.
     pub(crate) fn aim(&mut self, wanted: (usize, usize)) {
-        let wanted = (wanted.0.min(self.width - 1), wanted.1.min(self.height - 1));
-        let nearest = (0..self.blocked.len()).filter(|&i| !self.blocked[i]).min_by_key(|&i| {
-            let (dc, dr) =
-                ((i % self.width).abs_diff(wanted.0), (i / self.width).abs_diff(wanted.1));
-            dc * dc + dr * dr
+        let cells = cells(self.width, self.height).zip(&self.blocked);
+        let free = cells.filter(|(_, blocked)| !**blocked).map(|(cell, _)| cell);
+        let nearest = free.min_by_key(|cell| {
+            cell.col.abs_diff(wanted.0).pow(2) + cell.row.abs_diff(wanted.1).pow(2)
         });
-        let index = nearest.unwrap_or(wanted.1 * self.width + wanted.0);
-        self.blocked[index] = false;
-        self.target = Cell::new(index % self.width, index / self.width);
+        self.target = nearest.expect("a free cell");
     }
 
     fn drums(&mut self, random: &mut Random) {
@@ -242,8 +239,8 @@ fn spanning_tree(wide: usize, high: usize, more: f64, random: &mut Random) -> Ve
     let mut path = vec![0];
     seen[0] = true;
     while let Some(&room) = path.last() {
-        let mut open: Vec<_> = around(wide, high, room).into_iter().flatten().collect();
-        open.retain(|&next| !seen[next]);
+        let beside = around(wide, high, room).into_iter().flatten();
+        let open: Vec<usize> = beside.filter(|&next| !seen[next]).collect();
         if open.is_empty() {
             path.pop();
         } else {
