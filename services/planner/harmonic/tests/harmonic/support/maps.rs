@@ -1,5 +1,7 @@
 //! Generated maps: typical places of a ground robot, and those that break solvers.
 
+use std::ops::Range;
+
 use super::random::Random;
 use harmonic::{Cell, Domain};
 
@@ -76,12 +78,7 @@ impl Map {
         screened(self.domain(), length)
     }
 
-    pub(crate) fn fill(
-        &mut self,
-        cols: std::ops::Range<usize>,
-        rows: std::ops::Range<usize>,
-        blocked: bool,
-    ) {
+    pub(crate) fn fill(&mut self, cols: Range<usize>, rows: Range<usize>, blocked: bool) {
         for row in rows.start..rows.end.min(self.height) {
             for col in cols.start..cols.end.min(self.width) {
                 self.blocked[row * self.width + col] = blocked;
@@ -139,17 +136,20 @@ impl Map {
             self.fill(i * wide..i * wide + wall, 0..self.height, true);
         }
         for (a, b) in spanning_tree(ROOMS, ROOMS, 0.2, random) {
-            if a.0 == b.0 {
-                let door = (wide / 8).max(2);
-                let at = a.0 * wide + wall + random.below(wide - wall - door);
-                let row = a.1.max(b.1) * high;
-                self.fill(at..at + door, row..row + wall, false);
-            } else {
-                let door = (high / 8).max(2);
-                let at = a.1 * high + wall + random.below(high - wall - door);
-                let col = a.0.max(b.0) * wide;
-                self.fill(col..col + wall, at..at + door, false);
-            }
+            let room = if a.0 == b.0 { wide } else { high };
+            let door = (room / 8).max(2);
+            let at = wall + random.below(room - wall - door);
+            self.open_door((a, b), (wide, high), wall, at..at + door);
+        }
+    }
+
+    /// Frees a part of the wall between two rooms, counted from a corner of the second.
+    fn open_door(&mut self, (a, b): Pair, room: (usize, usize), wall: usize, door: Range<usize>) {
+        let (col, row) = (a.0.max(b.0) * room.0, a.1.max(b.1) * room.1);
+        if a.0 == b.0 {
+            self.fill(col + door.start..col + door.end, row..row + wall, false);
+        } else {
+            self.fill(col..col + wall, row + door.start..row + door.end, false);
         }
     }
 
@@ -198,14 +198,9 @@ impl Map {
         let rooms =
             (0..wide * high).map(|room| ((room % wide, room / wide), (room % wide, room / wide)));
         self.carve(side, rooms);
-        for (a, b) in spanning_tree(wide, high, 0.5, random) {
+        for pair in spanning_tree(wide, high, 0.5, random) {
             let at = 1 + random.below(side - door + 1);
-            let (col, row) = (a.0.max(b.0) * pitch, a.1.max(b.1) * pitch);
-            if a.0 == b.0 {
-                self.fill(col + at..col + at + door, row..row + 1, false);
-            } else {
-                self.fill(col..col + 1, row + at..row + at + door, false);
-            }
+            self.open_door(pair, (pitch, pitch), 1, at..at + door);
         }
     }
 
