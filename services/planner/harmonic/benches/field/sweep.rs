@@ -11,44 +11,38 @@ const SIDE: usize = 512;
 /// Runs per solve; the fastest counts.
 const RUNS: usize = 3;
 
-fn kinds() -> Vec<(String, Kind, f64)> {
-    const NONE: f64 = f64::INFINITY;
-    let mut kinds = vec![(Kind::Empty, NONE), (Kind::Drums, NONE), (Kind::Office, NONE)];
+/// Returns the kinds of maps with their screening lengths.
+fn kinds() -> Vec<(Kind, f64)> {
+    let mut kinds = vec![Kind::Empty, Kind::Drums, Kind::Office];
     for corridor in [1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64] {
-        kinds.push((Kind::Serpentine { corridor }, NONE));
-        kinds.push((Kind::Spiral { corridor }, NONE));
-        kinds.push((Kind::Maze { corridor }, NONE));
+        kinds.push(Kind::Serpentine { corridor });
+        kinds.push(Kind::Spiral { corridor });
+        kinds.push(Kind::Maze { corridor });
     }
     for side in [7, 15, 31, 63] {
-        for door in [1, 2, 4, 8, 16].into_iter().filter(|&door| door <= side) {
-            kinds.push((Kind::Rooms { side, door }, NONE));
-        }
+        let doors = [1, 2, 4, 8, 16].into_iter().filter(|&door| door <= side);
+        kinds.extend(doors.map(|door| Kind::Rooms { side, door }));
     }
-    for density in [0.01, 0.03, 0.1, 0.2, 0.25, 0.3, 0.35, 0.38, 0.4, 0.45] {
-        kinds.push((Kind::Noise { density }, NONE));
-    }
+    let densities = [0.01, 0.03, 0.1, 0.2, 0.25, 0.3, 0.35, 0.38, 0.4, 0.45];
+    kinds.extend(densities.map(|density| Kind::Noise { density }));
+    let mut kinds: Vec<_> = kinds.into_iter().map(|kind| (kind, f64::INFINITY)).collect();
     // These lengths lower u across a hall by 1e-3 to 1e-2000.
     for length in [70.0, 20.0, 7.0, 3.0, 1.0, 0.5, 0.1] {
         kinds.extend([Kind::Empty, Kind::Drums, Kind::Office].map(|kind| (kind, length)));
     }
-    let named = |(kind, length): (Kind, f64)| {
-        let mut name = format!("{kind:?}").replace(" { ", " ").replace(" }", "");
-        if length < NONE {
-            name += &format!(" L {length}");
-        }
-        (name, kind, length)
-    };
-    kinds.into_iter().map(named).collect()
+    kinds
 }
 
 /// Prints times of each map and of a wavefront measured in turn, worst ratio first.
 pub(crate) fn table(real: &[(String, Domain)]) {
-    let mut rows: Vec<_> = kinds()
-        .into_iter()
-        .map(|(name, kind, length)| {
-            row(&name, &Map::generate(kind, SIDE, SIDE, 1).screened(length))
-        })
-        .collect();
+    let generated = |(kind, length): (Kind, f64)| {
+        let mut name = format!("{kind:?}").replace(" { ", " ").replace(" }", "");
+        if length.is_finite() {
+            name += &format!(" L {length}");
+        }
+        row(&name, &Map::generate(kind, SIDE, SIDE, 1).screened(length))
+    };
+    let mut rows: Vec<_> = kinds().into_iter().map(generated).collect();
     rows.extend(real.iter().map(|(name, domain)| row(name, domain)));
     rows.sort_by(|a, b| b.0.total_cmp(&a.0));
     println!(
