@@ -226,7 +226,6 @@ mod tests {
         let twice = folder.path().join("twice");
         fs::create_dir(&twice).unwrap();
         fs::copy(&mission, twice.join("mission.toml")).unwrap();
-        fs::remove_file(folder.path().join("hall.yaml")).unwrap();
         assert_refused(folder.path(), ALL, "two worlds have the name mission");
     }
 }
