@@ -24,15 +24,14 @@ pub(crate) fn load_all(directory: String) -> Vec<(String, Domain)> {
 /// Loads a map; the target is the free cell nearest to the middle.
 fn load(file: &Path) -> Domain {
     let bytes = std::fs::read(file).expect("a map");
-    let (width, height, blocked) = pgm(&bytes);
-    let mut map = Map { width, height, blocked, target: Cell::new(0, 0) };
+    let mut map = pgm(&bytes);
     map.block_rim();
-    map.aim((width / 2, height / 2));
+    map.aim((map.width / 2, map.height / 2));
     map.domain()
 }
 
 /// Reads a binary 8-bit PGM with comments on separate lines.
-fn pgm(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
+fn pgm(bytes: &[u8]) -> Map {
     let mut numbers = Vec::new();
     let mut rest = bytes.strip_prefix(b"P5\n").expect("a binary PGM");
     while numbers.len() < 3 {
@@ -44,6 +43,7 @@ fn pgm(bytes: &[u8]) -> (usize, usize, Vec<bool>) {
         }
     }
     assert_eq!(numbers[2], 255, "8 bits");
-    let pixels = &rest[..numbers[0] * numbers[1]];
-    (numbers[0], numbers[1], pixels.iter().map(|&grey| grey < FREE_FROM).collect())
+    let (width, height) = (numbers[0], numbers[1]);
+    let blocked = rest[..width * height].iter().map(|&grey| grey < FREE_FROM).collect();
+    Map { width, height, blocked, target: Cell::new(0, 0) }
 }
