@@ -298,11 +298,14 @@ mod tests {
 
     use super::*;
 
+    fn mission() -> Mission {
+        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.rate_hz = 10\nrobot.protocol = 'ros2'\nrobot.address = 'ros2:7'\nrobot.ros2.hazards = '/hazards'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nfield_of_view_deg = 180\nbeams = 3\nreach_m = 4.0";
+        Mission::parse(text, Path::new("m.toml")).unwrap()
+    }
+
     #[test]
     fn reports_that_come_together_were_made_one_after_the_other() {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.rate_hz = 10";
-        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
-        let mut program = Program::new(&mission, 1.0);
+        let mut program = Program::new(&mission(), 1.0);
         let report = Report { wheels: Some([0.0; 2]), ..Report::default() };
         let mut taken_ms =
             |came_ms: u64| program.taken_ns(&report, came_ms * 1_000_000) / 1_000_000;
@@ -315,8 +318,7 @@ mod tests {
 
     #[test]
     fn what_a_simulated_robot_says_in_json_is_heard_over_ros_2_and_a_command_turns_its_wheels() {
-        let text = "target = [3, 0]\nrobot.model = 'kobuki'\nrobot.protocol = 'ros2'\nrobot.address = 'ros2:7'\nrobot.ros2.hazards = '/hazards'\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nforward_m = 0\nbearing_deg = 0\nfield_of_view_deg = 180\nbeams = 3\nreach_m = 4.0";
-        let mission = Mission::parse(text, Path::new("m.toml")).unwrap();
+        let mission = mission();
         let (mut program, mut driver) = (Program::new(&mission, 1.0), Ros2::new(&mission));
         let topics = Topics::of(&mission).heard;
         let mut say = |report: &Report, now_ns| {
