@@ -33,12 +33,6 @@ const fn now() -> Moment {
     ago(0)
 }
 
-fn command(ns_ago: [u64; 3]) -> CommandSample {
-    let [stamp_ns, pose_ns, guidance_ns] = ns_ago.map(|ns| ago(ns).machine_ns);
-    let stamp = Stamp { stamp_ns, ..Stamp::default() };
-    CommandSample { stamp, pose_ns, guidance_ns, ..CommandSample::default() }
-}
-
 const fn boards(volts: f64) -> Observation<'static> {
     Batteries([volts, 0.0, 0.0])
 }
@@ -57,7 +51,10 @@ impl Failsafe {
     }
 
     fn takes_command(&mut self, ns_ago: [u64; 3]) {
-        self.sees(Command(&command(ns_ago)), 0);
+        let [stamp_ns, pose_ns, guidance_ns] = ns_ago.map(|ns| ago(ns).machine_ns);
+        let stamp = Stamp { stamp_ns, ..Stamp::default() };
+        let command = CommandSample { stamp, pose_ns, guidance_ns, ..CommandSample::default() };
+        self.sees(Command(&command), 0);
     }
 
     fn loses_the_robot(&mut self) {
@@ -148,9 +145,7 @@ const CASES: &[(Break, Cause)] = &[
     (|it| it.is_held(HoldReason::Operator), Cause::OperatorStop),
     (|it| it.is_held(HoldReason::StageHeld), Cause::StageHeld),
     (|it| it.monitors.orders = Monitor::new(&front_only()), Cause::NotOrdered),
-    (|it| it.is_held(HoldReason::Starting), Cause::NotOrdered),
     (|it| it.is_held(HoldReason::None), Cause::NotOrdered),
-    (|it| it.is_held(HoldReason::Ending), Cause::NotOrdered),
     (
         |it| it.observe(&DRIVE, ago(orders::SUPERVISOR_SILENT.as_nanos() as u64 + 1)),
         Cause::SupervisorSilent,
