@@ -19,13 +19,14 @@ fn does_not_stop(monitor: &StopMonitor) -> Condition {
 }
 
 #[test]
-fn a_robot_obeys_that_comes_to_rest_in_half_a_second_and_one_that_rolls_on_does_when_it_rests() {
+fn a_robot_obeys_that_comes_to_rest_in_half_a_second_and_one_that_rolls_on_when_it_has_rested_so_long()
+ {
     for (rolls_for_s, disobeys, rest) in
         [(0.5, false, Rest::AtRest), (3.0, true, Rest::AtRest), (9.0, true, Rest::Moving)]
     {
         let mut monitor = stop_monitor();
         let clears = rule(Cause::RobotDoesNotStop).unwrap().clears;
-        let (mut rolled, mut first, mut applies) = (0.0, None, false);
+        let (mut rolled, mut first, mut last, mut applies) = (0.0, None, None, false);
         monitor.commanded([900, 900], MissionTime::default());
         for tick in 0..42 {
             let since_s = f64::from(tick) * PERIOD - 1.0;
@@ -38,11 +39,13 @@ fn a_robot_obeys_that_comes_to_rest_in_half_a_second_and_one_that_rolls_on_does_
             applies = clears.applies(applies, does_not_stop(&monitor));
             if applies {
                 first.get_or_insert(since_s);
+                last = Some(since_s);
             }
         }
         assert_eq!((first.is_some(), monitor.rest(at(41))), (disobeys, rest), "{rolls_for_s}");
         assert_eq!(applies, rest == Rest::Moving, "{rolls_for_s}");
         assert!(first.is_none_or(|first_s| first_s < 1.5), "{first:?}");
+        assert!(last.is_none_or(|last_s| last_s > 3.2), "{last:?}");
     }
 }
 
