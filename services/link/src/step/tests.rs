@@ -3,11 +3,7 @@ use super::*;
 use std::f64::consts::TAU;
 
 use common::{
-    clock::{MissionTime, Pace},
-    samples::{
-        Action, Cause, CommandSample, CommandState, HoldReason, Order, RangeReading, RangeStatus,
-        Stamp, WheelSample,
-    },
+    samples::{RangeReading, RangeStatus, Stamp},
     wire::{
         Addressing, COUNT_CYCLE, Command, CustomSensors, Decoder, Mode, MotorSensors, Parameter,
         Report, StandardSensors, SystemSignal,
