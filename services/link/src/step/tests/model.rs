@@ -113,33 +113,23 @@ fn started(now_ns: u64, next_tick: u64) -> Link {
     link
 }
 
-/// Copies a link. Whole datagrams leave nothing in a driver that a stop depends on.
-fn copy(link: &Link) -> Link {
-    Link {
-        state: link.state,
-        base: Box::new(X80::new(&MISSION)),
-        drivers: Vec::new(),
-        effects: Vec::new(),
-        sensors: link.sensors.clone(),
-        speeds: link.speeds.clone(),
-        failsafe: link.failsafe.clone(),
-        restart: link.restart.clone(),
-        trim: link.trim.clone(),
-        open: link.open.clone(),
-        polls: link.polls,
-        clock_rate: link.clock_rate,
-        ..*link
-    }
-}
-
 impl Clone for World {
     fn clone(&self) -> Self {
-        Self {
-            link: copy(&self.link),
-            supervisor: self.supervisor.clone(),
-            history: self.history.clone(),
-            ..*self
-        }
+        let link = &self.link;
+        // Whole datagrams leave nothing in a driver that a stop depends on.
+        let link = Link {
+            base: Box::new(X80::new(&MISSION)),
+            drivers: Vec::new(),
+            effects: Vec::new(),
+            sensors: link.sensors.clone(),
+            speeds: link.speeds.clone(),
+            failsafe: link.failsafe.clone(),
+            restart: link.restart.clone(),
+            trim: link.trim.clone(),
+            open: link.open.clone(),
+            ..*link
+        };
+        Self { link, supervisor: self.supervisor.clone(), history: self.history.clone(), ..*self }
     }
 }
 
