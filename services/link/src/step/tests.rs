@@ -3,7 +3,7 @@ use super::*;
 use std::f64::consts::TAU;
 
 use common::{
-    samples::{RangeReading, RangeStatus, Stamp},
+    samples::{RangeReading, Stamp},
     wire::{
         Addressing, COUNT_CYCLE, Command, CustomSensors, Decoder, Mode, MotorSensors, Parameter,
         Report, StandardSensors, SystemSignal,
@@ -296,15 +296,6 @@ fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
         matches!(effect, Effect::Infrared(_) | Effect::Power(_) | Effect::Surroundings(_))
     };
     assert_eq!((effects.iter().filter(told).count(), ticks(&effects).len()), (3, 0), "{effects:?}");
-}
-
-#[test]
-fn a_tick_has_the_readings_that_came_with_it_and_forward_counts() {
-    // Channel 0 counts down driving forward: 32768 - 100 is 100 counts forward.
-    let effects = driving(on_the_wall()).hears(&datagram(80, [32_668, 250]), 10);
-    let (tick, ranges, wheels) = &ticks(&effects)[0];
-    assert_eq!((*tick, wheels.left_counts, wheels.right_counts), (0, 100, 250));
-    assert_eq!((ranges[0].range_m, ranges[0].status()), (0.8, RangeStatus::Measured));
 }
 
 #[test]
