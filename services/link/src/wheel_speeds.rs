@@ -120,6 +120,8 @@ mod tests {
             let told = speeds.of(&turning(0.8 * top, top), 1.25, &WheelSample::default());
             let [left, right] = told.map(f64::from);
             assert!((left / right - ratio).abs() < 0.01, "{protocol}: {left} {right}");
+            let no_number = speeds.of(&turning(f64::NAN, 0.0), 1.0, &WheelSample::default());
+            assert_eq!(no_number, [0; 2], "{protocol}");
         }
     }
 

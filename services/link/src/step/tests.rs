@@ -262,10 +262,13 @@ fn a_robot_that_restarted_its_counts_is_noticed_and_set_up_again() {
 }
 
 #[test]
-fn a_command_is_sent_again_once_halfway_to_the_next_tick_with_what_remains_of_its_time() {
+fn a_command_is_sent_in_counts_and_again_once_halfway_to_the_next_tick_with_what_remains_of_its_time()
+ {
     let mut link = ticking();
-    let sent = |limit_ms: u16| [([Some(-1200), Some(1200)], Some(limit_ms))];
-    assert_eq!(timed(&link.told(0, 10, [TURN; 2])), sent(250));
+    let sent = |limit_ms: u16| [([Some(-1200), Some(600)], Some(limit_ms))];
+    let effects = link.told(0, 10, [TURN, TURN / 2.0]);
+    assert_eq!(timed(&effects), sent(250));
+    assert!(effects.contains(&Effect::Answered { began_ns: 10 * MS }));
     // Repeated half of 142.9 ms after the tick.
     assert_eq!(timed(&link.quiet(81)), []);
     assert_eq!(timed(&link.quiet(90)), sent(170));
@@ -322,16 +325,6 @@ fn a_command_that_is_older_than_the_newest_or_from_the_future_moves_nothing() {
     link.told(1, 150, [1.0; 2]);
     let old = Event::Command(command(0, 10 * MS, [-1.0; 2]));
     assert_eq!(link.at(old, 152 * MS), []);
-}
-
-#[test]
-fn a_command_reaches_the_wheels_signed_and_in_counts_and_no_number_moves_no_wheel() {
-    // The top speed of 1 m/s is 2247 counts/s.
-    for (speeds, counts) in [([TURN, -0.5 * TURN], [-1200, -600]), ([f64::NAN, 1e300], [0, 2247])] {
-        let effects = ticking().told(0, 10, speeds);
-        assert_eq!(velocities(&effects), [counts.map(Some)], "{speeds:?}");
-        assert!(effects.contains(&Effect::Answered { began_ns: 10 * MS }));
-    }
 }
 
 #[test]
