@@ -192,7 +192,7 @@ fn ticks(effects: &[Effect]) -> Vec<(u64, Vec<RangeReading>, WheelSample)> {
 }
 
 #[test]
-fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
+fn a_link_pings_until_the_robot_answers_sets_it_up_and_tells_it_to_stand_until_a_command_comes() {
     let mut link = on_the_wall();
     // A silent robot may still receive.
     for (ms, count) in [(0, 1 + STOPS as usize), (100, 0), (200, 2)] {
@@ -202,7 +202,12 @@ fn a_link_pings_until_the_robot_answers_and_then_sets_it_up() {
     let effects = link.still(201);
     assert!(effects.contains(&FOUND));
     assert_eq!(sent(&effects).len(), 9 + STOPS as usize, "{effects:?}");
-    assert!(!sent(&link.quiet(400)).contains(&PING));
+    // The previous link was killed, and the robot ignores its last command's limit.
+    assert_eq!(velocities(&effects), [STAND; STOPS as usize]);
+    assert!(velocities(&link.drive(202)).is_empty());
+    let effects = link.quiet(402);
+    assert!(!sent(&effects).contains(&PING));
+    assert_eq!(velocities(&effects), [STAND]);
 }
 
 #[test]
@@ -299,15 +304,6 @@ fn what_a_frame_carries_besides_the_tick_is_told_even_while_nothing_drives() {
         matches!(effect, Effect::Infrared(_) | Effect::Power(_) | Effect::Surroundings(_))
     };
     assert_eq!((effects.iter().filter(told).count(), ticks(&effects).len()), (3, 0), "{effects:?}");
-}
-
-#[test]
-fn a_robot_found_driving_is_told_to_stand_until_a_command_comes() {
-    // The previous link was killed, and the robot ignores its last command's limit.
-    let mut link = on_the_wall();
-    assert_eq!(velocities(&link.still(0)), [STAND; STOPS as usize]);
-    assert!(velocities(&link.drive(1)).is_empty());
-    assert_eq!(velocities(&link.quiet(201)), [STAND]);
 }
 
 #[test]
