@@ -276,22 +276,16 @@ fn a_cause_applies_no_longer_when_its_row_says_so() {
 }
 
 #[test]
-fn an_operators_resume_clears_what_its_row_says_an_end_stays_and_a_held_robot_is_not_given_up() {
+fn an_operators_resume_clears_at_once_what_its_row_says_and_an_end_stays() {
     let mut failsafe = broken(|it| it.jumps(9000));
     assert_eq!(failsafe.cause(), Cause::OdometryImplausible);
     failsafe.sees(Resumed, 0);
     assert!(!failsafe.applied(Cause::OdometryImplausible));
-    assert_eq!(failsafe.decides(), Decision::GO);
     let mut failsafe = broken(|it| it.jumps(10_000));
     for _ in 0..2 {
         assert_eq!(failsafe.cause(), Cause::OdometryGivenUp);
         failsafe.sees(Resumed, 0);
     }
-    let mut held = broken(|it| {
-        it.is_held(HoldReason::StageHeld);
-        it.jumps(10_000);
-    });
-    assert_eq!(held.decides().action, Action::Stop, "no stage waits for it");
 }
 
 #[test]
