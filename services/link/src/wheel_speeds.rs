@@ -83,22 +83,15 @@ mod tests {
     use super::*;
     use crate::testing::*;
 
-    /// Returns a car's speeds if its steering encoder reads `counts`, at 7 Hz with 3600 counts per
-    /// turn.
-    fn counts(left_rad_s: f64, angle: f64, share: f64, counts: u16) -> [i16; 2] {
-        let speeds = WheelSpeeds::new(&mission("robot.model = 'car'"));
-        let wheels = WheelSample { right_counts: counts, ..WheelSample::default() };
-        speeds.of(&turning(left_rad_s, angle), share, &wheels)
-    }
-
     #[test]
     fn a_cars_steering_is_driven_towards_its_angle_within_its_limits_and_a_slowed_car_keeps_its_curve()
      {
-        // 5 degrees are 50 counts; a tick turns 0.6 of the remaining angle. The rate limit is 1200
-        // counts/s; 30 degrees are 300 counts.
+        // At 7 Hz with 3600 counts per turn, 5 degrees are 50 counts; a tick turns 0.6 of the
+        // remaining angle. The rate limit is 1200 counts/s; 30 degrees are 300 counts.
+        let speeds = WheelSpeeds::new(&mission("robot.model = 'car'"));
         let five = 5_f64.to_radians();
         let tau = std::f64::consts::TAU;
-        for (left_rad_s, angle, share, at, expected) in [
+        for (left_rad_s, angle, share, right_counts, expected) in [
             (0.0, five, 1.0, 0, [0, 210]),
             (0.0, five, 1.0, 50, [0, 0]),
             (0.0, -five, 1.0, COUNT_CYCLE - 25, [0, -105]),
@@ -108,7 +101,9 @@ mod tests {
             (tau, five, 1.0, 0, [600, 210]),
             (tau, five, 0.5, 0, [300, 210]),
         ] {
-            assert_eq!(counts(left_rad_s, angle, share, at), expected, "{angle} {at}");
+            let wheels = WheelSample { right_counts, ..WheelSample::default() };
+            let told = speeds.of(&turning(left_rad_s, angle), share, &wheels);
+            assert_eq!(told, expected, "{angle} {right_counts}");
         }
     }
 

@@ -113,33 +113,30 @@ mod tests {
     use super::*;
     use crate::testing::*;
 
-    /// Returns whether a robot may be late that was found at 10 s after commands every 70 ms,
-    /// acknowledged after `delay_ms`. Then nothing is sent for `quiet_ms`.
-    fn may_be_late(delay_ms: u64, quiet_ms: u64) -> bool {
-        let mut monitor = LatencyMonitor::new(&mission(""));
-        // At half the pace of the clock.
-        let mut take = |what: Observation<'_>, ms: u64| {
-            let machine_ns = 2 * (10_000 + ms) * MS;
-            monitor.observe(&what, Moment { machine_ns, ..Moment::default() });
-        };
-        take(Observation::Pace(Pace::Rate(0.5)), 0);
-        take(Observation::Sent, 0);
-        take(Observation::Found { again: true }, 0);
-        for now in (0..=quiet_ms).step_by(70) {
-            if now <= delay_ms {
-                take(Observation::Acknowledged, now);
-            }
-            take(Observation::Time, now);
-        }
-        monitor.condition(Cause::RobotLate, Moment::default()) == Condition::Holds
-    }
-
     #[test]
     fn a_robot_may_go_after_the_window_if_its_acknowledgements_come_in_time() {
+        // Found at 10 s after commands every 70 ms, acknowledged after `delay_ms`. Then nothing is
+        // sent for `quiet_ms`.
         for (delay_ms, quiet_ms, is_late) in
             [(20, 300, true), (20, 700, false), (200, 700, false), (2000, 700, true)]
         {
-            assert_eq!(may_be_late(delay_ms, quiet_ms), is_late, "{delay_ms} {quiet_ms}");
+            let mut monitor = LatencyMonitor::new(&mission(""));
+            // At half the pace of the clock.
+            let mut take = |what: Observation<'_>, ms: u64| {
+                let machine_ns = 2 * (10_000 + ms) * MS;
+                monitor.observe(&what, Moment { machine_ns, ..Moment::default() });
+            };
+            take(Observation::Pace(Pace::Rate(0.5)), 0);
+            take(Observation::Sent, 0);
+            take(Observation::Found { again: true }, 0);
+            for now in (0..=quiet_ms).step_by(70) {
+                if now <= delay_ms {
+                    take(Observation::Acknowledged, now);
+                }
+                take(Observation::Time, now);
+            }
+            let is = monitor.condition(Cause::RobotLate, Moment::default());
+            assert_eq!(is == Condition::Holds, is_late, "{delay_ms} {quiet_ms}");
         }
     }
 }
