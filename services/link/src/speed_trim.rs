@@ -99,8 +99,6 @@ mod tests {
     use super::*;
     use crate::testing::*;
 
-    const PERIOD_S: f64 = 1.0 / 7.0;
-
     fn found(reached: f64, ticks: usize, command: impl Fn(usize) -> [f64; 2]) -> f64 {
         let mut trim = SpeedTrim::new(&mission(""));
         let mut rolled = [0.0; 2];

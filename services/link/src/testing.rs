@@ -10,6 +10,8 @@ use common::{
 };
 
 pub(crate) const MS: u64 = 1_000_000;
+/// Frame period of an X80, seconds.
+pub(crate) const PERIOD_S: f64 = 1.0 / 7.0;
 
 /// Returns a mission with a target and these lines.
 pub(crate) fn mission(text: &str) -> Mission {

@@ -220,8 +220,6 @@ mod tests {
     use super::*;
     use crate::testing::*;
 
-    const PERIOD_S: f64 = 1.0 / 7.0;
-
     /// Returns the shares after `ticks` of wheels that turn as `rolls(tick, told)`, counts per tick.
     fn shares(
         mut shares: WheelShares,

@@ -2,8 +2,6 @@ use super::*;
 use crate::testing::*;
 use common::{samples::ContactSample, wire::COUNT_CYCLE};
 
-/// Frame period at 7 Hz, seconds.
-const PERIOD: f64 = 1.0 / 7.0;
 /// One wheel turn per second, 0.53 m/s.
 const TURN: i16 = 1200;
 
@@ -73,7 +71,7 @@ fn drive(
 ) -> Suspected {
     let mut robot = (odometry(), Wheels::default());
     (0..ticks).filter(|tick| !out(*tick)).find_map(|tick| {
-        let time = f64::from(tick) * PERIOD;
+        let time = f64::from(tick) * PERIOD_S;
         turn(&mut robot, time, |counts| says(tick, counts), tells(tick))
     })
 }
@@ -218,7 +216,7 @@ fn three_jumps_within_two_seconds_are_suspected_until_two_seconds_without_twice_
     for start in [0.0, 10.0, 20.0] {
         for jump in 0..3 {
             assert_eq!(suspicion(&odometry), None);
-            odometry.implausible(at(start + PERIOD * f64::from(jump)));
+            odometry.implausible(at(start + PERIOD_S * f64::from(jump)));
         }
         assert_eq!(suspicion(&odometry), Some(Suspicion::Jumps));
         odometry.plausible([5, 5], at(start + 2.2));
@@ -243,7 +241,7 @@ fn held(
     let mut odometry = odometry();
     let (mut contacts, mut stood, mut rolled) = (Vec::new(), 1, [0.0; 2]);
     for tick in 0..40 {
-        let time = f64::from(tick) * PERIOD;
+        let time = f64::from(tick) * PERIOD_S;
         odometry.contacts.take_currents(held.map(|held| current(held, stood)));
         odometry.plausible(rolled.map(on_wire), at(time));
         contacts.extend(odometry.contacts.new.take().map(|contact| (time, contact)));
@@ -256,7 +254,7 @@ fn held(
         let told = if stands { [0, 0] } else { tells };
         odometry.commanded(told, at(time));
         for wheel in 0..2 {
-            rolled[wheel] += if held[wheel] { 0.0 } else { f64::from(told[wheel]) * PERIOD };
+            rolled[wheel] += if held[wheel] { 0.0 } else { f64::from(told[wheel]) * PERIOD_S };
         }
     }
     (contacts, None)
@@ -286,7 +284,7 @@ fn a_current_that_repeats_is_beyond_the_range_low_or_high_on_rolling_wheels_is_n
         robot.0.contacts.take_currents([HELD_AD; 2]);
         // The encoders die after 5 s.
         let says = |counts: [u16; 2]| if tick <= 35 { counts } else { [0; 2] };
-        let time = f64::from(tick) * PERIOD;
+        let time = f64::from(tick) * PERIOD_S;
         let suspected = turn(&mut robot, time, says, [TURN; 2]);
         assert!(robot.0.contacts.new.is_none());
         suspected
@@ -319,7 +317,7 @@ fn a_robot_that_another_host_turns_or_speeds_is_suspected_and_the_words_name_tha
         let mut robot = (odometry(), Wheels::default());
         let mut told_s = 0.0;
         let suspected = (0..140).find_map(|tick| {
-            let time = f64::from(tick) * PERIOD;
+            let time = f64::from(tick) * PERIOD_S;
             while told_s < time {
                 robot.1.roll_to(told_s);
                 robot.1.told.push((told_s, other));

@@ -1,9 +1,6 @@
 use super::*;
 use crate::failsafe::rule;
-use crate::testing::mission;
-
-/// Frame period at 7 Hz, seconds.
-const PERIOD: f64 = 1.0 / 7.0;
+use crate::testing::{PERIOD_S, mission};
 
 fn stop_monitor() -> StopMonitor {
     StopMonitor::new(&mission(""))
@@ -11,7 +8,7 @@ fn stop_monitor() -> StopMonitor {
 
 /// Time of a frame.
 fn at(frame: impl Into<f64>) -> MissionTime {
-    MissionTime::from_seconds(PERIOD * frame.into())
+    MissionTime::from_seconds(PERIOD_S * frame.into())
 }
 
 fn does_not_stop(monitor: &StopMonitor) -> Condition {
@@ -29,9 +26,9 @@ fn a_robot_obeys_that_comes_to_rest_in_half_a_second_and_one_that_rolls_on_when_
         let (mut rolled, mut first, mut last, mut applies) = (0.0, None, None, false);
         monitor.commanded([900, 900], MissionTime::default());
         for tick in 0..42 {
-            let since_s = f64::from(tick) * PERIOD - 1.0;
+            let since_s = f64::from(tick) * PERIOD_S - 1.0;
             let speed = if since_s <= 0.0 { 700.0 } else { 560.0 };
-            rolled += PERIOD * if since_s < rolls_for_s { speed } else { 0.0 };
+            rolled += PERIOD_S * if since_s < rolls_for_s { speed } else { 0.0 };
             monitor.heard([rolled as u16; 2], at(tick));
             if since_s >= 0.0 {
                 monitor.commanded([0, 0], at(tick));
@@ -57,7 +54,7 @@ fn a_robot_that_does_not_stop_is_not_taken_for_a_base_that_brakes_slowly_before_
     monitor.commanded([900, 900], MissionTime::default());
     let mut after = |speed: f64, ticks: std::ops::Range<u32>, monitor: &mut StopMonitor| {
         for tick in ticks {
-            rolled += PERIOD * speed;
+            rolled += PERIOD_S * speed;
             monitor.heard([rolled as u16; 2], at(tick));
             monitor.commanded([0, 0], at(tick));
         }
@@ -75,7 +72,7 @@ fn a_robot_that_does_not_stop_is_not_taken_for_a_base_that_brakes_slowly_before_
 fn a_robot_that_is_stopped_before_it_obeys_a_command_to_drive_is_not_at_rest_until_that_would_show()
 {
     // Also with a loaded machine's frames.
-    for period in [PERIOD, 0.25] {
+    for period in [PERIOD_S, 0.25] {
         let mut stop_monitor = stop_monitor();
         let time = |frame: i32| MissionTime::from_seconds(1.0 + f64::from(frame) * period);
         for frame in -4..=0 {
