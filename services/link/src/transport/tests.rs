@@ -29,18 +29,28 @@ fn ready(descriptor: impl AsFd) {
     assert!(poll::is_readable(descriptor, Duration::from_secs(10)).unwrap(), "nothing came");
 }
 
-fn maintain_until(transport: &mut Transport, open: bool, now_ns: u64) {
-    while transport.maintain(now_ns).unwrap() != Some(open) {
-        ready(transport.descriptor().unwrap());
+impl Transport {
+    fn wait(&self) {
+        ready(self.descriptor().unwrap());
+    }
+
+    fn changes_at(&mut self, ms: u64) -> Option<bool> {
+        self.maintain(ms * MS).unwrap()
     }
 }
 
-fn expect(transport: &mut Transport, wanted: &[u8], now_ns: u64) {
+fn maintain_until(transport: &mut Transport, open: bool, now_ms: u64) {
+    while transport.changes_at(now_ms) != Some(open) {
+        transport.wait();
+    }
+}
+
+fn expect(transport: &mut Transport, wanted: &[u8], now_ms: u64) {
     let mut came = Vec::new();
     while came.len() < wanted.len() {
-        match transport.receive(now_ns).unwrap() {
+        match transport.receive(now_ms * MS).unwrap() {
             Some(bytes) => came.extend_from_slice(bytes),
-            None => ready(transport.descriptor().unwrap()),
+            None => transport.wait(),
         }
     }
     assert_eq!(came, wanted);
@@ -50,12 +60,12 @@ fn trouble(transport: &Transport) -> String {
     transport.trouble().unwrap().to_string()
 }
 
-fn expect_closing(transport: &mut Transport, now_ns: u64) {
+fn expect_closing(transport: &mut Transport, now_ms: u64) {
     while transport.is_open() {
-        ready(transport.descriptor().unwrap());
-        assert_eq!(transport.receive(now_ns).unwrap(), None);
+        transport.wait();
+        assert_eq!(transport.receive(now_ms * MS).unwrap(), None);
     }
-    assert_eq!(transport.maintain(now_ns).unwrap(), Some(false));
+    assert_eq!(transport.changes_at(now_ms), Some(false));
 }
 
 #[test]
@@ -65,7 +75,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     transport.send(b"where?").unwrap();
     let (_, link) = robot.recv_from(&mut [0; 16]).unwrap();
     other.send_to(b"go left", link).unwrap();
-    ready(transport.descriptor().unwrap());
+    transport.wait();
     assert_eq!(transport.receive(0).unwrap(), None);
     assert_eq!(transport.tally().foreign_datagrams, 1);
     // It may be the robot, if the mission has a wrong port.
@@ -73,8 +83,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     let trouble = trouble(&transport);
     assert!(trouble.contains(&format!("answers from port {port}; name that port")), "{trouble}");
     robot.send_to(b"hello", link).unwrap();
-    ready(transport.descriptor().unwrap());
-    assert_eq!(transport.receive(0).unwrap(), Some(&b"hello"[..]));
+    expect(&mut transport, b"hello", 0);
 }
 
 #[test]
@@ -83,25 +92,25 @@ fn a_wire_that_cannot_be_opened_is_tried_ever_less_often_and_says_why_with_the_r
     let (listener, address) = listener();
     drop(listener);
     let mut transport = open_at(&Address::Tcp(address));
-    assert_eq!(transport.maintain(0).unwrap(), Some(false));
-    let (mut later_ns, mut pauses) = (0, Vec::new());
+    assert_eq!(transport.changes_at(0), Some(false));
+    let (mut later_ms, mut pauses) = (0, Vec::new());
     for _ in 0..7 {
         // Refused at once or a moment later; the wire stays closed.
-        while transport.attempts(later_ns).unwrap().next_ns == 0 {
-            assert_eq!(transport.maintain(later_ns).unwrap(), None);
+        while transport.attempts(later_ms * MS).unwrap().next_ns == 0 {
+            assert_eq!(transport.changes_at(later_ms), None);
         }
-        let wait = transport.attempts(later_ns).unwrap().next_ns;
-        pauses.push(wait / MS);
-        later_ns += wait;
+        let wait_ms = transport.attempts(later_ms * MS).unwrap().next_ns / MS;
+        pauses.push(wait_ms);
+        later_ms += wait_ms;
     }
     assert_eq!(pauses, [100, 200, 400, 800, 1600, 2000, 2000]);
     let trouble = transport.trouble().unwrap();
     assert_eq!(trouble.input, format!("tcp://{address}"));
     assert!(trouble.what.contains("refused") && trouble.remedy.contains("robot.address"));
     let listener = TcpListener::bind(address).unwrap();
-    let mut robot = connected(&listener, &mut transport, later_ns);
+    let mut robot = connected(&listener, &mut transport, later_ms);
     robot.write_all(b"hello").unwrap();
-    expect(&mut transport, b"hello", later_ns);
+    expect(&mut transport, b"hello", later_ms);
     assert_eq!(transport.trouble(), None);
 }
 
@@ -119,45 +128,45 @@ fn connection() -> (TcpListener, Transport, TcpStream) {
     (listener, transport, robot)
 }
 
-fn connected(listener: &TcpListener, transport: &mut Transport, now_ns: u64) -> TcpStream {
-    maintain_until(transport, true, now_ns);
+fn connected(listener: &TcpListener, transport: &mut Transport, now_ms: u64) -> TcpStream {
+    maintain_until(transport, true, now_ms);
     listener.accept().unwrap().0
 }
 
 #[test]
 fn a_robot_that_ends_one_connection_after_another_serves_another_program_too() {
     let (listener, mut transport, mut robot) = connection();
-    let mut now_ns = 0;
+    let mut now_ms = 0;
     for cuts in 1..=2 {
         robot.write_all(b"frame").unwrap();
-        expect(&mut transport, b"frame", now_ns);
+        expect(&mut transport, b"frame", now_ms);
         drop(robot);
-        expect_closing(&mut transport, now_ns);
+        expect_closing(&mut transport, now_ms);
         assert_eq!(transport.is_cut(), cuts > 1);
-        now_ns += 10_000 * MS;
-        robot = connected(&listener, &mut transport, now_ns);
+        now_ms += 10_000;
+        robot = connected(&listener, &mut transport, now_ms);
     }
     let why = trouble(&transport);
     assert!(why.contains("end the other program that connects to it"), "{why}");
     // A connection that lasts is its own.
     robot.write_all(b"frame").unwrap();
-    expect(&mut transport, b"frame", now_ns + 11_000 * MS);
+    expect(&mut transport, b"frame", now_ms + 11_000);
     assert!(!transport.is_cut());
     // Nor is a robot that is off in anybody's hands.
     for _ in 0..2 {
         drop(robot);
-        expect_closing(&mut transport, now_ns);
-        now_ns += 20_000 * MS;
-        robot = connected(&listener, &mut transport, now_ns);
+        expect_closing(&mut transport, now_ms);
+        now_ms += 20_000;
+        robot = connected(&listener, &mut transport, now_ms);
         robot.write_all(b"frame").unwrap();
-        expect(&mut transport, b"frame", now_ns);
+        expect(&mut transport, b"frame", now_ms);
     }
     assert!(transport.is_cut());
     drop((robot, listener));
-    expect_closing(&mut transport, now_ns);
+    expect_closing(&mut transport, now_ms);
     while transport.is_cut() {
-        now_ns += 3_000 * MS;
-        assert_eq!(transport.maintain(now_ns).unwrap(), None);
+        now_ms += 3000;
+        assert_eq!(transport.changes_at(now_ms), None);
     }
     let why = trouble(&transport);
     assert!(why.contains("switch the robot on"), "{why}");
@@ -166,9 +175,8 @@ fn a_robot_that_ends_one_connection_after_another_serves_another_program_too() {
 #[test]
 fn a_connection_without_a_word_is_taken_for_dead() {
     let (listener, mut transport, _robot) = connection();
-    assert_eq!(transport.maintain(4999 * MS).unwrap(), None);
-    assert_eq!(transport.maintain(5000 * MS).unwrap(), Some(false));
-    connected(&listener, &mut transport, 5000 * MS);
+    assert_eq!([4999, 5000].map(|ms| transport.changes_at(ms)), [None, Some(false)]);
+    connected(&listener, &mut transport, 5000);
 }
 
 #[test]
@@ -193,7 +201,7 @@ fn a_line_that_takes_no_more_loses_whole_frames_only() {
             while decoder.next_frame().is_some() {
                 frames += 1;
             }
-            transport.maintain(0).unwrap();
+            transport.changes_at(0);
         }
         transport.send(&message).unwrap();
         sent += 1;
@@ -290,13 +298,11 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     // The line hangs up when the robot's end is closed.
     line.robot = robots_end();
     expect_closing(&mut transport, 0);
-    for now in [0, 100 * MS, 300 * MS] {
-        assert_eq!(transport.maintain(now).unwrap(), None, "it is not there");
-    }
+    assert_eq!([0, 100, 300].map(|ms| transport.changes_at(ms)), [None; 3], "it is not there");
     assert_eq!(transport.attempts(300 * MS).unwrap().next_ns, 400 * MS);
     line.robot = plug_in(&line.name);
-    assert_eq!(transport.maintain(699 * MS).unwrap(), None);
-    maintain_until(&mut transport, true, 700 * MS);
+    assert_eq!(transport.changes_at(699), None);
+    maintain_until(&mut transport, true, 700);
     transport.send(b"stand").unwrap();
     assert_eq!(read_from(&line.robot, 5), b"stand");
 }
@@ -305,17 +311,17 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
 fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
     let (line, first) = open_line();
     let mut second = open_at(&Address::Serial(line.name.clone()));
-    assert_eq!(second.maintain(0).unwrap(), Some(false));
+    assert_eq!(second.changes_at(0), Some(false));
     // Another process holds the line, as a simulated robot does.
     let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
     drop(first);
-    maintain_until(&mut second, true, 100 * MS);
+    maintain_until(&mut second, true, 100);
 }
 
 #[test]
 fn a_file_that_is_no_serial_line_is_never_written_to() {
     let mut transport = open_at(&Address::Serial("/dev/null".into()));
-    assert_eq!(transport.maintain(0).unwrap(), Some(false));
+    assert_eq!(transport.changes_at(0), Some(false));
     transport.send(b"ping").unwrap();
     assert_eq!(transport.tally().unsent, 1);
 }
