@@ -59,7 +59,7 @@ impl World {
             Commands(pass) => self.commands = pass,
             Frames(pass) => self.frames = pass,
             SignedOff if !self.link => self.settle(true),
-            Drives | GuardIsKilled | SignedOff => {}
+            _ => {}
         }
         self.settle(false);
         if !matches!(what, Drives) {
