@@ -359,20 +359,12 @@ mod tests {
         assert_eq!(judged(spell().chain(spell()).chain(spell()).chain(hears())), [true, true]);
     }
 
-    /// Readings, centimetres, of the front sonar and of the rangers at 11.25 and -11.25 degrees.
-    const fn front(
-        front: Option<u8>,
-        left: Option<u8>,
-        right: Option<u8>,
-    ) -> [(u8, Option<u8>); 3] {
-        [(0, front), (4, left), (5, right)]
-    }
-
     #[test]
     fn a_sonar_that_hears_nothing_of_a_near_surface_square_ahead_is_implausible_after_4_readings_until_an_echo()
      {
-        // The rangers' points are 0.19 m apart, so 12 degrees are 4 cm in depth. A surface that is
-        // far, aslant or not before both proves nothing.
+        // Sensors 0, 4 and 5 are the front sonar and the rangers at 11.25 and -11.25 degrees, whose
+        // points are 0.19 m apart, so 12 degrees are 4 cm in depth. A surface that is far, aslant or
+        // not before both proves nothing.
         for (left, right, is_implausible) in [
             (30, Some(30), true),
             (44, Some(44), true),
@@ -383,13 +375,13 @@ mod tests {
         ] {
             let mut hearing = Hearing::of(&mission(""));
             let first = (1..50).find(|_| {
-                take(&mut hearing, front(None, Some(left), right));
+                take(&mut hearing, [(0, None), (4, Some(left)), (5, right)]);
                 hearing.judged(true).is_some()
             });
             assert_eq!(first, is_implausible.then_some(5), "{left} {right:?}");
             // It is over with an echo, or without the surface.
-            let over = if left == 44 { [None, None] } else { [Some(30); 2] };
-            take(&mut hearing, front(over[0], over[1], Some(30)));
+            let over = if left == 44 { None } else { Some(30) };
+            take(&mut hearing, [(0, over), (4, over), (5, Some(30))]);
             assert!(hearing.judged(true).is_none(), "{left} {right:?}");
         }
     }
