@@ -218,12 +218,8 @@ struct Line {
     _directory: TempDir,
 }
 
-fn robots_end() -> OwnedFd {
-    openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap()
-}
-
 fn plug_in(name: &Path) -> OwnedFd {
-    let robot = robots_end();
+    let robot = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&robot).unwrap();
     unlockpt(&robot).unwrap();
     let path = ptsname(&robot, Vec::new()).unwrap();
@@ -296,7 +292,7 @@ fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     expect(&mut transport, b"here", 0);
     std::fs::remove_file(&line.name).unwrap();
     // The line hangs up when the robot's end is closed.
-    line.robot = robots_end();
+    drop(line.robot);
     expect_closing(&mut transport, 0);
     assert_eq!([0, 100, 300].map(|ms| transport.changes_at(ms)), [None; 3], "it is not there");
     assert_eq!(transport.attempts(300 * MS).unwrap().next_ns, 400 * MS);
