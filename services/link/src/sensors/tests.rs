@@ -1,7 +1,7 @@
 use common::{
     driver::odometry::motion,
     samples::{
-        RangeStatus::{self, Absent, Invalid, Measured, Nothing},
+        RangeStatus::{Absent, Invalid, Measured, Nothing},
         Sweep,
     },
 };
@@ -9,38 +9,17 @@ use common::{
 use super::*;
 use crate::testing::*;
 
-/// Returns the laser status after each of `scans`: the number of beams that end, their range, and a
-/// further turn of the wheels in opposite directions, decimetres and tenths of a radian. Other beams
-/// see nothing. Invalid readings come without scans.
-fn scanned(model: &str, scans: &[(usize, u8, u8)]) -> Vec<RangeStatus> {
-    let mission = mission(&format!("robot.model = '{model}'"));
-    let (row, laser) = mission.laser().unwrap();
-    let mut sensors = Sensors::new(&mission);
-    let mut turned = 0.0;
-    let status = |&(ending, range, turn): &(usize, u8, u8)| {
-        turned += f64::from(turn) / 10.0;
-        let mut beams = vec![f32::from(range) / 10.0; ending];
-        beams.resize(laser.beams, f32::INFINITY);
-        let motion = motion(&mission.body(), [-turned, turned], [1.0; 2], [false; 2]);
-        let scan = LaserScan { row, beams, ..LaserScan::default() };
-        let mut heard = Heard { motion: Some(motion), scans: vec![scan], ..Heard::default() };
-        let status = sensors.take_heard(&mut heard, None)[0].status();
-        let (readings, scans) = sensors.for_tick(&motion, MissionTime::default());
-        assert_eq!((readings[row].status(), scans.is_empty()), (status, status == Invalid));
-        status
-    };
-    scans.iter().map(status).collect()
-}
-
 #[test]
 fn a_laser_that_says_the_same_while_the_wheels_turn_or_nothing_where_much_was_gives_no_reading_until_it_changes()
  {
+    // Each scan has the number of beams that end, their range, and a further turn of the wheels in
+    // opposite directions, decimetres and tenths of a radian. Other beams see nothing.
     // Only a Jackal's last case turns so far that what was seen is out of view: 100 beams of its
     // laser are 25 degrees; 1 rad of a wheel turns it by 30.
-    for (model, scans, status) in [
+    for (model, scans, expected) in [
         (
             "kobuki",
-            &[(360, 10, 0), (360, 10, 1), (360, 10, 8), (360, 10, 2)][..],
+            &[(360, 10_u8, 0), (360, 10, 1), (360, 10, 8), (360, 10, 2)][..],
             &[Measured, Measured, Measured, Invalid][..],
         ),
         ("kobuki", &[(360, 10, 0), (360, 10, 11), (360, 15, 1)], &[Measured, Invalid, Measured]),
@@ -55,7 +34,23 @@ fn a_laser_that_says_the_same_while_the_wheels_turn_or_nothing_where_much_was_gi
         ("jackal", &[(100, 10, 0), (0, 0, 1)], &[Measured, Invalid]),
         ("jackal", &[(100, 10, 0), (0, 0, 10)], &[Measured, Nothing]),
     ] {
-        assert_eq!(scanned(model, scans), status, "{scans:?}");
+        let mission = mission(&format!("robot.model = '{model}'"));
+        let (row, laser) = mission.laser().unwrap();
+        let mut sensors = Sensors::new(&mission);
+        let mut turned = 0.0;
+        for (&(ending, range, turn), &expected) in scans.iter().zip(expected) {
+            turned += f64::from(turn) / 10.0;
+            let mut beams = vec![f32::from(range) / 10.0; ending];
+            beams.resize(laser.beams, f32::INFINITY);
+            let motion = motion(&mission.body(), [-turned, turned], [1.0; 2], [false; 2]);
+            let scan = LaserScan { row, beams, ..LaserScan::default() };
+            let mut heard = Heard { motion: Some(motion), scans: vec![scan], ..Heard::default() };
+            let status = sensors.take_heard(&mut heard, None)[0].status();
+            let (readings, given) = sensors.for_tick(&motion, MissionTime::default());
+            let is = (status, readings[row].status(), given.is_empty());
+            // Invalid readings come without scans.
+            assert_eq!(is, (expected, expected, expected == Invalid), "{scans:?}");
+        }
     }
 }
 
