@@ -92,7 +92,6 @@ mod tests {
         let five = 5_f64.to_radians();
         let tau = std::f64::consts::TAU;
         for (left_rad_s, angle, share, right_counts, expected) in [
-            (0.0, five, 1.0, 0, [0, 210]),
             (0.0, five, 1.0, 50, [0, 0]),
             (0.0, -five, 1.0, COUNT_CYCLE - 25, [0, -105]),
             (0.0, 1.5, 1.0, 0, [0, 1200]),

@@ -538,7 +538,6 @@ mod tests {
     fn a_base_that_stops_later_than_stated_contradicts_that_and_one_that_is_as_stated_does_not() {
         let stated = Response { acceleration_m_s2: 1.0, ..Response::X80 };
         for (base, contradicts) in [
-            ([0.4, 0.3], true),
             ([0.25, 0.3], true),
             ([stated.dead_time_s(), 1.0], false),
             ([0.1, f64::INFINITY], false),
