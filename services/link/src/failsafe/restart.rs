@@ -215,18 +215,19 @@ mod tests {
         // 0.3 m/s are 674 counts/s, 96 per tick. A look around turns the wheels oppositely.
         for (driven, start) in [([674, 674], [300, 300]), ([-580, 580], [32_568, 200])] {
             let mut watch = watch();
-            let anew = [Implausible, Implausible, Elsewhere, Follow].map(|want| ([20, 20], want));
-            let frames =
-                [(start, Follow); 5].into_iter().enumerate().chain(anew.into_iter().enumerate());
-            for (number, (ticks, (first, want))) in frames.enumerate() {
+            let wants =
+                [Follow; 5].into_iter().chain([Implausible, Implausible, Elsewhere, Follow]);
+            for (number, want) in (0..).zip(wants) {
+                let (first, ticks) =
+                    if number < 5 { (start, number) } else { ([20; 2], number - 5) };
                 let now = at(143 * number as u64);
-                let count = |wheel: usize| {
-                    let turned = i32::from(driven[wheel]) * ticks as i32 / 7;
-                    (first[wheel] + turned).rem_euclid(32_768) as u16
-                };
                 watch.commanded(driven, now);
                 let speeds = driven.map(i32::from);
-                let are = watch.step([count(0), count(1)], speeds, false, now);
+                let counts = [0, 1].map(|wheel| {
+                    let turned: i32 = speeds[wheel] * ticks / 7;
+                    (first[wheel] + turned).rem_euclid(32_768) as u16
+                });
+                let are = watch.step(counts, speeds, false, now);
                 assert_eq!(are, want, "{driven:?} {number}");
             }
         }
