@@ -1,8 +1,8 @@
-//! Tests of missions over every wire, with robots that may leave and return.
+//! Tests of missions of robots that leave and return.
 
 use std::thread;
 
-use crate::support::{Run, assert_nothing_left, assert_reached, mission_file, wire::Robot};
+use crate::support::{Run, assert_nothing_left, mission_file, wire::Robot};
 
 /// Distance of a few seconds straight ahead, metres.
 const TARGET_M: f64 = 0.6;
@@ -10,24 +10,10 @@ const TOLERANCE_M: f64 = 0.1;
 /// Longest distance of a robot after its last received tick, metres.
 const UNRECEIVED_M: f64 = 0.12;
 
-fn mission() -> (tempfile::TempDir, String) {
-    mission_file(&format!("target = [{TARGET_M}, 0]\narrival_tolerance_m = {TOLERANCE_M}"))
-}
-
-#[test]
-fn a_mission_arrives_over_a_serial_line() {
-    let (_directory, mission) = mission();
-    let robot = Robot::start(&mission, "pty", "127.0.0.1:0");
-    let (code, summary) = Run::start("over-pty", &mission, &["--set", &robot.as_robot()]).finish();
-    assert_reached(code, &summary);
-    let went = robot.kill();
-    assert!((went - TARGET_M).abs() <= TOLERANCE_M + 0.02, "{went} m");
-    assert_nothing_left("over-pty");
-}
-
 /// Power-cycles the robot halfway. Its counts and place restart.
 fn goes_away_and_comes_back(transport: &str) {
-    let (_directory, mission) = mission();
+    let text = format!("target = [{TARGET_M}, 0]\narrival_tolerance_m = {TOLERANCE_M}");
+    let (_directory, mission) = mission_file(&text);
     let mut robot = Robot::start(&mission, transport, "127.0.0.1:0");
     let listened = robot.listening.clone();
     let name = format!("away-{transport}");
