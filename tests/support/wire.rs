@@ -6,11 +6,9 @@ use std::{
     process::{Child, Stdio},
     sync::{
         Arc, Mutex,
-        atomic::{AtomicBool, Ordering},
         mpsc::{Receiver, channel},
     },
-    thread::JoinHandle,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use serde_json::Value;
@@ -126,12 +124,10 @@ impl Drop for Robot {
     }
 }
 
-/// Forwarder of datagrams between link and robot, until dropped.
+/// Forwarder of datagrams between link and robot, until the process ends.
 #[derive(Debug)]
 pub struct Proxy {
     address: SocketAddr,
-    over: Arc<AtomicBool>,
-    threads: Vec<JoinHandle<()>>,
 }
 
 /// Function from received bytes to forwarded bytes.
@@ -146,24 +142,17 @@ impl Proxy {
         let (sending, answering) = (wire.try_clone().unwrap(), host.try_clone().unwrap());
         let link = Arc::new(Mutex::new(None));
         let link_too = Arc::clone(&link);
-        let over = Arc::new(AtomicBool::new(false));
-        let (over_out, over_back) = (Arc::clone(&over), Arc::clone(&over));
-        let out = std::thread::spawn(move || {
-            receive(&host, &over_out, |bytes, from| {
-                *link.lock().unwrap() = Some(from);
-                let _ = sending.send(&to_robot(bytes));
-            });
+        forward(host, move |bytes, from| {
+            *link.lock().unwrap() = Some(from);
+            let _ = sending.send(&to_robot(bytes));
         });
-        let back = std::thread::spawn(move || {
-            receive(&wire, &over_back, |bytes, _| {
-                let bytes = to_link(bytes);
-                if let Some(link) = *link_too.lock().unwrap() {
-                    let _ = answering.send_to(&bytes, link);
-                }
-            });
+        forward(wire, move |bytes, _| {
+            let bytes = to_link(bytes);
+            if let Some(link) = *link_too.lock().unwrap() {
+                let _ = answering.send_to(&bytes, link);
+            }
         });
-        let threads = vec![out, back];
-        Self { address, over, threads }
+        Self { address }
     }
 
     /// Returns the mission assignment that makes the proxy the robot.
@@ -172,30 +161,16 @@ impl Proxy {
     }
 }
 
-impl Drop for Proxy {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        for thread in self.threads.drain(..) {
-            let _ = thread.join();
+/// Passes each datagram of `socket` and its sender on, until the process ends.
+fn forward(socket: UdpSocket, mut pass: impl FnMut(&[u8], SocketAddr) + Send + 'static) {
+    std::thread::spawn(move || {
+        let mut buffer = [0; 2048];
+        loop {
+            match socket.recv_from(&mut buffer) {
+                Ok((length, from)) => pass(&buffer[..length], from),
+                // The other end does not listen now.
+                Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionRefused, "{error}"),
+            }
         }
-    }
-}
-
-fn receive(socket: &UdpSocket, over: &AtomicBool, mut take: impl FnMut(&[u8], SocketAddr)) {
-    let often = Some(Duration::from_millis(50));
-    socket.set_read_timeout(often).unwrap();
-    let mut buffer = [0; 2048];
-    while !over.load(Ordering::Relaxed) {
-        match socket.recv_from(&mut buffer) {
-            Ok((length, from)) => take(&buffer[..length], from),
-            // No datagram arrived, or the other end does not listen now.
-            Err(error) => assert!(
-                matches!(
-                    error.kind(),
-                    ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::ConnectionRefused
-                ),
-                "{error}"
-            ),
-        }
-    }
+    });
 }
