@@ -2,7 +2,7 @@
 
 use std::{
     io::{BufRead as _, BufReader},
-    process::{Child, Stdio},
+    process::Stdio,
     sync::{
         Arc, Mutex,
         atomic::{AtomicBool, Ordering},
@@ -10,7 +10,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::support::{self, Run, STAGES, assert_nothing_left, firsthand, in_own_process};
+use crate::support::{
+    self, Killed, Run, STAGES, assert_nothing_left, firsthand, in_own_process, start_quietly,
+};
 use common::{
     bus::{Bus, BusError},
     follower::{Event, Follower},
@@ -95,12 +97,8 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
             assert!(began.elapsed() < support::PATIENCE, "{} held", held.len());
         };
         assert!(matches!(refused, BusError::HoldsTooMany { .. }), "{refused}");
-        let mut shown = Staying(
-            firsthand(&["status", "--follow", "--robot", "greedy"])
-                .stdout(Stdio::piped())
-                .spawn()
-                .unwrap(),
-        );
+        let mut shown = firsthand(&["status", "--follow", "--robot", "greedy"]);
+        let mut shown = Killed(shown.stdout(Stdio::piped()).spawn().unwrap());
         let mut first = String::new();
         let mut said = BufReader::new(shown.0.stdout.take().unwrap());
         said.read_line(&mut first).unwrap();
@@ -133,15 +131,6 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
     });
 }
 
-struct Staying(Child);
-
-impl Drop for Staying {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// Joins the bus of `robot`, reads grid and field, and leaves, repeatedly until `over`. Returns the
 /// number of successes.
 fn join_again_and_again(robot: &str, over: &AtomicBool) -> usize {
@@ -171,8 +160,7 @@ fn consumers_that_stay_and_that_join_again_and_again_take_no_stages_place() {
         for consumer in 0..10 {
             let topic = ["grid", "field"][consumer % 2];
             let mut echo = firsthand(&["topic", "echo", topic, "--robot", robot]);
-            echo.stdout(Stdio::null()).stderr(Stdio::null());
-            staying.push(Staying(echo.spawn().unwrap()));
+            staying.push(Killed(start_quietly(&mut echo)));
         }
         let over = AtomicBool::new(false);
         let joined: usize = std::thread::scope(|scope| {

@@ -13,6 +13,7 @@ use crate::support::{
     operate as operate_robot, printed, refused, signal_process,
 };
 
+/// `firsthand page`, which ends with the test.
 struct Page {
     child: Child,
     watch: String,
@@ -44,13 +45,6 @@ impl Page {
 
     fn end(mut self, signal: Signal) {
         self.signal(signal);
-        let _ = self.child.wait();
-    }
-}
-
-impl Drop for Page {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }

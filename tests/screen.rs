@@ -20,7 +20,7 @@ use crate::support::{PATIENCE, Run, find, firsthand_under, refused, signal_proce
 /// Lines and columns of the terminal.
 const SIZE: (usize, usize) = (24, 80);
 
-/// `firsthand top` on its own terminal.
+/// `firsthand top` on its own terminal. It ends with the test.
 struct Screen {
     child: Child,
     terminal: Option<File>,
@@ -113,13 +113,6 @@ impl Screen {
         while self.read() {}
         let code = self.child.wait().unwrap().code();
         (code, String::from_utf8_lossy(&self.written).into_owned())
-    }
-}
-
-impl Drop for Screen {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

@@ -179,7 +179,8 @@ fn start_follower(robot: &str) -> (Killed, Receiver<String>) {
     (follower, received)
 }
 
-struct Killed(Child);
+/// Process that is killed when dropped.
+pub struct Killed(pub Child);
 
 impl Drop for Killed {
     fn drop(&mut self) {

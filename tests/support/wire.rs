@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use super::{PATIENCE, firsthand};
 
-/// Simulated robot, which runs until dropped.
+/// Simulated robot, which ends with the thread of its test.
 pub struct Robot {
     process: Child,
     scheme: &'static str,
@@ -33,15 +33,13 @@ impl Robot {
     }
 
     pub fn start(mission: &str, transport: &str, listen: &str) -> Self {
-        let arguments = ["--transport", transport, "--listen", listen];
         let scheme = match transport {
             "tcp" => "tcp://",
             "pty" => "serial://",
             _ => "udp://",
         };
-        let mut robot = Self::start_with(mission, &arguments);
-        robot.scheme = scheme;
-        robot
+        let arguments = ["--transport", transport, "--listen", listen];
+        Self { scheme, ..Self::start_with(mission, &arguments) }
     }
 
     /// Returns the mission assignment that makes this the robot.
@@ -115,13 +113,6 @@ fn rests(truth: &Value) -> bool {
 fn from_start(truth: &Value) -> f64 {
     let metres = |axis: &str| truth[axis].as_f64().unwrap();
     metres("x").hypot(metres("y"))
-}
-
-impl Drop for Robot {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
 }
 
 /// Forwarder of datagrams between link and robot, until the process ends.
