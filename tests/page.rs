@@ -68,10 +68,6 @@ const CHARTS: [&str; 9] = [
     "Ticks by latency",
 ];
 
-fn says(id: &str, text: &str) -> String {
-    format!("document.getElementById('{id}').textContent.includes('{text}')")
-}
-
 #[test]
 fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_server() {
     if !has_browser() {
@@ -81,7 +77,7 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
     let page = Page::start(robot, "127.0.0.1:0");
     let browser = Browser::open(390);
     browser.go(&page.drive);
-    browser.wait_until(&says("status", "no robot runs"));
+    browser.wait_for("status", "no robot runs");
     assert_eq!(browser.run("return location.hash"), "", "the token is not shown");
     let mut run = Run::start(robot, "open-room", &ENDLESS);
     run.wait_until_driving();
@@ -93,18 +89,18 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
 
     browser.assert_legible();
     browser.tap("map", 40, -30);
-    browser.wait_until(&says("chosen", ","));
+    browser.wait_for("chosen", ",");
     browser.wait_until("!document.getElementById('go').disabled");
     browser.tap("go", 0, 0);
-    browser.wait_until(&says("answer", "target: the supervisor sends the robot there"));
+    browser.wait_for("answer", "target: the supervisor sends the robot there");
     let sent = run.wait_until("the robot has another target", |status| {
         status["target"]["number"].as_u64() > Some(1)
     });
     assert_eq!(sent["order"], "driving");
-    browser.wait_until(&says("results", "target 1(4.00, 0.00): replaced"));
+    browser.wait_for("results", "target 1(4.00, 0.00): replaced");
 
     browser.tap("stop", 0, 0);
-    browser.wait_until(&says("answer", "stop: the robot rests"));
+    browser.wait_for("answer", "stop: the robot rests");
     browser.wait_until(RESTS);
     browser.tap("resume", 0, 0);
     browser.wait_until(GOES);
@@ -117,7 +113,7 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
     browser.run("const time = document.getElementById('time'); time.value = time.min; time.dispatchEvent(new Event('input'))");
     browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'false'");
     browser.wait_until("!document.getElementById('past').hidden");
-    browser.wait_until(&says("past", "Shown: "));
+    browser.wait_for("past", "Shown: ");
     operate_robot(robot, &["stop"]);
     browser.wait_until(RESTS);
     browser.wait_until("document.querySelector('header').className === 'bad'");
@@ -129,7 +125,7 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
 
     page.signal(Signal::STOP);
     browser.wait_until(IS_LOST);
-    browser.wait_until(&says("status", "unknown; last known"));
+    browser.wait_for("status", "unknown; last known");
     browser.wait_until("document.querySelector('header').className === 'bad'");
     page.signal(Signal::CONT);
     browser.wait_until(IS_THERE);
@@ -139,7 +135,7 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
     browser.wait_until(IS_LOST);
     // The next page has other tokens. Attempts follow every half second, and here none may.
     let page = Page::start(robot, &listen);
-    browser.wait_until(&says("notice", "wrong or expired: open an address that `firsthand page`"));
+    browser.wait_for("notice", "wrong or expired: open an address that `firsthand page`");
     browser.run("window.since = performance.now()");
     browser.wait_until("performance.now() - window.since > 2000");
     assert!(browser.text("notice").contains("expired"), "the notice stays");
@@ -148,7 +144,7 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
     browser.wait_until("!document.body.classList.contains('drive')");
     browser.wait_until(GOES);
     run.stop();
-    browser.wait_until(&says("status", "the run ended at"));
+    browser.wait_for("status", "the run ended at");
     page.end(Signal::TERM);
     assert_nothing_left(robot);
 }
@@ -188,10 +184,10 @@ fn actions_and_answers_are_in_view_at_every_size_without_scrolling() {
         seen(&["stop", "go", "waypoint", "clear", "chosen"], "0", "after a choice");
         if (width, height) == (1280, 720) {
             browser.tap("go", 0, 0);
-            browser.wait_until(&says("answer", "target: the supervisor sends the robot there"));
+            browser.wait_for("answer", "target: the supervisor sends the robot there");
         }
         browser.tap("stop", 0, 0);
-        browser.wait_until(&says("answer", "stop: the robot rests"));
+        browser.wait_for("answer", "stop: the robot rests");
         seen(&["stop", "answer", "status", "go"], "0", "after a stop");
         seen(&["stop", "answer", "status"], "document.body.scrollHeight", "scrolled down");
         browser.assert_legible();
@@ -245,7 +241,7 @@ fn a_recorded_run_is_scrubbed_played_and_printed_with_what_moved_in_windows_of_b
         browser.run("document.getElementById('speed').value = '10'");
         browser.tap("play", 0, 0);
         browser.wait_until(&ends);
-        browser.wait_until(&says("play", "Play"));
+        browser.wait_for("play", "Play");
         let there =
             browser.run("return getComputedStyle(document.getElementById('urgent')).display");
         assert_eq!(there, "none", "a recording has no stop button");

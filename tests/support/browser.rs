@@ -48,56 +48,56 @@ impl Browser {
         }
         let capabilities = json!({"browserName": "chrome", "goog:chromeOptions": options});
         let wanted = json!({"capabilities": {"alwaysMatch": capabilities}});
-        let session = browser.ask("POST", "/session", &wanted);
+        let session = browser.post("/session", &wanted);
         browser.session = format!("/session/{}", session["sessionId"].as_str().unwrap());
         browser
     }
 
-    fn ask(&self, method: &str, path: &str, body: &Value) -> Value {
-        let (head, value) = self.answer(method, path, body).unwrap();
-        assert!(head.starts_with("HTTP/1.1 200"), "{path}: {value}");
+    fn post(&self, path: &str, body: &Value) -> Value {
+        let (status, value) = self.answer("POST", path, body).unwrap();
+        assert!(status.starts_with("HTTP/1.1 200"), "{path}: {value}");
         value["value"].clone()
     }
 
+    /// Sends a request of the session. Returns the first line of the answer, and its content.
     fn answer(&self, method: &str, path: &str, body: &Value) -> io::Result<(String, Value)> {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port))?;
         stream.set_read_timeout(Some(PATIENCE))?;
         let body = body.to_string();
         let length = body.len();
+        let session = &self.session;
         let head = format!(
-            "{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n"
+            "{method} {session}{path} HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\nContent-Length: {length}\r\n\r\n"
         );
         stream.write_all((head + &body).as_bytes())?;
         let mut answer = BufReader::new(stream);
-        let (mut head, mut length) = (String::new(), 0);
-        while !head.ends_with("\r\n\r\n") {
-            let start = head.len();
-            if answer.read_line(&mut head)? == 0 {
-                return Err(io::ErrorKind::UnexpectedEof.into());
+        let (mut status, mut length) = (String::new(), 0);
+        answer.read_line(&mut status)?;
+        for line in answer.by_ref().lines() {
+            let line = line?.to_lowercase();
+            if line.is_empty() {
+                break;
             }
-            let line = head[start..].to_lowercase();
             if let Some(value) = line.strip_prefix("content-length:") {
                 length = value.trim().parse().map_err(io::Error::other)?;
             }
         }
         let mut body = vec![0; length];
         answer.read_exact(&mut body)?;
-        Ok((head, serde_json::from_slice(&body)?))
+        Ok((status, serde_json::from_slice(&body)?))
     }
 
     pub fn go(&self, url: &str) {
-        self.ask("POST", &format!("{}/url", self.session), &json!({"url": url}));
+        self.post("/url", &json!({"url": url}));
     }
 
     pub fn run(&self, script: &str) -> Value {
-        let asked = json!({"script": script, "args": []});
-        self.ask("POST", &format!("{}/execute/sync", self.session), &asked)
+        self.post("/execute/sync", &json!({"script": script, "args": []}))
     }
 
     /// Sends a command of Chromium's own protocol.
     pub fn command(&self, name: &str, parameters: &Value) -> Value {
-        let asked = json!({"cmd": name, "params": parameters});
-        self.ask("POST", &format!("{}/goog/cdp/execute", self.session), &asked)
+        self.post("/goog/cdp/execute", &json!({"cmd": name, "params": parameters}))
     }
 
     /// Asserts that each text of the page is legible, in light and dark colours.
@@ -116,6 +116,12 @@ impl Browser {
         text.as_str().unwrap().to_owned()
     }
 
+    /// Waits until the element `id` contains `text`.
+    #[track_caller]
+    pub fn wait_for(&self, id: &str, text: &str) {
+        self.wait_until(&format!("document.getElementById('{id}').textContent.includes('{text}')"));
+    }
+
     /// Waits until a script returns true.
     #[track_caller]
     pub fn wait_until(&self, script: &str) {
@@ -129,9 +135,9 @@ impl Browser {
     /// Taps the element `id` at an offset from its centre, CSS pixels.
     pub fn tap(&self, id: &str, x: i32, y: i32) {
         let found = json!({"using": "css selector", "value": format!("#{id}")});
-        let element = self.ask("POST", &format!("{}/element", self.session), &found);
+        let element = self.post("/element", &found);
         self.run(&format!("document.getElementById('{id}').scrollIntoView({{block: 'center'}})"));
-        let actions = json!({"actions": [{
+        let finger = json!({
             "type": "pointer",
             "id": "finger",
             "parameters": {"pointerType": "touch"},
@@ -140,17 +146,14 @@ impl Browser {
                 {"type": "pointerDown", "button": 0},
                 {"type": "pointerUp", "button": 0},
             ],
-        }]});
-        self.ask("POST", &format!("{}/actions", self.session), &actions);
+        });
+        self.post("/actions", &json!({"actions": [finger]}));
     }
 
     pub fn press(&self, key: &str) {
-        let actions = json!({"actions": [{
-            "type": "key",
-            "id": "keys",
-            "actions": [{"type": "keyDown", "value": key}, {"type": "keyUp", "value": key}],
-        }]});
-        self.ask("POST", &format!("{}/actions", self.session), &actions);
+        let strokes = ["keyDown", "keyUp"].map(|stroke| json!({"type": stroke, "value": key}));
+        let keys = json!({"type": "key", "id": "keys", "actions": strokes});
+        self.post("/actions", &json!({"actions": [keys]}));
     }
 }
 
@@ -158,7 +161,7 @@ impl Drop for Browser {
     fn drop(&mut self) {
         // Only the end of the session ends the browser with the driver, also after a failed test.
         if !self.session.is_empty() {
-            let _ = self.answer("DELETE", &self.session, &json!({}));
+            let _ = self.answer("DELETE", "", &json!({}));
         }
         let _ = self.driver.kill();
         let _ = self.driver.wait();
