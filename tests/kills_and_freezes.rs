@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::support::{
     self, ENDLESS, Run, STAGES, all_run, assert_ended, assert_nothing_left, assert_reached, find,
-    firsthand, operate, outcomes, output, pid, pids_of, processes, records, replayed_in,
+    firsthand, operate, outcomes, output, pid, processes, processes_with, records, replayed_in,
     replayed_poses, signal_process,
 };
 
@@ -139,7 +139,7 @@ fn a_list_is_driven_to_its_end_although_all_and_then_the_supervisor_are_killed_i
     let mut first = Run::under_way(robot, "open-room", FAST, 4.0);
     operate(robot, &["goto", "1.0", "-0.8", "1.8", "0.4"]);
     operate(robot, &["goto", "3.0", "0.4", "--heading", "-90", "--append"]);
-    for pid in pids_of(robot) {
+    for pid in processes_with(robot, "") {
         signal_process(pid, Signal::KILL);
     }
     first.reap();

@@ -1,9 +1,8 @@
 //! A robot with simulated lasers, through real processes.
 
-use recording::Recording;
 use rustix::process::Signal;
 
-use crate::support::{Run, STAGES, printed, replayed};
+use crate::support::{Run, STAGES, printed, recording_in, replayed};
 
 #[test]
 fn a_robot_with_two_lasers_arrives_though_each_stage_is_killed_and_replays_to_the_bit() {
@@ -23,7 +22,7 @@ fn a_robot_with_two_lasers_arrives_though_each_stage_is_killed_and_replays_to_th
     }
     run.kill_each(Signal::KILL);
     let (_, directory) = run.arrives_in();
-    let recording = Recording::open(&directory.path().join("run/recording.mcap")).unwrap();
+    let recording = recording_in(&directory);
     for topic in ["scan", "foxglove/scan/front", "foxglove/scan/back"] {
         assert!(recording.counts[topic] > 50, "{:?}", recording.counts);
     }

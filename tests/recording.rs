@@ -25,12 +25,8 @@ use rustix::process::Signal;
 use crate::support::{
     self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, assert_refused,
     firsthand, golden, golden_of, json_of, logged, messages, operate, output, processes_with,
-    refused, replayed, replayed_in, signal_process, wait_until,
+    recording_in, refused, replayed, replayed_in, signal_process, wait_until,
 };
-
-fn open(directory: &Path) -> Recording {
-    Recording::open(&directory.join("run/recording.mcap")).unwrap()
-}
 
 /// Starts a recorder of `robot`. Returns it with its output.
 fn recorder(robot: &str, file: &Path) -> (Child, BufReader<ChildStdout>) {
@@ -71,7 +67,7 @@ fn a_run_is_recorded_from_its_first_sample_and_every_stage_replays_to_the_bit() 
         assert!(logged(&run, process, &[]) > 0, "{process}");
     }
 
-    let recording = open(directory.path());
+    let recording = recording_in(&directory);
     assert_eq!(recording.end, End::Complete);
     assert!(recording.lost.is_empty(), "{:?}", recording.lost);
     let poses = recording.samples(&topics::POSE).unwrap();
@@ -136,7 +132,7 @@ fn every_order_that_was_answered_is_recorded_and_a_run_that_is_ended_waits_for_i
     signal_process(recorder, Signal::CONT);
     let (code, summary, directory) = run.finish_in();
     assert_ended(code, &summary, 0, "aborted");
-    let recording = open(directory.path());
+    let recording = recording_in(&directory);
     assert_eq!(recording.end, End::Complete);
     let orders = recording.samples(&topics::ORDERS).unwrap().map(|order| order.unwrap().sample);
     let orders: Vec<_> = orders.collect();
@@ -160,7 +156,7 @@ fn a_run_in_lockstep_waits_for_its_recorder_and_its_log_time_is_mission_time() {
     support::wait_for_status("rec-late", |status| status["order"] == "driving");
     signal_process(recorder, Signal::CONT);
     let (_, summary, directory) = run.finish_in();
-    let recording = open(directory.path());
+    let recording = recording_in(&directory);
     assert!(recording.lost.is_empty(), "{:?}", recording.lost);
     assert_eq!(replayed(&recording).equal(), 5);
 

@@ -204,16 +204,16 @@ pub fn assert_nothing_left(robot: &str) {
     // A stop guard ends after its link, when its robot is at rest or gone. A recorder whose
     // supervisor was killed first writes its last chunk.
     wait_until("no stop guard and no recorder is left", || {
-        let lasts =
-            |line: &String| line.contains("stop-guard") || line.contains("firsthand record");
-        !processes_of(robot).iter().any(lasts)
+        let lasts = |word| !processes_with(robot, word).is_empty();
+        !lasts("stop-guard") && !lasts("firsthand record")
     });
     let domain = domain(robot);
     let shared = shared_memory(&domain.shared_memory_prefix());
     assert!(shared.is_empty(), "left in shared memory: {shared:?}");
     let directory = domain.directory();
     assert!(!directory.exists(), "{} is left", directory.display());
-    assert_eq!(processes_of(robot), Vec::<String>::new());
+    let processes = processes_of(robot);
+    assert!(processes.is_empty(), "{processes:?}");
 }
 
 /// Returns the prefix of the directories for runs of `robot` in this suite.
@@ -221,24 +221,18 @@ fn mark(robot: &str) -> String {
     format!("firsthand-{}_{robot}_", suite())
 }
 
-pub fn processes_of(robot: &str) -> Vec<String> {
-    let found = processes(&mark(robot)).into_iter();
-    found.map(|(_, line)| line).collect()
-}
-
-pub fn pids_of(robot: &str) -> Vec<u32> {
-    let found = processes(&mark(robot)).into_iter();
-    found.map(|(pid, _)| pid).collect()
+fn processes_of(robot: &str) -> Vec<(u32, String)> {
+    processes(&mark(robot))
 }
 
 /// Returns the processes of `robot` whose command line contains `word`.
 pub fn processes_with(robot: &str, word: &str) -> Vec<u32> {
-    let found = processes(&mark(robot)).into_iter();
+    let found = processes_of(robot).into_iter();
     found.filter(|(_, line)| line.contains(word)).map(|(pid, _)| pid).collect()
 }
 
 pub fn wait_until_all_ended(robot: &str) {
-    wait_until("all have ended", || pids_of(robot).is_empty());
+    wait_until("all have ended", || processes_of(robot).is_empty());
 }
 
 pub fn processes(mark: &str) -> Vec<(u32, String)> {

@@ -253,7 +253,12 @@ pub fn run(robot: &str, mission: &str, arguments: &[&str]) -> (Option<i32>, Valu
 /// Asserts that every generation of every stage is bit-equal, or ended before its first input.
 #[track_caller]
 pub fn replayed_in(directory: &TempDir) -> Report {
-    replayed(&Recording::open(&directory.path().join("run/recording.mcap")).unwrap())
+    replayed(&recording_in(directory))
+}
+
+/// Opens the recording of a run, given the directory above the run's.
+pub fn recording_in(directory: &TempDir) -> Recording {
+    Recording::open(&directory.path().join("run/recording.mcap")).unwrap()
 }
 
 /// [`replayed_in`] for a recording.
