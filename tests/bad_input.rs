@@ -4,7 +4,8 @@
 use std::{fs, net::UdpSocket, path::Path, process::Command};
 
 use crate::support::{
-    Run, assert_nothing_left, assert_refused, json_of, output, refused, wait_for_status,
+    Run, assert_nothing_left, assert_refused, json_of, mission_file, output, refused,
+    wait_for_status,
 };
 
 #[test]
@@ -58,12 +59,10 @@ fn status_names_the_trouble_of_a_stage_that_cannot_start() {
     let text = fs::read_to_string(laser).unwrap();
     let model = "model = \"rplidar-a1\"";
     let nowhere = format!("{model}\naddress = \"tcp://no-such-host.invalid:1\"");
-    let directory = tempfile::tempdir().unwrap();
-    let file = directory.path().join("laser.toml");
-    fs::write(&file, text.replace(model, &nowhere)).unwrap();
+    let (_directory, mission) = mission_file(&text.replace(model, &nowhere));
     let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = format!("robot.address='udp://{}'", silent.local_addr().unwrap());
-    let run = Run::start("no-host", file.to_str().unwrap(), &["--set", &address]);
+    let run = Run::start("no-host", &mission, &["--set", &address]);
     let named = |status: &serde_json::Value| {
         status["complaint"].to_string().contains("no-such-host.invalid")
     };

@@ -4,7 +4,9 @@ use common::samples::PoseSample;
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{self, Run, json_of, operate, outcomes, output, records, refused};
+use crate::support::{
+    self, Run, json_of, mission_file, operate, outcomes, output, records, refused,
+};
 
 const PACE: [&str; 2] = ["--pace", "2"];
 
@@ -80,10 +82,8 @@ points = [[-2.2, -0.4], [-3.0, -0.4], [-3.0, 0.4], [-2.2, 0.4], [-2.2, -0.4]]
 #[test]
 fn a_robot_that_stays_takes_targets_zones_and_its_place_until_it_is_ended_and_replays_to_the_bit() {
     let robot = "goto-stay";
-    let directory = tempfile::tempdir().unwrap();
-    let mission = directory.path().join("stays.toml");
-    std::fs::write(&mission, STAYS).unwrap();
-    let mut run = Run::start(robot, mission.to_str().unwrap(), &["--pace", "4"]);
+    let (_directory, mission) = mission_file(STAYS);
+    let mut run = Run::start(robot, &mission, &["--pace", "4"]);
     let say = |words: &[&'static str], code: &str| {
         refused(&[words, &["--robot", robot]].concat(), code, &[]);
     };

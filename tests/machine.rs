@@ -11,7 +11,7 @@ use std::{
 use crate::support::{
     self, ENDLESS, Run, STAGES, all_run, assert_nothing_left, assert_reached, assert_refused,
     directory_of, find, firsthand, firsthand_under, generation, json_of, on_small_disk,
-    on_small_shared_memory, pid, refused, signal_process, start_quietly,
+    on_small_shared_memory, pid, refused, signal_process,
 };
 use rustix::process::Signal;
 use serde_json::Value;
@@ -120,20 +120,16 @@ fn shared_memory_that_is_full_is_refused_at_the_start_and_harms_no_run_later() {
 
 #[test]
 fn a_supervisor_waits_for_one_that_was_killed_a_moment_ago() {
-    let runs = directory_of("mach-gone");
     let domain = support::domain("mach-gone");
     fs::create_dir_all(domain.directory()).unwrap();
     let held = File::create(domain.lock_file()).unwrap();
     held.lock().unwrap();
-    let out = runs.path().join("run");
-    let mut run = firsthand(&["run", "open-room", "--robot", "mach-gone", "--out"]);
-    let mut run = start_quietly(run.arg(&out));
+    let run = Run::at_own_speed("mach-gone", "open-room", &[]);
     // The supervisor logs before it locks, and retries for a second.
-    support::wait_until("it logs", || out.join("supervisor.log").exists());
+    support::wait_until("it logs", || run.directory().join("supervisor.log").exists());
     thread::sleep(Duration::from_millis(100));
     drop(held);
-    assert_eq!(run.wait().unwrap().code(), Some(0));
-    assert_nothing_left("mach-gone");
+    run.arrives();
 }
 
 #[test]

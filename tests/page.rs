@@ -204,8 +204,7 @@ fn a_recorded_run_is_scrubbed_played_and_printed_with_what_moved_in_windows_of_b
     if !has_browser() {
         return not_run("a recorded page", "chromium and chromedriver are missing");
     }
-    let (code, summary, directory) = Run::at_own_speed("page-movers", "walkers", &[]).finish_in();
-    assert_eq!(code, Some(0), "{summary}");
+    let (_, directory) = Run::at_own_speed("page-movers", "walkers", &[]).arrives_in();
     let page = directory.path().join("run/report/report.html");
     let out = tempfile::tempdir().unwrap();
     let golden = golden().path;

@@ -223,9 +223,7 @@ fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_b
     // chunk.
     let slow = "controller.speed_m_s=0.15";
     let budget = ["--pace", "4", "--disk-budget", "1500kB", "--set", slow];
-    let (code, summary, directory) =
-        Run::start("rec-budget", "obstacle-course", &budget).finish_in();
-    assert_eq!(code, Some(0), "{summary}");
+    let (_, directory) = Run::start("rec-budget", "obstacle-course", &budget).arrives_in();
     let run = directory.path().join("run");
     let files = recording::parts(&run);
     let size = |file: &PathBuf| fs::metadata(file).unwrap().len();
@@ -243,7 +241,6 @@ fn a_disk_budget_ends_files_at_a_quarter_of_it_removes_the_oldest_and_each_can_b
     let mut grids = largest.slices(&topics::GRID).unwrap().map(Result::unwrap);
     assert!(grids.any(|grid| grid.header.part.is_keyframe()), "{files:?}");
     assert!(replay(&largest, &all).unwrap().not_replayed() > 0, "{files:?}");
-    assert_nothing_left("rec-budget");
 }
 
 /// `.ci/renew` records the golden recording again after an intended change.

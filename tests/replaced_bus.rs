@@ -4,8 +4,7 @@
 use std::time::{Duration, Instant};
 
 use crate::support::{
-    self, PATIENCE, Run, assert_nothing_left, bus_instance, find, half_make, in_own_process, pid,
-    signal_process,
+    self, PATIENCE, Run, bus_instance, generation, half_make, in_own_process, pid, signal_process,
 };
 use common::{bus::Bus, samples::PoseSample, topics, waiter::Waiter};
 use rustix::process::Signal;
@@ -67,14 +66,10 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         let before = run.wait_until("all work", |status| status["order"] == "driving");
         let after = run.kill_and_await_successor("dead-reckoning", Signal::KILL);
         // The stage must start once. Two refused starts would recreate the bus again.
-        let generation = |status, stage| find(status, stage)["generation"].as_u64().unwrap();
         for (stage, more) in [("dead-reckoning", 1), ("planner", 0)] {
             assert_eq!(generation(&after, stage), generation(&before, stage) + more, "{stage}");
         }
         drop(new);
-        run.signal(Signal::TERM);
-        let (code, summary) = run.finish();
-        assert_eq!(code, Some(0), "{summary}");
-        assert_nothing_left(ROBOT);
+        run.stop();
     });
 }
