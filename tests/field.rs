@@ -5,28 +5,29 @@ use std::path::{Path, PathBuf};
 use crate::support::{printed, refused};
 use serde_json::Value;
 
-/// Returns a room of 24 x 16 cells with a rim, a wall across it with one doorway, and a closed
-/// closet.
-fn rooms() -> Vec<String> {
-    (0..16)
-        .map(|row| {
-            (0..24)
-                .map(|col| {
-                    let rim = col == 0 || row == 0 || col == 23 || row == 15;
-                    let wall = col == 12 && row != 4;
-                    let closet = (18..=20).contains(&col)
-                        && (8..=10).contains(&row)
-                        && (col, row) != (19, 9);
-                    if rim || wall || closet { '@' } else { '.' }
-                })
-                .collect()
-        })
-        .collect()
-}
+/// Room of 24 x 16 cells with a wall across it with one doorway, and a closed closet.
+const ROOMS: [&str; 16] = [
+    "@@@@@@@@@@@@@@@@@@@@@@@@",
+    "@...........@..........@",
+    "@...........@..........@",
+    "@...........@..........@",
+    "@......................@",
+    "@...........@..........@",
+    "@...........@..........@",
+    "@...........@..........@",
+    "@...........@.....@@@..@",
+    "@...........@.....@.@..@",
+    "@...........@.....@@@..@",
+    "@...........@..........@",
+    "@...........@..........@",
+    "@...........@..........@",
+    "@...........@..........@",
+    "@@@@@@@@@@@@@@@@@@@@@@@@",
+];
 
 fn write_map(directory: &Path) -> PathBuf {
     let file = directory.join("rooms.map");
-    let text = format!("type octile\nheight 16\nwidth 24\nmap\n{}\n", rooms().join("\n"));
+    let text = format!("type octile\nheight 16\nwidth 24\nmap\n{}\n", ROOMS.join("\n"));
     std::fs::write(&file, text).unwrap();
     file
 }
@@ -42,30 +43,28 @@ fn assert_refuses(map: &Path, arguments: &[&str], code: &str, names: &[&str]) {
     refused(&[&field, arguments].concat(), code, names);
 }
 
-/// Reads a NumPy field: mantissa and exponent of u, ex and ey of each of 24 x 16 cells.
-fn values(file: &Path) -> Vec<(f64, i32, f32, f32)> {
+/// Reads a NumPy field: u, from its mantissa and exponent, ex and ey of each of 24 x 16 cells.
+fn values(file: &Path) -> Vec<(f64, f64, f64)> {
     let bytes = std::fs::read(file).unwrap();
     assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"));
     let begin = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
     assert_eq!(begin % 64, 0);
-    let header = str::from_utf8(&bytes[10..begin]).unwrap().trim_end();
     let types = "[('mantissa', '<f8'), ('exponent', '<i4'), ('ex', '<f4'), ('ey', '<f4')]";
     let text = format!("{{'descr': {types}, 'fortran_order': False, 'shape': (16, 24)}}");
-    assert_eq!(header, text);
-    assert_eq!(bytes[begin - 1], b'\n');
-    let cells = bytes[begin..].chunks(20);
-    assert_eq!(cells.len(), 24 * 16);
-    let four = |cell: &[u8], at: usize| -> [u8; 4] { cell[at..at + 4].try_into().unwrap() };
-    cells
-        .map(|cell| {
-            (
-                f64::from_le_bytes(cell[..8].try_into().unwrap()),
-                i32::from_le_bytes(four(cell, 8)),
-                f32::from_le_bytes(four(cell, 12)),
-                f32::from_le_bytes(four(cell, 16)),
-            )
-        })
-        .collect()
+    let header = str::from_utf8(&bytes[10..begin]).unwrap();
+    assert_eq!(header.strip_suffix('\n').unwrap().trim_end(), text);
+    let (cells, rest) = bytes[begin..].as_chunks::<20>();
+    assert_eq!((cells.len(), rest.len()), (24 * 16, 0));
+    let value = |cell: &[u8; 20]| {
+        let (mantissa, rest) = cell.split_first_chunk().unwrap();
+        let (exponent, rest) = rest.split_first_chunk().unwrap();
+        let (ex, ey) = rest.split_first_chunk().unwrap();
+        let exponent = i32::from_le_bytes(*exponent);
+        let direction = [*ex, *ey.first_chunk().unwrap()].map(f32::from_le_bytes);
+        let [ex, ey] = direction.map(f64::from);
+        (f64::from_le_bytes(*mantissa) * f64::from(exponent).exp2(), ex, ey)
+    };
+    cells.iter().map(value).collect()
 }
 
 const TARGET: usize = 12 * 24 + 3;
@@ -77,15 +76,12 @@ fn the_field_of_a_map_is_written_with_the_means_and_directions_and_reported() {
     let [out, picture] = ["rooms.npy", "rooms.svg"].map(|name| directory.path().join(name));
     let files = ["--out", out.to_str().unwrap(), "--picture", picture.to_str().unwrap()];
     let map = write_map(directory.path());
-    let free: Vec<bool> = rooms().concat().bytes().map(|cell| cell == b'.').collect();
+    let free: Vec<bool> = ROOMS.concat().bytes().map(|cell| cell == b'.').collect();
     // A screening length of 2.5 cells gives k = (1 / (2 x 2.5))^2.
     let screened = ["--screening-cells", "2.5"];
     for (screening, k) in [(&[][..], 0.0), (&screened[..], 0.04)] {
         let report = report(&map, &[&["--target-cell", "3,12"], &files[..], screening].concat());
-        let cells = values(&out).into_iter().map(|(mantissa, exponent, ex, ey)| {
-            (mantissa * f64::from(exponent).exp2(), f64::from(ex), f64::from(ey))
-        });
-        let cells: Vec<_> = cells.collect();
+        let cells = values(&out);
         for (at, &(u, ex, ey)) in cells.iter().enumerate() {
             if !free[at] || at == CLOSET || at == TARGET {
                 let expected = if at == TARGET { 1.0 } else { 0.0 };
