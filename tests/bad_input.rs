@@ -34,11 +34,11 @@ fn an_invalid_mission_is_refused_with_line_key_and_remedy_by_check_and_run_and_n
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     refused(&["check", pipe.to_str().unwrap()], "mission", &["pipe.toml"]);
     let run = ["run", "open-room", "--robot", "bad", "--set"];
-    for (setting, code) in [
-        ("robot.address='nowhere'", "mission"),
-        ("planner.executable='/no/such/planner'", "planner-executable"),
+    for (setting, code, names) in [
+        ("robot.address='not an address'", "mission", ["not an address", "robot.address"]),
+        ("planner.executable='/no/such/planner'", "planner-executable", ["/no/such/planner"; 2]),
     ] {
-        assert_eq!(refused(&[&run[..], &[setting]].concat(), code, &[]), Some(78));
+        assert_eq!(refused(&[&run[..], &[setting]].concat(), code, &names), Some(78));
     }
     for unit in ["firsthand", "firsthand-watch"] {
         let file = format!("{}/../systemd/{unit}.service", env!("CARGO_MANIFEST_DIR"));
@@ -79,7 +79,7 @@ fn status_names_the_trouble_of_a_stage_that_cannot_start() {
 fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let taken = taken.local_addr().unwrap().to_string();
-    let cases: [(&[&str], _, &[&str]); 24] = [
+    let cases: [(&[&str], _, &[&str]); 20] = [
         (&["run", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
         (&["record", "--robot", "bad", "--out", "/proc/x"], "", &["cannot write /proc/x"]),
         (&["check", "/no/such/file.toml"], "mission", &["/no/such/file.toml"]),
@@ -89,12 +89,6 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
             &["warp", "dead-reckoning"],
         ),
         (&["stage", "kil"], "unknown-stage", &["kil", "did you mean `stage kill`", "mapper"]),
-        (&["check", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
-        (
-            &["check", "trap", "--set", "planner.executable='/no/such/planner'"],
-            "planner-executable",
-            &["/no/such/planner"],
-        ),
         (
             &["run", "trap", "--set", "robot.address='serial:///dev/no-such-tty'"],
             "no-device",
@@ -112,12 +106,6 @@ fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
         (&["stage", "mapper", "--robot", "ghost"], "", &["ghost", "--watch-only"]),
         (&["stop", "--robot", "ghost"], "not-running", &["ghost"]),
         (&["status", "--robot", "ghost"], "not-running", &["ghost", "firsthand run"]),
-        (&["goto", "1", "1", "--robot", "ghost"], "not-running", &["ghost"]),
-        (
-            &["run", "--robot", "ghost", "--set", "robot.address='not an address'"],
-            "mission",
-            &["not an address", "robot.address"],
-        ),
         (&["run", "--pace", "warp"], "usage", &["warp"]),
         (&["run", "--robot", "../x"], "usage", &["../x"]),
         (&["bench", "chaos", "--robot-faults=honest"], "usage", &["honest", "encoder-dead"]),
