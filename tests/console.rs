@@ -14,7 +14,7 @@ use serde_json::Value;
 use crate::support::{
     PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, directory_of, firsthand,
     firsthand_under, generation, json_lines, operate, output, pid, refused, run, signal_process,
-    start_quietly, wait_for_status,
+    start_piped, start_quietly, wait_for_status,
 };
 
 /// Command whose lines are read as they arrive. It ends with the test.
@@ -26,8 +26,7 @@ struct Reading {
 
 impl Reading {
     fn start(arguments: &[&str]) -> Self {
-        let mut child =
-            firsthand(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut child = start_piped(firsthand(arguments).stderr(Stdio::piped()));
         let lines = BufReader::new(child.stdout.take().unwrap());
         let said = BufReader::new(child.stderr.take().unwrap());
         Self { child, lines, said }

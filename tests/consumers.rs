@@ -2,7 +2,6 @@
 
 use std::{
     io::{BufRead as _, BufReader},
-    process::Stdio,
     sync::{
         Arc, Mutex,
         atomic::{AtomicBool, Ordering},
@@ -11,7 +10,8 @@ use std::{
 };
 
 use crate::support::{
-    self, Killed, Run, STAGES, assert_nothing_left, firsthand, in_own_process, start_quietly,
+    self, Killed, Run, STAGES, assert_nothing_left, firsthand, in_own_process, start_piped,
+    start_quietly,
 };
 use common::{
     bus::{Bus, BusError},
@@ -98,7 +98,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
         };
         assert!(matches!(refused, BusError::HoldsTooMany { .. }), "{refused}");
         let mut shown = firsthand(&["status", "--follow", "--robot", "greedy"]);
-        let mut shown = Killed(shown.stdout(Stdio::piped()).spawn().unwrap());
+        let mut shown = Killed(start_piped(&mut shown));
         let mut first = String::new();
         let mut said = BufReader::new(shown.0.stdout.take().unwrap());
         said.read_line(&mut first).unwrap();

@@ -1,10 +1,10 @@
 //! A robot that follows another robot. `simulation` lets one follow a beacon.
 
-use std::process::Stdio;
-
 use serde_json::Value;
 
-use crate::support::{Run, assert_nothing_left, firsthand, operate, refused, replayed_in};
+use crate::support::{
+    Run, assert_nothing_left, firsthand, operate, refused, replayed_in, start_piped,
+};
 use rustix::process::Signal;
 
 #[test]
@@ -23,11 +23,8 @@ fn a_robot_follows_the_pose_of_another_robot_until_that_ends_and_replays_to_the_
     }
     // The first robot's mission frame is 1 m ahead of the second's, turned to its left.
     operate(first, &["goto", "1.2", "0"]);
-    let command = firsthand(&["goto", "--robot", second, "--follow", first])
-        .args(["--frame", "1", "0", "90", "--distance", "0.8"])
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut command = firsthand(&["goto", "--robot", second, "--follow", first]);
+    let command = start_piped(command.args(["--frame", "1", "0", "90", "--distance", "0.8"]));
     let off_m = |status: &Value| {
         let at = |key: &str| status["pose"][key].as_f64().unwrap_or(9.0);
         (at("x_m") - 1.0).hypot(at("y_m") - 1.2)

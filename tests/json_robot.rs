@@ -2,14 +2,14 @@
 
 use std::{
     io::{BufRead as _, BufReader},
-    process::{Child, Command, Stdio},
+    process::Child,
     thread::{self, JoinHandle},
 };
 
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{Run, assert_ended, assert_no_restart};
+use crate::support::{Run, assert_ended, assert_no_restart, start_piped, with_parent};
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
@@ -23,12 +23,8 @@ struct PythonRobot {
 
 impl PythonRobot {
     fn start() -> Self {
-        let mut process = Command::new("setpriv")
-            .args(["--pdeathsig", "KILL", "--", "python3"])
-            .args([&format!("{EXAMPLE}/robot.py"), "0"])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let program = format!("{EXAMPLE}/robot.py");
+        let mut process = start_piped(&mut with_parent(&["python3", &program, "0"]));
         let mut says = BufReader::new(process.stdout.take().unwrap());
         let mut first = String::new();
         says.read_line(&mut first).unwrap();

@@ -151,7 +151,7 @@ fn a_list_is_driven_to_its_end_although_all_and_then_the_supervisor_are_killed_i
     operate(robot, &["stop"]);
     second.kill().unwrap();
     second.wait().unwrap();
-    let third = resume(&first.directory()).stdout(Stdio::piped()).spawn().unwrap();
+    let third = support::start_piped(&mut resume(&first.directory()));
     support::wait_for_status(robot, |status| {
         assert_ne!(status["order"], "driving", "{status}");
         is_stopped(status) && all_run(status)

@@ -11,7 +11,7 @@ use std::{
 use crate::support::{
     self, ENDLESS, Run, STAGES, all_run, assert_nothing_left, assert_reached, assert_refused,
     directory_of, find, firsthand, firsthand_under, generation, json_of, on_small_disk,
-    on_small_shared_memory, pid, refused, signal_process,
+    on_small_shared_memory, pid, refused, signal_process, start_piped,
 };
 use rustix::process::Signal;
 use serde_json::Value;
@@ -53,14 +53,9 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
         let out = disk.path().join("run");
         // The robot arrives only after the second look at its stages.
         let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.25"];
-        let run = firsthand(&["run", "obstacle-course", "--robot", robot, "--json"])
-            .args(slow)
-            .args(["--set", "sure_within_m=9", "--out"])
-            .arg(&out)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut run = firsthand(&["run", "obstacle-course", "--robot", robot, "--json"]);
+        run.args(slow).args(["--set", "sure_within_m=9", "--out"]).arg(&out);
+        let run = start_piped(run.stderr(Stdio::piped()));
         support::wait_for_status(robot, |status| status["mission_time_s"].as_f64() > Some(1.0));
         disk.fill();
         for stage in STAGES {

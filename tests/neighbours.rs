@@ -6,14 +6,13 @@ use std::{
     net::UdpSocket,
     os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
-    process::Stdio,
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
 use crate::support::{
     self, PATIENCE, Run, assert_nothing_left, assert_reached, assert_refused, domain, firsthand,
-    in_own_process, json_of, pid, signal_process,
+    in_own_process, json_of, pid, signal_process, start_piped,
 };
 use common::{
     address::Address,
@@ -46,7 +45,7 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
         let run = Run::under_way(robot, "open-room", &slow, 0.3);
         let echo = |topic| {
             let mut echo = firsthand(&["topic", "echo", topic, "--robot", robot, "--json"]);
-            echo.args(["--number", "40"]).stdout(Stdio::piped()).spawn().unwrap()
+            start_piped(echo.args(["--number", "40"]))
         };
         let mut echoes = [echo("pose"), echo("guidance")];
         for echo in &mut echoes {

@@ -2,7 +2,7 @@
 
 use std::{
     io::{BufRead as _, BufReader},
-    process::{Child, Stdio},
+    process::Child,
 };
 
 use rustix::process::Signal;
@@ -10,7 +10,7 @@ use serde_json::json;
 
 use crate::support::{
     Browser, ENDLESS, Run, assert_nothing_left, firsthand, golden, has_browser, not_run,
-    operate as operate_robot, printed, refused, signal_process,
+    operate as operate_robot, printed, refused, signal_process, start_piped,
 };
 
 /// `firsthand page`, which ends with the test.
@@ -22,10 +22,8 @@ struct Page {
 
 impl Page {
     fn start(robot: &str, listen: &str) -> Self {
-        let mut child = firsthand(&["page", "--robot", robot, "--listen", listen])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut child = firsthand(&["page", "--robot", robot, "--listen", listen]);
+        let mut child = start_piped(&mut child);
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map(Result::unwrap);
         let mut address = |role: &str| {
             let line = lines.next().unwrap();

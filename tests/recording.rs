@@ -5,7 +5,7 @@ use std::{
     fs,
     io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
-    process::{Child, ChildStdout, Stdio},
+    process::{Child, ChildStdout},
     thread,
     time::Duration,
 };
@@ -25,13 +25,13 @@ use rustix::process::Signal;
 use crate::support::{
     self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, assert_refused,
     firsthand, golden, golden_of, json_of, logged, messages, operate, output, processes_with,
-    recording_in, refused, replayed, replayed_in, signal_process, wait_until,
+    recording_in, refused, replayed, replayed_in, signal_process, start_piped, wait_until,
 };
 
 /// Starts a recorder of `robot`. Returns it with its output.
 fn recorder(robot: &str, file: &Path) -> (Child, BufReader<ChildStdout>) {
     let mut command = firsthand(&["record", "--robot", robot, "--out"]);
-    let mut recorder = command.arg(file).stdout(Stdio::piped()).spawn().unwrap();
+    let mut recorder = start_piped(command.arg(file));
     let said = BufReader::new(recorder.stdout.take().unwrap());
     (recorder, said)
 }

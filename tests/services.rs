@@ -276,7 +276,7 @@ fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_
     let mut other = support::start_quietly(other.arg("--runs").arg(runs.path()));
     other.wait().unwrap();
     assert_eq!(fs::read_dir(runs.path()).unwrap().count(), 2);
-    let again = service().stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let again = support::start_piped(service().stderr(Stdio::piped()));
     let stands = |status: &serde_json::Value| status["order"] == "stopped by an operator";
     support::wait_for_status("cut", stands);
     support::operate("cut", &["resume"]);

@@ -6,15 +6,14 @@ use rustix::process::Signal;
 
 use crate::support::{
     all_run, assert_nothing_left, directory_of, domain, firsthand, processes_with, signal_process,
-    status_of, wait_until,
+    start_piped, status_of, wait_until,
 };
 
 /// Ends a run when `is_there` is true for its directory of runs.
 fn ends(robot: &str, arguments: &[&str], is_there: impl Fn(&Path) -> bool) {
     let runs = directory_of(robot);
     let mut run = firsthand(&["run", "open-room", "--robot", robot, "--pace", "1", "--runs"]);
-    run.arg(runs.path()).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let run = run.spawn().unwrap();
+    let run = start_piped(run.arg(runs.path()).args(arguments).stderr(Stdio::piped()));
     wait_until("it is there", || is_there(runs.path()));
     signal_process(run.id(), Signal::TERM);
     let output = run.wait_with_output().unwrap();

@@ -9,7 +9,7 @@ use std::{
 
 use serde_json::{Value, json};
 
-use super::{PATIENCE, commands::with_parent};
+use super::{PATIENCE, commands::with_parent, start_piped};
 
 /// Browser session that ends its driver on drop.
 pub struct Browser {
@@ -29,11 +29,8 @@ pub fn has_browser() -> bool {
 impl Browser {
     /// Opens a window of that width. A window of a phone's width has touch input.
     pub fn open(width: u32) -> Self {
-        let mut driver = with_parent(&["chromedriver", "--port=0"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let mut driver = with_parent(&["chromedriver", "--port=0"]);
+        let mut driver = start_piped(driver.stderr(Stdio::null()));
         let lines = BufReader::new(driver.stdout.take().unwrap()).lines();
         // The line is "ChromeDriver was started successfully on port N."
         let started = lines.map(Result::unwrap).find(|line| line.contains("successfully"));

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::robot::suite;
 
 /// Returns a command that gets SIGKILL when the thread that starts it ends.
-pub(super) fn with_parent(line: &[&str]) -> Command {
+pub fn with_parent(line: &[&str]) -> Command {
     let mut command = Command::new("setpriv");
     command.args(["--pdeathsig", "KILL", "--"]).args(line).env(SUITE_VARIABLE, suite());
     command
@@ -29,6 +29,11 @@ pub fn firsthand_under(wrapper: &[&str], arguments: &[&str]) -> Command {
 pub fn start_quietly(command: &mut Command) -> Child {
     let quiet = command.stdout(Stdio::null()).stderr(Stdio::null());
     quiet.spawn().unwrap()
+}
+
+/// Starts a command whose output is read while it runs.
+pub fn start_piped(command: &mut Command) -> Child {
+    command.stdout(Stdio::piped()).spawn().unwrap()
 }
 
 pub fn output(arguments: &[&str]) -> Output {

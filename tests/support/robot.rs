@@ -22,7 +22,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::commands::{firsthand, output};
+use super::commands::{firsthand, output, start_piped};
 
 pub const STAGES: [&str; 5] = ["link", "dead-reckoning", "mapper", "planner", "controller"];
 
@@ -171,8 +171,7 @@ pub fn follow_status(
 /// Starts a process that follows a robot's status. Returns it with its lines.
 fn start_follower(robot: &str) -> (Killed, Receiver<String>) {
     let mut command = firsthand(&["status", "--follow", "--json", "--robot", robot]);
-    let follower = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    let mut follower = Killed(follower);
+    let mut follower = Killed(start_piped(command.stderr(Stdio::null())));
     let lines = BufReader::new(follower.0.stdout.take().unwrap()).lines();
     let (sent, received) = mpsc::channel();
     thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| sent.send(line)));

@@ -15,7 +15,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use super::{
-    commands::{firsthand, json_lines},
+    commands::{firsthand, json_lines, start_piped},
     robot::{
         STAGES, all_run, assert_nothing_left, directory_of, follow_status, generation, pid,
         signal_process, status_of,
@@ -47,15 +47,10 @@ impl Run {
     pub fn at_own_speed(robot: &str, mission: &str, arguments: &[&str]) -> Self {
         let directory = directory_of(robot);
         let out = directory.path().join("run");
-        let child = firsthand(&["run", mission, "--robot", robot, "--json", "--out"])
-            .arg(&out)
-            .args(["--set", "sure_within_m=9", "--set", "timeout_s=900"])
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        Self { robot: robot.to_owned(), child: Some(child), directory, keeps_guard: false }
+        let mut run = firsthand(&["run", mission, "--robot", robot, "--json", "--out"]);
+        run.arg(&out).args(["--set", "sure_within_m=9", "--set", "timeout_s=900"]);
+        let child = Some(start_piped(run.args(arguments).stderr(Stdio::piped())));
+        Self { robot: robot.to_owned(), child, directory, keeps_guard: false }
     }
 
     /// Starts, and waits for `seconds` of mission time.

@@ -13,7 +13,7 @@ use std::{
 
 use serde_json::Value;
 
-use super::{PATIENCE, firsthand};
+use super::{PATIENCE, firsthand, start_piped};
 
 /// Simulated robot, which ends with the thread of its test.
 pub struct Robot {
@@ -49,12 +49,8 @@ impl Robot {
 
     /// Starts a simulated robot with further arguments of `firsthand sim`.
     pub fn start_with(mission: &str, arguments: &[&str]) -> Self {
-        let mut process = firsthand(&["sim", mission, "--ground-truth"])
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        let mut process = firsthand(&["sim", mission, "--ground-truth"]);
+        let mut process = start_piped(process.args(arguments).stderr(Stdio::null()));
         let output = BufReader::new(process.stdout.take().unwrap());
         let (tell, truth) = channel();
         std::thread::spawn(move || {
