@@ -55,15 +55,11 @@ impl Manager {
         text.lines().map(str::to_owned).collect()
     }
 
-    fn hear_until(&self, line: &str) {
-        self.hear_until_that(|heard| heard == line);
-    }
-
-    fn hear_until_that(&self, is_it: impl Fn(&str) -> bool) {
-        let began = Instant::now();
-        while !self.hear().iter().any(|line| is_it(line)) {
-            assert!(began.elapsed() < PATIENCE, "it is not heard");
-        }
+    /// Waits for a line that starts with `start` and contains `parts`.
+    fn hear_until(&self, start: &str, parts: &[&str]) {
+        let is_it =
+            |line: &String| line.starts_with(start) && parts.iter().all(|part| line.contains(part));
+        support::wait_until(start, || self.hear().iter().any(is_it));
     }
 }
 
@@ -81,17 +77,15 @@ fn systemd_hears_of_a_run_and_its_journal_of_deaths_and_a_frozen_supervisor_feed
     command.args(["--set", "controller.speed_m_s=0.05"]);
     command.env("JOURNAL_STREAM", format!("{}:{}", found.dev(), found.ino()));
     let mut supervisor = command.spawn().unwrap();
-    manager.hear_until("READY=1");
+    manager.hear_until("READY=1", &[]);
     // A loop that is late by half of the limit would be killed, so that much must be left.
     let mut fed = Instant::now();
     for _ in 0..3 {
-        manager.hear_until("WATCHDOG=1");
+        manager.hear_until("WATCHDOG=1", &[]);
         assert!(fed.elapsed() < WATCHDOG, "{:?}", fed.elapsed());
         fed = Instant::now();
     }
-    manager.hear_until_that(|line| {
-        line.starts_with("STATUS=") && line.contains("to go") && line.contains("5/5")
-    });
+    manager.hear_until("STATUS=", &["to go", "5/5"]);
     let status = support::wait_for_status(robot, |status| status["order"] == "driving");
     signal_process(support::pid(&status, "mapper"), Signal::KILL);
     support::wait_for_status(robot, |status| find(status, "mapper")["generation"] == 2);
@@ -107,7 +101,7 @@ fn systemd_hears_of_a_run_and_its_journal_of_deaths_and_a_frozen_supervisor_feed
     manager.socket.set_read_timeout(Some(PATIENCE)).unwrap();
     signal_process(supervisor.id(), Signal::CONT);
     signal_process(supervisor.id(), Signal::TERM);
-    manager.hear_until("STOPPING=1");
+    manager.hear_until("STOPPING=1", &[]);
     assert_eq!(supervisor.wait().unwrap().code(), Some(0));
 
     let text = fs::read_to_string(journal).unwrap();
@@ -187,12 +181,7 @@ impl Drop for Units {
     }
 }
 
-fn watching(robot: &'static str) -> (Run, Units) {
-    // The mission is long enough for several kills on a busy machine.
-    watching_with(robot, &["--pace", "4", "--set", "controller.speed_m_s=0.2"])
-}
-
-fn watching_with(robot: &'static str, arguments: &[&str]) -> (Run, Units) {
+fn watching(robot: &'static str, arguments: &[&str]) -> (Run, Units) {
     let arguments = [&["--watch-only"], arguments].concat();
     let mut run = Run::start(robot, "obstacle-course", &arguments);
     run.wait_until("there is a bus", |status| status["order"] == "starting");
@@ -202,7 +191,8 @@ fn watching_with(robot: &'static str, arguments: &[&str]) -> (Run, Units) {
 #[test]
 fn external_stages_survive_kills_and_freezes_and_those_that_systemd_stops_are_no_deaths() {
     let robot = "units";
-    let (mut run, mut units) = watching(robot);
+    // The mission is long enough for several kills on a busy machine.
+    let (mut run, mut units) = watching(robot, &["--pace", "4"]);
     run.wait_until_under_way(1.0);
     run.kill_each(Signal::KILL);
     let status = run.kill_and_await_successor("mapper", Signal::STOP);
@@ -232,7 +222,7 @@ fn external_stages_stop_the_robot_and_end_with_a_killed_supervisor_and_a_frozen_
     let body = Robot::on_the_course();
     let tap = Tap::before(&body);
     let address = tap.proxy.as_robot();
-    let (mut run, mut units) = watching_with(robot, &["--set", &address]);
+    let (mut run, mut units) = watching(robot, &["--set", &address]);
     let status = run.wait_until_under_way(1.0);
     // The kernel wakes a stage of the supervisor when its parent ends, but an external one stays
     // frozen.
