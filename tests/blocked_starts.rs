@@ -7,8 +7,8 @@ use std::{
 };
 
 use crate::support::{
-    PATIENCE, Run, STAGES, bus_instance, half_make, in_own_process, pid, shared_memory,
-    signal_process,
+    PATIENCE, Run, STAGES, assert_each_restarted, bus_instance, half_make, in_own_process, pid,
+    shared_memory, signal_process,
 };
 use common::{
     bus::{Bus, BusError},
@@ -51,14 +51,6 @@ fn assert_arrives(run: Run) -> Value {
     // A lost pose would have an error of metres.
     assert!(summary["pose_error_m"].as_f64() < Some(0.05), "{summary}");
     summary
-}
-
-/// A recreated bus restarts every stage.
-fn assert_bus_was_recreated(summary: &Value) {
-    for stage in STAGES {
-        let restarts = summary["restarts"][stage].as_u64();
-        assert!(restarts >= Some(1), "{stage}: {summary}");
-    }
 }
 
 #[test]
@@ -128,18 +120,6 @@ fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
 }
 
 #[test]
-fn a_half_made_service_blocks_starts_until_the_bus_is_recreated() {
-    let mut run = Run::start("block-service", "open-room", &PACE);
-    let status = run.wait_until_under_way(1.0);
-    let services = bus_instance("block-service").root().join("services");
-    for service in fs::read_dir(services).unwrap() {
-        half_make(&service.unwrap().path());
-    }
-    run.kill_and_await("planner", Signal::KILL, &status);
-    assert_bus_was_recreated(&assert_arrives(run));
-}
-
-#[test]
 fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_recreated() {
     in_own_process(|| {
         let mut run = Run::start("block-places", "open-room", &PACE);
@@ -170,6 +150,6 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
         run.signal(Signal::CONT);
         // The places are leaked, as if their owners had been killed.
         std::mem::forget((places, joined));
-        assert_bus_was_recreated(&assert_arrives(run));
+        assert_each_restarted(&assert_arrives(run));
     });
 }

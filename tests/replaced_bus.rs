@@ -4,7 +4,8 @@
 use std::time::{Duration, Instant};
 
 use crate::support::{
-    self, PATIENCE, Run, bus_instance, generation, half_make, in_own_process, pid, signal_process,
+    self, PATIENCE, Run, assert_each_restarted, bus_instance, generation, half_make,
+    in_own_process, pid, signal_process,
 };
 use common::{bus::Bus, samples::PoseSample, topics, waiter::Waiter};
 use rustix::process::Signal;
@@ -70,6 +71,6 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
             assert_eq!(generation(&after, stage), generation(&before, stage) + more, "{stage}");
         }
         drop(new);
-        run.stop();
+        assert_each_restarted(&run.stop());
     });
 }

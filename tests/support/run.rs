@@ -226,6 +226,14 @@ pub fn assert_no_restart(summary: &Value) {
     assert!(restarts.all(|times| times == 0), "{summary}");
 }
 
+/// Asserts that every stage was restarted, as with a recreated bus.
+#[track_caller]
+pub fn assert_each_restarted(summary: &Value) {
+    for stage in STAGES {
+        assert!(summary["restarts"][stage].as_u64() >= Some(1), "{stage}: {summary}");
+    }
+}
+
 /// Reads a file of records, one JSON value per line. A missing file has none.
 pub fn records(file: &Path) -> Vec<Value> {
     json_lines(&fs::read_to_string(file).unwrap_or_default())
