@@ -18,6 +18,14 @@ pub fn in_own_process<T: FnOnce()>(test: T) {
     in_process_under(&[], name_of::<T>(), test);
 }
 
+/// [`in_own_process`] for a test that acts as another user, which only root can.
+pub fn in_own_process_of_root<T: FnOnce()>(test: T) {
+    if !geteuid().is_root() {
+        return not_run(name_of::<T>(), "only root can act as another user");
+    }
+    in_own_process(test);
+}
+
 /// Runs `test` in its own process with a file system of `mebibytes` MiB.
 ///
 /// An ordinary user mounts it in a user namespace. If the system forbids that, the test is skipped
@@ -34,7 +42,8 @@ pub fn on_small_shared_memory<T: FnOnce(SmallDisk)>(mebibytes: u32, test: T) {
 
 fn on_small_file_system<T: FnOnce(SmallDisk)>(mount: &Path, mebibytes: u32, test: T) {
     let namespaces = ["unshare", "--user", "--map-root-user", "--mount"];
-    if !can_run(&namespaces) {
+    let probe = Command::new(namespaces[0]).args(&namespaces[1..]).arg("true").output();
+    if !probe.is_ok_and(|output| output.status.success()) {
         return not_run(name_of::<T>(), "no user namespace with mounts can be had here");
     }
     // The inner namespace restores the test's user, whose number is part of the robot's file names.
@@ -72,12 +81,6 @@ impl SmallDisk {
         let refused = std::iter::repeat_with(|| file.write_all(&[1; 4096])).find_map(Result::err);
         assert_eq!(refused.unwrap().kind(), std::io::ErrorKind::StorageFull);
     }
-}
-
-pub fn can_run(wrapper: &[&str]) -> bool {
-    let mut command = Command::new(wrapper[0]);
-    let output = command.args(&wrapper[1..]).arg("true").output();
-    output.is_ok_and(|output| output.status.success())
 }
 
 /// Number of skipped tests of this executable.
