@@ -4,10 +4,7 @@
 use std::{
     fs,
     path::Path,
-    sync::{
-        Arc,
-        atomic::{AtomicU8, Ordering},
-    },
+    sync::{Arc, Mutex},
     thread,
     time::{Duration, Instant},
 };
@@ -99,21 +96,20 @@ enum Fault {
 
 struct Wire {
     proxy: Proxy,
-    fault: Arc<AtomicU8>,
+    fault: Arc<Mutex<Fault>>,
 }
 
 impl Wire {
     fn before(robot: &Robot, fault: Fault) -> Self {
-        let shared = Arc::new(AtomicU8::new(fault as u8));
+        let shared = Arc::new(Mutex::new(fault));
         let (out, back) = (Arc::clone(&shared), Arc::clone(&shared));
-        let is = |shared: &AtomicU8, fault| shared.load(Ordering::Relaxed) == fault as u8;
         let mut decoder = Decoder::default();
         let to_robot: Box<Pass> = Box::new(move |bytes| {
             decoder.push(bytes);
             let mut passed = Vec::new();
             while let Some(frame) = decoder.next_frame() {
-                let stops = || Command::parse(&frame).is_ok_and(|command| is_any_stop(&command));
-                if !(is(&out, Fault::NoStop) && stops()) {
+                let stops = Command::parse(&frame).is_ok_and(|command| is_any_stop(&command));
+                if !stops || *out.lock().unwrap() != Fault::NoStop {
                     frame.encode(&mut passed);
                 }
             }
@@ -126,14 +122,15 @@ impl Wire {
             while let Some(frame) = decoder.next_frame() {
                 let Ok(mut report) = Report::parse(&frame) else { continue };
                 if let Report::Motor(sensors) = &mut report {
-                    if is(&back, Fault::NoFrame) {
-                        continue;
-                    }
                     frames = frames.wrapping_add(1);
-                    if is(&back, Fault::Random) {
-                        let random = |factor| frames.wrapping_mul(factor) % 32_768;
-                        sensors.encoders[0].position = random(9973);
-                        sensors.encoders[1].position = random(20_011);
+                    let random = |factor| frames.wrapping_mul(factor) % 32_768;
+                    match *back.lock().unwrap() {
+                        Fault::NoFrame => continue,
+                        Fault::Random => {
+                            sensors.encoders[0].position = random(9973);
+                            sensors.encoders[1].position = random(20_011);
+                        }
+                        _ => {}
                     }
                 }
                 report.encode(Addressing::default(), &mut passed);
@@ -144,7 +141,7 @@ impl Wire {
     }
 
     fn set(&self, fault: Fault) {
-        self.fault.store(fault as u8, Ordering::Relaxed);
+        *self.fault.lock().unwrap() = fault;
     }
 }
 
@@ -225,9 +222,9 @@ fn damage_bus(robot: &str, damage: fn(&Path)) {
 }
 
 fn remove(path: &Path) {
-    let removed = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
     // Its processes remove some files themselves.
-    assert!(removed.is_ok() || !path.exists(), "{}: {removed:?}", path.display());
+    let removed = fs::remove_file(path).or_else(|_| fs::remove_dir_all(path));
+    assert!(!path.exists(), "{}: {removed:?}", path.display());
 }
 
 fn truncate(path: &Path) {
