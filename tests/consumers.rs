@@ -10,8 +10,8 @@ use std::{
 };
 
 use crate::support::{
-    self, Killed, Run, STAGES, assert_nothing_left, firsthand, in_own_process, start_piped,
-    start_quietly,
+    Killed, PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, domain, firsthand,
+    in_own_process, signal_process, start_piped, start_quietly,
 };
 use common::{
     bus::{Bus, BusError},
@@ -22,12 +22,12 @@ use common::{
 type HeardPoses = Mutex<Vec<usize>>;
 
 fn follow(robot: &str, runs: usize, heard: &HeardPoses) {
-    let domain = support::domain(robot);
+    let domain = domain(robot);
     let mut follower = Follower::new(domain, "logger", &topics::POSE, |bus| {
         Ok((bus.reader(&topics::POSE)?, bus.reader(&topics::GRID)?))
     });
     let mut here = false;
-    let patience = support::PATIENCE * runs as u32;
+    let patience = PATIENCE * runs as u32;
     let began = Instant::now();
     while heard.lock().unwrap().len() < runs || here {
         assert!(began.elapsed() < patience, "{heard:?}");
@@ -60,7 +60,7 @@ fn a_logger_follows_its_robot_through_three_runs_one_of_them_killed_and_harms_no
                 let has_heard = || heard.lock().unwrap().get(1).is_some_and(|&poses| poses > 5);
                 let status = started.wait_until("the logger hears it", |_| has_heard());
                 let supervisor = status["supervisor_pid"].as_u64().unwrap() as u32;
-                support::signal_process(supervisor, rustix::process::Signal::KILL);
+                signal_process(supervisor, rustix::process::Signal::KILL);
                 started.reap();
                 // The bus of a killed supervisor stays until the next run removes it.
                 std::thread::park_timeout(Duration::from_secs(3));
@@ -68,7 +68,7 @@ fn a_logger_follows_its_robot_through_three_runs_one_of_them_killed_and_harms_no
             }
             let (code, summary) = started.finish();
             assert_eq!(code, Some(0), "{summary}");
-            support::assert_no_restart(&summary);
+            assert_no_restart(&summary);
             // The pause lets the consumer notice the end of the run. Robots are not restarted
             // within a second.
             std::thread::park_timeout(Duration::from_secs(1));
@@ -85,7 +85,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
         // The robot arrives only after its stages run again, on a busy machine too.
         let slowly = ["--pace", "2", "--set", "controller.speed_m_s=0.02"];
         let mut run = Run::under_way("greedy", "open-room", &slowly, 0.5);
-        let bus = Bus::join(&support::domain("greedy"), "greedy").unwrap();
+        let bus = Bus::join(&domain("greedy"), "greedy").unwrap();
         let mut grids = bus.reader(&topics::GRID).unwrap();
         let mut held = Vec::new();
         let began = Instant::now();
@@ -94,7 +94,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
                 Ok(sample) => held.extend(sample),
                 Err(error) => break error,
             }
-            assert!(began.elapsed() < support::PATIENCE, "{} held", held.len());
+            assert!(began.elapsed() < PATIENCE, "{} held", held.len());
         };
         assert!(matches!(refused, BusError::HoldsTooMany { .. }), "{refused}");
         let mut shown = firsthand(&["status", "--follow", "--robot", "greedy"]);
@@ -134,7 +134,7 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
 /// Joins the bus of `robot`, reads grid and field, and leaves, repeatedly until `over`. Returns the
 /// number of successes.
 fn join_again_and_again(robot: &str, over: &AtomicBool) -> usize {
-    let domain = support::domain(robot);
+    let domain = domain(robot);
     let mut joined = 0;
     while !over.load(Ordering::Relaxed) {
         let Ok(bus) = Bus::join(&domain, "visitor") else {
@@ -167,7 +167,7 @@ fn consumers_that_stay_and_that_join_again_and_again_take_no_stages_place() {
             let visitor = || scope.spawn(|| join_again_and_again(robot, &over));
             let visitors = [visitor(), visitor(), visitor()];
             run.wait_until_under_way(5.0);
-            let bus = Bus::join(&support::domain(robot), robot).unwrap();
+            let bus = Bus::join(&domain(robot), robot).unwrap();
             let all_that_there_are: Vec<_> =
                 std::iter::from_fn(|| bus.reader(&topics::GRID).ok()).collect();
             // The restarted stage gets its place before waiting consumers.

@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::support::{
-    self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left,
+    PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, not_run, wait_until_all_ended,
     wire::{Proxy, Robot},
 };
 use common::wire::{Command, Decoder};
@@ -173,7 +173,7 @@ fn ignores(signal: Signal) -> bool {
 fn a_run_that_a_signal_ends_or_kills_leaves_the_command_zero_and_no_process() {
     for signal in [Signal::INT, Signal::TERM, Signal::HUP, Signal::KILL] {
         if signal == Signal::HUP && ignores(signal) {
-            support::not_run("a_run_that_a_signal_ends_or_kills", "nohup: no SIGHUP");
+            not_run("a_run_that_a_signal_ends_or_kills", "nohup: no SIGHUP");
             continue;
         }
         let (_body, tap, mut run) = tapped("tap-end");
@@ -182,7 +182,7 @@ fn a_run_that_a_signal_ends_or_kills_leaves_the_command_zero_and_no_process() {
         run.signal(signal);
         if signal == Signal::KILL {
             run.reap();
-            support::wait_until_all_ended("tap-end");
+            wait_until_all_ended("tap-end");
         } else {
             let (code, summary) = run.finish();
             assert_ended(code, &summary, 0, "aborted");

@@ -5,7 +5,8 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::support::{
-    self, Run, json_of, mission_file, operate, outcomes, output, records, refused,
+    Run, assert_nothing_left, json_of, mission_file, operate, outcomes, output, printed, records,
+    refused, replayed_poses, wait_until,
 };
 
 const PACE: [&str; 2] = ["--pace", "2"];
@@ -56,7 +57,7 @@ fn a_mission_starts_from_the_map_that_an_earlier_run_saved_and_a_damaged_map_is_
         assert_eq!(summary[0]["outcome"], "reached");
     };
     drive(&first, &[]);
-    support::printed(&["map", "save", &first, "--out", &map]);
+    printed(&["map", "save", &first, "--out", &map]);
     drive(&second, &["--set", &set]);
     let mission = std::fs::read_to_string(path("second/mission.toml")).unwrap();
     assert!(mission.contains("[[known.box]]") && !mission.contains("course.yaml"), "{mission}");
@@ -101,7 +102,7 @@ fn a_robot_that_stays_takes_targets_zones_and_its_place_until_it_is_ended_and_re
     operate(robot, &["zone", "1.2", "-2", "--remove"]);
     // The supervisor judges a target by the map, which shows the change in its next part.
     let there = ["goto", "1.2", "-2", "0", "0", "--robot", robot];
-    support::wait_until("its old place is free", || output(&there).status.success());
+    wait_until("its old place is free", || output(&there).status.success());
     run.kill_and_await_successor("mapper", Signal::KILL);
     run.wait_until("it is back", waits);
     say(&["goto", "1.2", "2"], "target-in-hazard");
@@ -115,11 +116,11 @@ fn a_robot_that_stays_takes_targets_zones_and_its_place_until_it_is_ended_and_re
     run.wait_until("it believes so", |after| {
         after["pose"]["x_m"].as_f64().is_some_and(|x| x.abs() < 0.1) && *after != status
     });
-    support::wait_until("the recovery is recorded", || {
+    wait_until("the recovery is recorded", || {
         run.records("stalls.jsonl").iter().any(|stall| stall["cause"] == "relocated")
     });
     // A record waits for the ground truth of its tick.
-    support::wait_until("each has its record while the run goes on", || {
+    wait_until("each has its record while the run goes on", || {
         run.records("targets.jsonl").len() == 4
     });
     run.signal(Signal::INT);
@@ -129,9 +130,9 @@ fn a_robot_that_stays_takes_targets_zones_and_its_place_until_it_is_ended_and_re
     let directory = directory.path().join("run");
     let recorded = records(&directory.join("targets.jsonl"));
     assert_eq!(summary["targets"].as_array(), Some(&recorded), "each once");
-    for PoseSample { stamp, x_m, y_m, .. } in support::replayed_poses(&directory) {
+    for PoseSample { stamp, x_m, y_m, .. } in replayed_poses(&directory) {
         let is_in = (1.0..1.4).contains(&x_m) && y_m < 1.5 && y_m > -1.0;
         assert!(!is_in, "tick {} at ({x_m}, {y_m})", stamp.tick);
     }
-    support::assert_nothing_left(robot);
+    assert_nothing_left(robot);
 }

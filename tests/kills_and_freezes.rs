@@ -9,9 +9,10 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use crate::support::{
-    self, ENDLESS, Run, STAGES, all_run, assert_each_restarted, assert_ended, assert_nothing_left,
+    ENDLESS, Run, STAGES, all_run, assert_each_restarted, assert_ended, assert_nothing_left,
     assert_reached, find, firsthand, operate, outcomes, output, pid, processes, processes_with,
-    records, replayed_in, replayed_poses, signal_process,
+    records, replayed_in, replayed_poses, signal_process, start_piped, start_quietly,
+    wait_for_status, wait_until, wait_until_all_ended,
 };
 
 /// Options for mission time at four times the wall clock: a mission takes ten seconds.
@@ -34,7 +35,7 @@ fn first_process(run: &Run, stage: &str) -> u32 {
     let directory = run.directory();
     let directory = directory.to_str().unwrap();
     let mut found = None;
-    support::wait_until("the stage's process is there", || {
+    wait_until("the stage's process is there", || {
         let mut its = processes(directory).into_iter();
         found = its.find(|(_, line)| line.contains(&format!(" stage {stage} ")));
         found.is_some()
@@ -140,16 +141,16 @@ fn a_list_is_driven_to_its_end_although_all_and_then_the_supervisor_are_killed_i
         signal_process(pid, Signal::KILL);
     }
     first.reap();
-    support::wait_until_all_ended(robot);
-    let mut second = support::start_quietly(&mut resume(&first.directory()));
-    support::wait_for_status(robot, |status| {
+    wait_until_all_ended(robot);
+    let mut second = start_quietly(&mut resume(&first.directory()));
+    wait_for_status(robot, |status| {
         status["order"] == "driving" && status["mission_time_s"].as_f64() > Some(8.0)
     });
     operate(robot, &["stop"]);
     second.kill().unwrap();
     second.wait().unwrap();
-    let third = support::start_piped(&mut resume(&first.directory()));
-    support::wait_for_status(robot, |status| {
+    let third = start_piped(&mut resume(&first.directory()));
+    wait_for_status(robot, |status| {
         assert_ne!(status["order"], "driving", "{status}");
         is_stopped(status) && all_run(status)
     });

@@ -9,9 +9,10 @@ use std::{
 };
 
 use crate::support::{
-    self, ENDLESS, Run, STAGES, all_run, assert_nothing_left, assert_reached, assert_refused,
-    directory_of, find, firsthand, firsthand_under, generation, json_of, on_small_disk,
-    on_small_shared_memory, pid, refused, signal_process, start_piped,
+    ENDLESS, Run, STAGES, all_run, assert_no_restart, assert_nothing_left, assert_reached,
+    assert_refused, directory_of, domain, find, firsthand, firsthand_under, generation, json_of,
+    on_small_disk, on_small_shared_memory, pid, records, refused, signal_process, start_piped,
+    wait_for_status, wait_until,
 };
 use rustix::process::Signal;
 use serde_json::Value;
@@ -56,12 +57,12 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
         let mut run = firsthand(&["run", "obstacle-course", "--robot", robot, "--json"]);
         run.args(slow).args(["--set", "sure_within_m=9", "--out"]).arg(&out);
         let run = start_piped(run.stderr(Stdio::piped()));
-        support::wait_for_status(robot, |status| status["mission_time_s"].as_f64() > Some(1.0));
+        wait_for_status(robot, |status| status["mission_time_s"].as_f64() > Some(1.0));
         disk.fill();
         for stage in STAGES {
-            let before = support::wait_for_status(robot, all_run);
+            let before = wait_for_status(robot, all_run);
             signal_process(pid(&before, stage), Signal::KILL);
-            support::wait_for_status(robot, |status| {
+            wait_for_status(robot, |status| {
                 let newer = generation(status, stage) > generation(&before, stage);
                 newer && find(status, stage)["state"] == "running"
             });
@@ -69,7 +70,7 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
         let ended = run.wait_with_output().unwrap();
         let (exit, printed) = json_of(&ended);
         assert_reached(exit.code(), &printed[0]);
-        assert_eq!(support::records(&out.join("summary.json")), printed);
+        assert_eq!(records(&out.join("summary.json")), printed);
         // The message names the lost file.
         let said = String::from_utf8(ended.stderr).unwrap();
         assert!(said.contains("picture.svg"), "{said}");
@@ -109,19 +110,19 @@ fn shared_memory_that_is_full_is_refused_at_the_start_and_harms_no_run_later() {
         memory.empty();
         let run = Run::under_way(robot, "obstacle-course", &["--pace", "4"], 0.3);
         memory.fill();
-        support::assert_no_restart(&run.arrives());
+        assert_no_restart(&run.arrives());
     });
 }
 
 #[test]
 fn a_supervisor_waits_for_one_that_was_killed_a_moment_ago() {
-    let domain = support::domain("mach-gone");
+    let domain = domain("mach-gone");
     fs::create_dir_all(domain.directory()).unwrap();
     let held = File::create(domain.lock_file()).unwrap();
     held.lock().unwrap();
     let run = Run::at_own_speed("mach-gone", "open-room", &[]);
     // The supervisor logs before it locks, and retries for a second.
-    support::wait_until("it logs", || run.directory().join("supervisor.log").exists());
+    wait_until("it logs", || run.directory().join("supervisor.log").exists());
     thread::sleep(Duration::from_millis(100));
     drop(held);
     run.arrives();

@@ -11,8 +11,9 @@ use std::{
 };
 
 use crate::support::{
-    self, PATIENCE, Run, assert_nothing_left, assert_reached, assert_refused, domain, firsthand,
-    in_own_process, in_own_process_of_root, json_of, pid, signal_process, start_piped,
+    PATIENCE, Run, assert_no_restart, assert_nothing_left, assert_reached, assert_refused, domain,
+    firsthand, in_own_process, in_own_process_of_root, json_of, logged, output, pid, shared_memory,
+    signal_process, start_piped, wait_until,
 };
 use common::{
     address::Address,
@@ -68,8 +69,8 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
         }
         let own = format!("process {}:", std::process::id());
         for reader in ["dead-reckoning", "mapper", "planner", "controller"] {
-            let told = || support::logged(&run.directory(), reader, &["WARN", &own]) == 1;
-            support::wait_until("a warning names the forger", told);
+            let told = || logged(&run.directory(), reader, &["WARN", &own]) == 1;
+            wait_until("a warning names the forger", told);
         }
         let backwards = CommandSample {
             pose_ns: u64::MAX,
@@ -85,7 +86,7 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
             order: Order::Stop.into(),
             ..DirectiveSample::default()
         };
-        support::wait_until("the commander is told", || {
+        wait_until("the commander is told", || {
             let forged = MissionTime(u64::MAX);
             commands.publish(u64::MAX, forged, backwards).unwrap();
             orders.publish(u64::MAX, forged, stop).unwrap();
@@ -108,7 +109,7 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
         assert!(stamps.iter().all(|stamp| stamp.generation == 1));
         assert!(stamps.is_sorted_by_key(|stamp| stamp.tick));
         assert!(stamps.len() > 40, "{}", stamps.len());
-        support::assert_no_restart(&summary);
+        assert_no_restart(&summary);
         assert_eq!(summary["resets"], 0, "{summary}");
     });
 }
@@ -197,7 +198,7 @@ fn a_signal_goes_to_who_holds_the_supervisors_lock_and_not_to_the_number_in_its_
     fs::create_dir_all(robot.directory()).unwrap();
     for stale in [bystander.id().to_string(), "-1".to_owned()] {
         fs::write(robot.lock_file(), stale).unwrap();
-        let killed = support::output(&["stage", "kill", "supervisor", "--robot", "stale-lock"]);
+        let killed = output(&["stage", "kill", "supervisor", "--robot", "stale-lock"]);
         assert_refused(&killed, "no-process", &["supervisor"]);
         assert!(bystander.try_wait().unwrap().is_none(), "it was killed");
     }
@@ -210,7 +211,7 @@ fn a_signal_goes_to_who_holds_the_supervisors_lock_and_not_to_the_number_in_its_
 fn ends_after(robot: &str, damage: impl Fn(&[PathBuf])) {
     let mut run = Run::start(robot, "open-room", &["--pace", "1"]);
     let status = run.wait_until_under_way(0.3);
-    damage(&support::shared_memory(&domain(robot).shared_memory_prefix()));
+    damage(&shared_memory(&domain(robot).shared_memory_prefix()));
     // A stage that joins finds these files.
     signal_process(pid(&status, "mapper"), Signal::KILL);
     std::thread::park_timeout(Duration::from_millis(500));

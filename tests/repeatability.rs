@@ -7,7 +7,9 @@ use common::{bus::Bus, topics, waiter::Waiter};
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{self, Run, assert_nothing_left, in_own_process};
+use crate::support::{
+    Run, assert_nothing_left, domain, in_own_process, operate, pid, run, signal_process,
+};
 
 /// Returns the summary without wall-clock measurements.
 fn numbers(mut summary: Value) -> Value {
@@ -24,9 +26,9 @@ fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
     let calm = Run::start("tick-calm", "obstacle-course", &slow);
     let mut held = Run::start("tick-held", "obstacle-course", &slow);
     held.wait_until_driving();
-    support::operate("tick-held", &["stop"]);
+    operate("tick-held", &["stop"]);
     held.wait_until("it is stopped", |status| status["link"]["cause"] == "stopped by an operator");
-    support::operate("tick-held", &["resume"]);
+    operate("tick-held", &["resume"]);
     assert_eq!(numbers(held.arrives()), numbers(calm.arrives()));
 }
 
@@ -40,7 +42,7 @@ fn a_mission_that_ends_by_a_touch_or_whose_robot_stalls_gives_the_same_summary_t
     for (mission, arguments, code) in
         [("obstacle-course", blind, Some(5)), ("open-room", closed, Some(3))]
     {
-        let [one, other] = [(); 2].map(|()| support::run("again", mission, &arguments));
+        let [one, other] = [(); 2].map(|()| run("again", mission, &arguments));
         assert_eq!(one.0, code, "{}", one.1);
         assert_eq!(numbers(one.1), numbers(other.1));
     }
@@ -52,12 +54,12 @@ fn a_robot_with_a_laser_goes_the_same_way_though_a_slow_stage_makes_the_link_rep
     let robot = ["--set", "robot.model='kobuki'", "--set", "controller.speed_m_s=0.03"];
     let slow = [&robot[..], &["--timeout", "8000"]].concat();
     in_own_process(|| {
-        let (_, undisturbed) = support::run("laser-calm", "open-room", &slow);
+        let (_, undisturbed) = run("laser-calm", "open-room", &slow);
         let mut run = Run::start("laser-slow", "open-room", &slow);
-        let planner = support::pid(&run.wait_until_under_way(1.0), "planner");
+        let planner = pid(&run.wait_until_under_way(1.0), "planner");
         // The bus reports a repeated tick at once. A planner frozen for long would be replaced, and
         // its successor's map differs.
-        let bus = Bus::join(&support::domain("laser-slow"), "watcher").unwrap();
+        let bus = Bus::join(&domain("laser-slow"), "watcher").unwrap();
         let mut link = bus.reader(&topics::LINK).unwrap();
         let mut waiter = Waiter::default();
         waiter.on(bus.wakeup(&topics::LINK).unwrap());
@@ -69,9 +71,9 @@ fn a_robot_with_a_laser_goes_the_same_way_though_a_slow_stage_makes_the_link_rep
         };
         for _ in 0..5 {
             let before = repeated_ticks();
-            support::signal_process(planner, Signal::STOP);
+            signal_process(planner, Signal::STOP);
             while repeated_ticks() <= before {}
-            support::signal_process(planner, Signal::CONT);
+            signal_process(planner, Signal::CONT);
         }
         let (_, disturbed) = run.finish();
         assert_eq!(disturbed["restarts"]["planner"], 0, "{disturbed}");

@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use crate::support::{
-    self, PATIENCE, Run, assert_each_restarted, bus_instance, generation, half_make,
+    PATIENCE, Run, assert_each_restarted, bus_instance, domain, generation, half_make,
     in_own_process, pid, signal_process,
 };
 use common::{bus::Bus, samples::PoseSample, topics, waiter::Waiter};
@@ -34,7 +34,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
         let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02"];
         let mut run = Run::start(ROBOT, "open-room", &slow);
         let status = run.wait_until_under_way(1.0);
-        let domain = support::domain(ROBOT);
+        let domain = domain(ROBOT);
         let old = Bus::join(&domain, "logger").unwrap();
         let old_poses = old.reader(&topics::POSE).unwrap();
         let heard = next_pose(&old);
