@@ -3,12 +3,11 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    time::Instant,
 };
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_each_restarted, bus_instance, half_make, in_own_process, pid,
-    shared_memory, signal_process,
+    Run, STAGES, assert_each_restarted, bus_instance, half_make, in_own_process, pid,
+    shared_memory, signal_process, wait_until,
 };
 use common::{
     bus::{Bus, BusError},
@@ -81,11 +80,10 @@ fn what_a_killed_stage_left_half_made_blocks_no_start_and_is_removed() {
     fs::create_dir(&cut_off).unwrap();
     fs::write(cut_off.join(format!("{}node.details", bus.shared_memory_prefix())), "").unwrap();
     let status = run.kill_and_await("mapper", Signal::KILL, &status);
-    let began = Instant::now();
-    while !nodes_of(&bus, mapper).is_empty() || cut_off.exists() {
-        assert!(began.elapsed() < PATIENCE, "node files stay");
+    wait_until("node files are removed", || {
         run.status();
-    }
+        nodes_of(&bus, mapper).is_empty() && !cut_off.exists()
+    });
     for stage in STAGES {
         let process = pid(&status, stage);
         assert_eq!(nodes_of(&bus, process).len(), 1, "of a running process");
@@ -108,11 +106,10 @@ fn a_connection_half_made_by_an_unknown_process_blocks_one_start_at_most() {
     fs::write(node.join(tag), "").unwrap();
     half_make_connection(&bus, port);
     run.kill_and_await("mapper", Signal::KILL, &status);
-    let began = Instant::now();
-    while !shared(&bus, "_7.connection").is_empty() {
-        assert!(began.elapsed() < PATIENCE, "it stays");
+    wait_until("it is removed", || {
         run.status();
-    }
+        shared(&bus, "_7.connection").is_empty()
+    });
     let summary = assert_arrives(run);
     let restarts = summary["restarts"]["mapper"].as_u64().unwrap();
     assert!((1..=2).contains(&restarts), "{summary}");
@@ -142,11 +139,10 @@ fn places_in_a_topic_that_are_never_given_back_block_starts_until_the_bus_is_rec
         // successor.
         run.signal(Signal::STOP);
         signal_process(pid(&status, "dead-reckoning"), Signal::KILL);
-        let began = Instant::now();
-        while take_all() == all_but_one {
-            assert!(began.elapsed() < PATIENCE, "the bus keeps the place of the killed stage");
+        wait_until("the bus gives the place of the killed stage", || {
             joined.clear_up(&[]).unwrap();
-        }
+            take_all() > all_but_one
+        });
         run.signal(Signal::CONT);
         // The places are leaked, as if their owners had been killed.
         std::mem::forget((places, joined));

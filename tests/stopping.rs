@@ -14,9 +14,8 @@ use rustix::process::Signal;
 use tempfile::TempDir;
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, domain, find, logged, mission_file,
-    operate, output, pid, printed, processes_with, refused, shared_memory, signal_process,
-    wait_until,
+    Run, STAGES, assert_ended, assert_nothing_left, domain, find, logged, mission_file, operate,
+    output, pid, printed, processes_with, refused, shared_memory, signal_process, wait_until,
     wire::{Pass, Proxy, Robot},
 };
 
@@ -153,12 +152,10 @@ fn a_robot_that_gets_no_stop_has_an_outcome_of_its_own_and_a_guard_that_stops_it
     let wire = Wire::before(&robot, Fault::NoStop);
     let mut run = Run::start(name, &mission, &["--set", &wire.proxy.as_robot()]);
     let directory = run.directory();
-    let began = Instant::now();
-    while !fs::metadata(directory.join("summary.json")).is_ok_and(|file| file.len() > 2) {
+    wait_until("there is a summary", || {
         assert!(run.is_running(), "the run ended while its robot moves");
-        assert!(began.elapsed() < PATIENCE, "no summary");
-        robot.wait_for_a_tick();
-    }
+        fs::metadata(directory.join("summary.json")).is_ok_and(|file| file.len() > 2)
+    });
     let status = run.wait_until("the link tells it to stand", |status| {
         find(status, "link")["state"] == "running"
     });

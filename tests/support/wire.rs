@@ -8,12 +8,11 @@ use std::{
         Arc, Mutex,
         mpsc::{Receiver, channel},
     },
-    time::Instant,
 };
 
 use serde_json::Value;
 
-use super::{PATIENCE, firsthand, start_piped};
+use super::{PATIENCE, firsthand, start_piped, wait_until};
 
 /// Simulated robot, which ends with the thread of its test.
 pub struct Robot {
@@ -81,10 +80,7 @@ impl Robot {
     }
 
     pub fn wait_until_at_rest(&mut self) {
-        let began = Instant::now();
-        while !self.wait_for_a_tick() {
-            assert!(began.elapsed() < PATIENCE, "the robot moves");
-        }
+        wait_until("the robot rests", || self.wait_for_a_tick());
     }
 
     /// Returns whether both wheels are at rest in the newest record.
