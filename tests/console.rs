@@ -12,9 +12,9 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, directory_of, firsthand,
-    firsthand_under, generation, json_lines, operate, output, pid, refused, run, signal_process,
-    start_piped, start_quietly, wait_for_status,
+    PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, assert_said, directory_of,
+    firsthand, firsthand_under, generation, json_lines, operate, output, pid, refused, run,
+    signal_process, start_piped, start_quietly, wait_for_status,
 };
 
 /// Command whose lines are read as they arrive. It ends with the test.
@@ -243,8 +243,7 @@ fn robots_that_run_are_listed_with_their_place_and_do_not_see_each_other() {
     assert_ne!(pid(&status, "mapper"), pid(&other, "mapper"));
     killed.kill();
     assert_eq!(listed(one), None);
-    let said = output(&["status", "--all"]).stderr;
-    assert!(String::from_utf8_lossy(&said).contains(one), "{said:?}");
+    assert_said(&output(&["status", "--all"]), &[one]);
     assert_no_restart(&ended.stop());
     assert_eq!(listed(two), None);
     let (code, _) = run(one, "open-room", &["--timeout", "1"]);

@@ -5,7 +5,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::support::{
-    Run, assert_nothing_left, json_of, mission_file, operate, outcomes, output, printed, records,
+    Run, assert_nothing_left, mission_file, operate, outcomes, output, printed, reached, records,
     refused, replayed_poses, wait_until,
 };
 
@@ -52,9 +52,7 @@ fn a_mission_starts_from_the_map_that_an_earlier_run_saved_and_a_damaged_map_is_
     let set = format!("map='{map}'");
     let drive = |out: &str, more: &[&str]| {
         let common = ["run", "obstacle-course", "--robot", "prior-map", "--json", "--out", out];
-        let (status, summary) = json_of(&output(&[&common, more].concat()));
-        assert!(status.success(), "{summary:?}");
-        assert_eq!(summary[0]["outcome"], "reached");
+        reached(&output(&[&common, more].concat()));
     };
     drive(&first, &[]);
     printed(&["map", "save", &first, "--out", &map]);

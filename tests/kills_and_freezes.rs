@@ -9,10 +9,10 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use crate::support::{
-    ENDLESS, Run, STAGES, all_run, assert_each_restarted, assert_ended, assert_nothing_left,
-    assert_reached, find, firsthand, operate, outcomes, output, pid, processes, processes_with,
-    records, replayed_in, replayed_poses, signal_process, start_piped, start_quietly,
-    wait_for_status, wait_until, wait_until_all_ended,
+    ENDLESS, Run, STAGES, all_run, assert_each_restarted, assert_ended, assert_nothing_left, find,
+    firsthand, operate, outcomes, output, pid, processes, processes_with, reached, records,
+    replayed_in, replayed_poses, signal_process, start_piped, start_quietly, wait_for_status,
+    wait_until, wait_until_all_ended,
 };
 
 /// Options for mission time at four times the wall clock: a mission takes ten seconds.
@@ -156,8 +156,7 @@ fn a_list_is_driven_to_its_end_although_all_and_then_the_supervisor_are_killed_i
     });
     operate(robot, &["resume"]);
     let output = third.wait_with_output().unwrap();
-    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_reached(output.status.code(), &summary);
+    let summary = reached(&output);
     assert_eq!(summary["resumes"], 2, "{summary}");
     assert_eq!(outcomes(&summary), ["replaced", "reached", "reached", "reached"]);
     assert_pose_was_not_lost(&summary);

@@ -9,9 +9,9 @@ use std::{
 };
 
 use crate::support::{
-    ENDLESS, Run, STAGES, all_run, assert_no_restart, assert_nothing_left, assert_reached,
-    assert_refused, directory_of, domain, find, firsthand, firsthand_under, generation, json_of,
-    on_small_disk, on_small_shared_memory, pid, records, refused, signal_process, start_piped,
+    ENDLESS, Run, STAGES, all_run, assert_no_restart, assert_nothing_left, assert_refused,
+    assert_said, directory_of, domain, find, firsthand, firsthand_under, generation, on_small_disk,
+    on_small_shared_memory, pid, reached, records, refused, signal_process, start_piped,
     wait_for_status, wait_until,
 };
 use rustix::process::Signal;
@@ -68,12 +68,9 @@ fn a_full_disk_ends_no_mission_and_loses_no_result() {
             });
         }
         let ended = run.wait_with_output().unwrap();
-        let (exit, printed) = json_of(&ended);
-        assert_reached(exit.code(), &printed[0]);
-        assert_eq!(records(&out.join("summary.json")), printed);
+        assert_eq!(records(&out.join("summary.json")), [reached(&ended)]);
         // The message names the lost file.
-        let said = String::from_utf8(ended.stderr).unwrap();
-        assert!(said.contains("picture.svg"), "{said}");
+        assert_said(&ended, &["picture.svg"]);
         assert_nothing_left(robot);
     });
 }

@@ -16,7 +16,7 @@ use std::{
 use crate::{
     failsafe::Tap,
     support::{
-        self, PATIENCE, Run, STAGES, assert_nothing_left, assert_reached, find, firsthand,
+        self, PATIENCE, Run, STAGES, assert_nothing_left, assert_said, find, firsthand, reached,
         signal_process, wire::Robot,
     },
 };
@@ -271,14 +271,8 @@ fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_
     support::wait_for_status("cut", stands);
     support::operate("cut", &["resume"]);
     let again = again.wait_with_output().unwrap();
-    let said = String::from_utf8_lossy(&again.stderr);
-    assert!(
-        said.contains("believes it is where it stood") && said.contains("firsthand resume"),
-        "{said}"
-    );
-    let (exit, summary) = support::json_of(&again);
-    assert_reached(exit.code(), &summary[0]);
-    assert_eq!(summary[0]["resumes"], 1, "{summary:?}");
+    assert_said(&again, &["believes it is where it stood", "firsthand resume"]);
+    assert_eq!(reached(&again)["resumes"], 1, "{again:?}");
     assert_nothing_left("cut");
 }
 
@@ -303,11 +297,8 @@ fn a_service_goes_on_by_itself_if_its_mission_says_so_and_begins_anew_after_anot
     let resume = ["run", "--resume", directory.to_str().unwrap()];
     support::refused(&resume, "other-version", &[".checkpoint"]);
     let again = service().output().unwrap();
-    let said = String::from_utf8_lossy(&again.stderr);
-    assert!(said.contains("the last run ends here") && said.contains("version 1, not"), "{said}");
-    let (exit, summary) = support::json_of(&again);
-    assert_reached(exit.code(), &summary[0]);
-    assert_eq!(summary[0]["resumes"], 0, "{summary:?}");
+    assert_said(&again, &["the last run ends here", "version 1, not"]);
+    assert_eq!(reached(&again)["resumes"], 0, "{again:?}");
     assert_nothing_left(robot);
 }
 

@@ -5,7 +5,7 @@ use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use common::domain::SUITE_VARIABLE;
 use serde_json::Value;
 
-use super::robot::suite;
+use super::{robot::suite, run::assert_reached};
 
 /// Returns a command that gets SIGKILL when the thread that starts it ends.
 pub fn with_parent(line: &[&str]) -> Command {
@@ -85,8 +85,23 @@ pub fn assert_refused(output: &Output, code: &str, names: &[&str]) -> Option<i32
         _ => said.lines().find_map(coded).unwrap_or_default(),
     };
     assert_eq!(found, code, "{said}");
-    for name in names {
-        assert!(said.contains(name), "{name:?} is not named: {said}");
-    }
+    assert_said(output, names);
     exit
+}
+
+/// Asserts that the messages of a finished command contain all `parts`.
+#[track_caller]
+pub fn assert_said(output: &Output, parts: &[&str]) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    for part in parts {
+        assert!(said.contains(part), "{part:?} is not said: {said}");
+    }
+}
+
+/// Asserts that a finished run with `--json` reached its target untouched. Returns its summary.
+#[track_caller]
+pub fn reached(output: &Output) -> Value {
+    let (exit, mut summary) = json_of(output);
+    assert_reached(exit.code(), &summary[0]);
+    summary.remove(0)
 }
