@@ -15,7 +15,9 @@ use rustix::{
 };
 use serde_json::Value;
 
-use crate::support::{PATIENCE, Run, find, firsthand_under, refused, signal_process};
+use crate::support::{
+    PATIENCE, Run, all_run, firsthand_under, generation, refused, signal_process,
+};
 
 /// Lines and columns of the terminal.
 const SIZE: (usize, usize) = (24, 80);
@@ -33,28 +35,23 @@ fn shown(written: &[u8]) -> String {
     let mut letters = vec![vec![' '; SIZE.1]; SIZE.0];
     let (mut row, mut col) = (0, 0);
     let text = String::from_utf8_lossy(written);
-    let mut rest = text.chars();
-    while let Some(letter) = rest.next() {
-        if letter != '\x1b' {
+    // A code ends with its letter. The last one may be incomplete.
+    for part in text.trim_end_matches('\x1b').split("\x1b[") {
+        let Some(end) = part.find(|letter: char| letter.is_ascii_alphabetic()) else { continue };
+        let (numbers, shown) = (&part[..end], &part[end + 1..]);
+        // This sequence moves the cursor. The others are colours and modes.
+        if part[end..].starts_with('H')
+            && let Some((line, column)) = numbers.split_once(';')
+        {
+            row = line.parse::<usize>().unwrap() - 1;
+            col = column.parse::<usize>().unwrap() - 1;
+        }
+        for letter in shown.chars() {
+            assert_ne!(letter, '\x1b', "no code of this kind is known");
             if let Some(place) = letters.get_mut(row).and_then(|line| line.get_mut(col)) {
                 *place = letter;
             }
             col += 1;
-            continue;
-        }
-        let code: String = rest.by_ref().take_while(|it| *it != '[').collect();
-        assert_eq!(code, "", "no code of this kind is known");
-        let mut numbers = String::new();
-        let end = rest.find(|letter| {
-            numbers.push(*letter);
-            letter.is_ascii_alphabetic()
-        });
-        // This sequence moves the cursor. The others are colours and modes.
-        if end == Some('H')
-            && let Some((line, column)) = numbers.trim_end_matches('H').split_once(';')
-        {
-            row = line.parse::<usize>().unwrap() - 1;
-            col = column.parse::<usize>().unwrap() - 1;
         }
     }
     let lines = letters.into_iter().map(|line| line.into_iter().collect::<String>());
@@ -145,12 +142,8 @@ fn top_does_what_its_keys_say_ends_with_its_terminal_and_on_a_signal_and_the_mis
     // The planner is the fourth stage.
     screen.press("\x1b[B\x1b[B\x1b[Bk");
     screen.wait_for("kill planner: done");
-    let is_generation = |generation| {
-        move |status: &Value| {
-            let planner = find(status, "planner");
-            planner["generation"].as_u64() >= Some(generation) && planner["state"] == "running"
-        }
-    };
+    let is_generation =
+        |least| move |status: &Value| generation(status, "planner") >= least && all_run(status);
     run.wait_until("it is replaced", is_generation(2));
     let deaths = run.records("deaths.jsonl");
     let killed = deaths.iter().any(|death| {
