@@ -142,8 +142,9 @@ fn top_does_what_its_keys_say_ends_with_its_terminal_and_on_a_signal_and_the_mis
     // The planner is the fourth stage.
     screen.press("\x1b[B\x1b[B\x1b[Bk");
     screen.wait_for("kill planner: done");
-    let is_generation =
-        |least| move |status: &Value| generation(status, "planner") >= least && all_run(status);
+    let is_generation = |least: u64| {
+        move |status: &Value| generation(status, "planner") >= least && all_run(status)
+    };
     run.wait_until("it is replaced", is_generation(2));
     let deaths = run.records("deaths.jsonl");
     let killed = deaths.iter().any(|death| {
