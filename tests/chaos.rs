@@ -12,8 +12,8 @@ use crate::support::{self, assert_nothing_left, firsthand, json_of, output, star
 fn chaos(robot: &str, arguments: &[&str]) -> Value {
     let slow = ["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"];
     let open_room = ["bench", "chaos", "open-room", "--json", "--robot", robot];
-    let (exit, report) = json_of(&output(&[&open_room[..], &slow, arguments].concat()));
-    assert_eq!(exit.code(), Some(0), "{report:?}");
+    let (code, report) = json_of(&output(&[&open_room[..], &slow, arguments].concat()));
+    assert_eq!(code, Some(0), "{report:?}");
     assert_nothing_left(robot);
     report[0].clone()
 }

@@ -65,9 +65,9 @@ fn a_silent_address_a_foreign_protocol_and_a_robot_that_is_driven_are_refused_wi
 
 #[test]
 fn doctor_says_a_verdict_for_each_check_and_its_exit_code_follows_from_them() {
-    let (status, found) = json_of(&output(&["doctor", "--json"]));
+    let (code, found) = json_of(&output(&["doctor", "--json"]));
     let is_ill = found.iter().any(|it| it["verdict"] == "problem");
-    assert_eq!(status.code(), Some(i32::from(is_ill)), "{found:?}");
+    assert_eq!(code, Some(i32::from(is_ill)), "{found:?}");
     for check in [
         "limit of open files",
         "directory of robots",

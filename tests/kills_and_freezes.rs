@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::support::{
     ENDLESS, Run, STAGES, all_run, assert_each_restarted, assert_ended, assert_nothing_left, find,
-    firsthand, operate, outcomes, output, pid, processes, processes_with, reached, records,
+    firsthand, operate, outcomes, output, pid, process_with, processes_with, reached, records,
     replayed_in, replayed_poses, signal_process, start_piped, start_quietly, wait_for_status,
     wait_until, wait_until_all_ended,
 };
@@ -32,15 +32,12 @@ fn assert_pose_was_not_lost(summary: &Value) {
 }
 
 fn first_process(run: &Run, stage: &str) -> u32 {
-    let directory = run.directory();
-    let directory = directory.to_str().unwrap();
     let mut found = None;
     wait_until("the stage's process is there", || {
-        let mut its = processes(directory).into_iter();
-        found = its.find(|(_, line)| line.contains(&format!(" stage {stage} ")));
+        found = process_with(&run.robot, &format!(" stage {stage} "));
         found.is_some()
     });
-    found.unwrap().0
+    found.unwrap()
 }
 
 #[test]

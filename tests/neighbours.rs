@@ -98,9 +98,9 @@ fn a_second_controller_or_supervisor_and_samples_that_seem_newer_are_ignored_and
         });
         let ended = pidfd_open(Pid::from_child(&echo), PidfdFlags::empty()).unwrap();
         assert!(poll::is_readable(&ended, PATIENCE).unwrap(), "the echo ends");
-        let (status, shown) = json_of(&echo.wait_with_output().unwrap());
+        let (code, shown) = json_of(&echo.wait_with_output().unwrap());
         let forged = shown.iter().filter(|sample| sample["stamp"]["generation"] != 1);
-        assert_eq!((status.code(), shown.len(), forged.count()), (Some(0), 40, 0));
+        assert_eq!((code, shown.len(), forged.count()), (Some(0), 40, 0));
         drop((ranges, wheels, pose, grid, guidance, link, commands, orders, bus));
         let (summary, directory) = run.arrives_in();
         let recording = Recording::open(&directory.path().join("run")).unwrap();

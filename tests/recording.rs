@@ -24,7 +24,7 @@ use rustix::process::Signal;
 
 use crate::support::{
     self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, assert_refused,
-    firsthand, golden, golden_of, json_of, logged, messages, operate, output, processes_with,
+    firsthand, golden, golden_of, json_of, logged, messages, operate, output, process_with,
     recording_in, refused, replayed, replayed_in, signal_process, start_piped, wait_until,
 };
 
@@ -124,7 +124,7 @@ fn every_order_that_was_answered_is_recorded_and_a_run_that_is_ended_waits_for_i
     }
     refused(&["goto", "99", "0", "--robot", robot], "target-outside", &[]);
     asked.push((RequestKind::Goto, RequestAnswer::Outside));
-    let recorder = processes_with(robot, "firsthand record")[0];
+    let recorder = process_with(robot, "firsthand record").unwrap();
     signal_process(recorder, Signal::STOP);
     run.signal(Signal::TERM);
     // Longer than a hung loop may stand still.
@@ -151,7 +151,7 @@ fn a_run_in_lockstep_waits_for_its_recorder_and_its_log_time_is_mission_time() {
     let run = Run::start("rec-late", "open-room", &["--timeout", "8"]);
     let file = run.directory().join("recording.mcap");
     wait_until("the recorder has begun its file", || file.exists());
-    let recorder = processes_with("rec-late", "firsthand record")[0];
+    let recorder = process_with("rec-late", "firsthand record").unwrap();
     signal_process(recorder, Signal::STOP);
     support::wait_for_status("rec-late", |status| status["order"] == "driving");
     signal_process(recorder, Signal::CONT);
@@ -288,16 +288,16 @@ fn replay_and_diff_say_what_they_found_and_exit_with_1_on_a_difference() {
     let golden = golden();
     let file = golden.path.to_str().unwrap();
     let of_two = output(&["replay", file, "--stage", "mapper,planner", "--json"]);
-    let (exit, report) = json_of(&of_two);
-    assert_eq!(exit.code(), Some(0), "{of_two:?}");
+    let (code, report) = json_of(&of_two);
+    assert_eq!(code, Some(0), "{of_two:?}");
     assert_eq!(report[0]["stages"]["planner"]["equal"], 1, "{report:?}");
     assert!(report[0]["stages"].get("controller").is_none(), "{report:?}");
     let same = output(&["runs", "diff", file, file]);
     assert_eq!(same.status.code(), Some(0), "{same:?}");
     let other = golden_of("stall-and-kill").path;
     let parted = output(&["runs", "diff", file, other.to_str().unwrap(), "--json"]);
-    let (exit, found) = json_of(&parted);
-    assert_eq!(exit.code(), Some(1), "{parted:?}");
+    let (code, found) = json_of(&parted);
+    assert_eq!(code, Some(1), "{parted:?}");
     assert!(!found[0]["first"].is_null(), "{found:?}");
 
     let no_recording = concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml");

@@ -5,7 +5,7 @@ use std::{fs, path::Path, process::Stdio, thread};
 use rustix::process::Signal;
 
 use crate::support::{
-    all_run, assert_nothing_left, directory_of, domain, firsthand, processes_with, signal_process,
+    all_run, assert_nothing_left, directory_of, domain, firsthand, process_with, signal_process,
     start_piped, status_of, wait_until,
 };
 
@@ -27,18 +27,14 @@ fn ends(robot: &str, arguments: &[&str], is_there: impl Fn(&Path) -> bool) {
     assert!(left.is_empty(), "{left:?}");
 }
 
-fn process(robot: &str, word: &str) -> Option<u32> {
-    processes_with(robot, word).first().copied()
-}
-
 #[test]
 fn a_signal_at_any_moment_of_a_start_ends_the_run_with_a_summary_and_leaves_nothing() {
     ends("st-log", &[], |runs| runs.join("open-room-001/supervisor.log").exists());
     ends("st-claim", &[], |_| domain("st-claim").is_supervised());
     ends("st-bus", &[], |_| domain("st-bus").middleware_config().exists());
-    ends("st-robot", &[], |_| process("st-robot", "x80-sim.checkpoint").is_some());
-    ends("st-recorder", &[], |_| process("st-recorder", "firsthand record").is_some());
-    ends("st-stage", &[], |_| process("st-stage", "stage planner").is_some());
+    ends("st-robot", &[], |_| process_with("st-robot", "x80-sim.checkpoint").is_some());
+    ends("st-recorder", &[], |_| process_with("st-recorder", "firsthand record").is_some());
+    ends("st-stage", &[], |_| process_with("st-stage", "stage planner").is_some());
     // The robot is off.
     let nowhere = ["--set", "robot.address='127.0.0.1:9'"];
     ends("st-off", &nowhere, |_| status_of("st-off").is_some_and(|status| all_run(&status)));
@@ -57,7 +53,8 @@ fn a_signal_ends_a_run_whose_robot_or_recorder_gets_no_processor_while_it_starts
         for (robot, appears, frozen) in cases {
             scope.spawn(move || {
                 ends(robot, &[], |_| {
-                    let child = process(robot, appears).and_then(|_| process(robot, frozen));
+                    let child =
+                        process_with(robot, appears).and_then(|_| process_with(robot, frozen));
                     child.inspect(|&child| signal_process(child, Signal::STOP)).is_some()
                 });
             });

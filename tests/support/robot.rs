@@ -203,8 +203,7 @@ pub fn assert_nothing_left(robot: &str) {
     // A stop guard ends after its link, when its robot is at rest or gone. A recorder whose
     // supervisor was killed first writes its last chunk.
     wait_until("no stop guard and no recorder is left", || {
-        let lasts = |word| !processes_with(robot, word).is_empty();
-        !lasts("stop-guard") && !lasts("firsthand record")
+        ["stop-guard", "firsthand record"].iter().all(|word| process_with(robot, word).is_none())
     });
     let domain = domain(robot);
     let shared = shared_memory(&domain.shared_memory_prefix());
@@ -222,6 +221,11 @@ fn mark(robot: &str) -> String {
 
 fn processes_of(robot: &str) -> Vec<(u32, String)> {
     processes(&mark(robot))
+}
+
+/// Returns the first of [`processes_with`].
+pub fn process_with(robot: &str, word: &str) -> Option<u32> {
+    processes_with(robot, word).first().copied()
 }
 
 /// Returns the processes of `robot` whose command line contains `word`.
