@@ -3,15 +3,15 @@
 use std::{
     io::{BufRead as _, BufReader},
     sync::{
-        Arc, Mutex,
+        Mutex,
         atomic::{AtomicBool, Ordering},
     },
     time::{Duration, Instant},
 };
 
 use crate::support::{
-    Killed, PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, domain, firsthand,
-    in_own_process, signal_process, start_piped, start_quietly,
+    Killed, PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, assert_reached, domain,
+    firsthand, in_own_process, start_piped, start_quietly,
 };
 use common::{
     bus::{Bus, BusError},
@@ -51,29 +51,27 @@ fn follow(robot: &str, runs: usize, heard: &HeardPoses) {
 #[test]
 fn a_logger_follows_its_robot_through_three_runs_one_of_them_killed_and_harms_none() {
     in_own_process(|| {
-        let heard = Arc::new(HeardPoses::default());
-        let counted = Arc::clone(&heard);
-        let logger = std::thread::spawn(move || follow("followed", 3, &counted));
-        for run in 0..3 {
-            let mut started = Run::at_own_speed("followed", "open-room", &["--pace", "4"]);
-            if run == 1 {
-                let has_heard = || heard.lock().unwrap().get(1).is_some_and(|&poses| poses > 5);
-                let status = started.wait_until("the logger hears it", |_| has_heard());
-                let supervisor = status["supervisor_pid"].as_u64().unwrap() as u32;
-                signal_process(supervisor, rustix::process::Signal::KILL);
-                started.reap();
-                // The bus of a killed supervisor stays until the next run removes it.
-                std::thread::park_timeout(Duration::from_secs(3));
-                continue;
+        let heard = &HeardPoses::default();
+        std::thread::scope(|scope| {
+            scope.spawn(|| follow("followed", 3, heard));
+            for run in 0..3 {
+                let mut started = Run::at_own_speed("followed", "open-room", &["--pace", "4"]);
+                if run == 1 {
+                    let has_heard = || heard.lock().unwrap().get(1).is_some_and(|&poses| poses > 5);
+                    started.wait_until("the logger hears it", |_| has_heard());
+                    started.kill();
+                    // The bus of a killed supervisor stays until the next run removes it.
+                    std::thread::park_timeout(Duration::from_secs(3));
+                    continue;
+                }
+                let (code, summary) = started.finish();
+                assert_reached(code, &summary);
+                assert_no_restart(&summary);
+                // The pause lets the consumer notice the end of the run. Robots are not restarted
+                // within a second.
+                std::thread::park_timeout(Duration::from_secs(1));
             }
-            let (code, summary) = started.finish();
-            assert_eq!(code, Some(0), "{summary}");
-            assert_no_restart(&summary);
-            // The pause lets the consumer notice the end of the run. Robots are not restarted
-            // within a second.
-            std::thread::park_timeout(Duration::from_secs(1));
-        }
-        logger.join().unwrap();
+        });
         assert!(heard.lock().unwrap().iter().all(|&poses| poses > 5), "{heard:?}");
         assert_nothing_left("followed");
     });
