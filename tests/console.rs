@@ -12,9 +12,9 @@ use rustix::process::Signal;
 use serde_json::Value;
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, assert_said, directory_of,
-    firsthand, firsthand_under, generation, json_lines, operate, output, pid, refused, run,
-    signal_process, start_piped, start_quietly, wait_for_status,
+    ENDLESS, PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, assert_said,
+    directory_of, firsthand, firsthand_under, generation, json_lines, operate, output, pid,
+    refused, run, signal_process, start_piped, start_quietly, wait_for_status,
 };
 
 /// Command whose lines are read as they arrive. It ends with the test.
@@ -97,14 +97,13 @@ fn every_topic_is_echoed_and_counted_and_a_closed_standard_output_makes_no_comma
     }
     let directory = directory_of("con-shut");
     let out = directory.path().join("run");
-    let mission = format!("{}/../missions/trap.toml", env!("CARGO_MANIFEST_DIR"));
     for command in [
         &["status", "--all"][..],
         &["completions", "zsh"],
         &["man"],
         &["missions"],
         &["missions", "trap"],
-        &["check", &mission],
+        &["check", "trap"],
         &["install", "--print"],
         &["topic", "list"],
         &["stage", "list"],
@@ -219,9 +218,7 @@ fn echo_and_logs_follow_their_robot_from_run_to_run_and_logs_come_from_every_pro
 #[test]
 fn robots_that_run_are_listed_with_their_place_and_do_not_see_each_other() {
     let [one, two] = ["con-list-1", "con-list-2"];
-    // The robots still run if another test's frozen robot delays the list.
-    let slowly = ["--pace", "1", "--set", "controller.speed_m_s=0.05"];
-    let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &slowly));
+    let mut runs = [one, two].map(|robot| Run::start(robot, "open-room", &ENDLESS));
     runs.iter_mut().for_each(|run| drop(run.wait_until_under_way(0.5)));
     let listed = |robot: &str| {
         let robots = json_lines(&printed(&["status", "--all", "--json"]));

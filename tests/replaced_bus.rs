@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use crate::support::{
-    PATIENCE, Run, assert_each_restarted, bus_instance, domain, generation, half_make,
+    ENDLESS, PATIENCE, Run, assert_each_restarted, bus_instance, domain, generation, half_make,
     in_own_process, pid, signal_process, wait_until,
 };
 use common::{bus::Bus, samples::PoseSample, topics, waiter::Waiter};
@@ -30,9 +30,7 @@ fn next_pose(bus: &Bus) -> PoseSample {
 #[test]
 fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_without_harm() {
     in_own_process(|| {
-        // The robot arrives only after a busy machine has restarted its stages.
-        let slow = ["--pace", "4", "--set", "controller.speed_m_s=0.02"];
-        let mut run = Run::start(ROBOT, "open-room", &slow);
+        let mut run = Run::start(ROBOT, "open-room", &ENDLESS);
         let status = run.wait_until_under_way(1.0);
         let domain = domain(ROBOT);
         let old = Bus::join(&domain, "logger").unwrap();
