@@ -12,10 +12,10 @@ use crate::support::{ENDLESS, Run, domain, json_of, output, printed, refused, wi
 fn init_writes_a_mission_that_check_accepts_for_a_json_robot_or_an_x80_and_moves_it_nowhere() {
     let json = Robot::start_with("obstacle-course", &["--set", "robot.model='kobuki'"]);
     let x80 = Robot::start("obstacle-course", "tcp", "127.0.0.1:0");
-    let json_rows =
-        ["protocol = \"json\"", "name = \"laser\"", "beams = 360", "name = \"bumper-left\""];
-    let x80_rows = ["protocol = \"x80\"", "front-left"];
-    for (robot, scheme, rows) in [(json, "udp://", &json_rows[..]), (x80, "tcp://", &x80_rows)] {
+    for (robot, scheme, rows) in [
+        (json, "udp://", ["protocol = \"json\"", "name = \"bumper-left\""]),
+        (x80, "tcp://", ["protocol = \"x80\"", "front-left"]),
+    ] {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("robot.toml");
         let out = file.to_str().unwrap();
