@@ -1,9 +1,11 @@
 //! Tests of planners as separate executables: a mission names them, and they are supervised like
 //! every stage.
 
-use std::{fs, os::unix::fs::PermissionsExt as _, path::Path, process::Stdio};
+use std::{fs, os::unix::fs::PermissionsExt as _, path::Path};
 
-use crate::support::{Run, STAGES, firsthand, json_lines, pid, printed, refused, signal_process};
+use crate::support::{
+    Run, STAGES, firsthand, json_lines, pid, printed, refused, signal_process, start_quietly,
+};
 
 /// Drum known beforehand, so the path around it is the same in every run.
 const DRUM: [&str; 6] = [
@@ -50,27 +52,20 @@ fn a_stage_started_by_another_becomes_the_planner_that_the_mission_names() {
     let own = folder.path().join("planner");
     own_planner(&own);
     for (robot, named) in [("own-units", own.to_str().unwrap()), ("base-units", "wavefront")] {
-        becomes_the_planner(robot, named);
-    }
-}
-
-fn becomes_the_planner(robot: &str, named: &str) {
-    let set = planner(named);
-    let arguments = ["--pace", "4", "--watch-only", "--set", &set];
-    let mut run = Run::start(robot, "open-room", &arguments);
-    run.wait_until("there is a bus", |status| status["order"] == "starting");
-    let start = |stage: &&str| {
-        let mut command = firsthand(&["stage", stage, "--robot", robot]);
-        command.stderr(Stdio::null()).spawn().unwrap()
-    };
-    let stages: Vec<_> = STAGES.iter().map(start).collect();
-    let status = run.wait_until_driving();
-    let pid = pid(&status, "planner");
-    let words = fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap();
-    assert!(words.contains("stage\0wavefront\0"), "{words:?}");
-    run.arrives();
-    for mut stage in stages {
-        stage.wait().unwrap();
+        let set = planner(named);
+        let arguments = ["--pace", "4", "--watch-only", "--set", &set];
+        let mut run = Run::start(robot, "open-room", &arguments);
+        run.wait_until("there is a bus", |status| status["order"] == "starting");
+        let stages =
+            STAGES.map(|stage| start_quietly(&mut firsthand(&["stage", stage, "--robot", robot])));
+        let status = run.wait_until_driving();
+        let pid = pid(&status, "planner");
+        let words = fs::read_to_string(format!("/proc/{pid}/cmdline")).unwrap();
+        assert!(words.contains("stage\0wavefront\0"), "{words:?}");
+        run.arrives();
+        for mut stage in stages {
+            stage.wait().unwrap();
+        }
     }
 }
 
