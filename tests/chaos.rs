@@ -8,16 +8,6 @@ use serde_json::Value;
 
 use crate::support::{self, assert_nothing_left, firsthand, json_of, output, start_quietly};
 
-/// Returns the report of chaos on a mission that completes on a loaded machine too.
-fn chaos(robot: &str, arguments: &[&str]) -> Value {
-    let slow = ["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"];
-    let open_room = ["bench", "chaos", "open-room", "--json", "--robot", robot];
-    let (code, report) = json_of(&output(&[&open_room[..], &slow, arguments].concat()));
-    assert_eq!(code, Some(0), "{report:?}");
-    assert_nothing_left(robot);
-    report[0].clone()
-}
-
 fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_default()
 }
@@ -44,14 +34,17 @@ fn chaos_hits_stages_and_consumers_without_changing_the_outcome_and_each_signal_
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("results");
     let given = format!("'{}' topic echo pose --robot chd-hit", env!("CARGO_BIN_EXE_firsthand"));
-    let report = chaos(
-        "chd-hit",
-        &[
-            &["--kills", "30", "--include-consumers", "--include-startup", "--replay"][..],
-            &["--consumer", &given, "--out", out.to_str().unwrap()],
-        ]
-        .concat(),
-    );
+    let arguments = [
+        &["bench", "chaos", "open-room", "--json", "--robot", "chd-hit"][..],
+        // The mission completes on a loaded machine too.
+        &["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"],
+        &["--kills", "30", "--include-consumers", "--include-startup", "--replay"],
+        &["--consumer", &given, "--out", out.to_str().unwrap()],
+    ];
+    let (code, reports) = json_of(&output(&arguments.concat()));
+    assert_eq!(code, Some(0), "{reports:?}");
+    assert_nothing_left("chd-hit");
+    let report = &reports[0];
     assert_eq!(report["reached"], report["missions"], "{report}");
     assert_eq!(report["leftovers"].as_array().map(Vec::len), Some(0), "{report}");
     let consumers = &report["consumers"];
