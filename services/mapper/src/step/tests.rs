@@ -3,7 +3,7 @@ mod laser;
 
 use super::*;
 use crate::testing::mission;
-use CellState::{Free, Known, Margin, Perimeter, Scanned, Sensed};
+use CellState::{Free, Known, Perimeter, Scanned, Sensed};
 use common::samples::{RangeStatus, Stamp};
 use glam::dvec2;
 use std::f64::consts::FRAC_PI_2;
