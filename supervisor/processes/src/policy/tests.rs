@@ -1,5 +1,5 @@
-//! The model checks each rule, with its times, over every short history and many long ones. The
-//! test here guards shares of processor time.
+//! The model checks each rule, with its times, over every short history and many long ones. Tests
+//! here guard what follows from the rules together, and shares of processor time.
 
 mod model;
 
@@ -8,6 +8,35 @@ use crate::{activity::State, stages::TABLE};
 
 const fn ms(count: u64) -> Duration {
     Duration::from_millis(count)
+}
+
+fn running() -> Policy {
+    let mut policy = Policy::new(TABLE[0].deadlines);
+    policy.step(Event::Start, ms(0));
+    policy.step(Event::BeatReady, ms(10));
+    policy
+}
+
+#[test]
+fn a_stage_that_cannot_run_is_held_within_ten_seconds() {
+    let mut policy = running();
+    policy.step(Event::Exited, ms(20));
+    while let Some(now) = policy.deadline().filter(|_| policy.phase() != Phase::Held) {
+        assert!(now < ms(10_000), "{policy:?}");
+        policy.step(Event::Time(None), now);
+        policy.step(Event::Exited, now);
+    }
+    assert_eq!((policy.phase(), policy.recent_deaths()), (Phase::Held, 12));
+}
+
+#[test]
+fn a_stage_killed_once_a_second_is_never_held() {
+    let mut policy = running();
+    for second in 1..1000 {
+        let started = policy.step(Event::Exited, ms(second * 1000));
+        assert_eq!(started, Some(Action::Start), "after {second} kills");
+        policy.step(Event::BeatReady, ms(second * 1000 + 100));
+    }
 }
 
 #[test]
@@ -23,9 +52,7 @@ fn silence_is_aborted_by_processor_time_of_its_own_and_by_time_asleep_and_not_by
         (0.0, 0.0, Asleep, Some(3000)),
         (0.0, 0.5, Stopped, Some(750)),
     ] {
-        let mut policy = Policy::new(TABLE[0].deadlines);
-        policy.step(Event::Start, ms(0));
-        policy.step(Event::BeatReady, ms(10));
+        let mut policy = running();
         let aborted = (1..60_000).find(|&age| {
             let [ran, starved] = [ran, starved].map(|share| ms(age).mul_f64(share));
             let time = Event::Time(Some(Activity { ran, starved, state }));
