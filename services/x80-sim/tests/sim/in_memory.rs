@@ -52,7 +52,7 @@ fn at_max_its_datagrams_and_its_truth_are_those_of_a_process() {
             serde_json::from_str(&serde_json::to_string(&tick).unwrap()).unwrap()
         };
         let process = sim.truth();
-        assert!((31..40).contains(&process.len()), "{text}");
+        assert!(process.len() > 30, "{text}");
         assert_eq!(robot.truth().map(as_told).collect::<Vec<_>>(), process, "{text}");
     }
 }

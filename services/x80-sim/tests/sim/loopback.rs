@@ -1,14 +1,46 @@
 //! Tests of the process shell on a real loopback socket, at both paces.
 
+use std::net::UdpSocket;
+
 use common::{
     clock::Pace,
     wire::{Command, Report, SystemSignal},
 };
 
-use crate::support::{Sim, encoded, receive, reports};
+use crate::support::{Sim, encoded, forward, receive, reports};
 
 const PING: Command = Command::System(SystemSignal::Ping);
 const ACK: Report = Report::System(SystemSignal::Ack);
+
+fn exchange(host: &UdpSocket, command: &[u8]) -> [Vec<u8>; 2] {
+    host.send(command).unwrap();
+    [receive(host), receive(host)]
+}
+
+#[test]
+fn at_max_each_motion_command_moves_time_by_one_period_and_nothing_else_does() {
+    let world = "simulation.realism = 'measured'\nworld.wall = [{ points = [[1, -1], [1, 1]] }]";
+    let mut sim = Sim::start(world, Pace::Max);
+    let host = sim.host();
+    let start = sim.next_truth();
+    assert_eq!((start.tick, start.time_s, start.x), (0, 0.0, 0.0));
+
+    let [ack, first] = exchange(&host, &encoded(PING));
+    assert_eq!(reports(&ack), [ACK]);
+    let [_, again] = exchange(&host, &encoded(PING));
+    assert_eq!(first, again, "a ping changes nothing");
+
+    for tick in 1..=20_u64 {
+        let [ack, frames] = exchange(&host, &forward(500, 250));
+        assert_eq!(reports(&ack), [ACK]);
+        let ground_truth = sim.next_truth();
+        assert_eq!(ground_truth.tick, tick);
+        assert!((ground_truth.time_s - tick as f64 / 7.0).abs() < 1e-9);
+        let [_, current] = exchange(&host, &encoded(PING));
+        assert_eq!(frames, current, "a ping shows the tick once more");
+    }
+    sim.finish();
+}
 
 #[test]
 fn the_stream_goes_to_whoever_spoke_last_and_noise_is_no_speech() {
@@ -30,10 +62,8 @@ fn the_stream_goes_to_whoever_spoke_last_and_noise_is_no_speech() {
 fn half_a_frame_of_one_host_does_not_garble_the_other() {
     let sim = Sim::start("", Pace::Max);
     let (first, second) = (sim.host(), sim.host());
+    exchange(&first, &encoded(PING));
     let ping = encoded(PING);
-    first.send(&ping).unwrap();
-    receive(&first);
-    receive(&first);
     first.send(&ping[..4]).unwrap();
     second.send(&ping[..7]).unwrap();
     first.send(&ping[4..]).unwrap();
