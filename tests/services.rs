@@ -144,7 +144,7 @@ impl Units {
             let code = keeper.join().unwrap();
             let log = fs::read_to_string(self.directory.path().join(stage)).unwrap();
             let stopped = log.contains("common::shell: stopped");
-            assert!(stopped && code.is_none_or(|code| code == 0), "{stage}: {code:?}");
+            assert!(stopped && code.is_none_or(|code| code == 0), "{stage}: {code:?}: {log}");
         }
     }
 }
@@ -171,13 +171,9 @@ fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i3
 }
 
 impl Drop for Units {
-    /// Waits for the stages to end with their supervisor. A failed test prints their logs.
+    /// Lets the stages end with their supervisor.
     fn drop(&mut self) {
         self.over.store(true, Ordering::Relaxed);
-        for stage in STAGES.iter().filter(|_| thread::panicking()) {
-            let log = fs::read_to_string(self.directory.path().join(stage));
-            eprintln!("{stage}: {}", log.unwrap_or_default());
-        }
     }
 }
 
@@ -267,8 +263,7 @@ fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_
     other.wait().unwrap();
     assert_eq!(fs::read_dir(runs.path()).unwrap().count(), 2);
     let again = support::start_piped(service().stderr(Stdio::piped()));
-    let stands = |status: &serde_json::Value| status["order"] == "stopped by an operator";
-    support::wait_for_status("cut", stands);
+    support::wait_for_status("cut", |status| status["order"] == "stopped by an operator");
     support::operate("cut", &["resume"]);
     let again = again.wait_with_output().unwrap();
     assert_said(&again, &["believes it is where it stood", "firsthand resume"]);
@@ -308,8 +303,7 @@ fn a_service_that_stays_begins_where_it_stood_when_it_was_stopped_and_waits() {
     let stays = ["--stay", "--pace", "2", "--set", place[0], "--set", place[1]];
     let (_runs, service) = service("begins", &stays);
     let mut first = support::start_quietly(&mut service());
-    let waits = |status: &serde_json::Value| status["order"] == "waiting for a target";
-    support::wait_for_status("begins", waits);
+    support::wait_for_status("begins", |status| status["order"] == "waiting for a target");
     signal_process(first.id(), Signal::TERM);
     first.wait().unwrap();
     // Its mission has a target, so it stands.

@@ -68,11 +68,6 @@ impl Run {
         records(&self.directory().join(file))
     }
 
-    /// Returns whether a line of the link's log contains all `parts`, a level and fields.
-    pub fn link_logged(&self, parts: &[&str]) -> bool {
-        logged(&self.directory(), "link", parts) > 0
-    }
-
     pub fn is_running(&mut self) -> bool {
         let child = self.child.as_mut().unwrap();
         child.try_wait().unwrap().is_none()
