@@ -9,7 +9,7 @@ use std::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{Run, assert_ended, assert_no_restart, start_piped, with_parent};
+use crate::support::{Run, assert_no_restart, start_piped, with_parent};
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
@@ -67,8 +67,7 @@ fn a_robot_in_python_arrives_untouched_though_each_stage_is_killed() {
 fn a_run_whose_robot_names_a_sensor_otherwise_ends_with_both_names_and_blames_no_stage() {
     let robot = PythonRobot::start();
     let nose = "robot.sensor=[{name='nose',kind='cone',forward_m=0.2,bearing_deg=0}]";
-    let (code, summary) = robot.run("json-nose", &["--set", nose]).finish();
-    assert_ended(code, &summary, 6, "aborted");
+    let summary = robot.run("json-nose", &["--set", nose]).ends(6, "aborted");
     let reason = summary["reason"].as_str().unwrap();
     assert!(
         reason

@@ -9,10 +9,10 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 
 use crate::support::{
-    ENDLESS, Run, STAGES, all_run, assert_each_restarted, assert_ended, assert_nothing_left, find,
-    firsthand, operate, outcomes, output, pid, process_with, processes_with, reached, records,
-    replayed_in, replayed_poses, signal_process, start_piped, start_quietly, wait_for_status,
-    wait_until, wait_until_all_ended,
+    ENDLESS, Run, STAGES, all_run, assert_each_restarted, assert_nothing_left, find, firsthand,
+    operate, outcomes, output, pid, process_with, processes_with, reached, records, replayed_in,
+    replayed_poses, signal_process, start_piped, start_quietly, wait_for_status, wait_until,
+    wait_until_all_ended,
 };
 
 /// Options for mission time at four times the wall clock: a mission takes ten seconds.
@@ -82,17 +82,14 @@ fn a_mission_in_lockstep_does_not_hang_when_each_stage_is_killed_or_frozen() {
 
 #[test]
 fn all_stages_killed_or_frozen_while_the_run_stops_it_ends_in_order() {
-    let robot = "kf-stop";
-    let mut run = Run::start(robot, "open-room", FAST);
+    let mut run = Run::start("kf-stop", "open-room", FAST);
     let status = run.wait_until_under_way(0.5);
     run.signal(Signal::TERM);
     for (stage, signal) in kill_and_freeze_in_turn() {
         // A stage that has already ended in order cannot get a signal.
         let _ = kill_process(Pid::from_raw(pid(&status, stage) as i32).unwrap(), signal);
     }
-    let (code, summary) = run.finish();
-    assert_ended(code, &summary, 0, "aborted");
-    assert_nothing_left(robot);
+    run.ends(0, "aborted");
 }
 
 #[test]

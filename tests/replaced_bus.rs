@@ -61,7 +61,7 @@ fn a_consumer_of_a_bus_that_was_replaced_joins_again_and_leaves_the_old_one_with
 
         // This consumer is the last to leave the old bus.
         drop((old_poses, old));
-        let before = run.wait_until("all work", |status| status["order"] == "driving");
+        let before = run.wait_until_driving();
         let after = run.kill_and_await_successor("dead-reckoning", Signal::KILL);
         // The stage must start once. Two refused starts would recreate the bus again.
         for (stage, more) in [("dead-reckoning", 1), ("planner", 0)] {

@@ -176,6 +176,16 @@ impl Run {
         (summary, directory)
     }
 
+    /// Waits for the end. Asserts exit code and outcome, and that the robot left nothing.
+    #[track_caller]
+    pub fn ends(self, code: i32, outcome: &str) -> Value {
+        let robot = self.robot.clone();
+        let (found, summary) = self.finish();
+        assert_ended(found, &summary, code, outcome);
+        assert_nothing_left(&robot);
+        summary
+    }
+
     /// Stops the run with SIGTERM. Asserts that it ends in order and leaves nothing.
     #[track_caller]
     pub fn stop(self) -> Value {
