@@ -6,7 +6,7 @@ use std::fs;
 use common::domain::SUITE_VARIABLE;
 use serde_json::Value;
 
-use crate::support::{self, assert_nothing_left, firsthand, json_of, output, start_quietly};
+use crate::support::{self, assert_nothing_left, firsthand, json_of, kill, output, start_quietly};
 
 fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_default()
@@ -89,8 +89,7 @@ fn chaos_that_is_killed_keeps_its_rows_and_its_consumers_end_with_it() {
     let file = directory.path().join("signals.csv");
     let rows = || fs::read_to_string(&file).unwrap_or_default();
     support::wait_for_status("chd-cut", |_| rows().lines().count() >= 4);
-    chaos.kill().unwrap();
-    chaos.wait().unwrap();
+    kill(&mut chaos);
     let table = rows();
     let columns = |row: &str| row.matches(',').count();
     assert!(table.ends_with('\n') && table.lines().all(|row| columns(row) == 8), "{table}");

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::support::{
     ENDLESS, PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, assert_said,
-    directory_of, firsthand, firsthand_under, generation, json_lines, operate, output, pid,
+    directory_of, firsthand, firsthand_under, generation, json_lines, kill, operate, output, pid,
     refused, run, signal_process, start_piped, start_quietly, wait_for_status,
 };
 
@@ -270,8 +270,7 @@ fn runs_are_listed_with_their_outcomes_and_pruned() {
     let table = printed(&["runs", "--runs", below]);
     assert!(table.contains("2 runs, ") && table.contains(" reached "), "{table}");
     assert_eq!(list(&["--prune", "0"]), all[1..], "an active run is not removed");
-    goes_on.kill().unwrap();
-    goes_on.wait().unwrap();
+    kill(&mut goes_on);
     assert_eq!(list(&[]), ["open-room-002 cut off"]);
     let missing = "/no/such/directory";
     refused(&["runs", "--runs", missing], "", &[missing]);

@@ -9,7 +9,7 @@ use std::{
 use rustix::process::Signal;
 use serde_json::Value;
 
-use crate::support::{Run, assert_no_restart, start_piped, with_parent};
+use crate::support::{Run, assert_no_restart, kill, start_piped, with_parent};
 
 const EXAMPLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-robot");
 
@@ -43,8 +43,7 @@ impl PythonRobot {
 
     /// Ends the robot. Returns its last line about itself.
     fn end(mut self) -> Value {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
+        kill(&mut self.process);
         serde_json::from_str(&self.last.join().unwrap()).unwrap()
     }
 }

@@ -10,9 +10,9 @@ use serde_json::Value;
 
 use crate::support::{
     ENDLESS, Run, STAGES, all_run, assert_each_restarted, assert_nothing_left, find, firsthand,
-    operate, outcomes, output, pid, process_with, processes_with, reached, records, replayed_in,
-    replayed_poses, signal_process, start_piped, start_quietly, wait_for_status, wait_until,
-    wait_until_all_ended,
+    kill, operate, outcomes, output, pid, process_with, processes_with, reached, records,
+    replayed_in, replayed_poses, signal_process, start_piped, start_quietly, wait_for_status,
+    wait_until, wait_until_all_ended,
 };
 
 /// Options for mission time at four times the wall clock: a mission takes ten seconds.
@@ -141,8 +141,7 @@ fn a_list_is_driven_to_its_end_although_all_and_then_the_supervisor_are_killed_i
         status["order"] == "driving" && status["mission_time_s"].as_f64() > Some(8.0)
     });
     operate(robot, &["stop"]);
-    second.kill().unwrap();
-    second.wait().unwrap();
+    kill(&mut second);
     let third = start_piped(&mut resume(&first.directory()));
     wait_for_status(robot, |status| {
         assert_ne!(status["order"], "driving", "{status}");

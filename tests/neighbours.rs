@@ -12,8 +12,8 @@ use std::{
 
 use crate::support::{
     PATIENCE, Run, assert_no_restart, assert_nothing_left, assert_reached, assert_refused, domain,
-    firsthand, in_own_process, in_own_process_of_root, json_of, logged, output, pid, shared_memory,
-    signal_process, start_piped, wait_until,
+    firsthand, in_own_process, in_own_process_of_root, json_of, kill, logged, output, pid,
+    shared_memory, signal_process, start_piped, wait_until,
 };
 use common::{
     address::Address,
@@ -202,8 +202,7 @@ fn a_signal_goes_to_who_holds_the_supervisors_lock_and_not_to_the_number_in_its_
         assert_refused(&killed, "no-process", &["supervisor"]);
         assert!(bystander.try_wait().unwrap().is_none(), "it was killed");
     }
-    bystander.kill().unwrap();
-    bystander.wait().unwrap();
+    kill(&mut bystander);
     fs::remove_dir_all(robot.directory()).unwrap();
 }
 

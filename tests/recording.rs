@@ -24,7 +24,7 @@ use rustix::process::Signal;
 
 use crate::support::{
     self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, assert_refused,
-    firsthand, golden, golden_of, json_of, logged, messages, operate, output, process_with,
+    firsthand, golden, golden_of, json_of, kill, logged, messages, operate, output, process_with,
     recording_in, refused, replayed, replayed_in, signal_process, start_piped, wait_until,
 };
 
@@ -190,8 +190,7 @@ fn kill_recorder(robot: &str, file: &Path, growths: usize) {
         let before = length();
         wait_until("a chunk is written", || length() > before);
     }
-    recorder.kill().unwrap();
-    recorder.wait().unwrap();
+    kill(&mut recorder);
 }
 
 #[test]

@@ -249,8 +249,7 @@ fn kill_while_it_drives(robot: &str, service: &mut Command) {
     support::wait_for_status(robot, |status| {
         status["order"] == "driving" && status["mission_time_s"].as_f64().unwrap() > 0.5
     });
-    signal_process(cut.id(), Signal::KILL);
-    cut.wait().unwrap();
+    support::kill(&mut cut);
 }
 
 #[test]

@@ -36,6 +36,12 @@ pub fn start_piped(command: &mut Command) -> Child {
     command.stdout(Stdio::piped()).spawn().unwrap()
 }
 
+/// Ends a process with SIGKILL.
+pub fn kill(child: &mut Child) {
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
 pub fn output(arguments: &[&str]) -> Output {
     firsthand(arguments).output().unwrap()
 }

@@ -12,7 +12,7 @@ use std::{
 
 use serde_json::Value;
 
-use super::{PATIENCE, firsthand, start_piped, wait_until};
+use super::{PATIENCE, firsthand, kill, start_piped, wait_until};
 
 /// Simulated robot, which ends with the thread of its test.
 pub struct Robot {
@@ -90,8 +90,7 @@ impl Robot {
     }
 
     pub fn kill(mut self) -> f64 {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
+        kill(&mut self.process);
         let last = self.truth.iter().last();
         last.map_or(self.went, |truth| from_start(&truth))
     }
