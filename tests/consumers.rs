@@ -18,6 +18,7 @@ use common::{
     follower::{Event, Follower},
     topics,
 };
+use rustix::process::Signal;
 
 type HeardPoses = Mutex<Vec<usize>>;
 
@@ -115,9 +116,9 @@ fn a_consumer_that_holds_too_much_or_wants_every_place_is_told_and_no_stage_noti
         readers.pop();
         // A stage that needs a place gets one.
         for stage in ["mapper", "planner"] {
-            run.kill_and_await_successor(stage, rustix::process::Signal::KILL);
+            run.kill_and_await_successor(stage, Signal::KILL);
         }
-        run.signal(rustix::process::Signal::TERM);
+        run.signal(Signal::TERM);
         let (code, summary) = run.finish();
         assert_eq!(code, Some(0), "{summary}");
         for stage in ["mapper", "planner"] {
@@ -169,7 +170,7 @@ fn consumers_that_stay_and_that_join_again_and_again_take_no_stages_place() {
             let all_that_there_are: Vec<_> =
                 std::iter::from_fn(|| bus.reader(&topics::GRID).ok()).collect();
             // The restarted stage gets its place before waiting consumers.
-            run.kill_and_await_successor("planner", rustix::process::Signal::KILL);
+            run.kill_and_await_successor("planner", Signal::KILL);
             run.wait_until_under_way(8.0);
             over.store(true, Ordering::Relaxed);
             drop(all_that_there_are);

@@ -16,8 +16,9 @@ use std::{
 use crate::{
     failsafe::Tap,
     support::{
-        self, PATIENCE, Run, STAGES, assert_nothing_left, assert_said, find, firsthand, reached,
-        signal_process, wire::Robot,
+        PATIENCE, Run, STAGES, assert_nothing_left, assert_said, directory_of, find, firsthand,
+        kill, logged, operate, pid, reached, refused, signal_process, start_piped, start_quietly,
+        status_of, wait_for_status, wait_until, wire::Robot,
     },
 };
 use rustix::process::Signal;
@@ -59,7 +60,7 @@ impl Manager {
     fn hear_until(&self, start: &str, parts: &[&str]) {
         let is_it =
             |line: &String| line.starts_with(start) && parts.iter().all(|part| line.contains(part));
-        support::wait_until(start, || self.hear().iter().any(is_it));
+        wait_until(start, || self.hear().iter().any(is_it));
     }
 }
 
@@ -67,7 +68,7 @@ impl Manager {
 fn systemd_hears_of_a_run_and_its_journal_of_deaths_and_a_frozen_supervisor_feeds_no_watchdog() {
     let robot = "notify";
     let manager = Manager::new();
-    let directory = support::directory_of(robot);
+    let directory = directory_of(robot);
     let run = directory.path().join("run");
     let journal = directory.path().join("journal");
     let file = fs::File::create(&journal).unwrap();
@@ -86,9 +87,9 @@ fn systemd_hears_of_a_run_and_its_journal_of_deaths_and_a_frozen_supervisor_feed
         fed = Instant::now();
     }
     manager.hear_until("STATUS=", &["to go", "5/5"]);
-    let status = support::wait_for_status(robot, |status| status["order"] == "driving");
-    signal_process(support::pid(&status, "mapper"), Signal::KILL);
-    support::wait_for_status(robot, |status| find(status, "mapper")["generation"] == 2);
+    let status = wait_for_status(robot, |status| status["order"] == "driving");
+    signal_process(pid(&status, "mapper"), Signal::KILL);
+    wait_for_status(robot, |status| find(status, "mapper")["generation"] == 2);
 
     signal_process(supervisor.id(), Signal::STOP);
     // Messages from before the freeze.
@@ -111,8 +112,8 @@ fn systemd_hears_of_a_run_and_its_journal_of_deaths_and_a_frozen_supervisor_feed
     let bare = text.lines().filter(|line| !line.starts_with('<'));
     assert_eq!(bare.count(), 1, "{text}");
     // The run directory also records the death. Stages log to files, without priorities.
-    assert_eq!(support::logged(&run, "supervisor", &["WARN", "stage=\"mapper\"", "cause="]), 1);
-    assert_eq!(support::logged(&run, "mapper", &["<6>"]), 0);
+    assert_eq!(logged(&run, "supervisor", &["WARN", "stage=\"mapper\"", "cause="]), 1);
+    assert_eq!(logged(&run, "mapper", &["<6>"]), 0);
     assert_nothing_left(robot);
 }
 
@@ -162,8 +163,7 @@ fn keep_up(robot: &str, stage: &str, log: &Path, over: &AtomicBool) -> Option<i3
             last = code;
         }
         // The supervisor of a stalled robot replaces the planner, which also ends in order.
-        let is_replaced =
-            || support::status_of(robot).is_some_and(|status| status["order"] == "driving");
+        let is_replaced = || status_of(robot).is_some_and(|status| status["order"] == "driving");
         if code == Some(0) && !is_replaced() || over.load(Ordering::Relaxed) {
             return last;
         }
@@ -192,16 +192,16 @@ fn external_stages_survive_kills_and_freezes_and_those_that_systemd_stops_are_no
     run.wait_until_under_way(1.0);
     run.kill_each(Signal::KILL);
     let status = run.kill_and_await_successor("mapper", Signal::STOP);
-    let holder = support::pid(&status, "planner").to_string();
+    let holder = pid(&status, "planner").to_string();
     let second = ["stage", "planner", "--robot", robot];
-    assert_eq!(support::refused(&second, "", &["planner", &holder]), Some(1));
+    assert_eq!(refused(&second, "", &["planner", &holder]), Some(1));
     run.wait_until_driving();
     // systemd does not restart a unit that it stops.
     units.over.store(true, Ordering::Relaxed);
     let deaths = run.records("deaths.jsonl").len();
     assert!(deaths > STAGES.len());
     for stage in STAGES.iter().rev() {
-        signal_process(support::pid(&status, stage), Signal::TERM);
+        signal_process(pid(&status, stage), Signal::TERM);
     }
     run.wait_until("all have ended", |status| {
         STAGES.iter().all(|stage| find(status, stage)["state"] == "down")
@@ -223,7 +223,7 @@ fn external_stages_stop_the_robot_and_end_with_a_killed_supervisor_and_a_frozen_
     // The kernel wakes a stage of the supervisor when its parent ends, but an external one stays
     // frozen.
     let (_, mapper) = units.keepers.remove(2);
-    signal_process(support::pid(&status, "mapper"), Signal::STOP);
+    signal_process(pid(&status, "mapper"), Signal::STOP);
     run.kill();
     units.assert_all_leave();
     tap.assert_last_is_zero();
@@ -234,7 +234,7 @@ fn external_stages_stop_the_robot_and_end_with_a_killed_supervisor_and_a_frozen_
 /// Returns the command that starts a service with `--resume-last`, each time in the same directory
 /// of runs.
 fn service<'a>(robot: &'a str, more: &'a [&'a str]) -> (TempDir, impl Fn() -> Command + 'a) {
-    let directory = support::directory_of(robot);
+    let directory = directory_of(robot);
     let runs = directory.path().to_path_buf();
     let service = move || {
         let mut command = firsthand(&["run", "open-room", "--robot", robot, "--json"]);
@@ -245,11 +245,11 @@ fn service<'a>(robot: &'a str, more: &'a [&'a str]) -> (TempDir, impl Fn() -> Co
 }
 
 fn kill_while_it_drives(robot: &str, service: &mut Command) {
-    let mut cut = support::start_quietly(service.args(["--pace", "1"]));
-    support::wait_for_status(robot, |status| {
+    let mut cut = start_quietly(service.args(["--pace", "1"]));
+    wait_for_status(robot, |status| {
         status["order"] == "driving" && status["mission_time_s"].as_f64().unwrap() > 0.5
     });
-    support::kill(&mut cut);
+    kill(&mut cut);
 }
 
 #[test]
@@ -258,12 +258,12 @@ fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_
     kill_while_it_drives("cut", &mut service());
     // The run is not another robot's.
     let mut other = firsthand(&["run", "open-room", "--resume-last", "--robot", "cut-other"]);
-    let mut other = support::start_quietly(other.arg("--runs").arg(runs.path()));
+    let mut other = start_quietly(other.arg("--runs").arg(runs.path()));
     other.wait().unwrap();
     assert_eq!(fs::read_dir(runs.path()).unwrap().count(), 2);
-    let again = support::start_piped(service().stderr(Stdio::piped()));
-    support::wait_for_status("cut", |status| status["order"] == "stopped by an operator");
-    support::operate("cut", &["resume"]);
+    let again = start_piped(service().stderr(Stdio::piped()));
+    wait_for_status("cut", |status| status["order"] == "stopped by an operator");
+    operate("cut", &["resume"]);
     let again = again.wait_with_output().unwrap();
     assert_said(&again, &["believes it is where it stood", "firsthand resume"]);
     assert_eq!(reached(&again)["resumes"], 1, "{again:?}");
@@ -289,7 +289,7 @@ fn a_service_goes_on_by_itself_if_its_mission_says_so_and_begins_anew_after_anot
     }
     assert_eq!(fs::read_dir(runs.path()).unwrap().count(), 1);
     let resume = ["run", "--resume", directory.to_str().unwrap()];
-    support::refused(&resume, "other-version", &[".checkpoint"]);
+    refused(&resume, "other-version", &[".checkpoint"]);
     let again = service().output().unwrap();
     assert_said(&again, &["the last run ends here", "version 1, not"]);
     assert_eq!(reached(&again)["resumes"], 0, "{again:?}");
@@ -301,13 +301,13 @@ fn a_service_that_stays_begins_where_it_stood_when_it_was_stopped_and_waits() {
     let place = ["perimeter.width_m=8.0", "target=[0.9, 0.3]"];
     let stays = ["--stay", "--pace", "2", "--set", place[0], "--set", place[1]];
     let (_runs, service) = service("begins", &stays);
-    let mut first = support::start_quietly(&mut service());
-    support::wait_for_status("begins", |status| status["order"] == "waiting for a target");
+    let mut first = start_quietly(&mut service());
+    wait_for_status("begins", |status| status["order"] == "waiting for a target");
     signal_process(first.id(), Signal::TERM);
     first.wait().unwrap();
     // Its mission has a target, so it stands.
-    let mut again = support::start_quietly(&mut service());
-    let status = support::wait_for_status("begins", |status| {
+    let mut again = start_quietly(&mut service());
+    let status = wait_for_status("begins", |status| {
         status["order"] == "stopped by an operator" && status["pose"]["x_m"].is_f64()
     });
     let at = |key: &str| status["pose"][key].as_f64().unwrap();
