@@ -271,34 +271,17 @@ mod tests {
         hearing.take(&readings, Pose2::default(), 0.0);
     }
 
-    /// Judges two sonars that approach a post of 0.1 m radius at (1.2, 0.1). The robot drives 2 cm
-    /// per tick, and turns to and fro by 0.3 rad. `is_heard` selects the ticks and sonars that hear
-    /// the post.
-    fn judged_before_a_post(ticks: u32, is_heard: impl Fn(u32, u8) -> bool) -> [bool; 2] {
-        let rows = "[[robot.sensor]]\nname = 'a'\nkind = 'cone'\nforward_m = 0.2\nbearing_deg = 10\n\
-            [[robot.sensor]]\nname = 'b'\nkind = 'cone'\nforward_m = 0.2\nbearing_deg = -10\n";
-        let mission = mission(&format!("robot.model = 'kobuki'\nrobot.protocol = 'json'\n{rows}"));
-        let mut hearing = Hearing::of(&mission);
-        for tick in 0..ticks {
-            let position = DVec2::new(0.02 * f64::from(tick.min(30)), 0.0);
-            let heading = 0.3 * (0.4 * f64::from(tick)).sin();
-            let robot = Pose2 { position, heading };
-            let readings = [0, 1].map(|sensor| {
-                let from = hearing.sensors[&sensor].mount.on(robot);
-                let half_rad = hearing.sensors[&sensor].field_of_view_deg.to_radians() / 2.0;
-                let way = DVec2::new(1.2, 0.1) - from.position;
-                let is_seen = way.dot(from.axis()) > half_rad.cos() * way.length();
-                let hears = is_seen && is_heard(tick, sensor);
-                reading(sensor, hears.then_some(way.length() - 0.1))
-            });
-            hearing.take(&readings, robot, 0.1 * f64::from(tick));
-        }
-        [false, true].map(|sure| hearing.judged(sure).is_some())
-    }
-
     #[test]
     fn sonars_are_judged_deaf_that_do_not_hear_a_post_in_their_cones_as_before() {
         type IsHeard = fn(u32, u8) -> bool;
+        // Two sonars approach a post of 0.1 m radius at (1.2, 0.1). The robot drives 2 cm per tick,
+        // and turns to and fro by 0.3 rad. `is_heard` selects the ticks and sonars that hear the
+        // post.
+        let mission = mission(
+            "robot.model = 'kobuki'\nrobot.protocol = 'json'\n\
+             [[robot.sensor]]\nname = 'a'\nkind = 'cone'\nforward_m = 0.2\nbearing_deg = 10\n\
+             [[robot.sensor]]\nname = 'b'\nkind = 'cone'\nforward_m = 0.2\nbearing_deg = -10",
+        );
         let all_deaf: IsHeard = |tick, _| tick < 40;
         let one_deaf: IsHeard = |tick, sensor| sensor == 0 || tick < 40;
         let now_and_then: IsHeard = |tick, _| tick < 40 || tick % 40 > 30;
@@ -310,7 +293,23 @@ mod tests {
             (140, one_deaf, true),
             (231, now_and_then, true),
         ] {
-            assert_eq!(judged_before_a_post(ticks, is_heard), [are_deaf; 2], "{ticks}");
+            let mut hearing = Hearing::of(&mission);
+            for tick in 0..ticks {
+                let position = DVec2::new(0.02 * f64::from(tick.min(30)), 0.0);
+                let heading = 0.3 * (0.4 * f64::from(tick)).sin();
+                let robot = Pose2 { position, heading };
+                let readings = [0, 1].map(|sensor| {
+                    let from = hearing.sensors[&sensor].mount.on(robot);
+                    let half_rad = hearing.sensors[&sensor].field_of_view_deg.to_radians() / 2.0;
+                    let way = DVec2::new(1.2, 0.1) - from.position;
+                    let is_seen = way.dot(from.axis()) > half_rad.cos() * way.length();
+                    let hears = is_seen && is_heard(tick, sensor);
+                    reading(sensor, hears.then_some(way.length() - 0.1))
+                });
+                hearing.take(&readings, robot, 0.1 * f64::from(tick));
+            }
+            let judged = [false, true].map(|sure| hearing.judged(sure).is_some());
+            assert_eq!(judged, [are_deaf; 2], "{ticks}");
         }
     }
 
