@@ -27,8 +27,7 @@ pub(crate) fn angle_table() {
         "\nDirections of full solves beside exact ones, {MAPS} maps of {SIDE} x {SIDE} cells a row, degrees"
     );
     println!(
-        "{:<26} {:>6} {:<20} {:>8} {:>8} {:>8} {:>8} {:>9} {:>7}",
-        "map", "length", "method of the last", "p50", "p99", "clear", "max", "residual", "tile"
+        "map                        length method of the last        p50      p99    clear      max  residual    tile"
     );
     for kind in KINDS {
         for length in [f64::INFINITY, 7.0] {

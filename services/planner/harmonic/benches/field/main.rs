@@ -81,8 +81,7 @@ fn full_table() {
         "\nFull solves without screening: set-up + solve + verification, ms, and as multiples of a wavefront's time"
     );
     println!(
-        "{:<24} {:>9} {:<14} {:>9} {:>9} {:>9} {:>6} {:>6} {:>9} {:>9}",
-        "map", "cells", "method", "scratch", "target", "wavefront", "x", "x", "dijkstra", "log10 u"
+        "map                          cells method           scratch    target wavefront      x      x  dijkstra   log10 u"
     );
     let kinds = [Kind::Empty, Kind::Drums, Kind::Office, Kind::Trap]
         .into_iter()

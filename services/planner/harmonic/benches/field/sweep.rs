@@ -49,8 +49,7 @@ pub(crate) fn table(real: &[(String, Domain)]) {
         "\nSolves from scratch, {SIDE} x {SIDE} cells, as multiples of a wavefront's time, the worst first"
     );
     println!(
-        "{:<28} {:>6} {:>9} {:>7} {:<28} {:>6} {:>6} {:>9}",
-        "map", "x", "ms", "ms/1e6", "method", "cycles", "checks", "log10 u"
+        "map                               x        ms  ms/1e6 method                       cycles checks   log10 u"
     );
     for (_, line) in rows {
         println!("{line}");

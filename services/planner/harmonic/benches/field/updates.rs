@@ -10,7 +10,7 @@ const UPDATES: usize = 100;
 
 pub(crate) fn table() {
     println!("\nUpdates: 3 x 3 blocks that appear and vanish at random, us");
-    println!("{:<10} {:>5} {:>7} {:>8} {:>8} {:>8}", "map", "N", "length", "p50", "p90", "p99");
+    println!("map            N  length      p50      p90      p99");
     for kind in [Kind::Empty, Kind::Drums, Kind::Office] {
         for n in [50, 120, 280, 512] {
             for length in [f64::INFINITY, 7.0] {
