@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::support::{
-    PATIENCE, Run, STAGES, assert_no_restart, logged, wait_until_all_ended,
+    PATIENCE, Run, STAGES, assert_no_restart, logged, not_run, wait_until_all_ended,
     wire::{Proxy, Robot},
 };
 use common::wire::{Command, Decoder};
