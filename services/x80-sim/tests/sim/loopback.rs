@@ -1,13 +1,16 @@
 //! Tests of the process shell on a real loopback socket, at both paces.
 
-use std::net::UdpSocket;
+use std::{
+    net::UdpSocket,
+    time::{Duration, Instant},
+};
 
 use common::{
     clock::Pace,
     wire::{Command, Report, SystemSignal},
 };
 
-use crate::support::{Sim, encoded, forward, receive, reports};
+use crate::support::{PATIENCE, Sim, encoded, forward, receive, reports};
 
 const PING: Command = Command::System(SystemSignal::Ping);
 const ACK: Report = Report::System(SystemSignal::Ack);
@@ -70,4 +73,23 @@ fn half_a_frame_of_one_host_does_not_garble_the_other() {
     assert_eq!(reports(&receive(&first)), [ACK]);
     second.send(&ping[7..]).unwrap();
     assert_eq!(reports(&receive(&second)), [ACK]);
+}
+
+#[test]
+fn one_of_another_host_is_ignored_until_the_first_is_silent() {
+    let sim = Sim::start("robot.rate_hz = 20", Pace::Rate(5.0));
+    let (first, ping) = (sim.host(), encoded(PING));
+    first.send(&ping).unwrap();
+    receive(&first);
+    let second = UdpSocket::bind("127.0.0.2:0").unwrap();
+    second.connect(&sim.listening).unwrap();
+    second.set_read_timeout(Some(Duration::from_millis(300))).unwrap();
+    let began = Instant::now();
+    // The second host keeps asking; the first has sent nothing since.
+    second.send(&ping).unwrap();
+    while second.recv(&mut [0; 512]).is_err() {
+        second.send(&ping).unwrap();
+        assert!(began.elapsed() < PATIENCE, "never served");
+    }
+    assert!(began.elapsed().as_secs_f64() > 1.0, "{:?}", began.elapsed());
 }

@@ -7,7 +7,6 @@
 )]
 
 mod bad_radio;
-mod foreign_clients;
 mod in_memory;
 mod loopback;
 mod meeting;
