@@ -117,3 +117,20 @@ impl Monitor for BaseResponse {
         (self.found.is_some() && !self.is_followed).into()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::mission;
+
+    #[test]
+    fn a_slow_base_is_told_from_one_that_nobody_stated() {
+        for (robot, said) in [("", "are stated"), ("robot.protocol = 'json'", "is not stated")] {
+            let mission = mission(robot);
+            let mut base = BaseResponse::new(&mission);
+            let response = Response { delay_s: 2.0, ..mission.trusted_response() };
+            base.observe(&Observation::Responds(response), Moment::default());
+            assert!(base.words().unwrap().contains(said), "{robot}");
+        }
+    }
+}
