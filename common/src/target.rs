@@ -1,4 +1,4 @@
-//! Current target, as a stage follows it on topic `target`.
+//! Current target, as a stage follows it on topic `target`, and whether the robot has reached it.
 
 use crate::{bus::Reader, samples::TargetSample, start::Result};
 
@@ -20,6 +20,24 @@ impl TargetReader {
     pub fn next(&mut self, tick: u64) -> Result<Option<TargetSample>> {
         self.newest = self.samples.newest()?.or(self.newest);
         Ok(self.newest.filter(|newest| takes(&mut self.taken, newest, tick)))
+    }
+}
+
+/// Number of the target that the robot has reached; 0 for none.
+///
+/// A target stays reached within twice the tolerance. A robot at rest on the circle's edge stays
+/// for one count, one that slips while it turns goes on, and one whose stop was lost drives back.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reached(u64);
+
+impl Reached {
+    /// Returns whether a robot at `distance` from target `number` has reached it. Beside a target
+    /// in a hazard it has, at any distance.
+    pub fn is(&mut self, number: u64, distance: f64, tolerance: f64, beside: bool) -> bool {
+        let most = if self.0 == number { 2.0 * tolerance } else { tolerance };
+        let is = number != 0 && (beside || distance <= most);
+        self.0 = if is { number } else { 0 };
+        is
     }
 }
 

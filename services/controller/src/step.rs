@@ -10,6 +10,7 @@ use common::{
     motion_law::{Alignment, MotionLaw},
     samples::{CommandSample, CommandState, GuidanceSample, GuidanceStatus},
     stage::{Answer, Answering, ForeignState},
+    target::Reached,
     topics::{COMMAND, GUIDANCE},
 };
 use glam::DVec2;
@@ -19,15 +20,6 @@ const MOST_OFF_TARGET_M: f64 = 0.5;
 
 const FACES_WITHIN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Arrival {
-    #[default]
-    OnTheWay,
-    /// At the target, not yet facing its heading.
-    There,
-    Arrived,
-}
-
 #[derive(Debug)]
 pub struct Controller {
     drive: Drive,
@@ -35,8 +27,9 @@ pub struct Controller {
     lead: Option<Lead>,
     /// Turn near the antipode: 1 left, -1 right.
     side: f64,
-    /// Newest target's number, and progress.
-    arrival: (u64, Arrival),
+    reached: Reached,
+    /// Number of the target at which it has arrived, facing the heading; 0 for none.
+    arrived: u64,
     /// Mission as stated, without a found response.
     mission: Mission,
     found: FoundResponse,
@@ -60,7 +53,8 @@ impl Answering for Controller {
             law: MotionLaw::new(mission),
             lead: Lead::new(mission),
             side: 1.0,
-            arrival: Default::default(),
+            reached: Reached::default(),
+            arrived: 0,
             mission: mission.clone(),
             found: FoundResponse::default(),
         }
@@ -82,9 +76,10 @@ impl Answering for Controller {
     ) -> Answer<CommandSample> {
         if let Some(mission) = self.found.changed(found, &self.mission) {
             // Drops unanswered commands: the base stood while its response was found.
-            let Self { side, arrival, found, .. } = *self;
+            let Self { side, reached, arrived, found, .. } = *self;
             let stated = std::mem::take(&mut self.mission);
-            *self = Self { side, arrival, mission: stated, found, ..Answering::new(&mission) };
+            *self =
+                Self { side, reached, arrived, mission: stated, found, ..Answering::new(&mission) };
         }
         self.command(guidance).into()
     }
@@ -101,7 +96,7 @@ impl Controller {
             target_number: guidance.target_number,
             ..CommandSample::default()
         };
-        if self.arrival(guidance, distance) == Arrival::Arrived {
+        if self.has_arrived(guidance, distance) {
             return CommandSample { state: CommandState::Arrived.into(), ..command };
         }
         let direction = DVec2::new(guidance.ex, guidance.ey);
@@ -138,31 +133,18 @@ impl Controller {
         }
     }
 
-    /// Advances the progress. It reverts only beyond twice the tolerance: a robot at rest on the
-    /// circle's edge stays for one count, and one whose stop was lost drives back. Beside a target
-    /// in a hazard it has arrived too, if the planner sees no nearer place.
-    fn arrival(&mut self, guidance: &GuidanceSample, distance: f64) -> Arrival {
+    /// Once arrived, the robot stays so as long as the target is reached, whatever its heading.
+    fn has_arrived(&mut self, guidance: &GuidanceSample, distance: f64) -> bool {
         let number = guidance.target_number;
-        if self.arrival.0 != number {
-            self.arrival = (number, Arrival::OnTheWay);
-        }
         let beside = guidance.status() == GuidanceStatus::AtTarget && distance <= MOST_OFF_TARGET_M;
-        let is_there = beside || distance <= self.mission.arrival_tolerance_m;
-        let rolled_on = !is_there && distance > 2.0 * self.mission.arrival_tolerance_m;
-        let arrival = &mut self.arrival.1;
-        if rolled_on {
-            *arrival = Arrival::OnTheWay;
-        }
-        if *arrival == Arrival::OnTheWay && is_there && number != 0 {
-            *arrival = Arrival::There;
-        }
+        let tolerance = self.mission.arrival_tolerance_m;
+        let is_there = self.reached.is(number, distance, tolerance, beside);
         let faces = guidance.target.heading().is_none_or(|heading| {
             wrap_angle(heading - guidance.heading_rad).abs() <= FACES_WITHIN_RAD
         });
-        if *arrival == Arrival::There && faces {
-            *arrival = Arrival::Arrived;
-        }
-        *arrival
+        let has_arrived = is_there && (faces || self.arrived == number);
+        self.arrived = if has_arrived { number } else { 0 };
+        has_arrived
     }
 }
 

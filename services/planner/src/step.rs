@@ -16,6 +16,7 @@ use common::{
         CommandSample, CommandState, FaultKind, FieldCell, FieldHeader, GridHeader, GuidanceSample,
         GuidanceStatus, Maneuver, PoseSample, TargetPoint, TargetSample,
     },
+    target::Reached,
 };
 use glam::DVec2;
 use harmonic::{Cancellation, Cell, Domain, Screening, Settings, SolveError, Solver};
@@ -77,8 +78,7 @@ pub struct Planner {
     /// `None` before the first keyframe.
     live: Option<Live>,
     on_a_saddle: bool,
-    /// Number of the target that the robot has reached; 0 for none.
-    reached: u64,
+    reached: Reached,
     jobs: u64,
     full_solves: u64,
 }
@@ -101,7 +101,7 @@ impl Planner {
             belief: GridHeader::default(),
             live: None,
             on_a_saddle: false,
-            reached: 0,
+            reached: Reached::default(),
             jobs: 0,
             full_solves: 0,
         }
@@ -470,16 +470,13 @@ impl Planner {
         }
     }
 
-    /// Returns the heading to which a robot at its target turns. Once there, it counts as there to
-    /// twice the tolerance: it may slip while it turns.
+    /// Returns the heading to which a robot at its target turns.
     fn heading_there(&mut self, pose: &Pose2, status: GuidanceStatus) -> Option<f64> {
-        let sent = self.target?;
-        let tolerance_m = self.mission.arrival_tolerance_m;
-        let most_m = if self.reached == sent.number { 2.0 * tolerance_m } else { tolerance_m };
-        let is_there = status == GuidanceStatus::AtTarget
-            || pose.position.distance(sent.target.position()) <= most_m;
-        self.reached = if is_there { sent.number } else { 0 };
-        sent.target.heading().filter(|_| is_there)
+        let TargetSample { number, target, .. } = self.target?;
+        let (distance, tolerance) =
+            (pose.position.distance(target.position()), self.mission.arrival_tolerance_m);
+        let beside = status == GuidanceStatus::AtTarget;
+        target.heading().filter(|_| self.reached.is(number, distance, tolerance, beside))
     }
 
     /// Returns the field to `target` on a map, which a new planner computes.
