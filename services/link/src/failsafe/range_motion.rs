@@ -267,4 +267,15 @@ mod tests {
         assert_eq!(taken(0..3, 0, 70..84, 84).judged(false), None);
         names(&taken(0..3, 10, 70..84, 84).judged(false).unwrap(), 10);
     }
+
+    #[test]
+    fn a_reading_jumps_that_changes_by_more_than_the_robots_motion_explains() {
+        let newest = Newest { range_m: 0.0, robot: Pose2::default(), jumped_s: 0.0 };
+        let turned = Pose2 { heading: -1.0, ..Pose2::default() };
+        for (range_m, robot, jumps) in
+            [(0.1, newest.robot, false), (0.4, turned, false), (0.41, turned, true)]
+        {
+            assert_eq!(newest.has_jumped(range_m, robot), jumps, "{range_m}");
+        }
+    }
 }

@@ -14,9 +14,8 @@ use glam::DVec2;
 const DELAYS_S: [f64; 10] = [0.0, 0.3, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, f64::INFINITY];
 const APART_S: f64 = 0.45;
 const MOST_APART_S: f64 = 1.0;
-/// Retention of poses, seconds: the longest delay plus the time between two scans, up to
-/// `MOST_KEPT`.
-const POSES_S: f64 = 3.5;
+/// Bound on kept poses and scans. Poses of the longest delay plus the time between two scans, 3 s,
+/// are needed.
 const MOST_KEPT: usize = 2048;
 const BEAMS: usize = 180;
 const LEAST_BEAMS: f64 = 20.0;
@@ -36,8 +35,7 @@ pub(super) struct Poses(VecDeque<(f64, Pose2)>);
 impl Poses {
     pub(super) fn robot_is(&mut self, pose: Pose2, now: MissionTime) {
         self.0.push_back((now.seconds(), pose));
-        let old = |(at, _): &(f64, Pose2)| *at < now.seconds() - POSES_S;
-        while self.0.len() > MOST_KEPT || self.0.front().is_some_and(old) {
+        if self.0.len() > MOST_KEPT {
             self.0.pop_front();
         }
     }

@@ -10,6 +10,7 @@ fn in_lockstep_the_order_asks_for_tick_0_and_each_command_for_the_next() {
     for tick in 0..3 {
         assert_eq!(ticks(&link.still(0))[0].0, tick);
         assert_eq!(velocities(&link.answer(tick, 3)).len(), 1);
+        assert!(!link.is_at_rest());
     }
     let mut found_later = in_ticks();
     found_later.drive(0);
