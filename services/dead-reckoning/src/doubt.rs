@@ -1,5 +1,5 @@
-//! Doubts that no fix settles: unequal wheels, and fixes that contradicted the pose until it moved
-//! to them. They widen the published covariance only, because a wider filter's gates would accept
+//! Doubts that no fix settles: unequal wheels, travel that no command explains, and fixes that
+//! contradicted the pose until it moved to them. They widen the published covariance only, because a wider filter's gates would accept
 //! anything.
 
 use common::{clock::MissionTime, found_response::if_there, samples::WheelSample};
@@ -35,8 +35,32 @@ pub(crate) struct Doubt {
     is_told: bool,
     /// Squared moves and turns by relocations, m^2 and rad^2.
     relocated: [f64; 2],
+    /// Newest [`WheelSample::untold_m`].
+    untold_m: [f64; 2],
+    untold: Astray,
     #[serde(deserialize_with = "if_there")]
     turns: Turns,
+}
+
+/// Possible error of the pose since a fix that is independent of the wheels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Astray {
+    turn_rad: f64,
+    /// Beside the way, by the turn, and along it.
+    aside_m: f64,
+    along_m: f64,
+}
+
+impl Astray {
+    fn roll(&mut self, rim_m: f64) {
+        self.aside_m = (self.aside_m + self.turn_rad.abs() * rim_m).min(WIDEST_M);
+    }
+
+    /// Of position and heading, m^2 and rad^2.
+    fn variances(&self) -> [f64; 2] {
+        let Self { turn_rad, aside_m, along_m } = self;
+        [aside_m * aside_m + along_m * along_m, turn_rad * turn_rad]
+    }
 }
 
 /// Turns of the last ticks by gyro less those by wheels.
@@ -49,9 +73,8 @@ struct Turns {
     variance: f64,
     /// Deviations that all ticks share: by unequal wheels, track, gyro scale and bias, rad.
     shared_rad: [f64; 4],
-    /// Once gyro and wheels contradict each other: the turn between them, radians, and how far
-    /// apart they have led since, metres.
-    contradict: Option<[f64; 2]>,
+    /// Once gyro and wheels contradict each other: how far apart they lead.
+    contradict: Option<Astray>,
 }
 
 impl Turns {
@@ -70,20 +93,14 @@ impl Turns {
         let shared: f64 = self.shared_rad.iter().map(|it| it * it).sum();
         let variance = self.variance + shared + errors.counted(tick.moved());
         match &mut self.contradict {
-            Some([turn, _]) => *turn += apart,
+            Some(astray) => astray.turn_rad += apart,
             None if self.apart_rad.powi(2) > CONTRADICTS * variance => {
                 // The turn came up on the compared way.
                 let aside_m = self.apart_rad.abs() * self.way_m / 2.0;
-                self.contradict = Some([self.apart_rad, aside_m]);
+                self.contradict = Some(Astray { turn_rad: self.apart_rad, aside_m, along_m: 0.0 });
             }
             None => {}
         }
-    }
-
-    /// Of position and heading, m^2 and rad^2.
-    fn variances(&self) -> [f64; 2] {
-        let [turn, way_m] = self.contradict.unwrap_or_default();
-        [way_m * way_m, turn * turn]
     }
 }
 
@@ -96,6 +113,7 @@ impl Doubt {
 
     pub(crate) fn place_by_others(&mut self) {
         self.rolled_m = 0.0;
+        self.untold = Astray::default();
         self.turns = Turns { until: self.turns.until, ..Turns::default() };
     }
 
@@ -131,21 +149,36 @@ impl Doubt {
     ) -> Option<String> {
         assert!(rim_m >= 0.0 || rim_m.is_nan());
         self.rolled_m += rim_m;
-        if let Some([turn, aside_m]) = &mut self.turns.contradict {
-            *aside_m += turn.abs() * rim_m;
+        if let Some(astray) = &mut self.turns.contradict {
+            astray.roll(rim_m);
         }
-        let WheelSample { told_ratio, told_ratio_sd, .. } = *wheels;
+        let WheelSample { told_ratio, told_ratio_sd, untold_m, .. } = *wheels;
+        // A new link begins at 0.
+        let before = std::mem::replace(&mut self.untold_m, untold_m);
+        if untold_m != [0.0; 2] {
+            let [left, right] = [0, 1].map(|wheel| untold_m[wheel] - before[wheel]);
+            self.untold.turn_rad += (right - left) / track_m;
+            self.untold.along_m += f64::midpoint(left, right);
+        }
+        self.untold.roll(rim_m);
         let off = (told_ratio - 1.0).abs();
         if off > LEAST_OFF.max(DEVIATIONS * told_ratio_sd) {
             self.uneven = self.uneven.max(off);
         }
-        let [place, _] = self.of_wheels(track_m);
+        let [uneven, untold] = [self.of_wheels(track_m)[0], self.untold.variances()[0]];
+        let place = uneven.max(untold);
         if self.is_told || place < TOLD_M * TOLD_M {
             return None;
         }
         self.is_told = true;
+        let seen = match uneven > untold {
+            true => format!(
+                "relative to the commands, the right wheel counts {told_ratio:.2} times as much as the left"
+            ),
+            false => "the counts of the wheels jump without a command".to_owned(),
+        };
         Some(format!(
-            "relative to the commands, the right wheel counts {told_ratio:.2} times as much as the left, so the pose is uncertain by {:.1} m or more; check encoders and wheels",
+            "{seen}, so the pose is uncertain by {:.1} m or more; check encoders and wheels",
             place.sqrt()
         ))
     }
@@ -158,7 +191,8 @@ impl Doubt {
 
     /// Of position and heading, m^2 and rad^2.
     pub(crate) fn variances(&self, track_m: f64) -> [f64; 2] {
-        let all = [self.of_wheels(track_m), self.relocated, self.turns.variances()];
+        let contradict = self.turns.contradict.unwrap_or_default().variances();
+        let all = [self.of_wheels(track_m), self.relocated, self.untold.variances(), contradict];
         [0, 1].map(|part| all.iter().map(|of| of[part]).sum())
     }
 }

@@ -65,7 +65,7 @@ impl LinkStage {
                 response,
             } => {
                 out.at = Progress { tick, time };
-                out.publish(&CONTACT, contact)?;
+                out.publish(&CONTACT, contact.map(|contact| *contact))?;
                 out.publish(&BASE_RESPONSE, response.map(|response| *response))?;
                 for scan in scans {
                     let mut lasers = self.lasers.iter();

@@ -330,11 +330,13 @@ impl Link {
             self.state.next_tick += 1;
         }
         let endless = motion.endless;
-        let WheelRatio { ratio, deviation } = self.failsafe.monitors.odometry.shares.ratio();
+        let shares = &self.failsafe.monitors.odometry.shares;
+        let WheelRatio { ratio, deviation } = shares.ratio();
         let wheels = WheelSample {
             restarts: self.restart.restarts,
             told_ratio: ratio,
             told_ratio_sd: deviation,
+            untold_m: shares.untold_m(),
             ..motion.wheels
         };
         self.wheels = wheels;
@@ -359,7 +361,7 @@ impl Link {
             turn,
             wheels,
             endless,
-            contact,
+            contact: contact.map(Box::new),
             response: self.failsafe.monitors.base.sample().map(Box::new),
         };
         self.open = Some(OpenTick { effect, began_ns: self.now_ns, given_ns: None });

@@ -15,6 +15,7 @@ struct Robot {
     tick: u64,
     seed: u64,
     told_ratio: f64,
+    untold_m: [f64; 2],
 }
 
 impl Robot {
@@ -39,6 +40,7 @@ impl Robot {
             right_counts,
             told_ratio: self.told_ratio,
             told_ratio_sd: 0.006,
+            untold_m: self.untold_m,
             ..WheelSample::default()
         }
     }
@@ -320,21 +322,24 @@ fn a_source_that_contradicts_itself_moves_the_robot_twice_and_is_then_refused() 
 #[test]
 fn wheels_that_count_unequal_shares_of_what_they_are_told_make_the_pose_unsure_until_another_source_places_it()
  {
-    let deviation = |told_ratio: f64, by_others: bool| {
+    let deviation = |told_ratio: f64, untold_m: [f64; 2], by_others: bool| {
         let mut run = run(0.0);
-        run.robot.told_ratio = told_ratio;
+        (run.robot.told_ratio, run.robot.untold_m) = (told_ratio, untold_m);
         let fixes = |robot: &mut Robot| if by_others { vec![robot.fix()] } else { Vec::new() };
         let all = run.wind(80, fixes);
         let told = all.iter().filter(|(reckoned, _)| reckoned.doubted.is_some()).count();
         (run.deviation_m(), told)
     };
-    let (even, _) = deviation(1.01, false);
+    let (even, _) = deviation(1.01, [0.0; 2], false);
     // In none of 20 missions with an encoder 5 % low is it nearer to 1.
-    let (uneven, told) = deviation(0.965, false);
+    let (uneven, told) = deviation(0.965, [0.0; 2], false);
     assert!(even < 0.15 && uneven > 0.5 && told == 1, "{even} and {uneven}, told {told} times");
     // An encoder 4 % low for half a short mission.
-    assert!(deviation(1.02, false).0 > 0.25);
-    assert!(deviation(0.965, true).0 < 0.1);
+    assert!(deviation(1.02, [0.0; 2], false).0 > 0.25);
+    // A wheel's counts, and those of both, jump.
+    assert!(deviation(1.0, [0.08, 0.0], false).0 > 0.5);
+    assert!(deviation(1.0, [0.6; 2], false).0 > 0.5);
+    assert!(deviation(0.965, [0.08, 0.0], true).0 < 0.1);
 }
 
 #[test]

@@ -88,7 +88,7 @@ pub enum Effect {
         wheels: WheelSample,
         /// Unwrapped counts of a robot without a counter.
         endless: Option<CountsSample>,
-        contact: Option<ContactSample>,
+        contact: Option<Box<ContactSample>>,
         response: Option<Box<BaseResponseSample>>,
     },
     Answered {
