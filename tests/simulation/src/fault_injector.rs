@@ -2,11 +2,15 @@
 
 use std::{collections::VecDeque, time::Duration};
 
-use common::{json_wire::Report, mission::Protocol, wire::COUNT_CYCLE};
+use common::{json_wire::Report, mission::Mission, wire::COUNT_CYCLE};
 
-use self::words::{COUNT_RAD, Effect, Said, Words};
+use self::{
+    lie::{Change, Lie, Stream},
+    words::{COUNT_RAD, Effect, Said, Words},
+};
 use crate::{random::Random, robot_fault::RobotFault};
 
+pub(crate) mod lie;
 mod words;
 
 const LATE: Duration = Duration::from_secs(2);
@@ -20,17 +24,15 @@ const SLOW: Duration = Duration::from_millis(333);
 const LOW: [f64; 2] = [0.97, 0.90];
 const LOWER: [f64; 2] = [0.90, 0.65];
 const RUNS_COUNTS_S: [f64; 2] = [50.0, 300.0];
-/// Noise of readings near a frozen one. A tenth of it is the relative noise of beams.
+/// Noise of readings near a frozen one.
 const NEAR_M: [f64; 2] = [0.005, 0.05];
 const DRIFTS_DEG_S: [f64; 2] = [1.0, 6.0];
 const SATURATES_DEG_S: [f64; 2] = [40.0, 10.0];
 const JUMPS_RAD_S: f64 = 1.0;
 const RANDOM_COUNTS_S: f64 = 1000.0;
-const RANDOM_M: f64 = 2.5;
+const RANDOM_M: [f64; 2] = [0.2, 2.5];
 const WIDE_M: [f64; 2] = [1.9, 2.4];
 const NO_READING: f64 = -1.0;
-/// Frozen range of a sensor without earlier readings.
-const FROZEN_M: f64 = 1.5;
 /// Maximum stored messages: those of [`OLD`] at ten times the usual rate.
 const MOST_KEPT: usize = 1024;
 
@@ -44,8 +46,6 @@ pub(crate) struct Late {
 #[derive(Default)]
 pub(crate) struct FaultInjector {
     fault: Option<RobotFault>,
-    /// Time of the first wheel message that the fault changed.
-    began: Option<Duration>,
     chance: Random,
     channel: usize,
     size: f64,
@@ -58,21 +58,54 @@ pub(crate) struct FaultInjector {
     /// Newest moving command; none once the link stopped the robot other than by speed 0.
     moving: Option<Vec<u8>>,
     pushes: bool,
-    /// Angle of the gyro and the one told, before.
-    gyro: Option<[f64; 2]>,
+    /// Lie of the mission's seed, and the present one.
+    drawn: Option<Lie>,
+    lie: Option<Lie>,
 }
 
 impl FaultInjector {
-    pub(crate) fn new(protocol: Protocol, seed: u64) -> Self {
-        let chance = Random::new(seed, 13);
-        Self { chance, words: Words::of(protocol), ..Self::default() }
+    pub(crate) fn new(mission: &Mission, seed: u64) -> Self {
+        let words = Words::of(mission.robot.protocol());
+        let drawn = Some(Lie::draw(mission));
+        Self { chance: Random::new(seed, 13), words, drawn, ..Self::default() }
     }
 
     /// Draws the size of `fault` and the wheel that it affects. The fault acts until the next one
     /// or, without a fault, ends.
     pub(crate) fn set(&mut self, fault: Option<RobotFault>) {
-        (self.fault, self.began) = (fault, None);
+        self.fault = fault;
         (self.channel, self.size) = (self.chance.below(2), self.chance.share());
+        self.lie = fault.and_then(|fault| self.lie_of(fault));
+    }
+
+    fn lie_of(&mut self, fault: RobotFault) -> Option<Lie> {
+        use RobotFault as F;
+        let wheel = Stream::Wheel(self.channel);
+        let (stream, change) = match fault {
+            F::EncoderDead => (wheel, Change::Scaled(0.0)),
+            F::EncoderReversed => (wheel, Change::Scaled(-1.0)),
+            F::EncoderLow => (wheel, Change::Scaled(self.drawn(LOW))),
+            F::EncoderLower => (wheel, Change::Scaled(self.drawn(LOWER))),
+            F::EncoderRuns => (wheel, Change::Drifts(self.drawn(RUNS_COUNTS_S) * COUNT_RAD)),
+            F::CountsJump => (wheel, Change::Jumps(JUMPS_RAD_S)),
+            F::GyroStops => (Stream::Gyro, Change::Stuck),
+            F::GyroDrifts => (Stream::Gyro, Change::Drifts(self.drawn(DRIFTS_DEG_S).to_radians())),
+            F::GyroSaturates => {
+                (Stream::Gyro, Change::Capped(self.drawn(SATURATES_DEG_S).to_radians()))
+            }
+            F::RangeInvalid => (Stream::AllRanges, Change::Wild(1.0, [NO_READING; 2])),
+            F::RangeStuck => (Stream::AllRanges, Change::Wild(1.0, [self.words.stuck_m(); 2])),
+            F::RangeFrozen => (Stream::AllRanges, Change::Stuck),
+            F::RangeNear => (Stream::AllRanges, Change::Near(self.drawn(NEAR_M))),
+            F::RangeRandom => (Stream::AllRanges, Change::Wild(1.0, RANDOM_M)),
+            F::RangeSilent | F::RangeDeaf => (Stream::AllRanges, Change::Deaf(1.0)),
+            F::SonarsDeaf => (Stream::HalfOfRanges(self.channel), Change::Deaf(1.0)),
+            F::FrontStuck => (Stream::Range(0), Change::Stuck),
+            F::FrontWide => (Stream::Range(0), Change::Wild(1.0, WIDE_M)),
+            F::Drawn => return self.drawn.clone(),
+            _ => return None,
+        };
+        Some(Lie::new(stream, change, self.chance.bits()))
     }
 
     /// Converts the robot's bytes into those for the host.
@@ -145,7 +178,9 @@ impl FaultInjector {
     }
 
     fn note(&mut self, said: Said) {
-        let Report { ranges, scan, scans, .. } = &said.report;
+        let Report { ranges, scan, scans, wheels, gyro, .. } = &said.report;
+        (self.newest.wheels, self.newest.gyro) =
+            (wheels.or(self.newest.wheels), gyro.or(self.newest.gyro));
         let distances = ranges.iter().filter(|(_, range)| range.is_some_and(|range| range >= 0.0));
         self.newest.ranges.extend(distances.map(|(name, range)| (name.clone(), *range)));
         self.newest.scans.extend(scans.clone());
@@ -191,29 +226,11 @@ impl FaultInjector {
                 }
             }
             F::RangeDeaf if self.newest_speeds().is_none_or(|speeds| speeds == [0.0; 2]) => {}
-            F::RangeInvalid
-            | F::RangeStuck
-            | F::RangeSilent
-            | F::RangeFrozen
-            | F::RangeNear
-            | F::RangeRandom
-            | F::RangeDeaf => self.misread(fault, &mut said),
-            F::SonarsDeaf => {
-                let sonars = said.report.ranges.values_mut();
-                sonars.skip(self.channel).step_by(2).for_each(|range| *range = None);
+            _ if self.lie.is_some() => {
+                let lie = self.lie.iter_mut();
+                lie.for_each(|lie| lie.change(&mut said.report, &self.newest, now));
             }
-            F::FrontStuck | F::FrontWide => {
-                if let Some((name, range)) = said.report.ranges.iter_mut().next() {
-                    let before = self.newest.ranges.get(name).copied().flatten();
-                    let stuck = before.or(*range).unwrap_or(FROZEN_M);
-                    let wide = self.chance.within(WIDE_M[0], WIDE_M[1]);
-                    *range = Some(if fault == F::FrontStuck { stuck } else { wide });
-                }
-            }
-            F::GyroStops | F::GyroDrifts | F::GyroSaturates => {
-                self.misturn(fault, &mut said.report, now);
-            }
-            _ => self.miscount(fault, &mut said, now),
+            _ => self.miscount(fault, &mut said),
         }
         said.bytes()
     }
@@ -222,59 +239,8 @@ impl FaultInjector {
         self.kept.iter().rev().find_map(|(_, said)| said.report.speeds)
     }
 
-    fn misread(&mut self, fault: RobotFault, said: &mut Said) {
-        use RobotFault as F;
-        let near_m = self.drawn(NEAR_M);
-        let chance = &mut self.chance;
-        let [stuck_m, least_m] = said.stuck_and_least_m();
-        let Report { ranges, scan, scans, .. } = &mut said.report;
-        if matches!(fault, F::RangeFrozen | F::RangeNear) {
-            for (name, range) in &mut *ranges {
-                *range = self.newest.ranges.get(name).copied().unwrap_or(Some(FROZEN_M));
-            }
-            *scan = scan.take().and(self.newest.scan.clone());
-            if !scans.is_empty() {
-                scans.clone_from(&self.newest.scans);
-            }
-        }
-        let mut told = |read: Option<f64>, is_beam: bool| match fault {
-            F::RangeFrozen => read,
-            F::RangeNear if is_beam => {
-                read.map(|beam| beam * (1.0 + chance.within(-near_m, near_m) / 10.0))
-            }
-            F::RangeNear => read.map(|range| range + chance.within(-near_m, near_m)),
-            F::RangeRandom => Some(chance.within(least_m, RANDOM_M)),
-            F::RangeStuck => Some(stuck_m),
-            F::RangeInvalid => Some(NO_READING),
-            _ => None,
-        };
-        ranges.values_mut().for_each(|range| *range = told(*range, false));
-        let named = scans.values_mut().flat_map(|scan| &mut scan.ranges);
-        for beam in scan.iter_mut().flatten().chain(named) {
-            *beam = told(beam.map(f64::from), true).map(|beam| beam as f32);
-        }
-    }
-
-    /// Changes the turn of the gyro since its last report.
-    fn misturn(&mut self, fault: RobotFault, report: &mut Report, now: Duration) {
-        let Some(angle) = &mut report.gyro else { return };
-        let for_s = now.saturating_sub(self.began.replace(now).unwrap_or(now)).as_secs_f64();
-        let [before, told] = self.gyro.unwrap_or([*angle; 2]);
-        let turn = *angle - before;
-        let turn = match fault {
-            RobotFault::GyroStops => 0.0,
-            RobotFault::GyroDrifts => turn + self.drawn(DRIFTS_DEG_S).to_radians() * for_s,
-            _ => {
-                let most = self.drawn(SATURATES_DEG_S).to_radians() * for_s;
-                turn.clamp(-most, most)
-            }
-        };
-        self.gyro = Some([*angle, told + turn]);
-        *angle = told + turn;
-    }
-
     /// Changes the wheels of `said`, relative to those before the fault.
-    fn miscount(&mut self, fault: RobotFault, said: &mut Said, now: Duration) {
+    fn miscount(&mut self, fault: RobotFault, said: &mut Said) {
         use RobotFault as F;
         let Some(mut angles) = said.report.wheels else { return };
         let mut speeds = said.report.speeds.unwrap_or_default();
@@ -284,34 +250,18 @@ impl FaultInjector {
             return;
         }
         let before = base.report.wheels.unwrap_or(angles);
-        let since_s = now.saturating_sub(*self.began.get_or_insert(now)).as_secs_f64();
-        let [low, lower, runs] = [LOW, LOWER, RUNS_COUNTS_S].map(|range| self.drawn(range));
-        let (channel, chance) = (self.channel, &mut self.chance);
         let turned = [0, 1].map(|wheel| angles[wheel] - before[wheel]);
-        let mut counts_share = |share: f64| {
-            angles[channel] = before[channel] + share * turned[channel];
-            speeds[channel] *= share;
-        };
         match fault {
-            F::EncoderDead => counts_share(0.0),
-            F::EncoderReversed => counts_share(-1.0),
-            F::EncoderLow => counts_share(low),
-            F::EncoderLower => counts_share(lower),
             F::EncodersSwapped => {
                 angles = [0, 1].map(|wheel| before[wheel] + turned[1 - wheel]);
                 speeds.reverse();
             }
-            F::EncoderRuns => {
-                angles[channel] += runs * COUNT_RAD * since_s;
-                speeds[channel] += runs * COUNT_RAD;
-            }
             F::CountsRandom => {
-                let mut random = |least, most| chance.within(least, most) * COUNT_RAD;
+                let mut random = |least, most| self.chance.within(least, most) * COUNT_RAD;
                 angles = [(); 2].map(|()| random(0.0, COUNT_CYCLE.into()));
                 speeds = [(); 2].map(|()| random(-RANDOM_COUNTS_S, RANDOM_COUNTS_S));
             }
             F::CountsReset => angles = turned,
-            F::CountsJump => angles[channel] += JUMPS_RAD_S * since_s.floor(),
             F::HeldWheels if self.pushes => said.report.held = Some([true; 2]),
             _ => {}
         }

@@ -40,6 +40,7 @@ use summary::{Hearer, Summary};
 
 pub use self::{
     disturbance::{Disturbance, Request, What},
+    fault_injector::lie::Lie,
     invariant::Broken,
     load::Load,
     random::Random,

@@ -108,7 +108,7 @@ impl SimulatedMachine {
         let protocol = scenario.mission.robot.protocol();
         let invariants = Invariants::new(protocol, scenario.pace == Pace::Max);
         let faults = disturbances.iter().any(is_fault);
-        let faults = faults.then(|| RefCell::new(FaultInjector::new(protocol, seed)));
+        let faults = faults.then(|| RefCell::new(FaultInjector::new(&scenario.mission, seed)));
         Rc::new_cyclic(|own| Self {
             own: own.clone(),
             now_ns: Cell::new(BEGIN_NS),

@@ -87,6 +87,7 @@ pub enum RobotFault {
     Carried,
     FrontStuck,
     FrontWide,
+    Drawn,
 }
 
 static TABLE: LazyLock<Vec<Row>> = LazyLock::new(|| {

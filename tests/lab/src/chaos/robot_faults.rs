@@ -6,7 +6,7 @@ use clap::ValueEnum as _;
 use common::{ground_truth::GroundTruthTick, mission::Mission};
 use console::output::write_stderr;
 use mission_control::outcome::RIGHT_PLACE_M;
-use simulation::{Disturbance, Random, Request, RobotFault, Scenario, What};
+use simulation::{Disturbance, Lie, Random, Request, RobotFault, Scenario, What};
 use summary::Summary;
 
 use super::stop_time_table::{Entry, StopTimeTable};
@@ -103,6 +103,9 @@ fn one(healthy: &Healthy, fault: RobotFault) -> Entry {
     let turning = watched.iter().skip(1).rfind(|tick| !is_at_rest(tick));
     let contacts = |tick: Option<&GroundTruthTick>| tick.map_or(0, |tick| tick.contacts);
     let since = |then: Option<f64>| then.map_or(0.0, |then_s| (then_s - began_s).max(0.0));
+    if fault == RobotFault::Drawn {
+        reason = format!("{}: {reason}", Lie::draw(mission));
+    }
     Entry {
         fault,
         seed: *seed,

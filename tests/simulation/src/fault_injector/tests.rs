@@ -1,6 +1,9 @@
+use std::path::Path;
+
 use clap::ValueEnum as _;
 use common::{
     json_wire::{Order, line, parse},
+    mission::Protocol,
     wire::{
         Addressing, Command, Decoder, DecoderTally, Encoder, MotorSensors, Report as Frame,
         StandardSensors, SystemSignal,
@@ -57,9 +60,15 @@ fn sonar(passed: &[Late]) -> Option<u8> {
     })
 }
 
+fn injector(protocol: Protocol, seed: u64) -> FaultInjector {
+    let protocol = if protocol == Protocol::X80 { "x80" } else { "json" };
+    let text = format!("target = [3, 0]\nrobot.protocol = '{protocol}'");
+    FaultInjector::new(&Mission::parse(&text, Path::new("m.toml")).unwrap(), seed)
+}
+
 /// Returns an injector whose robot said `before` at 1 s, unchanged, and then became faulty.
 fn faulty(fault: F, protocol: Protocol, seed: u64, before: &[u8]) -> FaultInjector {
-    let mut injector = FaultInjector::new(protocol, seed);
+    let mut injector = injector(protocol, seed);
     let passed = injector.report(before, at(1.0));
     assert_eq!((passed[0].at, &*passed[0].bytes), (at(1.0), before));
     injector.set(Some(fault));
@@ -130,7 +139,7 @@ fn frames_are_late_old_or_rare_as_the_table_says() {
     assert_eq!(late(F::FramesLate), at(1.1) + LATE);
     assert!((at(1.35)..at(2.1)).contains(&late(F::LateFromBoot)));
 
-    let mut old = FaultInjector::new(Protocol::X80, 1);
+    let mut old = injector(Protocol::X80, 1);
     for number in 0..40 {
         old.report(&tick([number, 200], 90), at(0.1 * f64::from(number)));
     }
@@ -207,7 +216,7 @@ fn a_gyro_lies_as_the_table_says() {
     let gyro =
         |angle| line(&Report { wheels: Some([0.0; 2]), gyro: Some(angle), ..Report::default() });
     for (fault, told) in
-        [(F::GyroStops, 0.1..=0.1), (F::GyroDrifts, 2.11..=2.21), (F::GyroSaturates, 0.27..=0.80)]
+        [(F::GyroStops, 0.0..=0.0), (F::GyroDrifts, 2.11..=2.21), (F::GyroSaturates, 0.17..=0.70)]
     {
         let mut injector = faulty(fault, Protocol::Json, 1, &gyro(0.0));
         injector.report(&gyro(0.1), at(1.1));
@@ -237,19 +246,19 @@ fn a_robot_keeps_its_speed_until_it_is_disabled_or_stands_where_it_is_held() {
     let still_line = line(&Report { wheels, speeds, ..Report::default() });
     let [_, mut held] = [(Protocol::X80, x80, still), (Protocol::Json, json, still_line)].map(
         |(protocol, [go, stand, off], still)| {
-            let mut keeps = FaultInjector::new(protocol, 1);
+            let mut keeps = injector(protocol, 1);
             let healthy = [&*go, &stand].concat();
             assert_eq!(keeps.order(&healthy), healthy, "{protocol:?}");
             keeps.set(Some(F::DoesNotStop));
             assert_eq!(keeps.order(&stand), go, "{protocol:?}");
-            let mut rests = FaultInjector::new(protocol, 1);
+            let mut rests = injector(protocol, 1);
             rests.order(&go);
             rests.report(&still, at(1.0));
             rests.set(Some(F::DoesNotStop));
             assert_eq!(rests.order(&stand), stand, "{protocol:?}");
             let disabled = [&*off, &stand].concat();
             assert_eq!(keeps.order(&disabled), disabled, "{protocol:?}");
-            let mut held = FaultInjector::new(protocol, 1);
+            let mut held = injector(protocol, 1);
             held.set(Some(F::HeldWheels));
             assert_eq!(held.order(&go), stand, "{protocol:?}");
             held

@@ -34,6 +34,11 @@ impl Words {
         Self { protocol, ..Self::default() }
     }
 
+    /// Returns the range of a stuck sensor, metres.
+    pub(super) fn stuck_m(&self) -> f64 {
+        if self.protocol == Protocol::X80 { 0.08 } else { 0.3 }
+    }
+
     pub(super) fn said(&mut self, bytes: &[u8]) -> Vec<Said> {
         if self.protocol == Protocol::X80 {
             let said = frames(&mut self.robot_frames, bytes, |frame| {
@@ -142,11 +147,6 @@ impl Said {
 
     pub(super) const fn is_frame(&self) -> bool {
         self.frame.is_some()
-    }
-
-    /// Returns the stuck range, and the minimum random one, metres.
-    pub(super) const fn stuck_and_least_m(&self) -> [f64; 2] {
-        if self.is_frame() { [0.08, 0.04] } else { [0.3, 0.2] }
     }
 
     pub(super) fn readings(&self) -> [bool; 3] {

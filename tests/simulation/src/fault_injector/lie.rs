@@ -1,0 +1,272 @@
+//! Lies: a stream of the robot's data, and how it differs from the truth.
+
+use std::{collections::VecDeque, fmt, time::Duration};
+
+use common::{
+    json_wire::Report,
+    mission::{Mission, Protocol, Sensor, SensorKind},
+};
+
+use crate::random::Random;
+
+/// Longest history of a value.
+const MOST_KEPT: usize = 256;
+const PAUSES_EVERY_S: f64 = 4.0;
+/// Frozen range of a sensor without earlier readings.
+const FROZEN_M: f64 = 1.5;
+const LEAST_M: f64 = 0.02;
+/// Number of the first beam; smaller ones are those of ranges.
+const BEAMS: usize = 64;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Stream {
+    Wheel(usize),
+    Wheels,
+    Gyro,
+    Range(usize),
+    /// Every second one, from this on.
+    HalfOfRanges(usize),
+    AllRanges,
+}
+
+/// Sizes are radians of wheels and gyros, and metres of ranges.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Change {
+    /// The change since the lie began, or the range, times a factor.
+    Scaled(f64),
+    Shifted(f64),
+    /// By so much a second.
+    Drifts(f64),
+    Stuck,
+    /// Stuck but for noise, of beams a tenth of their range.
+    Near(f64),
+    /// By seconds.
+    Late(f64),
+    Noisy(f64),
+    /// Angles by so much more each second, ranges every second second.
+    Jumps(f64),
+    /// Angles change at most by so much a second, ranges end there.
+    Capped(f64),
+    /// Rounded to multiples.
+    Coarse(f64),
+    /// Stuck for so many of each 4 s.
+    Pauses(f64),
+    /// Random within a range, for a share of the readings.
+    Wild(f64, [f64; 2]),
+    /// Nothing in reach, for a share of the readings.
+    Deaf(f64),
+}
+
+impl Change {
+    fn draw(is_range: bool, is_gyro: bool, chance: &mut Random) -> Self {
+        let (size, sign) = (chance.below(3), if chance.chance(0.5) { 1.0 } else { -1.0 });
+        let of = |wheel: [f64; 3], gyro: [f64; 3], range: [f64; 3]| {
+            let sizes = if is_range {
+                range
+            } else if is_gyro {
+                gyro
+            } else {
+                wheel
+            };
+            sizes[size]
+        };
+        let share = [0.1, 0.4, 1.0][size];
+        let factor = [0.94_f64, 0.75, 0.5][size].powf(sign);
+        match chance.below(if is_range { 12 } else { 11 }) {
+            0 => Self::Scaled(factor),
+            1 => Self::Shifted(sign * of([0.3, 1.0, 3.0], [0.1, 0.3, 1.0], [0.1, 0.3, 0.8])),
+            2 => Self::Drifts(sign * of([0.05, 0.3, 1.0], [0.02, 0.05, 0.2], [0.01, 0.05, 0.2])),
+            3 => Self::Stuck,
+            4 => Self::Late([0.2, 0.6, 1.5][size]),
+            5 => Self::Noisy(of([0.05, 0.3, 1.0], [0.02, 0.1, 0.5], [0.05, 0.2, 0.6])),
+            6 => Self::Jumps(sign * of([0.1, 0.3, 1.0], [0.05, 0.1, 0.3], [0.1, 0.3, 0.8])),
+            7 => Self::Capped(of([3.0, 1.5, 0.5], [0.7, 0.35, 0.15], [1.5, 1.0, 0.5])),
+            8 => Self::Coarse(of([0.2, 0.6, 2.0], [0.05, 0.2, 0.5], [0.1, 0.3, 0.8])),
+            9 => Self::Pauses([0.5, 1.0, 2.0][size]),
+            10 if is_range => Self::Wild(share, [0.1, 2.5]),
+            10 => Self::Scaled(-1.0),
+            _ => Self::Deaf(share),
+        }
+    }
+}
+
+#[derive(Clone, Debug, Default)]
+struct Channel {
+    /// Time of the first false value, and the value before.
+    began: Option<(Duration, f64)>,
+    told: f64,
+    history: VecDeque<(Duration, f64)>,
+}
+
+#[derive(Clone, Debug)]
+pub struct Lie {
+    stream: Stream,
+    change: Change,
+    chance: Random,
+    channels: Vec<Channel>,
+    angles: Option<(Duration, [f64; 2])>,
+}
+
+impl Lie {
+    pub(crate) fn new(stream: Stream, change: Change, seed: u64) -> Self {
+        let chance = Random::new(seed, 29);
+        Self { stream, change, chance, channels: Vec::new(), angles: None }
+    }
+
+    /// Draws the lie of the mission's seed.
+    pub fn draw(mission: &Mission) -> Self {
+        let single = |sensor: &&Sensor| sensor.kind != SensorKind::Scan;
+        let ranges = match mission.robot.protocol() {
+            Protocol::X80 => 3,
+            _ => mission.sensor_table().iter().filter(single).count(),
+        };
+        let mut chance = Random::new(mission.seed, 31);
+        let [wheel, one] = [2, ranges].map(|of| chance.below(of));
+        let mut streams = vec![Stream::Wheel(wheel), Stream::Wheels, Stream::AllRanges];
+        if mission.robot.gyro() {
+            streams.push(Stream::Gyro);
+        }
+        if ranges > 1 {
+            streams.extend([Stream::Range(0), Stream::Range(one), Stream::HalfOfRanges(wheel)]);
+        }
+        let stream = streams[chance.below(streams.len())];
+        let is_range = !matches!(stream, Stream::Wheel(_) | Stream::Wheels | Stream::Gyro);
+        let change = Change::draw(is_range, stream == Stream::Gyro, &mut chance);
+        Self::new(stream, change, mission.seed)
+    }
+
+    /// Changes `report`. `before` holds the newest values from before the lie.
+    pub(crate) fn change(&mut self, report: &mut Report, before: &Report, now: Duration) {
+        let stream = self.stream;
+        match stream {
+            Stream::Wheel(_) | Stream::Wheels => self.miscount(report, before, now),
+            Stream::Gyro => {
+                if let Some(gyro) = &mut report.gyro {
+                    *gyro = self.told(0, (*gyro, before.gyro), now).unwrap_or(*gyro);
+                }
+                return;
+            }
+            _ => {}
+        }
+        let lies = |number: usize| match stream {
+            Stream::Range(one) => one == number,
+            Stream::HalfOfRanges(from) => number % 2 == from,
+            _ => stream == Stream::AllRanges,
+        };
+        for (number, (name, range)) in report.ranges.iter_mut().enumerate() {
+            if lies(number) {
+                let before = before.ranges.get(name).copied().flatten().unwrap_or(FROZEN_M);
+                *range = self.read(number, *range, Some(before), now);
+            }
+        }
+        if stream == Stream::AllRanges {
+            let before_of = |name| Some(&before.scans.get(name)?.ranges);
+            let named =
+                report.scans.iter_mut().map(|(name, scan)| (before_of(name), &mut scan.ranges));
+            let own = report.scan.iter_mut().map(|beams| (before.scan.as_ref(), beams));
+            let mut number = BEAMS;
+            for (before, beams) in own.chain(named) {
+                for (at, beam) in beams.iter_mut().enumerate() {
+                    let before = before.and_then(|before| *before.get(at)?).map(f64::from);
+                    let read = self.read(number, beam.map(f64::from), before, now);
+                    (*beam, number) = (read.map(|beam| beam as f32), number + 1);
+                }
+            }
+        }
+    }
+
+    fn miscount(&mut self, report: &mut Report, before: &Report, now: Duration) {
+        let Some(mut angles) = report.wheels else { return };
+        for (wheel, angle) in angles.iter_mut().enumerate() {
+            if self.stream == Stream::Wheels || self.stream == Stream::Wheel(wheel) {
+                let truth = (*angle, before.wheels.map(|before| before[wheel]));
+                *angle = self.told(wheel, truth, now).unwrap_or(*angle);
+            }
+        }
+        let last = self.angles.replace((now, angles));
+        if let (Some((then, last)), Some(speeds)) = (last, &mut report.speeds)
+            && now > then
+        {
+            let for_s = (now - then).as_secs_f64();
+            *speeds = [0, 1].map(|wheel| (angles[wheel] - last[wheel]) / for_s);
+        }
+        report.wheels = Some(angles);
+    }
+
+    fn read(
+        &mut self,
+        number: usize,
+        range: Option<f64>,
+        before: Option<f64>,
+        now: Duration,
+    ) -> Option<f64> {
+        let truth = match (self.change, range) {
+            // These need no truth.
+            (Change::Stuck | Change::Near(_), _) => before?,
+            (Change::Wild(..), _) => return self.told(number, (FROZEN_M, None), now),
+            (_, Some(range)) if range >= 0.0 => range,
+            _ => return range,
+        };
+        Some(self.told(number, (truth, before), now)?.max(LEAST_M))
+    }
+
+    /// Returns what is told of a value, which was another one before the lie; none for nothing in
+    /// reach.
+    fn told(
+        &mut self,
+        number: usize,
+        (truth, before): (f64, Option<f64>),
+        now: Duration,
+    ) -> Option<f64> {
+        if self.channels.len() <= number {
+            self.channels.resize_with(number + 1, Channel::default);
+        }
+        let (channel, chance) = (&mut self.channels[number], &mut self.chance);
+        let is_angle = matches!(self.stream, Stream::Wheel(_) | Stream::Wheels | Stream::Gyro);
+        let (began, onset) = *channel.began.get_or_insert_with(|| {
+            channel.told = before.unwrap_or(truth);
+            (now, channel.told)
+        });
+        let seconds = (now - began).as_secs_f64();
+        let (then, last) = channel.history.back().copied().unwrap_or((now, onset));
+        channel.history.push_back((now, truth));
+        channel.history.drain(..channel.history.len().saturating_sub(MOST_KEPT));
+        let zero = if is_angle { onset } else { 0.0 };
+        channel.told = match self.change {
+            Change::Scaled(factor) => zero + factor * (truth - zero),
+            Change::Shifted(by) => truth + by,
+            Change::Drifts(by) => truth + by * seconds,
+            Change::Stuck => onset,
+            Change::Near(by) => {
+                let of = if number < BEAMS { 1.0 } else { onset / 10.0 };
+                onset + of * chance.within(-by, by)
+            }
+            Change::Late(by_s) => {
+                let old = |(at, _): &&(Duration, f64)| *at + Duration::from_secs_f64(by_s) <= now;
+                channel.history.iter().rfind(old).map_or(onset, |(_, old)| *old)
+            }
+            Change::Noisy(by) => truth + chance.within(-by, by),
+            Change::Jumps(by) if is_angle => truth + by * seconds.floor(),
+            Change::Jumps(by) => truth + by * (seconds.floor() % 2.0),
+            Change::Capped(most) if is_angle => {
+                let most = most * (now - then).as_secs_f64();
+                channel.told + (truth - last).clamp(-most, most)
+            }
+            Change::Capped(most) => truth.min(most),
+            Change::Coarse(step) => (truth / step).round() * step,
+            Change::Pauses(for_s) if seconds % PAUSES_EVERY_S < for_s => channel.told,
+            Change::Wild(share, [least, most]) if chance.chance(share) => {
+                chance.within(least, most)
+            }
+            Change::Deaf(share) if chance.chance(share) => return None,
+            Change::Pauses(_) | Change::Wild(..) | Change::Deaf(_) => truth,
+        };
+        Some(channel.told)
+    }
+}
+
+impl fmt::Display for Lie {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?} {:?}", self.stream, self.change)
+    }
+}
