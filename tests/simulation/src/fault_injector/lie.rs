@@ -29,6 +29,12 @@ pub(crate) enum Stream {
     AllRanges,
 }
 
+impl Stream {
+    const fn is_angle(self) -> bool {
+        matches!(self, Self::Wheel(_) | Self::Wheels | Self::Gyro)
+    }
+}
+
 /// Sizes are radians of wheels and gyros, and metres of ranges.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Change {
@@ -58,34 +64,31 @@ pub(crate) enum Change {
 }
 
 impl Change {
-    fn draw(is_range: bool, is_gyro: bool, chance: &mut Random) -> Self {
-        let (size, sign) = (chance.below(3), if chance.chance(0.5) { 1.0 } else { -1.0 });
-        let of = |wheel: [f64; 3], gyro: [f64; 3], range: [f64; 3]| {
-            let sizes = if is_range {
-                range
-            } else if is_gyro {
-                gyro
-            } else {
-                wheel
-            };
-            sizes[size]
+    fn draw(stream: Stream, chance: &mut Random) -> Self {
+        let number = chance.below(3);
+        let size = [0.1, 0.3, 1.0][number];
+        let sign = if chance.chance(0.5) { 1.0 } else { -1.0 };
+        // Of these turns of wheels, turns of the body, or ranges.
+        let unit = match stream {
+            Stream::Wheel(_) | Stream::Wheels => 1.0,
+            Stream::Gyro => 0.2,
+            _ => 0.6,
         };
-        let share = [0.1, 0.4, 1.0][size];
-        let factor = [0.94_f64, 0.75, 0.5][size].powf(sign);
+        let is_range = !stream.is_angle();
         match chance.below(if is_range { 12 } else { 11 }) {
-            0 => Self::Scaled(factor),
-            1 => Self::Shifted(sign * of([0.3, 1.0, 3.0], [0.1, 0.3, 1.0], [0.1, 0.3, 0.8])),
-            2 => Self::Drifts(sign * of([0.05, 0.3, 1.0], [0.02, 0.05, 0.2], [0.01, 0.05, 0.2])),
+            0 => Self::Scaled([0.94_f64, 0.75, 0.5][number].powf(sign)),
+            1 => Self::Shifted(3.0 * sign * size * unit),
+            2 => Self::Drifts(sign * size * unit),
             3 => Self::Stuck,
-            4 => Self::Late([0.2, 0.6, 1.5][size]),
-            5 => Self::Noisy(of([0.05, 0.3, 1.0], [0.02, 0.1, 0.5], [0.05, 0.2, 0.6])),
-            6 => Self::Jumps(sign * of([0.1, 0.3, 1.0], [0.05, 0.1, 0.3], [0.1, 0.3, 0.8])),
-            7 => Self::Capped(of([3.0, 1.5, 0.5], [0.7, 0.35, 0.15], [1.5, 1.0, 0.5])),
-            8 => Self::Coarse(of([0.2, 0.6, 2.0], [0.05, 0.2, 0.5], [0.1, 0.3, 0.8])),
-            9 => Self::Pauses([0.5, 1.0, 2.0][size]),
-            10 if is_range => Self::Wild(share, [0.1, 2.5]),
+            4 => Self::Late(1.5 * size),
+            5 => Self::Noisy(size * unit),
+            6 => Self::Jumps(sign * size * unit),
+            7 => Self::Capped(0.3 * unit / size),
+            8 => Self::Coarse(2.0 * size * unit),
+            9 => Self::Pauses(2.0 * size),
+            10 if is_range => Self::Wild(size, [0.1, 2.5]),
             10 => Self::Scaled(-1.0),
-            _ => Self::Deaf(share),
+            _ => Self::Deaf(size),
         }
     }
 }
@@ -130,9 +133,7 @@ impl Lie {
             streams.extend([Stream::Range(0), Stream::Range(one), Stream::HalfOfRanges(wheel)]);
         }
         let stream = streams[chance.below(streams.len())];
-        let is_range = !matches!(stream, Stream::Wheel(_) | Stream::Wheels | Stream::Gyro);
-        let change = Change::draw(is_range, stream == Stream::Gyro, &mut chance);
-        Self::new(stream, change, mission.seed)
+        Self::new(stream, Change::draw(stream, &mut chance), mission.seed)
     }
 
     /// Changes `report`. `before` holds the newest values from before the lie.
@@ -222,7 +223,7 @@ impl Lie {
             self.channels.resize_with(number + 1, Channel::default);
         }
         let (channel, chance) = (&mut self.channels[number], &mut self.chance);
-        let is_angle = matches!(self.stream, Stream::Wheel(_) | Stream::Wheels | Stream::Gyro);
+        let is_angle = self.stream.is_angle();
         let (began, onset) = *channel.began.get_or_insert_with(|| {
             channel.told = before.unwrap_or(truth);
             (now, channel.told)
