@@ -5,6 +5,7 @@ mod model;
 
 use super::*;
 use crate::{activity::State, stages::TABLE};
+use Event::*;
 
 const fn ms(count: u64) -> Duration {
     Duration::from_millis(count)
@@ -12,19 +13,19 @@ const fn ms(count: u64) -> Duration {
 
 fn running() -> Policy {
     let mut policy = Policy::new(TABLE[0].deadlines);
-    policy.step(Event::Start, ms(0));
-    policy.step(Event::BeatReady, ms(10));
+    policy.step(Start, ms(0));
+    policy.step(BeatReady, ms(10));
     policy
 }
 
 #[test]
 fn a_stage_that_cannot_run_is_held_within_ten_seconds() {
     let mut policy = running();
-    policy.step(Event::Exited, ms(20));
+    policy.step(Exited, ms(20));
     while let Some(now) = policy.deadline().filter(|_| policy.phase() != Phase::Held) {
         assert!(now < ms(10_000), "{policy:?}");
-        policy.step(Event::Time(None), now);
-        policy.step(Event::Exited, now);
+        policy.step(Time(None), now);
+        policy.step(Exited, now);
     }
     assert_eq!((policy.phase(), policy.recent_deaths()), (Phase::Held, 12));
 }
@@ -33,9 +34,9 @@ fn a_stage_that_cannot_run_is_held_within_ten_seconds() {
 fn a_stage_killed_once_a_second_is_never_held() {
     let mut policy = running();
     for second in 1..1000 {
-        let started = policy.step(Event::Exited, ms(second * 1000));
+        let started = policy.step(Exited, ms(second * 1000));
         assert_eq!(started, Some(Action::Start), "after {second} kills");
-        policy.step(Event::BeatReady, ms(second * 1000 + 100));
+        policy.step(BeatReady, ms(second * 1000 + 100));
     }
 }
 
@@ -55,7 +56,7 @@ fn silence_is_aborted_by_processor_time_of_its_own_and_by_time_asleep_and_not_by
         let mut policy = running();
         let aborted = (1..60_000).find(|&age| {
             let [ran, starved] = [ran, starved].map(|share| ms(age).mul_f64(share));
-            let time = Event::Time(Some(Activity { ran, starved, state }));
+            let time = Time(Some(Activity { ran, starved, state }));
             policy.step(time, ms(10 + age)) == Some(Action::Abort)
         });
         assert_eq!(aborted, want, "{state:?}, {ran} run, {starved} starved");

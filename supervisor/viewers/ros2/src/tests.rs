@@ -22,7 +22,7 @@ use crate::{
     RVIZ,
     action::{Sent, Server},
     asked,
-    goals::Status,
+    goals::Status::{Aborted, Canceled, Succeeded},
     messages::{self, disc, lines},
     shown::Shown,
     topics::{Id, TABLE},
@@ -86,9 +86,13 @@ fn what_is_written_is_what_rclpy_writes() {
         (diagnostics.encode(), DIAGNOSTICS),
         (messages::markers(&header("map"), vec![drawn]), MARKERS),
     ] {
-        let bytes: String = message.iter().map(|byte| format!("{byte:02x}")).collect();
-        assert_eq!(bytes, written);
+        assert_eq!(message, bytes(written));
     }
+}
+
+pub fn bytes(hex: &str) -> Vec<u8> {
+    let digits = hex.as_bytes().chunks_exact(2);
+    digits.map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
 }
 
 fn pose_in(frame: &str) -> PoseStamped {
@@ -196,12 +200,12 @@ fn a_goal_of_the_action_ends_with_its_own_target_or_when_the_robot_is_sent_elsew
     let arrives: Said = |it| it.command(&arrival(5));
     for (what, said, want) in [
         ("another target's arrival", &[(|it| it.command(&arrival(4))) as Said][..], None),
-        ("its arrival", &[arrives], Some(Status::Succeeded)),
-        ("another target", &[|it| it.target(&target(6))], Some(Status::Aborted)),
-        ("a newer goal", &[|it| it.accept(sent(2), it.newest_target, 8)], Some(Status::Aborted)),
+        ("its arrival", &[arrives], Some(Succeeded)),
+        ("another target", &[|it| it.target(&target(6))], Some(Aborted)),
+        ("a newer goal", &[|it| it.accept(sent(2), it.newest_target, 8)], Some(Aborted)),
         ("a wait, whose arrival may still be read", &[waits], None),
-        ("a run that stays without it", &[waits, waits], Some(Status::Aborted)),
-        ("an arrival within a wait", &[waits, arrives, waits], Some(Status::Succeeded)),
+        ("a run that stays without it", &[waits, waits], Some(Aborted)),
+        ("an arrival within a wait", &[waits, arrives, waits], Some(Succeeded)),
     ] {
         let mut goals = with_a_goal();
         said.iter().for_each(|said| said(&mut goals));
@@ -217,20 +221,20 @@ fn a_goal_that_is_refused_has_nav2s_error_code_and_words_and_the_one_before_goes
     let mut goals = with_a_goal();
     goals.refuse(id, &point.unwrap_err(), 8);
     let (status, code, text) = told(&goals, 2);
-    assert_eq!((status, code), (Status::Aborted as i8, NavigateToPoseResult::TF_ERROR));
+    assert_eq!((status, code), (Aborted as i8, NavigateToPoseResult::TF_ERROR));
     assert!(text.contains("give it in \"map\""), "{text}");
     goals.command(&arrival(5));
-    assert_eq!(told(&goals, 1), (Status::Succeeded as i8, 0, String::new()));
+    assert_eq!(told(&goals, 1), (Succeeded as i8, 0, String::new()));
 }
 
 #[test]
 fn a_goal_that_ends_says_why_by_the_recorded_result_of_its_target_to_a_later_bridge_too() {
     let waits = directive(HoldReason::Waiting);
     for (outcome, status, code, words) in [
-        ("unreachable", Status::Aborted, 208, "no path"),
-        ("timed_out", Status::Aborted, 9003, "did not arrive"),
-        ("missed", Status::Aborted, 9000, "gave up"),
-        ("reached", Status::Succeeded, 0, ""),
+        ("unreachable", Aborted, 208, "no path"),
+        ("timed_out", Aborted, 9003, "did not arrive"),
+        ("missed", Aborted, 9000, "gave up"),
+        ("reached", Succeeded, 0, ""),
     ] {
         let mut goals = with_a_goal();
         goals.directive(&waits);
@@ -266,7 +270,7 @@ fn goals_of_the_action_are_reached_one_after_the_other_in_a_run_that_stays() {
         }
         goals.command(&arrival(nth.into()));
         goals.directive(&waits);
-        assert_eq!(state(&goals, nth), Some(Status::Succeeded as i8), "goal {nth}");
+        assert_eq!(state(&goals, nth), Some(Succeeded as i8), "goal {nth}");
     }
 }
 
@@ -278,8 +282,8 @@ fn a_goal_that_is_canceled_stays_canceled_although_the_robot_arrives() {
         assert_eq!((reply[4], stands), (0, true), "it is taken");
         goals.command(&arrival(5));
         assert_eq!(state(&goals, 1), None, "the robot does not stand yet");
-        goals.goals.end(Status::Canceled);
-        assert_eq!(state(&goals, 1), Some(Status::Canceled as i8));
+        goals.goals.end(Canceled);
+        assert_eq!(state(&goals, 1), Some(Canceled as i8));
     }
     let (reply, stands) = with_a_goal().goals.cancel(&cancel(2)).unwrap();
     assert_eq!((reply[4], stands), (2, false), "it is unknown");

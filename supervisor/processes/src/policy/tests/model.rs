@@ -47,20 +47,20 @@ impl Generation {
 }
 
 const EVENTS: [Event; 14] = [
-    Event::Start,
-    Event::StartFailed,
-    Event::BeatReady,
-    Event::OutputStale,
-    Event::Exited,
-    Event::Refused,
-    Event::Replace,
-    Event::Stop,
-    Event::Time(None),
-    Event::Time(Some(RAN)),
-    Event::Time(Some(SLEPT)),
-    Event::Time(Some(STOPPED)),
-    Event::Time(Some(STARVED)),
-    Event::Time(Some(STARVED_THEN_WAITED)),
+    Start,
+    StartFailed,
+    BeatReady,
+    OutputStale,
+    Exited,
+    Refused,
+    Replace,
+    Stop,
+    Time(None),
+    Time(Some(RAN)),
+    Time(Some(SLEPT)),
+    Time(Some(STOPPED)),
+    Time(Some(STARVED)),
+    Time(Some(STARVED_THEN_WAITED)),
 ];
 
 impl Model {
@@ -80,15 +80,13 @@ impl Model {
 
     fn can(&self, event: Event) -> bool {
         match event {
-            Event::Start => self.generation.is_none(),
+            Start => self.generation.is_none(),
             // A start fails at once.
-            Event::StartFailed => self.generation.as_ref().is_some_and(|generation| {
+            StartFailed => self.generation.as_ref().is_some_and(|generation| {
                 generation.sign == self.now && generation.ready.is_none() && !generation.stopping
             }),
-            Event::BeatReady | Event::OutputStale | Event::Exited | Event::Refused => {
-                self.generation.is_some()
-            }
-            Event::Replace | Event::Stop | Event::Time(_) => true,
+            BeatReady | OutputStale | Exited | Refused => self.generation.is_some(),
+            Replace | Stop | Time(_) => true,
         }
     }
 
@@ -116,55 +114,55 @@ impl Model {
         let blocked = self.blocked().is_some_and(|blocked| now >= blocked);
         let Some(generation) = &mut self.generation else {
             let starts = match event {
-                Event::Start if !self.held => true,
-                Event::Start | Event::Replace if self.wanted => {
+                Start if !self.held => true,
+                Start | Replace if self.wanted => {
                     (self.row, self.blocked_starts) = (0, 0);
                     self.deaths.clear();
                     true
                 }
-                Event::Time(_) => self.wanted && !self.held && due,
+                Time(_) => self.wanted && !self.held && due,
                 _ => false,
             };
-            if event == Event::Stop {
+            if event == Stop {
                 (self.wanted, self.held) = (false, false);
             }
             return starts.then(|| self.begin());
         };
         match event {
-            Event::BeatReady if generation.kill.is_none() => {
+            BeatReady if generation.kill.is_none() => {
                 generation.ready.get_or_insert(now);
                 generation.sign = now;
                 self.blocked_starts = 0;
                 None
             }
-            Event::Time(_) if due && generation.kill.is_some() => {
+            Time(_) if due && generation.kill.is_some() => {
                 generation.kill = Some(now + ms(100));
                 Some(Action::Kill)
             }
-            Event::Time(Some(STARVED | STARVED_THEN_WAITED)) => None,
-            Event::Time(Some(SLEPT)) if !blocked => None,
-            Event::Time(_) if due => self.abort(),
-            Event::OutputStale if generation.kill.is_none() && generation.ready.is_some() => {
+            Time(Some(STARVED | STARVED_THEN_WAITED)) => None,
+            Time(Some(SLEPT)) if !blocked => None,
+            Time(_) if due => self.abort(),
+            OutputStale if generation.kill.is_none() && generation.ready.is_some() => {
                 generation.sign = now;
                 self.abort()
             }
-            Event::Replace if self.wanted && !generation.stopping => {
+            Replace if self.wanted && !generation.stopping => {
                 generation.stopping = true;
                 let running = generation.kill.is_none();
                 generation.kill.get_or_insert(now + ms(300));
                 running.then_some(Action::Terminate)
             }
-            Event::Stop if self.wanted => {
+            Stop if self.wanted => {
                 (generation.stopping, generation.kill) = (true, Some(now + ms(300)));
                 self.wanted = false;
                 Some(Action::Terminate)
             }
-            Event::StartFailed => self.death(true, false),
-            Event::Exited => {
+            StartFailed => self.death(true, false),
+            Exited => {
                 let blocked = generation.aborted && generation.ready.is_none();
                 self.death(false, blocked)
             }
-            Event::Refused => {
+            Refused => {
                 let blocked = generation.ready.is_none();
                 self.death(false, blocked)
             }

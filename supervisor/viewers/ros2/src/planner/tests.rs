@@ -21,7 +21,7 @@ use super::{
     inscribed,
     planning::{Failure, Planner, Reason},
 };
-use crate::frames::Frames;
+use crate::{frames::Frames, tests::bytes};
 
 const BODY: Body = Body { radius_m: 0.22, occupied: 99, enters_unknown: true };
 
@@ -303,11 +303,6 @@ fn a_frame_is_found_in_another_by_way_of_the_one_above_both_unless_a_transform_i
             (found, want) => assert!(found.unwrap_err().contains(want.unwrap_err()), "{frame}"),
         }
     }
-}
-
-fn bytes(hex: &str) -> Vec<u8> {
-    let digits = hex.as_bytes().chunks_exact(2);
-    digits.map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap()).collect()
 }
 
 /// Goals to (1, 2) from (7, 8), all but the first via (5, 6), as Cyclone DDS serialises each
