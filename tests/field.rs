@@ -6,28 +6,28 @@ use crate::support::{printed, refused};
 use serde_json::Value;
 
 /// Room of 24 x 16 cells with a wall across it with one doorway, and a closed closet.
-const ROOMS: [&str; 16] = [
-    "@@@@@@@@@@@@@@@@@@@@@@@@",
-    "@...........@..........@",
-    "@...........@..........@",
-    "@...........@..........@",
-    "@......................@",
-    "@...........@..........@",
-    "@...........@..........@",
-    "@...........@..........@",
-    "@...........@.....@@@..@",
-    "@...........@.....@.@..@",
-    "@...........@.....@@@..@",
-    "@...........@..........@",
-    "@...........@..........@",
-    "@...........@..........@",
-    "@...........@..........@",
-    "@@@@@@@@@@@@@@@@@@@@@@@@",
-];
+const ROOMS: &str = "\
+@@@@@@@@@@@@@@@@@@@@@@@@
+@...........@..........@
+@...........@..........@
+@...........@..........@
+@......................@
+@...........@..........@
+@...........@..........@
+@...........@..........@
+@...........@.....@@@..@
+@...........@.....@.@..@
+@...........@.....@@@..@
+@...........@..........@
+@...........@..........@
+@...........@..........@
+@...........@..........@
+@@@@@@@@@@@@@@@@@@@@@@@@
+";
 
 fn write_map(directory: &Path) -> PathBuf {
     let file = directory.join("rooms.map");
-    let text = format!("type octile\nheight 16\nwidth 24\nmap\n{}\n", ROOMS.join("\n"));
+    let text = format!("type octile\nheight 16\nwidth 24\nmap\n{ROOMS}");
     std::fs::write(&file, text).unwrap();
     file
 }
@@ -76,7 +76,7 @@ fn the_field_of_a_map_is_written_with_the_means_and_directions_and_reported() {
     let [out, picture] = ["rooms.npy", "rooms.svg"].map(|name| directory.path().join(name));
     let files = ["--out", out.to_str().unwrap(), "--picture", picture.to_str().unwrap()];
     let map = write_map(directory.path());
-    let free: Vec<bool> = ROOMS.concat().bytes().map(|cell| cell == b'.').collect();
+    let free: Vec<bool> = ROOMS.lines().flat_map(str::bytes).map(|cell| cell == b'.').collect();
     // A screening length of 2.5 cells gives k = (1 / (2 x 2.5))^2.
     let screened = ["--screening-cells", "2.5"];
     for (screening, k) in [(&[][..], 0.0), (&screened[..], 0.04)] {

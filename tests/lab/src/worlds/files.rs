@@ -171,8 +171,8 @@ mod tests {
 
     /// Returns the map of a hall of 8 m by 3 m at (10.1, 20.1), its walls 1 m thick.
     fn hall() -> tempfile::TempDir {
-        let rows = ["##########", "#........#", "#........#", "#........#", "##########"];
-        drawn(&rows, "resolution: 1\norigin: [9.1, 19.1, 0]")
+        let map = "##########\n#........#\n#........#\n#........#\n##########";
+        drawn(map, "resolution: 1\norigin: [9.1, 19.1, 0]")
     }
 
     #[test]

@@ -145,22 +145,22 @@ mod tests {
 
     /// Returns the floor of a drawing: `#` is solid, cells of half a metre, the lower left corner
     /// at (-1, 2).
-    fn floor(rows: &[&str]) -> Floor {
-        let folder = drawn(rows, "resolution: 0.5\norigin: [-1.0, 2.0, 0.0]");
+    fn floor(map: &str) -> Floor {
+        let folder = drawn(map, "resolution: 0.5\norigin: [-1.0, 2.0, 0.0]");
         Floor::load(&folder.path().join("hall.yaml")).unwrap()
     }
 
     #[test]
     fn every_solid_cell_beside_the_ground_is_in_a_box_and_no_free_one_is() {
-        let floor = floor(&[
-            "##########",
-            "#...#..???",
-            "#.#.#..###",
-            "#...#....#",
-            "#.##...#.#",
-            "#....#...#",
-            "##########",
-        ]);
+        let floor = floor(
+            "##########\n\
+             #...#..???\n\
+             #.#.#..###\n\
+             #...#....#\n\
+             #.##...#.#\n\
+             #....#...#\n\
+             ##########",
+        );
         let start = floor.centre(11);
         assert_eq!(start, DVec2::new(-0.25, 4.75));
         let shapes = floor.shapes(Path::new("a.yaml"), start).unwrap();
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn what_no_robot_can_come_near_is_left_out() {
-        let floor = floor(&["#######", "#.###.#", "#######"]);
+        let floor = floor("#######\n#.###.#\n#######");
         let shapes = floor.shapes(Path::new("a.yaml"), floor.centre(8)).unwrap();
         let greatest = shapes.pieces().map(|piece| piece.bounds().1.x).fold(f64::MIN, f64::max);
         assert_eq!(greatest, 0.5);
@@ -182,15 +182,15 @@ mod tests {
 
     #[test]
     fn drawn_ends_are_connected_for_the_body_and_follow_from_the_seed() {
-        let floor = floor(&[
-            "##################",
-            "#................#",
-            "#................#",
-            "#................#",
-            "##################",
-            "#................#",
-            "##################",
-        ]);
+        let floor = floor(
+            "##################\n\
+             #................#\n\
+             #................#\n\
+             #................#\n\
+             ##################\n\
+             #................#\n\
+             ##################",
+        );
         let draw = |seed| floor.draw([Random::of_world(seed, 7, 0)].into_iter(), 0.24)[0];
         assert_eq!(draw(1), draw(1));
         assert_ne!(draw(1), draw(2));
@@ -204,7 +204,7 @@ mod tests {
 
     #[test]
     fn a_map_of_a_town_is_refused_with_its_size() {
-        let folder = drawn(&[&*".".repeat(200); 2], "resolution: 1\norigin: [0, 0, 0]");
+        let folder = drawn(&(".".repeat(200) + "\n").repeat(2), "resolution: 1\norigin: [0, 0, 0]");
         let file = folder.path().join("hall.yaml");
         let refused = Floor::load(&file).unwrap_err().to_string();
         let named = file.to_str().unwrap();
