@@ -176,8 +176,9 @@ mod tests {
         let refused = |set: &[&str]| load(set).unwrap_err().to_string();
         assert!(refused(&[]).contains("far.toml:3: target"));
         assert!(refused(&["seed=3"]).contains("far.toml:3: target"));
+        // The message cites the assignment, and no line of the file.
         let set = refused(&["perimeter.width_m=-1"]);
-        assert!(set.contains("perimeter.width_m") && !set.contains(".toml:"), "{set}");
+        assert!(set.contains("--set perimeter.width_m=-1: ") && !set.contains(".toml:"), "{set}");
         let too_far = refused(&["perimeter.width_m=12", "perimeter.centre=[10, 0]"]);
         assert!(too_far.contains("perimeter.centre"), "{too_far}");
         let mended = load(&["perimeter.width_m=24", "perimeter.centre=[10, 0]"]).unwrap();
@@ -185,10 +186,9 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_assignment_is_refused_with_its_text() {
+    fn a_bad_assignment_is_refused() {
         for bad in ["heading", "start.heading_deg=", "start.headin=3", "=3"] {
-            let error = load("trap", &[bad.to_owned()]).unwrap_err().to_string();
-            assert!(!error.is_empty(), "{bad} was accepted");
+            assert!(load("trap", &[bad.to_owned()]).is_err(), "{bad}");
         }
     }
 }
