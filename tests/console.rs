@@ -161,10 +161,10 @@ fn hz_counts_every_topic(robot: &str, printed: impl Fn(&[&str]) -> String) {
     let second = |topic: &str| reports.iter().rfind(|report| report["topic"] == topic).unwrap();
     // There are 7 ticks a second, at twice the wall clock.
     let rate = second("pose")["rate_hz"].as_f64().unwrap();
-    assert!((0.5..=40.0).contains(&rate), "{}", second("pose"));
-    assert!(second("pose")["missing_ticks"].is_u64(), "{}", second("pose"));
-    assert!(second("health")["rate_hz"].as_f64() > Some(5.0), "{}", second("health"));
-    assert!(second("stalls")["age_s"].is_null(), "{}", second("stalls"));
+    assert!((0.5..=40.0).contains(&rate), "{rate}");
+    assert!(second("pose")["missing_ticks"].is_u64(), "{reports:?}");
+    assert!(second("health")["rate_hz"].as_f64() > Some(5.0), "{reports:?}");
+    assert!(second("stalls")["age_s"].is_null(), "{reports:?}");
     let text = printed(&["topic", "hz", "pose", "-n", "1"]);
     let has = |part| text.contains(part);
     assert!(text.starts_with("topic") && has("\npose ") && has("  each tick: "), "{text}");

@@ -6,6 +6,7 @@ use std::{
         Mutex,
         atomic::{AtomicBool, Ordering},
     },
+    thread,
     time::{Duration, Instant},
 };
 
@@ -53,7 +54,7 @@ fn follow(robot: &str, runs: usize, heard: &HeardPoses) {
 fn a_logger_follows_its_robot_through_three_runs_one_of_them_killed_and_harms_none() {
     in_own_process(|| {
         let heard = &HeardPoses::default();
-        std::thread::scope(|scope| {
+        thread::scope(|scope| {
             scope.spawn(|| follow("followed", 3, heard));
             for run in 0..3 {
                 let mut started = Run::at_own_speed("followed", "open-room", &["--pace", "4"]);
@@ -62,7 +63,7 @@ fn a_logger_follows_its_robot_through_three_runs_one_of_them_killed_and_harms_no
                     started.wait_until("the logger hears it", |_| has_heard());
                     started.kill();
                     // The bus of a killed supervisor stays until the next run removes it.
-                    std::thread::park_timeout(Duration::from_secs(3));
+                    thread::park_timeout(Duration::from_secs(3));
                     continue;
                 }
                 let (code, summary) = started.finish();
@@ -70,7 +71,7 @@ fn a_logger_follows_its_robot_through_three_runs_one_of_them_killed_and_harms_no
                 assert_no_restart(&summary);
                 // The pause lets the consumer notice the end of the run. Robots are not restarted
                 // within a second.
-                std::thread::park_timeout(Duration::from_secs(1));
+                thread::park_timeout(Duration::from_secs(1));
             }
         });
         assert!(heard.lock().unwrap().iter().all(|&poses| poses > 5), "{heard:?}");
@@ -162,7 +163,7 @@ fn consumers_that_stay_and_that_join_again_and_again_take_no_stages_place() {
             staying.push(Killed(start_quietly(&mut echo)));
         }
         let over = AtomicBool::new(false);
-        let joined: usize = std::thread::scope(|scope| {
+        let joined: usize = thread::scope(|scope| {
             let visitor = || scope.spawn(|| join_again_and_again(robot, &over));
             let visitors = [visitor(), visitor(), visitor()];
             run.wait_until_under_way(5.0);

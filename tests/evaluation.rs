@@ -1,5 +1,7 @@
 //! Tests of evaluations: many missions, judged by the ground truth.
 
+use std::fs;
+
 use serde_json::Value;
 
 use crate::support::{messages, printed, refused};
@@ -24,17 +26,17 @@ fn an_evaluation_that_was_cut_off_goes_on_and_another_is_not_mixed_with_it() {
     assert_eq!(whole["aborted"], 0.0, "{whole}");
     assert!(out.join("index.html").exists());
 
-    let rows = std::fs::read_to_string(out.join("rows.csv")).unwrap();
+    let rows = fs::read_to_string(out.join("rows.csv")).unwrap();
     assert!(rows.contains("evidential front+infrared"), "{rows}");
     let (first, _) = rows.trim_end().rsplit_once('\n').unwrap();
     // State of an evaluation killed while it wrote the last row.
-    std::fs::write(out.join("rows.csv"), format!("{first}\nrooms-5-0001,6,evid")).unwrap();
+    fs::write(out.join("rows.csv"), format!("{first}\nrooms-5-0001,6,evid")).unwrap();
     let resumed = evaluate(name, &[&seed[..], &["--resume", "--processes"]].concat());
     assert_eq!(resumed["count"], 2, "{resumed}");
     assert_eq!(resumed["success"], whole["success"]);
-    let again = std::fs::read_to_string(out.join("rows.csv")).unwrap();
+    let again = fs::read_to_string(out.join("rows.csv")).unwrap();
     assert_eq!(again, rows, "the rows follow from the seed");
-    let latencies = std::fs::read_to_string(out.join("latencies.csv")).unwrap();
+    let latencies = fs::read_to_string(out.join("latencies.csv")).unwrap();
     assert!(latencies.lines().count() > 1, "the resumed mission was driven by processes");
 
     let again = two_rooms(name, &seed);
@@ -51,7 +53,7 @@ fn two_robots_that_meet_have_a_row_each_and_the_same_rows_twice() {
         let robots = ["--robot", "turtlebot2", "--set", "robot.rate_hz=10", "--seed", "3"];
         let meeting = ["evaluate", "--json", "--worlds", "meeting", "--count", "2", "--out"];
         printed(&[&meeting[..], &[out.to_str().unwrap()], &robots, more].concat());
-        std::fs::read_to_string(out.join("rows.csv")).unwrap()
+        fs::read_to_string(out.join("rows.csv")).unwrap()
     };
     let first = rows(&[]);
     let worlds = ["0000", "0000-oncoming", "0001", "0001-oncoming"];
@@ -61,7 +63,7 @@ fn two_robots_that_meet_have_a_row_each_and_the_same_rows_twice() {
     // One robot's row is lost, so both drive again.
     let kept = first.lines().filter(|row| !row.contains("0001-oncoming"));
     let kept: String = kept.map(|row| format!("{row}\n")).collect();
-    std::fs::write(out.join("rows.csv"), kept).unwrap();
+    fs::write(out.join("rows.csv"), kept).unwrap();
     assert_eq!(first, rows(&["--resume"]));
 }
 
@@ -71,13 +73,13 @@ fn a_failure_of_an_evaluation_is_opened_as_the_page_of_its_run() {
     let name = out.path().join("late");
     let all = evaluate(name.to_str().unwrap(), &["--set", "timeout_s=3"]);
     assert_eq!(all["timeout"], 1.0, "{all}");
-    let files = std::fs::read_dir(name.join("failures")).unwrap();
+    let files = fs::read_dir(name.join("failures")).unwrap();
     let files: Vec<_> = files.map(|file| file.unwrap().path()).collect();
     let pages: Vec<_> = files.iter().filter(|file| file.extension().unwrap() == "html").collect();
     assert_eq!((pages.len(), files.len()), (2, 4), "each has its picture: {files:?}");
-    let index = std::fs::read_to_string(name.join("index.html")).unwrap();
+    let index = fs::read_to_string(name.join("index.html")).unwrap();
     for page in pages {
-        let (messages, _) = messages(&std::fs::read_to_string(page).unwrap());
+        let (messages, _) = messages(&fs::read_to_string(page).unwrap());
         assert_eq!(messages.last().unwrap()["kind"], "bad");
         let file = page.file_name().unwrap().to_str().unwrap();
         assert!(index.contains(&format!("href=\"failures/{file}\"")), "{index}");

@@ -1,6 +1,9 @@
 //! Tests of `firsthand field`: the field of a map, and refusals of invalid maps.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use crate::support::{printed, refused};
 use serde_json::Value;
@@ -28,7 +31,7 @@ const ROOMS: &str = "\
 fn write_map(directory: &Path) -> PathBuf {
     let file = directory.join("rooms.map");
     let text = format!("type octile\nheight 16\nwidth 24\nmap\n{ROOMS}");
-    std::fs::write(&file, text).unwrap();
+    fs::write(&file, text).unwrap();
     file
 }
 
@@ -45,7 +48,7 @@ fn assert_refuses(map: &Path, arguments: &[&str], code: &str, names: &[&str]) {
 
 /// Reads a NumPy field: u, from its mantissa and exponent, ex and ey of each of 24 x 16 cells.
 fn values(file: &Path) -> Vec<(f64, f64, f64)> {
-    let bytes = std::fs::read(file).unwrap();
+    let bytes = fs::read(file).unwrap();
     assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"));
     let begin = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
     assert_eq!(begin % 64, 0);
@@ -102,7 +105,7 @@ fn the_field_of_a_map_is_written_with_the_means_and_directions_and_reported() {
         assert_eq!(Value::from(found.to_vec()), expected, "{report}");
         assert!(report["worst_residual"].as_f64() < Some(1e-2), "{report}");
     }
-    assert!(std::fs::read_to_string(picture).unwrap().starts_with("<svg"));
+    assert!(fs::read_to_string(picture).unwrap().starts_with("<svg"));
 }
 
 #[test]
@@ -129,7 +132,7 @@ fn a_file_that_is_no_map_or_cannot_be_written_is_named() {
         ("rooms.txt", b"@@@"),
     ] {
         let file = directory.path().join(name);
-        std::fs::write(&file, bytes).unwrap();
+        fs::write(&file, bytes).unwrap();
         assert_refuses(&file, &["--target-cell", "1,1"], "", &[name]);
     }
     let map = write_map(directory.path());

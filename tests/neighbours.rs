@@ -7,6 +7,7 @@ use std::{
     os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
     sync::atomic::{AtomicBool, Ordering},
+    thread,
     time::{Duration, Instant},
 };
 
@@ -119,7 +120,7 @@ fn another_user_who_waits_for_the_files_of_a_new_bus_opens_none() {
     in_own_process_of_root(|| {
         let robot = domain("raced");
         let over = AtomicBool::new(false);
-        let (seen, won) = std::thread::scope(|scope| {
+        let (seen, won) = thread::scope(|scope| {
             let racer = scope.spawn(|| race(&robot.shared_memory_prefix(), &over));
             for _ in 0..200 {
                 DomainLock::acquire(robot.clone(), 1).unwrap();
@@ -170,7 +171,7 @@ fn files_and_datagrams_of_another_user_neither_block_nor_drive_a_run() {
         let robot = common::run::Run::load(&run.directory()).unwrap().address;
         let Address::Udp(robot) = robot else { panic!("{robot}") };
         // The thread ends with the process of this test.
-        std::thread::spawn(move || {
+        thread::spawn(move || {
             let nobody = Uid::from_raw(65534);
             set_thread_res_uid(nobody, nobody, nobody).unwrap();
             let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -178,7 +179,7 @@ fn files_and_datagrams_of_another_user_neither_block_nor_drive_a_run() {
             Command::velocity([Some(-500); 2], None).encode(Addressing::default(), &mut backwards);
             loop {
                 let _ = socket.send_to(&backwards, robot);
-                std::thread::park_timeout(Duration::from_millis(5));
+                thread::park_timeout(Duration::from_millis(5));
             }
         });
         let (code, summary) = run.finish();
@@ -213,7 +214,7 @@ fn ends_after(robot: &str, damage: impl Fn(&[PathBuf])) {
     damage(&shared_memory(&domain(robot).shared_memory_prefix()));
     // A stage that joins finds these files.
     signal_process(pid(&status, "mapper"), Signal::KILL);
-    std::thread::park_timeout(Duration::from_millis(500));
+    thread::park_timeout(Duration::from_millis(500));
     if run.is_running() {
         run.signal(Signal::TERM);
     }
@@ -227,7 +228,7 @@ fn ends_after(robot: &str, damage: impl Fn(&[PathBuf])) {
 fn files_of_the_bus_truncated_or_removed_in_a_run_leave_sigterm_its_three_seconds() {
     in_own_process(|| {
         let truncate = |path: &PathBuf| drop(fs::File::create(path));
-        std::thread::scope(|scope| {
+        thread::scope(|scope| {
             scope.spawn(|| ends_after("truncated", |shared| shared.iter().for_each(truncate)));
             scope.spawn(|| {
                 ends_after("removed", |shared| {

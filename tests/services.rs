@@ -48,19 +48,15 @@ impl Manager {
             .env("WATCHDOG_USEC", WATCHDOG.as_micros().to_string());
     }
 
-    /// Returns the lines of the next message.
-    fn hear(&self) -> Vec<String> {
-        let mut message = [0; 4096];
-        let length = self.socket.recv(&mut message).unwrap();
-        let text = String::from_utf8(message[..length].to_vec()).unwrap();
-        text.lines().map(str::to_owned).collect()
-    }
-
     /// Waits for a line that starts with `start` and contains `parts`.
     fn hear_until(&self, start: &str, parts: &[&str]) {
-        let is_it =
-            |line: &String| line.starts_with(start) && parts.iter().all(|part| line.contains(part));
-        wait_until(start, || self.hear().iter().any(is_it));
+        let mut message = [0; 4096];
+        wait_until(start, || {
+            let length = self.socket.recv(&mut message).unwrap();
+            let text = String::from_utf8_lossy(&message[..length]);
+            let mut lines = text.lines().filter(|line| line.starts_with(start));
+            lines.any(|line| parts.iter().all(|part| line.contains(part)))
+        });
     }
 }
 

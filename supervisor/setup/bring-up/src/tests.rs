@@ -51,9 +51,14 @@ fn through(wires: Wires, values: [f64; 2]) -> [f64; 2] {
     wires.map(|(from, sign)| sign * values[from])
 }
 
-fn mission() -> Mission {
-    let text = "target = [1, 0]\n[robot]\nmodel = 'kobuki'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\nbeams = 180";
+fn parsed(text: &str) -> Mission {
     Mission::parse(text, Path::new("m.toml")).unwrap()
+}
+
+fn mission() -> Mission {
+    parsed(
+        "target = [1, 0]\n[robot]\nmodel = 'kobuki'\nrate_hz = 10.0\n[[robot.sensor]]\nname = 'laser'\nkind = 'scan'\nmodel = 'rplidar-a1'\nforward_m = 0.05\nbearing_deg = 0.0\nbeams = 180",
+    )
 }
 
 fn with_sonars() -> Mission {
@@ -63,7 +68,7 @@ fn with_sonars() -> Mission {
             "[[robot.sensor]]\nname = 'sonar{channel}'\nkind = 'cone'\nchannel = {channel}\nforward_m = 0.1\nbearing_deg = {bearing}\n"
         );
     }
-    Mission::parse(&text, Path::new("m.toml")).unwrap()
+    parsed(&text)
 }
 
 /// Range from `at` along `along` to the nearest wall: 1.4 m ahead, 1.9 m behind, 1.6 m left, 1.2 m
@@ -323,8 +328,7 @@ fn a_recording_that_begins_in_a_turn_is_no_finding() {
 
 #[test]
 fn echoes_are_drawn_where_they_ended_when_the_robot_has_turned_and_driven() {
-    let mission =
-        Mission::parse("target = [3, 0]\nsensors = 'front'", Path::new("m.toml")).unwrap();
+    let mission = parsed("target = [3, 0]\nsensors = 'front'");
     let motion = vec![(0.0, [0.0, 0.0]), (1.0, [FRAC_PI_2, 0.0]), (2.0, [FRAC_PI_2, 0.5])];
     let row = mission.front_row();
     let sensor = &mission.sensor_table()[row];

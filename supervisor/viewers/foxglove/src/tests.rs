@@ -43,7 +43,6 @@ fn sent() -> Sent {
     };
     let mission = mission("x80");
     let mut drawn = Drawn::new(Some(mission.clone()));
-    let mut message = Vec::new();
     let pose = PoseSample {
         x_m: 1.0,
         y_m: 2.0,
@@ -52,25 +51,24 @@ fn sent() -> Sent {
         covariance: [0.04, 0.0, 0.0, 0.01, 0.0, 0.0],
         ..PoseSample::default()
     };
-    encode_sample(&pose, &mut message);
-    drawn.message("pose", &message, 7_000_000_009, &mut sink);
     let reading = RangeReading {
         range_m: 0.5,
         status: RangeStatus::Measured.into(),
         ..RangeReading::default()
     };
-    let mut slice = |topic: &str, encode: &mut dyn FnMut(&mut Vec<u8>)| {
-        message.clear();
+    let mut say = |topic: &str, encode: &mut dyn FnMut(&mut Vec<u8>)| {
+        let mut message = Vec::new();
         encode(&mut message);
         drawn.message(topic, &message, 7_000_000_009, &mut sink);
     };
-    slice("ranges", &mut |to| encode_slice(&RangesHeader::default(), &[reading], to));
+    say("pose", &mut |to| encode_sample(&pose, to));
+    say("ranges", &mut |to| encode_slice(&RangesHeader::default(), &[reading], to));
     let frame = mission.grid_frame();
     let mut header = GridHeader { part: Part::whole(frame, 1), ..GridHeader::default() };
     let mover = Mover { x_m: 3.0, vy_m_s: 0.5, radius_m: 0.25, doubt_m: 0.1, ..Mover::default() };
     (header.movers[0], header.mover_count) = (mover, 1);
     let cells = vec![CellState::Sensed as u8; frame.area()];
-    slice("grid", &mut |to| encode_slice(&header, &cells, to));
+    say("grid", &mut |to| encode_slice(&header, &cells, to));
     let log = viewers::log("mapper", "12.5  WARN missed a grid version", 7_000_000_009);
     sink(viewers::LOG, &log);
     sent
