@@ -5,7 +5,7 @@ use std::{fs, net::UdpSocket, path::Path, process::Command};
 
 use crate::support::{
     Run, assert_nothing_left, assert_refused, json_of, mission_file, output, refused,
-    wait_for_status,
+    wait_for_status, words,
 };
 
 #[test]
@@ -77,46 +77,35 @@ fn status_names_the_trouble_of_a_stage_that_cannot_start() {
 fn what_is_not_there_or_cannot_be_is_named_with_what_there_is() {
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let taken = taken.local_addr().unwrap().to_string();
-    let cases: [(&[&str], _, &[&str]); 20] = [
-        (&["run", "moon"], "unknown-mission", &["moon", "obstacle-course"]),
-        (&["record", "--robot", "bad", "--out", "/proc/x"], "", &["cannot write /proc/x"]),
-        (&["check", "/no/such/file.toml"], "mission", &["/no/such/file.toml"]),
+    let on_taken = format!("sim open-room --listen {taken}");
+    let cases: [(&str, _, &[&str]); 20] = [
+        ("run moon", "unknown-mission", &["moon", "obstacle-course"]),
+        ("record --robot bad --out /proc/x", "", &["cannot write /proc/x"]),
+        ("check /no/such/file.toml", "mission", &["/no/such/file.toml"]),
+        ("stage warp --run /tmp --supervisor 1", "unknown-stage", &["warp", "dead-reckoning"]),
+        ("stage kil", "unknown-stage", &["kil", "did you mean `stage kill`", "mapper"]),
         (
-            &["stage", "warp", "--run", "/tmp", "--supervisor", "1"],
-            "unknown-stage",
-            &["warp", "dead-reckoning"],
-        ),
-        (&["stage", "kil"], "unknown-stage", &["kil", "did you mean `stage kill`", "mapper"]),
-        (
-            &["run", "trap", "--set", "robot.address='serial:///dev/no-such-tty'"],
+            "run trap --set robot.address='serial:///dev/no-such-tty'",
             "no-device",
             &["/dev/no-such-tty", "/dev/serial/by-id"],
         ),
-        (&["sim", "open-room", "--listen", &taken], "address-in-use", &[&taken]),
-        (&["stage", "restart", "wheel"], "unknown-stage", &["dead-reckoning"]),
-        (&["stage", "fault", "wheel", "spin"], "unknown-stage", &["dead-reckoning"]),
-        (
-            &["stage", "fault", "mapper", "saddle"],
-            "unknown-fault",
-            &["hazard-around-robot", "spin"],
-        ),
-        (&["stage", "fault", "mapper", "spin", "--robot", "ghost"], "not-running", &["ghost"]),
-        (&["stage", "mapper", "--robot", "ghost"], "", &["ghost", "--watch-only"]),
-        (&["stop", "--robot", "ghost"], "not-running", &["ghost"]),
-        (&["status", "--robot", "ghost"], "not-running", &["ghost", "firsthand run"]),
-        (&["run", "--pace", "warp"], "usage", &["warp"]),
-        (&["run", "--robot", "../x"], "usage", &["../x"]),
-        (&["bench", "chaos", "--robot-faults=honest"], "usage", &["honest", "encoder-dead"]),
-        (&["evaluate", "--set", "robot={model"], "mission", &["robot={model", "inline table"]),
-        (
-            &["evaluate", "--planner", "./no-planner", "--out", "/proc/x"],
-            "planner-executable",
-            &["./no-planner"],
-        ),
-        (&["experiments", "--only", "6"], "unknown-experiment", &["5-modulated"]),
+        (&on_taken, "address-in-use", &[&taken]),
+        ("stage restart wheel", "unknown-stage", &["dead-reckoning"]),
+        ("stage fault wheel spin", "unknown-stage", &["dead-reckoning"]),
+        ("stage fault mapper saddle", "unknown-fault", &["hazard-around-robot", "spin"]),
+        ("stage fault mapper spin --robot ghost", "not-running", &["ghost"]),
+        ("stage mapper --robot ghost", "", &["ghost", "--watch-only"]),
+        ("stop --robot ghost", "not-running", &["ghost"]),
+        ("status --robot ghost", "not-running", &["ghost", "firsthand run"]),
+        ("run --pace warp", "usage", &["warp"]),
+        ("run --robot ../x", "usage", &["../x"]),
+        ("bench chaos --robot-faults=honest", "usage", &["honest", "encoder-dead"]),
+        ("evaluate --set robot={model", "mission", &["robot={model", "inline table"]),
+        ("evaluate --planner ./no-planner --out /proc/x", "planner-executable", &["./no-planner"]),
+        ("experiments --only 6", "unknown-experiment", &["5-modulated"]),
     ];
-    for (arguments, code, names) in cases {
-        refused(arguments, code, names);
+    for (line, code, names) in cases {
+        refused(&words(line), code, names);
     }
     if cfg!(not(feature = "ros2")) {
         let robot = concat!(env!("CARGO_MANIFEST_DIR"), "/../guide/example-ros2-robot/robot.toml");

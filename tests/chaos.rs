@@ -6,7 +6,9 @@ use std::fs;
 use common::domain::SUITE_VARIABLE;
 use serde_json::Value;
 
-use crate::support::{self, assert_nothing_left, firsthand, json_of, kill, output, start_quietly};
+use crate::support::{
+    self, assert_nothing_left, firsthand, json_of, kill, output, start_quietly, words,
+};
 
 fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_default()
@@ -34,14 +36,11 @@ fn chaos_hits_stages_and_consumers_without_changing_the_outcome_and_each_signal_
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("results");
     let given = format!("'{}' topic echo pose --robot chd-hit", env!("CARGO_BIN_EXE_firsthand"));
-    let arguments = [
-        &["bench", "chaos", "open-room", "--json", "--robot", "chd-hit"][..],
-        // The mission completes on a loaded machine too.
-        &["--set", "timeout_s=600", "--set", "controller.speed_m_s=0.2"],
-        &["--kills", "30", "--include-consumers", "--include-startup", "--replay"],
-        &["--consumer", &given, "--out", out.to_str().unwrap()],
-    ];
-    let (code, reports) = json_of(&output(&arguments.concat()));
+    // The mission completes on a loaded machine too.
+    let fixed = "bench chaos open-room --json --robot chd-hit --kills 30 --include-consumers \
+                 --include-startup --replay --set timeout_s=600 --set controller.speed_m_s=0.2";
+    let more = ["--consumer", &given, "--out", out.to_str().unwrap()];
+    let (code, reports) = json_of(&output(&[&words(fixed)[..], &more].concat()));
     assert_eq!(code, Some(0), "{reports:?}");
     assert_nothing_left("chd-hit");
     let report = &reports[0];

@@ -14,7 +14,7 @@ use serde_json::Value;
 use crate::support::{
     ENDLESS, PATIENCE, Run, STAGES, assert_no_restart, assert_nothing_left, assert_said,
     directory_of, firsthand, firsthand_under, generation, json_lines, kill, operate, output, pid,
-    refused, run, signal_process, start_piped, start_quietly, wait_for_status,
+    refused, run, signal_process, start_piped, start_quietly, wait_for_status, words,
 };
 
 /// Command whose lines are read as they arrive. It ends with the test.
@@ -25,8 +25,8 @@ struct Reading {
 }
 
 impl Reading {
-    fn start(arguments: &[&str]) -> Self {
-        let mut child = start_piped(firsthand(arguments).stderr(Stdio::piped()));
+    fn start(line: &str) -> Self {
+        let mut child = start_piped(firsthand(&words(line)).stderr(Stdio::piped()));
         let lines = BufReader::new(child.stdout.take().unwrap());
         let said = BufReader::new(child.stderr.take().unwrap());
         Self { child, lines, said }
@@ -70,52 +70,50 @@ fn every_topic_is_echoed_and_counted_and_a_closed_standard_output_makes_no_comma
     // The robot arrives only after all output.
     let slow = ["--pace", "2", "--set", "controller.speed_m_s=0.02"];
     let run = Run::under_way(robot, "open-room", &slow, 0.2);
-    let of_robot = |command: &[&str]| printed(&[command, &["--robot", robot]].concat());
+    let of_robot = |line: &str| printed(&words(&format!("{line} --robot {robot}")));
     echo_prints_every_topic(robot, of_robot);
     hz_counts_every_topic(robot, of_robot);
-    let closed = |command: &[&str], silent: bool| {
-        let mut reading = Reading::start(command);
-        assert!(silent || !reading.line().is_empty(), "{command:?}");
+    let closed = |line: &str, silent: bool| {
+        let mut reading = Reading::start(&format!("{line} --robot {robot}"));
+        assert!(silent || !reading.line().is_empty(), "{line}");
         let (code, said) = reading.close();
-        assert!(code == Some(0) && !said.contains("panic"), "{command:?}: {said}");
-        assert!(silent || said.is_empty(), "{command:?}: {said}");
+        assert!(code == Some(0) && !said.contains("panic"), "{line}: {said}");
+        assert!(silent || said.is_empty(), "{line}: {said}");
     };
-    for command in [
-        &["topic", "echo", "pose"][..],
-        &["topic", "echo", "field", "--json"],
-        &["topic", "hz"],
-        &["topic", "hz", "pose", "--json"],
-        &["logs", "-f"],
+    for line in [
+        "topic echo pose",
+        "topic echo field --json",
+        "topic hz",
+        "topic hz pose --json",
+        "logs -f",
     ] {
-        closed(&[command, &["--robot", robot]].concat(), false);
+        closed(line, false);
     }
     // The first prints nothing, so a failed write cannot reveal the closed reader.
-    for command in
-        [&["topic", "echo", "stalls"][..], &["topic", "echo", "pose", "-n", "1"], &["status"]]
-    {
-        closed(&[command, &["--robot", robot]].concat(), true);
+    for line in ["topic echo stalls", "topic echo pose -n 1", "status"] {
+        closed(line, true);
     }
     let directory = directory_of("con-shut");
     let out = directory.path().join("run");
-    for command in [
-        &["status", "--all"][..],
-        &["completions", "zsh"],
-        &["man"],
-        &["missions"],
-        &["missions", "trap"],
-        &["check", "trap"],
-        &["install", "--print"],
-        &["topic", "list"],
-        &["stage", "list"],
-        &["table", "failsafe"],
-        &["help", "tables"],
-        &["run", "open-room", "--robot", "con-shut", "--out", out.to_str().unwrap()],
+    for line in [
+        "status --all",
+        "completions zsh",
+        "man",
+        "missions",
+        "missions trap",
+        "check trap",
+        "install --print",
+        "topic list",
+        "stage list",
+        "table failsafe",
+        "help tables",
+        &format!("run open-room --robot con-shut --out {}", out.display()),
     ] {
         // A pipe without a reader from the start.
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
-        let status = firsthand(command).stdout(writer).stderr(Stdio::null()).status();
-        assert_eq!(status.unwrap().code(), Some(0), "{command:?}");
+        let status = firsthand(&words(line)).stdout(writer).stderr(Stdio::null()).status();
+        assert_eq!(status.unwrap().code(), Some(0), "{line}");
     }
     run.stop();
 }
@@ -124,8 +122,8 @@ fn every_topic_is_echoed_and_counted_and_a_closed_standard_output_makes_no_comma
 const SELDOM: &str = "counts base_response tick_limit contact complaints scan scan_fix fix turn \
     beacon following imu_turn deaths stalls requests orders faults place zones mirror";
 
-fn echo_prints_every_topic(robot: &str, printed: impl Fn(&[&str]) -> String) {
-    let poses = json_lines(&printed(&["topic", "echo", "pose", "--json", "-n", "3"]));
+fn echo_prints_every_topic(robot: &str, printed: impl Fn(&str) -> String) {
+    let poses = json_lines(&printed("topic echo pose --json -n 3"));
     let tick = |pose: &Value| pose["stamp"]["tick"].as_u64().unwrap();
     assert!(poses.windows(2).all(|pair| tick(&pair[1]) == tick(&pair[0]) + 1), "{poses:?}");
     assert_eq!(poses[0]["covariance"].as_array().unwrap().len(), 6);
@@ -134,7 +132,7 @@ fn echo_prints_every_topic(robot: &str, printed: impl Fn(&[&str]) -> String) {
         if SELDOM.split_whitespace().any(|seldom| seldom == name) {
             continue;
         }
-        let text = printed(&["topic", "echo", name, "-n", "1"]);
+        let text = printed(&format!("topic echo {name} -n 1"));
         assert!(text.starts_with("stamp:\n  tick: ") && text.ends_with("---\n"), "{text}");
         let (Kind::Struct(header), element) = topic.layout() else { panic!("{name}") };
         for field in header.fields.iter().filter(|field| field.name != "stamp") {
@@ -142,7 +140,7 @@ fn echo_prints_every_topic(robot: &str, printed: impl Fn(&[&str]) -> String) {
         }
         assert_eq!(text.contains("\nelements:"), element.is_some(), "{text}");
     }
-    let roster = printed(&["topic", "echo", "roster", "-n", "1"]);
+    let roster = printed("topic echo roster -n 1");
     for stage in STAGES {
         assert!(roster.contains(&format!("- {{stage: {stage:?}, pid: ")), "{roster}");
     }
@@ -153,8 +151,8 @@ fn echo_prints_every_topic(robot: &str, printed: impl Fn(&[&str]) -> String) {
     );
 }
 
-fn hz_counts_every_topic(robot: &str, printed: impl Fn(&[&str]) -> String) {
-    let reports = json_lines(&printed(&["topic", "hz", "--json", "-n", "2"]));
+fn hz_counts_every_topic(robot: &str, printed: impl Fn(&str) -> String) {
+    let reports = json_lines(&printed("topic hz --json -n 2"));
     let names: Vec<_> = reports.iter().map(|report| report["topic"].as_str().unwrap()).collect();
     let table: Vec<_> = topics::TABLE.iter().map(|topic| topic.spec().name).collect();
     assert_eq!(names, [&table[..], &table].concat());
@@ -165,15 +163,15 @@ fn hz_counts_every_topic(robot: &str, printed: impl Fn(&[&str]) -> String) {
     assert!(second("pose")["missing_ticks"].is_u64(), "{reports:?}");
     assert!(second("health")["rate_hz"].as_f64() > Some(5.0), "{reports:?}");
     assert!(second("stalls")["age_s"].is_null(), "{reports:?}");
-    let text = printed(&["topic", "hz", "pose", "-n", "1"]);
+    let text = printed("topic hz pose -n 1");
     let has = |part| text.contains(part);
     assert!(text.starts_with("topic") && has("\npose ") && has("  each tick: "), "{text}");
 
-    let mut roster = Reading::start(&["topic", "hz", "roster", "--robot", robot, "--json"]);
+    let mut roster = Reading::start(&format!("topic hz roster --robot {robot} --json"));
     assert!(!roster.line().is_empty());
-    operate(robot, &["stage", "freeze", "supervisor"]);
+    operate(robot, "stage freeze supervisor");
     while roster.json()["late"] != true {}
-    operate(robot, &["stage", "thaw", "supervisor"]);
+    operate(robot, "stage thaw supervisor");
     while roster.json()["late"] != false {}
     roster.close();
 }
@@ -181,8 +179,8 @@ fn hz_counts_every_topic(robot: &str, printed: impl Fn(&[&str]) -> String) {
 #[test]
 fn echo_and_logs_follow_their_robot_from_run_to_run_and_logs_come_from_every_process() {
     let robot = "con-follow";
-    let mut echo = Reading::start(&["topic", "echo", "command", "--robot", robot, "--json"]);
-    let mut logs = Reading::start(&["logs", "-f", "supervisor", "--robot", robot]);
+    let mut echo = Reading::start(&format!("topic echo command --robot {robot} --json"));
+    let mut logs = Reading::start(&format!("logs -f supervisor --robot {robot}"));
     let mut waits = String::new();
     echo.said.read_line(&mut waits).unwrap();
     assert!(waits.contains(robot), "{waits}");

@@ -13,7 +13,7 @@ fn a_stage_that_spins_or_beats_and_answers_nothing_is_replaced_and_nobody_behind
         let status = run.wait_until("all run and it drives", |status| {
             status["order"] == "driving" && all_run(status)
         });
-        operate(robot, &["stage", "fault", stage, fault]);
+        operate(robot, &format!("stage fault {stage} {fault}"));
         let after = run.wait_until("it is replaced", |after| {
             generation(after, stage) > generation(&status, stage)
         });

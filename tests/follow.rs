@@ -22,7 +22,7 @@ fn a_robot_follows_the_pose_of_another_robot_until_that_ends_and_replays_to_the_
         refused(&words, code, &[]);
     }
     // The first robot's mission frame is 1 m ahead of the second's, turned to its left.
-    operate(first, &["goto", "1.2", "0"]);
+    operate(first, "goto 1.2 0");
     let mut command = firsthand(&["goto", "--robot", second, "--follow", first]);
     let command = start_piped(command.args(["--frame", "1", "0", "90", "--distance", "0.8"]));
     let off_m = |status: &Value| {
@@ -37,7 +37,7 @@ fn a_robot_follows_the_pose_of_another_robot_until_that_ends_and_replays_to_the_
     follows.wait_until("it lost the first robot", |status| {
         status["order"] == "lost what it follows" && status["link"]["at_rest"] == true
     });
-    operate(second, &["goto", "0", "0"]);
+    operate(second, "goto 0 0");
     let output = command.wait_with_output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
     // A starved machine may lose the first robot more than once: its pose is late after 0.5 s.

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::support::{
     Run, assert_nothing_left, mission_file, operate, outcomes, output, printed, reached, records,
-    refused, replayed_poses, wait_until,
+    refused, replayed_poses, wait_until, words,
 };
 
 const PACE: [&str; 2] = ["--pace", "2"];
@@ -14,30 +14,30 @@ const PACE: [&str; 2] = ["--pace", "2"];
 #[test]
 fn a_target_is_refused_with_the_reason_and_the_robot_keeps_the_one_it_has() {
     let robot = "goto-refused";
-    let to = |words: &[&'static str], code: &str, names: &[&str]| {
-        refused(&[&["goto", "--robot", robot], words].concat(), code, names);
+    let to = |line: &str, code: &str, names: &[&str]| {
+        refused(&words(&format!("goto --robot {robot} {line}")), code, names);
     };
-    to(&["1", "1"], "not-running", &[robot]);
+    to("1 1", "not-running", &[robot]);
     let known = ["--set", "known.drum=[{at=[2.0, 2.0], radius_m=0.3}]"];
     // It arrives only when it returns, on a starved machine too.
     let slow = ["--set", "controller.speed_m_s=0.005", "--set", "timeout_s=2000"];
     let mut run = Run::under_way(robot, "open-room", &[&PACE[..], &known, &slow].concat(), 1.0);
-    to(&["1"], "usage", &[]);
-    to(&["1", "1", "2"], "no-target", &["2"]);
-    to(&["inf", "1"], "no-target", &[robot]);
-    to(&["1", "1", "2", "2"], "target-in-hazard", &["hazard"]);
-    to(&["0"; 34], "too-many-targets", &["16"]);
-    to(&["--follow"], "not-staying", &[]);
+    to("1", "usage", &[]);
+    to("1 1 2", "no-target", &["2"]);
+    to("inf 1", "no-target", &[robot]);
+    to("1 1 2 2", "target-in-hazard", &["hazard"]);
+    to(&["0"; 34].join(" "), "too-many-targets", &["16"]);
+    to("--follow", "not-staying", &[]);
     // Each command in a row finds a place on the bus.
     for _ in 0..50 {
-        to(&["9", "0"], "target-outside", &["perimeter"]);
+        to("9 0", "target-outside", &["perimeter"]);
     }
-    operate(robot, &["stop"]);
-    to(&["1", "1"], "robot-stopped", &["resume"]);
+    operate(robot, "stop");
+    to("1 1", "robot-stopped", &["resume"]);
     refused(&["return", "--robot", robot], "robot-stopped", &["resume"]);
-    operate(robot, &["resume"]);
+    operate(robot, "resume");
     run.wait_until_driving();
-    operate(robot, &["return"]);
+    operate(robot, "return");
     let summary = run.arrives();
     assert_eq!(outcomes(&summary), ["replaced", "reached"]);
     assert!(summary["true_distance_m"].as_f64().unwrap() < 0.5, "{summary}");
@@ -83,34 +83,34 @@ fn a_robot_that_stays_takes_targets_zones_and_its_place_until_it_is_ended_and_re
     let robot = "goto-stay";
     let (_directory, mission) = mission_file(STAYS);
     let mut run = Run::start(robot, &mission, &["--pace", "4"]);
-    let say = |words: &[&'static str], code: &str| {
-        refused(&[words, &["--robot", robot]].concat(), code, &[]);
+    let say = |line: &str, code: &str| {
+        refused(&words(&format!("{line} --robot {robot}")), code, &[]);
     };
     run.wait_until("it waits for its first target", waits);
-    say(&["goto", "1.2", "0"], "target-in-hazard");
-    say(&["zone", "-1", "-1", "1", "-1", "1", "1", "-1", "1"], "zone-here");
-    say(&["zone", "2", "2", "3", "3"], "no-zone");
-    say(&["zone", "3", "3", "--remove"], "not-in-zone");
-    operate(robot, &["goto", "2.2", "0"]);
+    say("goto 1.2 0", "target-in-hazard");
+    say("zone -1 -1 1 -1 1 1 -1 1", "zone-here");
+    say("zone 2 2 3 3", "no-zone");
+    say("zone 3 3 --remove", "not-in-zone");
+    operate(robot, "goto 2.2 0");
     run.wait_until_driving();
-    say(&["place", "0", "0", "0"], "robot-moves");
+    say("place 0 0 0", "robot-moves");
     run.wait_until("it is there", waits);
     // The zone moves to the other side, which frees its old place.
-    operate(robot, &["zone", "1", "-1", "1.4", "-1", "1.4", "3.9", "1", "3.9"]);
-    operate(robot, &["zone", "1.2", "-2", "--remove"]);
+    operate(robot, "zone 1 -1 1.4 -1 1.4 3.9 1 3.9");
+    operate(robot, "zone 1.2 -2 --remove");
     // The supervisor judges a target by the map, which shows the change in its next part.
-    let there = ["goto", "1.2", "-2", "0", "0", "--robot", robot];
-    wait_until("its old place is free", || output(&there).status.success());
+    let there = format!("goto 1.2 -2 0 0 --robot {robot}");
+    wait_until("its old place is free", || output(&words(&there)).status.success());
     run.kill_and_await_successor("mapper", Signal::KILL);
     run.wait_until("it is back", waits);
-    say(&["goto", "1.2", "2"], "target-in-hazard");
-    let given_up = output(&["goto", "--robot", robot, "-2.6", "0.0", "--wait"]);
+    say("goto 1.2 2", "target-in-hazard");
+    let given_up = output(&words(&format!("goto --robot {robot} -2.6 0.0 --wait")));
     assert_eq!(given_up.status.code(), Some(3), "{given_up:?}");
     let status = run.wait_until("it waits after it has given up", |status| {
         waits(status) && status["link"]["at_rest"] == true
     });
-    say(&["place", "9", "0", "0"], "target-outside");
-    operate(robot, &["place", "0", "-2", "90", "--sigma", "0.1"]);
+    say("place 9 0 0", "target-outside");
+    operate(robot, "place 0 -2 90 --sigma 0.1");
     run.wait_until("it believes so", |after| {
         after["pose"]["x_m"].as_f64().is_some_and(|x| x.abs() < 0.1) && *after != status
     });

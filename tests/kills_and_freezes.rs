@@ -102,7 +102,7 @@ fn a_frozen_stage_that_is_thawed_in_time_goes_on() {
     // The controller may be replaced before the second command; both are then sent again.
     let goes_on = || {
         let before = run.wait_until("the controller beats", beats);
-        operate("kf-thaw", &["stage", "freeze", "controller"]);
+        operate("kf-thaw", "stage freeze controller");
         let thaw = output(&["stage", "thaw", "controller", "--robot", "kf-thaw"]);
         let after = run.wait_until("the controller beats again", beats);
         let same = pid(&before, "controller") == pid(&after, "controller");
@@ -129,8 +129,8 @@ fn is_stopped(status: &Value) -> bool {
 fn a_list_is_driven_to_its_end_although_all_and_then_the_supervisor_are_killed_in_between() {
     let robot = "kf-again";
     let mut first = Run::under_way(robot, "open-room", FAST, 4.0);
-    operate(robot, &["goto", "1.0", "-0.8", "1.8", "0.4"]);
-    operate(robot, &["goto", "3.0", "0.4", "--heading", "-90", "--append"]);
+    operate(robot, "goto 1.0 -0.8 1.8 0.4");
+    operate(robot, "goto 3.0 0.4 --heading -90 --append");
     for pid in processes_with(robot, "") {
         signal_process(pid, Signal::KILL);
     }
@@ -140,14 +140,14 @@ fn a_list_is_driven_to_its_end_although_all_and_then_the_supervisor_are_killed_i
     wait_for_status(robot, |status| {
         status["order"] == "driving" && status["mission_time_s"].as_f64() > Some(8.0)
     });
-    operate(robot, &["stop"]);
+    operate(robot, "stop");
     kill(&mut second);
     let third = start_piped(&mut resume(&first.directory()));
     wait_for_status(robot, |status| {
         assert_ne!(status["order"], "driving", "{status}");
         is_stopped(status) && all_run(status)
     });
-    operate(robot, &["resume"]);
+    operate(robot, "resume");
     let output = third.wait_with_output().unwrap();
     let summary = reached(&output);
     assert_eq!(summary["resumes"], 2, "{summary}");

@@ -2,17 +2,17 @@
 
 use std::{fs, os::unix::fs::MetadataExt as _};
 
-use crate::support::{self, ENDLESS, Run, assert_nothing_left, json_lines, printed};
+use crate::support::{self, ENDLESS, Run, assert_nothing_left, json_lines, printed, words};
 
 #[test]
 fn latency_is_measured_beside_hops_at_each_rate_and_leaves_nothing_but_what_was_there() {
     // Another robot of this user, with its directory below the removed one.
     let run = Run::under_way("hops-beside", "open-room", &ENDLESS, 0.3);
-    let measured = |robot: &str, arguments: &[&str]| {
-        let short = ["bench", "tick", "--rounds", "1", "--set", "timeout_s=5", "--json"];
-        json_lines(&printed(&[&short[..], &["--robot", robot], arguments].concat()))
+    let measured = |robot: &str, more: &str| {
+        let short = "bench tick --rounds 1 --set timeout_s=5 --json";
+        json_lines(&printed(&words(&format!("{short} --robot {robot} {more}"))))
     };
-    let reports = measured("hops", &["--busy", "1", "--set", "robot.rate_hz=20"]);
+    let reports = measured("hops", "--busy 1 --set robot.rate_hz=20");
     assert_nothing_left("hops");
     let regimes: Vec<_> = reports.iter().map(|report| &report["regime"]).collect();
     assert_eq!(regimes, ["back to back", "at 20 Hz"]);
@@ -24,8 +24,8 @@ fn latency_is_measured_beside_hops_at_each_rate_and_leaves_nothing_but_what_was_
         }
         assert!(report["ratio"].as_f64() > Some(0.0), "{report}");
     }
-    let at_30_hz = ["--rate", "30", "--set", "timeout_s=60", "--no-record", "--consumers", "0"];
-    let reports = measured(support::suite(), &at_30_hz);
+    let at_30_hz = "--rate 30 --set timeout_s=60 --no-record --consumers 0";
+    let reports = measured(support::suite(), at_30_hz);
     assert_eq!(reports.len(), 1, "{reports:?}");
     assert_eq!(reports[0]["regime"], "at 30 Hz");
     let root = fs::metadata(support::domain("hops-beside").directory()).unwrap();

@@ -9,7 +9,7 @@ fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
     let checkpoint = run.directory().join("mapper.checkpoint");
     std::fs::remove_file(&checkpoint).unwrap();
     std::fs::create_dir(&checkpoint).unwrap();
-    operate("held", &["stage", "kill", "mapper"]);
+    operate("held", "stage kill mapper");
     run.wait_until("it is held", |status| find(status, "mapper")["state"] == "held");
     let status = run
         .wait_until("the robot is stopped", |status| status["order"] == "stopped, a stage is held");
@@ -25,6 +25,6 @@ fn a_stage_that_dies_again_and_again_is_held_until_an_operator_releases_it() {
     let log_tail = last["log_tail"].as_str().unwrap();
     assert!(log_tail.contains("mapper.checkpoint"), "{log_tail}");
     std::fs::remove_dir(&checkpoint).unwrap();
-    operate("held", &["stage", "restart", "mapper"]);
+    operate("held", "stage restart mapper");
     run.arrives();
 }

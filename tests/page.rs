@@ -112,10 +112,10 @@ fn a_robot_is_watched_stopped_and_resumed_on_a_phone_that_loses_and_regains_its_
     browser.wait_until("document.getElementById('live').getAttribute('aria-pressed') === 'false'");
     browser.wait_until("!document.getElementById('past').hidden");
     browser.wait_for("past", "Shown: ");
-    operate_robot(robot, &["stop"]);
+    operate_robot(robot, "stop");
     browser.wait_until(RESTS);
     browser.wait_until("document.querySelector('header').className === 'bad'");
-    operate_robot(robot, &["resume"]);
+    operate_robot(robot, "resume");
     browser.wait_until(GOES);
     browser.tap("live", 0, 0);
     browser.wait_until("document.getElementById('past').hidden");

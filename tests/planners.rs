@@ -4,7 +4,7 @@
 use std::{fs, os::unix::fs::PermissionsExt as _, path::Path};
 
 use crate::support::{
-    Run, STAGES, firsthand, json_lines, pid, printed, refused, signal_process, start_quietly,
+    Run, STAGES, firsthand, json_lines, pid, printed, refused, signal_process, start_quietly, words,
 };
 
 /// Drum known beforehand, so the path around it is the same in every run.
@@ -74,9 +74,8 @@ fn planners_are_compared_on_the_same_worlds_and_every_row_names_its_planner() {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("out");
     let out = out.to_str().unwrap();
-    let planners = ["--planner", "harmonic,wavefront", "--count", "1", "--out", out];
-    let compared = printed(&[&["evaluate", "--json"], &planners[..]].concat());
-    let object = &json_lines(&compared)[0];
+    let line = format!("evaluate --json --planner harmonic,wavefront --count 1 --out {out}");
+    let object = &json_lines(&printed(&words(&line)))[0];
     assert_eq!(object["setting"], "harmonic", "{object}");
     assert_eq!(object["versus"][0]["totals"]["setting"], "wavefront", "{object}");
     assert_eq!(object["versus"][0]["pairs"], 1, "{object}");
@@ -85,6 +84,6 @@ fn planners_are_compared_on_the_same_worlds_and_every_row_names_its_planner() {
     let mut column: Vec<_> = column.collect();
     column.sort_unstable();
     assert_eq!(column, ["harmonic", "planner", "wavefront"]);
-    let other = ["evaluate", "--planner", "wavefront", "--count", "1", "--out", out, "--resume"];
-    refused(&other, "other-results", &[out]);
+    let other = format!("evaluate --planner wavefront --count 1 --out {out} --resume");
+    refused(&words(&other), "other-results", &[out]);
 }

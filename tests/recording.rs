@@ -25,7 +25,7 @@ use rustix::process::Signal;
 use crate::support::{
     self, PATIENCE, Run, STAGES, assert_ended, assert_nothing_left, assert_reached, assert_refused,
     firsthand, golden, golden_of, json_of, kill, logged, messages, operate, output, process_with,
-    recording_in, refused, replayed, replayed_in, signal_process, start_piped, wait_until,
+    recording_in, refused, replayed, replayed_in, signal_process, start_piped, wait_until, words,
 };
 
 /// Starts a recorder of `robot`. Returns it with its output.
@@ -107,14 +107,13 @@ fn every_order_that_was_answered_is_recorded_and_a_run_that_is_ended_waits_for_i
     run.wait_until_driving();
     let mut asked = Vec::new();
     for _ in 0..4 {
-        let words: [(&[&str], _); 4] = [
-            (&["stop"], RequestKind::Stop),
-            (&["resume"], RequestKind::Resume),
-            (&["goto", "3", "0"], RequestKind::Goto),
-            (&["stage", "restart", "planner"], RequestKind::Restart),
-        ];
-        for (words, kind) in words {
-            let said = output(&[words, &["--robot", robot]].concat());
+        for (line, kind) in [
+            ("stop", RequestKind::Stop),
+            ("resume", RequestKind::Resume),
+            ("goto 3 0", RequestKind::Goto),
+            ("stage restart planner", RequestKind::Restart),
+        ] {
+            let said = output(&words(&format!("{line} --robot {robot}")));
             assert!(said.status.success(), "{said:?}");
             // A stop that could not reach the supervisor says so, and still holds.
             if said.stderr.is_empty() {
@@ -197,7 +196,7 @@ fn kill_recorder(robot: &str, file: &Path, growths: usize) {
 fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was() {
     let run = Run::under_way("rec-shot", "open-room", &["--pace", "1"], 0.5);
     // A standing robot cannot arrive before its recorders are killed.
-    operate("rec-shot", &["stop"]);
+    operate("rec-shot", "stop");
     let directory = tempfile::tempdir().unwrap();
     let mut read = 0;
     for shot in 0..6 {
@@ -210,7 +209,7 @@ fn recorders_killed_leave_readable_files_that_say_so_and_the_mission_as_it_was()
         read += messages;
     }
     assert!(read > 0, "every recorder died before its first chunk");
-    operate("rec-shot", &["resume"]);
+    operate("rec-shot", "resume");
     let (summary, directory) = run.arrives_in();
     support::assert_no_restart(&summary);
     assert_eq!(replayed_in(&directory).equal(), 5);

@@ -26,9 +26,9 @@ fn a_run_that_was_stopped_and_resumed_gives_the_same_summary_to_the_bit() {
     let calm = Run::start("tick-calm", "obstacle-course", &slow);
     let mut held = Run::start("tick-held", "obstacle-course", &slow);
     held.wait_until_driving();
-    operate("tick-held", &["stop"]);
+    operate("tick-held", "stop");
     held.wait_until("it is stopped", |status| status["link"]["cause"] == "stopped by an operator");
-    operate("tick-held", &["resume"]);
+    operate("tick-held", "resume");
     assert_eq!(numbers(held.arrives()), numbers(calm.arrives()));
 }
 

@@ -259,7 +259,7 @@ fn a_service_that_was_cut_off_comes_up_stands_says_where_it_is_and_goes_on_when_
     assert_eq!(fs::read_dir(runs.path()).unwrap().count(), 2);
     let again = start_piped(service().stderr(Stdio::piped()));
     wait_for_status("cut", |status| status["order"] == "stopped by an operator");
-    operate("cut", &["resume"]);
+    operate("cut", "resume");
     let again = again.wait_with_output().unwrap();
     assert_said(&again, &["believes it is where it stood", "firsthand resume"]);
     assert_eq!(reached(&again)["resumes"], 1, "{again:?}");

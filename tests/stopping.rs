@@ -234,7 +234,7 @@ fn an_operator_stops_a_robot_whose_supervisor_is_frozen_or_whose_files_are_damag
     let is_stopped = |name: &str, damage: &dyn Fn(&Run)| {
         let (_directory, mut robot, run) = under_way(name, "udp");
         damage(&run);
-        operate(name, &["stop"]);
+        operate(name, "stop");
         assert!(robot.is_at_rest(), "{name}");
         run
     };
@@ -261,10 +261,10 @@ fn a_robot_whose_directory_is_removed_again_and_again_is_stopped_resumed_sent_an
     let robot = "so-cleaned";
     let (_directory, mut body, mut run) = under_way(robot, "udp");
     let domain = domain(robot);
-    for what in [&["stop"][..], &["resume"], &["goto", "4", "0"], &["stop"], &["resume"]] {
+    for what in ["stop", "resume", "goto 4 0", "stop", "resume"] {
         remove_directory_of(robot);
         operate(robot, what);
-        match what[0] {
+        match what {
             "stop" => assert!(body.is_at_rest()),
             _ => drop(run.wait_until_driving()),
         }

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::support::{
     Run, assert_no_restart, bus_instance, domain, in_own_process, logged, operate, pid, printed,
-    refused, shared_memory,
+    refused, shared_memory, words,
 };
 
 fn names(lists: &[Topics]) -> BTreeSet<&'static str> {
@@ -87,12 +87,12 @@ fn a_robot_of_another_version_is_named_and_can_be_stopped() {
     let file = bus_instance(robot).config();
     let config = fs::read_to_string(&file).unwrap();
     fs::write(&file, config.replacen(VERSION, "99.0.0", 1)).unwrap();
-    for command in [&["status"][..], &["goto", "1", "1"], &["stage", "kill", "planner"]] {
-        let command = [command, &["--robot", robot]].concat();
-        refused(&command, "other-version", &["99.0.0", VERSION]);
+    for line in ["status", "goto 1 1", "stage kill planner"] {
+        let line = format!("{line} --robot {robot}");
+        refused(&words(&line), "other-version", &["99.0.0", VERSION]);
     }
     assert!(printed(&["status", "--all"]).contains("it runs another version"));
-    operate(robot, &["stop"]);
+    operate(robot, "stop");
     fs::write(&file, config).unwrap();
     run.stop();
 }

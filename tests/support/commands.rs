@@ -64,9 +64,14 @@ pub fn json_lines(text: &str) -> Vec<Value> {
     text.lines().map(line).collect()
 }
 
-/// Asserts success.
-pub fn operate(robot: &str, arguments: &[&str]) {
-    printed(&[arguments, &["--robot", robot]].concat());
+/// Returns the words of a command line, none of which contains a blank.
+pub fn words(line: &str) -> Vec<&str> {
+    line.split_whitespace().collect()
+}
+
+/// Asserts the success of a command line.
+pub fn operate(robot: &str, line: &str) {
+    printed(&words(&format!("{line} --robot {robot}")));
 }
 
 /// Runs `firsthand`, and asserts that it fails with the error `code` and mentions all `names`, the
