@@ -21,25 +21,34 @@ fn mission(set: &str) -> Mission {
 
 fn driver() -> Arduino {
     let mut driver = Arduino::new(&mission(""));
-    asks(&mut driver, "\rb\r");
-    assert!(heard(&mut driver, " 57600\r\n").anything);
+    driver.asks("\rb\r");
+    assert!(driver.hears(" 57600\r\n").anything);
     driver
-}
-
-#[track_caller]
-fn asks(driver: &mut Arduino, request: &str) {
-    assert_eq!(String::from_utf8(driver.poll()).unwrap(), request);
-}
-
-fn heard(driver: &mut Arduino, bytes: &str) -> Heard {
-    driver.hear(bytes.as_bytes())
 }
 
 const ROUND: &str = "p 4\rp 5\re\r";
 
-fn round(driver: &mut Arduino, answers: &str) -> Heard {
-    asks(driver, ROUND);
-    heard(driver, answers)
+impl Arduino {
+    #[track_caller]
+    fn asks(&mut self, request: &str) {
+        assert_eq!(String::from_utf8(self.poll()).unwrap(), request);
+    }
+
+    fn hears(&mut self, bytes: &str) -> Heard {
+        self.hear(bytes.as_bytes())
+    }
+
+    fn round(&mut self, answers: &str) -> Heard {
+        self.asks(ROUND);
+        self.hears(answers)
+    }
+
+    /// Answers a round with these counts. Returns them, and the speeds.
+    fn turned(&mut self, [left, right]: [i32; 2]) -> ([u16; 2], [i32; 2]) {
+        let said = self.round(&format!("1\r\n1\r\n{left} {right}\r\n"));
+        let wheels = said.motion.unwrap().wheels;
+        (counts(&said).unwrap(), [wheels.left_counts_per_s, wheels.right_counts_per_s])
+    }
 }
 
 fn is_refused(heard: &Heard, why: &str) -> bool {
@@ -48,13 +57,6 @@ fn is_refused(heard: &Heard, why: &str) -> bool {
 
 fn says_nothing(heard: &Heard) -> bool {
     heard.motion.is_none() && heard.readings.is_empty()
-}
-
-/// Answers a round with these counts. Returns them, and the speeds.
-fn turned(driver: &mut Arduino, [left, right]: [i32; 2]) -> ([u16; 2], [i32; 2]) {
-    let said = round(driver, &format!("1\r\n1\r\n{left} {right}\r\n"));
-    let wheels = said.motion.unwrap().wheels;
-    (counts(&said).unwrap(), [wheels.left_counts_per_s, wheels.right_counts_per_s])
 }
 
 fn counts(heard: &Heard) -> Option<[u16; 2]> {
@@ -69,24 +71,24 @@ fn ranges(heard: &Heard) -> Vec<(u8, RangeStatus, f64)> {
 #[test]
 fn a_round_gives_the_range_of_each_sonar_and_the_counts_that_begin_a_tick() {
     let mut driver = driver();
-    let said = round(&mut driver, "123\r\n0\r\n-5 70\r\n");
+    let said = driver.round("123\r\n0\r\n-5 70\r\n");
     assert_eq!(counts(&said), Some([32_763, 70]));
     let want = [(0, RangeStatus::Measured, 1.23), (1, RangeStatus::Nothing, 0.0)];
     assert_eq!((ranges(&said), said.refused), (want.to_vec(), None));
     // Beyond its reach an echo counts as none, beyond twice that as no reading.
-    let said = round(&mut driver, "300\r\n17241\r\n0 0\r\n");
-    let statuses: Vec<_> = ranges(&said).iter().map(|range| range.1).collect();
+    let said = driver.round("300\r\n17241\r\n0 0\r\n");
+    let statuses = Vec::from_iter(ranges(&said).iter().map(|range| range.1));
     assert_eq!(statuses, [RangeStatus::Nothing, RangeStatus::Invalid]);
 }
 
 #[test]
 fn answers_come_in_any_pieces_and_commands_are_answered_between_them() {
     let mut driver = driver();
-    asks(&mut driver, ROUND);
+    driver.asks(ROUND);
     for piece in ["OK\r\n12", "3\r", "\nOK\r\n7\r\nOK\r\n1", " 2\r"] {
-        assert_eq!(counts(&heard(&mut driver, piece)), None, "{piece:?}");
+        assert_eq!(counts(&driver.hears(piece)), None, "{piece:?}");
     }
-    let said = heard(&mut driver, "\nOK\r\n");
+    let said = driver.hears("\nOK\r\n");
     assert_eq!((counts(&said), said.readings.len()), (Some([1, 2]), 2));
 }
 
@@ -102,17 +104,17 @@ fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
         ("57600\r\n", "is an unexpected answer"),
     ] {
         let mut driver = driver();
-        let said = round(&mut driver, bad);
+        let said = driver.round(bad);
         assert!(says_nothing(&said) && is_refused(&said, why), "{bad:?}: {said:?}");
         // Late answers, and an unrequested baud rate.
-        let late = heard(&mut driver, "77\r\n88\r\n9 9\r\n57600\r\n");
+        let late = driver.hears("77\r\n88\r\n9 9\r\n57600\r\n");
         assert!(says_nothing(&late), "{late:?}");
-        asks(&mut driver, "\rb\r");
-        let late = heard(&mut driver, "77\r\n88\r\n9 9\r\nInvalid Command\r\n");
+        driver.asks("\rb\r");
+        let late = driver.hears("77\r\n88\r\n9 9\r\nInvalid Command\r\n");
         assert!(says_nothing(&late) && !late.anything, "{late:?}");
-        assert!(heard(&mut driver, "57600\r\n").anything);
-        let said = round(&mut driver, "10\r\n20\r\n3 4\r\n");
-        let taken: Vec<_> = ranges(&said).iter().map(|range| (range.0, range.2)).collect();
+        assert!(driver.hears("57600\r\n").anything);
+        let said = driver.round("10\r\n20\r\n3 4\r\n");
+        let taken = Vec::from_iter(ranges(&said).iter().map(|range| (range.0, range.2)));
         assert_eq!((counts(&said), taken), (Some([3, 4]), vec![(0, 0.1), (1, 0.2)]));
     }
 }
@@ -120,40 +122,40 @@ fn after_a_line_that_does_not_fit_only_a_baud_rate_is_taken() {
 #[test]
 fn a_round_that_is_overdue_is_dropped_and_its_late_answers_are_no_answers_of_the_next() {
     let mut driver = driver();
-    asks(&mut driver, ROUND);
-    assert!(heard(&mut driver, "11\r\n").readings.is_empty());
-    asks(&mut driver, "");
-    asks(&mut driver, "");
-    asks(&mut driver, "\rb\r");
-    let late = heard(&mut driver, "22\r\n1 2\r\n");
+    driver.asks(ROUND);
+    assert!(driver.hears("11\r\n").readings.is_empty());
+    driver.asks("");
+    driver.asks("");
+    driver.asks("\rb\r");
+    let late = driver.hears("22\r\n1 2\r\n");
     assert!(says_nothing(&late) && is_refused(&late, "`p 5` is overdue"), "{late:?}");
-    assert!(heard(&mut driver, "57600\r\n").anything);
-    assert!(round(&mut driver, "1\r\n1\r\n1 2\r\n").motion.is_some());
+    assert!(driver.hears("57600\r\n").anything);
+    assert!(driver.round("1\r\n1\r\n1 2\r\n").motion.is_some());
     // A line that nobody asked for is refused too.
-    assert!(heard(&mut driver, "12\r\n").refused.is_some());
-    asks(&mut driver, "\rb\r");
+    assert!(driver.hears("12\r\n").refused.is_some());
+    driver.asks("\rb\r");
 }
 
 #[test]
 fn a_baud_rate_is_asked_for_again_only_when_its_answer_is_lost() {
     let mut driver = Arduino::new(&mission(""));
-    asks(&mut driver, "\rb\r");
+    driver.asks("\rb\r");
     // The board boots with other text: the driver waits.
-    assert!(heard(&mut driver, "booting\r\n").refused.is_some());
+    assert!(driver.hears("booting\r\n").refused.is_some());
     for _ in 1..20 {
-        asks(&mut driver, "");
+        driver.asks("");
     }
-    asks(&mut driver, "\rb\r");
+    driver.asks("\rb\r");
 }
 
 #[test]
 fn a_wire_that_opens_again_begins_anew() {
     let mut driver = driver();
-    asks(&mut driver, ROUND);
+    driver.asks(ROUND);
     driver.hear(b"1\r\n2");
     driver.reset();
-    asks(&mut driver, "\rb\r");
-    let said = heard(&mut driver, "57600\r\n");
+    driver.asks("\rb\r");
+    let said = driver.hears("57600\r\n");
     assert!(said.refused.is_none() && said.anything, "{said:?}");
 }
 
@@ -165,7 +167,7 @@ fn counts_that_wrap_at_32_bits_go_on_and_their_speeds_are_those_of_the_interval_
         [(0, 32_763, [0, 0]), (1, 5, [0, 0]), (2, 15, [100, -100]), (3, 25, [100, -100])]
     {
         let left = (i32::MAX - 4).wrapping_add(10 * tick);
-        let ([left, _], by) = turned(&mut driver, [left, -10 * tick]);
+        let ([left, _], by) = driver.turned([left, -10 * tick]);
         assert_eq!((left, by), (counts, speeds), "{tick}");
     }
 }
@@ -173,20 +175,20 @@ fn counts_that_wrap_at_32_bits_go_on_and_their_speeds_are_those_of_the_interval_
 #[test]
 fn the_speed_across_polls_without_a_round_is_by_the_time_between() {
     let mut driver = driver();
-    turned(&mut driver, [0, 0]);
-    asks(&mut driver, ROUND);
-    asks(&mut driver, "");
-    heard(&mut driver, "1\r\n1\r\n10 10\r\n");
+    driver.turned([0, 0]);
+    driver.asks(ROUND);
+    driver.asks("");
+    driver.hears("1\r\n1\r\n10 10\r\n");
     // A poll without a request precedes this round.
-    turned(&mut driver, [30, 30]);
-    assert_eq!(turned(&mut driver, [30, 30]).1[0], 100);
+    driver.turned([30, 30]);
+    assert_eq!(driver.turned([30, 30]).1[0], 100);
 }
 
 #[test]
 fn counts_that_begin_anew_are_said_as_they_are_and_their_jump_is_no_speed() {
     let mut driver = driver();
     for counts in [20_000_u16, 20_010, 0, 5] {
-        let (said, speeds) = turned(&mut driver, [counts.into(); 2]);
+        let (said, speeds) = driver.turned([counts.into(); 2]);
         assert!(said == [counts; 2] && speeds[0].abs() <= 100, "{said:?} {speeds:?}");
     }
 }
@@ -194,16 +196,16 @@ fn counts_that_begin_anew_are_said_as_they_are_and_their_jump_is_no_speed() {
 #[test]
 fn a_flood_of_lines_or_of_bytes_without_an_end_is_bounded_and_begins_anew() {
     let mut driver = driver();
-    asks(&mut driver, ROUND);
-    let said = heard(&mut driver, &"1\r\n".repeat(100_000));
+    driver.asks(ROUND);
+    let said = driver.hears(&"1\r\n".repeat(100_000));
     assert!(said.readings.is_empty() && said.refused.is_some());
-    asks(&mut driver, "\rb\r");
+    driver.asks("\rb\r");
     for _ in 0..100 {
         driver.hear(&[b'1'; 10_000]);
     }
     assert!(driver.tally().bytes_dropped > 900_000);
-    heard(&mut driver, "\r\n57600\r\n");
-    assert!(round(&mut driver, "1\r\n1\r\n1 1\r\n").motion.is_some());
+    driver.hears("\r\n57600\r\n");
+    assert!(driver.round("1\r\n1\r\n1 1\r\n").motion.is_some());
 }
 
 #[test]
@@ -230,7 +232,7 @@ fn a_command_is_said_in_counts_of_the_speed_loop_and_the_slowest_turns_a_wheel()
 #[test]
 fn a_board_acknowledges_each_velocity_and_owes_nothing_for_what_it_is_asked() {
     let mut driver = driver();
-    assert_eq!(heard(&mut driver, "OK\r\nOK\r\n").acknowledged, 2);
+    assert_eq!(driver.hears("OK\r\nOK\r\n").acknowledged, 2);
     assert_eq!(driver.owed(&driver.velocity([100, 100], Duration::ZERO)), 1);
     let asked = driver.poll();
     assert_eq!(driver.owed(&asked), 0);
@@ -243,10 +245,8 @@ fn a_third_number_is_the_angle_of_a_gyro_which_gives_the_turn_of_each_tick() {
     let mut turns = Vec::new();
     for tick in 0..6 {
         let side = 0.05 * f64::from(tick) * body.track_m / body.metres_per_count();
-        let said = round(
-            &mut driver,
-            &format!("0\r\n0\r\n{} {side:.0} {}\r\n", -side as i32, 1100 * tick),
-        );
+        let said =
+            driver.round(&format!("0\r\n0\r\n{} {side:.0} {}\r\n", -side as i32, 1100 * tick));
         assert_eq!(said.refused, None);
         turns.extend(driver.turn_for_tick().map(|turn| (turn.turn_rad * 1e6).round() / 1e6));
     }

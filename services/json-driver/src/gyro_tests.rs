@@ -33,7 +33,7 @@ fn the_turns_of_ticks_are_those_of_a_gyro_that_was_seen_to_agree_and_begin_anew_
 #[test]
 fn a_gyro_in_degrees_or_clockwise_is_not_used_and_named() {
     for factor in [57.3, -1.0] {
-        let said: Vec<_> = (0..8).map(|tick| Some(0.1 * factor * f64::from(tick) / 4.0)).collect();
+        let said = Vec::from_iter((0..8).map(|tick| Some(0.1 * factor * f64::from(tick) / 4.0)));
         let (turns, refused) = told(&said);
         assert!(turns.is_empty(), "{turns:?}");
         assert!(refused.unwrap().contains("in the unit of the protocol"));

@@ -280,14 +280,16 @@ mod tests {
         driver_of(&format!("robot.protocol = 'json'\n{}", laser("laser", keys)))
     }
 
-    fn heard(driver: &mut Json, line: &str) -> Heard {
-        driver.hear(format!("{line}\n").as_bytes())
+    impl Json {
+        fn hears(&mut self, line: &str) -> Heard {
+            self.hear(format!("{line}\n").as_bytes())
+        }
     }
 
     #[test]
     fn the_angles_of_wheels_are_counts_and_backward_ones_count_down() {
         let said = r#"{"wheels":[6.283185307,-3.141592654],"speeds":[1,-1],"held":[false,true]}"#;
-        let motion = heard(&mut driver(), said).motion.unwrap();
+        let motion = driver().hears(said).motion.unwrap();
         assert_eq!((motion.wheels.left_counts, motion.wheels.right_counts), (3600, 32_768 - 1800));
         assert_eq!(motion.wheels.right_counts_per_s, -573);
         assert_eq!(motion.currents, [0, 4095]);
@@ -298,7 +300,7 @@ mod tests {
         let mut driver = driver();
         let at = |driver: &mut Json, pose: &str| {
             let said = format!("{{\"odometry\":{pose},\"speeds\":[0,0]}}");
-            let wheels = heard(driver, &said).motion.unwrap().wheels;
+            let wheels = driver.hears(&said).motion.unwrap().wheels;
             [wheels.left_counts, wheels.right_counts]
         };
         assert_eq!(at(&mut driver, "[5,5,0]"), [0, 0]);
@@ -320,7 +322,7 @@ mod tests {
             (r#"{"odometry":[1e300,0,0],"speeds":[0,0]}"#, "odometry is out of range"),
             (r#"{"wheel":[0,0]}"#, "unknown field `wheel`"),
         ] {
-            let heard = heard(&mut driver(), said);
+            let heard = driver().hears(said);
             assert!(!heard.anything && heard.motion.is_none(), "{said}");
             assert!(refuses(&heard, why), "{said}");
         }
@@ -330,9 +332,9 @@ mod tests {
     fn a_refused_line_is_taken_in_no_part_and_another_keeps_the_battery_of_the_one_before() {
         let mut driver = driver();
         let half = r#"{"heard":9,"battery_v":12,"ranges":{"front":1,"nose":1}}"#;
-        let refused = heard(&mut driver, half);
+        let refused = driver.hears(half);
         assert!(refused.readings.is_empty() && refused.power.is_none(), "{refused:?}");
-        let both = heard(&mut driver, "{\"battery_v\":12}\n{\"heard\":1}");
+        let both = driver.hears("{\"battery_v\":12}\n{\"heard\":1}");
         assert!(both.power.is_some_and(|power| power.motor_v == 12.0));
     }
 
@@ -340,8 +342,8 @@ mod tests {
     fn a_line_of_16384_beams_with_all_digits_is_taken_and_a_laser_upside_down_is_mirrored() {
         let mut driver = driver_with_laser("beams = 16384\nroll_deg = 180");
         let range = |beam: u16| 1.000_000_000_000_123_4 + f64::from(beam) * 1e-4;
-        let beams: Vec<_> = (0..16_384).map(|beam| range(beam).to_string()).collect();
-        let heard = heard(&mut driver, &format!("{{\"scan\":[{}]}}", beams.join(",")));
+        let beams = Vec::from_iter((0..16_384).map(|beam| range(beam).to_string()));
+        let heard = driver.hears(&format!("{{\"scan\":[{}]}}", beams.join(",")));
         let scan = &heard.scans[0].beams;
         assert_eq!((scan.len(), scan[0]), (16_384, range(16_383) as f32));
     }
@@ -357,11 +359,11 @@ mod tests {
             ("-1", RangeStatus::Invalid),
             ("0.5", RangeStatus::Measured),
         ] {
-            let heard = heard(&mut driver(), &format!("{{\"ranges\":{{\"front\":{said}}}}}"));
+            let heard = driver().hears(&format!("{{\"ranges\":{{\"front\":{said}}}}}"));
             assert_eq!(heard.readings[0].status(), status, "{said}");
         }
         let mut driver = driver_with_laser("beams = 3");
-        let beams = heard(&mut driver, r#"{"scan":[null,1e308,1]}"#).scans.remove(0).beams;
+        let beams = driver.hears(r#"{"scan":[null,1e308,1]}"#).scans.remove(0).beams;
         assert!(beams[0] == f32::INFINITY && beams[1].is_nan(), "{beams:?}");
     }
 
@@ -370,20 +372,20 @@ mod tests {
         let mut driver = driver();
         let counts = [(5, 0), (8, 3), (8, 0), (2, 0), (1_000_000, 64), (u64::MAX, 64)];
         for (count, answered) in counts {
-            let heard = heard(&mut driver, &format!("{{\"heard\":{count}}}"));
+            let heard = driver.hears(&format!("{{\"heard\":{count}}}"));
             assert_eq!((heard.acknowledged, heard.restarted), (answered, false), "{count}");
         }
         let sent = [driver.greeting(), driver.velocity([1, 1], Duration::ZERO)].concat();
         assert_eq!(driver.owed(&sent), 2);
         let most = format!("{{\"heard\":0}}\n{{\"heard\":1}}\n{{\"heard\":{}}}", u64::MAX);
         let many = format!("{most}\n{most}");
-        assert_eq!(heard(&mut driver, &many).acknowledged, 64);
+        assert_eq!(driver.hears(&many).acknowledged, 64);
         // One old line is no restart.
         let mut driver = self::driver();
         for (count, restarted) in
             [(90, false), (60, false), (91, false), (0, false), (2, true), (3, false)]
         {
-            let heard = heard(&mut driver, &format!("{{\"heard\":{count}}}"));
+            let heard = driver.hears(&format!("{{\"heard\":{count}}}"));
             assert_eq!(heard.restarted, restarted, "{count}");
         }
     }
@@ -393,7 +395,7 @@ mod tests {
         let mut driver = driver_of("robot.model = 'kobuki'");
         let mut sweep = |words: &str| {
             let line = format!("{{\"scan\":[{}]{words}}}", vec!["1"; 360].join(","));
-            heard(&mut driver, &line).scans.pop().map(|scan| scan.sweep)
+            driver.hears(&line).scans.pop().map(|scan| scan.sweep)
         };
         assert_eq!(sweep(""), Some(Sweep::default()));
         let sent = Sweep { first_beam_ns: -300_000_000, beam_ns: 500_000, first_beam: 0 };
@@ -410,7 +412,7 @@ mod tests {
         let mut stamps = |words: &str| {
             let beams = vec!["1"; 360].join(",");
             let line = format!("{{\"wheels\":[0,0],\"speeds\":[0,0],\"scan\":[{beams}]{words}}}");
-            let heard = heard(&mut driver, &line);
+            let heard = driver.hears(&line);
             let scan = heard.scans.first()?.stamp_ns;
             Some([heard.stamp_ns, heard.motion.and_then(|motion| motion.stamp_ns), scan])
         };
@@ -427,12 +429,9 @@ mod tests {
         let mut driver = driver_of(&format!("robot.protocol = 'json'\n{rows}"));
         let said =
             r#"{"scans":{"back":{"ranges":[1,2,3],"age_s":0.2},"front":{"ranges":[4,5,6]}}}"#;
-        let scans = heard(&mut driver, said).scans;
+        let scans = driver.hears(said).scans;
         let told = |scan: &LaserScan| (scan.row, scan.beams[0], scan.sweep.first_beam_ns);
-        assert_eq!(
-            scans.iter().map(told).collect::<Vec<_>>(),
-            [(1, 1.0, -200_000_000), (0, 4.0, 0)]
-        );
+        assert_eq!(Vec::from_iter(scans.iter().map(told)), [(1, 1.0, -200_000_000), (0, 4.0, 0)]);
         for (said, why) in [
             (r#"{"scan":[1,2,3]}"#, "by the names of rows"),
             (
@@ -441,7 +440,7 @@ mod tests {
             ),
             (r#"{"scans":{"back":{"ranges":[1,2]}}}"#, "\"back\" has 3"),
         ] {
-            assert!(refuses(&heard(&mut driver, said), why), "{said}");
+            assert!(refuses(&driver.hears(said), why), "{said}");
         }
     }
 
@@ -449,8 +448,8 @@ mod tests {
     fn what_bumpers_feel_is_told_by_the_names_of_their_rows() {
         let mut driver = driver_of("robot.model = 'kobuki'");
         let said = r#"{"touched":{"bumper-right":true,"cliff-left":false}}"#;
-        assert_eq!(heard(&mut driver, said).touched, [(2, true), (3, false)]);
-        let refused = heard(&mut driver, r#"{"touched":{"nose":true}}"#);
+        assert_eq!(driver.hears(said).touched, [(2, true), (3, false)]);
+        let refused = driver.hears(r#"{"touched":{"nose":true}}"#);
         let why = "no row of robot.touch is named \"nose\"; send one of the names [\"bump";
         assert!(refuses(&refused, why), "{refused:?}");
     }
@@ -469,9 +468,9 @@ mod tests {
             let keys = format!("beams = 4\nfield_of_view_deg = {wide_deg}\nroll_deg = {roll_deg}");
             let mut driver = driver_with_laser(&keys);
             let said = r#"{"wheels":[0,0],"speeds":[0,0],"scan":[1,2,3,4],"scan_time_s":0.4}"#;
-            let LaserScan { beams, sweep, .. } = heard(&mut driver, said).scans.remove(0);
-            let times = (0..4).map(|beam| (sweep.beam_time_ns(beam, 4), beams[beam]));
-            let mut measured: Vec<_> = times.collect();
+            let LaserScan { beams, sweep, .. } = driver.hears(said).scans.remove(0);
+            let time = |beam| (sweep.beam_time_ns(beam, 4), beams[beam]);
+            let mut measured = [0, 1, 2, 3].map(time);
             measured.sort_by_key(|(at, _)| *at);
             let measured = measured.into_iter().map(|(at, range)| (at / 1_000_000, range));
             let said = [(0, 1.0), (100, 2.0), (200, 3.0), (300, 4.0)];

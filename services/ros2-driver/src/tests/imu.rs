@@ -53,11 +53,11 @@ impl Winding {
             let at_us = u64::from(self.ms) * 1000 - 3000;
             let rate = self.gyro * 0.8 * (at_us as f64 / 1e6).cos();
             if imu_speaks {
-                refused = said(&mut self.driver, TURNS, &imu_at(at_us, rate)).refused.or(refused);
+                refused = self.driver.said(TURNS, &imu_at(at_us, rate)).refused.or(refused);
             }
         }
         let pose = [0.0, 0.0, self.odometry * self.heading()];
-        let heard = said(&mut self.driver, ODOM, &odometry_of(self.ms, pose));
+        let heard = self.driver.said(ODOM, &odometry_of(self.ms, pose));
         assert!(heard.motion.is_some());
         (self.driver.turn_for_tick(), heard.refused.or(refused).map(|why| why.to_string()))
     }
@@ -128,9 +128,9 @@ fn after_a_gap_of_the_gyro_turns_begin_anew_and_a_gyro_of_another_clock_is_never
     let mut robot = Winding::new(1.0, 1.0);
     while robot.tick(true).0.is_none() {}
     let before = robot.tick(true).0.unwrap().sequence;
-    let silent: Vec<_> = (0..3).map(|_| robot.tick(false)).collect();
+    let silent = Vec::from_iter((0..3).map(|_| robot.tick(false)));
     assert!(silent.iter().all(|(turn, _)| turn.is_none()));
-    let refusals: Vec<_> = silent.into_iter().filter_map(|(_, refused)| refused).collect();
+    let refusals = Vec::from_iter(silent.into_iter().filter_map(|(_, refused)| refused));
     assert!(refusals.len() == 1 && refusals[0].contains("older than odometry"), "{refusals:?}");
     let first = robot.tick(true).0.unwrap();
     assert!(first.turn_rad == 0.0 && first.sequence > before + 1, "{first:?}");
@@ -138,10 +138,10 @@ fn after_a_gap_of_the_gyro_turns_begin_anew_and_a_gyro_of_another_clock_is_never
     let (mut other, mut refusals) = (driver(GYRO), Vec::new());
     for tick in 0..20_u32 {
         for part in 0..10 {
-            said(&mut other, TURNS, &imu_at(u64::from(tick * 10 + part) * 10_000, 0.5));
+            other.said(TURNS, &imu_at(u64::from(tick * 10 + part) * 10_000, 0.5));
         }
         let pose = [0.0, 0.0, 0.05 * f64::from(tick)];
-        let heard = said(&mut other, ODOM, &odometry_of(10_000 + 100 * tick, pose));
+        let heard = other.said(ODOM, &odometry_of(10_000 + 100 * tick, pose));
         refusals.extend(heard.refused);
         assert_eq!(other.turn_for_tick(), None);
     }
