@@ -37,35 +37,40 @@ impl Transport {
     fn changes_at(&mut self, ms: u64) -> Option<bool> {
         self.maintain(ms * MS).unwrap()
     }
-}
 
-fn maintain_until(transport: &mut Transport, open: bool, now_ms: u64) {
-    while transport.changes_at(now_ms) != Some(open) {
-        transport.wait();
-    }
-}
-
-fn expect(transport: &mut Transport, wanted: &[u8], now_ms: u64) {
-    let mut came = Vec::new();
-    while came.len() < wanted.len() {
-        match transport.receive(now_ms * MS).unwrap() {
-            Some(bytes) => came.extend_from_slice(bytes),
-            None => transport.wait(),
+    fn maintain_until(&mut self, open: bool, now_ms: u64) {
+        while self.changes_at(now_ms) != Some(open) {
+            self.wait();
         }
     }
-    assert_eq!(came, wanted);
+
+    fn connected(&mut self, listener: &TcpListener, now_ms: u64) -> TcpStream {
+        self.maintain_until(true, now_ms);
+        listener.accept().unwrap().0
+    }
+
+    fn expect(&mut self, wanted: &[u8], now_ms: u64) {
+        let mut came = Vec::new();
+        while came.len() < wanted.len() {
+            match self.receive(now_ms * MS).unwrap() {
+                Some(bytes) => came.extend_from_slice(bytes),
+                None => self.wait(),
+            }
+        }
+        assert_eq!(came, wanted);
+    }
+
+    fn expect_closing(&mut self, now_ms: u64) {
+        while self.is_open() {
+            self.wait();
+            assert_eq!(self.receive(now_ms * MS).unwrap(), None);
+        }
+        assert_eq!(self.changes_at(now_ms), Some(false));
+    }
 }
 
 fn trouble(transport: &Transport) -> String {
     transport.trouble().unwrap().to_string()
-}
-
-fn expect_closing(transport: &mut Transport, now_ms: u64) {
-    while transport.is_open() {
-        transport.wait();
-        assert_eq!(transport.receive(now_ms * MS).unwrap(), None);
-    }
-    assert_eq!(transport.changes_at(now_ms), Some(false));
 }
 
 #[test]
@@ -83,7 +88,7 @@ fn a_foreign_datagram_is_dropped_and_counted_and_the_port_of_the_robots_host_is_
     let trouble = trouble(&transport);
     assert!(trouble.contains(&format!("answers from port {port}; name that port")), "{trouble}");
     robot.send_to(b"hello", link).unwrap();
-    expect(&mut transport, b"hello", 0);
+    transport.expect(b"hello", 0);
 }
 
 #[test]
@@ -108,9 +113,9 @@ fn a_wire_that_cannot_be_opened_is_tried_ever_less_often_and_says_why_with_the_r
     assert_eq!(trouble.input, format!("tcp://{address}"));
     assert!(trouble.what.contains("refused") && trouble.remedy.contains("robot.address"));
     let listener = TcpListener::bind(address).unwrap();
-    let mut robot = connected(&listener, &mut transport, later_ms);
+    let mut robot = transport.connected(&listener, later_ms);
     robot.write_all(b"hello").unwrap();
-    expect(&mut transport, b"hello", later_ms);
+    transport.expect(b"hello", later_ms);
     assert_eq!(transport.trouble(), None);
 }
 
@@ -124,13 +129,8 @@ fn listener() -> (TcpListener, SocketAddr) {
 fn connection() -> (TcpListener, Transport, TcpStream) {
     let (listener, address) = listener();
     let mut transport = open_at(&Address::Tcp(address));
-    let robot = connected(&listener, &mut transport, 0);
+    let robot = transport.connected(&listener, 0);
     (listener, transport, robot)
-}
-
-fn connected(listener: &TcpListener, transport: &mut Transport, now_ms: u64) -> TcpStream {
-    maintain_until(transport, true, now_ms);
-    listener.accept().unwrap().0
 }
 
 #[test]
@@ -139,31 +139,31 @@ fn a_robot_that_ends_one_connection_after_another_serves_another_program_too() {
     let mut now_ms = 0;
     for cuts in 1..=2 {
         robot.write_all(b"frame").unwrap();
-        expect(&mut transport, b"frame", now_ms);
+        transport.expect(b"frame", now_ms);
         drop(robot);
-        expect_closing(&mut transport, now_ms);
+        transport.expect_closing(now_ms);
         assert_eq!(transport.is_cut(), cuts > 1);
         now_ms += 10_000;
-        robot = connected(&listener, &mut transport, now_ms);
+        robot = transport.connected(&listener, now_ms);
     }
     let why = trouble(&transport);
     assert!(why.contains("end the other program that connects to it"), "{why}");
     // A connection that lasts is its own.
     robot.write_all(b"frame").unwrap();
-    expect(&mut transport, b"frame", now_ms + 11_000);
+    transport.expect(b"frame", now_ms + 11_000);
     assert!(!transport.is_cut());
     // Nor is a robot that is off in anybody's hands.
     for _ in 0..2 {
         drop(robot);
-        expect_closing(&mut transport, now_ms);
+        transport.expect_closing(now_ms);
         now_ms += 20_000;
-        robot = connected(&listener, &mut transport, now_ms);
+        robot = transport.connected(&listener, now_ms);
         robot.write_all(b"frame").unwrap();
-        expect(&mut transport, b"frame", now_ms);
+        transport.expect(b"frame", now_ms);
     }
     assert!(transport.is_cut());
     drop((robot, listener));
-    expect_closing(&mut transport, now_ms);
+    transport.expect_closing(now_ms);
     while transport.is_cut() {
         now_ms += 3000;
         assert_eq!(transport.changes_at(now_ms), None);
@@ -176,7 +176,7 @@ fn a_robot_that_ends_one_connection_after_another_serves_another_program_too() {
 fn a_connection_without_a_word_is_taken_for_dead() {
     let (listener, mut transport, _robot) = connection();
     assert_eq!([4999, 5000].map(|ms| transport.changes_at(ms)), [None, Some(false)]);
-    connected(&listener, &mut transport, 5000);
+    transport.connected(&listener, 5000);
 }
 
 #[test]
@@ -238,7 +238,7 @@ fn line() -> Line {
 fn open_line() -> (Line, Transport) {
     let line = line();
     let mut transport = open_at(&Address::Serial(line.name.clone()));
-    maintain_until(&mut transport, true, 0);
+    transport.maintain_until(true, 0);
     (line, transport)
 }
 
@@ -267,7 +267,7 @@ fn a_serial_line_is_set_to_115200_8n1_and_carries_every_byte_as_it_is() {
     transport.send(&bytes).unwrap();
     assert_eq!(read_from(&line.robot, 256), bytes);
     write(&line.robot, &bytes).unwrap();
-    expect(&mut transport, &bytes, 0);
+    transport.expect(&bytes, 0);
 }
 
 #[test]
@@ -279,7 +279,7 @@ fn a_line_to_an_arduino_has_the_boards_speed_and_is_closed_without_a_hangup_that
     tcsetattr(&line.robot, OptionalActions::Now, &settings).unwrap();
     let address = Address::Serial(line.name);
     let mut transport = Transport::of_base(&address, &mission(ARDUINO)).unwrap();
-    maintain_until(&mut transport, true, 0);
+    transport.maintain_until(true, 0);
     let settings = tcgetattr(&line.robot).unwrap();
     assert_eq!(settings.output_speed(), 57_600);
     assert!(!settings.control_modes.contains(ControlModes::HUPCL));
@@ -289,15 +289,15 @@ fn a_line_to_an_arduino_has_the_boards_speed_and_is_closed_without_a_hangup_that
 fn a_serial_line_that_is_pulled_out_is_opened_again_when_it_is_back() {
     let (mut line, mut transport) = open_line();
     write(&line.robot, b"here").unwrap();
-    expect(&mut transport, b"here", 0);
+    transport.expect(b"here", 0);
     std::fs::remove_file(&line.name).unwrap();
     // The line hangs up when the robot's end is closed.
     drop(line.robot);
-    expect_closing(&mut transport, 0);
+    transport.expect_closing(0);
     assert_eq!([0, 100, 300].map(|ms| transport.changes_at(ms)), [None; 3], "it is not there");
     line.robot = plug_in(&line.name);
     assert_eq!(transport.changes_at(699), None);
-    maintain_until(&mut transport, true, 700);
+    transport.maintain_until(true, 700);
     transport.send(b"stand").unwrap();
     assert_eq!(read_from(&line.robot, 5), b"stand");
 }
@@ -310,7 +310,7 @@ fn a_serial_line_is_for_one_link_and_free_again_when_that_is_killed() {
     // Another process holds the line, as a simulated robot does.
     let _holder = open(&line.name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
     drop(first);
-    maintain_until(&mut second, true, 100);
+    second.maintain_until(true, 100);
 }
 
 #[test]
